@@ -9,8 +9,8 @@
 For each planner and budget: of the problems that can be solved how many were, in every seed; how many of the others
 were recognised as such; when the first path came; cost / bound (the best lower bound that any run proved) and
 cost / best (the cheapest path that any run found): median, 90th percentile and worst over problems and seeds. The
-table comes out ready for docs/planner.md. AVALON's A* and OMPL's planners run at 1 s only, unless --all. OMPL's
-(optional: requirements-bench.lock) run in a process of their own; see bench/ompl_planners.py.
+table comes out ready for docs/reference/planner.md. AVALON's A* and OMPL's planners run at 1 s only, unless --all.
+OMPL's (optional: requirements-bench.lock) run in a process of their own; see bench/ompl_planners.py.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ NAMES = {"ompl-rrtstar-se2": "OMPL RRT* in SE(2)", "ompl-informed": "OMPL Inform
 
 
 def show(lines):
-    """Print the table in Markdown, as docs/planner.md has it."""
+    """Print the table in Markdown, as docs/reference/planner.md has it."""
     if not lines:
         return
     print(f"of {lines[0]['solvable']} solvable and {lines[0]['hopeless']} hopeless; median / 90th percentile / worst\n")

@@ -8,7 +8,7 @@ Each cell is the better of two readings of a file by ``companion.geofence.read``
 how far the process's memory rose above what it held before. The last columns say what a point costs in the largest
 file, and the power of the size that the time grew with from the file before it: 1 is in proportion. Where a format
 writes more bytes a point than the limit of a file allows, the largest is smaller. The table is that of
-docs/formats.md.
+docs/reference/formats.md.
 """
 
 from __future__ import annotations

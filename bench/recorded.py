@@ -1,4 +1,4 @@
-"""What tacking on the shifts gains in recorded winds: ``python -m bench.recorded``, the paragraph of docs/regret.md.
+"""What tacking on shifts gains in recorded winds: ``python -m bench.recorded``, the paragraph of docs/lab/regret.md.
 
     python -m bench.recorded                        # the CSV records in $COMPANION_WIND_DATA: a few minutes
     python -m bench.recorded FOLDER --out recorded.jsonl

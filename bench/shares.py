@@ -5,8 +5,8 @@
 
 Each voyage is ``sitl run WATER --cpu SHARE``: companion and planner under a share of one core, in real time (a voyage
 takes as long as it takes), the simulated boat outside of it. With ``--kills`` the planner's process is killed (SIGKILL)
-at so many moments of the voyage. One line a voyage, as a row of docs/figures.md: waters are files of sitl/scenarios by
-their name. Exit code 1 when a voyage did not pass. The share is of a core of this machine: run it on a quiet one.
+at so many moments of the voyage. One line a voyage, as a row of docs/lab/figures.md: waters are files of sitl/scenarios
+by their name. Exit code 1 when a voyage did not pass. The share is of a core of this machine: run it on a quiet one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What tacking on the wind's shifts gains: ``python -m bench.shifts``, the table of docs/regret.md.
+"""What tacking on the wind's shifts gains: ``python -m bench.shifts``, the table of docs/lab/regret.md.
 
     python -m bench.shifts                                   500 m, 24 seeds of each wind: two minutes
     python -m bench.shifts --length 2000                     a longer beat

@@ -24,7 +24,8 @@ project = "Sailboat companion"
 copyright = "the authors; MIT licence"  # noqa: A001 - the name that Sphinx reads
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 root_doc = "docs/index"
-include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "docs/api/*.md"]
+include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md",
+                    *(f"docs/{folder}/*.md" for folder in ("guides", "reference", "lab", "api"))]
 exclude_patterns = [".*", "build", "voyages"]  # not walked
 
 html_theme = "furo"

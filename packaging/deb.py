@@ -126,8 +126,8 @@ def around(stage: Path, work: Path) -> None:
     documents = stage / "usr/share/doc" / NAME
     put(ROOT / "packaging/debian/copyright", documents / "copyright")
     zipped(documents / "changelog.gz", changelog().encode())
-    for page in ("on-the-boat.md", "formats.md", "watchdogs.md"):
-        put(ROOT / "docs" / page, documents / page)
+    for page in ("guides/on-the-boat.md", "reference/formats.md", "reference/watchdogs.md"):
+        put(ROOT / "docs" / page, documents / Path(page).name)
 
 
 def changelog() -> str:

@@ -1,4 +1,4 @@
-"""The pictures of docs/tracking.md: corners sailed and predicted, and the residuals' distribution."""
+"""The pictures of docs/lab/tracking.md: corners sailed and predicted, and the residuals' distribution."""
 
 from __future__ import annotations
 

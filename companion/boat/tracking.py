@@ -234,9 +234,9 @@ def _band_m(helm: GuidanceModel, polar: Polar, tws_mps: float) -> float:
 # What the predicted track is wrong by: the 99 % of its residuals on the real ArduRover.
 #
 # ``python -m bench.tracking`` measures it on ArduRover 4.7.0-dev: 25 voyages of 14 to 34 legs each, WP_RADIUS 1 to 10,
-# corners of 10 to 170 degrees, legs of 2 to 100 m; docs/tracking.md has the figures. A leg is short when the boat at
-# her best speed is there in less than ``SHORT_S``: she then overtakes the point that she follows and turns round to it,
-# and which way round is chance.
+# corners of 10 to 170 degrees, legs of 2 to 100 m; docs/lab/tracking.md has the figures. A leg is short when the boat
+# at her best speed is there in less than ``SHORT_S``: she then overtakes the point that she follows and turns round to
+# it, and which way round is chance.
 
 SHORT_S = 4.5
 # Best speed [m/s] -> 99 % of the distance between sailed and predicted track [m], where this leg, the one before and

@@ -30,8 +30,8 @@ examples:
   companion plan lake.json --explain
   companion plan archipelago.toml --explain --wind 5@20
 
-The problem's format is described in docs/problem-format.md. PLAN.json holds "waypoints" as [[x, y], ...] in metres;
-of a mission with several goals it is a list of plans.
+The problem's format is described in docs/reference/problem-format.md. PLAN.json holds "waypoints" as [[x, y], ...] in
+metres; of a mission with several goals it is a list of plans.
 Exit codes: 0 a path was found, 1 there is none, or it breaks the boat's limits of wind (the reason is printed), 2 the
 problem cannot be read or planned.
 """

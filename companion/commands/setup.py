@@ -225,7 +225,8 @@ def write_instance(folder: Path, name: str, mission: dict[str, Any], settings: s
 NAMES = ("autopilot", "serial/by-id/*", "serial0", "ttyAMA*", "ttyACM*", "ttyUSB*")
 BAUDS = (921_600, 115_200, 57_600)
 LISTEN_S = 3.0   # a heartbeat a second
-WIRE = "wire the autopilot to a serial port (docs/on-the-boat.md), or name another link: --link udpin:0.0.0.0:14550"
+WIRE = ("wire the autopilot to a serial port (docs/guides/on-the-boat.md), or name another link: "
+        "--link udpin:0.0.0.0:14550")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""The verbs as a page of the documentation: ``python -m companion.orders.document`` prints docs/orders.md's table."""
+"""The verbs as a table: ``python -m companion.orders.document`` prints that of docs/guides/orders.md."""
 
 from __future__ import annotations
 

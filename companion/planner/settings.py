@@ -29,7 +29,7 @@ class AstarSettings:
             unless the wind blows along the grid and the no-go zone is not widened: it gybes round.
         ship_match_s: Tolerance of eq. 4.7 [s].
         memory_bytes: What the grid may take.
-        projection: ``local``: planned in the problem's metres; ``flat``: in those of eq. 4.2 (docs/frames.md).
+        projection: ``local``: planned in the problem's metres; ``flat``: in those of eq. 4.2 (docs/lab/frames.md).
         origin: Where the problem's metres count from; the flat projection needs it (``PlannerChoice.about``).
 
     """

@@ -1,6 +1,6 @@
 """What the boat does when several things want doing: behaviors in one order, of which the first that acts has the step.
 
-``python -m companion.skipper.priorities`` prints the list as it stands in docs/skipper.md.
+``python -m companion.skipper.priorities`` prints the list as it stands in docs/reference/skipper.md.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def act(ctx: StepContext) -> None:
 
 
 def markdown() -> str:
-    """Return the list as it stands in docs/skipper.md."""
+    """Return the list as it stands in docs/reference/skipper.md."""
     rows = [f"| {n} | {b.name} | {b.when} | {b.does} |" for n, b in enumerate(BEHAVIORS, start=1)]
     return "\n".join([MADE_BY, "", "| | behavior | when | does |", "|--:|---|---|---|", *rows, ""])
 

@@ -21,7 +21,7 @@ from companion.wind.true_wind import LIGHT_MPS, apparent_wind, true_wind
 
 # Detectors of a wind sensor's faults, each a small fold over readings. None of them knows the others.
 #
-# Thresholds are set so that the 41 h of recorded good wind raise next to no alarm (docs/wind.md has the counts).
+# Thresholds are set so that the 41 h of recorded good wind raise next to no alarm (counts: docs/reference/wind.md).
 
 _STILL_RAD = math.radians(0.4)        # a vane within this has not moved (instruments report whole degrees)
 _SWEPT_RAD = math.radians(20.0)       # boat turned this much under a vane that has not moved: frozen

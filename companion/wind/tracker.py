@@ -115,7 +115,7 @@ class WindTracker:
         """Return the sigma [rad] that the autopilot's low pass took out of the wind.
 
         Measured on recorded wind passed through such a filter: 0.45 of the mean departure from the 90 s mean, at the
-        firmware's 3.2 s; restores the coverage of forecasts of the unfiltered direction (docs/wind.md).
+        firmware's 3.2 s; restores the coverage of forecasts of the unfiltered direction (docs/reference/wind.md).
         """
         dt_s = 1.0 if self._mean_s is None else max(0.0, sample.t_s - self._mean_s)
         begin = self._mean_s is None

@@ -16,7 +16,7 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _EXAMPLE = f"""examples:
   sitl hostile --list
   sitl hostile                                       measure all, print the table message x effect
-  sitl hostile --document docs/mavlink.md            ... and write it there, between its marks
+  sitl hostile --document docs/reference/mavlink.md            ... and write it there, between its marks
 
   sitl boat --warm --moored &                        a boat, on UDP 14555
   companion run MISSION.toml --link udpin:127.0.0.1:14551 &

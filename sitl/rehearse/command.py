@@ -29,7 +29,7 @@ examples:
 
 The answer stands on the terminal and, with a map of the tracks and of the trouble, in rehearsal.html, .png and .json of
 the folder; the folders of the worst voyages are there for 'companion view' and 'companion replay'. The same command
-goes on where it was; what was sailed is not sailed again. docs/rehearse.md says what is drawn and how sure it is.
+goes on where it was; what was sailed is not sailed again. What is drawn and how sure it is: docs/guides/rehearse.md.
 """
 
 

@@ -174,7 +174,7 @@ def forgery_named(name: str) -> Forgery:
     """
     found = next((f for f in FORGERIES if f.name == name), None)
     if found is None:
-        raise ValueError(f"no forgery is called {name!r}; the names are MESSAGE: SAYS of docs/mavlink.md")
+        raise ValueError(f"no forgery is called {name!r}; the names are MESSAGE: SAYS of docs/reference/mavlink.md")
     return found
 
 

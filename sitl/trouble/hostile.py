@@ -33,7 +33,7 @@ from sitl.trouble.fragile import FragilePlanner
 from sitl.trouble.signer import SignedEnd, Signer
 from sitl.world import AR1, Air
 
-BEGIN, END = "<!-- made by `sitl hostile --document docs/mavlink.md` -->", "<!-- end of the table -->"
+BEGIN, END = "<!-- made by `sitl hostile --document docs/reference/mavlink.md` -->", "<!-- end of the table -->"
 BURST_S = 2.0
 QUIET_S = 4.0            # after the last frame, for what comes of it
 CLEAR_S = 15.0           # at most, until what was raised is over

@@ -89,7 +89,7 @@ def flat_error_m(lat_deg: float, reach_m: float) -> float:
     return worst
 
 
-# docs/frames.md prints this table; a change of either shows here.
+# docs/lab/frames.md prints this table; a change of either shows here.
 FLAT_TABLE = {
     (0.0, 1_000.0): 11.23, (0.0, 10_000.0): 112.3, (0.0, 50_000.0): 561.3,
     (50.8, 1_000.0): 6.26, (50.8, 10_000.0): 70.75, (50.8, 50_000.0): 696.1,

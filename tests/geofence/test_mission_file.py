@@ -161,7 +161,7 @@ def test_a_damaged_mission_is_refused_in_one_line_or_read(data):
 
 
 def test_every_option_is_documented():
-    text = (pathlib.Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    text = (pathlib.Path(__file__).parents[2] / "docs" / "reference" / "formats.md").read_text(encoding="utf-8")
     part = text.partition("## The mission file")[2].partition("\n## ")[0]
     table, documented = "", set()
     for row in part.splitlines():

@@ -10,6 +10,8 @@ from bench import rooms
 from bench.layered import implied
 
 ROOT = Path(__file__).parents[2]
+TOP = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "packaging/blueos/README.md")
+PAGES = sorted(path for path in (ROOT / "docs").rglob("*.md") if path.parent.name != "api")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +45,7 @@ def test_rooms_in_a_circle_are_told():
 def test_every_name_in_the_glossary_is_in_the_code():
     source = "\n".join(file.read_text() for root in ("companion", "sitl") for file in (ROOT / root).rglob("*.py"))
     words = set(re.findall(r"\w+", source))
-    rows = [line.split("|")[-2] for line in (ROOT / "docs" / "glossary.md").read_text().splitlines()
+    rows = [line.split("|")[-2] for line in (ROOT / "docs" / "reference" / "glossary.md").read_text().splitlines()
             if line.startswith("| ") and not line.startswith("|---")]
     names = {name for row in rows for name in re.findall(r"`([^`]+)`", row) if not name.startswith("_en")}
     assert len(names) > 40
@@ -53,8 +55,8 @@ def test_every_name_in_the_glossary_is_in_the_code():
 
 
 def test_every_page_is_in_the_navigation(conf):
-    pages = {f"{path.stem}" for path in (ROOT / "docs").glob("*.md")} - {"index"}
-    listed = set(re.findall(r"<(?:\.\./)?([\w-]+)>", conf.navigation((ROOT / "docs" / "index.md").read_text())))
+    pages = {str(path.relative_to(ROOT / "docs").with_suffix("")) for path in PAGES} - {"index"}
+    listed = set(re.findall(r"<(?:\.\./)?([\w/-]+)>", conf.navigation((ROOT / "docs" / "index.md").read_text())))
     assert listed == pages | {"README", "CONTRIBUTING", "CHANGELOG"}
 
 
@@ -73,8 +75,30 @@ def test_a_link_that_a_reader_may_follow_is_no_request(conf, tmp_path):
     assert conf.foreign_requests(tmp_path) == []
 
 
-@pytest.mark.parametrize("page", ["README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md"))])
+@pytest.mark.parametrize("page", ["README.md", *(str(path.relative_to(ROOT)) for path in PAGES)])
 def test_every_file_that_a_page_names_is_there(page):
     folders = "companion|sitl|tests|bench|missions|deploy|docs"
     named = re.findall(rf"`((?:{folders})/[\w/.-]+\.\w+)", (ROOT / page).read_text())
     assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def anchors(text):
+    """Return the anchors of a page's headings, as a forge makes them."""
+    heads = re.findall(r"^#+ +(.+)$", re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE)
+    said = (re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", head).lower() for head in heads)
+    return {re.sub(r"[^\w\- ]", "", head).strip().replace(" ", "-") for head in said}
+
+
+@pytest.mark.parametrize("page", [*TOP, *(str(path.relative_to(ROOT)) for path in PAGES)])
+def test_every_link_leads_somewhere(page):
+    text = (ROOT / page).read_text()
+    prose = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    lost = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", prose):
+        file, _, anchor = link.partition("#")
+        if ":" in file:
+            continue
+        there = (ROOT / page).parent / file if file else ROOT / page
+        if not there.exists() or (anchor and there.suffix == ".md" and anchor not in anchors(there.read_text())):
+            lost.append(link)
+    assert lost == []

@@ -1,4 +1,4 @@
-"""docs/papers.md against the code: every file and test that it names is there, and no part of a paper is left out."""
+"""docs/lab/papers.md against the code: files and tests that it names are there, no part of a paper is left out."""
 
 import ast
 import re
@@ -15,7 +15,7 @@ TEST = re.compile(r"`(tests/[\w./-]+\.py)::(\w+)`")
 
 def chapter(paper):
     """Return a paper's parts as they are listed, and the rows of its table as four cells each."""
-    text = (ROOT / "docs" / "papers.md").read_text()
+    text = (ROOT / "docs" / "lab" / "papers.md").read_text()
     body = text.split(f"\n## {paper}\n")[1].split("\n## ")[0]
     listed = re.search(r"\nParts: (.+?)\.\n\n", body, re.DOTALL)
     lines = [line for line in body.splitlines() if line.startswith("| ")]

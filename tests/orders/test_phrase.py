@@ -72,4 +72,4 @@ def test_the_buttons_are_what_qgroundcontrol_reads():
 
 
 def test_the_page_has_the_table_as_it_is():
-    assert table() in Path("docs/orders.md").read_text(encoding="utf-8")
+    assert table() in Path("docs/guides/orders.md").read_text(encoding="utf-8")

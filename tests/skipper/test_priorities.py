@@ -19,7 +19,7 @@ from tests.skipper.test_voyage import ISLANDS
 from tests.skipper.test_walk import on_collision_course, states
 from tests.skipper.world import with_parts
 
-PAGE = Path(__file__).parents[2] / "docs" / "skipper.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "skipper.md"
 NAMES = [behavior.name for behavior in BEHAVIORS]
 PAIRS = list(pairwise(NAMES))
 

@@ -441,6 +441,6 @@ def test_the_table_has_an_entry_an_exit_and_an_action_for_each():
 def test_the_document_is_current():
     from pathlib import Path
 
-    path = Path(__file__).parents[2] / "docs" / "watchdogs.md"
+    path = Path(__file__).parents[2] / "docs" / "reference" / "watchdogs.md"
     text = path.read_text(encoding="utf-8")
-    assert text == markdown(), "run: python -m companion.skipper.watch.document > docs/watchdogs.md"
+    assert text == markdown(), "run: python -m companion.skipper.watch.document > docs/reference/watchdogs.md"

@@ -216,5 +216,5 @@ def test_two_hundred_vessels_cost_little() -> None:
             decoder.feed(line, float(second))
             t = t.heard(report(float(second), (30.0 * k, 1.0 * second), mmsi=1000 + k, course_rad=0.0, speed_mps=1.0))
         t.picture(float(second))
-    # The bound of the test is loose for a busy machine; docs/traffic.md has the measured figure.
+    # The bound of the test is loose for a busy machine; docs/reference/traffic.md has the measured figure.
     assert (process_time() - began) / 3.0 < 0.2

@@ -1,4 +1,4 @@
-"""A voyage that is commanded by satellite, by a shore that knows docs/far.md and nothing of ours."""
+"""A voyage that is commanded by satellite, by a shore that knows docs/reference/far.md and nothing of ours."""
 
 import asyncio
 import json

@@ -287,7 +287,7 @@ class CurrentOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Where it goes [deg, true]; with ``drift_mps``."""
     drift_mps: Annotated[float, Meta(ge=0.0, le=10.0)] | None = None
     table: str | None = None
-    """A file beside the mission in place of both: lines of time, set_deg, drift_mps (docs/current.md)."""
+    """A file beside the mission in place of both: lines of time, set_deg, drift_mps (docs/reference/current.md)."""
     sigma_mps: Annotated[float, Meta(ge=0.02, le=5.0)] = 0.2
     """How far what is given here may be wrong [m/s, standard deviation in each direction]."""
 
@@ -302,7 +302,7 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     replace_foreign: bool = False
     """Overwrite a mission on the autopilot that is not ours, before setting sail; under way somebody else's stays."""
     orders: tuple[str, ...] | str = ()
-    """What the crew may order over MAVLink (docs/orders.md): verbs, or ``all``. Asking why is always permitted."""
+    """What the crew may order over MAVLink (docs/guides/orders.md): verbs, or ``all``. Asking why is always so."""
     local_orders: tuple[str, ...] | str = ()
     """The same over the socket on board (``companion run --socket``)."""
     far_orders: tuple[str, ...] | str = ()
@@ -377,7 +377,7 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     autopilot_beats: bool = True
     """Where the water is clear by its corridor, leave the beat to the autopilot: it follows each shift at once."""
     shifts: bool = False
-    """On a beat so left, ask the autopilot for a tack where the wind's shifts make one worth it (docs/regret.md)."""
+    """On a beat so left, ask the autopilot for a tack where its shifts make one worth it (docs/lab/regret.md)."""
     tacks_per_minute: Annotated[float, Meta(gt=0.0, le=6.0)] = 6.0
     """Of these, at most: as far apart, and from the last that was asked for otherwise."""
     guidance: Literal["plan", "heading", "field"] = "plan"
@@ -462,7 +462,7 @@ class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class OutputOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """``[output]``: other displays that are told of the voyage under way (docs/displays.md)."""
+    """``[output]``: other displays that are told of the voyage under way (docs/guides/displays.md)."""
 
     nmea: tuple[str, ...] = ()
     """NMEA 0183: ``udp:HOST:PORT``, or ``tcp:[HOST:]PORT`` to be a server."""

@@ -1,4 +1,4 @@
-"""The three layouts as they stand in docs/far.md: ``python -m companion.orders.far.document`` prints them."""
+"""The three layouts as they stand in docs/reference/far.md: ``python -m companion.orders.far.document`` prints them."""
 
 from __future__ import annotations
 

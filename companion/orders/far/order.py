@@ -165,12 +165,13 @@ MOST_COUNTER = 0xFFFF
 MARK_BYTES = 4
 LAYOUT = Layout((
     BitField(name="version", size=1, says=f"{VERSION}"),
-    BitField(name="verb", size=1, says="its number, as in [orders](orders.md)"),
+    BitField(name="verb", size=1, says="its number, as in [orders](../guides/orders.md)"),
     BitField(name="number", size=1, says="of a refuge in the mission, 0: the nearest, or by `lat`; else 0"),
     BitField(name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"),
     BitField(name="counter", size=2, says="from 1, never twice since one beginning"),
     BitField(name="lat", size=4, is_signed=True, unit="1e-7 deg",
-          says="of a goal; of a refuge the number of its name (`param3` in [orders](orders.md)) or 0; else 0"),
+          says="of a goal; of a refuge the number of its name (`param3` in [orders](../guides/orders.md)) or 0; "
+               "else 0"),
     BitField(name="lon", size=4, is_signed=True, unit="1e-7 deg", says="of a goal; else 0"),
 ))
 SIZE = LAYOUT.size + SEAL_BYTES

@@ -1,4 +1,4 @@
-"""Reads a problem's JSON form (docs/problem-format.md): degrees and WKT outside, radians and geometry inside."""
+"""Reads a problem's JSON (docs/reference/problem-format.md): degrees and WKT outside, radians and shapes inside."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class _JsonReader:
     def __init__(self, raw: Any, source: str, place: str) -> None:
         self.source, self.place = source, place
         if not isinstance(raw, Mapping):
-            raise InputError(source, place, "is not a JSON object", "see docs/problem-format.md")
+            raise InputError(source, place, "is not a JSON object", "see docs/reference/problem-format.md")
         self.raw = raw
 
     def _get(self, key: str, default: Any, convert: Callable[[Any], T]) -> T:
@@ -52,14 +52,14 @@ class _JsonReader:
         if key not in self.raw:
             if default is not ...:
                 return default  # type: ignore[no-any-return]
-            raise InputError(self.source, where, "is missing", "see docs/problem-format.md")
+            raise InputError(self.source, where, "is missing", "see docs/reference/problem-format.md")
         try:
             return convert(self.raw[key])
         except (TypeError, ValueError) as error:
             text = repr(self.raw[key])
             text = text if len(text) < 60 else text[:57] + "..."
             raise InputError(self.source, where, f"{text} is not what belongs here ({error})",
-                             "see docs/problem-format.md") from error
+                             "see docs/reference/problem-format.md") from error
 
     def number(self, key: str, default: Any = ...) -> float:
         """Return a float (may be NaN: that is for ``defect`` to say)."""
@@ -93,7 +93,7 @@ class _JsonReader:
         """Return the object under ``key``."""
         where = f"{self.place}.{key}" if self.place else key
         if key not in self.raw:
-            raise InputError(self.source, where, "is missing", "see docs/problem-format.md")
+            raise InputError(self.source, where, "is missing", "see docs/reference/problem-format.md")
         return _JsonReader(self.raw[key], self.source, where)
 
 
@@ -156,9 +156,9 @@ def read_fields(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
     except OSError as error:
         raise InputError(str(path), "", f"cannot be read ({error.strerror})", "name a problem file") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(str(path), "", f"is not JSON ({error})", "see docs/problem-format.md") from error
+        raise InputError(str(path), "", f"is not JSON ({error})", "see docs/reference/problem-format.md") from error
     if not isinstance(raw, Mapping):
-        raise InputError(str(path), "", "is not a JSON object", "see docs/problem-format.md")
+        raise InputError(str(path), "", "is not a JSON object", "see docs/reference/problem-format.md")
     return _fields(raw, str(path))
 
 
@@ -350,7 +350,7 @@ def _parse_tracking(track: _JsonReader) -> Tracking:
     try:
         helm = GuidanceModel(**numbers, no_go_half_rad=math.radians(angle))
     except ValueError as error:
-        raise InputError(track.source, track.place, str(error), "see docs/problem-format.md") from error
+        raise InputError(track.source, track.place, str(error), "see docs/reference/problem-format.md") from error
     solids = track.raw.get("solids") or []
     if not isinstance(solids, (list, tuple)):
         raise InputError(track.source, "tracking.solids", "is not a list", "write a list of WKT polygons")

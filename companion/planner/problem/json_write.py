@@ -1,4 +1,4 @@
-"""Writes a problem in its JSON form (docs/problem-format.md); reading that gives the same problem."""
+"""Writes a problem in its JSON form (docs/reference/problem-format.md); reading that gives the same problem."""
 
 from __future__ import annotations
 

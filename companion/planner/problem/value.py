@@ -1,7 +1,7 @@
 """The planning problem as a value: where from, where to, what is in the way, which wind, which boat.
 
-The JSON format (metres, degrees) and its extensions are in docs/problem-format.md. Inside, angles are radians and
-geometry is shapely's, in local east-north metres. ``Problem.from_json`` raises ``InputError`` for what cannot be
+The JSON format (metres, degrees) and its extensions are in docs/reference/problem-format.md. Inside, angles are radians
+and geometry is shapely's, in local east-north metres. ``Problem.from_json`` raises ``InputError`` for what cannot be
 read; what can be read but not planned (zero wind, NaN, delta_s out of range, a start inside an obstacle) is found
 by ``defect_of`` and becomes ``PlanStatus.INVALID``.
 """

@@ -44,15 +44,15 @@ from companion.planner.settings import AstarSettings
 #
 # Every place of the problem goes over latitude and longitude into his plane; the path's places come back the same way,
 # so corners lose nothing. Between them a straight leg of his plane is a slightly bent one, and his courses are not
-# quite true (docs/frames.md has the figures). What that may cost is kept clear of beforehand: solids are grown by the
-# bend, the sailable angles are narrowed by the error of course. The answer is judged in the problem's own metres by the
-# exact scorer, like every other.
+# quite true (docs/lab/frames.md has the figures). What that may cost is kept clear of beforehand: solids are grown by
+# the bend, the sailable angles are narrowed by the error of course. The answer is judged in the problem's own metres by
+# the exact scorer, like every other.
 
 # Büsser's flat earth, kept as a reference: a plane of latitude and longitude scaled at the origin.
 #
 # Büsser 2009, equation 4.2: x = R_E cos(lat) π/180 lon, y = R_E π/180 lat, then an offset is subtracted; here lat in
 # the cosine is the origin's, without which x would not be a function of longitude alone. Fine within a kilometre or so;
-# the boat uses ``companion.geo.frame``. ``docs/frames.md`` has the table of its errors.
+# the boat uses ``companion.geo.frame``. ``docs/lab/frames.md`` has the table of its errors.
 
 EARTH_RADIUS_M = 6_371_000.0  # mean radius of the sphere
 

@@ -2,7 +2,7 @@
 
 ArduRover keeps the reason of a mode change in its log and tells none over MAVLink: a cause is known by its signs. A
 sign is the beginning of a text, or of something that the status shows from then on (``STANDING``); what has no sign is
-a person's doing. ``python -m companion.skipper.watch.document`` prints the table into docs/watchdogs.md.
+a person's doing. ``python -m companion.skipper.watch.document`` prints the table into docs/reference/watchdogs.md.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""docs/watchdogs.md, made from the tables of watchdogs and of failsafes' causes.
+"""docs/reference/watchdogs.md, made from the tables of watchdogs and of failsafes' causes.
 
-``python -m companion.skipper.watch.document > docs/watchdogs.md``
+``python -m companion.skipper.watch.document > docs/reference/watchdogs.md``
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ onto something.
 
 
 def markdown() -> str:
-    """Return docs/watchdogs.md."""
+    """Return docs/reference/watchdogs.md."""
     return HEAD + "".join(map(_row, TABLE)) + CAUSES_HEAD + "".join(map(_cause, CAUSES))
 
 

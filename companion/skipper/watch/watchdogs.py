@@ -2,7 +2,7 @@
 
 Each row has an entry (a condition that holds for ``enter_s``), an exit (its opposite, with a hysteresis, for
 ``exit_s``) and a response; ``measures`` has the figures and ``watch`` raises and clears. ``python -m
-companion.skipper.watch.document`` prints docs/watchdogs.md from the table.
+companion.skipper.watch.document`` prints docs/reference/watchdogs.md from the table.
 """
 
 from __future__ import annotations

@@ -29,9 +29,9 @@ from companion.wind.estimators.forecaster_kernels import Constants
 # What recorded wind taught: the few constants of the default forecaster, with their provenance.
 #
 # Made by ``python -m companion.wind.study.fit FOLDER`` on the 14 development records (41 h on lakes, a fjord, the
-# Baltic and the Adriatic; docs/wind.md says which). They are shapes, not climates: how long a wind shift of a given
-# time scale survives, how errors grow with the horizon, how heavy their tails are. Everything about today's wind is
-# learned on board.
+# Baltic and the Adriatic; docs/reference/wind.md says which). They are shapes, not climates: how long a wind shift of a
+# given time scale survives, how errors grow with the horizon, how heavy their tails are. Everything about today's wind
+# is learned on board.
 #
 # Rounded from the fit (110 to 170 evaluations); on records left out it loses less than 1 % of CRPS. ``memory`` and
 # ``tail`` were chosen by hand: seconds of own errors, pool, quantiles, roughness, shown spread; pull of the quantiles

@@ -1,7 +1,7 @@
 """The parameters of a fresh simulated boat that matter to sailing, with the values and types of ArduRover 4.7-dev.
 
 One line each: name, value, and the type unless it is REAL32. Parameters that change nothing here and that nobody
-who sails asks for (of the real boat's 1288) are left out; docs/simulated-autopilot.md says which act.
+who sails asks for (of the real boat's 1288) are left out; docs/reference/simulated-autopilot.md says which act.
 """
 
 TABLE = """

@@ -107,6 +107,6 @@ def check_parameters(overrides: Mapping[str, float]) -> None:
         if name not in known:
             near = difflib.get_close_matches(name.upper(), known, n=1)
             raise InputError("--param", name, "is no parameter of this boat", f"did you mean {near[0]}?" if near else
-                             "docs/simulated-autopilot.md says which it has")
+                             "docs/reference/simulated-autopilot.md says which it has")
         if not math.isfinite(value) or len(name) > 16 or struct.unpack("f", struct.pack("f", value))[0] != value:
             raise InputError("--param", name, f"{value} cannot be a parameter", "write NAME=NUMBER")

@@ -1,4 +1,4 @@
-"""A second reader and writer of both messages, by the tables of docs/far.md alone: struct and hmac, nothing of ours."""
+"""A second reader and writer of both messages, by the tables of docs/reference/far.md alone: struct and hmac."""
 
 import hashlib
 import hmac
@@ -6,7 +6,7 @@ import re
 import struct
 from pathlib import Path
 
-PAGE = Path("docs/far.md")
+PAGE = Path("docs/reference/far.md")
 CODES = {"u8": "B", "u16": "H", "i32": "i"}
 
 

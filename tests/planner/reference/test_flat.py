@@ -16,7 +16,7 @@ from companion.planner.reference.astar import FlatPlane, flat_en_from_lonlat
 from companion.planner.settings import AUTO, AstarSettings, PlannerChoice, RrtstarSettings
 from tests.planner.problems import box, simple
 
-# How far places [m] and courses [deg] of his plane are off the frame, up to 70 degrees of latitude (docs/frames.md).
+# How far places [m] and courses [deg] of his plane are off the frame, up to 70 deg of latitude (docs/lab/frames.md).
 WITHIN = {1_000.0: (6.0, 0.2), 10_000.0: (57.0, 0.3), 50_000.0: (720.0, 1.4)}
 lats, courses = st.floats(-70.0, 70.0), st.floats(0.0, 2.0 * math.pi)
 

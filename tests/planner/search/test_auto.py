@@ -38,7 +38,7 @@ def test_the_whole_set(path):
         assert judged.time_s == answer.cost_s
         assert answer.lower_bound_s <= answer.cost_s
         assert answer.lower_bound_s <= BEST[path.stem]["time_s"] * (1 + 1e-9)
-        # A small budget here; the figures for 1 s and 10 s are in docs/planner-auto.md.
+        # A small budget here; the figures for 1 s and 10 s are in docs/lab/planner-auto.md.
         assert answer.cost_s <= BEST[path.stem]["time_s"] * 1.03
     elif expected != "any":
         assert answer.status.value == expected

@@ -9,7 +9,7 @@ from sitl.campaigns.encounters import Job, key_of, row, run_encounters, sail_enc
 from sitl.means import Means
 from sitl.runner import sail
 
-EXPLAINED = {("sailing", "rules"): {72, 85}}   # docs/traffic.md
+EXPLAINED = {("sailing", "rules"): {72, 85}}   # docs/reference/traffic.md
 
 
 def test_a_seed_draws_the_same_encounter_and_another_seed_another():

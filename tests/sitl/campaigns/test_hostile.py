@@ -1,4 +1,4 @@
-"""The hostile client: it forges all that the companion reads, and docs/mavlink.md says what comes of it."""
+"""The hostile client: it forges all that the companion reads, and docs/reference/mavlink.md says what comes of it."""
 
 import ast
 import asyncio
@@ -32,7 +32,7 @@ from sitl.trouble.man_in_the_middle import Middle, Plan
 from sitl.trouble.signer import Signer
 from sitl.world.wind import Constant
 
-DOCUMENT = Path("docs/mavlink.md")
+DOCUMENT = Path("docs/reference/mavlink.md")
 # Names of messages in the code that are not read there: sent, asked for, or counted.
 NOT_READ = {("MISSION_CLEAR_ALL", "mavsdk_session"), *((name, "doctor") for name in (
     "WIND", "GLOBAL_POSITION_INT", "ATTITUDE", "MISSION_CURRENT", "EKF_STATUS_REPORT"))}
@@ -83,7 +83,7 @@ def test_what_one_who_listens_can_do_is_what_is_documented(tmp_path):
 def test_the_whole_table_is_as_measured(tmp_path):
     lines = rows({who.name: measure(who, tmp_path / who.name) for who in HOSTILITIES})
     text = DOCUMENT.read_text(encoding="utf-8")
-    assert text == written(text, lines), "run: sitl hostile --document docs/mavlink.md"
+    assert text == written(text, lines), "run: sitl hostile --document docs/reference/mavlink.md"
 
 
 def test_no_forgery_makes_the_companion_set_a_mode_arm_or_steer():

@@ -53,7 +53,7 @@ def test_more_voyages_make_it_narrower_and_none_leave_it_open():
     widths = [share_of(n, n).width for n in (0, 1, 5, 20, 56, 200)]
     assert widths == sorted(widths, reverse=True)
     assert widths[0] == 1.0
-    assert share_of(52, 52).width > 0.1 >= share_of(53, 53).width   # what docs/rehearse.md says of --sure 10
+    assert share_of(52, 52).width > 0.1 >= share_of(53, 53).width   # what docs/guides/rehearse.md says of --sure 10
 
 
 def test_the_median_is_inside_at_all_looks_and_those_who_never_arrive_count():

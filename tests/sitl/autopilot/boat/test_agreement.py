@@ -2,7 +2,7 @@
 
 Each test holds a figure that ArduRover 4.7.0-dev (January 2025, frame sailboat) was measured to give, in recordings and
 runs of it, and how far ours may be from it. ``NOT_IMITATED`` lists what is known to differ;
-docs/simulated-autopilot.md shows both.
+docs/reference/simulated-autopilot.md shows both.
 """
 
 from __future__ import annotations
@@ -408,9 +408,9 @@ def test_slow_rudder_makes_slow_tacks() -> None:
 def test_table_of_differences_is_in_the_documentation() -> None:
     from pathlib import Path
 
-    text = (Path(__file__).parents[4] / "docs" / "simulated-autopilot.md").read_text()
+    text = (Path(__file__).parents[4] / "docs" / "reference" / "simulated-autopilot.md").read_text()
     for name in NOT_IMITATED:
-        assert name in text, f"docs/simulated-autopilot.md does not mention: {name}"
+        assert name in text, f"docs/reference/simulated-autopilot.md does not mention: {name}"
 
 
 def figures() -> str:
