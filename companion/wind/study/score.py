@@ -2,8 +2,8 @@
 
 The rules are those of the reference figures in docs/reference/wind.md: every reading is fed to the estimator, and a
 forecast is made every 30 s after ten minutes, and scored against the single reading at t + h (within 1.05 s) unless the
-boat was turning or the wind was below 1 m/s. Direction is scored by the circular continuous ranked probability score of a
-wrapped normal (Grimit, Gneiting, Berrocal and Johnson 2006),
+boat was turning or the wind was below 1 m/s. Direction is scored by the circular continuous ranked probability score of
+a wrapped normal (Grimit, Gneiting, Berrocal and Johnson 2006),
 
     CRPS = E d(X, y) - E d(X, X') / 2,    d = arc on the circle,                                       (a)
 
