@@ -22,9 +22,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sitl.campaigns.campaign import Job, key_of, sail_one
-from sitl.means import Means
+from sitl.options import CampaignOptions
 from sitl.run.compiled import compile_ahead
-from sitl.runner import sail
+from sitl.runner import run_jobs
 
 DEMO = Path(__file__).parents[1] / "sitl" / "scenarios" / "demo.toml"
 MACHINES, CORES, VOYAGES = 100, 2, 10_000
@@ -69,11 +69,11 @@ def bare(seeds, workers):
 
 
 def voyages(seeds, means):
-    return sail("campaign", sail_one, [Job(scenario=DEMO, seed=n, keep=None) for n in seeds], means, key=key_of)
+    return run_jobs("campaign", sail_one, [Job(scenario=DEMO, seed=n, keep=None) for n in seeds], means, key=key_of)
 
 
 def empty(count, means):
-    return sail("empty", nothing, range(count), means, key=lambda seed: {"seed": seed})
+    return run_jobs("empty", nothing, range(count), means, key=lambda seed: {"seed": seed})
 
 
 def tell(name, row):
@@ -88,16 +88,16 @@ def main(argv=None):
     args = parser.parse_args(argv)
     compile_ahead()
     with tempfile.TemporaryDirectory() as folder:
-        ways = [(f"{w} workers", Means(workers=w)) for w in args.workers if w > 1]
-        ways += [(f"{w} workers, dask", Means(workers=w, dask="local")) for w in args.workers]
+        ways = [(f"{w} workers", CampaignOptions(workers=w)) for w in args.workers if w > 1]
+        ways += [(f"{w} workers, dask", CampaignOptions(workers=w, dask="local")) for w in args.workers]
         # Last, for one sails in this process: what it held once is counted of each worker that it begins.
-        ways += [("1 worker", Means(workers=1))] if 1 in args.workers else []
+        ways += [("1 worker", CampaignOptions(workers=1))] if 1 in args.workers else []
         print("jobs that do nothing")
         added_s = {}
         for name, means in ways:
             count = args.empty if means.dask is None else args.empty // 10
             few = spent(10, lambda means=means: empty(10, means))
-            out = Means(workers=means.workers, dask=means.dask, out=Path(folder) / f"{name}.jsonl")
+            out = CampaignOptions(workers=means.workers, dask=means.dask, out=Path(folder) / f"{name}.jsonl")
             many = spent(count, lambda out=out, count=count: empty(count, out))
             added_s[name] = (many.cpu_s - few.cpu_s) / (count - 10)
             print(f"  {name:18} {1000 * added_s[name]:6.2f} ms CPU a job, {few.cpu_s:5.1f} s CPU to begin and end",
@@ -111,7 +111,7 @@ def main(argv=None):
         peaks, inner = [], []
         for name, means in ways:
             out = Path(folder) / f"v-{name}.jsonl"
-            whole = Means(workers=means.workers, dask=means.dask, out=out)
+            whole = CampaignOptions(workers=means.workers, dask=means.dask, out=out)
             tell(name, spent(len(seeds), lambda whole=whole: voyages(seeds, whole)))
             facts = [json.loads(line) for line in out.with_suffix(".facts.jsonl").read_text().splitlines()]
             peaks.append((name, max(fact["peak_mb"] for fact in facts)))

@@ -27,7 +27,7 @@ def sail(folder):
     from companion.planner.solve import warm
     from companion.wind.estimators import compile_kernels
     from sitl.run.embedded import run_embedded
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     warm()
     compile_kernels()

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterator
 
 from bench.voyage import live
-from sitl.scene import free_port
+from sitl.scenario import free_port
 
 WATCHERS = 12
 AGAIN_S = 2.0

@@ -23,10 +23,10 @@ import numpy as np
 
 from companion.geo.angles import mean_direction_rad
 from companion.wind.study.records import parse_csv
-from sitl.campaigns.figures import NAMES, jobs_of, key_of, sail_one
-from sitl.means import Means
+from sitl.campaigns.baselines import NAMES, jobs_of, key_of, sail_one
+from sitl.options import CampaignOptions
 from sitl.run.compiled import compile_ahead
-from sitl.runner import sail
+from sitl.runner import run_jobs
 
 BEAT = Path(__file__).parents[1] / "sitl" / "scenarios" / "figures" / "beat-500.toml"
 WHO, AGAINST = "shifts", "alone-embedded"
@@ -88,7 +88,7 @@ def main(argv=None):
             for number, part in enumerate(windows(record)):
                 record_of[scenario(part, number, Path(temporary))] = path.stem
         jobs = jobs_of([WHO, AGAINST], list(record_of), 1, 1.0, None)
-        sailed = sail("baselines", sail_one, jobs, Means(workers=args.workers, out=args.out), key=key_of)
+        sailed = run_jobs("baselines", sail_one, jobs, CampaignOptions(workers=args.workers, out=args.out), key=key_of)
     tell(sailed.records, {path.stem: stem for path, stem in record_of.items()})
     return sailed.exit_code(is_good=True)
 

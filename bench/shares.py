@@ -25,7 +25,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl.run.cpu_share import family_of
+from sitl.run.live import family_of
 
 SCENARIOS = Path("sitl/scenarios")
 SHARES = (1.0, 0.25, 0.1, 0.05)

@@ -22,7 +22,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from sitl.scene import free_port
+from sitl.scenario import free_port
 
 SCENARIO = Path("sitl/scenarios/demo.toml")
 MISSION = Path("missions/archipelago.toml")
@@ -110,7 +110,7 @@ def live(seconds: float, *options: str) -> dict[str, float]:
 def virtual() -> dict[str, float]:
     from companion.clock import run_virtual
     from sitl.run.embedded import run_embedded
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     scenario = load_scenario(SCENARIO)
     ratios = []

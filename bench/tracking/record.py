@@ -22,8 +22,8 @@ from companion.messages import Command, Mode, waypoint
 from sitl.ardurover import ArduRover, require
 from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Truth as Now
-from sitl.world import Wind
-from sitl.world.wind import AR1, Constant
+from sitl.world import WindModel
+from sitl.world.environment import AR1, Constant
 
 EVERY_S = 0.2
 PATIENCE_S = 150.0     # without a waypoint, and the time of the longest leg
@@ -37,7 +37,7 @@ Track = NDArray[np.float64]
 class Risen:
     """A calm until it is let go, then the trial's wind."""
 
-    def __init__(self, wind: Wind) -> None:
+    def __init__(self, wind: WindModel) -> None:
         self._wind, self.is_released = wind, False
 
     def at(self, t_s: float) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from companion.boat.tracking import GuidanceModel, PredictedTrack, are_near_shor
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import Vehicle
-from sitl.world.wind import Constant
+from sitl.world.environment import Constant
 
 QUANTILES = (0.5, 0.9, 0.99, 1.0)
 WP_SPEED_MPS = 5.0     # of sailboat.parm

@@ -26,7 +26,7 @@ from companion.geo.frame import LocalFrame
 from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint, Mode
 from sitl.autopilot import Truth
-from sitl.world import Waters, Wind
+from sitl.world import Waters, WindModel
 
 DEFAULTS = Path(__file__).with_name("sailboat.parm")
 MOTOR = "-motor"      # of a model: the hull with an auxiliary motor
@@ -61,7 +61,7 @@ class ArduRover:
     """
 
     def __init__(
-        self, program: Path, home: GeoPoint, wind: Wind, *, heading_rad: float = 0.0, speedup: float = 1.0,
+        self, program: Path, home: GeoPoint, wind: WindModel, *, heading_rad: float = 0.0, speedup: float = 1.0,
         instance: int | None = None, parameters: Mapping[str, float] | None = None, folder: Path | None = None,
         model: str = "sailboat", waters: Waters | None = None,
     ) -> None:

@@ -25,14 +25,47 @@ from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.boat.kernel import TACK_RETRY_S
 from sitl.autopilot.boat.parameters import check_parameters
 from sitl.autopilot.boat.trial import no_go_half_rad, settled_polar, tack_loss_s
-from sitl.autopilot.config import EPOCH_S, FRAME_M, HOME, AutopilotConfig, GpsFault, Truth, VaneFault, VaneState
-from sitl.autopilot.departures import Departures, Sensors, Waves
-from sitl.autopilot.links.memory import PERFECT, FrameStream, Impairment, MemoryEnd, MemoryLink
-from sitl.autopilot.protocol.ais_list import Vessel
+from sitl.autopilot.config import (
+    EPOCH_S,
+    FRAME_M,
+    HOME,
+    AutopilotConfig,
+    Departures,
+    GpsFault,
+    Sensors,
+    Truth,
+    VaneFault,
+    VaneState,
+    Waves,
+)
+from sitl.autopilot.memory_link import PERFECT, FrameStream, Impairment, MemoryEnd, MemoryLink
+from sitl.autopilot.protocol.telemetry import AisVessel
 from sitl.autopilot.server import Server, serve
 
 __all__ = [
-    "EPOCH_S", "FRAME_M", "HOME", "PERFECT", "TACK_RETRY_S", "Autopilot", "AutopilotConfig", "Departures",
-    "FrameStream", "GpsFault", "Impairment", "MemoryEnd", "MemoryLink", "Sensors", "Server", "Truth", "VaneFault",
-    "VaneState", "Vessel", "Waves", "check_parameters", "no_go_half_rad", "serve", "settled_polar", "tack_loss_s",
+    "EPOCH_S",
+    "FRAME_M",
+    "HOME",
+    "PERFECT",
+    "TACK_RETRY_S",
+    "AisVessel",
+    "Autopilot",
+    "AutopilotConfig",
+    "Departures",
+    "FrameStream",
+    "GpsFault",
+    "Impairment",
+    "MemoryEnd",
+    "MemoryLink",
+    "Sensors",
+    "Server",
+    "Truth",
+    "VaneFault",
+    "VaneState",
+    "Waves",
+    "check_parameters",
+    "no_go_half_rad",
+    "serve",
+    "settled_polar",
+    "tack_loss_s",
 ]

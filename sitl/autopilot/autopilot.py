@@ -13,13 +13,12 @@ from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.messages import Mode
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.config import AutopilotConfig, GpsFault, Truth, VaneFault
-from sitl.autopilot.links.link import LOOP_S, Link
+from sitl.autopilot.link import LOOP_S, MavlinkPort
 from sitl.autopilot.pilot.core import Core
 from sitl.autopilot.pilot.pilot import Pilot
-from sitl.autopilot.protocol.ais_list import Vessel
-from sitl.autopilot.protocol.ports import Ports
-from sitl.autopilot.protocol.telemetry import heartbeat
-from sitl.world import Wind
+from sitl.autopilot.protocol.handlers import Ports
+from sitl.autopilot.protocol.telemetry import AisVessel, heartbeat
+from sitl.world import WindModel
 
 _CHUNK = 50
 
@@ -27,7 +26,7 @@ _CHUNK = 50
 class Autopilot:
     """One boat with its autopilot. See the package for how it is used."""
 
-    def __init__(self, config: AutopilotConfig, wind: Wind, seed: int) -> None:
+    def __init__(self, config: AutopilotConfig, wind: WindModel, seed: int) -> None:
         self.core = Core(config, wind, seed)
         self._debt_s = 0.0
         self._power_up()
@@ -89,11 +88,11 @@ class Autopilot:
 
     # --------------------------------------------------------------------------------------------- ports
     @property
-    def links(self) -> dict[int, Link]:
+    def links(self) -> dict[int, MavlinkPort]:
         """The open ports by number."""
         return self.core.voice.links
 
-    def open_link(self, link_id: int) -> Link:
+    def open_link(self, link_id: int) -> MavlinkPort:
         """Return a port; a new one sends the default streams from now on."""
         return self.core.voice.open(link_id, self.t_s)
 
@@ -166,6 +165,6 @@ class Autopilot:
         """Break or mend the position."""
         self.pilot.failsafe.set_gps(fault)
 
-    def hear_vessel(self, vessel: Vessel) -> None:
+    def hear_vessel(self, vessel: AisVessel) -> None:
         """An AIS receiver at the autopilot heard a vessel."""
         self._ports.ais_list.hear(vessel, self.t_s)

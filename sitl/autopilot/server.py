@@ -17,7 +17,7 @@ from companion.errors import LinkError
 from companion.mavlink.transports import LinkName, Transport, open_link, parse_link
 from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.config import Truth
-from sitl.autopilot.links.link import LOOP_S
+from sitl.autopilot.link import LOOP_S
 
 # Behind by more than this the machine is too slow for the speed asked for: simulated time stretches instead.
 MAX_LAG_S = 2.0

@@ -16,9 +16,9 @@ import numpy as np
 
 from companion.errors import InputError
 from companion.geofence import Mission
-from sitl.means import Means
+from sitl.options import CampaignOptions
 from sitl.run.variation import Variation, foreknown, unspread
-from sitl.runner import Key, file_hash, sail
+from sitl.runner import Key, file_hash, run_jobs
 
 HERE = Path(__file__).parents[1] / "scenarios"
 SCENARIOS = (HERE / "two-channels.toml", HERE / "figures" / "two-channels-rough.toml", HERE / "narrow-channel.toml")
@@ -57,7 +57,7 @@ def sail_one(job: Job) -> dict[str, Any]:
     """Sail a job; return its figures. What was not foreseen is in ``error``."""
     from companion.clock import run_virtual
     from sitl.run.embedded import run_embedded
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     scenario = load_scenario(job.scenario)
     said = {"scenario": scenario.name, "variation": job.variation, "seed": job.seed}
@@ -73,7 +73,7 @@ def sail_one(job: Job) -> dict[str, Any]:
 
 def key_of(job: Job) -> Key:
     """Return what a voyage is known by."""
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     return {"scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario),
             "variation": job.variation, "seed": job.seed}
@@ -85,13 +85,13 @@ def _floor_m(path: Path) -> float:
 
 def _mission(path: Path) -> Mission:
     from sitl.run.embedded import mission_of
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     return mission_of(load_scenario(path), path)
 
 
 def run_ablation(
-    scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int, means: Means,
+    scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int, means: CampaignOptions,
 ) -> int:
     """Sail what has no result yet, print the tables; return the exit code."""
     from sitl.run.compiled import compile_ahead
@@ -106,7 +106,7 @@ def run_ablation(
         compile_ahead(planner)
     jobs = [Job(scenario=path, variation=name, seed=first_seed + n)
             for n in range(runs) for path in scenarios for name in wanted]
-    sailed = sail("ablate", sail_one, jobs, means, key=key_of, is_failed=lambda record: bool(record["error"]))
+    sailed = run_jobs("ablate", sail_one, jobs, means, key=key_of, is_failed=lambda record: bool(record["error"]))
     records = sailed.records
     for scenario in dict.fromkeys(record["scenario"] for record in sorted(records, key=_order)):
         print(f"{scenario}, {runs} seeds from {first_seed}")

@@ -15,13 +15,15 @@ from __future__ import annotations
 
 import asyncio
 import math
+import statistics
 import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
+from msgspec import structs
 
 from companion.clock import now_s, run, run_virtual
 from companion.compose import boat_of
@@ -37,11 +39,23 @@ from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
 from sitl.ardurover import ArduRover, require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Truth as Now
+from sitl.campaigns.ablation import interval
+from sitl.options import CampaignOptions
 from sitl.run.embedded import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.run.live import run_live
 from sitl.run.variation import Variation
-from sitl.scene import EventSpec, Scenario, Truth, Verdict, count_tacks, own_polar, scenario_wind
-from sitl.world import Wind
+from sitl.runner import Key, file_hash, read_results, run_jobs
+from sitl.scenario import (
+    EventSpec,
+    Scenario,
+    ScenarioVerdict,
+    TrueTrack,
+    count_tacks,
+    load_scenario,
+    own_polar,
+    scenario_wind,
+)
+from sitl.world import WindModel
 
 # Measured to be its best (ArduPilot 4.7): margins that a tacking boat needs, the fence itself without action.
 DIJKSTRA = {
@@ -56,10 +70,10 @@ DIES_S = 45.0
 WEATHER_FROM_S = 35.0
 
 
-class Held:
+class HeldWind:
     """No wind until ``release``; from then on the weather. The real simulator's boat drifts as soon as there is any."""
 
-    def __init__(self, wind: Wind) -> None:
+    def __init__(self, wind: WindModel) -> None:
         self._wind = wind
         self._last_s = 0.0
         self._from_s: float | None = None
@@ -77,11 +91,11 @@ class Held:
 
 
 @dataclass(slots=True)
-class Track:
+class BaselineTrack:
     """The true track of a voyage, and when it reached its goals."""
 
     mission: Mission
-    truth: Truth = field(default_factory=Truth)
+    truth: TrueTrack = field(default_factory=TrueTrack)
     goals_s: list[float] = field(default_factory=list)
 
     def add(self, t_s: float, now: Now) -> None:
@@ -91,7 +105,7 @@ class Track:
         en = self.mission.frame().en_from_geo(now.position)
         self._note(t_s, en, now.heading_rad, now.speed_mps, (now.twd_from_rad, now.tws_mps))
 
-    def follow(self, noted: Truth) -> None:
+    def follow(self, noted: TrueTrack) -> None:
         """Take the track that somebody else noted, up to the last goal."""
         for n, t_s in enumerate(noted.t_s):
             if self.is_done:
@@ -138,7 +152,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class _Observer:
-    track: Track
+    track: BaselineTrack
 
     def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:  # noqa: ARG002 - the interface has it
         self.track.add(t_s, autopilot.truth)
@@ -148,38 +162,38 @@ class _Observer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Voyage:
+class BaselineVoyage:
     """A voyage: the true track, and what is told of it."""
 
-    track: Track
+    track: BaselineTrack
     record: dict[str, Any]
 
 
 # ------------------------------------------------------------------------------------------- voyages
-def sail_companion(scenario: Scenario, path: Path, seed: int, *, shifts: bool | None, told: str) -> Voyage:
+def sail_companion(scenario: Scenario, path: Path, seed: int, *, shifts: bool | None, told: str) -> BaselineVoyage:
     """Sail with the companion on the embedded autopilot; ``shifts``: by them or not, None: as the mission says."""
     variation = None if shifts is None else Variation(tables={"skipper": {"shifts": shifts}})
-    track = Track(load_mission(scenario.mission_path(path)))
+    track = BaselineTrack(load_mission(scenario.mission_path(path)))
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
         verdict = run_virtual(run_embedded(
             scenario, path, seed, Path(folder) / "voyage", observer=track.observe(), variation=variation))
-    return Voyage(track=track, record={**track.record(told, scenario.name, seed), **_promises(verdict)})
+    return BaselineVoyage(track=track, record={**track.record(told, scenario.name, seed), **_promises(verdict)})
 
 
-def sail_fixed(scenario: Scenario, path: Path, seed: int) -> Voyage:
+def sail_fixed(scenario: Scenario, path: Path, seed: int) -> BaselineVoyage:
     """Sail the companion's first plan on the embedded autopilot: nobody plans again."""
     dies = EventSpec(at_s=DIES_S, kind="kill_companion")
-    track = Track(load_mission(scenario.mission_path(path)))
+    track = BaselineTrack(load_mission(scenario.mission_path(path)))
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
         run_virtual(run_embedded(
             msgspec.structs.replace(scenario, events=(*scenario.events, dies)), path, seed, Path(folder) / "voyage",
             observer=track.observe()))
-    return Voyage(track=track, record=track.record("fixed plan", scenario.name, seed))
+    return BaselineVoyage(track=track, record=track.record("fixed plan", scenario.name, seed))
 
 
-def sail_companion_ardurover(scenario: Scenario, path: Path, seed: int, speedup: float) -> Voyage:
+def sail_companion_ardurover(scenario: Scenario, path: Path, seed: int, speedup: float) -> BaselineVoyage:
     """Sail with the companion, as a process of its own, on the real ArduRover."""
-    track, noted = Track(load_mission(scenario.mission_path(path))), Truth()
+    track, noted = BaselineTrack(load_mission(scenario.mission_path(path))), TrueTrack()
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
         verdict = run_live(
             scenario, path, seed, Path(folder) / "voyage", autopilot="ardurover", program=None, speedup=speedup,
@@ -190,19 +204,19 @@ def sail_companion_ardurover(scenario: Scenario, path: Path, seed: int, speedup:
     point = track.mission.frame().geo_from_en(*noted.en_m[0])
     start = [point.lat_deg, point.lon_deg, math.degrees(noted.heading_rad[0])]
     told = track.record("companion, ArduRover", scenario.name, seed)
-    return Voyage(track=track, record={**told, **_promises(verdict), "start": start})
+    return BaselineVoyage(track=track, record={**told, **_promises(verdict), "start": start})
 
 
-def _promises(verdict: Verdict) -> dict[str, Any]:
+def _promises(verdict: ScenarioVerdict) -> dict[str, Any]:
     return {key: verdict.figures.get(key) for key in ("promised_risk", "no_go_entries", "replans")}
 
 
-def sail_alone(scenario: Scenario, path: Path, seed: int) -> Voyage:
+def sail_alone(scenario: Scenario, path: Path, seed: int) -> BaselineVoyage:
     """Sail with one waypoint per goal on the embedded autopilot."""
-    track = Track(load_mission(scenario.mission_path(path)))
+    track = BaselineTrack(load_mission(scenario.mission_path(path)))
 
     async def voyage() -> None:
-        mission, wind = track.mission, Held(scenario_wind(scenario, path, seed))
+        mission, wind = track.mission, HeldWind(scenario_wind(scenario, path, seed))
         autopilot = Autopilot(
             AutopilotConfig(home=mission.start or mission.origin, heading_rad=_heading_rad(mission), is_warm=True,
                             is_moored=True, parameters=scenario.parameters, polar=own_polar(mission)), wind, seed=seed)
@@ -216,19 +230,19 @@ def sail_alone(scenario: Scenario, path: Path, seed: int) -> Voyage:
             await _sail(pilot, track, lambda: autopilot.truth, scenario.limit_s)
 
     run_virtual(voyage())
-    return Voyage(track=track, record=track.record("alone, embedded", scenario.name, seed))
+    return BaselineVoyage(track=track, record=track.record("alone, embedded", scenario.name, seed))
 
 
 def sail_ardurover(
     scenario: Scenario, path: Path, seed: int, who: str, speedup: float,
     set_sail: tuple[float, float, float] | None = None,
-) -> Voyage:
+) -> BaselineVoyage:
     """Sail with the real ArduRover, "alone" or with its own "dijkstra".
 
     ``set_sail`` is where, in place of the mission's start: latitude, longitude, heading [deg].
     """
     mission = load_mission(scenario.mission_path(path))
-    track = Track(mission)
+    track = BaselineTrack(mission)
     has_obstacles = bool(mission.area.solids or mission.area.fence.inclusions)
     parameters = {**scenario.parameters, **(DIJKSTRA if who == "dijkstra" and has_obstacles else {})}
 
@@ -237,7 +251,7 @@ def sail_ardurover(
         if set_sail is not None:
             start = GeoPoint(lat_deg=set_sail[0], lon_deg=set_sail[1])
             heading_rad = math.radians(set_sail[2])
-        wind = Held(scenario_wind(scenario, path, seed))
+        wind = HeldWind(scenario_wind(scenario, path, seed))
         async with (
             ArduRover(require(), start, wind, heading_rad=heading_rad, speedup=speedup,
                       parameters=parameters) as rover,
@@ -266,14 +280,14 @@ def sail_ardurover(
             await _sail(pilot, track, now, scenario.limit_s)
 
     run(voyage(), speedup=speedup)
-    return Voyage(track=track, record=track.record(f"{who}, ArduRover", scenario.name, seed))
+    return BaselineVoyage(track=track, record=track.record(f"{who}, ArduRover", scenario.name, seed))
 
 
 def _heading_rad(mission: Mission) -> float:
     return math.radians(mission.options.start.heading_deg) if mission.options.start else 0.0
 
 
-async def _sail(pilot: Pilot, track: Track, now: Callable[[], Now | None], limit_s: float) -> None:
+async def _sail(pilot: Pilot, track: BaselineTrack, now: Callable[[], Now | None], limit_s: float) -> None:
     """Upload a waypoint per goal, arm, set AUTO, and watch until the last goal or the limit.
 
     The last waypoint is there twice: the mission then ends beyond the goal's radius for nobody.
@@ -298,3 +312,184 @@ async def _sail(pilot: Pilot, track: Track, now: Callable[[], Now | None], limit
         await asyncio.sleep(TRUTH_EVERY_S)
     if not track.truth.t_s:
         raise JobError("it never sailed in AUTO")
+
+
+HEADS = ("scenario", "sailor", "pairs", "median s", "against s", "median %", "mean % (95 %)", "worst pair %", "tacks",
+         "of the possible %")
+
+
+def pairs(records: Sequence[dict[str, Any]], against: str) -> str:
+    """Return a Markdown table: a row for each scenario and sailor but ``against``, as it is told in records.
+
+    Pairs of clean arrivals count; how many seeds both sailed is said where it is more. "median %" is of the medians,
+    the mean geometric over pairs with the bootstrap's interval. "of the possible" is the sum of what was gained over
+    that of what a clairvoyant gains in the same winds, where he is known.
+    """
+    lines = ["| " + " | ".join(HEADS) + " |", "|---|---|" + "--:|" * (len(HEADS) - 2)]
+    base = {(r["scenario"], r["seed"]): r for r in records if r["who"] == against}
+    for scenario in dict.fromkeys(scenario for scenario, _ in base):
+        for who in dict.fromkeys(r["who"] for r in records if r["scenario"] == scenario and r["who"] != against):
+            both = [(r, base[key]) for r in records
+                    if (key := (scenario, r["seed"])) in base and (r["scenario"], r["who"]) == (scenario, who)]
+            lines.append("| " + " | ".join((scenario, who, *_cells(both))) + " |")
+    return "\n".join(lines)
+
+
+def _cells(both: Sequence[tuple[dict[str, Any], dict[str, Any]]]) -> list[str]:
+    clean = [(a, b) for a, b in both if all(r["arrived"] and not r["contacts"] for r in (a, b))]
+    count = str(len(clean)) if len(clean) == len(both) else f"{len(clean)} of {len(both)}"
+    if not clean:
+        return [count, *("-" for _ in HEADS[3:])]
+    shares = [a["time_s"] / b["time_s"] for a, b in clean]
+    mine, other = (statistics.median(r["time_s"] for r in rows) for rows in zip(*clean, strict=True))
+    middle, low, high = (100.0 * (share - 1.0) for share in interval(shares))
+    known = [(a["time_s"], b["time_s"], b["best_s"]) for a, b in clean if "best_s" in b]
+    possible_s = sum(other_s - best_s for _, other_s, best_s in known)
+    gained_s = sum(other_s - mine_s for mine_s, other_s, _ in known)
+    return [count, f"{mine:.0f}", f"{other:.0f}", f"{100.0 * (mine / other - 1.0):+.1f}",
+            f"{middle:+.1f} ({low:+.1f} to {high:+.1f})", f"{100.0 * (max(shares) - 1.0):+.1f}",
+            f"{statistics.median(a['tacks'] for a, _ in clean):g}",
+            f"{100.0 * gained_s / possible_s:.0f}" if possible_s > 0.0 else "-"]
+
+
+HERE = Path(__file__).parents[1] / "scenarios"
+SCENARIOS = (
+    HERE / "figures" / "block.toml", HERE / "two-channels.toml", HERE / "demo.toml", HERE / "lee-shore.toml",
+    HERE / "figures" / "slalom.toml", HERE / "upwind.toml",
+)
+# The sailors, and as they are told in tables, in their order there.
+NAMES = {
+    "companion": "companion", "shifts": "companion, by shifts", "no-shifts": "companion, no shifts",
+    "fixed": "fixed plan", "companion-ardurover": "companion, ArduRover", "alone-embedded": "alone, embedded",
+    "alone": "alone, ArduRover", "dijkstra": "dijkstra, ArduRover",
+}
+TOLD = tuple(NAMES.values())
+# Sailors with the companion on the embedded autopilot: by the shifts, or not; None: as the mission says.
+SHIFTS: dict[str, bool | None] = {"companion": None, "shifts": True, "no-shifts": False}
+# Who never tacks on them, by the parameters for that.
+WITHOUT = frozenset({"no-shifts", "alone-embedded", "alone", "dijkstra"})
+# A wind: its spread [deg] and correlation time [s].
+WindOf = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One voyage."""
+
+    who: str
+    scenario: Path
+    seed: int
+    speedup: float
+    set_sail: tuple[float, float, float] | None = None
+    wind: WindOf | None = None      # in place of the scenario's
+
+
+def scenario_of(job: Job) -> Scenario:
+    """Return what a job sails: by this sailor's parameters; in another wind it has another name."""
+    scenario = load_scenario(job.scenario)
+    if job.who in WITHOUT:
+        scenario = structs.replace(scenario, parameters={**scenario.parameters, **scenario.without_shifts})
+    if job.wind is None:
+        return scenario
+    spread_deg, tau_s = job.wind
+    told = f"{spread_deg:g}°, {tau_s:g} s" if spread_deg > 0.0 else "steady"
+    model: Literal["ou", "constant"] = "ou" if spread_deg > 0.0 else "constant"
+    wind = structs.replace(scenario.wind, model=model, sd_deg=spread_deg, tau_s=tau_s)
+    return structs.replace(scenario, name=f"{scenario.name}, {told}", wind=wind)
+
+
+def sail_one(job: Job) -> dict[str, Any]:
+    """Sail a job; return what is told of it."""
+    return voyage_of(job).record
+
+
+def voyage_of(job: Job) -> BaselineVoyage:
+    """Sail a job; JobError or LinkError where the harness fails, and then there is no result."""
+    what = scenario_of(job), job.scenario, job.seed
+    if job.who in SHIFTS:
+        return sail_companion(*what, shifts=SHIFTS[job.who], told=NAMES[job.who])
+    if job.who == "companion-ardurover":
+        return sail_companion_ardurover(*what, job.speedup)
+    if job.who == "fixed":
+        return sail_fixed(*what)
+    if job.who == "alone-embedded":
+        return sail_alone(*what)
+    return sail_ardurover(*what, job.who, job.speedup, job.set_sail)
+
+
+def key_of(job: Job) -> Key:
+    """Return what a voyage is known by: of those on the real ArduRover the pace and where they set sail, too."""
+    key: dict[str, str | int | float | None] = {
+        "who": job.who, "scenario": scenario_of(job).name, "hash": file_hash(job.scenario), "seed": job.seed}
+    if job.who in {"companion-ardurover", "alone", "dijkstra"}:
+        key["speedup"] = job.speedup
+    if job.set_sail is not None and job.who in {"alone", "dijkstra"}:
+        key["from"] = "{:.6f},{:.6f},{:.1f}".format(*job.set_sail)
+    return key
+
+
+def run_baselines(
+    *, who: Sequence[str], scenarios: Sequence[Path], seeds: int, means: CampaignOptions, speedup: float,
+    winds: Sequence[WindOf] | None = None, against: str | None = None,
+) -> int:
+    """Sail everything that has no result yet, print the table of all that the file holds; return the exit code."""
+    began: dict[tuple[str, int], tuple[float, float, float]] = {}
+    if means.file is not None and means.file.is_file() and means.file.stat().st_size:
+        began = {(key["scenario"], key["seed"]): tuple(result["start"])
+                 for key, result in read_results(means.file).pairs() if "start" in result}
+    jobs = [replace(job, set_sail=began.get((scenario_of(job).name, job.seed)))
+            for job in jobs_of(who, scenarios, seeds, speedup, winds)]
+    sailed = run_jobs("baselines", sail_one, jobs, means, key=key_of)
+    records = latest([result for _, result in sailed.held.pairs()])
+    print(table(records))
+    if against is not None:
+        print(pairs(records, NAMES[against]))
+    return sailed.exit_code(is_good=True)
+
+
+def jobs_of(
+    who: Sequence[str], scenarios: Sequence[Path], seeds: int, speedup: float, winds: Sequence[WindOf] | None,
+) -> list[Job]:
+    """Return the voyages of a campaign; ``winds`` None: those of the scenarios."""
+    return [Job(who=w, scenario=p, seed=s, speedup=speedup, wind=wind)
+            for s in range(seeds) for w in who for p in scenarios for wind in winds or (None,)]
+
+
+def latest(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return one record of every sailor, scenario and seed: of those that set sail here and there, the last."""
+    return list({(r["who"], r["scenario"], r["seed"]): r for r in records}.values())
+
+
+def table(records: Sequence[dict[str, Any]]) -> str:
+    """Return the figures as a Markdown table: a row for each scenario and sailor, losses included.
+
+    Times are of voyages that arrived without contact; "forced" is how many of the companion's voyages met a wind shift
+    into the no-go zone on a leg, to be held against the risk that the plan promised.
+    """
+    lines = [
+        "| scenario | sailor | runs | arrived | touched | clean | median s | 90 % | tacks | least m | risk | forced |",
+        "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|",
+    ]
+    names = list(dict.fromkeys(load_scenario(p).name for p in SCENARIOS))
+    for name in [*names, *sorted({r["scenario"] for r in records} - set(names))]:
+        for who in TOLD:
+            rows = [r for r in records if r["scenario"] == name and r["who"] == who]
+            if rows:
+                lines.append(_row(name, who, rows))
+    return "\n".join(lines)
+
+
+def _row(name: str, who: str, rows: Sequence[dict[str, Any]]) -> str:
+    clean = sorted(r["time_s"] for r in rows if r["arrived"] and not r["contacts"])
+    clearances = [r["clearance_m"] for r in rows if r["clearance_m"] is not None]
+    risks = [r["promised_risk"] for r in rows if r.get("promised_risk") is not None]
+    entered = [r["no_go_entries"] for r in rows if r.get("no_go_entries") is not None]
+    cells = [
+        name, who, str(len(rows)), str(sum(r["arrived"] for r in rows)), str(sum(r["contacts"] > 0 for r in rows)),
+        str(len(clean)), f"{statistics.median(clean):.0f}" if clean else "-",
+        f"{clean[math.ceil(0.9 * len(clean)) - 1]:.0f}" if clean else "-",
+        f"{statistics.median(r['tacks'] for r in rows):g}", f"{min(clearances):.1f}" if clearances else "-",
+        f"{statistics.median(risks):.2f}" if risks else "-",
+        f"{sum(n > 0 for n in entered)} of {len(entered)}" if entered else "-",
+    ]
+    return "| " + " | ".join(cells) + " |"

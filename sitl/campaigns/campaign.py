@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from companion.words import file_name
-from sitl.means import Means
+from sitl.options import CampaignOptions
 from sitl.run.variation import AS_IT_SAYS, Method, can_be_sailed
-from sitl.runner import Key, file_hash, sail
+from sitl.runner import Key, file_hash, run_jobs
 
 FAILURES = Path("campaign-failures")
 
@@ -35,7 +35,7 @@ def sail_one(job: Job) -> dict[str, Any]:
     """Sail one seed; return its verdict as a record. Runs in a worker process."""
     from companion.clock import run_virtual
     from sitl.run.embedded import mission_of, run_embedded
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     scenario = load_scenario(job.scenario)
     name = file_name(_name(scenario.name, job.method))
@@ -67,20 +67,20 @@ def _name(scenario: str, method: Method) -> str:
 
 def key_of(job: Job) -> Key:
     """Return what a run is known by."""
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     return {"scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario),
             **({"method": job.method.told} if job.method.told else {}), "seed": job.seed}
 
 
 def run_campaign(
-    scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, means: Means, json_path: Path | None = None,
+    scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, means: CampaignOptions, json_path: Path | None = None,
     keep: Path | None = None, methods: Sequence[Method] = (AS_IT_SAYS,),
 ) -> int:
     """Run each scenario by each method that its mission allows, and print; return the exit code."""
     from sitl.run.compiled import compile_ahead
     from sitl.run.embedded import mission_of
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     loaded = [load_scenario(path) for path in scenarios]
     missions = [mission_of(scenario, path) for scenario, path in zip(loaded, scenarios, strict=True)]
@@ -91,7 +91,7 @@ def run_campaign(
     names = [_name(name, method) for name, _, method in ways]
     jobs = [Job(scenario=path, seed=first_seed + k, keep=keep, method=method)
             for _, path, method in ways for k in range(runs)]
-    sailed = sail("campaign", sail_one, jobs, means, key=key_of,
+    sailed = run_jobs("campaign", sail_one, jobs, means, key=key_of,
                   on_record=lambda record: print(json.dumps(record, separators=(",", ":")), flush=True))
     records = sailed.records
     table = [figures(name, [r for r in records if r["scenario"] == name]) for name in names]

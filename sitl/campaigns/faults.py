@@ -1,48 +1,80 @@
 """Faults by the thousand: random but repeatable trouble on a short voyage, and what may never come of it.
 
 A seed gives the weather and one to five faults of link, sensors, wind, process and people
-(``sitl.campaigns.fault_draw``). Each voyage is sailed on the embedded autopilot under the virtual clock and judged on
-five points (``sitl.campaigns.fault_watch``): no contact of the hull that was to be helped
-(``sitl.campaigns.counterfactual``), the margin's floor kept in ordinary weather, no mission that is a mixture of two,
-no silence without a status, no unhandled exception. Arriving is counted, not required: a boat that the operator put in
-HOLD for half the voyage has done nothing wrong by being late.
+(``sitl.campaigns.fault_sampling``). Each voyage is sailed on the embedded autopilot under the virtual clock and judged
+on five points (``sitl.campaigns.fault_judge``): no contact of the hull that was to be helped, the margin's floor kept
+in ordinary weather, no mission that is a mixture of two, no silence without a status, no unhandled exception. Arriving
+is counted, not required: a boat that the operator put in HOLD for half the voyage has done nothing wrong by being late.
 """
 
 from __future__ import annotations
 
+import asyncio
 import json
 import random
 import statistics
 import tempfile
+import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import shapely
 
+from companion.clock import RealTimeLoop
 from companion.errors import InputError
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode
-from sitl.campaigns.counterfactual import ALERT_S, avoidable, by_hand
-from sitl.campaigns.fault_draw import BESIDE, draw, draw_beside, draw_planner, draw_turned_vane
-from sitl.campaigns.fault_watch import (
+from sitl.campaigns.fault_judge import (
+    ALERT_S,
     EXCUSES,
     MAX_SILENCE_S,
     UNEXCUSED,
     Watch,
+    avoidable,
+    by_hand,
     false_wind_spans,
     mission_key,
     operator_spans,
 )
-from sitl.campaigns.jump_draw import KINDS, MODES, Jump, draw_jump
-from sitl.means import Means
+from sitl.campaigns.fault_sampling import (
+    BESIDE,
+    KINDS,
+    MODES,
+    Jump,
+    draw,
+    draw_beside,
+    draw_jump,
+    draw_planner,
+    draw_turned_vane,
+)
+from sitl.options import CampaignOptions
 from sitl.run.variation import DRAWABLE, Method, Variation, drawn_method
-from sitl.runner import Key, file_hash, sail
-from sitl.scene import EventSpec, Scenario, is_all_ordinary, load_scenario
+from sitl.runner import Key, file_hash, run_jobs
+from sitl.scenario import EventSpec, Scenario, is_all_ordinary, load_scenario
+
+T = TypeVar("T")
+
+
+class _FromZero(RealTimeLoop):
+    def __init__(self, speedup: float) -> None:
+        self._zero_s = time.monotonic() * speedup
+        super().__init__(speedup)
+
+    def time(self) -> float:
+        """Return loop time since the start [s]."""
+        return super().time() - self._zero_s
+
+
+def run_from_zero(main: Coroutine[Any, Any, T], speedup: float) -> T:
+    """Run ``main`` in real time, ``speedup`` times as fast, on a clock that begins at 0."""
+    with asyncio.Runner(loop_factory=lambda: _FromZero(speedup)) as runner:
+        return runner.run(main)
+
 
 BASE = Path(__file__).parents[1] / "scenarios" / "faults" / "rocks.toml"
 # Effort of one plan: the voyage is short and its water simple.
@@ -221,7 +253,6 @@ def _sail(
     from companion.compose import boat_of
     from companion.geofence import load_mission
     from companion.messages import waypoint
-    from sitl.campaigns.from_zero import run_from_zero
     from sitl.run.embedded import run_embedded, solid_of
 
     mission = load_mission(scenario.mission_path(base))
@@ -272,7 +303,7 @@ SAILORS = {"all": sail_seed, "jumps": sail_jump_seed, "turned-vane": sail_turned
 
 
 def run_faults(
-    *, runs: int, first_seed: int = 0, means: Means, json_path: Path | None = None, trouble: str = "all",
+    *, runs: int, first_seed: int = 0, means: CampaignOptions, json_path: Path | None = None, trouble: str = "all",
     draws: Sequence[str] = (),
 ) -> int:
     """Sail ``runs`` seeds, print those that failed and what was counted; return the exit code.
@@ -294,7 +325,7 @@ def run_faults(
             print(f"{word} seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})", flush=True)
 
     work = partial(SAILORS[trouble], draws=tuple(draws))
-    sailed = sail("faults", work, range(first_seed, first_seed + runs), means, key=key_of, on_record=tell)
+    sailed = run_jobs("faults", work, range(first_seed, first_seed + runs), means, key=key_of, on_record=tell)
     records = sailed.records
     drawing = f" --draw {','.join(draws)}" if draws else ""
     table = jump_figures(records) if trouble == "jumps" else figures_of(records)

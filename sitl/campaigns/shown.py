@@ -17,8 +17,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from sitl.means import Means
-from sitl.runner import Key, file_hash, sail
+from sitl.options import CampaignOptions
+from sitl.runner import Key, file_hash, run_jobs
 
 CAMPAIGN = "shown"
 EVERY_S = 2.0
@@ -54,9 +54,9 @@ def key_of(job: Job) -> Key:
 def sail_one(job: Job) -> dict[str, Any]:
     """Sail a job; return what was shown beside what came."""
     from companion.clock import run_virtual
-    from sitl.campaigns.mismatch.draw import draw
+    from sitl.campaigns.mismatch_sampling import draw
     from sitl.run.embedded import run_embedded
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     name = "mismatch" if job.scenario is None else job.scenario.stem
     with tempfile.TemporaryDirectory(prefix="shown-") as scratch:
@@ -209,7 +209,8 @@ def told(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def run_shown(
-    scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: bool, means: Means, json_path: Path | None,
+    scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: bool, means: CampaignOptions,
+    json_path: Path | None,
 ) -> int:
     """Sail what has no result yet, and print the table of each kind of voyage and of all; return the exit code."""
     from sitl.run.compiled import compile_ahead
@@ -217,7 +218,7 @@ def run_shown(
     compile_ahead("auto")
     paths: Sequence[Path | None] = [None] if mismatch else scenarios or SCENARIOS
     jobs = [Job(scenario=path, seed=seed) for path in paths for seed in range(first_seed, first_seed + seeds)]
-    sailed = sail(CAMPAIGN, sail_one, jobs, means, key=key_of)
+    sailed = run_jobs(CAMPAIGN, sail_one, jobs, means, key=key_of)
     names = list(dict.fromkeys(record["scenario"] for record in sailed.records))
     tables = {name: table_of([r for r in sailed.records if r["scenario"] == name]) for name in names}
     if len(names) > 1:

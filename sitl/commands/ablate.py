@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import whole
-from sitl.means import add_options, means_of
+from sitl.options import add_options, options_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -36,4 +36,4 @@ def run(args: argparse.Namespace) -> int:
 
     return run_ablation(
         args.scenarios or SCENARIOS, names=args.only or tuple(VARIATIONS), runs=args.runs, first_seed=args.first_seed,
-        means=means_of(args))
+        means=options_of(args))

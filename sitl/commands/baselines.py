@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import number, whole
-from sitl.means import add_options, means_of
+from sitl.options import add_options, options_of
 
 USUAL = ("companion", "fixed", "companion-ardurover", "alone-embedded", "alone", "dijkstra")
 SAILORS = (*USUAL, "shifts", "no-shifts")
@@ -57,14 +57,14 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.figures import SCENARIOS, run_baselines
+    from sitl.campaigns.baselines import SCENARIOS, run_baselines
     from sitl.run.compiled import compile_ahead
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     for path in args.scenarios or ():
         load_scenario(path)
     compile_ahead()
     return run_baselines(
-        who=args.who, scenarios=args.scenarios or SCENARIOS, seeds=args.seeds, means=means_of(args),
+        who=args.who, scenarios=args.scenarios or SCENARIOS, seeds=args.seeds, means=options_of(args),
         speedup=args.speedup, winds=args.winds, against=args.against,
     )

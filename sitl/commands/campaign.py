@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import out_file, out_folder, whole
-from sitl.means import add_options, means_of
-from sitl.methods import add_methods, methods_of
+from sitl.options import add_methods, add_options, methods_of, options_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -36,6 +35,6 @@ def run(args: argparse.Namespace) -> int:
     from sitl.campaigns.campaign import run_campaign
 
     return run_campaign(
-        args.scenarios, runs=args.runs, first_seed=args.first_seed, means=means_of(args), json_path=args.json,
+        args.scenarios, runs=args.runs, first_seed=args.first_seed, means=options_of(args), json_path=args.json,
         keep=args.keep, methods=methods_of(args.guidance, args.planner),
     )

@@ -6,8 +6,8 @@ import argparse
 from typing import Any
 
 from companion.program.arguments import out_file, out_folder, whole
-from sitl.campaigns.encounter_draw import KINDS, POLICIES, Policy
-from sitl.means import add_options, means_of
+from sitl.campaigns.encounters import KINDS, POLICIES, Policy
+from sitl.options import add_options, options_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -47,4 +47,4 @@ def run(args: argparse.Namespace) -> int:
             print(f"{key}: {value}")
         return 0 if record["passed"] else 1
     return run_encounters(runs=args.runs, kinds=kinds, policies=policies, first_seed=args.first_seed,
-                          means=means_of(args), json_path=args.json)
+                          means=options_of(args), json_path=args.json)

@@ -7,8 +7,7 @@ from typing import Any
 
 from companion.errors import InputError
 from companion.program.arguments import out_file, out_folder, whole
-from sitl.means import add_options, means_of
-from sitl.methods import add_draw, compile_planners
+from sitl.options import add_draw, add_options, compile_planners, options_of
 
 # What else may be drawn beside a seed's own faults, of the campaign that has them.
 BESIDE = {
@@ -62,5 +61,5 @@ def run(args: argparse.Namespace) -> int:
         for key, value in record.items():
             print(f"{key}: {value}")
         return 0 if record["passed"] else 1
-    return run_faults(runs=args.runs, first_seed=args.first_seed, means=means_of(args), json_path=args.json,
+    return run_faults(runs=args.runs, first_seed=args.first_seed, means=options_of(args), json_path=args.json,
                       trouble=args.trouble, draws=args.draw)

@@ -57,7 +57,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.mavlink.reads import ASHORE, READS
-    from sitl.trouble import FORGERIES
+    from sitl.faults import FORGERIES
 
     if args.list:
         for forgery in FORGERIES:
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _measure(document: Path | None) -> int:
     """Measure all forgeries and print, or write, the table."""
-    from sitl.trouble import HOSTILITIES, measure, rows, written
+    from sitl.faults import HOSTILITIES, measure, rows, written
 
     try:
         text = None if document is None else document.read_text(encoding="utf-8")
@@ -100,7 +100,7 @@ def _stand_between(args: argparse.Namespace) -> int:
     from companion.clock import run as run_loop
     from companion.mavlink.reads import READS
     from companion.mavlink.transports import parse_link
-    from sitl.trouble import FORGERIES, Middle, Plan
+    from sitl.faults import FORGERIES, ManInTheMiddle, SpoofingPlan
 
     for option, value, low, high in (("--rate", args.rate, 0.0, MAX_RATE_HZ), ("--count", args.count, 0, MAX_COUNT),
                                      ("--for", args.for_s, 0.0, MAX_S)):
@@ -115,9 +115,9 @@ def _stand_between(args: argparse.Namespace) -> int:
     forgeries = tuple(f for f in FORGERIES if not args.message or f.message in args.message)
     if not forgeries:
         raise InputError("--message", ", ".join(args.message), "is read ashore only", "see sitl hostile --list")
-    plan = Plan(forgeries=forgeries, rate_hz=args.rate, count=args.count, for_s=args.for_s, system=args.system,
+    plan = SpoofingPlan(forgeries=forgeries, rate_hz=args.rate, count=args.count, for_s=args.for_s, system=args.system,
                 listens=args.listen, key=args.signing_key, boat_key=args.sign_boat)
-    middle = Middle(args.boat, args.companion, plan)
+    middle = ManInTheMiddle(args.boat, args.companion, plan)
     try:
         run_loop(middle.run())
     finally:

@@ -8,8 +8,7 @@ from typing import Any
 
 from companion.errors import InputError
 from companion.program.arguments import out_file, out_folder, whole
-from sitl.means import add_options, means_of
-from sitl.methods import add_draw, compile_planners
+from sitl.options import add_draw, add_options, compile_planners, options_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -42,8 +41,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.mismatch.draw import KINDS
-    from sitl.campaigns.mismatch.voyages import Job, run_mismatch, sail_one
+    from sitl.campaigns.mismatch import Job, run_mismatch, sail_one
+    from sitl.campaigns.mismatch_sampling import KINDS
 
     compile_planners(args.draw)
     only = () if args.as_planned else None if args.only is None else tuple(args.only)
@@ -56,5 +55,5 @@ def run(args: argparse.Namespace) -> int:
         for key, value in record.items():
             print(f"{key}: {json.dumps(value)}")
         return 0 if record["passed"] else 1
-    return run_mismatch(runs=args.runs, first_seed=args.first_seed, means=means_of(args), planned=args.planned,
+    return run_mismatch(runs=args.runs, first_seed=args.first_seed, means=options_of(args), planned=args.planned,
                         only=only, json_path=args.json, draws=args.draw)

@@ -8,7 +8,7 @@ from typing import Any
 
 from companion.program.arguments import number, out_file, whole
 from sitl.commands.baselines import SAILORS, add_winds
-from sitl.means import add_options, means_of
+from sitl.options import add_options, options_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -39,13 +39,13 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.figures import SCENARIOS
-    from sitl.campaigns.regret.voyages import require_judged, run_regret
+    from sitl.campaigns.baselines import SCENARIOS
+    from sitl.campaigns.regret import require_judged, run_regret
     from sitl.run.compiled import compile_ahead
 
     scenarios = args.scenarios or SCENARIOS
     for path in scenarios:
         require_judged(path)
     compile_ahead()
-    return run_regret(who=args.who, scenarios=scenarios, seeds=args.seeds, means=means_of(args), speedup=args.speedup,
+    return run_regret(who=args.who, scenarios=scenarios, seeds=args.seeds, means=options_of(args), speedup=args.speedup,
                       json_path=args.json, plot=args.plot, winds=args.winds, against=args.against)

@@ -29,8 +29,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.mismatch.reliability import to_dict, told
-    from sitl.campaigns.mismatch.voyages import CAMPAIGN
+    from sitl.campaigns.mismatch import CAMPAIGN
+    from sitl.campaigns.reliability import to_dict, told
     from sitl.runner import read_results
 
     held = [read_results(path) for path in args.files]
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         args.json.write_text(json.dumps(to_dict(records), indent=1) + "\n", encoding="utf-8")
     if args.plot is not None:
-        from sitl.campaigns.mismatch.picture import save_reliability
+        from sitl.campaigns.plots import save_reliability
 
         save_reliability(records, args.plot)
         print(f"drawn in {args.plot}")

@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     from companion.telemetry.folder import DECISIONS
     from sitl.run.compiled import compile_ahead
     from sitl.run.embedded import mission_of, run_embedded
-    from sitl.scene import beginning, load_scenario, own_polar, scenario_wind
+    from sitl.scenario import beginning, load_scenario, own_polar, scenario_wind
 
     scenario = load_scenario(args.scenario)
     scenario = msgspec.structs.replace(scenario, begins=beginning(scenario, args.scenario, args.at))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import out_folder, whole
-from sitl.means import add_options, means_of
+from sitl.options import add_options, options_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.errors import InputError
     from sitl.campaigns.faults import BASE
-    from sitl.campaigns.search.voyages import NARROW, run_search
+    from sitl.campaigns.search import NARROW, run_search
     from sitl.run.compiled import compile_ahead
 
     if args.what == "faults" and args.water is not None:
@@ -47,4 +47,4 @@ def run(args: argparse.Namespace) -> int:
     compile_ahead()
     scenario = BASE if args.what == "faults" else args.water or NARROW
     return run_search(what=args.what, scenario=scenario, runs=args.runs, each=args.each, first_seed=args.first_seed,
-                      is_blind=args.blind, found=args.found, means=means_of(args))
+                      is_blind=args.blind, found=args.found, means=options_of(args))

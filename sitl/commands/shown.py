@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import out_file, whole
-from sitl.means import add_options, means_of
+from sitl.options import add_options, options_of
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -38,4 +38,4 @@ def run(args: argparse.Namespace) -> int:
     from sitl.campaigns.shown import run_shown
 
     return run_shown(args.scenarios, seeds=args.seeds, first_seed=args.first_seed, mismatch=args.mismatch,
-                     means=means_of(args), json_path=args.json)
+                     means=options_of(args), json_path=args.json)

@@ -13,7 +13,7 @@ from typing import Any
 
 from companion.program.arguments import duration, moment, number, out_file, out_folder, whole
 from companion.words import file_name
-from sitl.means import add_options, means_of
+from sitl.options import add_options, options_of
 
 SUMMARY = "sail a mission a thousand times before it is sailed"
 FOLDER = Path("rehearsals")
@@ -76,12 +76,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.rehearse.change import change_of, usual
-    from sitl.rehearse.outcome import RESULTS
+    from sitl.rehearse.changes import change_of, usual
     from sitl.rehearse.prepared import prepared
     from sitl.rehearse.rehearsal import Limits, rehearse
+    from sitl.rehearse.report import RESULTS
     from sitl.run.compiled import compile_ahead
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     folder = args.out or FOLDER / file_name(load_scenario(args.mission).name)
     compile_ahead()
@@ -95,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
           f"{f'; planned {planned_s:.0f} s' if planned_s else ''}, called off after {made.scenario.limit_s:.0f} s; "
           f"results in {folder}", flush=True)
     return rehearse(made, folder, Limits(width=args.sure / 100.0, runs=args.runs, minutes=args.minutes), changes,
-                    args.pairs, means_of(args, out=folder / RESULTS), args.json)
+                    args.pairs, options_of(args, out=folder / RESULTS), args.json)
 
 
 def _error(text: str) -> tuple[float, float]:

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from companion.plots.chart import save, scale_bar
 from companion.plots.mission import draw_area, draw_marks, extent_of
 from companion.words import counted
-from sitl.rehearse.known import Known, clock, percent
-from sitl.rehearse.outcome import Outcome
-from sitl.rehearse.pairs import Tried, scaled
-from sitl.rehearse.prepared import Prepared
+from sitl.rehearse.changes import Tried, scaled
+from sitl.rehearse.estimates import Estimates, clock, percent
+from sitl.rehearse.prepared import PreparedRehearsal
+from sitl.rehearse.report import RehearsalOutcome
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +38,7 @@ WORST = ("#7b1fa2", "#ad1457", "#4e342e")
 KINDS = ("#d62728", "#ff7f0e", "#9467bd", "#8c564b", "#e377c2", "#111111")
 
 
-def save_rehearsal(made: Prepared, outcome: Outcome, path: Path) -> None:
+def save_rehearsal(made: PreparedRehearsal, outcome: RehearsalOutcome, path: Path) -> None:
     """Write the picture. Raises InputError when the file cannot be written."""
     has_changes = any(pair.comparison.changes for pair in outcome.changes)
     figure = plt.figure(figsize=(15.0, 9.6), layout="constrained")
@@ -54,7 +54,7 @@ def save_rehearsal(made: Prepared, outcome: Outcome, path: Path) -> None:
     save(figure, path)
 
 
-def _map(axes: Axes, made: Prepared, outcome: Outcome) -> None:
+def _map(axes: Axes, made: PreparedRehearsal, outcome: RehearsalOutcome) -> None:
     mission, records = made.mission, outcome.known.records
     frame = mission.frame()
     local = mission.water()
@@ -108,7 +108,7 @@ def shares_of(
     return counts / max(1, len(tracks))
 
 
-def _chances(axes: Axes, known: Known) -> None:
+def _chances(axes: Axes, known: Estimates) -> None:
     bars = [("arrives", known.arrives), ("below the floor", known.low), ("touches", known.touches),
             *list(known.watchdogs.items())[:MOST_BARS]]
     for row, (_, share) in enumerate(bars):
@@ -121,7 +121,7 @@ def _chances(axes: Axes, known: Known) -> None:
     axes.grid(visible=True, axis="x", alpha=0.3)
 
 
-def _times(axes: Axes, known: Known, planned_s: float) -> None:
+def _times(axes: Axes, known: Estimates, planned_s: float) -> None:
     times = sorted(record["time_s"] for record in known.records if record.get("arrived"))
     if times:
         axes.step([0.0, *times], [n / len(known.records) for n in range(len(times) + 1)], where="post", color=BLUE)

@@ -15,10 +15,9 @@ from companion.errors import InputError
 from companion.geofence import Mission
 from companion.mission_check import AssumedWind, leg_names, legs, planned_legs
 from companion.planner import Plan, Problem, plan
-from sitl.rehearse.draw import Doubts
-from sitl.rehearse.wind import given_wind
+from sitl.rehearse.sampling import Doubts, given_wind
 from sitl.run.embedded import EXPANSIONS, mission_of
-from sitl.scene import Scenario, WindSpec, beginning, load_scenario, scenario_text
+from sitl.scenario import Scenario, WindSpec, beginning, load_scenario, scenario_text
 
 SCENARIO = "rehearsal.toml"
 SLOWER = 3.0        # a voyage may take this much longer than planned ...
@@ -27,7 +26,7 @@ BESIDE_S = 3600.0   # for what the preview of a plan does not count: a search, a
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Prepared:
+class PreparedRehearsal:
     """A rehearsal that can begin.
 
     Attributes:
@@ -50,7 +49,7 @@ class Prepared:
 def prepared(
     path: Path, folder: Path, *, wind: str | None, wind_error: tuple[float, float] | None, doubt: float, faults: bool,
     depart: dt.datetime | None, limit_s: float | None,
-) -> Prepared:
+) -> PreparedRehearsal:
     """Read and plan a mission (or a scenario), and write the scenario that is sailed into ``folder``.
 
     Raises:
@@ -74,7 +73,7 @@ def prepared(
     folder.mkdir(parents=True, exist_ok=True)
     source = folder / SCENARIO
     Disk().replace(source, scenario_text(scenario).encode())
-    return Prepared(
+    return PreparedRehearsal(
         source=source, scenario=scenario, mission=mission, plans=tuple(plans), doubts=Doubts(
             wind=replace(given, spec=scenario.wind), boat=doubt, faults=faults, voyage_s=round(max(voyage_s, 60.0), 1)),
         tells_the_hour=given.record_s > 0.0 or mission.tide_path is not None or mission.safety.dark != "say")

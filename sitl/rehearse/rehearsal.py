@@ -16,16 +16,13 @@ from companion.errors import CompanionError
 from companion.program import control
 from companion.program.commands import missing
 from companion.words import counted
-from sitl.means import Means
-from sitl.rehearse.change import Change
-from sitl.rehearse.known import Known, known_of, told, why_bad
-from sitl.rehearse.outcome import FIGURES, PAGE, PICTURE, RESULTS, WORST, Outcome
-from sitl.rehearse.page import page_of
-from sitl.rehearse.pairs import Tried, tried
-from sitl.rehearse.prepared import Prepared
-from sitl.rehearse.sure import share_of
-from sitl.rehearse.voyage import CAMPAIGN, Job, key_of, sail_one
-from sitl.runner import Sailed, sail
+from sitl.options import CampaignOptions
+from sitl.rehearse.changes import CAMPAIGN, MissionChange, Tried, tried
+from sitl.rehearse.estimates import Estimates, estimates_of, share_of, told, why_bad
+from sitl.rehearse.prepared import PreparedRehearsal
+from sitl.rehearse.report import FIGURES, PAGE, PICTURE, RESULTS, WORST, RehearsalOutcome, page_of
+from sitl.rehearse.voyage import Job, key_of, sail_one
+from sitl.runner import CampaignResults, run_jobs
 
 MOST_WORST = 3
 
@@ -49,7 +46,7 @@ class Follower:
     limits: Limits
     count: int = 0
     ends: str = ""
-    known: Known = field(default_factory=lambda: known_of(()))
+    known: Estimates = field(default_factory=lambda: estimates_of(()))
     _of: int = 0
     _arrived: int = 0
     _low: int = 0
@@ -68,13 +65,13 @@ class Follower:
         minutes = self.limits.minutes
         if not self.ends and minutes is not None and time.monotonic() - self._began_s >= 60.0 * minutes:
             self.ends = "the time is over"
-        self.known = known_of(there[:self.count])
+        self.known = estimates_of(there[:self.count])
         return self.known.line() if self.count else "nothing known yet", bool(self.ends)
 
 
 def rehearse(
-    made: Prepared, folder: Path, limits: Limits, changes: Sequence[Change], pairs: int, means: Means,
-    json_path: Path | None,
+    made: PreparedRehearsal, folder: Path, limits: Limits, changes: Sequence[MissionChange], pairs: int,
+    means: CampaignOptions, json_path: Path | None,
 ) -> int:
     """Sail, tell and write; return the exit code."""
     jobs = [Job(scenario=made.source, seed=seed, doubts=made.doubts) for seed in range(limits.runs)]
@@ -96,17 +93,18 @@ def rehearse(
         for change in changes:
             if mine := [record for record in again.records if record["change"] == change.told]:
                 found.append(tried(change, follower.known.records[:count], mine))
-    outcome = Outcome(known=follower.known, ends=follower.ends or "not as sure as was asked for",
+    outcome = RehearsalOutcome(known=follower.known, ends=follower.ends or "not as sure as was asked for",
                       changes=tuple(found), folders=_worst(follower.known, jobs, folder))
     sys.stdout.write("\n".join(_words(outcome, sailed)) + "\n")
     return code | _written(outcome, made, folder, json_path)
 
 
-def _sailed(jobs: Sequence[Job], means: Means, follower: Follower | None) -> Sailed:
-    return sail(CAMPAIGN, sail_one, jobs, means, key=key_of, watch=follower, is_failed=lambda record: "error" in record)
+def _sailed(jobs: Sequence[Job], means: CampaignOptions, follower: Follower | None) -> CampaignResults:
+    return run_jobs(CAMPAIGN, sail_one, jobs, means, key=key_of, watch=follower,
+                    is_failed=lambda record: "error" in record)
 
 
-def _part(jobs: Sequence[Job], changes: Sequence[Change], pairs: int, means: Means) -> int:
+def _part(jobs: Sequence[Job], changes: Sequence[MissionChange], pairs: int, means: CampaignOptions) -> int:
     """Sail a part of all voyages; what is known is told when the parts are together."""
     others = [replace(job, change=change) for change in changes for job in jobs[:pairs]]
     sailed = _sailed([*jobs, *others], means, None)
@@ -117,7 +115,7 @@ def _part(jobs: Sequence[Job], changes: Sequence[Change], pairs: int, means: Mea
     return sailed.exit_code(is_good=True)
 
 
-def _worst(known: Known, jobs: Sequence[Job], folder: Path) -> tuple[tuple[dict[str, Any], Path | None], ...]:
+def _worst(known: Estimates, jobs: Sequence[Job], folder: Path) -> tuple[tuple[dict[str, Any], Path | None], ...]:
     """Sail the worst voyages again and keep their folders; a seed repeats to the last bit."""
     found: list[tuple[dict[str, Any], Path | None]] = []
     for before in (folder / WORST).glob("*-seed-*"):   # ours, and nothing else that may be there
@@ -143,7 +141,7 @@ def _worst(known: Known, jobs: Sequence[Job], folder: Path) -> tuple[tuple[dict[
     return tuple(found)
 
 
-def _words(outcome: Outcome, sailed: Sailed) -> list[str]:
+def _words(outcome: RehearsalOutcome, sailed: CampaignResults) -> list[str]:
     lines = [*told(outcome.known), f"{outcome.ends}; {sailed.took}"]
     if outcome.changes:
         lines.append("what to change, by pairs of voyages with the same seed (the difference and its 95 % interval; of "
@@ -156,7 +154,7 @@ def _words(outcome: Outcome, sailed: Sailed) -> list[str]:
     return lines
 
 
-def _written(outcome: Outcome, made: Prepared, folder: Path, json_path: Path | None) -> int:
+def _written(outcome: RehearsalOutcome, made: PreparedRehearsal, folder: Path, json_path: Path | None) -> int:
     """Write figures, picture and page; say what the disk does not take. Return the exit code."""
     figures = json.dumps(outcome.to_dict(made), indent=1).encode() + b"\n"
     try:
@@ -173,7 +171,7 @@ def _written(outcome: Outcome, made: Prepared, folder: Path, json_path: Path | N
     return 0
 
 
-def _draw(outcome: Outcome, made: Prepared, path: Path) -> None:
+def _draw(outcome: RehearsalOutcome, made: PreparedRehearsal, path: Path) -> None:
     """Draw the picture where there is something to draw with."""
     path.unlink(missing_ok=True)
     try:

@@ -19,12 +19,11 @@ from companion.geo.frame import LocalFrame
 from companion.messages import CompanionStatus, Mode
 from companion.skipper.step import Announce, Severity
 from sitl.autopilot import Autopilot, MemoryLink
-from sitl.rehearse.change import Change
-from sitl.rehearse.draw import Doubts, drawn
+from sitl.rehearse.changes import MissionChange
+from sitl.rehearse.sampling import Doubts, drawn
 from sitl.runner import Key, file_hash
-from sitl.scene import HullTrack
+from sitl.scenario import HullTrack
 
-CAMPAIGN = "rehearse"
 TRACK_M = 1.0      # by how much a kept track may be off the true one
 UNDER_WAY_S = 2.0  # what is said when she sets sail is of the mission and of no place
 FIGURES = ("arrived", "contacts", "time_s", "distance_m", "tacks", "gybes", "min_clearance_m", "silence_s", "replans",
@@ -38,7 +37,7 @@ class Job:
     scenario: Path
     seed: int
     doubts: Doubts
-    change: Change | None = None
+    change: MissionChange | None = None
     keep: Path | None = None
 
 
@@ -89,7 +88,7 @@ def sail_one(job: Job) -> dict[str, Any]:
     from companion.clock import run_virtual
     from companion.compose import boat_of
     from sitl.run.embedded import mission_of, run_embedded, solid_of
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     base = load_scenario(job.scenario)
     mission = mission_of(base, job.scenario)
@@ -132,7 +131,7 @@ def sail_one(job: Job) -> dict[str, Any]:
 
 def key_of(job: Job) -> Key:
     """Return what a voyage is known by."""
-    from sitl.scene import load_scenario
+    from sitl.scenario import load_scenario
 
     doubts = job.doubts
     return {"mission": load_scenario(job.scenario).name, "hash": file_hash(job.scenario), "wind": doubts.wind.told,

@@ -27,9 +27,9 @@ from companion.mavlink.transports import open_link
 from companion.mavlink.wire import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import MOTOR, ArduRover, require
-from sitl.scene import EventSpec, Scenario, SensorsSpec, free_port, scenario_waters
-from sitl.trouble import DRAWN, draw, give_order, set_parameter
-from sitl.world import Wind
+from sitl.faults import REDRAWN, give_order, redraw, set_parameter
+from sitl.scenario import EventSpec, Scenario, SensorsSpec, free_port, scenario_waters
+from sitl.world import WindModel
 
 # A warm simulated autopilot has been up for a minute when its simulation starts [s].
 WARM_BOOT_S = 60.0
@@ -43,11 +43,11 @@ JUDGE_STREAMS = (
     Stream("ATTITUDE", 5.0, 3.0),
 )
 # What an operator and a ground station do, over any autopilot's link.
-OPERATORS = frozenset({"mode", "reboot", "foreign_mission", "order", "parameter"}) | DRAWN
+OPERATORS = frozenset({"mode", "reboot", "foreign_mission", "order", "parameter"}) | REDRAWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Fix:
+class LiveFix:
     """Where the boat truly is, and whether it sails."""
 
     position: GeoPoint
@@ -62,7 +62,7 @@ class Fix:
         return self.speed_mps * math.sin(self.heading_rad), self.speed_mps * math.cos(self.heading_rad)
 
 
-class Boat(Protocol):
+class LiveBoat(Protocol):
     """What a live runner needs of an autopilot that runs."""
 
     plays: frozenset[str]
@@ -73,7 +73,7 @@ class Boat(Protocol):
         """The companion's LINK."""
         ...
 
-    def fix(self) -> Fix | None:
+    def fix(self) -> LiveFix | None:
         """Return the truth now; None before there is any."""
         ...
 
@@ -106,7 +106,7 @@ class SimulatedBoat:
 
     plays = OPERATORS
 
-    def __init__(self, pilot: Autopilot, wind: Wind, port: int, judge_url: str) -> None:
+    def __init__(self, pilot: Autopilot, wind: WindModel, port: int, judge_url: str) -> None:
         self._pilot, self._wind, self._judge_url = pilot, wind, judge_url
         self.link = f"udpin:127.0.0.1:{port}"
         self._state: VehicleState | None = None
@@ -119,7 +119,7 @@ class SimulatedBoat:
     @classmethod
     @contextlib.asynccontextmanager
     async def start(
-        cls, source: Path, wind: Wind, seed: int, pace: float, epoch_s: float,
+        cls, source: Path, wind: WindModel, seed: int, pace: float, epoch_s: float,
     ) -> AsyncIterator[SimulatedBoat]:
         """Run it while the block runs."""
         port, judge_port = free_port(), free_port()
@@ -146,13 +146,13 @@ class SimulatedBoat:
         """Return what it cannot be: a boat whose sensors err, for they are what the judge listens to."""
         return [] if scenario.sensors is None else ["[sensors]"]
 
-    def fix(self) -> Fix | None:
+    def fix(self) -> LiveFix | None:
         """Return what the simulated autopilot tells, whose sensors do not err unless a scenario says so."""
         state, status = self._state, self._pilot.status
         if state is None or status is None:
             return None
         # The autopilot is warm: its boot time is a minute ahead of the simulation.
-        return Fix(
+        return LiveFix(
             position=state.position, heading_rad=state.heading_rad, speed_mps=state.speed_mps,
             wind=self._wind.at(max(0.0, state.boot_s - WARM_BOOT_S)),
             sails=status.is_armed and status.mode in {Mode.AUTO, Mode.GUIDED},
@@ -170,8 +170,8 @@ class SimulatedBoat:
             await _answered(give_order(open_link(self._judge_url), event, frame))
         elif event.kind == "parameter":
             await _answered(set_parameter(open_link(self._judge_url), event))
-        elif event.kind in DRAWN:
-            await _answered(draw(open_link(self._judge_url), event, frame))
+        elif event.kind in REDRAWN:
+            await _answered(redraw(open_link(self._judge_url), event, frame))
 
 
 class RealBoat:
@@ -186,7 +186,7 @@ class RealBoat:
     @classmethod
     @contextlib.asynccontextmanager
     async def start(
-        cls, scenario: Scenario, mission: Mission, wind: Wind, program: Path | None, pace: float, folder: Path,
+        cls, scenario: Scenario, mission: Mission, wind: WindModel, program: Path | None, pace: float, folder: Path,
     ) -> AsyncIterator[RealBoat]:
         """Run it while the block runs."""
         waters = scenario_waters(scenario, wind, mission.frame().en_from_geo(mission.start or mission.origin))
@@ -211,13 +211,13 @@ class RealBoat:
         tables = {"[boat]": scenario.boat is not None, "[waves]": scenario.waves is not None, "[sensors]": errs}
         return [name for name, asked in tables.items() if asked]
 
-    def fix(self) -> Fix | None:
+    def fix(self) -> LiveFix | None:
         """Return the simulator's own state."""
         try:
             t = self._rover.truth
         except LinkError:
             return None
-        return Fix(
+        return LiveFix(
             position=t.position, heading_rad=t.heading_rad, speed_mps=t.speed_mps,
             wind=(t.twd_from_rad, t.tws_mps), sails=t.is_armed and t.mode in {Mode.AUTO, Mode.GUIDED},
         )
@@ -235,8 +235,8 @@ class RealBoat:
             await _answered(give_order(open_link(rover.shore_link), event, frame))
         elif event.kind == "parameter":
             await _answered(set_parameter(open_link(rover.shore_link), event))
-        elif event.kind in DRAWN:
-            await _answered(draw(open_link(rover.shore_link), event, frame))
+        elif event.kind in REDRAWN:
+            await _answered(redraw(open_link(rover.shore_link), event, frame))
         elif event.kind in {"arm", "disarm"}:
             rover.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, float(event.kind == "arm"))
         elif event.kind == "radio_lost":

@@ -37,12 +37,23 @@ from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT
 from companion.wind import Estimator, WindTracker
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.faults import (
+    KEY,
+    REDRAWN,
+    FaultyPlanner,
+    KillablePlanner,
+    Observer,
+    Satellite,
+    SimulatedWorld,
+    channel,
+    inject,
+)
 from sitl.run.variation import Variation
-from sitl.scene import (
+from sitl.scenario import (
     Others,
     Outlet,
     Scenario,
-    Verdict,
+    ScenarioVerdict,
     free_port,
     is_all_ordinary,
     judge,
@@ -53,7 +64,6 @@ from sitl.scene import (
     scenario_wind,
     tasks_of,
 )
-from sitl.trouble import DRAWN, KEY, FragilePlanner, MortalPlanner, Observer, Satellite, World, channel, happen
 
 TRUTH_EVERY_S = 0.25
 MAX_TRUTH_SAMPLES = 20_000
@@ -116,7 +126,7 @@ def replace_struct(struct: Any, **changes: Any) -> Any:
 
 
 # What is done ashore over a port of the autopilot's own; into which nothing is plugged where none of it is.
-SHORE_EVENTS = frozenset({"foreign_mission", "parameter", "order"}) | DRAWN
+SHORE_EVENTS = frozenset({"foreign_mission", "parameter", "order"}) | REDRAWN
 RADIO_EVENTS = frozenset({"intruder", "second_boat"})
 
 
@@ -136,7 +146,7 @@ async def run_embedded(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, on_status: OnStatus | None = None,
     expansions: int | None = EXPANSIONS, observer: Observer | None = None, worker_pace: float | None = None,
     variation: Variation | None = None,
-) -> Verdict:
+) -> ScenarioVerdict:
     """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json.
 
     With ``worker_pace`` (loop seconds per second, on a loop in real time that begins at 0) the planner is the real
@@ -163,7 +173,7 @@ async def run_embedded(
     )
     link = MemoryLink("companion", seed=seed)
     frame = mission.frame()
-    world = World(
+    world = SimulatedWorld(
         autopilot=autopilot, link=link, frame=frame, wind=wind, seed=seed, shore=MemoryLink("shore", seed=seed + 1),
         station=MemoryLink("station", seed=seed + 2), observer=observer,
         others=Others(frame, wind, seed, port=radio_port, hear=autopilot.hear_vessel))
@@ -177,7 +187,7 @@ async def run_embedded(
         side_tasks = [
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
             *([asyncio.create_task(world.satellite.run(), name="satellite")] if world.satellite is not None else []),
-            *(asyncio.create_task(happen(world, e), name=f"event {e.kind}") for e in scenario.events),
+            *(asyncio.create_task(inject(world, e), name=f"event {e.kind}") for e in scenario.events),
         ]
         await _sail_and_restart(world, scenario, mission, seed, folder, on_status, expansions, worker_pace, room)
         for task in side_tasks:
@@ -199,7 +209,7 @@ async def run_embedded(
 
 
 async def _sail_and_restart(
-    world: World, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_status: OnStatus | None,
+    world: SimulatedWorld, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_status: OnStatus | None,
     expansions: int | None, worker_pace: float | None, room: Callable[[Estimator], WindTracker] | None,
 ) -> None:
     """Run the companion; kill it where the scenario says, and start it again."""
@@ -231,7 +241,7 @@ async def _sail_and_restart(
             return
         born_s = now_s()
         # the planner's process lives and dies with the companion's
-        planner = world.planner = FragilePlanner() if worker_pace is None else MortalPlanner()
+        planner = world.planner = FaultyPlanner() if worker_pace is None else KillablePlanner()
         task = asyncio.create_task(
             _one_life(planner, sail(mission, world.heard_by(), planner, folder, replace(options, limit_s=left_s),
                                     on_status=look, guard=_guard_of(scenario.broken, seed))),
@@ -289,12 +299,12 @@ def _guard_of(broken: Sequence[Outlet], seed: int) -> Guard:
     return guard
 
 
-async def _one_life(planner: FragilePlanner | MortalPlanner, voyage: Coroutine[Any, Any, dict[str, Any]]) -> Any:
+async def _one_life(planner: FaultyPlanner | KillablePlanner, voyage: Coroutine[Any, Any, dict[str, Any]]) -> Any:
     async with planner:
         return await voyage
 
 
-def _collect_alerts(world: World, folder: Path) -> None:
+def _collect_alerts(world: SimulatedWorld, folder: Path) -> None:
     try:
         summary = json.loads((folder / "summary.json").read_bytes())
     except (OSError, ValueError):
@@ -303,7 +313,7 @@ def _collect_alerts(world: World, folder: Path) -> None:
         world.alerts[code] = world.alerts.get(code, 0) + count
 
 
-async def _watch_truth(world: World, frame: LocalFrame, limit_s: float) -> None:
+async def _watch_truth(world: SimulatedWorld, frame: LocalFrame, limit_s: float) -> None:
     # A day is watched once in four seconds: the judge looks between samples too, and its memory is bounded.
     every_s = max(TRUTH_EVERY_S, limit_s / MAX_TRUTH_SAMPLES)
     while True:

@@ -3,6 +3,10 @@
 The autopilot is the simulated one over UDP or the real ArduRover; the companion is ``companion run``, as on the
 boat. The judge is a third party on another link: it reads where the boat is, plays the operator and the fates,
 sails the other vessels, and never talks to the companion but as an AIS receiver or a radio would.
+
+By the kernel's own quota where that may be set (cgroup version 2 or 1, as root or in a folder that was handed to the
+user), else by stopping and continuing the processes in turn (SIGSTOP, SIGCONT), in slices of a tenth of a second. The
+quota is the better likeness: it counts what is really used, and stops nobody who is idle.
 """
 
 from __future__ import annotations
@@ -10,9 +14,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,24 +29,111 @@ from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
 from companion.telemetry.folder import DECISIONS, VERDICT
-from sitl.run.boats import Boat, RealBoat, SimulatedBoat
-from sitl.run.cpu_share import CpuShare, cpu_share
+from sitl.faults import LINK_EVENTS, Relay, break_vane, impair
+from sitl.run.boats import LiveBoat, RealBoat, SimulatedBoat
 from sitl.run.embedded import TRUTH_EVERY_S, ends_of, marks_of, solid_of
-from sitl.scene import (
+from sitl.scenario import (
     TRAFFIC,
     EventSpec,
     Motion,
     Others,
     Scenario,
-    Truth,
-    Verdict,
+    ScenarioVerdict,
+    TrueTrack,
     free_port,
     is_all_ordinary,
     judge,
     scenario_wind,
     tasks_of,
 )
-from sitl.trouble import LINK_EVENTS, Relay, befall, break_vane
+
+PERIOD_S = 0.1
+CGROUPS = Path("/sys/fs/cgroup")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CpuShare:
+    """A share of one core that processes can be put under.
+
+    Attributes:
+        share: Of one core, more than 0 and at most 1.
+        cgroup: The folder of the control group that bounds it; None: by stopping and continuing.
+
+    """
+
+    share: float
+    cgroup: Path | None
+
+    @property
+    def means(self) -> str:
+        """How it is bounded, in words."""
+        return "stopping and continuing" if self.cgroup is None else f"the quota of {self.cgroup}"
+
+    def enter(self) -> None:
+        """Put the calling process, and all that it starts, under the share: in a child, before its program begins."""
+        if self.cgroup is not None:
+            (self.cgroup / "cgroup.procs").write_text(str(os.getpid()))
+
+    async def hold(self, pid: int) -> None:
+        """Keep a process and its children within the share until they are gone; nothing to do under a quota."""
+        while self.cgroup is None and (family := family_of(pid)):
+            for number, pause_s in ((signal.SIGSTOP, 1.0 - self.share), (signal.SIGCONT, self.share)):
+                for member in family:
+                    with contextlib.suppress(ProcessLookupError):
+                        os.kill(member, number)
+                await asyncio.sleep(PERIOD_S * pause_s)
+
+
+def family_of(pid: int) -> list[int]:
+    """Return a process and its descendants, those that have ended left out."""
+    children: dict[int, list[int]] = {}
+    alive = set()
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError, ValueError):
+            state, parent = stat.read_text().rpartition(")")[2].split()[:2]
+            if state not in "ZX":
+                alive.add(int(stat.parent.name))
+                children.setdefault(int(parent), []).append(int(stat.parent.name))
+    family = [pid] if pid in alive else []
+    for member in family:
+        family += children.get(member, [])
+    return family
+
+
+@contextlib.asynccontextmanager
+async def cpu_share(share: float) -> AsyncIterator[CpuShare]:
+    """Make a share of a core, and take it away when all that was put under it has ended."""
+    folder = _quota(share)
+    try:
+        yield CpuShare(share=share, cgroup=folder)
+    finally:
+        if folder is not None:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+
+
+def _quota(share: float) -> Path | None:
+    """Return a new control group with the share as its quota, None where none may be made."""
+    period_us = int(PERIOD_S * 1e6)
+    quota_us = max(1000, int(share * period_us))
+    for parent, settings in (
+        (CGROUPS / "cpu", {"cpu.cfs_period_us": f"{period_us}", "cpu.cfs_quota_us": f"{quota_us}"}),
+        (CGROUPS, {"cpu.max": f"{quota_us} {period_us}"}),
+    ):
+        folder = parent / f"sitl-share-{os.getpid()}"
+        with contextlib.suppress(OSError):
+            folder.mkdir()
+            try:
+                for name, value in settings.items():
+                    if not (folder / name).exists():
+                        raise FileNotFoundError(name)
+                    (folder / name).write_text(value)
+            except OSError:
+                folder.rmdir()
+                raise
+            return folder
+    return None
+
 
 COMPANION_STOP_S = 20.0
 # What befalls the companion's process or its link, and what the wind is made of.
@@ -110,8 +203,8 @@ class _Companion:
 
 def run_live(
     scenario: Scenario, source: Path, seed: int, folder: Path, *, autopilot: str, program: Path | None,
-    speedup: float | None, truth: Truth | None = None, page: Sequence[str] = (), cpu: float | None = None,
-) -> Verdict:
+    speedup: float | None, truth: TrueTrack | None = None, page: Sequence[str] = (), cpu: float | None = None,
+) -> ScenarioVerdict:
     """Run ``scenario``; leaves a voyage folder with verdict.json. The judge's track is noted in ``truth``.
 
     ``page`` is what the companion is told of its live page. ``cpu`` is the share of one core, 0 to 1, that it and its
@@ -133,7 +226,7 @@ def run_live(
             f"{scenario.name}: {', '.join(unlike)} can be had of the embedded autopilot only; leave out "
             f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}")
     pace = speedup or scenario.speedup
-    track = Truth() if truth is None else truth
+    track = TrueTrack() if truth is None else truth
     try:
         return run(_run(scenario, source, seed, folder, autopilot, program, pace, track, page, cpu), speedup=pace)
     except asyncio.CancelledError:   # SIGTERM
@@ -142,8 +235,8 @@ def run_live(
 
 async def _run(
     scenario: Scenario, source: Path, seed: int, folder: Path, kind: str, program: Path | None, pace: float,
-    truth: Truth, page: Sequence[str], cpu: float | None,
-) -> Verdict:
+    truth: TrueTrack, page: Sequence[str], cpu: float | None,
+) -> ScenarioVerdict:
     mission_path = scenario.mission_path(source)
     mission = load_mission(mission_path)
     wind = scenario_wind(scenario, source, seed)
@@ -152,7 +245,7 @@ async def _run(
     port = free_port()
     others = Others(frame, wind, seed, port=port)
     async with contextlib.AsyncExitStack() as stack:
-        boat: Boat
+        boat: LiveBoat
         if kind == "ardurover":
             boat = await stack.enter_async_context(RealBoat.start(scenario, mission, wind, program, pace, folder))
         else:
@@ -206,7 +299,7 @@ async def _run(
     return verdict
 
 
-async def _watch(boat: Boat, frame: LocalFrame, truth: Truth, others: Others, began_s: float) -> None:
+async def _watch(boat: LiveBoat, frame: LocalFrame, truth: TrueTrack, others: Others, began_s: float) -> None:
     """Note where the boat is from the moment it sails, and how near the others come."""
     sails = False
     while True:
@@ -221,7 +314,7 @@ async def _watch(boat: Boat, frame: LocalFrame, truth: Truth, others: Others, be
 
 
 async def _event(
-    event: EventSpec, began_s: float, boat: Boat, frame: LocalFrame, companion: _Companion, others: Others,
+    event: EventSpec, began_s: float, boat: LiveBoat, frame: LocalFrame, companion: _Companion, others: Others,
     relay: Relay | None,
 ) -> None:
     """Play one event; wind events are in the wind."""
@@ -231,14 +324,14 @@ async def _event(
     elif event.kind == "kill_companion":
         await companion.kill(event.restart_after_s)
     elif event.kind in LINK_EVENTS and relay is not None:
-        await befall(relay.line, event)
+        await impair(relay.line, event)
     elif event.kind == "vane" and relay is not None:
         await break_vane(relay.vane.set, event)
     elif event.kind in boat.plays:
         await boat.play(event, frame)
 
 
-def _ours(boat: Boat, frame: LocalFrame) -> tuple[Motion, float]:
+def _ours(boat: LiveBoat, frame: LocalFrame) -> tuple[Motion, float]:
     fix = boat.fix()
     if fix is None:
         raise LinkError("where our boat is was not told yet")

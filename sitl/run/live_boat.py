@@ -16,7 +16,7 @@ from pathlib import Path
 from companion.clock import run
 from companion.geofence import load_mission
 from sitl.autopilot import EPOCH_S, Autopilot, AutopilotConfig, serve
-from sitl.scene import load_scenario, own_polar, recentre_m, scenario_departures, scenario_waters, scenario_wind
+from sitl.scenario import load_scenario, own_polar, recentre_m, scenario_departures, scenario_waters, scenario_wind
 
 
 def main() -> int:

@@ -16,7 +16,7 @@ from companion.geofence import Mission
 from companion.messages import WindForecast
 from companion.mission_check import require_sailable
 from companion.wind import Estimator, WindTracker
-from sitl.world import Wind
+from sitl.world import WindModel
 
 MEAN_S = 30.0       # [s] over which what will blow is averaged: a plan is of legs, not of puffs
 _MEAN_STEP_S = 2.0
@@ -47,7 +47,7 @@ class Foreknown(WindTracker):
     ``wind`` is counted from the zero of the clock that its readings are stamped with.
     """
 
-    def __init__(self, wind: Wind, estimator: Estimator) -> None:
+    def __init__(self, wind: WindModel, estimator: Estimator) -> None:
         super().__init__(estimator=estimator)
         self._wind = wind
 
@@ -80,7 +80,7 @@ class Variation:
     """Keys of the mission's tables that are other ones, and the wind room: of the wind and the mission's estimator."""
 
     tables: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    room: Callable[[Wind, Estimator], WindTracker] | None = None
+    room: Callable[[WindModel, Estimator], WindTracker] | None = None
 
     def mission(self, mission: Mission) -> Mission:
         """Return the mission so changed."""
@@ -89,12 +89,12 @@ class Variation:
         return replace(mission, options=msgspec.structs.replace(mission.options, **changes))
 
 
-def unspread(_: Wind, estimator: Estimator) -> WindTracker:
+def unspread(_: WindModel, estimator: Estimator) -> WindTracker:
     """Return the room without spread."""
     return Unspread(estimator=estimator)
 
 
-def foreknown(wind: Wind, estimator: Estimator) -> WindTracker:
+def foreknown(wind: WindModel, estimator: Estimator) -> WindTracker:
     """Return the room that knows what will blow."""
     return Foreknown(wind, estimator)
 

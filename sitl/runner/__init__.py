@@ -1,13 +1,39 @@
 """The runner: seeded jobs over processes or a Dask cluster, and the file in which each result stays as it comes."""
 
-from sitl.runner.cargo import Cargo, file_hash
-from sitl.runner.identity import MadeBy, made_by
-from sitl.runner.ledger import Held, Key, Ledger, read_results
-from sitl.runner.processes import WorkerDiedError, in_processes, settled
-from sitl.runner.sailing import Sailed, sail
-from sitl.runner.table import Table, joined, read_table, table_of, write_table
+from sitl.runner.campaign import CampaignResults, run_jobs
+from sitl.runner.executors import WorkerDiedError, in_processes, settled
+from sitl.runner.job import ScenarioBundle, file_hash
+from sitl.runner.result_store import (
+    Key,
+    MadeBy,
+    ResultStore,
+    StoredResults,
+    Table,
+    joined,
+    made_by,
+    read_results,
+    read_table,
+    table_of,
+    write_table,
+)
 
 __all__ = [
-    "Cargo", "Held", "Key", "Ledger", "MadeBy", "Sailed", "Table", "WorkerDiedError", "file_hash", "in_processes",
-    "joined", "made_by", "read_results", "read_table", "sail", "settled", "table_of", "write_table",
+    "CampaignResults",
+    "Key",
+    "MadeBy",
+    "ResultStore",
+    "ScenarioBundle",
+    "StoredResults",
+    "Table",
+    "WorkerDiedError",
+    "file_hash",
+    "in_processes",
+    "joined",
+    "made_by",
+    "read_results",
+    "read_table",
+    "run_jobs",
+    "settled",
+    "table_of",
+    "write_table",
 ]

@@ -34,8 +34,8 @@ from companion.mavlink.link import Link
 from companion.mavlink.transports import open_link
 from companion.messages import Command, MissionItem, Mode, VehicleState, WindSample, waypoint
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, Truth, serve
-from sitl.scene import station_score
-from sitl.tasks.wrsc2013 import LEAVE_WITHIN_S, ORIGIN, Score, broadcast, draw, score
+from sitl.scenario import station_score
+from sitl.tasks.wrsc2013 import LEAVE_WITHIN_S, ORIGIN, Wrsc2013Score, broadcast, draw, score
 from sitl.tasks.wrsc2013_skippers import HALF_M, FieldSkipper
 from sitl.world import AR1
 
@@ -190,7 +190,7 @@ def _weather(twd_from_rad: float, tws_mps: float, seed: int) -> AR1:
     return AR1(twd_from_rad, tws_mps, seed=seed, sd_rad=math.radians(9.0), tws_sd_mps=0.1 * tws_mps)
 
 
-def run_wrsc(seed: int, autopilot: str = "embedded", speedup: float = 8.0) -> Score:
+def run_wrsc(seed: int, autopilot: str = "embedded", speedup: float = 8.0) -> Wrsc2013Score:
     """Sail WRSC 2013 over MAVLink and score it."""
     course = draw(seed)
     course = replace(course, entry_s=60.0 + course.entry_s * (ENTRY_LIMIT_S - 60.0) / 2700.0)

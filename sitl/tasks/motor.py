@@ -47,7 +47,7 @@ HABITS = GuidanceSettings(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Score:
+class MotorScore:
     """What came of a run; distances [m] of the boat's middle."""
 
     seed: int
@@ -63,7 +63,7 @@ class Score:
         return self.marks == len(MARKS) and self.rock_m > 3.0 and self.intruder_m > 8.0 and self.sailed_upwind
 
 
-class Pilot:
+class MotorPilot:
     """The marks in turn by the guidance; the intruder appears when the third leg begins."""
 
     def __init__(self, seed: int, speed_mps: float) -> None:
@@ -115,12 +115,12 @@ class Pilot:
         return x + vx * (t_s - since), y + vy * (t_s - since)
 
 
-def _score(seed: int, pilot: Pilot, rows: Any) -> Score:
+def _score(seed: int, pilot: MotorPilot, rows: Any) -> MotorScore:
     """Score rows of (t, east, north, ...) [s, m]."""
     track = np.asarray(rows, dtype=np.float64)
     first = np.flatnonzero(np.hypot(track[:, 1] - MARKS[0][0], track[:, 2] - MARKS[0][1]) < REACHED_M + 1.0)
     upwind = track[:first[0] + 1] if first.size else track
-    return Score(
+    return MotorScore(
         seed=seed, marks=pilot.mark, time_s=float(track[-1, 0] - track[0, 0]),
         rock_m=min(ROCK.distance(Point(e, n)) for e, n in track[:, 1:3]),
         intruder_m=min(math.dist((e, n), pilot.intruder_at(t)) for t, e, n in track[:, :3]),
@@ -128,10 +128,10 @@ def _score(seed: int, pilot: Pilot, rows: Any) -> Score:
     )
 
 
-def run(seed: int) -> Score:
+def run(seed: int) -> MotorScore:
     """Run the model with two motors."""
     rng = np.random.default_rng((5, 2, seed, 1))
-    boat, pilot, rows, t = MotorBoat(), Pilot(seed, 2.0), [(0.0, 0.0, 0.0)], 0.0
+    boat, pilot, rows, t = MotorBoat(), MotorPilot(seed, 2.0), [(0.0, 0.0, 0.0)], 0.0
     while pilot.mark < len(MARKS) and t < LIMIT_S:
         noise = rng.normal(0.0, 0.7, 2)
         heading, _ = pilot.decide(Situation(
@@ -143,9 +143,9 @@ def run(seed: int) -> Score:
     return _score(seed, pilot, rows)
 
 
-def run_ardurover(seed: int, speedup: float = 8.0) -> Score:
+def run_ardurover(seed: int, speedup: float = 8.0) -> MotorScore:
     """Run ArduRover's motorboat in GUIDED, the wind from the first mark."""
-    pilot = Pilot(seed, 3.0)
+    pilot = MotorPilot(seed, 3.0)
 
     async def job(facade: Facade, truth: Callable[[], Truth]) -> Any:
         return await sail_guided(facade, truth, LocalFrame(ORIGIN), pilot.decide,

@@ -47,7 +47,7 @@ from companion.traffic.occupancy import Disc, Keep
 from companion.traffic.plans import MIN_INTERVAL_S, pressing
 from companion.traffic.predict import tail_factor
 from sitl.tasks.wrsc2013 import least_distance_m
-from sitl.tasks.wrsc2013_planner import target_of
+from sitl.tasks.wrsc2013_skippers import target_of
 from sitl.world import polar_at
 
 ORIGIN = GeoPoint(lat_deg=48.0, lon_deg=-6.0)
@@ -60,7 +60,7 @@ LIMIT_S = 5400.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ship:
+class TaskShip:
     """A ship on a straight course: where it is at t = 0, how it goes, how long it is."""
 
     en_m: tuple[float, float]
@@ -90,7 +90,7 @@ class Scene:
 
     name: str
     goal_en: tuple[float, float]
-    ships: tuple[Ship, ...]
+    ships: tuple[TaskShip, ...]
     twd_deg: float = 0.0
     tws_mps: float = 6.0
 
@@ -98,14 +98,14 @@ class Scene:
 def meeting(
     goal: tuple[float, float], share: float, course_deg: float, speed: float, own_mps: float, miss_m: float = 0.0,
     **more: float,
-) -> Ship:
+) -> TaskShip:
     """Return a ship that would meet a boat going straight to ``goal`` after ``share`` of the way."""
     x, y = goal[0] * share, goal[1] * share
     t = math.hypot(x, y) / own_mps
     c = math.radians(course_deg)
     east = x - t * speed * math.sin(c) + miss_m * math.cos(c)
     north = y - t * speed * math.cos(c) - miss_m * math.sin(c)
-    return Ship(en_m=(east, north), course_deg=course_deg, speed_mps=speed, **more)
+    return TaskShip(en_m=(east, north), course_deg=course_deg, speed_mps=speed, **more)
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -127,7 +127,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class ShipsOutcome:
     """What came of a voyage. Distances [m] between hulls; path distances between successive plans, one each replan."""
 
     scene: str
@@ -142,7 +142,7 @@ class Outcome:
     no_plan: int
 
 
-class Voyage:
+class ShipsVoyage:
     """One voyage among ships."""
 
     def __init__(self, scene: Scene, seed: int) -> None:
@@ -157,7 +157,7 @@ class Voyage:
         self._unsafe = self._none = 0
         self._pace = 1.0 + float(self._rng.normal(0.0, 0.05))
 
-    def sail(self) -> Outcome:
+    def sail(self) -> ShipsOutcome:
         """Sail to the goal or to the limit."""
         scene = self._scene
         least, t, arrived = math.inf, 0.0, False
@@ -174,7 +174,7 @@ class Voyage:
             t += STEP_S
             arrived = math.dist(self._en, scene.goal_en) < 40.0
         gaps = np.diff(self._planned)
-        return Outcome(
+        return ShipsOutcome(
             scene=scene.name, seed=self._seed, arrived=arrived, time_s=t, least_m=least, plans=len(self._planned),
             shortest_interval_s=float(gaps.min()) if len(gaps) else math.inf,
             path_distances_m=tuple(round(d) for d in self._distances), checks_unsafe=self._unsafe, no_plan=self._none,
@@ -276,7 +276,7 @@ def main(argv: list[str] | None = None) -> int:
     good = True
     for scene in scenes():
         for seed in range(args.seeds):
-            o = Voyage(scene, seed).sail()
+            o = ShipsVoyage(scene, seed).sail()
             good = good and o.arrived and o.least_m > 5.0 and o.shortest_interval_s >= 20.0
             if args.json:
                 sys.stdout.write(json.dumps(asdict(o)) + "\n")

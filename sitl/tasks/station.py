@@ -1,7 +1,7 @@
 """Station keeping on VAIMOS's model: by field, and by a plan, a short loop.
 
-The scores are in ``sitl.scene.scores``. Published: 9.4 m with a boat of 2.6 m, 3.61 lengths, is the best of WRSC 2018;
-mean radii of 2.1 to 8.4 m are those of 2019.
+The scores are in ``sitl.scenario.verdict``. Published: 9.4 m with a boat of 2.6 m, 3.61 lengths, is the best of
+WRSC 2018; mean radii of 2.1 to 8.4 m are those of 2019.
 
     python -m sitl.tasks.station --runs 20
     python -m sitl.tasks.station --runs 20 --method plan
@@ -21,8 +21,8 @@ from companion.field.controllers import line_following
 from companion.field.guidance import go_to, helm, step
 from companion.field.station import Station, StationState, keep
 from companion.field.values import GuidanceSettings, GuidanceState, Situation
-from sitl.scene import TASK_S, StationScore, station_score
-from sitl.world import LENGTH_M, Afloat, habits_for, wind_for
+from sitl.scenario import TASK_S, StationScore, station_score
+from sitl.world import LENGTH_M, SimulatedVaimos, habits_for, wind_for
 
 PLAN_HALF_M = 2.0     # the plan: to and fro between two waypoints this far from the station, across the wind
 PLAN_REACHED_M = 3.0
@@ -67,7 +67,8 @@ def run(seed: int, method: str = "field") -> tuple[NDArray[np.float64], StationS
     rng = np.random.default_rng((2018, seed))
     twd, tws = float(rng.uniform(0.0, 2.0 * math.pi)), float(rng.uniform(3.0, 8.0))
     off = float(rng.uniform(0.0, 2.0 * math.pi))
-    boat = Afloat.launch(wind_for(twd, tws, seed), rng, (45.0 * math.sin(off), 45.0 * math.cos(off)), twd + math.pi / 2)
+    at_en = 45.0 * math.sin(off), 45.0 * math.cos(off)
+    boat = SimulatedVaimos.launch(wind_for(twd, tws, seed), rng, at_en, twd + math.pi / 2)
     station, state, plan = Station(at_en=(0.0, 0.0)), StationState(), ByPlan()
     first: float | None = None
     while boat.t_s < 900.0 and (first is None or boat.t_s < first + TASK_S + 1.0):

@@ -23,11 +23,10 @@ from numpy.typing import NDArray
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
-from sitl.means import Means, add_options, means_of
-from sitl.runner import Sailed, sail
-from sitl.tasks.wrsc2013_planner import PlanSkipper
-from sitl.tasks.wrsc2013_skippers import HALF_M, FieldSkipper
-from sitl.world import LENGTH_M, Afloat, habits_for, summary, wind_for
+from sitl.options import CampaignOptions, add_options, options_of
+from sitl.runner import CampaignResults, run_jobs
+from sitl.tasks.wrsc2013_skippers import HALF_M, FieldSkipper, PlanSkipper
+from sitl.world import LENGTH_M, SimulatedVaimos, habits_for, summary, wind_for
 
 APPROACH_M = 5.0
 ENTRY_LIMIT_S = 2700.0
@@ -38,7 +37,7 @@ METHODS = ("field", "plan", "schmitt")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Course:
+class Wrsc2013Course:
     """The draw of one run: the wind and the intruder."""
 
     seed: int
@@ -65,7 +64,7 @@ class Course:
         return min(ends) / self.speed_mps
 
 
-def draw(seed: int) -> Course:
+def draw(seed: int) -> Wrsc2013Course:
     """Return the course of a seed: wind from anywhere at 3 to 10 m/s, an intruder from anywhere at 0.5 to 3 m/s.
 
     It passes through a point drawn in the middle quarter of the square, where a boat that stays must be near.
@@ -76,13 +75,13 @@ def draw(seed: int) -> Course:
     x, y = (float(v) for v in rng.uniform(-0.5 * HALF_M, 0.5 * HALF_M, 2))
     s, c = math.sin(heading), math.cos(heading)
     back = min((p + math.copysign(HALF_M, v)) / v for p, v in ((x, s), (y, c)) if abs(v) > 1e-9)
-    return Course(seed=seed, twd_from_rad=twd, tws_mps=tws, entry_s=float(rng.uniform(60.0, ENTRY_LIMIT_S)),
+    return Wrsc2013Course(seed=seed, twd_from_rad=twd, tws_mps=tws, entry_s=float(rng.uniform(60.0, ENTRY_LIMIT_S)),
                   heading_rad=heading, speed_mps=speed, through_en=(x, y), entry_en=(x - back * s, y - back * c))
 
 
 # ------------------------------------------------------------------------------------------- scorer
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Score:
+class Wrsc2013Score:
     """The task's four booleans and its figures; distances are between hulls' discs [m]."""
 
     seed: int
@@ -99,7 +98,7 @@ class Score:
         return self.stayed and self.left_in_time and self.kept_clear and self.crossed
 
 
-def score(track: NDArray[np.float64], intruder: NDArray[np.float64], *, seed: int = 0) -> Score:
+def score(track: NDArray[np.float64], intruder: NDArray[np.float64], *, seed: int = 0) -> Wrsc2013Score:
     """Score a run from two tracks on the same times.
 
     Args:
@@ -116,7 +115,7 @@ def score(track: NDArray[np.float64], intruder: NDArray[np.float64], *, seed: in
     left = np.flatnonzero(outside[entered:])
     left_after = float(t[entered + left[0]] - t[entered]) if left.size else None
     least = least_distance_m(p, intruder) - 0.5 * (LENGTH_M + INTRUDER_LENGTH_M)
-    return Score(
+    return Wrsc2013Score(
         seed=seed, stayed=stayed, left_in_time=left_after is not None and left_after <= LEAVE_WITHIN_S,
         kept_clear=least >= APPROACH_M, crossed=entered < len(t) and float(t[entered]) <= ENTRY_LIMIT_S,
         least_m=least, left_after_s=left_after,
@@ -135,7 +134,7 @@ def least_distance_m(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 
 
 # ---------------------------------------------------------------------------------------------- run
-def broadcast(course: Course, t_s: float, rng: np.random.Generator, frame: LocalFrame) -> bytes | None:
+def broadcast(course: Wrsc2013Course, t_s: float, rng: np.random.Generator, frame: LocalFrame) -> bytes | None:
     """Return the intruder's datagram of this second, with the noise of its GPS; one in twenty is lost."""
     if rng.random() < 0.05:
         return None
@@ -153,10 +152,10 @@ def broadcast(course: Course, t_s: float, rng: np.random.Generator, frame: Local
 class Run:
     """A run's tracks and score."""
 
-    course: Course
+    course: Wrsc2013Course
     track: NDArray[np.float64]
     intruder: NDArray[np.float64]
-    score: Score
+    score: Wrsc2013Score
     irons: int
     plans: int
     last_resort_s: float
@@ -167,7 +166,7 @@ def run(seed: int, method: str = "field") -> Run:
     course = draw(seed)
     rng = np.random.default_rng((2013, seed, 7))
     frame = LocalFrame(ORIGIN)
-    boat = Afloat.launch(wind_for(course.twd_from_rad, course.tws_mps, seed), rng, (0.0, 0.0),
+    boat = SimulatedVaimos.launch(wind_for(course.twd_from_rad, course.tws_mps, seed), rng, (0.0, 0.0),
                          course.twd_from_rad + math.pi / 2.0)
     skipper = (
         PlanSkipper(habits_for, frame, seed) if method == "plan"
@@ -203,10 +202,10 @@ def _one(job: tuple[int, str]) -> dict[str, Any]:
     return {k: (round(v, 2) if isinstance(v, float) else v) for k, v in out.items()}
 
 
-def campaign(seeds: Iterable[int], methods: Iterable[str], means: Means) -> Sailed:
+def campaign(seeds: Iterable[int], methods: Iterable[str], means: CampaignOptions) -> CampaignResults:
     """Sail each seed by each method."""
     jobs = [(seed, method) for method in methods for seed in seeds]
-    return sail("wrsc2013", _one, jobs, means, is_failed=lambda row: not row["complete"],
+    return run_jobs("wrsc2013", _one, jobs, means, is_failed=lambda row: not row["complete"],
                 key=lambda job: {"scenario": "wrsc2013", "method": job[1], "seed": job[0]})
 
 
@@ -240,7 +239,7 @@ def main(argv: list[str] | None = None) -> int:
     add_options(parser)
     args = parser.parse_args(argv)
     methods = METHODS if args.method == "all" else (args.method,)
-    sailed = campaign(range(args.first, args.first + args.runs), methods, means_of(args))
+    sailed = campaign(range(args.first, args.first + args.runs), methods, options_of(args))
     lines, tables = sailed.records, []
     for method in methods:
         rows = [row for row in lines if row["method"] == method]

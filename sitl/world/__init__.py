@@ -1,12 +1,43 @@
 """The world: wind, boats as physics, the air that radios share."""
 
-from sitl.world.afloat import LENGTH_M, Afloat, habits_for, polar_at, summary, wind_for
-from sitl.world.air import Air
-from sitl.world.motorboat import MotorBoat
-from sitl.world.waters import Gusty, Lee, Stream, Waters
-from sitl.world.wind import AR1, Constant, Event, Later, Process, Recorded, Scripted, Wind, parse_wind
+from sitl.world.boats import LENGTH_M, MotorBoat, SimulatedVaimos, habits_for, polar_at, summary, wind_for
+from sitl.world.environment import (
+    AR1,
+    Constant,
+    CurrentModel,
+    Gusty,
+    Later,
+    Lee,
+    Process,
+    Recorded,
+    Scripted,
+    Waters,
+    WindEvent,
+    WindModel,
+    parse_wind,
+)
+from sitl.world.radio_channel import RadioChannel
 
 __all__ = [
-    "AR1", "LENGTH_M", "Afloat", "Air", "Constant", "Event", "Gusty", "Later", "Lee", "MotorBoat", "Process",
-    "Recorded", "Scripted", "Stream", "Waters", "Wind", "habits_for", "parse_wind", "polar_at", "summary", "wind_for",
+    "AR1",
+    "LENGTH_M",
+    "Constant",
+    "CurrentModel",
+    "Gusty",
+    "Later",
+    "Lee",
+    "MotorBoat",
+    "Process",
+    "RadioChannel",
+    "Recorded",
+    "Scripted",
+    "SimulatedVaimos",
+    "Waters",
+    "WindEvent",
+    "WindModel",
+    "habits_for",
+    "parse_wind",
+    "polar_at",
+    "summary",
+    "wind_for",
 ]

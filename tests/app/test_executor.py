@@ -17,7 +17,7 @@ from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import CommandResult, UploadResult
 from sitl.autopilot import HOME, AutopilotConfig, Impairment, MemoryLink, serve
 from sitl.autopilot import Autopilot as SimulatedAutopilot
-from sitl.world.wind import Constant
+from sitl.world.environment import Constant
 
 ITEMS = tuple(waypoint(GeoPoint(lat_deg=HOME.lat_deg + 0.001 * n, lon_deg=HOME.lon_deg)) for n in range(1, 31))
 CONFIG = SkipperConfig()

@@ -34,8 +34,8 @@ from companion.telemetry.state_file import StateFile
 from companion.traffic.feeds import Feeds
 from companion.view import ViewFold
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.scene.ships import free_port
-from sitl.world.wind import Constant
+from sitl.scenario.traffic import free_port
+from sitl.world.environment import Constant
 
 # When everything beside the voyage is broken [s]: from before its start, and again under way.
 WINDOWS = ((0.0, 12.0), (80.0, 95.0))

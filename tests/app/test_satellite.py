@@ -30,7 +30,7 @@ from companion.orders.far import (
 from companion.skipper.step import Acknowledge
 from companion.skipper.step.state import SkipperState, VoyageState
 from sitl.autopilot import MemoryLink
-from sitl.trouble.sick_disk import SickDisk
+from sitl.faults.computer_faults import FaultyDisk
 from tests.orders.far import by_the_page
 
 KEY = FarKey(bytes(range(32)), 1)
@@ -161,7 +161,7 @@ def test_what_is_no_order_is_removed_and_said_once_and_what_is_not_whole_is_left
 
 
 def test_a_disk_that_keeps_nothing_does_not_stop_an_order(tmp_path):
-    disk = SickDisk()
+    disk = FaultyDisk()
     voyage = Voyage(tmp_path, disk=disk)
 
     def fill():

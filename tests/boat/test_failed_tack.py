@@ -12,12 +12,11 @@ from hypothesis import strategies as st
 from companion.boat.boat import coefficient_of
 from companion.boat.failed_tack import AGAIN_SHARE, SET_SHARE, failed_tack, lee_set
 from sitl.autopilot.boat import kernel as k
-from sitl.autopilot.boat.departed import IRONS_RAD, side_mps
+from sitl.autopilot.boat.kernel import IRONS_RAD, side_mps
 from sitl.autopilot.boat.parameters import Parameters
-from sitl.autopilot.boat.surroundings import Surroundings
-from sitl.autopilot.boat.vehicle import Vehicle
-from sitl.autopilot.departures import Departures
-from sitl.world.wind import Constant
+from sitl.autopilot.boat.vehicle import Surroundings, Vehicle
+from sitl.autopilot.config import Departures
+from sitl.world.environment import Constant
 
 HALF = math.radians(50.0)
 

@@ -16,7 +16,7 @@ from companion.plots.chart import save
 from sitl import cli as sitl_cli
 from sitl.run import compiled
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import ExpectSpec, Scenario, WindSpec
+from sitl.scenario.scenario import ExpectSpec, Scenario, WindSpec
 
 ROOT = Path(__file__).parents[2]
 PROBLEM = ROOT / "bench" / "problems"

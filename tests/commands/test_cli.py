@@ -14,7 +14,7 @@ import pytest
 from companion import cli
 from companion.program import control
 from sitl import cli as sitl_cli
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 
 GOOD = Path("missions/archipelago.toml").read_text()
 

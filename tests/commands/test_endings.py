@@ -17,8 +17,8 @@ from companion.commands.run import Ending
 from companion.geofence import load_mission
 from companion.program.arguments import absent_device
 from sitl.autopilot import MemoryLink
-from sitl.scene.ships import free_port
-from sitl.trouble.fragile import FragilePlanner
+from sitl.faults.computer_faults import FaultyPlanner
+from sitl.scenario.traffic import free_port
 
 MISSION = 'name = "a"\n[[goal]]\nlat = 50.817\nlon = -1.3085\nradius_m = 10.0\n'
 HERE = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -32,7 +32,7 @@ def test_a_voyage_that_hears_nobody_is_stopped_when_it_is_asked(tmp_path):
         stop = asyncio.Event()
         asyncio.get_running_loop().call_later(3.3, stop.set)
         options = SailOptions(epoch_s=1.78e9, offload=at_once, is_durable=False, wait_s=30.0)
-        told = await sail(load_mission(tmp_path / "a.toml"), MemoryLink("nobody", seed=1).near, FragilePlanner(),
+        told = await sail(load_mission(tmp_path / "a.toml"), MemoryLink("nobody", seed=1).near, FaultyPlanner(),
                           tmp_path / "v", options, stop=stop)
         return told, now_s()
 

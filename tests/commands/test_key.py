@@ -20,8 +20,8 @@ from companion.mavlink.link import Link
 from companion.mavlink.signing import SigningStore, make_key, read_key
 from sitl.autopilot import Autopilot as Boat
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
-from sitl.scene.ships import free_port
-from sitl.world.wind import Constant
+from sitl.scenario.traffic import free_port
+from sitl.world.environment import Constant
 
 NOW_S = 1_780_000_000.0
 

@@ -31,9 +31,9 @@ from companion.skipper.step.config import Permissions
 from companion.skipper.watch.watchdogs import TABLE
 from companion.skipper.way.gates import gates_of
 from sitl import cli as sitl_cli
-from sitl import means
-from sitl.scene.scenario import load_scenario
-from sitl.scene.ships import free_port
+from sitl import options
+from sitl.scenario.scenario import load_scenario
+from sitl.scenario.traffic import free_port
 
 # One mission that has every table; the keys are given other values one by one.
 MISSION = """
@@ -277,7 +277,7 @@ def test_what_only_previews_use_changes_the_picture(tmp_path, capsys):
 
 def test_the_starts_heading_is_that_of_a_simulated_boat(tmp_path):
     from sitl.run.boats import heading_deg_of
-    from sitl.scene.scenario import Scenario
+    from sitl.scenario.scenario import Scenario
 
     folder_with(tmp_path)
     scenario = Scenario(name="s", mission="m.toml")
@@ -327,7 +327,7 @@ def read_names(package):
     """
     names = set()
     paths = [*Path(inspect.getfile(package)).parent.rglob("*.py")]
-    for path in paths if package.__name__ == "companion.commands" else [*paths, Path(inspect.getfile(means))]:
+    for path in paths if package.__name__ == "companion.commands" else [*paths, Path(inspect.getfile(options))]:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):
                 names.add(node.attr)

@@ -12,7 +12,7 @@ from companion import cli
 from companion.mavlink import vehicle_identity
 from companion.mavlink.wire.codec import status_texts
 from companion.mavlink.wire.frames import Codec
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 
 BEAT = wire.MAVLink_heartbeat_message(
     wire.MAV_TYPE_SURFACE_BOAT, wire.MAV_AUTOPILOT_ARDUPILOTMEGA, wire.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, 0,

@@ -14,7 +14,7 @@ from companion.geofence import read
 from sitl.ardurover.program import find
 from sitl.ardurover.simulation import ArduRover
 from sitl.autopilot import HOME
-from sitl.world.wind import Constant
+from sitl.world.environment import Constant
 from tests.sitl.boats import boat_process
 
 PACE = 20

@@ -11,7 +11,7 @@ import pytest
 
 from companion.kernels.build import is_ready, prepare
 from companion.telemetry.folder.recorder import read_jsonl
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 
 PACE = 20
 MOST_MB = 160.0

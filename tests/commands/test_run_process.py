@@ -15,7 +15,7 @@ import pytest
 
 from companion.disk import Disk
 from companion.telemetry.folder.recorder import read_jsonl
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 
 PACE = 20
 MISSION = """

@@ -11,7 +11,7 @@ from companion.geofence import load_mission
 from companion.mission_check import require_sailable
 from sitl.commands import run as sitl_run
 from sitl.run.embedded import permitted
-from sitl.scene.scenario import load_scenario
+from sitl.scenario.scenario import load_scenario
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 SCENARIOS = sorted((Path(sitl_run.__file__).parents[1] / "scenarios").glob("*.toml"))

@@ -17,7 +17,7 @@ from companion import cli
 from companion.commands import setup
 from companion.errors import LinkError
 from companion.geofence import load_mission
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 
 HERE = ["--start", "50.817,-1.31", "--goal", "50.8188,-1.3085"]
 

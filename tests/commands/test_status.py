@@ -12,7 +12,7 @@ from companion.mavlink import vehicle_identity
 from companion.mavlink.wire.companion_status import status_messages
 from companion.mavlink.wire.frames import Codec
 from companion.messages import CompanionStatus
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 
 MANUAL, DISARMED, STANDBY = 0, wire.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, wire.MAV_STATE_STANDBY
 

@@ -17,9 +17,9 @@ from companion.geofence import load_mission
 from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, SigningStore
 from companion.messages import GeoPoint, MissionItem
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.autopilot.links.memory import frames
-from sitl.trouble.signer import Signer
-from sitl.world.wind import parse_wind
+from sitl.autopilot.memory_link import frames
+from sitl.faults.spoofing import Signer
+from sitl.world.environment import parse_wind
 from tests.sitl.boats import boat_process
 
 # ArduRover's sailboat as `sim_vehicle.py -f sailboat` starts it.

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.field.controllers import line_following, motor_commands, rudder_for, sail_for
-from sitl.world.vaimos import STEP_S, VaimosParameters, state_at, step
+from sitl.world.boats import STEP_S, VaimosParameters, state_at, step
 
 angle = st.floats(-math.pi, math.pi)
 PARAMETERS = VaimosParameters().array()

@@ -14,8 +14,8 @@ from companion.field.guidance import LastResort, follow_line, go_to, helm, hold_
 from companion.field.look_ahead import foresee, margins
 from companion.field.values import GuidanceSettings, GuidanceState, Intent, Manoeuvre, MovingObstacle, Situation
 from companion.geo.angles import wrap_pi
-from sitl.world.afloat import Afloat, habits_for, wind_for
-from sitl.world.wind import AR1
+from sitl.world.boats import SimulatedVaimos, habits_for, wind_for
+from sitl.world.environment import AR1
 
 angle = st.floats(-math.pi, math.pi)
 HABITS = GuidanceSettings()
@@ -82,7 +82,7 @@ def test_out_of_irons_on_the_boat_model(tws: float) -> None:
     times = []
     for seed in range(4):
         wind = wind_for(0.0, tws, seed)
-        boat = Afloat.launch(wind, np.random.default_rng(seed), (0.0, 0.0), wind.at(0.0)[0])
+        boat = SimulatedVaimos.launch(wind, np.random.default_rng(seed), (0.0, 0.0), wind.at(0.0)[0])
         boat.state[5] = 0.0
         state = GuidanceState()
         while boat.t_s < 200.0:
@@ -98,7 +98,7 @@ def test_out_of_irons_on_the_boat_model(tws: float) -> None:
 
 def test_without_the_recovery_she_stays_in_irons_for_long() -> None:
     """The danger is real in the model: asking for a reach from a standstill head to wind does not soon get her out."""
-    boat = Afloat.launch(AR1(0.0, 5.0, seed=1, sd_rad=0.0), np.random.default_rng(1), (0.0, 0.0), 0.0)
+    boat = SimulatedVaimos.launch(AR1(0.0, 5.0, seed=1, sd_rad=0.0), np.random.default_rng(1), (0.0, 0.0), 0.0)
     boat.state[5] = 0.0
     for _ in range(20):
         boat.sail(math.radians(90.0))
@@ -122,9 +122,9 @@ def test_margins_are_the_least_sampled_ones(x: float, y: float, vx: float, vy: f
 
 def sail(
     intent: Intent, habits: GuidanceSettings, obstacle: MovingObstacle | None, seconds: int
-) -> tuple[Afloat, float, int]:
+) -> tuple[SimulatedVaimos, float, int]:
     """Sail the model by the guidance; return the boat, the least distance and the tacks' count of irons."""
-    boat = Afloat.launch(wind_for(0.0, 6.0, 3), np.random.default_rng(3), (0.0, -150.0), math.radians(60.0))
+    boat = SimulatedVaimos.launch(wind_for(0.0, 6.0, 3), np.random.default_rng(3), (0.0, -150.0), math.radians(60.0))
     state, least = GuidanceState(), math.inf
     for k in range(seconds):
         moved = () if obstacle is None else (replace(obstacle, en_m=(

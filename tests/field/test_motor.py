@@ -12,7 +12,7 @@ from companion.field.controllers import motor_commands
 from companion.geo.angles import wrap_pi
 from sitl.ardurover.program import find
 from sitl.tasks.motor import HABITS, run, run_ardurover
-from sitl.world.motorboat import MotorBoat
+from sitl.world.boats import MotorBoat
 
 
 def test_both_motors_at_one_half_go_straight_at_two_metres_a_second() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.world.vaimos import STEP_S, VaimosParameters, polar, sail_heading, state_at, step
+from sitl.world.boats import STEP_S, VaimosParameters, polar, sail_heading, state_at, step
 
 P = VaimosParameters().array()
 

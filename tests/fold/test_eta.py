@@ -11,7 +11,7 @@ from companion.eta import PRIOR_PACE, TRIED_S, PaceTrial
 from companion.messages import Mode
 from companion.skipper.step import Announce
 from sitl.run.embedded import run_embedded
-from sitl.scene import load_scenario
+from sitl.scenario import load_scenario
 from tests.skipper.world import with_parts
 
 DEMO = Path("sitl/scenarios/demo.toml")

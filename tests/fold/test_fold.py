@@ -29,7 +29,7 @@ from companion.wind import WindTracker
 from companion.wind.parameters import VaneParameters
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, serve
-from sitl.world.wind import Constant
+from sitl.world.environment import Constant
 from tests.skipper.world import with_parts
 
 DEMO = "missions/archipelago.toml"

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import companion.cli
-from sitl.scene import free_port
+from sitl.scenario import free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "packaging/blueos"

@@ -15,7 +15,7 @@ from companion.kernels import places
 from companion.kernels.build import Progress, is_ready, prepare
 from companion.kernels.carry import carry
 from companion.kernels.listed import as_text, read_list
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 
 ALL = ("companion", "sitl")
 # What is compiled while a program does all that a voyage asks for.

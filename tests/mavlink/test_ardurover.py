@@ -18,8 +18,8 @@ from sitl.ardurover.program import find
 from sitl.ardurover.simulation import ArduRover
 from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Autopilot as SimulatedAutopilot
-from sitl.autopilot.links.memory import frames
-from sitl.world.wind import Constant
+from sitl.autopilot.memory_link import frames
+from sitl.world.environment import Constant
 
 PROGRAM = find()
 SPEEDUP = 10.0

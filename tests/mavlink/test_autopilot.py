@@ -18,8 +18,8 @@ from companion.mavlink.wire.items import canonical, mission_hash, sailed
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
-from sitl.autopilot.links.memory import Impairment
-from sitl.world.wind import Constant
+from sitl.autopilot.memory_link import Impairment
+from sitl.world.environment import Constant
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
 

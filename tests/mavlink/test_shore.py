@@ -11,7 +11,7 @@ from companion.mavlink.reception import SHORE, LinkIdentity
 from companion.messages import Mode
 from sitl.autopilot import Autopilot as Boat
 from sitl.autopilot import AutopilotConfig, MemoryLink, serve
-from sitl.world.wind import Constant
+from sitl.world.environment import Constant
 from tests.mavlink.test_autopilot import mission, set_sail
 
 

@@ -10,7 +10,7 @@ import time
 import urllib.error
 import urllib.request
 
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 
 PROGRAM = os.environ.get("SIGNALK_SERVER") or shutil.which("signalk-server")
 MISSING = ("no Signal K server: `npm install --prefix DIR signalk-server`, and set $SIGNALK_SERVER to "

@@ -21,7 +21,7 @@ from companion.outputs.nmea import MOST_CLIENTS
 from companion.outputs.outlet import Slot
 from companion.outputs.outputs import read_token
 from companion.view.values import AlarmView
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 from tests.outputs.conftest import chosen, view_of
 
 STEP_S = 0.02

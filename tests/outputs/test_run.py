@@ -12,8 +12,8 @@ from companion.compose import displays_of
 from companion.geofence import load_mission
 from companion.mission_check import require_sailable
 from sitl.run.live import run_live
-from sitl.scene import Truth, load_scenario
-from sitl.scene.ships import free_port
+from sitl.scenario import TrueTrack, load_scenario
+from sitl.scenario.traffic import free_port
 from tests.outputs.signalk_server import MISSING, PROGRAM, Server
 
 MISSION = """
@@ -135,7 +135,7 @@ def test_a_voyage_is_told_to_a_real_signal_k_server(tmp_path):
             'name = "s"\nmission = "m.toml"\nlimit_s = 90.0\nspeedup = 8.0\n[wind]\nmodel = "ou"\nfrom_deg = 0.0\n'
             'tws_mps = 5.0\nsd_deg = 9.0\ntau_s = 28.0\n')
         run_live(load_scenario(tmp_path / "s.toml"), tmp_path / "s.toml", 0, tmp_path / "v", autopilot="embedded",
-                 program=None, speedup=None, truth=Truth())
+                 program=None, speedup=None, truth=TrueTrack())
         told = {path: server.get(path) for path in (
             "navigation.position", "navigation.speedOverGround", "navigation.state", "environment.wind.directionTrue",
             "environment.wind.angleApparent", "navigation.courseGreatCircle.nextPoint.distance",

@@ -8,7 +8,7 @@ import pytest
 
 from companion.outputs import Outputs
 from companion.view.values import AlarmView
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 from tests.outputs.conftest import chosen, view_of
 from tests.outputs.signalk_server import MISSING, PROGRAM, Server
 

@@ -3,7 +3,7 @@
 import pytest
 
 from companion.commands.view import read_record
-from sitl.scene.scenario import EventSpec
+from sitl.scenario.scenario import EventSpec
 from tests.view.conftest import sail
 
 

@@ -12,7 +12,7 @@ from companion import cli
 from companion.page import read_token
 from sitl import cli as sitl_cli
 from sitl.commands.run import page_words
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 from tests.view.conftest import write_mission
 
 

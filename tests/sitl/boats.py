@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.clock import now_s, run_virtual
 from companion.geo.frame import LocalFrame
 from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.world.wind import Constant, Wind
+from sitl.world.environment import Constant, WindModel
 
 FRAME = LocalFrame(HOME)
 
@@ -160,7 +160,7 @@ class Client:
 
 
 def sail(
-    job: Callable[[Client], Awaitable[Any]], *, wind: Wind | None = None, seed: int = 1, is_warm: bool = True,
+    job: Callable[[Client], Awaitable[Any]], *, wind: WindModel | None = None, seed: int = 1, is_warm: bool = True,
     is_moored: bool = False, has_motor: bool = False, heading_deg: float = 0.0, **parameters: float,
 ) -> Any:
     """Run ``job`` with a client of a boat, under the virtual clock."""

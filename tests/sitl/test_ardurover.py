@@ -17,7 +17,7 @@ from companion.mavlink.transports import open_link
 from sitl.ardurover.program import check, fetch, find
 from sitl.ardurover.simulation import ArduRover, free_instance
 from sitl.autopilot import HOME
-from sitl.world.wind import Constant, Event, Scripted
+from sitl.world.environment import Constant, Scripted, WindEvent
 from tests.sitl.boats import Client, sail
 
 PROGRAM = find()
@@ -101,7 +101,7 @@ def test_the_same_internal_error_on_the_real_one(mark: None, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("mark", [pytest.param(None, marks=needs_program)])
 def test_wind_follows_and_two_boats_side_by_side(mark: None) -> None:
-    wind = Scripted(Constant(1.0, 4.0), (Event(at_s=30.0, veer_rad=1.0),))
+    wind = Scripted(Constant(1.0, 4.0), (WindEvent(at_s=30.0, veer_rad=1.0),))
 
     async def main() -> None:
         first = free_instance()

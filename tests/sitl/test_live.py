@@ -21,15 +21,13 @@ from companion.messages import GeoPoint
 from companion.traffic.feeds import open_feed
 from companion.traffic.nmea import NmeaDecoder
 from sitl.ardurover.program import find
-from sitl.autopilot import VaneFault, VaneState, Vessel
+from sitl.autopilot import AisVessel, VaneFault, VaneState
+from sitl.faults.link_faults import FaultyVane, Relay, impair
 from sitl.run.live import run_live
-from sitl.scene.others import Others, sentences
-from sitl.scene.scenario import EventSpec, load_scenario
-from sitl.scene.ships import distance_m, free_port, ship_of
-from sitl.scene.verdict import Truth
-from sitl.trouble.false_vane import FalseVane
-from sitl.trouble.relay import Relay, befall
-from sitl.world.wind import Constant
+from sitl.scenario.scenario import EventSpec, load_scenario
+from sitl.scenario.traffic import Others, distance_m, free_port, sentences, ship_of
+from sitl.scenario.verdict import TrueTrack
+from sitl.world.environment import Constant
 
 ORIGIN = GeoPoint(lat_deg=50.817, lon_deg=-1.31)
 FRAME = LocalFrame(ORIGIN)
@@ -41,7 +39,7 @@ FRAME = LocalFrame(ORIGIN)
     mmsi=st.integers(200_000_000, 799_999_999),
 )
 def test_a_receivers_sentence_says_where_the_ship_is(lat, lon, course, speed, mmsi):
-    vessel = Vessel(mmsi=mmsi, position=GeoPoint(lat_deg=lat, lon_deg=lon), cog_deg=course, sog_mps=speed,
+    vessel = AisVessel(mmsi=mmsi, position=GeoPoint(lat_deg=lat, lon_deg=lon), cog_deg=course, sog_mps=speed,
                     heading_deg=course, nav_status=0)
     report = NmeaDecoder().feed(sentences(vessel).strip(), 1.0)
     assert report.mmsi == mmsi
@@ -68,7 +66,7 @@ def test_a_vane_broken_on_the_link_says_what_a_broken_one_would(twd_deg, yaw, no
     at_rest = mav.MAVLink_global_position_int_message(0, 0, 0, 0, 0, 0, 0, 0, 0)
     way = mav.MAVLink_global_position_int_message(0, 0, 0, 0, 0, round(100 * north), round(100 * east), 0, 0)
     wind = mav.MAVLink_wind_message(twd_deg, speed, 0.0)
-    vane = FalseVane(seed=0)
+    vane = FaultyVane(seed=0)
     frame, _ = passed(vane, attitude(yaw), way, wind)
     assert frame[9:-2] == bytes(wind.pack(mav.MAVLink(None, srcSystem=1, srcComponent=1)))[9:-2]   # untouched
     vane.set(VaneFault(state=VaneState.FROZEN))
@@ -87,7 +85,7 @@ def test_a_vane_broken_on_the_link_says_what_a_broken_one_would(twd_deg, yaw, no
 
 async def heard_for(seconds, event, began_s):
     """Play ``event`` and return what a companion's feed hears, and the judge's truth."""
-    port, reports, truth = free_port(), [], Truth()
+    port, reports, truth = free_port(), [], TrueTrack()
     others = Others(FRAME, Constant(0.0, 5.0), 0, port=port)
     async with open_feed(f"udpin:127.0.0.1:{port}", reports.append):
         playing = asyncio.create_task(others.play(event, began_s, lambda: (((0.0, 0.0), (0.0, 0.0)), 0.0)))
@@ -153,7 +151,7 @@ def test_a_relay_carries_both_ways_and_its_link_is_cut_for_a_while():
             await asyncio.sleep(0.1)
             companion.write(frame(3))
             await asyncio.sleep(0.1)
-            cut = asyncio.create_task(befall(relay.line, EventSpec(at_s=0.0, kind="link_cut", for_s=0.3)))
+            cut = asyncio.create_task(impair(relay.line, EventSpec(at_s=0.0, kind="link_cut", for_s=0.3)))
             await asyncio.sleep(0.1)
             for end in (boat, companion):
                 end.write(frame(4))

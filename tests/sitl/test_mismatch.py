@@ -11,8 +11,8 @@ from companion.errors import InputError, JobError
 from sitl.run.boats import RealBoat, SimulatedBoat
 from sitl.run.embedded import run_embedded
 from sitl.run.live import run_live
-from sitl.scene import load_scenario, scenario_departures, scenario_waters, scenario_wind
-from sitl.scene.mismatch import CurrentSpec, HullSpec, LeeSpec, SensorsSpec, WavesSpec
+from sitl.scenario import load_scenario, scenario_departures, scenario_waters, scenario_wind
+from sitl.scenario.scenario import CurrentSpec, HullSpec, LeeSpec, SensorsSpec, WavesSpec
 
 OTHER = Path("sitl/scenarios/other-boat.toml")
 BOTH = Path("sitl/scenarios/tide-and-lee.toml")

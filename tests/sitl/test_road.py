@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from companion.traffic import Role, classify, cpa
-from sitl.scene import encounter, mariner, road
-from sitl.scene.encounter import Met, judge_encounter
-from sitl.scene.mariner import Mariner, met_by
-from sitl.scene.road import SHIP_TYPE, STATUS, Mover, closest, duty
+from sitl.scenario import colregs
+from sitl.scenario.colregs import SHIP_TYPE, STATUS, Mariner, Met, Mover, closest, duty, judge_encounter, met_by
 from tests.traffic.conftest import own, vessel
 
 CRAFTS = tuple(STATUS)
@@ -23,7 +21,7 @@ def mover(en, course_deg, speed_mps=3.0, craft="power"):
     return Mover(en_m=en, course_rad=c, heading_rad=c, speed_mps=speed_mps, craft=craft)
 
 
-@pytest.mark.parametrize("module", [road, encounter, mariner])
+@pytest.mark.parametrize("module", [colregs])
 def test_the_judge_knows_nothing_of_the_companions_rules(module):
     names = [n.module for n in ast.walk(ast.parse(Path(module.__file__).read_text())) if isinstance(n, ast.ImportFrom)]
     assert not [n for n in names if n.startswith("companion")]
@@ -63,7 +61,7 @@ def test_the_companion_and_the_judge_agree_on_situations_drawn():
                                speed := rng.uniform(1, 8), rng.uniform(60, 200), rng.uniform(-10, 10))
         hers = mover(place, math.degrees(course), speed, rng.choice(CRAFTS))
         if closest(ours, hers)[1] < 1.0 or any(
-                abs(abs(road.bearing_off_bow_deg(a, b)) - limit) < 3.0
+                abs(abs(colregs.bearing_off_bow_deg(a, b)) - limit) < 3.0
                 for a, b in ((ours, hers), (hers, ours)) for limit in (0.0, 6.0, 12.0, 112.5, 180.0)):
             continue
         if any(abs(math.sin(m.heading_rad)) < math.sin(math.radians(13.0)) for m in (ours, hers)):

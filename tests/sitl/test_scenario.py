@@ -9,9 +9,8 @@ import pytest
 
 from companion.errors import InputError
 from sitl.autopilot import EPOCH_S
-from sitl.scene.scenario import beginning, load_scenario
-from sitl.scene.ships import PORTS, free_port
-from sitl.scene.weather import scenario_wind
+from sitl.scenario.scenario import beginning, load_scenario, scenario_wind
+from sitl.scenario.traffic import PORTS, free_port
 
 OURS = sorted(Path("sitl/scenarios").glob("*.toml"))
 
@@ -62,7 +61,7 @@ def test_a_free_port_is_nobodys_of_udp_and_of_tcp_and_none_that_the_system_gives
     taken, numbers = free_port(), count(free_port() - PORTS.start)
     for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):
         drawn = chain([taken - PORTS.start], numbers)
-        monkeypatch.setattr("sitl.scene.ships.secrets.randbelow", lambda among, drawn=drawn: next(drawn) % among)
+        monkeypatch.setattr("sitl.scenario.traffic.secrets.randbelow", lambda among, drawn=drawn: next(drawn) % among)
         with socket.socket(socket.AF_INET, kind) as other:
             other.bind(("127.0.0.1", taken))
             assert free_port() != taken

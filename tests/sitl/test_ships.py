@@ -2,14 +2,14 @@
 
 import pytest
 
-from sitl.tasks.ships import Voyage, scenes
+from sitl.tasks.ships import ShipsVoyage, scenes
 
 APART_M = 300.0     # of the next five minutes of a path and of the unsafe one before it; a straight way is 3 km
 
 
 @pytest.mark.parametrize("seed", [1])
 def test_four_ships_at_once(seed):
-    o = Voyage(scenes()[0], seed).sail()
+    o = ShipsVoyage(scenes()[0], seed).sail()
     assert o.arrived
     assert o.least_m > 50.0
     assert o.shortest_interval_s >= 20.0
@@ -21,7 +21,7 @@ def test_four_ships_at_once(seed):
 @pytest.mark.campaign
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_a_ship_ten_times_faster_is_kept_clear_of(number):
-    o = Voyage(scenes()[number], 0).sail()
+    o = ShipsVoyage(scenes()[number], 0).sail()
     assert o.arrived
     assert o.least_m > 50.0
     assert o.shortest_interval_s >= 20.0

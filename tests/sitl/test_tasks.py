@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import shapely
 
-from sitl.scene.scenario import ExpectSpec
-from sitl.scene.tasks import Pair, Tasks, count_gates, crossings, findings, share_seen, shares_inside
+from sitl.scenario.scenario import ExpectSpec
+from sitl.scenario.tasks import GateLine, Tasks, count_gates, crossings, findings, share_seen, shares_inside
 
-NORTHWARD = Pair(port_en_m=(-10.0, 50.0), starboard_en_m=(10.0, 50.0))
-SOUTHWARD = Pair(port_en_m=(50.0, 20.0), starboard_en_m=(30.0, 20.0))
+NORTHWARD = GateLine(port_en_m=(-10.0, 50.0), starboard_en_m=(10.0, 50.0))
+SOUTHWARD = GateLine(port_en_m=(50.0, 20.0), starboard_en_m=(30.0, 20.0))
 
 
 def track(*points):
@@ -34,7 +34,7 @@ def test_beside_the_marks_and_up_to_the_line_is_not_through_it():
 
 @pytest.mark.parametrize(("after_s", "passed"), [(5.0, [True, True]), (30.0, [False, False]), (1.0, [False, True])])
 def test_a_start_is_after_the_gun_and_soon(after_s, passed):
-    start = Pair(port_en_m=(-10.0, 50.0), starboard_en_m=(10.0, 50.0), after_s=after_s)
+    start = GateLine(port_en_m=(-10.0, 50.0), starboard_en_m=(10.0, 50.0), after_s=after_s)
     way = track((0.0, 0.0), (0.0, 70.0))
     t_s = [100.0 + 0.25 * n for n in range(len(way))]   # crossed after about 7 s
     found = list(findings(ExpectSpec(start_within_s=4.0), Tasks(gates=(start,)), t_s, way, set()))
@@ -42,7 +42,7 @@ def test_a_start_is_after_the_gun_and_soon(after_s, passed):
 
 
 def test_the_gun_by_the_clock_is_in_the_tracks_time():
-    start = Pair(port_en_m=(-10.0, 50.0), starboard_en_m=(10.0, 50.0), not_before_s=1000.0)
+    start = GateLine(port_en_m=(-10.0, 50.0), starboard_en_m=(10.0, 50.0), not_before_s=1000.0)
     way = track((0.0, 0.0), (0.0, 70.0))
     t_s = [0.25 * n for n in range(len(way))]
     (_, ok, late_s, _), *_ = findings(

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from companion.boat import Hull
 from sitl.commands.run import print_verdict
-from sitl.scene.clearance import HullTrack
-from sitl.scene.scenario import EventSpec, ExpectSpec, HeldSpec, is_ordinary
-from sitl.scene.verdict import Truth, count_roundings, count_tacks, judge, longest_silence_s
+from sitl.scenario.scenario import EventSpec, ExpectSpec, HeldSpec, is_ordinary
+from sitl.scenario.verdict import HullTrack, TrueTrack, count_roundings, count_tacks, judge, longest_silence_s
 
 ISLAND = shapely.Point(0.0, 0.0).buffer(10.0)
 
@@ -45,7 +44,7 @@ def test_a_verdict_is_printed_in_words(capsys):
 @pytest.mark.parametrize(("held", "within_m"), [((10.0, 20.0), 0.0), ((0.0, 30.0), 75.0), ((100.0, 200.0), None)])
 def test_a_boat_that_is_to_hold_is_judged_by_how_far_she_goes_meanwhile(held, within_m):
     """Away for ten seconds at 10 m/s, still for ten, on for ten; and never seen in the time that was asked for."""
-    truth = Truth()
+    truth = TrueTrack()
     for t_s in range(31):
         truth.add(5.0 + t_s, (10.0 * (min(t_s, 10) + max(0, t_s - 20)), 0.0), 0.0, 1.0, (0.0, 5.0))
     for limit_m in (1.0, 200.0):
@@ -114,7 +113,7 @@ def test_a_boat_that_never_sailed_touched_nothing_and_does_not_pass():
     away = _truth([0.0] * 400)
     away.en_m = [(50.0, north) for _, north in away.en_m]
     assert verdict(away).passed
-    assert not verdict(Truth()).passed
+    assert not verdict(TrueTrack()).passed
 
 
 def test_open_water_has_no_clearance():
@@ -123,7 +122,7 @@ def test_open_water_has_no_clearance():
 
 
 def _truth(headings_deg, twd_deg=0.0, step_s=0.25):
-    truth = Truth()
+    truth = TrueTrack()
     for k, heading in enumerate(headings_deg):
         truth.add(k * step_s, (0.0, float(k)), math.radians(heading), 2.0, (math.radians(twd_deg), 5.0))
     return truth

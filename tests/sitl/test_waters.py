@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.world import Constant, Gusty, Lee, Stream, Waters
+from sitl.world import Constant, CurrentModel, Gusty, Lee, Waters
 
 NORTHERLY = Constant(0.0, 6.0)
 ISLAND = Lee(en_m=(100.0, 50.0), radius_m=40.0, loss=0.6, reach_m=200.0)
@@ -44,7 +44,7 @@ def test_a_gradient_is_counted_from_the_frames_origin_wherever_home_is():
 
 
 def test_a_tide_runs_to_and_fro_or_turns():
-    tide = Stream(tide_to_rad=math.pi / 2.0, tide_mps=0.8, tide_s=1000.0, tide_high_s=100.0)
+    tide = CurrentModel(tide_to_rad=math.pi / 2.0, tide_mps=0.8, tide_s=1000.0, tide_high_s=100.0)
     assert tide.at(100.0, (0.0, 0.0)) == pytest.approx((0.8, 0.0))
     assert tide.at(600.0, (0.0, 0.0)) == pytest.approx((-0.8, 0.0))
     assert tide.at(350.0, (0.0, 0.0)) == pytest.approx((0.0, 0.0))
@@ -56,7 +56,7 @@ def test_a_tide_runs_to_and_fro_or_turns():
 
 @given(places, st.floats(0.0, 1e5))
 def test_a_sheared_stream_never_turns_round(place, t_s):
-    stream = Stream(set_to_rad=1.0, drift_mps=0.5, shear_per_km=1.5, shear_to_rad=0.3)
+    stream = CurrentModel(set_to_rad=1.0, drift_mps=0.5, shear_per_km=1.5, shear_to_rad=0.3)
     east, north = stream.at(t_s, place)
     assert east * math.sin(1.0) + north * math.cos(1.0) >= 0.0
 

@@ -12,7 +12,17 @@ from hypothesis import strategies as st
 
 from companion.errors import InputError
 from companion.geo.angles import difference_rad, wrap_pi
-from sitl.world.wind import AR1, NOISE_RAD, RHO_HZ, SPREAD_RAD, Constant, Event, Recorded, Scripted, parse_wind
+from sitl.world.environment import (
+    AR1,
+    NOISE_RAD,
+    RHO_HZ,
+    SPREAD_RAD,
+    Constant,
+    Recorded,
+    Scripted,
+    WindEvent,
+    parse_wind,
+)
 
 
 def directions(wind: AR1, step_s: float, count: int) -> np.ndarray:
@@ -54,9 +64,9 @@ def test_a_wind_is_a_function_of_time(seed: int, times: list[float]) -> None:
 
 def test_events_compose() -> None:
     wind = Scripted(Constant(math.radians(350.0), 5.0), (
-        Event(at_s=10.0, veer_rad=math.radians(20.0), over_s=10.0),
-        Event(at_s=50.0, tws_mps=0.0, over_s=5.0, for_s=20.0),
-        Event(at_s=100.0, tws_factor=1.5, for_s=5.0),
+        WindEvent(at_s=10.0, veer_rad=math.radians(20.0), over_s=10.0),
+        WindEvent(at_s=50.0, tws_mps=0.0, over_s=5.0, for_s=20.0),
+        WindEvent(at_s=100.0, tws_factor=1.5, for_s=5.0),
     ))
     assert wind.at(9.0) == (pytest.approx(math.radians(350.0)), 5.0)
     assert math.degrees(difference_rad(wind.at(15.0)[0], 0.0)) == pytest.approx(0.0, abs=1e-6)

@@ -11,7 +11,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.step.state import Phase
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import ExpectSpec, Scenario, WindSpec
+from sitl.scenario.scenario import ExpectSpec, Scenario, WindSpec
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 

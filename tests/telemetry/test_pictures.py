@@ -21,7 +21,7 @@ from companion.plots import chart, mission, voyage
 from companion.plots import plan as plan_picture
 from companion.telemetry.folder.reading import read_voyage
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import ExpectSpec, Scenario, WindSpec
+from sitl.scenario.scenario import ExpectSpec, Scenario, WindSpec
 
 ROOT = Path(__file__).parents[2]
 MISSIONS = ROOT / "missions"

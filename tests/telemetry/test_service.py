@@ -16,7 +16,7 @@ import pytest
 
 from companion import cli
 from companion.telemetry.systemd import STATUS_CHARACTERS, ServiceManager
-from sitl.scene.ships import free_port
+from sitl.scenario.traffic import free_port
 
 UNIT = Path("deploy/companion@.service")
 

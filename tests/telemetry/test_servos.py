@@ -7,7 +7,7 @@ from companion import cli
 from companion.clock import run_virtual
 from companion.telemetry.folder.records import Servos
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import load_scenario
+from sitl.scenario.scenario import load_scenario
 
 
 def moved(*looks):

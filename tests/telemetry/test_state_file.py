@@ -17,7 +17,7 @@ from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted
 from companion.telemetry import state_file
 from companion.telemetry.state_file import StateFile
-from sitl.trouble.sick_disk import SickDisk
+from sitl.faults.computer_faults import FaultyDisk
 
 ITEMS = (MissionItem(command=16, lat_e7=508170000, lon_e7=-13100000), MissionItem(command=17, lat_e7=5, lon_e7=7))
 ROUTE = Route(
@@ -109,7 +109,7 @@ def test_a_state_that_cannot_be_read_is_left_where_it_is(tmp_path):
 
 
 def test_a_state_that_could_not_be_saved_is_saved_when_it_can(tmp_path):
-    disk = SickDisk()
+    disk = FaultyDisk()
     state = file(tmp_path / "state.json", disk)
 
     async def voyage():

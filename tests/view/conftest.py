@@ -11,7 +11,7 @@ from companion.geofence import load_mission
 from companion.telemetry.folder import VoyageFigures
 from companion.view import ViewFold
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import EventSpec, Scenario, WindSpec
+from sitl.scenario.scenario import EventSpec, Scenario, WindSpec
 
 MISSION = """
 name = "beat"

@@ -10,7 +10,7 @@ from companion.clock import run_virtual
 from companion.geofence import load_mission
 from companion.replay import replay
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import EventSpec, load_scenario
+from sitl.scenario.scenario import EventSpec, load_scenario
 
 FOLDER = Path("sitl/scenarios")
 LAST_RESORT = FOLDER / "last-resort.toml"

@@ -7,7 +7,7 @@ import msgspec
 
 from companion.clock import run_virtual
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import load_scenario
+from sitl.scenario.scenario import load_scenario
 
 ADRIFT = Path("sitl/scenarios/calm-adrift.toml")
 

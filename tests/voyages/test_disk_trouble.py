@@ -1,7 +1,7 @@
 """A disk that is full, sick or read-only under way: the boat sails on, says so, and records again when it can.
 
-Whole voyages under the virtual clock on a disk that fails as Linux says it (``sitl.trouble.sick_disk``); a real full
-file system and a real read-only one are in test_recorder.py and test_run_process.py.
+Whole voyages under the virtual clock on a disk that fails as Linux says it (``sitl.faults.computer_faults``); a real
+full file system and a real read-only one are in test_recorder.py and test_run_process.py.
 """
 
 import csv
@@ -23,8 +23,8 @@ from companion.replay import replay
 from companion.telemetry.folder.recorder import read_jsonl
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import EventSpec, ExpectSpec, Scenario, WindSpec
-from sitl.world.wind import Constant
+from sitl.scenario.scenario import EventSpec, ExpectSpec, Scenario, WindSpec
+from sitl.world.environment import Constant
 
 # A reach of 200 m past a rock.
 MISSION = """

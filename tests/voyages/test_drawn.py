@@ -28,8 +28,8 @@ from companion.orders import Result, give, phrase
 from companion.replay import replay
 from companion.skipper.board.mark import are_marked, marked
 from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.trouble.fragile import FragilePlanner
-from sitl.world.wind import AR1
+from sitl.faults.computer_faults import FaultyPlanner
+from sitl.world.environment import AR1
 from tests.sitl.boats import FRAME, Client
 
 BOAT = """
@@ -111,7 +111,7 @@ class Bay:
                     "exit_on_arrival": True,
                     "settings": DrawnSettings(
                         options=load_settings(self.path), path=self.path, state_path=self.state_path)}
-        return await sail(found.drawn.mission, self.line.near, FragilePlanner(), folder or self.folder,
+        return await sail(found.drawn.mission, self.line.near, FaultyPlanner(), folder or self.folder,
                           SailOptions(**settings | options), on_status=look)
 
     def announced(self, folder=None):

@@ -12,7 +12,7 @@ import pytest
 from companion.clock import run_virtual
 from companion.telemetry.folder.recorder import DECISIONS, STATE, TLOG, TRACK
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import load_scenario
+from sitl.scenario.scenario import load_scenario
 
 SCENARIO = Path("sitl/scenarios/endurance.toml")
 SETTLED_S = 2.0 * 3600.0       # every kind of thing has happened once by then

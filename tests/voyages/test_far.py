@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.clock import now_s, run_virtual
 from companion.replay import replay
 from companion.telemetry.folder.recorder import read_jsonl
+from sitl.faults import KEY, injection
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import EventSpec, ExpectSpec, HeldSpec, SatelliteSpec, load_scenario
-from sitl.trouble import KEY, befalls
+from sitl.scenario.scenario import EventSpec, ExpectSpec, HeldSpec, SatelliteSpec, load_scenario
 from tests.orders.far import by_the_page
 from tests.voyages.test_orders import Station, failed
 
@@ -63,7 +63,7 @@ class Shore:
 
 def test_a_voyage_by_satellite_each_order_once_the_late_one_never_and_over_a_kill(tmp_path, monkeypatch):
     shore = Shore()
-    monkeypatch.setattr(befalls, "order_far", shore)
+    monkeypatch.setattr(injection, "order_far", shore)
     (tmp_path / "m.toml").write_text(Path("missions/buoy-course.toml").read_text().replace("laps = 5", "laps = 1"))
     scenario = msgspec.structs.replace(
         load_scenario(SOURCE), mission="m.toml", limit_s=4000.0,
@@ -124,7 +124,7 @@ class HighLatencyStation(Station):
 
 def test_high_latency_is_spoken_while_it_is_asked_for(tmp_path, monkeypatch):
     station = HighLatencyStation()
-    monkeypatch.setattr(befalls, "give_order", station)
+    monkeypatch.setattr(injection, "give_order", station)
     path = Path("sitl/scenarios/upwind.toml")
     scenario = msgspec.structs.replace(
         load_scenario(path), events=(EventSpec(at_s=60.0, kind="order"),), limit_s=110.0,

@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.clock import run_virtual
 from companion.replay import replay
 from companion.telemetry.folder.recorder import read_jsonl
+from sitl.faults import injection
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import EventSpec, ExpectSpec, HeldSpec, load_scenario
-from sitl.trouble import befalls
+from sitl.scenario.scenario import EventSpec, ExpectSpec, HeldSpec, load_scenario
 
 HOLD = Path("sitl/scenarios/orders-hold.toml")
 PARKED = {"arrived": None, "within_m": None, "alerts": ("order",)}
@@ -75,7 +75,7 @@ class Station:
 
 def test_a_station_that_knows_pymavlink_alone_is_answered(tmp_path, monkeypatch):
     station = Station()
-    monkeypatch.setattr(befalls, "give_order", station)
+    monkeypatch.setattr(injection, "give_order", station)
     verdict = sail(tmp_path, [EventSpec(at_s=60.0, kind="order")], limit_s=100.0, exit_on_arrival=False,
                    expect=ExpectSpec(**PARKED))
     assert verdict.passed, failed(verdict)

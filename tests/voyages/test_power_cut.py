@@ -28,7 +28,7 @@ from companion.skipper.step.snapshot import ReadOutcome, Snapshot
 from sitl.campaigns.faults import BASE
 from sitl.run import embedded as runner
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import EventSpec, ExpectSpec, WindSpec, load_scenario
+from sitl.scenario.scenario import EventSpec, ExpectSpec, WindSpec, load_scenario
 from tests.voyages.test_voyage import ROCK, SHORT_MISSION
 
 STATE = "state.json"
@@ -145,7 +145,7 @@ def test_after_a_power_cut_at_any_write_the_mission_on_board_is_known(durable, m
     """Renames were not synced: a state one upload older ended as "foreign", without control (issue 12, point 14)."""
     disk = ForgetfulDisk()
     witness = Witness(disk)
-    monkeypatch.setattr(runner, "World", functools.partial(runner.World, disk=disk))
+    monkeypatch.setattr(runner, "SimulatedWorld", functools.partial(runner.SimulatedWorld, disk=disk))
     (tmp_path / "mission.toml").write_text(SHORT_MISSION + "[skipper]\nautopilot_beats = false\n")
     (tmp_path / "rock.wkt").write_text(ROCK)
     source = tmp_path / "scenario.toml"

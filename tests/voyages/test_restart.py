@@ -17,7 +17,7 @@ from companion.replay import replay
 from companion.telemetry.folder.recorder import read_jsonl
 from sitl.campaigns.faults import BASE
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import EventSpec, ExpectSpec, WindSpec, load_scenario
+from sitl.scenario.scenario import EventSpec, ExpectSpec, WindSpec, load_scenario
 
 MOMENTS = 200
 EXPANSIONS = 4_000

@@ -19,7 +19,7 @@ from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from companion.replay import replay
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import load_scenario
+from sitl.scenario.scenario import load_scenario
 
 FOLDER = Path("sitl/scenarios")
 # What is folded again from the record: the new inputs of a failsafe's answer and of a watched rest among them.

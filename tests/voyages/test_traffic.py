@@ -19,8 +19,8 @@ from companion.replay import replay
 from companion.telemetry.folder.records import ais_of, ais_record
 from companion.traffic.plans import ALIKE_M
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import load_scenario
-from sitl.scene.ships import ship_of
+from sitl.scenario.scenario import load_scenario
+from sitl.scenario.traffic import ship_of
 
 CROSSING = Path("sitl/scenarios/crossing.toml")
 

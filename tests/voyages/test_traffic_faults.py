@@ -17,8 +17,8 @@ from companion.mavlink.wire.companion_status import StatusReader
 from companion.mavlink.wire.frames import Codec
 from companion.replay import replay
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import load_scenario
-from sitl.scene.ships import ship_of
+from sitl.scenario.scenario import load_scenario
+from sitl.scenario.traffic import ship_of
 from tests.voyages.test_traffic import CROSSING, decisions, failed, port, unheard, with_feeds  # noqa: F401 - a fixture
 
 AFTER_S = 260.0      # the ship has gone by: the voyage need not be sailed to its end

@@ -12,7 +12,7 @@ from companion.plots.voyage import plot_voyage
 from companion.replay import replay
 from companion.telemetry.folder.reading import read_voyage
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import EventSpec, ExpectSpec, Scenario, WindSpec, load_scenario
+from sitl.scenario.scenario import EventSpec, ExpectSpec, Scenario, WindSpec, load_scenario
 
 SHORT_MISSION = """
 name = "short"

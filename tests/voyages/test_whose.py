@@ -19,9 +19,9 @@ from companion.mavlink.wire.frames import Codec
 from companion.messages import Mode
 from companion.replay import replay
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.trouble.fragile import FragilePlanner
-from sitl.world.air import Air
-from sitl.world.wind import AR1
+from sitl.faults.computer_faults import FaultyPlanner
+from sitl.world.environment import AR1
+from sitl.world.radio_channel import RadioChannel
 
 MISSION = """
 name = "reach"
@@ -58,7 +58,7 @@ class World:
                                         "is_moored": True, "uid": name.encode(), **change})
             self.boats[name] = Autopilot(config, AR1(0.0, 6.0, seed=1, sd_rad=0.05), seed=1)
             self.lines[name] = MemoryLink(name, seed=1)
-        self.air = Air(*(line.near for line in self.lines.values()))
+        self.air = RadioChannel(*(line.near for line in self.lines.values()))
         self.steps = []
 
     async def sail(self, *, air=None, folder=None, on_step=None, **options):
@@ -68,7 +68,7 @@ class World:
                 on_step(step)
 
         settings = {"epoch_s": 1.78e9, "offload": at_once, "is_durable": False, "limit_s": 400.0, "expansions": 2000}
-        return await sail(self.mission, air or self.air, FragilePlanner(), folder or self.folder,
+        return await sail(self.mission, air or self.air, FaultyPlanner(), folder or self.folder,
                           SailOptions(**settings | options), on_status=look)
 
     def run(self, work=None, **options):
@@ -257,7 +257,7 @@ def test_of_two_that_start_together_one_sails(tmp_path):
     assert sailed["arrived"]
 
 
-class Echo(Air):
+class Echo(RadioChannel):
     """A router that sends back what it was sent."""
 
     def write(self, data):

@@ -16,10 +16,138 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.boat import Polar
+from companion.boat.boat import CROSS_FLOW
 from companion.kernels.jit import kernel
-from sitl.autopilot.boat.departed import falls_off, side_mps, speed_share
-from sitl.autopilot.boat.sail import polar_force, polar_speed, sail_force
-from sitl.autopilot.boat.scalars import alpha, clip, wrap
+
+
+@kernel
+def wrap(angle: float) -> float:
+    """Return an angle [rad] on -π..π."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@kernel
+def clip(x: float, low: float, high: float) -> float:
+    """Return ``x``, or the end of low..high that it is beyond."""
+    return low if x < low else min(x, high)
+
+
+@kernel
+def alpha(dt_s: float, cutoff_hz: float) -> float:
+    """Return the share of the new value in a low-pass filter of one pole; 1 without a cut-off."""
+    return 1.0 if cutoff_hz <= 0.0 else dt_s / (dt_s + 1.0 / (2.0 * math.pi * cutoff_hz))
+
+
+def hash01(seed: int, number: int) -> float:
+    """Return a number on 0..1 that depends on a seed and a number only (splitmix64); not compiled."""
+    z = (seed * 0x9E3779B97F4A7C15 + number * 0xBF58476D1CE4E5B9 + 1) & 0xFFFFFFFFFFFFFFFF
+    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & 0xFFFFFFFFFFFFFFFF
+    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & 0xFFFFFFFFFFFFFFFF
+    return ((z ^ (z >> 31)) >> 11) / float(1 << 53)
+
+
+# Of the push on a boat whose sails are eased: what hull and mast leave.
+WINDAGE = 0.25
+# Angles to the wind at which the shares of speed are stated, straight between and level beyond them.
+BEAT_RAD, REACH_RAD, RUN_RAD = math.radians(45.0), math.radians(90.0), math.radians(150.0)
+# A boat in irons lies so far off the wind, on the tack that she came from; she sails again beyond the other.
+IRONS_RAD, FILLED_RAD = math.radians(15.0), math.radians(50.0)
+SETTLING_HZ, FALLING_RADPS = 0.5, 0.35
+
+
+@kernel
+def side_mps(
+    coefficient: float, aws_mps: float, awa_rad: float, speed_mps: float, sail_rad: float, ideal_rad: float,
+) -> float:
+    """Return the speed to starboard [m/s] at which the water's push balances that of the sail.
+
+    As ``companion.boat.boat`` has it, and an eased sail leaves ``WINDAGE`` of the push.
+    """
+    drawing = clip((abs(awa_rad) - sail_rad) / max(ideal_rad, 0.1), 0.0, 1.0)
+    push = coefficient * aws_mps * aws_mps * abs(math.sin(awa_rad)) * (WINDAGE + (1.0 - WINDAGE) * drawing)
+    if push == 0.0:
+        return 0.0
+    way = abs(speed_mps)
+    side = 2.0 * push / (math.sqrt(way * way + 4.0 * CROSS_FLOW * push) + way)
+    return -side if awa_rad > 0.0 else side
+
+
+@kernel
+def speed_share(angle_rad: float, beat: float, reach: float, run: float) -> float:
+    """Return the share of the polar's speed that she makes at an angle to the true wind."""
+    if angle_rad < REACH_RAD:
+        return beat + (reach - beat) * clip((angle_rad - BEAT_RAD) / (REACH_RAD - BEAT_RAD), 0.0, 1.0)
+    return reach + (run - reach) * clip((angle_rad - REACH_RAD) / (RUN_RAD - REACH_RAD), 0.0, 1.0)
+
+
+@kernel
+def falls_off(angle_rad: float, is_caught: bool) -> tuple[float, bool]:
+    """Return the turn [rad/s] of a boat whose tack failed, and whether she sails again.
+
+    ``angle_rad`` is where the wind is, positive on the side of the tack that she came from, and a positive turn
+    brings it ahead. Caught, she lies near head to wind; then she falls off to the old tack.
+    """
+    if is_caught:
+        return SETTLING_HZ * (angle_rad - IRONS_RAD), False
+    return -FALLING_RADPS, angle_rad > FILLED_RAD
+
+
+POLAR_STEP_MPS = 0.5
+# Lift and drag of the sail per m/s of apparent wind, by angle of attack in steps of 10 degrees (SIM_Sailboat).
+_LIFT = np.array([0.0, 0.5, 1.0, 1.1, 0.95, 0.75, 0.6, 0.4, 0.2, 0.0, -0.2, -0.4, -0.6, -0.75, -0.95, -1.1, -1.0, -0.5])
+_DRAG = np.array([0.1, 0.1, 0.2, 0.4, 0.8, 1.2, 1.5, 1.7, 1.9, 1.95, 1.9, 1.7, 1.5, 1.2, 0.8, 0.4, 0.2, 0.1])
+
+
+@kernel
+def sail_force(aws_mps: float, awa_rad: float, sail_rad: float) -> float:
+    """Return the driving force [N]: F = aws (CL sin|b| - CD cos b), linear in the apparent wind speed."""
+    angle = abs(awa_rad)
+    attack = max(math.degrees(angle - sail_rad), 0.0)
+    if attack >= 170.0:
+        lift, drag = _LIFT[17], _DRAG[17]
+    else:
+        i = int(attack / 10.0)
+        share = attack / 10.0 - i
+        lift = _LIFT[i] + share * (_LIFT[i + 1] - _LIFT[i])
+        drag = _DRAG[i] + share * (_DRAG[i + 1] - _DRAG[i])
+    return float(aws_mps * (lift * math.sin(angle) - drag * math.cos(angle)))
+
+
+@kernel
+def polar_speed(polar: NDArray[np.float64], twa_rad: float, tws_mps: float) -> float:
+    """Return the speed [m/s] in a table by whole degrees (0..180) and steps of POLAR_STEP_MPS; its last one above."""
+    row = min(abs(math.degrees(twa_rad)), 180.0)
+    column = min(tws_mps / POLAR_STEP_MPS, polar.shape[1] - 1.0)
+    i, j = min(int(row), 179), min(int(column), polar.shape[1] - 2)
+    f, g = row - i, column - j
+    low = (1.0 - g) * polar[i, j] + g * polar[i, j + 1]
+    return float((1.0 - f) * low + f * ((1.0 - g) * polar[i + 1, j] + g * polar[i + 1, j + 1]))
+
+
+@kernel
+def polar_force(speed_mps: float, force: float, awa_rad: float, sail_rad: float, ideal_rad: float) -> float:
+    """Return the driving force [N] of a boat whose polar says ``speed_mps``; ``force`` is that of SIM_Sailboat's sail.
+
+    Sheeted as the autopilot does for full speed it balances the drag at that speed; eased by the sail's ideal angle of
+    attack it is none. Near head to wind the sail pushes her astern as it does there.
+    """
+    eased = sail_rad - clip(abs(awa_rad) - ideal_rad, 0.0, 0.5 * math.pi)
+    drawing = 1.0 - clip(eased / max(ideal_rad, 0.1), 0.0, 1.0)
+    return 0.5 * speed_mps * speed_mps * drawing + min(force, 0.0)
+
+
+def polar_table(polar: Polar) -> NDArray[np.float64]:
+    """Return a polar as ``polar_speed`` looks it up: by whole degrees, and steps of wind up to its last and one more.
+
+    Without wind nobody sails, not even a boat whose polar is one speed for every wind.
+    """
+    winds = np.arange(0.0, float(polar.tws_mps[-1]) + 2.0 * POLAR_STEP_MPS, POLAR_STEP_MPS)
+    angles = np.radians(np.arange(181.0))
+    table = np.stack([polar.speeds_mps(angles, float(tws)) for tws in winds], axis=1)
+    table[:, 0] = 0.0
+    return table
+
 
 LOOP_S = 0.02
 SUBSTEPS = 4

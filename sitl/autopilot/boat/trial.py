@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from companion.boat import Polar
 from companion.kernels.jit import kernel
-from sitl.autopilot.boat.kernel import S_TACKS, S_V, S_YAW
+from sitl.autopilot.boat.kernel import S_TACKS, S_V, S_YAW, clip, sail_force
 from sitl.autopilot.boat.parameters import Parameters
-from sitl.autopilot.boat.sail import sail_force
-from sitl.autopilot.boat.scalars import clip
 from sitl.autopilot.boat.vehicle import LOOP_S, Vehicle
 from sitl.world import Constant
 

@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
+import enum
 import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from sitl.autopilot.boat.chart import Chart
+from companion.messages import Mode
 from sitl.autopilot.boat.kernel import WIND_DELAY_S
 from sitl.autopilot.boat.parameters import Parameters
-from sitl.autopilot.boat.surroundings import Surroundings
-from sitl.autopilot.boat.vehicle import Vehicle
+from sitl.autopilot.boat.vehicle import HomeChart, Surroundings, Vehicle
 from sitl.autopilot.config import AutopilotConfig
-from sitl.autopilot.links.voice import Voice
-from sitl.world import Wind
+from sitl.autopilot.link import Voice
+from sitl.world import WindModel
+
+# Entering one of these gives the navigation its limits of acceleration and jerk.
+NAVIGATING = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL})
+POSITION_MODES = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL, Mode.LOITER})
+KNOWN = frozenset({
+    Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.HOLD, Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED,
+})
+
+
+class MissionTask(enum.Enum):
+    """What the boat is doing within its mode."""
+
+    LEG = "leg"                # to a waypoint of the mission
+    RTL = "rtl"
+    GUIDED = "guided"          # to a position that was sent
+    SETPOINT = "setpoint"      # a heading or turn rate that was sent
+    LOITER = "loiter"
+    HOLD = "hold"
+
 
 INVALID_RESULT = 0x20000000
 """AP_InternalError's bit of an argument or result that cannot be."""
@@ -26,10 +45,10 @@ MOTORBOAT = {"SAIL_ENABLE": 0.0, "WNDVN_TYPE": 0.0}   # there is no sail, and no
 class Core:
     """State that belongs to no single part. ``power_up`` forgets what a reboot forgets."""
 
-    def __init__(self, config: AutopilotConfig, wind: Wind, seed: int) -> None:
+    def __init__(self, config: AutopilotConfig, wind: WindModel, seed: int) -> None:
         self.config = config
         self.voice = Voice(config.sysid)
-        self.chart = Chart(config.home)
+        self.chart = HomeChart(config.home)
         given = {**(MOTORBOAT if config.is_motorboat else {}), **config.parameters}
         self.parameters = Parameters(given, new_names=config.new_parameter_names)
         twd, tws = wind.at(0.0)
@@ -151,7 +170,7 @@ class Core:
         return max(0, min(100, round((self.battery_v - 9.6) / 3.0 * 100.0)))
 
 
-def _about(config: AutopilotConfig, wind: Wind, seed: int) -> Surroundings | None:
+def _about(config: AutopilotConfig, wind: WindModel, seed: int) -> Surroundings | None:
     if config.departures is None and config.waters is None:
         return None
     return Surroundings(wind, config.departures, config.waters, seed)

@@ -1,7 +1,8 @@
 """Failsafes: the links to the shore, the battery, a knock-down, the position, and what a breached fence does.
 
 The order of things follows ArduRover's ``failsafe_trigger``: the radio is looked at in every loop, the ground
-station ten times a second, both act through one place, and whoever looks next acts for the other, under its own name.
+station ten times a second, both act through one place, and whoever looks next acts for the other, under its own
+name.
 """
 
 from __future__ import annotations
@@ -14,13 +15,197 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
 from sitl.autopilot.config import GpsFault
-from sitl.autopilot.pilot.arming import Arming
-from sitl.autopilot.pilot.core import Core
-from sitl.autopilot.pilot.ekf import Ekf
-from sitl.autopilot.pilot.fence import Fence
-from sitl.autopilot.pilot.helm import Helm
-from sitl.autopilot.pilot.modes import POSITION_MODES
-from sitl.autopilot.pilot.radio import Radio
+from sitl.autopilot.pilot.core import INTERNAL_ERROR, POSITION_MODES, Core
+from sitl.autopilot.pilot.fence import FenceMonitor
+from sitl.autopilot.pilot.helm import ModeController
+
+READY_S = 42.0   # boot to "EKF3 IMU0 is using GPS" on the real one
+# Measured on the real one, with FS_EKF_THRESH 0.8: a jump of 30 m, and a receiver switched off.
+GLITCH_FLAG = 0x8000
+GLITCH_SEEN_S, JUMP_TAKEN_S, JUMP_FAILSAFE_S, JUMP_OVER_S = 1.5, 3.8, 4.8, 11.0
+LOST_FAILSAFE_S, LOST_STOPPED_S = 8.3, 15.3
+
+
+class Ekf:
+    """Believes a position, or resists it for a while; its failsafe acts once and never restores a mode."""
+
+    def __init__(self, core: Core, helm: ModeController) -> None:
+        self._core = core
+        self._helm = helm
+        self._fault = GpsFault()
+        self._fault_s = -math.inf
+        self.has_acted = False
+        self.has_second = False    # another receiver, whose truth the filter does not take
+
+    @property
+    def gps_lost(self) -> bool:
+        """Whether there is no fix."""
+        return self._fault.is_lost
+
+    @property
+    def is_watching(self) -> bool:
+        """Whether something is due soon."""
+        return self.has_acted or self._fault.is_lost or self._is_resisting or self._is_growing
+
+    @property
+    def _is_resisting(self) -> bool:
+        return self._fault.is_resisted and self._core.t_s - self._fault_s < JUMP_OVER_S + 1.0
+
+    @property
+    def _is_growing(self) -> bool:
+        return 0.0 < self._fault.over_s >= self._core.t_s - self._fault_s - 1.0
+
+    @property
+    def velocity_error_en_mps(self) -> tuple[float, float]:
+        """What is wrong with the velocity that is told [m/s]: how fast an offset grows."""
+        fault = self._fault
+        if 0.0 < fault.over_s >= self._core.t_s - self._fault_s and not fault.is_resisted:
+            return fault.east_m / fault.over_s, fault.north_m / fault.over_s
+        return 0.0, 0.0
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the position can be used."""
+        return bool(self.flags & mav.EKF_POS_HORIZ_ABS)
+
+    def set_gps(self, fault: GpsFault) -> None:
+        """Break or mend the position."""
+        self._fault, self._fault_s = fault, self._core.t_s
+        self.has_second = self.has_second or fault.is_of_one
+        if not fault.is_resisted:
+            self._take_position()
+
+    def _take_position(self) -> None:
+        fault = self._fault
+        share = 1.0 if fault.over_s <= 0.0 else min(1.0, (self._core.t_s - self._fault_s) / fault.over_s)
+        self._core.vehicle.set_position_error(share * fault.east_m, share * fault.north_m)
+
+    @property
+    def flags(self) -> int:
+        """EKF_STATUS_REPORT.flags."""
+        boot_s = self._core.boot_s
+        if boot_s < READY_S:
+            return 0x400 if boot_s < 4.3 else 0 if boot_s < 6.5 else 0xA7
+        age_s = self._core.t_s - self._fault_s
+        if self._fault.is_lost:
+            if age_s >= LOST_STOPPED_S:
+                return 0xA7
+            return 0x8027 if age_s >= LOST_FAILSAFE_S else 0x833F
+        return 0x33F | (GLITCH_FLAG if self._is_resisting and age_s >= GLITCH_SEEN_S else 0)
+
+    def update(self) -> None:
+        """Look at the filter."""
+        core, age_s = self._core, self._core.t_s - self._fault_s
+        bad = self._fault.is_lost and age_s >= LOST_FAILSAFE_S - 1e-9
+        if self._is_growing and not self._fault.is_resisted:
+            self._take_position()
+        if self._fault.is_resisted:
+            if age_s >= JUMP_TAKEN_S - 1e-9:
+                self._take_position()
+            bad = bad or JUMP_FAILSAFE_S - 1e-9 <= age_s < JUMP_OVER_S
+        if bad and not self.has_acted:
+            self.has_acted = True
+            core.voice.announce(mav.MAV_SEVERITY_CRITICAL, "EKF variance")
+            core.voice.announce(mav.MAV_SEVERITY_CRITICAL, "EKF failsafe")
+            if core.is_armed and core.parameters.flag("FS_EKF_ACTION") and self._helm.mode in POSITION_MODES:
+                self._helm.set_mode(Mode.HOLD)
+        elif self.has_acted and not bad:
+            self.has_acted = False
+            core.voice.announce(mav.MAV_SEVERITY_CRITICAL, "EKF failsafe cleared")
+
+
+class Arming:
+    """Arms and disarms; both speak behind the acknowledgement."""
+
+    def __init__(self, core: Core, helm: ModeController, fence: FenceMonitor, ekf: Ekf) -> None:
+        self._core = core
+        self._helm = helm
+        self._fence = fence
+        self._ekf = ekf
+        self.is_refused = False   # by a check of the autopilot's that knows why
+
+    def arm(self, *, force: bool) -> bool:
+        """Arm; False, with the reasons announced, when refused."""
+        core = self._core
+        if core.is_armed:
+            return True
+        reasons = [] if force else self._reasons()
+        for reason in reasons:
+            core.voice.announce_after_ack(mav.MAV_SEVERITY_CRITICAL, f"Arm: {reason}")
+        if reasons:
+            return False
+        core.set_armed(armed=True)
+        self._helm.armed()
+        core.voice.announce_after_ack(mav.MAV_SEVERITY_INFO, "Throttle armed")
+        return True
+
+    def _reasons(self) -> list[str]:
+        core, mode = self._core, self._helm.mode
+        reasons = ["Hardware safety switch"] if self.is_refused else []
+        if core.internal_errors:
+            reasons.append(INTERNAL_ERROR)
+        if core.parameters.flag("SAIL_ENABLE") and not core.parameters.flag("WNDVN_TYPE"):
+            reasons.append("Sailing enabled with no WindVane")
+        if not self._ekf.is_ready and mode is not Mode.MANUAL:
+            reasons.append("Accels inconsistent")
+            if mode in POSITION_MODES:
+                reasons.append("AHRS: waiting for home")
+        if self._fence.is_enabled and self._fence.is_breached:
+            reasons.append("Vehicle breaching Polygon fence")
+        return reasons
+
+    def disarm(self) -> None:
+        """Disarm; outside AUTO this forgets the mission's index."""
+        if self._core.is_armed:
+            self._core.set_armed(armed=False)
+            if self._helm.mode is not Mode.AUTO:
+                self._helm.mission.reset()
+            self._core.voice.announce_after_ack(mav.MAV_SEVERITY_INFO, "Throttle disarmed")
+
+
+# Sticks at rest and the mode switch in its highest place, as SITL's 16 channels [us].
+CHANNELS_US = (1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, *([1500] * 8))
+# The middle of each of the mode switch's six places [us]: MODE1 to MODE6.
+SWITCH_US = (1165, 1295, 1425, 1555, 1685, 1800)
+SILENT_S = 0.5   # without pulses for longer than this the receiver has lost its transmitter
+
+
+class Radio:
+    """What the receiver hears. A receiver that hears nothing holds its last values."""
+
+    def __init__(self, core: Core, helm: ModeController) -> None:
+        self._core = core
+        self._helm = helm
+        self.channels_us: list[int] = list(CHANNELS_US)
+        self._lost_s = math.inf
+
+    @property
+    def is_switched_off(self) -> bool:
+        """Whether the transmitter is silent, noticed or not."""
+        return self._lost_s < math.inf
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the autopilot counts the radio as lost."""
+        return self._core.t_s - self._lost_s > SILENT_S
+
+    def switch(self, *, is_on: bool) -> None:
+        """Switch the transmitter on or off, or carry it out of range."""
+        if is_on:
+            self._lost_s = math.inf
+        elif not self.is_switched_off:
+            self._lost_s = self._core.t_s
+
+    def select(self, mode: Mode) -> bool:
+        """Move the mode switch to ``mode``; False when the transmitter is off or no place of the switch has it."""
+        get = self._core.parameters.flag
+        places = [n for n in range(6) if get(f"MODE{n + 1}") == mode]
+        channel = get("MODE_CH")
+        if self.is_switched_off or not places or not 1 <= channel <= len(self.channels_us):
+            return False
+        self.channels_us[channel - 1] = SWITCH_US[places[0]]
+        return self._helm.set_mode(int(mode))
+
 
 _CHECK_S = 0.1
 RADIO, STATION = 1, 2
@@ -37,7 +222,9 @@ RECOVERY_S = 10.0   # AC_FENCE_MANUAL_RECOVERY_TIME_MIN
 class Failsafe:
     """Watches; acts once when something begins, says when it has ended, never restores a mode."""
 
-    def __init__(self, core: Core, helm: Helm, arming: Arming, fence: Fence, radio: Radio, ekf: Ekf) -> None:
+    def __init__(
+        self, core: Core, helm: ModeController, arming: Arming, fence: FenceMonitor, radio: Radio, ekf: Ekf,
+    ) -> None:
         self._core = core
         self._helm = helm
         self._arming = arming

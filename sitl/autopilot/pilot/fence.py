@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from sitl.autopilot.pilot.core import Core
-from sitl.autopilot.pilot.items import Item
+from sitl.autopilot.pilot.mission import Item
 
 CHECK_S = 0.1
 TYPE_CIRCLE, TYPE_POLYGON = 2, 4
@@ -51,7 +51,7 @@ class Polygon:
 
 
 @dataclass(frozen=True, slots=True)
-class Circle:
+class CircleZone:
     """``sign`` +1: stay inside; -1: stay outside."""
 
     sign: float
@@ -64,9 +64,9 @@ class Circle:
         return (self.radius_m - math.hypot(east - self.east_m, north - self.north_m)) * self.sign
 
 
-def zones(items: Sequence[Item], to_en: Callable[[int, int], tuple[float, float]]) -> list[Polygon | Circle] | None:
+def zones(items: Sequence[Item], to_en: Callable[[int, int], tuple[float, float]]) -> list[Polygon | CircleZone] | None:
     """Return the zones of a fence, or None when the vertex counts do not fit."""
-    out: list[Polygon | Circle] = []
+    out: list[Polygon | CircleZone] = []
     i = 0
     while i < len(items):
         item = items[i]
@@ -83,7 +83,7 @@ def zones(items: Sequence[Item], to_en: Callable[[int, int], tuple[float, float]
             if item.command in _CIRCLES:
                 if item.p1 <= 0.0:
                     return None
-                out.append(Circle(_CIRCLES[item.command], *to_en(item.x, item.y), float(item.p1)))
+                out.append(CircleZone(_CIRCLES[item.command], *to_en(item.x, item.y), float(item.p1)))
             i += 1
     return out
 
@@ -100,14 +100,14 @@ def _ring(group: Sequence[Item]) -> list[tuple[int, int]]:
     return out
 
 
-class Fence:
+class FenceMonitor:
     """What is stored, whether it is on, and what it found."""
 
     def __init__(self, core: Core) -> None:
         self._core = core
         self._due_s = core.t_s
         self.items: list[Item] = []
-        self._zones: list[Polygon | Circle] = []
+        self._zones: list[Polygon | CircleZone] = []
         self.is_enabled = False
         self.is_breached = False
         self.breach_count = 0

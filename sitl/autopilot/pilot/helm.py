@@ -9,31 +9,29 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
 from sitl.autopilot.boat import kernel as k
-from sitl.autopilot.pilot.core import Core
-from sitl.autopilot.pilot.fence import Fence
-from sitl.autopilot.pilot.items import NAMES, Item
-from sitl.autopilot.pilot.mission import Mission, RunState, is_reported
-from sitl.autopilot.pilot.modes import KNOWN, NAVIGATING, Task
-from sitl.autopilot.pilot.rally import Rally
+from sitl.autopilot.pilot.core import KNOWN, NAVIGATING, Core, MissionTask
+from sitl.autopilot.pilot.fence import FenceMonitor
+from sitl.autopilot.pilot.mission import NAMES, Item, RunState, StoredMission, is_reported
+from sitl.autopilot.pilot.storage import Rally
 
 GUIDED_TIMEOUT_S = 3.0
 AUX_TACK, AUX_MOTOR = 63, 74
 
 
-class Helm:
+class ModeController:
     """Owner of the mode. ``mode_changed`` is called as soon as the mode is another one."""
 
-    def __init__(self, core: Core, fence: Fence, rally: Rally, mode_changed: Callable[[], None]) -> None:
+    def __init__(self, core: Core, fence: FenceMonitor, rally: Rally, mode_changed: Callable[[], None]) -> None:
         self._core = core
         self._vehicle = core.vehicle
         self._voice = core.voice
         self._fence = fence
         self._rally = rally
         self._mode_changed = mode_changed
-        self.mission = Mission(self)
+        self.mission = StoredMission(self)
         self.mode = Mode.MANUAL
         self.refused: Mode | None = None   # it cannot be entered now
-        self.task = Task.HOLD
+        self.task = MissionTask.HOLD
         self._is_waiting = False       # AUTO was entered before there was an origin
         self._is_reached = False
         self._corner_passed = False
@@ -106,21 +104,21 @@ class Helm:
 
     def armed(self) -> None:
         """The boat was armed: a leg that waited starts here."""
-        if self.mode is Mode.AUTO and self.task is Task.LEG and self.mission.state is RunState.RUNNING:
+        if self.mode is Mode.AUTO and self.task is MissionTask.LEG and self.mission.state is RunState.RUNNING:
             self._corner_passed = False
             self._vehicle.leave_from_here()
 
     def _hold(self) -> None:
-        self.task = Task.HOLD
+        self.task = MissionTask.HOLD
         self._vehicle.hold()
 
     def _manual(self) -> None:
-        self.task = Task.HOLD
+        self.task = MissionTask.HOLD
         self._vehicle.sticks_at_rest()
 
     def loiter(self) -> None:
         """Loiter where the boat could stop."""
-        self.task = Task.LOITER
+        self.task = MissionTask.LOITER
         self._vehicle.loiter()
 
     def sail_home(self) -> None:
@@ -129,26 +127,26 @@ class Helm:
         if goal is None:
             self._hold()
             return
-        self.task = Task.RTL
+        self.task = MissionTask.RTL
         self._is_reached = self._told_home = False
         self._vehicle.sail_leg(self._vehicle.position, goal, None, is_corner=False, goes_on=False)
 
     # ------------------------------------------------------------------------------------------ guided
     def go_to(self, goal: tuple[float, float]) -> None:
         """GUIDED: sail to a position; no time-out."""
-        self.task = Task.GUIDED
+        self.task = MissionTask.GUIDED
         self._is_reached = False
         self._vehicle.sail_leg(self._vehicle.position, goal, None, is_corner=False, goes_on=False)
 
     def steer(self, heading_rad: float, thrust: float) -> None:
         """GUIDED: hold a heading; to be sent again within three seconds."""
-        self.task = Task.SETPOINT
+        self.task = MissionTask.SETPOINT
         self._setpoint_s = self._core.t_s
         self._vehicle.steer_heading(heading_rad, thrust)
 
     def turn(self, rate_radps: float, thrust: float) -> None:
         """GUIDED: turn at a rate; to be sent again within three seconds."""
-        self.task = Task.SETPOINT
+        self.task = MissionTask.SETPOINT
         self._setpoint_s = self._core.t_s
         self._vehicle.steer_rate(rate_radps, thrust)
 
@@ -156,7 +154,7 @@ class Helm:
     @property
     def due_s(self) -> float:
         """When ``update`` has something to do though nothing happened."""
-        if self.mode is Mode.GUIDED and self.task is Task.SETPOINT:
+        if self.mode is Mode.GUIDED and self.task is MissionTask.SETPOINT:
             return self._setpoint_s + GUIDED_TIMEOUT_S
         if self.mode is Mode.AUTO:
             if self._is_waiting:
@@ -164,7 +162,7 @@ class Helm:
             if self._hold_until_s > self._core.t_s:
                 return self._hold_until_s
             if self.mission.state is RunState.RUNNING and (
-                (self.task is Task.LEG and self._is_reached) or self.mission.is_changed
+                (self.task is MissionTask.LEG and self._is_reached) or self.mission.is_changed
             ):
                 return self._core.t_s
         return math.inf
@@ -187,7 +185,7 @@ class Helm:
                 self.mission.start_or_resume(restart=self._core.parameters.flag("MIS_RESTART") == 1)
             if self.mission.is_changed and not self._is_waiting:
                 self.mission.is_changed = False
-                if self.mission.state is RunState.RUNNING and self.task is Task.LEG:
+                if self.mission.state is RunState.RUNNING and self.task is MissionTask.LEG:
                     self._corner_passed = False
                     done = self.mission.restart_current()
                     what = "restarted command" if done else "but failed to restart command"
@@ -195,13 +193,13 @@ class Helm:
                     self._voice.announce(mav.MAV_SEVERITY_CRITICAL, f"Auto mission changed{comma} {what}")
             self.mission.update()
         elif self.mode is Mode.GUIDED:
-            if self.task is Task.SETPOINT and self._core.t_s - self._setpoint_s >= GUIDED_TIMEOUT_S - 1e-9:
+            if self.task is MissionTask.SETPOINT and self._core.t_s - self._setpoint_s >= GUIDED_TIMEOUT_S - 1e-9:
                 self._voice.announce(mav.MAV_SEVERITY_WARNING, "target not received last 3secs, stopping")
                 self.loiter()
-            elif self.task is Task.GUIDED and self._is_reached:
+            elif self.task is MissionTask.GUIDED and self._is_reached:
                 self._voice.broadcast(mav.MAVLink_mission_item_reached_message(0))
                 self.loiter()
-        if self.task is Task.RTL and self._is_reached and not self._told_home:
+        if self.task is MissionTask.RTL and self._is_reached and not self._told_home:
             self._told_home = True
             self._voice.announce(mav.MAV_SEVERITY_INFO, "Reached destination")
             self._vehicle.loiter()
@@ -235,7 +233,7 @@ class Helm:
             origin, goal, self._place(following) if is_corner and following is not None else None,
             is_corner=is_corner, goes_on=passed,
         )
-        self.task = Task.LEG
+        self.task = MissionTask.LEG
         return True
 
     def _place(self, item: Item) -> tuple[float, float]:

@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+import math
+
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from sitl.autopilot.pilot.core import Core
-from sitl.autopilot.pilot.fence import Fence
-from sitl.autopilot.pilot.items import FENCE, MISSION, Item
-from sitl.autopilot.pilot.mission import Mission
-from sitl.autopilot.pilot.rally import Rally
+from sitl.autopilot.pilot.fence import FenceMonitor
+from sitl.autopilot.pilot.mission import FENCE, MISSION, Item, StoredMission
+
+
+class Rally:
+    """The stored rally points."""
+
+    def __init__(self, core: Core) -> None:
+        self._core = core
+        self.items: list[Item] = []
+
+    def refuge(self) -> tuple[float, float] | None:
+        """Return home or the nearest rally point within RALLY_LIMIT_KM."""
+        core, here = self._core, self._core.vehicle.position
+        limit_m = core.parameters.get("RALLY_LIMIT_KM") * 1000.0
+        points = [core.chart.to_en(i.x, i.y) for i in self.items]
+        points = [p for p in points if limit_m <= 0.0 or math.dist(p, here) <= limit_m]
+        if core.home_en is not None and (not points or core.parameters.flag("RALLY_INCL_HOME")):
+            points.append(core.home_en)
+        return min(points, key=lambda p: math.dist(p, here), default=None)
+
 
 _OK, _ERROR = int(mav.MAV_MISSION_ACCEPTED), int(mav.MAV_MISSION_ERROR)
 
@@ -16,7 +35,7 @@ _OK, _ERROR = int(mav.MAV_MISSION_ACCEPTED), int(mav.MAV_MISSION_ERROR)
 class Storage:
     """The three lists, as the mission protocol and MAVFTP see them."""
 
-    def __init__(self, core: Core, mission: Mission, fence: Fence, rally: Rally) -> None:
+    def __init__(self, core: Core, mission: StoredMission, fence: FenceMonitor, rally: Rally) -> None:
         self._core = core
         self.mission = mission
         self.fence = fence

@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.clock import now_s, run_virtual
 from companion.messages import GeoPoint, Mode
 from sitl.autopilot import (
+    AisVessel,
     Autopilot,
     AutopilotConfig,
     GpsFault,
@@ -23,10 +24,9 @@ from sitl.autopilot import (
     MemoryLink,
     VaneFault,
     VaneState,
-    Vessel,
     serve,
 )
-from sitl.world.wind import AR1, Constant
+from sitl.world.environment import AR1, Constant
 from tests.sitl.boats import Client, e7, sail
 
 EAST = [(100.0 * n, 0.0) for n in range(1, 7)]
@@ -387,12 +387,12 @@ def test_clearance_agrees_with_shapely(seed: int, east: float, north: float, *, 
 # ---------------------------------------------------------------------------------------------------------- AIS
 def test_ais_is_off_by_default_and_has_the_real_units() -> None:
     async def job(c: Client) -> None:
-        ship = Vessel(
+        ship = AisVessel(
             mmsi=211000001, position=GeoPoint(lat_deg=51.101, lon_deg=-1.3), cog_deg=180.0, sog_mps=5.0,
             heading_deg=None, turn_rate_dps=-2.0,
         )
         c.autopilot.hear_vessel(ship)
-        c.autopilot.hear_vessel(Vessel(mmsi=211000005, position=ship.position, is_class_b=True))
+        c.autopilot.hear_vessel(AisVessel(mmsi=211000005, position=ship.position, is_class_b=True))
         await asyncio.sleep(3.0)
         assert not c.of("AIS_VESSEL")
         assert await c.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, 301, 200_000) == 0

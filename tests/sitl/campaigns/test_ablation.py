@@ -15,8 +15,8 @@ from sitl import cli
 from sitl.campaigns.ablation import AS_IT_IS, SCENARIOS, VARIATIONS, interval, table
 from sitl.run.embedded import mission_of, run_embedded
 from sitl.run.variation import MEAN_S, foreknown, unspread
-from sitl.scene import load_scenario
-from sitl.world.wind import parse_wind
+from sitl.scenario import load_scenario
+from sitl.world.environment import parse_wind
 
 UPWIND = SCENARIOS[0].parent / "upwind.toml"
 

@@ -5,10 +5,9 @@ import dataclasses
 import msgspec
 import pytest
 
-from sitl.campaigns.counterfactual import CAUSES, GAINED_S, Reach, avoidable, by_hand, moments, without
-from sitl.campaigns.fault_watch import EXCUSES
+from sitl.campaigns.fault_judge import CAUSES, EXCUSES, GAINED_S, Reach, avoidable, by_hand, moments, without
 from sitl.campaigns.faults import BASE
-from sitl.scene.scenario import EventSpec, load_scenario
+from sitl.scenario.scenario import EventSpec, load_scenario
 
 JUMP = EventSpec(at_s=100.0, kind="gps_jump", east_m=50.0, for_s=20.0)
 GUST = EventSpec(at_s=50.0, kind="wind_speed", tws_mps=10.0, for_s=5.0)

@@ -4,10 +4,9 @@ from collections import Counter
 
 import pytest
 
-from sitl.campaigns.encounter_draw import KINDS, POLICIES, draw
-from sitl.campaigns.encounters import Job, key_of, row, run_encounters, sail_encounter
-from sitl.means import Means
-from sitl.runner import sail
+from sitl.campaigns.encounters import KINDS, POLICIES, Job, draw, key_of, row, run_encounters, sail_encounter
+from sitl.options import CampaignOptions
+from sitl.runner import run_jobs
 
 EXPLAINED = {("sailing", "rules"): {72, 85}}   # docs/reference/traffic.md
 
@@ -53,7 +52,7 @@ def test_without_the_policy_the_distance_is_kept_and_nobody_is_stood_on_to():
 
 def test_the_table_names_what_failed_and_how_to_sail_it_again(capsys):
     """The autopilot passes no size on: a yacht is taken for a ship of 100 m, and we act early."""
-    assert run_encounters(runs=1, kinds=("sailing",), first_seed=85, means=Means(workers=1)) == 1
+    assert run_encounters(runs=1, kinds=("sailing",), first_seed=85, means=CampaignOptions(workers=1)) == 1
     out = capsys.readouterr().out
     assert "FAILED sailing, rules, seed 85: did not stand on" in out
     assert "0 of 1 passed; rules kept 0, distance kept 1, touched 0" in out
@@ -65,6 +64,6 @@ def test_the_table_names_what_failed_and_how_to_sail_it_again(capsys):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_hundred_of_each_kind(kind, policy):
     jobs = [Job(kind=kind, policy=policy, seed=seed) for seed in range(100)]
-    records = sail("encounters", sail_encounter, jobs, Means(), key=key_of).records
+    records = run_jobs("encounters", sail_encounter, jobs, CampaignOptions(), key=key_of).records
     assert {r["seed"] for r in records if not r["passed"]} == EXPLAINED.get((kind, policy), set())
     assert all(r["met"]["kept_distance"] for r in records)

@@ -17,8 +17,7 @@ from companion.messages import GeoPoint, Mode
 from companion.telemetry.folder.recorder import read_jsonl
 from sitl import cli
 from sitl.autopilot import EPOCH_S
-from sitl.campaigns.fault_draw import BESIDE, draw, draw_beside, draw_turned_vane
-from sitl.campaigns.fault_watch import (
+from sitl.campaigns.fault_judge import (
     EXCUSES,
     REACTION_S,
     RESUME_S,
@@ -27,11 +26,23 @@ from sitl.campaigns.fault_watch import (
     mission_key,
     operator_spans,
 )
+from sitl.campaigns.fault_sampling import (
+    BESIDE,
+    CREEPS_MPS,
+    KINDS,
+    LONG_S,
+    MODES,
+    NEAR_M,
+    SHORT_S,
+    draw,
+    draw_beside,
+    draw_jump,
+    draw_turned_vane,
+)
 from sitl.campaigns.faults import BASE, jump_figures, run_faults, sail_faults, sail_seed
-from sitl.campaigns.jump_draw import CREEPS_MPS, KINDS, LONG_S, MODES, NEAR_M, SHORT_S, draw_jump
-from sitl.means import Means
-from sitl.scene.scenario import EventSpec, Outlet, load_scenario
-from sitl.trouble.forgeries import forgery_named
+from sitl.faults.spoofing import forgery_named
+from sitl.options import CampaignOptions
+from sitl.scenario.scenario import EventSpec, Outlet, load_scenario
 
 SEEDS = Path(__file__).parent / "seeds"
 ROCK = shapely.box(10.0, -5.0, 20.0, 5.0)
@@ -433,4 +444,4 @@ def test_silence_counts_within_a_life_only(ghost):
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 def test_a_thousand_voyages_with_faults(tmp_path):
-    assert run_faults(runs=1000, means=Means(), json_path=tmp_path / "faults.json") == 0
+    assert run_faults(runs=1000, means=CampaignOptions(), json_path=tmp_path / "faults.json") == 0

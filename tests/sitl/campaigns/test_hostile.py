@@ -16,8 +16,7 @@ from companion.mavlink.transports import open_link
 from companion.mavlink.wire.frames import Codec, Drop, SigningState
 from sitl import cli
 from sitl.autopilot import Autopilot, AutopilotConfig, serve
-from sitl.trouble.forgeries import FORGERIES, Forger
-from sitl.trouble.hostile import (
+from sitl.faults.hostile import (
     AGAINST_A_KEY,
     BEGIN,
     END,
@@ -28,9 +27,8 @@ from sitl.trouble.hostile import (
     rows,
     written,
 )
-from sitl.trouble.man_in_the_middle import Middle, Plan
-from sitl.trouble.signer import Signer
-from sitl.world.wind import Constant
+from sitl.faults.spoofing import FORGERIES, Forger, ManInTheMiddle, Signer, SpoofingPlan
+from sitl.world.environment import Constant
 
 DOCUMENT = Path("docs/reference/mavlink.md")
 # Names of messages in the code that are not read there: sent, asked for, or counted.
@@ -126,8 +124,8 @@ def free_port():
 def test_between_a_live_boat_and_a_companion_it_passes_on_and_adds_its_own():
     boat_port, companion_port = free_port(), free_port()
     boat = Autopilot(AutopilotConfig(is_warm=True, is_moored=True), Constant(0.0, 5.0), 1)
-    plan = Plan(forgeries=FORGERIES[:1], rate_hz=20.0, count=40, for_s=12.0)
-    middle = Middle(f"udpout:127.0.0.1:{boat_port}", f"udpout:127.0.0.1:{companion_port}", plan)
+    plan = SpoofingPlan(forgeries=FORGERIES[:1], rate_hz=20.0, count=40, for_s=12.0)
+    middle = ManInTheMiddle(f"udpout:127.0.0.1:{boat_port}", f"udpout:127.0.0.1:{companion_port}", plan)
 
     async def main():
         async with (

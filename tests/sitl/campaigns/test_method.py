@@ -6,15 +6,13 @@ from pathlib import Path
 import pytest
 
 from sitl import cli
-from sitl.campaigns import campaign
-from sitl.campaigns.fault_draw import draw
+from sitl.campaigns import campaign, mismatch
+from sitl.campaigns.fault_sampling import draw
 from sitl.campaigns.faults import BASE, method_of, run_faults, sail_seed, told
-from sitl.campaigns.mismatch import voyages
-from sitl.means import Means
-from sitl.methods import add_draw, add_methods, methods_of
+from sitl.options import CampaignOptions, add_draw, add_methods, methods_of
 from sitl.run.embedded import mission_of
 from sitl.run.variation import DRAWABLE, GUIDANCES, PLANNERS, Method, Variation, can_be_sailed
-from sitl.scene import load_scenario
+from sitl.scenario import load_scenario
 
 HERE = Path("sitl/scenarios")
 
@@ -84,14 +82,14 @@ def test_results_of_the_default_keep_their_keys(monkeypatch):
         keys.extend(key(job) for job in jobs)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sitl.campaigns.faults.sail", noted)
+    monkeypatch.setattr("sitl.campaigns.faults.run_jobs", noted)
     for draws in ((), DRAWABLE):
         with pytest.raises(KeyboardInterrupt):
-            run_faults(runs=1, means=Means(), draws=draws)
+            run_faults(runs=1, means=CampaignOptions(), draws=draws)
     assert "draws" not in keys[0]
     assert keys[1] == {**keys[0], "draws": "guidance, planner"}
-    assert "draws" not in voyages.key_of(voyages.Job(seed=3))
-    assert voyages.key_of(voyages.Job(seed=3, draws=DRAWABLE))["draws"] == "guidance, planner"
+    assert "draws" not in mismatch.key_of(mismatch.Job(seed=3))
+    assert mismatch.key_of(mismatch.Job(seed=3, draws=DRAWABLE))["draws"] == "guidance, planner"
     job = campaign.Job(scenario=HERE / "demo.toml", seed=0, keep=None)
     assert set(campaign.key_of(job)) == {"scenario", "hash", "seed"}
 

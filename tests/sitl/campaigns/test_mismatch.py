@@ -8,19 +8,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sitl import cli
-from sitl.campaigns.mismatch.draw import KINDS, LIMIT_S, WATERS, draw
-from sitl.campaigns.mismatch.promises import (
-    Sailed,
+from sitl.campaigns.mismatch import (
+    Job,
+    SailedSpan,
     arrival_promised,
     bow_rad,
     chance_of_no_go,
+    figures_of,
+    key_of,
     legs_promised,
     promised_s,
+    sail_one,
+    share_interval,
+    told,
 )
-from sitl.campaigns.mismatch.table import figures_of, share_interval, told
-from sitl.campaigns.mismatch.voyages import Job, key_of, sail_one
-from sitl.runner import Ledger
-from sitl.scene import HullSpec, SensorsSpec
+from sitl.campaigns.mismatch_sampling import KINDS, LIMIT_S, WATERS, draw
+from sitl.runner import ResultStore
+from sitl.scenario import HullSpec, SensorsSpec
 
 ROCKS = next(n for n, path in enumerate(WATERS) if path.stem == "rocks")   # a seed on the shortest water
 
@@ -128,7 +132,7 @@ def test_the_table_counts_losses_too():
 
 def test_what_a_file_holds_is_not_sailed_again(tmp_path, capsys):
     out, figures = tmp_path / "v.jsonl", tmp_path / "v.json"
-    with Ledger(out, "mismatch") as ledger:
+    with ResultStore(out, "mismatch") as ledger:
         for record in RECORDS[:3]:
             ledger.add(json.dumps(key_of(Job(seed=record["seed"])), separators=(",", ":")), record, {})
     whole = out.read_bytes()
@@ -157,7 +161,7 @@ def test_a_leg_is_held_against_the_newest_plan_that_has_it(tmp_path):
         return json.dumps({"t_s": t_s, "kind": "plan", "plan": {"cost_s": 90.0 + t_s, "legs": [leg]}}) + "\n"
 
     (tmp_path / "decisions.jsonl").write_text(plan(1.0, 60.0) + plan(50.0, 45.0) + '{"t_s": 60, "ki')
-    sailed = [Sailed(t_s=t, end_en_m=end, bow_rad=math.pi / 2.0, twd_from_rad=twd) for t, end, twd in (
+    sailed = [SailedSpan(t_s=t, end_en_m=end, bow_rad=math.pi / 2.0, twd_from_rad=twd) for t, end, twd in (
         (20.0, (100.1, 0.0), 0.0), (70.0, (100.0, 0.1), 1.2), (80.0, (120.0, 0.0), 0.0))]
     found = legs_promised(tmp_path, sailed, math.radians(45.0))
     assert [leg["came"] for leg in found] == [False, True]

@@ -3,10 +3,9 @@
 import pytest
 
 from sitl import cli
-from sitl.campaigns.figures import HERE, NAMES, Job, key_of, scenario_of
-from sitl.campaigns.pairs import pairs
+from sitl.campaigns.baselines import HERE, NAMES, Job, key_of, pairs, scenario_of
 from sitl.commands.baselines import SAILORS
-from sitl.scene import load_scenario
+from sitl.scenario import load_scenario
 
 BEAT = HERE / "figures" / "beat-500.toml"
 

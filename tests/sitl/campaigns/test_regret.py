@@ -6,9 +6,8 @@ import pytest
 
 from companion.errors import InputError
 from sitl import cli
-from sitl.campaigns.figures import HERE, SCENARIOS
-from sitl.campaigns.regret.table import figures_of, told
-from sitl.campaigns.regret.voyages import require_judged
+from sitl.campaigns.baselines import HERE, SCENARIOS
+from sitl.campaigns.regret import figures_of, require_judged, told
 
 
 def record(seed, time_s, who="companion", **more):

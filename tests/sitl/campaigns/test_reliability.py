@@ -6,8 +6,8 @@ import random
 import pytest
 
 from sitl import cli
-from sitl.campaigns.mismatch.reliability import coverage, floor_curve, late_curve, no_go_curve, time_shares, told
-from sitl.runner import Ledger
+from sitl.campaigns.reliability import coverage, floor_curve, late_curve, no_go_curve, time_shares, told
+from sitl.runner import ResultStore
 
 
 def voyage(seed, legs, *, kinds=(), clear_m=12.0, time_s=110.0, **also):
@@ -76,7 +76,7 @@ def test_arrivals_are_held_against_each_quantile_that_was_stated():
 def test_the_command_tells_draws_and_writes(tmp_path, capsys):
     path, picture, figures = tmp_path / "v.jsonl", tmp_path / "r.png", tmp_path / "r.json"
     records = [*honest(20), voyage(90, [], kinds=["vane"], clear_m=2.0)]
-    with Ledger(path, "mismatch") as ledger:
+    with ResultStore(path, "mismatch") as ledger:
         for record in records:
             ledger.add(json.dumps({"seed": record["seed"]}, separators=(",", ":")), record, {})
     assert cli.main(["reliability", str(path), "--plot", str(picture), "--json", str(figures)]) == 0
@@ -93,7 +93,7 @@ def test_what_holds_no_voyages_is_refused(tmp_path, capsys, campaign):
     if campaign is None:
         path.write_text("no voyage\n")
     else:
-        with Ledger(path, campaign):
+        with ResultStore(path, campaign):
             pass
     assert cli.main(["reliability", str(path)]) == 2
     assert str(path) in capsys.readouterr().err

@@ -9,13 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sitl import cli
-from sitl.campaigns import fault_draw
+from sitl.campaigns import fault_sampling, mismatch_sampling, search
 from sitl.campaigns.faults import BASE
-from sitl.campaigns.mismatch import draw
-from sitl.campaigns.search import voyages
-from sitl.campaigns.search.splitting import LENGTH, Point, Splitting, Tape, blind, moved
-from sitl.campaigns.search.voyages import NARROW, Job, drawn_of
-from sitl.scene import load_scenario
+from sitl.campaigns.search import LENGTH, NARROW, Job, Point, Splitting, Tape, blind, drawn_of, moved
+from sitl.scenario import load_scenario
 
 
 def test_a_stream_gives_its_numbers_and_goes_on_the_same_behind_its_end():
@@ -31,14 +28,14 @@ def test_a_stream_gives_its_numbers_and_goes_on_the_same_behind_its_end():
 def test_whatever_a_stream_holds_can_be_drawn(numbers, seed):
     point = Point(seed=seed, numbers=tuple(numbers))
     base = load_scenario(BASE)
-    assert fault_draw.drawn_by(point.draws(), base) == fault_draw.drawn_by(point.draws(), base)
-    draw.drawn_by(point.draws(), NARROW)
+    assert fault_sampling.drawn_by(point.draws(), base) == fault_sampling.drawn_by(point.draws(), base)
+    mismatch_sampling.drawn_by(point.draws(), NARROW)
 
 
 def test_blind_points_draw_what_seeds_draw():
-    """By how often each kind of mismatch is there: half of the voyages."""
+    """By how often each kind of mismatch is there: half of the search."""
     rng = random.Random(1)
-    kinds = [set(draw.drawn_by(blind(rng).draws(), NARROW).kinds) for _ in range(80)]
+    kinds = [set(mismatch_sampling.drawn_by(blind(rng).draws(), NARROW).kinds) for _ in range(80)]
     for kind in ("gusts", "polar", "vane", "position"):
         assert 26 <= sum(kind in found for found in kinds) <= 54
 
@@ -92,7 +89,7 @@ def test_what_is_found_is_left_as_a_scenario_that_repeats_it(tmp_path, monkeypat
         return type("Sailed", (), {"records": records, "lost": []})
 
     made = []
-    monkeypatch.setattr(voyages, "sail", sail)
+    monkeypatch.setattr(search, "run_jobs", sail)
     monkeypatch.chdir(tmp_path)
     assert cli.main(["search", "mismatch", "--each", "4", "--runs", "40"]) == 1
     out = capsys.readouterr().out
@@ -107,10 +104,10 @@ def test_what_is_found_is_left_as_a_scenario_that_repeats_it(tmp_path, monkeypat
 def test_a_voyage_that_is_excused_leads_nowhere(monkeypatch):
     job = Job(what="faults", scenario=BASE, point=blind(random.Random(1)), search="s", number=0)
     for excuse, score_m in (("operator", None), ("none", 0.0)):
-        monkeypatch.setattr(voyages.faults, "sail_faults", lambda *_, e=excuse: {
+        monkeypatch.setattr(search.faults, "sail_faults", lambda *_, e=excuse: {
             "contacts": [{"excuse": e}], "clearance_m": 0.0, "events": [], "passed": False, "faults": []})
-        monkeypatch.setattr(voyages, "UNEXCUSED", "none")
-        assert voyages.sail_point(job)["score_m"] == score_m
+        monkeypatch.setattr(search, "UNEXCUSED", "none")
+        assert search.sail_point(job)["score_m"] == score_m
 
 
 def test_a_water_is_of_mismatch(capsys):

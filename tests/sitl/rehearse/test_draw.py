@@ -10,11 +10,10 @@ import pytest
 
 from companion.errors import InputError
 from companion.geofence.mission.options import CurrentOptions
-from sitl.rehearse.change import change_of, usual
-from sitl.rehearse.draw import Doubts, drawn
-from sitl.rehearse.wind import given_wind
+from sitl.rehearse.changes import change_of, usual
+from sitl.rehearse.sampling import Doubts, drawn, given_wind
 from sitl.run.embedded import mission_of
-from sitl.scene import HullSpec, SensorsSpec, WindSpec, load_scenario, scenario_wind
+from sitl.scenario import HullSpec, SensorsSpec, WindSpec, load_scenario, scenario_wind
 
 ROCKS = Path("missions/rocks.toml")
 SEEDS = range(40)

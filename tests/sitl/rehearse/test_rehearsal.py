@@ -17,12 +17,12 @@ from companion import cli
 from companion.disk import Disk
 from sitl import cli as sitl_cli
 from sitl.rehearse import rehearsal
-from sitl.rehearse.known import clock, known_of, told, why_bad
+from sitl.rehearse.estimates import clock, estimates_of, told, why_bad
 from sitl.rehearse.picture import shares_of
 from sitl.rehearse.prepared import prepared
 from sitl.rehearse.rehearsal import Follower, Limits
 from sitl.rehearse.voyage import Job, key_of
-from sitl.runner import Cargo
+from sitl.runner import ScenarioBundle
 
 ROCKS = Path("missions/rocks.toml").resolve()
 
@@ -56,7 +56,7 @@ def test_it_ends_at_the_same_voyage_in_whatever_order_results_come():
 
 
 def test_a_quick_voyage_after_a_gap_is_not_counted_yet():
-    known = known_of([record(0), None, record(2)])
+    known = estimates_of([record(0), None, record(2)])
     assert [r["seed"] for r in known.records] == [0]
 
 
@@ -76,13 +76,13 @@ def test_the_time_ends_it_too():
 def test_the_worst_come_in_the_order_of_what_they_cost():
     records = [record(0), record(1, time_s=900.0), record(2, arrived=False, end_reason="out of time"),
                record(3, low=True), record(4, contacts=1), record(5, arrived=False, error="ValueError()")]
-    known = known_of(records)
+    known = estimates_of(records)
     assert [r["seed"] for r in known.worst(6)] == [5, 4, 3, 2, 1, 0]
     assert [why_bad(r).split(" ")[0] for r in known.worst(4)] == ["an", "touched", "arrived", "did"]
 
 
 def test_watchdogs_are_counted_by_voyages_and_times_by_all():
-    known = known_of([record(0, alerts={"in irons": 3}), record(1, alerts={"in irons": 1, "done": 1}),
+    known = estimates_of([record(0, alerts={"in irons": 3}), record(1, alerts={"in irons": 1, "done": 1}),
                       record(2, arrived=False)])
     assert {name: share.came for name, share in known.watchdogs.items()} == {"in irons": 2}
     assert [q.value for q in known.times] == [200.0, 201.0, math.inf]
@@ -224,7 +224,7 @@ def test_on_another_machine_a_rehearsal_is_whole(sailed, monkeypatch):
     (sailed / "day.csv").write_text("t_s,wind_from_deg,wind_speed_ms\n0,10,5\n3600,40,6\n")
     made = prepared(Path("rocks.toml"), Path("packed"), wind="day.csv", wind_error=None, doubt=1.0, faults=False,
                     depart=None, limit_s=60.0)
-    cargo = Cargo.of(made.source)
+    cargo = ScenarioBundle.of(made.source)
     assert sorted(Path(name).name for name, _ in cargo.packed) == ["day.csv", "rehearsal.toml", "rocks.toml",
                                                                   "rocks.wkt"]
     job = Job(scenario=made.source, seed=3, doubts=made.doubts)
@@ -248,7 +248,7 @@ RING = ("POLYGON ((-1.3115 50.8175, -1.3085 50.8175, -1.3085 50.8195, -1.3115 50
     ("", "", ("--dask", "tcp://127.0.0.1:1"), "no Dask scheduler answers"),
 ])
 def test_what_cannot_be_rehearsed_is_said_at_once_in_one_line(tmp_path, monkeypatch, capsys, old, new, words, told_):
-    monkeypatch.setattr("sitl.runner.cluster.ANSWER_S", 0.5)
+    monkeypatch.setattr("sitl.runner.executors.ANSWER_S", 0.5)
     shutil.copy(ROCKS.parent / "rocks.wkt", tmp_path)
     (tmp_path / "ring.wkt").write_text(RING)
     assert old in ROCKS.read_text()

@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 
 from bench.shares import plans_of
-from sitl.run.cpu_share import CpuShare, cpu_share, family_of
-from sitl.run.live import run_live
-from sitl.scene import load_scenario
+from sitl.run.live import CpuShare, cpu_share, family_of, run_live
+from sitl.scenario import load_scenario
 
 # A child of a child that turns for a second, and says which part of a core it had.
 BUSY = """

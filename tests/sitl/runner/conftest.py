@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from sitl.runner import cargo
-from sitl.scene import load_scenario
+from sitl.runner import job
+from sitl.scenario import load_scenario
 
 ROCKS = Path(__file__).parents[3] / "sitl" / "scenarios" / "faults" / "rocks.toml"
 
@@ -16,7 +16,7 @@ def own(tmp_path):
     """A scenario of a user's, its mission and the mission's files in folders of their own."""
     there = load_scenario(ROCKS).mission_path(ROCKS)
     (tmp_path / "own" / "missions").mkdir(parents=True)
-    for name, path in cargo.files_of(ROCKS).items():
+    for name, path in job.files_of(ROCKS).items():
         if name and path != there:
             (tmp_path / "own" / "missions" / name).parent.mkdir(exist_ok=True)
             shutil.copy(path, tmp_path / "own" / "missions" / name)

@@ -7,26 +7,27 @@ import pytest
 
 from companion.errors import InputError, JobError
 from sitl.campaigns.campaign import Job
-from sitl.runner import Cargo, cargo, file_hash
+from sitl.runner import ScenarioBundle, file_hash
+from sitl.runner.job import localised
 from tests.sitl.runner.conftest import ROCKS
 
 
 def test_what_comes_with_the_program_is_only_named():
-    packed = Cargo.of(ROCKS)
+    packed = ScenarioBundle.of(ROCKS)
     assert (packed.main, packed.packed) == ("faults/rocks.toml", ())
     assert packed.here().samefile(ROCKS)
-    other = Cargo(main=packed.main, hash="of another version")
+    other = ScenarioBundle(main=packed.main, hash="of another version")
     with pytest.raises(JobError, match=r"has another faults/rocks.toml; install the same version"):
         other.here()
 
 
 def test_what_a_user_made_is_packed_whole(own):
-    packed, digest = Cargo.of(own), file_hash(own)
+    packed, digest = ScenarioBundle.of(own), file_hash(own)
     names = {path.relative_to(own.parent).as_posix() for path in own.parent.rglob("*") if path.is_file()}
     assert {name for name, _ in packed.packed} == names
     assert len(names) > 2
     shutil.rmtree(own.parent)
-    job = cargo.localised(Job(scenario=own, seed=3, keep=None), {own: packed})
+    job = localised(Job(scenario=own, seed=3, keep=None), {own: packed})
     assert job.scenario != own
     assert file_hash(job.scenario) == digest
 
@@ -46,7 +47,7 @@ def test_the_hash_is_of_the_content_and_of_every_file(own, tmp_path):
 def test_a_file_that_only_this_machine_finds_is_told(own):
     own.write_text(own.read_text().replace("missions/mine.toml", str(own.parent / "missions" / "mine.toml")))
     with pytest.raises(InputError, match="names a file that another machine will not find; name files relative"):
-        Cargo.of(own)
+        ScenarioBundle.of(own)
 
 
 @dataclass(frozen=True)
@@ -56,5 +57,5 @@ class Plain:
 
 def test_a_job_without_a_scenario_is_left_alone():
     job = Plain(3)
-    assert cargo.localised(job, {ROCKS: Cargo.of(ROCKS)}) is job
-    assert cargo.localised(7, {ROCKS: Cargo.of(ROCKS)}) == 7
+    assert localised(job, {ROCKS: ScenarioBundle.of(ROCKS)}) is job
+    assert localised(7, {ROCKS: ScenarioBundle.of(ROCKS)}) == 7

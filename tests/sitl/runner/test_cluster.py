@@ -18,9 +18,9 @@ from sitl import cli
 from sitl.campaigns.campaign import Job as CampaignJob
 from sitl.campaigns.campaign import key_of as campaign_key
 from sitl.campaigns.campaign import sail_one
-from sitl.means import Means
-from sitl.runner import read_results, sail, sailing
-from sitl.runner.cluster import settled_on
+from sitl.options import CampaignOptions
+from sitl.runner import campaign, read_results, run_jobs
+from sitl.runner.executors import settled_on
 from tests.sitl.runner.jobs import Job, attempts, key_of, work
 
 ROOT = Path(__file__).parents[3]
@@ -93,13 +93,14 @@ def test_a_killed_worker_and_a_scheduler_that_is_started_again_lose_nothing(clus
             cluster.begin()
 
     out = tmp_path / "far.jsonl"
-    far = sail("quick", work, jobs, Means(dask=cluster.address, out=out), key=key_of, on_record=on_record)
+    far = run_jobs("quick", work, jobs, CampaignOptions(dask=cluster.address, out=out), key=key_of, on_record=on_record)
     assert sorted(seen) == list(range(JOBS))
     assert (far.now, far.lost) == (JOBS, [])
     said = capsys.readouterr().err
     assert "the scheduler went; it is waited for" in said
     here = tmp_path / "here.jsonl"
-    sail("quick", work, [Job(seed=n, folder=folder) for n in range(JOBS)], Means(workers=1, out=here), key=key_of)
+    jobs = [Job(seed=n, folder=folder) for n in range(JOBS)]
+    run_jobs("quick", work, jobs, CampaignOptions(workers=1, out=here), key=key_of)
     assert out.read_bytes() == here.read_bytes()
     before = [json.loads(line)["key"]["seed"] for line in (tmp_path / "far.facts.jsonl").read_text().splitlines()]
     assert before == seen
@@ -111,8 +112,8 @@ def test_a_voyage_on_the_cluster_is_the_same_to_the_last_byte(cluster, own, tmp_
     monkeypatch.chdir(tmp_path)   # the folder of a voyage that failed is left here
     jobs = [CampaignJob(scenario=own, seed=3, keep=None)]
     for name, address in (("far", cluster.address), ("here", None)):
-        sailed = sail("campaign", sail_one, jobs, Means(workers=1, dask=address, out=tmp_path / f"{name}.jsonl"),
-                      key=campaign_key)
+        means = CampaignOptions(workers=1, dask=address, out=tmp_path / f"{name}.jsonl")
+        sailed = run_jobs("campaign", sail_one, jobs, means, key=campaign_key)
         assert sailed.lost == []
     assert (tmp_path / "far.jsonl").read_bytes() == (tmp_path / "here.jsonl").read_bytes()
     assert "arrived" in (tmp_path / "far.jsonl").read_text()
@@ -152,10 +153,10 @@ def test_a_program_of_another_version_is_said_at_once(cluster, folder, tmp_path)
 
 def test_a_worker_that_comes_later_is_asked_too(cluster, folder, monkeypatch):
     """By the task itself, which carries what it was made by."""
-    real = sailing.made_by()
-    monkeypatch.setattr(sailing, "made_by", lambda: type(real).from_dict({**real.to_dict(), "source": "of tomorrow"}))
+    real = campaign.made_by()
+    monkeypatch.setattr(campaign, "made_by", lambda: type(real).from_dict({**real.to_dict(), "source": "of tomorrow"}))
     with pytest.raises(JobError, match=r"a worker on .* runs another version \(its source is .* there and of tomorrow"):
-        sail("quick", work, [Job(seed=0, folder=folder)], Means(dask=cluster.address), key=key_of)
+        run_jobs("quick", work, [Job(seed=0, folder=folder)], CampaignOptions(dask=cluster.address), key=key_of)
     assert attempts(folder) == {}
 
 
@@ -165,7 +166,7 @@ def test_a_worker_that_comes_later_is_asked_too(cluster, folder, monkeypatch):
     ("nonsense://x:1", "nonsense://x:1: no Dask scheduler answers ("),
 ])
 def test_a_cluster_that_is_not_there_is_one_line(tmp_path, monkeypatch, capsys, address, told):
-    monkeypatch.setattr("sitl.runner.cluster.ANSWER_S", 0.3)
+    monkeypatch.setattr("sitl.runner.executors.ANSWER_S", 0.3)
     monkeypatch.chdir(tmp_path)
     words = ["faults", "--runs", "1", "--dask", address, "--out", str(tmp_path / "r.jsonl")]
     assert cli.main(words) == 1

@@ -12,8 +12,8 @@ import pytest
 
 from companion.disk import Disk
 from companion.errors import InputError, JobError
-from sitl.means import Means
-from sitl.runner import Ledger, ledger, made_by, read_results, sail
+from sitl.options import CampaignOptions
+from sitl.runner import ResultStore, made_by, read_results, result_store, run_jobs
 from tests.sitl.runner.jobs import Job, attempts, key_of, raising, work
 
 
@@ -28,7 +28,7 @@ def jobs_in(folder, seeds=range(6), **more):
 
 
 def sailed(folder, out, seeds=range(6), do=work, **means):
-    return sail("quick", do, jobs_in(folder, seeds), Means(workers=1, out=out, **means), key=key_of)
+    return run_jobs("quick", do, jobs_in(folder, seeds), CampaignOptions(workers=1, out=out, **means), key=key_of)
 
 
 @pytest.mark.parametrize("cut", [1, 40, 200])
@@ -84,7 +84,8 @@ def test_a_run_ends_when_enough_is_known_and_goes_on_when_more_is_wanted(tmp_pat
         return watch
 
     for count in (2, 2, 5):
-        found = sail("quick", work, jobs_in(folder), Means(workers=1, out=out), key=key_of, watch=until(count))
+        means = CampaignOptions(workers=1, out=out)
+        found = run_jobs("quick", work, jobs_in(folder), means, key=key_of, watch=until(count))
         assert [r["seed"] for r in found.records] == list(range(count))
     assert seen == [0, 1, 2, 2, 2, 3, 4, 5]
     assert (found.now, attempts(folder)) == (3, dict.fromkeys(range(5), 1))
@@ -95,7 +96,7 @@ def test_a_run_ends_when_enough_is_known_and_goes_on_when_more_is_wanted(tmp_pat
 def test_sigterm_ends_it_as_ctrl_c_does_and_leaves_nobody(tmp_path, folder, workers):
     out, before = tmp_path / "r.jsonl", signal.getsignal(signal.SIGTERM)
     with pytest.raises(KeyboardInterrupt):
-        sail("quick", work, jobs_in(folder), Means(workers=workers, out=out), key=key_of,
+        run_jobs("quick", work, jobs_in(folder), CampaignOptions(workers=workers, out=out), key=key_of,
              on_record=lambda _: os.kill(os.getpid(), signal.SIGTERM))
     assert signal.getsignal(signal.SIGTERM) is before
     assert not multiprocessing.active_children()
@@ -117,7 +118,7 @@ def test_a_job_that_raises_is_told_and_tried_again(tmp_path, folder, capsys):
 
 def test_results_of_another_program_or_campaign_are_not_mixed(tmp_path, folder):
     out = tmp_path / "r.jsonl"
-    with Ledger(out, "faults"):
+    with ResultStore(out, "faults"):
         pass
     with pytest.raises(InputError, match="holds results of sitl faults; name another file"):
         sailed(folder, out)
@@ -144,7 +145,7 @@ def test_another_commit_of_the_same_source_is_the_same_program(tmp_path, folder)
 
 def test_two_runs_do_not_write_one_file(tmp_path, folder):
     out = tmp_path / "r.jsonl"
-    with Ledger(out, "quick"), pytest.raises(JobError, match="another run writes it"):
+    with ResultStore(out, "quick"), pytest.raises(JobError, match="another run writes it"):
         sailed(folder, out)
     assert sailed(folder, out).now == 6
 
@@ -177,12 +178,12 @@ def test_no_voyage_is_sailed_on_a_full_disk(tmp_path, folder, monkeypatch):
         def room(self, path):
             return replace(super().room(path), free_bytes=0)
 
-    monkeypatch.setattr("sitl.runner.work.Disk", Full)
+    monkeypatch.setattr("sitl.runner.job.Disk", Full)
     with pytest.raises(JobError, match="0 MB are left, too few for a voyage; make room"):
         sailed(folder, tmp_path / "r.jsonl")
     assert attempts(folder) == {}
 
 
 def test_keys_are_in_the_order_of_numbers():
-    assert sorted(['{"seed":10}', '{"seed":9}', '{"seed":null}'], key=ledger._order) == [
+    assert sorted(['{"seed":10}', '{"seed":9}', '{"seed":null}'], key=result_store._order) == [
         '{"seed":null}', '{"seed":9}', '{"seed":10}']

@@ -17,7 +17,7 @@ from companion.skipper.board.mark import are_marked, marked
 from sitl.ardurover.program import find
 from sitl.ardurover.simulation import ArduRover
 from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
-from sitl.world.wind import Constant
+from sitl.world.environment import Constant
 
 PLACES = st.builds(
     GeoPoint, lat_deg=st.floats(-89.0, 89.0), lon_deg=st.floats(-179.0, 179.0))

@@ -24,7 +24,7 @@ from companion.telemetry.folder import VoyageFigures, read_decisions, read_voyag
 from companion.view import ViewFold
 from companion.view.recorded import recorded_views
 from sitl.run.embedded import run_embedded
-from sitl.scene.scenario import EventSpec, load_scenario
+from sitl.scenario.scenario import EventSpec, load_scenario
 
 FOLDER = Path("sitl/scenarios")
 EARTH = Geod(ellps="WGS84")

@@ -19,7 +19,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import Vehicle
-from sitl.world.wind import Constant, Event, Scripted
+from sitl.world.environment import Constant, Scripted, WindEvent
 from tests.sitl.boats import Client, en, sail
 
 REACH = [(120.0, 0.0), (160.0, -70.0), (20.0, -70.0), (-80.0, -20.0), (20.0, -20.0), (80.0, 10.0)]
@@ -219,7 +219,7 @@ def test_servos_of_the_sail() -> None:
 @pytest.mark.parametrize(("share", "measured_s"), [(0.1, 0.9), (0.5, 2.8), (0.63, 3.6), (0.9, 6.9), (0.95, 8.6)])
 def test_latency_of_wind_direction(share: float, measured_s: float) -> None:
     vehicle = boat(5.0, 270.0)
-    vehicle.wind = Scripted(Constant(0.0, 5.0), (Event(at_s=20.0, veer_rad=math.radians(30.0)),))
+    vehicle.wind = Scripted(Constant(0.0, 5.0), (WindEvent(at_s=20.0, veer_rad=math.radians(30.0)),))
     vehicle.steer_heading(math.radians(270.0), 1.0)
     vehicle.advance(1000)
     while (vehicle.true_wind[0] + 0.5) % (2 * math.pi) - 0.5 < math.radians(30.0) * share:
@@ -230,7 +230,7 @@ def test_latency_of_wind_direction(share: float, measured_s: float) -> None:
 @pytest.mark.parametrize(("share", "measured_s"), [(0.1, 1.1), (0.5, 3.1), (0.63, 3.9), (0.9, 7.3)])
 def test_latency_of_wind_speed(share: float, measured_s: float) -> None:
     vehicle = boat(5.0, 270.0)
-    vehicle.wind = Scripted(Constant(0.0, 5.0), (Event(at_s=20.0, tws_mps=8.0),))
+    vehicle.wind = Scripted(Constant(0.0, 5.0), (WindEvent(at_s=20.0, tws_mps=8.0),))
     vehicle.steer_heading(math.radians(270.0), 1.0)
     vehicle.advance(1000)
     start = vehicle.true_wind[1]

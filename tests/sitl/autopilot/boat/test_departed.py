@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 from companion.boat import constant
 from companion.boat.boat import coefficient_of, leeway_rad
 from sitl.autopilot.boat import kernel as k
-from sitl.autopilot.boat.departed import side_mps, speed_share
+from sitl.autopilot.boat.kernel import side_mps, speed_share
 from sitl.autopilot.boat.parameters import Parameters
-from sitl.autopilot.boat.surroundings import Surroundings
-from sitl.autopilot.boat.vehicle import Vehicle
-from sitl.autopilot.departures import Departures, Sensors, Waves
-from sitl.world import Stream, Waters
-from sitl.world.wind import Constant
+from sitl.autopilot.boat.vehicle import Surroundings, Vehicle
+from sitl.autopilot.config import Departures, Sensors, Waves
+from sitl.world import CurrentModel, Waters
+from sitl.world.environment import Constant
 
 WIND = Constant(0.0, 5.0)
 AS_PLANNED = Departures()
@@ -59,7 +58,7 @@ def test_a_boat_as_planned_sails_as_one_of_whom_nothing_is_said():
 def test_pieces_of_any_length_make_the_same_voyage():
     strange = Departures(leeway_rad=0.1, waves=Waves(loss=0.2, yaw_rad=0.1),
                          sensors=Sensors(gps_noise_m=2.0, gps_lag_s=0.5, deviation_rad=0.1))
-    waters = Waters(wind=WIND, stream=Stream(drift_mps=0.3, shear_per_km=2.0, shear_to_rad=1.0))
+    waters = Waters(wind=WIND, stream=CurrentModel(drift_mps=0.3, shear_per_km=2.0, shear_to_rad=1.0))
     whole, pieces = (boat(strange, 60, waters=waters) for _ in range(2))
     advance(whole, 700)
     for loops in (1, 2, 3, 4, 6, 50, 7, 27, 100, 500):
@@ -193,7 +192,7 @@ def test_a_position_is_old_and_wanders():
 
 
 def test_a_stream_carries_her_and_is_added_to_what_an_event_makes():
-    waters = Waters(wind=WIND, stream=Stream(set_to_rad=math.pi, drift_mps=0.5))
+    waters = Waters(wind=WIND, stream=CurrentModel(set_to_rad=math.pi, drift_mps=0.5))
     vehicle = boat(AS_PLANNED, 90, waters=waters, polar=constant(2.0))
     vehicle.load_parameters()
     advance(vehicle, 1500)

@@ -10,8 +10,8 @@ from companion.geo import MPS_PER_KNOT
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import Vehicle
-from sitl.scene.hull import own_polar
-from sitl.world.wind import Constant
+from sitl.scenario.scenario import own_polar
+from sitl.world.environment import Constant
 
 # A keelboat, slower than the simulator's own hull on every course; knots.
 SLOW = Polar(

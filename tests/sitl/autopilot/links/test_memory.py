@@ -14,7 +14,7 @@ from companion.clock import now_s, run_virtual
 from companion.errors import LinkError
 from companion.mavlink.transports import TransportState
 from sitl.autopilot import Impairment, MemoryLink
-from sitl.autopilot.links.memory import FrameStream, frames
+from sitl.autopilot.memory_link import FrameStream, frames
 from sitl.autopilot.server import pieces
 
 

@@ -11,7 +11,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.clock import now_s
-from sitl.autopilot.pilot.items import to_file
+from sitl.autopilot.pilot.mission import to_file
 from tests.sitl.boats import Client, e7, en, sail
 
 SEVEN = [(60.0 * n, 0.0) for n in range(1, 7)]
@@ -355,7 +355,7 @@ class Ftp:
 
 
 def mission_file(specs: list[Any], *, options: int = 0, start: int = 0) -> bytes:
-    from sitl.autopilot.pilot.items import Item
+    from sitl.autopilot.pilot.mission import Item
 
     items = [Item(16, 3, 0, 0, 0, 0, *e7(*place), 0.0) for place in specs]
     head = struct.pack("<HHHHH", 0x763D, 0, options, start, len(items))

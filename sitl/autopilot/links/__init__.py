@@ -1,1 +1,0 @@
-"""The autopilot's ports and what they are joined to: bytes, stream rates, routes, the voice on all of them."""

@@ -1,0 +1,207 @@
+"""A job as a worker does it, in whichever process or machine: with its files, fit for it, with room for it.
+
+What comes with the program is there already and only named; everything else is packed. The hash of the content tells
+one water from another whose files have the same names.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import json
+import os
+import platform
+import resource
+import shutil
+import tempfile
+import time
+import zlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from companion.disk import Disk
+from companion.errors import InputError, JobError
+from sitl.runner.result_store import ROOTS, MadeBy, made_by, processor
+
+SCENARIOS = ROOTS[1] / "scenarios"
+JobT = TypeVar("JobT")
+
+
+def files_of(path: Path) -> dict[str, Path]:
+    """Return the files of a scenario by what they are called in it; it itself is ``""``, its mission ``mission``."""
+    from companion.geofence import load_mission  # late: a worker that begins has no use for them yet
+    from sitl.scenario import load_scenario
+
+    scenario = load_scenario(path)
+    mission_path = scenario.mission_path(path)
+    found = {"": path, "mission": mission_path}
+    for base, plain in ((path, msgspec.to_builtins(scenario)), (mission_path, msgspec.to_builtins(
+            load_mission(mission_path).options))):
+        for word in _words(plain):
+            file = base.parent / word
+            if len(word) < 256 and "\n" not in word and "\0" not in word and file.is_file():
+                found.setdefault(word, file)
+    return found
+
+
+def _words(plain: Any) -> Iterator[str]:
+    if isinstance(plain, str) and plain:
+        yield plain
+    elif isinstance(plain, Mapping):
+        for value in plain.values():
+            yield from _words(value)
+    elif isinstance(plain, list | tuple):
+        for value in plain:
+            yield from _words(value)
+
+
+@cache
+def file_hash(path: Path) -> str:
+    """Return the hash of a scenario's content and of every file that it names, wherever they lie."""
+    digest = hashlib.sha256()
+    for file in sorted(file.read_bytes() for file in files_of(path).values()):
+        digest.update(hashlib.sha256(file).digest())
+    return digest.hexdigest()[:12]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScenarioBundle:
+    """A scenario to be sailed elsewhere: ``main`` among ``packed`` files, or among those of the program."""
+
+    main: str
+    hash: str
+    packed: tuple[tuple[str, bytes], ...] = ()
+
+    @classmethod
+    def of(cls, path: Path) -> ScenarioBundle:
+        """Pack a scenario.
+
+        Raises:
+            InputError: it names a file in a way that only this machine understands.
+        """
+        where = path.resolve()
+        if where.is_relative_to(SCENARIOS):
+            return cls(main=where.relative_to(SCENARIOS).as_posix(), hash=file_hash(path))
+        files = {file.resolve() for file in files_of(path).values()}
+        root = Path(os.path.commonpath([file.parent for file in files]))
+        cargo = cls(main=where.relative_to(root).as_posix(), hash=file_hash(path), packed=tuple(
+            sorted((file.relative_to(root).as_posix(), zlib.compress(file.read_bytes())) for file in files)))
+        with tempfile.TemporaryDirectory(prefix="cargo-") as trial:
+            try:
+                is_whole = file_hash.__wrapped__(cargo.unpack(Path(trial))) == cargo.hash
+                is_own = all(file.resolve().is_relative_to(Path(trial).resolve()) or any(
+                    file.resolve().is_relative_to(ours.parent) for ours in ROOTS)
+                    for file in files_of(Path(trial) / cargo.main).values())
+            except InputError:
+                is_whole = is_own = False
+        if not (is_whole and is_own):
+            raise InputError(str(path), "", "names a file that another machine will not find",
+                             "name files relative to the file that names them")
+        return cargo
+
+    def unpack(self, folder: Path) -> Path:
+        """Write the files below ``folder``; return the scenario's."""
+        for name, data in self.packed:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(zlib.decompress(data))
+        return folder / self.main
+
+    def here(self) -> Path:
+        """Return the scenario on this machine, its files put there once in a process; JobError where it is another."""
+        return _here(self)
+
+
+@cache
+def _here(cargo: ScenarioBundle) -> Path:
+    if not cargo.packed:
+        path = SCENARIOS / cargo.main
+        if not path.is_file() or file_hash(path) != cargo.hash:
+            raise JobError(f"the program there has another {cargo.main}; install the same version there")
+        return path
+    folder = tempfile.mkdtemp(prefix="cargo-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return cargo.unpack(Path(folder))
+
+
+def localised(job: JobT, cargoes: Mapping[Path, ScenarioBundle]) -> JobT:
+    """Return a job with the paths of scenarios as they are on this machine."""
+    if not cargoes or not is_dataclass(job) or isinstance(job, type):
+        return job
+    values = {f.name: getattr(job, f.name) for f in fields(job)}
+    moved = {name: cargoes[value].here() for name, value in values.items()
+             if isinstance(value, Path) and value in cargoes}
+    return replace(job, **moved) if moved else job
+
+
+class UnfitError(JobError):
+    """A worker that would give other results, or that does not keep voyages apart."""
+
+
+class RaisedError(JobError):
+    """What a job raised, in words: the exception itself may not find its way from one process to another."""
+
+
+class NoRoomError(JobError):
+    """A worker's disk is full: what would be sailed now says more of the disk than of the boat."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """One job. ``by`` and ``cargoes`` are for a worker elsewhere."""
+
+    work: Callable[[Any], Any]
+    job: Any
+    by: MadeBy | None = None
+    cargoes: Mapping[Path, ScenarioBundle] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Done:
+    """What came of a task: the result, and apart from it what it took."""
+
+    result: dict[str, Any]
+    facts: dict[str, Any]
+
+
+def perform(task: Task) -> Done:
+    """Do a task.
+
+    Raises:
+        UnfitError: this process must not do it, nor any other of its program.
+        NoRoomError: the disk is full.
+        RaisedError: the work raised something.
+    """
+    if task.by is not None:
+        require_fit(task.by)
+    _require_room()
+    began_s, worked_s = time.perf_counter(), time.process_time()
+    try:
+        result = task.work(localised(task.job, task.cargoes or {}))
+    except Exception as error:
+        _require_room()
+        raise RaisedError(f"{type(error).__name__}: {error}") from None
+    spent = {"wall_s": time.perf_counter() - began_s, "cpu_s": time.process_time() - worked_s}
+    _require_room()   # the voyage may have met the end of the disk
+    return Done(result=json.loads(json.dumps(result)), facts={
+        "host": platform.node(), "pid": os.getpid(), "processor": processor(), **spent, "at": time.time(),
+        "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0})
+
+
+def require_fit(by: MadeBy) -> None:
+    """Raise UnfitError unless this process is the same program as ``by``."""
+    unlike = by.unlike(made_by())
+    if unlike:
+        raise UnfitError(f"a worker on {platform.node()} runs another version ({unlike}); install the same there")
+
+
+def _require_room() -> None:
+    scratch = Path(tempfile.gettempdir())
+    room = Disk().room(scratch)
+    if room.is_short:
+        raise NoRoomError(f"{platform.node()}: {scratch}: {room.free_bytes >> 20} MB are left, too few for a voyage; "
+                          "make room, and the same command goes on")
