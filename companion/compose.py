@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from companion.addresses import Displays, OutputName, parse_nmea, parse_signalk
@@ -62,9 +63,6 @@ from companion.messages import GeoPoint
 from companion.orders import ALL, Verb, unknown
 from companion.planner.settings import AUTO, SETTINGS, PlannerChoice
 from companion.skipper.step import (
-    CHOICES,
-    SHORE,
-    End,
     Ends,
     Guidance,
     Permissions,
@@ -389,7 +387,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         "guidance": Guidance(options.guidance),
         "station_s": options.station_s,
         "adopts": mission.options.from_autopilot,
-        "ends": _ends(mission),
+        "ends": Ends.of(**msgspec.structs.asdict(mission.safety)),
         "voyage_timeout_s": options.voyage_timeout_s,
         "min_replan_interval_s": options.min_replan_s,
         "traffic_clearance_m": mission.traffic.safe_distance_m,
@@ -403,20 +401,6 @@ def config_of(mission: Mission) -> SkipperConfig:
     if options.max_replan_s is not None:
         changes["plan_age_s"] = options.max_replan_s
     return replace(SkipperConfig(), **changes)
-
-
-def _ends(mission: Mission) -> Ends:
-    safety = mission.safety
-    return Ends(
-        battery=End(safety.battery), battery_v=safety.battery_v, leak=End(safety.leak),
-        out_of_time=End(safety.out_of_time), strong_wind=End(safety.strong_wind),
-        light_wind=End(safety.light_wind), dark=End(safety.dark),
-        dark_below_rad=math.radians(safety.dark_below_deg), shore_lost=End(safety.shore_lost),
-        shore_lost_s=safety.shore_lost_s, battery_reserve=safety.battery_reserve,
-        failsafes=tuple((name, CHOICES[word]) for name, word in (
-            ("position", safety.position_failsafe), ("battery", safety.battery_failsafe),
-            ("fence", safety.fence_failsafe), (SHORE, safety.shore_failsafe))),
-    )
 
 
 def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:

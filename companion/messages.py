@@ -127,7 +127,21 @@ class AutopilotStatus:
     servo_us: tuple[int, ...] = ()       # what its servo outputs are told, by number from 1 [us]; 0: nothing
     home: GeoPoint | None = None
     utc_at_boot_s: float | None = None   # Unix time of its start, once it knows the time
-    leaks: bool | None = None            # a switch in the bilge, where a script of the autopilot's tells of one
+    sensors: tuple[tuple[str, float], ...] = ()   # told now by a script on it, by name (``companion.safety.SENSORS``)
+
+    def sensor(self, name: str) -> float | None:
+        """Return what a script on the autopilot tells under this name, None: nothing now."""
+        return dict(self.sensors).get(name) if self.sensors else None
+
+
+class Severity(enum.IntEnum):
+    """MAVLink's MAV_SEVERITY, of what the companion says."""
+
+    CRITICAL = 2
+    ERROR = 3
+    WARNING = 4
+    NOTICE = 5
+    INFO = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -57,6 +57,7 @@ from companion.geofence.check import AreaConditions, check_area
 from companion.geofence.mission import AreaOptions, kind_of, place_troubles, read_mission
 from companion.planner import Plan, Problem
 from companion.planner.problem import assumed, strength_dict
+from companion.safety import LIGHT_WIND, STRONG_WIND
 from companion.skipper.planning import HOME_RADIUS_M
 from companion.skipper.way import Composed, Until
 from companion.words import counted
@@ -342,9 +343,9 @@ def wind_limit_words(mission: Mission) -> str:
     if not limits:
         return ""
     allowed = 100.0 * (1.0 - mission.risk.delta_s)
+    strong, light = (mission.safety.end(name).value for name in (STRONG_WIND, LIGHT_WIND))
     return (f"she does not set sail where {' or '.join(limits)} of wind is forecast with over {allowed:.0f} % at any "
-            f"instant of the plan; under way [safety] has {mission.safety.strong_wind!r} for strong wind and "
-            f"{mission.safety.light_wind!r} for light")
+            f"instant of the plan; under way [safety] has {strong!r} for strong wind and {light!r} for light")
 
 
 def planned_legs(walk: Generator[Problem, Plan, None], answer: Callable[[Problem], Plan]) -> list[Plan]:

@@ -19,8 +19,8 @@ from companion.mavlink.microservices import CommandAnswer
 from companion.mavlink.reception import OWN_COMPONENT
 from companion.mavlink.vehicle_identity import LISTEN_S, type_words, yields_to
 from companion.mavlink.wire import RANGES
-from companion.messages import MissionItem
-from companion.skipper.step import Severity, is_given_up
+from companion.messages import MissionItem, Severity
+from companion.skipper.step import is_given_up
 
 LOOK_S = 1.0
 # A parameter that is not answered is asked for again after this long [s].

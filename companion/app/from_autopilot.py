@@ -26,10 +26,9 @@ from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
 from companion.mavlink.signing import SigningStore
 from companion.mavlink.transports import Transport
 from companion.mavlink.wire import mission_hash
-from companion.messages import GeoPoint, MissionItem
+from companion.messages import GeoPoint, MissionItem, Severity
 from companion.mission_check import require_sailable
 from companion.skipper.board.mark import are_marked, is_remnant
-from companion.skipper.step import Severity
 from companion.telemetry.state_file import known_beside, read_state
 
 READ_TRIES = 5         # of one list; each has a patience of its own

@@ -10,8 +10,9 @@ from companion.clock import now_s
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import LATER, Link
 from companion.mavlink.wire import CONTROL_COMMAND, Drop
+from companion.messages import Severity
 from companion.orders import COMMANDS, LOCAL, MAVLINK, RESULTS, Answer, Order, Result, Source, Wanted, wanted_of
-from companion.skipper.step import Acknowledge, Severity
+from companion.skipper.step import Acknowledge
 
 # What comes in one step beyond this is sent away: each order costs the radio an answer.
 MOST_WAITING = 4

@@ -42,9 +42,9 @@ from companion.mavlink.link import Link
 from companion.mavlink.reception import LinkIdentity, LinkStats
 from companion.mavlink.transports import Transport
 from companion.mavlink.wire import Drop
-from companion.messages import CompanionStatus, MissionItem
+from companion.messages import CompanionStatus, MissionItem, Severity
 from companion.skipper import Skipper
-from companion.skipper.step import Phase, Severity, Snapshot
+from companion.skipper.step import Phase, Snapshot
 from companion.telemetry.console import DISK, GONE, left_behind
 from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, fence_record, order_record, outcome_record
 from companion.telemetry.state_file import StateFile

@@ -24,7 +24,7 @@ from companion.app.options import Offload, SatelliteLink
 from companion.clock import now_s
 from companion.disk import NEW, Disk, read_regular, reason
 from companion.fold import Step
-from companion.messages import CompanionStatus
+from companion.messages import CompanionStatus, Severity
 from companion.orders import FAR, Answer, Wanted
 from companion.orders.far import (
     BEGINNING_SIZE,
@@ -39,7 +39,6 @@ from companion.orders.far import (
     unpack_beginning,
     unpack_order,
 )
-from companion.skipper.step import Severity
 from companion.telemetry.status import far_status, unix_of_boat
 
 LOOK_S = 5.0           # into the folder

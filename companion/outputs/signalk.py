@@ -25,13 +25,14 @@ from companion.geo.frame import LocalFrame
 from companion.outputs.nmea import UNTRUSTED, course_of, is_fresh, place_of
 from companion.outputs.outlet import Outlet, Say
 from companion.program.commands import install
+from companion.safety import TABLE
 from companion.view.values import AlarmView, PointEn, View
 
 # As $source: into a source with a label a server puts a label of its own.
 LABEL = "sailboat-companion"
 BATTERY = "electrical.batteries.autopilot"
 # Alarms for which the specification has a name of its own; the others are under notifications.companion.
-KNOWN = {"leaking": "flooding", "drifting": "grounding", "vessel too near": "collision"}
+KNOWN = {dog.name: dog.notification for dog in TABLE if dog.notification}
 STATES = {"critical": "emergency", "error": "alarm", "warning": "warn", "notice": "alert"}
 LOUD = frozenset({"emergency", "alarm"})
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from companion.frozen import changed
-from companion.messages import Mode, StatusText
+from companion.messages import Mode, Severity, StatusText
 from companion.skipper.behaviors.failsafe import note
 from companion.skipper.behaviors.helm import MOTOR_OFF, MOTOR_ON
 from companion.skipper.passing import pass_gates
@@ -14,7 +14,7 @@ from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.diversions import diversion, is_composed
 from companion.skipper.planning.uploads import take_upload
 from companion.skipper.planning.waits import utc_s
-from companion.skipper.step.actions import CancelPlan, Severity
+from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.snapshot import (

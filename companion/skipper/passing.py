@@ -8,9 +8,10 @@ from typing import Any
 import shapely
 
 from companion.frozen import changed
+from companion.messages import Severity
 from companion.skipper.behaviors.field_guidance import has_sailed
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, utc_s, waits_for_gun
-from companion.skipper.step.actions import CancelPlan, Severity
+from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.state import Inside
 from companion.skipper.way.gates import Approach, Gate, again, is_on_wrong_side

@@ -24,9 +24,9 @@ from typing import Protocol, Self, TextIO
 
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
-from companion.messages import CompanionStatus, Mode
+from companion.messages import CompanionStatus, Mode, Severity
 from companion.program import control
-from companion.skipper.step import Announce, Phase, Severity
+from companion.skipper.step import Announce, Phase
 from companion.telemetry.folder.records import sigma_ahead_rad
 from companion.words import one_line, printable
 

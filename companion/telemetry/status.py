@@ -12,11 +12,11 @@ from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.wire import HIGH_LATENCY_S
-from companion.messages import CompanionStatus, TrafficStatus
+from companion.messages import CompanionStatus, Severity, TrafficStatus
 from companion.orders.far import FarStatus, Reply, minutes_of
+from companion.safety import BY_NAME
 from companion.skipper.planning import next_tack_s
-from companion.skipper.step import Announce, Phase, Route, Severity, Snapshot
-from companion.skipper.watch.watchdogs import BY_NAME
+from companion.skipper.step import Announce, Phase, Route, Snapshot
 from companion.skipper.way import Voyage, gates_of
 from companion.telemetry.folder.logbook import Logbook
 from companion.telemetry.folder.records import VoyageFigures, sigma_ahead_rad

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from companion.fold import Step
+from companion.messages import Severity
 from companion.orders import Order
 from companion.planner import Plan
 from companion.skipper.step import (
@@ -17,7 +18,6 @@ from companion.skipper.step import (
     ModeChanged,
     PlanOutcome,
     RequestPlan,
-    Severity,
     UploadMission,
     UploadOutcome,
     UploadResult,

@@ -15,9 +15,9 @@ from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.messages import Command, CompanionStatus, TrafficStatus, VehicleState, WindForecast
 from companion.orders import Verb, permitted
 from companion.planner import Leg, Plan
+from companion.safety import BY_NAME
 from companion.skipper.planning import next_tack
 from companion.skipper.step import Route, SkipperConfig, WindHealth
-from companion.skipper.watch.watchdogs import BY_NAME
 from companion.skipper.way import (
     Goal,
     PointEn,

@@ -139,7 +139,7 @@ def _false(step: Step, autopilot: Autopilot) -> list[str]:
         out += ["false EKF state"] * (not status.ekf_ok)
         out += ["false GPS state"] * (status.gps_fix is not None and status.gps_fix < 3)
         out += ["false battery"] * (status.battery_remaining is not None and status.battery_remaining < 0.5)
-        out += ["false leak"] * bool(status.leaks)
+        out += ["false leak"] * bool(status.sensor("LEAK"))
         out += ["false time"] * (status.utc_at_boot_s is not None and status.utc_at_boot_s < EPOCH_S - 3600.0)
         out += ["false fence state"] * bool(status.fence_breached)
         out += ["a person at the sticks"] * (snapshot.t_s - step.state.operator.signs.rc_moved_s <= TOLD_S)

@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from companion.skipper.watch.watchdogs import TABLE
+from companion.safety import TABLE
 from companion.words import counted
 
 LEVEL = 0.95

@@ -15,6 +15,7 @@ from companion.errors import InputError
 from companion.geofence import Mission
 from companion.mission_check import AssumedWind, leg_names, legs, planned_legs
 from companion.planner import Plan, Problem, plan
+from companion.safety import DARK, End
 from sitl.rehearse.sampling import Doubts, given_wind
 from sitl.run.embedded import EXPANSIONS, mission_of
 from sitl.scenario import Scenario, WindSpec, beginning, load_scenario, scenario_text
@@ -76,7 +77,7 @@ def prepared(
     return PreparedRehearsal(
         source=source, scenario=scenario, mission=mission, plans=tuple(plans), doubts=Doubts(
             wind=replace(given, spec=scenario.wind), boat=doubt, faults=faults, voyage_s=round(max(voyage_s, 60.0), 1)),
-        tells_the_hour=given.record_s > 0.0 or mission.tide_path is not None or mission.safety.dark != "say")
+        tells_the_hour=given.record_s > 0.0 or mission.tide_path is not None or mission.safety.end(DARK) is not End.SAY)
 
 
 def _mean(base: Scenario, mission: Mission) -> WindSpec:

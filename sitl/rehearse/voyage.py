@@ -16,8 +16,8 @@ import shapely
 from companion.boat import Hull
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
-from companion.messages import CompanionStatus, Mode
-from companion.skipper.step import Announce, Severity
+from companion.messages import CompanionStatus, Mode, Severity
+from companion.skipper.step import Announce
 from sitl.autopilot import Autopilot, MemoryLink
 from sitl.rehearse.changes import MissionChange
 from sitl.rehearse.sampling import Doubts, drawn

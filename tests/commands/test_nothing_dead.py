@@ -27,8 +27,8 @@ from companion.compose import (
 )
 from companion.geofence import load_mission
 from companion.geofence.mission.options import ATOMS, KINDS, tables
+from companion.safety import CHOICES, ENDINGS, FAILSAFES, SETTINGS, TABLE, WORD_OF, Answer, End
 from companion.skipper.step.config import Permissions
-from companion.skipper.watch.watchdogs import TABLE
 from companion.skipper.way.gates import gates_of
 from sitl import cli as sitl_cli
 from sitl import options
@@ -124,10 +124,12 @@ OTHER = {
                 "off_track_m": 45.0, "voyage_timeout_s": 900.0, "planner": "astar"},
     "planner": {**ASTAR, **RRTSTAR},
     "passage": {"leg_m": 70_000.0, "recentre_m": 2000.0},
-    "safety": {"battery": "stay", "battery_v": 10.5, "leak": "home", "out_of_time": "say", "dark": "refuge",
-               "dark_below_deg": 0.0, "shore_lost": "stay", "shore_lost_s": 60.0, "battery_reserve": 3.0,
-               "position_failsafe": "leave", "battery_failsafe": "stay", "fence_failsafe": "refuge",
-               "shore_failsafe": "sail_on", "strong_wind": "stay", "light_wind": "stay"},
+    "safety": {
+        **{ending.key: next(str(end) for end in End if end is not ending.default) for ending in ENDINGS.values()},
+        **{key: 10.0 if setting.default is None else setting.default * 0.5 for key, setting in SETTINGS.items()},
+        **{cause.key: next(word for word in CHOICES if word != WORD_OF[cause.answer])
+           for cause in FAILSAFES if cause.key},
+    },
     "traffic": {"feeds": ["udpin:127.0.0.1:10110"], "safe_distance_m": 60.0, "safe_time_s": 80.0,
                 "drop_after_s": 300.0, "policy": "rules"},
     "output": {"nmea": ["udp:127.0.0.1:10110"], "signalk": ["tcp:127.0.0.1:8375"], "signalk_token": "token"},
@@ -362,11 +364,8 @@ def test_every_watchdog_is_raised_in_a_scenario():
 
 
 def test_every_failsafe_that_is_answered_is_in_a_scenario():
-    from companion.skipper.step.causes import TABLE as CAUSES
-    from companion.skipper.step.causes import Answer
-
     told = {code for path in Path("sitl/scenarios").glob("*.toml") for code in load_scenario(path).expect.alerts}
-    answered = {f"{cause.name} failsafe" for cause in CAUSES if cause.answer is not Answer.LEAVE}
+    answered = {f"{cause.name} failsafe" for cause in FAILSAFES if cause.answer is not Answer.LEAVE}
     assert answered - told == set()
 
 

@@ -1,6 +1,7 @@
 """Mission TOML: what is wrong is said in one line with the file, the place and the remedy."""
 
 import pathlib
+import re
 
 import numpy as np
 import pytest
@@ -169,6 +170,8 @@ def test_every_option_is_documented():
         if len(cells) == 6:
             table = cells[1].strip().strip("`[]") or table
             documented |= {(table, key.strip().strip("`")) for key in cells[2].split(",")}
+    safety = (pathlib.Path(__file__).parents[2] / "docs" / "reference" / "watchdogs.md").read_text(encoding="utf-8")
+    documented |= {("safety", key) for key in re.findall(r"^\| `(\w+)`", safety, re.MULTILINE)}
     missing = {
         (name, key) for name, keys in tables().items() if name for key in keys if (name, key) not in documented}
     assert missing == set()

@@ -2,9 +2,10 @@
 
 import pytest
 
+from companion.safety import End
 from companion.skipper.planning.ends import announcement
 from companion.skipper.step.actions import RequestPlan
-from companion.skipper.step.config import End, Ends, SafeEnd, SkipperConfig
+from companion.skipper.step.config import Ends, SafeEnd, SkipperConfig
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from tests.skipper.test_voyage import is_done, make, said
@@ -25,7 +26,7 @@ def under_way(ends=None, *, has_refuge=True, **config):
 
 
 def leak(world, *, is_wet=True):
-    world.shown["leaks"] = is_wet
+    world.shown["sensors"] = (("LEAK", float(is_wet)),)
 
 
 def night(world, *, is_dark=True):
@@ -46,7 +47,7 @@ CAUSES = {"leak": leak, "dark": night, "shore_lost": silence, "battery": volts}
 @pytest.mark.parametrize("cause", CAUSES)
 @pytest.mark.parametrize(("end", "where"), [(End.REFUGE, REFUGE), (End.HOME, HOME), (End.STAY, None), (End.SAY, None)])
 def test_each_cause_leads_where_the_mission_says_and_on_when_it_is_over(cause, end, where):
-    world = under_way(Ends(battery_v=10.5, **{cause: end}))
+    world = under_way(Ends.of(battery_v=10.5, **{cause: end}))
     here = world.position
     CAUSES[cause](world)
     if end is End.SAY:
@@ -68,21 +69,21 @@ def test_without_a_place_to_go_to_a_leaking_boat_stays_and_one_with_an_empty_bat
     wet = under_way(has_refuge=False)
     leak(wet)
     assert wet.run(120, lambda w: w.state.why.startswith("staying near by: she is leaking"))
-    empty = under_way(Ends(battery_v=10.5), has_refuge=False)
+    empty = under_way(Ends.of(battery_v=10.5), has_refuge=False)
     volts(empty)
     assert empty.run(600, is_done)
     assert empty.state.voyage.arrived
 
 
 def test_out_of_time_she_may_only_say_so_and_sails_on():
-    world = under_way(Ends(out_of_time=End.SAY), voyage_timeout_s=60.0)
+    world = under_way(Ends.of(out_of_time=End.SAY), voyage_timeout_s=60.0)
     assert world.run(600, is_done)
     assert world.state.voyage.arrived
     assert [entry[2].partition(": ")[2] for entry in said(world, "out of time")] == ["say so"]
 
 
 def test_an_order_stands_over_darkness_but_not_over_a_leak():
-    world = under_way(Ends(dark=End.REFUGE))
+    world = under_way(Ends.of(dark=End.REFUGE))
     world.order("hold")
     world.run(20)
     night(world)
@@ -93,7 +94,7 @@ def test_an_order_stands_over_darkness_but_not_over_a_leak():
 
 
 def test_a_station_that_was_never_heard_and_a_clock_that_nobody_set_raise_nothing():
-    world = under_way(Ends(dark=End.REFUGE, shore_lost=End.REFUGE))
+    world = under_way(Ends.of(dark=End.REFUGE, shore_lost=End.REFUGE))
     world.run(60)
     assert not said(world, "dark")
     assert not said(world, "shore lost")

@@ -13,6 +13,7 @@ import shapely
 from companion.mavlink.vehicle_identity import Identity
 from companion.messages import Mode, StatusText
 from companion.planner import plan
+from companion.safety import FAILSAFES, SETTINGS, TABLE, WORD_OF, Response
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import ALL_PERMITTED, DRY_RUN, Permissions
 from companion.skipper.step.snapshot import (
@@ -31,7 +32,6 @@ from companion.skipper.step.snapshot import (
 )
 from companion.skipper.step.state import Phase
 from companion.skipper.watch.document import markdown
-from companion.skipper.watch.watchdogs import TABLE
 from companion.skipper.way.geometry import bearing_rad, moved
 from companion.skipper.way.voyage import Goal, Side
 from companion.traffic import TrafficPicture
@@ -210,7 +210,7 @@ EVENTS = {
     "reboot": event(AutopilotRebooted()),
     "battery low": status(battery_remaining=0.15),
     "battery critical": status(battery_remaining=0.02),
-    "leaking": status(leaks=True),
+    "leaking": status(sensors=(("LEAK", 1.0),)),
     "dark": status(utc_at_boot_s=MIDNIGHT_S),
     "shore lost": lambda s: replace(s, shore_age_s=700.0),
     "planner dead": lambda s: replace(s, planner_alive=False),
@@ -436,6 +436,34 @@ def test_the_table_has_an_entry_an_exit_and_an_action_for_each():
         assert dog.why
         assert dog.enter_s >= 0.0
         assert dog.exit_s >= 0.0
+
+
+def test_numbers_on_the_air_and_keys_of_missions_are_given_for_good():
+    """What boats and shores of other releases send and missions say: a new row is added here, none is changed."""
+    assert {dog.name: (dog.number, *((dog.ends.key, str(dog.ends.default)) if dog.ends else ())) for dog in TABLE} == {
+        "link silent": (1,), "position lost": (2,), "position jump": (3,), "wind untrusted": (4,), "becalmed": (5,),
+        "drifting": (6,), "in irons": (7,), "vessel too near": (8,), "no progress": (9,),
+        "heading against course": (10,), "off the corridor": (11,), "stuck waypoint": (12,), "mission ended": (13,),
+        "fence breach": (14,), "foreign mission": (15,), "reboot": (16,), "battery low": (17,),
+        "battery critical": (18, "battery", "refuge"), "leaking": (19, "leak", "refuge"), "dark": (20, "dark", "say"),
+        "shore lost": (21, "shore_lost", "say"), "out of time": (22, "out_of_time", "refuge"), "dragged off": (23,),
+        "planner dead": (24,), "strong wind": (25, "strong_wind", "refuge"), "light wind": (26, "light_wind", "say"),
+        "fence off": (27,), "wind contradicted": (28,),
+    }
+    assert {s.key: (s.default, s.above, s.least, s.most) for s in SETTINGS.values()} == {
+        "battery_v": (None, 0.0, None, None), "battery_reserve": (1.5, None, 0.0, 10.0),
+        "dark_below_deg": (-6.0, None, -18.0, 45.0), "shore_lost_s": (600.0, None, 10.0, None),
+    }
+    assert {cause.key: WORD_OF[cause.answer] for cause in FAILSAFES if cause.key} == {
+        "position_failsafe": "sail_on", "battery_failsafe": "refuge", "fence_failsafe": "sail_on",
+        "shore_failsafe": "stay",
+    }
+
+
+def test_who_ends_a_voyage_says_that_the_mission_has_it_and_no_two_have_one_rank():
+    ends = [dog for dog in TABLE if dog.ends is not None]
+    assert ends == [dog for dog in TABLE if dog.response is Response.AS_SET]
+    assert len({dog.ends.rank for dog in ends}) == len(ends)
 
 
 def test_the_document_is_current():

@@ -10,9 +10,9 @@ import pytest
 import shapely
 
 from companion.fold import Step
-from companion.messages import CompanionStatus, Mode
+from companion.messages import CompanionStatus, Mode, Severity
 from companion.skipper import Skipper
-from companion.skipper.step.actions import Announce, Severity
+from companion.skipper.step.actions import Announce
 from companion.skipper.step.config import SkipperConfig
 from companion.telemetry.console import ProgressLine, left_behind, progress_text
 from tests.skipper.world import World, voyage, with_parts

@@ -6,10 +6,12 @@ An unknown key is an error (with the nearest known spelling), a missing one take
 from __future__ import annotations
 
 import datetime as dt
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta, Struct
+
+from companion.safety import CHOICES, ENDINGS, FAILSAFES, SETTINGS, WORD_OF, End, Setting
 
 # ``[[goal]]``: what a mission TOML may say of a goal, one struct per kind. Without ``kind`` it is a point.
 
@@ -409,41 +411,34 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Under way for longer than this the goals are given up: to the nearest refuge, or home, or a loiter near by."""
 
 
-End = Literal["say", "stay", "refuge", "home"]
-Failsafe = Literal["leave", "sail_on", "stay", "refuge"]
-
-
-class SafetyOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """``[safety]``: what ends a voyage early, and where to.
+class _Safety(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[safety]``: what ends a voyage early, and where to; its keys are those of the table (``companion.safety``).
 
     ``refuge``: the nearest one, without one home if the mission ends there; ``home``; ``stay``: a loiter near by;
-    ``say``: words alone. A place to which no way leads is replaced by the next of these.
+    ``say``: words alone. A place to which no way leads is replaced by the next of these. Of a failsafe of the autopilot
+    that has stopped her, with ``set_auto``: ``sail_on``, ``stay``, ``refuge``; ``leave``: nothing.
     """
 
-    battery: End = "refuge"
-    """10 % are left, the autopilot calls it critical, or it has fallen to ``battery_v``."""
-    battery_v: Positive | None = None
-    leak: End = "refuge"
-    """The autopilot tells NAMED_VALUE_FLOAT ``LEAK`` 1 (a script of its own reads the switch)."""
-    out_of_time: End = "refuge"
-    """``[skipper] voyage_timeout_s`` is over: the goals are given up."""
-    strong_wind: End = "refuge"
-    """The forecast has more than ``[boat] max_tws_mps`` within the plan's time, by more than ``1 - delta_s``."""
-    light_wind: End = "say"
-    """The same of less than ``[boat] min_tws_mps``."""
-    dark: End = "say"
-    """The sun is lower than ``dark_below_deg``, by the autopilot's time; it is over when it rises."""
-    dark_below_deg: Annotated[float, Meta(ge=-18.0, le=45.0)] = -6.0
-    battery_reserve: Annotated[float, Meta(ge=0.0, le=10.0)] = 1.5
-    """Critical, too, when at its rate the charge lasts less than so many times the way to the refuge; 0: not asked."""
-    position_failsafe: Failsafe = "sail_on"
-    """What is done when a failsafe of the autopilot has stopped her, with ``set_auto``; ``leave``: nothing."""
-    battery_failsafe: Failsafe = "refuge"
-    fence_failsafe: Failsafe = "sail_on"
-    shore_failsafe: Failsafe = "stay"
-    shore_lost: End = "say"
-    """A ground station was heard, and none for ``shore_lost_s``."""
-    shore_lost_s: Annotated[float, Meta(ge=10.0)] = 600.0
+    def end(self, watchdog: str) -> End:
+        """Return what is done when this watchdog is raised."""
+        return End(getattr(self, ENDINGS[watchdog].key))
+
+
+def _figure(setting: Setting) -> tuple[str, Any, float | None]:
+    """Return a setting as a field: its key, what it may be, and its default."""
+    number = Annotated[float, Meta(gt=setting.above, ge=setting.least, le=setting.most)]
+    return setting.key, number if setting.default is not None else number | None, setting.default
+
+
+if TYPE_CHECKING:
+    SafetyOptions = _Safety
+else:
+    SafetyOptions = msgspec.defstruct(
+        "SafetyOptions", [
+            *((ending.key, Literal[tuple(map(str, End))], ending.default.value) for ending in ENDINGS.values()),
+            *map(_figure, SETTINGS.values()),
+            *((cause.key, Literal[tuple(CHOICES)], WORD_OF[cause.answer]) for cause in FAILSAFES if cause.key),
+        ], bases=(_Safety,), frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

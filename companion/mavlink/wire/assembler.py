@@ -26,6 +26,7 @@ from companion.messages import (
     VehicleState,
     WindSample,
 )
+from companion.safety import SENSORS
 
 # Positions that a boat cannot have come to: held back until the next ones agree. Pure.
 
@@ -89,7 +90,6 @@ REBOOT_BACK_S = 5.0
 ATTITUDE_MAX_AGE_S = 1.5
 # NAV_CONTROLLER_OUTPUT and FENCE_STATUS stop when they have nothing to say; then they are unknown after [s].
 QUIET_S = 5.0
-LEAK = "LEAK"                     # the name under which a script tells of the bilge's switch: 1 wet, 0 dry
 KNOWS_TIME_S = 1_577_836_800.0    # 2020: an autopilot that has no time yet tells less
 # What tells of the status; an autopilot sends as many kinds again that tell nothing here.
 _TELLING = frozenset({
@@ -145,8 +145,8 @@ class VehicleAssembler:
         self._gps2_s: float | None = None
         self._fenced_s = 0.0   # since when it tells of a fence without a gap
         self._fence_told = (False, -1)
-        self._leak_told: bool | None = None
-        self._leak_s: float | None = None
+        # Of each sensor: whether it was told beyond its entry, when, and what is believed.
+        self._sensed: dict[str, tuple[bool | None, float, float | None]] = {}
 
     def take(self, t_s: float, message: Message) -> list[Value]:
         """Return the values that ``message``, heard at ``t_s`` [s], completes: none, one, or several texts.
@@ -202,7 +202,7 @@ class VehicleAssembler:
             return self._position(t_s, message)
         if kind == "WIND":
             return [codec.wind_sample(t_s, message)]
-        if kind == "NAMED_VALUE_FLOAT" and message.name != LEAK:
+        if kind == "NAMED_VALUE_FLOAT" and message.name not in SENSORS:
             return self._named(t_s, message)
         if kind == "COMMAND_ACK":
             if message.command in _CHANGING and message.result == wire.MAV_RESULT_ACCEPTED:
@@ -310,9 +310,7 @@ class VehicleAssembler:
             return {"utc_at_boot_s": unix_s - message.time_boot_ms / 1e3} if unix_s > KNOWS_TIME_S else None
         if kind == "NAMED_VALUE_FLOAT":
             # Twice in a row, as the fence: nothing true would ever contradict one that was forged.
-            wet, before = message.value > 0.5, self._leak_told
-            self._leak_told, self._leak_s = wet, t_s
-            return {"leaks": wet} if wet == before else {}
+            return self._sensor(t_s, message.name, float(message.value))
         if kind == "FENCE_STATUS":
             # Two in a row that say the same: one alone may be damaged or forged.
             fence = bool(message.breach_status), int(message.breach_count)
@@ -325,9 +323,9 @@ class VehicleAssembler:
                 **({"fence_breaches": fence[1]} if fence[1] == last[1] else {})}
         return None
 
-    def _quiet(self, t_s: float) -> dict[str, bool | None]:
+    def _quiet(self, t_s: float) -> dict[str, Any]:
         """Return what was told too long ago to be true of now."""
-        old: dict[str, bool | None] = {}
+        old: dict[str, Any] = {}
         if self._nav_s is not None and t_s - self._nav_s > QUIET_S:
             self._nav_s = None
             old |= {"waypoint_distance_m": None, "target_bearing_rad": None, "cross_track_m": None}
@@ -339,10 +337,22 @@ class VehicleAssembler:
         if self._gps2_s is not None and t_s - self._gps2_s > QUIET_S:
             self._gps2_s = None
             old |= {"gps2": None}
-        if self._leak_s is not None and t_s - self._leak_s > QUIET_S:
-            self._leak_s = self._leak_told = None
-            old |= {"leaks": None}
+        if any(t_s - told_s > QUIET_S for _, told_s, _ in self._sensed.values()):
+            self._sensed = {name: told for name, told in self._sensed.items() if t_s - told[1] <= QUIET_S}
+            old |= {"sensors": self._believed()}
         return old
+
+    def _sensor(self, t_s: float, name: str, value: float) -> dict[str, Any] | None:
+        """Take what a script tells: believed when this and the value before are on one side of the row's entry."""
+        if not math.isfinite(value):
+            return None
+        dog, (was_beyond, _, believed) = SENSORS[name], self._sensed.get(name, (None, t_s, None))
+        is_beyond = value >= dog.enter if dog.enter >= dog.exit else value <= dog.enter
+        self._sensed[name] = is_beyond, t_s, value if is_beyond is was_beyond else believed
+        return {"sensors": self._believed()}
+
+    def _believed(self) -> tuple[tuple[str, float], ...]:
+        return tuple(sorted((name, value) for name, (_, _, value) in self._sensed.items() if value is not None))
 
 
 class _Stale(Exception):  # noqa: N818 - a signal inside this module

@@ -24,6 +24,7 @@ from companion.geo.angles import wrap_two_pi
 from companion.mavlink.wire.codec import e7, geo_point
 from companion.mavlink.wire.frames import Message
 from companion.messages import AutopilotStatus, CompanionStatus, TrafficStatus, VehicleState
+from companion.safety import number_of
 
 # TUNNEL payload types from 32768 on are free for private use; ours is read by nobody else.
 PAYLOAD_TYPE = 0xC05A
@@ -327,30 +328,6 @@ def unpack_traffic(payload: bytes) -> TrafficStatus:
         bearing_rad=None if bearing == _NONE16 else math.radians(bearing / 100.0),
         alarm=words[0], role=words[1], rule=words[2], name=words[3],
     )
-
-
-# The watchdogs as numbers, for links that have no room for words.
-
-# In the order in which they were numbered: a new one goes to the end, for a status of last year must read the same.
-WATCHDOGS = (
-    "link silent", "position lost", "position jump", "wind untrusted", "becalmed", "drifting", "in irons",
-    "vessel too near", "no progress", "heading against course", "off the corridor", "stuck waypoint", "mission ended",
-    "fence breach", "foreign mission", "reboot", "battery low", "battery critical", "leaking", "dark", "shore lost",
-    "out of time", "dragged off", "planner dead", "strong wind", "light wind", "fence off",
-    "wind contradicted",
-)
-
-
-def number_of(watchdog: str) -> int:
-    """Return the number of a watchdog, 0 for none (an empty name)."""
-    return WATCHDOGS.index(watchdog) + 1 if watchdog else 0
-
-
-def watchdog_of(number: int) -> str:
-    """Return the watchdog of a number, empty for 0; one that is not known here is named by its number."""
-    if number == 0:
-        return ""
-    return WATCHDOGS[number - 1] if number <= len(WATCHDOGS) else f"watchdog {number}"
 
 
 # HIGH_LATENCY2 of the companion: the boat and the companion's view of her in one message of 42 bytes. Pure.

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from companion.mavlink.wire import companion_status
 from companion.messages import GeoPoint
 from companion.orders.far.order import REPLIES, SEAL_BYTES, STATUS, BitField, FarKey, Layout, Reply
 from companion.orders.order import BY_VERB, Verb, verb_of
+from companion.safety import number_of, watchdog_of
 
 VERSION = 1
 # The skipper's phases and the traffic's alarms in the order in which they were numbered: new ones go to the end.
@@ -49,8 +49,7 @@ LAYOUT = Layout((
     _MINUTE, _LAT, _LON, _METRE, _TO_WAYPOINT, _SPEED, _TWD, _TWS, _SIGMA,
     BitField(name="phase", size=1, says=", ".join(f"{n} {word}" for n, word in enumerate(PHASES))),
     _GOAL, _GOALS, _AGE, _RISK, _CLEAR, _CPA,
-    BitField(name="watchdog", size=1, says="the worst that is raised, 0 none: " + ", ".join(
-        f"{n} {word}" for n, word in enumerate(companion_status.WATCHDOGS, 1))),
+    BitField(name="watchdog", size=1, says="the worst that is raised, 0 none: its number in [the table](watchdogs.md)"),
     _BATTERY,
     BitField(name="order", size=2, unknown=0, says="the counter of the order that came last, 0: none has come"),
     BitField(name="reply", size=1, says="what became of it (lower four bits): " + ", ".join(
@@ -114,7 +113,7 @@ def pack_status(status: FarStatus, key: FarKey) -> bytes:
         "phase": PHASES.index(status.phase), "goal": _GOAL.count(status.goal), "goals": _GOALS.count(status.goals),
         "plan_age": _AGE.count(status.plan_age_s), "risk": _RISK.count(status.promised_risk),
         "clearance": _CLEAR.count(status.clearance_m), "cpa": _CPA.count(status.cpa_m),
-        "watchdog": companion_status.number_of(status.watchdog), "battery": _BATTERY.count(status.battery_v),
+        "watchdog": number_of(status.watchdog), "battery": _BATTERY.count(status.battery_v),
         "order": status.order or 0, "reply": reply | alarm << 4, "sequence": status.sequence % 256,
     }))
 
@@ -145,7 +144,7 @@ def unpack_status(data: bytes, key: FarKey) -> FarStatus:
         plan_age_s=_AGE.value(counts["plan_age"]), promised_risk=_RISK.value(counts["risk"]),
         clearance_m=_CLEAR.value(counts["clearance"]), cpa_m=_CPA.value(counts["cpa"]),
         alarm="" if alarm == _NONE4 else ALARMS[alarm],
-        watchdog=companion_status.watchdog_of(counts["watchdog"]), battery_v=_BATTERY.value(counts["battery"]),
+        watchdog=watchdog_of(counts["watchdog"]), battery_v=_BATTERY.value(counts["battery"]),
         order=counts["order"] or None, reply=REPLIES[reply - 1] if reply else None,
     )
 

@@ -10,10 +10,9 @@ from __future__ import annotations
 import math
 
 from companion.frozen import changed
-from companion.messages import Mode
+from companion.messages import Mode, Severity
 from companion.skipper.behaviors.headings import course_rad
 from companion.skipper.behaviors.helm import is_busy, set_mode
-from companion.skipper.step.actions import Severity
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Phase
 from companion.skipper.way.drift import DriftAhead, drift_ahead

@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 
 from companion.frozen import changed
 from companion.geo.angles import difference_rad, heading_of
-from companion.messages import Mode
+from companion.messages import Mode, Severity
+from companion.safety import LIGHT_MPS
 from companion.skipper.behaviors.helm import is_busy, run_motor, set_mode
-from companion.skipper.step.actions import Severity
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import ROOMIER_M
 from companion.skipper.step.state import Fix, Phase
@@ -27,7 +27,6 @@ from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import PointEn, water_at
 
 STEERAGE_MPS = 0.4     # less wind than this moves no boat that could be steered
-LIGHT_MPS = 0.8        # less than this makes no way that is worth a plan: the entry of "becalmed"
 DRIFT_MPS = 0.15       # a slower velocity is a receiver's noise
 SLOW_MPS = 0.04        # of a drift seen in places: 2.4 m in a minute; slower is a receiver's noise, too
 PLACE_S, SLOW_PLACES, LEAST_S = 10.0, 6, 30.0   # places of a boat that hardly moves: one in 10 s, a minute, half of it

@@ -13,22 +13,22 @@ from dataclasses import replace
 
 from companion.boat import AutopilotLimits
 from companion.frozen import changed
-from companion.messages import AutopilotStatus, Command, Mode, StatusText
-from companion.skipper.behaviors.helm import is_busy, set_mode
-from companion.skipper.step.actions import CancelPlan, Severity
-from companion.skipper.step.causes import (
+from companion.messages import AutopilotStatus, Command, Mode, Severity, StatusText
+from companion.safety import (
     CRITICAL,
     EMPTY,
+    FAILSAFES,
     HOMEWARD,
     PERSON,
     RECEIVER,
     SHORE,
     STOPPING,
-    TABLE,
     Answer,
     standing,
     told_by,
 )
+from companion.skipper.behaviors.helm import is_busy, set_mode
+from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, Stop
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
@@ -130,7 +130,7 @@ def _cause(stop: Stop, signs: Signs) -> str:
     # A receiver that loses its transmitter may put its channels where its maker likes.
     if first <= signs.rc_moved_s <= last and RECEIVER not in told:
         return PERSON
-    return next((cause.name for cause in TABLE if cause.name in told), PERSON)
+    return next((cause.name for cause in FAILSAFES if cause.name in told), PERSON)
 
 
 def take_over(ctx: StepContext) -> bool:

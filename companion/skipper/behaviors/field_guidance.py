@@ -22,14 +22,14 @@ from companion.field.tree import LEAST, FieldConditions, field_of, lengths, zone
 from companion.field.values import GuidanceSettings, Intent, MovingObstacle, Setpoint, Situation
 from companion.frozen import changed
 from companion.geo.angles import wrap_pi
-from companion.messages import Mode
+from companion.messages import Mode, Severity
 from companion.skipper.behaviors.helm import hand_back, is_busy, set_mode
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.diversions import diversion, is_composed
 from companion.skipper.planning.right_of_way import held_of
 from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
 from companion.skipper.planning.waits import stay_left_s, utc_s
-from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
+from companion.skipper.step.actions import ReplanReason, SteerHeading
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import ByField, Inside

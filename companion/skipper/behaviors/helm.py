@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from companion.frozen import changed
-from companion.messages import MissionState, Mode
+from companion.messages import MissionState, Mode, Severity
 from companion.skipper.planning.uploads import upload
-from companion.skipper.step.actions import Action, Arm, RunMotor, SetCurrent, SetMode, Severity, Tack
+from companion.skipper.step.actions import Action, Arm, RunMotor, SetCurrent, SetMode, Tack
 from companion.skipper.step.context import SHOWS_S, StepContext
 from companion.skipper.way.geometry import is_past
 

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from companion.frozen import changed
-from companion.messages import Mode
+from companion.messages import Mode, Severity
 from companion.orders import FAR, LOCAL, MAVLINK, Answer, Order, Place, Result, Verb, Wanted, lead_in, permitted, which
 from companion.skipper.behaviors.rest import UNTIL_TOLD
 from companion.skipper.board.on_board import adopt
@@ -19,7 +19,7 @@ from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.autopilot_beats import next_tack_s
 from companion.skipper.planning.diversions import diversion, home_trouble, is_at_rest, place_trouble, pressing
 from companion.skipper.planning.not_found import hold
-from companion.skipper.step.actions import Acknowledge, CancelPlan, ReplanReason, RequestPlan, Severity, StopOrders
+from companion.skipper.step.actions import Acknowledge, CancelPlan, ReplanReason, RequestPlan, StopOrders
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Kind
 from companion.skipper.step.saved import Standing

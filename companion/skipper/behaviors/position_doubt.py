@@ -20,13 +20,13 @@ import math
 from dataclasses import replace
 
 from companion.frozen import changed
-from companion.messages import Mode
+from companion.messages import Mode, Severity
+from companion.safety import CRITICAL, HOMEWARD, JUMP_M
 from companion.skipper.behaviors.drifting import stops_drift
 from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.planning.waits import utc_s
-from companion.skipper.step.actions import CancelPlan, Severity
-from companion.skipper.step.causes import CRITICAL, HOMEWARD
-from companion.skipper.step.context import FRESH_S, JUMP_M, StepContext
+from companion.skipper.step.actions import CancelPlan
+from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.saved import SavedPlace
 from companion.skipper.step.state import Phase
 from companion.skipper.way.position_plausibility import (

@@ -8,14 +8,14 @@ watch goes on until somebody ends the program.
 from __future__ import annotations
 
 from companion.frozen import changed
+from companion.messages import Severity
+from companion.safety import ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
 from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
 from companion.skipper.planning.diversions import home_trouble, is_at_rest, pressing
-from companion.skipper.planning.ends import HOW_LONG, OUT_OF_TIME, end_of
-from companion.skipper.step.actions import CancelPlan, Severity
-from companion.skipper.step.causes import SHORE, STOPPING
-from companion.skipper.step.config import End, SafeEnd
+from companion.skipper.step.actions import CancelPlan
+from companion.skipper.step.config import SafeEnd
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Diversion, Kind
 from companion.skipper.step.state import Phase
@@ -32,7 +32,7 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
     """Lie at the end of a diversion; True while she does."""
     if not is_at_rest(ctx) or ctx.state.steering.own_mode in STOPPING:
         return False
-    if ctx.is_raised(OUT_OF_TIME) and end_of(ctx.config, OUT_OF_TIME) is not End.SAY and not (
+    if ctx.is_raised(OUT_OF_TIME) and ctx.config.ends.end(OUT_OF_TIME) is not End.SAY and not (
         ctx.state.operator.answering or pressing(ctx) is not None or bound.is_ordered
     ):
         reached = len(ctx.state.progress.reached)
@@ -56,8 +56,9 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
 
 def _how_long(ctx: StepContext) -> str:
     """Return how long a diversion that nobody ordered keeps her."""
-    raised = next((name for name in HOW_LONG if ctx.is_raised(name) and end_of(ctx.config, name) is not End.SAY), "")
-    return HOW_LONG.get(raised) or ANSWERED.get(ctx.state.operator.answering, TAKEN)
+    until = next((ending.until for name, ending in ENDINGS.items() if ending.until and ctx.is_raised(name)
+                  and ctx.config.ends.end(name) is not End.SAY), "")
+    return until or ANSWERED.get(ctx.state.operator.answering, TAKEN)
 
 
 def rest(ctx: StepContext) -> None:

@@ -6,7 +6,8 @@ import math
 
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
-from companion.messages import Mode
+from companion.messages import Mode, Severity
+from companion.safety import HOMEWARD, STOPPING
 from companion.skipper.behaviors.drifting import stops_drift
 from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import heading as by_field_heading
@@ -31,8 +32,7 @@ from companion.skipper.planning.right_of_way import stands_on
 from companion.skipper.planning.triggers import find_trigger, is_buoy
 from companion.skipper.planning.vessels import near
 from companion.skipper.planning.waits import stay_left_s
-from companion.skipper.step.actions import ReplanReason, Severity, SteerHeading
-from companion.skipper.step.causes import HOMEWARD, STOPPING
+from companion.skipper.step.actions import ReplanReason, SteerHeading
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Diversion

@@ -12,10 +12,10 @@ from dataclasses import replace
 from companion.frozen import changed
 from companion.geofence.mission import hindrance, offer
 from companion.mavlink.wire import mission_hash
-from companion.messages import Command, MissionItem, Mode
+from companion.messages import Command, MissionItem, Mode, Severity
+from companion.safety import STOPPING
 from companion.skipper.board.mark import are_marked, marked
-from companion.skipper.step.actions import AdoptDrawing, ReadMission, Severity
-from companion.skipper.step.causes import STOPPING
+from companion.skipper.step.actions import AdoptDrawing, ReadMission
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
 from companion.skipper.step.route import Route

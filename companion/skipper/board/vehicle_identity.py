@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from companion.frozen import changed
 from companion.mavlink.vehicle_identity import ROVERS, Identity, type_words
-from companion.skipper.step.actions import CancelPlan, Severity, StopOrders
+from companion.messages import Severity
+from companion.skipper.step.actions import CancelPlan, StopOrders
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Phase
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from companion.boat.tracking import SHORT_S
 from companion.frozen import changed
+from companion.messages import Severity
 from companion.planner import Plan, PlanStatus
 from companion.planner.plan import Arrival
 from companion.planner.problem import evaluate, resolved
@@ -21,7 +22,7 @@ from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.track import of_way, said
 from companion.skipper.planning.uploads import is_begun_risky, is_riskier, upload
 from companion.skipper.planning.vessels import apart_m, meetings
-from companion.skipper.step.actions import Change, ReplanReason, Severity
+from companion.skipper.step.actions import Change, ReplanReason
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import Tail, splice
 from companion.skipper.step.route import Kind, Route

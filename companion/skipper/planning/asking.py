@@ -10,7 +10,7 @@ from companion.boat.failed_tack import IRONS_S
 from companion.current import over_ground
 from companion.errors import InputError
 from companion.frozen import changed
-from companion.messages import Mode
+from companion.messages import Mode, Severity
 from companion.planner import Problem
 from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
 from companion.skipper.planning.diversions import diversion, gate_for, homeward
@@ -18,7 +18,7 @@ from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.planning.track import problem_tracking, steps
 from companion.skipper.planning.vessels import shares
-from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan, Severity
+from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import path_length_m
 from companion.skipper.step.route import Diversion

@@ -9,22 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from companion.messages import Severity
 from companion.orders import Verb
-from companion.skipper.planning.ends import (
-    BATTERY,
-    DARK,
-    LEAK,
-    LIGHT_WIND,
-    OUT_OF_TIME,
-    SHORE_LOST,
-    STRONG_WIND,
-    WHY,
-    end_of,
-)
+from companion.safety import BATTERY, BY_RANK, ENDINGS, SHORE, Answer, End
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
-from companion.skipper.step.actions import Severity
-from companion.skipper.step.causes import SHORE, Answer
-from companion.skipper.step.config import End, SafeEnd
+from companion.skipper.step.config import SafeEnd
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import HOME_RADIUS_M, Diversion, Kind
 from companion.skipper.way.autopilot_fence import Circle, Drawn
@@ -112,15 +101,12 @@ def pressing(ctx: StepContext) -> Diversion | None:
     if answer is Answer.SHELTER:
         is_battery = state.operator.answering == "battery"
         # she is stopped: something must be done
-        end = End.REFUGE if not is_battery or ends.battery is End.SAY else ends.battery
-        why = WHY[BATTERY] if is_battery and ctx.is_raised(BATTERY) else why
+        end = End.REFUGE if not is_battery or ends.end(BATTERY) is End.SAY else ends.end(BATTERY)
+        why = ENDINGS[BATTERY].because if is_battery and ctx.is_raised(BATTERY) else why
         return _found(ctx, end, why) or _stay(ctx, why)
-    if ctx.is_raised(BATTERY):
-        found = _found(ctx, ends.battery, WHY[BATTERY])
-        if found is not None:
-            return found   # without a place to go to what is left takes her on
-    if ctx.is_raised(LEAK) and ends.leak is not End.SAY:
-        return _found(ctx, ends.leak, WHY[LEAK]) or _stay(ctx, WHY[LEAK])
+    ended = _ended_early(ctx, over_orders=True)
+    if ended is not None:
+        return ended
     if answer is Answer.STAY:
         return (_home(ctx, why) if state.operator.sent_home else None) or _stay(ctx, why)
     return None
@@ -146,13 +132,30 @@ def _at_the_end(ctx: StepContext) -> Diversion | None:
     """Return where she is bound for when time, light, shore or a wind for her are gone, or the goals are reached, or
     she is off her place."""  # noqa: D205, D209
     state = ctx.state
-    for name in (OUT_OF_TIME, STRONG_WIND, SHORE_LOST, DARK, LIGHT_WIND):
-        end = end_of(ctx.config, name)
-        if ctx.is_raised(name) and end is not End.SAY and not state.voyage.over:
-            return _found(ctx, end, WHY[name]) or _stay(ctx, WHY[name])
+    if not state.voyage.over:
+        ended = _ended_early(ctx, over_orders=False)
+        if ended is not None:
+            return ended
     if state.voyage.over:
         return _back(ctx)
     return homeward(ctx) if ctx.gate is None else None
+
+
+def _ended_early(ctx: StepContext, *, over_orders: bool) -> Diversion | None:
+    """Return the diversion of the first watchdog in the table's rank that ends the voyage early, None: none does."""
+    for name in BY_RANK:
+        ending = ENDINGS[name]
+        if ending.over_orders is not over_orders or not ctx.is_raised(name):
+            continue
+        end = ctx.config.ends.end(name)
+        if end is End.SAY:
+            continue
+        found = _found(ctx, end, ending.because)
+        if found is None and not ending.sails_on:
+            found = _stay(ctx, ending.because)
+        if found is not None:
+            return found
+    return None
 
 
 def _kept_in(ctx: StepContext) -> Diversion | None:

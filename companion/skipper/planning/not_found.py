@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from companion.frozen import changed
-from companion.messages import Command, waypoint
+from companion.messages import Command, Severity, waypoint
 from companion.planner.settings import AUTO
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, leads_there, too_risky, upload
 from companion.skipper.planning.vessels import meetings
-from companion.skipper.step.actions import Severity
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import loiter_place
 from companion.skipper.step.state import PendingPlan, Phase

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from companion.boat.tracking import SHORT_S
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
+from companion.messages import Severity
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
 from companion.skipper.planning.diversions import HOME, diversion, homeward, is_composed
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
-from companion.skipper.step.actions import ReplanReason, Severity
+from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.config import Guidance, ReplanPolicy
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import NO_PLAN, path_length_m

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from companion.frozen import changed
+from companion.messages import Severity
 from companion.planner import Leg, Problem
 from companion.planner.problem import evaluate, resolved
 from companion.planner.risk import of_risky, path_risk, tacks_at_risk
@@ -16,7 +17,7 @@ from companion.skipper.board.mark import marked
 from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
 from companion.skipper.planning.track import of_way
 from companion.skipper.planning.vessels import meetings
-from companion.skipper.step.actions import Change, Severity, UploadMission
+from companion.skipper.step.actions import Change, UploadMission
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import common_prefix, stopgap
 from companion.skipper.step.route import Route

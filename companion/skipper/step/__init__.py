@@ -12,15 +12,13 @@ from companion.skipper.step.actions import (
     RunMotor,
     SetCurrent,
     SetMode,
-    Severity,
     SteerHeading,
     StopOrders,
     Tack,
     UploadFence,
     UploadMission,
 )
-from companion.skipper.step.causes import CHOICES, SHORE
-from companion.skipper.step.config import End, Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.step.config import Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted, Standing
@@ -46,11 +44,11 @@ from companion.skipper.step.snapshot import (
 from companion.skipper.step.state import Phase, SkipperState, is_given_up
 
 __all__ = [
-    "CHOICES", "SHORE", "Acknowledge", "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted",
-    "CancelPlan", "CommandOutcome", "CommandResult", "Disbelieved", "End", "Ends", "Event", "Guidance",
+    "Acknowledge", "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted",
+    "CancelPlan", "CommandOutcome", "CommandResult", "Disbelieved", "Ends", "Event", "Guidance",
     "MissionOnBoard", "ModeChanged", "Outcome", "ParameterChanged", "Permissions", "Persisted", "Phase",
     "PlanOutcome", "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd",
-    "SetCurrent", "SetMode", "Severity", "SkipperConfig", "SkipperState", "Snapshot", "Standing",
+    "SetCurrent", "SetMode", "SkipperConfig", "SkipperState", "Snapshot", "Standing",
     "SteerHeading", "StopOrders", "Tack", "UploadFence", "UploadMission", "UploadOutcome", "UploadResult",
     "WaypointReached", "WindHealth", "WindView", "ends_safely", "is_given_up",
 ]

@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass
 from typing import Any
 
-from companion.messages import MissionItem, Mode
+from companion.messages import MissionItem, Mode, Severity
 from companion.orders import Result
 from companion.planner.settings import AUTO, PlannerChoice
 
@@ -34,16 +34,6 @@ class ReplanReason(enum.Enum):
     ORDER = "order"                    # somebody asked for it, or she has come out of irons
     RETRY = "retry"                    # a step of the ladder after nothing was found
     MISMATCH = "mismatch"              # the mission on the autopilot is not the one that was uploaded
-
-
-class Severity(enum.IntEnum):
-    """MAVLink's."""
-
-    CRITICAL = 2
-    ERROR = 3
-    WARNING = 4
-    NOTICE = 5
-    INFO = 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from companion.orders import ALL
 from companion.planner.settings import AUTO, PlannerChoice
-from companion.skipper.step.causes import BY_NAME, Answer
+from companion.safety import CAUSES, CHOICES, ENDINGS, SETTINGS, Answer, End
 from companion.traffic import Policy
 
 
@@ -37,36 +37,35 @@ class SafeEnd(enum.Enum):
     RETURN = "return"          # at home, the way there planned like any other
 
 
-class End(enum.Enum):
-    """What is done when something ends a voyage early (``[safety]``)."""
-
-    SAY = "say"
-    STAY = "stay"              # a loiter where there is room near by
-    REFUGE = "refuge"          # the nearest; without one home if the mission ends there
-    HOME = "home"              # where there is no way to it, the nearest refuge
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Ends:
-    """What ends a voyage early, and how; the figures at which it does."""
+    """What the mission's ``[safety]`` says, as pairs of key and value; what it does not say is as the table has it."""
 
-    battery: End = End.REFUGE
-    battery_v: float | None = None     # critical at this voltage too; None: by charge and the autopilot's limits alone
-    leak: End = End.REFUGE
-    out_of_time: End = End.REFUGE
-    strong_wind: End = End.REFUGE
-    light_wind: End = End.SAY
-    dark: End = End.SAY
-    dark_below_rad: float = -0.104720  # the sun 6 deg under the horizon: the end of civil twilight
-    shore_lost: End = End.SAY
-    shore_lost_s: float = 600.0        # no ground station was heard for so long
-    battery_reserve: float = 1.5       # critical when it lasts less than so many times the way to a refuge; 0: never
-    failsafes: tuple[tuple[str, Answer], ...] = ()   # by cause, in place of ``companion.skipper.step.causes``
+    said: tuple[tuple[str, str | float | None], ...] = ()
+
+    @classmethod
+    def of(cls, **said: str | float | None) -> Ends:
+        """Return what these keys of ``[safety]`` say."""
+        return cls(tuple(said.items()))
+
+    def end(self, watchdog: str) -> End:
+        """Return what is done when a watchdog that ends a voyage early is raised.
+
+        Raises:
+            KeyError: it is none of these.
+        """
+        ending = ENDINGS[watchdog]
+        return End(str(dict(self.said).get(ending.key, ending.default)))
+
+    def figure(self, key: str) -> float | None:
+        """Return a figure of ``[safety]`` in the unit of its key, None: it is not asked for."""
+        value = dict(self.said).get(key, SETTINGS[key].default)
+        return None if value is None else float(value)
 
     def answer(self, cause: str) -> Answer | None:
         """Return what is done about a stop by this cause, None: it is nobody's failsafe."""
-        known = BY_NAME.get(cause)
-        return dict(self.failsafes).get(cause, known.answer) if known is not None else None
+        known = CAUSES.get(cause)
+        return None if known is None else CHOICES.get(str(dict(self.said).get(known.key)), known.answer)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,7 +91,7 @@ ALL_PERMITTED = Permissions(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkipperConfig:
-    """Thresholds of the rules. Watchdog thresholds are in ``companion.skipper.watch.watchdogs``."""
+    """Thresholds of the rules. Watchdog thresholds are in ``companion.safety``."""
 
     sails: bool = True                 # False: a motor boat is what the mission asks for
     # planning

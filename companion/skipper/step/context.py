@@ -12,7 +12,8 @@ from dataclasses import replace
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.mavlink.wire import MEMORY_S
-from companion.messages import AutopilotStatus, Mode
+from companion.messages import AutopilotStatus, Mode, Severity
+from companion.safety import JUMP_M, STOPPING
 from companion.skipper.step.actions import (
     Action,
     Announce,
@@ -20,13 +21,11 @@ from companion.skipper.step.actions import (
     RunMotor,
     SetCurrent,
     SetMode,
-    Severity,
     SteerHeading,
     Tack,
     UploadFence,
     UploadMission,
 )
-from companion.skipper.step.causes import STOPPING
 from companion.skipper.step.config import Guidance, Permissions, SkipperConfig
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Diversion, Route
@@ -60,8 +59,7 @@ from companion.skipper.way.stemming import Water
 from companion.skipper.way.voyage import PointEn, Voyage
 
 FRESH_S = 3.0          # a part older than this is not acted upon
-JUMP_M = 10.0          # a fix this much farther from where she is reckoned than she can have turned away is a jump
-GAINS_MPS = 1.0        # ... or gained speed
+GAINS_MPS = 1.0        # a fix with this much more speed than she can have gained is a jump, as one that is JUMP_M off
 SHOWS_S = 2.5          # a command that was accepted shows in the next heartbeats: it is not repeated before that
 DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
 

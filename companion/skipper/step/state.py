@@ -155,7 +155,7 @@ PATIENT = Retry()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """She was being sailed and no longer is: since when, what she was put into, and by what (``causes``).
+    """She was being sailed and no longer is: since when, what she was put into, and by what (``FAILSAFES``).
 
     ``before_s`` is when she was last seen being sailed: the change of mode is between the two.
     """

@@ -1,4 +1,4 @@
-"""docs/reference/watchdogs.md, made from the tables of watchdogs and of failsafes' causes.
+"""docs/reference/watchdogs.md, made from the tables of ``companion.safety``.
 
 ``python -m companion.skipper.watch.document > docs/reference/watchdogs.md``
 """
@@ -7,20 +7,48 @@ from __future__ import annotations
 
 import sys
 
-from companion.skipper.step.causes import TABLE as CAUSES
-from companion.skipper.step.causes import Answer, Cause
-from companion.skipper.watch.watchdogs import TABLE, Watchdog
+from companion.safety import (
+    BY_RANK,
+    ENDINGS,
+    FAILSAFES,
+    SETTINGS,
+    TABLE,
+    WORD_OF,
+    Answer,
+    Cause,
+    Setting,
+    Watchdog,
+)
 
 HEAD = """# Watchdogs
 
-Made from the tables in `companion/skipper/watch/watchdogs.py` and `causes.py` by `python -m
-companion.skipper.watch.document`; a test checks that it is current. A watchdog is raised when its figure has been at or
-beyond the entry threshold for the time given, and cleared when it has been at or beyond the exit threshold (or cannot
-be told) for its time. Those marked * are watched before the boat sails and when the voyage is over, too; those marked °
-when it is over, too.
+Made from the tables in `companion/safety.py` by `python -m companion.skipper.watch.document`; a test checks that it is
+current. A watchdog is raised when its figure has been at or beyond the entry threshold for the time given, and cleared
+when it has been at or beyond the exit threshold (or cannot be told) for its time. Those marked * are watched before the
+boat sails and when the voyage is over, too; those marked ° when it is over, too. Its number stands for it where there
+is no room for words ([far away](far.md), HIGH_LATENCY2): 0 is none, and none is ever given to another.
 
-| watchdog | watches | entry | exit | says | then | why |
-|---|---|---|---|---|---|---|
+| watchdog | number | watches | entry | exit | says | then | why |
+|---|---|---|---|---|---|---|---|
+"""
+ENDS_HEAD = """
+## What ends a voyage early
+
+The keys of a mission's `[safety]`, in the order in which they come. `refuge`: to the nearest refuge, without one home
+if `[skipper] end` says so; `home`: home, without a way there to the nearest refuge; `stay`: a loiter near by; `say`:
+words alone. Where there is no such place she loiters near by; with one marked † she sails on. Those marked ‡ come
+before the orders of the crew, too. When it is over she sails on.
+
+| key | default | when | how long |
+|---|---|---|---|
+"""
+FIGURES_HEAD = """
+The figures of these, and what is done, with `set_auto`, when a failsafe of the autopilot [has stopped
+her](#when-the-autopilot-stops-her-by-itself): `sail_on`; `stay`: a loiter near by; `refuge`; `leave`: nothing, a person
+must. What she stays for ends when a person gives AUTO, that of the shore link when the link is back.
+
+| key | default | what |
+|---|---|---|
 """
 CAUSES_HEAD = """
 ## When the autopilot stops her by itself
@@ -39,7 +67,23 @@ onto something.
 
 def markdown() -> str:
     """Return docs/reference/watchdogs.md."""
-    return HEAD + "".join(map(_row, TABLE)) + CAUSES_HEAD + "".join(map(_cause, CAUSES))
+    return "".join((
+        HEAD, *map(_row, TABLE), ENDS_HEAD, *map(_ending, BY_RANK), FIGURES_HEAD, *map(_figure, SETTINGS.values()),
+        *(f"| `{cause.key}` | `{WORD_OF[cause.answer]}` | when the {cause.name} failsafe has |\n"
+          for cause in FAILSAFES if cause.key),
+        CAUSES_HEAD, *map(_cause, FAILSAFES)))
+
+
+def _ending(name: str) -> str:
+    ending = ENDINGS[name]
+    marks = "†" * ending.sails_on + "‡" * ending.over_orders
+    asked = f"; watched with `{ending.asked_by}`" if ending.asked_by else ""
+    return (f'| `{ending.key}`{marks} | `{ending.default}` | {ending.because}: watchdog "{name}"{asked} | '
+            f"{ending.until or 'the voyage is over'} |\n")
+
+
+def _figure(setting: Setting) -> str:
+    return f"| `{setting.key}` | {'none' if setting.default is None else f'{setting.default:g}'} | {setting.says} |\n"
 
 
 def _row(dog: Watchdog) -> str:
@@ -47,7 +91,7 @@ def _row(dog: Watchdog) -> str:
     unit = f" {dog.unit}" if dog.unit else ""
     mark = "*" if dog.at_rest else "°" if dog.loitering else ""
     return " | ".join((
-        f"| {dog.name}{mark}", dog.watches,
+        f"| {dog.name}{mark}", str(dog.number), dog.watches,
         f"{sign} {dog.enter:g}{unit} for {dog.enter_s:g} s",
         f"{back} {dog.exit:g}{unit} for {dog.exit_s:g} s", dog.severity.name.lower(), dog.response.value,
         f"{dog.why} |\n",

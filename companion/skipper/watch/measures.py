@@ -9,18 +9,17 @@ from dataclasses import replace
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.geo.sun import sun_height_rad
+from companion.messages import Severity
+from companion.safety import BY_NAME, JUMP_M, STOPPING
 from companion.skipper.behaviors.drifting import meets_in_s, sails
 from companion.skipper.behaviors.field_guidance import meets_in
 from companion.skipper.planning.autopilot_beats import beaten_within_m
 from companion.skipper.planning.diversions import diversion, home_trouble, is_composed
-from companion.skipper.step.actions import Severity
-from companion.skipper.step.causes import STOPPING
-from companion.skipper.step.context import JUMP_M, StepContext
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Kind
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.state import Charge
 from companion.skipper.step.wind_limits import too_light, too_strong
-from companion.skipper.watch.watchdogs import BY_NAME
 from companion.skipper.way.geometry import along_m, cross_track_m, distance_m
 
 IRONS_TWA_RAD = math.radians(35.0)
@@ -36,6 +35,9 @@ LEAST_MPS = 0.5
 
 def measure(ctx: StepContext, name: str) -> float | None:
     """Return the watched figure in the table's unit, None when it cannot be told now."""
+    dog = BY_NAME[name]
+    if dog.sensor:
+        return ctx.autopilot.sensor(dog.sensor) if ctx.autopilot is not None else None
     return _MEASURES[name](ctx)
 
 
@@ -177,7 +179,7 @@ def _battery_low(ctx: StepContext) -> float | None:
 
 
 def _battery_critical(ctx: StepContext) -> float | None:
-    status, least_v = ctx.autopilot, ctx.config.ends.battery_v
+    status, least_v = ctx.autopilot, ctx.config.ends.figure("battery_v")
     volts = status.battery_v if status is not None else None
     is_empty = least_v is not None and volts is not None and volts <= least_v
     is_short = ctx.state.alarms.charge is not None and ctx.state.alarms.charge.is_short
@@ -185,23 +187,19 @@ def _battery_critical(ctx: StepContext) -> float | None:
     return _battery(ctx, "battery critical", is_below=is_below)
 
 
-def _leak(ctx: StepContext) -> float | None:
-    return _flag(ctx.autopilot.leaks) if ctx.autopilot is not None else None
-
-
 def _dark(ctx: StepContext) -> float | None:
-    status, vehicle = ctx.autopilot, ctx.snapshot.vehicle
-    if status is None or vehicle is None or status.utc_at_boot_s is None or status.boot_s is None:
+    status, vehicle, below_deg = ctx.autopilot, ctx.snapshot.vehicle, ctx.config.ends.figure("dark_below_deg")
+    if below_deg is None or status is None or vehicle is None or status.utc_at_boot_s is None or status.boot_s is None:
         return None
     height_rad = sun_height_rad(
         math.radians(vehicle.position.lat_deg), math.radians(vehicle.position.lon_deg),
         status.utc_at_boot_s + status.boot_s)
-    return math.degrees(height_rad - ctx.config.ends.dark_below_rad)
+    return math.degrees(height_rad - math.radians(below_deg))
 
 
 def _shore(ctx: StepContext) -> float | None:
-    age_s = ctx.snapshot.shore_age_s
-    return None if age_s is None else age_s / ctx.config.ends.shore_lost_s
+    age_s, limit_s = ctx.snapshot.shore_age_s, ctx.config.ends.figure("shore_lost_s")
+    return None if age_s is None or limit_s is None else age_s / limit_s
 
 
 def _time(ctx: StepContext) -> float | None:
@@ -235,7 +233,7 @@ _MEASURES: dict[str, Callable[[StepContext], float | None]] = {
     "mission ended": _ended, "fence breach": _breach, "fence off": _fence_off, "foreign mission": _foreign,
     "reboot": _reboot,
     "battery low": _battery_low, "battery critical": _battery_critical, "out of time": _time, "dragged off": _dragged,
-    "planner dead": _planner, "leaking": _leak, "dark": _dark, "shore lost": _shore,
+    "planner dead": _planner, "dark": _dark, "shore lost": _shore,
 }
 
 
@@ -261,7 +259,7 @@ def follow_charge(ctx: StepContext) -> None:
     if now.is_short or left_s is None:
         return
     needed_s = way_s(ctx)
-    if needed_s is None or left_s >= ctx.config.ends.battery_reserve * needed_s:
+    if needed_s is None or left_s >= (ctx.config.ends.figure("battery_reserve") or 0.0) * needed_s:
         return
     ctx.set(alarms=changed(ctx.state.alarms, charge=replace(now, is_short=True)))
     ctx.say(Severity.WARNING, "charge", f"the charge lasts {math.floor(left_s / 60.0)} min at its rate, the way to "

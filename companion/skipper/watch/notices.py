@@ -10,10 +10,9 @@ import math
 
 from companion.frozen import changed
 from companion.geo.angles import wrap_two_pi
-from companion.messages import Mode
+from companion.messages import Mode, Severity
+from companion.safety import CAUSES, HOMEWARD, PERSON
 from companion.skipper.behaviors.failsafe import TOLD_S, is_answered
-from companion.skipper.step.actions import Severity
-from companion.skipper.step.causes import BY_NAME, HOMEWARD, PERSON
 from companion.skipper.step.context import StepContext
 from companion.skipper.way.drift import DriftAhead, drift_ahead
 from companion.skipper.way.voyage import PointEn, outside_m, water_at
@@ -88,7 +87,7 @@ def _remedy(ctx: StepContext) -> str:
         return ctx.state.why
     if stop is not None and not stop.is_armed:
         return "arm her and press AUTO, or take her in MANUAL"
-    cause = BY_NAME.get(stop.cause) if stop is not None else None
+    cause = CAUSES.get(stop.cause) if stop is not None else None
     if cause is None:
         return "press AUTO to sail on, or take her in MANUAL"
     leave = "" if may.may_set_mode else " (the mission's [operator] set_auto would let the companion)"

@@ -15,9 +15,8 @@ from dataclasses import replace
 from companion.boat.failed_tack import SHOOT_S
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
-from companion.messages import Mode
+from companion.messages import Mode, Severity
 from companion.skipper.planning.autopilot_beats import TACKS_FAIL_AFTER
-from companion.skipper.step.actions import Severity
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Tacking
 from companion.skipper.way.voyage import PointEn

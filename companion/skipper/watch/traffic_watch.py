@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.frozen import changed
-from companion.skipper.step.actions import Severity
+from companion.messages import Severity
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.context import StepContext
 from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, Policy, assess

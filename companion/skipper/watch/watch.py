@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from companion.frozen import changed
-from companion.messages import Mode
+from companion.messages import Mode, Severity
+from companion.safety import BY_NAME, TABLE, Response, Watchdog
 from companion.skipper.behaviors.drifting import STEERAGE_MPS
 from companion.skipper.planning.ends import words
-from companion.skipper.step.actions import Severity
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Raised
 from companion.skipper.watch.measures import measure
-from companion.skipper.watch.watchdogs import BY_NAME, TABLE, Response, Watchdog
 
 
 def watch(ctx: StepContext) -> None:

@@ -350,6 +350,20 @@ def test_what_tells_a_failsafe_from_a_person_reaches_the_status():
     assert (twice.fence_breached, twice.fence_breaches) == (True, 3)
 
 
+def test_what_a_script_tells_of_a_sensor_is_believed_twice_and_forgotten_when_it_falls_silent():
+    def tell(t_s, value, name=b"LEAK"):
+        assembler.take(t_s, heard(wire.MAVLink_named_value_float_message(1000, name, value)))
+        return assembler.status.sensor("LEAK")
+
+    assembler = VehicleAssembler()
+    assembler.take(0.0, heard(wire.MAVLink_heartbeat_message(11, 3, 65, 10, 4, 3)))
+    assert [tell(0.1 * n, value) for n, value in enumerate((0.0, 1.0, 0.0, 0.0, 1.0))] == [None, None, None, 0.0, 0.0]
+    assert [tell(0.6, 1.0), tell(0.7, math.nan), tell(0.8, 0.0)] == [1.0, 1.0, 1.0]
+    assert tell(5.5, 0.0, b"FOO") == 1.0   # nobody's sensor
+    assembler.take(5.9, heard(wire.MAVLink_heartbeat_message(11, 3, 65, 10, 4, 3)))
+    assert assembler.status.sensors == ()
+
+
 def test_each_receiver_says_where_it_is_and_one_that_falls_silent_is_forgotten():
     def second(fix_type):
         return heard(wire.MAVLink_gps2_raw_message(

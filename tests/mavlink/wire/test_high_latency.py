@@ -5,9 +5,10 @@ import math
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.wire.companion_status import WATCHDOGS, high_latency2, number_of, watchdog_of
+from companion.mavlink.wire.companion_status import high_latency2
 from companion.mavlink.wire.frames import Codec
 from companion.messages import AutopilotStatus, CompanionStatus, GeoPoint, Mode, VehicleState
+from companion.safety import TABLE, number_of, watchdog_of
 
 VEHICLE = VehicleState(t_s=9.0, boot_s=123.456, position=GeoPoint(lat_deg=50.8, lon_deg=-1.3),
                        velocity_en_mps=(1.2, 1.6), heading_rad=math.radians(359.5))
@@ -52,5 +53,6 @@ def test_what_is_not_known_is_minus_one_and_what_does_not_fit_is_cut():
 
 
 def test_watchdogs_have_numbers_for_good():
-    assert [watchdog_of(number_of(name)) for name in ("", *WATCHDOGS)] == ["", *WATCHDOGS]
+    names = ["", *(dog.name for dog in TABLE)]
+    assert [watchdog_of(number_of(name)) for name in names] == names
     assert watchdog_of(200) == "watchdog 200"

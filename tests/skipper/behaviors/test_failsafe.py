@@ -8,8 +8,8 @@ import pytest
 from shapely.geometry import box
 
 from companion.messages import Command, MissionItem, Mode, StatusText, waypoint
+from companion.safety import CAUSES, FAILSAFES, WORD_OF, Answer
 from companion.skipper.step import actions as act
-from companion.skipper.step.causes import TABLE, Answer
 from companion.skipper.step.config import Ends
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import distance_m
@@ -68,7 +68,7 @@ def test_each_cause_is_known_by_its_sign_before_or_after_the_change_of_mode(what
         text(world, words)
     world.run(2)
     assert world.state.operator.stop.cause == cause
-    expected = {c.name: c.answer is not Answer.LEAVE for c in TABLE}.get(cause, False)
+    expected = {c.name: c.answer is not Answer.LEAVE for c in FAILSAFES}.get(cause, False)
     assert bool(world.state.operator.answering) is expected
     assert (world.state.phase is Phase.OPERATOR) is not expected
 
@@ -383,7 +383,7 @@ def test_a_loiter_that_cannot_be_sailed_to_any_more_is_laid_anew():
 def test_the_mission_says_what_is_done_about_each(name, words, is_over, answer):
     """``[safety] ..._failsafe``: left alone, sailed on, stayed near by, or to the refuge; the end of a sign."""
     refuge = (40.0, 90.0)
-    world = under_way(config={"ends": Ends(failsafes=((name, answer),))}, voyage={"refuges": (refuge,)})
+    world = under_way(config={"ends": Ends.of(**{CAUSES[name].key: WORD_OF[answer]})}, voyage={"refuges": (refuge,)})
     here = world.position
     sign = {"battery_failed": True} if name == "battery" else {}
     stop(world, **sign)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.skipper.planning.ends import BATTERY
+from companion.safety import BATTERY
 from companion.skipper.step.config import Ends
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Alarms, Charge, SkipperState
@@ -41,7 +41,7 @@ def test_it_is_critical_while_it_still_covers_the_way_to_the_refuge():
 
 
 @pytest.mark.parametrize("made", [
-    {"voyage": {"refuges": ((0.0, 0.0),)}, "config": {"ends": Ends(battery_reserve=0.0)}},   # not asked for
+    {"voyage": {"refuges": ((0.0, 0.0),)}, "config": {"ends": Ends.of(battery_reserve=0.0)}},   # not asked for
     {"voyage": {"refuges": ((1400.0, 100.0),)}},                                             # near by
 ])
 def test_it_is_not_where_it_is_not_asked_for_or_the_refuge_is_near(made):

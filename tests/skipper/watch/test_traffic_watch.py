@@ -8,8 +8,8 @@ import pytest
 
 from companion.compose import config_of
 from companion.geofence import load_mission
+from companion.messages import Severity
 from companion.skipper.step import actions as act
-from companion.skipper.step.actions import Severity
 from companion.skipper.step.context import StepContext
 from companion.skipper.watch.traffic_watch import SHOWN, limits, look_out
 from companion.traffic import LAKE, Alarm, Role, Rule, TrafficPicture

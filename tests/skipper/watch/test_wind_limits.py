@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from companion.safety import End
 from companion.skipper.step.actions import Arm, SetMode
-from companion.skipper.step.config import End, Ends
+from companion.skipper.step.config import Ends
 from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
@@ -53,7 +54,7 @@ def test_what_is_not_believed_is_widened():
 
 @pytest.mark.parametrize(("end", "where"), [(End.REFUGE, REFUGE), (End.STAY, None), (End.SAY, None)])
 def test_under_way_too_much_wind_leads_where_the_mission_says_and_on_when_it_is_over(end, where):
-    world = limited(5.0, Ends(strong_wind=end), max_tws_mps=8.0)
+    world = limited(5.0, Ends.of(strong_wind=end), max_tws_mps=8.0)
     assert world.run(120, lambda w: w.state.voyage.sailing)
     world.run(20)
     here = world.position
