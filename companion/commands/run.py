@@ -57,6 +57,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR",
                         help="the voyage folder (default: voyages/<UTC time>-<mission>)")
     parser.add_argument("--dry-run", action="store_true", help="look, plan and speak; touch nothing")
+    parser.add_argument("--permit", action="append", choices=("set_auto", "arm"), default=[], metavar="KEY",
+                        help="permit this voyage what [operator] does not: set_auto or arm; may be given twice "
+                        "(sitl run does, for its simulated boat)")
     parser.add_argument("--seed", type=whole(), default=None, help="of the planner (default: the mission's)")
     parser.add_argument("--state", type=Path, metavar="FILE",
                         help="where the state for a restart is kept (default: voyages/<mission>.state.json); its "
@@ -227,7 +230,7 @@ def _voyage(
         budget_bytes = int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9)
         archive = VoyageArchive(folder=folder.parent, budget_bytes=budget_bytes)
     mission = sailed.mission.with_feeds(*args.feed).with_system(args.system).with_outputs(
-        args.nmea, args.signalk, args.signalk_token)
+        args.nmea, args.signalk, args.signalk_token).permitting(*args.permit)
     seed = mission.skipper.seed if args.seed is None else args.seed
     guard = Guard(lambda name, why: err.write(f"companion run: note: sailed without the {name}: {why}\n"), seed=seed,
                   pace=args.speedup)

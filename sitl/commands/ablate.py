@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import whole
+from sitl.commands.run import scenario_file
 from sitl.options import add_options, options_of
 
 
@@ -18,9 +18,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "wind's spread, the forecaster, the probability of staying out of the no-go zone, beats left to the autopilot, "
         "the planner. Prints for each scenario arrivals, contacts, voyages below the floor, times in the no-go "
         "zone, clearance, and the time as a share of the same seed's with everything, with its 95 % interval.",
-        epilog='Example: sitl ablate sitl/scenarios/two-channels.toml --runs 20 --only "no spread" --only kalman',
+        epilog='Example: sitl ablate two-channels --runs 20 --only "no spread" --only kalman',
     )
-    parser.add_argument("scenarios", type=Path, nargs="*", metavar="SCENARIO.toml",
+    parser.add_argument("scenarios", type=scenario_file, nargs="*", metavar="SCENARIO",
                         help="(default: Wolsieffer's two channels in two winds, and a narrow one)")
     parser.add_argument("--only", action="append", default=[], metavar="NAME",
                         help="only these variations (default: all; a wrong name lists them)")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import number, whole
+from sitl.commands.run import scenario_file
 from sitl.options import add_options, options_of
 
 USUAL = ("companion", "fixed", "companion-ardurover", "alone-embedded", "alone", "dijkstra")
@@ -46,7 +47,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     )
     parser.add_argument("--who", nargs="+", choices=SAILORS, default=list(USUAL),
                         help="sailors (default: all but the last two)")
-    parser.add_argument("--scenarios", type=Path, nargs="+", metavar="FILE", help="scenario files (default: the six)")
+    parser.add_argument("--scenarios", type=scenario_file, nargs="+", metavar="SCENARIO",
+                        help="scenario files, or names of ours (default: the six)")
     parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
     parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=20.0, metavar="X",
                         help="of the real ArduRover (default: 20)")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import out_file, out_folder, whole
+from sitl.commands.run import scenario_file
 from sitl.options import add_methods, add_options, methods_of, options_of
 
 
@@ -16,9 +16,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "campaign", help=summary,
         description="Sail a scenario over many seeds on the embedded autopilot: one JSON line per run, then a table "
         "of success, time, tacks, replans, clearance and risk. A failing seed is named and repeats exactly.",
-        epilog="Example: sitl campaign sitl/scenarios/demo.toml --runs 50",
+        epilog="Example: sitl campaign demo --runs 50",
     )
-    parser.add_argument("scenarios", type=Path, nargs="+", metavar="SCENARIO.toml")
+    parser.add_argument("scenarios", type=scenario_file, nargs="+", metavar="SCENARIO",
+                        help="a scenario or a mission file, or the name of one of ours (sitl run --help)")
     parser.add_argument("--runs", type=whole(at_least=1), default=50, metavar="N", help="seeds 0..N-1 (default: 50)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the table's figures")

@@ -16,7 +16,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
     parser = subparsers.add_parser(
         "fetch", help=summary, description=f"{summary}, for Linux on x86-64, from {URL}",
-        epilog="example: sitl fetch && sitl run missions/demo.toml --autopilot ardurover",
+        epilog="example: sitl fetch && sitl run demo --autopilot ardurover",
     )
     parser.add_argument("--to", type=Path, metavar="FILE", help=f"where to put it (default {fetched_path()})")
     parser.add_argument("--url", default=URL, help="another place to get it from")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import number, out_file, whole
 from sitl.commands.baselines import SAILORS, add_winds
+from sitl.commands.run import scenario_file
 from sitl.options import add_options, options_of
 
 
@@ -24,8 +24,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     )
     parser.add_argument("--who", nargs="+", choices=SAILORS, default=["companion", "fixed", "alone-embedded"],
                         help="sailors (default: companion fixed alone-embedded)")
-    parser.add_argument("--scenarios", type=Path, nargs="+", metavar="FILE",
-                        help="scenario files (default: the six of sitl baselines)")
+    parser.add_argument("--scenarios", type=scenario_file, nargs="+", metavar="SCENARIO",
+                        help="scenario files, or names of ours (default: the six of sitl baselines)")
     parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
     parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=20.0, metavar="X",
                         help="of the real ArduRover (default: 20)")

@@ -20,7 +20,7 @@ OURS = {path.stem: path for path in (Path(__file__).resolve().parents[1] / "scen
 def scenario_file(text: str) -> Path:
     """Return the file, or the scenario of ours with that name."""
     path = Path(text)
-    if path.exists() or path.suffix:
+    if path.is_file() or path.suffix or (path.exists() and text not in OURS):
         return path
     if text not in OURS:
         close = difflib.get_close_matches(text, OURS, n=1)
@@ -70,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
 
     from companion.clock import run_virtual
     from companion.errors import InputError
+    from companion.geofence import load_mission
     from companion.telemetry.console import ProgressLine
     from companion.telemetry.folder import DECISIONS
     from sitl.run.compiled import compile_ahead
@@ -90,6 +91,12 @@ def run(args: argparse.Namespace) -> int:
     page = page_words(args)
     print(f"{scenario.name} begins {scenario.begins:%Y-%m-%d %H:%M} UTC"
           f"{'' if args.at else '; --at names another time'}", flush=True)
+    own = load_mission(scenario.mission_path(args.scenario)).options.operator
+    if not (own.arm and own.set_auto) and scenario.set_auto:
+        print("the simulated boat may be armed and set to AUTO; on the water [operator] of the mission forbids it")
+    if args.http is not None:
+        host, port = args.http
+        print(f"the page: http://{f'[{host}]' if ':' in host else host}:{port}/ once the companion is up", flush=True)
     compile_ahead(mission.skipper.planner)
     if is_live(args):
         from sitl.run.live import run_live

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import out_folder, whole
+from sitl.commands.run import scenario_file
 from sitl.options import add_options, options_of
 
 
@@ -20,7 +21,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         epilog="Example: sitl search faults --runs 400 --out search.jsonl",
     )
     parser.add_argument("what", choices=("mismatch", "faults"), help="what is drawn")
-    parser.add_argument("--water", type=Path, metavar="SCENARIO.toml",
+    parser.add_argument("--water", type=scenario_file, metavar="SCENARIO",
                         help="mismatch: where it is sailed (default: the narrow channel)")
     parser.add_argument("--runs", type=whole(at_least=1), default=400, metavar="N",
                         help="voyages at most (default: 400)")

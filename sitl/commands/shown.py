@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from companion.program.arguments import out_file, whole
+from sitl.commands.run import scenario_file
 from sitl.options import add_options, options_of
 
 
@@ -20,9 +20,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "one, two and five minutes; the clearance that a plan expected. 'error' is told less came in the median, "
         "'of it' as a share of what was left, '90 %%' what nine in ten errors are below, 'held' how often it came as "
         "it was told.",
-        epilog="Example: sitl shown sitl/scenarios/demo.toml --seeds 10",
+        epilog="Example: sitl shown demo --seeds 10",
     )
-    parser.add_argument("scenarios", type=Path, nargs="*", metavar="SCENARIO.toml",
+    parser.add_argument("scenarios", type=scenario_file, nargs="*", metavar="SCENARIO",
                         help="(default: the demo, five waters and two winds)")
     parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="of each (default: 5)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S")

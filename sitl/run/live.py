@@ -261,6 +261,7 @@ async def _run(
             "--state", str(folder / "state.json"), "--seed", str(seed), "--speedup", f"{pace:g}",
             "--limit", f"{scenario.limit_s:g}", *feeds, *(["--exit-on-arrival"] if scenario.exit_on_arrival else []),
             *(["--dry-run"] if scenario.dry_run else []), *page,
+            "--permit", "arm", *(["--permit", "set_auto"] if scenario.set_auto else []),
         ], share)
         stack.push_async_callback(companion.stop)
         here = asyncio.current_task()

@@ -13,6 +13,7 @@ import difflib
 import math
 from collections.abc import Iterable
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 import msgspec
@@ -374,6 +375,11 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return ours if path.parent.name == ours.parent.name and ours.is_file() and not path.is_file() else path
 
 
+# The autopilot of a plain mission, as `companion doctor --apply` leaves it: with bit 2, a default, the fence is a
+# circle of 300 m round home, too, and a mission that keeps the fence switched on and leads further is not begun.
+AS_SET_UP = MappingProxyType({"FENCE_TYPE": 4.0})
+
+
 def load_scenario(path: Path) -> Scenario:
     """Read a scenario, or a mission file as the plain scenario of sailing it.
 
@@ -389,7 +395,7 @@ def load_scenario(path: Path) -> Scenario:
     except (msgspec.DecodeError, ValueError, RecursionError) as error:
         raise InputError(str(path), "", f"is not TOML ({str(error)[:80]})", "is it the file that was meant?") from error
     if "mission" not in raw and "goal" in raw:
-        raw = {"name": str(raw.get("name", path.stem)), "mission": path.name}
+        raw = {"name": str(raw.get("name", path.stem)), "mission": path.name, "parameters": dict(AS_SET_UP)}
     try:
         scenario = msgspec.convert(raw, Scenario)
     except msgspec.ValidationError as error:

@@ -70,6 +70,8 @@ def test_a_name_that_names_nothing_is_found(tmp_path, name, called, words):
 def test_defaults(tmp_path):
     mission = load(tmp_path)
     assert (mission.operator.arm, mission.operator.set_auto, mission.operator.guided) == (False, False, False)
+    permitted = mission.permitting("arm").operator
+    assert (permitted.arm, permitted.set_auto, permitted.guided) == (True, False, False)
     assert mission.name == "m"
     assert mission.origin == mission.start
     assert mission.area.local(mission.frame()).names == ("obstacle 1",)

@@ -57,6 +57,10 @@ def test_a_mission_is_a_scenario():
     assert scenario.mission == "open-water.toml"
 
 
+def test_of_a_mission_the_fence_is_not_the_circle_of_300_m_that_an_autopilot_comes_with():
+    assert load_scenario(Path("missions/bay.toml")).parameters == {"FENCE_TYPE": 4.0}
+
+
 def test_a_free_port_is_nobodys_of_udp_and_of_tcp_and_none_that_the_system_gives_away(monkeypatch):
     taken, numbers = free_port(), count(free_port() - PORTS.start)
     for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):

@@ -161,6 +161,11 @@ class Mission:
             signalk_token=own.signalk_token if token_file is None else str(token_file.absolute()))
         return replace(self, options=msgspec.structs.replace(self.options, output=output))
 
+    def permitting(self, *names: str) -> Mission:
+        """Return the mission whose ``[operator]`` permits ``names`` (arm, set_auto), too."""
+        operator = msgspec.structs.replace(self.options.operator, **dict.fromkeys(names, True))
+        return replace(self, options=msgspec.structs.replace(self.options, operator=operator))
+
     def with_system(self, system: int | None) -> Mission:
         """Return the mission for the autopilot of ``system``, None: as it is."""
         if system is None:

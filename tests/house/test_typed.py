@@ -1,0 +1,166 @@
+"""What README and the guides tell a reader to type: understood as it stands, and README's lines are run as he would."""
+
+import contextlib
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+from companion import cli
+from companion.errors import InputError
+from sitl import cli as sitl_cli
+from sitl.scenario.traffic import free_port
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "guides").glob("*.md"))]
+PROGRAMS = {"companion": cli.PROGRAM, "sitl": sitl_cli.PROGRAM}
+# What stands for something of the reader's own, and a word of its kind.
+STANDS_FOR = {"LINK": "tcp:127.0.0.1:5760", "LAT,LON": "50.817,-1.31", "VERB": "hold", "ADDRESS": "local", "[ARGS]": ""}
+# Of README, what a test is no place for.
+NOT_RUN = {"make demo": "CI runs it", "make test": "this is it", "python3 -m venv": "CI makes one",
+           "pip install": "CI installs it"}
+NAMES_A_COMMAND = re.compile("are required|expected one argument")   # and not a line to type
+UNDER_WAY, ENDS_S = "under way", 60.0
+
+
+def blocks(page):
+    """Return the lines of a page's indented blocks that begin with a program, without what a # says of them."""
+    first = "companion|sitl|make|python3?|pip"
+    lines = re.findall(rf"^ {{4,}}((?:{first}) (?:[^\n]*\\\n)*[^\n]*)", page.read_text(), re.MULTILINE)
+    return [re.sub(r"\s+#.*", "", line.replace("\\\n", " ")).strip() for line in lines if "run: " not in line]
+
+
+def quoted(page):
+    """Return the command lines between backticks that are whole: more than the name of a command."""
+    return [line for line in re.findall(r"`((?:companion|sitl) [a-z][^`]* [^`]+)`", page.read_text().replace("\n", " "))
+            if "..." not in line]
+
+
+def words_of(line):
+    for name, word in STANDS_FOR.items():
+        line = line.replace(name, word)
+    return [word for word in shlex.split(line) if word not in ("&", "&&")]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_command_line_of_a_page_is_understood(page, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    typed_ones = [line for line in blocks(page) if line.startswith(("companion ", "sitl "))]
+    for line in (*typed_ones, *quoted(page)):
+        program, *words = words_of(line)
+        if words[-1] in ("--help", "--version"):
+            continue
+        try:
+            PROGRAMS[program].parser(words[0]).parse_args(words)
+        except InputError as wrong:
+            if line in typed_ones or not NAMES_A_COMMAND.search(str(wrong)):
+                pytest.fail(f"{line}: {wrong}")
+
+
+@contextlib.contextmanager
+def typed(line, folder):
+    """Type a line into a shell in the folder; it is stopped with Ctrl-C in the end, where it has not ended."""
+    env = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT),
+           "LANG": "C"}
+    shell = subprocess.Popen(["bash", "-c", f"exec {line}"], cwd=folder, env=env, stdin=subprocess.DEVNULL, text=True,
+                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    try:
+        yield shell
+    finally:
+        if shell.poll() is None:
+            shell.send_signal(signal.SIGINT)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            shell.communicate(timeout=ENDS_S)
+        shell.kill()
+
+
+def until(shell, said):
+    """Read what it says until the pattern is found; fail with all of it where it ends before."""
+    seen = ""
+    for text in shell.stdout:
+        seen += text
+        if re.search(said, text):
+            return seen
+    pytest.fail(f"ended, {shell.wait()}, and never said {said}: {seen[-2000:]}")
+    return seen
+
+
+def door(heading):
+    """Return the command lines under a heading of README."""
+    part = (ROOT / "README.md").read_text().partition(f"## {heading}\n")[2].partition("\n## ")[0]
+    lines = re.findall(r"^ {4}(\S.*)$", part, re.MULTILINE)
+    assert lines, heading
+    return [re.sub(r"\s+#.*", "", line) for line in lines]
+
+
+def done(line, folder, exits=(0,)):
+    with typed(line, folder) as shell:
+        said, _ = shell.communicate(timeout=200)
+    assert shell.returncode in exits, f"{line}: {said[-2000:]}"
+    return said
+
+
+def page_is_served(line, folder, said):
+    port = free_port()
+    with typed(line.replace("8765", str(port)), folder) as shell:
+        until(shell, said)
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=20) as answer:
+            assert answer.status == 200
+
+
+def test_each_line_of_the_front_page_is_run_here_or_it_is_said_why_not():
+    doors = {line for heading in ("I want to see it sail", "I want to draw a mission", "I want it on my boat",
+                                  "I want to do research") for line in door(heading)}
+    others = set(blocks(PAGES[0])) - doors
+    assert [line for line in others if not line.startswith(tuple(NOT_RUN))] == []
+    assert len(doors) == 12
+
+
+def test_who_wants_to_see_it_sail(tmp_path):
+    demo, live, report = door("I want to see it sail")
+    assert "arrived" in done(demo, tmp_path)
+    page_is_served(live, tmp_path, UNDER_WAY)
+    assert "Arrived after" in done(report, tmp_path)
+    assert list(tmp_path.glob("voyages/*/voyage.png"))
+
+
+def test_who_wants_to_draw_a_mission(tmp_path):
+    example, edit, live = door("I want to draw a mission")
+    assert "archipelago.toml" in done(example, tmp_path)
+    port = free_port()
+    with typed(f"{edit} --http {port}", tmp_path) as shell:
+        until(shell, rf"http://127.0.0.1:{port}/#")
+    page_is_served(live, tmp_path, UNDER_WAY)
+
+
+def test_a_mission_of_ones_own_that_permits_nothing_sails_in_the_simulator(tmp_path):
+    done("companion mission new own.toml --start 50.8170,-1.3100 --goal 50.8220,-1.3094", tmp_path)
+    with typed("sitl run own.toml --live --speedup 20", tmp_path) as shell:
+        said = until(shell, UNDER_WAY)
+    assert "[operator] of the mission forbids it" in said
+
+
+def test_who_wants_it_on_his_boat(tmp_path):
+    setup, doctor, run = door("I want it on my boat")
+    port = free_port()
+    with typed(f"sitl boat --port {port} --home 50.8170,-1.3100", tmp_path) as boat:
+        until(boat, "Ctrl-C ends")
+        here = f"tcp:127.0.0.1:{port}"
+        assert "lake.toml: written" in done(f"{setup} --link {here} --no-doctor", tmp_path)
+        assert "nothing was changed" in done(doctor.replace("/dev/serial0:921600", here), tmp_path, exits=(0, 1))
+        with typed(run.replace("/dev/serial0:921600", here), tmp_path) as shell:
+            until(shell, r"WAITING \| wind")
+
+
+def test_who_wants_to_do_research(tmp_path):
+    campaign, plan, mismatch = door("I want to do research")
+    done("companion mission example missions", tmp_path)
+    assert '"passed":true' in done(campaign.replace("--runs 10", "--runs 1"), tmp_path)
+    assert "plan.png" in done(plan, tmp_path)
+    assert done(mismatch.replace("--runs 10", "--runs 1"), tmp_path)
