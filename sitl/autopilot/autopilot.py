@@ -139,9 +139,11 @@ class Autopilot:
         """Change the battery's voltage."""
         self.core.battery_v = volts
 
-    def set_leak(self, *, leaks: bool) -> None:
-        """Wet or dry the switch in the bilge, which a script reads from now on."""
-        self.core.leaks = leaks
+    def set_sensor(self, name: str, value: float | None) -> None:
+        """Set what a script of the boat's tells of a sensor (NAMED_VALUE_FLOAT) from now on, None: nothing."""
+        self.core.sensors.pop(name, None)
+        if value is not None:
+            self.core.sensors[name] = value
 
     def set_roll(self, roll_rad: float) -> None:
         """Knock the boat down, or right it; no other effect than what the autopilot makes of it."""

@@ -32,7 +32,7 @@ from sitl.world import RadioChannel, WindModel
 
 BEAT_S = 1.0
 PERSONS = frozenset({"mode", "arm", "disarm", "set_current"})
-FAILURES = frozenset({"radio_lost", "station", "knockdown", "battery", "leak"})
+FAILURES = frozenset({"radio_lost", "station", "knockdown", "battery", "leak", "sensor"})
 
 
 async def play(event: EventSpec, autopilot: Autopilot, station: MemoryEnd) -> None:
@@ -56,9 +56,14 @@ async def play(event: EventSpec, autopilot: Autopilot, station: MemoryEnd) -> No
     elif event.kind == "battery":
         autopilot.set_battery(event.volts or 0.0)
     elif event.kind == "leak":
-        autopilot.set_leak(leaks=True)
+        autopilot.set_sensor("LEAK", 1.0)
         await asyncio.sleep(lasts_s)
-        autopilot.set_leak(leaks=False)
+        autopilot.set_sensor("LEAK", 0.0)
+    elif event.kind == "sensor":
+        before = autopilot.core.sensors.get(event.sensor)
+        autopilot.set_sensor(event.sensor, event.value)
+        await asyncio.sleep(lasts_s)
+        autopilot.set_sensor(event.sensor, before)
     elif event.kind == "radio_lost":
         autopilot.pilot.radio.switch(is_on=False)
         await asyncio.sleep(lasts_s)

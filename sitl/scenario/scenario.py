@@ -162,6 +162,7 @@ EventKind = Literal[
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
     "leak",              # for_s: the bilge's switch is wet
+    "sensor",            # sensor, value, for_s: a script of the boat's tells it (NAMED_VALUE_FLOAT)
     "radio_lost",        # for_s: the transmitter is out of range
     "station",           # for_s: a ground station is heard, from then on no more
     "knockdown",         # roll_deg, for_s
@@ -227,6 +228,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     state: str | None = None
     value_deg: float = 0.0
     parameter: str = ""
+    sensor: Annotated[str, msgspec.Meta(max_length=10, pattern="^[ -~]*$")] = ""
     value: float = 0.0
     restart_after_s: float | None = None
     saved: Literal["kept", "lost", "torn", "old"] = "kept"   # what becomes of the companion's saved state
@@ -262,8 +264,8 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 # What a boat must bear without coming nearer to anything than its mission allows.
 ORDINARY = frozenset({
-    "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "leak", "vessel",
-    "neighbour", "disk", "order", "far_order", "meeting"})
+    "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "leak", "sensor",
+    "vessel", "neighbour", "disk", "order", "far_order", "meeting"})
 ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
 ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
 ORDINARY_LOSS = 0.3          # a link that loses more is none
@@ -402,6 +404,8 @@ def load_scenario(path: Path) -> Scenario:
         raise InputError(str(path), _place(error), _sentence(error), _suggestion(error)) from error
     if scenario.satellite is None and any(event.kind == "far_order" for event in scenario.events):
         raise InputError(str(path), "events", "far_order needs a satellite link", "add a table [satellite]")
+    if any(event.kind == "sensor" and not event.sensor for event in scenario.events):
+        raise InputError(str(path), "events", "sensor has no name", 'write sensor = "NAME", as a script tells it')
     if not scenario.mission_path(path).is_file():
         raise InputError(str(path), "mission", f"there is no file {scenario.mission}", "paths start at the scenario")
     return scenario

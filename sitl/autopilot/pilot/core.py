@@ -62,7 +62,7 @@ class Core:
         self.run_motor(on=False)
         self._told = (self.vehicle.position, self.chart.to_e7(self.vehicle.position))
         self.battery_v = config.battery_v
-        self.leaks: bool | None = None   # what a script of the boat's tells of her bilge
+        self.sensors: dict[str, float] = {}   # what a script of the boat's tells, by name
         self.roll_rad = 0.0
         self.power_up(-WARM_BOOT_S if config.is_warm else 0.0)
         if config.is_warm:

@@ -322,11 +322,10 @@ def autopilot_version(p: Pilot) -> Any:
 
 
 def named_floats(p: Pilot) -> tuple[Any, ...]:
-    """Return the NAMED_VALUE_FLOATs that go with a WIND: the apparent wind, and what a script says of a leak."""
+    """Return the NAMED_VALUE_FLOATs that go with a WIND: the apparent wind, and what a script tells of sensors."""
     awa, aws = p.core.vehicle.apparent
     told = [(b"AppWndSpd", aws), (b"AppWndDir", math.degrees(awa))]
-    if p.core.leaks is not None:
-        told.append((b"LEAK", float(p.core.leaks)))
+    told += [(name.encode("ascii"), value) for name, value in p.core.sensors.items()]
     return tuple(mav.MAVLink_named_value_float_message(p.core.boot_ms, name, value) for name, value in told)
 
 
