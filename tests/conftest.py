@@ -25,7 +25,8 @@ def pytest_configure(config):
 
 
 def pytest_itemcollected(item):
-    if item.nodeid in item.config.stash[NAMED]:
+    # with an example's name, or without, and then all its examples are
+    if {item.nodeid, item.nodeid.partition("[")[0]} & item.config.stash[NAMED]:
         item.add_marker("long")
 
 

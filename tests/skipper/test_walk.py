@@ -438,22 +438,30 @@ def test_the_table_has_an_entry_an_exit_and_an_action_for_each():
         assert dog.exit_s >= 0.0
 
 
+# What boats and shores of other releases send, and missions say, for good: a new row is added here, none is changed.
+# The watchdogs' numbers on the air, with the key in [safety] and its default where one ends the voyage early.
+NUMBERS = {
+    "link silent": (1,), "position lost": (2,), "position jump": (3,), "wind untrusted": (4,), "becalmed": (5,),
+    "drifting": (6,), "in irons": (7,), "vessel too near": (8,), "no progress": (9,), "heading against course": (10,),
+    "off the corridor": (11,), "stuck waypoint": (12,), "mission ended": (13,), "fence breach": (14,),
+    "foreign mission": (15,), "reboot": (16,), "battery low": (17,), "battery critical": (18, "battery", "refuge"),
+    "leaking": (19, "leak", "refuge"), "dark": (20, "dark", "say"), "shore lost": (21, "shore_lost", "say"),
+    "out of time": (22, "out_of_time", "refuge"), "dragged off": (23,), "planner dead": (24,),
+    "strong wind": (25, "strong_wind", "refuge"), "light wind": (26, "light_wind", "say"), "fence off": (27,),
+    "wind contradicted": (28,),
+}
+# The figures of [safety]: default, more than, at least, at most.
+FIGURES = {
+    "battery_v": (None, 0.0, None, None), "battery_reserve": (1.5, None, 0.0, 10.0),
+    "dark_below_deg": (-6.0, None, -18.0, 45.0), "shore_lost_s": (600.0, None, 10.0, None),
+}
+
+
 def test_numbers_on_the_air_and_keys_of_missions_are_given_for_good():
-    """What boats and shores of other releases send and missions say: a new row is added here, none is changed."""
-    assert {dog.name: (dog.number, *((dog.ends.key, str(dog.ends.default)) if dog.ends else ())) for dog in TABLE} == {
-        "link silent": (1,), "position lost": (2,), "position jump": (3,), "wind untrusted": (4,), "becalmed": (5,),
-        "drifting": (6,), "in irons": (7,), "vessel too near": (8,), "no progress": (9,),
-        "heading against course": (10,), "off the corridor": (11,), "stuck waypoint": (12,), "mission ended": (13,),
-        "fence breach": (14,), "foreign mission": (15,), "reboot": (16,), "battery low": (17,),
-        "battery critical": (18, "battery", "refuge"), "leaking": (19, "leak", "refuge"), "dark": (20, "dark", "say"),
-        "shore lost": (21, "shore_lost", "say"), "out of time": (22, "out_of_time", "refuge"), "dragged off": (23,),
-        "planner dead": (24,), "strong wind": (25, "strong_wind", "refuge"), "light wind": (26, "light_wind", "say"),
-        "fence off": (27,), "wind contradicted": (28,),
-    }
-    assert {s.key: (s.default, s.above, s.least, s.most) for s in SETTINGS.values()} == {
-        "battery_v": (None, 0.0, None, None), "battery_reserve": (1.5, None, 0.0, 10.0),
-        "dark_below_deg": (-6.0, None, -18.0, 45.0), "shore_lost_s": (600.0, None, 10.0, None),
-    }
+    assert {dog.name: (dog.number, *((dog.ends.key, str(dog.ends.default)) if dog.ends else ())) for dog in TABLE} == (
+        NUMBERS)
+    assert len({dog.number for dog in TABLE}) == len(TABLE)
+    assert {s.key: (s.default, s.above, s.least, s.most) for s in SETTINGS.values()} == FIGURES
     assert {cause.key: WORD_OF[cause.answer] for cause in FAILSAFES if cause.key} == {
         "position_failsafe": "sail_on", "battery_failsafe": "refuge", "fence_failsafe": "sail_on",
         "shore_failsafe": "stay",
