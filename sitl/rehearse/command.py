@@ -61,7 +61,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
     ends.add_argument("--runs", type=whole(at_least=1), default=1000, metavar="N",
                       help="voyages at most (default: 1000)")
     ends.add_argument("--minutes", type=number("minutes", above=0.0, at_most=100_000.0), metavar="M",
-                      help="end after so many minutes")
+                      help="have the whole answer in so many minutes: the chances first, then what "
+                      "changes are worth, then the worst voyages again")
     ends.add_argument("--try", action="append", dest="tries", default=[], metavar="NAME=VALUE",
                       help="what a change is worth: margin_m, delta_s, SAIL_XTRACK_MAX, or later=1h; may be given more "
                       "than once (default: a usual set)")
@@ -79,12 +80,13 @@ def run(args: argparse.Namespace) -> int:
     from sitl.rehearse.changes import change_of, usual
     from sitl.rehearse.prepared import prepared
     from sitl.rehearse.rehearsal import Limits, rehearse
-    from sitl.rehearse.report import RESULTS
+    from sitl.rehearse.report import PAGE, RESULTS
     from sitl.run.compiled import compile_ahead
     from sitl.scenario import load_scenario
 
     folder = args.out or FOLDER / file_name(load_scenario(args.mission).name)
     compile_ahead()
+    limits = Limits(width=args.sure / 100.0, runs=args.runs, minutes=args.minutes)   # whose minutes begin here
     made = prepared(args.mission, folder, wind=args.wind, wind_error=args.wind_error, doubt=args.doubt,
                     faults=args.faults, depart=args.depart, limit_s=args.limit)
     changes = [change_of(text, made.mission) for text in args.tries] or usual(
@@ -93,9 +95,9 @@ def run(args: argparse.Namespace) -> int:
     print(f"{made.mission.name}: {made.doubts.wind.told}; doubt {args.doubt:g}{', with trouble' if args.faults else ''}"
           f"; sets sail {made.scenario.begins:%Y-%m-%d %H:%M} UTC"
           f"{f'; planned {planned_s:.0f} s' if planned_s else ''}, called off after {made.scenario.limit_s:.0f} s; "
-          f"results in {folder}", flush=True)
-    return rehearse(made, folder, Limits(width=args.sure / 100.0, runs=args.runs, minutes=args.minutes), changes,
-                    args.pairs, options_of(args, out=folder / RESULTS), args.json)
+          f"the page, from the first voyage on: {folder / PAGE}", flush=True)
+    return rehearse(made, folder, limits, changes, args.pairs,
+                    options_of(args, out=folder / RESULTS), args.json)
 
 
 def _error(text: str) -> tuple[float, float]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import math
+import os
 import shutil
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,17 +26,28 @@ from sitl.rehearse.prepared import PreparedRehearsal
 from sitl.rehearse.report import FIGURES, PAGE, PICTURE, RESULTS, WORST, RehearsalOutcome, page_of
 from sitl.rehearse.voyage import Job, key_of, sail_one
 from sitl.runner import CampaignResults, run_jobs
+from sitl.runner.campaign import Watch
 
 MOST_WORST = 3
+CHANCES_SHARE = 0.6   # of the minutes, where changes are tried in the rest
+PAGE_EVERY_S = 10.0   # the page fills
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """When a rehearsal ends: its intervals are no wider than ``width``, ``runs`` voyages, ``minutes`` from now."""
+    """When a rehearsal ends: its intervals are no wider than ``width``, ``runs`` voyages, ``minutes`` from ``began_s``.
+
+    The minutes are those of the whole answer: the chances first, then what changes are worth, then the worst again.
+    """
 
     width: float
     runs: int
     minutes: float | None = None
+    began_s: float = field(default_factory=time.monotonic)
+
+    def left_s(self, share: float = 1.0) -> float:
+        """Return how long it is until that share of the minutes is over [s]; infinite where none are named."""
+        return math.inf if self.minutes is None else self.began_s + 60.0 * share * self.minutes - time.monotonic()
 
 
 @dataclass(slots=True)
@@ -44,13 +58,14 @@ class Follower:
     """
 
     limits: Limits
+    share: float = 1.0     # of the minutes
+    on_known: Callable[[Estimates], None] = lambda _: None
     count: int = 0
     ends: str = ""
     known: Estimates = field(default_factory=lambda: estimates_of(()))
     _of: int = 0
     _arrived: int = 0
     _low: int = 0
-    _began_s: float = field(default_factory=time.monotonic)
 
     def __call__(self, there: Sequence[dict[str, Any] | None]) -> tuple[str, bool]:
         """Return what is known so far, in words, and whether that is enough."""
@@ -62,11 +77,27 @@ class Follower:
             widths = (share_of(came, self._of).width for came in (self._arrived, self._low))
             if max(widths) <= self.limits.width:
                 self.ends = "sure enough"
-        minutes = self.limits.minutes
-        if not self.ends and minutes is not None and time.monotonic() - self._began_s >= 60.0 * minutes:
+        if not self.ends and self.limits.left_s(self.share) <= 0.0:
             self.ends = "the time is over"
         self.known = estimates_of(there[:self.count])
+        if self.known.records:
+            self.on_known(self.known)
         return self.known.line() if self.count else "nothing known yet", bool(self.ends)
+
+
+class _GrowingPage:
+    """The page while voyages come: there from the first on, written again every ``PAGE_EVERY_S``."""
+
+    def __init__(self, made: PreparedRehearsal, folder: Path) -> None:
+        self._made, self._folder = made, folder
+        self._written_s = -math.inf
+
+    def fill(self, outcome: RehearsalOutcome) -> None:
+        """Write it, if it is time; what the disk does not take is said in the end."""
+        if time.monotonic() - self._written_s >= PAGE_EVERY_S:
+            self._written_s = time.monotonic()
+            with contextlib.suppress(OSError):
+                Disk().replace(self._folder / PAGE, page_of(self._made, outcome, self._folder, is_whole=False))
 
 
 def rehearse(
@@ -75,7 +106,9 @@ def rehearse(
 ) -> int:
     """Sail, tell and write; return the exit code."""
     jobs = [Job(scenario=made.source, seed=seed, doubts=made.doubts) for seed in range(limits.runs)]
-    follower = Follower(limits)
+    page = _GrowingPage(made, folder)
+    follower = Follower(limits, share=CHANCES_SHARE if changes and pairs else 1.0,
+                        on_known=lambda known: page.fill(RehearsalOutcome(known=known, ends="more to come")))
     if means.array[1] > 1:
         return _part(jobs, changes, pairs, means)
     try:
@@ -86,20 +119,32 @@ def rehearse(
     code = sailed.exit_code(is_good=True)
     count = min(pairs, len(follower.known.records))
     found: list[Tried] = []
+    voyage_s = sailed.wall_s / sailed.now * (means.workers or os.cpu_count() or 1) if sailed.now else 0.0
     if changes and count:
+        sys.stdout.write("\n".join(told(follower.known)) + "\n")   # the chances are known: nobody waits for the rest
         sys.stderr.write(f"{counted(len(changes), 'change')}, each for the first {counted(count, 'seed')}\n")
-        again = _sailed([replace(job, change=change) for change in changes for job in jobs[:count]], means, None)
+
+        def so_far(records: Sequence[dict[str, Any]]) -> list[Tried]:
+            return [tried(change, follower.known.records[:count], mine) for change in changes
+                    if (mine := [r for r in records if r.get("change") == change.told])]
+
+        def is_time(there: Sequence[dict[str, Any] | None]) -> tuple[str, bool]:
+            records = [record for record in there if record]
+            page.fill(RehearsalOutcome(known=follower.known, ends="more to come", changes=tuple(so_far(records))))
+            return "", limits.left_s() <= voyage_s   # of the worst, once again
+
+        # seed by seed: when the time is over, all changes have been tried alike
+        others = [replace(job, change=change) for job in jobs[:count] for change in changes]
+        again = _sailed(others, means, is_time)
         code |= again.exit_code(is_good=True)
-        for change in changes:
-            if mine := [record for record in again.records if record["change"] == change.told]:
-                found.append(tried(change, follower.known.records[:count], mine))
+        found = so_far(again.records)
     outcome = RehearsalOutcome(known=follower.known, ends=follower.ends or "not as sure as was asked for",
-                      changes=tuple(found), folders=_worst(follower.known, jobs, folder))
-    sys.stdout.write("\n".join(_words(outcome, sailed)) + "\n")
+                      changes=tuple(found), folders=_worst(follower.known, jobs, folder, limits, voyage_s))
+    sys.stdout.write("\n".join(_words(outcome, sailed, is_told=bool(changes and count))) + "\n")
     return code | _written(outcome, made, folder, json_path)
 
 
-def _sailed(jobs: Sequence[Job], means: CampaignOptions, follower: Follower | None) -> CampaignResults:
+def _sailed(jobs: Sequence[Job], means: CampaignOptions, follower: Watch | None) -> CampaignResults:
     return run_jobs(CAMPAIGN, sail_one, jobs, means, key=key_of, watch=follower,
                     is_failed=lambda record: "error" in record)
 
@@ -115,12 +160,17 @@ def _part(jobs: Sequence[Job], changes: Sequence[MissionChange], pairs: int, mea
     return sailed.exit_code(is_good=True)
 
 
-def _worst(known: Estimates, jobs: Sequence[Job], folder: Path) -> tuple[tuple[dict[str, Any], Path | None], ...]:
-    """Sail the worst voyages again and keep their folders; a seed repeats to the last bit."""
+def _worst(
+    known: Estimates, jobs: Sequence[Job], folder: Path, limits: Limits, voyage_s: float,
+) -> tuple[tuple[dict[str, Any], Path | None], ...]:
+    """Sail the worst voyages again, while there is time, and keep their folders; a seed repeats to the last bit."""
     found: list[tuple[dict[str, Any], Path | None]] = []
     for before in (folder / WORST).glob("*-seed-*"):   # ours, and nothing else that may be there
         shutil.rmtree(before) if before.is_dir() else before.unlink()
     for number, record in enumerate(known.worst(MOST_WORST), start=1):
+        if limits.left_s() < voyage_s:
+            found.append((dict(record), None))
+            continue
         place = folder / WORST / f"{number}-seed-{record['seed']}"
         control(sys.stderr, f"\rthe worst again: {number} of {min(MOST_WORST, len(known.records))}   ")
         sys.stderr.flush()
@@ -141,8 +191,10 @@ def _worst(known: Estimates, jobs: Sequence[Job], folder: Path) -> tuple[tuple[d
     return tuple(found)
 
 
-def _words(outcome: RehearsalOutcome, sailed: CampaignResults) -> list[str]:
-    lines = [*told(outcome.known), f"{outcome.ends}; {sailed.took}"]
+def _words(outcome: RehearsalOutcome, sailed: CampaignResults, *, is_told: bool) -> list[str]:
+    lines = [*(() if is_told else told(outcome.known)), f"{outcome.ends}; {sailed.took}"]
+    if is_told and not outcome.changes:
+        lines.append("what changes are worth: there was no time for it; more --minutes, and the same command goes on")
     if outcome.changes:
         lines.append("what to change, by pairs of voyages with the same seed (the difference and its 95 % interval; of "
                      "twenty such intervals one is wrong):")

@@ -59,8 +59,10 @@ td.n{text-align:right;font-variant-numeric:tabular-nums}img{max-width:100%;backg
 """
 
 
-def page_of(made: PreparedRehearsal, outcome: RehearsalOutcome, folder: Path) -> bytes:
+def page_of(made: PreparedRehearsal, outcome: RehearsalOutcome, folder: Path, *, is_whole: bool = True) -> bytes:
     """Return the page; the worst voyages' own pages are written beside their folders.
+
+    One that is not whole yet has no picture, and is looked at again by itself.
 
     Raises:
         OSError: the disk does not take them.
@@ -68,11 +70,12 @@ def page_of(made: PreparedRehearsal, outcome: RehearsalOutcome, folder: Path) ->
     known = outcome.known
     name = html.escape(made.mission.name)
     picture = ""
-    if (folder / PICTURE).is_file():
+    if is_whole and (folder / PICTURE).is_file():
         data = base64.b64encode((folder / PICTURE).read_bytes()).decode()
         picture = f"<img alt='Map of the voyages, chances, times, changes' src='data:image/png;base64,{data}'>"
     head = ("<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content='width=device-width'>"
-            f"<title>{name}, rehearsed</title><link rel=icon href='data:,'><style>{STYLE}</style>")
+            f"<title>{name}, rehearsed</title><link rel=icon href='data:,'><style>{STYLE}</style>"
+            f"{'' if is_whole else '<meta http-equiv=refresh content=10>'}")
     asked = (f"<h1>{name}, rehearsed</h1><p>{len(known.records)} voyages, {html.escape(outcome.ends)}. Wind: "
              f"{html.escape(made.doubts.wind.told)}. Doubt in boat, sea and sensors: {made.doubts.boat:g}; "
              f"{'with' if made.doubts.faults else 'without'} trouble. In brackets what is 95 % sure.</p>")

@@ -156,11 +156,15 @@ class _Companion:
         return None if self._process is None else self._process.returncode
 
     async def start(self) -> None:
-        """Start it; its progress line is ours."""
+        """Start it; its progress line is ours.
+
+        A group of its own: Ctrl-C of a terminal goes to all of a group at once, and who then stops it would end it a
+        second time, without a summary.
+        """
         self._expects_death = False
         share = self._share
         self._process = await asyncio.create_subprocess_exec(
-            *self._command, preexec_fn=None if share is None else share.enter)
+            *self._command, process_group=0, preexec_fn=None if share is None else share.enter)
         if share is not None:
             self._holder = asyncio.create_task(share.hold(self._process.pid), name="share of a core")
         self._watcher = asyncio.create_task(self._watch(self._process), name="companion process")

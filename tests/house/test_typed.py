@@ -69,15 +69,17 @@ def typed(line, folder):
     env = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT),
            "LANG": "C"}
     shell = subprocess.Popen(["bash", "-c", f"exec {line}"], cwd=folder, env=env, stdin=subprocess.DEVNULL, text=True,
-                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+    said = ""
     try:
         yield shell
     finally:
         if shell.poll() is None:
-            shell.send_signal(signal.SIGINT)
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            shell.communicate(timeout=ENDS_S)
+            os.killpg(shell.pid, signal.SIGINT)   # as a terminal does: to all of the group
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                said = shell.communicate(timeout=ENDS_S)[0]
         shell.kill()
+    assert "Traceback" not in said
 
 
 def until(shell, said):

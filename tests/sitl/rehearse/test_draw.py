@@ -155,7 +155,8 @@ def test_a_change_is_of_one_thing(base, mission):
     margin = change_of("margin_m=20", mission)
     assert margin.variation.mission(mission).margin_m == 20.0
     assert margin.scenario(scenario) == scenario
-    assert change_of("SAIL_XTRACK_MAX=4", mission).scenario(scenario).parameters == {"SAIL_XTRACK_MAX": 4.0}
+    corridor = change_of("SAIL_XTRACK_MAX=4", mission).scenario(scenario)
+    assert corridor.parameters == {**scenario.parameters, "SAIL_XTRACK_MAX": 4.0}
     later = change_of("later=2h", mission).scenario(scenario)
     assert (later.begins - scenario.begins).total_seconds() == later.wind.from_s == 7200.0
 

@@ -7,6 +7,7 @@ import random
 import re
 import shutil
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -71,6 +72,15 @@ def test_the_time_ends_it_too():
     follower = Follower(Limits(width=0.01, runs=9, minutes=1e-9))
     assert follower([record(0), None]) == (follower.known.line(), True)
     assert follower.ends == "the time is over"
+
+
+def test_of_the_minutes_the_chances_have_their_share_and_the_page_is_told_from_the_first_voyage_on():
+    shown = []
+    limits = Limits(width=0.01, runs=9, minutes=1.0, began_s=time.monotonic() - 40.0)
+    assert not Follower(limits)([record(0), None])[1]
+    follower = Follower(limits, share=0.6, on_known=shown.append)
+    assert follower([record(0), None])[1]
+    assert [known.arrives.of for known in shown] == [1]
 
 
 def test_the_worst_come_in_the_order_of_what_they_cost():
