@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+# Those to learn from, the simplest first; the others are what scenarios and tests sail.
+TEACHING = (
+    "lake", "rocks", "bay", "bay-with-care", "archipelago", "buoy-course", "gates", "box", "search", "field-ring",
+)
 _HERE = Path(__file__).resolve().parent
 
 

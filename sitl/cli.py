@@ -15,6 +15,7 @@ PROGRAM = Program(
         "demo": "the archipelago, with live progress: what a new user sees first",
         "boat": "the simulated autopilot alone, for any MAVLink client",
         "run": "sail a scenario: autopilot, weather, companion, verdict",
+        "example": "a scenario with a comment at every key, to begin your own from",
         "campaign": "a scenario over many seeds: success, risk, time",
         "faults": "a short voyage a thousand times, each with trouble of its own",
         "encounters": "vessels that would hit the boat, by the hundred: the rules of the road",

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 _EPILOG = """\
 examples:
   companion field missions/field-ring.toml
-  companion field missions/field-square.toml --goal 2 --plot leave.png
-  companion field missions/field-lane.toml --wind 5@40 --fans --plot lane.png
+  companion field missions/field-ring.toml --goal 1 --plot ring.png
+  companion field missions/field-ring.toml --wind 5@40 --fans --plot fans.png
   companion field missions/field-ring.toml --page ring.html      (turn the wind, drag the boat)
 
 FILE is a mission with a goal of kind = "field", or one of [skipper] guidance = "field". The wind is steady, there

@@ -7,6 +7,7 @@ import math
 import sys
 import tempfile
 import time
+import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -68,6 +69,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
     example = verbs.add_parser("example", help="write the missions that come with the program, to begin from")
     example.add_argument("folder", type=Path, metavar="DIR")
+    example.add_argument("--all", action="store_true", help="those that scenarios and tests sail, too")
     example.set_defaults(run=_example)
 
     convert = verbs.add_parser("convert", help="write a mission in another format and say what it does not carry")
@@ -98,7 +100,12 @@ def _example(args: argparse.Namespace) -> int:
     from companion import examples
     from companion.disk import Disk, reason
 
-    files = sorted(path for path in examples.folder().iterdir() if path.suffix in {".toml", ".wkt"})
+    every = sorted(path for path in examples.folder().iterdir() if path.suffix in {".toml", ".wkt"})
+    missions = [path for path in every if path.suffix == ".toml"]
+    if not args.all:
+        missions = [examples.folder() / f"{name}.toml" for name in examples.TEACHING]
+    told = {path: path.read_text(encoding="utf-8") for path in missions}
+    files = [path for path in every if path in told or any(f'"{path.name}"' in text for text in told.values())]
     there = [path.name for path in files if (args.folder / path.name).exists()]
     if there:
         raise InputError(str(args.folder), there[0], "is there already", "name another folder: nothing is written over")
@@ -108,9 +115,11 @@ def _example(args: argparse.Namespace) -> int:
             Disk().replace(args.folder / path.name, path.read_bytes())
     except OSError as error:
         raise InputError(str(args.folder), "", f"cannot be written ({reason(error)})", "name another folder") from error
-    missions = [path for path in files if path.suffix == ".toml"]
+    width = max(len(path.name) for path in missions)
+    for path, text in told.items():
+        print(f"{path.name:{width}}  {tomllib.loads(text)['description']}")
     print(f"{counted(len(missions), 'mission')} in {args.folder}; next: companion mission check {args.folder}/"
-          f"archipelago.toml --plot archipelago.png")
+          f"{missions[0].name} --plot {missions[0].stem}.png")
     return 0
 
 

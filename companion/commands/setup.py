@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import grp
 import os
 import re
@@ -81,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         args.start = args.start or ask("where she starts, LAT,LON", None, place)
         args.goal = args.goal or [ask("where she is to sail, LAT,LON", None, place)]
     args.no_go = args.no_go or ask("how near to the wind she sails [deg]", 47.0, NO_GO_DEG)
-    written = write_instance(args.dir, args.name, mission_of(args, system), settings_of(link), args.polar)
+    written = write_instance(args.dir, args.name, mission_of(args, link, system), settings_of(link), args.polar)
     for path in written:
         print(f"{path}: written")
     code = 0 if args.no_doctor else _examine(written[0], link, system)
@@ -163,7 +164,22 @@ class Questions:
                 print(error)
 
 
-def mission_of(args: argparse.Namespace, system: int | None) -> dict[str, Any]:
+def margin_of(link: str | None, system: int | None) -> dict[str, float]:
+    """Return the margin that the doctor finds enough for the autopilot on a link; None, or silent: for a default."""
+    from companion.boat import AutopilotLimits, Boat, ardurover_sitl, proposed_margin
+    from companion.commands.doctor import limits_at
+    from companion.geofence.mission import WindOptions
+
+    limits, boat = AutopilotLimits(), Boat(polar=ardurover_sitl())
+    if link is not None:
+        with contextlib.suppress(CompanionError):
+            limits = limits_at(link, system=system)
+    proposed = proposed_margin(
+        limits, speed_mps=boat.polar.max_speed_mps(WindOptions().preview_speed_mps), hull=boat.hull)
+    return {"margin_m": proposed.margin_m, "margin_floor_m": proposed.floor_m}
+
+
+def mission_of(args: argparse.Namespace, link: str | None, system: int | None) -> dict[str, Any]:
     """Return the mission, as its file has it; its operator permits nothing."""
     boat: dict[str, Any] = {"no_go_half_deg": args.no_go}
     if args.polar is not None:
@@ -174,6 +190,7 @@ def mission_of(args: argparse.Namespace, system: int | None) -> dict[str, Any]:
     else:
         mission["start"] = _place(args.start)
         mission["goal"] = [_place(goal) for goal in args.goal]
+    mission["area"] = margin_of(None if args.no_doctor else link, system)
     mission["boat"] = boat
     if system is not None:
         mission["autopilot"] = {"system": system}

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.words import counted
+
 
 class PlanStatus(enum.Enum):
     """How planning ended; ``Plan.reason`` says more."""
@@ -155,6 +157,15 @@ class Plan:
         if not self.has_path or not self.lower_bound_s > 0.0:
             return 0.0 if self.has_path and self.cost_s <= self.lower_bound_s else math.inf
         return max(0.0, self.cost_s / self.lower_bound_s - 1.0)
+
+    def __str__(self) -> str:
+        """Return it as a line: what it is, how long it takes, the best that there may be, its risk."""
+        if not self.has_path:
+            return f"{self.status.value}: {self.reason}"
+        length_m = sum(leg.length_m for leg in self.legs)
+        risk = "" if self.risk is None else f", {100.0 * self.risk:.1f} % risk of the whole path"
+        return (f"{self.status.value}: {counted(len(self.legs), 'leg')}, {length_m:.0f} m, {self.cost_s:.0f} s "
+                f"(at least {self.lower_bound_s:.0f} s){risk}")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form: degrees, metres, seconds; None for what is not finite."""

@@ -69,6 +69,7 @@ def test_it_finds_the_autopilot_writes_a_mission_that_can_be_sailed_and_runs_the
     assert code in {0, 1}, err   # the doctor's: what it finds on a fresh autopilot
     assert f"the autopilot of system 7 is on {serial}:921600" in out
     assert "nothing was changed" in out
+    assert "margin" not in out   # the doctor praises what it writes
     assert sorted(p.name for p in tmp_path.iterdir()) == ["lake.env", "lake.toml"]
     assert f"LINK={serial}:921600\n" in (tmp_path / "lake.env").read_text()
     mission = load_mission(tmp_path / "lake.toml")

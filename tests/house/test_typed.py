@@ -1,5 +1,6 @@
 """What README and the guides tell a reader to type: understood as it stands, and README's lines are run as he would."""
 
+import argparse
 import contextlib
 import os
 import re
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+import companion.commands.mission
 from companion import cli
 from companion.errors import InputError
 from sitl import cli as sitl_cli
@@ -61,6 +63,31 @@ def test_every_command_line_of_a_page_is_understood(page, monkeypatch, tmp_path)
         except InputError as wrong:
             if line in typed_ones or not NAMES_A_COMMAND.search(str(wrong)):
                 pytest.fail(f"{line}: {wrong}")
+
+
+@pytest.mark.parametrize("name", [(program, command) for program, it in PROGRAMS.items() for command in it.names],
+                         ids=" ".join)
+def test_the_examples_of_a_help_are_understood_and_name_what_an_installed_program_has(name, monkeypatch, tmp_path):
+    program, command = name
+    monkeypatch.chdir(tmp_path)
+    companion.commands.mission._example(argparse.Namespace(folder=Path("missions"), all=False))
+    monkeypatch.setenv("COLUMNS", "1000")
+    text = helps(PROGRAMS[program].parser(command))
+    assert "sitl/scenarios" not in text
+    assert [file for file in re.findall(r"missions/[\w.-]+", text) if not Path(file).exists()] == []
+    for line in re.findall(r"^  ((?:companion|sitl) [a-z].*?)(?:\s{2,}.*)?$", text, re.MULTILINE):
+        try:
+            words = words_of(line)[1:]
+            PROGRAMS[line.partition(" ")[0]].parser(words[0]).parse_args(words)
+        except InputError as wrong:
+            pytest.fail(f"{line}: {wrong}")
+
+
+def helps(parser):
+    """Return the help of a parser and of all below it."""
+    below = [p for action in parser._actions if isinstance(action, argparse._SubParsersAction)
+             for p in action.choices.values()]
+    return "\n".join([parser.format_help(), *(helps(p) for p in below)])
 
 
 @contextlib.contextmanager

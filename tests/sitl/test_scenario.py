@@ -1,6 +1,7 @@
 """Scenario files: bad ones are one line that names file, place and remedy; all of ours load."""
 
 import datetime as dt
+import re
 import socket
 from itertools import chain, count
 from pathlib import Path
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from companion.errors import InputError
+from sitl import cli
 from sitl.autopilot import EPOCH_S
 from sitl.scenario.scenario import beginning, load_scenario, scenario_wind
 from sitl.scenario.traffic import PORTS, free_port
@@ -59,6 +61,19 @@ def test_a_mission_is_a_scenario():
 
 def test_of_a_mission_the_fence_is_not_the_circle_of_300_m_that_an_autopilot_comes_with():
     assert load_scenario(Path("missions/bay.toml")).parameters == {"FENCE_TYPE": 4.0}
+
+
+def test_the_example_is_a_scenario_that_can_be_read_and_nothing_is_written_over(tmp_path, capsys):
+    folder = tmp_path / "squall"
+    assert cli.main(["example", str(folder)]) == 0
+    scenario = load_scenario(folder / "squall.toml")
+    assert (scenario.name, len(scenario.events), scenario.expect.max_time_s) == ("squall", 2, 600.0)
+    assert cli.main(["example", str(folder)]) == 2
+    assert "nothing is written over" in capsys.readouterr().err
+    bare = "\n".join(line.removeprefix("# ") if re.match(r"# (\w+ = |\[)", line) else line
+                     for line in (folder / "squall.toml").read_text().splitlines())
+    (folder / "all.toml").write_text(bare)   # what is commented out is right, too
+    assert load_scenario(folder / "all.toml").current is not None
 
 
 def test_a_free_port_is_nobodys_of_udp_and_of_tcp_and_none_that_the_system_gives_away(monkeypatch):
