@@ -59,6 +59,7 @@ from companion.skipper.step import (
     SkipperState,
     Snapshot,
     WaypointReached,
+    WindBefore,
     WindHealth,
     WindView,
 )
@@ -209,6 +210,7 @@ class ParameterStore:
 
 # Modes in which the sheets are trimmed to sail; in HOLD they are eased, and by hand nobody knows.
 _SAILS = frozenset({Mode.AUTO, Mode.GUIDED, Mode.LOITER})
+VANE_OFFSET = "WNDVN_DIR_OFS"   # [deg] that the autopilot adds to what the vane says
 UNTOLD_S = 60.0       # of a boat whose motion does not tell whether the wind that is learned anew is the right one
 _NO_INDEX = 65535      # of a parameter that was set or asked for by its name: one of a list has its place in it
 
@@ -254,6 +256,8 @@ class VoyageFold:
         self.current = CurrentEstimator(skipper.voyage.boat.polar.speed_mps, water)
         self._anew = ""    # why the wind is learned anew, until it is ...
         self._anew_s: float | None = None   # ... and since when
+        self._sure_wind: tuple[float, float] | None = None   # the mean wind when it was believed last ...
+        self._offset_rad: float | None = None                # ... and by how much the vane's offset was changed since
         self.skipper, self.permissions = skipper, permissions
         self._air = StepWind(wind)
         self.state: SkipperState = skipper.initial(persisted, known)
@@ -376,6 +380,10 @@ class VoyageFold:
         learns = ""
         if change.effect in {Effect.WIND, Effect.HEADING}:
             self._anew, self._anew_s = text, None
+            if change.name == VANE_OFFSET and change.before is not None:
+                self._offset_rad = (self._offset_rad or 0.0) + math.radians(change.after - change.before)
+            elif change.effect is Effect.HEADING:
+                self._sure_wind = None   # it was told by another compass
             self._air.begin_anew()
             learns = ": wind, current and polar are learned anew"
         elif change.effect is Effect.BOAT:
@@ -443,6 +451,7 @@ class VoyageFold:
         wind = self._air.view(t_s)
         self.current.update(t_s, self._utc_s(t_s), self._sailing(t_s, wind))
         self._air.room.contradict(self.current.motion_doubt if self.current.doubts_wind else "")
+        unsure = self._unsure(t_s, wind)
         return Snapshot(
             t_s=t_s,
             vehicle=vehicle,
@@ -454,7 +463,8 @@ class VoyageFold:
             wind=wind,
             current=self.current.view(),
             doubt=self.current.doubt(),
-            unsure=self._unsure(t_s, wind),
+            unsure=unsure,
+            wind_before=self._wind_before(wind, unsure=unsure),
             mission=self._mission,
             identity=replace(
                 self._identity, vehicle_type=None if autopilot is None else autopilot.vehicle_type,
@@ -482,6 +492,23 @@ class VoyageFold:
         if self.current.motion_doubt or (is_told and wind.record_s >= self.skipper.config.wind_settle_s):
             self._anew = ""
         return f"{self._anew}: the wind is learned anew" if self._anew else self.current.motion_doubt
+
+    def _wind_before(self, wind: WindView, *, unsure: str) -> WindBefore | None:
+        """Return the wind as it was before it came to be doubted, None while it is believed or where that is not known.
+
+        It is known where the vane's offset was changed, and where the direction leapt.
+        """
+        if not unsure:
+            self._offset_rad = None
+            if wind.health is WindHealth.GOOD and wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
+                self._sure_wind = wind.mean_twd_from_rad, wind.mean_tws_mps
+            return None
+        now_rad, leapt_rad, sure = wind.present_twd_from_rad, self.current.wind_before_rad, self._sure_wind
+        if sure is not None and self._offset_rad is not None:
+            return WindBefore(twd_from_rad=sure[0], tws_mps=sure[1], turned_rad=wrap_pi(self._offset_rad))
+        if sure is not None and leapt_rad is not None and now_rad is not None:
+            return WindBefore(twd_from_rad=leapt_rad, tws_mps=sure[1], turned_rad=wrap_pi(now_rad - leapt_rad))
+        return None
 
     def _utc_s(self, t_s: float) -> float | None:
         """Return the Unix time at ``t_s`` by the autopilot's clock, None before it knows the time."""

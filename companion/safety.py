@@ -99,7 +99,7 @@ class Watchdog:
     why: str
     at_rest: bool = False      # watched before she sails and when the voyage is over, too
     loitering: bool = False    # watched when the voyage is over; without at_rest not before she sails
-    calm_enter_s: float | None = None   # the entry in place of ``enter_s`` where there is no wind to be steered in
+    unsailed_enter_s: float | None = None   # in place of ``enter_s`` where nothing but a drift can move the boat
     sensor: str = ""           # the NAMED_VALUE_FLOAT of a script on the autopilot whose value is the figure
     notification: str = ""     # Signal K's own name for it; empty: one made of the name
     ends: Ending | None = None  # it ends the voyage early, as the mission's ``[safety]`` says
@@ -140,9 +140,9 @@ TABLE: tuple[Watchdog, ...] = (
     W(name="drifting", number=6, notification="grounding",
       watches="time until a boat that does not sail drifts within the margin's floor of something",
       enter=300.0, exit=360.0, unit="s", enter_s=20.0, exit_s=30.0, severity=S.CRITICAL, response=Response.STOP_DRIFT,
-      loitering=True, calm_enter_s=5.0,
-      why="a current takes her there without wind, and an anchor takes time to be let go; in a calm nothing else can "
-          "have moved her, and she is told of after 5 s"),
+      loitering=True, unsailed_enter_s=5.0,
+      why="a current takes her there without wind, and an anchor takes time to be let go; in a calm, or astern in a "
+          "loiter by a doubted wind, nothing else can have moved her, and she is told of after 5 s"),
     W(name="in irons", number=7,
       watches="speed ahead while pointing within 35° of the wind", enter=0.3, exit=0.8, unit="m/s",
       enter_s=8.0, exit_s=3.0, severity=S.WARNING, response=Response.BEAR_AWAY,

@@ -278,6 +278,11 @@ class CurrentEstimator:
         """Whether the doubt is of the wind sensor."""
         return self._check is not None and self._check.is_winds
 
+    @property
+    def wind_before_rad(self) -> float | None:
+        """Where the wind came from before its direction leapt, while that is doubted; else None."""
+        return None if self._check is None else self._check.before_rad
+
     def _predict(self, t_s: float, utc_s: float | None) -> None:
         expected = self._prior.at(utc_s)
         if self._t_s is None or self._expected is None:

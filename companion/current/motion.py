@@ -90,6 +90,11 @@ class MotionCheck:
         self._leapt_s = -math.inf                                # ... and when it was seen to have
         self._fitted: list[float] = []                           # headings on which she sailed as she should
 
+    @property
+    def before_rad(self) -> float | None:
+        """Where the wind came from before it leapt, while that is why it is doubted."""
+        return self._before_rad if self.doubt and self.is_winds else None
+
     def pause(self) -> None:
         """Take note that nobody knows how she is driven: what is settled begins anew."""
         self._t_s = None

@@ -15,7 +15,6 @@ from companion.skipper.behaviors.field_guidance import last_resort
 from companion.skipper.behaviors.helm import repair
 from companion.skipper.behaviors.launch import finished, launch, start
 from companion.skipper.behaviors.operator_orders import holds_ashore, leaves_alone
-from companion.skipper.behaviors.position_doubt import holds
 from companion.skipper.behaviors.sailing import (
     bear_away,
     follow_route,
@@ -26,6 +25,7 @@ from companion.skipper.behaviors.sailing import (
     stand_off,
     stop_drift,
 )
+from companion.skipper.behaviors.wind_doubt import holds, seeks_sea_room
 from companion.skipper.board.on_board import mission_is_known
 from companion.skipper.board.vehicle_identity import stand_by
 from companion.skipper.intake import notice_truncation
@@ -110,7 +110,10 @@ BEHAVIORS: tuple[Behavior, ...] = (
              does="plans and uploads one, once position, wind and permissions are there"),
     Behavior(name="set sail", act=_set_sail, when="she is not under way", does="sets AUTO and arms, as permitted"),
     Behavior(name="stand off", act=stand_off, when="the position is doubted and the place reckoned is not clear, or "
-             "a LOITER's point jumped with it", does="asks for LOITER, and keeps it until the position is believed"),
+             "a LOITER's point jumped with it or lies beyond something",
+             does="asks for LOITER, and keeps it until the position is believed"),
+    Behavior(name="seek sea room", act=seeks_sea_room, when="the wind is doubted, and a LOITER by it would be "
+             "driven onto something", does="sails a straight clear leg to water with nothing to leeward"),
     Behavior(name="stop a drift", act=stop_drift, when="she does not sail and drifts onto something, or in a calm",
              does="motor, LOITER, the call to the anchor"),
     Behavior(name="rest", act=rest_at_end, when="the voyage is over, or no goal is left and nothing else to sail to",

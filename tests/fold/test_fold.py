@@ -136,6 +136,24 @@ def test_a_parameter_that_changes_what_a_sensor_says_is_said_and_the_wind_is_lea
     assert not heard(fold, 70, 140, twd_rad=1.9).unsure
 
 
+def test_an_offset_that_was_set_leaves_the_wind_before_it_and_says_how_far_it_has_turned():
+    fold = fresh()
+    told(fold, "WNDVN_DIR_OFS", 0.0)
+    assert heard(fold, 1, 60).wind_before is None
+    for _ in range(2):
+        told(fold, "WNDVN_DIR_OFS", 90.0)
+    before = heard(fold, 60, 62).wind_before
+    assert before.twd_from_rad == pytest.approx(0.3, abs=0.01)
+    assert before.turned_rad == pytest.approx(math.radians(90.0))
+    for _ in range(2):
+        told(fold, "WNDVN_DIR_OFS", 0.0)
+    assert heard(fold, 62, 64).wind_before.turned_rad == pytest.approx(0.0), "put back"
+    assert heard(fold, 64, 140).wind_before is None, "believed again"
+    for _ in range(2):
+        told(fold, "COMPASS_ORIENT", 4.0)
+    assert heard(fold, 140, 142).wind_before is None, "what another compass told of the wind is of no use"
+
+
 @pytest.mark.parametrize(
     ("name", "anew"), [("SERVO1_REVERSED", True), ("SAIL_ANGLE_IDEAL", True), ("SAIL_HEEL_MAX", False)])
 def test_one_that_changes_how_she_answers_leaves_the_wind(name, anew):

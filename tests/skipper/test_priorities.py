@@ -14,6 +14,7 @@ from companion.orders import Verb
 from companion.skipper.priorities import BEHAVIORS, act, markdown
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import Standing
+from companion.skipper.step.snapshot import WindBefore
 from companion.skipper.step.state import PositionDoubt, Raised, Stop
 from tests.skipper.test_voyage import ISLANDS
 from tests.skipper.test_walk import on_collision_course, states
@@ -62,6 +63,15 @@ def before_island(s, state):
     return replace(unsure(s, state), position_en_m=here, vehicle=replace(s.vehicle, velocity_en_mps=(0.0, 3.0)))
 
 
+def south_of_island(s, state):
+    """Put the boat in a loiter 30 m to windward of an island's end, in a wind from the south that is told as west."""
+    island = min(ISLANDS, key=lambda p: p.distance(shapely.Point(s.position_en_m)))
+    west, south, _, _ = island.bounds
+    held = showing(mode=Mode.LOITER)(unsure(s, state), state)
+    return replace(held, position_en_m=(west + 6.0, south - 30.0), wind_before=WindBefore(
+        twd_from_rad=math.pi, tws_mps=5.0, turned_rad=math.pi / 2.0))
+
+
 def homeward_over_island(s, state):
     here = s.position_en_m
     island = min(ISLANDS, key=lambda p: p.distance(shapely.Point(here)))
@@ -84,7 +94,8 @@ SITUATIONS = {
     ("first plan", "set sail"): ("waiting", ASHORE, None),
     ("set sail", "stand off"): ("standard", DOUBT | IN_LOITER | {"voyage": {"sailing": False}},
                                 showing(mode=Mode.LOITER)),
-    ("stand off", "stop a drift"): ("standard", DOUBT | IN_LOITER | DRIFTS, showing(mode=Mode.LOITER)),
+    ("seek sea room", "stop a drift"): (
+        "standard", IN_LOITER | DRIFTS | {"position": {"last_seen": None}}, south_of_island),
     ("stop a drift", "rest"): ("done", IN_LOITER | DRIFTS, showing(mode=Mode.LOITER)),
     ("rest", "hold"): ("done", {}, unsure),
     ("hold", "brake"): ("standard", {"position": {"last_seen": None}}, before_island),
@@ -99,6 +110,7 @@ SITUATIONS = {
 # Neighbours that never both have something to do.
 NEVER_BOTH = {
     ("given up", "keep off"): "nothing is asked of a boat that was given up",
+    ("stand off", "seek sea room"): "no leg is sailed from a position that is doubted, or while a loiter is begun anew",
     ("brake", "sail on"): "one is for a boat that is sailed, the other for one that shows a stop",
 }
 

@@ -32,6 +32,8 @@ SLOW_MPS = 0.04        # of a drift seen in places: 2.4 m in a minute; slower is
 PLACE_S, SLOW_PLACES, LEAST_S = 10.0, 6, 30.0   # places of a boat that hardly moves: one in 10 s, a minute, half of it
 SAILS_MPS = 0.5
 AGAINST_RAD = math.radians(60.0)   # a boat that sails makes less leeway than this, in any current that she can stem
+ASTERN_MPS = 0.3       # slower going astern shows nothing: a turn, a wave, a noisy receiver
+ASTERN_RAD = math.radians(30.0)    # the course is so near to dead astern of the bow
 AWAY_M = 25.0          # LOITER has been measured to stay within 12 m of its point
 TAU_S = 10.0           # of the mean velocity: longer than a wave, shorter than a board
 SPARE = 1.3            # what can stem a drift is this much faster
@@ -90,11 +92,30 @@ def _is_against(ctx: StepContext, ground: tuple[float, float]) -> bool:
     return vehicle is not None and abs(difference_rad(heading_of(*ground), vehicle.heading_rad)) > AGAINST_RAD
 
 
+def goes_astern(ctx: StepContext) -> bool:
+    """Return whether the boat goes astern in a loiter: there it lies with its bow in the wind and is driven by it."""
+    status, vehicle = ctx.autopilot, ctx.snapshot.vehicle
+    if status is None or vehicle is None or vehicle.speed_mps < ASTERN_MPS:
+        return False
+    if status.mode is not Mode.LOITER and (status.mode is not Mode.AUTO or ctx.ahead()):
+        return False
+    east, north = vehicle.velocity_en_mps
+    return abs(difference_rad(heading_of(-east, -north), vehicle.heading_rad)) < ASTERN_RAD
+
+
+def is_driven_astern(ctx: StepContext) -> bool:
+    """Return whether a loiter by a wind that is doubted is driven astern: as surely a drift as one in a calm."""
+    return bool(ctx.snapshot.unsure) and goes_astern(ctx)
+
+
 def _is_carried(ctx: StepContext, boat: PointEn, ground: tuple[float, float]) -> bool:
     """Return whether the boat goes where she is not steered, in a wind to steer by.
 
-    In HOLD nobody steers. In LOITER she turns in circles, and is carried when she leaves the place of them.
+    In HOLD nobody steers. In LOITER she turns in circles, and is carried when she leaves the place of them, or goes
+    astern by a wind that is doubted.
     """
+    if is_driven_astern(ctx):
+        return True
     mode = ctx.autopilot.mode if ctx.autopilot is not None else None
     place = ctx.state.adrift.loiter_en_m
     if mode is Mode.LOITER:
@@ -108,7 +129,9 @@ def _goes_away(boat: PointEn, place: PointEn, ground: tuple[float, float]) -> bo
 
 def drift(ctx: StepContext) -> DriftAhead | None:
     """Return where the boat drifts, None when she sails, lies still, or it cannot be told."""
-    ground, wind, boat = over_ground(ctx), ctx.wind_now, ctx.reckoned_en
+    ground, wind, boat, vehicle = over_ground(ctx), ctx.wind_now, ctx.reckoned_en, ctx.snapshot.vehicle
+    if vehicle is not None and is_driven_astern(ctx):
+        ground = vehicle.velocity_en_mps   # of now: the mean is still of how she sailed
     if ground is None or wind is None or boat is None:
         return None
     if not (wind[1] < STEERAGE_MPS or _is_carried(ctx, boat, ground)):

@@ -1,4 +1,4 @@
-"""What is done while it is doubted where the boat is, or what wind she sails in.
+"""What is done while it is doubted where the boat is.
 
 A position in doubt: what is safe where it says that the boat is, and where she was and has sailed on from?
 The autopilot takes a new position and sails by it, true or not. Until there is evidence (``companion.skipper.way
@@ -8,27 +8,24 @@ the new place is not clear, either, is no reason against it: nobody sails inside
 often than true.
 
 Once held she stays held until the position is believed. A jump moves the point of a LOITER that is sailed already, and
-she would make for it over whatever lies between: then she is put into HOLD and into LOITER again, which begins here.
-
-A wind that her motion contradicts, or that is learned anew: she loiters, and nothing is planned. A plan for a wind that
-is not there leads anywhere, and each step of the ladder gives up some of what keeps her clear.
+she would make for it over whatever lies between: then she is put into HOLD and into LOITER again, which begins here. So
+is a boat that was driven off the point, by a wrong wind or in a calm, until something lay between.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from companion.frozen import changed
 from companion.messages import Mode, Severity
 from companion.safety import CRITICAL, HOMEWARD, JUMP_M
-from companion.skipper.behaviors.drifting import stops_drift
+from companion.skipper.behaviors.drifting import AWAY_M, stops_drift
 from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.planning.waits import utc_s
-from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.saved import SavedPlace
 from companion.skipper.step.state import Phase
+from companion.skipper.way.geometry import moved
 from companion.skipper.way.position_plausibility import (
     DISPUTED_S,
     ERROR_M,
@@ -49,7 +46,8 @@ STRAYS_M = 25.0       # what a boat in LOITER or HOLD is off her place when she 
 LEAST_REACH_M = 30.0  # a start finds her so near to where she was, whatever the clocks say
 UNKNOWN_S = 120.0     # how long a start has taken when no clock tells
 BEATEN_MPS = 10.0     # the wind in which she may have sailed meanwhile
-SAID_S = 60.0         # between two words on a wind that is not known
+POINT_S = 5.0         # after LOITER was accepted what is told may still be the distance of the leg before it
+POINT_SHUT = "the loiter's point cannot be sailed to from here"
 CODE = "position doubted"
 
 
@@ -217,10 +215,12 @@ def stands_off(ctx: StepContext) -> bool:
         return False
     if not status.ekf_ok or status.system_status == CRITICAL:
         return False   # nor would it loiter then
-    if state.position.anew is not None:
+    if state.position.anew is None and _is_point_shut(ctx):
+        ctx.set(position=changed(ctx.state.position, anew=Mode.HOLD))
+    if ctx.state.position.anew is not None:
         _begin_anew(ctx)
         if ctx.state.position.anew is not None:
-            ctx.phase(Phase.HOLDING, "the position jumped, and the loiter's point with it: waiting to loiter anew")
+            ctx.phase(Phase.HOLDING, f"{POINT_SHUT}: waiting to loiter anew")
             return True
     if state.position.doubt is None:
         return False
@@ -245,8 +245,22 @@ def stands_off(ctx: StepContext) -> bool:
     return True
 
 
+def _is_point_shut(ctx: StepContext) -> bool:
+    """Return whether a LOITER of ours, sailed back to the point that the autopilot tells, would lead over something."""
+    status, boat = ctx.autopilot, ctx.boat_en
+    if status is None or boat is None or ctx.state.position.doubt is not None or (
+            status.mode is not Mode.LOITER or ctx.state.steering.own_mode is not Mode.LOITER):
+        return False
+    far_m, course = status.waypoint_distance_m, status.target_bearing_rad
+    name, accepted_s = ctx.state.pending.accepted or ("", -math.inf)
+    is_of_the_leg = name == Mode.LOITER.name and ctx.t_s < accepted_s + POINT_S
+    if far_m is None or course is None or is_of_the_leg or far_m < AWAY_M:
+        return False
+    return ctx.voyage.area.path_clearance_m([boat, moved(boat, course, far_m)]) < ctx.voyage.boat.hull.reach_m
+
+
 def _begin_anew(ctx: StepContext) -> None:
-    """Begin a LOITER anew whose point has jumped with the position: HOLD, then LOITER, then it is over.
+    """Begin a LOITER anew whose point is not to be made for: HOLD, then LOITER, then it is over.
 
     A position that is believed is planned from meanwhile: with a plan on its way HOLD is left for that.
     """
@@ -255,38 +269,10 @@ def _begin_anew(ctx: StepContext) -> None:
     if shown not in {Mode.LOITER, Mode.HOLD} or state.steering.own_mode not in {Mode.LOITER, Mode.HOLD}:
         ctx.set(position=changed(ctx.state.position, anew=None))
     elif state.position.anew is Mode.HOLD and shown is Mode.LOITER:
-        set_mode(ctx, Mode.HOLD, "the position jumped, and the loiter's point with it: loitering anew")
+        set_mode(ctx, Mode.HOLD, f"{POINT_SHUT}: loitering anew")
     elif shown is Mode.LOITER or (
         state.position.doubt is None and (state.pending.plan is not None or state.pending.upload is not None)
     ):
         ctx.set(position=changed(ctx.state.position, anew=None))
     elif set_mode(ctx, Mode.LOITER, "loitering anew where she is"):
         ctx.set(position=changed(ctx.state.position, anew=Mode.LOITER))
-
-
-def holds(ctx: StepContext) -> bool:
-    """Loiter while wind and water are not to be planned with; True while LOITER is ours, or asked for."""
-    status, state, why = ctx.autopilot, ctx.state, ctx.snapshot.unsure
-    memory = state.adrift
-    if not why and memory.loiter_en_m is not None and not memory.loitered:
-        ctx.set(adrift=replace(memory, loiter_en_m=None))
-    if not why or status is None:
-        return False
-    if state.pending.plan is not None:
-        ctx.act(CancelPlan(request_id=state.pending.plan.request_id))
-        ctx.set(pending=changed(ctx.state.pending, plan=None))
-    ctx.set(plans=changed(ctx.state.plans, rung=0, ladder_reason=None))
-    ctx.say(Severity.ERROR, "held", f"{why}: no plan is made until it is known again", every_s=SAID_S)
-    if state.by_field.resort.engaged or not ctx.snapshot.permissions.may_set_mode or not status.ekf_ok:
-        return False
-    if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
-        if memory.loiter_en_m is None:   # by a wrong wind she may be carried off it, which is a drift
-            ctx.set(adrift=replace(memory, loiter_en_m=ctx.boat_en))
-        ctx.phase(Phase.HOLDING, f"{why}: waiting in a loiter until the wind is known")
-        return True
-    if state.steering.until_s is not None:      # out of irons, it was believed
-        ctx.set(steering=changed(ctx.state.steering, until_s=None, heading_rad=None))
-    if not is_busy(ctx, Mode.LOITER.name) and set_mode(ctx, Mode.LOITER, why):
-        ctx.set(operator=changed(ctx.state.operator, is_back=True))
-    ctx.phase(Phase.HOLDING, f"{why}: waiting for the autopilot to take LOITER")
-    return True

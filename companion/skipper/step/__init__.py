@@ -38,6 +38,7 @@ from companion.skipper.step.snapshot import (
     UploadOutcome,
     UploadResult,
     WaypointReached,
+    WindBefore,
     WindHealth,
     WindView,
 )
@@ -50,5 +51,5 @@ __all__ = [
     "PlanOutcome", "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd",
     "SetCurrent", "SetMode", "SkipperConfig", "SkipperState", "Snapshot", "Standing",
     "SteerHeading", "StopOrders", "Tack", "UploadFence", "UploadMission", "UploadOutcome", "UploadResult",
-    "WaypointReached", "WindHealth", "WindView", "ends_safely", "is_given_up",
+    "WaypointReached", "WindBefore", "WindHealth", "WindView", "ends_safely", "is_given_up",
 ]

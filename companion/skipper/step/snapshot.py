@@ -161,6 +161,19 @@ Outcome = PlanOutcome | UploadOutcome | ReadOutcome | CommandOutcome
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WindBefore:
+    """The wind as it was before it came to be doubted.
+
+    ``twd_from_rad`` [rad] and ``tws_mps`` are its mean, ``turned_rad`` by how much what is told of it has turned since
+    [rad, positive clockwise].
+    """
+
+    twd_from_rad: float
+    tws_mps: float
+    turned_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
     """All that is known at ``t_s``. Ages are seconds since the part was heard; None: never."""
 
@@ -175,6 +188,7 @@ class Snapshot:
     current: WaterCurrent = STILL_WATER
     doubt: WindAngleUncertainty | None = None
     unsure: str = ""                       # why no plan may be made for wind and water now, in words; empty: it may
+    wind_before: WindBefore | None = None  # while the wind is doubted: what it was; None: not known, or believed
     mission: MissionOnBoard = MissionOnBoard()
     identity: Identity = field(default_factory=Identity)   # as far as the autopilot has told it
     neighbours: tuple[str, ...] = ()       # other autopilots on a link on which ours was not named, in words

@@ -7,7 +7,7 @@ from dataclasses import replace
 from companion.frozen import changed
 from companion.messages import Mode, Severity
 from companion.safety import BY_NAME, TABLE, Response, Watchdog
-from companion.skipper.behaviors.drifting import STEERAGE_MPS
+from companion.skipper.behaviors.drifting import STEERAGE_MPS, is_driven_astern
 from companion.skipper.planning.ends import words
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Raised
@@ -61,8 +61,8 @@ def watch(ctx: StepContext) -> None:
 def _patience_s(ctx: StepContext, dog: Watchdog) -> float:
     """Return how long the entry condition must hold [s]."""
     wind = ctx.wind_now
-    is_calm = wind is not None and wind[1] < STEERAGE_MPS
-    return dog.calm_enter_s if is_calm and dog.calm_enter_s is not None else dog.enter_s
+    is_sure = is_driven_astern(ctx) or (wind is not None and wind[1] < STEERAGE_MPS)
+    return dog.unsailed_enter_s if is_sure and dog.unsailed_enter_s is not None else dog.enter_s
 
 
 def _done_about(ctx: StepContext, dog: Watchdog) -> str:

@@ -1,0 +1,229 @@
+"""What is done while the wind is doubted: a vane that was turned, an offset that somebody set, a motion against it.
+
+Nothing is planned: a plan for a wind that is not there leads anywhere, and each step of the ladder gives up some of
+what keeps the boat clear. It waits in LOITER. But the autopilot sails LOITER by the wind that it is told, too: with the
+told no-go zone elsewhere it points the bow at the loiter's point, straight into the true wind, and is driven astern,
+away from the point, as long as that lasts. So a LOITER by a wrong wind is a drift dead to leeward of the true wind, and
+it is foreseen. The true wind is the one before the doubt; where nobody remembers that, a boat that goes astern in
+LOITER shows it: the wind comes from where the bow points.
+
+Where that drift meets something within ``HORIZON_S``, the boat first seeks sea room: one straight clear leg, in AUTO,
+to a place with nothing to leeward, on a course that is sailed in both winds. It waits in the loiter that ends that leg.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from companion.frozen import changed
+from companion.geo.angles import difference_rad, wrap_pi
+from companion.messages import Command, Mode, Severity, waypoint
+from companion.skipper.behaviors.drifting import goes_astern
+from companion.skipper.behaviors.helm import hand_back, is_busy, set_mode
+from companion.skipper.planning.uploads import upload
+from companion.skipper.step.actions import CancelPlan
+from companion.skipper.step.context import StepContext
+from companion.skipper.step.snapshot import WindBefore
+from companion.skipper.step.state import Phase
+from companion.skipper.way.drift import HORIZON_S, drift_ahead
+from companion.skipper.way.geometry import distance_m, moved
+from companion.skipper.way.voyage import Area, PointEn, water_at
+
+SAID_S = 60.0                       # between two words on a wind that is not known
+SEA_ROOM = "sea room"               # the rung of a route that leads there, and the code under which it is said
+ASTERN_SHARE = 0.2                  # of the wind's speed: how fast a LOITER by a wrong wind is driven astern
+SPREAD_RAD = math.radians(15.0)     # of the true wind while it is not measured
+PAD_RAD = math.radians(10.0)        # outside the true no-go zone, for the same reason
+EASED_RAD = math.radians(10.0)      # a sheet that is eased farther than this for the true wind does not draw
+ROOMY_S = 60.0                      # of drift gained: for less the boat is not sent elsewhere
+RINGS_M = (40.0, 60.0, 80.0, 120.0, 160.0, 240.0)
+DIRECTIONS = 36
+AHEAD_S = 3.0                       # what the boat sails on until it turns on to a leg that is being uploaded
+WAY_MPS = 0.3                       # made good towards it: slower the leg is not sailed
+TURNS_S = 20.0                      # from lying head to wind until it is
+STRAYS_M = 15.0                     # from the loiter's point: LOITER turns in circles of 12 m
+LEAST_M = 1.0                       # beside the hull: what the rest of a leg that she was set off must keep
+HAIR_M = 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DoubtedWind:
+    """The winds of a boat whose wind is doubted, and where a LOITER would be driven by them.
+
+    Attributes:
+        true_from_rad: where the wind comes from, as far as that is known.
+        told_from_rad: where it comes from as the autopilot is told: sheet and no-go zone go by that.
+        drift_en_mps: the drift of a LOITER over ground [m/s, east north].
+    """
+
+    true_from_rad: float
+    told_from_rad: float
+    drift_en_mps: tuple[float, float]
+
+    def sails(self, course_rad: float, no_go_half_rad: float) -> bool:
+        """Return whether a course is sailed: outside both no-go zones, and by a sheet that draws in the true wind."""
+        true = abs(difference_rad(self.true_from_rad, course_rad))
+        told = abs(difference_rad(self.told_from_rad, course_rad))
+        return true >= no_go_half_rad + PAD_RAD and told >= no_go_half_rad and told <= true + EASED_RAD
+
+
+def doubted_wind(ctx: StepContext) -> DoubtedWind | None:
+    """Return the winds of now, None where the true one is not known, or LOITER can be sailed by the told one."""
+    told, vehicle = ctx.wind_now, ctx.snapshot.vehicle
+    if told is not None and vehicle is not None and goes_astern(ctx):
+        return DoubtedWind(
+            true_from_rad=vehicle.heading_rad, told_from_rad=told[0], drift_en_mps=vehicle.velocity_en_mps)
+    before, route = ctx.snapshot.wind_before, ctx.state.mission.route
+    if before is None and told is not None and route is not None and route.plan_tws_mps > 0.0:
+        # Not remembered over a restart: the wind that the way on board was planned in is.
+        before = WindBefore(twd_from_rad=route.plan_twd_from_rad, tws_mps=route.plan_tws_mps,
+                            turned_rad=difference_rad(told[0], route.plan_twd_from_rad))
+    if before is None or abs(before.turned_rad) < ctx.no_go_half_rad:
+        return None   # within that the told no-go zone keeps the bow off the true wind
+    leeward, speed = before.twd_from_rad + math.pi, ASTERN_SHARE * before.tws_mps
+    return DoubtedWind(
+        true_from_rad=before.twd_from_rad, told_from_rad=wrap_pi(before.twd_from_rad + before.turned_rad),
+        drift_en_mps=(speed * math.sin(leeward), speed * math.cos(leeward)))
+
+
+# ------------------------------------------------------------------------------------------ sea room
+def seeks_sea_room(ctx: StepContext) -> bool:
+    """Sail to water with nothing to leeward, where a LOITER by this wind drifts onto something; True while it does."""
+    status, state, may = ctx.autopilot, ctx.state, ctx.snapshot.permissions
+    boat, vehicle, route = ctx.boat_en, ctx.snapshot.vehicle, ctx.state.mission.route
+    if not ctx.snapshot.unsure or status is None or boat is None or vehicle is None or route is None:
+        return False
+    if not (may.may_set_mode and may.may_upload and status.ekf_ok and state.voyage.sailing) or (
+            state.by_field.resort.engaged or state.mission.foreign):
+        return False
+    wind = doubted_wind(ctx)
+    water = water_at(ctx.voyage.area, boat)
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m,
+                  max(0.0, float(water.clearance_m([boat])[0]) - HAIR_M))
+    if state.pending.upload is not None:
+        leads_there = state.pending.upload.route.rung == SEA_ROOM
+        if leads_there:
+            ctx.phase(Phase.HOLDING, state.pending.upload.route.why)
+        return leads_there
+    left_s = HORIZON_S if wind is None else _left_s(water, boat, wind, floor_m)
+    if route.rung == SEA_ROOM and (left_s >= HORIZON_S or _is_on_the_way(ctx, water, boat, route.points_en_m[-1])):
+        if state.steering.own_mode is not None:
+            hand_back(ctx)
+        ctx.phase(Phase.HOLDING, route.why)
+        return True
+    if wind is None or left_s >= HORIZON_S or ctx.t_s < state.pending.upload_retry.not_before_s:
+        return False
+    runs_s = 0.0 if goes_astern(ctx) else AHEAD_S   # a sheet that draws stops her at once
+    ahead = (boat[0] + runs_s * vehicle.velocity_en_mps[0], boat[1] + runs_s * vehicle.velocity_en_mps[1])
+    found = _sea_room(
+        water, boat, ahead, wind, no_go_half_rad=ctx.no_go_half_rad, clear_m=(ctx.config.margin_m, floor_m))
+    if found is None or found[1] < left_s + ROOMY_S:
+        return False
+    _stop_planning(ctx)
+    place, gained_s = found
+    keep = min(state.mission.index, len(route.items) - 1)
+    onto = water.nearest_name(boat) or "something"
+    text = (f"{ctx.snapshot.unsure}: a loiter here would drift onto {onto} in {left_s:.0f} s; waiting until there is "
+            f"{'sea room' if gained_s >= HORIZON_S else f'room for {gained_s:.0f} s'}")
+    away = replace(
+        route, items=(*route.items[:keep], waypoint(
+            ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)),
+        points_en_m=(*route.points_en_m[:keep], place), leg_from_en_m=(*route.leg_from_en_m[:keep], boat),
+        gate_of=(*route.gate_of[:keep], -1), rung=SEA_ROOM, risk=None, cost_s=None, median_s=None, late_s=None,
+        bound_for="", why=text)
+    upload(ctx, away, keep + 1, text)
+    ctx.say(Severity.WARNING, SEA_ROOM, text, every_s=0.0)
+    ctx.phase(Phase.HOLDING, text)
+    return True
+
+
+def _is_on_the_way(ctx: StepContext, water: Area, boat: PointEn, place: PointEn) -> bool:
+    """Return whether the leg to sea room is clear, and sailed, just begun, or ends in a loiter that is not driven off.
+
+    Not whether the winds of now allow it: what a turned vane tells of the true wind changes with the boat's own speed.
+    """
+    left_m, vehicle = distance_m(boat, place), ctx.snapshot.vehicle
+    if vehicle is None or water.path_clearance_m([boat, place]) < ctx.voyage.boat.hull.reach_m + LEAST_M:
+        return False
+    if left_m < STRAYS_M:
+        return not goes_astern(ctx)
+    east, north = vehicle.velocity_en_mps
+    made_good_mps = (east * (place[0] - boat[0]) + north * (place[1] - boat[1])) / left_m
+    return made_good_mps >= WAY_MPS or ctx.t_s - ctx.state.mission.uploaded_s < TURNS_S
+
+
+def _left_s(water: Area, place: PointEn, wind: DoubtedWind, floor_m: float) -> float:
+    """Return for how long a LOITER that begins at a place keeps the floor [s], at most ``HORIZON_S``."""
+    east, north = wind.drift_en_mps
+    least_s = HORIZON_S
+    for off in (-SPREAD_RAD, 0.0, SPREAD_RAD):
+        velocity = (east * math.cos(off) + north * math.sin(off), north * math.cos(off) - east * math.sin(off))
+        found = drift_ahead(water, place, velocity, floor_m=floor_m)
+        least_s = min(least_s, HORIZON_S if found.floor_s is None else found.floor_s)
+    return least_s
+
+
+def _sea_room(
+    water: Area, boat: PointEn, ahead: PointEn, wind: DoubtedWind, *, no_go_half_rad: float, clear_m: Sequence[float],
+) -> tuple[PointEn, float] | None:
+    """Return the nearest place from which a LOITER drifts clear, else the one from which it does so longest [s].
+
+    It is reached straight from the boat, and from where it will have come to when it turns, ``clear_m`` of everything:
+    the first of these with which a clear place is found, else any. None where no such leg is clear.
+    """
+    best: tuple[PointEn, float] | None = None
+    for least_m in clear_m:
+        for place in _places(boat, wind, no_go_half_rad):
+            if water.path_clearance_m([boat, ahead, place]) < least_m:
+                continue
+            left_s = _left_s(water, place, wind, least_m)
+            if best is None or left_s > best[1]:
+                best = place, left_s
+            if left_s >= HORIZON_S:
+                return best
+    return best
+
+
+def _places(boat: PointEn, wind: DoubtedWind, no_go_half_rad: float) -> Iterator[PointEn]:
+    """Yield the places that a straight leg leads to, near ones first."""
+    courses = [2.0 * math.pi * n / DIRECTIONS for n in range(DIRECTIONS)]
+    for ring_m, course in itertools.product(RINGS_M, courses):
+        if wind.sails(course, no_go_half_rad):
+            yield moved(boat, course, ring_m)
+
+
+# --------------------------------------------------------------------------------------------- held
+def holds(ctx: StepContext) -> bool:
+    """Loiter while wind and water are not to be planned with; True while LOITER is ours, or asked for."""
+    status, state, why = ctx.autopilot, ctx.state, ctx.snapshot.unsure
+    memory = state.adrift
+    if not why and memory.loiter_en_m is not None and not memory.loitered:
+        ctx.set(adrift=replace(memory, loiter_en_m=None))
+    if not why or status is None:
+        return False
+    _stop_planning(ctx)
+    ctx.say(Severity.ERROR, "held", f"{why}: no plan is made until it is known again", every_s=SAID_S)
+    if state.by_field.resort.engaged or not ctx.snapshot.permissions.may_set_mode or not status.ekf_ok:
+        return False
+    if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
+        if memory.loiter_en_m is None:   # by a wrong wind she may be carried off it, which is a drift
+            ctx.set(adrift=replace(memory, loiter_en_m=ctx.boat_en))
+        ctx.phase(Phase.HOLDING, f"{why}: waiting in a loiter until the wind is known")
+        return True
+    if state.steering.until_s is not None:      # out of irons, it was believed
+        ctx.set(steering=changed(ctx.state.steering, until_s=None, heading_rad=None))
+    if not is_busy(ctx, Mode.LOITER.name) and set_mode(ctx, Mode.LOITER, why):
+        ctx.set(operator=changed(ctx.state.operator, is_back=True))
+    ctx.phase(Phase.HOLDING, f"{why}: waiting for the autopilot to take LOITER")
+    return True
+
+
+def _stop_planning(ctx: StepContext) -> None:
+    """Call off a plan that is being made, and come down from the ladder."""
+    if ctx.state.pending.plan is not None:
+        ctx.act(CancelPlan(request_id=ctx.state.pending.plan.request_id))
+        ctx.set(pending=changed(ctx.state.pending, plan=None))
+    ctx.set(plans=changed(ctx.state.plans, rung=0, ladder_reason=None))

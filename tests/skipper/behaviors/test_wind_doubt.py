@@ -1,0 +1,191 @@
+"""A wind that is not to be planned with: the boat waits in a loiter with sea room, and nothing is planned."""
+
+import math
+
+import pytest
+from shapely.geometry import box
+
+from companion.geo.angles import difference_rad
+from companion.messages import Command, Mode
+from companion.skipper.behaviors.wind_doubt import SEA_ROOM, DoubtedWind
+from companion.skipper.step import ParameterChanged, Permissions, WindBefore
+from companion.skipper.step import actions as act
+from companion.skipper.step.state import Phase
+from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.voyage import Goal
+from tests.skipper.test_voyage import is_done, make, said
+from tests.skipper.world import area, restarted
+
+WHY = "the wind's direction leapt by +90° and she makes 0.7 m/s astern where 2.2 m/s were to be expected"
+SAILS = {Phase.STANDARD, Phase.DESTINATION_APPROACH}
+
+
+def under_way(**made):
+    world = make(**made)
+    assert world.run(120, lambda w: w.state.phase in SAILS and w.t > 40.0)
+    return world
+
+
+def asked_since(world, t_s, kind):
+    return [a for at_s, a in world.actions if at_s >= t_s and isinstance(a, kind)]
+
+
+def test_she_loiters_while_it_lasts_and_sails_on_by_a_plan_from_where_she_is():
+    world = under_way()
+    world.extra["unsure"], begins = WHY, world.t
+    assert world.run(5, lambda w: w.mode is Mode.LOITER)
+    world.run(120)
+    assert world.mode is Mode.LOITER
+    assert world.state.phase is Phase.HOLDING
+    assert WHY in world.state.why
+    assert not asked_since(world, begins, act.RequestPlan), "neither a plan nor a step of the ladder"
+    assert said(world, "wind contradicted")
+    assert 2 <= len(said(world, "held")) <= 3, "once a minute"
+    world.extra["unsure"], ends = "", world.t
+    assert world.run(60, lambda w: w.mode is Mode.AUTO)
+    assert asked_since(world, ends, act.RequestPlan)[0].from_seq is None
+    assert world.run(1500, is_done)
+
+
+def test_a_plan_that_is_being_made_is_called_off_and_no_rung_follows_it():
+    world = under_way(plan_s=5.0)
+    assert world.run(300, lambda w: w.state.pending.plan is not None)
+    number = world.state.pending.plan.request_id
+    world.extra["unsure"], begins = WHY, world.t
+    world.run(20)
+    assert [a.request_id for a in asked_since(world, begins, act.CancelPlan)] == [number]
+    assert world.state.pending.plan is None
+    assert not asked_since(world, begins, act.RequestPlan)
+
+
+def test_without_the_permission_to_set_modes_it_is_said_and_nothing_is_planned():
+    world = under_way()
+    world.permissions = Permissions(may_upload=True)
+    world.extra["unsure"], begins = WHY, world.t
+    world.run(60)
+    assert world.mode is Mode.AUTO
+    assert not asked_since(world, begins, act.SetMode)
+    assert not asked_since(world, begins, act.RequestPlan)
+    assert said(world, "held")
+
+
+def test_a_wind_that_is_contradicted_stems_no_drift_and_the_anchor_is_called_for():
+    """What she could sail against the drift is reckoned from the wind that is not believed."""
+    world = under_way()
+    world.extra["unsure"] = WHY
+    world.drift_mps, world.current = 0.0, lambda t: (0.0, 0.8)
+    assert world.run(400, lambda w: bool(said(w, "anchor")))
+    assert not any(text.endswith(": loiter") for _, _, text in said(world, "drift"))
+
+
+@pytest.mark.parametrize("name", ["WNDVN_DIR_OFS", "SERVO1_REVERSED"])
+def test_a_parameter_that_somebody_set_is_said(name):
+    world = under_way()
+    world.events.append(ParameterChanged(name=name, text=f"{name} was set from 0 to 1"))
+    world.run(2)
+    assert said(world, "parameter")[0][2] == f"{name} was set from 0 to 1"
+
+
+# ------------------------------------------------------------------------------------------ sea room
+ROCK = box(30.0, -60.0, 90.0, -40.0)      # to leeward of a boat that reaches east in a wind from the north
+TURNED = WindBefore(twd_from_rad=0.0, tws_mps=5.0, turned_rad=math.radians(90.0))
+
+
+def north_of_the_rock(obstacles=(ROCK,)):
+    world = make(Goal(en_m=(400.0, 0.0)), obstacles=obstacles, wind=lambda t: (0.0, 5.0))
+    assert world.run(120, lambda w: w.position[0] > 50.0)
+    assert world.mode is Mode.AUTO
+    return world
+
+
+def doubted(world, before=TURNED):
+    world.extra |= {"unsure": WHY, "wind_before": before}
+    return world.t
+
+
+def test_a_loiter_that_would_be_driven_onto_a_rock_waits_for_sea_room():
+    world = north_of_the_rock()
+    begins = doubted(world)
+    assert world.run(10, lambda w: w.state.mission.route.rung == SEA_ROOM)
+    [item] = world.mission[-1:]
+    place = world.state.mission.route.points_en_m[-1]
+    assert item.command == Command.NAV_LOITER_UNLIM
+    assert area(ROCK).path_clearance_m([place, (place[0], place[1] - 300.0)]) > world.skipper.config.margin_floor_m
+    assert not asked_since(world, begins, act.RequestPlan)
+    world.run(100)
+    assert distance_m(world.position, place) < 20.0
+    assert world.mode is Mode.AUTO, "in the loiter that ends the leg"
+    assert world.clearance() > world.skipper.config.margin_floor_m
+    assert len(said(world, SEA_ROOM)) == 1
+    world.extra = {}
+    assert world.run(600, is_done), "sailed on when the wind is known"
+
+
+@pytest.mark.parametrize(("obstacles", "turned_deg"), [((), 90.0), ((ROCK,), 30.0)])
+def test_with_nothing_to_leeward_or_a_wind_that_has_hardly_turned_it_loiters_at_once(obstacles, turned_deg):
+    world = north_of_the_rock(obstacles)
+    doubted(world, WindBefore(twd_from_rad=0.0, tws_mps=5.0, turned_rad=math.radians(turned_deg)))
+    assert world.run(5, lambda w: w.mode is Mode.LOITER)
+    world.run(30)
+    assert not said(world, SEA_ROOM)
+
+
+def test_where_no_course_leads_to_sea_room_it_loiters():
+    world = north_of_the_rock((box(-300.0, -60.0, 500.0, -40.0),))
+    doubted(world)
+    assert world.run(5, lambda w: w.mode is Mode.LOITER)
+    assert not said(world, SEA_ROOM)
+
+
+def test_going_astern_in_a_loiter_shows_the_true_wind_that_nobody_remembers():
+    world = north_of_the_rock()
+    doubted(world, None)
+    assert world.run(5, lambda w: w.mode is Mode.LOITER)
+    world.run(5)
+    assert not said(world, SEA_ROOM)
+    world.wind, world.heading, world.current = lambda t: (math.pi / 2.0, 5.0), 0.0, lambda t: (0.0, -0.8)
+    assert world.run(15, lambda w: bool(said(w, SEA_ROOM)))
+
+
+def test_after_a_restart_the_wind_of_the_plan_on_board_is_the_true_one():
+    world = north_of_the_rock()
+    restarted(world)
+    doubted(world, None)
+    world.wind = lambda t: (math.pi / 2.0, 5.0)
+    assert world.run(30, lambda w: bool(said(w, SEA_ROOM)))
+
+
+def test_a_sternway_that_meets_something_is_a_drift_at_once():
+    """Not when it has carried the boat 25 m from the loiter's point: by then there is no time for the anchor."""
+    world = north_of_the_rock()
+    world.permissions = Permissions(may_set_mode=True)   # what stops it is left: sea room takes an upload
+    doubted(world)
+    assert world.run(5, lambda w: w.mode is Mode.LOITER)
+    world.heading, world.speed, world.current = 0.0, 0.0, lambda t: (0.0, -0.8)
+    assert world.run(20, lambda w: bool(said(w, "anchor")))
+    assert world.position[1] > -10.0
+
+
+def test_every_turn_of_the_vane_leaves_courses_that_are_sailed_in_both_winds():
+    half_rad = math.radians(45.0)
+    for turned_deg in range(46, 315, 3):
+        wind = DoubtedWind(true_from_rad=0.0, told_from_rad=math.radians(turned_deg), drift_en_mps=(0.0, -1.0))
+        courses = [math.radians(c) for c in range(0, 360, 5) if wind.sails(math.radians(c), half_rad)]
+        assert len(courses) >= 10, turned_deg
+        assert all(abs(difference_rad(c, 0.0)) > half_rad for c in courses), "none in the true no-go zone"
+
+
+# ---------------------------------------------------------------------------------- the loiter's point
+@pytest.mark.parametrize(("obstacles", "anew"), [((ROCK,), True), ((), False)])
+def test_a_loiter_whose_point_lies_beyond_something_is_begun_anew(obstacles, anew):
+    world = north_of_the_rock(obstacles)
+    doubted(world, None)
+    assert world.run(5, lambda w: w.mode is Mode.LOITER)
+    world.run(10)
+    begins, world.shown = world.t, {"waypoint_distance_m": 90.0, "target_bearing_rad": math.pi}
+    world.run(6)
+    world.shown = {"waypoint_distance_m": 1.0, "target_bearing_rad": math.pi}
+    modes = [a.mode for a in asked_since(world, begins, act.SetMode)]
+    assert modes == ([Mode.HOLD, Mode.LOITER] if anew else [])
+    world.run(10)
+    assert world.mode is Mode.LOITER
