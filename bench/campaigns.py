@@ -21,10 +21,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl.campaigns.campaign import Job, key_of, sail_one
+from sitl.campaigns.campaign import campaign, sail
 from sitl.options import CampaignOptions
 from sitl.run.compiled import compile_ahead
-from sitl.runner import run_jobs
+from sitl.runner import Experiment, Job
 
 DEMO = Path(__file__).parents[1] / "sitl" / "scenarios" / "demo.toml"
 MACHINES, CORES, VOYAGES = 100, 2, 10_000
@@ -39,13 +39,17 @@ class Spent:
     cpu_s: float
 
 
-def nothing(seed):
-    return {"seed": seed, "passed": True}
+def nothing(job):
+    return {"seed": job.seed, "passed": True}
 
 
 def share(seeds):
-    for seed in seeds:
-        sail_one(Job(scenario=DEMO, seed=seed, keep=None))
+    for job in voyages_of(seeds).jobs:
+        sail(job)
+
+
+def voyages_of(seeds):
+    return campaign([DEMO], runs=len(seeds), first_seed=seeds.start)
 
 
 def cpu_s():
@@ -69,11 +73,12 @@ def bare(seeds, workers):
 
 
 def voyages(seeds, means):
-    return run_jobs("campaign", sail_one, [Job(scenario=DEMO, seed=n, keep=None) for n in seeds], means, key=key_of)
+    return campaign([DEMO], runs=len(seeds)).results(means)
 
 
 def empty(count, means):
-    return run_jobs("empty", nothing, range(count), means, key=lambda seed: {"seed": seed})
+    jobs = [Job(seed=seed, case=None) for seed in range(count)]
+    return Experiment(name="empty", jobs=jobs, sail=nothing, key=lambda job: {"seed": job.seed}).results(means)
 
 
 def tell(name, row):

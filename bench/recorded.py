@@ -23,10 +23,9 @@ import numpy as np
 
 from companion.geo.angles import mean_direction_rad
 from companion.wind.study.records import parse_csv
-from sitl.campaigns.baselines import NAMES, jobs_of, key_of, sail_one
+from sitl.campaigns.baselines import NAMES, baselines, jobs_of
 from sitl.options import CampaignOptions
 from sitl.run.compiled import compile_ahead
-from sitl.runner import run_jobs
 
 BEAT = Path(__file__).parents[1] / "sitl" / "scenarios" / "figures" / "beat-500.toml"
 WHO, AGAINST = "shifts", "alone-embedded"
@@ -87,8 +86,8 @@ def main(argv=None):
                 record = parse_csv(lines, path.name)
             for number, part in enumerate(windows(record)):
                 record_of[scenario(part, number, Path(temporary))] = path.stem
-        jobs = jobs_of([WHO, AGAINST], list(record_of), 1, 1.0, None)
-        sailed = run_jobs("baselines", sail_one, jobs, CampaignOptions(workers=args.workers, out=args.out), key=key_of)
+        voyages = baselines(jobs_of([WHO, AGAINST], list(record_of), 1, 1.0, None), results=args.out)
+        sailed = voyages.results(CampaignOptions(workers=args.workers, out=args.out))
     tell(sailed.records, {path.stem: stem for path, stem in record_of.items()})
     return sailed.exit_code(is_good=True)
 

@@ -6,9 +6,7 @@ Asks what Wolsieffer 2020 leaves to future work: is a boat safer that plans with
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +14,8 @@ import numpy as np
 
 from companion.errors import InputError
 from companion.geofence import Mission
-from sitl.options import CampaignOptions
 from sitl.run.variation import Variation, foreknown, unspread
-from sitl.runner import Key, file_hash, run_jobs
+from sitl.runner import CampaignResults, Experiment, Job, Summary
 
 HERE = Path(__file__).parents[1] / "scenarios"
 SCENARIOS = (HERE / "two-channels.toml", HERE / "figures" / "two-channels-rough.toml", HERE / "narrow-channel.toml")
@@ -44,43 +41,23 @@ VARIATIONS: Mapping[str, Variation] = {
 BOOTSTRAPS = 2000
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One voyage."""
-
-    scenario: Path
-    variation: str
-    seed: int
-
-
-def sail_one(job: Job) -> dict[str, Any]:
-    """Sail a job; return its figures. What was not foreseen is in ``error``."""
+def sail(job: Job[str]) -> dict[str, Any]:
+    """Sail a job by the variation that its case names; return its figures. What was not foreseen is in ``error``."""
     from companion.clock import run_virtual
     from sitl.run.embedded import run_embedded
     from sitl.scenario import load_scenario
 
     scenario = load_scenario(job.scenario)
-    said = {"scenario": scenario.name, "variation": job.variation, "seed": job.seed}
-    with tempfile.TemporaryDirectory(prefix="ablation-") as scratch:
+    said = {"scenario": scenario.name, "variation": job.case, "seed": job.seed}
+    with job.folder() as folder:
         try:
             verdict = run_virtual(run_embedded(
-                scenario, job.scenario, job.seed, Path(scratch) / "voyage", variation=VARIATIONS[job.variation]))
+                scenario, job.scenario, job.seed, folder, variation=VARIATIONS[job.case]))
         except Exception as error:
             return {**said, "error": repr(error)}
     names = ("arrived", "contacts", "time_s", "tacks", "min_clearance_m", "no_go_entries", "replans", "promised_risk")
-    return {**said, "error": "", **{name: verdict.figures[name] for name in names}, "floor_m": _floor_m(job.scenario)}
-
-
-def key_of(job: Job) -> Key:
-    """Return what a voyage is known by."""
-    from sitl.scenario import load_scenario
-
-    return {"scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario),
-            "variation": job.variation, "seed": job.seed}
-
-
-def _floor_m(path: Path) -> float:
-    return _mission(path).margin_floor_m
+    return {**said, "error": "", **{name: verdict.figures[name] for name in names},
+            "floor_m": _mission(job.scenario).margin_floor_m}
 
 
 def _mission(path: Path) -> Mission:
@@ -90,30 +67,36 @@ def _mission(path: Path) -> Mission:
     return mission_of(load_scenario(path), path)
 
 
-def run_ablation(
-    scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int, means: CampaignOptions,
-) -> int:
-    """Sail what has no result yet, print the tables; return the exit code."""
-    from sitl.run.compiled import compile_ahead
+def ablation(
+    scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int,
+) -> Experiment[str]:
+    """Return the voyages of each scenario by the variations that are named and as it is; tables of each.
 
+    Raises:
+        InputError: there is no such variation, or no such scenario.
+    """
     unknown = next((name for name in names if name not in VARIATIONS), None)
     if unknown is not None:
         raise InputError("--only", unknown, "is no variation", "choose of: " + "; ".join(VARIATIONS))
     wanted = [AS_IT_IS, *(name for name in VARIATIONS if name in names and name != AS_IT_IS)]
     for path in scenarios:
         _mission(path)
-    for planner in ("auto", *(name for name in ("rrtstar", "astar") if name in wanted)):
-        compile_ahead(planner)
-    jobs = [Job(scenario=path, variation=name, seed=first_seed + n)
-            for n in range(runs) for path in scenarios for name in wanted]
-    sailed = run_jobs("ablate", sail_one, jobs, means, key=key_of, is_failed=lambda record: bool(record["error"]))
-    records = sailed.records
-    for scenario in dict.fromkeys(record["scenario"] for record in sorted(records, key=_order)):
-        print(f"{scenario}, {runs} seeds from {first_seed}")
-        print(table([record for record in records if record["scenario"] == scenario], wanted))
-    for record in (r for r in records if r["error"]):
-        print(f"ERROR {record['scenario']}, {record['variation']}, seed {record['seed']}: {record['error'][:300]}")
-    return sailed.exit_code(is_good=not any(r["error"] for r in records))
+
+    def sum_up(sailed: CampaignResults) -> Summary:
+        records = sailed.records
+        lines = []
+        for scenario in dict.fromkeys(record["scenario"] for record in sorted(records, key=_order)):
+            lines += [f"{scenario}, {runs} seeds from {first_seed}",
+                      table([record for record in records if record["scenario"] == scenario], wanted)]
+        errors = [f"ERROR {r['scenario']}, {r['variation']}, seed {r['seed']}: {r['error'][:300]}"
+                  for r in records if r["error"]]
+        return Summary(lines=lines + errors, is_good=not errors)
+
+    return Experiment(
+        name="ablate", sail=sail, key=lambda job: job.key(variation=job.case), sum_up=sum_up,
+        jobs=[Job(scenario=path, case=name, seed=first_seed + n)
+              for n in range(runs) for path in scenarios for name in wanted],
+        is_failed=lambda record: bool(record["error"]))
 
 
 def _order(record: Mapping[str, Any]) -> tuple[str, int, int]:

@@ -40,11 +40,10 @@ from sitl.ardurover import ArduRover, require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Truth as Now
 from sitl.campaigns.ablation import interval
-from sitl.options import CampaignOptions
 from sitl.run.embedded import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.run.live import run_live
 from sitl.run.variation import Variation
-from sitl.runner import Key, file_hash, read_results, run_jobs
+from sitl.runner import CampaignResults, Experiment, Job, Key, Summary, file_hash, read_results
 from sitl.scenario import (
     EventSpec,
     Scenario,
@@ -373,85 +372,80 @@ WindOf = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One voyage."""
+class Sailor:
+    """Who sails a voyage, at which pace of the real ArduRover, and from where; ``wind`` in place of the scenario's."""
 
     who: str
-    scenario: Path
-    seed: int
     speedup: float
     set_sail: tuple[float, float, float] | None = None
-    wind: WindOf | None = None      # in place of the scenario's
+    wind: WindOf | None = None
 
 
-def scenario_of(job: Job) -> Scenario:
+def scenario_of(job: Job[Sailor]) -> Scenario:
     """Return what a job sails: by this sailor's parameters; in another wind it has another name."""
     scenario = load_scenario(job.scenario)
-    if job.who in WITHOUT:
+    if job.case.who in WITHOUT:
         scenario = structs.replace(scenario, parameters={**scenario.parameters, **scenario.without_shifts})
-    if job.wind is None:
+    if job.case.wind is None:
         return scenario
-    spread_deg, tau_s = job.wind
+    spread_deg, tau_s = job.case.wind
     told = f"{spread_deg:g}°, {tau_s:g} s" if spread_deg > 0.0 else "steady"
     model: Literal["ou", "constant"] = "ou" if spread_deg > 0.0 else "constant"
     wind = structs.replace(scenario.wind, model=model, sd_deg=spread_deg, tau_s=tau_s)
     return structs.replace(scenario, name=f"{scenario.name}, {told}", wind=wind)
 
 
-def sail_one(job: Job) -> dict[str, Any]:
+def sail(job: Job[Sailor]) -> dict[str, Any]:
     """Sail a job; return what is told of it."""
     return voyage_of(job).record
 
 
-def voyage_of(job: Job) -> BaselineVoyage:
+def voyage_of(job: Job[Sailor]) -> BaselineVoyage:
     """Sail a job; JobError or LinkError where the harness fails, and then there is no result."""
-    what = scenario_of(job), job.scenario, job.seed
-    if job.who in SHIFTS:
-        return sail_companion(*what, shifts=SHIFTS[job.who], told=NAMES[job.who])
-    if job.who == "companion-ardurover":
-        return sail_companion_ardurover(*what, job.speedup)
-    if job.who == "fixed":
+    what, sailor = (scenario_of(job), job.scenario, job.seed), job.case
+    if sailor.who in SHIFTS:
+        return sail_companion(*what, shifts=SHIFTS[sailor.who], told=NAMES[sailor.who])
+    if sailor.who == "companion-ardurover":
+        return sail_companion_ardurover(*what, sailor.speedup)
+    if sailor.who == "fixed":
         return sail_fixed(*what)
-    if job.who == "alone-embedded":
+    if sailor.who == "alone-embedded":
         return sail_alone(*what)
-    return sail_ardurover(*what, job.who, job.speedup, job.set_sail)
+    return sail_ardurover(*what, sailor.who, sailor.speedup, sailor.set_sail)
 
 
-def key_of(job: Job) -> Key:
+def key_of(job: Job[Sailor]) -> Key:
     """Return what a voyage is known by: of those on the real ArduRover the pace and where they set sail, too."""
-    key: dict[str, str | int | float | None] = {
-        "who": job.who, "scenario": scenario_of(job).name, "hash": file_hash(job.scenario), "seed": job.seed}
-    if job.who in {"companion-ardurover", "alone", "dijkstra"}:
-        key["speedup"] = job.speedup
-    if job.set_sail is not None and job.who in {"alone", "dijkstra"}:
-        key["from"] = "{:.6f},{:.6f},{:.1f}".format(*job.set_sail)
+    sailor = job.case
+    key: Key = {"who": sailor.who, "scenario": scenario_of(job).name, "hash": file_hash(job.scenario),
+                "seed": job.seed}
+    if sailor.who in {"companion-ardurover", "alone", "dijkstra"}:
+        key = {**key, "speedup": sailor.speedup}
+    if sailor.set_sail is not None and sailor.who in {"alone", "dijkstra"}:
+        key = {**key, "from": "{:.6f},{:.6f},{:.1f}".format(*sailor.set_sail)}
     return key
 
 
-def run_baselines(
-    *, who: Sequence[str], scenarios: Sequence[Path], seeds: int, means: CampaignOptions, speedup: float,
-    winds: Sequence[WindOf] | None = None, against: str | None = None,
-) -> int:
-    """Sail everything that has no result yet, print the table of all that the file holds; return the exit code."""
+def baselines(jobs: Sequence[Job[Sailor]], *, results: Path | None, against: str | None = None) -> Experiment[Sailor]:
+    """Return the voyages, begun where the companion set sail in ``results``; a table of all that the file holds."""
     began: dict[tuple[str, int], tuple[float, float, float]] = {}
-    if means.file is not None and means.file.is_file() and means.file.stat().st_size:
+    if results is not None and results.is_file() and results.stat().st_size:
         began = {(key["scenario"], key["seed"]): tuple(result["start"])
-                 for key, result in read_results(means.file).pairs() if "start" in result}
-    jobs = [replace(job, set_sail=began.get((scenario_of(job).name, job.seed)))
-            for job in jobs_of(who, scenarios, seeds, speedup, winds)]
-    sailed = run_jobs("baselines", sail_one, jobs, means, key=key_of)
-    records = latest([result for _, result in sailed.held.pairs()])
-    print(table(records))
-    if against is not None:
-        print(pairs(records, NAMES[against]))
-    return sailed.exit_code(is_good=True)
+                 for key, result in read_results(results).pairs() if "start" in result}
+
+    def sum_up(sailed: CampaignResults) -> Summary:
+        records = latest([result for _, result in sailed.held.pairs()])
+        return Summary(lines=[table(records), *([] if against is None else [pairs(records, NAMES[against])])])
+
+    return Experiment(name="baselines", sail=sail, key=key_of, sum_up=sum_up, jobs=[
+        replace(job, case=replace(job.case, set_sail=began.get((scenario_of(job).name, job.seed)))) for job in jobs])
 
 
 def jobs_of(
     who: Sequence[str], scenarios: Sequence[Path], seeds: int, speedup: float, winds: Sequence[WindOf] | None,
-) -> list[Job]:
+) -> list[Job[Sailor]]:
     """Return the voyages of a campaign; ``winds`` None: those of the scenarios."""
-    return [Job(who=w, scenario=p, seed=s, speedup=speedup, wind=wind)
+    return [Job(scenario=p, seed=s, case=Sailor(who=w, speedup=speedup, wind=wind))
             for s in range(seeds) for w in who for p in scenarios for wind in winds or (None,)]
 
 

@@ -7,103 +7,87 @@ import json
 import math
 import shutil
 import statistics
-import tempfile
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from companion.words import file_name
-from sitl.options import CampaignOptions
 from sitl.run.variation import AS_IT_SAYS, Method, can_be_sailed
-from sitl.runner import Key, file_hash, run_jobs
+from sitl.runner import CampaignResults, Experiment, Job, Key, Summary
 
 FAILURES = Path("campaign-failures")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One run; ``method`` takes the place of the mission's guidance and planner."""
-
-    scenario: Path
-    seed: int
-    keep: Path | None
-    method: Method = AS_IT_SAYS
-
-
-def sail_one(job: Job) -> dict[str, Any]:
-    """Sail one seed; return its verdict as a record. Runs in a worker process."""
+def sail(job: Job[Method]) -> dict[str, Any]:
+    """Sail one seed by the case's guidance and planner; return its verdict as a record."""
     from companion.clock import run_virtual
     from sitl.run.embedded import mission_of, run_embedded
     from sitl.scenario import load_scenario
 
     scenario = load_scenario(job.scenario)
-    name = file_name(_name(scenario.name, job.method))
-    place = job.keep / f"{name}-{job.seed:04d}" if job.keep else None
-    with tempfile.TemporaryDirectory(prefix="voyage-") as scratch:
-        folder = place or Path(scratch) / "voyage"
-        if place is not None:
-            shutil.rmtree(place, ignore_errors=True)
+    told = _name(scenario.name, job.case)
+    name = f"{file_name(told)}-{job.seed:04d}"
+    place = job.keep / name if job.keep else None
+    if place is not None:
+        shutil.rmtree(place, ignore_errors=True)
+    with replace(job, keep=place).folder() as folder:
         try:
-            variation = job.method.variation(mission_of(scenario, job.scenario))
+            variation = job.case.variation(mission_of(scenario, job.scenario))
             verdict = run_virtual(
                 run_embedded(scenario, job.scenario, job.seed, folder, variation=variation)).to_dict()
         except Exception as error:
             verdict = {"scenario": scenario.name, "seed": job.seed, "passed": False, "checks": [
                 {"name": "no unhandled error", "passed": False, "figure": repr(error), "required": []}], "figures": {}}
         if not verdict["passed"] and place is None:
-            kept = FAILURES / f"{name}-{job.seed:04d}"
+            kept = FAILURES / name
             shutil.rmtree(kept, ignore_errors=True)
             if folder.is_dir():
                 with contextlib.suppress(OSError):   # a seed repeats: its result is worth more than its folder
                     kept.parent.mkdir(exist_ok=True)
                     shutil.copytree(folder, kept)
-    return {**verdict, "scenario": _name(scenario.name, job.method)}
+    return {**verdict, "scenario": told}
 
 
 def _name(scenario: str, method: Method) -> str:
     return f"{scenario}, {method.told}" if method.told else scenario
 
 
-def key_of(job: Job) -> Key:
+def key_of(job: Job[Method]) -> Key:
     """Return what a run is known by."""
-    from sitl.scenario import load_scenario
-
-    return {"scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario),
-            **({"method": job.method.told} if job.method.told else {}), "seed": job.seed}
+    return job.key(**({"method": job.case.told} if job.case.told else {}))
 
 
-def run_campaign(
-    scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, means: CampaignOptions, json_path: Path | None = None,
-    keep: Path | None = None, methods: Sequence[Method] = (AS_IT_SAYS,),
-) -> int:
-    """Run each scenario by each method that its mission allows, and print; return the exit code."""
-    from sitl.run.compiled import compile_ahead
+def campaign(
+    scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, keep: Path | None = None,
+    methods: Sequence[Method] = (AS_IT_SAYS,),
+) -> Experiment[Method]:
+    """Return the voyages of each scenario by each method that its mission allows; a table, and what failed."""
     from sitl.run.embedded import mission_of
     from sitl.scenario import load_scenario
 
     loaded = [load_scenario(path) for path in scenarios]
     missions = [mission_of(scenario, path) for scenario, path in zip(loaded, scenarios, strict=True)]
-    for planner in dict.fromkeys(method.planner or "auto" for method in methods):
-        compile_ahead(planner)
     ways = [(scenario.name, path, method) for scenario, path, mission in zip(loaded, scenarios, missions, strict=True)
             for method in methods if method.guidance is None or can_be_sailed(mission, method.guidance)]
-    names = [_name(name, method) for name, _, method in ways]
-    jobs = [Job(scenario=path, seed=first_seed + k, keep=keep, method=method)
-            for _, path, method in ways for k in range(runs)]
-    sailed = run_jobs("campaign", sail_one, jobs, means, key=key_of,
-                  on_record=lambda record: print(json.dumps(record, separators=(",", ":")), flush=True))
-    records = sailed.records
-    table = [figures(name, [r for r in records if r["scenario"] == name]) for name in names]
-    print_table(table)
-    rate = sum(t["sailed_s"] for t in table) / sailed.cpu_s if sailed.now == len(records) and sailed.cpu_s else None
-    print(sailed.took + (f"; {rate:.0f} times real time per core" if rate else ""))
-    for record in sorted((r for r in records if not r["passed"]), key=lambda r: (r["scenario"], r["seed"])):
-        bad = "; ".join(f"{c['name']}: {c['figure']}" for c in record["checks"] if not c["passed"])
-        print(f"FAILED {record['scenario']} seed {record['seed']}: {bad[:300]}")
-    if json_path is not None:
-        json_path.write_text(json.dumps({"table": table, "wall_s": sailed.wall_s}, indent=1) + "\n", encoding="utf-8")
-    return sailed.exit_code(is_good=all(r["passed"] for r in records))
+
+    def sum_up(sailed: CampaignResults) -> Summary:
+        records = sailed.records
+        table = [figures(name, [r for r in records if r["scenario"] == name])
+                 for name in (_name(name, method) for name, _, method in ways)]
+        rate = sum(t["sailed_s"] for t in table) / sailed.cpu_s if sailed.now == len(records) and sailed.cpu_s else None
+        lines = [*told(table), sailed.took + (f"; {rate:.0f} times real time per core" if rate else "")]
+        for record in sorted((r for r in records if not r["passed"]), key=lambda r: (r["scenario"], r["seed"])):
+            bad = "; ".join(f"{c['name']}: {c['figure']}" for c in record["checks"] if not c["passed"])
+            lines.append(f"FAILED {record['scenario']} seed {record['seed']}: {bad[:300]}")
+        return Summary(lines=lines, figures={"table": table, "wall_s": sailed.wall_s},
+                       is_good=all(r["passed"] for r in records))
+
+    return Experiment(
+        name="campaign", sail=sail, key=key_of, sum_up=sum_up,
+        line=lambda record: json.dumps(record, separators=(",", ":")),
+        jobs=[Job(scenario=path, seed=first_seed + k, keep=keep, case=method)
+              for _, path, method in ways for k in range(runs)])
 
 
 def figures(name: str, records: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -140,8 +124,8 @@ def _median(values: Iterable[float]) -> float | None:
     return statistics.median(values) if values else None
 
 
-def print_table(rows: Sequence[dict[str, Any]]) -> None:
-    """Print the rows under each other."""
+def told(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Return the rows under each other."""
     heads = {
         "scenario": "scenario", "runs": "runs", "passed": "passed", "arrived": "arrived", "touched": "touched",
         "time_median_s": "time s", "time_p90_s": "p90 s", "tacks_median": "tacks", "replans_median": "replans",
@@ -151,10 +135,8 @@ def print_table(rows: Sequence[dict[str, Any]]) -> None:
     }
     texts = [[_cell(row[key]) for key in heads] for row in rows]
     widths = [max(len(head), *(len(t[i]) for t in texts)) for i, head in enumerate(heads.values())]
-    print("  ".join(head.rjust(w) if i else head.ljust(w)
-                    for i, (head, w) in enumerate(zip(heads.values(), widths, strict=True))))
-    for cells in texts:
-        print("  ".join(c.rjust(w) if i else c.ljust(w) for i, (c, w) in enumerate(zip(cells, widths, strict=True))))
+    return ["  ".join(c.rjust(w) if i else c.ljust(w) for i, (c, w) in enumerate(zip(cells, widths, strict=True)))
+            for cells in (list(heads.values()), *texts)]
 
 
 def _cell(value: Any) -> str:

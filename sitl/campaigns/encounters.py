@@ -10,19 +10,15 @@ from the next tack. The other is placed where both would nearly touch.
 
 from __future__ import annotations
 
-import json
 import math
 import random
 import statistics
-import tempfile
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from sitl.options import CampaignOptions
-from sitl.runner import Key, file_hash, run_jobs
+from sitl.runner import CampaignResults, Experiment, Job, Summary, file_hash
 from sitl.scenario import (
     CLOSE_HAULED_DEG,
     Craft,
@@ -40,6 +36,7 @@ Kind = Literal["crossing", "head-on", "overtaking", "sailing"]
 Policy = Literal["rules", "keep clear"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 POLICIES: tuple[Policy, ...] = get_args(Policy)
+Encounter = tuple[Kind, Policy]
 
 AT_S = 75.0                  # under way for half a minute, on course
 OUR_MPS = 2.7
@@ -104,30 +101,20 @@ def _is(event: EventSpec, kind: Kind, twd_deg: float) -> bool:
 
 
 EXPANSIONS = 4_000
-_SOURCE = Path(__file__).parents[1] / "scenarios" / "crossing.toml"   # the drawn ones are as if they lay beside it
+SOURCE = Path(__file__).parents[1] / "scenarios" / "crossing.toml"   # the drawn ones are as if they lay beside it
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One voyage."""
-
-    kind: Kind
-    policy: Policy
-    seed: int
-    keep: Path | None = None
-
-
-def sail_encounter(job: Job) -> dict[str, Any]:
-    """Sail one encounter and return how it went; a voyage folder is left in ``job.keep``."""
+def sail(job: Job[Encounter]) -> dict[str, Any]:
+    """Sail one encounter and return how it went."""
     from companion.clock import run_virtual
     from sitl.run.embedded import run_embedded
 
-    scenario = draw(job.seed, job.kind, job.policy)
+    kind, policy = job.case
+    scenario = draw(job.seed, kind, policy)
     figures: dict[str, Any] = {}
-    with tempfile.TemporaryDirectory(prefix="encounter-") as scratch:
-        folder = job.keep if job.keep is not None else Path(scratch) / "voyage"
+    with job.folder() as folder:
         try:
-            verdict = run_virtual(run_embedded(scenario, _SOURCE, job.seed, folder, expansions=EXPANSIONS))
+            verdict = run_virtual(run_embedded(scenario, job.scenario, job.seed, folder, expansions=EXPANSIONS))
             figures = verdict.figures
             faults = [f"{c.name}: {c.figure}" for c in verdict.checks if not c.passed]
         except Exception as error:
@@ -138,11 +125,11 @@ def sail_encounter(job: Job) -> dict[str, Any]:
     else:
         if not met["kept_distance"]:
             faults.append(f"{met['nearest_m']:.0f} m between the hulls")
-        if job.policy == "rules":
+        if policy == "rules":
             faults += met["faults"]
     event = scenario.events[0]
     return {
-        "kind": job.kind, "policy": job.policy, "seed": job.seed, "passed": not faults, "faults": faults, "met": met,
+        "kind": kind, "policy": policy, "seed": job.seed, "passed": not faults, "faults": faults, "met": met,
         "shoal": "shoal" in scenario.mission, "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}",
         "vessel": f"{event.craft} of {event.length_m:g} m, {event.sog_mps:g} m/s, {event.course_deg:+g} deg off our "
                   f"course, every {event.every_s:g} s by {event.receiver}, "
@@ -151,40 +138,34 @@ def sail_encounter(job: Job) -> dict[str, Any]:
     }
 
 
-def key_of(job: Job) -> Key:
-    """Return what an encounter is known by."""
-    return {"scenario": "encounter", "hash": file_hash(_SOURCE), "kind": job.kind, "policy": job.policy,
-            "seed": job.seed}
+def job_of(kind: Kind, policy: Policy, seed: int, keep: Path | None = None) -> Job[Encounter]:
+    """Return an encounter as a job."""
+    return Job(scenario=SOURCE, case=(kind, policy), seed=seed, keep=keep)
 
 
-def run_encounters(
+def encounters(
     *, runs: int, kinds: Sequence[Kind] = KINDS, policies: Sequence[Policy] = ("rules",), first_seed: int = 0,
-    means: CampaignOptions, json_path: Path | None = None,
-) -> int:
-    """Sail ``runs`` seeds of each kind and policy, print what failed and the table; return the exit code."""
-    jobs = [Job(kind=kind, policy=policy, seed=first_seed + n)
-            for n in range(runs) for kind in kinds for policy in policies]
+) -> Experiment[Encounter]:
+    """Return ``runs`` seeds of each kind and policy; a table of them, and what failed."""
+    def line(record: dict[str, Any]) -> str | None:
+        return None if record["passed"] else (
+            f"FAILED {record['kind']}, {record['policy']}, seed {record['seed']}: {'; '.join(record['faults'])} "
+            f"({record['vessel']}; wind {record['wind']}{'; shoal' if record['shoal'] else ''})")
 
-    def tell(record: dict[str, Any]) -> None:
-        if not record["passed"]:
-            print(f"FAILED {record['kind']}, {record['policy']}, seed {record['seed']}: "
-                  f"{'; '.join(record['faults'])} ({record['vessel']}; wind {record['wind']}"
-                  f"{'; shoal' if record['shoal'] else ''})", flush=True)
+    def sum_up(sailed: CampaignResults) -> Summary:
+        records = sorted(sailed.records, key=lambda r: (r["policy"], r["kind"], r["seed"]))
+        rows = [row(kind, policy, found) for policy in policies for kind in kinds
+                if (found := [r for r in records if (r["kind"], r["policy"]) == (kind, policy)])]
+        again = [f"again: sitl encounters --kind {r['kind']} --policy \"{r['policy']}\" --first-seed {r['seed']} "
+                 "--keep DIR" for r in records if not r["passed"]]
+        return Summary(lines=[*map(told, rows), sailed.took, *again], is_good=not again,
+                       figures={"table": rows, "voyages": records})
 
-    sailed = run_jobs("encounters", sail_encounter, jobs, means, key=key_of, on_record=tell)
-    records = sailed.records
-    records.sort(key=lambda r: (r["policy"], r["kind"], r["seed"]))
-    rows = [row(kind, policy, found) for policy in policies for kind in kinds
-            if (found := [r for r in records if (r["kind"], r["policy"]) == (kind, policy)])]
-    print_rows(rows)
-    print(sailed.took)
-    for record in records:
-        if not record["passed"]:
-            print(f"again: sitl encounters --kind {record['kind']} --policy \"{record['policy']}\" "
-                  f"--first-seed {record['seed']} --keep DIR")
-    if json_path is not None:
-        json_path.write_text(json.dumps({"table": rows, "voyages": records}, indent=1) + "\n", encoding="utf-8")
-    return sailed.exit_code(is_good=all(r["passed"] for r in records))
+    return Experiment(
+        name="encounters", sail=sail, line=line, sum_up=sum_up,
+        key=lambda job: {"scenario": "encounter", "hash": file_hash(job.scenario), "kind": job.case[0],
+                         "policy": job.case[1], "seed": job.seed},
+        jobs=[job_of(kind, policy, first_seed + n) for n in range(runs) for kind in kinds for policy in policies])
 
 
 def row(kind: str, policy: str, records: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -209,16 +190,16 @@ def row(kind: str, policy: str, records: Sequence[dict[str, Any]]) -> dict[str, 
     }
 
 
-def print_rows(rows: Sequence[dict[str, Any]]) -> None:
-    """Print the table."""
-    for r in rows:
-        print(f"{r['kind']}, {r['policy']}: {r['passed']} of {r['voyages']} passed; rules kept {r['rules kept']}, "
-              f"distance kept {r['distance kept']}, touched {r['touched']}; nearest {_figure(r['nearest m'])} m, "
-              f"median {_figure(r['nearest median m'])} m")
-        print(f"  gave way {r['kept giving way']} of {r['give way']} by the rules (by "
-              f"{_figure(r['altered median deg'])} deg, {_figure(r['before median s'])} s before, medians; crossed "
-              f"{r['crossed'].get('astern', 0)} astern, {r['crossed'].get('ahead', 0)} ahead); stood on "
-              f"{r['kept standing on']} of {r['stand on']} ({r['stubborn']} others did not act)")
+def told(r: dict[str, Any]) -> str:
+    """Return a row of the table as text."""
+    return (
+        f"{r['kind']}, {r['policy']}: {r['passed']} of {r['voyages']} passed; rules kept {r['rules kept']}, "
+        f"distance kept {r['distance kept']}, touched {r['touched']}; nearest {_figure(r['nearest m'])} m, "
+        f"median {_figure(r['nearest median m'])} m\n"
+        f"  gave way {r['kept giving way']} of {r['give way']} by the rules (by "
+        f"{_figure(r['altered median deg'])} deg, {_figure(r['before median s'])} s before, medians; crossed "
+        f"{r['crossed'].get('astern', 0)} astern, {r['crossed'].get('ahead', 0)} ahead); stood on "
+        f"{r['kept standing on']} of {r['stand on']} ({r['stubborn']} others did not act)")
 
 
 def _figure(value: float | None) -> str:

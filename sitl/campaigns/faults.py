@@ -10,23 +10,19 @@ is counted, not required: a boat that the operator put in HOLD for half the voya
 from __future__ import annotations
 
 import asyncio
-import json
 import random
 import statistics
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Coroutine, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import msgspec
 import shapely
 
 from companion.clock import RealTimeLoop
-from companion.errors import InputError
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode
 from sitl.campaigns.fault_judge import (
@@ -52,9 +48,8 @@ from sitl.campaigns.fault_sampling import (
     draw_planner,
     draw_turned_vane,
 )
-from sitl.options import CampaignOptions
 from sitl.run.variation import DRAWABLE, Method, Variation, drawn_method
-from sitl.runner import Key, file_hash, run_jobs
+from sitl.runner import CampaignResults, Experiment, Job, Summary
 from sitl.scenario import EventSpec, Scenario, is_all_ordinary, load_scenario
 
 T = TypeVar("T")
@@ -86,47 +81,48 @@ KNOWN: Mapping[int, str] = {
 WORKER_PACE = 2.0    # faster, two seconds of a busy machine would count as silence
 
 
-def sail_seed(
-    seed: int, base: Path = BASE, keep: Path | None = None, *, draws: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Draw the faults of one seed, sail them and return how it went; a voyage folder is left in ``keep``.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultCase:
+    """What a seed draws its trouble of, and what is drawn beside: as of ``method_of``, and of ``BESIDE``."""
 
-    ``draws`` as of ``method_of``, and of ``BESIDE``: what is drawn beside the seed's own faults.
+    trouble: Literal["all", "jumps", "turned-vane", "worker"] = "all"
+    draws: tuple[str, ...] = ()
+
+
+def job_of(seed: int, case: FaultCase = FaultCase(), keep: Path | None = None) -> Job[FaultCase]:
+    """Return a seed as a job."""
+    return Job(scenario=BASE, seed=seed, case=case, keep=keep)
+
+
+def sail(job: Job[FaultCase]) -> dict[str, Any]:
+    """Draw the faults of a seed, sail them and return how it went.
+
+    Those of the planner's real process are sailed in real time, ``WORKER_PACE`` times as fast.
     """
-    scenario = load_scenario(base)
-    drawn = draw(seed, scenario)
-    if set(draws) & set(BESIDE):
-        drawn = draw_beside(seed, drawn, draws, _jump_of(seed, scenario, base))
-    return sail_faults(drawn, seed, base, keep, method=method_of(seed, drawn, base, draws))
+    scenario = load_scenario(job.scenario)
+    if job.case.trouble == "jumps":
+        return sail_jump(_jump_of(job.seed, scenario, job.scenario), job)
+    if job.case.trouble == "turned-vane":
+        drawn = draw_turned_vane(job.seed, scenario)
+    elif job.case.trouble == "worker":
+        drawn = draw_planner(job.seed, scenario)
+    else:
+        drawn = draw(job.seed, scenario)
+        if set(job.case.draws) & set(BESIDE):
+            drawn = draw_beside(job.seed, drawn, job.case.draws, _jump_of(job.seed, scenario, job.scenario))
+    return sail_faults(drawn, job)
 
 
-def sail_turned_vane_seed(
-    seed: int, base: Path = BASE, keep: Path | None = None, *, draws: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Sail what ``sail_seed`` sails, with a vane that is turned under way beside it."""
-    drawn = draw_turned_vane(seed, load_scenario(base))
-    return sail_faults(drawn, seed, base, keep, method=method_of(seed, drawn, base, draws))
-
-
-def sail_worker_seed(
-    seed: int, base: Path = BASE, keep: Path | None = None, *, draws: Sequence[str] = (),
-) -> dict[str, Any]:
-    """Sail one seed with faults of the planner's real process, in real time ``WORKER_PACE`` times as fast."""
-    scenario = load_scenario(base)
-    return sail_faults(draw_planner(seed, scenario), seed, base, keep, worker_pace=WORKER_PACE,
-                       method=method_of(seed, scenario, base, draws))
-
-
-def method_of(seed: int, scenario: Scenario, source: Path, draws: Sequence[str]) -> Method:
-    """Return by which guidance and planner a seed is sailed: ``draws`` names what is drawn of them, else the mission's.
+def method_of(job: Job[FaultCase], scenario: Scenario) -> Method:
+    """Return by which guidance and planner a seed is sailed: drawn where the case says so, else the mission's.
 
     They are drawn apart, of those that ``scenario`` can be sailed by: what else a seed is does not depend on them.
     """
     from sitl.run.embedded import mission_of
 
-    if not set(draws) & set(DRAWABLE):
+    if not set(job.case.draws) & set(DRAWABLE):
         return Method()
-    return drawn_method(random.Random(f"method {seed}"), draws, mission_of(scenario, source))
+    return drawn_method(random.Random(f"method {job.seed}"), job.case.draws, mission_of(scenario, job.scenario))
 
 
 def _jump_of(seed: int, base: Scenario, source: Path) -> Jump:
@@ -142,25 +138,21 @@ def _jump_of(seed: int, base: Scenario, source: Path) -> Jump:
                      solids_en=[(p.centroid.x, p.centroid.y) for p in shapely.get_parts(solid)])
 
 
-def sail_jump_seed(
-    seed: int, base: Path = BASE, keep: Path | None = None, *, draws: Sequence[str] = (),
-) -> dict[str, Any]:
+def sail_jump(drawn: Jump, job: Job[FaultCase]) -> dict[str, Any]:
     """Sail a voyage with a false position, and once more with a skipper who puts her into LOITER and leaves her there.
 
     The second does so as soon as anything could be known of it. What the first touches and the second does not is a
-    fault. ``draws`` as of ``method_of``.
+    fault.
     """
-    plain = load_scenario(base)
-    drawn = _jump_of(seed, plain, base)
-    method = method_of(seed, plain, base, draws)
-    ours = _sail(drawn.scenario, seed, base, keep, method=method, variation=drawn.variation)
+    method = method_of(job, load_scenario(job.scenario))
+    ours = _sail(drawn.scenario, job, method, drawn.variation)
     reach = ours.watch.reach()
     jump = next(e for e in drawn.scenario.events if e.kind == "gps_jump" and e.for_s is not None)
     first_s = next((t for t in reach.false_s if t >= jump.at_s), jump.at_s)
     seen_s = reach.first_s(first_s + ALERT_S, drawn.scenario.limit_s)
     held = None if seen_s is None else _sail(
-        by_hand(drawn.scenario, seen_s, Mode.LOITER, drawn.scenario.limit_s), seed, base, None,
-        method=method, variation=drawn.variation)
+        by_hand(drawn.scenario, seen_s, Mode.LOITER, drawn.scenario.limit_s), replace(job, keep=None), method,
+        drawn.variation)
     touched = [t_s for t_s, _ in ours.watch.contacts() if t_s >= jump.at_s]
     held_touched = [] if held is None else [t_s for t_s, _ in held.watch.contacts() if t_s >= jump.at_s]
     faults = [f"contact at {touched[0]:.0f} s, none when held in LOITER"] if touched and not held_touched else []
@@ -170,7 +162,7 @@ def sail_jump_seed(
     if ours.errors:
         faults.append(f"unhandled: {ours.errors[0].strip().splitlines()[-1]}")
     return {
-        "seed": seed, "passed": not faults, "faults": faults, "kind": drawn.kind, "mode": drawn.mode,
+        "seed": job.seed, "passed": not faults, "faults": faults, "kind": drawn.kind, "mode": drawn.mode,
         "size": drawn.size_class, "size_m": drawn.size_m, "for_s": drawn.for_s,
         "events": [told(e) for e in drawn.scenario.events], "parameters": {},
         "touched_s": touched[:1], "held_touched_s": held_touched[:1], "arrived": bool(ours.figures.get("arrived")),
@@ -179,19 +171,14 @@ def sail_jump_seed(
     }
 
 
-def sail_faults(
-    scenario: Scenario, seed: int, base: Path, keep: Path | None = None, *, worker_pace: float | None = None,
-    method: Method | None = None,
-) -> dict[str, Any]:
-    """Sail a scenario, read from ``base``, with what else a ``seed`` decides, and return how it went."""
-    method = method or Method()
-    if keep is not None and keep.is_dir() and any(keep.iterdir()):
-        raise InputError("--keep", str(keep), "is not empty", "a voyage's folder is taken up where it was left")
-    voyage = _sail(scenario, seed, base, keep, worker_pace, method=method)
+def sail_faults(scenario: Scenario, job: Job[FaultCase]) -> dict[str, Any]:
+    """Sail what was drawn, with what else the job's seed decides, and return how it went."""
+    method = method_of(job, scenario)
+    voyage = _sail(scenario, job, method)
     watch, figures, errors = voyage.watch, voyage.figures, voyage.errors
 
     def touches(other: Scenario) -> float | None:
-        sailed = _sail(other, seed, base, None, worker_pace, method=method)
+        sailed = _sail(other, replace(job, keep=None), method)
         return next((t_s for t_s, _ in sailed.watch.contacts()), None)
 
     contacts = []
@@ -217,7 +204,7 @@ def sail_faults(
     if errors:
         faults.append(f"unhandled: {errors[0].strip().splitlines()[-1]}")
     return {
-        "seed": seed, "passed": not faults, "faults": faults,
+        "seed": job.seed, "passed": not faults, "faults": faults,
         "events": [told(e) for e in scenario.events], "parameters": dict(scenario.parameters),
         "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}", "limit_s": scenario.limit_s,
         "set_auto": scenario.set_auto, "system": scenario.system, "method": method.told,
@@ -245,8 +232,7 @@ class _Voyage:
 
 
 def _sail(
-    scenario: Scenario, seed: int, base: Path, keep: Path | None, worker_pace: float | None = None, *,
-    method: Method | None = None, variation: Variation | None = None,
+    scenario: Scenario, job: Job[FaultCase], method: Method, variation: Variation | None = None,
 ) -> _Voyage:
     """Sail a scenario on the embedded autopilot under the eyes of a watch."""
     from companion.clock import run_virtual
@@ -255,7 +241,8 @@ def _sail(
     from companion.messages import waypoint
     from sitl.run.embedded import run_embedded, solid_of
 
-    mission = load_mission(scenario.mission_path(base))
+    pace = WORKER_PACE if job.case.trouble == "worker" else None
+    mission = load_mission(scenario.mission_path(job.scenario))
     frame = mission.frame()
     watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame, hull=boat_of(mission).hull,
                   operator_s=operator_spans(scenario.events, scenario.limit_s),
@@ -274,20 +261,19 @@ def _sail(
     figures: dict[str, Any] = {}
     errors: list[str] = []
     ordered: list[int] = []
-    with tempfile.TemporaryDirectory(prefix="faults-") as scratch:
-        folder = keep if keep is not None else Path(scratch) / "voyage"
+    with job.folder() as folder:
         try:
-            voyage = run_embedded(scenario, base, seed, folder, on_status=on_status, expansions=EXPANSIONS,
-                                  observer=watch, worker_pace=worker_pace,
-                                  variation=(method or Method()).variation(mission, variation))
-            verdict = run_virtual(voyage) if worker_pace is None else run_from_zero(voyage, worker_pace)
+            voyage = run_embedded(scenario, job.scenario, job.seed, folder, on_status=on_status, expansions=EXPANSIONS,
+                                  observer=watch, worker_pace=pace,
+                                  variation=method.variation(mission, variation))
+            verdict = run_virtual(voyage) if pace is None else run_from_zero(voyage, pace)
             figures = verdict.figures
             seen = {check.name: check.figure for check in verdict.checks}
             errors, ordered = [str(e) for e in seen["no unhandled error"]], seen.get("neighbours given orders", [])
         except Exception as error:
             errors = [repr(error)]
     return _Voyage(watch=watch, figures=figures, errors=errors, status_s=status_s, floor_m=mission.margin_floor_m,
-                   ordered=ordered)
+                                      ordered=ordered)
 
 
 def told(event: EventSpec) -> str:
@@ -298,49 +284,38 @@ def told(event: EventSpec) -> str:
     return f"{event.kind} at {event.at_s:.0f} s" + (f" ({', '.join(drawn)})" if drawn else "")
 
 
-# What a seed draws its trouble of, and who sails it.
-SAILORS = {"all": sail_seed, "jumps": sail_jump_seed, "turned-vane": sail_turned_vane_seed, "worker": sail_worker_seed}
+def faults(case: FaultCase, *, runs: int, first_seed: int = 0) -> Experiment[FaultCase]:
+    """Return ``runs`` seeds; what failed that is not ``KNOWN`` to, and what was counted."""
+    trouble, draws = case.trouble, case.draws
+    known = KNOWN if case == FaultCase() else {}
+    drawing = {"draws": ", ".join(draws)} if draws else {}
 
+    def line(record: dict[str, Any]) -> str | None:
+        if record["passed"]:
+            return None
+        method = [record["method"]] if record.get("method") else []
+        method += [f"no {outlet}" for outlet in record.get("broken", ())]
+        drawn = method + record["events"] + [f"{name} {value:g}" for name, value in record["parameters"].items()]
+        word = "known to fail," if record["seed"] in known else "FAILED"
+        return f"{word} seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})"
 
-def run_faults(
-    *, runs: int, first_seed: int = 0, means: CampaignOptions, json_path: Path | None = None, trouble: str = "all",
-    draws: Sequence[str] = (),
-) -> int:
-    """Sail ``runs`` seeds, print those that failed and what was counted; return the exit code.
+    def sum_up(sailed: CampaignResults) -> Summary:
+        records = sailed.records
+        table = jump_figures(records) if trouble == "jumps" else figures_of(records)
+        lines = jumps_told(table) if trouble == "jumps" else figures_told(table)
+        lines.append(f"{table['simulated_s'] / 3600.0:.1f} h simulated; {sailed.took}")
+        option = ("" if trouble == "all" else f" --{trouble}") + (f" --draw {','.join(draws)}" if draws else "")
+        for record in records:
+            if not record["passed"]:
+                lines.append(f"again: sitl faults{option} --first-seed {record['seed']} --keep DIR")
+            elif record["seed"] in known:
+                lines.append(f"seed {record['seed']} passes, which was known to fail: {known[record['seed']]}")
+        return Summary(lines=lines, is_good=all(r["passed"] or r["seed"] in known for r in records), figures={
+            "figures": {**table, "wall_s": sailed.wall_s, "cpu_s": sailed.cpu_s}, "voyages": records})
 
-    ``draws`` as of ``method_of``. It is 1 where one failed that is not ``KNOWN`` to.
-    """
-    known = KNOWN if trouble == "all" and not draws else {}
-    water = {"scenario": load_scenario(BASE).name, "hash": file_hash(BASE), "trouble": trouble}
-
-    def key_of(seed: int) -> Key:
-        return {**water, **({"draws": ", ".join(draws)} if draws else {}), "seed": seed}
-
-    def tell(record: dict[str, Any]) -> None:
-        if not record["passed"]:
-            method = [record["method"]] if record.get("method") else []
-            method += [f"no {outlet}" for outlet in record.get("broken", ())]
-            drawn = method + record["events"] + [f"{name} {value:g}" for name, value in record["parameters"].items()]
-            word = "known to fail," if record["seed"] in known else "FAILED"
-            print(f"{word} seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})", flush=True)
-
-    work = partial(SAILORS[trouble], draws=tuple(draws))
-    sailed = run_jobs("faults", work, range(first_seed, first_seed + runs), means, key=key_of, on_record=tell)
-    records = sailed.records
-    drawing = f" --draw {','.join(draws)}" if draws else ""
-    table = jump_figures(records) if trouble == "jumps" else figures_of(records)
-    (print_jumps if trouble == "jumps" else print_figures)(table)
-    print(f"{table['simulated_s'] / 3600.0:.1f} h simulated; {sailed.took}")
-    option = "" if trouble == "all" else f" --{trouble}"
-    for record in records:
-        if not record["passed"]:
-            print(f"again: sitl faults{option}{drawing} --first-seed {record['seed']} --keep DIR")
-        elif record["seed"] in known:
-            print(f"seed {record['seed']} passes, which was known to fail: {known[record['seed']]}")
-    if json_path is not None:
-        plain = {"figures": {**table, "wall_s": sailed.wall_s, "cpu_s": sailed.cpu_s}, "voyages": records}
-        json_path.write_text(json.dumps(plain, indent=1) + "\n", encoding="utf-8")
-    return sailed.exit_code(is_good=all(r["passed"] or r["seed"] in known for r in records))
+    return Experiment(name="faults", sail=sail, line=line, sum_up=sum_up,
+                      key=lambda job: job.key(trouble=trouble, **drawing),
+                      jobs=[job_of(seed, case) for seed in range(first_seed, first_seed + runs)])
 
 
 def figures_of(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -373,17 +348,18 @@ def figures_of(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def print_figures(table: dict[str, Any]) -> None:
-    """Print what was counted."""
-    print(f"{table['voyages']} voyages, {table['passed']} passed, {table['arrived']} arrived in time")
-    print(f"touched something: {table['touched']} voyages; longest mixture {table['mixture_max_s']:.1f} s; "
-          f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}")
-    for excuse, voyages in table["touched_excused"].items():
-        print(f"  excused: {voyages} voyages touched, {EXCUSES[excuse]}; nothing that was tried would have helped")
-    print(f"below the margin's floor: {table['below_floor']} voyages, {len(table['below_floor_in_weather'])} of them "
-          "in ordinary weather")
-    print(f"  a mission held back by a slow upload, ended by a loiter: {table['held_back_max_s']:.1f} s at most")
-    print("voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items()))
+def figures_told(table: dict[str, Any]) -> list[str]:
+    """Return what was counted, in lines."""
+    return [
+        f"{table['voyages']} voyages, {table['passed']} passed, {table['arrived']} arrived in time",
+        (f"touched something: {table['touched']} voyages; longest mixture {table['mixture_max_s']:.1f} s; "
+         f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}"),
+        *(f"  excused: {voyages} voyages touched, {EXCUSES[excuse]}; nothing that was tried would have helped"
+          for excuse, voyages in table["touched_excused"].items()),
+        (f"below the margin's floor: {table['below_floor']} voyages, {len(table['below_floor_in_weather'])} of them "
+         "in ordinary weather"),
+        f"  a mission held back by a slow upload, ended by a loiter: {table['held_back_max_s']:.1f} s at most",
+        "voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items())]
 
 
 def jump_figures(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -403,9 +379,8 @@ def jump_figures(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "simulated_s": sum(r["simulated_s"] for r in records)}
 
 
-def print_jumps(table: dict[str, Any]) -> None:
-    """Print the classes of false positions under each other."""
-    print(f"{'false position':<24} voyages  touched  held in LOITER  arrived")
-    for row in table["classes"]:
-        print(f"{row['class']:<24} {row['voyages']:7}  {row['touched']:7}  {row['held_touched']:14}  "
-              f"{row['arrived']:7}")
+def jumps_told(table: dict[str, Any]) -> list[str]:
+    """Return the classes of false positions under each other."""
+    return [f"{'false position':<24} voyages  touched  held in LOITER  arrived", *(
+        f"{row['class']:<24} {row['voyages']:7}  {row['touched']:7}  {row['held_touched']:14}  {row['arrived']:7}"
+        for row in table["classes"])]

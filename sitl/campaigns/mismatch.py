@@ -16,23 +16,20 @@ import json
 import math
 import random
 import statistics
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from companion.current import over_water
-from companion.errors import InputError
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import Mode
 from companion.telemetry.folder import DECISIONS
 from sitl.autopilot import Autopilot, MemoryLink
 from sitl.campaigns.mismatch_sampling import SampledMismatch, draw
-from sitl.options import CampaignOptions
 from sitl.run.variation import Variation, drawn_method
-from sitl.runner import Key, file_hash, run_jobs
+from sitl.runner import CampaignResults, Experiment, Job, Key, Summary
 
 # A plan's waypoint and the autopilot's are one where they are this near: degrees x 1e7 are a centimetre.
 _SAME_M = 0.5
@@ -265,44 +262,42 @@ ONE_GOAL = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One voyage; with ``planned`` no beat is left to the autopilot; ``only`` as of ``draw``.
+class MismatchCase:
+    """Whether no beat is left to the autopilot; ``only`` as of ``draw``; ``draws`` of guidance and planner."""
 
-    ``draws`` names what is drawn of guidance and planner, apart from all else; else they are the mission's.
-    """
-
-    seed: int
     planned: bool = False
     only: tuple[str, ...] | None = None
-    keep: Path | None = None
     draws: tuple[str, ...] = ()
 
 
-def sail_one(job: Job) -> dict[str, Any]:
-    """Sail a seed; return what was drawn, promised and sailed. A voyage folder is left in ``job.keep``."""
-    return sail_drawn(draw(job.seed, only=job.only), job)
+def job_of(seed: int, case: MismatchCase = MismatchCase(), keep: Path | None = None) -> Job[MismatchCase]:
+    """Return a seed as a job."""
+    return Job(scenario=draw(seed).source, seed=seed, case=case, keep=keep)
 
 
-def sail_drawn(drawn: SampledMismatch, job: Job) -> dict[str, Any]:
+def sail(job: Job[MismatchCase]) -> dict[str, Any]:
+    """Sail a seed; return what was drawn, promised and sailed."""
+    return sail_drawn(draw(job.seed, only=job.case.only), job)
+
+
+def sail_drawn(drawn: SampledMismatch, job: Job[MismatchCase]) -> dict[str, Any]:
     """Sail what was drawn, with what else the job's seed decides."""
     from companion.clock import run_virtual
     from sitl.run.embedded import mission_of, run_embedded
 
-    if job.keep is not None and job.keep.is_dir() and any(job.keep.iterdir()):
-        raise InputError("--keep", str(job.keep), "is not empty", "a voyage's folder is taken up where it was left")
+    case = job.case
     mission = mission_of(drawn.scenario, drawn.source)
-    method = drawn_method(random.Random(f"method {job.seed}"), job.draws, mission)
+    method = drawn_method(random.Random(f"method {job.seed}"), case.draws, mission)
     legs = Legs(mission.frame())
     record: dict[str, Any] = {
-        "seed": job.seed, "scenario": drawn.scenario.name, "planned": job.planned,
-        "as_planned": job.only == (), "kinds": list(drawn.kinds),
+        "seed": job.seed, "scenario": drawn.scenario.name, "planned": case.planned,
+        "as_planned": case.only == (), "kinds": list(drawn.kinds),
         "drawn": drawn.told(), "method": method.told, "floor_m": mission.margin_floor_m}
-    with tempfile.TemporaryDirectory(prefix="mismatch-") as scratch:
-        folder = job.keep if job.keep is not None else Path(scratch) / "voyage"
+    with job.folder() as folder:
         try:
             verdict = run_virtual(run_embedded(
                 drawn.scenario, drawn.source, job.seed, folder, expansions=EXPANSIONS, observer=legs,
-                variation=method.variation(mission, PLANNED if job.planned else None)))
+                variation=method.variation(mission, PLANNED if case.planned else None)))
         except Exception as error:
             return record | {"passed": False, "faults": [f"unhandled: {error!r}"]}
         summary = json.loads((folder / "summary.json").read_bytes())
@@ -322,38 +317,30 @@ def sail_drawn(drawn: SampledMismatch, job: Job) -> dict[str, Any]:
         "arrival": arrival, "legs": promised}
 
 
-def key_of(job: Job) -> Key:
+def key_of(job: Job[MismatchCase]) -> Key:
     """Return what a voyage is known by."""
-    drawn = draw(job.seed)
-    only = "any" if job.only is None else ", ".join(job.only)
-    return {"scenario": drawn.scenario.name, "hash": file_hash(drawn.source), "planned": job.planned, "only": only,
-            **({"draws": ", ".join(job.draws)} if job.draws else {}), "seed": job.seed}
+    case = job.case
+    only = "any" if case.only is None else ", ".join(case.only)
+    return job.key(planned=case.planned, only=only, **({"draws": ", ".join(case.draws)} if case.draws else {}))
 
 
-def run_mismatch(
-    *, runs: int, first_seed: int, means: CampaignOptions, planned: bool, only: tuple[str, ...] | None,
-    json_path: Path | None, draws: tuple[str, ...] = (),
-) -> int:
-    """Sail what has no result yet, print what failed and the table; return the exit code."""
-    jobs = [Job(seed=seed, planned=planned, only=only, draws=draws) for seed in range(first_seed, first_seed + runs)]
+def mismatch(case: MismatchCase, *, runs: int, first_seed: int) -> Experiment[MismatchCase]:
+    """Return ``runs`` seeds of a case; what failed, and what was counted."""
+    def line(record: dict[str, Any]) -> str | None:
+        method = f" {record['method']}" if record.get("method") else ""
+        return None if record["passed"] else (
+            f"FAILED seed {record['seed']}, {record['scenario']}{method}: {'; '.join(record['faults'])} "
+            f"({', '.join(record['kinds']) or 'as planned'})")
 
-    def tell(record: dict[str, Any]) -> None:
-        if not record["passed"]:
-            method = f" {record['method']}" if record.get("method") else ""
-            print(f"FAILED seed {record['seed']}, {record['scenario']}{method}: {'; '.join(record['faults'])} "
-                  f"({', '.join(record['kinds']) or 'as planned'})", flush=True)
+    def sum_up(sailed: CampaignResults) -> Summary:
+        records = sorted(sailed.records, key=lambda r: int(r["seed"]))
+        table = figures_of(records)
+        how = (" --planned" if case.planned else "") + (f" --draw {','.join(case.draws)}" if case.draws else "")
+        how += " --as-planned" if case.only == () else "".join(f' --only "{kind}"' for kind in case.only or ())
+        again = [f"again: sitl mismatch --first-seed {r['seed']}{how} --keep DIR"
+                 for r in records if not r["passed"] or r.get("below_floor")]
+        return Summary(lines=[told(table), sailed.took, *again], figures={"figures": table, "voyages": records},
+                       is_good=all(r["passed"] for r in records))
 
-    sailed = run_jobs(CAMPAIGN, sail_one, jobs, means, key=key_of, on_record=tell)
-    records = sailed.records
-    records.sort(key=lambda r: int(r["seed"]))
-    table = figures_of(records)
-    print(told(table))
-    print(sailed.took)
-    how = (" --planned" if planned else "") + (f" --draw {','.join(draws)}" if draws else "")
-    how += " --as-planned" if only == () else "".join(f' --only "{kind}"' for kind in only or ())
-    for record in records:
-        if not record["passed"] or record.get("below_floor"):
-            print(f"again: sitl mismatch --first-seed {record['seed']}{how} --keep DIR")
-    if json_path is not None:
-        json_path.write_text(json.dumps({"figures": table, "voyages": records}, indent=1) + "\n", encoding="utf-8")
-    return sailed.exit_code(is_good=all(r["passed"] for r in records))
+    return Experiment(name=CAMPAIGN, sail=sail, key=key_of, line=line, sum_up=sum_up,
+                      jobs=[job_of(seed, case) for seed in range(first_seed, first_seed + runs)])

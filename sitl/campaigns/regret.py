@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import statistics
 from collections.abc import Sequence
@@ -19,19 +18,16 @@ from sitl.campaigns.baselines import (
     NAMES,
     TOLD,
     BaselineTrack,
-    Job,
-    WindOf,
-    jobs_of,
+    Sailor,
     key_of,
     latest,
     pairs,
     scenario_of,
     voyage_of,
 )
-from sitl.options import CampaignOptions
 from sitl.perfect_information import Best, Race, RaceBoat, RaceMark, Weather, best
 from sitl.run.embedded import solid_of
-from sitl.runner import run_jobs
+from sitl.runner import CampaignResults, Experiment, Job, Summary
 from sitl.scenario import Scenario, load_scenario, own_polar, scenario_departures, scenario_waters, scenario_wind
 
 HEADS = ("scenario", "sailor", "runs", "clean", "median s", "tacks", "best s", "its tacks", "over best %", "10 %",
@@ -134,7 +130,7 @@ def best_of(scenario: Scenario, track: BaselineTrack) -> Best | None:
     return None if track.time_s is None else best(race_of(scenario, track), UNTIL * track.time_s)
 
 
-def sail_one(job: Job) -> dict[str, Any]:
+def sail(job: Job[Sailor]) -> dict[str, Any]:
     """Sail a job; return what is told of it, and the best."""
     voyage = voyage_of(job)
     ideal = best_of(scenario_of(job), voyage.track)
@@ -144,22 +140,19 @@ def sail_one(job: Job) -> dict[str, Any]:
             "best_tacks": ideal.tacks}
 
 
-def run_regret(
-    *, who: Sequence[str], scenarios: Sequence[Path], seeds: int, means: CampaignOptions, speedup: float,
-    json_path: Path | None, plot: Path | None, winds: Sequence[WindOf] | None, against: str | None,
-) -> int:
-    """Sail everything that has no result yet, print the table of all that there is; return the exit code."""
-    sailed = run_jobs("regret", sail_one, jobs_of(who, scenarios, seeds, speedup, winds), means, key=key_of)
-    records = latest([result for _, result in sailed.held.pairs()])
-    print(told(records))
-    if against is not None:
-        print(pairs(records, NAMES[against]))
-    if json_path is not None:
-        json_path.write_text(json.dumps(figures_of(records), indent=1) + "\n", encoding="utf-8")
-    if plot is not None:
-        from sitl.campaigns.plots import save_regret
+def regret(jobs: Sequence[Job[Sailor]], *, against: str | None) -> Experiment[Sailor]:
+    """Return the voyages; a table of all that there is, and one sailor against the others."""
+    def sum_up(sailed: CampaignResults) -> Summary:
+        records = latest([result for _, result in sailed.held.pairs()])
+        return Summary(lines=[told(records), *([] if against is None else [pairs(records, NAMES[against])])],
+                       figures=figures_of(records))
 
-        drawn = [(job, voyage_of(job)) for job in jobs_of(who, scenarios[:1], 1, speedup, winds and winds[:1])]
-        save_regret([(voyage, best_of(scenario_of(job), voyage.track)) for job, voyage in drawn], plot)
-        print(f"drawn in {plot}")
-    return sailed.exit_code(is_good=True)
+    return Experiment(name="regret", sail=sail, key=key_of, sum_up=sum_up, jobs=jobs)
+
+
+def draw_regret(jobs: Sequence[Job[Sailor]], plot: Path) -> None:
+    """Sail jobs again and draw them over the best."""
+    from sitl.campaigns.plots import save_regret
+
+    voyages = [(voyage_of(job), scenario_of(job)) for job in jobs]
+    save_regret([(voyage, best_of(scenario, voyage.track)) for voyage, scenario in voyages], plot)

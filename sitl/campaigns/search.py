@@ -27,7 +27,7 @@ from companion.words import counted
 from sitl.campaigns import fault_sampling, faults, mismatch, mismatch_sampling
 from sitl.campaigns.fault_judge import UNEXCUSED
 from sitl.options import CampaignOptions
-from sitl.runner import Key, file_hash, run_jobs
+from sitl.runner import Experiment, Job, file_hash
 from sitl.scenario import Scenario, load_scenario, scenario_text
 
 LENGTH = 160        # numbers of a stream; what a voyage draws beyond them is the same for all its descendants
@@ -122,67 +122,66 @@ class Splitting:
             now if now[0] <= self.threshold_m else before for now, before in zip(came, self._parents, strict=True)]
 
 
-CAMPAIGN = "search"
 # The water of `sitl mismatch` in which the floor was broken.
 NARROW = mismatch_sampling.WATERS[2]
 What = Literal["mismatch", "faults"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One voyage of a search: the ``number``-th of it."""
+class SearchCase:
+    """What is drawn by a point, the ``number``-th voyage of a search."""
 
     what: What
-    scenario: Path
     point: Point
-    search: str
     number: int
 
 
-def drawn_of(job: Job) -> Scenario:
+def drawn_of(job: Job[SearchCase]) -> Scenario:
     """Return the scenario of a job, with all that was drawn for it."""
-    if job.what == "faults":
-        return fault_sampling.drawn_by(job.point.draws(), load_scenario(job.scenario))
-    return mismatch_sampling.drawn_by(job.point.draws(), job.scenario).scenario
+    if job.case.what == "faults":
+        return fault_sampling.drawn_by(job.case.point.draws(), load_scenario(job.scenario))
+    return mismatch_sampling.drawn_by(job.case.point.draws(), job.scenario).scenario
 
 
-def sail_point(job: Job) -> dict[str, Any]:
+def sail(job: Job[SearchCase]) -> dict[str, Any]:
     """Sail a job; return how it went and how near it came."""
-    seed = job.point.seed
-    if job.what == "faults":
-        record = faults.sail_faults(drawn_of(job), seed, job.scenario)
+    if job.case.what == "faults":
+        record = faults.sail_faults(
+            drawn_of(job), Job(scenario=job.scenario, seed=job.seed, case=faults.FaultCase()))
         touched = [contact["excuse"] == UNEXCUSED for contact in record["contacts"]]
         near_m, drawn = record["clearance_m"], record["events"]
     else:
-        drawn_boat = mismatch_sampling.drawn_by(job.point.draws(), job.scenario)
-        record = mismatch.sail_drawn(drawn_boat, mismatch.Job(seed=seed))
+        drawn_boat = mismatch_sampling.drawn_by(job.case.point.draws(), job.scenario)
+        record = mismatch.sail_drawn(drawn_boat, mismatch.job_of(job.seed))
         touched = [True] * (record.get("contacts") or 0)
         near_m, drawn = record.get("min_clearance_m"), record["kinds"]
     score_m = near_m if near_m is not None and math.isfinite(near_m) else None
     if touched:
         score_m = 0.0 if any(touched) else None
-    return {"number": job.number, "seed": seed, "score_m": score_m, "violates": any(touched),
+    return {"number": job.case.number, "seed": job.seed, "score_m": score_m, "violates": any(touched),
             "passed": record["passed"], "faults": record["faults"], "drawn": drawn}
 
 
-def key_of(job: Job) -> Key:
-    """Return what a voyage is known by: a search and its number say what was drawn."""
-    return {"search": job.search, "scenario": load_scenario(job.scenario).name, "hash": file_hash(job.scenario),
-            "number": job.number}
+def generation(name: str, jobs: Sequence[Job[SearchCase]]) -> Experiment[SearchCase]:
+    """Return a generation of the search that is called so: it and a voyage's number say what was drawn."""
+    return Experiment(
+        name="search", jobs=jobs, sail=sail, is_failed=lambda record: record["violates"],
+        key=lambda job: {"search": name, "scenario": load_scenario(job.scenario).name,
+                         "hash": file_hash(job.scenario), "number": job.case.number})
 
 
 def run_search(
     *, what: What, scenario: Path, runs: int, each: int, first_seed: int, is_blind: bool, found: Path,
-    means: CampaignOptions,
+    options: CampaignOptions,
 ) -> int:
     """Search until a voyage touches or ``runs`` are sailed; say how, and leave the scenario. Return the exit code."""
     name = f"{what} {'blind' if is_blind else 'splitting'} {each} {first_seed}"
     search = Splitting(random.Random(f"search {name}"), each=each, is_blind=is_blind)
     sailed = 0
     while sailed < runs:
-        jobs = [Job(what=what, scenario=scenario, point=point, search=name, number=sailed + n)
+        jobs = [Job(scenario=scenario, seed=point.seed, case=SearchCase(what=what, point=point, number=sailed + n))
                 for n, point in enumerate(search.ask())]
-        there = run_jobs(CAMPAIGN, sail_point, jobs, means, key=key_of, is_failed=lambda record: record["violates"])
+        there = generation(name, jobs).results(options)
         if there.lost:
             return there.exit_code(is_good=False)
         sailed += len(jobs)
@@ -192,7 +191,7 @@ def run_search(
               f"{search.chance:.2g}), nearest of this generation {nearest:.1f} m", flush=True)
         bad = [record for record in there.records if record["violates"] or record["faults"]]
         for record in bad:
-            path = _left(jobs[record["number"] - jobs[0].number], found)
+            path = _left(jobs[record["number"] - jobs[0].case.number], found)
             print(f"FOUND after {record['number'] + 1} voyages: {'; '.join(record['faults'])} "
                   f"({', '.join(record['drawn'])}); again: sitl run {path} --seed {record['seed']}", flush=True)
         if any(record["violates"] for record in bad):
@@ -201,10 +200,10 @@ def run_search(
     return 0
 
 
-def _left(job: Job, folder: Path) -> Path:
+def _left(job: Job[SearchCase], folder: Path) -> Path:
     """Write the scenario of a job into a folder; return its file."""
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{job.what}-{job.number}-{job.point.seed}.toml"
+    path = folder / f"{job.case.what}-{job.case.number}-{job.seed}.toml"
     drawn = drawn_of(job)
     mission = os.path.relpath(drawn.mission_path(job.scenario), folder.resolve())
     Disk().replace(path, scenario_text(msgspec.structs.replace(drawn, mission=mission)).encode())

@@ -6,21 +6,16 @@ Each voyage is sailed on the embedded autopilot under the virtual clock and its 
 
 from __future__ import annotations
 
-import json
 import math
 import statistics
-import tempfile
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from sitl.options import CampaignOptions
-from sitl.runner import Key, file_hash, run_jobs
+from sitl.runner import CampaignResults, Experiment, Job, Key, Summary, file_hash
 
-CAMPAIGN = "shown"
 EVERY_S = 2.0
 AHEAD_S = (10, 30, 60, 120)          # the places that are scored
 LEFT_S = (0.0, 30.0, 60.0, 120.0, 300.0, math.inf)   # classes of what is left until the goal
@@ -36,37 +31,21 @@ SCENARIOS = tuple(HERE / f"{name}.toml" for name in (
     "figures/beat-500"))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One voyage: of a scenario, or, where that is None, of a boat and water that are not the plan's."""
-
-    scenario: Path | None
-    seed: int
-
-
-def key_of(job: Job) -> Key:
-    """Return what a voyage is known by."""
-    if job.scenario is None:
-        return {"scenario": "mismatch", "seed": job.seed}
-    return {"scenario": job.scenario.stem, "hash": file_hash(job.scenario), "seed": job.seed}
-
-
-def sail_one(job: Job) -> dict[str, Any]:
-    """Sail a job; return what was shown beside what came."""
+def sail(job: Job[bool]) -> dict[str, Any]:
+    """Sail a job, in the case True with what ``sitl mismatch`` draws; return what was shown beside what came."""
     from companion.clock import run_virtual
     from sitl.campaigns.mismatch_sampling import draw
     from sitl.run.embedded import run_embedded
     from sitl.scenario import load_scenario
 
-    name = "mismatch" if job.scenario is None else job.scenario.stem
-    with tempfile.TemporaryDirectory(prefix="shown-") as scratch:
-        folder = Path(scratch) / "voyage"
-        if job.scenario is None:
-            drawn = draw(job.seed)
-            run_virtual(run_embedded(drawn.scenario, drawn.source, job.seed, folder))
-        else:
-            run_virtual(run_embedded(load_scenario(job.scenario), job.scenario, job.seed, folder))
-        return {"scenario": name, "seed": job.seed, **scored(folder)}
+    scenario = draw(job.seed).scenario if job.case else load_scenario(job.scenario)
+    with job.folder() as folder:
+        run_virtual(run_embedded(scenario, job.scenario, job.seed, folder))
+        return {"scenario": _name(job), "seed": job.seed, **scored(folder)}
+
+
+def _name(job: Job[bool]) -> str:
+    return "mismatch" if job.case else job.scenario.stem
 
 
 def scored(folder: Path) -> dict[str, Any]:
@@ -208,24 +187,23 @@ def told(rows: Sequence[dict[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def run_shown(
-    scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: bool, means: CampaignOptions,
-    json_path: Path | None,
-) -> int:
-    """Sail what has no result yet, and print the table of each kind of voyage and of all; return the exit code."""
-    from sitl.run.compiled import compile_ahead
+def shown(scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: bool) -> Experiment[bool]:
+    """Return the voyages of each scenario, or of what ``sitl mismatch`` draws; a table of each kind and of all."""
+    from sitl.campaigns.mismatch_sampling import draw
 
-    compile_ahead("auto")
-    paths: Sequence[Path | None] = [None] if mismatch else scenarios or SCENARIOS
-    jobs = [Job(scenario=path, seed=seed) for path in paths for seed in range(first_seed, first_seed + seeds)]
-    sailed = run_jobs(CAMPAIGN, sail_one, jobs, means, key=key_of)
-    names = list(dict.fromkeys(record["scenario"] for record in sailed.records))
-    tables = {name: table_of([r for r in sailed.records if r["scenario"] == name]) for name in names}
-    if len(names) > 1:
-        tables["all"] = table_of(sailed.records)
-    for name, rows in tables.items():
-        print(f"{name}\n{told(rows)}\n")
-    print(sailed.took)
-    if json_path is not None:
-        json_path.write_text(json.dumps(tables, indent=1) + "\n", encoding="utf-8")
-    return sailed.exit_code(is_good=True)
+    def sum_up(sailed: CampaignResults) -> Summary:
+        names = list(dict.fromkeys(record["scenario"] for record in sailed.records))
+        tables = {name: table_of([r for r in sailed.records if r["scenario"] == name]) for name in names}
+        if len(names) > 1:
+            tables["all"] = table_of(sailed.records)
+        return Summary(lines=[*(f"{name}\n{told(rows)}\n" for name, rows in tables.items()), sailed.took],
+                       figures=tables)
+
+    def key(job: Job[bool]) -> Key:
+        water = {} if job.case else {"hash": file_hash(job.scenario)}
+        return {"scenario": _name(job), **water, "seed": job.seed}
+
+    every = range(first_seed, first_seed + seeds)
+    jobs = [Job(scenario=draw(seed).source, case=True, seed=seed) for seed in every] if mismatch else [
+        Job(scenario=path, case=False, seed=seed) for path in scenarios or SCENARIOS for seed in every]
+    return Experiment(name="shown", sail=sail, key=key, sum_up=sum_up, jobs=jobs)

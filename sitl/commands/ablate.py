@@ -32,8 +32,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.ablation import SCENARIOS, VARIATIONS, run_ablation
+    from sitl.campaigns.ablation import SCENARIOS, VARIATIONS, ablation
+    from sitl.run.compiled import compile_ahead
 
-    return run_ablation(
-        args.scenarios or SCENARIOS, names=args.only or tuple(VARIATIONS), runs=args.runs, first_seed=args.first_seed,
-        means=options_of(args))
+    experiment = ablation(args.scenarios or SCENARIOS, names=args.only or tuple(VARIATIONS), runs=args.runs,
+                          first_seed=args.first_seed)
+    drawn = {job.case for job in experiment.jobs}
+    for planner in ("auto", *(name for name in ("rrtstar", "astar") if name in drawn)):
+        compile_ahead(planner)
+    return experiment.run(options_of(args))

@@ -59,14 +59,13 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.baselines import SCENARIOS, run_baselines
+    from sitl.campaigns.baselines import SCENARIOS, baselines, jobs_of
     from sitl.run.compiled import compile_ahead
     from sitl.scenario import load_scenario
 
     for path in args.scenarios or ():
         load_scenario(path)
     compile_ahead()
-    return run_baselines(
-        who=args.who, scenarios=args.scenarios or SCENARIOS, seeds=args.seeds, means=options_of(args),
-        speedup=args.speedup, winds=args.winds, against=args.against,
-    )
+    options = options_of(args)
+    jobs = jobs_of(args.who, args.scenarios or SCENARIOS, args.seeds, args.speedup, args.winds)
+    return baselines(jobs, results=options.file, against=args.against).run(options)

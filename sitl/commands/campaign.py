@@ -33,9 +33,11 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.campaign import run_campaign
+    from sitl.campaigns.campaign import campaign
+    from sitl.run.compiled import compile_ahead
 
-    return run_campaign(
-        args.scenarios, runs=args.runs, first_seed=args.first_seed, means=options_of(args), json_path=args.json,
-        keep=args.keep, methods=methods_of(args.guidance, args.planner),
-    )
+    methods = methods_of(args.guidance, args.planner)
+    experiment = campaign(args.scenarios, runs=args.runs, first_seed=args.first_seed, keep=args.keep, methods=methods)
+    for planner in dict.fromkeys(method.planner or "auto" for method in methods):
+        compile_ahead(planner)
+    return experiment.run(options_of(args), args.json)

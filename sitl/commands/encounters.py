@@ -35,16 +35,14 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.encounters import Job, run_encounters, sail_encounter
+    from sitl.campaigns.encounters import encounters, job_of, sail
     from sitl.run.compiled import compile_ahead
+    from sitl.runner import sail_kept
 
     compile_ahead()
     kinds = KINDS if args.kind is None else (args.kind,)
     policies: tuple[Policy, ...] = POLICIES if args.policy == "both" else (args.policy,)
     if args.keep is not None:
-        record = sail_encounter(Job(kind=kinds[0], policy=policies[0], seed=args.first_seed, keep=args.keep))
-        for key, value in record.items():
-            print(f"{key}: {value}")
-        return 0 if record["passed"] else 1
-    return run_encounters(runs=args.runs, kinds=kinds, policies=policies, first_seed=args.first_seed,
-                          means=options_of(args), json_path=args.json)
+        return sail_kept(sail, job_of(kinds[0], policies[0], args.first_seed, args.keep))
+    experiment = encounters(runs=args.runs, kinds=kinds, policies=policies, first_seed=args.first_seed)
+    return experiment.run(options_of(args), args.json)

@@ -50,16 +50,14 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.faults import SAILORS, run_faults
+    from sitl.campaigns.faults import FaultCase, faults, job_of, sail
+    from sitl.runner import sail_kept
 
     beside = [what for what in args.draw if what in BESIDE]
     if beside and args.trouble != "all":
         raise InputError("--draw", beside[0], f"is not drawn with --{args.trouble}", "leave out one of them")
     compile_planners(args.draw)
+    case = FaultCase(trouble=args.trouble, draws=args.draw)
     if args.keep is not None:
-        record = SAILORS[args.trouble](args.first_seed, keep=args.keep, draws=args.draw)
-        for key, value in record.items():
-            print(f"{key}: {value}")
-        return 0 if record["passed"] else 1
-    return run_faults(runs=args.runs, first_seed=args.first_seed, means=options_of(args), json_path=args.json,
-                      trouble=args.trouble, draws=args.draw)
+        return sail_kept(sail, job_of(args.first_seed, case, args.keep))
+    return faults(case, runs=args.runs, first_seed=args.first_seed).run(options_of(args), args.json)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import Any
 
 from companion.errors import InputError
@@ -41,19 +40,16 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.mismatch import Job, run_mismatch, sail_one
+    from sitl.campaigns.mismatch import MismatchCase, job_of, mismatch, sail
     from sitl.campaigns.mismatch_sampling import KINDS
+    from sitl.runner import sail_kept
 
     compile_planners(args.draw)
     only = () if args.as_planned else None if args.only is None else tuple(args.only)
     alien = next((kind for kind in only or () if kind not in KINDS), None)
     if alien is not None:
         raise InputError("--only", alien, "is not drawn", f"name one of: {', '.join(KINDS)}")
+    case = MismatchCase(planned=args.planned, only=only, draws=args.draw)
     if args.keep is not None:
-        record = sail_one(Job(seed=args.first_seed, planned=args.planned, only=only, keep=args.keep,
-                              draws=args.draw))
-        for key, value in record.items():
-            print(f"{key}: {json.dumps(value)}")
-        return 0 if record["passed"] else 1
-    return run_mismatch(runs=args.runs, first_seed=args.first_seed, means=options_of(args), planned=args.planned,
-                        only=only, json_path=args.json, draws=args.draw)
+        return sail_kept(sail, job_of(args.first_seed, case, args.keep))
+    return mismatch(case, runs=args.runs, first_seed=args.first_seed).run(options_of(args), args.json)

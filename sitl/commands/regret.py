@@ -39,13 +39,17 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.baselines import SCENARIOS
-    from sitl.campaigns.regret import require_judged, run_regret
+    from sitl.campaigns.baselines import SCENARIOS, jobs_of
+    from sitl.campaigns.regret import draw_regret, regret, require_judged
     from sitl.run.compiled import compile_ahead
 
     scenarios = args.scenarios or SCENARIOS
     for path in scenarios:
         require_judged(path)
     compile_ahead()
-    return run_regret(who=args.who, scenarios=scenarios, seeds=args.seeds, means=options_of(args), speedup=args.speedup,
-                      json_path=args.json, plot=args.plot, winds=args.winds, against=args.against)
+    jobs = jobs_of(args.who, scenarios, args.seeds, args.speedup, args.winds)
+    code = regret(jobs, against=args.against).run(options_of(args), args.json)
+    if args.plot is not None:
+        draw_regret(jobs_of(args.who, scenarios[:1], 1, args.speedup, args.winds and args.winds[:1]), args.plot)
+        print(f"drawn in {args.plot}")
+    return code

@@ -48,4 +48,4 @@ def run(args: argparse.Namespace) -> int:
     compile_ahead()
     scenario = BASE if args.what == "faults" else args.water or NARROW
     return run_search(what=args.what, scenario=scenario, runs=args.runs, each=args.each, first_seed=args.first_seed,
-                      is_blind=args.blind, found=args.found, means=options_of(args))
+                      is_blind=args.blind, found=args.found, options=options_of(args))

@@ -35,7 +35,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.campaigns.shown import run_shown
+    from sitl.campaigns.shown import shown
+    from sitl.run.compiled import compile_ahead
 
-    return run_shown(args.scenarios, seeds=args.seeds, first_seed=args.first_seed, mismatch=args.mismatch,
-                     means=options_of(args), json_path=args.json)
+    compile_ahead("auto")
+    experiment = shown(args.scenarios, seeds=args.seeds, first_seed=args.first_seed, mismatch=args.mismatch)
+    return experiment.run(options_of(args), args.json)

@@ -20,13 +20,12 @@ from companion.program import control
 from companion.program.commands import missing
 from companion.words import counted
 from sitl.options import CampaignOptions
-from sitl.rehearse.changes import CAMPAIGN, MissionChange, Tried, tried
+from sitl.rehearse.changes import MissionChange, Tried, tried
 from sitl.rehearse.estimates import Estimates, estimates_of, share_of, told, why_bad
 from sitl.rehearse.prepared import PreparedRehearsal
 from sitl.rehearse.report import FIGURES, PAGE, PICTURE, RESULTS, WORST, RehearsalOutcome, page_of
-from sitl.rehearse.voyage import Job, key_of, sail_one
-from sitl.runner import CampaignResults, run_jobs
-from sitl.runner.campaign import Watch
+from sitl.rehearse.voyage import RehearsalCase, rehearsal, sail
+from sitl.runner import CampaignResults, Job
 
 MOST_WORST = 3
 CHANCES_SHARE = 0.6   # of the minutes, where changes are tried in the rest
@@ -105,14 +104,14 @@ def rehearse(
     means: CampaignOptions, json_path: Path | None,
 ) -> int:
     """Sail, tell and write; return the exit code."""
-    jobs = [Job(scenario=made.source, seed=seed, doubts=made.doubts) for seed in range(limits.runs)]
+    jobs = [Job(scenario=made.source, seed=seed, case=RehearsalCase(doubts=made.doubts)) for seed in range(limits.runs)]
     page = _GrowingPage(made, folder)
     follower = Follower(limits, share=CHANCES_SHARE if changes and pairs else 1.0,
                         on_known=lambda known: page.fill(RehearsalOutcome(known=known, ends="more to come")))
     if means.array[1] > 1:
         return _part(jobs, changes, pairs, means)
     try:
-        sailed = _sailed(jobs, means, follower)
+        sailed = rehearsal(jobs).results(means, watch=follower)
     except KeyboardInterrupt:
         sys.stdout.write("\n" + "\n".join(told(follower.known)) + "\nended by hand: the same command goes on\n")
         raise
@@ -134,8 +133,7 @@ def rehearse(
             return "", limits.left_s() <= voyage_s   # of the worst, once again
 
         # seed by seed: when the time is over, all changes have been tried alike
-        others = [replace(job, change=change) for job in jobs[:count] for change in changes]
-        again = _sailed(others, means, is_time)
+        again = rehearsal(changed(jobs[:count], changes)).results(means, watch=is_time)
         code |= again.exit_code(is_good=True)
         found = so_far(again.records)
     outcome = RehearsalOutcome(known=follower.known, ends=follower.ends or "not as sure as was asked for",
@@ -144,15 +142,18 @@ def rehearse(
     return code | _written(outcome, made, folder, json_path)
 
 
-def _sailed(jobs: Sequence[Job], means: CampaignOptions, follower: Watch | None) -> CampaignResults:
-    return run_jobs(CAMPAIGN, sail_one, jobs, means, key=key_of, watch=follower,
-                    is_failed=lambda record: "error" in record)
+def changed(
+    jobs: Sequence[Job[RehearsalCase]], changes: Sequence[MissionChange],
+) -> list[Job[RehearsalCase]]:
+    """Return each job with each change, seed by seed."""
+    return [replace(job, case=replace(job.case, change=change)) for job in jobs for change in changes]
 
 
-def _part(jobs: Sequence[Job], changes: Sequence[MissionChange], pairs: int, means: CampaignOptions) -> int:
+def _part(
+    jobs: Sequence[Job[RehearsalCase]], changes: Sequence[MissionChange], pairs: int, means: CampaignOptions,
+) -> int:
     """Sail a part of all voyages; what is known is told when the parts are together."""
-    others = [replace(job, change=change) for change in changes for job in jobs[:pairs]]
-    sailed = _sailed([*jobs, *others], means, None)
+    sailed = rehearsal([*jobs, *changed(jobs[:pairs], changes)]).results(means)
     number, of = means.array
     sys.stdout.write(f"{sailed.took}\npart {number} of {of}, in {means.file}; when all are sailed: sitl results join "
                      f"{means.out.with_name(f'results.*-of-{of}.jsonl') if means.out else ''} --out {means.out}, and "
@@ -161,7 +162,7 @@ def _part(jobs: Sequence[Job], changes: Sequence[MissionChange], pairs: int, mea
 
 
 def _worst(
-    known: Estimates, jobs: Sequence[Job], folder: Path, limits: Limits, voyage_s: float,
+    known: Estimates, jobs: Sequence[Job[RehearsalCase]], folder: Path, limits: Limits, voyage_s: float,
 ) -> tuple[tuple[dict[str, Any], Path | None], ...]:
     """Sail the worst voyages again, while there is time, and keep their folders; a seed repeats to the last bit."""
     found: list[tuple[dict[str, Any], Path | None]] = []
@@ -177,7 +178,7 @@ def _worst(
         kept: Path | None = place
         try:
             place.parent.mkdir(parents=True, exist_ok=True)
-            again = json.loads(json.dumps(sail_one(replace(jobs[record["seed"]], keep=place))))
+            again = json.loads(json.dumps(sail(replace(jobs[record["seed"]], keep=place))))
             if again != record:
                 sys.stderr.write(f"\nseed {record['seed']} is another voyage here: was it sailed by another kind of "
                                  "processor?\n")

@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from bisect import bisect_right
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,9 +20,9 @@ from companion.geo.frame import LocalFrame
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.skipper.step import Announce
 from sitl.autopilot import Autopilot, MemoryLink
-from sitl.rehearse.changes import MissionChange
+from sitl.rehearse.changes import CAMPAIGN, MissionChange
 from sitl.rehearse.sampling import Doubts, drawn
-from sitl.runner import Key, file_hash
+from sitl.runner import Experiment, Job, Key, file_hash
 from sitl.scenario import HullTrack
 
 TRACK_M = 1.0      # by how much a kept track may be off the true one
@@ -31,14 +32,16 @@ FIGURES = ("arrived", "contacts", "time_s", "distance_m", "tacks", "gybes", "min
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One voyage: of a scenario's file, with a seed, perhaps with something changed; its folder left in ``keep``."""
+class RehearsalCase:
+    """What may be unlike the plan, and perhaps something changed."""
 
-    scenario: Path
-    seed: int
     doubts: Doubts
     change: MissionChange | None = None
-    keep: Path | None = None
+
+    @property
+    def told(self) -> str:
+        """Return the change in words; "": none."""
+        return "" if self.change is None else self.change.told
 
 
 @dataclass(slots=True)
@@ -83,8 +86,8 @@ class Trace:
         return [round(x, 1) for x in self.en_m[index]]
 
 
-def sail_one(job: Job) -> dict[str, Any]:
-    """Sail a voyage; return what came of it. Runs in a worker process."""
+def sail(job: Job[RehearsalCase]) -> dict[str, Any]:
+    """Sail a voyage; return what came of it."""
     from companion.clock import run_virtual
     from companion.compose import boat_of
     from sitl.run.embedded import mission_of, run_embedded, solid_of
@@ -92,10 +95,11 @@ def sail_one(job: Job) -> dict[str, Any]:
 
     base = load_scenario(job.scenario)
     mission = mission_of(base, job.scenario)
-    scenario, kinds = drawn(job.seed, base, mission, job.doubts)
+    scenario, kinds = drawn(job.seed, base, mission, job.case.doubts)
     variation = None
-    if job.change is not None:
-        scenario, variation = job.change.scenario(scenario), job.change.variation
+    change = job.case.change
+    if change is not None:
+        scenario, variation = change.scenario(scenario), change.variation
     trace = Trace(mission.frame())
     announced: list[tuple[float, str, Severity]] = []
 
@@ -104,7 +108,7 @@ def sail_one(job: Job) -> dict[str, Any]:
                          if isinstance(action, Announce))
 
     record: dict[str, Any] = {
-        "seed": job.seed, "change": "" if job.change is None else job.change.told, "kinds": list(kinds),
+        "seed": job.seed, "change": job.case.told, "kinds": list(kinds),
         "wind_from_deg": scenario.wind.from_deg, "tws_mps": scenario.wind.tws_mps, "wind_from_s": scenario.wind.from_s,
         "faults": sorted({event.kind for event in scenario.events})}
     with tempfile.TemporaryDirectory(prefix="rehearse-") as scratch:
@@ -129,11 +133,15 @@ def sail_one(job: Job) -> dict[str, Any]:
                      if severity <= Severity.WARNING and (place := trace.at(t_s - UNDER_WAY_S)) is not None]}
 
 
-def key_of(job: Job) -> Key:
+def rehearsal(jobs: Sequence[Job[RehearsalCase]]) -> Experiment[RehearsalCase]:
+    """Return voyages of a rehearsal."""
+    return Experiment(name=CAMPAIGN, jobs=jobs, sail=sail, key=key_of, is_failed=lambda record: "error" in record)
+
+
+def key_of(job: Job[RehearsalCase]) -> Key:
     """Return what a voyage is known by."""
     from sitl.scenario import load_scenario
 
-    doubts = job.doubts
+    doubts = job.case.doubts
     return {"mission": load_scenario(job.scenario).name, "hash": file_hash(job.scenario), "wind": doubts.wind.told,
-            "doubt": doubts.boat, "faults": doubts.faults, "change": "" if job.change is None else job.change.told,
-            "seed": job.seed}
+            "doubt": doubts.boat, "faults": doubts.faults, "change": job.case.told, "seed": job.seed}

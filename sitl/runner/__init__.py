@@ -1,8 +1,8 @@
 """The runner: seeded jobs over processes or a Dask cluster, and the file in which each result stays as it comes."""
 
-from sitl.runner.campaign import CampaignResults, run_jobs
 from sitl.runner.executors import WorkerDiedError, in_processes, settled
-from sitl.runner.job import ScenarioBundle, file_hash
+from sitl.runner.experiment import CampaignResults, Experiment, Summary, sail_kept
+from sitl.runner.job import Job, ScenarioBundle, file_hash
 from sitl.runner.result_store import (
     Key,
     MadeBy,
@@ -19,11 +19,14 @@ from sitl.runner.result_store import (
 
 __all__ = [
     "CampaignResults",
+    "Experiment",
+    "Job",
     "Key",
     "MadeBy",
     "ResultStore",
     "ScenarioBundle",
     "StoredResults",
+    "Summary",
     "Table",
     "WorkerDiedError",
     "file_hash",
@@ -32,7 +35,7 @@ __all__ = [
     "made_by",
     "read_results",
     "read_table",
-    "run_jobs",
+    "sail_kept",
     "settled",
     "table_of",
     "write_table",

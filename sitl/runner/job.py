@@ -7,6 +7,7 @@ one water from another whose files have the same names.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import hashlib
 import json
 import os
@@ -17,19 +18,55 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
 from companion.disk import Disk
 from companion.errors import InputError, JobError
-from sitl.runner.result_store import ROOTS, MadeBy, made_by, processor
+from sitl.runner.result_store import ROOTS, Key, KeyValue, MadeBy, made_by, processor
 
 SCENARIOS = ROOTS[1] / "scenarios"
-JobT = TypeVar("JobT")
+CaseT = TypeVar("CaseT")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job(Generic[CaseT]):
+    """One job of an experiment: a voyage of the scenario in a file, with a seed.
+
+    ``case`` is what the experiment varies beside them. The voyage's folder stays in ``keep``.
+    """
+
+    seed: int
+    case: CaseT
+    scenario: Path = Path()     # none where the case is all
+    keep: Path | None = None
+
+    @contextlib.contextmanager
+    def folder(self) -> Iterator[Path]:
+        """Give the voyage's folder: ``keep``, or one that goes with the block.
+
+        Raises:
+            InputError: there is something in ``keep``.
+        """
+        if self.keep is None:
+            with tempfile.TemporaryDirectory(prefix="voyage-") as scratch:
+                yield Path(scratch) / "voyage"
+            return
+        if self.keep.is_dir() and any(self.keep.iterdir()):
+            raise InputError("--keep", str(self.keep), "is not empty",
+                             "a voyage's folder is taken up where it was left")
+        yield self.keep
+
+    def key(self, **case: KeyValue) -> Key:
+        """Return what a job is known by among results, with what it has of its own in ``case``."""
+        from sitl.scenario import load_scenario
+
+        return {"scenario": load_scenario(self.scenario).name, "hash": file_hash(self.scenario), **case,
+                "seed": self.seed}
 
 
 def files_of(path: Path) -> dict[str, Path]:
@@ -128,16 +165,6 @@ def _here(cargo: ScenarioBundle) -> Path:
     return cargo.unpack(Path(folder))
 
 
-def localised(job: JobT, cargoes: Mapping[Path, ScenarioBundle]) -> JobT:
-    """Return a job with the paths of scenarios as they are on this machine."""
-    if not cargoes or not is_dataclass(job) or isinstance(job, type):
-        return job
-    values = {f.name: getattr(job, f.name) for f in fields(job)}
-    moved = {name: cargoes[value].here() for name, value in values.items()
-             if isinstance(value, Path) and value in cargoes}
-    return replace(job, **moved) if moved else job
-
-
 class UnfitError(JobError):
     """A worker that would give other results, or that does not keep voyages apart."""
 
@@ -152,12 +179,12 @@ class NoRoomError(JobError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """One job. ``by`` and ``cargoes`` are for a worker elsewhere."""
+    """One job. ``by`` and ``bundle``, its scenario, are for a worker elsewhere."""
 
-    work: Callable[[Any], Any]
-    job: Any
+    work: Callable[[Job[Any]], Any]
+    job: Job[Any]
     by: MadeBy | None = None
-    cargoes: Mapping[Path, ScenarioBundle] | None = None
+    bundle: ScenarioBundle | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,7 +208,8 @@ def perform(task: Task) -> Done:
     _require_room()
     began_s, worked_s = time.perf_counter(), time.process_time()
     try:
-        result = task.work(localised(task.job, task.cargoes or {}))
+        job = task.job if task.bundle is None else replace(task.job, scenario=task.bundle.here())
+        result = task.work(job)
     except Exception as error:
         _require_room()
         raise RaisedError(f"{type(error).__name__}: {error}") from None

@@ -113,7 +113,8 @@ def _commit() -> str:
 
 FORMAT = 1
 # What a job is known by: words and numbers.
-Key = Mapping[str, str | int | float | bool | None]
+KeyValue = str | int | float | bool | None
+Key = Mapping[str, KeyValue]
 
 
 def text_of(value: Any) -> str:

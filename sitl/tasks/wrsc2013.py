@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
-from sitl.options import CampaignOptions, add_options, options_of
-from sitl.runner import CampaignResults, run_jobs
+from sitl.options import add_options, options_of
+from sitl.runner import Experiment, Job
 from sitl.tasks.wrsc2013_skippers import HALF_M, FieldSkipper, PlanSkipper
 from sitl.world import LENGTH_M, SimulatedVaimos, habits_for, summary, wind_for
 
@@ -193,20 +193,21 @@ def run(seed: int, method: str = "field") -> Run:
                irons=skipper.irons, plans=skipper.plans, last_resort_s=skipper.last_resort_s)
 
 
-def _one(job: tuple[int, str]) -> dict[str, Any]:
-    seed, method = job
-    result = run(seed, method)
-    out = {**asdict(result.score), "method": method, "complete": result.score.complete, "irons": result.irons,
+def sail(job: Job[str]) -> dict[str, Any]:
+    """Sail a seed by the method of the case; return its score."""
+    result = run(job.seed, job.case)
+    out = {**asdict(result.score), "method": job.case, "complete": result.score.complete, "irons": result.irons,
            "plans": result.plans, "last_resort_s": result.last_resort_s,
            "tws_mps": round(result.course.tws_mps, 2), "intruder_mps": round(result.course.speed_mps, 2)}
     return {k: (round(v, 2) if isinstance(v, float) else v) for k, v in out.items()}
 
 
-def campaign(seeds: Iterable[int], methods: Iterable[str], means: CampaignOptions) -> CampaignResults:
-    """Sail each seed by each method."""
-    jobs = [(seed, method) for method in methods for seed in seeds]
-    return run_jobs("wrsc2013", _one, jobs, means, is_failed=lambda row: not row["complete"],
-                key=lambda job: {"scenario": "wrsc2013", "method": job[1], "seed": job[0]})
+def wrsc2013(seeds: Iterable[int], methods: Iterable[str]) -> Experiment[str]:
+    """Return each seed by each method."""
+    return Experiment(
+        name="wrsc2013", sail=sail, jobs=[Job(seed=seed, case=method) for method in methods for seed in seeds],
+        key=lambda job: {"scenario": "wrsc2013", "method": job.case, "seed": job.seed},
+        is_failed=lambda row: not row["complete"])
 
 
 def table(rows: list[dict[str, Any]], method: str) -> dict[str, Any]:
@@ -239,7 +240,7 @@ def main(argv: list[str] | None = None) -> int:
     add_options(parser)
     args = parser.parse_args(argv)
     methods = METHODS if args.method == "all" else (args.method,)
-    sailed = campaign(range(args.first, args.first + args.runs), methods, options_of(args))
+    sailed = wrsc2013(range(args.first, args.first + args.runs), methods).results(options_of(args))
     lines, tables = sailed.records, []
     for method in methods:
         rows = [row for row in lines if row["method"] == method]

@@ -19,7 +19,7 @@ from sitl.options import CampaignOptions
 from sitl.scenario.verdict import sailbot_points, station_score
 from sitl.tasks.guided import run_station, run_wrsc
 from sitl.tasks.station import run as keep_station
-from sitl.tasks.wrsc2013 import campaign, draw, run, score, table
+from sitl.tasks.wrsc2013 import draw, run, score, table, wrsc2013
 from sitl.tasks.wrsc2013_skippers import HALF_M
 
 EARLY = (66, 154)
@@ -92,7 +92,7 @@ def test_a_run_repeats_bit_for_bit() -> None:
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("method", ["field", "plan"])
 def test_five_hundred_seeds(method: str) -> None:
-    t = table(campaign(range(500), [method], CampaignOptions(workers=2)).records, method)
+    t = table(wrsc2013(range(500), [method]).results(CampaignOptions(workers=2)).records, method)
     assert t["share_complete"] >= 0.99
     assert t["least_m"] >= 5.0
 

@@ -12,8 +12,8 @@ from companion.errors import InputError, JobError
 from sitl import cli
 from sitl.options import CampaignOptions
 from sitl.results import LEVEL, compare, told, told_table
-from sitl.runner import ResultStore, Table, made_by, read_results, read_table, run_jobs, write_table
-from tests.sitl.runner.jobs import Job, key_of, work
+from sitl.runner import ResultStore, Table, made_by, read_results, read_table, write_table
+from tests.sitl.runner.jobs import jobs_in, quick
 
 
 def row(seed, time_s=300.0, *, scenario="demo", water="abc", **more):
@@ -119,9 +119,9 @@ def test_a_change_lies_in_its_interval_and_turns_with_the_tables(times):
 @pytest.fixture
 def ledger(tmp_path):
     (tmp_path / "attempts").mkdir()
-    jobs = [Job(seed=n, folder=tmp_path / "attempts") for n in range(5)]
+    jobs = jobs_in(tmp_path / "attempts", range(5))
     out = tmp_path / "r.jsonl"
-    run_jobs("quick", work, jobs, CampaignOptions(workers=1, out=out, table=tmp_path / "r.parquet"), key=key_of)
+    quick(jobs).results(CampaignOptions(workers=1, out=out, table=tmp_path / "r.parquet"))
     return out
 
 
@@ -154,11 +154,11 @@ def test_values_of_several_kinds_are_kept(tmp_path):
 
 
 def test_parts_are_joined_to_the_file_of_the_whole(tmp_path, ledger, capsys):
-    jobs = [Job(seed=n, folder=tmp_path / "attempts") for n in range(5)]
+    jobs = jobs_in(tmp_path / "attempts", range(5))
     parts = []
     for number in (1, 2):
         means = CampaignOptions(workers=1, out=tmp_path / "p.jsonl", array=(number, 2))
-        run_jobs("quick", work, jobs, means, key=key_of)
+        quick(jobs).results(means)
         parts.append(str(means.file))
     assert cli.main(["results", "join", *parts, "--out", str(tmp_path / "whole.jsonl")]) == 0
     assert (tmp_path / "whole.jsonl").read_bytes() == ledger.read_bytes()

@@ -4,9 +4,8 @@ from collections import Counter
 
 import pytest
 
-from sitl.campaigns.encounters import KINDS, POLICIES, Job, draw, key_of, row, run_encounters, sail_encounter
+from sitl.campaigns.encounters import KINDS, POLICIES, draw, encounters, job_of, row, sail
 from sitl.options import CampaignOptions
-from sitl.runner import run_jobs
 
 EXPLAINED = {("sailing", "rules"): {72, 85}}   # docs/reference/traffic.md
 
@@ -34,7 +33,7 @@ def test_every_sort_of_vessel_watch_and_receiver_is_drawn(kind):
 
 @pytest.mark.parametrize(("kind", "seed"), [("crossing", 0), ("head-on", 0), ("overtaking", 0), ("sailing", 16)])
 def test_a_handful_is_sailed_by_the_rules(kind, seed):
-    record = sail_encounter(Job(kind=kind, policy="rules", seed=seed))
+    record = sail(job_of(kind, "rules", seed))
     assert record["passed"], record
 
 
@@ -42,7 +41,7 @@ def test_without_the_policy_the_distance_is_kept_and_nobody_is_stood_on_to():
     """A motor ship crosses and keeps her course."""
     seed = next(n for n in range(100) if (e := draw(n, "crossing", "rules").events[0]).craft == "power"
                 and e.manner == "keeps")
-    record = sail_encounter(Job(kind="crossing", policy="keep clear", seed=seed))
+    record = sail(job_of("crossing", "keep clear", seed))
     assert record["passed"], record
     assert record["met"]["duty"] == "we stand on"
     assert not record["met"]["kept_rules"]
@@ -52,7 +51,7 @@ def test_without_the_policy_the_distance_is_kept_and_nobody_is_stood_on_to():
 
 def test_the_table_names_what_failed_and_how_to_sail_it_again(capsys):
     """The autopilot passes no size on: a yacht is taken for a ship of 100 m, and we act early."""
-    assert run_encounters(runs=1, kinds=("sailing",), first_seed=85, means=CampaignOptions(workers=1)) == 1
+    assert encounters(runs=1, kinds=("sailing",), first_seed=85).run(CampaignOptions(workers=1)) == 1
     out = capsys.readouterr().out
     assert "FAILED sailing, rules, seed 85: did not stand on" in out
     assert "0 of 1 passed; rules kept 0, distance kept 1, touched 0" in out
@@ -63,7 +62,6 @@ def test_the_table_names_what_failed_and_how_to_sail_it_again(capsys):
 @pytest.mark.parametrize("policy", POLICIES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_hundred_of_each_kind(kind, policy):
-    jobs = [Job(kind=kind, policy=policy, seed=seed) for seed in range(100)]
-    records = run_jobs("encounters", sail_encounter, jobs, CampaignOptions(), key=key_of).records
+    records = encounters(runs=100, kinds=(kind,), policies=(policy,)).results(CampaignOptions()).records
     assert {r["seed"] for r in records if not r["passed"]} == EXPLAINED.get((kind, policy), set())
     assert all(r["met"]["kept_distance"] for r in records)

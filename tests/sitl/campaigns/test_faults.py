@@ -39,18 +39,23 @@ from sitl.campaigns.fault_sampling import (
     draw_jump,
     draw_turned_vane,
 )
-from sitl.campaigns.faults import BASE, jump_figures, run_faults, sail_faults, sail_seed
+from sitl.campaigns.faults import BASE, FaultCase, faults, job_of, jump_figures, sail, sail_faults
 from sitl.faults.spoofing import forgery_named
 from sitl.options import CampaignOptions
+from sitl.runner import Job
 from sitl.scenario.scenario import EventSpec, Outlet, load_scenario
 
 SEEDS = Path(__file__).parent / "seeds"
 ROCK = shapely.box(10.0, -5.0, 20.0, 5.0)
 
 
+def sailed(path, seed):
+    return sail_faults(load_scenario(path), Job(scenario=path, seed=seed, case=FaultCase()))
+
+
 def sail_kept(seed, again=0):
     """Sail what a seed drew; ``again`` with other noise, for what it shows is no matter of one."""
-    return sail_faults(load_scenario(SEEDS / f"{seed}.toml"), seed + again, SEEDS / f"{seed}.toml")
+    return sailed(SEEDS / f"{seed}.toml", seed + again)
 
 
 def test_a_seed_draws_the_same_faults_and_another_seed_others():
@@ -110,7 +115,7 @@ def test_a_vane_that_is_turned_far_is_a_false_wind_while_it_is():
 
 def test_a_voyage_whose_outlets_cannot_be_used_arrives_and_says_so(tmp_path):
     scenario = msgspec.structs.replace(load_scenario(BASE), broken=get_args(Outlet))
-    record = sail_faults(scenario, 1, BASE, tmp_path / "v")
+    record = sail_faults(scenario, job_of(1, keep=tmp_path / "v"))
     assert (record["passed"], record["arrived"], record["broken"]) == (True, True, list(get_args(Outlet)))
     records = read_jsonl(tmp_path / "v/decisions.jsonl")
     gone = {r["what"] for r in records if r["kind"] == "auxiliary" and r["gone"]}
@@ -174,7 +179,7 @@ def test_what_takes_long_is_rare_and_leaves_the_voyage_time(drawn):
 
 @pytest.mark.parametrize("seed", [17, 5])
 def test_a_voyage_with_faults_repeats_exactly(seed, tmp_path):
-    first, second = sail_seed(seed, keep=tmp_path / "a"), sail_seed(seed, keep=tmp_path / "b")
+    first, second = (sail(job_of(seed, keep=tmp_path / name)) for name in "ab")
     assert first == second
     assert first["passed"], first
     for name in ("telemetry.tlog", "track.csv"):
@@ -265,7 +270,7 @@ def test_what_comes_below_the_floor_in_ordinary_weather_fails(tmp_path):
     base = tmp_path / "s.toml"
     kept = (SEEDS / "9.toml").read_text()          # a gust, long after the rocks
     base.write_text(kept.replace("../../../../missions/rocks.toml", "rocks.toml"))
-    record = sail_faults(load_scenario(base), 9, base)
+    record = sailed(base, 9)
     assert record["weather_only"]
     assert not record["passed"]
     assert record["faults"] == [
@@ -444,4 +449,4 @@ def test_silence_counts_within_a_life_only(ghost):
 @pytest.mark.campaign
 @pytest.mark.timeout(3600)
 def test_a_thousand_voyages_with_faults(tmp_path):
-    assert run_faults(runs=1000, means=CampaignOptions(), json_path=tmp_path / "faults.json") == 0
+    assert faults(FaultCase(), runs=1000).run(CampaignOptions(), tmp_path / "faults.json") == 0

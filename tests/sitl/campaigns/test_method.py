@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 from sitl import cli
-from sitl.campaigns import campaign, mismatch
+from sitl.campaigns.campaign import campaign
 from sitl.campaigns.fault_sampling import draw
-from sitl.campaigns.faults import BASE, method_of, run_faults, sail_seed, told
-from sitl.options import CampaignOptions, add_draw, add_methods, methods_of
+from sitl.campaigns.faults import BASE, FaultCase, faults, job_of, method_of, sail, told
+from sitl.campaigns.mismatch import MismatchCase, mismatch
+from sitl.options import add_draw, add_methods, methods_of
 from sitl.run.embedded import mission_of
 from sitl.run.variation import DRAWABLE, GUIDANCES, PLANNERS, Method, Variation, can_be_sailed
 from sitl.scenario import load_scenario
@@ -22,27 +23,31 @@ def mission(name):
     return mission_of(load_scenario(path), path)
 
 
+def drawn_of(seed, scenario, draws=DRAWABLE):
+    return method_of(job_of(seed, FaultCase(draws=draws)), scenario)
+
+
 @pytest.fixture(scope="module")
 def methods():
     scenario = load_scenario(BASE)
-    return [method_of(seed, scenario, BASE, DRAWABLE) for seed in range(40)]
+    return [drawn_of(seed, scenario) for seed in range(40)]
 
 
 def test_each_guidance_with_each_planner_comes_and_a_seed_is_one_of_them(methods):
     assert {(m.guidance, m.planner) for m in methods} == {(g, p) for g in GUIDANCES for p in PLANNERS}
-    assert method_of(7, load_scenario(BASE), BASE, DRAWABLE) == methods[7]
+    assert drawn_of(7, load_scenario(BASE)) == methods[7]
 
 
 def test_what_is_not_asked_for_is_the_missions_own():
     scenario = load_scenario(BASE)
-    assert method_of(7, scenario, BASE, ()) == Method()
+    assert drawn_of(7, scenario, ()) == Method()
     assert Method().variation(mission("demo")) is None
-    assert method_of(7, scenario, BASE, ("planner",)).guidance is None
+    assert drawn_of(7, scenario, ("planner",)).guidance is None
 
 
 def test_who_may_not_steer_is_sailed_by_plan():
     drawn = next(s for s in (draw(seed, load_scenario(BASE)) for seed in range(100)) if not s.set_auto)
-    assert {method_of(seed, drawn, BASE, DRAWABLE).guidance for seed in range(20)} == {"plan"}
+    assert {drawn_of(seed, drawn).guidance for seed in range(20)} == {"plan"}
 
 
 def test_a_method_is_a_missions_keys_and_guided_is_permitted_for_it():
@@ -68,30 +73,24 @@ def test_what_a_mission_cannot_be_sailed_by_is_not_drawn():
 
 def test_a_faulty_voyage_is_the_same_but_for_what_is_drawn_of_the_boat(methods):
     seed = next(n for n, m in enumerate(methods) if m.guidance == "heading" and m.planner == "auto")
-    record, plain = sail_seed(seed, draws=DRAWABLE), draw(seed, load_scenario(BASE))
+    record, plain = sail(job_of(seed, FaultCase(draws=DRAWABLE))), draw(seed, load_scenario(BASE))
     assert record["method"] == "by heading, planner auto"
     assert record["events"] == [told(event) for event in plain.events]
     assert (record["parameters"], record["limit_s"]) == (plain.parameters, plain.limit_s)
     assert record["passed"], record
 
 
-def test_results_of_the_default_keep_their_keys(monkeypatch):
-    keys = []
+def test_results_of_the_default_keep_their_keys():
+    def key(experiment):
+        return experiment.key(experiment.jobs[0])
 
-    def noted(name, work, jobs, means, *, key, on_record):
-        keys.extend(key(job) for job in jobs)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("sitl.campaigns.faults.run_jobs", noted)
-    for draws in ((), DRAWABLE):
-        with pytest.raises(KeyboardInterrupt):
-            run_faults(runs=1, means=CampaignOptions(), draws=draws)
-    assert "draws" not in keys[0]
-    assert keys[1] == {**keys[0], "draws": "guidance, planner"}
-    assert "draws" not in mismatch.key_of(mismatch.Job(seed=3))
-    assert mismatch.key_of(mismatch.Job(seed=3, draws=DRAWABLE))["draws"] == "guidance, planner"
-    job = campaign.Job(scenario=HERE / "demo.toml", seed=0, keep=None)
-    assert set(campaign.key_of(job)) == {"scenario", "hash", "seed"}
+    plain, drawn = (key(faults(FaultCase(draws=draws), runs=1)) for draws in ((), DRAWABLE))
+    assert "draws" not in plain
+    assert drawn == {**plain, "draws": "guidance, planner"}
+    plain, drawn = (key(mismatch(MismatchCase(draws=draws), runs=1, first_seed=3)) for draws in ((), DRAWABLE))
+    assert "draws" not in plain
+    assert drawn == {**plain, "draws": "guidance, planner"}
+    assert set(key(campaign([HERE / "demo.toml"], runs=1))) == {"scenario", "hash", "seed"}
 
 
 def test_the_options():

@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 
 from sitl import cli
 from sitl.campaigns.mismatch import (
-    Job,
     SailedSpan,
     arrival_promised,
     bow_rad,
     chance_of_no_go,
     figures_of,
+    job_of,
     key_of,
     legs_promised,
     promised_s,
-    sail_one,
+    sail,
     share_interval,
     told,
 )
@@ -87,7 +87,7 @@ def test_a_kind_that_is_not_drawn_is_refused_and_the_others_are_named(capsys):
 
 
 def test_a_voyage_is_judged_kept_and_repeats(tmp_path, capsys):
-    records = [sail_one(Job(seed=ROCKS, keep=tmp_path / str(n))) for n in range(2)]
+    records = [sail(job_of(ROCKS, keep=tmp_path / str(n))) for n in range(2)]
     assert records[0] == records[1]
     assert records[0]["scenario"] == "rocks"
     assert records[0]["legs"]
@@ -134,7 +134,7 @@ def test_what_a_file_holds_is_not_sailed_again(tmp_path, capsys):
     out, figures = tmp_path / "v.jsonl", tmp_path / "v.json"
     with ResultStore(out, "mismatch") as ledger:
         for record in RECORDS[:3]:
-            ledger.add(json.dumps(key_of(Job(seed=record["seed"])), separators=(",", ":")), record, {})
+            ledger.add(json.dumps(key_of(job_of(record["seed"])), separators=(",", ":")), record, {})
     whole = out.read_bytes()
     out.write_bytes(whole + b'{"key":{"seed":9')
     argv = ["mismatch", "--runs", "3", "--out", str(out), "--json", str(figures), "--workers", "1"]

@@ -3,8 +3,9 @@
 import pytest
 
 from sitl import cli
-from sitl.campaigns.baselines import HERE, NAMES, Job, key_of, pairs, scenario_of
+from sitl.campaigns.baselines import HERE, NAMES, Sailor, key_of, pairs, scenario_of
 from sitl.commands.baselines import SAILORS
+from sitl.runner import Job
 from sitl.scenario import load_scenario
 
 BEAT = HERE / "figures" / "beat-500.toml"
@@ -13,6 +14,10 @@ BEAT = HERE / "figures" / "beat-500.toml"
 def record(who, seed, time_s, **more):
     return {"who": who, "scenario": "a", "seed": seed, "arrived": True, "contacts": 0, "time_s": time_s, "tacks": 3,
             **more}
+
+
+def job_of(who, wind=None):
+    return Job(scenario=BEAT, seed=0, case=Sailor(who=who, speedup=1.0, wind=wind))
 
 
 def test_the_command_knows_the_sailors_that_there_are():
@@ -38,10 +43,10 @@ def test_a_sailor_without_a_clean_pair_has_no_figures():
 
 
 def test_another_wind_is_another_scenario():
-    job = Job(who="shifts", scenario=BEAT, seed=0, speedup=1.0, wind=(18.6, 120.0))
+    job = job_of("shifts", (18.6, 120.0))
     wind = scenario_of(job).wind
     assert (wind.model, wind.sd_deg, wind.tau_s, wind.tws_mps) == ("ou", 18.6, 120.0, 5.0)
-    steady = scenario_of(Job(who="shifts", scenario=BEAT, seed=0, speedup=1.0, wind=(0.0, 60.0)))
+    steady = scenario_of(job_of("shifts", (0.0, 60.0)))
     assert steady.wind.model == "constant"
     assert len({scenario_of(job).name, steady.name, load_scenario(BEAT).name}) == 3
     assert key_of(job)["scenario"] == scenario_of(job).name
@@ -49,7 +54,7 @@ def test_another_wind_is_another_scenario():
 
 @pytest.mark.parametrize("who", NAMES)
 def test_who_does_not_tack_on_the_shifts_has_the_parameters_for_that(who):
-    corridor_m = scenario_of(Job(who=who, scenario=BEAT, seed=0, speedup=1.0)).parameters["SAIL_XTRACK_MAX"]
+    corridor_m = scenario_of(job_of(who)).parameters["SAIL_XTRACK_MAX"]
     assert (corridor_m == 30.0) == (who in {"no-shifts", "alone-embedded", "alone", "dijkstra"})
 
 

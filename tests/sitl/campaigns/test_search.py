@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from sitl import cli
 from sitl.campaigns import fault_sampling, mismatch_sampling, search
 from sitl.campaigns.faults import BASE
-from sitl.campaigns.search import LENGTH, NARROW, Job, Point, Splitting, Tape, blind, drawn_of, moved
+from sitl.campaigns.search import LENGTH, NARROW, Point, SearchCase, Splitting, Tape, blind, drawn_of, moved
+from sitl.runner import Experiment, Job
 from sitl.scenario import load_scenario
 
 
@@ -79,17 +80,17 @@ def test_the_chance_of_a_level_is_about_true():
 
 def test_what_is_found_is_left_as_a_scenario_that_repeats_it(tmp_path, monkeypatch, capsys):
     """Sailing is left out: the third voyage of the second generation touches."""
-    def sail(campaign, work, jobs, means, *, key, is_failed):
-        names = [key(job) for job in jobs]
-        assert len({name["number"] for name in names}) == len(jobs)
-        records = [{"number": job.number, "seed": job.point.seed, "score_m": 5.0 + job.number % 3, "drawn": ["gusts"],
-                    "violates": job.number == 6, "passed": True, "faults": ["contacts: 1"] if job.number == 6 else []}
-                   for job in jobs]
-        made.extend(jobs)
+    def results(experiment, options):
+        names = [experiment.key(job) for job in experiment.jobs]
+        assert len({name["number"] for name in names}) == len(names)
+        records = [{"number": n, "seed": job.seed, "score_m": 5.0 + n % 3, "drawn": ["gusts"],
+                    "violates": n == 6, "passed": True, "faults": ["contacts: 1"] if n == 6 else []}
+                   for n, job in enumerate(experiment.jobs, start=len(made))]
+        made.extend(experiment.jobs)
         return type("Sailed", (), {"records": records, "lost": []})
 
     made = []
-    monkeypatch.setattr(search, "run_jobs", sail)
+    monkeypatch.setattr(Experiment, "results", results)
     monkeypatch.chdir(tmp_path)
     assert cli.main(["search", "mismatch", "--each", "4", "--runs", "40"]) == 1
     out = capsys.readouterr().out
@@ -102,12 +103,12 @@ def test_what_is_found_is_left_as_a_scenario_that_repeats_it(tmp_path, monkeypat
 
 
 def test_a_voyage_that_is_excused_leads_nowhere(monkeypatch):
-    job = Job(what="faults", scenario=BASE, point=blind(random.Random(1)), search="s", number=0)
+    job = Job(scenario=BASE, seed=0, case=SearchCase(what="faults", point=blind(random.Random(1)), number=0))
     for excuse, score_m in (("operator", None), ("none", 0.0)):
         monkeypatch.setattr(search.faults, "sail_faults", lambda *_, e=excuse: {
             "contacts": [{"excuse": e}], "clearance_m": 0.0, "events": [], "passed": False, "faults": []})
         monkeypatch.setattr(search, "UNEXCUSED", "none")
-        assert search.sail_point(job)["score_m"] == score_m
+        assert search.sail(job)["score_m"] == score_m
 
 
 def test_a_water_is_of_mismatch(capsys):

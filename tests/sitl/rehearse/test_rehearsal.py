@@ -22,8 +22,8 @@ from sitl.rehearse.estimates import clock, estimates_of, told, why_bad
 from sitl.rehearse.picture import shares_of
 from sitl.rehearse.prepared import prepared
 from sitl.rehearse.rehearsal import Follower, Limits
-from sitl.rehearse.voyage import Job, key_of
-from sitl.runner import ScenarioBundle
+from sitl.rehearse.voyage import RehearsalCase, key_of
+from sitl.runner import Job, ScenarioBundle
 
 ROCKS = Path("missions/rocks.toml").resolve()
 
@@ -237,7 +237,7 @@ def test_on_another_machine_a_rehearsal_is_whole(sailed, monkeypatch):
     cargo = ScenarioBundle.of(made.source)
     assert sorted(Path(name).name for name, _ in cargo.packed) == ["day.csv", "rehearsal.toml", "rocks.toml",
                                                                   "rocks.wkt"]
-    job = Job(scenario=made.source, seed=3, doubts=made.doubts)
+    job = Job(scenario=made.source, seed=3, case=RehearsalCase(doubts=made.doubts))
     assert key_of(replace(job, scenario=cargo.here()))["hash"] == key_of(job)["hash"]
     assert made.tells_the_hour
 

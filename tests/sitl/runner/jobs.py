@@ -8,13 +8,22 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from sitl.runner import Experiment, Job
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    seed: int
+class Attempt:
     folder: Path                # every attempt leaves a line in it
     deadly: str = ""            # "once" or "always"
     work_s: float = 0.0
+
+
+def jobs_in(folder, seeds, **more):
+    return [Job(seed=n, case=Attempt(folder=folder, **more)) for n in seeds]
+
+
+def quick(jobs, sail=None, line=lambda _: None):
+    return Experiment(name="quick", jobs=jobs, sail=sail or work, key=key_of, line=line)
 
 
 def key_of(job):
@@ -22,12 +31,12 @@ def key_of(job):
 
 
 def work(job):
-    attempts = job.folder / f"{job.seed}"
+    attempts = job.case.folder / f"{job.seed}"
     with attempts.open("a") as file:
         file.write(f"{os.getpid()}\n")
-    if job.deadly == "always" or (job.deadly == "once" and len(attempts.read_text().splitlines()) == 1):
+    if job.case.deadly == "always" or (job.case.deadly == "once" and len(attempts.read_text().splitlines()) == 1):
         os.kill(os.getpid(), signal.SIGKILL)
-    time.sleep(job.work_s)
+    time.sleep(job.case.work_s)
     rng = random.Random(job.seed)
     return {"seed": job.seed, "passed": True, "figures": {"time_s": rng.gauss(300.0, 10.0), "track": (1, 2.5)}}
 

@@ -1,14 +1,12 @@
 """A scenario that goes to another machine: with every file that it names, found there, its content in its hash."""
 
 import shutil
-from dataclasses import dataclass
 
 import pytest
 
 from companion.errors import InputError, JobError
-from sitl.campaigns.campaign import Job
-from sitl.runner import ScenarioBundle, file_hash
-from sitl.runner.job import localised
+from sitl.runner import Job, ScenarioBundle, file_hash
+from sitl.runner.job import Task, perform
 from tests.sitl.runner.conftest import ROCKS
 
 
@@ -27,9 +25,9 @@ def test_what_a_user_made_is_packed_whole(own):
     assert {name for name, _ in packed.packed} == names
     assert len(names) > 2
     shutil.rmtree(own.parent)
-    job = localised(Job(scenario=own, seed=3, keep=None), {own: packed})
-    assert job.scenario != own
-    assert file_hash(job.scenario) == digest
+    done = perform(Task(work=where, job=Job(scenario=own, seed=3, case=None), bundle=packed))
+    assert done.result["scenario"] != str(own)
+    assert done.result["hash"] == digest
 
 
 def test_the_hash_is_of_the_content_and_of_every_file(own, tmp_path):
@@ -50,12 +48,9 @@ def test_a_file_that_only_this_machine_finds_is_told(own):
         ScenarioBundle.of(own)
 
 
-@dataclass(frozen=True)
-class Plain:
-    seed: int
+def where(job):
+    return {"scenario": str(job.scenario), "hash": file_hash(job.scenario)}
 
 
-def test_a_job_without_a_scenario_is_left_alone():
-    job = Plain(3)
-    assert localised(job, {ROCKS: ScenarioBundle.of(ROCKS)}) is job
-    assert localised(7, {ROCKS: ScenarioBundle.of(ROCKS)}) == 7
+def test_a_job_that_is_done_here_is_of_the_file_as_it_lies():
+    assert perform(Task(work=where, job=Job(scenario=ROCKS, seed=3, case=None))).result["scenario"] == str(ROCKS)

@@ -15,13 +15,11 @@ import pytest
 
 from companion.errors import JobError
 from sitl import cli
-from sitl.campaigns.campaign import Job as CampaignJob
-from sitl.campaigns.campaign import key_of as campaign_key
-from sitl.campaigns.campaign import sail_one
+from sitl.campaigns.campaign import campaign
 from sitl.options import CampaignOptions
-from sitl.runner import campaign, read_results, run_jobs
+from sitl.runner import Job, experiment, read_results
 from sitl.runner.executors import settled_on
-from tests.sitl.runner.jobs import Job, attempts, key_of, work
+from tests.sitl.runner.jobs import Attempt, attempts, jobs_in, quick, work
 
 ROOT = Path(__file__).parents[3]
 JOBS = 40
@@ -81,7 +79,8 @@ def patiently(check, timeout_s=60.0):
 
 def test_a_killed_worker_and_a_scheduler_that_is_started_again_lose_nothing(cluster, folder, tmp_path, capsys):
     """One job kills its worker, and in the middle of the run the whole cluster is killed and begun anew."""
-    jobs = [Job(seed=n, folder=folder, work_s=0.02, deadly="once" if n == 4 else "") for n in range(JOBS)]
+    jobs = [Job(seed=n, case=Attempt(folder=folder, work_s=0.02, deadly="once" if n == 4 else ""))
+            for n in range(JOBS)]
     seen, done = [], {}
 
     def on_record(record):
@@ -93,14 +92,13 @@ def test_a_killed_worker_and_a_scheduler_that_is_started_again_lose_nothing(clus
             cluster.begin()
 
     out = tmp_path / "far.jsonl"
-    far = run_jobs("quick", work, jobs, CampaignOptions(dask=cluster.address, out=out), key=key_of, on_record=on_record)
+    far = quick(jobs, line=on_record).results(CampaignOptions(dask=cluster.address, out=out))
     assert sorted(seen) == list(range(JOBS))
     assert (far.now, far.lost) == (JOBS, [])
     said = capsys.readouterr().err
     assert "the scheduler went; it is waited for" in said
     here = tmp_path / "here.jsonl"
-    jobs = [Job(seed=n, folder=folder) for n in range(JOBS)]
-    run_jobs("quick", work, jobs, CampaignOptions(workers=1, out=here), key=key_of)
+    quick(jobs_in(folder, range(JOBS))).results(CampaignOptions(workers=1, out=here))
     assert out.read_bytes() == here.read_bytes()
     before = [json.loads(line)["key"]["seed"] for line in (tmp_path / "far.facts.jsonl").read_text().splitlines()]
     assert before == seen
@@ -110,10 +108,9 @@ def test_a_killed_worker_and_a_scheduler_that_is_started_again_lose_nothing(clus
 def test_a_voyage_on_the_cluster_is_the_same_to_the_last_byte(cluster, own, tmp_path, monkeypatch):
     """A user's own scenario: the workers have none of its files."""
     monkeypatch.chdir(tmp_path)   # the folder of a voyage that failed is left here
-    jobs = [CampaignJob(scenario=own, seed=3, keep=None)]
     for name, address in (("far", cluster.address), ("here", None)):
-        means = CampaignOptions(workers=1, dask=address, out=tmp_path / f"{name}.jsonl")
-        sailed = run_jobs("campaign", sail_one, jobs, means, key=campaign_key)
+        sailed = campaign([own], runs=1, first_seed=3).results(
+            CampaignOptions(workers=1, dask=address, out=tmp_path / f"{name}.jsonl"))
         assert sailed.lost == []
     assert (tmp_path / "far.jsonl").read_bytes() == (tmp_path / "here.jsonl").read_bytes()
     assert "arrived" in (tmp_path / "far.jsonl").read_text()
@@ -131,7 +128,7 @@ def test_a_program_of_another_version_is_said_at_once(cluster, folder, tmp_path)
     stranger = cluster.worker("--name", "stranger", root=other)
     try:
         def run():
-            list(settled_on(cluster.address, work, {0: Job(seed=0, folder=folder)}, None, say=lambda _: None))
+            list(settled_on(cluster.address, work, dict(enumerate(jobs_in(folder, [0]))), None, say=lambda _: None))
 
         def is_told():
             try:
@@ -153,10 +150,11 @@ def test_a_program_of_another_version_is_said_at_once(cluster, folder, tmp_path)
 
 def test_a_worker_that_comes_later_is_asked_too(cluster, folder, monkeypatch):
     """By the task itself, which carries what it was made by."""
-    real = campaign.made_by()
-    monkeypatch.setattr(campaign, "made_by", lambda: type(real).from_dict({**real.to_dict(), "source": "of tomorrow"}))
+    real = experiment.made_by()
+    other = type(real).from_dict({**real.to_dict(), "source": "of tomorrow"})
+    monkeypatch.setattr(experiment, "made_by", lambda: other)
     with pytest.raises(JobError, match=r"a worker on .* runs another version \(its source is .* there and of tomorrow"):
-        run_jobs("quick", work, [Job(seed=0, folder=folder)], CampaignOptions(dask=cluster.address), key=key_of)
+        quick(jobs_in(folder, [0])).results(CampaignOptions(dask=cluster.address))
     assert attempts(folder) == {}
 
 

@@ -13,8 +13,8 @@ import pytest
 from companion.disk import Disk
 from companion.errors import InputError, JobError
 from sitl.options import CampaignOptions
-from sitl.runner import ResultStore, made_by, read_results, result_store, run_jobs
-from tests.sitl.runner.jobs import Job, attempts, key_of, raising, work
+from sitl.runner import ResultStore, made_by, read_results, result_store
+from tests.sitl.runner.jobs import attempts, jobs_in, quick, raising, work
 
 
 @pytest.fixture
@@ -23,12 +23,8 @@ def folder(tmp_path):
     return tmp_path / "attempts"
 
 
-def jobs_in(folder, seeds=range(6), **more):
-    return [Job(seed=n, folder=folder, **more) for n in seeds]
-
-
 def sailed(folder, out, seeds=range(6), do=work, **means):
-    return run_jobs("quick", do, jobs_in(folder, seeds), CampaignOptions(workers=1, out=out, **means), key=key_of)
+    return quick(jobs_in(folder, seeds), do).results(CampaignOptions(workers=1, out=out, **means))
 
 
 @pytest.mark.parametrize("cut", [1, 40, 200])
@@ -84,8 +80,7 @@ def test_a_run_ends_when_enough_is_known_and_goes_on_when_more_is_wanted(tmp_pat
         return watch
 
     for count in (2, 2, 5):
-        means = CampaignOptions(workers=1, out=out)
-        found = run_jobs("quick", work, jobs_in(folder), means, key=key_of, watch=until(count))
+        found = quick(jobs_in(folder, range(6))).results(CampaignOptions(workers=1, out=out), watch=until(count))
         assert [r["seed"] for r in found.records] == list(range(count))
     assert seen == [0, 1, 2, 2, 2, 3, 4, 5]
     assert (found.now, attempts(folder)) == (3, dict.fromkeys(range(5), 1))
@@ -96,8 +91,8 @@ def test_a_run_ends_when_enough_is_known_and_goes_on_when_more_is_wanted(tmp_pat
 def test_sigterm_ends_it_as_ctrl_c_does_and_leaves_nobody(tmp_path, folder, workers):
     out, before = tmp_path / "r.jsonl", signal.getsignal(signal.SIGTERM)
     with pytest.raises(KeyboardInterrupt):
-        run_jobs("quick", work, jobs_in(folder), CampaignOptions(workers=workers, out=out), key=key_of,
-             on_record=lambda _: os.kill(os.getpid(), signal.SIGTERM))
+        quick(jobs_in(folder, range(6)), line=lambda _: os.kill(os.getpid(), signal.SIGTERM)).results(
+            CampaignOptions(workers=workers, out=out))
     assert signal.getsignal(signal.SIGTERM) is before
     assert not multiprocessing.active_children()
     assert len(read_results(out).results) == 1

@@ -7,7 +7,7 @@ import pytest
 
 from companion.errors import InputError
 from sitl.runner import WorkerDiedError, in_processes, settled
-from tests.sitl.runner.jobs import Job, attempts, leaving, raising, work
+from tests.sitl.runner.jobs import Attempt, Job, attempts, jobs_in, leaving, raising, work
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def folder(tmp_path):
 
 def test_a_process_that_is_killed_loses_no_job_and_only_a_deadly_job_is_lost(folder):
     deadly = {2: "once", 5: "always"}
-    jobs = [Job(seed=n, folder=folder, deadly=deadly.get(n, "")) for n in range(8)]
+    jobs = [Job(seed=n, case=Attempt(folder=folder, deadly=deadly.get(n, ""))) for n in range(8)]
     found = dict(settled(work, jobs, 2))
     lost = found.pop(5)
     assert isinstance(lost, WorkerDiedError)
@@ -28,13 +28,13 @@ def test_a_process_that_is_killed_loses_no_job_and_only_a_deadly_job_is_lost(fol
 
 
 def test_alone_and_beside_others_a_seed_gives_the_same(folder):
-    jobs = [Job(seed=n, folder=folder) for n in range(4)]
+    jobs = jobs_in(folder, range(4))
     alone, beside = dict(settled(work, jobs, 1)), dict(settled(work, jobs, 2))
     assert json.dumps(alone, sort_keys=True) == json.dumps(beside, sort_keys=True)
 
 
 def test_what_a_job_raises_is_its_own(folder):
-    jobs = [Job(seed=n, folder=folder) for n in range(4)]
+    jobs = jobs_in(folder, range(4))
     found = dict(settled(raising, jobs, 1))
     assert [n for n, result in found.items() if isinstance(result, ZeroDivisionError)] == [1, 3]
     with pytest.raises(ZeroDivisionError, match="of seed 1"):
@@ -42,7 +42,7 @@ def test_what_a_job_raises_is_its_own(folder):
 
 
 def test_who_has_seen_enough_ends_it_and_nothing_is_left(folder):
-    found = settled(leaving, [Job(seed=n, folder=folder) for n in range(9)], 2)
+    found = settled(leaving, jobs_in(folder, range(9)), 2)
     left = Path(next(found)[1]["left"])
     assert left.is_dir()
     found.close()
