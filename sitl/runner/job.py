@@ -97,9 +97,16 @@ def _words(plain: Any) -> Iterator[str]:
             yield from _words(value)
 
 
-@cache
 def file_hash(path: Path) -> str:
-    """Return the hash of a scenario's content and of every file that it names, wherever they lie."""
+    """Return the hash of a scenario's content and of every file that it names, wherever they lie.
+
+    It is taken once in a process.
+    """
+    return _file_hash(path.resolve())   # a relative name is another file in another folder
+
+
+@cache
+def _file_hash(path: Path) -> str:
     digest = hashlib.sha256()
     for file in sorted(file.read_bytes() for file in files_of(path).values()):
         digest.update(hashlib.sha256(file).digest())
@@ -130,7 +137,7 @@ class ScenarioBundle:
             sorted((file.relative_to(root).as_posix(), zlib.compress(file.read_bytes())) for file in files)))
         with tempfile.TemporaryDirectory(prefix="cargo-") as trial:
             try:
-                is_whole = file_hash.__wrapped__(cargo.unpack(Path(trial))) == cargo.hash
+                is_whole = _file_hash.__wrapped__(cargo.unpack(Path(trial))) == cargo.hash
                 is_own = all(file.resolve().is_relative_to(Path(trial).resolve()) or any(
                     file.resolve().is_relative_to(ours.parent) for ours in ROOTS)
                     for file in files_of(Path(trial) / cargo.main).values())

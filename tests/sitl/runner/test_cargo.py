@@ -1,6 +1,7 @@
 """A scenario that goes to another machine: with every file that it names, found there, its content in its hash."""
 
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -40,6 +41,17 @@ def test_the_hash_is_of_the_content_and_of_every_file(own, tmp_path):
         file = changed / path.relative_to(own.parent)
         file.write_bytes(file.read_bytes() + b"\n")
         assert file_hash(changed / "mine.toml") != first
+
+
+def test_a_name_is_another_file_in_another_folder(own, tmp_path, monkeypatch):
+    hashes = []
+    for folder in ("a", "b"):
+        shutil.copytree(own.parent, tmp_path / folder)
+        file = tmp_path / folder / "mine.toml"
+        file.write_text(f"{file.read_text()}# {folder}\n")
+        monkeypatch.chdir(tmp_path / folder)
+        hashes.append(file_hash(Path("mine.toml")))
+    assert hashes[0] != hashes[1]
 
 
 def test_a_file_that_only_this_machine_finds_is_told(own):
