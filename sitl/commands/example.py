@@ -9,7 +9,7 @@ from typing import Any
 EXAMPLE = """\
 # A scenario: a mission, the weather, what befalls the boat, and what must hold in the end.
 # Sail it: sitl run {name}.toml --seed 3   Over many seeds: sitl campaign {name}.toml --runs 20
-# Every key: docs/reference/simulated-autopilot.md. A key that is not known is refused, with what it may have meant.
+# Every key: docs/reference/scenarios.md. A key that is not known is refused, with what it may have meant.
 name = "{name}"
 title = "A shift and a squall on the way between three rocks"
 mission = "rocks.toml"            # beside this file; any mission will do

@@ -47,8 +47,8 @@ class LeeSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """An island that takes the wind from the water behind it."""
 
     east_m: Metres               # its middle, from the mission's origin
-    north_m: Metres
-    radius_m: Positive
+    north_m: Metres   # the same
+    radius_m: Positive   # of the island
     loss: Share = 0.5            # of the wind's strength, close behind it
     reach_m: Positive = 150.0    # downwind of which a third of that is left
 
@@ -57,9 +57,9 @@ class CurrentSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """The water's motion: a constant part and a tide, both stronger on one side of the water."""
 
     set_deg: Degrees = 0.0       # where it runs to
-    drift_mps: Speed = 0.0
+    drift_mps: Speed = 0.0   # of its constant part
     tide_set_deg: Degrees = 0.0  # where the tide runs to at its greatest
-    tide_mps: Speed = 0.0
+    tide_mps: Speed = 0.0   # the tide's greatest speed
     tide_s: Positive = 44_712.0  # from one such time to the next: 12.42 hours, the moon's
     tide_high_s: Metres = 0.0    # the first of them, after the start
     tide_turns: Turns = 0.0      # 0: to and fro; 1: turns with the clock; -1: against it; between: an ellipse
@@ -184,27 +184,27 @@ Outlet = Literal["page", "page token", "socket", "satellite"]
 class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The weather; from ``gust_spread`` on also what varies in time beside it and over the water."""
 
-    model: Literal["constant", "ou", "recorded"] = "ou"
-    from_deg: float = 0.0
-    tws_mps: float = 5.0
-    sd_deg: float = 9.0
+    model: Literal["constant", "ou", "recorded"] = "ou"   # ou wanders about its mean
+    from_deg: float = 0.0   # where it comes from, on the average
+    tws_mps: float = 5.0   # true wind speed, on the average
+    sd_deg: float = 9.0   # standard deviation of the direction
     tau_s: float = 28.0          # 1 / rho: Wolsieffer's 0.036 Hz
-    tws_sd_mps: float = 0.3
-    file: str | None = None
+    tws_sd_mps: float = 0.3   # standard deviation of the speed
+    file: str | None = None   # of a recorded wind: CSV, relative to this one
     from_s: float = 0.0                # of the weather's own time: what has blown by then is over
     gust_spread: Share = 0.0           # of the strength's logarithm, about the strength that is there without gusts
     gust_s: Positive = 15.0            # their correlation time
     stronger_per_km: Slope = 0.0       # the wind is stronger by this share for each km from the mission's origin ...
     stronger_to_deg: Degrees = 0.0     # ... in this direction ...
     bends_deg_per_km: Degrees = 0.0    # ... and veers by so much there
-    lees: tuple[LeeSpec, ...] = ()
+    lees: tuple[LeeSpec, ...] = ()   # behind islands
 
 
 class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Something that happens at ``at_s`` [s] after the simulation's start."""
 
-    at_s: float
-    kind: EventKind
+    at_s: float              # after the simulation's start
+    kind: EventKind          # see below
     veer_deg: float = 0.0
     over_s: float = 0.0
     tws_mps: float | None = None
@@ -291,40 +291,40 @@ def is_all_ordinary(events: Iterable[EventSpec]) -> bool:
 class SatelliteSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A satellite link to the boat: each message takes from ``delay_s`` to ``delay_most_s``, by a lot of its own."""
 
-    delay_s: float = 30.0
-    delay_most_s: float = 300.0
-    loss: float = 0.0
-    duplicate: float = 0.0
-    status_every_s: float = 600.0
+    delay_s: float = 30.0   # a message takes at least ...
+    delay_most_s: float = 300.0   # ... and at most
+    loss: float = 0.0   # share of messages that never come
+    duplicate: float = 0.0   # share that comes twice
+    status_every_s: float = 600.0   # between two statuses of the boat
 
 
 class HeldSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """She must stay where she is: from and to these times [s after the simulation's start], within ``within_m``."""
 
-    from_s: float
-    to_s: float
+    from_s: float   # after the start
+    to_s: float   # after the start
     within_m: float          # of her mean place meanwhile
 
 
 class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What must hold when it is over; a check that is not asked for is not made."""
 
-    arrived: bool | None = True
-    contacts: int | None = 0
+    arrived: bool | None = True   # at the last goal
+    contacts: int | None = 0   # of the hull with what is solid, by the true track
     within_m: float | None = None             # last position to the last goal, or to what ``ends_at`` names
     ends_at: Literal["goal", "home", "refuge"] = "goal"   # home: where she was armed; the nearest refuge
     refuge_within_m: float | None = None      # of a refuge, at some moment
-    max_time_s: float | None = None
-    min_clearance_m: float | None = None
+    max_time_s: float | None = None   # from setting sail to the end
+    min_clearance_m: float | None = None   # from what is solid and the fence, by the true track
     min_vessel_distance_m: float | None = None  # from the boat to each vessel's hull
     second_boat_within_m: float | None = None   # of its goal, at some moment
     rules_kept: bool | None = None            # of the road, by the tracks, in every meeting
     station_radius_m: float | None = None       # about their mean, of 95 % of 5 minutes' points at the last goal
     max_silence_s: float | None = 10.0        # without a status from the companion that says why
-    max_replans_per_hour: float | None = None
+    max_replans_per_hour: float | None = None   # plans made under way
     max_tacks: int | None = None              # before the boat first comes within ``within_m`` of the last goal
-    held: HeldSpec | None = None
-    end_phase: str | None = None
+    held: HeldSpec | None = None   # she stays where she is
+    end_phase: str | None = None   # the skipper's phase in the end
     alerts: tuple[str, ...] = ()              # announced at least once, by code
     marks_rounded: int | None = None           # in order, each on its side
     gates_crossed: int | None = None           # in order, each in its direction, laps counted
@@ -339,13 +339,13 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One scenario file."""
 
-    name: str
-    title: str = ""
-    mission: str
-    limit_s: float = 3600.0
+    name: str   # of the voyage folder and in tables
+    title: str = ""   # what it is about, in a sentence
+    mission: str   # the mission file, relative to this one
+    limit_s: float = 3600.0   # called off then
     speedup: float = 8.0                      # when it runs in real time, separate processes
-    begins: dt.datetime = dt.datetime.fromtimestamp(EPOCH_S, dt.UTC)
-    start_heading_deg: float | None = None
+    begins: dt.datetime = dt.datetime.fromtimestamp(EPOCH_S, dt.UTC)   # UTC: what is dark, and the tide
+    start_heading_deg: float | None = None   # None: as the mission says
     has_ftp: bool = True                      # the embedded autopilot offers MAVFTP; else items go one by one
     is_service: bool = False                  # a companion that heard no autopilot is started again
     exit_on_arrival: bool = True              # else the boat is watched in its loiter until the limit
@@ -355,15 +355,15 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     system: int | None = None                 # of our autopilot, named in place of what the mission says
     satellite: SatelliteSpec | None = None    # ``far_order`` needs one
     broken: tuple[Outlet, ...] = ()           # what is wanted beside the voyage, and cannot be used
-    wind: WindSpec = msgspec.field(default_factory=WindSpec)
+    wind: WindSpec = msgspec.field(default_factory=WindSpec)   # the weather
     current: CurrentSpec | None = None        # of these four: what the plan does not know of, None: it is as planned
-    waves: WavesSpec | None = None
-    boat: HullSpec | None = None
-    sensors: SensorsSpec | None = None
-    parameters: dict[str, float] = {}
+    waves: WavesSpec | None = None   # a seaway
+    boat: HullSpec | None = None   # a boat that is not the polar's
+    sensors: SensorsSpec | None = None   # sensors that err
+    parameters: dict[str, float] = {}   # of the autopilot, by name, from its start
     without_shifts: dict[str, float] = {}     # beside those, of who does not tack on the shifts (sitl baselines)
-    events: tuple[EventSpec, ...] = ()
-    expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)
+    events: tuple[EventSpec, ...] = ()   # what befalls her, in any number
+    expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)   # what must hold in the end
 
     @property
     def epoch_s(self) -> float:

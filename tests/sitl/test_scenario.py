@@ -6,11 +6,14 @@ import socket
 from itertools import chain, count
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from companion.errors import InputError
 from sitl import cli
 from sitl.autopilot import EPOCH_S
+from sitl.scenario import scenario as scenario_module
+from sitl.scenario.document import page
 from sitl.scenario.scenario import beginning, load_scenario, scenario_wind
 from sitl.scenario.traffic import PORTS, free_port
 
@@ -74,6 +77,16 @@ def test_the_example_is_a_scenario_that_can_be_read_and_nothing_is_written_over(
                      for line in (folder / "squall.toml").read_text().splitlines())
     (folder / "all.toml").write_text(bare)   # what is commented out is right, too
     assert load_scenario(folder / "all.toml").current is not None
+
+
+def test_the_page_of_all_keys_is_current_and_says_something_of_each():
+    made = page(Path("sitl/scenario/scenario.py").read_text())
+    assert Path("docs/reference/scenarios.md").read_text() == made, (
+        "run: python -m sitl.scenario.document > docs/reference/scenarios.md")
+    assert re.findall(r"^.*\| (?:of )? *\|$", made, re.MULTILINE) == []
+    tables = [c for c in vars(scenario_module).values() if isinstance(c, type) and issubclass(c, msgspec.Struct)]
+    keys = {key for table in tables for key in table.__struct_fields__}
+    assert [key for key in keys if f"| `{key}` |" not in made] == []
 
 
 def test_a_free_port_is_nobodys_of_udp_and_of_tcp_and_none_that_the_system_gives_away(monkeypatch):
