@@ -41,7 +41,7 @@ from companion.planner.effort import Effort
 from companion.planner.plan import Plan, PlanStatus
 from companion.planner.reference.astar import search as search_astar
 from companion.planner.risk import simulate_entries
-from companion.planner.settings import AstarSettings
+from companion.planners import AstarSettings
 from companion.plots.field import atoms_figure, encounter_figure, field_figure, trees_figure
 from companion.plots.plan import draw_plan
 from companion.plots.wind import filter_figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import msgspec
@@ -61,7 +61,7 @@ from companion.geofence.mission import (
 from companion.geofence.shapes import polygon_en
 from companion.messages import GeoPoint
 from companion.orders import ALL, Verb, unknown
-from companion.planner.settings import AUTO, SETTINGS, PlannerChoice
+from companion.planners import ALGORITHMS, AUTO, PlannerChoice
 from companion.skipper.step import (
     Ends,
     Guidance,
@@ -129,12 +129,18 @@ def boat_of(mission: Mission) -> Boat:
     )
 
 
-# The keys of [planner] by planner, and what they are called among its settings.
-_ASTAR = frozenset({"grid_m", "turn_s_per_rad", "tack_s", "gybe_s", "tunnel", "tunnel_width_m", "heuristic_kn",
-                    "min_twa_deg", "max_twa_deg", "max_turn_deg", "ship_match_s", "projection"})
-_RRTSTAR = frozenset({"goal_bias", "range_m", "rewiring", "risk_weight_s", "state_risk_weight_s"})
-_NUMBERS = {"tunnel": "is_tunnel_abrupt", "heuristic_kn": "heuristic_mps", "min_twa_deg": "min_twa_rad",
-            "max_twa_deg": "max_twa_rad", "max_turn_deg": "max_turn_rad", "rewiring": "is_rewired"}
+# What the keys of [planner] are called among a planner's settings, where it is not the key, or in radians.
+_NUMBERS = {"tunnel": "is_tunnel_abrupt", "heuristic_kn": "heuristic_mps", "rewiring": "is_rewired"}
+
+
+def _number(key: str) -> str:
+    return _NUMBERS.get(key, key.replace("_deg", "_rad"))
+
+
+def _own(algorithm: str, key: str) -> bool:
+    """Return whether a key of ``[planner]`` is a number of this planner's."""
+    settings = ALGORITHMS[algorithm].settings
+    return settings is not None and _number(key) in {field.name for field in fields(settings)}
 
 
 def planner_of(mission: Mission) -> PlannerChoice:
@@ -147,12 +153,12 @@ def planner_of(mission: Mission) -> PlannerChoice:
     given = {key: value for key in options.__struct_fields__ if (value := getattr(options, key)) is not None}
     expansions = given.pop("expansions", None)
     if expansions is not None and algorithm == AUTO.algorithm:
-        raise InputError(str(mission.path), "[planner] expansions", 'is for "rrtstar" and "astar"',
+        others = " and ".join(f'"{name}"' for name in ALGORITHMS if name != AUTO.algorithm)
+        raise InputError(str(mission.path), "[planner] expansions", f"is for {others}",
                          "write [skipper] expansions for auto's")
-    own = _ASTAR if algorithm == "astar" else _RRTSTAR if algorithm == "rrtstar" else frozenset()
     for key in given:
-        if key not in own:
-            whose = "astar" if key in _ASTAR else "rrtstar"
+        if not _own(algorithm, key):
+            whose = next(name for name in ALGORITHMS if _own(name, key))
             raise InputError(str(mission.path), f"[planner] {key}",
                              f"is a number of {whose!r}, and this mission plans by {algorithm!r}",
                              f'write [skipper] planner = "{whose}", or leave it out')
@@ -160,15 +166,15 @@ def planner_of(mission: Mission) -> PlannerChoice:
         raise InputError(str(mission.path), "[planner] tunnel", "a tunnel has a width", "add tunnel_width_m")
     if algorithm == AUTO.algorithm:
         return AUTO
-    numbers: dict[str, Any] = {_NUMBERS.get(key, key): value for key, value in given.items()}
-    for key in ("min_twa_rad", "max_twa_rad", "max_turn_rad"):
-        if key in numbers:
-            numbers[key] = math.radians(numbers[key])
+    numbers: dict[str, Any] = {
+        _number(key): math.radians(value) if key.endswith("_deg") else value for key, value in given.items()}
     if "heuristic_mps" in numbers:
         numbers["heuristic_mps"] = numbers["heuristic_mps"] * MPS_PER_KNOT or None
     if "is_tunnel_abrupt" in numbers:
         numbers["is_tunnel_abrupt"] = numbers["is_tunnel_abrupt"] == "abrupt"
-    return PlannerChoice(algorithm=algorithm, settings=SETTINGS[algorithm](**numbers), expansions=expansions)
+    settings = ALGORITHMS[algorithm].settings
+    return PlannerChoice(
+        algorithm=algorithm, settings=None if settings is None else settings(**numbers), expansions=expansions)
 
 
 LEAST_LINE_M = 1.0

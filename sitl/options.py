@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeVar
 
 from companion.errors import InputError
+from companion.planners import ALGORITHMS
 from companion.program.arguments import out_file, whole
 
 if TYPE_CHECKING:
@@ -119,9 +120,9 @@ def add_draw(parser: argparse.ArgumentParser, more: Mapping[str, str] = MappingP
     """Add ``--draw``, of guidance and planner and of ``more``: what each of them is, in words."""
     words = "".join(f", {name} ({told})" for name, told in more.items())
     parser.add_argument("--draw", type=partial(_drawable, more=tuple(more)), default=(), metavar="WHAT[,WHAT]",
-                        help="draw from each seed, too: guidance (in AUTO, by heading, by field), planner (auto, "
-                        f"rrtstar, astar){words}; all: each of these; what else a seed is stays the same (default: as "
-                        "the mission says)")
+                        help="draw from each seed, too: guidance (in AUTO, by heading, by field), planner ("
+                        f"{', '.join(ALGORITHMS)}){words}; all: each of these; what else a seed is stays the same "
+                        "(default: as the mission says)")
 
 
 def add_methods(parser: argparse.ArgumentParser) -> None:
@@ -129,7 +130,7 @@ def add_methods(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--guidance", type=_guidance, nargs="+", metavar="G",
                         help="sail by each of these in place of the mission's own: plan (in AUTO), heading, field")
     parser.add_argument("--planner", type=_planner, nargs="+", metavar="P",
-                        help="and by the plans of each of these: auto, rrtstar, astar")
+                        help="and by the plans of each of these: " + ", ".join(ALGORITHMS))
 
 
 def methods_of(guidances: Sequence[str] | None, planners: Sequence[str] | None) -> list[Method]:

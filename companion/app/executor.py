@@ -19,7 +19,7 @@ from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.microservices import CommandAnswer
 from companion.mavlink.microservices import TransferOutcome as WireOutcome
 from companion.planner import Plan, Problem
-from companion.planner.settings import Settings
+from companion.planners import Settings
 from companion.skipper.step import (
     Acknowledge,
     Action,

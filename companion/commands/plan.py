@@ -15,6 +15,7 @@ from companion.commands.output import patience
 from companion.errors import InputError
 from companion.planner.courses import courses
 from companion.planner.problem import evaluate
+from companion.planners import ALGORITHMS
 from companion.program.arguments import number, out_file, picture, whole, wind
 from companion.words import counted
 
@@ -52,7 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument("--expansions", type=whole(at_least=1), metavar="N",
                         help="effort in the algorithm's own steps instead")
     parser.add_argument("--seed", type=whole(), default=0, metavar="N", help="of every random choice (default 0)")
-    parser.add_argument("--algorithm", default="auto", choices=("auto", "rrtstar", "astar"))
+    parser.add_argument("--algorithm", default="auto", choices=tuple(ALGORITHMS))
     parser.add_argument("--explain", action="store_true", help="say what bound each leg and what would change the plan")
     parser.add_argument("--explain-budget", type=number("s", above=0.0), default=5.0, metavar="S",
                         help="computing time for that [s]")

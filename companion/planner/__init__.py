@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
-from companion.planner.solve import ALGORITHMS, plan
+from companion.planner.solve import plan
+from companion.planners import ALGORITHMS
 
 __all__ = ["ALGORITHMS", "Leg", "Plan", "PlanStatus", "Problem", "Why", "plan"]

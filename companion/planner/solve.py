@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -26,8 +26,8 @@ from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.evaluate import Evaluation, clearances, evaluate
 from companion.planner.problem.value import Problem, defect_of, resolved
-from companion.planner.settings import SETTINGS, Settings
 from companion.planner.warm import warm_problems
+from companion.planners import ALGORITHMS, Settings
 
 DEFAULT_BUDGET_S = 1.0
 OPTIMAL_GAP = 1e-3
@@ -36,14 +36,6 @@ MENDED = 0.25          # ... more where the first path's track does not, or a ta
 AGAIN = 0.6            # of what judging the first path takes: that of another, for which water and winds are at hand
 LATER = 2.0            # another path is judged after as many times as long, while somebody hears of it
 SEARCHED = 0.94        # of a budget in seconds: the last step of a search ends late, and its path is checked exactly
-
-ALGORITHMS: Mapping[str, tuple[str, str]] = {
-    "auto": ("companion.planner.search.auto", "search"),
-    "rrtstar": ("companion.planner.reference.rrtstar", "search"),
-    "astar": ("companion.planner.reference.astar", "search"),
-}
-"""Name -> module and function; modules are imported when asked for."""
-
 
 _loaded: set[str] = set()
 
@@ -79,7 +71,7 @@ def plan(
     """
     if algorithm not in ALGORITHMS:
         raise InputError("plan", "algorithm", f"{algorithm!r} is unknown", "choose " + ", ".join(ALGORITHMS))
-    if settings is not None and type(settings) is not SETTINGS.get(algorithm):
+    if settings is not None and type(settings) is not ALGORITHMS[algorithm].settings:
         raise InputError("plan", "settings", f"{type(settings).__name__} is not for {algorithm!r}",
                          "give those of the algorithm, or none")
     if budget_s is not None and not budget_s > 0.0:
@@ -109,19 +101,19 @@ def warm(algorithm: str = "auto") -> None:
     if algorithm not in _loaded:
         _loaded.add(algorithm)
         for problem in warm_problems():
-            plan(problem, expansions=20_000 if algorithm == "auto" else 2000, algorithm=algorithm)
+            plan(problem, expansions=ALGORITHMS[algorithm].warm_expansions, algorithm=algorithm)
 
 
 def _solved(
     problem: Problem, effort: Effort, empty: Plan, settings: Settings | None,
     on_better: Callable[[Plan], None] | None,
 ) -> Plan:
-    module, name = ALGORITHMS[empty.algorithm]
-    found = getattr(importlib.import_module(module), name)
+    algorithm = ALGORITHMS[empty.algorithm]
+    found = importlib.import_module(algorithm.module).search
     search: Search = found if settings is None else partial(found, settings=settings)
     from companion.planner.risk.chance_constraint import keep_limit, search_within
 
-    if empty.algorithm == "rrtstar" and problem.is_shared:
+    if algorithm.carries_vessels and problem.is_shared:
         from companion.planner.reference.vessels import carried, judge_of, keep_share
 
         found_vessels = carried(problem)
@@ -139,7 +131,7 @@ def _solved(
 
     whole = _whole(search, problem)
     answers = _Answers(problem, effort, empty, on_better)
-    is_within = problem.risk is None or empty.algorithm == "rrtstar"   # whose tree carries the limit itself (CC-RRT*)
+    is_within = problem.risk is None or algorithm.bounds_path_risk
     if is_within and (on_better is not None or (problem.tracking is not None and empty.algorithm == "auto")):
         effort.listen(answers.judge)
     if is_within:

@@ -34,8 +34,8 @@ from companion.planner.child import Child, Forked, Started
 from companion.planner.nursery import Nursery
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
-from companion.planner.settings import Settings
 from companion.planner.solve import DEFAULT_BUDGET_S, plan
+from companion.planners import Settings
 
 _LOG = logging.getLogger(__name__)
 _LENGTH = struct.Struct("<Q")

@@ -14,6 +14,7 @@ import numpy as np
 
 from companion.errors import InputError
 from companion.geofence import Mission
+from companion.planners import ALGORITHMS, AUTO
 from sitl.run.variation import Variation, foreknown, unspread
 from sitl.runner import CampaignResults, Experiment, Job, Summary
 
@@ -35,8 +36,8 @@ VARIATIONS: Mapping[str, Variation] = {
     "planned, delta_s 0.6": Variation(tables={**PLANNED, "risk": {"delta_s": 0.6}}),
     "planned, delta_s 0.8": Variation(tables={**PLANNED, "risk": {"delta_s": 0.8}}),
     "planned, delta_s 0.98": Variation(tables={**PLANNED, "risk": {"delta_s": 0.98}}),
-    "rrtstar": Variation(tables={"skipper": {"autopilot_beats": False, "planner": "rrtstar"}}),
-    "astar": Variation(tables={"skipper": {"autopilot_beats": False, "planner": "astar"}}),
+    **{name: Variation(tables={"skipper": {"autopilot_beats": False, "planner": name}})
+       for name in ALGORITHMS if name != AUTO.algorithm},
 }
 BOOTSTRAPS = 2000
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from companion.planners import ALGORITHMS, AUTO
 from companion.program.arguments import whole
 from sitl.commands.run import scenario_file
 from sitl.options import add_options, options_of
@@ -38,6 +39,6 @@ def run(args: argparse.Namespace) -> int:
     experiment = ablation(args.scenarios or SCENARIOS, names=args.only or tuple(VARIATIONS), runs=args.runs,
                           first_seed=args.first_seed)
     drawn = {job.case for job in experiment.jobs}
-    for planner in ("auto", *(name for name in ("rrtstar", "astar") if name in drawn)):
+    for planner in (name for name in ALGORITHMS if name == AUTO.algorithm or name in drawn):
         compile_ahead(planner)
     return experiment.run(options_of(args))

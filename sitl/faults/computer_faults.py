@@ -15,8 +15,8 @@ from typing import Final
 from companion.clock import now_s
 from companion.disk import Disk, Room
 from companion.planner import Plan, Problem
-from companion.planner.settings import Settings
 from companion.planner.worker import DEFAULT_GRACE_S, InlinePlanner, PlannerWorker, failed
+from companion.planners import Settings
 from companion.telemetry.folder import STATE
 
 START_S = 1.5   # what it takes to start another worker

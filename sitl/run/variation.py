@@ -15,6 +15,7 @@ from companion.errors import InputError
 from companion.geofence import Mission
 from companion.messages import WindForecast
 from companion.mission_check import require_sailable
+from companion.planners import ALGORITHMS
 from companion.wind import Estimator, WindTracker
 from sitl.world import WindModel
 
@@ -101,7 +102,7 @@ def foreknown(wind: WindModel, estimator: Estimator) -> WindTracker:
 
 # ------------------------------------------------------------------------------------- guidance and planner
 GUIDANCES = ("plan", "heading", "field")    # [skipper] guidance
-PLANNERS = ("auto", "rrtstar", "astar")     # [skipper] planner
+PLANNERS = tuple(ALGORITHMS)                # [skipper] planner
 DRAWABLE = ("guidance", "planner")
 
 

@@ -9,7 +9,7 @@ import pytest
 from companion.errors import InputError
 from companion.planner import ALGORITHMS, PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.settings import AstarSettings, RrtstarSettings
+from companion.planners import AstarSettings, RrtstarSettings
 
 PROBLEMS = Path(__file__).resolve().parents[2] / "bench" / "problems"
 # For each: expansions that suffice; with them the tests do not depend on how busy the machine is.
@@ -76,10 +76,10 @@ def test_none_finds_a_way_through_a_wall(algorithm):
     assert answer.reason
 
 
-@pytest.mark.parametrize("algorithm", ["rrtstar", "astar"])
+@pytest.mark.parametrize("algorithm", [name for name in ALGORITHMS if name != "auto"])
 def test_a_budget_of_expansions_and_a_seed_give_the_same_plan_twice(algorithm):
     p = fixture("four-run")
-    a, b = (plan(p, algorithm=algorithm, expansions=20_000, seed=11) for _ in range(2))
+    a, b = (plan(p, algorithm=algorithm, expansions=min(20_000, 4 * EFFORT[algorithm]), seed=11) for _ in range(2))
     assert np.array_equal(a.waypoints_en, b.waypoints_en)
     assert a.expansions == b.expansions
 
@@ -109,7 +109,7 @@ NASTY = {
 
 
 @pytest.mark.parametrize("name", NASTY)
-@pytest.mark.parametrize("algorithm", ["rrtstar", "astar"])
+@pytest.mark.parametrize("algorithm", [name for name in ALGORITHMS if name != "auto"])
 def test_bad_input_is_a_plan_or_a_reason_within_the_budget(algorithm, name):
     p = Problem.from_json({
         "id": "n", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 0}, "goal": {"x": 0, "y": 200, "radius": 5},
@@ -120,7 +120,7 @@ def test_bad_input_is_a_plan_or_a_reason_within_the_budget(algorithm, name):
                  "speed": {"model": "constant", "v_mps": 1.5}},
         **NASTY[name],
     })
-    answer = plan(p, algorithm=algorithm, expansions=2000 if algorithm == "rrtstar" else 200_000)
+    answer = plan(p, algorithm=algorithm, expansions=min(200_000, EFFORT[algorithm] // 4))
     assert answer.reason
     if answer.has_path:
         assert evaluate(p, answer.waypoints_en).is_feasible

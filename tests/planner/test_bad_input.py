@@ -11,7 +11,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.planner import PlanStatus, Problem, plan
+from companion.planner import ALGORITHMS, PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import SolidObstacles, evaluate
 from companion.planner.search.kernels import is_free
 from companion.planner.search.world import make_world
@@ -39,7 +39,7 @@ def metres(low, high):
     return st.floats(low, high).map(lambda v: round(v, 6))
 
 
-@pytest.mark.parametrize("algorithm", ["auto", "rrtstar", "astar"])
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
 @pytest.mark.parametrize(("change", "words"), [
     ({"obstacles": ["POLYGON ((nan 0, 10 0, 10 10, nan 0))"]}, "not a finite number"),
     ({"obstacles": ["POLYGON ((inf 0, 10 0, 10 10, inf 0))"]}, "not a finite number"),

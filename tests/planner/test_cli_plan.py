@@ -10,7 +10,7 @@ import pytest
 from companion import cli
 from companion.geofence import load_mission
 from companion.mission_check import AssumedWind, leg_problem
-from companion.planner import Problem
+from companion.planner import ALGORITHMS, Problem
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.json_write import to_dict
 
@@ -42,7 +42,7 @@ def run(capsys, *args):
     return code, out, err
 
 
-@pytest.mark.parametrize("algorithm", ["auto", "rrtstar", "astar"])
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_it_prints_a_summary_and_writes_a_plan_that_scores(capsys, file, tmp_path, algorithm):
     out_file = tmp_path / "plan.json"
     code, out, err = run(capsys, file(), "--budget", "0.5", "--algorithm", algorithm, "--out", out_file)

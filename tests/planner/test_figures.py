@@ -13,7 +13,7 @@ from companion.planner import PlanStatus, plan
 from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.reference.astar import search
-from companion.planner.settings import AstarSettings
+from companion.planners import AstarSettings
 
 SAMPLES = 6000   # as they are drawn
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "figures"

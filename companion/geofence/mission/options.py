@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 from msgspec import Meta, Struct
 
+from companion.planners import ALGORITHMS
 from companion.safety import CHOICES, ENDINGS, FAILSAFES, SETTINGS, WORD_OF, End, Setting
 
 # ``[[goal]]``: what a mission TOML may say of a goal, one struct per kind. Without ``kind`` it is a point.
@@ -312,7 +313,7 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class PlannerOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """``[planner]``: the numbers of ``[skipper] planner = "rrtstar"`` or ``"astar"``; a key of the other is refused."""
+    """``[planner]``: the numbers of ``[skipper] planner``; a key of another is refused."""
 
     expansions: Annotated[int, Meta(gt=0)] | None = None
     """Its effort in its own steps (states taken, samples drawn), in place of the voyage's."""
@@ -369,6 +370,12 @@ class AutopilotOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """What it must be: a boat (FRAME_CLASS 2) that sails (SAIL_ENABLE 1), or one that does not."""
 
 
+if TYPE_CHECKING:
+    PlannerName = str
+else:
+    PlannerName = Literal[tuple(ALGORITHMS)]
+
+
 class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """``[skipper]``: the rules of the voyage, numbers as data."""
 
@@ -393,7 +400,7 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Half width of the lane between two goals; None: no lane. A goal may have its own."""
     horizon_m: Annotated[float, Meta(ge=500.0, le=60_000.0)] = 5000.0
     """A plan covers the next so many metres of the way (Büsser: 15 to 20 nautical miles at sea)."""
-    planner: Literal["auto", "rrtstar", "astar"] = "auto"
+    planner: PlannerName = "auto"
     """The project's own; or Wolsieffer's RRT*, or Büsser's A*, by the numbers of ``[planner]``. What these do not find
     is planned by ``auto``."""
     planning_budget_s: Annotated[float, Meta(gt=0.0, le=600.0)] = 2.0

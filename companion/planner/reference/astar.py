@@ -38,7 +38,7 @@ from companion.planner.problem.value import Problem
 from companion.planner.reference import kernels
 from companion.planner.reference.rrtstar import simple_bound_s
 from companion.planner.reference.world import bounds_of, world_of
-from companion.planner.settings import AstarSettings
+from companion.planners import AstarSettings
 
 # A problem in the metres of Büsser's flat earth (2009, eq. 4.2), for ``astar``, and its path back.
 #

@@ -9,7 +9,7 @@ in a box of half the distance around everything.
 With ``problem.risk`` it is CC-RRT* (Luders, Karaman and How 2013): every state carries a bound on the risk that
 its path has accumulated, states above the limit are refused, and the cost is time plus ``risk_weight_s`` per unit
 of risk, plus ``state_risk_weight_s`` times the greatest risk of any one state. ``risk.leg_risk`` says how a leg's
-share is bounded. ``companion.planner.settings`` has the numbers.
+share is bounded. ``companion.planners`` has the numbers.
 
 Uncertain vessels are under the tree's bound, too (``companion.planner.reference.vessels``): an edge on which one may be
 too near with more than its part of the promise is refused, and what it adds to the path's risk is a state's to carry.
@@ -38,7 +38,7 @@ from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.reference.vessels import NO_VESSELS, TreeVessels
 from companion.planner.reference.world import ReferenceWorld, bounds_of, world_of
 from companion.planner.risk.chance_constraint import PROMISE_FACTOR, process_of
-from companion.planner.settings import RrtstarSettings
+from companion.planners import RrtstarSettings
 
 REACH_SHARE = 0.2      # of the search box's diagonal: OMPL's default range
 DEFAULTS = RrtstarSettings()

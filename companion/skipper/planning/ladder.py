@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from companion.planner.settings import AUTO, PlannerChoice
+from companion.planners import AUTO, PlannerChoice
 from companion.skipper.step.config import SkipperConfig
 
 PINCHES = "closer to the wind than the autopilot keeps to a line"

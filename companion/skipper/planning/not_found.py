@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
-from companion.planner.settings import AUTO
+from companion.planners import AUTO
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, leads_there, too_risky, upload

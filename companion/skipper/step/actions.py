@@ -8,7 +8,7 @@ from typing import Any
 
 from companion.messages import MissionItem, Mode, Severity
 from companion.orders import Result
-from companion.planner.settings import AUTO, PlannerChoice
+from companion.planners import AUTO, PlannerChoice
 
 
 class ReplanReason(enum.Enum):

@@ -10,7 +10,7 @@ import enum
 from dataclasses import dataclass
 
 from companion.orders import ALL
-from companion.planner.settings import AUTO, PlannerChoice
+from companion.planners import AUTO, PlannerChoice
 from companion.safety import CAUSES, CHOICES, ENDINGS, SETTINGS, Answer, End
 from companion.traffic import Policy
 

@@ -9,7 +9,7 @@ from companion.planner import PlanStatus, Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.reference.astar import grid_of, search, ship_discs, steps_of, target_heading
-from companion.planner.settings import AstarSettings
+from companion.planners import AstarSettings
 
 AVALON_TWA = list(range(0, 181, 5))
 AVALON_MPS = [

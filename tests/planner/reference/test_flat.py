@@ -13,7 +13,7 @@ from companion.planner import PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.parts import Target
 from companion.planner.reference.astar import FlatPlane, flat_en_from_lonlat
-from companion.planner.settings import AUTO, AstarSettings, PlannerChoice, RrtstarSettings
+from companion.planners import AUTO, AstarSettings, PlannerChoice, RrtstarSettings
 from tests.planner.problems import box, simple
 
 # How far places [m] and courses [deg] of his plane are off the frame, up to 70 deg of latitude (docs/lab/frames.md).

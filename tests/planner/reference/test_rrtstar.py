@@ -15,7 +15,7 @@ from companion.planner.reference.kernels import first_hit, turn_time, wrap
 from companion.planner.reference.kernels import steer as steer_kernel
 from companion.planner.reference.rrtstar import RrtTree, search
 from companion.planner.reference.world import bounds_of, world_of
-from companion.planner.settings import RrtstarSettings
+from companion.planners import RrtstarSettings
 
 BLOCK = "POLYGON((-60 150,60 150,60 220,-60 220,-60 150))"
 AR1 = {"model": "ar1", "sigma0_deg": 2.0, "sigma_inf_deg": 8.0, "rho_hz": 0.036}

@@ -20,7 +20,7 @@ from companion.planner.reference.rrtstar import RrtTree, search
 from companion.planner.reference.vessels import carried, is_kept, keep_share
 from companion.planner.reference.world import world_of
 from companion.planner.risk.chance_constraint import path_risk, vessel_risk
-from companion.planner.settings import RrtstarSettings
+from companion.planners import RrtstarSettings
 
 EFFORT = 1200
 

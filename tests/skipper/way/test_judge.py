@@ -11,7 +11,7 @@ from shapely.geometry import box
 from companion.boat import Boat, ardurover_sitl
 from companion.planner import Problem, plan
 from companion.planner.problem.value import defect_of
-from companion.planner.settings import AUTO, AstarSettings, PlannerChoice
+from companion.planners import AUTO, AstarSettings, PlannerChoice
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired, wind_part
 from companion.skipper.step.config import SkipperConfig

@@ -1,15 +1,21 @@
-"""The numbers of the papers' planners, and the choice among them: ``rrtstar`` is Wolsieffer's, ``astar`` Büsser's.
+"""The planners by name, as one table: the module that searches, the numbers that a mission may set, what it bounds.
 
-``auto`` has none: it is what the project sails by, and sets itself.
+A planner is registered here and nowhere else: missions (``[skipper] planner``), ``companion plan --algorithm``, the
+campaigns' draws, methods and variations, and the benchmark take it from this table. Its module is imported when it is
+asked for, and has a function ``search(problem, effort, seed) -> Outcome`` (``companion.planner.effort``). ``auto`` is
+the project's own, and sets its numbers itself; ``rrtstar`` is Wolsieffer's, ``astar`` Büsser's.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from companion.geo import MPS_PER_KNOT
-from companion.messages import GeoPoint
+
+if TYPE_CHECKING:
+    from companion.messages import GeoPoint
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +80,25 @@ class RrtstarSettings:
 
 
 Settings = AstarSettings | RrtstarSettings
-SETTINGS: dict[str, type[Settings]] = {"astar": AstarSettings, "rrtstar": RrtstarSettings}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Algorithm:
+    """One row: the module of a planner, its numbers (None: it has none), and what its own search answers for."""
+
+    module: str
+    settings: type[Settings] | None = None
+    bounds_path_risk: bool = False   # its tree keeps a limit on the path's risk; of others a path is judged, and redone
+    carries_vessels: bool = False    # other vessels are under its tree's own bound
+    warm_expansions: int = 2000      # what compiles or loads all of its kernels, before a budget begins
+
+
+ALGORITHMS = {
+    "auto": Algorithm(module="companion.planner.search.auto", warm_expansions=20_000),
+    "rrtstar": Algorithm(module="companion.planner.reference.rrtstar", settings=RrtstarSettings, bounds_path_risk=True,
+                         carries_vessels=True),
+    "astar": Algorithm(module="companion.planner.reference.astar", settings=AstarSettings),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
