@@ -336,9 +336,9 @@ class LocalArea:
     def obstacle_names(self, margin_m: float = 0.0) -> list[str]:
         """Return what each of ``obstacles_wkt`` is called: by the obstacles that have grown into it."""
         out = []
+        tree = shapely.STRtree(self.polygons)   # a chart has islands by the thousand
         for part in parts(self.buffered(margin_m)) if self.polygons else []:
-            shapely.prepare(part)
-            names = [name for name, p in zip(self.names, self.polygons, strict=True) if shapely.intersects(part, p)]
+            names = [self.names[n] for n in sorted(tree.query(part, predicate="intersects").tolist())]
             out.append(listed(names[:3]) if len(names) <= 3 else f"{', '.join(names[:2])} and {len(names) - 2} more")
         return out
 

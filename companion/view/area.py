@@ -29,7 +29,8 @@ class AreaView:
     """Obstacles as drawn, as grown by the margin, and the limits: polygons, each an outer ring and its holes.
 
     Metres east and north of ``origin_lat_deg`` and ``origin_lon_deg``; ``lat_m`` and ``lon_m`` are the metres in a
-    degree there. ``hash`` names the content.
+    degree there. ``names`` are the obstacles', one each: of the mission's file, else "obstacle N". ``hash`` names
+    the content.
     """
 
     hash: str = ""
@@ -39,6 +40,7 @@ class AreaView:
     lat_m: float
     lon_m: float
     obstacles: tuple[tuple[Ring, ...], ...] = ()
+    names: tuple[str, ...] = ()
     grown: tuple[tuple[Ring, ...], ...] = ()
     limits: tuple[tuple[Ring, ...], ...] = ()
     margin_m: float | None = None
@@ -56,14 +58,14 @@ def area_of(voyage: Voyage, margin_m: float) -> AreaView:
     fence = voyage.area.fence_wkt(0.0)
     return drawn(
         voyage.name, voyage.frame.origin, voyage.area.obstacles_wkt(0.0), voyage.area.obstacles_wkt(margin_m),
-        [] if fence is None else [fence], margin_m)
+        [] if fence is None else [fence], margin_m, voyage.area.obstacle_names(0.0))
 
 
 def drawn(
     name: str, origin: GeoPoint, obstacles: Iterable[str], grown: Iterable[str], limits: Iterable[str],
-    margin_m: float | None,
+    margin_m: float | None, names: Iterable[str] = (),
 ) -> AreaView:
-    """Return the area of WKT polygons in local metres."""
+    """Return the area of WKT polygons in local metres; ``names`` are the obstacles', or there are none."""
     from companion.geo.frame import LocalFrame
 
     frame = LocalFrame(origin)
@@ -75,7 +77,7 @@ def drawn(
     area = AreaView(
         name=name, origin_lat_deg=origin.lat_deg, origin_lon_deg=origin.lon_deg, lat_m=round(north_m / step, 3),
         lon_m=round(abs(east_m) / 0.01, 3), obstacles=_shapes(obstacles), grown=_shapes(grown), limits=_shapes(limits),
-        margin_m=margin_m)
+        margin_m=margin_m, names=tuple(names))
     return replace(area, hash=hashlib.sha256(msgspec.json.encode(area)).hexdigest()[:HASH_DIGITS])
 
 

@@ -33,7 +33,7 @@ def area_of_chart(record: VoyageRecord) -> AreaView:
     chart = record.chart
     return drawn(
         chart.name, GeoPoint(lat_deg=chart.origin.lat_deg, lon_deg=chart.origin.lon_deg), chart.obstacles, chart.grown,
-        [chart.fence] if chart.fence else [], chart.margin_m)
+        [chart.fence] if chart.fence else [], chart.margin_m, chart.names)
 
 
 def views_of_rows(record: VoyageRecord, area: AreaView) -> Iterator[values.View]:

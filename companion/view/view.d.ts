@@ -24,7 +24,8 @@ export interface Alarm {
  * Obstacles as drawn, as grown by the margin, and the limits: polygons, each an outer ring and its holes.
  *
  *     Metres east and north of ``origin_lat_deg`` and ``origin_lon_deg``; ``lat_m`` and ``lon_m`` are the metres in a
- *     degree there. ``hash`` names the content.
+ *     degree there. ``names`` are the obstacles', one each: of the mission's file, else "obstacle N". ``hash`` names
+ *     the content.
  */
 export interface Area {
   name: string;
@@ -34,6 +35,7 @@ export interface Area {
   lon_m: number;
   hash: string;
   obstacles: [number, number][][][];
+  names: string[];
   grown: [number, number][][][];
   limits: [number, number][][][];
   margin_m: number | null;

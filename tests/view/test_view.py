@@ -110,6 +110,8 @@ def test_the_records_give_the_same_views(beat):
     recorded = recorded_views(beat.folder)
     assert recorded.is_whole
     assert recorded.area == beat.area
+    assert len(beat.area.names) == len(beat.area.obstacles)
+    assert all(beat.area.names)
     again = list(recorded.moments)
     assert len(again) == recorded.count == len(beat.moments)
     for (live, events), (then, events_then) in zip(beat.moments, again, strict=True):

@@ -80,7 +80,7 @@ function area(sketch) {
   const locked = state.locked.map((shape) => ({ zone: shape.zone, rings: shape.rings.map((ring) => ring.map(en)) }));
   const of = (/** @type {string} */ zone) => [...drawn, ...locked].filter((shape) => shape.zone === zone && shape.rings.length > 0).map((shape) => shape.rings);
   const grown = (found?.grown ?? []).map((shape) => shape.map((ring) => ring.map(en)));
-  return /** @type {Area} */ (/** @type {unknown} */ ({ hash: "", name: state.called, origin_lat_deg: state.frame.lat, origin_lon_deg: state.frame.lon, lat_m: state.frame.lat_m, lon_m: state.frame.lon_m, obstacles: of("exclusion"), limits: of("inclusion"), grown, margin_m: sketch.margin_m }));
+  return /** @type {Area} */ (/** @type {unknown} */ ({ hash: "", name: state.called, origin_lat_deg: state.frame.lat, origin_lon_deg: state.frame.lon, lat_m: state.frame.lat_m, lon_m: state.frame.lon_m, obstacles: of("exclusion"), names: [], limits: of("inclusion"), grown, margin_m: sketch.margin_m }));
 }
 
 /** The sketch as the map knows a voyage: the boat lies at the start. @param {Sketch} sketch @returns {View} */

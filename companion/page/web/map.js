@@ -377,6 +377,15 @@ function places(view, at) {
     const isCut = x + 7 * text.length > camera.width;
     children.push(svg("text", { x: isCut ? x - 18 : x, y: line, class: `word ${kind}`, "text-anchor": isCut ? "end" : "start" }, text));
   }
+  state.area?.names?.forEach((name, n) => {
+    const ring = state.area?.obstacles[n]?.[0] ?? [], es = ring.map((p) => p[0]), ns = ring.map((p) => p[1]);
+    const [e, w, s, m] = [Math.max(...es), Math.min(...es), Math.min(...ns), Math.max(...ns)];
+    const [x, y] = at([(e + w) / 2, (s + m) / 2]);
+    // a name that its island has room for, and nothing else is written over
+    if (Math.max(e - w, m - s) * camera.scale < 24 || taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - y) < 12)) return;
+    taken.push([x, y]);
+    children.push(svg("text", { x, y: y + 4, class: "word land", "text-anchor": "middle" }, name));
+  });
   fill("places", children);
 }
 

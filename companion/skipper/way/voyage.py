@@ -174,6 +174,10 @@ class Area(Protocol):
         """Return the obstacles grown by the margin as WKT POLYGONs."""
         ...
 
+    def obstacle_names(self, margin_m: float = 0.0) -> list[str]:
+        """Return what each of ``obstacles_wkt`` is called."""
+        ...
+
     def fence_wkt(self, margin_m: float = 0.0, near_en: PointEn | None = None) -> str | None:
         """Return the limits less the margin as a WKT POLYGON, None without any; ValueError when nothing is left."""
         ...

@@ -87,6 +87,7 @@ def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str,
             for g in voyage.goals
         ],
         "obstacles": area.obstacles_wkt(0.0),
+        "names": area.obstacle_names(0.0),
         "grown": area.obstacles_wkt(margin_m),
         "fence": area.fence_wkt(0.0),
         "margin_m": margin_m,

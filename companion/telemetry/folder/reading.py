@@ -60,12 +60,13 @@ class ChartGoal(Struct, frozen=True, kw_only=True):
 
 
 class RecordedChart(Struct, frozen=True, kw_only=True):
-    """area.json: obstacles as drawn and as grown by the margin, and the fence, as WKT in local metres."""
+    """area.json: obstacles as drawn, their names, obstacles as grown by the margin, the fence; WKT in local metres."""
 
     name: str
     origin: Origin
     goals: tuple[ChartGoal, ...] = ()
     obstacles: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
     grown: tuple[str, ...] = ()
     fence: str | None = None
     margin_m: float | None = None
