@@ -4,11 +4,11 @@ Time goes on in steps. From each kept place all angles of its tack are sailed fo
 wind; a tack or gybe takes its whole number of steps and no way. Of two that come into one cell, tack and leg of the
 course the one with the less time behind it and to go is kept: who is there later could have been the other and have
 waited. Places are never moved to a cell's middle, so what comes out can be sailed exactly; the cells decide only what
-is thrown away. A place from which no wind that comes would bring her to the goal in time (``rungs``) is left out.
+is thrown away. A place from which no wind that comes would bring the boat to the goal in time (``rungs``) is left out.
 
-Along any direction n her speed made good is at most the largest of n . v over the angles of the tack that she is on.
-The best sequence of tacks for that alone is a small dynamic programme over time and tack, exact, whatever she does
-across n. She is at the goal by T only if for every n the way to it along n is no longer. Where nothing is in the way
+Along any direction n the speed made good is at most the largest of n . v over the angles of the tack that is sailed.
+The best sequence of tacks for that alone is a small dynamic programme over time and tack, exact, whatever is done
+across n. The goal is reached by T only if for every n the way to it along n is no longer. Where nothing is in the way
 these conditions are nearly enough: in a wind that is the same everywhere an optimum has one costate, a constant n.
 """
 
@@ -57,9 +57,9 @@ class RaceBoat:
 
     Attributes:
         polar: speed by wind angle and strength.
-        no_go_half_rad: she sails no nearer to the wind.
+        no_go_half_rad: the boat sails no nearer to the wind.
         max_twa_rad: and no deeper.
-        tack_s: so long she stands still in each change of side, tack or gybe.
+        tack_s: so long the boat stands still in each change of side, tack or gybe.
         board_s: least time on a tack from its beginning, that included.
     """
 
@@ -176,7 +176,7 @@ def _moves(race: Race, cell_m: float, until_s: float) -> tuple[NDArray[np.int64]
     moves = [(r, c) for r in range(-REACH, REACH + 1) for c in range(-REACH, REACH + 1) if math.gcd(r, c) == 1]
     costs = []
     for r, c in moves:
-        # a move from the goal outwards: she sails it the other way
+        # a move from the goal outwards: the boat sails it the other way
         course = math.atan2(-c, -r) - mean
         ray = shapely.LineString([(0.0, 0.0), (100.0 * math.sin(course), 100.0 * math.cos(course))])
         costs.append(math.hypot(r, c) * cell_m / max(0.05, float(shapely.length(ray.intersection(hull)))))

@@ -55,7 +55,7 @@ class ArduRover:
         parameters: set besides those of the model's file, sailboat.parm or motorboat.parm.
         folder: where it keeps eeprom and logs; a temporary one when None.
         model: of the simulator; ``sailboat-motor`` has a throttle.
-        waters: wind and stream by place, told as they are where she is.
+        waters: wind and stream by place, told as they are where the boat is.
 
     ``link`` is the companion's LINK, ``shore_link`` another port (SERIAL2) for a ground station.
     """

@@ -14,12 +14,12 @@ from sitl.world import Waters
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waves:
-    """A seaway: what it takes from her speed and how it turns her about.
+    """A seaway: what it takes from the boat's speed and how it turns the boat about.
 
     Attributes:
         from_rad: where the waves come from.
-        loss: the share of her speed that is lost head to sea; none with it, half of it abeam.
-        yaw_rad: how far her bow swings to each side.
+        loss: the share of the boat's speed that is lost head to sea; none with it, half of it abeam.
+        yaw_rad: how far the boat's bow swings to each side.
         period_s: of that swing.
     """
 
@@ -29,11 +29,11 @@ class Waves:
     period_s: float = 4.0
 
     def share(self, heading_rad: float) -> float:
-        """Return the share of her speed that is left on a heading."""
+        """Return the share of the boat's speed that is left on a heading."""
         return 1.0 - self.loss * 0.5 * (1.0 + math.cos(heading_rad - self.from_rad))
 
     def wobble_radps(self, t_s: float) -> float:
-        """Return the turn that the waves give her."""
+        """Return the turn that the waves give the boat."""
         rate_hz = 2.0 * math.pi / self.period_s
         return self.yaw_rad * rate_hz * math.cos(rate_hz * t_s)
 
@@ -72,9 +72,9 @@ class Departures:
 
     Attributes:
         beat, reach, run: shares of the polar's speed at 45, 90 and 150 degrees to the true wind, straight between.
-        leeway_rad: on a beat, the apparent wind 30 degrees off her bow and three times as fast as she.
+        leeway_rad: on a beat, the apparent wind 30 degrees off the bow and three times as fast as the boat.
         tack_fails: the chance that a tack does.
-        irons_s: for so long she lies near head to wind then, before she falls off to the old tack.
+        irons_s: for so long the boat lies near head to wind then, before it falls off to the old tack.
         waves: the seaway.
         sensors: what errs.
     """
@@ -102,7 +102,7 @@ class AutopilotConfig:
     """One boat.
 
     Attributes:
-        home: where it lies at power-up; the origin of ``Truth.east_m`` and ``north_m`` until she is ``recentre_m`` off.
+        home: where it lies at power-up; the origin of ``Truth.east_m`` and ``north_m`` until it is ``recentre_m`` off.
         recentre_m: so far from the origin of its metres the boat is what they count from next.
         heading_rad: of the bow at power-up.
         is_warm: powered up long ago: boot time starts at 60 s, EKF ready, filters settled, wind there from the
@@ -114,7 +114,7 @@ class AutopilotConfig:
         parameters: values other than the fresh boat's, by name.
         battery_v: at the start; ``Autopilot.set_battery`` changes it.
         has_ftp: offer MAVFTP; small boards are built without it.
-        polar: of a boat that is not the simulator's own; None: hers.
+        polar: of a boat that is not the simulator's own; None: the simulator's.
         has_motor: an auxiliary motor, run by DO_AUX_FUNCTION 74.
         is_motorboat: it has no sail, and its motor runs; ``SAIL_ENABLE`` and ``WNDVN_TYPE`` are 0.
         epoch_s: Unix time of the start, as its GPS tells it.

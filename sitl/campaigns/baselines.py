@@ -1,6 +1,6 @@
 """What the companion is worth: the same water and weather sailed by ArduRover alone.
 
-Beside the companion: ``fixed``: her first plan, which she uploads and then dies. ``alone``: ArduRover with nothing but
+Beside the companion: ``fixed``: its first plan, after whose upload it dies. ``alone``: ArduRover with nothing but
 a waypoint at each goal, in AUTO. ``dijkstra``: the same with ArduRover's own path planning round the obstacles as
 exclusion fences, set at boot as well as we know how. The companion sails on the embedded autopilot and the real
 ArduRover, and so does ``alone``; ``dijkstra`` on the real one alone, for the embedded one has no path planning, and the

@@ -4,7 +4,7 @@ A seed gives the weather and the other vessel (``sitl.campaigns.encounters``); s
 course whatever. Each voyage is sailed on the embedded autopilot under the virtual clock and judged by its true tracks
 (``sitl.scenario.colregs``): the distance to keep, and under the policy "rules" the rules too.
 
-Our boat is on a reach or a broad reach, so that she holds her course by herself: on a beat nobody can tell standing on
+Our boat is on a reach or a broad reach, so that it holds its course by itself: on a beat nobody can tell standing on
 from the next tack. The other is placed where both would nearly touch.
 """
 
@@ -44,7 +44,7 @@ LEG_DEG = 90.0
 RULE = {"crossing": "18", "head-on": "18", "overtaking": "13", "sailing": "12"}
 SHOAL = 0.25                 # of the voyages, and how many of the vessels keep the rules
 KEEPS_RULES = 0.6
-CLEAR_TACK_DEG = 12.0        # nearer to the wind's line nobody could tell her tack
+CLEAR_TACK_DEG = 12.0        # nearer to the wind's line nobody could tell the boat's tack
 _MOTOR: tuple[tuple[Craft, float], ...] = (
     ("power", 0.5), ("fishing", 0.2), ("restricted", 0.1), ("not under command", 0.1), ("draught", 0.1))
 

@@ -97,8 +97,8 @@ class Reach:
     lives: Sequence[tuple[float, float]]
     link_up: Sequence[tuple[float, bool]]
     operator_s: Sequence[tuple[float, float]]
-    stopped_s: Sequence[float] = ()          # when a failsafe stopped her: a sign as well
-    false_s: Sequence[float] = ()            # when the autopilot came to believe a place where she is not
+    stopped_s: Sequence[float] = ()          # when a failsafe stopped the boat: a sign as well
+    false_s: Sequence[float] = ()            # when the autopilot came to believe a place where the boat is not
 
     def first_s(self, t_s: float, before_s: float) -> float | None:
         """Return the first moment from ``t_s`` on at which he could, None before ``before_s``."""
@@ -185,7 +185,7 @@ CALLED_S = 120.0
 # From the water's carrying a boat without steerage to a call [s]: a wind that has died is one by its mean over a
 # minute, and a velocity that is not by sails by its mean over ten seconds.
 NOTICED_S = 60.0
-# With less wind over the water than this there is no steerage [m/s]; and with less than this many times the current she
+# With less wind over the water than this there is no steerage [m/s]; and with less than this many times the current it
 # does not stem it: half of the wind is what the boat makes in light air.
 STEERAGE_MPS, STEMS = 0.8, 2.0
 TURNED_DEG = 60.0
@@ -333,7 +333,7 @@ class Watch:
         return tuple(t_s for n, t_s in enumerate(self.t_s) if holds[n] and not (n and holds[n - 1]))
 
     def _is_false(self) -> list[bool]:
-        """Return, of each sample, whether the autopilot believed the boat to be where she was not."""
+        """Return, of each sample, whether the autopilot believed the boat to be where it was not."""
         off_m = np.asarray(self.en_m).reshape(-1, 2) - np.asarray(self.believed_en_m).reshape(-1, 2)
         return [bool(far) for far in np.hypot(*off_m.T) > FALSE_M]
 

@@ -259,9 +259,9 @@ CRASH_DEG = 40.0
 
 
 def _fence(rng: random.Random, at_s: float) -> SampledFault:
-    """The circle round home, which is where she lies: the goal is outside of it.
+    """The circle round home, which is where the boat lies: the goal is outside of it.
 
-    It is there from the start, or somebody sets it under way: it may be behind her then. Now and then it is widened.
+    It is there from the start, or set under way, perhaps when the boat is past it. Now and then it is widened.
     """
     circle = {
         "FENCE_TYPE": 2.0, "FENCE_RADIUS": round(rng.uniform(30.0, 160.0), 1), "FENCE_ACTION": rng.choice(_ACTIONS),
@@ -308,7 +308,7 @@ def _filter(rng: random.Random, at_s: float) -> SampledFault:
 
 
 def _knockdown(rng: random.Random, at_s: float) -> SampledFault:
-    """Knocked down; a person looks at her and sets AUTO, or never does."""
+    """Knocked down; a person looks at the boat and sets AUTO, or never does."""
     fallen = EventSpec(at_s=at_s, kind="knockdown", roll_deg=round(rng.uniform(CRASH_DEG + 5.0, 100.0), 1),
                        for_s=length(rng, 1.0, 20.0))
     looked = EventSpec(at_s=round(at_s + (fallen.for_s or 0.0) + length(rng, 5.0, 120.0), 1), kind="mode", mode="AUTO")
@@ -318,12 +318,12 @@ def _knockdown(rng: random.Random, at_s: float) -> SampledFault:
 
 
 def _leak(rng: random.Random, at_s: float) -> SampledFault:
-    """The bilge's switch is wet, for good or as she rolls; nothing on the autopilot acts on it."""
+    """The bilge's switch is wet, for good or as the boat rolls; nothing on the autopilot acts on it."""
     return SampledFault(events=(EventSpec(at_s=at_s, kind="leak", for_s=rng.choice((None, length(rng, 1.0, 120.0)))),))
 
 
 def unattended(rng: random.Random) -> SampledFault:
-    """The companion may not set modes: a person arms her and sets AUTO, now and then again, or does not."""
+    """The companion may not set modes: a person arms the boat and sets AUTO, now and then again, or does not."""
     times = [10.0, 20.0, 30.0, *sorted(round(rng.uniform(40.0, 250.0), 1) for _ in range(rng.choice((0, 1, 3))))]
     autos = tuple(EventSpec(at_s=t_s, kind="mode", mode="AUTO") for t_s in times)
     return SampledFault(events=(EventSpec(at_s=8.0, kind="arm"), *autos), changes={"set_auto": False})
@@ -399,7 +399,7 @@ def draw_jump(
         events.insert(0, EventSpec(at_s=round(at_s - rng.uniform(0.1, 0.9) * dead_s, 1), kind="kill_companion",
                                    restart_after_s=dead_s))
     if mode == "held by order":
-        first_s = at_s if kind != "on restart" else events[0].at_s - ANSWER_S   # she lives to answer it
+        first_s = at_s if kind != "on restart" else events[0].at_s - ANSWER_S   # the companion lives to answer it
         events.append(EventSpec(at_s=round(first_s - rng.uniform(5.0, 20.0), 1), kind="order", order="hold"))
     headings: dict[str, dict[str, Any]] = {"skipper": {"guidance": "heading"}, "operator": {"guided": True}}
     tables = {"by headings": headings, "held by order": {"operator": {"orders": "all"}}}

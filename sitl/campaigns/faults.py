@@ -139,7 +139,7 @@ def _jump_of(seed: int, base: Scenario, source: Path) -> Jump:
 
 
 def sail_jump(drawn: Jump, job: Job[FaultCase]) -> dict[str, Any]:
-    """Sail a voyage with a false position, and once more with a skipper who puts her into LOITER and leaves her there.
+    """Sail a voyage with a false position, and once more with a skipper who puts the boat into LOITER for good.
 
     The second does so as soon as anything could be known of it. What the first touches and the second does not is a
     fault.

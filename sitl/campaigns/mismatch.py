@@ -3,7 +3,7 @@
 A leg's promise is the probability that the true wind puts its heading into the no-go zone, from the spread and the
 angle that it was planned with; what came of it is looked at once, half way along the leg. Both are of the bow through
 the water and of the wind over it: what the sails feel. Where there is a current or leeway the bow is the one that
-keeps her on the leg in them.
+keeps the boat on the leg in them.
 
 Each is sailed on the embedded autopilot under the virtual clock. A voyage passes that touches nothing, is never silent
 and ends without an unhandled error; one below the margin's floor is counted and named. Arriving is counted, not
@@ -36,7 +36,7 @@ _SAME_M = 0.5
 # What a plan says of its arrival, and the probability of being there by then.
 QUANTILES = {"p10_s": 0.1, "p50_s": 0.5, "p90_s": 0.9}
 _SHORT_M = 10.0       # a leg that is shorter is the middle of a turn
-_SLOW_MPS = 0.3       # slower than this she goes nowhere that could be kept to
+_SLOW_MPS = 0.3       # slower than this the boat goes nowhere that could be kept to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +80,7 @@ class Legs:
             twd_from_rad=over_water(truth.twd_from_rad, truth.tws_mps, current)[0]))
 
     def life(self, start_s: float, end_s: float) -> None:
-        """Take one life of the companion: none is taken from her here."""
+        """Take one life of the companion: nothing is made of it."""
 
 
 def bow_rad(
@@ -88,9 +88,9 @@ def bow_rad(
 ) -> float:
     """Return the heading that makes a course over the ground good.
 
-    ``through_en_mps`` is how she goes through the water while her bow is at ``heading_rad``: her speed, her leeway.
+    ``through_en_mps`` is how the boat goes through the water with its bow at ``heading_rad``: speed and leeway.
 
-    >>> round(math.degrees(bow_rad(0.0, (1.0, 0.0), (0.0, 2.0), 0.0)))     # set to the east, she holds up to the west
+    >>> round(math.degrees(bow_rad(0.0, (1.0, 0.0), (0.0, 2.0), 0.0)))     # set to the east, it holds up to the west
     -30
     """
     speed_mps = math.hypot(*through_en_mps)
@@ -115,7 +115,7 @@ def chance_of_no_go(twa_rad: float, sigma_rad: float, half_rad: float) -> float:
 def legs_promised(folder: Path, sailed: list[SailedSpan], half_rad: float) -> list[dict[str, Any]]:
     """Return of each sailed leg that a plan of the record holds: its promise, what came, whose its tacks were.
 
-    ``off_deg`` is how far the wind's angle to her bow was from the planned one, positive to starboard; ``sigma_deg``
+    ``off_deg`` is how far the wind's angle to the bow was from the planned one, positive to starboard; ``sigma_deg``
     how far it was expected to be.
     """
     plans = [(d["t_s"], d["plan"]["legs"]) for d in decisions(folder) if d["kind"] == "plan" and d.get("plan")]

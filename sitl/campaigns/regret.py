@@ -1,4 +1,4 @@
-"""Regret: the time that every sailor takes over the best that could have been made of the wind that she met."""
+"""Regret: the time that every sailor takes over the best that could have been made of the wind that the boat met."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _percent(share: float | None, digits: int) -> str:
     return "-" if share is None else f"{100.0 * share:.{digits}f}"
 
 
-# Asked for within this share of what was sailed: her polar's speeds are not passed by much for long.
+# Asked for within this share of what was sailed: its polar's speeds are not passed by much for long.
 UNTIL = 1.2
 
 
@@ -105,7 +105,7 @@ def require_judged(path: Path) -> None:
 
 
 def race_of(scenario: Scenario, track: BaselineTrack) -> Race:
-    """Return the race of a voyage: from where she set sail, in the wind that she met from then on."""
+    """Return the race of a voyage: from where the boat set sail, in the wind that it met from then on."""
     mission, truth = track.mission, track.truth
     frame, boat = mission.frame(), boat_of(mission)
     t_s, tws = np.array(truth.t_s), np.array(truth.tws_mps)

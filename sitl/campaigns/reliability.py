@@ -1,7 +1,7 @@
 """Reliability: what was promised with a probability, and how often it came, over the voyages of a campaign.
 
 Of each leg that a plan sails itself: the chance that the true wind puts its heading into the no-go zone, and whether
-the wind's angle to her bow was in the central intervals of its spread. Of each voyage: whether it came below the
+the wind's angle to the bow was in the central intervals of its spread. Of each voyage: whether it came below the
 margin's floor, by how much was not the plan's; its time as a share of what the first plan promised; and whether it was
 later than each quantile of that plan's arrival.
 """
@@ -61,7 +61,7 @@ def no_go_curve(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
 
 
 def coverage(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
-    """Return how often the wind's angle to her bow was in the central interval of each level, as of a normal."""
+    """Return how often the wind's angle to the boat's bow was in the central interval of each level, as of a normal."""
     legs = _own_legs(records)
     wide = [(level, NormalDist().inv_cdf(0.5 + 0.5 * level)) for level in LEVELS if legs]
     return [Bin(promised=level, name=f"central {100.0 * level:g} %", of=len(legs),

@@ -112,7 +112,7 @@ class Estimates:
     Attributes:
         records: the voyages, by their seeds.
         arrives, low, touches: the chances of arriving, of coming below the margin's floor, of touching something.
-        times: quantiles of the time until she arrives [s], of all voyages: who does not arrive takes for ever.
+        times: quantiles of the time until the boat arrives [s], of all voyages: who does not arrive takes for ever.
         watchdogs: the chance that each is raised, the most frequent first; those that never were are left out.
     """
 

@@ -1,4 +1,4 @@
-"""The picture of a rehearsal: where she goes and how often, where the trouble is, chances, times, what changes gain."""
+"""The picture of a rehearsal: the way sailed and how often, where the trouble is, chances, times, what changes gain."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class PreparedRehearsal:
         mission: what it sails.
         doubts: what a seed draws.
         plans: the way in the mean wind, goal by goal; empty where fields lead.
-        tells_the_hour: whether it makes a difference when she sails: a measured wind, a tide, the dark.
+        tells_the_hour: whether it makes a difference when the boat sails: a measured wind, a tide, the dark.
     """
 
     source: Path

@@ -169,8 +169,8 @@ class Doubts:
     Attributes:
         wind: what is known of it.
         boat: how far boat, sea and sensors may be others, 1: as ``sitl mismatch`` draws them; 0: as the plan has them.
-        faults: whether trouble befalls her.
-        voyage_s: about how long a voyage takes; what befalls her begins by then.
+        faults: whether trouble is drawn, too.
+        voyage_s: about how long a voyage takes; trouble begins by then.
     """
 
     wind: Given

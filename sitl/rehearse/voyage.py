@@ -26,7 +26,7 @@ from sitl.runner import Experiment, Job, Key, file_hash
 from sitl.scenario import HullTrack
 
 TRACK_M = 1.0      # by how much a kept track may be off the true one
-UNDER_WAY_S = 2.0  # what is said when she sets sail is of the mission and of no place
+UNDER_WAY_S = 2.0  # what is said when the boat sets sail is of the mission and of no place
 FIGURES = ("arrived", "contacts", "time_s", "distance_m", "tacks", "gybes", "min_clearance_m", "silence_s", "replans",
            "promised_risk", "no_go_entries", "end_reason")
 
@@ -63,22 +63,22 @@ class Trace:
             self.heading_rad.append(truth.heading_rad)
 
     def life(self, start_s: float, end_s: float) -> None:
-        """Take one life of the companion: none is taken from her here."""
+        """Take one life of the companion: nothing is made of it."""
 
     def at(self, t_s: float) -> tuple[float, float] | None:
-        """Return where she was at a time; None before she sailed."""
+        """Return where the boat was at a time; None before it sailed."""
         index = bisect_right(self.t_s, t_s) - 1
         return self.en_m[index] if index >= 0 else None
 
     def track(self) -> list[list[float]]:
-        """Return the way she went, in as few points as it needs."""
+        """Return the way sailed, in as few points as it needs."""
         if len(self.en_m) < 2:
             return []
         line = shapely.simplify(shapely.linestrings(self.en_m), TRACK_M)
         return [[round(x, 1), round(y, 1)] for x, y in shapely.get_coordinates(line).tolist()]
 
     def nearest(self, solid: Any, hull: Hull) -> list[float] | None:
-        """Return where her hull came nearest to what is solid, or touched it first."""
+        """Return where the hull came nearest to what is solid, or touched it first."""
         if not self.en_m:
             return None
         _, index = HullTrack(en_m=np.asarray(self.en_m), heading_rad=np.asarray(self.heading_rad),

@@ -58,7 +58,7 @@ class LiveFix:
 
     @property
     def velocity_en_mps(self) -> tuple[float, float]:
-        """Along the bow: what leeway and stream make of it is left out, as by whoever sees her from another boat."""
+        """Along the bow: what leeway and stream make of it is left out, as seen from another boat."""
         return self.speed_mps * math.sin(self.heading_rad), self.speed_mps * math.cos(self.heading_rad)
 
 

@@ -3,13 +3,13 @@
 Written from the rules and not from the companion's code, which it is to judge: nothing of ``companion.traffic`` is
 used. Angles are those that the rules name, seen from each vessel in turn.
 
-The duty is that of the moment when our boat could first know of the other (her first report).
+The duty is that of the moment when our boat could first know of the other (its first report).
 Then, from the tracks alone:
 
 - **we stand on** (17 a i): our course stays within ``STEADY_DEG`` until the other has evidently not acted, which is
-  when no more than ``EVIDENT_S`` are left and she has not changed course; if she has, we still stand on until past;
+  when no more than ``EVIDENT_S`` are left and it has not changed course; if it has, we still stand on until past;
 - **we give way** (8, 15, 16): a change of course of ``APPARENT_DEG``, begun early (``EARLY_S`` before the meeting, or
-  within ``PROMPT_S`` of her first report), and not across her bow nearer than ``AHEAD_S`` of her way; where rule 14
+  within ``PROMPT_S`` of its first report), and not across its bow nearer than ``AHEAD_S`` of its way; where rule 14
   says so, to starboard; under sail on port tack, with a vessel nearly dead before the wind whose tack nobody could
   tell, giving way is no fault either (12 a iii);
 - **both**: the hulls stay ``keep_m`` apart.
@@ -17,9 +17,9 @@ Then, from the tracks alone:
 The thresholds are this project's: the rules have none.
 
 A ``Mariner`` is placed so that, both going on, the vessels are ``miss_m`` apart after ``meet_s``. One who keeps them
-gives way where it is for her to do so: when as little as ``react_s`` is left she turns by 50 degrees to the side on
-which she passes our stern, by more while that is not enough, and comes back to her course when we are past. Under sail
-she does not turn nearer to the wind than she can sail.
+gives way where that is its duty: when as little as ``react_s`` is left it turns by 50 degrees to the side on
+which it passes our stern, by more while that is not enough, and comes back to its course when we are past. Under sail
+it does not turn nearer to the wind than it can sail.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ from numpy.typing import NDArray
 Craft = Literal["power", "sail", "fishing", "restricted", "not under command", "draught"]
 Duty = Literal["first", "second", "both"]
 
-# ITU-R M.1371: what a vessel of each kind says of herself.
+# ITU-R M.1371: what a vessel of each kind says of itself.
 STATUS: dict[Craft, int] = {
     "power": 0, "sail": 8, "fishing": 7, "restricted": 3, "not under command": 2, "draught": 4}
 SHIP_TYPE: dict[Craft, int] = {
     "power": 70, "sail": 36, "fishing": 30, "restricted": 33, "not under command": 70, "draught": 80}
-# Rule 18: who is before whom; a vessel constrained by her draught is not to be impeded by sail either.
+# Rule 18: who is before whom; a vessel constrained by its draught is not to be impeded by sail either.
 _RANK: dict[Craft, int] = {
     "power": 0, "sail": 1, "draught": 2, "fishing": 3, "restricted": 4, "not under command": 4}
 STERN_SECTOR_DEG = 112.5     # 22.5 degrees abaft the beam
@@ -106,7 +106,7 @@ def _sails(a: Mover, b: Mover, twd_deg: float) -> Duty:
     """Rule 12 a: the tack, and on the same tack the place."""
     first, second = (_half_turn(twd_deg - math.degrees(m.heading_rad)) > 0.0 for m in (a, b))
     if first != second:
-        return "second" if first else "first"      # with the wind on the starboard side she is on starboard tack
+        return "second" if first else "first"      # with the wind on the starboard side it is on starboard tack
     upwind = complex(math.sin(math.radians(twd_deg)), math.cos(math.radians(twd_deg)))
     higher = ((complex(*a.en_m) - complex(*b.en_m)) * upwind.conjugate()).real
     return "first" if higher >= 0.0 else "second"
@@ -129,7 +129,7 @@ DOUBT_DEG = 25.0
 
 @dataclass(slots=True)
 class Met:
-    """The true track of a vessel that was met, in the times of our boat's; ``heard_s`` is of her first report."""
+    """The true track of a vessel that was met, in the times of our boat's; ``heard_s`` is of its first report."""
 
     craft: Craft
     manner: str
@@ -151,7 +151,7 @@ class Judgement:
     manner: str
     craft: str
     cpa_unaltered_m: float
-    meet_s: float            # from her first report to the meeting, both going on
+    meet_s: float            # from its first report to the meeting, both going on
     nearest_m: float         # between the hulls
     altered_deg: float       # our largest change of course before the closest approach
     altered_left_s: float | None   # to the meeting when our change had begun
@@ -182,7 +182,7 @@ def judge_encounter(
     met: Met, t_s: Sequence[float], en_m: Sequence[tuple[float, float]], heading_rad: Sequence[float],
     twd_from_rad: Sequence[float], *, keep_m: float, our_length_m: float, craft: Craft = "sail",
 ) -> Judgement | None:
-    """Return what the tracks show; None where she was not heard, or nothing was sailed after that.
+    """Return what the tracks show; None where the other was not heard, or nothing was sailed after that.
 
     Args:
         met: the other's track.
@@ -238,7 +238,7 @@ def judge_encounter(
 
 
 def _in_doubt(ours: Mover, hers: Mover, twd_from_rad: float) -> bool:
-    """Whether we are on port tack and her tack cannot be told for sure: she runs nearly dead before the wind."""
+    """Whether we are on port tack and the other's tack cannot be told for sure: it runs nearly dead before the wind."""
     off_wind = math.degrees(abs(math.remainder(hers.heading_rad - twd_from_rad, 2.0 * math.pi)))
     return off_wind > 180.0 - DOUBT_DEG and math.sin(twd_from_rad - ours.heading_rad) < 0.0
 
@@ -279,7 +279,7 @@ def _crossed(
     ours: NDArray[np.float64], hers: NDArray[np.float64], hers_deg: NDArray[np.float64], speed: NDArray[np.float64],
     between_deg: float,
 ) -> tuple[str, float]:
-    """Return on which side of her we crossed her course's line first, and how many seconds of her way off."""
+    """Return on which side of the other we crossed its course's line first, and how many seconds of its way off."""
     if not CROSS_DEG[0] < abs(math.remainder(between_deg, 360.0)) < CROSS_DEG[1]:
         return "", math.inf
     off = ours - hers
@@ -319,7 +319,7 @@ def _speeds(
 def _gaps(
     ours: NDArray[np.float64], hers: NDArray[np.float64], hers_deg: NDArray[np.float64], met: Met, our_length_m: float,
 ) -> NDArray[np.float64]:
-    """Return the distances between her rectangle and our disc [m]."""
+    """Return the distances between the other's rectangle and our disc [m]."""
     off = ours - hers
     s, c = np.sin(np.radians(hers_deg)), np.cos(np.radians(hers_deg))
     along, across = np.abs(off[:, 0] * s + off[:, 1] * c), np.abs(off[:, 0] * c - off[:, 1] * s)
@@ -331,27 +331,27 @@ Manner = Literal["rules", "keeps"]
 TURN_DEG, MORE_DEG, MOST_DEG = 50.0, 20.0, 110.0
 MORE_AFTER_S = 15.0
 CLOSE_HAULED_DEG = 50.0
-NIMBLE_M = 40.0              # shorter than this she turns fast
+NIMBLE_M = 40.0              # shorter than this it turns fast
 RATES_DEG_S = (6.0, 2.5)
-ROOM_M = 90.0                # between the middles, beyond half her length: what she wants between us
+ROOM_M = 90.0                # between the middles, beyond half its length: what it wants between us
 
 
 @dataclass(slots=True)
 class Mariner:
-    """Her state; ``watch`` moves her on by a second."""
+    """State of the other vessel; ``watch`` moves it on by a second."""
 
     mmsi: int
     length_m: float
     craft: Craft
     manner: Manner
     react_s: float
-    base_rad: float          # the course that she is on her way by
+    base_rad: float          # the course that it is on its way by
     speed_mps: float
     en_m: tuple[float, float]
     t_s: float
     name: str = ""
     course_rad: float = 0.0
-    turn_deg: float = 0.0    # how far off her course she has decided to go
+    turn_deg: float = 0.0    # how far off its course it has decided to go
     turned_s: float = -math.inf
     gives_way: bool | None = None   # by what the rules gave when it began
 
@@ -359,16 +359,16 @@ class Mariner:
         self.course_rad = self.base_rad
 
     def at(self, t_s: float) -> tuple[float, float]:
-        """Return her middle at ``t_s``, a second or so from the last look."""
+        """Return its middle at ``t_s``, a second or so from the last look."""
         run = self.speed_mps * (t_s - self.t_s)
         return self.en_m[0] + run * math.sin(self.course_rad), self.en_m[1] + run * math.cos(self.course_rad)
 
-    def way(self, t_s: float) -> tuple[float, float, float]:  # noqa: ARG002 - she turns from look to look
+    def way(self, t_s: float) -> tuple[float, float, float]:  # noqa: ARG002 - it turns from look to look
         """Return course, heading and speed."""
         return self.course_rad, self.course_rad, self.speed_mps
 
     def mover(self, course_rad: float | None = None) -> Mover:
-        """Return her as the rules see her, on her course or on another."""
+        """Return the vessel as the rules see it, on its course or on another."""
         course = self.course_rad if course_rad is None else course_rad
         return Mover(en_m=self.en_m, course_rad=course, heading_rad=course, speed_mps=self.speed_mps, craft=self.craft)
 
@@ -411,7 +411,7 @@ class Mariner:
 
 @dataclass(slots=True)
 class Receiver:
-    """What AIS makes of her: errors of her receiver and log, drawn from a seed."""
+    """What AIS makes of a vessel: errors of its receiver and log, drawn from a seed."""
 
     rng: np.random.Generator
     fix_sd_m: float = 3.0
@@ -435,14 +435,14 @@ class Receiver:
 
 def met_by(ours: tuple[tuple[float, float], tuple[float, float]], course_deg: float, sog_mps: float, meet_s: float,
            miss_m: float) -> tuple[tuple[float, float], float]:
-    """Return where a vessel is, and her course [rad], who will meet ours after ``meet_s``.
+    """Return where a vessel is, and its course [rad], that will meet ours after ``meet_s``.
 
     Args:
         ours: position and velocity, east and north [m, m/s].
-        course_deg: hers, clockwise from ours.
-        sog_mps: hers.
+        course_deg: the vessel's, clockwise from ours.
+        sog_mps: the vessel's.
         meet_s: until the closest approach, both going on.
-        miss_m: between the middles then; positive: she is ahead of our bow, or to starboard where courses are alike.
+        miss_m: between the middles then; positive: it is ahead of our bow, or to starboard where courses are alike.
 
     """
     (east, north), (ve, vn) = ours

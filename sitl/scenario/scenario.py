@@ -71,8 +71,8 @@ class WavesSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """A seaway."""
 
     from_deg: Degrees | None = None   # none: from where the wind is on the average
-    loss: Share = 0.0            # of her speed, head to sea; half of it abeam, none with it
-    yaw_deg: Swing = 0.0         # how far her bow swings to each side
+    loss: Share = 0.0            # of the boat's speed, head to sea; half of it abeam, none with it
+    yaw_deg: Swing = 0.0         # how far the bow swings to each side
     period_s: Positive = 4.0     # of that
 
 
@@ -83,9 +83,9 @@ class HullSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     beat: Factor = 1.0           # ... this at 45 degrees to the true wind
     reach: Factor = 1.0          # at 90
     run: Factor = 1.0            # at 150, straight between
-    leeway_deg: Leeway = 0.0     # on a beat: the apparent wind 30 degrees off the bow, three times as fast as she
+    leeway_deg: Leeway = 0.0     # on a beat: the apparent wind 30 degrees off the bow, three times as fast as the boat
     tack_fails: Share = 0.0      # the chance that a tack does ...
-    irons_s: Seconds = 10.0      # ... and how long she lies near head to wind then
+    irons_s: Seconds = 10.0      # ... and how long the boat lies near head to wind then
 
 
 class SensorsSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -254,10 +254,10 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     gap_m: float = 0.0
     bearing_deg: float = 0.0     # clockwise
     craft: Craft = "power"
-    manner: Manner = "rules"     # of whoever is met: gives way where it is for her, or keeps her course whatever
+    manner: Manner = "rules"     # of whoever is met: gives way by the rules, or keeps its course whatever
     meet_s: float = 120.0        # until the closest approach, both going on ...
     miss_m: float = 0.0          # ... and how far apart the middles are then
-    receiver: Literal["autopilot", "feed"] = "autopilot"   # who hears her AIS
+    receiver: Literal["autopilot", "feed"] = "autopilot"   # who hears that vessel's AIS
     goal_east_m: float = 0.0
     goal_north_m: float = 0.0
 
@@ -299,11 +299,11 @@ class SatelliteSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
 
 class HeldSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """She must stay where she is: from and to these times [s after the simulation's start], within ``within_m``."""
+    """The boat must stay where it is: from and to these times [s after the simulation's start], within ``within_m``."""
 
     from_s: float   # after the start
     to_s: float   # after the start
-    within_m: float          # of her mean place meanwhile
+    within_m: float          # of the boat's mean place meanwhile
 
 
 class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -312,7 +312,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     arrived: bool | None = True   # at the last goal
     contacts: int | None = 0   # of the hull with what is solid, by the true track
     within_m: float | None = None             # last position to the last goal, or to what ``ends_at`` names
-    ends_at: Literal["goal", "home", "refuge"] = "goal"   # home: where she was armed; the nearest refuge
+    ends_at: Literal["goal", "home", "refuge"] = "goal"   # home: where the boat was armed; the nearest refuge
     refuge_within_m: float | None = None      # of a refuge, at some moment
     max_time_s: float | None = None   # from setting sail to the end
     min_clearance_m: float | None = None   # from what is solid and the fence, by the true track
@@ -323,14 +323,14 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     max_silence_s: float | None = 10.0        # without a status from the companion that says why
     max_replans_per_hour: float | None = None   # plans made under way
     max_tacks: int | None = None              # before the boat first comes within ``within_m`` of the last goal
-    held: HeldSpec | None = None   # she stays where she is
+    held: HeldSpec | None = None   # the boat stays where it is
     end_phase: str | None = None   # the skipper's phase in the end
     alerts: tuple[str, ...] = ()              # announced at least once, by code
     marks_rounded: int | None = None           # in order, each on its side
     gates_crossed: int | None = None           # in order, each in its direction, laps counted
     marks_clear_m: float = 1.0                 # of the gates: what the boat's position keeps clear of them
     start_within_s: float | None = None        # after the gun, and not before it
-    inside_s: float | None = None              # each box is not left for so long after she came in ...
+    inside_s: float | None = None              # each box is not left for so long after the boat came in ...
     inside_share: float = 0.98                 # ... but for the rest of this share of the time
     seen: float | None = None                  # share of the water of each search, within half a swath of the track
     called_s: float | None = None              # the crew is called to the anchor this long before a contact
@@ -362,7 +362,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     sensors: SensorsSpec | None = None   # sensors that err
     parameters: dict[str, float] = {}   # of the autopilot, by name, from its start
     without_shifts: dict[str, float] = {}     # beside those, of who does not tack on the shifts (sitl baselines)
-    events: tuple[EventSpec, ...] = ()   # what befalls her, in any number
+    events: tuple[EventSpec, ...] = ()   # what befalls the boat, in any number
     expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)   # what must hold in the end
 
     @property

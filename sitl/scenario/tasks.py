@@ -86,7 +86,7 @@ def share_seen(track: Points, water: BaseGeometry, swath_m: float) -> float:
 
 
 def shares_inside(t_s: Sequence[float], track: Points, boxes: Sequence[BaseGeometry], for_s: float) -> list[float]:
-    """Return for each box the share of the ``for_s`` after she first came in that she was in it; 0: not so long there.
+    """Return for each box the share of the ``for_s`` after the boat first came in that it stayed; 0: not so long there.
 
     A share is of samples; the track must go on for as long.
     """

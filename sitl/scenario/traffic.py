@@ -39,7 +39,7 @@ BOAT_M = 12.0              # up to here the beam is a boat's
 FIRST_MMSI = 211_000_001
 PORTS = range(20_000, 32_000)
 KEEP_M = 15.0              # what the second boat's field keeps between hulls
-REPULSIVE_M = 30.0         # its Gaussian beyond that: Schmitt's 100 m would send her round by 200 m
+REPULSIVE_M = 30.0         # its Gaussian beyond that: Schmitt's 100 m would send the boat round by 200 m
 
 Motion = tuple[tuple[float, float], tuple[float, float]]
 """Position and velocity, east and north [m, m/s]."""
@@ -311,7 +311,7 @@ class Others:
     async def _meet(
         self, event: EventSpec, number: int, began_s: float, ours: Callable[[], tuple[Motion, float]],
     ) -> None:
-        """Let a vessel come whose watch sees us, and tell of her by AIS with the errors of her instruments."""
+        """Let a vessel come whose watch sees us, and tell of it by AIS with the errors of its instruments."""
         motion, _ = ours()
         place, course = met_by(motion, event.course_deg, event.sog_mps, event.meet_s, event.miss_m)
         mariner = Mariner(

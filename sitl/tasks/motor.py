@@ -89,12 +89,12 @@ class MotorPilot:
             other = MovingObstacle(en_m=(x + noise[0], y + noise[1]), velocity_en_mps=self._intruder[2],
                              keep_m=INTRUDER_KEEP_M, growth_mps=0.1)
             seen = replace(seen, obstacles=(other,))
-        # Without the wind there is no no-go zone: she goes where the field points.
+        # Without the wind there is no no-go zone: the boat goes where the field points.
         seen = replace(seen, twd_from_rad=None)
         near = math.dist(seen.en_m, b) < NEAR_M
         intent = replace(go_to(b, 0.0) if near else follow_line(a, b, 20.0), clearance=self._area.clearance_m)
         self._state, setpoint = step(self._state, seen, intent, self._habits)
-        # Slower through sharp turns: at full speed she would circle a mark that lies inside her turning circle.
+        # Slower through sharp turns: at full speed the boat would circle a mark that lies inside its turning circle.
         return setpoint.heading_rad, max(SLOW, math.cos(wrap_pi(setpoint.heading_rad - seen.heading_rad)))
 
     def _appear(self, seen: Situation) -> None:

@@ -32,7 +32,7 @@ PLAN_R_M = 10.0        # of the line controller
 class ByPlan:
     """A short loop as a mission would have it: Jaulin and Le Bars' line following between two waypoints.
 
-    It is made once, for the wind when the boat comes within 12 m; until then the field brings her.
+    It is made once, for the wind when the boat comes within 12 m; until then the field brings it.
     """
 
     def __init__(self) -> None:

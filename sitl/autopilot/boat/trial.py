@@ -1,4 +1,4 @@
-"""The boat tried in a steady wind: her settled speeds, and what a tack costs her, from the equations that move her."""
+"""The boat tried in a steady wind: its settled speeds, and what a tack costs it, from the equations that move it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def settled_polar(parameters: Mapping[str, float]) -> Polar:
 
 @kernel
 def _settled_mps(twa_rad: Floats, tws_mps: Floats, ideal_rad: float, least_rad: float, most_rad: float) -> Floats:
-    """Return (angles, winds) the speed at which sail and drag are even, by bisection; 0 where she drifts astern."""
+    """Return (angles, winds) the speed at which sail and drag are even, by bisection; 0 where it drifts astern."""
     out = np.zeros((twa_rad.shape[0], tws_mps.shape[0]))
     for i in range(twa_rad.shape[0]):
         for j in range(tws_mps.shape[0]):

@@ -70,11 +70,11 @@ _TACKS = 0x7AC4           # what tells the lots of tacks from a faulty vane's
 
 
 class Surroundings:
-    """Waters and departures of one boat. Times are since her start, places metres from her home."""
+    """Waters and departures of one boat. Times are since its start, places metres from its home."""
 
     def __init__(self, wind: WindModel, departures: Departures | None, waters: Waters | None, seed: int) -> None:
         self._wind, self._waters = wind, waters
-        self._home: Shift | None = None   # from her metres to those that the waters are in, where they are others
+        self._home: Shift | None = None   # from its metres to those that the waters are in, where they are others
         self.departures = departures or Departures()
         self._seed = seed
         sensors = self.departures.sensors
@@ -82,7 +82,7 @@ class Surroundings:
                      for stream in _GPS_STREAMS] if sensors.gps_noise_m > 0.0 else []
 
     def carry(self, shift: Shift) -> None:
-        """Take it that her metres count from elsewhere."""
+        """Count the boat's metres from elsewhere."""
         self._home = Shift(shift.after, shift.before if self._home is None else self._home.after)
 
     def fill(self, settings: NDArray[np.float64]) -> None:
@@ -95,14 +95,14 @@ class Surroundings:
         settings[k.P_VANE_OFFSET] += boat.sensors.vane_rad
 
     def wind_at(self, t_s: float, state: NDArray[np.float64]) -> tuple[float, float]:
-        """Return the wind where she is: from [rad], speed [m/s]."""
+        """Return the wind where the boat is: from [rad], speed [m/s]."""
         return self._wind.at(t_s) if self._waters is None else self._waters.wind_at(t_s, self._place(state))
 
     def look(
         self, t_s: float, state: NDArray[np.float64], tide_en_mps: tuple[float, float],
         jump_en_m: tuple[float, float], fault_rad: float,
     ) -> None:
-        """Set what changes: stream, waves, what her position and her compass err by, the next tack's lot.
+        """Set what changes: stream, waves, what the boat's position and compass err by, the next tack's lot.
 
         ``tide_en_mps``, ``jump_en_m`` and ``fault_rad`` are what a scenario's events made of stream, position and
         compass; all is added to them.
@@ -208,7 +208,7 @@ class Vehicle:
         return self._loops(wind, first, loops)
 
     def _advance_among(self, surroundings: Surroundings, loops: int) -> tuple[int, int]:
-        """Advance in pieces that end where the wind's grid does; at the first loop of each she looks about."""
+        """Advance in pieces that end where the wind's grid does; at the first loop of each look about."""
         done = events = 0
         while done < loops and not events:
             first = self.tick + 1 - (self.tick + 1) % _WIND_LOOPS

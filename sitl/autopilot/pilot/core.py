@@ -122,7 +122,7 @@ class Core:
         return self._told[1]
 
     def follow(self) -> bool:
-        """Let all metres count from the boat when she is far from where they do; True: places must be taken anew."""
+        """Let all metres count from the boat when it is far from where they do; True: places must be taken anew."""
         if math.hypot(*self.vehicle.true_position) < self.config.recentre_m:
             return False
         shift = self.chart.follow(self.vehicle.true_position)
