@@ -245,7 +245,8 @@ def told_table(table: Table) -> str:
     rows = [("", "voyages", *(m.name + (f" {m.unit}" if m.unit else "") for m in MEASURES))]
     for name, found in groups.items():
         rows.append((name, str(len(found)), *(_figure(measure, found) for measure in MEASURES)))
-    return f"sitl {table.campaign}: {counted(len(table.rows), 'result')} by {told_by(table.by)}\n" + _columns(rows)
+    head = f"sitl {table.campaign}: {counted(len(table.rows), 'result')} by {told_by(table.by)}"
+    return "\n".join([head, *columns(rows, left=2)]) + "\n"
 
 
 def _figure(measure: Measure, rows: Sequence[Row]) -> str:
@@ -266,7 +267,7 @@ def told(comparison: Comparison, *, most: int = 10) -> str:
     rows = [("", "figure", "pairs", "first", "second", "change (95 %)", "by luck", "")]
     rows += [(c.group, c.measure.name, str(c.pairs), *_values(c), f"{c.p_worse:.2g}" if c.measure.worse else "-",
               "WORSE" if c.is_worse else "") for c in comparison.changes if c.change != (c.measure.kind == "ratio")]
-    lines.append(_columns(rows).rstrip() if len(rows) > 1 else "no figure that is measured here changed")
+    lines += columns(rows, left=2) if len(rows) > 1 else ["no figure that is measured here changed"]
     worst = [pair for pair in comparison.pairs if any(x > 0.0 for x in pair.worse)][:most]
     if worst:
         lines.append("worse, the worst first:")
@@ -297,7 +298,19 @@ def _figure_pair(before: Row, after: Row) -> str:
     return ", ".join(parts)
 
 
-def _columns(rows: Sequence[Sequence[str]]) -> str:
-    widths = [max(len(row[n]) for row in rows) for n in range(len(rows[0]))]
-    return "".join("  ".join(cell.rjust(w) if n > 1 else cell.ljust(w) for n, (cell, w) in enumerate(
-        zip(row, widths, strict=True))).rstrip() + "\n" for row in rows)
+def columns(rows: Sequence[Sequence[str]], *, left: int) -> list[str]:
+    """Return rows under each other, a line each; all columns but the first ``left`` are flush right.
+
+    >>> columns([("sailor", "s"), ("alone", "301")], left=1)
+    ['sailor    s', 'alone   301']
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(cell.rjust(w) if n >= left else cell.ljust(w) for n, (cell, w) in enumerate(
+        zip(row, widths, strict=True))).rstrip() for row in rows]
+
+
+def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a Markdown table whose first two columns are words and all others numbers."""
+    lines = [" | ".join(row) for row in (heads, *rows)]
+    return "\n".join(["| " + lines[0] + " |", "|---|---|" + "--:|" * (len(heads) - 2),
+                      *("| " + line + " |" for line in lines[1:])])

@@ -15,6 +15,7 @@ import numpy as np
 from companion.errors import InputError
 from companion.geofence import Mission
 from companion.planners import ALGORITHMS, AUTO
+from sitl.results import columns
 from sitl.run.variation import Variation, foreknown, unspread
 from sitl.runner import CampaignResults, Experiment, Job, Summary
 
@@ -107,9 +108,8 @@ def _order(record: Mapping[str, Any]) -> tuple[str, int, int]:
 def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
     """Return one scenario's table, a line for each variation; times are paired with those of ``AS_IT_IS``."""
     reference = {r["seed"]: r for r in records if r["variation"] == AS_IT_IS and not r["error"]}
-    heads = ("", "arrived", "touched", "below floor", "in no-go, per voyage", "least clearance m", "median m", "tacks",
-             "time, share of as it is")
-    rows = [heads]
+    rows = [("", "arrived", "touched", "below floor", "in no-go, per voyage", "least clearance m", "median m", "tacks",
+             "time, share of as it is")]
     for name in names:
         mine = [r for r in records if r["variation"] == name and not r["error"]]
         if not mine:
@@ -125,10 +125,7 @@ def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
             f"{min(clear):.1f}" if clear else "-", f"{np.median(clear):.1f}" if clear else "-",
             f"{np.median([r['tacks'] for r in mine]):.0f}",
             "1" if name == AS_IT_IS else f"{middle:.3f} ({low:.3f} to {high:.3f})" if shares else "-"))
-    widths = [max(len(row[n]) for row in rows) for n in range(len(heads))]
-    return "\n".join("  ".join(cell.rjust(w) if n else cell.ljust(w)
-                               for n, (cell, w) in enumerate(zip(row, widths, strict=True))).rstrip()
-                     for row in rows) + "\n"
+    return "\n".join(columns(rows, left=1)) + "\n"
 
 
 def interval(shares: Sequence[float]) -> tuple[float, float, float]:

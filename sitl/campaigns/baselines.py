@@ -40,6 +40,7 @@ from sitl.ardurover import ArduRover, require
 from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Truth as Now
 from sitl.campaigns.ablation import interval
+from sitl.results import markdown
 from sitl.run.embedded import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.run.live import run_live
 from sitl.run.variation import Variation
@@ -324,14 +325,14 @@ def pairs(records: Sequence[dict[str, Any]], against: str) -> str:
     the mean geometric over pairs with the bootstrap's interval. "of the possible" is the sum of what was gained over
     that of what a clairvoyant gains in the same winds, where he is known.
     """
-    lines = ["| " + " | ".join(HEADS) + " |", "|---|---|" + "--:|" * (len(HEADS) - 2)]
+    rows = []
     base = {(r["scenario"], r["seed"]): r for r in records if r["who"] == against}
     for scenario in dict.fromkeys(scenario for scenario, _ in base):
         for who in dict.fromkeys(r["who"] for r in records if r["scenario"] == scenario and r["who"] != against):
             both = [(r, base[key]) for r in records
                     if (key := (scenario, r["seed"])) in base and (r["scenario"], r["who"]) == (scenario, who)]
-            lines.append("| " + " | ".join((scenario, who, *_cells(both))) + " |")
-    return "\n".join(lines)
+            rows.append((scenario, who, *_cells(both)))
+    return markdown(HEADS, rows)
 
 
 def _cells(both: Sequence[tuple[dict[str, Any], dict[str, Any]]]) -> list[str]:
@@ -460,25 +461,24 @@ def table(records: Sequence[dict[str, Any]]) -> str:
     Times are of voyages that arrived without contact; "forced" is how many of the companion's voyages met a wind shift
     into the no-go zone on a leg, to be held against the risk that the plan promised.
     """
-    lines = [
-        "| scenario | sailor | runs | arrived | touched | clean | median s | 90 % | tacks | least m | risk | forced |",
-        "|---|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|",
-    ]
+    heads = ("scenario", "sailor", "runs", "arrived", "touched", "clean", "median s", "90 %", "tacks", "least m",
+             "risk", "forced")
+    lines = []
     names = list(dict.fromkeys(load_scenario(p).name for p in SCENARIOS))
     for name in [*names, *sorted({r["scenario"] for r in records} - set(names))]:
         for who in TOLD:
             rows = [r for r in records if r["scenario"] == name and r["who"] == who]
             if rows:
                 lines.append(_row(name, who, rows))
-    return "\n".join(lines)
+    return markdown(heads, lines)
 
 
-def _row(name: str, who: str, rows: Sequence[dict[str, Any]]) -> str:
+def _row(name: str, who: str, rows: Sequence[dict[str, Any]]) -> list[str]:
     clean = sorted(r["time_s"] for r in rows if r["arrived"] and not r["contacts"])
     clearances = [r["clearance_m"] for r in rows if r["clearance_m"] is not None]
     risks = [r["promised_risk"] for r in rows if r.get("promised_risk") is not None]
     entered = [r["no_go_entries"] for r in rows if r.get("no_go_entries") is not None]
-    cells = [
+    return [
         name, who, str(len(rows)), str(sum(r["arrived"] for r in rows)), str(sum(r["contacts"] > 0 for r in rows)),
         str(len(clean)), f"{statistics.median(clean):.0f}" if clean else "-",
         f"{clean[math.ceil(0.9 * len(clean)) - 1]:.0f}" if clean else "-",
@@ -486,4 +486,3 @@ def _row(name: str, who: str, rows: Sequence[dict[str, Any]]) -> str:
         f"{statistics.median(risks):.2f}" if risks else "-",
         f"{sum(n > 0 for n in entered)} of {len(entered)}" if entered else "-",
     ]
-    return "| " + " | ".join(cells) + " |"

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.words import file_name
+from sitl.results import columns
 from sitl.run.variation import AS_IT_SAYS, Method, can_be_sailed
 from sitl.runner import CampaignResults, Experiment, Job, Key, Summary
 
@@ -133,10 +134,7 @@ def told(rows: Sequence[dict[str, Any]]) -> list[str]:
         "clearance_median_m": "median m", "promised_risk": "promised risk",
         "observed_no_go": "forced into no-go",
     }
-    texts = [[_cell(row[key]) for key in heads] for row in rows]
-    widths = [max(len(head), *(len(t[i]) for t in texts)) for i, head in enumerate(heads.values())]
-    return ["  ".join(c.rjust(w) if i else c.ljust(w) for i, (c, w) in enumerate(zip(cells, widths, strict=True)))
-            for cells in (list(heads.values()), *texts)]
+    return columns([list(heads.values()), *([_cell(row[key]) for key in heads] for row in rows)], left=1)
 
 
 def _cell(value: Any) -> str:

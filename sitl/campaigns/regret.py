@@ -26,6 +26,7 @@ from sitl.campaigns.baselines import (
     voyage_of,
 )
 from sitl.perfect_information import Best, Race, RaceBoat, RaceMark, Weather, best
+from sitl.results import markdown
 from sitl.run.embedded import solid_of
 from sitl.runner import CampaignResults, Experiment, Job, Summary
 from sitl.scenario import Scenario, load_scenario, own_polar, scenario_departures, scenario_waters, scenario_wind
@@ -65,14 +66,10 @@ def _figures(name: str, who: str, rows: Sequence[dict[str, Any]]) -> dict[str, A
 
 def told(records: Sequence[dict[str, Any]]) -> str:
     """Return the figures as a Markdown table."""
-    lines = ["| " + " | ".join(HEADS) + " |", "|---|---|" + "--:|" * (len(HEADS) - 2)]
-    for f in figures_of(records):
-        cells = [
-            f["scenario"], f["sailor"], str(f["runs"]), str(f["clean"]), _number(f["time_s"]), _number(f["tacks"], "g"),
-            _number(f["best_s"]), _number(f["best_tacks"], "g"), *(_percent(f[k], 1) for k in ("regret", "regret_10",
-            "regret_90")), _percent(f["gap"], 1), _percent(f["refined"], 2)]
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    return markdown(HEADS, [[
+        f["scenario"], f["sailor"], str(f["runs"]), str(f["clean"]), _number(f["time_s"]), _number(f["tacks"], "g"),
+        _number(f["best_s"]), _number(f["best_tacks"], "g"), *(_percent(f[k], 1) for k in ("regret", "regret_10",
+        "regret_90")), _percent(f["gap"], 1), _percent(f["refined"], 2)] for f in figures_of(records)])
 
 
 def _number(value: float | None, kind: str = ".0f") -> str:

@@ -101,24 +101,24 @@ class _GrowingPage:
 
 def rehearse(
     made: PreparedRehearsal, folder: Path, limits: Limits, changes: Sequence[MissionChange], pairs: int,
-    means: CampaignOptions, json_path: Path | None,
+    options: CampaignOptions, json_path: Path | None,
 ) -> int:
     """Sail, tell and write; return the exit code."""
     jobs = [Job(scenario=made.source, seed=seed, case=RehearsalCase(doubts=made.doubts)) for seed in range(limits.runs)]
     page = _GrowingPage(made, folder)
     follower = Follower(limits, share=CHANCES_SHARE if changes and pairs else 1.0,
                         on_known=lambda known: page.fill(RehearsalOutcome(known=known, ends="more to come")))
-    if means.array[1] > 1:
-        return _part(jobs, changes, pairs, means)
+    if options.array[1] > 1:
+        return _part(jobs, changes, pairs, options)
     try:
-        sailed = rehearsal(jobs).results(means, watch=follower)
+        sailed = rehearsal(jobs).results(options, watch=follower)
     except KeyboardInterrupt:
         sys.stdout.write("\n" + "\n".join(told(follower.known)) + "\nended by hand: the same command goes on\n")
         raise
     code = sailed.exit_code(is_good=True)
     count = min(pairs, len(follower.known.records))
     found: list[Tried] = []
-    voyage_s = sailed.wall_s / sailed.now * (means.workers or os.cpu_count() or 1) if sailed.now else 0.0
+    voyage_s = sailed.wall_s / sailed.now * (options.workers or os.cpu_count() or 1) if sailed.now else 0.0
     if changes and count:
         sys.stdout.write("\n".join(told(follower.known)) + "\n")   # the chances are known: nobody waits for the rest
         sys.stderr.write(f"{counted(len(changes), 'change')}, each for the first {counted(count, 'seed')}\n")
@@ -133,7 +133,7 @@ def rehearse(
             return "", limits.left_s() <= voyage_s   # of the worst, once again
 
         # seed by seed: when the time is over, all changes have been tried alike
-        again = rehearsal(changed(jobs[:count], changes)).results(means, watch=is_time)
+        again = rehearsal(changed(jobs[:count], changes)).results(options, watch=is_time)
         code |= again.exit_code(is_good=True)
         found = so_far(again.records)
     outcome = RehearsalOutcome(known=follower.known, ends=follower.ends or "not as sure as was asked for",
@@ -150,14 +150,14 @@ def changed(
 
 
 def _part(
-    jobs: Sequence[Job[RehearsalCase]], changes: Sequence[MissionChange], pairs: int, means: CampaignOptions,
+    jobs: Sequence[Job[RehearsalCase]], changes: Sequence[MissionChange], pairs: int, options: CampaignOptions,
 ) -> int:
     """Sail a part of all voyages; what is known is told when the parts are together."""
-    sailed = rehearsal([*jobs, *changed(jobs[:pairs], changes)]).results(means)
-    number, of = means.array
-    sys.stdout.write(f"{sailed.took}\npart {number} of {of}, in {means.file}; when all are sailed: sitl results join "
-                     f"{means.out.with_name(f'results.*-of-{of}.jsonl') if means.out else ''} --out {means.out}, and "
-                     "this command without --array tells what is known\n")
+    sailed = rehearsal([*jobs, *changed(jobs[:pairs], changes)]).results(options)
+    number, of = options.array
+    sys.stdout.write(f"{sailed.took}\npart {number} of {of}, in {options.file}; when all are sailed: sitl results join "
+                     f"{options.out.with_name(f'results.*-of-{of}.jsonl') if options.out else ''} --out {options.out}, "
+                     "and this command without --array tells what is known\n")
     return sailed.exit_code(is_good=True)
 
 

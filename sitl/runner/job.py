@@ -133,20 +133,20 @@ class ScenarioBundle:
             return cls(main=where.relative_to(SCENARIOS).as_posix(), hash=file_hash(path))
         files = {file.resolve() for file in files_of(path).values()}
         root = Path(os.path.commonpath([file.parent for file in files]))
-        cargo = cls(main=where.relative_to(root).as_posix(), hash=file_hash(path), packed=tuple(
+        bundle = cls(main=where.relative_to(root).as_posix(), hash=file_hash(path), packed=tuple(
             sorted((file.relative_to(root).as_posix(), zlib.compress(file.read_bytes())) for file in files)))
-        with tempfile.TemporaryDirectory(prefix="cargo-") as trial:
+        with tempfile.TemporaryDirectory(prefix="scenario-") as trial:
             try:
-                is_whole = _file_hash.__wrapped__(cargo.unpack(Path(trial))) == cargo.hash
+                is_whole = _file_hash.__wrapped__(bundle.unpack(Path(trial))) == bundle.hash
                 is_own = all(file.resolve().is_relative_to(Path(trial).resolve()) or any(
                     file.resolve().is_relative_to(ours.parent) for ours in ROOTS)
-                    for file in files_of(Path(trial) / cargo.main).values())
+                    for file in files_of(Path(trial) / bundle.main).values())
             except InputError:
                 is_whole = is_own = False
         if not (is_whole and is_own):
             raise InputError(str(path), "", "names a file that another machine will not find",
                              "name files relative to the file that names them")
-        return cargo
+        return bundle
 
     def unpack(self, folder: Path) -> Path:
         """Write the files below ``folder``; return the scenario's."""
@@ -161,15 +161,15 @@ class ScenarioBundle:
 
 
 @cache
-def _here(cargo: ScenarioBundle) -> Path:
-    if not cargo.packed:
-        path = SCENARIOS / cargo.main
-        if not path.is_file() or file_hash(path) != cargo.hash:
-            raise JobError(f"the program there has another {cargo.main}; install the same version there")
+def _here(bundle: ScenarioBundle) -> Path:
+    if not bundle.packed:
+        path = SCENARIOS / bundle.main
+        if not path.is_file() or file_hash(path) != bundle.hash:
+            raise JobError(f"the program there has another {bundle.main}; install the same version there")
         return path
-    folder = tempfile.mkdtemp(prefix="cargo-")
+    folder = tempfile.mkdtemp(prefix="scenario-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return cargo.unpack(Path(folder))
+    return bundle.unpack(Path(folder))
 
 
 class UnfitError(JobError):

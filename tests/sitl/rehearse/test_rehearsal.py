@@ -234,11 +234,11 @@ def test_on_another_machine_a_rehearsal_is_whole(sailed, monkeypatch):
     (sailed / "day.csv").write_text("t_s,wind_from_deg,wind_speed_ms\n0,10,5\n3600,40,6\n")
     made = prepared(Path("rocks.toml"), Path("packed"), wind="day.csv", wind_error=None, doubt=1.0, faults=False,
                     depart=None, limit_s=60.0)
-    cargo = ScenarioBundle.of(made.source)
-    assert sorted(Path(name).name for name, _ in cargo.packed) == ["day.csv", "rehearsal.toml", "rocks.toml",
+    bundle = ScenarioBundle.of(made.source)
+    assert sorted(Path(name).name for name, _ in bundle.packed) == ["day.csv", "rehearsal.toml", "rocks.toml",
                                                                   "rocks.wkt"]
     job = Job(scenario=made.source, seed=3, case=RehearsalCase(doubts=made.doubts))
-    assert key_of(replace(job, scenario=cargo.here()))["hash"] == key_of(job)["hash"]
+    assert key_of(replace(job, scenario=bundle.here()))["hash"] == key_of(job)["hash"]
     assert made.tells_the_hour
 
 
