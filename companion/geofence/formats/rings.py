@@ -26,6 +26,7 @@ MAX_FACES = 2000             # of a self-crossing keep-in ring ...
 MAX_FACE_EDGES = 50_000_000  # ... and that times its edges: each face is held against each edge
 HOPELESS_EDGES = 20_000      # from here on GEOS takes too long to see that a tangle is none of its business ...
 HOPELESS_CROSSINGS = 500_000  # ... as one with more crossings than this is
+DATE_LINE_DEG = 30.0         # a ring across the antimeridian that is wider is worth a word; a bay there is not
 _DRAWN = 32
 
 _TANGLED = "it is too tangled to be repaired"
@@ -102,11 +103,12 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
     if not _on_globe(coordinates, place, findings):
         return np.empty((0, 2))
     if float(np.ptp(coordinates[:, 0])) > 180.0:
-        findings.add(
-            Severity.WARNING, Code.ANTIMERIDIAN, place,
-            "the ring spans more than 180 degrees of longitude and is read as crossing the antimeridian",
-        )
         coordinates = unwrapped(coordinates)
+        if float(np.ptp(coordinates[:, 0])) > DATE_LINE_DEG:
+            findings.add(
+                Severity.WARNING, Code.ANTIMERIDIAN, place,
+                "the ring spans more than 180 degrees of longitude and is read as crossing the antimeridian",
+            )
         if not math.isclose(coordinates[0, 0], coordinates[-1, 0], abs_tol=1e-6):
             findings.add(Severity.ERROR, Code.ANTIMERIDIAN, place, "the ring goes round a pole", "cut it in two")
             return np.empty((0, 2))

@@ -101,11 +101,13 @@ def test_swapped_axes_are_told_by_the_place():
     assert check_place(far, near).findings[-1].code is Code.FAR_AWAY
 
 
-def test_antimeridian_is_read_as_a_crossing():
-    document = parse(b"POLYGON ((179.99 0, -179.99 0, -179.99 0.01, 179.99 0.01, 179.99 0))", "f.wkt")
-    assert [f.code for f in document.findings] == [Code.ANTIMERIDIAN]
+@pytest.mark.parametrize(("half_deg", "findings"), [(0.01, []), (14.0, []), (80.0, [Code.ANTIMERIDIAN])])
+def test_antimeridian_is_read_as_a_crossing_and_told_of_where_it_may_be_meant_otherwise(half_deg, findings):
+    e, w = 180.0 - half_deg, half_deg - 180.0
+    document = parse(f"POLYGON (({e} 0, {w} 0, {w} 0.01, {e} 0.01, {e} 0))".encode(), "f.wkt")
+    assert [f.code for f in document.findings] == findings
     west, _, east, _ = document.zones[0].shape.bounds
-    assert east - west == pytest.approx(0.02)
+    assert east - west == pytest.approx(2.0 * half_deg)
 
 
 COORDINATE = st.integers(0, 100_000).map(lambda i: i * 1e-7)  # as files write them
