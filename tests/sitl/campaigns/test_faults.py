@@ -236,7 +236,7 @@ def test_nor_does_one_that_the_campaign_or_the_search_found(seed):
     assert record["passed"], record
 
 
-# Explained in docs/guides/campaigns.md and not mended; whoever mends one moves it up.
+# Explained in docs/lab/campaigns.md and not mended; whoever mends one moves it up.
 @pytest.mark.campaign
 @pytest.mark.xfail(strict=True, reason="found and not mended")
 @pytest.mark.parametrize("seed", [
