@@ -38,7 +38,7 @@ from sitl.autopilot.config import (
     VaneState,
     Waves,
 )
-from sitl.autopilot.memory_link import PERFECT, FrameStream, Impairment, MemoryEnd, MemoryLink
+from sitl.autopilot.memory_link import PERFECT, FrameStream, Impairment, MemoryEnd, MemoryLink, RadioChannel
 from sitl.autopilot.protocol.telemetry import AisVessel
 from sitl.autopilot.server import Server, serve
 
@@ -57,6 +57,7 @@ __all__ = [
     "Impairment",
     "MemoryEnd",
     "MemoryLink",
+    "RadioChannel",
     "Sensors",
     "Server",
     "Truth",

@@ -1,4 +1,4 @@
-"""A link without a network: two transports in one process, with a radio's faults between them.
+"""Links without a network: transports in one process, with a radio's faults between them, or shared by several.
 
 Both ends have the shape of ``companion.mavlink.transports.Transport``. Nothing is lost by default. Faults are
 drawn from a seed, frame by frame, so that under the virtual clock a bad link repeats exactly.
@@ -9,12 +9,12 @@ from __future__ import annotations
 import asyncio
 import random
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from companion.clock import now_s
 from companion.errors import LinkError
-from companion.mavlink.transports import OnBytes, TransportState, TransportStats
+from companion.mavlink.transports import OnBytes, Transport, TransportState, TransportStats
 
 _STX = 0xFD
 
@@ -212,3 +212,58 @@ def _frame_length(data: bytes, start: int) -> int:
     if start + 3 > len(data):
         return 12
     return 12 + data[start + 1] + (13 if data[start + 2] & 1 else 0)
+
+
+class RadioChannel:
+    """One channel that several transmit on: what one says, all others hear. The companion's end; a ``Transport``.
+
+    Args:
+        ends: the boats' ends, one for each autopilot in range.
+        on_heard: gets every piece that a boat says, before the companion does: for one who listens.
+    """
+
+    def __init__(self, *ends: Transport, on_heard: Callable[[bytes], None] | None = None) -> None:
+        self._ends, self._on_heard = ends, on_heard
+        self._on_bytes: OnBytes | None = None
+
+    @property
+    def name(self) -> str:
+        """A name for messages."""
+        return "air:" + "+".join(end.name for end in self._ends)
+
+    @property
+    def stats(self) -> TransportStats:
+        """The counters of the first end."""
+        return self._ends[0].stats
+
+    @property
+    def state(self) -> TransportState:
+        """Open or closed."""
+        return self._ends[0].state
+
+    async def open(self, on_bytes: OnBytes) -> None:
+        """Start to hear."""
+        self._on_bytes = on_bytes
+        for end in self._ends:
+            await end.open(self._hear)
+
+    def write(self, data: bytes) -> None:
+        """Speak to everybody."""
+        for end in self._ends:
+            end.write(data)
+
+    async def close(self) -> None:
+        """Stop to hear."""
+        for end in self._ends:
+            await end.close()
+        self._on_bytes = None
+
+    def say(self, data: bytes) -> None:
+        """Let the companion hear what no boat said."""
+        if self._on_bytes is not None:
+            self._on_bytes(data)
+
+    def _hear(self, data: bytes) -> None:
+        if self._on_heard is not None:
+            self._on_heard(data)
+        self.say(data)

@@ -27,10 +27,10 @@ from companion.messages import GeoPoint
 from companion.skipper.behaviors import TOLD_S
 from companion.skipper.step import Phase
 from companion.skipper.step import actions as act
-from sitl.autopilot import EPOCH_S, Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import EPOCH_S, Autopilot, AutopilotConfig, MemoryLink, RadioChannel, serve
 from sitl.faults.computer_faults import FaultyPlanner
 from sitl.faults.spoofing import FORGERIES, Forger, Forgery, SignedEnd, Signer
-from sitl.world import AR1, RadioChannel
+from sitl.world import AR1
 
 BEGIN, END = "<!-- made by `sitl hostile --document docs/reference/mavlink.md` -->", "<!-- end of the table -->"
 BURST_S = 2.0

@@ -21,14 +21,24 @@ from companion.mavlink.reception import OWN_COMPONENT, LinkIdentity
 from companion.mavlink.transports import Transport
 from companion.mavlink.wire import Codec
 from companion.messages import GeoPoint, MissionItem, Mode, waypoint
-from sitl.autopilot import Autopilot, AutopilotConfig, GpsFault, MemoryEnd, MemoryLink, VaneFault, VaneState, serve
+from sitl.autopilot import (
+    Autopilot,
+    AutopilotConfig,
+    GpsFault,
+    MemoryEnd,
+    MemoryLink,
+    RadioChannel,
+    VaneFault,
+    VaneState,
+    serve,
+)
 from sitl.faults.computer_faults import FaultyDisk, FaultyPlanner, KillablePlanner
 from sitl.faults.ground_station import REDRAWN, give_order, redraw, set_parameter, wanted_by
 from sitl.faults.link_faults import LINK_EVENTS, impair
 from sitl.faults.satellite_link import Satellite, order_far
 from sitl.faults.spoofing import Forger, forgery_named
 from sitl.scenario import TRAFFIC, EventSpec, Motion, Others, TrueTrack
-from sitl.world import RadioChannel, WindModel
+from sitl.world import WindModel
 
 BEAT_S = 1.0
 PERSONS = frozenset({"mode", "arm", "disarm", "set_current"})

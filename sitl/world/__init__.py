@@ -1,4 +1,4 @@
-"""The world: wind, boats as physics, the air that radios share."""
+"""The world: wind, and boats as physics."""
 
 from sitl.world.boats import LENGTH_M, MotorBoat, SimulatedVaimos, habits_for, polar_at, summary, wind_for
 from sitl.world.environment import (
@@ -16,7 +16,6 @@ from sitl.world.environment import (
     WindModel,
     parse_wind,
 )
-from sitl.world.radio_channel import RadioChannel
 
 __all__ = [
     "AR1",
@@ -28,7 +27,6 @@ __all__ = [
     "Lee",
     "MotorBoat",
     "Process",
-    "RadioChannel",
     "Recorded",
     "Scripted",
     "SimulatedVaimos",

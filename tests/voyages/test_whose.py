@@ -18,10 +18,9 @@ from companion.geofence import load_mission
 from companion.mavlink.wire.frames import Codec
 from companion.messages import Mode
 from companion.replay import replay
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, RadioChannel, serve
 from sitl.faults.computer_faults import FaultyPlanner
 from sitl.world.environment import AR1
-from sitl.world.radio_channel import RadioChannel
 
 MISSION = """
 name = "reach"
