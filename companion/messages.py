@@ -403,6 +403,7 @@ class CompanionStatus:
     order: str = ""                           # the verb of the order that stands; empty: none does
     order_age_s: float | None = None
     plan_answer_s: float | None = None        # nine plans of ten take so long, told of a slow computer; None: it is not
+    figures: tuple[tuple[str, float], ...] = ()   # of the table (``companion.figures``), by name; sent beside the wind
     alert_code: str = ""                      # the rule or watchdog that speaks; empty: all is well
     alert_text: str = ""
 
@@ -414,5 +415,5 @@ class CompanionStatus:
             current_set_rad=self.current_set_rad, current_drift_mps=self.current_drift_mps,
             next_tack_s=self.next_tack_s, promised_risk=self.promised_risk, plan_age_s=self.plan_age_s,
             battery_v=self.battery_v, bytes_out_per_s=self.bytes_out_per_s, order_age_s=self.order_age_s,
-            plan_answer_s=self.plan_answer_s,
+            plan_answer_s=self.plan_answer_s, **dict(self.figures),
         )

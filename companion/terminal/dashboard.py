@@ -9,11 +9,12 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from companion.figures import BY_NAME
 from companion.geo import MPS_PER_KNOT
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.terminal.keys import KEYS, KeyCommands, shown
 from companion.terminal.screen import Frame, Style
-from companion.view import Event, View
+from companion.view import Event, FigureView, View
 from companion.words import counted, one_line
 
 OLD_S = 10.0      # what was heard longer ago looks old
@@ -240,7 +241,21 @@ def body_of(view: View, *, knots: bool, columns: int) -> list[Row]:
         _wind(view, knots=knots), *_water(view, knots=knots), _bow(view, knots=knots), _boat(view, knots=knots),
         _leg(view), _goal(view),
         _tack(view), _plan(view, is_wide=is_wide), _clear(view), _parts(view), _power(view), _speeds(view, knots=knots),
+        *_figures(view, knots=knots),
     ]
+
+
+def _figures(view: View, *, knots: bool) -> list[Row]:
+    """Return the figures of the table that are shown here."""
+    return [(figure.label, _text_of(figure, knots=knots), Style.PLAIN) for figure in view.shown
+            if figure.name not in BY_NAME or "watch" in BY_NAME[figure.name].shown]
+
+
+def _text_of(figure: FigureView, *, knots: bool) -> str:
+    if figure.kind == "speed":
+        return f"{speed_text(figure.value, knots=knots)} {unit_text(knots=knots)}"
+    return {"distance": length_text, "time": span_text, "bearing": direction_text, "share": share_text}.get(
+        figure.kind, number_text)(figure.value)
 
 
 def _wind(view: View, *, knots: bool) -> Row:

@@ -9,9 +9,9 @@ from companion.view.events import Event
 from companion.view.fold import ViewFold
 from companion.view.heard import HeardFold
 from companion.view.recorded import RecordedViews, recorded_views
-from companion.view.values import SCHEMA, Past, Sample, Trail, View, sample_of
+from companion.view.values import SCHEMA, FigureView, Past, Sample, Trail, View, sample_of
 
 __all__ = [
-    "SCHEMA", "AreaView", "Event", "HeardFold", "Past", "RecordedViews", "Sample", "Trail", "View", "ViewFold",
-    "area_of", "drawn", "recorded_views", "sample_of",
+    "SCHEMA", "AreaView", "Event", "FigureView", "HeardFold", "Past", "RecordedViews", "Sample", "Trail", "View",
+    "ViewFold", "area_of", "drawn", "recorded_views", "sample_of",
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import replace
 
+from companion.figures import told as figures_now
 from companion.fold import Step
 from companion.geo.shift import Shift, carried
 from companion.messages import CompanionStatus
@@ -138,7 +139,8 @@ class ViewFold:
                         for at_s, at, tack in self._track),
             vessels=vessels_of(step), goals=goals, refuges=parts.refuges_of(voyage), home=parts.home_of(step, voyage),
             safe_end=safe_end_of(route), orders=parts.orders_of(step),
-            figures=parts.figures_of(step, figures, voyage), health=parts.health_of(step, status))
+            figures=parts.figures_of(step, figures, voyage), shown=parts.shown(figures_now(step, "page")),
+            health=parts.health_of(step, status))
 
 
 def aged(view: values.View, passed_s: float) -> values.View:

@@ -11,7 +11,7 @@ from companion.messages import AutopilotStatus, VehicleState
 from companion.view import values
 from companion.view.area import AreaView, drawn
 from companion.view.events import Event
-from companion.view.parts import by_age, heard_vessel
+from companion.view.parts import by_age, heard_vessel, shown
 from companion.view.values import compass, place, rounded, signed, tack_of
 
 ALARMED = frozenset({"warn", "act", "touch"})
@@ -64,6 +64,7 @@ class HeardFold:
                 tacks=None if status is None else status.tacks, replans=None if status is None else status.replans,
                 goals=None if status is None else status.goal_count,
                 goals_reached=None if status is None else status.goal_index),
+            shown=shown({} if status is None else dict(status.figures)),
             health=_health(t_s, report, vehicle, autopilot))
         return view, events
 

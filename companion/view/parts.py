@@ -10,6 +10,8 @@ from functools import lru_cache
 from companion.boat import AutopilotLimits, Boat
 from companion.current import over_water
 from companion.eta import Eta
+from companion.figures import BY_NAME as FIGURES_BY_NAME
+from companion.figures import vmg_mps
 from companion.fold import Step
 from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.messages import Command, CompanionStatus, TrafficStatus, VehicleState, WindForecast
@@ -151,7 +153,7 @@ def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatV
         cog_deg=compass(cog_rad), sog_mps=rounded(vehicle.speed_mps),
         roll_deg=None if vehicle.roll_rad is None else signed(vehicle.roll_rad),
         tack=None if twa_rad is None else tack_of(twa_rad),
-        vmg_mps=None if twd_rad is None else rounded(vehicle.speed_mps * math.cos(twd_rad - cog_rad)),
+        vmg_mps=rounded(vmg_mps(step)),
         vmc_mps=rounded(vehicle.speed_mps * math.cos(to_goal_rad - cog_rad)),
         clearance_m=rounded(status.clearance_m, 1),
         cross_track_m=None if autopilot is None else rounded(autopilot.cross_track_m, 1),
@@ -224,6 +226,15 @@ def figures_of(step: Step, figures: VoyageFigures, voyage: Voyage) -> values.Fig
         min_clearance_m=rounded(figures.min_clearance_m, 1),
         promised_clearance_m=rounded(figures.promised_clearance_m, 1),
         goals_reached=min(len(step.state.progress.reached), len(voyage.legs)), goals=len(voyage.legs))
+
+
+def shown(told: Mapping[str, float]) -> tuple[values.FigureView, ...]:
+    """Return figures of the table by their names as the page shows them; those of another release are left out."""
+    return tuple(
+        values.FigureView(
+            name=name, label=figure.label, kind=figure.kind, hint=figure.hint,
+            value=compass(value) if figure.kind == "bearing" else rounded(value, 4))
+        for name, value in told.items() if (figure := FIGURES_BY_NAME.get(name)) is not None)
 
 
 def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:

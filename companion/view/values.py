@@ -402,6 +402,17 @@ class Figures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FigureView:
+    """A figure of the table (``companion.figures``): its value is m/s, m, s, degrees, a share of 1, or a number."""
+
+    name: str
+    label: str
+    kind: Literal["speed", "distance", "time", "bearing", "share", "number"]
+    value: float
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
     """How a part of the whole is: when it was last heard of, and what is the matter with it."""
 
@@ -443,6 +454,7 @@ class View:
     safe_end: PlaceView | None = None
     orders: Orders = Orders()
     figures: Figures = Figures()
+    shown: tuple[FigureView, ...] = ()
     health: tuple[Part, ...] = ()
 
 

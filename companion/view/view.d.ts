@@ -94,6 +94,17 @@ export interface Event {
 }
 
 /**
+ * A figure of the table (``companion.figures``): its value is m/s, m, s, degrees, a share of 1, or a number.
+ */
+export interface Figure {
+  name: string;
+  label: string;
+  kind: "bearing" | "distance" | "number" | "share" | "speed" | "time";
+  value: number;
+  hint: string;
+}
+
+/**
  * The voyage so far.
  */
 export interface Figures {
@@ -367,6 +378,7 @@ export interface View {
   safe_end: Place | null;
   orders: Orders;
   figures: Figures;
+  shown: Figure[];
   health: Part[];
 }
 

@@ -39,6 +39,7 @@ _NONE16 = 0xFFFF
 _NONE8 = 0xFF
 _STATE_BYTES, _CODE_BYTES = 24, 16
 FLOATS = ("co_twd", "co_tws", "co_sig", "co_psafe", "co_tack", "co_xt")
+PREFIX = "co_"     # figures of the table (``companion.figures``) are sent beside the wind by names that begin so
 SLOW = "co_plan"   # of a slow computer: nine plans of ten take so long [s]; sent beside the wind, not packed
 # From here on a part that was not heard again is old [s]: four turns of the plain messages.
 STALE_S = 35.0
@@ -153,7 +154,8 @@ def status_messages(status: CompanionStatus, boot_s: float, turn: int) -> list[M
     if turn == 3:
         wind = wind_cov(status, boot_s)
         slow = [] if status.plan_answer_s is None else [_named(boot_s, SLOW, status.plan_answer_s)]
-        return [*messages, *([] if wind is None else [wind]), *slow]
+        figures = [_named(boot_s, name, value) for name, value in status.figures]
+        return [*messages, *([] if wind is None else [wind]), *slow, *figures]
     values = named_values(status)
     for name in FLOATS[2 * turn:2 * turn + 2]:
         value = values[name]
@@ -214,6 +216,7 @@ class StatusReader:
         self._plain = CompanionStatus(t_s=0.0, state="")
         self._traffic: TrafficStatus | None = None
         self._plan_answer_s: float | None = None
+        self._figures: dict[str, float] = {}
         self._heard_s: dict[str, float] = {}
 
     def take(self, t_s: float, message: Message) -> bool:
@@ -235,6 +238,9 @@ class StatusReader:
                 self._heard_s[SLOW] = t_s
             elif kind == "NAMED_VALUE_FLOAT" and message.name in FLOATS:
                 self._take_float(t_s, message.name, float(message.value))
+            elif kind == "NAMED_VALUE_FLOAT" and message.name.startswith(PREFIX) and math.isfinite(message.value):
+                self._figures[message.name] = float(message.value)
+                self._heard_s[message.name] = t_s
             else:
                 return False
         except (ValueError, TypeError):
@@ -252,7 +258,9 @@ class StatusReader:
         traffic = self._traffic if age_s.get("traffic", math.inf) <= STALE_S else None
         answer_s = self._plan_answer_s if age_s.get(SLOW, math.inf) <= STALE_S else None
         return StatusReport(
-            status=replace(status, traffic=traffic, plan_answer_s=answer_s), age_s=age_s, has_packed=has_packed)
+            status=replace(status, traffic=traffic, plan_answer_s=answer_s, figures=tuple(
+                (name, value) for name, value in self._figures.items() if age_s[name] <= STALE_S)),
+            age_s=age_s, has_packed=has_packed)
 
     def _take_wind(self, t_s: float, message: Message) -> None:
         north, east = float(message.wind_x), float(message.wind_y)

@@ -67,13 +67,20 @@ function one(name, value, unit, kind = "", hint = "") {
   return el("div", hint ? { class: kind, title: hint } : { class: kind }, el("dt", {}, name), el("dd", {}, value, value === NONE || !unit ? "" : el("small", {}, ` ${unit}`)));
 }
 
+/** A figure of the table, by its kind. @param {import("../../view/view").Figure} f */
+function shown(f) {
+  const [text, unit] = f.kind === "speed" ? [speed(f.value), speedUnit()] : f.kind === "distance" ? [distance(f.value), ""] : f.kind === "time" ? [duration(f.value), ""]
+    : f.kind === "bearing" ? [bearing(f.value), bearingUnit()] : f.kind === "share" ? [percent(f.value), ""] : [figure(f.value, 1), ""];
+  return one(f.label, text ?? NONE, unit ?? "", "", f.hint);
+}
+
 /** @param {View | null} view */
 function figures(view) {
   const boat = view?.boat, wind = view?.wind, plan = view?.plan;
   const tack = boat?.tack ?? "";
   get("figures").replaceChildren(
     one("TWA", atBow(wind?.twa_deg), "", tack), one("AWA", atBow(wind?.awa_deg), "", tack),
-    one("AWS", speed(wind?.aws_mps), speedUnit()), one("VMG", speed(boat?.vmg_mps), speedUnit()),
+    one("AWS", speed(wind?.aws_mps), speedUnit()), ...(view?.shown ?? []).map(shown),
     one("COG", bearing(boat?.cog_deg), bearingUnit()), one("to mark", distance(boat?.goal_m), ""),
     one("TWD σ 1 min", wind?.sigma_deg == null ? NONE : `±${figure(wind.sigma_deg, 0)}°`, ""), one("clearance", distance(boat?.clearance_m), ""),
     one("next tack", `${plan?.next_tack_is_planned === false ? "about " : ""}${duration(plan?.next_tack_s)}`, "", "", TACK), one("there in", duration(plan?.there_s), "", "", THERE), one("off the plan", percent(plan?.path_risk), "", "", OFF_PLAN),

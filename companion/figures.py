@@ -1,0 +1,65 @@
+"""Figures of the moment, one row each: the page, the line, ``companion watch`` and the radio derive from it.
+
+A row says how a figure is told from a step, in SI units and radians, and what it is called. On board and from a record
+it is computed; over the radio it comes under the row's name as a NAMED_VALUE_FLOAT, which any ground station plots.
+What needs more than a number (a plan's legs, a vessel) is a part of the view (``companion.view.values``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from companion.fold import Step
+from companion.geo.angles import heading_of
+
+Kind = Literal["speed", "distance", "time", "bearing", "share", "number"]
+EVERYWHERE = frozenset({"page", "line", "watch", "radio"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """One row. ``kind`` is its unit: m/s, m, s, rad clockwise from true north, a share of 1, or none."""
+
+    name: str                                # over the radio: co_ and at most seven characters more
+    label: str
+    kind: Kind
+    of: Callable[[Step], float | None]       # None: it cannot be told now
+    hint: str = ""                           # what it means, where there is room
+    shown: frozenset[str] = EVERYWHERE
+
+
+def vmg_mps(step: Step) -> float | None:
+    """Return the speed over ground to windward [m/s], negative to leeward."""
+    vehicle, twd_rad = step.snapshot.vehicle, step.snapshot.wind.present_twd_from_rad
+    if vehicle is None or twd_rad is None:
+        return None
+    return vehicle.speed_mps * math.cos(twd_rad - heading_of(*vehicle.velocity_en_mps))
+
+
+FIGURES: tuple[Figure, ...] = (
+    Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page"})),
+)
+BY_NAME = {figure.name: figure for figure in FIGURES}
+_UNITS = {"speed": " m/s", "distance": " m", "time": " s", "bearing": "°", "share": " %", "number": ""}
+
+
+def told(step: Step, where: str) -> dict[str, float]:
+    """Return by name what can be told now of the figures that are shown there: page, line, watch or radio."""
+    values = {figure.name: figure.of(step) for figure in FIGURES if where in figure.shown}
+    return {name: value for name, value in values.items() if value is not None and math.isfinite(value)}
+
+
+def shown_value(figure: Figure, value: float) -> float:
+    """Return a value as it is shown: degrees, per cent, else in its unit."""
+    if figure.kind == "bearing":
+        return round(math.degrees(value), 1) % 360.0
+    return round(100.0 * value, 1) if figure.kind == "share" else round(value, 2)
+
+
+def in_words(values: Mapping[str, float]) -> list[str]:
+    """Return figures as a line has them: label, value, unit."""
+    return [f"{BY_NAME[name].label} {shown_value(BY_NAME[name], value):g}{_UNITS[BY_NAME[name].kind]}"
+            for name, value in values.items() if name in BY_NAME]

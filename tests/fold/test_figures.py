@@ -1,0 +1,82 @@
+"""The table of figures: what of a step it tells, and that each row is shown wherever it says."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
+from companion import figures
+from companion.figures import BY_NAME, FIGURES, Figure, in_words, told
+from companion.fold import Step
+from companion.mavlink.wire.companion_status import FLOATS, SLOW, StatusReader, status_messages
+from companion.mavlink.wire.frames import Codec
+from companion.messages import CompanionStatus
+from companion.skipper import Skipper
+from companion.skipper.step.config import SkipperConfig
+from companion.telemetry.console import progress_text
+from companion.terminal.dashboard import body_of
+from companion.view import HeardFold
+from tests.skipper.world import FRAME, World, voyage
+
+
+@pytest.fixture
+def step():
+    """A step of a boat under way, whose autopilot tells where home is."""
+    world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
+    world.shown["home"] = FRAME.geo_from_en(0.0, 0.0)
+    assert world.run(120, lambda w: w.state.voyage.sailing)
+    world.run(5)
+    return Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
+
+
+@pytest.fixture
+def table(monkeypatch):
+    """The table with a row of the test's own, which is shown everywhere."""
+    row = Figure(name="co_test", label="test way", kind="bearing", of=lambda step: math.radians(41.26), hint="why")
+    monkeypatch.setattr(figures, "FIGURES", (*FIGURES, row))
+    monkeypatch.setitem(BY_NAME, row.name, row)
+
+
+def test_each_row_has_a_name_of_its_own_that_the_radio_carries():
+    names = [figure.name for figure in FIGURES]
+    assert len({*names, *FLOATS, SLOW}) == len(names) + len(FLOATS) + 1
+    for name in names:
+        assert name.startswith("co_")
+        assert len(name.encode("ascii")) <= 10
+    assert len({figure.label for figure in FIGURES}) == len(FIGURES)
+
+
+def test_what_cannot_be_told_is_left_out(step, monkeypatch):
+    for value in (None, math.nan):
+        row = Figure(name="co_test", label="x", kind="number", of=lambda step, value=value: value)
+        monkeypatch.setattr(figures, "FIGURES", (row,))
+        assert told(step, "line") == {}
+
+
+def test_vmg_is_the_speed_against_the_wind(step):
+    vehicle, wind = step.snapshot.vehicle, step.snapshot.wind.present_twd_from_rad
+    east, north = vehicle.velocity_en_mps
+    assert told(step, "page")["co_vmg"] == pytest.approx(east * math.sin(wind) + north * math.cos(wind))
+
+
+def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(step, table):
+    assert in_words(told(step, "line"))[-1] == "test way 41.3°"
+    assert "test way 41.3°" in progress_text(step, None)
+    status = CompanionStatus(t_s=1.0, state="standard", figures=tuple(told(step, "radio").items()))
+    sender, receiver, reader = Codec(1, 191), Codec(254, 25), StatusReader()
+    for turn in range(4):
+        for sent in status_messages(status, 50.0, turn):
+            for message in receiver.feed(sender.pack(sent)):
+                assert reader.take(1.0, message)
+    view, _ = HeardFold().take(2.0, reader.report(2.0), None, None)
+    assert [(f.label, f.kind, f.value, f.hint) for f in view.shown if f.name == "co_test"] == [
+        ("test way", "bearing", 41.3, "why")]
+    assert ("test way", "041°") in [row[:2] for row in body_of(view, knots=True, columns=80)]
+    assert HeardFold().take(60.0, reader.report(60.0), None, None)[0].shown == ()   # long not heard
+
+
+def test_what_another_release_sends_is_not_shown():
+    reader, sender, receiver = StatusReader(), Codec(1, 191), Codec(254, 25)
+    for message in receiver.feed(sender.pack(wire.MAVLink_named_value_float_message(0, b"co_new", 1.0))):
+        assert reader.take(1.0, message)
+    assert HeardFold().take(2.0, reader.report(2.0), None, None)[0].shown == ()
