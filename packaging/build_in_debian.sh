@@ -32,8 +32,8 @@ cp /etc/resolv.conf "$root/etc/resolv.conf"
 cp -L /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/ca-certificates.crt"
 if [ -f /etc/pip.conf ]; then cp /etc/pip.conf "$root/etc/pip.conf"; fi
 mount -t proc proc "$root/proc"
-if [ ! -e "$root/usr/bin/ld" ]; then   # links the kernels
-    chroot "$root" /bin/sh -c 'apt-get -qq update && apt-get -qq install --yes --no-install-recommends binutils' >"$work/log" 2>&1 ||
+if ! compgen -G "$root/usr/include/python3*/Python.h" >/dev/null || [ ! -e "$root/usr/bin/g++" ]; then   # for the kernels
+    chroot "$root" /bin/sh -c 'apt-get -qq update && apt-get -qq install --yes --no-install-recommends g++ python3-dev' >"$work/log" 2>&1 ||
         { tail -5 "$work/log"; exit 1; }
 fi
 rm -rf "$root/source"

@@ -1,8 +1,8 @@
 """The Debian package: ``python3 packaging/deb.py [--out DIR] [--work DIR]`` (make deb), with the Debian that it is for.
 
 An environment of its own under /opt/companion for this release's Python, with what requirements.lock names and the
-compiled kernels; commands, units, udev rule, manual pages and completion. Needs python3-venv, binutils, dpkg-deb and
-the network (or pip's own settings: PIP_FIND_LINKS, PIP_NO_INDEX). With --work what is made is kept there:
+compiled kernels; commands, units, udev rule, manual pages and completion. Needs python3-venv, python3-dev, g++,
+dpkg-deb and the network (or pip's own settings: PIP_FIND_LINKS, PIP_NO_INDEX). With --work what is made is kept there:
 interrupted, it goes on where it was.
 """
 
@@ -57,7 +57,8 @@ def environment(stage: Path, work: Path) -> None:
            "--disable-pip-version-check")
     if not done.exists():
         print("deb: installing libraries", flush=True)
-        run(work / "pip/bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "hatchling")
+        run(work / "pip/bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "hatchling",
+            "setuptools")
         run(*pip, "--require-hashes", "-r", ROOT / "requirements.lock")
         done.touch()
     shutil.rmtree(work / "wheel", ignore_errors=True)
@@ -74,7 +75,8 @@ def environment(stage: Path, work: Path) -> None:
             elif not KEPT.search(path.as_posix()):
                 path.unlink()
     print("deb: compiling kernels", flush=True)
-    run(home / "bin/python", "-B", "-m", "companion.kernels.carry", cwd=work)
+    tools = next((work / "pip").glob("lib/python3.*/site-packages"))   # setuptools, for the compiler
+    run("/usr/bin/env", f"PYTHONPATH={tools}", home / "bin/python", "-B", "-m", "companion.kernels.carry", cwd=work)
     run(home / "bin/python", "-B", ROOT / "packaging/pages.py", work / "pages", cwd=work)
     for path in (home / "bin").iterdir():   # of the place where they will be
         if path.is_file() and not path.is_symlink():

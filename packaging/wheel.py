@@ -13,7 +13,7 @@ class Carried(BuildHookInterface):
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Set the tag; an editable install carries nothing."""
-        if version == "standard" and (Path(self.root) / "companion/kernels/carried/made-for.txt").is_file():
+        if version == "standard" and (Path(self.root) / "companion/kernels/carried/carried.json").is_file():
             python = f"cp{sys.version_info.major}{sys.version_info.minor}"
             platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
             build_data["pure_python"] = False

@@ -1,23 +1,34 @@
-"""Compiling ahead: all listed kernels, by several processes at once, each small, with progress that can be believed.
+"""Compiling ahead: all listed kernels, by a process a core, with progress that can be believed.
 
-The processes (``crew``) share nothing but the folder of machine code: each takes the next kernel that nobody has
-begun and whose callees are there, holds it by a lock while it compiles, and leaves before it has grown large; another
-takes its place. So it goes on where it was, after a kill too, and there is no limit of time. Two programs that begin
-at once share the work.
+The processes share nothing but the folder of machine code, where each kernel is compiled by one of them (``cache``).
+So it goes on where it was, after a kill too, and there is no limit of time; two programs that begin at once share the
+work.
+
+    python -m companion.kernels.build PACKAGE...     what ``prepare`` runs beside the program that waits for it
 """
 
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
+import os
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from pathlib import Path
 
-from companion.kernels.places import looked_in, mark, misfit, sweep, written_to
+from companion.kernels.carried import is_carried, misfit
+from companion.kernels.listed import Entry, from_text, read_list
+from companion.kernels.places import looked_in, mark, sweep, written_to
 
-KILLED = 9   # exit code of a crew whose hands were killed
+KILLED = 9            # exit code where the compiling processes were killed
+PROCESS_MB = 250      # of memory for each; it leaves after ...
+KERNELS_A_PROCESS = 12
+_TRIES = 3            # of processes that die: short of memory, most likely
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +57,7 @@ def _rough(seconds: float) -> str:
 
 def is_ready(packages: Sequence[str]) -> bool:
     """Return whether the packages' kernels, as their source is now, were all compiled before."""
-    return all(any((place / name).exists() for place in looked_in()) for name in map(mark, packages))
+    return all(is_carried(name) or any((place / mark(name)).exists() for place in looked_in()) for name in packages)
 
 
 def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
@@ -57,25 +68,68 @@ def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
     if is_ready(packages):
         return
     # In a session of its own: Ctrl-C is for this process, which ends its children itself.
-    with subprocess.Popen([sys.executable, "-m", "companion.kernels.crew", *packages],  # noqa: S603 - our own program
-                          stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, start_new_session=True) as crew:
+    with subprocess.Popen([sys.executable, "-m", "companion.kernels.build", *packages],  # noqa: S603 - our own program
+                          stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, start_new_session=True) as compiling:
         try:
-            assert crew.stdout is not None
+            assert compiling.stdout is not None
             began_s, first, why = time.monotonic(), None, misfit()
-            for line in crew.stdout:
+            for line in compiling.stdout:
                 done, of, done_s, of_s = line.split()
-                progress = Progress(done=int(done), of=int(of), done_s=float(done_s), of_s=float(of_s),
-                                    why=why)
+                progress = Progress(done=int(done), of=int(of), done_s=float(done_s), of_s=float(of_s), why=why)
                 first = first or progress
                 say(progress.say(time.monotonic() - began_s, first))
-            code = crew.wait()
+            code = compiling.wait()
         finally:
-            crew.kill()   # its hands see it, and leave after the kernel in hand
+            compiling.kill()   # its processes see it, and leave after the kernel in hand
     if code != 0:
         why = "killed, most likely for want of memory" if code in {KILLED, -KILLED} else f"exit code {code}"
         say(f"kernels cannot be compiled ahead ({why}): they are compiled one by one as they are called")
         return
     with contextlib.suppress(OSError):
-        for name in map(mark, packages):
-            (written_to() / name).touch()
-    sweep(time.time())
+        for name in packages:
+            (written_to() / mark(name)).touch()
+
+
+def compile_listed(packages: Sequence[str]) -> int:
+    """Compile what is not there and write how far it is; return 0, or KILLED."""
+    sweep()
+    left = [entry for package in packages for entry in read_list(package)]
+    of, of_s, deaths = len(left), sum(entry.seconds for entry in left), 0
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["companion.kernels.cache"])   # so that a process begins with numba loaded
+    while left:
+        at_once = hands()
+        try:
+            with ProcessPoolExecutor(at_once, context) as pool:   # anew for each batch: what compiles grows
+                jobs = {pool.submit(_compile, entry): entry for entry in left[:at_once * KERNELS_A_PROCESS]}
+                for job in as_completed(jobs):
+                    job.result()
+                    left.remove(jobs[job])
+                    sys.stdout.write(f"{of - len(left)} {of} {of_s - sum(e.seconds for e in left):.2f} {of_s:.2f}\n")
+                    sys.stdout.flush()
+        except BrokenProcessPool:
+            deaths += 1
+            if deaths == _TRIES:
+                return KILLED
+    return 0
+
+
+def _compile(entry: Entry) -> None:
+    entry.kernel().compile(from_text(entry.signature))
+
+
+def hands() -> int:
+    """Return how many processes compile at once: one a core, as far as there is memory for them."""
+    cores = len(os.sched_getaffinity(0))
+    with contextlib.suppress(OSError, ValueError, StopIteration):
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        free_kb = int(next(line for line in lines if line.startswith("MemAvailable")).split()[1])
+        return max(1, min(cores, free_kb // (1024 * PROCESS_MB)))
+    return 1
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(compile_listed(sys.argv[1:]))
+    except BrokenPipeError:   # who asked for it has gone; there is nobody to flush for either
+        os._exit(1)

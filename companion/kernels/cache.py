@@ -1,155 +1,123 @@
-"""The cache of one kernel: a file for each signature, named by all that its machine code depends on.
+"""Kernels as numba has them, in numba's own cache, which is told where to keep them and when they are stale.
 
-A file begins with the digest of the rest: a torn or damaged one is compiled again.
+Numba goes by the source file of a kernel alone, so that an edit of what it calls in another file would not be seen; two
+processes that compile one kernel for different types can mix up each other's files; a torn file or a full disk raises.
+So the name of a kernel's files has the digest of ``stamp`` in it, a kernel is compiled under a lock, and a cache that
+cannot be read or written costs nothing but the time to compile again.
 """
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import hashlib
 import logging
 import os
 import pickle
-import tempfile
-import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
-from llvmlite import binding as llvm
-from numba.core.caching import _Cache
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompileResult
-from numba.core.dispatcher import Dispatcher
-from numba.core.serialize import dumps
+import numba
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher
+from numba.core.types.misc import unliteral
 
-from companion.errors import JobError
-from companion.kernels.places import folder, looked_in, objection, refuse, used, versions, written_to
-from companion.kernels.stamp import name_of, stamp
+from companion.kernels import places
+from companion.kernels.stamp import stamp
 
 _LOG = logging.getLogger(__name__)
-_DIGEST_BYTES = hashlib.sha256().digest_size
-_LIBRARY, _ANNOTATION = 0, 6   # of what numba writes of a compiled function
+
+# Code for this very processor would be of no use in a package, would make other plans on another machine, and plans in
+# 1 to 5 % less time here.
+numba.config.CPU_NAME = "generic"
+numba.config.CPU_FEATURES = ""
+numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.Locator"   # the setting NUMBA_CACHE_LOCATOR_CLASSES
+
+# What reading a torn or foreign file of the cache raises.
+_UNREADABLE = (EOFError, pickle.UnpicklingError, ValueError, IndexError, KeyError, TypeError, AttributeError,
+               ImportError, RuntimeError)
 
 
-class _Loaded(JITCodeLibrary):  # type: ignore[misc]
-    """Loaded machine code without LLVM's form of it, which is read when another kernel is compiled that calls it.
+class Locator:
+    """Where numba keeps a kernel's machine code, and under which name, as its cache asks for it."""
 
-    That form of a planner's kernels takes 12 MB, and nobody asks for it where nothing is compiled. It is read from the
-    file that was loaded, which must be that file still: the name of a function in machine code has a number in it that
-    another process's compiling of the same kernel gives otherwise, and linking with that leaves a call to nowhere.
-    """
-
-    path: Path
-    digest: bytes
-    parsed: Any
+    def __init__(self, digest: str, folder: Path) -> None:
+        self._digest, self._folder = digest, folder
 
     @classmethod
-    def lighten(cls, library: Any, path: Path, payload: bytes) -> None:
-        """Make a library that was loaded from the file at ``path``, which held ``payload``, one of these."""
-        library._shared_module.close()  # noqa: SLF001
-        del library._shared_module  # noqa: SLF001
-        library.__class__, library.path, library.parsed = cls, path, None
-        library.digest = hashlib.sha256(payload).digest()
-
-    @property
-    def _shared_module(self) -> Any:
-        if self.parsed is None:
-            payload = read(self.path)
-            if payload is None or hashlib.sha256(payload).digest() != self.digest:
-                raise JobError(f"{self.path} has gone or changed while a kernel was compiled that needs it")
-            _, _, (_, bitcode) = pickle.loads(payload)[_LIBRARY]  # noqa: S301 - our own
-            self.parsed = llvm.parse_bitcode(bitcode)
-        return self.parsed
-
-
-class KernelCache(_Cache):  # type: ignore[misc]
-    """A kernel's cache, as numba's dispatcher wants it."""
-
-    def __init__(self, dispatcher: Dispatcher) -> None:
-        self._dispatcher = dispatcher
-        self._stamp = ""   # known when the kernels that it calls are: when it is first compiled
-
-    @property
-    def cache_path(self) -> str:
-        """Where it writes."""
-        return str(folder())
-
-    def file_name(self, signature: Any, codegen: Any) -> str:
-        """Return the name of the file for a signature, a tuple of numba's types."""
-        self._stamp = self._stamp or stamp(self._dispatcher)
-        depends = f"{self._stamp} {signature} {codegen.magic_tuple()} {versions()}"
-        return f"{name_of(self._dispatcher)}-{hashlib.sha256(depends.encode()).hexdigest()[:24]}"
-
-    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        """Return what was compiled before, None when nothing that can be used is there."""
-        target_context.refresh()
-        name = self.file_name(sig, target_context.codegen())
-        for place in looked_in():
-            payload = read(place / name)
-            if payload is None:
-                continue
-            try:
-                result = CompileResult._rebuild(target_context, *pickle.loads(payload))  # noqa: S301, SLF001 - our own
-                _Loaded.lighten(result.library, place / name, payload)
-            except Exception:
-                _LOG.warning("%s cannot be loaded: compiled again", place / name, exc_info=True)
-            else:
-                return result
-        return None
-
-    def save_overload(self, sig: Any, data: CompileResult) -> None:
-        """Keep what was compiled; a folder that cannot be written costs nothing but the time to compile again."""
-        if data.library.has_dynamic_globals or any(not x.can_cache for x in data.lifted):
-            return
+    def from_function(cls, function: FunctionType, _source: str) -> Locator | None:
+        """Return the locator of a kernel's function; None: nothing can be kept on this machine."""
+        text = f"{function.__module__} {stamp(function)} {places.versions()}"
+        digest = hashlib.sha256(text.encode()).hexdigest()[:24]
         try:
-            parts = list(data._reduce())  # noqa: SLF001
-            parts[_ANNOTATION] = ""   # the source with its types, for a person who asks; none does
-            path = written_to() / self.file_name(sig, data.codegen)
-            if read(path) is None:   # who has loaded the file that another process made meanwhile links with that one
-                _write(path, dumps(tuple(parts)))
+            folder = places.written_to()
         except OSError as error:
-            _LOG.warning("compiled kernels cannot be kept in %s (%s)", folder(), error.strerror)
+            _LOG.warning("compiled kernels cannot be kept in %s (%s)", places.folder(), error.strerror)
+            folder = None
+        for place in places.looked_in():   # a card that has become read-only is still read
+            if place != folder and any(place.glob(f"*-{digest}.*")):
+                return cls(digest, place)
+        return None if folder is None else cls(digest, folder)
 
-    def enable(self) -> None:
-        """Always on."""
+    def ensure_cache_path(self) -> None:
+        """Make the folder again, should it have gone meanwhile."""
+        self._folder.mkdir(parents=True, exist_ok=True, mode=0o700)
 
-    def disable(self) -> None:
-        """Always on."""
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(self._folder)
 
-    def flush(self) -> None:
-        """Nothing is kept in memory."""
+    def get_source_stamp(self) -> str:
+        """Return what a file must have been made from."""
+        return self._digest
 
-
-def read(path: Path) -> bytes | None:
-    """Return what a file of ours holds behind its digest; None: it is not there, damaged, or others could write it."""
-    try:
-        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
-            why = objection(os.fstat(file.fileno()), path.parent)   # of what is read, and no other
-            if why:
-                refuse(path, why)
-                return None
-            data = file.read()
-    except OSError:
-        return None
-    if hashlib.sha256(data[_DIGEST_BYTES:]).digest() != data[:_DIGEST_BYTES]:
-        _LOG.warning("%s is damaged: compiled again", path)
-        return None
-    used(path, time.time())
-    return data[_DIGEST_BYTES:]
+    def get_disambiguator(self) -> str:
+        """Return what tells the files of two kernels of one name apart: versions of one kernel lie side by side."""
+        return self._digest
 
 
-def _write(path: Path, payload: bytes) -> None:
-    handle, beside = tempfile.mkstemp(dir=path.parent, prefix=".")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(hashlib.sha256(payload).digest() + payload)
-        try:
-            os.link(beside, path)        # the first stays, see _Loaded
-        except FileExistsError:
-            if read(path) is None:
-                Path(beside).replace(path)   # it is damaged
-        except OSError:
-            Path(beside).replace(path)       # a file system without links
-        Path(beside).unlink(missing_ok=True)
-    except BaseException:
-        Path(beside).unlink(missing_ok=True)
-        raise
+class Compiled(CPUDispatcher):  # type: ignore[misc]
+    """Numba's dispatcher: one machine code for each combination of types, compiled by one process at a time."""
+
+    def __init__(self, function: Callable[..., Any], locals: Any = None, targetoptions: Any = None) -> None:  # noqa: A002
+        super().__init__(function, locals=locals or {},
+                         targetoptions=targetoptions or {"nopython": True, "nogil": True, "boundscheck": None})
+        self._is_kept = False
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how a kernel is called from another: a literal is a number like any other, not a type of its own."""
+        plain = tuple(unliteral(a) for a in args)
+        return super().get_call_template(plain, {name: unliteral(a) for name, a in kws.items()})
+
+    def compile(self, sig: Any) -> Any:
+        """Return the machine code for a signature, from the cache or made now."""
+        if not self._is_kept:   # not before: what it is made of is known when the kernels that it calls are
+            with contextlib.suppress(RuntimeError):   # there is no place
+                self.enable_caching()
+            self._is_kept = True
+        with global_compiler_lock, self._alone():   # that first: a thread that waits for it would hold this
+            try:
+                return super().compile(sig)
+            except OSError as error:
+                _LOG.warning("compiled kernels cannot be kept in %s (%s)", places.folder(), error.strerror)
+            except _UNREADABLE as error:
+                if isinstance(error, numba.core.errors.NumbaError):
+                    raise
+                _LOG.warning("%s: its file in the cache cannot be read: compiled again", self.py_func.__qualname__)
+                with contextlib.suppress(OSError):
+                    self._cache.flush()
+            return super().compile(sig)
+
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Hold this kernel's lock; callees are held after their callers, and no kernel calls itself in a circle."""
+        with contextlib.ExitStack() as held:
+            if self._cache.cache_path is not None:
+                name = f".{self.py_func.__module__}.{self.py_func.__qualname__}.lock"
+                with contextlib.suppress(OSError):   # nothing can be written: there is nothing to mix up either
+                    fd = os.open(Path(self._cache.cache_path, name), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+                    held.callback(os.close, fd)
+                    fcntl.flock(fd, fcntl.LOCK_EX)
+            yield

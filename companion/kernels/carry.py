@@ -1,59 +1,69 @@
-"""Compiling what a package carries: all kernels, for the processor's plain family, into the package itself.
+"""Compiling what a package carries: one extension module with all listed kernels, into the package itself.
 
-    python -m companion.kernels.carry
+    python -m companion.kernels.carry [FOLDER]
 
-Run once where the package is built (by ``make deb``, the container, or before a wheel is built). Whoever installs it
-compiles nothing: the files are found by their content, whatever their time stamps (``cache``). Interrupted, it goes on
-where it was: by emulation it takes an hour.
+Run once where the package is built (by ``make deb``, the container, or before a wheel is built). Needs a C compiler,
+Python's headers and setuptools; whoever installs the package needs none of them, and compiles nothing. Numba compiles
+it ahead of time (``numba.pycc``: deprecated since 0.57 with a successor promised and none yet, so the version of numba
+is bounded); a minute or two, by emulation half an hour.
 """
 
 from __future__ import annotations
 
-import os
+import hashlib
+import json
 import sys
+import warnings
+from pathlib import Path
+from typing import Any
 
 from companion.kernels import places
-from companion.kernels.build import is_ready, prepare
-from companion.kernels.crew import planned
-from companion.kernels.linked import INDEX, LIBRARY
-
-PACKAGES = ("companion", "sitl")
+from companion.kernels.carried import EXTENSION, PACKAGES, Carried, symbol
+from companion.kernels.listed import from_text, read_list
 
 
-def carry() -> int:
-    """Fill the package's folder with what is missing and nothing else; return how many bytes it holds.
+def carry(folder: Path = places.CARRIED) -> Path:
+    """Make the extension for the sources as they are now, and nothing else in the folder; return its path.
 
     Raises:
-        OSError: it cannot be written; RuntimeError: what was compiled is not all there.
+        OSError: it cannot be written; JobError: the list names what is no kernel; SystemExit, CompileError: of the C
+            compiler.
     """
-    places.CARRIED.mkdir(exist_ok=True)
-    (places.CARRIED / INDEX).unlink(missing_ok=True)   # kernels are compiled here, not called from there
-    os.environ["COMPANION_KERNELS"] = str(places.CARRIED)   # of the processes that compile, too
-    prepare(PACKAGES, say=_say)
-    if not is_ready(PACKAGES) or not all((places.CARRIED / places.mark(name)).exists() for name in PACKAGES):
-        raise RuntimeError(f"{places.CARRIED}: not all kernels are there")
-    (places.CARRIED / places.MADE_FOR).write_text(f"{places.versions()}\n", encoding="utf-8")
-    places.CARRIED.chmod(0o755)
-    from companion.kernels.linking import link
-
-    if not link(PACKAGES, places.CARRIED):
-        _say("there is no ld here: kernels are carried for numba alone (apt install binutils)")
-    wanted = {work.file for work in planned(PACKAGES)} | {places.mark(name) for name in PACKAGES}
-    wanted |= {places.MADE_FOR, INDEX, LIBRARY}
-    size = 0
-    for path in places.CARRIED.iterdir():
-        if path.name not in wanted:   # of another source, or half written when it was interrupted
+    folder.mkdir(exist_ok=True, parents=True)
+    (folder / places.CARRIED_FOR).unlink(missing_ok=True)
+    Carried.waiting = None   # kernels are compiled here, not called from what was carried before
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")   # that it is deprecated
+        from numba.pycc import CC, compiler
+    compiler.Flags = _flags(compiler.Flags)
+    extension = CC(EXTENSION)
+    extension.output_dir, extension.target_cpu = str(folder), "generic"
+    for package in PACKAGES:
+        for number, entry in enumerate(read_list(package)):
+            extension.export(symbol(package, number), from_text(entry.signature))(entry.kernel().py_func)
+    extension.compile()
+    library = folder / str(extension.output_file)
+    for path in folder.iterdir():
+        if path != library:
             path.unlink()
-            continue
-        path.chmod(0o644)   # written for its owner alone; what is installed is for everyone
-        size += path.stat().st_size
-    return size
+    folder.chmod(0o755)
+    library.chmod(0o644)
+    index = {package: places.source(package) for package in PACKAGES}
+    index |= {"library": library.name, "sha256": hashlib.sha256(library.read_bytes()).hexdigest()}
+    (folder / places.CARRIED_FOR).write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
+    return library
 
 
-def _say(text: str) -> None:
-    sys.stdout.write(f"{text}\n")
-    sys.stdout.flush()
+def _flags(of_numba: Any) -> Any:
+    """Return numba's flags with the interpreter's lock released while a kernel runs; ``CC`` has no option for it."""
+    class Flags(of_numba):  # type: ignore[misc]
+        def __init__(self, copy_from: Any = None) -> None:
+            super().__init__(copy_from)
+            self.release_gil = True
+
+    return Flags
 
 
 if __name__ == "__main__":
-    sys.stdout.write(f"{places.CARRIED}: {carry() / 1e6:.1f} MB\n")
+    made = carry(*map(Path, sys.argv[1:2]))
+    sys.stdout.write(f"{made}: {made.stat().st_size / 1e6:.1f} MB\n")

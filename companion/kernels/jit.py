@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from companion.kernels import linked
+from companion.kernels import carried
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -17,8 +17,8 @@ def kernel(function: F) -> F:
     compiles. Anything else is refused when it is first compiled: its changes could not be seen. Numba is loaded only
     where the package does not carry it all.
     """
-    if linked.is_linked(function.__module__.partition(".")[0]):
-        return cast("F", linked.Linked(function))
-    from companion.kernels.compiled import Compiled
+    if carried.is_used(function.__module__.partition(".")[0]):
+        return cast("F", carried.Carried(function))
+    from companion.kernels.cache import Compiled
 
     return cast("F", Compiled(function))

@@ -1,12 +1,12 @@
 """Where machine code is kept, and the mark that says that all of it is there. Does not load numba.
 
-Looked for in what the package carries, in a folder of the user's, and in memory. Written to the folder, which is
-``$COMPANION_KERNELS``, the service manager's ``$CACHE_DIRECTORY``, or ``sailboat-companion/kernels`` under
-``$XDG_CACHE_HOME`` (``~/.cache``); where that cannot be written, to memory: a Pi's card that fails is mounted read-only
-by the kernel, and a companion that starts again then must not compile for minutes at every start.
+It is kept in a folder, which is ``$COMPANION_KERNELS``, the service manager's ``$CACHE_DIRECTORY``, or
+``sailboat-companion/kernels`` under ``$XDG_CACHE_HOME`` (``~/.cache``); where that cannot be written, in memory: a Pi's
+card that fails is mounted read-only by the kernel, and a companion that starts again then must not compile for minutes
+at every start.
 
-What lies there is run. So a folder or a file that another user owns (root, and who owns the package, may as well change
-the program) or that others may write to is not used, and that is said once.
+What lies there is run. So a folder that another user owns (root, and who owns the package, may as well change the
+program) or that others may write to is not used, and that is said once; one of ours is closed to everybody else.
 """
 
 from __future__ import annotations
@@ -29,13 +29,11 @@ FILE = "kernels.txt"   # in each package: see ``listed``
 PACKAGES = Path(__file__).resolve().parents[2]
 IN_MEMORY = (Path("/dev/shm"), Path("/run"))  # noqa: S108 - see _is_private
 CARRIED = Path(__file__).resolve().parent / "carried"   # filled when a package is built: see ``carry``
-MADE_FOR = "made-for.txt"                               # in it: the versions that it was made for
-KEPT_S = 30 * 86_400.0     # a file that nobody has used for this long goes ...
-KEPT_BYTES = 200 * 2**20   # ... and the oldest beyond this, a dozen versions of everything
+CARRIED_FOR = "carried.json"                            # in it: the sources that it was made from, and the library
+KEPT_BYTES = 200 * 2**20   # beyond this, a dozen versions of everything, the oldest files go
 _LOG = logging.getLogger(__name__)
 ROOT = 0                   # the user who may change everything
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
-_USED_S = 86_400.0         # the time of use is noted once a day: an SD card wears
 
 
 def folder() -> Path:
@@ -50,7 +48,7 @@ def folder() -> Path:
 
 def looked_in() -> tuple[Path, ...]:
     """Return where machine code may lie, in the order in which it is looked for."""
-    places = [place for place in (CARRIED, folder()) if _is_ours(place)]
+    places = [folder()] if _is_ours(folder()) else []
     return *places, *(place for place in map(_of_user, IN_MEMORY) if _is_private(place))
 
 
@@ -118,6 +116,8 @@ def _tried(place: Path) -> Path:
     place.mkdir(parents=True, exist_ok=True, mode=0o700)
     if not _is_ours(place):
         raise OSError(errno.EPERM, "it is not ours alone", str(place))
+    if place.stat().st_mode & 0o077:
+        place.chmod(0o700)   # numba's files are as open as the user's umask has them
     with tempfile.TemporaryFile(dir=place):
         return place
 
@@ -132,47 +132,28 @@ def versions() -> str:
     return f"{sys.implementation.cache_tag} {libraries} {platform.machine()}"
 
 
-def misfit() -> str:
-    """Return why the kernels that the package carries are of no use here; empty: it carries none, or all fit."""
-    try:
-        made_for = (CARRIED / MADE_FOR).read_text(encoding="utf-8").strip()
-    except OSError:
-        return ""
-    if made_for != versions():
-        return f"those of the package are for {made_for}, this is {versions()}"
-    return "those of the package are of another source"
+def source(package: str) -> str:
+    """Return a digest of all that a package's kernels can be made from: its files and its list, as they are now."""
+    seen = hashlib.sha256()
+    for path in sorted((PACKAGES / package).rglob("*.py")):
+        seen.update(path.read_bytes())
+    seen.update((PACKAGES / package / FILE).read_bytes())
+    return seen.hexdigest()
 
 
 def mark(package: str) -> str:
     """Return the name of the empty file that says: all that the package lists, as its files are now, is compiled."""
-    seen = hashlib.sha256(versions().encode())
-    for path in sorted((PACKAGES / package).rglob("*.py")):
-        seen.update(path.read_bytes())
-    seen.update((PACKAGES / package / FILE).read_bytes())
-    return f"all-{package}-{seen.hexdigest()[:24]}"
+    return f"all-{package}-{hashlib.sha256(f'{source(package)} {versions()}'.encode()).hexdigest()[:24]}"
 
 
-def used(path: Path, now_s: float) -> None:
-    """Note that a file was used."""
-    with contextlib.suppress(OSError):
-        if now_s - path.stat().st_mtime > _USED_S:
-            os.utime(path)
-
-
-def sweep(now_s: float) -> int:
-    """Remove what nobody has used for long, the oldest beyond the limit, and numba's own caches of before; count it."""
+def sweep() -> int:
+    """Remove the oldest files beyond the limit; return how many."""
     held = removed = 0
-    kept = [place for place in looked_in() if place != CARRIED]
-    for used_s, size, path in sorted((file for place in kept for file in _files(place)), reverse=True):
+    for _, size, path in sorted((file for place in looked_in() for file in _files(place)), reverse=True):
         held += size
-        if now_s - used_s > KEPT_S or held > KEPT_BYTES:
+        if held > KEPT_BYTES:
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
-                removed += 1
-    for package in ("companion", "sitl"):
-        for path in (PACKAGES / package).glob("**/__pycache__/*.nb[ci]"):
-            with contextlib.suppress(OSError):
-                path.unlink()
                 removed += 1
     return removed
 

@@ -19,50 +19,44 @@ OURS = ("companion", "sitl")
 _LITERALS = (bool, int, float, complex, str, bytes, type(None), np.generic)
 
 
-def stamp(dispatcher: Dispatcher) -> str:
+def stamp(function: types.FunctionType) -> str:
     """Return a digest of everything that decides a kernel's machine code, apart from types, versions and processor.
+
+    Args:
+        function: what was decorated.
 
     Raises:
         JobError: the kernel, or one that it calls, uses something whose changes cannot be seen.
     """
-    whole = hashlib.sha256()
-    for name, digest in sorted((name_of(k), _own(k)) for k in _reachable(dispatcher)):
-        whole.update(f"{name} {digest}\n".encode())
-    return whole.hexdigest()
-
-
-def name_of(dispatcher: Dispatcher) -> str:
-    """Return a kernel's full name."""
-    return f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__qualname__}"
-
-
-@functools.cache
-def callees(dispatcher: Dispatcher) -> tuple[Dispatcher, ...]:
-    """Return the kernels that a kernel calls itself."""
-    return tuple(value for _, value in _globals_of(dispatcher.py_func) if isinstance(value, Dispatcher))
-
-
-def _reachable(dispatcher: Dispatcher) -> set[Dispatcher]:
-    found, left = {dispatcher}, [dispatcher]
+    found, left = {function}, [function]
     while left:
-        for callee in callees(left.pop()):
+        for callee in _callees(left.pop()):
             if callee not in found:
                 found.add(callee)
                 left.append(callee)
-    return found
+    said = sorted(f"{_name(each)} {_own(each)}\n" for each in found)
+    return hashlib.sha256("".join(said).encode()).hexdigest()
+
+
+def _name(function: types.FunctionType) -> str:
+    return f"{function.__module__}.{function.__qualname__}"
 
 
 @functools.cache
-def _own(dispatcher: Dispatcher) -> str:
-    """Return the digest of a kernel's own code, options and constants."""
-    function = dispatcher.py_func
+def _callees(function: types.FunctionType) -> tuple[types.FunctionType, ...]:
+    return tuple(value.py_func for _, value in _globals_of(function) if isinstance(value, Dispatcher))
+
+
+@functools.cache
+def _own(function: types.FunctionType) -> str:
+    """Return the digest of a kernel's own code and constants."""
     if function.__closure__:
-        raise JobError(f"{name_of(dispatcher)}: a kernel is a function of its module, not of another function")
-    said = [*_code(function.__code__, function.__doc__), repr(sorted(dispatcher.targetoptions.items(), key=str))]
+        raise JobError(f"{_name(function)}: a kernel is a function of its module, not of another function")
+    said = [*_code(function.__code__, function.__doc__)]
     for default in (*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()):
-        said.append(_constant(default, name_of(dispatcher)))
+        said.append(_constant(default, _name(function)))
     for name, value in _globals_of(function):
-        said.append(f"{name}={_constant(value, f'{name_of(dispatcher)}, {name}')}")
+        said.append(f"{name}={_constant(value, f'{_name(function)}, {name}')}")
     return hashlib.sha256("\n".join(said).encode()).hexdigest()
 
 
@@ -76,7 +70,7 @@ def _code(code: types.CodeType, doc: str | None = "") -> Iterator[str]:
             yield repr(constant)
 
 
-def _globals_of(function: Any) -> list[tuple[str, Any]]:
+def _globals_of(function: types.FunctionType) -> list[tuple[str, Any]]:
     """Return the module's names that the function uses, and what they are."""
     known = function.__globals__
     return [(name, known[name]) for name in _names_of(function.__code__) if name in known]
@@ -95,7 +89,7 @@ def _names_of(code: types.CodeType) -> tuple[str, ...]:
 def _constant(value: Any, where: str) -> str:
     """Return a text that is another one when the value is."""
     if isinstance(value, Dispatcher):
-        return name_of(value)
+        return _name(value.py_func)
     if isinstance(value, enum.Enum):
         return f"{type(value).__qualname__}.{value.name}={value.value!r}"
     if isinstance(value, _LITERALS):

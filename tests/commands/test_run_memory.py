@@ -1,4 +1,7 @@
-"""What ``companion run`` and its planner take of a small computer's memory, together, and what they load."""
+"""What ``companion run`` and its planner take of a small computer's memory, together, and what they load.
+
+With the kernels that a package carries, as on the boat: numba in a clone takes 60 MB more.
+"""
 
 import os
 import signal
@@ -9,13 +12,20 @@ from pathlib import Path
 
 import pytest
 
-from companion.kernels.build import is_ready, prepare
 from companion.telemetry.folder.recorder import read_jsonl
 from sitl.scenario.traffic import free_port
 
 PACE = 20
-MOST_MB = 160.0
-ASHORE = ("/scipy/", "/matplotlib/", "mavsdk", "/ompl/")   # in the names of their libraries
+MOST_MB = 130.0   # 113 to 122: a plan that is being made counts
+ASHORE = ("/scipy/", "/matplotlib/", "mavsdk", "/ompl/", "/numba/", "llvmlite")   # in the names of their libraries
+PACKAGED = """
+import sys
+from pathlib import Path
+from companion.kernels import places
+places.CARRIED = Path(sys.argv.pop(1))
+from companion.cli import main
+sys.exit(main())
+"""
 MISSION = """
 name = "there"
 [[goal]]
@@ -53,12 +63,10 @@ def boat():
         process.terminate()
 
 
-def test_it_is_small_with_its_planner_and_leaves_no_process_behind(boat, tmp_path):
-    if not is_ready(("companion",)):
-        prepare(("companion",), say=lambda _: None)
+def test_it_is_small_with_its_planner_and_leaves_no_process_behind(boat, carried, tmp_path):
     (tmp_path / "there.toml").write_text(MISSION)
-    command = [sys.executable, "-m", "companion.cli", "run", "there.toml", "--link", boat, "--speedup", str(PACE),
-               "--out", "voyage"]
+    command = [sys.executable, "-c", PACKAGED, str(carried), "run", "there.toml", "--link", boat, "--out", "voyage",
+               "--speedup", str(PACE)]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL,
                           env={**os.environ, "PYTHONPATH": str(Path.cwd())}) as companion:
         try:
@@ -71,7 +79,10 @@ def test_it_is_small_with_its_planner_and_leaves_no_process_behind(boat, tmp_pat
         finally:
             companion.send_signal(signal.SIGINT)
         companion.wait(60)
-    assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
+    end = time.monotonic() + 10.0   # the planner ends when it sees that its socket is closed
+    while any(Path(f"/proc/{pid}").exists() for pid in pids):
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 def wait_for_plans(path, count):

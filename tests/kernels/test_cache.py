@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import subprocess
 import sys
 import time
 import types
@@ -9,7 +10,7 @@ import types
 import pytest
 
 from companion.errors import JobError
-from companion.kernels import cache, places
+from companion.kernels import places
 
 KNOTS = """
 from companion.kernels.jit import kernel
@@ -99,10 +100,11 @@ def test_what_could_change_unseen_is_refused(load, unseen):
         load(KNOTS.replace("FACTOR = 2.0", unseen))(3.0)
 
 
-@pytest.mark.parametrize("damage", [lambda b: b[:-7], lambda b: b[:50], lambda b: b"", lambda b: b[:-1] + b"x"])
-def test_a_torn_file_is_compiled_again(load, kept, damage):
+@pytest.mark.parametrize("damage", [lambda b: b[:-7], lambda b: b[:50], lambda b: b"", lambda b: b[:len(b) // 2]])
+@pytest.mark.parametrize("which", [".nbi", ".nbc"])
+def test_a_torn_file_is_compiled_again(load, kept, damage, which):
     load()(3.0)
-    for path in kept.iterdir():
+    for path in kept.glob(f"*{which}"):
         path.write_bytes(damage(path.read_bytes()))
     again = load()
     assert again(3.0) == 7.0
@@ -122,7 +124,7 @@ def test_where_nothing_can_be_written_it_is_kept_in_memory(load, monkeypatch, tm
     load()(3.0)
     place = tmp_path / "memory" / f"companion-kernels-{os.getuid()}"
     assert place.stat().st_mode & 0o777 == 0o700
-    assert len(list(place.iterdir())) == 2
+    assert len(list(place.glob("*.nbi"))) == 2
     assert not is_compiled_anew_after(load)
 
 
@@ -138,51 +140,86 @@ def test_what_others_can_write_is_not_run(load, monkeypatch, tmp_path, caplog):
 
 
 @pytest.mark.parametrize(("mode", "uid"), [(0o770, None), (0o702, None), (0o700, 54321)])
-@pytest.mark.parametrize("what", ["folder", "file"])
 def test_kernels_that_others_may_have_written_are_not_run_and_that_is_said_once(
-        load, kept, monkeypatch, tmp_path, caplog, what, mode, uid):
+        load, kept, monkeypatch, caplog, mode, uid):
     """They were unpickled and run from any folder that was named (issue 43, point 9)."""
     places.refuse.cache_clear()
     load()(3.0)
-    files = list(kept.iterdir())
-    for path in [kept] if what == "folder" else files:
-        path.chmod(mode)
-        if uid is not None:
-            monkeypatch.setattr(places.os, "geteuid", lambda: uid)   # what was ours is another's
-            monkeypatch.setattr(places, "ROOT", uid)
-    before = {path: path.read_bytes() for path in files}
+    kept.chmod(mode)
+    if uid is not None:
+        monkeypatch.setattr(places.os, "geteuid", lambda: uid)   # what was ours is another's
+        monkeypatch.setattr(places, "ROOT", uid)
+    before = {path: path.read_bytes() for path in kept.iterdir()}
     caplog.clear()
     assert is_compiled_anew_after(load)
     said = [r.message for r in caplog.records if "none of it is used" in r.message]
     assert len(said) == len(set(said)) > 0
-    if what == "folder" or uid is not None:
-        assert {path: path.read_bytes() for path in kept.iterdir()} == before, "it is left alone"
-    if what == "folder" and uid is None:
-        kept.chmod(0o700)
+    assert {path: path.read_bytes() for path in kept.iterdir()} == before, "it is left alone"
+    if uid is None:
+        kept.chmod(0o755)
         assert not is_compiled_anew_after(load)
+        assert kept.stat().st_mode & 0o777 == 0o700, "closed: a file in it may be as open as the umask had it"
 
 
-def test_what_is_carried_or_kept_is_read_where_nothing_can_be_written(load, kept, monkeypatch, tmp_path):
+def test_what_is_kept_is_read_where_nothing_can_be_written(load, kept, monkeypatch, tmp_path):
+    """A card that has become read-only: what is there is used, and what is new is kept in memory."""
     load()(3.0)
-    monkeypatch.setattr(places, "CARRIED", kept)
-    monkeypatch.setenv("COMPANION_KERNELS", "/proc/none")
+    tried = places._tried
+
+    def refused(place):
+        if place == kept:
+            raise OSError(30, "read-only", str(place))
+        return tried(place)
+
+    monkeypatch.setattr(places, "_tried", refused)
     assert not is_compiled_anew_after(load)
-    assert not list((tmp_path / "memory").iterdir())
+    assert not list((tmp_path / "memory").glob("*/*.nbi"))
+    assert load(knots=KNOTS.replace("2.0", "9.0"))(3.0) == 28.0
+    assert list((tmp_path / "memory").glob("*/*.nbi"))
 
 
-def test_what_nobody_uses_goes(kept, monkeypatch):
-    kept.mkdir()
+def test_a_full_disk_costs_no_more_than_the_time_to_compile(load, monkeypatch, caplog):
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", full)
+    assert load()(3.0) == 7.0
+    assert "cannot be kept" in caplog.text
+
+
+def full(*_):
+    raise OSError(28, "No space left on device")
+
+
+TYPES = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from test_boat import speed
+makes = [float, int, np.float32, np.int32, bool, np.int8]
+makes = makes[int(sys.argv[2]):] + makes[:int(sys.argv[2])]
+print(sorted(float(speed(make(1))) for make in makes))
+"""
+
+
+def test_processes_that_compile_one_kernel_for_other_types_do_not_mix_up_its_files(kept, tmp_path):
+    """Numba's index of a kernel is read, changed and written without a lock: the last one wins."""
+    (tmp_path / "test_knots.py").write_text(KNOTS)
+    (tmp_path / "test_boat.py").write_text(BOAT)
+    for _ in range(2):
+        running = [subprocess.Popen([sys.executable, "-c", TYPES, str(tmp_path), str(n)], stdout=subprocess.PIPE,
+                                    text=True) for n in range(4)]
+        assert {process.communicate()[0].strip() for process in running} == {str([3.0] * 6)}
+    index, = kept.glob("test_boat.speed-*.nbi")
+    assert len(list(kept.glob(f"{index.name.removesuffix('.nbi')}.*.nbc"))) == 6
+
+
+def test_beyond_the_limit_the_oldest_go(kept, monkeypatch):
+    kept.mkdir(mode=0o700)
     now_s = time.time()
     for n in range(6):
         (kept / f"kernel{n}").write_bytes(bytes(100))
         os.utime(kept / f"kernel{n}", (now_s - n, now_s - n))
-    os.utime(kept / "kernel1", (0.0, now_s - 31 * 86_400.0))
     monkeypatch.setattr(places, "KEPT_BYTES", 300)
-    monkeypatch.setattr(places, "PACKAGES", kept)
-    assert places.sweep(now_s) == 3
-    assert sorted(p.name for p in kept.iterdir()) == ["kernel0", "kernel2", "kernel3"]
-    places.used(kept / "kernel0", now_s + 2 * 86_400.0)
-    assert cache.folder() == kept
+    assert places.sweep() == 3
+    assert sorted(p.name for p in kept.iterdir()) == ["kernel0", "kernel1", "kernel2"]
 
 
 @pytest.mark.parametrize(("environment", "there"), [
