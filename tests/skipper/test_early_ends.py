@@ -65,6 +65,16 @@ def test_each_cause_leads_where_the_mission_says_and_on_when_it_is_over(cause, e
     assert world.state.voyage.arrived
 
 
+def test_of_two_causes_the_one_that_leads_her_says_how_long():
+    world = under_way(Ends.of(dark=End.REFUGE, shore_lost=End.REFUGE))
+    night(world)
+    silence(world)
+    assert world.run(400, lambda w: "; waiting until" in w.state.why)
+    assert world.state.why.endswith("no ground station is heard; waiting until a ground station is heard")
+    silence(world, is_silent=False)
+    assert world.run(60, lambda w: w.state.why.endswith("it is dark; waiting until it is light"))
+
+
 def test_without_a_place_to_go_to_a_leaking_boat_stays_and_one_with_an_empty_battery_sails_on():
     wet = under_way(has_refuge=False)
     leak(wet)

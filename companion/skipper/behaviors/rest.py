@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from companion.frozen import changed
 from companion.messages import Severity
-from companion.safety import ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
+from companion.safety import BY_RANK, ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
 from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
@@ -56,7 +56,7 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
 
 def _how_long(ctx: StepContext) -> str:
     """Return how long a diversion that nobody ordered keeps her."""
-    until = next((ending.until for name, ending in ENDINGS.items() if ending.until and ctx.is_raised(name)
+    until = next((ENDINGS[name].until for name in BY_RANK if ENDINGS[name].until and ctx.is_raised(name)
                   and ctx.config.ends.end(name) is not End.SAY), "")
     return until or ANSWERED.get(ctx.state.operator.answering, TAKEN)
 
