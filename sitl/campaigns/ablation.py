@@ -17,7 +17,7 @@ from companion.geofence import Mission
 from companion.planners import ALGORITHMS, AUTO
 from sitl.results import columns
 from sitl.run.variation import Variation, foreknown, unspread
-from sitl.runner import CampaignResults, Experiment, Job, Summary
+from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job
 
 HERE = Path(__file__).parents[1] / "scenarios"
 SCENARIOS = (HERE / "two-channels.toml", HERE / "figures" / "two-channels-rough.toml", HERE / "narrow-channel.toml")
@@ -84,7 +84,7 @@ def ablation(
     for path in scenarios:
         _mission(path)
 
-    def sum_up(sailed: CampaignResults) -> Summary:
+    def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = sailed.records
         lines = []
         for scenario in dict.fromkeys(record["scenario"] for record in sorted(records, key=_order)):
@@ -92,7 +92,7 @@ def ablation(
                       table([record for record in records if record["scenario"] == scenario], wanted)]
         errors = [f"ERROR {r['scenario']}, {r['variation']}, seed {r['seed']}: {r['error'][:300]}"
                   for r in records if r["error"]]
-        return Summary(lines=lines + errors, is_good=not errors)
+        return ExperimentSummary(lines=lines + errors, is_good=not errors)
 
     return Experiment(
         name="ablate", sail=sail, key=lambda job: job.key(variation=job.case), sum_up=sum_up,

@@ -44,7 +44,7 @@ from sitl.results import markdown
 from sitl.run.embedded import TRUTH_EVERY_S, run_embedded, solid_of
 from sitl.run.live import run_live
 from sitl.run.variation import Variation
-from sitl.runner import CampaignResults, Experiment, Job, Key, Summary, file_hash, read_results
+from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key, file_hash, read_results
 from sitl.scenario import (
     EventSpec,
     Scenario,
@@ -434,9 +434,9 @@ def baselines(jobs: Sequence[Job[Sailor]], *, results: Path | None, against: str
         began = {(key["scenario"], key["seed"]): tuple(result["start"])
                  for key, result in read_results(results).pairs() if "start" in result}
 
-    def sum_up(sailed: CampaignResults) -> Summary:
+    def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = latest([result for _, result in sailed.held.pairs()])
-        return Summary(lines=[table(records), *([] if against is None else [pairs(records, NAMES[against])])])
+        return ExperimentSummary(lines=[table(records), *([] if against is None else [pairs(records, NAMES[against])])])
 
     return Experiment(name="baselines", sail=sail, key=key_of, sum_up=sum_up, jobs=[
         replace(job, case=replace(job.case, set_sail=began.get((scenario_of(job).name, job.seed)))) for job in jobs])

@@ -15,7 +15,7 @@ from typing import Any
 from companion.words import file_name
 from sitl.results import columns
 from sitl.run.variation import AS_IT_SAYS, Method, can_be_sailed
-from sitl.runner import CampaignResults, Experiment, Job, Key, Summary
+from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key
 
 FAILURES = Path("campaign-failures")
 
@@ -72,7 +72,7 @@ def campaign(
     ways = [(scenario.name, path, method) for scenario, path, mission in zip(loaded, scenarios, missions, strict=True)
             for method in methods if method.guidance is None or can_be_sailed(mission, method.guidance)]
 
-    def sum_up(sailed: CampaignResults) -> Summary:
+    def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = sailed.records
         table = [figures(name, [r for r in records if r["scenario"] == name])
                  for name in (_name(name, method) for name, _, method in ways)]
@@ -81,8 +81,8 @@ def campaign(
         for record in sorted((r for r in records if not r["passed"]), key=lambda r: (r["scenario"], r["seed"])):
             bad = "; ".join(f"{c['name']}: {c['figure']}" for c in record["checks"] if not c["passed"])
             lines.append(f"FAILED {record['scenario']} seed {record['seed']}: {bad[:300]}")
-        return Summary(lines=lines, figures={"table": table, "wall_s": sailed.wall_s},
-                       is_good=all(r["passed"] for r in records))
+        return ExperimentSummary(lines=lines, figures={"table": table, "wall_s": sailed.wall_s},
+                                 is_good=all(r["passed"] for r in records))
 
     return Experiment(
         name="campaign", sail=sail, key=key_of, sum_up=sum_up,

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from sitl.runner import CampaignResults, Experiment, Job, Summary, file_hash
+from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, file_hash
 from sitl.scenario import (
     CLOSE_HAULED_DEG,
     Craft,
@@ -152,14 +152,14 @@ def encounters(
             f"FAILED {record['kind']}, {record['policy']}, seed {record['seed']}: {'; '.join(record['faults'])} "
             f"({record['vessel']}; wind {record['wind']}{'; shoal' if record['shoal'] else ''})")
 
-    def sum_up(sailed: CampaignResults) -> Summary:
+    def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = sorted(sailed.records, key=lambda r: (r["policy"], r["kind"], r["seed"]))
         rows = [row(kind, policy, found) for policy in policies for kind in kinds
                 if (found := [r for r in records if (r["kind"], r["policy"]) == (kind, policy)])]
         again = [f"again: sitl encounters --kind {r['kind']} --policy \"{r['policy']}\" --first-seed {r['seed']} "
                  "--keep DIR" for r in records if not r["passed"]]
-        return Summary(lines=[*map(told, rows), sailed.took, *again], is_good=not again,
-                       figures={"table": rows, "voyages": records})
+        return ExperimentSummary(lines=[*map(told, rows), sailed.took, *again], is_good=not again,
+                                 figures={"table": rows, "voyages": records})
 
     return Experiment(
         name="encounters", sail=sail, line=line, sum_up=sum_up,

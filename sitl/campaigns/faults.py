@@ -49,7 +49,7 @@ from sitl.campaigns.fault_sampling import (
     draw_turned_vane,
 )
 from sitl.run.variation import DRAWABLE, Method, Variation, drawn_method
-from sitl.runner import CampaignResults, Experiment, Job, Summary
+from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job
 from sitl.scenario import EventSpec, Scenario, is_all_ordinary, load_scenario
 
 T = TypeVar("T")
@@ -299,7 +299,7 @@ def faults(case: FaultCase, *, runs: int, first_seed: int = 0) -> Experiment[Fau
         word = "known to fail," if record["seed"] in known else "FAILED"
         return f"{word} seed {record['seed']}: {'; '.join(record['faults'])} ({', '.join(drawn)})"
 
-    def sum_up(sailed: CampaignResults) -> Summary:
+    def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = sailed.records
         table = jump_figures(records) if trouble == "jumps" else figures_of(records)
         lines = jumps_told(table) if trouble == "jumps" else figures_told(table)
@@ -310,7 +310,7 @@ def faults(case: FaultCase, *, runs: int, first_seed: int = 0) -> Experiment[Fau
                 lines.append(f"again: sitl faults{option} --first-seed {record['seed']} --keep DIR")
             elif record["seed"] in known:
                 lines.append(f"seed {record['seed']} passes, which was known to fail: {known[record['seed']]}")
-        return Summary(lines=lines, is_good=all(r["passed"] or r["seed"] in known for r in records), figures={
+        return ExperimentSummary(lines=lines, is_good=all(r["passed"] or r["seed"] in known for r in records), figures={
             "figures": {**table, "wall_s": sailed.wall_s, "cpu_s": sailed.cpu_s}, "voyages": records})
 
     return Experiment(name="faults", sail=sail, line=line, sum_up=sum_up,

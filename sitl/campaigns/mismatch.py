@@ -29,7 +29,7 @@ from companion.telemetry.folder import DECISIONS
 from sitl.autopilot import Autopilot, MemoryLink
 from sitl.campaigns.mismatch_sampling import SampledMismatch, draw
 from sitl.run.variation import Variation, drawn_method
-from sitl.runner import CampaignResults, Experiment, Job, Key, Summary
+from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key
 
 # A plan's waypoint and the autopilot's are one where they are this near: degrees x 1e7 are a centimetre.
 _SAME_M = 0.5
@@ -332,15 +332,16 @@ def mismatch(case: MismatchCase, *, runs: int, first_seed: int) -> Experiment[Mi
             f"FAILED seed {record['seed']}, {record['scenario']}{method}: {'; '.join(record['faults'])} "
             f"({', '.join(record['kinds']) or 'as planned'})")
 
-    def sum_up(sailed: CampaignResults) -> Summary:
+    def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = sorted(sailed.records, key=lambda r: int(r["seed"]))
         table = figures_of(records)
         how = (" --planned" if case.planned else "") + (f" --draw {','.join(case.draws)}" if case.draws else "")
         how += " --as-planned" if case.only == () else "".join(f' --only "{kind}"' for kind in case.only or ())
         again = [f"again: sitl mismatch --first-seed {r['seed']}{how} --keep DIR"
                  for r in records if not r["passed"] or r.get("below_floor")]
-        return Summary(lines=[told(table), sailed.took, *again], figures={"figures": table, "voyages": records},
-                       is_good=all(r["passed"] for r in records))
+        return ExperimentSummary(lines=[told(table), sailed.took, *again],
+                                 figures={"figures": table, "voyages": records},
+                                 is_good=all(r["passed"] for r in records))
 
     return Experiment(name=CAMPAIGN, sail=sail, key=key_of, line=line, sum_up=sum_up,
                       jobs=[job_of(seed, case) for seed in range(first_seed, first_seed + runs)])

@@ -28,7 +28,7 @@ from sitl.campaigns.baselines import (
 from sitl.perfect_information import Best, Race, RaceBoat, RaceMark, Weather, best
 from sitl.results import markdown
 from sitl.run.embedded import solid_of
-from sitl.runner import CampaignResults, Experiment, Job, Summary
+from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job
 from sitl.scenario import Scenario, load_scenario, own_polar, scenario_departures, scenario_waters, scenario_wind
 
 HEADS = ("scenario", "sailor", "runs", "clean", "median s", "tacks", "best s", "its tacks", "over best %", "10 %",
@@ -139,10 +139,10 @@ def sail(job: Job[Sailor]) -> dict[str, Any]:
 
 def regret(jobs: Sequence[Job[Sailor]], *, against: str | None) -> Experiment[Sailor]:
     """Return the voyages; a table of all that there is, and one sailor against the others."""
-    def sum_up(sailed: CampaignResults) -> Summary:
+    def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = latest([result for _, result in sailed.held.pairs()])
-        return Summary(lines=[told(records), *([] if against is None else [pairs(records, NAMES[against])])],
-                       figures=figures_of(records))
+        return ExperimentSummary(lines=[told(records), *([] if against is None else [pairs(records, NAMES[against])])],
+                                 figures=figures_of(records))
 
     return Experiment(name="regret", sail=sail, key=key_of, sum_up=sum_up, jobs=jobs)
 

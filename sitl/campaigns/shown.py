@@ -14,7 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from sitl.runner import CampaignResults, Experiment, Job, Key, Summary, file_hash
+from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key, file_hash
 
 EVERY_S = 2.0
 AHEAD_S = (10, 30, 60, 120)          # the places that are scored
@@ -191,13 +191,13 @@ def shown(scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: b
     """Return the voyages of each scenario, or of what ``sitl mismatch`` draws; a table of each kind and of all."""
     from sitl.campaigns.mismatch_sampling import draw
 
-    def sum_up(sailed: CampaignResults) -> Summary:
+    def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         names = list(dict.fromkeys(record["scenario"] for record in sailed.records))
         tables = {name: table_of([r for r in sailed.records if r["scenario"] == name]) for name in names}
         if len(names) > 1:
             tables["all"] = table_of(sailed.records)
-        return Summary(lines=[*(f"{name}\n{told(rows)}\n" for name, rows in tables.items()), sailed.took],
-                       figures=tables)
+        return ExperimentSummary(lines=[*(f"{name}\n{told(rows)}\n" for name, rows in tables.items()), sailed.took],
+                                 figures=tables)
 
     def key(job: Job[bool]) -> Key:
         water = {} if job.case else {"hash": file_hash(job.scenario)}

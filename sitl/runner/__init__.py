@@ -1,7 +1,7 @@
 """The runner: seeded jobs over processes or a Dask cluster, and the file in which each result stays as it comes."""
 
 from sitl.runner.executors import WorkerDiedError, in_processes, settled
-from sitl.runner.experiment import CampaignResults, Experiment, Summary, sail_kept
+from sitl.runner.experiment import CampaignResults, Experiment, ExperimentSummary, sail_kept
 from sitl.runner.job import Job, ScenarioBundle, file_hash
 from sitl.runner.result_store import (
     Key,
@@ -20,13 +20,13 @@ from sitl.runner.result_store import (
 __all__ = [
     "CampaignResults",
     "Experiment",
+    "ExperimentSummary",
     "Job",
     "Key",
     "MadeBy",
     "ResultStore",
     "ScenarioBundle",
     "StoredResults",
-    "Summary",
     "Table",
     "WorkerDiedError",
     "file_hash",

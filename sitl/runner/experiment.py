@@ -58,7 +58,7 @@ class CampaignResults:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Summary:
+class ExperimentSummary:
     """What is told of an experiment: lines to print, figures for JSON, whether all is as it must be."""
 
     lines: Sequence[str]
@@ -83,7 +83,7 @@ class Experiment(Generic[CaseT]):
     jobs: Sequence[Job[CaseT]]
     sail: Callable[[Job[CaseT]], dict[str, Any]]
     key: Callable[[Job[CaseT]], Key]
-    sum_up: Callable[[CampaignResults], Summary] = lambda _: Summary(lines=())
+    sum_up: Callable[[CampaignResults], ExperimentSummary] = lambda _: ExperimentSummary(lines=())
     line: Callable[[dict[str, Any]], str | None] = lambda _: None
     is_failed: Callable[[dict[str, Any]], bool] = _is_failed
 
