@@ -128,7 +128,8 @@ def around(stage: Path, work: Path) -> None:
     documents = stage / "usr/share/doc" / NAME
     put(ROOT / "packaging/debian/copyright", documents / "copyright")
     zipped(documents / "changelog.gz", changelog().encode())
-    for page in ("guides/on-the-boat.md", "reference/formats.md", "reference/watchdogs.md"):
+    for page in ("guides/on-the-boat.md", "reference/service.md", "reference/formats.md",
+                 "reference/watchdogs.md"):
         put(ROOT / "docs" / page, documents / Path(page).name)
 
 

@@ -1,4 +1,7 @@
-"""What README and the guides tell a reader to type: understood as it stands, and README's lines are run as he would."""
+"""What README and the guides tell a reader to type: README's lines and benches are run, in an empty folder, in order.
+
+Every other line is understood by its program, and not run: it names a link, a file or a cluster of the reader's own.
+"""
 
 import argparse
 import contextlib
@@ -185,6 +188,24 @@ def test_who_wants_it_on_his_boat(tmp_path):
         assert "nothing was changed" in done(doctor.replace("/dev/serial0:921600", here), tmp_path, exits=(0, 1))
         with typed(run.replace("/dev/serial0:921600", here), tmp_path) as shell:
             until(shell, r"WAITING \| wind")
+
+
+def test_the_bench_of_an_evening_from_an_empty_folder(tmp_path):
+    """A boat in one terminal, the companion in another: moored until it sails, however long that takes."""
+    boat_line, example, run = [line for line in blocks(ROOT / "docs" / "guides" / "boat-in-an-evening.md")
+                               if line.startswith(("sitl boat", "companion mission example", "companion run"))]
+    port = free_port()
+    with typed(f"{boat_line} --port {port}", tmp_path) as boat:
+        until(boat, "Ctrl-C ends")
+        done(example, tmp_path)
+        with typed(run.replace(":5760", f":{port}"), tmp_path) as shell:
+            until(shell, UNDER_WAY)
+
+
+def test_a_guide_that_rehearses_does(tmp_path):
+    for line in blocks(ROOT / "docs" / "guides" / "rehearse.md")[:2]:
+        done(line + (" --runs 1 --pairs 0 --workers 1" if "rehearse" in line else ""), tmp_path)
+    assert (tmp_path / "rehearsals" / "archipelago" / "rehearsal.html").is_file()
 
 
 def test_who_wants_to_do_research(tmp_path):
