@@ -369,7 +369,9 @@ def extent_of(
 def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
     """Return what came of the plans, one line each."""
     out = []
-    names = [*(goal.name or "goal" for goal in mission.goals), "home"]
+    are_many = len(mission.goals) > 1
+    names = [goal.name or (f"goal {n}" if are_many else "goal") for n, goal in enumerate(mission.goals, start=1)]
+    names.append("home")
     for name, answer in zip(names, plans, strict=False):
         if answer.has_path:
             out.append(f"{name}: {answer.cost_s:.0f} s in {counted(len(courses(answer.legs)), 'course')}")

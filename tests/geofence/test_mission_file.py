@@ -177,3 +177,16 @@ def test_every_option_is_documented():
     missing = {
         (name, key) for name, keys in tables().items() if name for key in keys if (name, key) not in documented}
     assert missing == set()
+
+
+@pytest.mark.parametrize(("start", "goal", "asked"), [
+    ("lat = -35.28\nlon = 149.1", "lat = 35.285\nlon = 149.11", "is the sign of lat wrong, 35.285 for -35.285?"),
+    ("lat = 50.8\nlon = -1.31", "lat = 50.8\nlon = 1.31", "is the sign of lon wrong, 1.31 for -1.31?"),
+    ("lat = 50.8\nlon = -1.31", "lat = -1.31\nlon = 50.8", "are lat and lon swapped?"),
+])
+def test_a_place_that_is_far_is_asked_about_as_a_sign_where_its_mirror_is_near(tmp_path, start, goal, asked):
+    file = tmp_path / "m.toml"
+    file.write_text(f"name = 'm'\n[start]\n{start}\n[[goal]]\n{goal}\n")
+    with pytest.raises(InputError) as error:
+        load_mission(file)
+    assert error.value.remedy.startswith(asked)

@@ -181,7 +181,7 @@ def test_a_mission_of_ones_own_that_permits_nothing_sails_in_the_simulator(tmp_p
 def test_who_wants_it_on_his_boat(tmp_path):
     setup, doctor, run = door("I want it on my boat")
     port = free_port()
-    with typed(f"sitl boat --port {port} --home 50.8170,-1.3100", tmp_path) as boat:
+    with typed(f"sitl boat --port {port} --udp 0 --home 50.8170,-1.3100", tmp_path) as boat:
         until(boat, "Ctrl-C ends")
         here = f"tcp:127.0.0.1:{port}"
         assert "lake.toml: written" in done(f"{setup} --link {here} --no-doctor", tmp_path)
@@ -195,7 +195,7 @@ def test_the_bench_of_an_evening_from_an_empty_folder(tmp_path):
     boat_line, example, run = [line for line in blocks(ROOT / "docs" / "guides" / "boat-in-an-evening.md")
                                if line.startswith(("sitl boat", "companion mission example", "companion run"))]
     port = free_port()
-    with typed(f"{boat_line} --port {port}", tmp_path) as boat:
+    with typed(f"{boat_line} --port {port} --udp 0", tmp_path) as boat:
         until(boat, "Ctrl-C ends")
         done(example, tmp_path)
         with typed(run.replace(":5760", f":{port}"), tmp_path) as shell:

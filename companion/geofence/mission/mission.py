@@ -327,7 +327,7 @@ def place_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
         east_m, north_m = frame.en_from_geo(point)
         if max(abs(east_m), abs(north_m)) > RANGE_M:
             yield (place, f"is {np.hypot(east_m, north_m) / 1000.0:.0f} km from the origin",
-                   "are lat and lon swapped? beyond 50 km it is a passage, which says so: [passage] leg_m")
+                   f"{_asked(point, mission.origin)} beyond 50 km it is a passage, which says so: [passage] leg_m")
             continue
         problem = trouble_at(local, (east_m, north_m))
         if problem:
@@ -368,6 +368,14 @@ def passage_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
             goal.gate, frame, local, mission.margin_floor_m)
         if problem:
             yield place, problem, "move its marks into free water or correct the area's files"
+
+
+def _asked(point: GeoPoint, origin: GeoPoint) -> str:
+    """Ask what may be wrong with a place that is far from the origin: a sign, where its mirror is near."""
+    for name, here_deg, there_deg in (("lat", point.lat_deg, origin.lat_deg), ("lon", point.lon_deg, origin.lon_deg)):
+        if abs(here_deg + there_deg) < 0.5 < abs(here_deg - there_deg):
+            return f"is the sign of {name} wrong, {here_deg:g} for {-here_deg:g}?"
+    return "are lat and lon swapped?"
 
 
 def trouble_at(local: LocalArea, point_en: tuple[float, float]) -> str:
