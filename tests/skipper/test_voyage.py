@@ -82,6 +82,18 @@ def test_runs_to_a_goal_downwind():
     assert world.clearance() > world.skipper.config.margin_floor_m
 
 
+@pytest.mark.parametrize("off_m", [1.0, 5.0])
+@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.LOITER])
+def test_a_voyage_begins_beside_something_solid_by_leading_away_from_it(off_m, mode):
+    """Below the margin's floor, as at a quay: no way from there keeps it, and none may come nearer than she is."""
+    quay = box(-60.0, -off_m - 20.0, 60.0, -off_m)
+    world = make(Goal(en_m=(250.0, 60.0)), obstacles=(quay,), wind=lambda t: (0.0, 5.0), mode=mode)
+    assert off_m < world.skipper.config.margin_floor_m
+    assert world.run(60, lambda w: w.state.voyage.sailing)
+    assert world.run(300, is_done)
+    assert world.clearance() >= off_m - 0.3
+
+
 def test_replans_at_each_waypoint_from_the_next_one_and_before_it_is_reached():
     world = make()
     assert world.run(1500, is_done)

@@ -25,6 +25,7 @@ from companion.skipper.way.geometry import distance_m, leg_distance_m
 
 ARRIVED_BEFORE = "all goals were reached before this start; --again sails the mission again"
 MAY_UPLOAD = "[operator] set_auto = true in the mission, and no --dry-run"
+HAIR_M = 0.3             # what a repaired start's lead-in may come nearer by
 STALE_S = 60.0           # a plan that waits for permission is renewed no more often than this
 
 
@@ -201,7 +202,9 @@ def _stale(ctx: StepContext) -> str:
         return wrong
     age_s, config = ctx.t_s - ctx.state.plans.last_s, ctx.config
     clear_m = ctx.voyage.area.path_clearance_m([boat, leg[1]])
-    if clear_m < min(config.margin_floor_m, config.margin_m):
+    # From below the floor a way that comes no nearer than she lies leads her out; another plan would be no other way.
+    here_m = float(ctx.voyage.area.clearance_m([boat])[0])
+    if clear_m < min(config.margin_floor_m, config.margin_m, here_m - HAIR_M):
         where = f"{max(0.0, clear_m):.0f} m from {ctx.voyage.area.nearest_name(boat)} on the way to the first waypoint"
         return f"she lies or has drifted {where}"
     if age_s < STALE_S:
