@@ -84,6 +84,42 @@ def test_every_file_that_a_page_names_is_there(page):
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 
+def invariants():
+    """Return the rows of the skipper's table of invariants: (invariant, held in, tests, campaign)."""
+    text = (ROOT / "docs" / "reference" / "skipper.md").read_text()
+    table = text.partition("\n## Invariants\n")[2].partition("\n## ")[0]
+    return [tuple(cell.strip() for cell in line.strip("| ").split(" | ")) for line in table.splitlines()
+            if line.startswith("| ") and not line.startswith("| invariant")]
+
+
+def test_the_table_of_invariants_is_there():
+    rows = invariants()
+    assert len(rows) >= 10
+    assert {len(row) for row in rows} == {4}
+
+
+@pytest.mark.parametrize("row", invariants(), ids=lambda row: row[0][:40])
+def test_an_invariant_names_code_tests_and_a_campaign_that_are_there(row):
+    _, held_in, tests, campaign = row
+    places = re.findall(r"`(companion/[\w/]+\.py)`(?: \(((?:`\w+`(?:, )?)+)\))?", held_in)
+    assert places
+    for file, names in places:
+        defined = re.findall(r"^\s*(?:def|class) (\w+)|^(\w+)(?:: [^=]+)? = ", (ROOT / file).read_text(), re.MULTILINE)
+        assert set(re.findall(r"\w+", names)) <= {name for pair in defined for name in pair}, file
+    named = re.findall(r"`(tests/[\w/.]+)`", tests)
+    assert named
+    assert [name for name in named if not (ROOT / name).exists()] == []
+    scenarios = re.findall(r"`([\w-]+)`", tests.partition(";")[2])
+    assert [name for name in scenarios if not list((ROOT / "sitl" / "scenarios").rglob(f"{name}.toml"))] == []
+    [command] = re.findall(r"`([^`]+)`", campaign)
+    program, what, *options = command.split()
+    if program == "make":
+        assert re.search(rf"^{what}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    else:
+        source = (ROOT / "sitl" / "commands" / f"{what}.py").read_text()
+        assert [o for o in options if o.startswith("--") and f'"{o}"' not in source] == []
+
+
 def anchors(text):
     """Return the anchors of a page's headings, as a forge makes them."""
     heads = re.findall(r"^#+ +(.+)$", re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL), re.MULTILINE)
