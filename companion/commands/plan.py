@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         sys.stdout.write(text)
     else:
-        print("\n\n".join(describe(problem, answer) for problem, answer in answers))
+        print("\n\n".join(describe(problem, answer, ground.get("margin_m", 0.0)) for problem, answer in answers))
         for path in (args.out, args.plot):
             if path is not None:
                 print(f"written: {path}")
@@ -156,8 +156,8 @@ def _file(problem: Problem, answer: Plan) -> dict[str, Any]:
     return {"problem": problem.id, **answer.to_dict()}
 
 
-def describe(problem: Problem, answer: Plan) -> str:
-    """Return the plan as text for a person."""
+def describe(problem: Problem, answer: Plan, margin_m: float = 0.0) -> str:
+    """Return the plan as text for a person; ``margin_m`` is what the problem's obstacles were made larger by."""
     name = problem.id or "problem"
     lines = [f"{name}: {problem.title}" if problem.title else name]
     effort = f"{answer.algorithm}, seed {answer.seed}, {answer.expansions} expansions in {answer.elapsed_s:.2f} s"
@@ -182,6 +182,9 @@ def describe(problem: Problem, answer: Plan) -> str:
         effort,
         "",
         *_table(answer),
+        "",
+        "to spare: between the course and the edge of the no-go zone as it is then"
+        + (f"; clear: beyond the margin of {margin_m:.0f} m" if margin_m else ""),
     ]
     if answer.why.text:
         lines += ["", answer.why.text]
@@ -223,7 +226,7 @@ def _of_legs(answer: Plan) -> str:
 
 def _table(answer: Plan) -> list[str]:
     """Return the courses as lines under a head; where the legs of one differ, their range."""
-    rows = [("course", "heading", "TWA", "tack", "length", "from", "to", "no-go", "margin", "clear", "risk")]
+    rows = [("course", "heading", "TWA", "tack", "length", "from", "to", "no-go", "to spare", "clear", "off plan")]
     for place, course in enumerate(courses(answer.legs), start=1):
         first, last = course.legs[0], course.legs[-1]
         clearances = [leg.clearance_m for leg in course.legs if leg.clearance_m is not None]
@@ -251,13 +254,14 @@ def _range(begin: float, end: float) -> str:
 
 def _risk_text(problem: Problem, answer: Plan) -> str:
     if problem.wind.sigma.model == "none" and not problem.is_shared:
-        return "risk: none, the wind is taken as certain"
+        return "off the plan: 0 %, for the wind is taken as certain"
     from companion.planner.risk import path_risk
 
     risk = path_risk(problem, answer)
     if problem.is_shared:
         # the words of the plan have the parts
-        return f"risk: at most {100.0 * risk.total:.1f} % of such voyages meet the no-go zone or a vessel"
+        return f"off the plan: at most {100.0 * risk.total:.1f} % of such voyages meet the no-go zone or a vessel"
     limit = f" (limit {100.0 * problem.risk.max_path_risk:.1f} %)" if problem.risk is not None else ""
-    return (f"risk: the wind forces the boat into the no-go zone on at most {100.0 * risk.total:.1f} % of such "
-            f"voyages{limit}; {100.0 * (1.0 - problem.delta_s):.0f} % is allowed at each instant")
+    return ("off the plan: the wind forces the boat to tack or bear away unplanned on at most "
+            f"{100.0 * risk.total:.1f} % of such voyages{limit}; {100.0 * (1.0 - problem.delta_s):.0f} % is allowed at "
+            "each instant")

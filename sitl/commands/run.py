@@ -175,7 +175,7 @@ def print_verdict(verdict: Any) -> None:
               f"(wanted: {words(check.required)})")
     f = verdict.figures
     print(f"{'PASSED' if verdict.passed else 'FAILED'}  {verdict.scenario} seed {verdict.seed}: "
-          f"{f['time_s']:.0f} s, {f['distance_m']:.0f} m, {counted(f['tacks'], 'tack')}, "
+          f"{f['time_s']:.0f} s and {counted(f['tacks'], 'tack')} in all, {f['distance_m']:.0f} m, "
           f"{counted(f['replans'], 'replan')}, " + (
               "nothing to be clear of" if f["min_clearance_m"] is None else
               f"clearance {f['min_clearance_m']:.1f} m" + (

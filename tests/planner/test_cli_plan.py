@@ -48,7 +48,7 @@ def test_it_prints_a_summary_and_writes_a_plan_that_scores(capsys, file, tmp_pat
     code, out, err = run(capsys, file(), "--budget", "0.5", "--algorithm", algorithm, "--out", out_file)
     assert code == 0, out + err
     assert "above the bound" in out
-    assert "risk: the wind forces the boat" in out
+    assert "off the plan: the wind forces the boat" in out
     assert str(out_file) in out
     written = json.loads(out_file.read_text(encoding="utf-8"))
     assert all(len(w) == 2 for w in written["waypoints"])
