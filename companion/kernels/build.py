@@ -26,8 +26,8 @@ from companion.kernels.listed import Entry, from_text, read_list
 from companion.kernels.places import looked_in, mark, sweep, written_to
 
 KILLED = 9            # exit code where the compiling processes were killed
-PROCESS_MB = 250      # of memory for each; it leaves after ...
-KERNELS_A_PROCESS = 12
+PROCESS_MB = 250      # of memory that each process may take, ...
+KERNELS_A_PROCESS = 12   # which is what so many kernels make of it
 _TRIES = 3            # of processes that die: short of memory, most likely
 
 

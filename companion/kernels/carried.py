@@ -39,7 +39,8 @@ def is_used(package: str) -> bool:
 def is_carried(package: str) -> bool:
     """Return whether the extension has the kernels of the package's files as they are now, and can be loaded here."""
     try:
-        return _index().get(package) == places.source(package) and bool(_extension())
+        index = _index()
+        return package in index and index[package] == places.source(package) and bool(_extension())
     except (OSError, ImportError, ValueError, KeyError) as error:
         _LOG.warning("the kernels that the package carries cannot be used, numba is: %s", error)
         return False

@@ -171,7 +171,7 @@ async def _begins(event: EventSpec) -> None:
     await asyncio.sleep(max(0.0, event.at_s - now_s()))
 
 
-def _switched(do: Callable[[SimulatedWorld, EventSpec], None], undo: Callable[[SimulatedWorld], None]) -> _Befall:
+def _switched(do: Callable[[SimulatedWorld, EventSpec], None], undo: Callable[[SimulatedWorld], None]) -> _Inject:
     """Return an event that is there from its time on, for ``for_s``."""
     async def happens(world: SimulatedWorld, event: EventSpec) -> None:
         await _begins(event)
@@ -182,8 +182,20 @@ def _switched(do: Callable[[SimulatedWorld, EventSpec], None], undo: Callable[[S
     return happens
 
 
-def _at(do: Callable[[SimulatedWorld, EventSpec], None]) -> _Befall:
+def _at(do: Callable[[SimulatedWorld, EventSpec], None]) -> _Inject:
     return _switched(do, lambda _: None)
+
+
+def _ashore(ask: Callable[[SimulatedWorld, EventSpec], Awaitable[str]]) -> _Inject:
+    """Have a ground station of a person's do something, one at a time; what went wrong is an error of the voyage."""
+    async def inject(world: SimulatedWorld, event: EventSpec) -> None:
+        await _begins(event)
+        async with world.stranger:
+            trouble = await ask(world, event)
+        if trouble:
+            world.errors.append(trouble)
+
+    return inject
 
 
 async def _failsafe(world: SimulatedWorld, event: EventSpec) -> None:
@@ -223,22 +235,6 @@ async def _foreign(world: SimulatedWorld, event: EventSpec) -> None:
         await _upload_foreign(world.shore.near, [waypoint(away)])
 
 
-async def _parameter(world: SimulatedWorld, event: EventSpec) -> None:
-    await _begins(event)
-    async with world.stranger:
-        trouble = await set_parameter(world.shore.near, event)
-    if trouble:
-        world.errors.append(trouble)
-
-
-async def _draw(world: SimulatedWorld, event: EventSpec) -> None:
-    await _begins(event)
-    async with world.stranger:
-        trouble = await redraw(world.shore.near, event, world.frame)
-    if trouble:
-        world.errors.append(trouble)
-
-
 async def _company(world: SimulatedWorld, event: EventSpec) -> None:
     """Be another companion with our ids, at work: it says so once a second."""
     await _begins(event)
@@ -268,14 +264,6 @@ async def _neighbour(world: SimulatedWorld, event: EventSpec) -> None:
         finally:
             if other.truth.is_armed or other.pilot.helm.mission.total > 1:
                 world.ordered.append(event.system)
-
-
-async def _order(world: SimulatedWorld, event: EventSpec) -> None:
-    await _begins(event)
-    async with world.stranger:
-        trouble = await give_order(world.shore.near, event, world.frame)
-    if trouble:
-        world.errors.append(trouble)
 
 
 async def _far_order(world: SimulatedWorld, event: EventSpec) -> None:
@@ -318,8 +306,8 @@ async def _upload_foreign(end: MemoryEnd, items: list[MissionItem]) -> None:
         await pilot.upload_mission(items, method="items")
 
 
-_Befall = Callable[[SimulatedWorld, EventSpec], Awaitable[None]]
-_BY_KIND: dict[str, _Befall] = {
+_Inject = Callable[[SimulatedWorld, EventSpec], Awaitable[None]]
+_BY_KIND: dict[str, _Inject] = {
     **dict.fromkeys(PERSONS | FAILURES, _failsafe),
     **dict.fromkeys(LINK_EVENTS, _link),
     **dict.fromkeys(TRAFFIC, _traffic),
@@ -346,11 +334,11 @@ _BY_KIND: dict[str, _Befall] = {
     "planner_starved": _at(lambda world, _: world.planner.starve()),
     "vane": _vane,
     "crew": _crew,
-    "order": _order,
+    "order": _ashore(lambda world, e: give_order(world.shore.near, e, world.frame)),
     "far_order": _far_order,
     "foreign_mission": _foreign,
-    "parameter": _parameter,
-    **dict.fromkeys(REDRAWN, _draw),
+    "parameter": _ashore(lambda world, e: set_parameter(world.shore.near, e)),
+    **dict.fromkeys(REDRAWN, _ashore(lambda world, e: redraw(world.shore.near, e, world.frame))),
     "company": _company,
     "refused": _switched(_refuse, lambda world: world.autopilot.pilot.refuse("")),
     "neighbour": _neighbour,
