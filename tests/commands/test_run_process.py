@@ -169,7 +169,7 @@ def test_the_second_mission_sails_from_wherever_it_is_started(first, link, folde
                          text=True, check=False, stdin=subprocess.DEVNULL, timeout=PATIENCE_S)
     assert run.returncode == 0, run.stdout + run.stderr
     *_, end, where = run.stdout.splitlines()
-    assert re.match(r"arrived; [1-9]\d* s, ", end)
+    assert re.match(r"arrived; [1-9]\d* s under way, ", end)
     voyage = tmp_path / where
     said = [d["code"] for d in records(voyage / "decisions.jsonl") if d.get("action") == "Announce"]
     assert "adopted" in said or "earlier mission" in said
