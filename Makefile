@@ -124,6 +124,7 @@ deb:
 # machines are put there before: packaging/build_in_debian.sh).
 release: $(ENV)
 	$(BIN)/python -m hatchling build -t wheel -d dist
+	cd lab && $(abspath $(BIN))/python -m hatchling build -t wheel -d ../dist
 	$(BIN)/python packaging/sbom.py requirements.lock > dist/sailboat-companion.cdx.json
 	cd dist && sha256sum *.whl *.deb *.cdx.json 2>/dev/null > SHA256SUMS; cat SHA256SUMS
 

@@ -21,7 +21,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl.campaigns.campaign import campaign, sail
+from lab.campaigns.campaign import campaign, sail
 from sitl.options import CampaignOptions
 from sitl.run.compiled import compile_ahead
 from sitl.runner import Experiment, Job

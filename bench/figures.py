@@ -47,8 +47,8 @@ from companion.plots.plan import draw_plan
 from companion.plots.wind import filter_figure
 from companion.wind.study import characterise, parse_csv
 from companion.wind.study.records import weather
-from sitl.tasks.wrsc2013 import HALF_M
-from sitl.tasks.wrsc2013 import run as run_wrsc2013
+from lab.tasks.wrsc2013 import HALF_M
+from lab.tasks.wrsc2013 import run as run_wrsc2013
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "figures"
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from companion.geo.angles import mean_direction_rad
 from companion.wind.study.records import parse_csv
-from sitl.campaigns.baselines import NAMES, baselines, jobs_of
+from lab.campaigns.baselines import NAMES, baselines, jobs_of
 from sitl.options import CampaignOptions
 from sitl.run.compiled import compile_ahead
 

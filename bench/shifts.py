@@ -27,10 +27,10 @@ from companion.skipper.behaviors.tacks import LAST_S, LEAST_MPS, TURNING
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.wind_shifts import shifts_of
 from companion.wind import Forecaster
+from lab.commands.baselines import STEADY, wind_of
 from sitl.autopilot.boat.kernel import LOOP_S, S_TACKING, S_TACKS, S_TWD_COS, S_TWD_SIN, S_TWS, S_V, S_YAW
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import Vehicle
-from sitl.commands.baselines import STEADY, wind_of
 from sitl.world import AR1, Constant
 
 HALF_RAD = math.radians(45.0)

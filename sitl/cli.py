@@ -1,21 +1,20 @@
-"""The simulator's command line; its commands are the modules of ``sitl.commands``."""
+"""The simulator's command line; its commands are the modules of ``sitl.commands``, and the laboratory's.
+
+Those of the laboratory, which a boat does not carry, are known here by name.
+"""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
 
-from companion.program import Program
+from companion.program import Annex, Program
 
-PROGRAM = Program(
-    name="sitl",
-    description="A simulated ArduRover sailboat, weather, and scenarios for the companion.",
-    package="sitl.commands",
+LABORATORY = Annex(
+    name="the laboratory",
+    package="lab.commands",
+    remedy="in the clone of this project: pip install ./lab",
     commands={
-        "demo": "the archipelago, with live progress: what a new user sees first",
-        "boat": "the simulated autopilot alone, for any MAVLink client",
-        "run": "sail a scenario: autopilot, weather, companion, verdict",
-        "example": "a scenario with a comment at every key, to begin your own from",
         "campaign": "a scenario over many seeds: success, risk, time",
         "faults": "a short voyage a thousand times, each with trouble of its own",
         "encounters": "vessels that would hit the boat, by the hundred: the rules of the road",
@@ -28,8 +27,20 @@ PROGRAM = Program(
         "regret": "every sailor's time over the best that could have been made of the same wind",
         "results": "what campaigns left: shown, joined, held against each other by seed",
         "hostile": "forge what the companion reads, and see what comes of it",
+    },
+)
+PROGRAM = Program(
+    name="sitl",
+    description="A simulated ArduRover sailboat, weather, and scenarios for the companion.",
+    package="sitl.commands",
+    commands={
+        "demo": "the archipelago, with live progress: what a new user sees first",
+        "boat": "the simulated autopilot alone, for any MAVLink client",
+        "run": "sail a scenario: autopilot, weather, companion, verdict",
+        "example": "a scenario with a comment at every key, to begin your own from",
         "fetch": "download the official ArduRover simulator",
     },
+    annex=LABORATORY,
 )
 
 

@@ -15,7 +15,7 @@ from numba.core.dispatcher import Dispatcher
 
 from companion.errors import JobError
 
-OURS = ("companion", "sitl")
+OURS = ("companion", "sitl", "lab")
 _LITERALS = (bool, int, float, complex, str, bytes, type(None), np.generic)
 
 

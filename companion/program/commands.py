@@ -14,6 +14,7 @@ import argparse
 import contextlib
 import difflib
 import importlib
+import importlib.util
 import re
 import signal
 import sys
@@ -153,29 +154,56 @@ class Parser(argparse.ArgumentParser):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Annex:
+    """Commands in the package of another distribution, which need not be installed; ``remedy`` is what brings it."""
+
+    name: str
+    package: str
+    commands: Mapping[str, str]
+    remedy: str
+
+    @property
+    def is_installed(self) -> bool:
+        """Whether the package is there."""
+        try:
+            return importlib.util.find_spec(self.package) is not None
+        except ModuleNotFoundError:   # the package that it is in
+            return False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
     """A command line: its name, what it is for, and the summary of each command in the package of them.
 
-    ``guests`` is a group of entry points (pyproject.toml): commands of packages that this one does not know. Such a
-    module has its summary in ``SUMMARY``.
+    ``annex`` has further commands, known by name where their package is not installed. ``guests`` is a group of entry
+    points (pyproject.toml): commands of packages that this one does not know. Such a module has its summary in
+    ``SUMMARY``.
     """
 
     name: str
     description: str
     package: str
     commands: Mapping[str, str]
+    annex: Annex | None = None
     guests: str = ""
 
     @property
     def names(self) -> list[str]:
-        """The names of all commands, the guests' last."""
-        return [*self.commands, *(point.name for point in self._points())]
+        """The names of all commands that are installed, the guests' last."""
+        return [*self._known(), *(point.name for point in self._points())]
 
     def module(self, name: str) -> ModuleType:
         """Return the module of a command."""
         if name in self.commands:
             return importlib.import_module(f"{self.package}.{name}")
+        if self.annex is not None and name in self.annex.commands:
+            return importlib.import_module(f"{self.annex.package}.{name}")
         return importlib.import_module(next(point.value for point in self._points() if point.name == name))
+
+    def _known(self) -> Mapping[str, str]:
+        """Return the summaries of the commands that are no guests'."""
+        return self.commands if self.annex is None or not self.annex.is_installed else {
+            **self.commands, **self.annex.commands}
 
     def _points(self) -> EntryPoints | tuple[()]:
         if not self.guests:
@@ -186,7 +214,8 @@ class Program:
 
     def summary(self, name: str) -> str:
         """Return what a command does."""
-        return self.commands[name] if name in self.commands else str(self.module(name).SUMMARY)
+        known = self._known()
+        return known[name] if name in known else str(self.module(name).SUMMARY)
 
     def parser(self, command: str | None = None) -> Parser:
         """Return the parser; only ``command``'s own options are loaded, or all of them when it is None."""
@@ -198,7 +227,8 @@ class Program:
         parser.add_argument("--version", action="version", version=f"{self.name} {__version__}")
         subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
         # entry points are looked for where one is asked for, or all are
-        for name in self.commands if command in self.commands else self.names:
+        known = self._known()
+        for name in known if command in known else self.names:
             if command is None or name == command:
                 self.module(name).add_parser(subparsers, self.summary(name))
             else:
@@ -218,10 +248,10 @@ class Program:
         arguments = with_negative_values(sys.argv[1:] if argv is None else argv)
         command = next((a for a in arguments if not a.startswith("-")), None)
         try:
-            if command is not None and command not in self.commands and command not in self.names:
+            if command is not None and command not in self._known() and command not in self.names:
                 raise self._unknown(command)
             args = self.parser(command or "").parse_args(arguments)
-        except InputError as error:
+        except CompanionError as error:
             sys.stderr.write(f"{error}\n")
             return error.exit_code
         if threading.current_thread() is threading.main_thread():
@@ -252,8 +282,11 @@ class Program:
             sys.stderr.write(f"{self.name} {args.command}: {one_line(str(error.filename))}: {reason(error)}\n")
             return CompanionError.exit_code
 
-    def _unknown(self, word: str) -> InputError:
+    def _unknown(self, word: str) -> CompanionError:
         """Return what to raise for a command that there is not: it may be a verb of one, or a slip of the pen."""
+        if self.annex is not None and word in self.annex.commands:
+            return JobError(f"{self.name} {word}: {self.annex.name} is not installed, which this needs; "
+                            f"{self.annex.remedy}")
         whole = [f"{name} {word}" for name, parser in self.parser().commands.items() if word in parser.commands]
         meant = whole or difflib.get_close_matches(word, self.names, n=1)
         remedy = f"there are {', '.join(self.names)}; '{self.name} --help' says more"

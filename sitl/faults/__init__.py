@@ -2,24 +2,26 @@
 
 from sitl.faults.computer_faults import FaultyPlanner, KillablePlanner
 from sitl.faults.ground_station import REDRAWN, give_order, redraw, set_parameter
-from sitl.faults.hostile import HOSTILITIES, measure, rows, written
 from sitl.faults.injection import Observer, SimulatedWorld, break_vane, channel, inject
 from sitl.faults.link_faults import LINK_EVENTS, Relay, impair
 from sitl.faults.satellite_link import KEY, Satellite
-from sitl.faults.spoofing import FORGERIES, ManInTheMiddle, SpoofingPlan
+from sitl.faults.spoofing import FORGERIES, Forger, Forgery, ManInTheMiddle, SignedEnd, Signer, SpoofingPlan
 
 __all__ = [
     "FORGERIES",
-    "HOSTILITIES",
     "KEY",
     "LINK_EVENTS",
     "REDRAWN",
     "FaultyPlanner",
+    "Forger",
+    "Forgery",
     "KillablePlanner",
     "ManInTheMiddle",
     "Observer",
     "Relay",
     "Satellite",
+    "SignedEnd",
+    "Signer",
     "SimulatedWorld",
     "SpoofingPlan",
     "break_vane",
@@ -27,9 +29,6 @@ __all__ = [
     "give_order",
     "impair",
     "inject",
-    "measure",
     "redraw",
-    "rows",
     "set_parameter",
-    "written",
 ]

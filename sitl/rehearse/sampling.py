@@ -19,8 +19,8 @@ import msgspec
 from companion.compose import water_of
 from companion.errors import InputError
 from companion.geofence import Mission
-from sitl.campaigns.fault_sampling import sampled_faults, with_faults
-from sitl.campaigns.mismatch_sampling import departing
+from sitl.rehearse.fault_sampling import sampled_faults, with_faults
+from sitl.rehearse.mismatch_sampling import departing
 from sitl.scenario import CurrentSpec, HullSpec, LeeSpec, Scenario, SensorsSpec, WavesSpec, WindSpec
 from sitl.world import Recorded
 

@@ -2,7 +2,7 @@
 
 from sitl.runner.executors import WorkerDiedError, in_processes, settled
 from sitl.runner.experiment import CampaignResults, Experiment, ExperimentSummary, sail_kept
-from sitl.runner.job import Job, ScenarioBundle, file_hash
+from sitl.runner.job import SCENARIO_FOLDER, Job, ScenarioBundle, file_hash
 from sitl.runner.result_store import (
     Key,
     MadeBy,
@@ -18,6 +18,7 @@ from sitl.runner.result_store import (
 )
 
 __all__ = [
+    "SCENARIO_FOLDER",
     "CampaignResults",
     "Experiment",
     "ExperimentSummary",

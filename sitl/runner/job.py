@@ -29,7 +29,7 @@ from companion.disk import Disk
 from companion.errors import InputError, JobError
 from sitl.runner.result_store import ROOTS, Key, KeyValue, MadeBy, made_by, processor
 
-SCENARIOS = ROOTS[1] / "scenarios"
+SCENARIO_FOLDER = ROOTS[1] / "scenarios"
 CaseT = TypeVar("CaseT")
 
 
@@ -129,8 +129,8 @@ class ScenarioBundle:
             InputError: it names a file in a way that only this machine understands.
         """
         where = path.resolve()
-        if where.is_relative_to(SCENARIOS):
-            return cls(main=where.relative_to(SCENARIOS).as_posix(), hash=file_hash(path))
+        if where.is_relative_to(SCENARIO_FOLDER):
+            return cls(main=where.relative_to(SCENARIO_FOLDER).as_posix(), hash=file_hash(path))
         files = {file.resolve() for file in files_of(path).values()}
         root = Path(os.path.commonpath([file.parent for file in files]))
         bundle = cls(main=where.relative_to(root).as_posix(), hash=file_hash(path), packed=tuple(
@@ -163,7 +163,7 @@ class ScenarioBundle:
 @cache
 def _here(bundle: ScenarioBundle) -> Path:
     if not bundle.packed:
-        path = SCENARIOS / bundle.main
+        path = SCENARIO_FOLDER / bundle.main
         if not path.is_file() or file_hash(path) != bundle.hash:
             raise JobError(f"the program there has another {bundle.main}; install the same version there")
         return path

@@ -37,7 +37,9 @@ from companion.errors import InputError, JobError, unreadable
 from companion.words import counted
 
 LIBRARIES = ("numpy", "numba", "shapely", "pyproj", "pymavlink")
-ROOTS = tuple(Path(package.__path__[0]).resolve() for package in (companion, sitl))
+# The laboratory's lies beside them, or is not installed.
+ROOTS = tuple(folder for folder in (*(Path(package.__path__[0]).resolve() for package in (companion, sitl)),
+                                    Path(sitl.__path__[0]).resolve().with_name("lab")) if folder.is_dir())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

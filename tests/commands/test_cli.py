@@ -274,6 +274,6 @@ def test_nothing_writes_to_a_terminal_but_through_the_safe_streams():
     """What goes round them: the console's thread and the dashboard, each with its own text made safe; see there."""
     around = re.compile(
         r"(stdout|stderr)\.buffer|os\.write\((1|2|self\._fd|self\._out)\b|__stdout__|__stderr__|/dev/tty['\"]")
-    found = {str(path) for folder in ("companion", "sitl") for path in Path(folder).rglob("*.py")
+    found = {str(path) for folder in ("companion", "sitl", "lab") for path in Path(folder).rglob("*.py")
              if around.search(path.read_text())}
     assert found == {"companion/telemetry/console.py", "companion/terminal/screen.py"}

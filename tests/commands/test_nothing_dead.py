@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import lab.options
+import sitl.options
 from companion import cli
 from companion.commands.doctor import needs_of
 from companion.compose import (
@@ -31,7 +33,6 @@ from companion.safety import CHOICES, ENDINGS, FAILSAFES, SETTINGS, TABLE, WORD_
 from companion.skipper.step.config import Permissions
 from companion.skipper.way.gates import gates_of
 from sitl import cli as sitl_cli
-from sitl import options
 from sitl.scenario.scenario import load_scenario
 from sitl.scenario.traffic import free_port
 
@@ -325,11 +326,11 @@ def options_of(parser):
 def read_names(package):
     """Return every attribute that the command modules read, and every name given to getattr.
 
-    The options that campaigns share are read where they are made.
+    The options that rehearsals and campaigns share are read where they are made.
     """
     names = set()
-    paths = [*Path(inspect.getfile(package)).parent.rglob("*.py")]
-    for path in paths if package.__name__ == "companion.commands" else [*paths, Path(inspect.getfile(options))]:
+    shared = [] if package.__name__ == "companion.commands" else [sitl.options, lab.options]
+    for path in (*Path(inspect.getfile(package)).parent.rglob("*.py"), *map(Path, map(inspect.getfile, shared))):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load):
                 names.add(node.attr)
@@ -338,12 +339,12 @@ def read_names(package):
     return names
 
 
-@pytest.mark.parametrize(("program", "package"), [
-    (cli.PROGRAM, "companion.commands"), (sitl_cli.PROGRAM, "sitl.commands")])
-def test_every_option_is_read(program, package):
-    read = read_names(import_module(package))
+@pytest.mark.parametrize(("program", "of"), [
+    (cli.PROGRAM, cli.PROGRAM), (sitl_cli.PROGRAM, sitl_cli.PROGRAM), (sitl_cli.PROGRAM, sitl_cli.LABORATORY)])
+def test_every_option_is_read(program, of):
+    read = read_names(import_module(of.package))
     unread = {
-        (name, dest) for name in program.commands for dest in options_of(program.parser(name))
+        (name, dest) for name in of.commands for dest in options_of(program.parser(name))
         if dest not in read and dest != "command"
     }
     assert unread == set()

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from companion.field.controllers import motor_commands
 from companion.geo.angles import wrap_pi
+from lab.tasks.motor import HABITS, run, run_ardurover
 from sitl.ardurover.program import find
-from sitl.tasks.motor import HABITS, run, run_ardurover
 from sitl.world.boats import MotorBoat
 
 

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
+from lab.tasks.guided import run_station, run_wrsc
+from lab.tasks.station import run as keep_station
+from lab.tasks.wrsc2013 import draw, run, score, table, wrsc2013
+from lab.tasks.wrsc2013_skippers import HALF_M
 from sitl.options import CampaignOptions
 from sitl.scenario.verdict import sailbot_points, station_score
-from sitl.tasks.guided import run_station, run_wrsc
-from sitl.tasks.station import run as keep_station
-from sitl.tasks.wrsc2013 import draw, run, score, table, wrsc2013
-from sitl.tasks.wrsc2013_skippers import HALF_M
 
 EARLY = (66, 154)
 

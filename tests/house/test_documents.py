@@ -8,6 +8,7 @@ import pytest
 
 from bench import rooms
 from bench.layered import implied
+from sitl import cli
 
 ROOT = Path(__file__).parents[2]
 TOP = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", "packaging/blueos/README.md")
@@ -43,15 +44,16 @@ def test_rooms_in_a_circle_are_told():
 
 
 def test_every_name_in_the_glossary_is_in_the_code():
-    source = "\n".join(file.read_text() for root in ("companion", "sitl") for file in (ROOT / root).rglob("*.py"))
+    source = "\n".join(file.read_text() for root in rooms.PICTURES for file in (ROOT / root).rglob("*.py"))
     words = set(re.findall(r"\w+", source))
     rows = [line.split("|")[-2] for line in (ROOT / "docs" / "reference" / "glossary.md").read_text().splitlines()
             if line.startswith("| ") and not line.startswith("|---")]
     names = {name for row in rows for name in re.findall(r"`([^`]+)`", row) if not name.startswith("_en")}
     assert len(names) > 40
-    modules = {name for name in names if "." in name}   # below companion, or of sitl
+    modules = {name for name in names if "." in name}   # below companion, or of the others
     assert names - modules <= words
-    paths = {m: (ROOT if m.startswith("sitl.") else ROOT / "companion") / m.replace(".", "/") for m in modules}
+    paths = {m: (ROOT if m.partition(".")[0] in rooms.PICTURES else ROOT / "companion") / m.replace(".", "/")
+             for m in modules}
     there = [m for m, p in paths.items() if p.with_suffix(".py").is_file() or (p / "__init__.py").is_file()]
     assert sorted(there) == sorted(modules)
 
@@ -116,8 +118,8 @@ def test_an_invariant_names_code_tests_and_a_campaign_that_are_there(row):
     if program == "make":
         assert re.search(rf"^{what}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
     else:
-        source = (ROOT / "sitl" / "commands" / f"{what}.py").read_text()
-        assert [o for o in options if o.startswith("--") and f'"{o}"' not in source] == []
+        known = cli.PROGRAM.parser(what).commands[what]._option_string_actions
+        assert [o for o in options if o.startswith("--") and o not in known] == []
 
 
 def anchors(text):

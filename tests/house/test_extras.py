@@ -50,7 +50,7 @@ def test_each_extra_brings_what_it_is_known_by():
 def test_no_module_needs_an_extra_to_be_loaded_but_those_that_are_loaded_late():
     """At the top of a module only where the module is itself an extra's."""
     found = set()
-    for top in ("companion", "sitl"):
+    for top in ("companion", "sitl", "lab"):
         for path in Path(top).rglob("*.py"):
             for node in ast.parse(path.read_text(encoding="utf-8")).body:
                 loaded = [a.name for a in node.names] if isinstance(node, ast.Import) else (
@@ -58,7 +58,18 @@ def test_no_module_needs_an_extra_to_be_loaded_but_those_that_are_loaded_late():
                 if {name.partition(".")[0] for name in loaded} & set(EXTRAS):
                     found.add((path if path.parent.name == "campaigns" else path.parent).as_posix())
     assert found == {
-        "companion/plots", "companion/wind/study", "sitl/campaigns/plots.py", "sitl/rehearse"}
+        "companion/plots", "companion/wind/study", "lab/campaigns/plots.py", "sitl/rehearse"}
+
+
+def test_without_the_laboratory_its_commands_are_one_line_and_not_in_the_help(tmp_path):
+    without = "import sys; sys.modules['lab'] = None; from sitl.cli import main; sys.exit(main())"
+    asked, helped = (subprocess.run([sys.executable, "-c", without, *words], cwd=tmp_path, text=True,
+                                    capture_output=True, check=False, env={**os.environ, "PYTHONPATH": str(Path.cwd())})
+                     for words in (("campaign", "demo", "--runs", "3"), ("--help",)))
+    assert (asked.returncode, asked.stderr) == (
+        1, ("sitl campaign: the laboratory is not installed, which this needs; "
+            "in the clone of this project: pip install ./lab\n"))
+    assert "campaign" not in helped.stdout
 
 
 def test_the_demo_sails_without_any(sailed):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-CODE = sorted(p for top in ("companion", "sitl") for p in (ROOT / top).rglob("*.py"))
+CODE = sorted(p for top in ("companion", "sitl", "lab") for p in (ROOT / top).rglob("*.py"))
 ROOMS = sorted({p.parent for p in CODE})
 
 
@@ -28,7 +28,8 @@ def test_a_room_says_what_it_owns(room):
 
 def test_a_sub_room_is_entered_by_its_face():
     """From another room; a room's own sub-rooms are neighbours, and know each other's modules."""
-    sub_rooms = [room for room in ROOMS if len(room.relative_to(ROOT).parts) == 3 or room.parent == ROOT / "sitl"]
+    sub_rooms = [room for room in ROOMS
+                 if len(room.relative_to(ROOT).parts) == 3 or room.parent in {ROOT / "sitl", ROOT / "lab"}]
     faced = [name_of(room) for room in sub_rooms if "__all__" in (room / "__init__.py").read_text(encoding="utf-8")]
     around = {name: name.rpartition(".")[0] if name.count(".") == 2 else name for name in faced}
     wrong = [

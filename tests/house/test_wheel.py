@@ -27,8 +27,16 @@ def run(installed, folder, *words):
         env={**os.environ, "PYTHONPATH": str(installed)})
 
 
-def test_it_holds_what_it_needs_and_nothing_else(installed):
+def test_the_boat_carries_no_laboratory_and_the_laboratory_nothing_else(installed, tmp_path):
     assert {p.name for p in installed.iterdir() if not p.name.endswith(".dist-info")} == {"companion", "sitl"}
+    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)], check=True,
+                   capture_output=True, cwd="lab")
+    wheel, = tmp_path.glob("*.whl")
+    inside = [name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name]
+    assert sorted(inside) == sorted(path.as_posix() for path in Path("lab").rglob("*.py"))
+
+
+def test_it_holds_what_it_needs(installed):
     inside, beside = (sorted(p.name for p in folder.glob("*.toml"))
                       for folder in (installed / "companion" / "missions", Path("missions")))
     assert inside == beside

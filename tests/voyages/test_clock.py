@@ -8,7 +8,7 @@ import msgspec
 from companion.clock import run_virtual
 from companion.replay import replay
 from companion.telemetry.folder.recorder import read_jsonl
-from sitl.campaigns.faults import BASE
+from lab.campaigns.faults import BASE
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import EventSpec, ExpectSpec, WindSpec, load_scenario
 

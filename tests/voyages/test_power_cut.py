@@ -25,7 +25,7 @@ from companion.skipper.step import actions
 from companion.skipper.step.config import ALL_PERMITTED
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import ReadOutcome, Snapshot
-from sitl.campaigns.faults import BASE
+from lab.campaigns.faults import BASE
 from sitl.run import embedded as runner
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import EventSpec, ExpectSpec, WindSpec, load_scenario

@@ -5,9 +5,9 @@ import pytest
 
 from companion.wind import make
 from companion.wind.estimators.forecaster import CONSTANTS
-from companion.wind.study.fit import Prepared, figures
 from companion.wind.study.records import parse_csv
 from companion.wind.study.score import HORIZONS_S, average, score
+from lab.wind_fit import Prepared, figures
 
 pytestmark = pytest.mark.winddata
 

@@ -28,7 +28,7 @@ from companion.wind.estimators.forecaster_kernels import Constants
 
 # What recorded wind taught: the few constants of the default forecaster, with their provenance.
 #
-# Made by ``python -m companion.wind.study.fit FOLDER`` on the 14 development records (41 h on lakes, a fjord, the
+# Made by ``python -m lab.wind_fit FOLDER`` on the 14 development records (41 h on lakes, a fjord, the
 # Baltic and the Adriatic; docs/reference/wind.md says which). They are shapes, not climates: how long a wind shift of a
 # given time scale survives, how errors grow with the horizon, how heavy their tails are. Everything about today's wind
 # is learned on board.

@@ -1,19 +1,23 @@
-"""Recorded wind: records, scores of forecasts over them, and the constants fitted to them."""
+"""Recorded wind: records, scores of forecasts over them, and what an AR(1) fits to them."""
 
-from companion.wind.study.records import Ar1Fit, Record, fit_ar1, parse_csv
+from companion.wind.study.records import Ar1Fit, Record, equation_17, fit_ar1, parse_csv
 from companion.wind.study.score import (
+    FEWEST,
+    HORIZONS_S,
     SCORED_LEVELS,
     Characterisation,
     FilterScore,
     HorizonScore,
     Score,
+    asked_rows,
     average,
     characterise,
     runs,
     score,
+    targets,
 )
 
 __all__ = [
-    "SCORED_LEVELS", "Ar1Fit", "Characterisation", "FilterScore", "HorizonScore", "Record", "Score", "average",
-    "characterise", "fit_ar1", "parse_csv", "runs", "score",
+    "FEWEST", "HORIZONS_S", "SCORED_LEVELS", "Ar1Fit", "Characterisation", "FilterScore", "HorizonScore", "Record",
+    "Score", "asked_rows", "average", "characterise", "equation_17", "fit_ar1", "parse_csv", "runs", "score", "targets",
 ]

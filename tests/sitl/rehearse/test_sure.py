@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.campaigns.mismatch import share_interval
+from lab.campaigns.mismatch import share_interval
 from sitl.rehearse.estimates import quantile_of, share_of
 
 LOOKS = range(5, 200, 5)

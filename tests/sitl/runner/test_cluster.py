@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from companion.errors import JobError
+from lab.campaigns.campaign import campaign
 from sitl import cli
-from sitl.campaigns.campaign import campaign
 from sitl.options import CampaignOptions
 from sitl.runner import Job, experiment, read_results
 from sitl.runner.executors import settled_on

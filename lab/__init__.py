@@ -1,0 +1,1 @@
+"""The laboratory: what research runs on the companion and its simulator, beside what a boat carries."""

@@ -1,0 +1,66 @@
+"""What a screen shows against what came: the table of made-up voyages, and one that was sailed."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from lab.campaigns.shown import AHEAD_S, sail, shown, table_of, tacked_s, told
+from sitl.runner import Job
+
+DEMO = Path("sitl/scenarios/demo.toml")
+
+
+def voyage(**changed):
+    return {"there": [], "tack": [], "place": [], "wind": [], "clear": []} | changed
+
+
+def row(rows, figure):
+    return next(r for r in rows if r["figure"].startswith(figure))
+
+
+def test_a_time_that_is_told_wrong_shows():
+    rows = table_of([voyage(there=[[15.0, 131.0, 148.0], [20.0, 22.0, 30.0], [25.0, 25.0, 24.0]])])
+    there = row(rows, "there in, of 0 to 30 s")
+    assert there["shown"] == 3
+    assert there["median_error"] == 2.0
+    assert there["p90_error"] == 116.0
+    assert there["held"] == pytest.approx(2 / 3)
+
+
+def test_a_tack_that_does_not_come_does_not_hold_and_is_of_its_own_kind():
+    rows = table_of([voyage(tack=[[10.0, 12.0, True], [10.0, 40.0, False], [30.0, None, False]])])
+    assert row(rows, "next tack, of the plan")["held"] == 1.0
+    assert row(rows, "next tack, the autopilot's own")["held"] == 0.0
+    assert row(rows, "next tack, the autopilot's own")["shown"] == 2
+
+
+def test_places_winds_and_clearances_are_counted_by_their_own_bands():
+    rows = table_of([voyage(place=[[60, 10.0, 30.0], [60, 40.0, 30.0]], wind=[[60.0, True], [60.0, False]],
+                            clear=[[6.0, 7.0], [6.0, 5.0]])])
+    for figure in ("place in 60 s", "wind in 60 s", "clearance expected"):
+        assert row(rows, figure)["held"] == 0.5
+    assert len(told(rows).splitlines()) == 4
+    assert "nan" not in told(rows)
+
+
+def test_a_tack_is_one_that_is_kept():
+    times = [float(t) for t in range(20)]
+    tacks = ["port"] * 6 + ["starboard"] * 2 + ["port"] * 4 + [None] + ["starboard"] * 7
+    assert tacked_s(times, tacks) == [13.0]
+
+
+def test_the_demo_shows_what_comes():
+    """Coarse: a figure that is shown is a promise, and whoever looks at the demonstration looks at these."""
+    record = sail(Job(scenario=DEMO, seed=1, case=False))
+    rows = table_of([record])
+    for figure in ("there in, of 0 to 30 s", "there in, of 30 to 60 s", "there in, of 60 to 120 s"):
+        assert abs(row(rows, figure)["median_error"]) <= 15.0
+        assert row(rows, figure)["held"] >= 0.7
+    for ahead_s in AHEAD_S[:3]:
+        assert row(rows, f"place in {ahead_s} s")["held"] >= 0.75
+    assert row(rows, "next tack, of the plan")["held"] >= 0.5
+    assert row(rows, "clearance expected")["held"] >= 0.75
+    assert math.isfinite(row(rows, "wind in 60 s")["held"])
+    experiment = shown([DEMO], seeds=2, first_seed=1, mismatch=False)
+    assert experiment.key(experiment.jobs[0]) != experiment.key(experiment.jobs[1])
