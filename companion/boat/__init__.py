@@ -8,21 +8,17 @@
 from companion.boat.boat import Boat, Hull, can_hold, made_good_mps, outline_en_m, slowest_en_mps
 from companion.boat.margins import (
     AutopilotLimits,
-    Margin,
-    MarginPart,
     ProposedMargin,
-    fence_penetration,
     narrowest_corridor_m,
     proposed_margin,
     required_margin,
     widest_corridor_m,
 )
-from companion.boat.polar import Polar, SailingAngle, ardurover_sitl, avalon, constant
-from companion.boat.polar_files import PolarFile, parse_polar, read_polar
+from companion.boat.polar import Polar, ardurover_sitl, avalon, constant
+from companion.boat.polar_files import parse_polar, read_polar
 
 __all__ = [
-    "AutopilotLimits", "Boat", "Hull", "Margin", "MarginPart", "Polar", "PolarFile", "ProposedMargin", "SailingAngle",
-    "ardurover_sitl", "avalon", "can_hold", "constant", "fence_penetration", "made_good_mps", "narrowest_corridor_m",
-    "outline_en_m", "parse_polar", "proposed_margin", "read_polar", "required_margin", "slowest_en_mps",
-    "widest_corridor_m",
+    "AutopilotLimits", "Boat", "Hull", "Polar", "ProposedMargin", "ardurover_sitl", "avalon", "can_hold",
+    "constant", "made_good_mps", "narrowest_corridor_m", "outline_en_m", "parse_polar", "proposed_margin",
+    "read_polar", "required_margin", "slowest_en_mps", "widest_corridor_m",
 ]

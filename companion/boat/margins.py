@@ -21,8 +21,6 @@ from companion.boat.boat import Hull
 TRACK_S = 0.85              # |cross-track| <= 2.4 m at 2.93 m/s on reaches and close-hauled legs
 CORRIDOR_OVERSHOOT_S = 0.45  # 0.9 m beyond the corridor at 2.0 m/s before the tack has turned the boat
 CORNER_S = 1.4              # |cross-track| <= 4 m at 2.9 m/s just after the corners of a planned beat
-HOLD_COAST_S = 3.6          # 10.4 m inside a fence at 2.93 m/s when the action is Hold (sails eased)
-RTL_TURN_S = 2.6            # 7.4 m when it is RTL (the boat turns round)
 # Narrower than this a corridor is crossed, at 45 degrees to the line, in less than 7 s; the autopilot tacks at most
 # every 5 s and would do little else.
 NARROWEST_S = 2.5
@@ -207,16 +205,3 @@ def proposed_margin(limits: AutopilotLimits, *, speed_mps: float, hull: Hull | N
     floor = required_margin(limits, speed_mps=speed_mps, hull=hull, legs_can_enter_no_go=False)
     return ProposedMargin(margin_m=float(math.ceil(margin.total_m)), floor_m=float(math.ceil(floor.total_m)),
                           margin=margin)
-
-
-def fence_penetration(limits: AutopilotLimits, *, speed_mps: float) -> MarginPart | None:
-    """Return how far past its own fence the autopilot lets the boat go [m]; None without a fence."""
-    if limits.fence_action is None:
-        return None
-    if limits.fence_action == 0:
-        return MarginPart(name="fence", value_m=0.0, why="FENCE_ACTION 0 only reports: the fence stops nothing")
-    coasts = limits.fence_action in {2, 4}
-    seconds = HOLD_COAST_S if coasts else RTL_TURN_S
-    why = "eases its sails and coasts" if coasts else "turns for home"
-    text = f"on a breach the autopilot {why} inside the fence"
-    return MarginPart(name="fence", value_m=seconds * speed_mps, why=text)

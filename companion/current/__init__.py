@@ -2,11 +2,11 @@
 
 from companion.current.estimator import UNTOLD_MPS, CurrentEstimator, Sailing, WindAngleUncertainty, plain
 from companion.current.motion import FITS_S, MotionCheck, MotionSample
-from companion.current.prior import DEFAULT_SIGMA_MPS, STILL, ExpectedCurrent, Prior, TableRow, read_table
+from companion.current.prior import STILL, Prior, TableRow, read_table
 from companion.current.water_current import STILL_WATER, WaterCurrent, forecast_over_water, over_ground, over_water
 
 __all__ = [
-    "DEFAULT_SIGMA_MPS", "FITS_S", "STILL", "STILL_WATER", "UNTOLD_MPS", "CurrentEstimator", "ExpectedCurrent",
-    "MotionCheck", "MotionSample", "Prior", "Sailing", "TableRow", "WaterCurrent", "WindAngleUncertainty",
-    "forecast_over_water", "over_ground", "over_water", "plain", "read_table",
+    "FITS_S", "STILL", "STILL_WATER", "UNTOLD_MPS", "CurrentEstimator", "MotionCheck", "MotionSample", "Prior",
+    "Sailing", "TableRow", "WaterCurrent", "WindAngleUncertainty", "forecast_over_water", "over_ground",
+    "over_water", "plain", "read_table",
 ]

@@ -1,6 +1,6 @@
 """The editor: a mission drawn in a browser, checked and planned as it is drawn, saved as the file it came from."""
 
 from companion.editor.base import SourceFiles, read_base
-from companion.editor.desk import EditorAddress, editing
+from companion.editor.desk import editing
 
-__all__ = ["EditorAddress", "SourceFiles", "editing", "read_base"]
+__all__ = ["SourceFiles", "editing", "read_base"]

@@ -16,8 +16,6 @@ from companion.field.vector_fields import Field
 Clearance = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Points (n, 2) [m] to their distances from what stands still (n,) [m]: positive in free water."""
 
-SETPOINT_LIFE_S = 3.0
-"""ArduRover's GUIDED stops a boat whose heading setpoint is older."""
 RESEND_S = 1.0
 
 
@@ -115,7 +113,7 @@ class GuidanceState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setpoint:
-    """A heading for GUIDED: resend every ``RESEND_S``, it dies after ``SETPOINT_LIFE_S``.
+    """A heading for GUIDED: resend every ``RESEND_S``, ArduRover stops a boat whose setpoint is older than 3 s.
 
     ``margin_m`` is the least distance outside every obstacle's disc that is foreseen, None without look-ahead.
     """

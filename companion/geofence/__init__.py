@@ -7,11 +7,10 @@ metres for the planner. ``read(path)`` reads any single file into a ``Document``
 from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Code, Document, Finding, Severity
 from companion.geofence.formats.registry import read
-from companion.geofence.mission.goals import Goal
 from companion.geofence.mission.mission import Mission, load_mission
 from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
 
 __all__ = [
-    "Area", "Circle", "Code", "Document", "Fence", "Finding", "Goal", "LocalArea", "Mission", "Obstacle", "Severity",
+    "Area", "Circle", "Code", "Document", "Fence", "Finding", "LocalArea", "Mission", "Obstacle", "Severity",
     "Zone", "ZoneKind", "load_mission", "read",
 ]

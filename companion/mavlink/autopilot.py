@@ -312,10 +312,6 @@ class Autopilot:
                     result, outcome=answer.outcome, text=f"uploaded, but not made current: {answer.text}")
         return replace(result, duration_s=now_s() - began_s)
 
-    async def upload_partial(self, start: int, items: Sequence[MissionItem]) -> TransferResult:
-        """Replace items ``start``.. (1 is the first after home) by MISSION_WRITE_PARTIAL_LIST and read them back."""
-        return await self._lists.write_partial(start, items)
-
     async def upload_fence(self, items: Sequence[MissionItem]) -> TransferResult:
         """Put a fence on the autopilot (taken over in one piece at its end), read back and compare."""
         return await self._lists.write(MissionType.FENCE, items)
@@ -327,7 +323,3 @@ class Autopilot:
     async def clear_mission(self) -> TransferResult:
         """Remove the mission; refused while it sails."""
         return await self._lists.clear(MissionType.MISSION)
-
-    async def clear_fence(self) -> TransferResult:
-        """Remove the fence."""
-        return await self._lists.clear(MissionType.FENCE)

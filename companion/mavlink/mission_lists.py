@@ -115,18 +115,6 @@ class MissionLists:
                     break
         return result
 
-    async def write_partial(self, start: int, items: Sequence[MissionItem]) -> TransferResult:
-        """Replace mission items ``start``.. (1 is the first after home) and read them back."""
-        began_s = now_s()
-        async with self._link.lock("lists"):
-            machine = ListUpload(self._link.party, MissionType.MISSION, items, first=start, partial=True)
-            written = await self._link.perform(machine)
-            result = TransferResult(outcome=written.outcome, text=written.text, method="partial")
-            if written.outcome in {TransferOutcome.OK, TransferOutcome.UNCONFIRMED}:
-                part = slice(start - 1, start - 1 + len(items))
-                result = compared(items, await self._read(MissionType.MISSION, "items"), "partial", part)
-        return replace(result, duration_s=now_s() - began_s)
-
     async def write(self, kind: MissionType, items: Sequence[MissionItem]) -> TransferResult:
         """Put a fence or rally points on the autopilot, read back and compare."""
         began_s = now_s()

@@ -12,8 +12,6 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import BinaryIO, Self
 
 from companion.errors import InputError
 from companion.mavlink.wire.frames import STX, Codec, Message
@@ -26,31 +24,6 @@ _EARLIEST_US, _LATEST_US = 946_684_800_000_000, 4_102_444_800_000_000
 def stamp(unix_us: int, frame: bytes) -> bytes:
     """Return one record: ``frame`` with its time [µs since 1970]."""
     return _STAMP.pack(unix_us & ~3) + frame
-
-
-class TlogWriter:
-    """Appends records to a file; each is handed to the operating system at once."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._file: BinaryIO | None = None
-
-    def __enter__(self) -> Self:
-        self._file = self._path.open("ab", buffering=0)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._file is not None:
-            self._file.close()
-            self._file = None
-
-    def write(self, unix_us: int, frame: bytes) -> None:
-        """Append ``frame`` with its time [µs since 1970]."""
-        if self._file is None:
-            raise ValueError("the log is not open")
-        self._file.write(stamp(unix_us, frame))
 
 
 @dataclass(frozen=True, slots=True)

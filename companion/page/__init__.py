@@ -6,7 +6,6 @@ from companion.page.connections import (
     Guests,
     HttpRefusal,
     HttpReply,
-    HttpServer,
     Stream,
     listening,
     read_token,
@@ -17,7 +16,7 @@ from companion.page.site import export, files
 from companion.page.sources import LiveSource, RecordedSource, plan_figures
 
 __all__ = [
-    "Address", "Guests", "HttpRefusal", "HttpReply", "HttpServer", "LiveSource", "RecordedSource", "Stream",
-    "TileChart", "export", "files", "listening", "open_charts", "plan_figures", "read_token", "require_token",
-    "served", "tile_at",
+    "Address", "Guests", "HttpRefusal", "HttpReply", "LiveSource", "RecordedSource", "Stream", "TileChart",
+    "export", "files", "listening", "open_charts", "plan_figures", "read_token", "require_token", "served",
+    "tile_at",
 ]

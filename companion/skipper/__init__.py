@@ -4,13 +4,8 @@ Pure rules. ``Skipper(voyage=..., config=...).step(state, snapshot) -> (state, a
 """
 
 from companion.skipper.rules import Skipper
-from companion.skipper.step.config import ALL_PERMITTED, DRY_RUN, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
-from companion.skipper.step.saved import Persisted
-from companion.skipper.step.snapshot import Snapshot
-from companion.skipper.step.state import Phase, SkipperState
-from companion.skipper.way.voyage import Goal, Side, Voyage
+from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.state import SkipperState
+from companion.skipper.way.voyage import Voyage
 
-__all__ = [
-    "ALL_PERMITTED", "DRY_RUN", "Goal", "Permissions", "Persisted", "Phase", "ReplanPolicy", "SafeEnd", "Side",
-    "Skipper", "SkipperConfig", "SkipperState", "Snapshot", "Voyage",
-]
+__all__ = ["Skipper", "SkipperConfig", "SkipperState", "Voyage"]

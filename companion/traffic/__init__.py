@@ -16,19 +16,17 @@ Times are absolute [s] on the companion's clock, except in a ``Disc`` and a ``Ti
 the moment that the discs were made for (a plan's t = 0).
 """
 
-from companion.traffic.approach import LAKE, SEA, Alarm, AlarmLimits, Approach, OwnShip, cpa, peril_m
-from companion.traffic.colregs import Assessment, Encounter, Policy, Role, Rule, assess, classify
-from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json, decode_nmea
-from companion.traffic.occupancy import Disc, planning_discs, time_matched_discs
-from companion.traffic.plans import Conflict, Decision, TimedLeg, check_legs, decide, path_distance_m
-from companion.traffic.predict import MotionUncertainty, Prediction, motion_of, predict
-from companion.traffic.targets import TargetChange, TargetLimits, Targets, TrafficCounts, TrafficPicture
-from companion.traffic.vessel import Vessel, VesselDimensions
+from companion.traffic.approach import LAKE, SEA, Alarm, AlarmLimits, OwnShip, cpa, peril_m
+from companion.traffic.colregs import Assessment, Policy, Role, Rule, assess, classify
+from companion.traffic.nmea import decode_json
+from companion.traffic.occupancy import Disc, planning_discs
+from companion.traffic.plans import Conflict, Decision, check_legs, decide, path_distance_m
+from companion.traffic.predict import predict
+from companion.traffic.targets import TargetLimits, Targets, TrafficCounts, TrafficPicture
+from companion.traffic.vessel import Vessel
 
 __all__ = [
-    "LAKE", "SEA", "Alarm", "AlarmLimits", "Approach", "Assessment", "Conflict", "Decision", "DecodeCounts", "Disc",
-    "Encounter", "MotionUncertainty", "NmeaDecoder", "OwnShip", "Policy", "Prediction", "Role", "Rule", "TargetChange",
-    "TargetLimits", "Targets", "TimedLeg", "TrafficCounts", "TrafficPicture", "Vessel", "VesselDimensions", "assess",
-    "check_legs", "classify", "cpa", "decide", "decode_json", "decode_nmea", "motion_of", "path_distance_m", "peril_m",
-    "planning_discs", "predict", "time_matched_discs",
+    "LAKE", "SEA", "Alarm", "AlarmLimits", "Assessment", "Conflict", "Decision", "Disc", "OwnShip", "Policy",
+    "Role", "Rule", "TargetLimits", "Targets", "TrafficCounts", "TrafficPicture", "Vessel", "assess", "check_legs",
+    "classify", "cpa", "decide", "decode_json", "path_distance_m", "peril_m", "planning_discs", "predict",
 ]

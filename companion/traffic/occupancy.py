@@ -28,7 +28,6 @@ from companion.traffic.vessel import Vessel
 HORIZON_S = 900.0
 # Windows of one disc each, as shares of the horizon: short where the spread bends most.
 _SHARES = (0.0, 0.12, 0.4, 1.0)
-BUSSER_WINDOW_S = 20.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -218,24 +217,4 @@ def too_near(discs: Sequence[Disc], own: OwnShip) -> tuple[Disc, ...]:
         x, y = disc.centre_en_m(0.0)
         if math.hypot(own.en_m[0] - x, own.en_m[1] - y) < disc.radius_at_m(0.0):
             out.append(disc)
-    return tuple(out)
-
-
-def time_matched_discs(
-    vessels: Iterable[Vessel], t_s: float, own: OwnShip, radius_m: float, *, mean_speed_mps: float,
-    window_s: float = BUSSER_WINDOW_S, horizon_s: float = HORIZON_S, step_s: float = 5.0,
-) -> tuple[tuple[float, float, float], ...]:
-    """Return Büsser's static obstacles (x, y, radius) [m]: where a ship and we could meet.
-
-    Along each ship's future track, the points at which |t - d(t) / v| < 20 s, d(t) being our distance to the ship
-    then and v our mean speed (Büsser 2009, condition 4.7; the printed form has no absolute value, which would turn
-    every early point into an obstacle).
-    """
-    out = []
-    for vessel in vessels:
-        for i in range(int(horizon_s / step_s) + 1):
-            t = i * step_s
-            x, y = predict(vessel, t_s + t).mean_en_m
-            if abs(t - math.hypot(x - own.en_m[0], y - own.en_m[1]) / mean_speed_mps) < window_s:
-                out.append((x, y, radius_m + vessel.reach_m))
     return tuple(out)

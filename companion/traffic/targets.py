@@ -6,29 +6,18 @@ that cannot be. Everything refused is counted; nothing raises.
 
 from __future__ import annotations
 
-import enum
 import heapq
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from companion.geo.angles import difference_rad, wrap_two_pi
+from companion.geo.angles import wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
 from companion.messages import AisReport
 from companion.traffic.approach import peril_m
-from companion.traffic.predict import predict, risk_factor
+from companion.traffic.predict import predict
 from companion.traffic.vessel import Vessel, hull_of
-
-# The vessels as the rest of the program sees them: one picture a step, and what happened to the reports behind it.
-
-class TargetChange(enum.Enum):
-    """Why an active plan should be checked again."""
-
-    APPEARED = "appeared"
-    TURNED = "turned"
-    SPEED = "changed speed"
-    SURPRISE = "is not where it was expected"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +41,6 @@ class TrafficPicture:
 
     t_s: float
     vessels: tuple[Vessel, ...] = ()
-    changes: tuple[tuple[float, int, TargetChange], ...] = ()   # (when, MMSI, what), the last 32
     counts: TrafficCounts = TrafficCounts()
     last_heard_s: float | None = None
 
@@ -65,19 +53,11 @@ class TrafficPicture:
         """Seconds since any report; None: never heard one. AIS is not all traffic, and a stopped feed is silent."""
         return None if self.last_heard_s is None else max(0.0, self.t_s - self.last_heard_s)
 
-    def changed_since(self, t_s: float) -> tuple[tuple[float, int, TargetChange], ...]:
-        """Return the changes after ``t_s``: an active plan is checked again when there is one."""
-        return tuple(change for change in self.changes if change[0] > t_s)
-
 
 # How far off a report may be from what can be reached and still be the same vessel [m, m/s]: fast ferries do 25.
 REACH_SLACK_M, REACH_MPS = 400.0, 30.0
 # Farther from us than this a vessel says nothing to a boat of a few knots.
 FAR_M = 60_000.0
-# A change of course or speed worth checking a plan for.
-TURNED_RAD, TURNED_SHARE, TURNED_MPS = math.radians(10.0), 0.2, 0.5
-# A report off its prediction by more than this share of risk counts as a manoeuvre, too.
-SURPRISE_RISK = 1e-3
 # The companion's clock never goes back; a replay's or a test's may. More than this is a jump, not disorder.
 CLOCK_BACK_S = 60.0
 # Who goes next where there are too many is judged for an eighth of them, and for so long [s]: a flood of new numbers
@@ -114,7 +94,6 @@ class Targets:
     frame: LocalFrame
     limits: TargetLimits = TargetLimits()
     vessels: Mapping[Key, Vessel] = field(default_factory=dict)
-    changes: tuple[tuple[float, int, TargetChange], ...] = ()
     counts: TrafficCounts = field(default_factory=TrafficCounts)
     last_heard_s: float | None = None
     spare: tuple[tuple[float, Key], ...] = ()   # who goes next: peril [m] and whose, the least perilous first
@@ -128,8 +107,7 @@ class Targets:
     def picture(self, t_s: float) -> TrafficPicture:
         """Return what is known at ``t_s``: vessels not expired, nearest MMSI order (stable)."""
         alive = [v for _, v in sorted(self.vessels.items()) if t_s - v.heard_s <= self.limits.expire_s]
-        return TrafficPicture(t_s=t_s, vessels=tuple(alive), changes=self.changes, counts=self.counts,
-                              last_heard_s=self.last_heard_s)
+        return TrafficPicture(t_s=t_s, vessels=tuple(alive), counts=self.counts, last_heard_s=self.last_heard_s)
 
     def heard(
         self, report: AisReport, own_en_m: tuple[float, float] = (0.0, 0.0),
@@ -174,10 +152,8 @@ class Targets:
             return self
         jump = t_s - self.last_heard_s
         moved = {k: replace(v, t_s=v.t_s + jump, heard_s=v.heard_s + jump) for k, v in self.vessels.items()}
-        return replace(
-            self, vessels=moved, last_heard_s=t_s, changes=tuple((t + jump, m, c) for t, m, c in self.changes),
-            counts=replace(self.counts, clock_jumps=self.counts.clock_jumps + 1),
-        )
+        return replace(self, vessels=moved, last_heard_s=t_s,
+                       counts=replace(self.counts, clock_jumps=self.counts.clock_jumps + 1))
 
     def _branches(self, mmsi: int) -> list[Vessel]:
         keys = ((mmsi, branch) for branch in range(self.limits.max_branches))
@@ -207,11 +183,8 @@ class Targets:
         vessels = dict(self.vessels)
         if nearest is None:
             return self._new(report, en, own, t_s, vessels, known, counts, now_s)
-        after = _moved(nearest, report, en, t_s, now_s)
-        vessels[nearest.mmsi, nearest.branch] = after
-        change = _change(nearest, after)
-        changes = self.changes if change is None else (*self.changes, (now_s, report.mmsi, change))[-32:]
-        return replace(self, vessels=vessels, changes=changes, counts=counts, last_heard_s=now_s)
+        vessels[nearest.mmsi, nearest.branch] = _moved(nearest, report, en, t_s, now_s)
+        return replace(self, vessels=vessels, counts=counts, last_heard_s=now_s)
 
     def _new(
         self, report: AisReport, en: tuple[float, float], own: _Own, t_s: float,
@@ -238,10 +211,8 @@ class Targets:
             newcomer = peril_m(*own, vessels[report.mmsi, branch], now_s), (report.mmsi, branch)
             del vessels[max(newcomer, spare[0])[1]]
             forgotten += 1
-        changes = (*self.changes, (now_s, report.mmsi, TargetChange.APPEARED))[-32:]
         counts = replace(counts, forgotten=counts.forgotten + forgotten)
-        return replace(self, vessels=vessels, changes=changes, counts=counts, last_heard_s=now_s, spare=spare,
-                       spare_s=spare_s)
+        return replace(self, vessels=vessels, counts=counts, last_heard_s=now_s, spare=spare, spare_s=spare_s)
 
 
 _Own = tuple[tuple[float, float], tuple[float, float]]   # place [m] and velocity [m/s] of our boat
@@ -315,22 +286,3 @@ def _moved(vessel: Vessel, report: AisReport, en: tuple[float, float], t_s: floa
         nav_status=report.nav_status if report.nav_status is not None else vessel.nav_status,
         is_class_b=report.is_class_b or vessel.is_class_b, reports=vessel.reports + 1, derived=derived,
     )
-
-
-def _change(before: Vessel, after: Vessel) -> TargetChange | None:
-    """Return what the vessel did that its earlier reports did not say."""
-    there = predict(before, after.t_s)
-    off = math.dist(there.mean_en_m, after.centre_en_m)
-    if off > there.reach_m * 0.2 + risk_factor(SURPRISE_RISK) * max(there.sigma_along_m, there.sigma_across_m):
-        return TargetChange.SURPRISE
-    a, b = before.speed_mps, after.speed_mps
-    if a is None or b is None:
-        return None
-    if abs(b - a) > max(TURNED_MPS, TURNED_SHARE * a):
-        return TargetChange.SPEED
-    if before.course_rad is not None and after.course_rad is not None and b > 0.3:
-        # What was announced by the rate of turn is no change.
-        turned = abs(difference_rad(after.course_rad, there.course_rad))
-        if turned > TURNED_RAD:
-            return TargetChange.TURNED
-    return None

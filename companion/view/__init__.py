@@ -4,14 +4,14 @@
 ashore; all give a ``View`` and the ``Event``s that led to it.
 """
 
-from companion.view.area import AreaView, area_of, drawn
+from companion.view.area import AreaView
 from companion.view.events import Event
 from companion.view.fold import ViewFold
 from companion.view.heard import HeardFold
-from companion.view.recorded import RecordedViews, recorded_views
-from companion.view.values import SCHEMA, FigureView, Past, Sample, Trail, View, sample_of
+from companion.view.recorded import recorded_views
+from companion.view.values import SCHEMA, FigureView, Past, Trail, View, sample_of
 
 __all__ = [
-    "SCHEMA", "AreaView", "Event", "FigureView", "HeardFold", "Past", "RecordedViews", "Sample", "Trail", "View",
-    "ViewFold", "area_of", "drawn", "recorded_views", "sample_of",
+    "SCHEMA", "AreaView", "Event", "FigureView", "HeardFold", "Past", "Trail", "View", "ViewFold", "recorded_views",
+    "sample_of",
 ]

@@ -14,7 +14,6 @@ from companion.view.events import Event
 from companion.view.parts import by_age, heard_vessel, shown
 from companion.view.values import compass, place, rounded, signed, tack_of
 
-ALARMED = frozenset({"warn", "act", "touch"})
 LATE_S = 10.0      # the companion speaks every two seconds; a radio loses some
 
 

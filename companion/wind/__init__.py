@@ -7,13 +7,13 @@
 """
 
 from companion.wind.estimators.catalogue import NAMES, Forecaster, make
-from companion.wind.estimators.estimator import HORIZONS_S, LEVELS, Estimator
+from companion.wind.estimators.estimator import HORIZONS_S, Estimator
 from companion.wind.parameters import VaneParameters
-from companion.wind.sensor_faults import WindStatus, WindVerdict, WindWatch
+from companion.wind.sensor_faults import WindStatus, WindVerdict
 from companion.wind.tracker import WindTracker
 from companion.wind.true_wind import apparent_wind, true_wind
 
 __all__ = [
-    "HORIZONS_S", "LEVELS", "NAMES", "Estimator", "Forecaster", "VaneParameters", "WindStatus", "WindTracker",
-    "WindVerdict", "WindWatch", "apparent_wind", "make", "true_wind",
+    "HORIZONS_S", "NAMES", "Estimator", "Forecaster", "VaneParameters", "WindStatus", "WindTracker", "WindVerdict",
+    "apparent_wind", "make", "true_wind",
 ]

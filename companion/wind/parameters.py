@@ -15,15 +15,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VaneParameters:
-    """The vane's set-up; ``None`` is not known. Filters are corner frequencies [Hz], at most 0 is no filter."""
+    """The vane's set-up; ``None`` is not known. The filter is its corner frequency [Hz]; at most 0 is none."""
 
     vane_type: int | None = None
     speed_type: int | None = None
     speed_min_mps: float | None = None
     true_filter_hz: float | None = 0.05
-    direction_filter_hz: float | None = 0.5
-    speed_filter_hz: float | None = 0.5
-    offset_deg: float | None = None
 
     @classmethod
     def from_mapping(cls, parameters: Mapping[str, float]) -> VaneParameters:
@@ -39,9 +36,6 @@ class VaneParameters:
             speed_type=None if speed is None else round(speed),
             speed_min_mps=number("WNDVN_SPEED_MIN", None),
             true_filter_hz=number("WNDVN_TRUE_FILT", 0.05),
-            direction_filter_hz=number("WNDVN_DIR_FILT", 0.5),
-            speed_filter_hz=number("WNDVN_SPEED_FILT", 0.5),
-            offset_deg=number("WNDVN_DIR_OFS", None),
         )
 
     @property

@@ -38,35 +38,13 @@ from sitl.autopilot.config import (
     VaneState,
     Waves,
 )
-from sitl.autopilot.memory_link import PERFECT, FrameStream, Impairment, MemoryEnd, MemoryLink, RadioChannel
+from sitl.autopilot.memory_link import FrameStream, Impairment, MemoryEnd, MemoryLink, RadioChannel
 from sitl.autopilot.protocol.telemetry import AisVessel
-from sitl.autopilot.server import Server, serve
+from sitl.autopilot.server import serve
 
 __all__ = [
-    "EPOCH_S",
-    "FRAME_M",
-    "HOME",
-    "PERFECT",
-    "TACK_RETRY_S",
-    "AisVessel",
-    "Autopilot",
-    "AutopilotConfig",
-    "Departures",
-    "FrameStream",
-    "GpsFault",
-    "Impairment",
-    "MemoryEnd",
-    "MemoryLink",
-    "RadioChannel",
-    "Sensors",
-    "Server",
-    "Truth",
-    "VaneFault",
-    "VaneState",
-    "Waves",
-    "check_parameters",
-    "no_go_half_rad",
-    "serve",
-    "settled_polar",
+    "EPOCH_S", "FRAME_M", "HOME", "TACK_RETRY_S", "AisVessel", "Autopilot", "AutopilotConfig", "Departures",
+    "FrameStream", "GpsFault", "Impairment", "MemoryEnd", "MemoryLink", "RadioChannel", "Sensors", "Truth",
+    "VaneFault", "VaneState", "Waves", "check_parameters", "no_go_half_rad", "serve", "settled_polar",
     "tack_loss_s",
 ]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.boat import AutopilotLimits, Hull, fence_penetration, required_margin
+from companion.boat import AutopilotLimits, Hull, required_margin
 
 
 def names(margin):
@@ -28,15 +28,6 @@ def test_without_a_corridor_the_beat_has_no_bound():
     assert not margin.is_bounded
     assert "no bound" in margin.describe()
     assert required_margin(AutopilotLimits(sail_xtrack_max_m=0.0), speed_mps=2.0, legs_can_enter_no_go=False).is_bounded
-
-
-def test_the_fence_lets_the_boat_in_as_far_as_was_measured():
-    hold = fence_penetration(AutopilotLimits(fence_action=2), speed_mps=2.93)
-    rtl = fence_penetration(AutopilotLimits(fence_action=1), speed_mps=2.93)
-    assert hold.value_m >= 10.4
-    assert rtl.value_m >= 7.4
-    assert fence_penetration(AutopilotLimits(), speed_mps=2.93) is None
-    assert "stops nothing" in fence_penetration(AutopilotLimits(fence_action=0), speed_mps=2.93).why
 
 
 def test_parameters_by_their_ardupilot_names():

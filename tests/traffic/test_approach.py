@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from companion.traffic import LAKE, SEA, Alarm, cpa, predict
 from companion.traffic.approach import alarm_of
-from companion.traffic.occupancy import Keep, needed_radius_m, planning_discs, time_matched_discs, too_near
+from companion.traffic.occupancy import Keep, needed_radius_m, planning_discs, too_near
 from companion.traffic.predict import motion_of, risk_factor
 from tests.traffic.conftest import own, vessel
 
@@ -151,14 +151,3 @@ def test_risk_factor() -> None:
     assert math.exp(-0.5 * risk_factor(0.01) ** 2) == pytest.approx(0.01)
     with pytest.raises(ValueError, match="risk"):
         risk_factor(0.0)
-
-
-def test_time_matched_obstacles_of_busser() -> None:
-    """A ship that crosses our bow 200 m off when we could be there becomes an obstacle there and nowhere else."""
-    crossing = vessel((-500.0, 200.0), 90.0, 5.0, size=POINT)
-    found = time_matched_discs([crossing], 0.0, own(), 10.0, mean_speed_mps=2.0)
-    assert found
-    for x, y, _ in found:
-        t = (x + 500.0) / 5.0
-        assert abs(t - math.hypot(x, y) / 2.0) < 20.0
-    assert not time_matched_discs([vessel((5000.0, 200.0), 90.0, 5.0)], 0.0, own(), 10.0, mean_speed_mps=2.0)

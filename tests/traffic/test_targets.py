@@ -16,7 +16,7 @@ from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.messages import AisReport, GeoPoint, VehicleState
 from companion.skipper import Skipper
-from companion.traffic import TargetChange, TargetLimits, Targets
+from companion.traffic import TargetLimits, Targets
 from companion.traffic.nmea import NmeaDecoder
 from companion.wind import WindTracker
 from tests.traffic.conftest import FRAME, report
@@ -96,20 +96,6 @@ def test_another_continent_is_counted_not_tracked() -> None:
     t = Targets.empty(FRAME).heard(AisReport(t_s=0.0, mmsi=3669154, position=GeoPoint(lat_deg=-40.0, lon_deg=170.0)))
     assert t.picture(0.0).vessels == ()
     assert t.counts.far == 1
-
-
-def test_changes_say_when_to_check_a_plan_again() -> None:
-    t = Targets.empty(FRAME).heard(report(0.0, (0.0, 0.0), course_rad=0.0, speed_mps=5.0))
-    assert t.changes[-1][2] is TargetChange.APPEARED
-    straight = t.heard(report(10.0, (0.0, 50.0), course_rad=0.02, speed_mps=5.1))
-    assert len(straight.changes) == 1
-    turned = t.heard(report(10.0, (8.0, 49.0), course_rad=0.4, speed_mps=5.0))
-    assert turned.changes[-1][2] is TargetChange.TURNED
-    slowed = t.heard(report(10.0, (0.0, 45.0), course_rad=0.0, speed_mps=2.0))
-    assert slowed.changes[-1][2] is TargetChange.SPEED
-    assert straight.picture(10.0).changed_since(5.0) == ()
-    elsewhere = t.heard(report(10.0, (200.0, 50.0), course_rad=0.0, speed_mps=5.0))
-    assert elsewhere.changes[-1][2] is TargetChange.SURPRISE
 
 
 def test_the_number_of_vessels_is_bounded_and_the_farthest_goes() -> None:

@@ -11,7 +11,7 @@ from companion.geofence.mission.autopilot_mission import (
     read_kept,
 )
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
-from companion.geofence.mission.goals import Box, ByField, Gate, free_water, is_file
+from companion.geofence.mission.goals import ByField, Gate, free_water, is_file
 from companion.geofence.mission.mission import load_area, load_mission, load_settings, place_troubles, read_mission
 from companion.geofence.mission.options import (
     AreaOptions,
@@ -42,12 +42,12 @@ from companion.geofence.mission.options import (
 from companion.geofence.mission.text import parse_options, read_options, without_defaults
 
 __all__ = [
-    "NO_NAME", "PERMITS", "AreaOptions", "AtomOptions", "Box", "BoxOptions", "ByField", "CircleAtomOptions",
+    "NO_NAME", "PERMITS", "AreaOptions", "AtomOptions", "BoxOptions", "ByField", "CircleAtomOptions",
     "DrawnMission", "FieldOptions", "Gate", "GateOptions", "GoalOptions", "HeadingAtomOptions", "Latitude",
     "LeaveAtomOptions", "LineAtomOptions", "Longitude", "MarkOptions", "MissionFiles", "MissionOptions",
     "PointAtomOptions", "PointOptions", "RefugeOptions", "RepulsiveLineAtomOptions", "RepulsivePointAtomOptions",
-    "SearchOptions", "StartOptions", "StationAtomOptions", "WindOptions", "document_of", "drawing_of", "drawn_mission",
-    "free_water", "goal_losses", "hindrance", "is_file", "kept", "kind_of", "load_area", "load_mission",
-    "load_settings", "mission_files", "offer", "parse_options", "place_troubles", "read_kept", "read_mission",
-    "read_options", "without_defaults", "zones_only",
+    "SearchOptions", "StartOptions", "StationAtomOptions", "WindOptions", "document_of", "drawing_of",
+    "drawn_mission", "free_water", "goal_losses", "hindrance", "is_file", "kept", "kind_of", "load_area",
+    "load_mission", "load_settings", "mission_files", "offer", "parse_options", "place_troubles", "read_kept",
+    "read_mission", "read_options", "without_defaults", "zones_only",
 ]

@@ -244,14 +244,13 @@ def ais_report(t_s: float, message: Message) -> AisReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutopilotVersion:
-    """AUTOPILOT_VERSION: ``version`` as (major, minor, patch), the capability bits, the git hash, the board's id.
+    """AUTOPILOT_VERSION: ``version`` as (major, minor, patch), the capability bits, the board's id.
 
     ``uid`` are the hex digits of UID2, of the older UID where that is empty, and "" of a board that tells neither.
     """
 
     version: tuple[int, int, int]
     capabilities: int
-    git_hash: str
     uid: str
 
     @property
@@ -266,7 +265,6 @@ def autopilot_version(message: Message) -> AutopilotVersion:
     return AutopilotVersion(
         version=(number_ >> 24 & 0xFF, number_ >> 16 & 0xFF, number_ >> 8 & 0xFF),
         capabilities=message.capabilities,
-        git_hash=bytes(message.flight_custom_version).rstrip(b"\x00").decode("ascii", "replace"),
         uid=bytes(message.uid2).rstrip(b"\x00").hex() or (f"{message.uid:x}" if message.uid else ""),
     )
 

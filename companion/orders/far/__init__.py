@@ -2,7 +2,6 @@
 
 from companion.orders.far.order import (
     BEGINNING_SIZE,
-    MOST_AHEAD_S,
     MOST_COUNTER,
     MOST_JUMP,
     WINDOW,
@@ -24,7 +23,7 @@ from companion.orders.far.order import (
 from companion.orders.far.status import FarStatus, pack_status, unpack_status
 
 __all__ = [
-    "BEGINNING_SIZE", "MOST_AHEAD_S", "MOST_COUNTER", "MOST_JUMP", "WINDOW", "Beginning", "FarKey", "FarOrder",
-    "FarStatus", "Reply", "Taken", "begun", "judged", "minutes_of", "pack_beginning", "pack_order", "pack_status",
-    "reply_of", "unix_of", "unpack_beginning", "unpack_order", "unpack_status",
+    "BEGINNING_SIZE", "MOST_COUNTER", "MOST_JUMP", "WINDOW", "Beginning", "FarKey", "FarOrder", "FarStatus",
+    "Reply", "Taken", "begun", "judged", "minutes_of", "pack_beginning", "pack_order", "pack_status", "reply_of",
+    "unix_of", "unpack_beginning", "unpack_order", "unpack_status",
 ]

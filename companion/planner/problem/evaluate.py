@@ -252,7 +252,6 @@ class Evaluation:
     length_m: float
     tacks: int
     gybes: int
-    min_margin_rad: float
     legs: tuple[Leg, ...]
 
 
@@ -305,7 +304,7 @@ def evaluate(problem: Problem, waypoints_en: ArrayLike) -> Evaluation:
     if not points or not all(math.isfinite(c) for q in points for c in q):
         text = "non-finite waypoint" if points else "no path"
         return Evaluation(is_feasible=False, reasons=(text,), time_s=math.inf, sail_s=0.0, turn_s=0.0, length_m=0.0,
-                          tacks=0, gybes=0, min_margin_rad=math.inf, legs=())
+                          tacks=0, gybes=0, legs=())
     if math.dist(points[0], p.start_en) > START_SLACK_M:
         reasons.append("first waypoint is not the start")
     points[0] = p.start_en
@@ -385,7 +384,6 @@ def evaluate(problem: Problem, waypoints_en: ArrayLike) -> Evaluation:
     return Evaluation(
         is_feasible=not reasons, reasons=tuple(reasons), time_s=t, sail_s=sail_s, turn_s=turn_s, length_m=length_m,
         tacks=tacks, gybes=gybes, legs=tuple(legs),
-        min_margin_rad=min((leg.margin_rad for leg in legs if not leg.is_beat), default=math.inf),
     )
 
 

@@ -140,12 +140,6 @@ RISK_ROUNDS = 8             # parts that the bisection under a limit divides its
 RISK_TURNS = 16
 MOST_EXTRA_SIGMAS = 8.0
 EXTRA_RESOLUTION = 0.02     # of the bisection [standard deviations]
-ASSUMPTION = {
-    kernels.NONE: "the wind is as forecast",
-    kernels.KALMAN: "the wind's direction walks at random (Kalman filter run open loop)",
-    kernels.AR1: "the wind's direction is an Ornstein-Uhlenbeck process about the forecast, correlation time 1/rho",
-    kernels.TABLE: "the forecast's sigma times a stationary process of the forecast's correlation time",
-}
 
 
 class WindProcess(NamedTuple):
@@ -187,7 +181,6 @@ class PathRisk:
         tacks: Those that may fail onto something (``companion.planner.risk.tacks``).
         total: What is promised: wind, vessels and tacks together by the union bound, at most 1.
         boole: The union bound over entries and up-crossings, at most 1.
-        assumption: What is assumed of the wind, in words.
         correlation_time_s: Of the wind [s].
     """
 
@@ -198,7 +191,6 @@ class PathRisk:
     tacks: tuple[TackAtRisk, ...]
     total: float
     boole: float
-    assumption: str
     correlation_time_s: float
 
     @property
@@ -253,7 +245,7 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
         legs=tuple(out), computed=computed, wind=wind, vessels=vessels, tacks=tacks,
         total=min(1.0, wind + vessels.total + sum(tack.risk for tack in tacks)),
         boole=float(min(1.0, boole)),
-        assumption=ASSUMPTION[process.model], correlation_time_s=process.correlation_time_s,
+        correlation_time_s=process.correlation_time_s,
     )
 
 

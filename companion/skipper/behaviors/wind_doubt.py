@@ -226,4 +226,4 @@ def _stop_planning(ctx: StepContext) -> None:
     if ctx.state.pending.plan is not None:
         ctx.act(CancelPlan(request_id=ctx.state.pending.plan.request_id))
         ctx.set(pending=changed(ctx.state.pending, plan=None))
-    ctx.set(plans=changed(ctx.state.plans, rung=0, ladder_reason=None))
+    ctx.set(plans=changed(ctx.state.plans, rung=0))

@@ -1,6 +1,6 @@
 """Planning under way: why, from where, with which step of the ladder, and what is done with the answer."""
 
-from companion.skipper.planning.autopilot_beats import NextTack, next_tack, next_tack_s
+from companion.skipper.planning.autopilot_beats import next_tack, next_tack_s
 from companion.skipper.planning.vessels import (
     ALIKE_S,
     GIVE_UP_RISK,
@@ -14,5 +14,5 @@ from companion.skipper.step.route import HOME_RADIUS_M
 
 __all__ = [
     "ALIKE_S", "GIVE_UP_RISK", "HOME_RADIUS_M", "HORIZON_S", "OWN_TIMING_MPS", "PART_BY_RUNG", "SETTLED_M",
-    "NextTack", "next_tack", "next_tack_s", "soon",
+    "next_tack", "next_tack_s", "soon",
 ]

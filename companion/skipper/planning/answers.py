@@ -58,7 +58,7 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
         not_found(ctx, pending, reason)
         return
     ctx.set(plans=changed(
-        ctx.state.plans, unanswered=0, effort=min(1.0, MORE * ctx.state.plans.effort), rung=0, ladder_reason=None,
+        ctx.state.plans, unanswered=0, effort=min(1.0, MORE * ctx.state.plans.effort), rung=0,
         retry=ctx.failed(ctx.state.plans.retry) if pending.rung > 0 else Retry()))
     keep, set_current = _place(ctx, pending)
     if keep is None:

@@ -21,7 +21,7 @@ from companion.skipper.step.actions import (
 from companion.skipper.step.config import Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Route
-from companion.skipper.step.saved import Persisted, Standing
+from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
@@ -45,11 +45,11 @@ from companion.skipper.step.snapshot import (
 from companion.skipper.step.state import Phase, SkipperState, is_given_up
 
 __all__ = [
-    "Acknowledge", "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted",
-    "CancelPlan", "CommandOutcome", "CommandResult", "Disbelieved", "Ends", "Event", "Guidance",
-    "MissionOnBoard", "ModeChanged", "Outcome", "ParameterChanged", "Permissions", "Persisted", "Phase",
-    "PlanOutcome", "ReadMission", "ReadOutcome", "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd",
-    "SetCurrent", "SetMode", "SkipperConfig", "SkipperState", "Snapshot", "Standing",
-    "SteerHeading", "StopOrders", "Tack", "UploadFence", "UploadMission", "UploadOutcome", "UploadResult",
-    "WaypointReached", "WindBefore", "WindHealth", "WindView", "ends_safely", "is_given_up",
+    "Acknowledge", "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome",
+    "CommandResult", "Disbelieved", "Ends", "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome",
+    "ParameterChanged", "Permissions", "Persisted", "Phase", "PlanOutcome", "ReadMission", "ReadOutcome",
+    "ReplanPolicy", "RequestPlan", "Route", "RunMotor", "SafeEnd", "SetCurrent", "SetMode", "SkipperConfig",
+    "SkipperState", "Snapshot", "SteerHeading", "StopOrders", "Tack", "UploadFence", "UploadMission",
+    "UploadOutcome", "UploadResult", "WaypointReached", "WindBefore", "WindHealth", "WindView", "ends_safely",
+    "is_given_up",
 ]

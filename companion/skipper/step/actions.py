@@ -26,7 +26,6 @@ class ReplanReason(enum.Enum):
     MISSED_BUOY = "missed_buoy"
     NO_PROGRESS = "no_progress"
     OPERATOR_BACK = "operator_back"
-    REBOOT = "reboot"
     OBSTACLE = "obstacle"              # the area or the traffic changed
     REFUGE = "refuge"                  # the battery is critical, or the voyage out of time
     HOME = "home"                      # all goals are reached, or the autopilot wants her home

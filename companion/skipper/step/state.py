@@ -328,13 +328,11 @@ class Planning:
     last_s: float = float("-inf")      # when a plan was last asked for
     retry: Retry = PATIENT
     rung: int = 0                      # step of the ladder being tried
-    ladder_reason: ReplanReason | None = None
     unanswered: int = 0                # requests in a row that the planner did not answer
     latency: PlannerLatency = NO_ANSWERS   # how long the planner takes on this computer
     effort: float = 1.0                # share of the planning budget that is asked for: less on a slow processor
     replans: int = 0
     replanned_index: int = -1          # the target for which Wolsieffer's replan was asked
-    good_wind_since_s: float | None = None
     no_go_since_s: float | None = None
 
 

@@ -43,11 +43,6 @@ def width_m(line: Line) -> float:
     return distance_m(line.port_en_m, line.starboard_en_m)
 
 
-def opening_m(line: Line) -> float:
-    """Return what is left to sail through between the marks [m], at most 0: nothing."""
-    return width_m(line) - 2.0 * (line.keep_m + STRAY_M)
-
-
 def ahead_m(line: Line, point: PointEn) -> float:
     """Return how far beyond the line a point is [m], negative before it."""
     return -cross_track_m(point, line.port_en_m, line.starboard_en_m)

@@ -24,7 +24,6 @@ from dataclasses import dataclass, replace
 from companion.skipper.way.voyage import Area, PointEn
 
 ERROR_M = 5.0         # of a good fix, and of a chart's outline beside its margin
-SIGMAS = 3.0          # of what a receiver says of its own error
 BACK_M = 15.0         # back where it was reckoned misses that by no more, and ...
 BACK_SHARE = 0.5      # ... by no more of the farthest that the position was off it
 ERRS_MPS = 0.05       # the reckoned place errs by so much more each second that the velocity is heard

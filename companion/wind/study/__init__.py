@@ -6,7 +6,6 @@ from companion.wind.study.score import (
     HORIZONS_S,
     SCORED_LEVELS,
     Characterisation,
-    FilterScore,
     HorizonScore,
     Score,
     asked_rows,
@@ -18,6 +17,6 @@ from companion.wind.study.score import (
 )
 
 __all__ = [
-    "FEWEST", "HORIZONS_S", "SCORED_LEVELS", "Ar1Fit", "Characterisation", "FilterScore", "HorizonScore", "Record",
+    "FEWEST", "HORIZONS_S", "SCORED_LEVELS", "Ar1Fit", "Characterisation", "HorizonScore", "Record",
     "Score", "asked_rows", "average", "characterise", "equation_17", "fit_ar1", "parse_csv", "runs", "score", "targets",
 ]

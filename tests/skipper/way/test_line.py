@@ -17,7 +17,6 @@ from companion.skipper.way.line import (
     crossing,
     crossing_en,
     is_between,
-    opening_m,
     wings_wkt,
 )
 from companion.skipper.way.voyage import Goal, Line
@@ -83,7 +82,6 @@ def test_where_it_is_crossed_lies_in_the_opening(before, after):
     cut = crossing_en(NORTHWARD, before, after)
     assert is_between(NORTHWARD, cut)
     assert min(distance_m(cut, NORTHWARD.port_en_m), distance_m(cut, NORTHWARD.starboard_en_m)) >= 8.0
-    assert opening_m(NORTHWARD) == pytest.approx(24.0)
 
 
 def test_the_wings_stand_outwards_and_end_ashore():
