@@ -20,7 +20,7 @@ import numpy as np
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from companion.planner import Problem, plan
-from companion.planner.problem import BoatLimits, ProblemWind, RiskLimit, Sigma, Target, evaluate
+from companion.planner.problem import BoatLimits, ProblemWind, RiskLimit, Sigma, evaluate
 from companion.planner.risk import path_risk, simulate_entries
 from companion.traffic import Vessel
 from companion.traffic.occupancy import Keep, planning_discs
@@ -60,9 +60,7 @@ def keep_of(clearance_m=0.0):
 
 def problem(ships, keep, delta_s=0.7, **change):
     """Return 900 m to the east across the wind, among ships."""
-    targets = tuple(Target(
-        x_m=d.x_m, y_m=d.y_m, vx_mps=d.vx_mps, vy_mps=d.vy_mps, radius_m=d.radius_m, growth_mps=d.growth_mps,
-        from_s=d.from_s, until_s=d.until_s, name=d.name, spread=d.spread) for d in planning_discs(ships, 0.0, keep))
+    targets = planning_discs(ships, 0.0, keep)
     values = {
         "start_en": (0.0, 0.0), "start_heading_rad": math.pi / 2, "goal_en": (900.0, 0.0), "goal_radius_m": 10.0,
         "wind": ProblemWind(twd_from_rad=0.0, tws_mps=5.0, sigma=Sigma(

@@ -269,6 +269,76 @@ class AisReport:
     age_s: float = 0.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """The vessel behind a disc, as predicted: a Gaussian about a mean that goes the disc's way at the disc's velocity.
+
+    The standard deviations are linear in time through the disc's window, chords of the convex prediction and so never
+    less than it. Errors persist: a vessel that is one sigma ahead of its mean stays one sigma ahead of it.
+
+    Attributes:
+        vessel: whose; the windows of one vessel share it.
+        x_m, y_m: the mean at t = 0 [m].
+        course_rad: of the axis "along".
+        keep_m: our boat's middle nearer than this to the hull's middle is what must not happen: both hulls and the
+            clearance asked for.
+        along_m, along_mps: standard deviation along the course at t = 0 and its growth.
+        across_m, across_mps: the same across it.
+        own_mps: how fast our own place along the plan becomes uncertain, one standard deviation.
+        sigma_m, sigma_mps: the chord of the larger of both with our own: what the disc is sized by.
+
+    """
+
+    vessel: int
+    x_m: float
+    y_m: float
+    course_rad: float
+    keep_m: float
+    along_m: float
+    along_mps: float
+    across_m: float
+    across_mps: float
+    own_mps: float
+    sigma_m: float
+    sigma_mps: float
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """All figures, for a check that they are finite."""
+        return (self.x_m, self.y_m, self.course_rad, self.keep_m, self.along_m, self.along_mps, self.across_m,
+                self.across_mps, self.own_mps, self.sigma_m, self.sigma_mps)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """A moving disc to keep out of: at (x + vx t, y + vy t), radius ``radius_m + growth_mps t``, in its window.
+
+    Times count from the moment for which it was made. With a ``spread`` it is a vessel's prediction: the radius is that
+    without any doubt, and how much doubt is added follows from the promise (``companion.planner.risk``). ``mmsi`` says
+    whose it is; None: nobody's.
+    """
+
+    x_m: float
+    y_m: float
+    vx_mps: float = 0.0
+    vy_mps: float = 0.0
+    radius_m: float
+    growth_mps: float = 0.0
+    from_s: float = 0.0
+    until_s: float = math.inf
+    name: str = ""
+    mmsi: int | None = None
+    spread: Spread | None = None
+
+    def centre_en_m(self, t_s: float) -> tuple[float, float]:
+        """Return the centre at ``t_s``."""
+        return self.x_m + self.vx_mps * t_s, self.y_m + self.vy_mps * t_s
+
+    def radius_at_m(self, t_s: float) -> float:
+        """Return the radius at ``t_s``."""
+        return self.radius_m + self.growth_mps * t_s
+
+
 # ------------------------------------------------------------------------------------------- mission
 class MissionType(enum.IntEnum):
     """Which list of the autopilot (MAV_MISSION_TYPE)."""

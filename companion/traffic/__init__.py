@@ -9,24 +9,24 @@ A pure fold and pure questions about its value; sockets are in ``companion.traff
     approach = cpa(own, vessel, t_s)                     # Approach: distance between hulls, TCPA, bearing
     alarms = assess(own, picture, LAKE, twd_from_rad)    # per vessel: Approach, Alarm, Encounter (COLREGs)
     predict(vessel, t_s)                                 # Prediction: mean, covariance, radius_m(risk)
-    discs = planning_discs(picture, t_s, own, ...)       # tuple[Disc, ...]: fields of companion.planner.Target
+    discs = planning_discs(picture, t_s, own, ...)       # tuple[Target, ...]: what a planning problem has
     conflicts = check_legs(legs, discs)                  # the active plan against the targets
 
-Times are absolute [s] on the companion's clock, except in a ``Disc`` and a ``TimedLeg``, where they count from
+Times are absolute [s] on the companion's clock, except in a ``Target`` and a ``TimedLeg``, where they count from
 the moment that the discs were made for (a plan's t = 0).
 """
 
 from companion.traffic.approach import LAKE, SEA, Alarm, AlarmLimits, OwnShip, cpa, peril_m
 from companion.traffic.colregs import Assessment, Policy, Role, Rule, assess, classify
 from companion.traffic.nmea import decode_json
-from companion.traffic.occupancy import Disc, planning_discs
+from companion.traffic.occupancy import planning_discs
 from companion.traffic.plans import Conflict, Decision, check_legs, decide, path_distance_m
 from companion.traffic.predict import predict
 from companion.traffic.targets import TargetLimits, Targets, TrafficCounts, TrafficPicture
 from companion.traffic.vessel import Vessel
 
 __all__ = [
-    "LAKE", "SEA", "Alarm", "AlarmLimits", "Assessment", "Conflict", "Decision", "Disc", "OwnShip", "Policy",
+    "LAKE", "SEA", "Alarm", "AlarmLimits", "Assessment", "Conflict", "Decision", "OwnShip", "Policy",
     "Role", "Rule", "TargetLimits", "Targets", "TrafficCounts", "TrafficPicture", "Vessel", "assess", "check_legs",
     "classify", "cpa", "decide", "decode_json", "path_distance_m", "peril_m", "planning_discs", "predict",
 ]

@@ -1,7 +1,6 @@
 """Where not to be, and when: predicted vessels as moving discs for a planner that plans in time.
 
-A ``Disc`` has the fields of ``companion.planner.problem.value.Target`` (the planner sits above this room and makes one
-from the other). Its radius grows linearly; the radius that is needed, hull and clearance and k sigma(t), is convex
+A ``Target``'s radius grows linearly; the radius that is needed, hull and clearance and k sigma(t), is convex
 in time and its centre straight, so the chord over a window covers it all through the window. A turning vessel's
 arc adds its own sagitta.
 """
@@ -13,6 +12,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+from companion.messages import Spread, Target
 from companion.traffic.approach import OwnShip
 from companion.traffic.predict import (
     TURN_HOLD_S,
@@ -28,74 +28,6 @@ from companion.traffic.vessel import Vessel
 HORIZON_S = 900.0
 # Windows of one disc each, as shares of the horizon: short where the spread bends most.
 _SHARES = (0.0, 0.12, 0.4, 1.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Spread:
-    """The vessel behind a disc, as predicted: a Gaussian about a mean that goes the disc's way at the disc's velocity.
-
-    The standard deviations are linear in time through the disc's window, chords of the convex prediction and so never
-    less than it. Errors persist: a vessel that is one sigma ahead of its mean stays one sigma ahead of it.
-
-    Attributes:
-        vessel: whose; the windows of one vessel share it.
-        x_m, y_m: the mean at t = 0 [m].
-        course_rad: of the axis "along".
-        keep_m: our boat's middle nearer than this to the hull's middle is what must not happen: both hulls and the
-            clearance asked for.
-        along_m, along_mps: standard deviation along the course at t = 0 and its growth.
-        across_m, across_mps: the same across it.
-        own_mps: how fast our own place along the plan becomes uncertain, one standard deviation.
-        sigma_m, sigma_mps: the chord of the larger of both with our own: what the disc is sized by.
-
-    """
-
-    vessel: int
-    x_m: float
-    y_m: float
-    course_rad: float
-    keep_m: float
-    along_m: float
-    along_mps: float
-    across_m: float
-    across_mps: float
-    own_mps: float
-    sigma_m: float
-    sigma_mps: float
-
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """All figures, for a check that they are finite."""
-        return (self.x_m, self.y_m, self.course_rad, self.keep_m, self.along_m, self.along_mps, self.across_m,
-                self.across_mps, self.own_mps, self.sigma_m, self.sigma_mps)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Disc:
-    """A moving disc: at (x + vx t, y + vy t), radius ``radius_m + growth_mps t``, for from_s <= t <= until_s.
-
-    Times count from the moment for which the disc was made. ``mmsi`` says whose it is; ``spread`` how surely.
-    """
-
-    x_m: float
-    y_m: float
-    vx_mps: float
-    vy_mps: float
-    radius_m: float
-    growth_mps: float
-    from_s: float
-    until_s: float
-    name: str
-    mmsi: int
-    spread: Spread | None = None
-
-    def centre_en_m(self, t_s: float) -> tuple[float, float]:
-        """Return the centre at ``t_s``."""
-        return self.x_m + self.vx_mps * t_s, self.y_m + self.vy_mps * t_s
-
-    def radius_at_m(self, t_s: float) -> float:
-        """Return the radius at ``t_s``."""
-        return self.radius_m + self.growth_mps * t_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,7 +71,7 @@ def _sigma_m(there: Prediction, t_s: float, keep: Keep) -> float:
 
 def planning_discs(
     vessels: Iterable[Vessel], t_s: float, keep: Keep | None = None, *, motion: MotionUncertainty | None = None
-) -> tuple[Disc, ...]:
+) -> tuple[Target, ...]:
     """Return the discs of all vessels for a plan that starts at ``t_s``.
 
     Args:
@@ -153,7 +85,7 @@ def planning_discs(
     return tuple(disc for vessel in vessels for disc in _discs(vessel, t_s, rules, motion))
 
 
-def _discs(vessel: Vessel, t_s: float, keep: Keep, motion: MotionUncertainty | None) -> list[Disc]:
+def _discs(vessel: Vessel, t_s: float, keep: Keep, motion: MotionUncertainty | None) -> list[Target]:
     model = motion if motion is not None else motion_of(vessel)
     turn = turn_rate(vessel)
     cuts = [share * keep.horizon_s for share in _SHARES]
@@ -171,7 +103,7 @@ def _discs(vessel: Vessel, t_s: float, keep: Keep, motion: MotionUncertainty | N
 
 def _disc(
     vessel: Vessel, t_s: float, begin: float, end: float, keep: Keep, motion: MotionUncertainty, turn: float
-) -> Disc:
+) -> Target:
     a, b = predict(vessel, t_s + begin, motion), predict(vessel, t_s + end, motion)
     span = end - begin
     vx, vy = (b.mean_en_m[0] - a.mean_en_m[0]) / span, (b.mean_en_m[1] - a.mean_en_m[1]) / span
@@ -202,13 +134,13 @@ def _disc(
         ahead = 0.5 * keep.ahead_m
         x, y = x + ahead * vx / math.hypot(vx, vy), y + ahead * vy / math.hypot(vx, vy)
         ra += ahead
-    return Disc(
+    return Target(
         x_m=x - vx * begin, y_m=y - vy * begin, vx_mps=vx, vy_mps=vy, radius_m=ra - growth * begin, growth_mps=growth,
         from_s=begin, until_s=end, name=vessel.label, mmsi=vessel.mmsi, spread=spread,
     )
 
 
-def too_near(discs: Sequence[Disc], own: OwnShip) -> tuple[Disc, ...]:
+def too_near(discs: Sequence[Target], own: OwnShip) -> tuple[Target, ...]:
     """Return the discs that our boat is already in: no plan can start, steer by field (or by hand) first."""
     out = []
     for disc in discs:

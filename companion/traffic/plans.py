@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from companion.traffic.occupancy import Disc
+from companion.messages import Target
 
 # A plan may be this deep in a disc [m]: numerical slack.
 SLACK_M = 1e-3
@@ -67,7 +67,7 @@ class Conflict:
 
 
 def check_legs(
-    legs: Sequence[TimedLeg], discs: Sequence[Disc], *, now_s: float = 0.0, plan_t0_s: float = 0.0
+    legs: Sequence[TimedLeg], discs: Sequence[Target], *, now_s: float = 0.0, plan_t0_s: float = 0.0
 ) -> tuple[Conflict, ...]:
     """Return where the plan meets the discs, the earliest meeting of each vessel, in order of time.
 
@@ -88,6 +88,7 @@ def check_legs(
             hit = _enters(leg, begin, end, lo, hi, disc)
             if hit is None:
                 continue
+            assert disc.mmsi is not None, "a vessel's disc says whose it is"
             before = found.get(disc.mmsi)
             if before is None or hit[0] < before.time_s:
                 depth = hit[1] if before is None else max(hit[1], before.depth_m)
@@ -96,7 +97,7 @@ def check_legs(
 
 
 def _enters(
-    leg: TimedLeg, begin: float, end: float, lo: float, hi: float, disc: Disc
+    leg: TimedLeg, begin: float, end: float, lo: float, hi: float, disc: Target
 ) -> tuple[float, float] | None:
     """Return (first time inside, greatest depth) or None: |r + w s|² < (R + g s)², a quadratic in s."""
     span = end - begin

@@ -15,13 +15,13 @@ import json
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.geo.frame import LocalFrame
-from companion.messages import AisReport, GeoPoint
+from companion.messages import AisReport, GeoPoint, Target
 from companion.planner import Plan, Problem, plan
 from companion.planner.problem import VESSELS_SHARE, BoatLimits, ProblemWind, Sigma, evaluate
 from companion.skipper.planning import (
@@ -43,11 +43,10 @@ from companion.traffic import (
     path_distance_m,
     planning_discs,
 )
-from companion.traffic.occupancy import Disc, Keep
+from companion.traffic.occupancy import Keep
 from companion.traffic.plans import MIN_INTERVAL_S, pressing
 from companion.traffic.predict import tail_factor
 from lab.tasks.wrsc2013 import least_distance_m
-from lab.tasks.wrsc2013_skippers import target_of
 from sitl.world import polar_at
 
 ORIGIN = GeoPoint(lat_deg=48.0, lon_deg=-6.0)
@@ -191,7 +190,7 @@ class ShipsVoyage:
                 heading_rad=ship.course_at(t_s), bow_m=half, stern_m=half, port_m=0.1 * half, starboard_m=0.1 * half,
             ))
 
-    def _problem(self, discs: Sequence[Disc], part: float | None = None) -> Problem:
+    def _problem(self, discs: Sequence[Target], part: float | None = None) -> Problem:
         twa, speed = polar_at(self._scene.tws_mps)
         return Problem(
             start_en=self._en, start_heading_rad=self._heading, goal_en=self._scene.goal_en, goal_radius_m=30.0,
@@ -199,10 +198,10 @@ class ShipsVoyage:
                       sigma=Sigma(model="ar1", sigma0_rad=0.05, sigma_inf_rad=0.15, rho_hz=0.036)),
             boat=BoatLimits(no_go_half_rad=math.radians(47.0), turn_rate_radps=0.2, polar_twa_rad=twa, polar_mps=speed,
                             tack_loss_s=7.0),
-            delta_s=DELTA_S, targets=tuple(replace(target_of(d), spread=d.spread) for d in discs), vessels_part=part,
+            delta_s=DELTA_S, targets=tuple(discs), vessels_part=part,
         )
 
-    def _discs(self, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Disc, ...]:
+    def _discs(self, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Target, ...]:
         keep = Keep(sigmas=sigmas, clearance_m=CLEARANCE_M, own_radius_m=1.8, own_timing_mps=OWN_TIMING_MPS,
                     ahead_m=CLEARANCE_M, horizon_s=HORIZON_S, settled_m=SETTLED_M)
         return planning_discs(vessels, t_s, keep)

@@ -19,10 +19,11 @@ from companion.field.look_ahead import way_out_rad
 from companion.field.values import GuidanceSettings, GuidanceState, Intent, MovingObstacle, Situation
 from companion.field.vector_fields import Uniform
 from companion.geo.frame import LocalFrame
+from companion.messages import Target
 from companion.planner import Problem, plan
-from companion.planner.problem import BoatLimits, ProblemWind, Sigma, Target, evaluate
+from companion.planner.problem import BoatLimits, ProblemWind, Sigma, evaluate
 from companion.traffic import TargetLimits, Targets, Vessel, check_legs, decide, decode_json, planning_discs, predict
-from companion.traffic.occupancy import Disc, Keep
+from companion.traffic.occupancy import Keep
 from companion.traffic.plans import Conflict, Decision
 from companion.traffic.predict import STEADY, risk_factor
 from sitl.world import LENGTH_M
@@ -140,7 +141,7 @@ WIND_SIGMA = Sigma(model="ar1", sigma0_rad=math.radians(3.0), sigma_inf_rad=math
 
 
 def problem_for(
-    seen: Situation, habits: GuidanceSettings, goal_en: tuple[float, float], discs: tuple[Disc, ...], *,
+    seen: Situation, habits: GuidanceSettings, goal_en: tuple[float, float], discs: tuple[Target, ...], *,
     goal_radius_m: float = GOAL_RADIUS_M,
 ) -> Problem:
     """Return the planning problem of the moment; its clock starts now, as the discs' does."""
@@ -152,14 +153,8 @@ def problem_for(
             no_go_half_rad=habits.no_go_half_rad, turn_rate_radps=habits.turn_rate_radps,
             polar_twa_rad=habits.polar_twa_rad, polar_mps=habits.polar_mps, tack_loss_s=habits.tack_s,
         ),
-        delta_s=0.7, targets=tuple(target_of(disc) for disc in discs),
+        delta_s=0.7, targets=tuple(replace(disc, spread=None) for disc in discs),
     )
-
-
-def target_of(disc: Disc) -> Target:
-    """Return the planner's target for a disc."""
-    return Target(x_m=disc.x_m, y_m=disc.y_m, vx_mps=disc.vx_mps, vy_mps=disc.vy_mps, radius_m=disc.radius_m,
-                  growth_mps=disc.growth_mps, from_s=disc.from_s, until_s=disc.until_s, name=disc.name)
 
 
 class PlanSkipper(FieldSkipper):
@@ -247,7 +242,7 @@ class PlanSkipper(FieldSkipper):
             self._plan(seen, habits, discs)
         self._resort = self._resort.step(seen.t_s, too_near=near, can_plan=self._way is not None and not near)
 
-    def _plan(self, seen: Situation, habits: GuidanceSettings, discs: tuple[Disc, ...]) -> None:
+    def _plan(self, seen: Situation, habits: GuidanceSettings, discs: tuple[Target, ...]) -> None:
         """Plan to the goals that look nearest in time; keep the best that keeps clear."""
         self._planned_s = seen.t_s
         self._way = None

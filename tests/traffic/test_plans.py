@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.traffic import Decision, Disc, check_legs, decide, path_distance_m
+from companion.messages import Target
+from companion.traffic import Decision, check_legs, decide, path_distance_m
 from companion.traffic.plans import ALIKE_M, SLACK_M, PlainLeg
 
 
 def disc(x: float, y: float, vx: float = 0.0, vy: float = 0.0, radius: float = 20.0, growth: float = 0.0,
-         begin: float = 0.0, end: float = 900.0) -> Disc:
-    return Disc(x_m=x, y_m=y, vx_mps=vx, vy_mps=vy, radius_m=radius, growth_mps=growth, from_s=begin, until_s=end,
+         begin: float = 0.0, end: float = 900.0) -> Target:
+    return Target(x_m=x, y_m=y, vx_mps=vx, vy_mps=vy, radius_m=radius, growth_mps=growth, from_s=begin, until_s=end,
                 name="it", mmsi=1)
 
 

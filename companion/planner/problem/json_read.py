@@ -15,6 +15,7 @@ import shapely
 from companion.boat.failed_tack import IRONS_S
 from companion.disk import read_regular
 from companion.errors import InputError
+from companion.messages import Spread, Target
 from companion.planner.problem.parts import (
     SIGMA_MODELS,
     AutopilotBeatZone,
@@ -26,12 +27,10 @@ from companion.planner.problem.parts import (
     Sigma,
     Speeds,
     Strength,
-    Target,
 )
 
 if TYPE_CHECKING:
     from companion.planner.problem.tracking import Tracking
-    from companion.traffic.occupancy import Spread
 
 T = TypeVar("T")
 HELM_KEYS = ("wp_radius_m", "turn_radius_m", "wp_speed_mps", "accel_mps2", "jerk_mps3", "corridor_m")
@@ -304,8 +303,6 @@ def _parse_target(target: _JsonReader) -> Target:
 
 
 def _parse_spread(spread: _JsonReader) -> Spread:
-    from companion.traffic.occupancy import Spread
-
     return Spread(
         vessel=spread.whole("vessel"), x_m=spread.number("x"), y_m=spread.number("y"),
         course_rad=math.radians(spread.number("course_deg")), keep_m=spread.number("keep_m"),

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import shapely
 
 from companion.boat.failed_tack import IRONS_S
+from companion.messages import Spread
 from companion.planner.problem.json_read import HELM_KEYS
 from companion.planner.problem.value import LEG_SAVING, Problem
 
 if TYPE_CHECKING:
     from companion.planner.problem.parts import Strength
     from companion.planner.problem.tracking import Tracking
-    from companion.traffic.occupancy import Spread
 
 
 def _wkt(geometry: shapely.Geometry) -> str:

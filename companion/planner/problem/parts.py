@@ -6,15 +6,11 @@ import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from companion.boat.failed_tack import IRONS_S
-
-if TYPE_CHECKING:
-    from companion.traffic.occupancy import Spread
 
 TOUCH_M = 1e-3
 """A path may be this deep in an obstacle [m]: numerical slack for touching."""
@@ -174,26 +170,6 @@ class AutopilotBeatZone:
     from_rad: float
     half_rad: float
     open_half_rad: float = 0.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Target:
-    """A moving disc to keep out of: at (x + vx t, y + vy t), radius ``radius_m + growth_mps t``, in its window.
-
-    With a ``spread`` it is a vessel's prediction: the radius is that without any doubt, and how much doubt is added
-    follows from the promise (``companion.planner.risk.chance_constraint``).
-    """
-
-    x_m: float
-    y_m: float
-    vx_mps: float = 0.0
-    vy_mps: float = 0.0
-    radius_m: float
-    growth_mps: float = 0.0
-    from_s: float = 0.0
-    until_s: float = math.inf
-    name: str = ""
-    spread: Spread | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

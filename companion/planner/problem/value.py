@@ -20,6 +20,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from companion.messages import Spread, Target
 from companion.planner.problem.json_read import read_fields
 from companion.planner.problem.parts import (
     LEAST_MPS,
@@ -31,7 +32,6 @@ from companion.planner.problem.parts import (
     Current,
     ProblemWind,
     RiskLimit,
-    Target,
     interpolated,
 )
 
@@ -297,9 +297,6 @@ def defect_of(p: Problem) -> str | None:
 # obstacles). The wind's part widens the no-go zone (Wolsieffer 2020, eq. 15), a vessel's part r makes its disc hulls,
 # clearance and Phi^-1(1 - r) sigma wide: a boat outside it is met with probability r at most (``tail_factor``). Without
 # uncertain targets all of it is the wind's, as the problem's format has it.
-
-if TYPE_CHECKING:
-    from companion.traffic.occupancy import Spread
 
 LEAST_PART = 1e-12
 

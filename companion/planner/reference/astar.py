@@ -29,11 +29,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from companion.geo.angles import difference_rad, heading_of, wrap_pi
 from companion.geo.frame import LocalFrame
-from companion.messages import GeoPoint
+from companion.messages import GeoPoint, Target
 from companion.planner.effort import Effort, Outcome
 from companion.planner.plan import PlanStatus
 from companion.planner.problem.evaluate import endpoint_error, ground_track, is_zoned
-from companion.planner.problem.parts import Target
 from companion.planner.problem.value import Problem
 from companion.planner.reference import kernels
 from companion.planner.reference.rrtstar import simple_bound_s

@@ -16,14 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.messages import Spread, Target
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem.evaluate import Evaluation, evaluate
-from companion.planner.problem.parts import Target
 from companion.planner.problem.value import Problem, sigmas_for, uncertain, vessel_count
 from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.risk.chance_constraint import vessel_risk
 from companion.planner.risk.kernels import LEAST_SIGMA_M, inside, spread_at
-from companion.traffic.occupancy import Spread
 
 KEPT = 1.0 - 1e-6    # of its part that the tree uses: the judge's times differ by the last digits
 SLACK = 1e-9

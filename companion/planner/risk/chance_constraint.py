@@ -26,16 +26,16 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi
+from companion.messages import Spread, Target
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.parts import Target
 from companion.planner.problem.value import LEAST_PART, Problem, sigmas_for, uncertain, vessel_count
 from companion.planner.risk import kernels
 from companion.planner.risk.tacks import TackAtRisk, tack_risks, tacks_at_risk
@@ -45,9 +45,6 @@ from companion.planner.risk.tacks import TackAtRisk, tack_risks, tacks_at_risk
 # Over a whole path a vessel's error is one draw, not one at each instant: a ship that is late is late all the way. The
 # risk is the expected number of entries into its disc of hulls and clearance, first inside or later (Rice's formula,
 # ``vessel_kernels``), which bounds the probability of any. Vessels and wind add up, by the union bound again.
-
-if TYPE_CHECKING:
-    from companion.traffic.occupancy import Spread
 
 VESSELS_PROMISE_FACTOR = 1.15
 """What is promised over what is computed: simulated futures scatter, and bends of a predicted track are chords."""

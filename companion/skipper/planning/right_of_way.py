@@ -18,12 +18,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
-from companion.planner.problem import Target
+from companion.messages import Target
 from companion.skipper.step.context import StepContext
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.voyage import PointEn
-from companion.traffic import Disc, Policy, Role, Vessel, predict
+from companion.traffic import Policy, Role, Vessel, predict
 from companion.traffic.colregs import APPARENT_RAD, OngoingEncounter
 
 AHEAD_S = 60.0               # crossing ahead of a bow by more than this is no risk
@@ -62,9 +63,9 @@ def stands_on(ctx: StepContext) -> bool:
                for h in ctx.state.traffic.encounters)
 
 
-def bow_discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, share: float = 1.0) -> tuple[Disc, ...]:
+def bow_discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, share: float = 1.0) -> tuple[Target, ...]:
     """Return the rows ahead of the bows that we must not cross, in times from ``t_s`` on [s]."""
-    out: list[Disc] = []
+    out: list[Target] = []
     for vessel in vessels:
         held = held_of(ctx, vessel)
         if held is None or not held.must_act or held.encounter.role is Role.KEEP_CLEAR:
@@ -78,7 +79,7 @@ def bow_discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, share: fl
         reach = there.reach_m + AHEAD_S * speed
         for n in range(1, 1 + math.ceil(reach / (BOW_STEP * radius))):
             centre = moved(there.mean_en_m, there.course_rad, min(n * BOW_STEP * radius, reach))
-            out.append(Disc(
+            out.append(Target(
                 x_m=centre[0], y_m=centre[1], vx_mps=there.velocity_en_mps[0], vy_mps=there.velocity_en_mps[1],
                 radius_m=radius, growth_mps=0.0, from_s=0.0, until_s=BOW_HORIZON_S, name=vessel.label,
                 mmsi=vessel.mmsi))
@@ -92,8 +93,7 @@ def regions(
 
     ``is_met``: the way sailed now meets a vessel, so that there is a change of course to be seen.
     """
-    out = [Target(x_m=d.x_m, y_m=d.y_m, vx_mps=d.vx_mps, vy_mps=d.vy_mps, radius_m=d.radius_m, growth_mps=0.0,
-                  from_s=d.from_s, until_s=d.until_s, name=f"ahead of {d.name}")
+    out = [replace(d, name=f"ahead of {d.name}")
            for d in bow_discs(ctx, vessels, ctx.t_s + after_s)]
     for vessel in vessels if is_met else ():
         held = held_of(ctx, vessel)

@@ -14,13 +14,14 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from companion.geo.angles import difference_rad
-from companion.planner.problem import VESSELS_SHARE, Target, sigmas_for, vessel_count
+from companion.messages import Target
+from companion.planner.problem import VESSELS_SHARE, sigmas_for, vessel_count
 from companion.skipper.planning.right_of_way import MEET_SHARE, bow_discs, held_of, is_stood_on_to, regions
 from companion.skipper.step.context import StepContext
 from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.judge import LOST_MPS
 from companion.skipper.way.voyage import PointEn
-from companion.traffic import Conflict, Disc, Vessel, check_legs, path_distance_m, peril_m, planning_discs, predict
+from companion.traffic import Conflict, Vessel, check_legs, path_distance_m, peril_m, planning_discs, predict
 from companion.traffic.colregs import expected
 from companion.traffic.occupancy import Keep
 from companion.traffic.plans import TimedLeg, pressing
@@ -80,7 +81,7 @@ def near(ctx: StepContext) -> tuple[Vessel, ...]:
     return tuple(vessel for *_, vessel in soon)
 
 
-def discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Disc, ...]:
+def discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Target, ...]:
     """Return where not to be because of ``vessels``, in times from ``t_s`` on [s], ``sigmas`` wide."""
     hull = ctx.voyage.boat.hull
     keep = Keep(
@@ -129,17 +130,13 @@ def shares(ctx: StepContext, start_en: PointEn, after_s: float, rung: int, delta
     wanted = VESSELS_SHARE * (1.0 - delta_s) * PART_BY_RUNG[min(rung, len(PART_BY_RUNG) - 1)]
     part = min(wanted, 1.0 - LEAST_DELTA_S - of_wind)
     inside_m: dict[int, float] = {}
-    every = tuple(Target(
-        x_m=disc.x_m, y_m=disc.y_m, vx_mps=disc.vx_mps, vy_mps=disc.vy_mps, radius_m=disc.radius_m,
-        growth_mps=disc.growth_mps, from_s=disc.from_s, until_s=disc.until_s, name=disc.name, spread=disc.spread,
-    ) for disc in found)
-    sigmas = sigmas_for(part, vessel_count(every))
-    for disc, target in zip(found, every, strict=True):
-        if disc.from_s <= 0.0 and target.spread is not None:
-            gap_m = distance_m(start_en, disc.centre_en_m(0.0)) - disc.radius_m - sigmas * target.spread.sigma_m
+    sigmas = sigmas_for(part, vessel_count(found))
+    for target in found:
+        if target.from_s <= 0.0 and target.spread is not None:
+            gap_m = distance_m(start_en, target.centre_en_m(0.0)) - target.radius_m - sigmas * target.spread.sigma_m
             inside_m[target.spread.vessel] = HAIR_M - gap_m
     out = []
-    for target in every:
+    for target in found:
         assert target.spread is not None
         radius_m = target.radius_m - max(0.0, inside_m.get(target.spread.vessel, 0.0))
         growth_mps = target.growth_mps + sigmas * target.spread.sigma_mps

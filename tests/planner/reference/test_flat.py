@@ -8,10 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.geo.frame import LocalFrame
-from companion.messages import GeoPoint
+from companion.messages import GeoPoint, Target
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.parts import Target
 from companion.planner.reference.astar import FlatPlane, flat_en_from_lonlat
 from companion.planners import AUTO, AstarSettings, PlannerChoice, RrtstarSettings
 from tests.planner.problems import box, simple

@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.vessels import SCENES, holds, keep_of, met, problem, ship
+from companion.messages import Target
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.json_write import to_dict
-from companion.planner.problem.parts import Current, RiskLimit, Sigma, Target
+from companion.planner.problem.parts import Current, RiskLimit, Sigma
 from companion.planner.problem.value import resolved, uncertain
 from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.reference.rrtstar import RrtTree, search

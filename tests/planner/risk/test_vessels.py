@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.vessels import SCENES, holds, keep_of, met, problem, ship
+from companion.messages import Target
 from companion.planner import Plan, Problem, plan
 from companion.planner.explain import explain
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.json_write import to_dict
-from companion.planner.problem.parts import RiskLimit, Target
+from companion.planner.problem.parts import RiskLimit
 from companion.planner.problem.value import defect_of, resolved, sigmas_for
 from companion.planner.risk import kernels
 from companion.planner.risk.chance_constraint import path_risk, simulate_entries
