@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -40,7 +40,6 @@ from companion.field.tree import (
 )
 from companion.field.values import GuidanceSettings, Situation
 from companion.fold import Waters
-from companion.geo import MPS_PER_KNOT
 from companion.geo.frame import LocalFrame
 from companion.geofence import Code, Finding, LocalArea, Mission, Severity
 from companion.geofence.mission import (
@@ -129,20 +128,6 @@ def boat_of(mission: Mission) -> Boat:
     )
 
 
-# What the keys of [planner] are called among a planner's settings, where it is not the key, or in radians.
-_NUMBERS = {"tunnel": "is_tunnel_abrupt", "heuristic_kn": "heuristic_mps", "rewiring": "is_rewired"}
-
-
-def _number(key: str) -> str:
-    return _NUMBERS.get(key, key.replace("_deg", "_rad"))
-
-
-def _own(algorithm: str, key: str) -> bool:
-    """Return whether a key of ``[planner]`` is a number of this planner's."""
-    settings = ALGORITHMS[algorithm].settings
-    return settings is not None and _number(key) in {field.name for field in fields(settings)}
-
-
 def planner_of(mission: Mission) -> PlannerChoice:
     """Return the mission's planner and its numbers.
 
@@ -156,9 +141,10 @@ def planner_of(mission: Mission) -> PlannerChoice:
         others = " and ".join(f'"{name}"' for name in ALGORITHMS if name != AUTO.algorithm)
         raise InputError(str(mission.path), "[planner] expansions", f"is for {others}",
                          "write [skipper] expansions for auto's")
+    keys = {name: {key.key for key in row.keys.values()} for name, row in ALGORITHMS.items()}
     for key in given:
-        if not _own(algorithm, key):
-            whose = next(name for name in ALGORITHMS if _own(name, key))
+        if key not in keys[algorithm]:
+            whose = next(name for name, own in keys.items() if key in own)
             raise InputError(str(mission.path), f"[planner] {key}",
                              f"is a number of {whose!r}, and this mission plans by {algorithm!r}",
                              f'write [skipper] planner = "{whose}", or leave it out')
@@ -166,15 +152,8 @@ def planner_of(mission: Mission) -> PlannerChoice:
         raise InputError(str(mission.path), "[planner] tunnel", "a tunnel has a width", "add tunnel_width_m")
     if algorithm == AUTO.algorithm:
         return AUTO
-    numbers: dict[str, Any] = {
-        _number(key): math.radians(value) if key.endswith("_deg") else value for key, value in given.items()}
-    if "heuristic_mps" in numbers:
-        numbers["heuristic_mps"] = numbers["heuristic_mps"] * MPS_PER_KNOT or None
-    if "is_tunnel_abrupt" in numbers:
-        numbers["is_tunnel_abrupt"] = numbers["is_tunnel_abrupt"] == "abrupt"
-    settings = ALGORITHMS[algorithm].settings
     return PlannerChoice(
-        algorithm=algorithm, settings=None if settings is None else settings(**numbers), expansions=expansions)
+        algorithm=algorithm, settings=ALGORITHMS[algorithm].settings_of(given), expansions=expansions)
 
 
 LEAST_LINE_M = 1.0

@@ -9,13 +9,45 @@ the project's own, and sets its numbers itself; ``rrtstar`` is Wolsieffer's, ``a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from companion.geo import MPS_PER_KNOT
 
 if TYPE_CHECKING:
     from companion.messages import GeoPoint
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Key:
+    """How a mission's ``[planner]`` sets a number: its key, and its bounds or the words for it.
+
+    A key in ``_deg`` sets a number in radians, one in ``_kn`` one in m/s, of which 0 is None. Of two words for a number
+    that is yes or no the second is yes.
+    """
+
+    key: str
+    is_flag: bool = False
+    above: float | None = None
+    least: float | None = None
+    most: float | None = None
+    below: float | None = None
+    words: tuple[str, ...] = ()
+
+    def value_of(self, told: Any, default: object) -> Any:
+        """Return the number that a mission's value says; ``default`` is the one without it."""
+        if self.key.endswith("_deg"):
+            return math.radians(told)
+        if self.key.endswith("_kn"):
+            return told * MPS_PER_KNOT or None
+        return told == self.words[1] if self.words and isinstance(default, bool) else told
+
+
+def _set_by(key: str, default: T, **bounds: Any) -> T:
+    """Return a field of settings that a mission sets by ``key``."""
+    return field(default=default, metadata={"key": Key(key=key, is_flag=isinstance(default, bool), **bounds)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,19 +72,19 @@ class AstarSettings:
 
     """
 
-    grid_m: float | None = None
-    turn_s_per_rad: float = 8.0
-    tack_s: float = 0.0
-    gybe_s: float = 0.0
-    tunnel_width_m: float | None = None
-    is_tunnel_abrupt: bool = False
-    heuristic_mps: float | None = 7.0 * MPS_PER_KNOT
-    min_twa_rad: float = math.radians(45.0)
-    max_twa_rad: float = math.radians(160.0)
-    max_turn_rad: float = 0.5 * math.pi
-    ship_match_s: float = 20.0
+    grid_m: float | None = _set_by("grid_m", None, above=0.0)
+    turn_s_per_rad: float = _set_by("turn_s_per_rad", 8.0, least=0.0)
+    tack_s: float = _set_by("tack_s", 0.0, least=0.0)
+    gybe_s: float = _set_by("gybe_s", 0.0, least=0.0)
+    tunnel_width_m: float | None = _set_by("tunnel_width_m", None, above=0.0)
+    is_tunnel_abrupt: bool = _set_by("tunnel", False, words=("linear", "abrupt"))
+    heuristic_mps: float | None = _set_by("heuristic_kn", 7.0 * MPS_PER_KNOT, least=0.0)
+    min_twa_rad: float = _set_by("min_twa_deg", math.radians(45.0), least=0.0, below=90.0)
+    max_twa_rad: float = _set_by("max_twa_deg", math.radians(160.0), above=90.0, most=180.0)
+    max_turn_rad: float = _set_by("max_turn_deg", 0.5 * math.pi, above=0.0, most=180.0)
+    ship_match_s: float = _set_by("ship_match_s", 20.0, above=0.0)
     memory_bytes: int = 256_000_000
-    projection: str = "local"
+    projection: str = _set_by("projection", "local", words=("local", "flat"))
     origin: GeoPoint | None = None
 
 
@@ -72,11 +104,11 @@ class RrtstarSettings:
 
     """
 
-    goal_bias: float = 0.05
-    range_m: float | None = None
-    is_rewired: bool = True
-    risk_weight_s: float = 10.0
-    state_risk_weight_s: float = 0.0
+    goal_bias: float = _set_by("goal_bias", 0.05, least=0.0, below=1.0)
+    range_m: float | None = _set_by("range_m", None, above=0.0)
+    is_rewired: bool = _set_by("rewiring", True)
+    risk_weight_s: float = _set_by("risk_weight_s", 10.0, least=0.0)
+    state_risk_weight_s: float = _set_by("state_risk_weight_s", 0.0, least=0.0)
 
 
 Settings = AstarSettings | RrtstarSettings
@@ -91,6 +123,20 @@ class Algorithm:
     bounds_path_risk: bool = False   # its tree keeps a limit on the path's risk; of others a path is judged, and redone
     carries_vessels: bool = False    # other vessels are under its tree's own bound
     warm_expansions: int = 2000      # what compiles or loads all of its kernels, before a budget begins
+
+    @property
+    def keys(self) -> dict[str, Key]:
+        """The numbers that a mission may set, by their names among the settings."""
+        own = () if self.settings is None else fields(self.settings)
+        return {each.name: each.metadata["key"] for each in own if "key" in each.metadata}
+
+    def settings_of(self, told: dict[str, Any]) -> Settings | None:
+        """Return the settings in which these keys of a mission are said, each of which is the planner's own."""
+        if self.settings is None:
+            return None
+        defaults = {each.name: each.default for each in fields(self.settings)}
+        return self.settings(**{
+            name: key.value_of(told[key.key], defaults[name]) for name, key in self.keys.items() if key.key in told})
 
 
 ALGORITHMS = {

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-from companion.planners import ALGORITHMS
+from companion.planners import ALGORITHMS, Key
 from companion.safety import CHOICES, ENDINGS, FAILSAFES, SETTINGS, WORD_OF, End, Setting
 
 # ``[[goal]]``: what a mission TOML may say of a goal, one struct per kind. Without ``kind`` it is a point.
@@ -312,43 +312,27 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """The same over a satellite link (``companion run --far``)."""
 
 
-class PlannerOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """``[planner]``: the numbers of ``[skipper] planner``; a key of another is refused."""
+def _planner_key(key: Key) -> tuple[str, Any, None]:
+    """Return a number of a planner as a field: its key, what it may be; not said it is the planner's default."""
+    if key.words:
+        return key.key, Literal[key.words] | None, None
+    number = Annotated[float, Meta(gt=key.above, ge=key.least, le=key.most, lt=key.below)]
+    return key.key, (bool if key.is_flag else number) | None, None
+
+
+class _Planner(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[planner]``: the numbers of ``[skipper] planner``, from the table of planners; a key of another is refused."""
 
     expansions: Annotated[int, Meta(gt=0)] | None = None
     """Its effort in its own steps (states taken, samples drawn), in place of the voyage's."""
-    grid_m: Positive | None = None
-    """A*: the spacing of its grid (GRID SIZE); None: a fortieth of the distance."""
-    turn_s_per_rad: NonNegative | None = None
-    """A*: f of eq. 4.4."""
-    tack_s: NonNegative | None = None
-    """A*: what a tack costs beyond its time, and so for a gybe."""
-    gybe_s: NonNegative | None = None
-    tunnel: Literal["linear", "abrupt"] | None = None
-    """A*: a cost that grows with the distance from the direct line (eq. 4.6), or one beyond a border."""
-    tunnel_width_m: Positive | None = None
-    """A*: TUNNEL WIDTH of eq. 4.6, or the width between the borders."""
-    heuristic_kn: NonNegative | None = None
-    """A*: the speed of its estimate; 0: none (Dijkstra)."""
-    min_twa_deg: Annotated[float, Meta(ge=0.0, lt=90.0)] | None = None
-    max_twa_deg: Annotated[float, Meta(gt=90.0, le=180.0)] | None = None
-    """A*: the headings off the wind that it sails."""
-    max_turn_deg: Annotated[float, Meta(gt=0.0, le=180.0)] | None = None
-    """A*: the greatest change of heading from step to step; with his 90 it gybes round where a tack turns farther."""
-    ship_match_s: Positive | None = None
-    """A*: the tolerance of eq. 4.7."""
-    projection: Literal["local", "flat"] | None = None
-    """A*: plan in the metres of the local frame, or in those of his flat earth (eq. 4.2)."""
-    goal_bias: Annotated[float, Meta(ge=0.0, lt=1.0)] | None = None
-    """RRT*: the share of its samples that are the goal."""
-    range_m: Positive | None = None
-    """RRT*: its longest branch (eta); None: a fifth of the water's diagonal."""
-    rewiring: bool | None = None
-    """RRT*: whether states are given better parents."""
-    risk_weight_s: NonNegative | None = None
-    """RRT*: what certain failure costs, where ``[risk] max_path_risk`` bounds it."""
-    state_risk_weight_s: NonNegative | None = None
-    """RRT*: what the greatest risk of one state costs."""
+
+
+if TYPE_CHECKING:
+    PlannerOptions = _Planner
+else:
+    PlannerOptions = msgspec.defstruct(
+        "PlannerOptions", [_planner_key(key) for row in ALGORITHMS.values() for key in row.keys.values()],
+        bases=(_Planner,), frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 
 class PassageOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
