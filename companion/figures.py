@@ -1,4 +1,4 @@
-"""Figures of the moment, one row each: the page, the line, ``companion watch`` and the radio derive from it.
+"""Figures of the moment, one row each: page, line, ``companion watch``, radio and ``companion report`` derive from it.
 
 A row says how a figure is told from a step, in SI units and radians, and what it is called. On board and from a record
 it is computed; over the radio it comes under the row's name as a NAMED_VALUE_FLOAT, which any ground station plots.
@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from companion.fold import Step
 from companion.geo.angles import heading_of
 
 Kind = Literal["speed", "distance", "time", "bearing", "share", "number"]
-EVERYWHERE = frozenset({"page", "line", "watch", "radio"})
+EVERYWHERE = frozenset({"page", "line", "watch", "radio", "report"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,14 +40,14 @@ def vmg_mps(step: Step) -> float | None:
 
 
 FIGURES: tuple[Figure, ...] = (
-    Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page"})),
+    Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page", "report"})),
 )
 BY_NAME = {figure.name: figure for figure in FIGURES}
 _UNITS = {"speed": " m/s", "distance": " m", "time": " s", "bearing": "°", "share": " %", "number": ""}
 
 
 def told(step: Step, where: str) -> dict[str, float]:
-    """Return by name what can be told now of the figures that are shown there: page, line, watch or radio."""
+    """Return by name what can be told now of the figures that are shown there: page, line, watch, radio or report."""
     values = {figure.name: figure.of(step) for figure in FIGURES if where in figure.shown}
     return {name: value for name, value in values.items() if value is not None and math.isfinite(value)}
 
@@ -61,5 +61,37 @@ def shown_value(figure: Figure, value: float) -> float:
 
 def in_words(values: Mapping[str, float]) -> list[str]:
     """Return figures as a line has them: label, value, unit."""
-    return [f"{BY_NAME[name].label} {shown_value(BY_NAME[name], value):g}{_UNITS[BY_NAME[name].kind]}"
-            for name, value in values.items() if name in BY_NAME]
+    return [f"{figure.label} {_shown(figure, value)}"
+            for name, value in values.items() if (figure := BY_NAME.get(name)) is not None]
+
+
+def _shown(figure: Figure, value: float) -> str:
+    return f"{shown_value(figure, value):g}{_UNITS[figure.kind]}"
+
+
+@dataclass(slots=True)
+class Ranges:
+    """What the figures of a report have been since a voyage began: the least, the most and the mean of each.
+
+    A bearing has none of these.
+    """
+
+    by_name: dict[str, list[float]] = field(default_factory=dict)   # least, most, sum, count
+
+    def take(self, step: Step) -> None:
+        """Take one step."""
+        for name, value in told(step, "report").items():
+            least, most, total, count = self.by_name.get(name, (math.inf, -math.inf, 0.0, 0.0))
+            self.by_name[name] = [min(least, value), max(most, value), total + value, count + 1.0]
+
+    def to_dict(self) -> dict[str, dict[str, float]]:
+        """Return them by the figures' names."""
+        return {name: {"least": least, "most": most, "mean": total / count}
+                for name, (least, most, total, count) in self.by_name.items() if BY_NAME[name].kind != "bearing"}
+
+
+def ranges_in_words(ranges: Mapping[str, Mapping[str, float]]) -> list[str]:
+    """Return what ``Ranges.to_dict`` has recorded, a sentence each; a figure of another release is left out."""
+    return [f"{figure.label}: {_shown(figure, of['least'])} to {_shown(figure, of['most'])}, "
+            f"{_shown(figure, of['mean'])} in the mean."
+            for name, of in ranges.items() if (figure := BY_NAME.get(name)) is not None]

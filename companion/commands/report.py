@@ -108,6 +108,7 @@ def track_of(record: VoyageRecord) -> Document:
 
 def in_words(record: VoyageRecord) -> list[str]:
     """Return a voyage as sentences."""
+    from companion.figures import ranges_in_words
     from companion.plots.chart import date_words, place_words
 
     s, chart = record.summary, record.chart
@@ -125,6 +126,7 @@ def in_words(record: VoyageRecord) -> list[str]:
         whole = f" and {100.0 * s.path_risk:.0f} % over a whole way" if s.path_risk is not None else ""
         lines.append(f"Chance that plans gave the wind to force her into the no-go zone: up to "
                      f"{100.0 * s.promised_risk:.0f} % at each instant{whole}; entered {_times(s.no_go_entries)}.")
+    lines += ranges_in_words(s.figures)
     if s.servos:
         moved = "; ".join(f"output {number} {_times(servo.movements)}, {servo.travel_us} us in all"
                           for number, servo in s.servos.items())

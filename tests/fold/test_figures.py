@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion import figures
-from companion.figures import BY_NAME, FIGURES, Figure, in_words, told
+from companion.figures import BY_NAME, FIGURES, Figure, in_words, ranges_in_words, told
 from companion.fold import Step
 from companion.mavlink.wire.companion_status import FLOATS, SLOW, StatusReader, status_messages
 from companion.mavlink.wire.frames import Codec
@@ -14,6 +14,7 @@ from companion.messages import CompanionStatus
 from companion.skipper import Skipper
 from companion.skipper.step.config import SkipperConfig
 from companion.telemetry.console import progress_text
+from companion.telemetry.folder import VoyageFigures
 from companion.terminal.dashboard import body_of
 from companion.view import HeardFold
 from tests.skipper.world import FRAME, World, voyage
@@ -73,6 +74,20 @@ def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(step, table):
         ("test way", "bearing", 41.3, "why")]
     assert ("test way", "041°") in [row[:2] for row in body_of(view, knots=True, columns=80)]
     assert HeardFold().take(60.0, reader.report(60.0), None, None)[0].shown == ()   # long not heard
+
+
+def test_a_row_is_in_the_report_from_its_least_to_its_most(step, monkeypatch):
+    values = iter([3.0, -1.0, 4.0])
+    way = Figure(name="co_test", label="way", kind="distance", of=lambda step: next(values))
+    course = Figure(name="co_course", label="course", kind="bearing", of=lambda step: 1.0)
+    monkeypatch.setattr(figures, "FIGURES", (way, course))
+    monkeypatch.setattr(figures, "BY_NAME", {"co_test": way, "co_course": course})
+    recorded = VoyageFigures(first_s=0.0)
+    for _ in range(3):
+        recorded.take(step, None)
+    assert recorded.to_dict()["figures"] == {"co_test": {"least": -1.0, "most": 4.0, "mean": 2.0}}
+    assert ranges_in_words(recorded.to_dict()["figures"]) == ["way: -1 m to 4 m, 2 m in the mean."]
+    assert ranges_in_words({"co_new": {"least": 1.0, "most": 1.0, "mean": 1.0}}) == []
 
 
 def test_what_another_release_sends_is_not_shown():

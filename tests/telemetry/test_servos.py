@@ -40,4 +40,6 @@ def test_a_voyage_tells_rudder_and_sheet_in_its_summary_and_in_words(tmp_path, c
     assert set(servos) == {"1", "4"}     # SERVO1_FUNCTION 26, SERVO4_FUNCTION 89; the throttle rests
     assert all(servo["movements"] > 0 and servo["travel_us"] >= 10 for servo in servos.values())
     assert cli.main(["report", str(tmp_path)]) == 0
-    assert "Servos moved: output 1 " in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "Servos moved: output 1 " in told
+    assert "\nVMG: " in told

@@ -128,6 +128,7 @@ class Summary(Struct, frozen=True, kw_only=True):
     path_risk: float | None = None
     alerts: dict[str, int] = {}
     servos: dict[str, ServoFigures] = {}
+    figures: dict[str, dict[str, float]] = {}
     records_dropped: int = 0
     disk_trouble: str = ""
 

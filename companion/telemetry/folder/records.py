@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from companion.current import WaterCurrent, plain
+from companion.figures import Ranges
 from companion.fold import Step
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.geo.frame import LocalFrame
@@ -289,6 +290,7 @@ class VoyageFigures:
     current: WaterCurrent | None = None
     traffic: TrafficCounts | None = None
     servos: Servos = field(default_factory=Servos)
+    ranges: Ranges = field(default_factory=Ranges)
     _anchor: tuple[float, float] | None = None
     _side: int = 0
     _pending: tuple[int, float, float] | None = None
@@ -338,6 +340,7 @@ class VoyageFigures:
         if step.state.voyage.over:
             return   # what follows is a loiter
         self.last_s = snapshot.t_s
+        self.ranges.take(step)
         if autopilot is not None:
             self.servos.take(autopilot.servo_us)
         if snapshot.position_en_m is not None:
@@ -409,6 +412,7 @@ class VoyageFigures:
             "no_go_entries": self.no_go_entries,
             "current": None if self.current is None else plain(self.current),
             "servos": self.servos.to_dict(),
+            "figures": self.ranges.to_dict(),
             "alerts": dict(sorted(self.alerts.items())),
             "traffic": None if self.traffic is None else asdict(self.traffic),
         }
