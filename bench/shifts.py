@@ -23,7 +23,7 @@ import numpy as np
 
 from companion.boat.polar import ardurover_sitl
 from companion.geo.angles import difference_rad, mean_direction_rad
-from companion.skipper.behaviors.tacks import LAST_S, LEAST_MPS, TURNING
+from companion.skipper.behaviors.sailing import LAST_S, LEAST_MPS, TURNING
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.wind_shifts import shifts_of
 from companion.wind import Forecaster

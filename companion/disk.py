@@ -1,13 +1,14 @@
 """The disk: whole files that a power cut leaves old or new, appended records whole or absent, the room that is left.
 
 Everything that a voyage writes goes through a ``Disk``. Tests and the simulator put another in its place: one that
-is full, sick or read-only, or that forgets what was not synced.
+is full, sick or read-only, or that forgets what was not synced. A folder's lock and files with a secret are here, too.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import io
 import os
 import stat
@@ -15,6 +16,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
+
+from companion.errors import InputError, unreadable
 
 # A restart must find room for its state on a disk that records have filled: they stop at this much [bytes] ...
 RESERVE_BYTES = 8 << 20
@@ -200,3 +203,67 @@ def reason(error: OSError) -> str:
 def is_mistake(error: OSError) -> bool:
     """Return whether the name was wrong: whoever typed it must hear so, and waiting does not mend it."""
     return error.errno in _MISTAKES
+
+
+class FolderLock:
+    """The lock on ``folder``, held by one process for as long as it lives; not taken until ``take``.
+
+    The folder itself is locked (flock), so nothing is written, nothing is left behind by a kill, and a full or
+    read-only disk can be locked too.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._fd: int | None = None
+
+    @property
+    def is_held(self) -> bool:
+        """Whether this process holds it."""
+        return self._fd is not None
+
+    def take(self) -> bool:
+        """Take the lock; False when somebody else holds it.
+
+        Raises:
+            OSError: the folder is not there, or its file system knows no locks.
+        """
+        fd = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(fd)
+            return False
+        except OSError:
+            os.close(fd)
+            raise
+        self._fd = fd
+        return True
+
+    def release(self) -> None:
+        """Give it back, if it is held."""
+        if self._fd is not None:
+            os.close(self._fd)
+            self._fd = None
+
+
+MOST_BYTES = 65_536
+
+
+def read_secret(path: Path, what: str, remedy: str) -> str:
+    """Return the text of such a file, without the blanks around it.
+
+    ``what`` is its name in a message, ``remedy`` what to do when it is not there.
+
+    Raises:
+        InputError: it cannot be read, is not text, or others may read it.
+    """
+    try:
+        with open_regular(path) as file:
+            mode, text = os.fstat(file.fileno()).st_mode, file.read(MOST_BYTES).decode("utf-8").strip()
+    except OSError as error:
+        raise unreadable(str(path), error, what, remedy) from error
+    except UnicodeDecodeError as error:
+        raise InputError(str(path), "", f"{what} is not text", remedy) from error
+    if mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise InputError(str(path), "", f"{what} can be read by others", f"chmod 600 {path}")
+    return text

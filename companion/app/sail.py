@@ -19,8 +19,7 @@ from typing import Any
 from companion.app.autopilot_upkeep import NOBODY, keep_fence, keep_identity, keep_parameters, make_way, others_on
 from companion.app.executor import Executor, Planner
 from companion.app.from_autopilot import ADOPTED, Adoption
-from companion.app.local_clients import OnView, ViewBroadcast, live_page, take_orders
-from companion.app.operator_commands import OperatorCommands
+from companion.app.local_clients import OnView, OperatorCommands, ViewBroadcast, live_page, take_orders
 from companion.app.options import SailOptions, SatelliteLink
 from companion.app.satellite import SatelliteMailbox
 from companion.clock import now_s

@@ -57,7 +57,7 @@ _Mark = tuple[int, int]   # of a file: when it was changed, and which it is
 
 
 class OrderHandler(Protocol):
-    """Who carries out orders, and answers (``companion.app.operator_commands.OperatorCommands``)."""
+    """Who carries out orders, and answers (``companion.app.local_clients.OperatorCommands``)."""
 
     async def ask(self, wanted: Wanted, number: int, way: str) -> Answer:
         """Give an order and return its answer."""

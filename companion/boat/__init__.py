@@ -14,8 +14,7 @@ from companion.boat.margins import (
     required_margin,
     widest_corridor_m,
 )
-from companion.boat.polar import Polar, ardurover_sitl, avalon, constant
-from companion.boat.polar_files import parse_polar, read_polar
+from companion.boat.polar import Polar, ardurover_sitl, avalon, constant, parse_polar, read_polar
 
 __all__ = [
     "AutopilotLimits", "Boat", "Hull", "Polar", "ProposedMargin", "ardurover_sitl", "avalon", "can_hold",

@@ -455,9 +455,8 @@ def hold_state_folder(state_path: Path, folder: Path, err: Console) -> Iterator[
 
     A state within the voyage's own folder is guarded by whoever records there.
     """
-    from companion.disk import Disk, is_mistake, reason
+    from companion.disk import Disk, FolderLock, is_mistake, reason
     from companion.errors import InputError, JobError
-    from companion.lock import FolderLock
 
     if state_path.is_dir():
         raise InputError("--state", str(state_path), "is a folder", "name a file")

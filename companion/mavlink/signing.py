@@ -15,10 +15,9 @@ import re
 import secrets
 from pathlib import Path
 
-from companion.disk import Disk, read_regular, reason
+from companion.disk import Disk, read_regular, read_secret, reason
 from companion.errors import InputError
 from companion.mavlink.wire.frames import MOST_TIMESTAMP, SigningState
-from companion.secret import read_secret
 
 # 2015-01-01T00:00:00Z in Unix seconds: the zero of MAVLink signing timestamps, which count 10 µs.
 EPOCH_S = 1_420_070_400.0

@@ -10,13 +10,13 @@ from types import TracebackType
 from typing import Any, Self
 
 from companion.addresses import Displays
+from companion.disk import read_secret
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.guard import Auxiliary, Guard
 from companion.outputs.nmea import Lines, TcpOutlet, UdpOutlet, lines_of
 from companion.outputs.outlet import Outlet, Say
 from companion.outputs.signalk import TcpSignalK, Values, WebSocketSignalK, require_websockets, values_of
-from companion.secret import read_secret
 from companion.view.values import View
 
 MOST_TOKEN = 8192   # characters

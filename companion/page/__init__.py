@@ -11,8 +11,7 @@ from companion.page.connections import (
     read_token,
     require_token,
 )
-from companion.page.server import served, tile_at
-from companion.page.site import export, files
+from companion.page.server import export, files, served, tile_at
 from companion.page.sources import LiveSource, RecordedSource, plan_figures
 
 __all__ = [

@@ -25,9 +25,8 @@ import h11
 import msgspec
 
 from companion.clock import now_s
-from companion.disk import Disk, read_regular
+from companion.disk import Disk, read_regular, read_secret
 from companion.errors import InputError, JobError, unreadable
-from companion.secret import read_secret
 
 LEAST_TOKEN = 22      # characters: 128 bits in base64
 MOST_EMPTY = 65_536   # bytes of nothing that are looked through

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -21,13 +21,128 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.errors import InputError
-from companion.planner.contingency import CONTACT_S
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import Plan, PlanStatus, Why
-from companion.planner.problem.evaluate import Evaluation, clearances, evaluate
+from companion.planner.problem.evaluate import Evaluation, beaten, clearances, evaluate
+from companion.planner.problem.parts import Beat
 from companion.planner.problem.value import Problem, defect_of, resolved
+from companion.planner.risk.tacks import TackAtRisk, of_risky, tacks_at_risk
 from companion.planner.warm import warm_problems
 from companion.planners import ALGORITHMS, Settings
+
+DEARER = 1.10          # of the first path's time: what another may take
+CONTACT_S = 1800.0     # what a contact counts as
+AGAIN_SHARE = 0.15     # of the search's expansions, for each of the others
+AGAIN_TIME_SHARE = 0.04   # of its seconds: together they stay within a fifth of the budget
+NARROWER = (1.0, 2.0, 3.0, 0.5)   # of the room that is missing: more of it lets more failures in a row pass
+SPARE_M = 0.5
+
+
+def with_contingency(search: Search) -> Search:
+    """Return the search whose tacks have room to fail, where there is such a path.
+
+    Where a tack's failure would touch (``companion.planner.risk.tacks``) it looks again in water that is narrower by
+    the room that is missing, and by other shares of that: the boat then tacks earlier; and as a boat that does not
+    tack. Of what is within ``DEARER`` of the first path's time the least risky is handed out; a slower one where the
+    risk that it spares, a contact taken for ``CONTACT_S``, is worth the time. What no such path avoids is counted in
+    the path's risk.
+    """
+
+    def careful(problem: Problem, effort: Effort, seed: int) -> Outcome:
+        outcome = search(problem, effort, seed)
+        if outcome.waypoints_en is None:
+            return outcome
+        judged = evaluate(problem, outcome.waypoints_en)
+        tacks = tacks_at_risk(problem, judged.legs)
+        if not any(tack.is_risky for tack in tacks):
+            return outcome
+        best, best_key, limit_s = outcome, (of_risky(tacks), judged.time_s), DEARER * judged.time_s
+        for other in _others(problem, tacks):
+            again = effort.again(AGAIN_SHARE, AGAIN_TIME_SHARE)
+            if not effort.has_time(0.0 if math.isinf(again.budget_s) else again.budget_s):
+                break
+            found = search(other, again, seed)
+            effort.spend(again.used)
+            if found.waypoints_en is None:
+                continue
+            # in the problem itself: what is narrower for the search is not narrower for the path
+            seen = evaluate(problem, found.waypoints_en)
+            if not seen.is_feasible:
+                continue
+            key = (of_risky(tacks_at_risk(problem, seen.legs)), seen.time_s)
+            is_worth_it = key < best_key if seen.time_s <= limit_s else _keyed_s(key) < _keyed_s(best_key)
+            if is_worth_it:
+                best, best_key = found, key
+            if best_key[0] == 0.0:
+                break
+        return replace(best, lower_bound_s=outcome.lower_bound_s)
+
+    return careful
+
+
+def _keyed_s(key: tuple[float, float]) -> float:
+    """Return a path's time, with what its risk counts as [s]."""
+    risk, time_s = key
+    return time_s + CONTACT_S * risk
+
+
+def _others(problem: Problem, tacks: tuple[TackAtRisk, ...]) -> Iterator[Problem]:
+    """Yield the problem with more room about its tacks, and without tacks."""
+    lack = max(tack.lack_m for tack in tacks if tack.is_risky) + SPARE_M
+    for share in NARROWER:
+        narrower = replace(problem, clearance_floor_m=problem.clearance_floor_m + share * lack)
+        if defect_of(narrower) is None:
+            yield narrower
+    yield replace(problem, beat=None, boat=replace(problem.boat, can_tack=False))
+
+
+BOUND_TESTS = 40_000   # of visibility, for the bound of both kinds of path, when there is effort left
+BEAT_SHARE = 0.3       # of the effort, for the path with beats: an easier search, and often the end of it
+
+
+def with_beats(search: Search, beat: Beat) -> Search:
+    """Return the search of the faster of two paths: one without beats, one whose beats are left to the autopilot.
+
+    Its bound holds for paths of both kinds.
+    """
+    from companion.planner.search.bound import cut_off, lower_bound_s
+    from companion.planner.search.world import make_world
+
+    def both(problem: Problem, effort: Effort, seed: int) -> Outcome:
+        closed = replace(problem, beat=None)
+        straight = beaten(problem, beat)
+
+        def bounded(outcome: Outcome) -> Outcome:
+            either = replace(straight, clearance_floor_m=problem.clearance_floor_m)
+            bound_s = 0.0 if effort.is_late else lower_bound_s(either, tests=0 if effort.is_over else BOUND_TESTS)
+            return replace(outcome, lower_bound_s=min(bound_s, outcome.lower_bound_s))
+
+        # Where the fence leaves no corridor there is nothing to search.
+        beating, beating_s = Outcome(waypoints_en=None), math.inf
+        if defect_of(straight) is None:
+            beating = search(straight, effort.part(BEAT_SHARE), seed)
+        if beating.waypoints_en is not None:
+            judged = evaluate(problem, beating.waypoints_en)
+            beating_s = judged.time_s if judged.is_feasible else math.inf
+        if math.isfinite(beating_s) and beating_s <= lower_bound_s(closed):
+            return bounded(replace(beating, lower_bound_s=math.inf))
+        if math.isfinite(beating_s) and effort.is_late:
+            return bounded(replace(beating, lower_bound_s=math.inf))
+        sailing = search(closed, effort, seed)
+        if sailing.waypoints_en is None and math.isinf(beating_s):
+            if sailing.status is PlanStatus.INFEASIBLE and cut_off(make_world(closed)) is None:
+                # The wind closes what is sailed and the corridor what is beaten: no proof for a path of both.
+                reason = f"no path was found; without beats {sailing.reason}"
+                return replace(sailing, status=PlanStatus.TIMEOUT, reason=reason)
+            return sailing
+        if sailing.waypoints_en is None:
+            return bounded(replace(beating, lower_bound_s=math.inf))
+        if beating_s < evaluate(problem, sailing.waypoints_en).time_s:
+            return bounded(replace(beating, lower_bound_s=math.inf))
+        return bounded(sailing)
+
+    return both
+
 
 DEFAULT_BUDGET_S = 1.0
 OPTIMAL_GAP = 1e-3
@@ -125,7 +240,6 @@ def _solved(
             return keep_limit(problem, keep_share(problem, _judged(free, outcome, effort, empty)))
 
     if problem.beat is not None and problem.boat.can_tack and empty.algorithm == "auto":
-        from companion.planner.beat_search import with_beats
 
         search = with_beats(search, problem.beat)
 
@@ -225,7 +339,6 @@ def _whole(
 
         whole = with_track(search_resolved, judge)
     if problem.boat.tack_fails > 0.0 and problem.boat.can_tack:
-        from companion.planner.contingency import with_contingency
 
         whole = with_contingency(whole)
     return whole

@@ -9,9 +9,9 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from companion.skipper.behaviors.brake import brakes
 from companion.skipper.behaviors.failsafe import keeps_off, operator_has_it
 from companion.skipper.behaviors.field_guidance import last_resort
+from companion.skipper.behaviors.headings import brakes
 from companion.skipper.behaviors.helm import repair
 from companion.skipper.behaviors.launch import finished, launch, start
 from companion.skipper.behaviors.operator_orders import holds_ashore, leaves_alone

@@ -48,10 +48,8 @@ from companion.skipper.step.state import (
     standing_saved,
 )
 from companion.skipper.watch.measures import follow_charge
-from companion.skipper.watch.notices import speak_of_stop, watch_water
 from companion.skipper.watch.tacks import watch_tacks
-from companion.skipper.watch.traffic_watch import look_out
-from companion.skipper.watch.watch import watch
+from companion.skipper.watch.watch import look_out, speak_of_stop, watch, watch_water
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.voyage import Voyage
 

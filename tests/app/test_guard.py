@@ -13,7 +13,7 @@ from companion import cli
 from companion.app import autopilot_upkeep, local_clients
 from companion.app import sail as app
 from companion.app.from_autopilot import Adoption
-from companion.app.operator_commands import OperatorCommands
+from companion.app.local_clients import OperatorCommands
 from companion.app.options import SailOptions, SatelliteLink, at_once
 from companion.app.satellite import SatelliteMailbox
 from companion.clock import now_s, run_virtual

@@ -10,8 +10,7 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from companion.app.local_clients import MAX_LINE, MOST, ViewBroadcast, orders_served
-from companion.app.operator_commands import OperatorCommands
+from companion.app.local_clients import MAX_LINE, MOST, OperatorCommands, ViewBroadcast, orders_served
 from companion.clock import run
 from companion.compose import config_of, voyage_of
 from companion.errors import InputError

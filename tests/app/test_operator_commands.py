@@ -4,7 +4,7 @@ import asyncio
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.app.operator_commands import MOST_WAITING, OperatorCommands
+from companion.app.local_clients import MOST_WAITING, OperatorCommands
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.wire.frames import Codec, Drop, SigningState
 from companion.orders import Verb

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from companion.app import satellite
-from companion.app.operator_commands import OperatorCommands
+from companion.app.local_clients import OperatorCommands
 from companion.app.options import SatelliteLink, at_once
 from companion.app.satellite import ASIDE, IN, LOOK_S, MOST_ASIDE, OUT, TAKEN, TRIES, SatelliteMailbox
 from companion.clock import run_virtual

@@ -11,8 +11,7 @@ import pytest
 
 from companion import cli, clock
 from companion.geofence import read
-from sitl.ardurover.program import find
-from sitl.ardurover.simulation import ArduRover
+from sitl.ardurover.simulation import ArduRover, find
 from sitl.autopilot import HOME
 from sitl.world.environment import Constant
 from tests.sitl.boats import boat_process

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from companion.field.controllers import motor_commands
 from companion.geo.angles import wrap_pi
 from lab.tasks.motor import HABITS, run, run_ardurover
-from sitl.ardurover.program import find
+from sitl.ardurover.simulation import find
 from sitl.world.boats import MotorBoat
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.geo.sun import sun_height_rad
+from companion.skipper.watch.measures import sun_height_rad
 
 
 def height_deg(lat_deg, lon_deg, *when):

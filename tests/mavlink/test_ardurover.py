@@ -14,8 +14,7 @@ from companion.mavlink.transports import open_link
 from companion.mavlink.wire.companion_status import StatusReader
 from companion.mavlink.wire.items import first_difference, mission_hash, sailed
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, Mode, StatusText, waypoint
-from sitl.ardurover.program import find
-from sitl.ardurover.simulation import ArduRover
+from sitl.ardurover.simulation import ArduRover, find
 from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, serve
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.autopilot.memory_link import frames

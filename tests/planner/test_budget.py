@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from companion.planner import Plan, Problem, effort, plan
-from companion.planner.contingency import CONTACT_S
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.solve import warm
+from companion.planner.solve import CONTACT_S, warm
 from companion.planner.track import expected
 from tests.planner.problems import load
 

@@ -14,8 +14,7 @@ from companion import clock
 from companion.errors import InputError, JobError
 from companion.geo.angles import difference_rad
 from companion.mavlink.transports import open_link
-from sitl.ardurover.program import check, fetch, find
-from sitl.ardurover.simulation import ArduRover, free_instance
+from sitl.ardurover.simulation import ArduRover, check, fetch, find, free_instance
 from sitl.autopilot import HOME
 from sitl.world.environment import Constant, Scripted, WindEvent
 from tests.sitl.boats import Client, sail

@@ -20,7 +20,7 @@ from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint
 from companion.traffic.feeds import open_feed
 from companion.traffic.nmea import NmeaDecoder
-from sitl.ardurover.program import find
+from sitl.ardurover.simulation import find
 from sitl.autopilot import AisVessel, VaneFault, VaneState
 from sitl.faults.link_faults import FaultyVane, Relay, impair
 from sitl.run.live import run_live

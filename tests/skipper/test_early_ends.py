@@ -3,7 +3,7 @@
 import pytest
 
 from companion.safety import End
-from companion.skipper.planning.ends import announcement
+from companion.skipper.planning.diversions import announcement
 from companion.skipper.step.actions import RequestPlan
 from companion.skipper.step.config import Ends, SafeEnd, SkipperConfig
 from companion.skipper.way.geometry import distance_m

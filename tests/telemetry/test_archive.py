@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from companion.lock import FolderLock
+from companion.disk import FolderLock
 from companion.telemetry.folder.recorder import DECISIONS, TLOG, TRACK, VOYAGE, Recorder, VoyageArchive, read_jsonl
 
 STAMPS = {"t_s": 1.0, "utc": "then"}

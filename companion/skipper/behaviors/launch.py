@@ -11,8 +11,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode, Severity
 from companion.skipper.behaviors.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning.asking import lacks, request
-from companion.skipper.planning.diversions import fenced_off, home_trouble
-from companion.skipper.planning.ends import announcement
+from companion.skipper.planning.diversions import announcement, fenced_off, home_trouble
 from companion.skipper.planning.uploads import upload
 from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.config import SafeEnd

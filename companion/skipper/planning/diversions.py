@@ -9,17 +9,19 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from companion.boat import Boat
 from companion.messages import Severity
 from companion.orders import Verb
-from companion.safety import BATTERY, BY_RANK, ENDINGS, SHORE, Answer, End
+from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, Answer, End
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
-from companion.skipper.step.config import SafeEnd
+from companion.skipper.step.config import SafeEnd, SkipperConfig
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import HOME_RADIUS_M, Diversion, Kind
 from companion.skipper.way.autopilot_fence import Circle, Drawn
 from companion.skipper.way.gates import Gate, marks_of
 from companion.skipper.way.geometry import disc_wkt, distance_m
 from companion.skipper.way.voyage import PointEn, Refuge
+from companion.traffic import Policy
 
 DRAGGED = "dragged off"   # a watchdog
 HOME, REST = "home", "the place to rest"
@@ -308,3 +310,33 @@ def is_at_rest(ctx: StepContext) -> bool:
     if bound is None or route is None or ctx.ahead():
         return False
     return bound.kind is Kind.STAY or route.bound_for == bound.name
+
+
+POLICY_WORDS = {
+    Policy.KEEP_CLEAR: "vessels: kept clear of, whoever must give way",
+    Policy.RULES: "vessels: by the rules of the road",
+}
+
+
+def words(config: SkipperConfig, name: str) -> str:
+    """Return what is done about a watchdog that ends a voyage, in words."""
+    end = config.ends.end(name)
+    last = "say so" if ENDINGS[name].sails_on else "loiter near by"
+    home = "home, " if config.safe_end is SafeEnd.RETURN else ""
+    return {
+        End.SAY: "say so", End.STAY: "loiter near by",
+        End.REFUGE: f"to the nearest refuge, else {home}{last}", End.HOME: f"home, else to the nearest refuge, {last}",
+    }[end]
+
+
+def announcement(config: SkipperConfig, boat: Boat) -> str:
+    """Return all of it in one sentence, and how vessels are met, to be said before setting sail."""
+    limits = {"voyage_timeout_s": config.voyage_timeout_s, "max_tws_mps": boat.max_tws_mps,
+              "min_tws_mps": boat.min_tws_mps, "": 0.0}
+    names = [name for name, ending in ENDINGS.items() if limits[ending.asked_by] is not None]
+    said = [f"{name}: {words(config, name)}" for name in names]
+    for name in (cause.name for cause in FAILSAFES):
+        answer = config.ends.answer(name)
+        if answer is not None:
+            said.append(f"{name} failsafe: {answer.words}")
+    return "; ".join([*said, POLICY_WORDS[config.traffic_policy]])

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
-from companion.geo.sun import sun_height_rad
 from companion.messages import Severity
 from companion.safety import BY_NAME, JUMP_M, STOPPING
 from companion.skipper.behaviors.drifting import meets_in_s, sails
@@ -21,6 +20,29 @@ from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.state import Charge
 from companion.skipper.step.wind_limits import too_light, too_strong
 from companion.skipper.way.geometry import along_m, cross_track_m, distance_m
+
+_J2000_UNIX_S = 946_728_000.0   # 2000-01-01 12:00 UTC
+_DAY_S = 86_400.0
+
+
+def sun_height_rad(lat_rad: float, lon_rad: float, unix_s: float) -> float:
+    """Return how high the sun's centre stands over the horizon, negative below it, without refraction [rad].
+
+    The almanac's low-precision formula (U.S. Naval Observatory, Astronomical Almanac, section C): within 0.01 deg of
+    the true place until 2050.
+    """
+    days = (unix_s - _J2000_UNIX_S) / _DAY_S
+    mean_longitude = math.radians((280.460 + 0.9856474 * days) % 360.0)
+    anomaly = math.radians((357.528 + 0.9856003 * days) % 360.0)
+    longitude = mean_longitude + math.radians(1.915) * math.sin(anomaly) + math.radians(0.020) * math.sin(2.0 * anomaly)
+    obliquity = math.radians(23.439 - 4e-7 * days)
+    ascension = math.atan2(math.cos(obliquity) * math.sin(longitude), math.cos(longitude))
+    declination = math.asin(math.sin(obliquity) * math.sin(longitude))
+    sidereal = math.radians((280.46062 + 360.98564737 * days) % 360.0)   # Greenwich mean
+    hour_angle = sidereal + lon_rad - ascension
+    return math.asin(
+        math.sin(lat_rad) * math.sin(declination) + math.cos(lat_rad) * math.cos(declination) * math.cos(hour_angle))
+
 
 IRONS_TWA_RAD = math.radians(35.0)
 IRONS_TWS_MPS = 1.5            # less wind than this is a calm, not irons

@@ -1,17 +1,209 @@
-"""The watch: raises and clears the watchdogs of the table, and says so."""
+"""The watch: watchdogs of the table, the lookout for vessels, and what is said of a boat that was stopped."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.frozen import changed
+from companion.geo.angles import wrap_two_pi
 from companion.messages import Mode, Severity
-from companion.safety import BY_NAME, TABLE, Response, Watchdog
+from companion.safety import BY_NAME, CAUSES, HOMEWARD, PERSON, TABLE, Response, Watchdog
 from companion.skipper.behaviors.drifting import STEERAGE_MPS, is_driven_astern
-from companion.skipper.planning.ends import words
+from companion.skipper.behaviors.failsafe import TOLD_S, is_answered
+from companion.skipper.planning.diversions import words
+from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Raised
 from companion.skipper.watch.measures import measure
+from companion.skipper.way.drift import DriftAhead, drift_ahead
+from companion.skipper.way.voyage import PointEn, outside_m, water_at
+from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, Policy, assess
+from companion.traffic.colregs import follow
+
+SHOWN = 8                # vessels kept in the state: the worst
+VESSEL_EVERY_S = 30.0           # between two lines of one vessel
+# Acting begins nearer than warning: the shares of a lake's limits (``companion.traffic.LAKE``).
+ACT_CPA, ACT_TCPA = 0.4, 0.5
+SEVERITY = {Alarm.WARN: Severity.WARNING, Alarm.ACT: Severity.CRITICAL, Alarm.TOUCH: Severity.CRITICAL}
+
+
+def limits(config: SkipperConfig) -> AlarmLimits:
+    """Return when to warn and to act, from the distance and the time that the mission calls safe."""
+    return AlarmLimits(
+        warn_cpa_m=config.traffic_clearance_m, warn_tcpa_s=config.traffic_time_s,
+        act_cpa_m=ACT_CPA * config.traffic_clearance_m, act_tcpa_s=ACT_TCPA * config.traffic_time_s)
+
+
+def look_out(ctx: StepContext) -> None:
+    """Judge the vessels in view and announce alarms that are new or go on.
+
+    An alarm needs CPA and TCPA both under their limits. Of each vessel one line is said in half a minute, one vessel a
+    step and the worst first: among many nobody can read more. The rules of the road are shown, and not relied upon: the
+    boat keeps clear of everyone (``companion.traffic.colregs``). Under the policy "rules" encounters are followed to
+    past and clear, and each is said when it begins and when what we do changes.
+    """
+    picture, vehicle, boat = ctx.snapshot.traffic, ctx.snapshot.vehicle, ctx.boat_en
+    if picture is None or vehicle is None or boat is None or not picture.vessels:
+        if ctx.state.traffic.watch:
+            ctx.set(traffic=changed(ctx.state.traffic, watch=()))
+        return
+    hull, wind, adrift = ctx.voyage.boat.hull, ctx.wind_now, ctx.state.adrift
+    own = OwnShip(
+        t_s=ctx.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
+        radius_m=hull.reach_m,
+        is_sailing=ctx.config.sails and not (adrift.motor and adrift.since_s is not None))   # rule 3 c
+    found = assess(own, picture, limits(ctx.config), None if wind is None else wind[0])
+    if ctx.config.traffic_policy is Policy.RULES:
+        found = _meet(ctx, own, found)
+    ctx.set(traffic=changed(ctx.state.traffic, watch=found[:SHOWN]))
+    _say(ctx, found[:SHOWN])
+
+
+def _meet(ctx: StepContext, own: OwnShip, found: Sequence[Assessment]) -> tuple[Assessment, ...]:
+    """Follow the encounters, say which have changed, and return the vessels with what the rules gave each of them."""
+    state, mean = ctx.state, ctx.wind_mean
+    before = {(h.mmsi, h.branch): h for h in state.traffic.encounters}
+    held = follow(state.traffic.encounters, own, found, t_s=ctx.t_s, clearance_m=ctx.config.traffic_clearance_m,
+                  twd_from_rad=None if mean is None else mean[0])
+    now = {(h.mmsi, h.branch): h for h in held}
+    told = {t[:2]: t for t in state.announced.encounters}
+    for one in found:
+        key = one.vessel.mmsi, one.vessel.branch
+        after, last = now.get(key), told.get(key)
+        if after is None:
+            continue
+        what = "evident" if after.evident else after.encounter.role.value
+        if last is not None and (last[2] == what or (ctx.t_s - last[3] < VESSEL_EVERY_S and not after.evident)):
+            continue
+        severity = (Severity.CRITICAL if after.evident else Severity.WARNING if after.stands_on else Severity.NOTICE)
+        ctx.say(severity, "encounter", after.sentence(one.approach), every_s=0.0)
+        told[key] = (*key, what, ctx.t_s)
+    for key, gone in before.items():
+        if key not in now:
+            ctx.say(Severity.INFO, "encounter", f"{gone.label}: past and clear", every_s=0.0)
+            told.pop(key, None)
+    ctx.set(
+        traffic=changed(ctx.state.traffic, encounters=held),
+        announced=changed(ctx.state.announced, encounters=tuple(told.values())))
+    return tuple(replace(one, encounter=now[key].encounter) if (
+        key := (one.vessel.mmsi, one.vessel.branch)) in now else one for one in found)
+
+
+def _say(ctx: StepContext, found: Sequence[Assessment]) -> None:
+    """Say the worst of the alarms that were not said lately."""
+    lately = tuple(told for told in ctx.state.announced.watch if ctx.t_s - told[2] < VESSEL_EVERY_S)
+    known = {told[:2] for told in lately}
+    news = next((a for a in found if a.alarm is not Alarm.NONE and (a.vessel.mmsi, a.vessel.branch) not in known), None)
+    if news is not None:
+        ctx.say(SEVERITY[news.alarm], "vessel near", news.sentence(), every_s=0.0)
+        lately = (*lately, (news.vessel.mmsi, news.vessel.branch, ctx.t_s))
+    ctx.set(announced=changed(ctx.state.announced, watch=lately))
+
+
+EVERY_S = 60.0
+MOVES_MPS = 0.15      # slower than this the fixes' noise tells no drift
+CARRIED_MPS = 3.0     # faster than this a disarmed boat is towed or carried
+LOITER_M = 20.0       # so near to where RTL ends it loiters there
+PATIENCE_S = 30.0     # an answer that is on its way is given this long before it is spoken of
+ANOTHER_MPS = 0.25       # it is said again when it has changed by so much
+REMIND_S = 1800.0
+
+
+def speak_of_stop(ctx: StepContext) -> None:
+    """Say how the boat drifts while a stop lasts, what it meets and when, and what to press.
+
+    A failsafe's stop is told every minute for as long as it lasts, whoever may end it. A person who has stopped the
+    boat knows that, and is told only when it drifts onto something.
+    """
+    stop = ctx.state.operator.stop
+    if stop is None or ctx.autopilot is None or ctx.t_s - stop.t_s <= (
+        PATIENCE_S if is_answered(ctx) else TOLD_S
+    ) or ctx.is_said("adrift", EVERY_S):
+        return
+    here, vehicle = ctx.snapshot.position_en_m, ctx.snapshot.vehicle
+    ahead = None if here is None or vehicle is None else _ahead(ctx, here, vehicle.velocity_en_mps)
+    meets = ahead is not None and not ahead.is_clear
+    if stop.cause == PERSON and not (meets and ahead is not None and MOVES_MPS <= ahead.speed_mps <= CARRIED_MPS):
+        return
+    mode = stop.mode.name if stop.mode is not None else "an unknown mode"
+    by = "a person" if stop.cause == PERSON else f"the {stop.cause} failsafe"
+    what = f"{mode if stop.is_armed else 'disarmed'} by {by}"
+    where = "; her position is not known" if here is None or ahead is None else _where(ctx, here, ahead)
+    ctx.say(Severity.CRITICAL if meets or not is_answered(ctx) else Severity.WARNING, "adrift",
+             f"{what}{where}; {_remedy(ctx)}", every_s=EVERY_S)
+
+
+def _ahead(ctx: StepContext, here: PointEn, velocity: tuple[float, float]) -> DriftAhead:
+    """Follow the drift; in RTL the straight way to where the autopilot takes her. A loiter goes nowhere.
+
+    Outside the fence the fence is left out.
+    """
+    status, area = ctx.snapshot.autopilot, water_at(ctx.voyage.area, here)
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
+    speed = math.hypot(*velocity)
+    homeward = status is not None and status.mode in HOMEWARD
+    far_m = status.waypoint_distance_m if status is not None and homeward else None
+    course = status.target_bearing_rad if status is not None else None
+    if status is not None and (status.mode is Mode.LOITER or (homeward and (far_m is None or far_m < LOITER_M))):
+        return drift_ahead(area, here, (0.0, 0.0), floor_m=floor_m)
+    if course is None or far_m is None:
+        return drift_ahead(area, here, velocity, floor_m=floor_m)
+    way = (speed * math.sin(course), speed * math.cos(course))
+    return drift_ahead(area, here, way, floor_m=floor_m, horizon_s=max(1.0, far_m / max(speed, MOVES_MPS)))
+
+
+def _where(ctx: StepContext, here: PointEn, ahead: DriftAhead) -> str:
+    vehicle, far_m = ctx.snapshot.vehicle, outside_m(ctx.voyage.area, here)
+    place = "" if vehicle is None else f" at {vehicle.position.lat_deg:.5f}, {vehicle.position.lon_deg:.5f}"
+    fence = f", {far_m:.0f} m outside the fence" if far_m > 0.0 else ""
+    if ctx.autopilot is not None and ctx.autopilot.mode in HOMEWARD and ahead.speed_mps > 0.0:
+        course = math.degrees(wrap_two_pi(math.atan2(*ahead.velocity_en_mps)))
+        way = f"sailing straight home, {course:03.0f}°"
+        if ahead.floor_s is not None:
+            meets = f"onto {ahead.name}" if ahead.contact_s is not None else f"past {ahead.name}"
+            way += f", {meets} in {ahead.contact_s if ahead.contact_s is not None else ahead.floor_s:.0f} s"
+    else:
+        way = ahead.sentence() if ahead.speed_mps >= MOVES_MPS else "staying there"
+    return f": {way}{place}{fence}"
+
+
+def _remedy(ctx: StepContext) -> str:
+    """Return what to press, and what would let the companion do it."""
+    stop, may = ctx.state.operator.stop, ctx.snapshot.permissions
+    if is_answered(ctx):
+        return ctx.state.why
+    if stop is not None and not stop.is_armed:
+        return "arm her and press AUTO, or take her in MANUAL"
+    cause = CAUSES.get(stop.cause) if stop is not None else None
+    if cause is None:
+        return "press AUTO to sail on, or take her in MANUAL"
+    leave = "" if may.may_set_mode else " (the mission's [operator] set_auto would let the companion)"
+    return f"press {cause.press}{leave}"
+
+
+# --------------------
+# What is said of the current: when plans begin to reckon with one, when it has become another, and what is not known.
+# A tide table that has ended, or that no time can be found in, is said as soon as she is under way and every half hour.
+
+
+def watch_water(ctx: StepContext) -> None:
+    """Say what is new of the current."""
+    current, told = ctx.snapshot.current, ctx.state.announced.water_en_mps
+    if not ctx.state.voyage.sailing:
+        return
+    if current.verdict:
+        ctx.say(Severity.WARNING, "tide table", current.verdict, every_s=REMIND_S)
+    if not current.is_significant:
+        if told is not None:
+            ctx.set(announced=changed(ctx.state.announced, water_en_mps=None))
+            ctx.say(Severity.INFO, "current", "the current is no longer told from still water: plans leave it out",
+                     every_s=0.0)
+        return
+    if told is None or math.dist(told, current.en_mps) >= ANOTHER_MPS:
+        ctx.set(announced=changed(ctx.state.announced, water_en_mps=current.en_mps))
+        ctx.say(Severity.INFO, "current", f"{current.sentence()}: plans reckon with it", every_s=0.0)
 
 
 def watch(ctx: StepContext) -> None:

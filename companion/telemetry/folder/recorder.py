@@ -35,9 +35,8 @@ from typing import Any, Self
 import numpy as np
 import tomli_w
 
-from companion.disk import Disk, is_mistake, open_regular, reason
+from companion.disk import Disk, FolderLock, is_mistake, open_regular, reason
 from companion.errors import JobError
-from companion.lock import FolderLock
 
 DECISIONS = "decisions.jsonl"
 TRACK = "track.csv"

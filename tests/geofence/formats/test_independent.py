@@ -171,8 +171,7 @@ def test_only_the_boat_that_is_named_is_touched(tmp_path):
 
 @pytest.mark.ardurover
 def test_shore_tools_against_the_real_ardurover(tmp_path):
-    from sitl.ardurover.program import find
-    from sitl.ardurover.simulation import DEFAULTS, free_instance
+    from sitl.ardurover.simulation import DEFAULTS, find, free_instance
 
     program = find()
     if program is None:

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from companion.planner import Problem
 from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
+from companion.planner.search.auto import Searcher
 from companion.planner.search.bound import Bound, grows, make_boards
 from companion.planner.search.gauge import make_gauge
-from companion.planner.search.searcher import Searcher
 from companion.planner.search.world import make_world
 from tests.planner.problems import box, load, random_problems, simple
 

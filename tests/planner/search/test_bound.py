@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
+from companion.planner.search.auto import Searcher
 from companion.planner.search.bound import Bound, cut_off
 from companion.planner.search.gauge import disc_time, make_gauge
-from companion.planner.search.searcher import Searcher
 from companion.planner.search.world import make_world
 from tests.planner.problems import POLAR, box, load, random_problems, simple
 

@@ -14,8 +14,7 @@ from companion.mavlink.link import Link
 from companion.mavlink.transports import open_link
 from companion.messages import Command, GeoPoint, MissionItem, waypoint
 from companion.skipper.board.mark import are_marked, marked
-from sitl.ardurover.program import find
-from sitl.ardurover.simulation import ArduRover
+from sitl.ardurover.simulation import ArduRover, find
 from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
 from sitl.world.environment import Constant
 

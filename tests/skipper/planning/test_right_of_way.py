@@ -8,14 +8,14 @@ import pytest
 from companion.boat import Boat, constant
 from companion.geo.angles import difference_rad
 from companion.messages import Severity
-from companion.skipper.planning.ends import announcement
+from companion.skipper.planning.diversions import announcement
 from companion.skipper.planning.right_of_way import bow_discs, regions, stands_on
 from companion.skipper.planning.vessels import meetings, near, shares
 from companion.skipper.step import actions as act
 from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.context import StepContext
-from companion.skipper.watch.traffic_watch import look_out
+from companion.skipper.watch.watch import look_out
 from companion.skipper.way.geometry import distance_m
 from companion.traffic import Policy, Role, TrafficPicture
 from companion.traffic.colregs import APPARENT_RAD

@@ -11,7 +11,7 @@ from companion.geofence import load_mission
 from companion.messages import Severity
 from companion.skipper.step import actions as act
 from companion.skipper.step.context import StepContext
-from companion.skipper.watch.traffic_watch import SHOWN, limits, look_out
+from companion.skipper.watch.watch import SHOWN, limits, look_out
 from companion.traffic import LAKE, Alarm, Role, Rule, TrafficPicture
 from tests.skipper.planning.test_traffic import Ship, make, sail
 from tests.traffic.conftest import vessel
