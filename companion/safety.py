@@ -75,9 +75,9 @@ class Ending:
     default: End
     rank: int                  # the lower comes first where several are raised
     over_orders: bool = False  # it comes before the orders of the crew, too
-    sails_on: bool = False     # where there is no place to go to what is left takes her on; else she stays near by
+    sails_on: bool = False     # where there is no place to go to what is left takes the boat on; else it stays near by
     because: str
-    until: str = ""            # how long she waits there; empty: the voyage is over
+    until: str = ""            # how long the boat waits there; empty: the voyage is over
     asked_by: str = ""         # the key without which it is not watched, and not announced
     settings: tuple[Setting, ...] = ()
 
@@ -97,8 +97,8 @@ class Watchdog:
     severity: Severity
     response: Response
     why: str
-    at_rest: bool = False      # watched before she sails and when the voyage is over, too
-    loitering: bool = False    # watched when the voyage is over; without at_rest not before she sails
+    at_rest: bool = False      # watched before the boat sails and when the voyage is over, too
+    loitering: bool = False    # watched when the voyage is over; without at_rest not before the boat sails
     unsailed_enter_s: float | None = None   # in place of ``enter_s`` where nothing but a drift can move the boat
     sensor: str = ""           # the NAMED_VALUE_FLOAT of a script on the autopilot whose value is the figure
     notification: str = ""     # Signal K's own name for it; empty: one made of the name
@@ -273,7 +273,7 @@ def watchdog_of(number: int) -> str:
 
 CRITICAL = 5          # MAV_STATE of a heartbeat while a failsafe of links or position has acted
 AUTOPILOT = 1         # the component whose texts are signs
-# What a failsafe puts a boat into; RTL and LOITER sail, but not where the voyage wants her.
+# What a failsafe puts a boat into; RTL and LOITER sail, but not where the voyage wants it.
 HOMEWARD = frozenset({Mode.RTL, Mode.SMART_RTL})
 STOPPING = frozenset({Mode.HOLD, Mode.LOITER, *HOMEWARD})
 EMPTY = " is critical "   # in the battery's words, when the second of its limits is passed

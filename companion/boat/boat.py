@@ -50,10 +50,10 @@ class Boat:
         gybe_room_m: Leg to leeward that gybing round needs [m]; None: five turning radii at full speed.
         hull: Its size.
         has_motor: It has an auxiliary motor that the autopilot can run.
-        max_tws_mps: More wind than this she is not to be out in [m/s]; None: there is no such limit.
-        min_tws_mps: In less than this she makes no way [m/s].
+        max_tws_mps: More wind than this the boat is not to be out in [m/s]; None: there is no such limit.
+        min_tws_mps: In less than this the boat makes no way [m/s].
         tack_fails: The chance that a tack fails [0..1), before any was seen; 0: they are not reckoned to fail.
-        leeway_rad: On a beat, the apparent wind 30 degrees off her bow and three times as fast as she; see ``leeway``.
+        leeway_rad: On a beat, the apparent wind 30 degrees off its bow and three times as fast as it; see ``leeway``.
     """
 
     polar: Polar
@@ -90,7 +90,7 @@ class Boat:
             raise ValueError(f"gybe_room_m is {self.gybe_room_m}; it must be 0 m or more")
 
     def made_good_rad(self, twa_rad: float, tws_mps: float) -> float:
-        """Return the angle to the wind of her course through the water, with her bow at ``twa_rad`` [rad, 0..π]."""
+        """Return the angle to the wind of a course through the water, with the bow at ``twa_rad`` [rad, 0..π]."""
         if self.leeway_rad == 0.0:
             return twa_rad
         speed = self.polar.speed_mps(twa_rad, tws_mps)
@@ -99,13 +99,13 @@ class Boat:
     def _made_good(
         self, twa_rad: NDArray[np.float64], speed_mps: NDArray[np.float64], tws_mps: float,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return a polar's curve by her course in place of her bow's angle, and the speed along it."""
+        """Return a polar's curve by the boat's course in place of its bow's angle, and the speed along it."""
         k = coefficient_of(self.leeway_rad)
         bows = np.unique(np.concatenate([twa_rad, np.radians(np.arange(0.0, 181.0, 5.0))]))
         speeds = np.interp(bows, twa_rad, speed_mps)
         slips = np.array([leeway_at(k, float(b), tws_mps, float(v)) for b, v in zip(bows, speeds, strict=True)])
         courses = np.minimum(bows + slips, math.pi)
-        # Nearer to the wind than where her course comes nearest to it she only drifts more: not sailed by anybody.
+        # Nearer to the wind than where its course comes nearest to it the boat only drifts more: not sailed by anybody.
         later = np.append(np.minimum.accumulate(courses[::-1])[::-1][1:], math.inf)
         kept = courses < later - 1e-6
         return courses[kept], (speeds / np.maximum(np.cos(slips), 0.1))[kept]
@@ -144,7 +144,7 @@ class Boat:
         return out
 
     def problem_speeds(self) -> dict[str, Any]:
-        """Return the ``boat.speeds`` of a planning problem: her speed in every wind, as her polar's columns have it."""
+        """Return the ``boat.speeds`` of a planning problem: its speed in every wind, as its polar's columns have it."""
         return _speeds_of(self)
 
 
@@ -161,7 +161,7 @@ def _speeds_of(boat: Boat) -> dict[str, Any]:
             "v_mps": rows}
 
 
-# Leeway: how far to leeward of her bow a boat goes through the water.
+# Leeway: how far to leeward of its bow a boat goes through the water.
 #
 # The sail's side force grows with the square of the apparent wind and the sine of its angle. The keel's lift, which
 # grows with speed times side speed, and the drag of the flow across hull and keel, with the square of the side speed,
@@ -171,7 +171,7 @@ def _speeds_of(boat: Boat) -> dict[str, Any]:
 # Cross-flow drag of hull and keel as a share of the slope of the keel's lift: a plate's drag of 1.17 across the stream
 # (Hoerner, Fluid-Dynamic Drag, 3) over the slope 2 pi / (1 + 2 / A) of a keel whose aspect ratio A is about 1.
 CROSS_FLOW = 0.5
-# Where the leeway of a boat is stated: close-hauled, the apparent wind so many times her speed.
+# Where the leeway of a boat is stated: close-hauled, the apparent wind so many times its speed.
 STATED_AWA_RAD = math.radians(30.0)
 STATED_RATIO = 3.0
 
@@ -232,19 +232,19 @@ def made_good_mps(
     boat: Boat, course_rad: float, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float],
     no_go_half_rad: float,
 ) -> float | None:
-    """Return the most that she makes good over the ground along a course [m/s], tacking and gybing as it takes.
+    """Return the most that the boat makes good over the ground along a course [m/s], tacking and gybing as it takes.
 
-    Her velocities over the ground are the convex hull of what her polar allows outside the no-go zone, moved by the
-    current; she stays on the line on the whole where the line meets the hull. None: nowhere, she makes no way along it
-    whatever she does, and is carried off it or back.
+    Its velocities over the ground are the convex hull of what its polar allows outside the no-go zone, moved by the
+    current; it stays on the line on the whole where the line meets the hull. None: nowhere, it makes no way along it
+    whatever it does, and is carried off it or back.
 
     Args:
-        boat: her polar and deepest angle.
+        boat: its polar and deepest angle.
         course_rad: over the ground.
         twd_from_rad: where the wind over the water comes from.
         tws_mps: how fast it is.
         current_en_mps: where the water goes.
-        no_go_half_rad: what she keeps out of.
+        no_go_half_rad: what it keeps out of.
 
     """
     # s (n . course) <= reach holds for every normal n of the hull
@@ -259,7 +259,7 @@ def made_good_mps(
 def slowest_en_mps(
     boat: Boat, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float,
 ) -> tuple[float, float]:
-    """Return the slowest that she can be carried over the ground on the whole [m/s east, north]; 0, 0: she can stay.
+    """Return the slowest that the boat can be carried over the ground [m/s east, north]; 0, 0: it can stay.
 
     It is the point of the hull of ``made_good_mps`` that is nearest to lying still (arguments as there).
     """
@@ -288,6 +288,6 @@ def _reach(
 def can_hold(
     boat: Boat, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float,
 ) -> bool:
-    """Return whether she can stay where she is on the whole, and so make way everywhere (arguments as above)."""
+    """Return whether the boat can stay where it is on the whole, and so make way everywhere (arguments as above)."""
     return slowest_en_mps(boat, twd_from_rad=twd_from_rad, tws_mps=tws_mps, current_en_mps=current_en_mps,
                           no_go_half_rad=no_go_half_rad) == (0.0, 0.0)

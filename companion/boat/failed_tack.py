@@ -1,10 +1,10 @@
-"""Where a tack that fails carries the boat: she shoots up into the wind, lies there, falls off to the old tack.
+"""Where a tack that fails carries the boat: it shoots up into the wind, lies there, falls off to the old tack.
 
-Measured on the simulator's hull (winds of 3 to 9 m/s, 4 to 14 s in irons): she shoots 1.9 to 2.1 s of her speed, half
-way between the old course and the wind, and has sailed 0.3 to 0.6 s of it on the old course when she tries again, at
+Measured on the simulator's hull (winds of 3 to 9 m/s, 4 to 14 s in irons): it shoots 1.9 to 2.1 s of its speed, half
+way between the old course and the wind, and has sailed 0.3 to 0.6 s of it on the old course when it tries again, at
 half the speed; ``tests/boat/test_failed_tack.py`` holds these figures against it. That hull hardly goes astern. One
-with a rig does: what she is blown back is reckoned from its windage, beside the track without it. One that makes
-leeway is set to the lee side while she lies a little on her old tack, farther on than she was going (``lee_set``).
+with a rig does: what it is blown back is reckoned from its windage, beside the track without it. One that makes
+leeway is set to the lee side while it lies a little on its old tack, farther on than it was going (``lee_set``).
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi
 
-SHOOT_S = 2.1        # of her speed, before she lies
-FILL_S = 0.8         # of her speed, on the old course until she tries again
-AGAIN_SHARE = 0.6    # of her speed, at the next try
-TRIES = 2            # then she gybes round where there is room
+SHOOT_S = 2.1        # of the boat's speed, before it lies
+FILL_S = 0.8         # of the boat's speed, on the old course until it tries again
+AGAIN_SHARE = 0.6    # of the boat's speed, at the next try
+TRIES = 2            # then the boat gybes round where there is room
 RISKY = 0.01         # one failure must not touch; several in a row may, with no more than this probability
-IRONS_S = 10.0       # she lies head to wind: the skipper bears away after 8 s (``in irons``), and that takes her two
+IRONS_S = 10.0       # it lies head to wind: the skipper bears away after 8 s (``in irons``), and that takes it two
 # Of the wind's speed: hull and flogging sails. A skiff under bare poles is blown at 3 to 6 % of it.
 BLOWN_SHARE = 0.04
-# Likewise, abeam: a hull whose leeway is 5 degrees on a beat, the wind 15 degrees off her bow and her sails flogging
+# Likewise, abeam: a hull whose leeway is 5 degrees on a beat, the wind 15 degrees off its bow and its sails flogging
 # (``companion.boat.boat``, of the push a quarter).
 SET_SHARE = 0.05
 
@@ -35,9 +35,9 @@ def failed_tack(
     corner_en: tuple[float, float], *, course_rad: float, speed_mps: float, twd_from_rad: float, tws_mps: float,
     current_en_mps: tuple[float, float] = (0.0, 0.0), irons_s: float = IRONS_S,
 ) -> tuple[Track, Track]:
-    """Return two tracks (n, 2) [m] of one failed tack: blown back while she lies, and not.
+    """Return two tracks (n, 2) [m] of one failed tack: blown back while the boat lies, and not.
 
-    Both end where she tries again, on the old course. ``course_rad`` and ``speed_mps`` are hers before the corner.
+    Both end where it tries again, on the old course. ``course_rad`` and ``speed_mps`` are its own before the corner.
     """
     up = course_rad + 0.5 * wrap_pi(twd_from_rad - course_rad)
     shot = _moved(corner_en, up, SHOOT_S * speed_mps)
@@ -49,7 +49,7 @@ def failed_tack(
 
 
 def lee_set(*, course_rad: float, twd_from_rad: float, lee_mps: float) -> tuple[float, float]:
-    """Return how a hull that is set at ``lee_mps`` is while she lies (east, north) [m/s]: abeam, to her old lee."""
+    """Return how a hull that is set at ``lee_mps`` is while it lies (east, north) [m/s]: abeam, to its old lee."""
     abeam = twd_from_rad - math.copysign(0.5 * math.pi, wrap_pi(twd_from_rad - course_rad))
     return lee_mps * math.sin(abeam), lee_mps * math.cos(abeam)
 

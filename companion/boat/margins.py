@@ -41,7 +41,7 @@ class AutopilotLimits:
     sail_xtrack_max_m: float = 10.0  # 0: no corridor, long boards to the layline
     wp_radius_m: float = 2.0
     turn_radius_m: float = 0.9
-    wp_speed_mps: float | None = None   # of the point that she follows, not of her; None: it was not read
+    wp_speed_mps: float | None = None   # of the point that the boat follows, not the boat's; None: it was not read
     wp_accel_mps2: float = 1.0       # of that point
     wp_jerk_mps3: float = 1.0
     fence_action: int | None = None  # None: no fence guards this obstacle; 0 report .. 4, see FENCE_ACTION

@@ -1,8 +1,8 @@
-"""The predicted track, compiled: a point that runs along the legs, a boat that is steered to it, and her tacks.
+"""The predicted track, compiled: a point that runs along the legs, a boat that is steered to it, and its tacks.
 
 The guidance is ArduRover's since 4.3, restated: AR_WPNav's point on the legs, which waits for the boat and rounds each
-corner in a curve of its own acceleration; AR_PosControl, which turns the boat by what her velocity lacks; and
-sailboat.cpp, which holds the edge of the no-go zone on a leg that is inside it and tacks where she is a corridor off
+corner in a curve of its own acceleration; AR_PosControl, which turns the boat by what its velocity lacks; and
+sailboat.cpp, which holds the edge of the no-go zone on a leg that is inside it and tacks where it is a corridor off
 the line. The boat is a speed that follows the polar and a yaw rate that follows what is asked: no more is known of most
 boats. What it leaves out is in the stated error (``companion.boat.tracking``).
 
@@ -191,7 +191,7 @@ def sail(
             rise, rise_next = rise_s(v_this, accel, jerk), rise_s(v_next, accel, jerk)
             whole, whole_next = leg_s(length, v_this, rise), leg_s(after, v_next, rise_next)
             looked_at = leg
-        # --- the point on the legs waits for the boat, or hurries with her
+        # --- the point on the legs waits for the boat, or hurries with it
         want = 1.0
         if pace > 1e-6:
             re, rn = he / pace, hn / pace

@@ -31,8 +31,8 @@ class GuidanceModel:
 
     Attributes:
         wp_radius_m: WP_RADIUS, which the corner's curve passes the waypoint by.
-        turn_radius_m: TURN_RADIUS, and the tightest circle that she turns in.
-        wp_speed_mps: WP_SPEED: a boat's speed does not obey it, the point that she follows does.
+        turn_radius_m: TURN_RADIUS, and the tightest circle that it turns in.
+        wp_speed_mps: WP_SPEED: a boat's speed does not obey it, the point that it follows does.
         accel_mps2: WP_ACCEL or ATC_ACCEL_MAX, of that point.
         jerk_mps3: WP_JERK, of that point; 0 there means the acceleration's figure.
         pos_p: PSC_POS_P [1/s].
@@ -43,7 +43,7 @@ class GuidanceModel:
         pivot_rate_radps: WP_PIVOT_RATE, in a tack.
         rate_max_radps: ATC_STR_RAT_MAX.
         rate_change_radps2: ATC_STR_ACC_MAX.
-        gather_m: Way in which she gathers or loses her speed [m]: 2 for the simulator's hull of 2 kg.
+        gather_m: Way in which it gathers or loses its speed [m]: 2 for the simulator's hull of 2 kg.
         angle_p: ATC_STR_ANG_P [1/s].
         wind_lag_s: Time constant of the autopilot's true wind [s]: WNDVN_TRUE_FILT 0.05 Hz.
         latency_s: How old the autopilot's position is when it steers by it [s].
@@ -144,12 +144,12 @@ def predict(
 
     Args:
         points_en_m: (n, 2) the legs' ends, n at least 2; the first is where the first leg begins.
-        helm: How she is steered.
+        helm: How the boat is steered.
         curve_mps: Speeds by |TWA| (``curve_of``).
         twd_from_rad: Where the wind comes from [rad]; an array holds it every half second.
-        start_en_m: Where she is; None: where the first leg begins.
-        heading_rad: Her heading; None: along the first leg.
-        speed_mps: Her speed; None: the polar's on the first leg, her no-go zone's edge at the nearest.
+        start_en_m: Where it is; None: where the first leg begins.
+        heading_rad: Its heading; None: along the first leg.
+        speed_mps: Its speed; None: the polar's on the first leg, its no-go zone's edge at the nearest.
 
     """
     points = np.ascontiguousarray(points_en_m, dtype=np.float64).reshape(-1, 2)
@@ -192,8 +192,8 @@ def drawn_winds(
 
 # How far off the line a beat that is left to the autopilot comes: the corridor, and what a tack at its edge swings.
 #
-# The autopilot tacks where she is a corridor off the line, at most every five seconds; what she sails beyond the edge
-# depends on her speed and on how squarely she crosses it. A wind that spreads turns her course by as much as the leg
+# The autopilot tacks where it is a corridor off the line, at most every five seconds; what it sails beyond the edge
+# depends on its speed and on how squarely it crosses it. A wind that spreads turns its course by as much as the leg
 # may lie off the wind: so legs off the wind by ``SQUARE_RAD`` to either side stand for it. In winds with a spread of
 # 18.6 degrees nine boards in ten stay within this (a test holds it); which share of the boards of a plan's own legs
 # keeps clear is judged in drawn winds (``companion.planner.track``).
@@ -207,8 +207,8 @@ def beat_band_m(helm: GuidanceModel, polar: Polar, *, tws_mps: float) -> float:
     """Return what the boards of a beat keep within, to either side of the line [m].
 
     Args:
-        helm: How she is steered; with a corridor.
-        polar: Her speeds.
+        helm: How the boat is steered; with a corridor.
+        polar: Its speeds.
         tws_mps: Strength of the wind.
 
     Raises:
@@ -235,7 +235,7 @@ def _band_m(helm: GuidanceModel, polar: Polar, tws_mps: float) -> float:
 #
 # ``python -m bench.tracking`` measures it on ArduRover 4.7.0-dev: 25 voyages of 14 to 34 legs each, WP_RADIUS 1 to 10,
 # corners of 10 to 170 degrees, legs of 2 to 100 m; docs/lab/tracking.md has the figures. A leg is short when the boat
-# at her best speed is there in less than ``SHORT_S``: she then overtakes the point that she follows and turns round to
+# at its best speed is there in less than ``SHORT_S``: it then overtakes the point that it follows and turns round to
 # it, and which way round is chance.
 
 SHORT_S = 4.5
@@ -260,7 +260,7 @@ def stated_error_m(best_mps: float, *, has_short: bool) -> float:
 
 
 def loop_m(best_mps: float) -> float:
-    """Return how far off her track [m] a loop about the end of a short leg takes a boat of a best speed."""
+    """Return how far off the boat's track [m] a loop about the end of a short leg takes a boat of a best speed."""
     return float(np.interp(best_mps, LOOP_SPEEDS_MPS, LOOP_M)) * max(1.0, best_mps / LOOP_SPEEDS_MPS[-1])
 
 

@@ -1,13 +1,13 @@
-"""The current from the boat's own track: where she goes against where she points and how fast she should be.
+"""The current from the boat's own track: where it goes against where it points and how fast it should be.
 
     ground velocity = (1 + k) v (sin h, cos h) + v (leeway + compass) (cos h, -sin h) + current + noise           (a)
 
 with the heading h and the polar's speed v in the wind over the water. The polar may be wrong by a share k, the compass
-by an angle, and leeway sets her to leeward, to the other side on the other tack. So on one heading a current along it
-looks like a polar error and one across it like leeway. A vane that is turned makes her seem to point higher on one tack
+by an angle, and leeway sets it to leeward, to the other side on the other tack. So on one heading a current along it
+looks like a polar error and one across it like leeway. A vane that is turned makes it seem to point higher on one tack
 than on the other, and so too slow on one and too fast on the other, as a current across the wind does: v is that of
 the wind with the vane turned back by what is believed of it. The filter carries all six numbers and says what it cannot
-tell by its covariance, which shrinks when she sails on headings far apart. It is a Kalman filter, linear but for the
+tell by its covariance, which shrinks when it sails on headings far apart. It is a Kalman filter, linear but for the
 vane (there about what is believed), one reading a second.
 
 The current is a departure from what the mission expects (``Prior``), and goes back to it with ``TAU_S`` where nothing
@@ -33,20 +33,20 @@ from companion.current.water_current import WaterCurrent, over_water
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import WindForecast
 
-# What is not known of the wind's angle to her bow on a leg: current, leeway, compass and vane, told of together.
+# What is not known of the wind's angle to the boat's bow on a leg: current, leeway, compass and vane, told of together.
 #
-# A plan lays a leg by the wind as it is measured. On the leg she heads up against a current abeam of it and against her
+# A plan lays a leg by the wind as it is measured. On the leg it heads up against a current abeam of it and against its
 # leeway, the current turns the wind over the water, and a vane or a compass that errs has turned the wind from the
 # start. To first order the angle is off by g x, with x as ``CurrentEstimator`` carries it and, with the wind on the
 # side s (1: over starboard) from θ, the course φ, W of wind, v through the water,
 #
 #     g = (n(θ) / W + n(φ) / v, 0, -s, 1 + v cos β / W, -(1 + v cos β / W)),    n(a) = (cos a, -sin a)           (a)
 #
-# since the autopilot's wind over ground is its apparent wind, longer by v cos β on a beat at β, less her velocity. The
+# since the autopilot's wind over ground is its apparent wind, longer by v cos β on a beat at β, less its velocity. The
 # mean is left where it is measured, for by that wind the autopilot decides what it beats: what is believed of the
 # errors is part of the spread, as what is not known of them is.
 
-UNTOLD_MPS = 0.15    # [m/s] of a current that is not planned for: of a stronger one her own track soon tells
+UNTOLD_MPS = 0.15    # [m/s] of a current that is not planned for: of a stronger one the boat's own track soon tells
 SLOW_MPS = 0.5       # [m/s] the least speed that a crab angle is reckoned with
 LEAST_MPS = 0.5      # [m/s] likewise the least wind
 
@@ -56,7 +56,8 @@ class WindAngleUncertainty:
     """What the estimator believes and how well.
 
     Attributes:
-        believed: current east, north [m/s]; share by which she is faster than her polar; leeway, compass, vane [rad].
+        believed: current east, north [m/s]; share by which the boat is faster than its polar; leeway, compass, vane
+            [rad].
         covariance: of these, by rows.
         is_planned: plans reckon with the current; the others of ``believed`` they never do.
     """
@@ -112,7 +113,7 @@ def _abeam(of_rad: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 Matrix = NDArray[np.float64]
-TILT_RAD = math.radians(3.0)  # of the vane to either side, to see what it makes of her speed
+TILT_RAD = math.radians(3.0)  # of the vane to either side, to see what it makes of its speed
 Speed = Callable[[float, float], float]
 """Speed through the water [m/s] at a true wind angle [rad] in a wind over the water [m/s]: the boat's polar."""
 
@@ -125,7 +126,7 @@ ALONG_MPS, ALONG_SHARE = 0.08, 0.06   # noise of a reading along the heading: gu
 ACROSS_MPS, ACROSS_SHARE = 0.06, 0.03
 ALIKE_S = 12.0               # readings this near in time are wrong alike: waves, a gust, the helm
 STEADY_RAD_S = math.radians(6.0)      # faster turns are manoeuvres ...
-SETTLES_S = 6.0              # ... after which, and the means with them, she needs this long to have her speed again
+SETTLES_S = 6.0              # ... after which, and the means with them, it needs this long to have its speed again
 STEADY_MPS2 = 0.06           # a faster change of speed is none of the polar's
 LEAST_TWA_RAD = math.radians(38.0)    # closer to the wind the polar says little
 EVERY_S = 1.0
@@ -134,7 +135,7 @@ GATE = 16.0                  # of the innovation squared over its variance, two 
 MISFIT_SAMPLES, MISFIT = 15.0, 0.5   # the mean of that figure: 0.1 at most in a steady current, noise being twelvefold
 FADE_SHARE = 0.02            # of the prior's variance, for each reading while it does not fit
 GATED_S = 60.0               # what does not fit for so long is the new truth
-BELIEVED_S = 60.0            # she is held against the water that was believed so long ago: water changes slowly
+BELIEVED_S = 60.0            # the boat is held against the water that was believed so long ago: water changes slowly
 NEW_WATER_S = 60.0           # of readings, on headings apart, tell of water that changed as water seldom does ...
 NEW_WATER_MPS, NEW_WATER_SPREADS = 0.5, 3.0   # ... no stronger than so many of this and of the prior's spread
 
@@ -143,7 +144,7 @@ NEW_WATER_MPS, NEW_WATER_SPREADS = 0.5, 3.0   # ... no stronger than so many of 
 class Sailing:
     """One moment of the boat: velocity over ground [m/s], heading, and the wind over the ground.
 
-    ``is_driven``: her sails are sheeted and nothing else drives her; ``age_s``: of the velocity and the heading;
+    ``is_driven``: its sails are sheeted and nothing else drives it; ``age_s``: of the velocity and the heading;
     ``roll_rad``: positive to starboard, None where it is not told.
     """
 
@@ -270,7 +271,7 @@ class CurrentEstimator:
 
     @property
     def fits_s(self) -> float:
-        """For how long she has moved as she should since this was begun, or a doubt [s]."""
+        """For how long the boat has moved as it should since this was begun, or a doubt [s]."""
         return 0.0 if self._check is None else self._check.fits_s
 
     @property
@@ -347,7 +348,7 @@ class CurrentEstimator:
     def _speed_with(
         self, now: Sailing, current_en_mps: tuple[float, float], vane_rad: float,
     ) -> tuple[float, float]:
-        """Return the wind's angle to her bow and the polar's speed, where the vane is turned clockwise so far."""
+        """Return the wind's angle to the bow and the polar's speed, where the vane is turned clockwise so far."""
         east, north = now.velocity_en_mps
         felt_e = now.tws_mps * math.sin(now.twd_from_rad) + east
         felt_n = now.tws_mps * math.cos(now.twd_from_rad) + north
@@ -383,7 +384,7 @@ class CurrentEstimator:
 
     @property
     def scale(self) -> float:
-        """How fast she is against her polar, as a share: 1 as it says."""
+        """How fast the boat is against its polar, as a share: 1 as it says."""
         return 1.0 + float(self._x[2])
 
     def _headings_rad(self) -> float:

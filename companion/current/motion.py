@@ -1,16 +1,16 @@
-"""Does the boat move as the wind that is measured and her polar say, in any water that is likely?
+"""Does the boat move as the wind that is measured and its polar say, in any water that is likely?
 
 Water changes slowly, and no current turns the wind over the ground. So a boat that goes astern, or lies nearly still,
-where she should run at 2 m/s has been told a wrong wind: a vane that was turned on its mast, or an offset that somebody
+where it should run at 2 m/s has been told a wrong wind: a vane that was turned on its mast, or an offset that somebody
 wrote, not a current of 3 m/s that came within a second. What tells:
 
-- **Speed.** Along her heading she lacks (or has too much of) more than the polar's error and what is not known of the
+- **Speed.** Along its heading it lacks (or has too much of) more than the polar's error and what is not known of the
   current could explain.
-- **Heel.** She heels to windward.
-- **The direction's leap.** A front turns the wind, too, but then she sails by it. A direction that has leapt before she
-  ceased to sail as she should is the sensor's doing; less is enough then, and a shorter time.
+- **Heel.** It heels to windward.
+- **The direction's leap.** A front turns the wind, too, but then it sails by it. A direction that has leapt before it
+  ceased to sail as it should is the sensor's doing; less is enough then, and a shorter time.
 
-What sets her across her heading as well is no wind's doing: a current's, which the filter takes up, or a compass's,
+What sets it across its heading as well is no wind's doing: a current's, which the filter takes up, or a compass's,
 which "heading against course" tells.
 """
 
@@ -22,16 +22,16 @@ from dataclasses import dataclass
 
 from companion.geo.angles import difference_rad
 
-SWINGS_S = 4.0                     # of the means of heading and velocity: waves swing her bow within less
-TURNING_RAD_S = math.radians(6.0)  # faster she manoeuvres ...
-SETTLES_S = 4.0                    # ... and has her speed again so long after it, and the means with it
-LEAST_TWA_RAD = math.radians(38.0)  # closer to the wind a polar says little, and she may be in irons
+SWINGS_S = 4.0                     # of the means of heading and velocity: waves swing the boat's bow within less
+TURNING_RAD_S = math.radians(6.0)  # faster the boat manoeuvres ...
+SETTLES_S = 4.0                    # ... and has the boat's speed again so long after it, and the means with it
+LEAST_TWA_RAD = math.radians(38.0)  # closer to the wind a polar says little, and the boat may be in irons
 LEAST_TWS_MPS = 1.5
-STANDS_MPS, SHOULD_MPS = 0.15, 0.6  # a boat that stands where she should sail is aground, moored or in irons
+STANDS_MPS, SHOULD_MPS = 0.15, 0.6  # a boat that stands where it should sail is aground, moored or in irons
 ODD_MPS, ODD_SHARE = 0.5, 0.35     # of a speed: gusts that the hull has not answered, and a polar that is a quarter off
 SPREADS = 2.0                      # of what is not known of the current, beside it
 LEAPT_MPS, LEAPT_SHARE, LEAPT_SPREADS = 0.4, 0.2, 1.0   # likewise after the direction has leapt
-ACROSS_SHARE = 0.3                 # of what she lacks: a current sets her more across her heading, on most of them ...
+ACROSS_SHARE = 0.3                 # of what it lacks: a current sets it more across its heading, on most of them ...
 LEAPT_ACROSS_SHARE = 0.6           # ... and a compass that is up to 120 degrees off does, with a direction that leapt
 HEELS_RAD = math.radians(8.0)      # to windward: more than a wave's
 LEAST_HEEL_TWA_RAD, MOST_HEEL_TWA_RAD = math.radians(30.0), math.radians(150.0)
@@ -48,15 +48,15 @@ KEPT_EVERY_S = 5.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionSample:
-    """One moment: how she goes through the water that is believed, and what the polar says in the wind of now.
+    """One moment: how the boat goes through the water that is believed, and what the polar says in the wind of now.
 
     Attributes:
         along_mps, across_mps: through the water, ahead and to starboard, means over ``SWINGS_S``.
         speed_mps: the polar's.
-        twa_rad: the wind's angle to her bow, over the water, positive over starboard.
+        twa_rad: the wind's angle to its bow, over the water, positive over starboard.
         twd_from_rad, tws_mps: the wind over the ground.
-        heading_rad: of her bow, likewise a mean.
-        sigma_mps: of the current along her heading.
+        heading_rad: of its bow, likewise a mean.
+        sigma_mps: of the current along its heading.
         roll_rad: positive to starboard; None: not told.
     """
 
@@ -88,7 +88,7 @@ class MotionCheck:
         self._directions: deque[tuple[float, float]] = deque()   # of the wind, one in 5 s
         self._before_rad: float | None = None                    # where it came from before it leapt ...
         self._leapt_s = -math.inf                                # ... and when it was seen to have
-        self._fitted: list[float] = []                           # headings on which she sailed as she should
+        self._fitted: list[float] = []                           # headings on which the boat sailed as it should
 
     @property
     def before_rad(self) -> float | None:
@@ -96,7 +96,7 @@ class MotionCheck:
         return self._before_rad if self.doubt and self.is_winds else None
 
     def pause(self) -> None:
-        """Take note that nobody knows how she is driven: what is settled begins anew."""
+        """Take note that nobody knows how the boat is driven: what is settled begins anew."""
         self._t_s = None
 
     def update(self, t_s: float, now: MotionSample) -> None:
@@ -126,7 +126,7 @@ class MotionCheck:
             self._begin(t_s, now)
 
     def _fits(self, t_s: float, now: MotionSample) -> bool | None:
-        """Return whether she moves as the wind and her polar say, None where that cannot be told."""
+        """Return whether the boat moves as the wind and its polar say, None where that cannot be told."""
         angle = abs(now.twa_rad)
         if self._heels_to_windward(now):
             return False

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from companion.geo.angles import heading_of, wrap_two_pi
 from companion.messages import WindForecast
 
-# A weaker one turns the heading of a boat of 2 m/s by less than 3 degrees: less than she wanders about her line.
+# A weaker one turns the heading of a boat of 2 m/s by less than 3 degrees: less than it wanders about its line.
 LEAST_MPS = 0.1
 # Of drift' P^-1 drift, which is chi-squared with two degrees of freedom in still water: 99 % of it is below this ...
 BEYOND_DOUBT = 9.21

@@ -78,7 +78,7 @@ def motor_commands(rudder_rad: float) -> tuple[float, float]:
     """Return (u1, u2), the two motors of Schmitt's boat, for a rudder angle in [-π/4, π/4] [2].
 
     u1 = (1 + 4 rudder / pi) / 2, u2 = (1 - 4 rudder / pi) / 2. u1 is the left motor for a rudder that is positive to
-    starboard. Their sum is 1 and each is within [0, 1], so inside the [-1, 1] that she allows; a rudder
+    starboard. Their sum is 1 and each is within [0, 1], so inside the [-1, 1] that Schmitt allows; a rudder
     beyond its range is taken at its end.
     """
     share = max(-1.0, min(1.0, rudder_rad * 4.0 / math.pi))

@@ -69,7 +69,7 @@ def step(
         state = replace(state, round_side=side)
         off = wrap_pi(chosen - twd)
         if abs(wrap_pi(wanted - twd)) < habits.no_go_half_rad + 1e-6 and abs(off) < math.pi / 2.0:
-            # Beating: the tack that something in the way made her take is kept, else she would tack back at once.
+            # Beating: the tack that something in the way made the boat take is kept, else it would tack back at once.
             state = replace(state, q=1 if off > 0.0 else -1)
         wanted = chosen
     state, heading, reason = helm(state, situation, wanted, habits)
@@ -140,7 +140,7 @@ def _out_of_irons(
     assert situation.twd_from_rad is not None
     t = situation.t_s - state.since_s
     side = state.irons_side * (-1 if int(t / 30.0) % 2 else 1)
-    # Over the ground she drifts to leeward even at rest: the rudder feels the water.
+    # Over the ground the boat drifts to leeward even at rest: the rudder feels the water.
     water = way_mps + habits.leeway_share * situation.tws_mps * math.cos(twa)
     if water < 0.0:
         side = -side

@@ -1,7 +1,7 @@
 """Look-ahead: a fan of sailable headings, where each would take the boat, and what it would cost.
 
 The cheapest is the one nearest to the field's that keeps its distance from vessels for the next minute and a half
-and from the shore for as long as she needs to turn away from it.
+and from the shore for as long as it needs to turn away from it.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def choose(
         cost += 4.0 * _leaving(track, intent.stay_in, habits)
     if intent.clearance is not None:
         ashore = _ashore(track, intent.clearance, habits)
-        # headings[0] is the field's own. On a beat the tack she is on is the side that is kept, by q.
+        # headings[0] is the field's own. On a beat the tack the boat is on is the side that is kept, by q.
         beats = twd is not None and abs(wrap_pi(wanted_rad - twd)) < habits.no_go_half_rad + 1e-6
         blocked = bool(ashore[0] > 0.0) and not beats
         side = _wrap(headings - wanted_rad) * state.round_side

@@ -2,7 +2,7 @@
 
 A vector inside the no-go zone is turned to one of its two edges. Which one is the state q of Jaulin and Le Bars:
 +1 is the edge clockwise of the wind (the wind then comes over the port bow), -1 the other. q is fixed by the side
-of the trajectory that the boat is on outside a zone of 50 m about it, and kept inside: she beats up the line in
+of the trajectory that the boat is on outside a zone of 50 m about it, and kept inside: it beats up the line in
 long boards instead of shivering on it.
 """
 

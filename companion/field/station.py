@@ -2,7 +2,7 @@
 
 A boat that tacks within seconds sails short boards close-hauled and ends each by tacking. Any other turns in loops,
 always the same way, with the sail eased, and goes straight for the point whenever that lies ahead: through the wind
-she needs way, which she gathers first. Far off both sail back by the attractive point of the field.
+it needs way, which it gathers first. Far off both sail back by the attractive point of the field.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class Station:
     """Where and how to stay. At ``far_m`` the field takes over.
 
     Boards (``tacks``): one at ``board_twa_rad`` ends when the boat is ``board_max_m`` beyond the point on its side;
-    ``bear_off_deg_per_m`` is how much lower she sails for each metre too far to windward.
+    ``bear_off_deg_per_m`` is how much lower it sails for each metre too far to windward.
 
     Loops: about a point ``loop_up_m`` to windward of the station, since they drift; ``loop_cone_rad`` is how far from
-    ahead a point may lie that she goes straight for, beyond ``loop_near_m`` of it; above ``ease_mps`` the sail is let
-    out; ``loop_turn_rad`` is how far ahead of the bow a turn's heading is set; ``look_s`` her place is looked at ahead.
+    ahead a point may lie that it goes straight for, beyond ``loop_near_m`` of it; above ``ease_mps`` the sail is let
+    out; ``loop_turn_rad`` is how far ahead of the bow a turn's heading is set; ``look_s`` its place is looked at ahead.
     """
 
     at_en: tuple[float, float]
@@ -47,7 +47,7 @@ class Station:
 
 
 class StationPhase(enum.Enum):
-    """What she is doing."""
+    """What the boat is doing."""
 
     RETURN = "return"     # by the field
     BOARD = "board"
@@ -97,11 +97,11 @@ def _board(
     twa = wrap_pi(twd - situation.heading_rad)
     if state.phase is StationPhase.RETURN:
         state = replace(state, phase=StationPhase.BOARD, since_s=t, side=1 if twa > 0.0 else -1)
-    # Wind on starboard (side +1) carries her to port of the wind's eye.
+    # Wind on starboard (side +1) carries the boat to port of the wind's eye.
     beyond = -state.side * across
     if state.phase is StationPhase.BOARD and beyond > (0.0 if up > 0.0 else station.board_max_m):
         state = replace(state, phase=StationPhase.TACK, since_s=t, side=-state.side)
-    # To windward of the point she bears off, up to a broad reach: that is how she loses height on purpose.
+    # To windward of the point the boat bears off, up to a broad reach: that is how it loses height on purpose.
     height = max(0.0, up + 1.0)
     angle = min(math.radians(125.0), station.board_twa_rad + math.radians(station.bear_off_deg_per_m) * height)
     if state.phase is StationPhase.TACK:
@@ -137,7 +137,7 @@ def _loop(
         if through and speed < station.tack_mps and abs(twa) > math.radians(40.0):
             wanted, thrust, what = twd - same_tack * math.radians(65.0), 1.0, "gathering way"
         elif abs(wrap_pi(twd - wanted)) < half:
-            wanted = twd + half      # she turns to the right: out of the zone on the other side
+            wanted = twd + half      # the boat turns to the right: out of the zone on the other side
     way = replace(habits, tack_min_mps=0.8 * station.tack_mps)
     steering, heading, why = helm(state.steering, situation, wanted, way)
     if steering.manoeuvre in {Manoeuvre.IRONS, Manoeuvre.WEAR}:

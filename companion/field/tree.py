@@ -36,7 +36,7 @@ from companion.field.vector_fields import (
 
 # The text of a composed field: Schmitt's binary tree as a sailor writes it, read and printed.
 #
-# Atoms have names; where they lie and how large they are is theirs to know (her rotate, shift and scalar). An
+# Atoms have names; where they lie and how large they are is theirs to know (Schmitt's rotate, shift and scalar). An
 # expression adds them, weighs them, takes the longer of two vectors, and projects a part out of the no-go zone::
 #
 #     ring + 0.5 * islet
@@ -268,7 +268,7 @@ class PointTo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StayAt:
-    """Towards a place, and about it once she is there."""
+    """Towards a place, and about it once it is there."""
 
     at_en: PointEn
     zone_m: float = 15.0
@@ -361,7 +361,7 @@ class FieldConditions:
     """What a tree depends on besides the place.
 
     ``seen`` is the boat among the vessels that a way out keeps clear of; ``way_out_rad`` is the one that was found for
-    her, None: it is looked for at each place. Without a wind nothing is projected: a motorboat goes where it points.
+    it, None: it is looked for at each place. Without a wind nothing is projected: a motorboat goes where it points.
     """
 
     seen: Situation

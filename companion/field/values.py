@@ -83,7 +83,7 @@ class GuidanceSettings:
 
     @property
     def shore_s(self) -> float:
-        """How far ahead [s] what stands still is looked at: a tack, half a turn, and a little; later she can turn."""
+        """How far ahead [s] what stands still is looked at: a tack, half a turn, and a little; later it can turn."""
         return 8.0 + self.tack_s + math.pi / self.turn_rate_radps
 
 

@@ -1,10 +1,10 @@
 """Vector fields as values: Schmitt's five atoms and the operations that compose them.
 
 A field maps points to vectors, both (n, 2) arrays of east and north: where the boat should head from there, and
-how strongly. Her constants are the defaults: nominal fields have length 10, repulsive ones up to 20 with a
+how strongly. The thesis's constants are the defaults: nominal fields have length 10, repulsive ones up to 20 with a
 Gaussian of 100 m, so that far from an obstacle the trajectory decides and close to it the obstacle does.
-Equations: S. Schmitt, Obstacle Avoidance for an Autonomous Marine Robot, 2013, section 4.1.2; her x is east here
-and her y north.
+Equations: S. Schmitt, Obstacle Avoidance for an Autonomous Marine Robot, 2013, section 4.1.2; its x is east here
+and its y north.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From the metres of one local frame to those of another: a boat that sails far takes her frame along.
+"""From the metres of one local frame to those of another: a boat that sails far takes its frame along.
 
 Places are carried over latitude and longitude, so nothing is lost but what a double rounds away. Velocities are turned
 by how far the north of one frame is off the other's there. Headings and winds are of true north at the boat and stay.

@@ -301,7 +301,7 @@ class LocalArea:
     def path_clearance_m(self, path_en: ArrayLike) -> float:
         """Return the exact smallest distance of a polyline (n, 2) to obstacles and limits [m], ≤ 0 on contact."""
         if isinstance(path_en, list) and len(path_en) == 2 and all(isinstance(place, tuple) for place in path_en):
-            return self._way_clearance_m(*path_en)   # the boat's to her waypoint: asked for several times a step
+            return self._way_clearance_m(*path_en)   # the boat's to its waypoint: asked for several times a step
         return self._path_clearance_m(path_en)
 
     @functools.lru_cache(maxsize=16)  # noqa: B019 - an area lives as long as its voyage

@@ -93,7 +93,7 @@ def _take_command(ctx: StepContext, outcome: CommandOutcome) -> None:
 
 
 def _command_failed(ctx: StepContext, what: str) -> None:
-    """Note an order that was refused or not answered; a mode that was not taken leaves her steered as she was."""
+    """Note an order that was refused or not answered; a mode that was not taken leaves the boat steered as it was."""
     state, status = ctx.state, ctx.autopilot
     ctx.set(pending=changed(ctx.state.pending, command=None, command_retry=ctx.failed(state.pending.command_retry)))
     is_steered = ctx.steers and status is not None and status.mode is Mode.GUIDED

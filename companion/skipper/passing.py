@@ -1,4 +1,4 @@
-"""Passing: which gates the boat has passed, by nearness, round a buoy, or across a line; which she missed."""
+"""Passing: which gates the boat has passed, by nearness, round a buoy, or across a line; which it missed."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def pass_gates(ctx: StepContext) -> None:
 
 
 def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
-    """Count the time in a box from entry on; True when it is over, or she was told to go on."""
+    """Count the time in a box from entry on; True when it is over, or it was told to go on."""
     box, inside = gate.box, ctx.state.progress.inside
     assert box is not None
     if inside is None or inside.goal != gate.goal:
@@ -118,7 +118,7 @@ def _cross(ctx: StepContext) -> None:
     if gate is None or gate.line is None:
         return
     found = crossing(gate.line, last.en_m, boat) if last is not None and not is_blind else None
-    # Sailed on by the autopilot while nobody looked, she is straight behind the line: its leg led across it.
+    # Sailed on by the autopilot while nobody looked, the boat is straight behind the line: its leg led across it.
     unseen = is_blind and gate.is_crossed and is_between(gate.line, boat) and (
         0.0 < ahead_m(gate.line, boat) <= BEYOND_M + ctx.config.grid_size_m)
     if not unseen and (found is None or (not found.is_forward and not gate.is_crossed)):
@@ -135,7 +135,7 @@ def _cross(ctx: StepContext) -> None:
         return
     following = next((n for n, g in enumerate(ctx.gates) if g.goal > gate.goal), len(ctx.gates))
     if not gate.is_crossed:
-        # Her route leads to the place before the line, which is behind her.
+        # The boat's route leads to the place before the line, which is behind it.
         ctx.set(plans=changed(ctx.state.plans, asked=f"{gate.name} is crossed"))
     ctx.set(progress=changed(
         ctx.state.progress, gate=following, reached=(*ctx.state.progress.reached, gate.goal), closest_m=math.inf,
@@ -193,7 +193,7 @@ def missed(ctx: StepContext) -> None:
 
 
 def follow_search(ctx: StepContext) -> None:
-    """Note where she is while she searches, and lay the rest anew between two sweeps where the wind has turned."""
+    """Note where the boat is while it searches, and lay the rest anew between two sweeps where the wind has turned."""
     gate, boat = ctx.gate, ctx.boat_en
     if gate is None or gate.search is None:
         if ctx.state.progress.task:
@@ -215,7 +215,7 @@ def follow_search(ctx: StepContext) -> None:
 
 
 def _begins(ctx: StepContext, gate: Gate) -> bool:
-    """Return whether the gate is where a sweep begins: she is not on one."""
+    """Return whether the gate is where a sweep begins: the boat is not on one."""
     before = ctx.gates[ctx.state.progress.gate - 1] if ctx.state.progress.gate > 0 else None
     return before is None or before.goal != gate.goal or before.sweep != gate.sweep
 

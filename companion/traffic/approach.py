@@ -17,7 +17,7 @@ from companion.traffic.predict import predict
 from companion.traffic.vessel import Vessel
 
 # Of two vessels that come equally near the sooner one matters more: ten minutes count as 60 m. One that comes no nearer
-# than she is counts as if she were so much farther: it takes a turn of hers or ours.
+# than it is counts as if it were so much farther: it takes a turn of its own or ours.
 PERIL_MPS, OPENING_M = 0.1, 100.0
 
 

@@ -152,7 +152,7 @@ def _two_sails(approach: Approach, ours: float, theirs: float, twd_from_rad: flo
     if twd_from_rad is None:
         return Encounter(rule=Rule.SAILING, role=Role.GIVE_WAY, reason="the wind is not known")
     tack = wind_side(ours, twd_from_rad)
-    # Close to head to wind or dead before it her tack cannot be told from her heading.
+    # Close to head to wind or dead before it a vessel's tack cannot be told from its heading.
     unsure = abs(math.sin(difference_rad(twd_from_rad, theirs))) < math.sin(math.radians(10.0))
     if unsure and tack == "port":
         return Encounter(rule=Rule.SAILING, role=Role.GIVE_WAY, reason="we are on port tack and unsure of hers")
@@ -161,7 +161,7 @@ def _two_sails(approach: Approach, ours: float, theirs: float, twd_from_rad: flo
         if tack == "port":
             return Encounter(rule=Rule.SAILING, role=Role.GIVE_WAY, reason="we are on port tack, she on starboard")
         return Encounter(rule=Rule.SAILING, role=Role.STAND_ON, reason="she is on port tack, we on starboard")
-    # Same side: the one to windward gives way. We are to windward when the wind blows from us to her.
+    # Same side: the one to windward gives way. We are to windward when the wind blows from us to the other.
     down = math.cos(wrap_pi(approach.bearing_rad - (twd_from_rad + math.pi)))
     if down >= 0.0:
         return Encounter(rule=Rule.SAILING, role=Role.GIVE_WAY, reason=f"both on {tack} tack, we are to windward")
@@ -233,23 +233,23 @@ def assess(
 
 SOON_S = 300.0               # an approach later than this is no risk of collision yet
 OVER_S = 5.0                 # for so long they have drawn apart, and would on their first courses: past and clear
-LEFT_S = 120.0               # for so long she has drawn away on a course of hers: she does not come back
+LEFT_S = 120.0               # for so long the other has drawn away on its own course: it does not come back
 # Getting clear by ourselves: seeing it, a plan, its upload and the turn; then a way that is not straight across.
 REACTION_S, DETOUR = 15.0, 1.5
 SLOW_MPS = 1.0
 # A change of course that is readily apparent (rule 8 b). The rule has no number: 30 degrees is the usual reading; once
 # the lesser of these shows, the change is made.
 APPARENT_RAD, SHOWN_RAD = math.radians(30.0), math.radians(24.0)
-ACTS_RAD, SHE_ACTS_CPA = math.radians(15.0), 0.4   # she has turned by this much; then this share of the distance does
+ACTS_RAD, OTHER_ACTS_CPA = math.radians(15.0), 0.4   # turned by this much; then this share of the distance does
 TACK_RAD = math.radians(10.0)   # nearer to the wind's line than this a tack is not told from a heading
 
-# Who stands on is bound to keep course and speed (rule 17), and who should give way and does not has shown that she
+# Who stands on is bound to keep course and speed (rule 17), and who should give way and does not has shown that it
 # keeps them: in an encounter no vessel is expected to wander. Reports that say otherwise make another plan.
 HOLDING = MotionUncertainty(speed_mps=0.3, course_rad=math.radians(2.0), accel_mps2=0.01, turn_radps=math.radians(0.05))
 
 
 def expected(vessel: Vessel) -> MotionUncertainty:
-    """Return how surely a vessel in an encounter keeps course and speed: as her class does, or better."""
+    """Return how surely a vessel in an encounter keeps course and speed: as its class does, or better."""
     usual = motion_of(vessel)
     return usual if vessel.is_stopped or usual.course_rad < HOLDING.course_rad else HOLDING
 
@@ -260,15 +260,15 @@ class OngoingEncounter:
 
     Attributes:
         mmsi, branch: with whom.
-        label: her name or number.
+        label: the other's name or number.
         encounter: what the rules gave when it began.
         since_s: when it began.
         course_rad: ours then, over ground.
-        side: where she was then: "ahead", "port", "starboard" or "astern".
-        her_course_rad: hers then; None where it was not known.
-        tacks: ours and hers, "" where it cannot be told.
-        must_act: we must keep out of her way now.
-        evident: we stood on and she evidently does not act: it is for us to get clear now.
+        side: where the other was then: "ahead", "port", "starboard" or "astern".
+        other_course_rad: the other's then; None where it was not known.
+        tacks: ours and the other's, "" where it cannot be told.
+        must_act: we must keep out of the other's way now.
+        evident: we stood on and the other evidently does not act: it is for us to get clear now.
         altered: our change of course is apparent.
         cpa_m: how near both would come, going on as they do now.
         apart_s: since when the vessels draw apart.
@@ -282,7 +282,7 @@ class OngoingEncounter:
     since_s: float
     course_rad: float
     side: str
-    her_course_rad: float | None = None
+    other_course_rad: float | None = None
     tacks: tuple[str, str] = ("", "")
     must_act: bool = False
     evident: bool = False
@@ -292,12 +292,12 @@ class OngoingEncounter:
 
     @property
     def stands_on(self) -> bool:
-        """Do we keep course and speed because of her?"""
+        """Do we keep course and speed because of the other?"""
         return not self.must_act and self.encounter.role is Role.STAND_ON
 
     @property
     def gives_way(self) -> bool:
-        """Do the rules want us to keep out of her way, early and by much (rules 8 and 16)?"""
+        """Do the rules want us to keep out of the other's way, early and by much (rules 8 and 16)?"""
         return self.must_act and not self.evident and self.encounter.role is not Role.KEEP_CLEAR
 
     @property
@@ -323,14 +323,14 @@ class OngoingEncounter:
         return (f"{self.label} {where}: {does} ({rule}); CPA {approach.distance_m:.0f} m in {approach.time_s:.0f} s")
 
 
-def act_limits(own: OwnShip, vessel: Vessel, clearance_m: float, *, she_acts: bool = False) -> AlarmLimits:
-    """Return when an approach is an encounter, and when a vessel that stands on must act by herself.
+def act_limits(own: OwnShip, vessel: Vessel, clearance_m: float, *, other_acts: bool = False) -> AlarmLimits:
+    """Return when an approach is an encounter, and when a vessel that stands on must act by itself.
 
-    Where the other has turned, how near she then passes is her choice, as long as it is not too near.
+    Where the other has turned, how near it then passes is its choice, as long as it is not too near.
     """
     way_m = DETOUR * (clearance_m + own.radius_m + vessel.reach_m)
     return AlarmLimits(
-        warn_cpa_m=clearance_m, warn_tcpa_s=SOON_S, act_cpa_m=clearance_m * (SHE_ACTS_CPA if she_acts else 1.0),
+        warn_cpa_m=clearance_m, warn_tcpa_s=SOON_S, act_cpa_m=clearance_m * (OTHER_ACTS_CPA if other_acts else 1.0),
         act_tcpa_s=REACTION_S + way_m / max(own.speed_mps, SLOW_MPS))
 
 
@@ -372,7 +372,7 @@ def _begun(
     return OngoingEncounter(
         mmsi=one.vessel.mmsi, branch=one.vessel.branch, label=one.vessel.label, encounter=one.encounter, since_s=t_s,
         course_rad=course, side=_side(difference_rad(a.bearing_rad, course)),
-        her_course_rad=one.vessel.course_rad, tacks=_tacks(own, one.vessel, twd_from_rad))
+        other_course_rad=one.vessel.course_rad, tacks=_tacks(own, one.vessel, twd_from_rad))
 
 
 def _gone_on(
@@ -389,7 +389,7 @@ def _gone_on(
             difference_rad(math.atan2(*own.velocity_en_mps), held.course_rad)) >= SHOWN_RAD:
         held = replace(held, altered=True)
     tacks = _tacks(own, one.vessel, twd_from_rad)
-    # Hers may change because she gives way: that relieves her of nothing.
+    # The other's may change because it gives way: that relieves it of nothing.
     changed = bool(tacks[0]) and bool(held.tacks[0]) and tacks[0] != held.tacks[0]
     if held.encounter.rule is Rule.SAILING and changed and a.is_closing and not held.altered:
         return replace(held, encounter=one.encounter, tacks=tacks, evident=False)
@@ -399,19 +399,19 @@ def _gone_on(
 
 def _meets_again(held: OngoingEncounter, own: OwnShip, vessel: Vessel, t_s: float) -> bool:
     """Would they close again, were both back on the courses that the encounter began on?"""
-    if held.her_course_rad is None:
+    if held.other_course_rad is None:
         return False
     back = replace(own, velocity_en_mps=(
         own.speed_mps * math.sin(held.course_rad), own.speed_mps * math.cos(held.course_rad)))
-    return cpa(back, replace(vessel, course_rad=held.her_course_rad, heading_rad=None), t_s).is_closing
+    return cpa(back, replace(vessel, course_rad=held.other_course_rad, heading_rad=None), t_s).is_closing
 
 
 def _judged(
     held: OngoingEncounter, own: OwnShip, one: Assessment, clearance_m: float, policy: Policy
 ) -> OngoingEncounter:
-    then, now = held.her_course_rad, one.vessel.course_rad
-    she_acts = then is not None and now is not None and abs(difference_rad(now, then)) >= ACTS_RAD
-    alarm = alarm_of(one.approach, act_limits(own, one.vessel, clearance_m, she_acts=she_acts))
+    then, now = held.other_course_rad, one.vessel.course_rad
+    other_acts = then is not None and now is not None and abs(difference_rad(now, then)) >= ACTS_RAD
+    alarm = alarm_of(one.approach, act_limits(own, one.vessel, clearance_m, other_acts=other_acts))
     must_act = held.evident or held.encounter.role is not Role.STAND_ON or held.encounter.must_act(alarm, policy)
     return replace(held, must_act=must_act, evident=must_act and held.encounter.role is Role.STAND_ON,
                    cpa_m=one.approach.distance_m)

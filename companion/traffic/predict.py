@@ -46,7 +46,7 @@ class MotionUncertainty:
     unknown_mps: float = 4.0
 
 
-# Own assumptions, not from a standard: a ship holds her course, small craft, sailing and fishing boats do not.
+# Own assumptions, not from a standard: a ship holds its course, small craft, sailing and fishing boats do not.
 SHIP = MotionUncertainty()
 SMALL = MotionUncertainty(position_m=5.0, speed_mps=0.5, course_rad=math.radians(5.0), accel_mps2=0.02,
                turn_radps=math.radians(0.5), unknown_mps=3.0)

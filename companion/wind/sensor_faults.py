@@ -410,7 +410,7 @@ class WindWatch:
     def _lacks_speed(self, sample: WindSample, dt_s: float) -> bool:
         """No speed sensor configured or, where that is not known, a speed of exactly nothing on a boat that moves.
 
-        A boat that a current carries through a calm looks the same, but feels a wind as fast as she goes.
+        A boat that a current carries through a calm looks the same, but feels a wind as fast as it goes.
         """
         self._zero_s = self._zero_s + dt_s if sample.tws_mps == 0.0 else 0.0
         if self.parameters.speed_type is not None:

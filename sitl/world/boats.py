@@ -20,13 +20,13 @@ and a turn damping that does not vanish at v = 0. And they have no hull speed: f
 2.4 m/s for a waterline of 3.65 m. The sail swings and the rudder turns at a finite rate.
 
 Head to wind the sail gives no force and the rudder none without way: the boat is in irons until sternway and a
-reversed rudder, or a wind shift, get her out.
+reversed rudder, or a wind shift, get it out.
 
 One second at a time: measure, decide, sail. The guidance sees a position with noise, and a wind that is a mean of
 what a vane with noise said, never the truth.
 
-The controller in her boat turns a rudder angle into u1 and u2 (``companion.field.controllers.motor_commands``); the
-rudder is the line controller's. Numbers are those of a boat of 1.5 m and 40 kg that makes 2 m/s with both motors at
+The controller in Schmitt's boat turns a rudder angle into u1 and u2 (``companion.field.controllers.motor_commands``);
+the rudder is the line controller's. Numbers are those of a boat of 1.5 m and 40 kg that makes 2 m/s with both motors at
 one half, which is what u1 and u2 add up to; no measured boat stands behind them.
 """
 
@@ -164,7 +164,7 @@ def _advance(s, p, rudder_rad, sheet_rad, twd_from_rad, tws_mps, h):  # type: ig
 
 @lru_cache(maxsize=4)
 def polar(parameters: VaimosParameters | None = None) -> Polar:
-    """Return the speeds through the water, found by sailing the model: means of two minutes, 0 where she falls off."""
+    """Return the speeds through the water, found by sailing the model: means of two minutes, 0 where it falls off."""
     p = (parameters or VaimosParameters()).array()
     twa = np.radians(np.arange(0.0, 181.0, 5.0))
     tws = np.array([2.0, 3.0, 4.5, 6.0, 8.0, 10.0, 13.0])
@@ -199,7 +199,7 @@ def polar_at(tws_mps: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 def habits_for(tws_mps: float, **changes: float | bool) -> GuidanceSettings:
-    """Return what VAIMOS can do in this wind: her polar, slow tacks, leeway of 3 % of the wind."""
+    """Return what VAIMOS can do in this wind: the boat's polar, slow tacks, leeway of 3 % of the wind."""
     twa, speed = polar_at(tws_mps)
     base: dict[str, float | bool] = {
         "turn_rate_radps": math.radians(11.0), "tack_s": 7.0, "tack_min_mps": 0.5, "lag_s": 6.0, "leeway_share": 0.03,
@@ -216,7 +216,7 @@ def wind_for(twd_from_rad: float, tws_mps: float, seed: int) -> AR1:
 
 @dataclass(slots=True)
 class SimulatedVaimos:
-    """The boat, her wind and her sensors; ``track`` grows by a row (t, east, north, heading, speed) each second."""
+    """The boat, its wind and its sensors; ``track`` grows by a row (t, east, north, heading, speed) each second."""
 
     wind: WindModel
     rng: np.random.Generator

@@ -59,7 +59,7 @@ def test_who_has_turned_may_pass_nearer():
     we, ship = crossing(away_s=30.0, miss_m=60.0, **POWER)
     [held] = look((), *crossing(**POWER))
     [kept] = look((held,), we, ship, t_s=1.0)
-    [turned] = look((replace(held, her_course_rad=held.her_course_rad + 1.1 * ACTS_RAD),), we, ship, t_s=1.0)
+    [turned] = look((replace(held, other_course_rad=held.other_course_rad + 1.1 * ACTS_RAD),), we, ship, t_s=1.0)
     assert 0.4 * CLEAR_M < turned.cpa_m < CLEAR_M
     assert kept.evident
     assert turned.stands_on

@@ -36,7 +36,7 @@ from companion.words import counted
 # the items ask for is either what the voyage does, too, or refused: nothing that was drawn is passed over in silence.
 
 MAX_GOALS = 1000   # that laps may make of a drawing; a voyage of more is meant otherwise
-STAY_M = 25.0      # half the side of the box in which she stays: her loiter swings 12 m
+STAY_M = 25.0      # half the side of the box in which the boat stays: its loiter swings 12 m
 MAX_STEPS = 20 * MAX_GOALS   # jumps among jumps that pass no waypoint end here
 GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})   # MAV_FRAMEs whose x and y are latitude and longitude
 REDRAW = "change the drawing and upload it again"
@@ -55,7 +55,7 @@ class MissionStop:
     stay_s: float = 0.0
 
     def goal(self, name: str, radius_m: float | None = None) -> GoalOptions:
-        """Return it as a goal of a mission file: where she stays, a box about it."""
+        """Return it as a goal of a mission file: where it stays, a box about it."""
         if self.stay_s <= 0.0:
             there = PointOptions(lat=self.point.lat_deg, lon=self.point.lon_deg, name=name)
             return there if radius_m is None else msgspec.structs.replace(there, radius_m=radius_m)
@@ -127,7 +127,7 @@ def course_of(items: Sequence[MissionItem]) -> DrawnCourse:
         found.say(final, f"{found.name(final)} of {station_s:g} s is the last: she stays until told", "", Severity.NOTE)
     stays = {n: max(0.0, _stay_s(items[n - 1])) for n in walked}
     if final is not None and walked.count(final) == 1:
-        stays[final] = 0.0   # the mission's own end keeps her
+        stays[final] = 0.0   # the mission's own end keeps the boat
     stops = [MissionStop(number=n, point=items[n - 1].point,
                          stay_s=stays[n]) for n in walked if _has_place(items[n - 1])]
     lap = _lap(stops) if jumps else len(stops)

@@ -32,7 +32,7 @@ LOITER_ROOM_M = 16.0   # a sailboat's loiter swings 12 m, about a place that is 
 LEAST_WATER = 0.5      # share of a search's area
 MOST_SWEEPS = 200      # each is two plans and two uploads
 WIDEST_M = 2000.0    # a longer line is two marks that do not belong together
-WATER_M = 3000.0     # across: what a field speaks of, or leads out of, is looked over from where she is
+WATER_M = 3000.0     # across: what a field speaks of, or leads out of, is looked over from where the boat is
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +82,7 @@ class Goal:
 
     With ``gate`` two marks to pass between: ``point`` is the middle, and ``radius_m`` about it is for previews alone.
     With ``box`` or ``search`` some water: ``point`` is the place with the most room in it, and ``radius_m`` that room.
-    With ``field`` she is steered by that, and ``point`` is where the mission on board leads meanwhile.
+    With ``field`` it is steered by that, and ``point`` is where the mission on board leads meanwhile.
     ``bandwidth_m`` is half the width of the lane that leads here, None: as the mission has it.
     """
 

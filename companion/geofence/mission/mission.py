@@ -71,7 +71,7 @@ class Mission:
 
     @property
     def places(self) -> tuple[GeoPoint, ...]:
-        """Where she may be bound for: the goals and the refuges."""
+        """Where the boat may be bound for: the goals and the refuges."""
         return (*(g.point for g in self.goals), *(r.point for r in self.refuges))
 
     def frame(self) -> LocalFrame:

@@ -81,12 +81,12 @@ class FieldOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     lat: Latitude
     lon: Longitude
-    """Where the mission on board leads meanwhile: she loiters there when she cannot be steered."""
+    """Where the mission on board leads meanwhile: the boat loiters there when it cannot be steered."""
     field: str
     """The expression: ``ring + 0.5 * islet``."""
     until: Literal["told", "time", "place", "vessel", "outside"] = "told"
-    """What ends it: the order ``go_on``; ``for_s`` alone; she is within ``radius_m`` of the place; another vessel is
-    inside ``polygon``; she herself is outside of it. The order always does."""
+    """What ends it: the order ``go_on``; ``for_s`` alone; it is within ``radius_m`` of the place; another vessel is
+    inside ``polygon``; the boat itself is outside of it. The order always does."""
     for_s: Annotated[float, Meta(gt=0.0, le=1e7)] | None = None
     """At the longest, counted from when the goal before was reached."""
     radius_m: Annotated[float, Meta(gt=0.0, le=5000.0)] = 10.0
@@ -123,7 +123,7 @@ class PointAtomOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 class StationAtomOptions(
     Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="station",
 ):
-    """``kind = "station"``: to a place, and about it once she is there: short boards, or loops."""
+    """``kind = "station"``: to a place, and about it once it is there: short boards, or loops."""
 
     lat: Latitude
     lon: Longitude
@@ -259,15 +259,15 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     beam_m: Annotated[float, Meta(gt=0.0, le=30.0)] = 0.3
     """The hull: what touches, and what vessels are kept clear of. The position is taken to be amidships."""
     leeway_deg: Annotated[float, Meta(ge=0.0, le=30.0)] = 0.0
-    """How far to leeward of her bow she goes on a beat: apparent wind 30 degrees off it, three times as fast as she."""
+    """How far to leeward of the bow a beat goes: apparent wind 30 degrees off it, three times the boat's speed."""
     max_tws_mps: Positive | None = None
-    """She is not to be out in more wind than this, with probability ``[risk] delta_s`` at each instant."""
+    """The boat is not to be out in more wind than this, with probability ``[risk] delta_s`` at each instant."""
     min_tws_mps: Positive | None = None
-    """In less wind than this she makes no way; with the same probability."""
+    """In less wind than this the boat makes no way; with the same probability."""
     tack_fails: Annotated[float, Meta(ge=0.0, le=0.9)] = 0.03
     """The chance that a tack fails; the voyage's own tacks add to it. 0: tacks are not reckoned to fail."""
     motor: bool = False
-    """The boat has an auxiliary motor that the autopilot can run: used when she drifts onto something."""
+    """The boat has an auxiliary motor that the autopilot can run: used when it drifts onto something."""
 
 
 class WindOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -407,7 +407,7 @@ class _Safety(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     ``refuge``: the nearest one, without one home if the mission ends there; ``home``; ``stay``: a loiter near by;
     ``say``: words alone. A place to which no way leads is replaced by the next of these. Of a failsafe of the autopilot
-    that has stopped her, with ``set_auto``: ``sail_on``, ``stay``, ``refuge``; ``leave``: nothing.
+    that has stopped it, with ``set_auto``: ``sail_on``, ``stay``, ``refuge``; ``leave``: nothing.
     """
 
     def end(self, watchdog: str) -> End:

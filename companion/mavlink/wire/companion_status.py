@@ -338,7 +338,7 @@ def unpack_traffic(payload: bytes) -> TrafficStatus:
     )
 
 
-# HIGH_LATENCY2 of the companion: the boat and the companion's view of her in one message of 42 bytes. Pure.
+# HIGH_LATENCY2 of the companion: the boat and the companion's view of it in one message of 42 bytes. Pure.
 #
 # Sent as component 191 after MAV_CMD_CONTROL_HIGH_LATENCY, for a program that passes it on over a narrow link. A
 # station may take it for the vehicle's own (QGroundControl looks at no component id): so type, mode and arming are the

@@ -20,7 +20,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "SAIL_LOIT_RADIUS": (0.0, 10_000.0),
     "WP_RADIUS": (0.0, 10_000.0),
     "TURN_RADIUS": (0.0, 10_000.0),
-    # the point on the legs that she follows
+    # the point on the legs that the boat follows
     "WP_SPEED": (0.0, 100.0),
     "WP_ACCEL": (0.0, 100.0),
     "WP_JERK": (0.0, 100.0),
@@ -82,7 +82,7 @@ EFFECTS: tuple[tuple[re.Pattern[str], Effect], ...] = (
 
 
 def effect_of(name: str) -> Effect | None:
-    """Return what setting a parameter changes of what sensors say and how she sails, None for any other.
+    """Return what setting a parameter changes of what sensors say and how the boat sails, None for any other.
 
     >>> effect_of("WNDVN_DIR_OFS"), effect_of("SERVO1_REVERSED"), effect_of("WP_RADIUS")
     (<Effect.WIND: 'what the vane says'>, <Effect.BOAT: 'how she answers to sheet and rudder'>, None)

@@ -1,4 +1,4 @@
-"""A status in 42 bytes: enough of the boat for who hears her every ten minutes, and what became of the last order."""
+"""A status in 42 bytes: enough of the boat for who hears it every ten minutes, and what became of the last order."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The page of a composed field: Schmitt's interactive picture in one file that asks for nothing.
 
-The wind is turned by a slider, the boat is dragged, and the fan of possible directions can be shown (her section
+The wind is turned by a slider, the boat is dragged, and the fan of possible directions can be shown (section
 4.1.3). What is computed in the browser is what the companion computes: a test holds the two together.
 """
 

@@ -142,7 +142,7 @@ def beaten(problem: Problem, beat: Beat) -> Problem:
     boat = problem.boat
     still, tacking = replace(problem, current=NO_CURRENT), beat
     if problem.current.drift_mps > 0.0:
-        tacking = replace(beat, tack_s=0.0)   # while she tacks in place a share of her speed would be carried back
+        tacking = replace(beat, tack_s=0.0)   # while the boat tacks in place a share of its speed would be carried back
     inside = [float(a) for a in np.linspace(0.0, beat.no_go_half_rad, ANGLES)]
     made = [beaten_mps(still, tacking, angle) for angle in inside]
     outside = [(a, v) for a, v in zip(boat.polar_twa_rad, boat.polar_mps, strict=True) if a > beat.no_go_half_rad]

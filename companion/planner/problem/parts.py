@@ -93,8 +93,8 @@ class BoatLimits:
 
     ``can_tack`` False: no turn goes through the wind's eye, so the boat gybes round. ``gybe_room_m`` is the leg that
     turning round the long way needs; None: five turning radii at full speed. ``speeds`` is the polar in other winds.
-    More wind than ``max_tws_mps``, or less than ``min_tws_mps``, she is not to be out in (None: no limit).
-    ``tack_fails`` is the chance that a tack fails, below 1; 0: what then comes is not looked at. She then lies for
+    More wind than ``max_tws_mps``, or less than ``min_tws_mps``, it is not to be out in (None: no limit).
+    ``tack_fails`` is the chance that a tack fails, below 1; 0: what then comes is not looked at. It then lies for
     ``irons_s``, set to lee at ``lee_mps`` (on starboard tack, on port) beside what the water does.
     """
 
@@ -268,7 +268,7 @@ class Speeds:
         twa_rad: (n,) increasing.
         v_mps: m rows of n speeds.
 
-    Below the first wind nothing was measured. She is taken to be slower there than in proportion to the wind: by its
+    Below the first wind nothing was measured. It is taken to be slower there than in proportion to the wind: by its
     square.
     """
 

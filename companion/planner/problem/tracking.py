@@ -23,8 +23,8 @@ class Tracking:
         floor_m: What hull and band keep clear of everything solid, 0 or more [m].
         reach_m: How far the hull reaches from its place [m].
         solids: What is solid, as it is: the problem's obstacles are grown by a margin.
-        limits: What is around her, as it is; None: nothing.
-        before_en: Where the leg begins that ends at the start; None: she begins there.
+        limits: What is around the boat, as it is; None: nothing.
+        before_en: Where the leg begins that ends at the start; None: it begins there.
         correlation_s: How long the wind's direction remembers [s].
         is_known: The autopilot's parameters were read; without, the greater of the two stated errors holds everywhere.
 

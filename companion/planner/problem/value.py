@@ -51,7 +51,7 @@ class Problem:
 
     ``vessels_part`` is what uncertain targets get of 1 - delta_s, at each instant and together; None: a tenth of it.
     ``tracking`` says how the plan will be sailed, and what that track keeps clear of; without it the legs alone count.
-    ``adrift`` is a current that is believed and not sure enough to be planned with: it carries her where a tack fails.
+    ``adrift`` is a current that is believed and not sure enough to be planned with: it carries a boat whose tack fails.
     ``leg_saving`` is what a leg must save, as a share of the path's time, for ``auto`` to keep it.
     """
 

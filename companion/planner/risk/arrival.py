@@ -3,8 +3,8 @@
 Less wind costs more than as much more wind gains, and no speed is below none: so the spread of the time is not
 symmetric, and its median is later than the plan's own time. The plan is sailed on paper in ``WINDS`` drawn winds.
 Strength and direction are independent Gauss-Markov processes of the problem's own spreads. In each, a leg's progress at
-an instant is its planned one times the ratio of her speeds in that wind and in the plan's; where the wind has closed a
-leg she beats along it. Turns take their time in any wind, and a tack that fails takes ``FAILED_S`` more.
+an instant is its planned one times the ratio of its speeds in that wind and in the plan's; where the wind has closed a
+leg it beats along it. Turns take their time in any wind, and a tack that fails takes ``FAILED_S`` more.
 
 Where a step is long against the correlation time, the mean over a step has less spread than an instant: the
 remainder is averaged over within the step.
@@ -33,7 +33,7 @@ STEPS_OF_PLAN, LONGEST = 50, 5     # steps in the plan's own time; a wind in whi
 QUANTILES = (0.1, 0.5, 0.9)
 NODES_MPS, NODES_RAD, NODES_TWA = 33, 17, 361   # of the tables of progress: winds, their turns, angles to them
 REACH = 3.5                        # standard deviations that they reach to
-FAILED_S = IRONS_S + 4.0           # head to wind, and until she has way on again
+FAILED_S = IRONS_S + 4.0           # head to wind, and until the boat has way on again
 MOST_FAILURES = 20
 
 Floats = NDArray[np.float64]
@@ -56,7 +56,7 @@ def arrival(problem: Problem, legs: Sequence[Leg]) -> Arrival | None:
 
 
 def _speeds(problem: Problem, strength: Strength) -> tuple[Speeds, tuple[str, ...]]:
-    """Return her speeds in every wind, and what is not known."""
+    """Return the boat's speeds in every wind, and what is not known."""
     doubts = [] if strength.is_known else ["the spread of the wind's strength is assumed"]
     speeds, boat = problem.boat.speeds, problem.boat
     if speeds is None:

@@ -1,6 +1,6 @@
-"""What comes of tacks that fail: how often in a row one may before she touches, and what that adds to a path's risk.
+"""What comes of tacks that fail: how often in a row one may before a contact, and what that adds to a path's risk.
 
-At each failure she is carried on along the old course, and tries again. After ``TRIES`` of them she gybes round where
+At each failure it is carried on along the old course, and tries again. After ``TRIES`` of them it gybes round where
 there is room (``companion.boat.failed_tack``): so the skipper does. A tack that cannot fail so often, or is to be tried
 on for want of that room, is a risk: the chance of one failure to the power of how many it takes to touch. Tacks add up
 by the union bound. A beat that is left to the autopilot has its tacks anywhere along the edges of its corridor.
@@ -36,7 +36,7 @@ class TackAtRisk:
     Attributes:
         leg: that it leads into; of a beat that is left to the autopilot the leg itself.
         at_en: where.
-        failures: in a row until she touches.
+        failures: in a row until it touches.
         risk: the probability of it.
         lack_m: the room that is missing for so many.
 
@@ -55,7 +55,7 @@ class TackAtRisk:
 
 
 def tacks_at_risk(problem: Problem, legs: Sequence[Leg]) -> tuple[TackAtRisk, ...]:
-    """Return the tacks of a path whose failures would bring her onto something, the riskiest of each leg."""
+    """Return the tacks of a path whose failures would bring the boat onto something, the riskiest of each leg."""
     if problem.boat.tack_fails <= 0.0 or not problem.boat.can_tack or not legs:
         return ()
     return _at_risk(problem, tuple(replace(leg, risk=0.0, clearance_m=0.0) for leg in legs))
@@ -118,7 +118,7 @@ def _beaten(problem: Problem, solids: _Solids, n: int, leg: Leg, chance: float) 
     worst: TackAtRisk | None = None
     risk = 0.0
     for side, at, distance_m in zip(sides, places, solids.distances_m(shapely.points(places)), strict=True):
-        # to the right of the line she comes on port tack, whose course is to the right of the wind
+        # to the right of the line the boat comes on port tack, whose course is to the right of the wind
         course = problem.wind.twd_from_rad + side * beat.no_go_half_rad
         tack = solids.tack(problem, n, at, course, speed, chance, distance_m)
         if tack is not None:
@@ -172,7 +172,7 @@ class _Solids:
         self, problem: Problem, leg: int, at: Place, course_rad: float, speed_mps: float, chance: float,
         distance_m: float | None = None,
     ) -> TackAtRisk | None:
-        """Return what a tack there comes to when it fails, None: she has room for what she does then.
+        """Return what a tack there comes to when it fails, None: it has room for what it does then.
 
         ``distance_m`` of the place from everything solid; None: it is asked for.
         """
@@ -220,12 +220,12 @@ class _Solids:
 
 
 def _point(tracks: Sequence[NDArray[np.float64]]) -> Place:
-    """Return where she tries again: the farthest on."""
+    """Return where the boat tries again: the farthest on."""
     return float(tracks[-1][-1][0]), float(tracks[-1][-1][1])
 
 
 def in_words(problem: Problem, tacks: Sequence[TackAtRisk]) -> Iterator[str]:
-    """Yield a sentence for each tack that may bring her onto something."""
+    """Yield a sentence for each tack that may bring the boat onto something."""
     for tack in tacks:
         where = f"{tack.at_en[0]:.0f} E, {tack.at_en[1]:.0f} N"
         often = "once" if tack.failures == 1 else f"{tack.failures} times in a row"

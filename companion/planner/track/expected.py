@@ -30,8 +30,8 @@ from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.tracking import Tracking
 from companion.planner.problem.value import Problem
 
-RUN_UP_M = 40.0      # of the leg before the start: she is on it, and rounds the corner between
-BESIDE_M = 15.0      # of that leg's end the corner is the plan's; within this of her own place the error grows
+RUN_UP_M = 40.0      # of the leg before the start: the boat is on it, and rounds the corner between
+BESIDE_M = 15.0      # of that leg's end the corner is the plan's; within this of the boat's own place the error grows
 SPARE_M = 0.3        # a start that is nearer than the floor need come no nearer than this more
 SIGMA_AT_S = 60.0    # horizon at which the spread is taken for boards
 STRIDE = 10          # places of a track, a fifth of a second apart
@@ -44,7 +44,7 @@ class ExpectedTrack:
     Attributes:
         clearance_m: Least clearance of the hull, inf where nothing is solid [m].
         at_en: Where, and ``leg`` on which leg of the path.
-        is_kept: Whether the floor is, everywhere; at a start that is nearer she only comes no nearer.
+        is_kept: Whether the floor is, everywhere; at a start that is nearer it only comes no nearer.
         lack_m: How far the worst place is below what it needs [m], 0 where none is.
         error_m: The prediction's own stated error there, loops left aside [m].
         worst_en: Where that is, and ``near_en`` the place of something solid that it is near to.
@@ -88,7 +88,7 @@ def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray
         legs: What the scorer says of the path; None: it is asked.
         has_boards: Look at the boards of legs that are left to the autopilot, which takes its time.
         has_loops: Allow for a loop about the ends of legs that are too short to be followed.
-        part: Of which waypoints, the whole path otherwise: she comes to them along the leg before.
+        part: Of which waypoints, the whole path otherwise: it comes to them along the leg before.
         sailed_m: Of the first leg, which is as much longer than what is left of it.
 
     """
@@ -131,12 +131,12 @@ def _expected(
     stated_m = stated_error_m(best, has_short=not tracking.is_known)
     error = np.where(near & has_loops, loop_m(best), stated_m)[leg]
     if not first:
-        error = error * np.minimum(1.0, np.hypot(*(en - path[0]).T) / BESIDE_M)   # where she begins is known
+        error = error * np.minimum(1.0, np.hypot(*(en - path[0]).T) / BESIDE_M)   # where the boat begins is known
     room = distance - error - tracking.reach_m
     need = np.full(len(room), tracking.floor_m)
     clear = np.flatnonzero(room >= need)
     begin = int(clear[0]) if len(clear) else len(room)
-    need[:begin] = np.minimum(need[:begin], room[0] - SPARE_M)   # nearer already, where she begins
+    need[:begin] = np.minimum(need[:begin], room[0] - SPARE_M)   # nearer already, where the boat begins
     is_beaten = beats[leg]
     judged = np.where(is_beaten, math.inf, room)
     lack = np.where(is_beaten, 0.0, np.maximum(0.0, need - room))
@@ -180,7 +180,7 @@ def _with_boards(
     for n in np.flatnonzero(beats):
         for rows in _boards(tracking, tracks, whole, int(n) + first):
             if len(rows) < 0.25 * len(tracks):
-                continue   # few winds bring her there at all
+                continue   # few winds bring the boat there at all
             rows.sort()
             room, place = rows[math.floor((1.0 - problem.delta_s) * len(rows) + 1e-9)]
             if room < out.clearance_m:

@@ -111,7 +111,7 @@ def _scorer(problem: Problem) -> Judge:
 def _fewer(
     problem: Problem, judge: Judge, path: Path, judged: Evaluation, effort: Effort,
 ) -> tuple[Path, Evaluation]:
-    """Leave out corners and short legs, the shortest first, while it costs little and brings her nearer to nothing.
+    """Leave out corners and short legs, the shortest first, while it costs little and brings it nearer to nothing.
 
     A change is judged where it is made: what has been tried there is not tried again for a change elsewhere.
     """

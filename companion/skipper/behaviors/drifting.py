@@ -1,11 +1,11 @@
-"""A boat that does not sail and moves all the same: seen from her track against her heading, and stopped.
+"""A boat that does not sail and moves all the same: seen from its track against its heading, and stopped.
 
-Without wind, head to wind or with her sails eased she goes where the water and the wind take her. Where that is within
-five minutes is held against the area (``companion.skipper.way.drift``) and said; what there is to stop her with stands
+Without wind, head to wind or with its sails eased it goes where the water and the wind take it. Where that is within
+five minutes is held against the area (``companion.skipper.way.drift``) and said; what there is to stop it with stands
 in ``MEANS``, the first that will do is used, and the crew is called to the anchor where none will.
 
-In a calm she is put into LOITER where it found her: when the wind comes back she then circles there until a way from
-where the current has taken her is planned, in place of sailing for her old waypoint across whatever lies between.
+In a calm it is put into LOITER where it found it: when the wind comes back it then circles there until a way from
+where the current has taken it is planned, in place of sailing for its old waypoint across whatever lies between.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ DRIFT_MPS = 0.15       # a slower velocity is a receiver's noise
 SLOW_MPS = 0.04        # of a drift seen in places: 2.4 m in a minute; slower is a receiver's noise, too
 PLACE_S, SLOW_PLACES, LEAST_S = 10.0, 6, 30.0   # places of a boat that hardly moves: one in 10 s, a minute, half of it
 SAILS_MPS = 0.5
-AGAINST_RAD = math.radians(60.0)   # a boat that sails makes less leeway than this, in any current that she can stem
+AGAINST_RAD = math.radians(60.0)   # a boat that sails makes less leeway than this, in any current that it can stem
 ASTERN_MPS = 0.3       # slower going astern shows nothing: a turn, a wave, a noisy receiver
 ASTERN_RAD = math.radians(30.0)    # the course is so near to dead astern of the bow
 AWAY_M = 25.0          # LOITER has been measured to stay within 12 m of its point
@@ -65,9 +65,9 @@ def follow_ground(ctx: StepContext) -> None:
 
 
 def over_ground(ctx: StepContext) -> tuple[float, float] | None:
-    """Return how the boat moves over ground [m/s, east north], None when she lies still or it is not known.
+    """Return how the boat moves over ground [m/s, east north], None when it lies still or it is not known.
 
-    By her velocity; a slow drift, which a receiver's noise would hide, by the places where she has been.
+    By its velocity; a slow drift, which a receiver's noise would hide, by the places where it has been.
     """
     ground, places = ctx.state.adrift.ground_en_mps, ctx.state.adrift.places
     if ground is None or math.hypot(*ground) >= DRIFT_MPS:
@@ -80,7 +80,7 @@ def over_ground(ctx: StepContext) -> tuple[float, float] | None:
 
 
 def sails(ctx: StepContext) -> bool:
-    """Return whether the boat goes where her bow points, in a wind that she can be steered in."""
+    """Return whether the boat goes where its bow points, in a wind that it can be steered in."""
     ground, wind = over_ground(ctx), ctx.wind_now
     if ground is None or wind is None or wind[1] < STEERAGE_MPS:
         return False
@@ -109,9 +109,9 @@ def is_driven_astern(ctx: StepContext) -> bool:
 
 
 def _is_carried(ctx: StepContext, boat: PointEn, ground: tuple[float, float]) -> bool:
-    """Return whether the boat goes where she is not steered, in a wind to steer by.
+    """Return whether the boat goes where it is not steered, in a wind to steer by.
 
-    In HOLD nobody steers. In LOITER she turns in circles, and is carried when she leaves the place of them, or goes
+    In HOLD nobody steers. In LOITER it turns in circles, and is carried when it leaves the place of them, or goes
     astern by a wind that is doubted.
     """
     if is_driven_astern(ctx):
@@ -128,15 +128,15 @@ def _goes_away(boat: PointEn, place: PointEn, ground: tuple[float, float]) -> bo
 
 
 def drift(ctx: StepContext) -> DriftAhead | None:
-    """Return where the boat drifts, None when she sails, lies still, or it cannot be told."""
+    """Return where the boat drifts, None when it sails, lies still, or it cannot be told."""
     ground, wind, boat, vehicle = over_ground(ctx), ctx.wind_now, ctx.reckoned_en, ctx.snapshot.vehicle
     if vehicle is not None and is_driven_astern(ctx):
-        ground = vehicle.velocity_en_mps   # of now: the mean is still of how she sailed
+        ground = vehicle.velocity_en_mps   # of now: the mean is still of how the boat sailed
     if ground is None or wind is None or boat is None:
         return None
     if not (wind[1] < STEERAGE_MPS or _is_carried(ctx, boat, ground)):
         return None
-    # What she is too near to already counts when she comes nearer still.
+    # What the boat is too near to already counts when it comes nearer still.
     water = water_at(ctx.voyage.area, boat)
     here_m = float(water.clearance_m([boat])[0])
     floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m, max(0.0, here_m - HAIR_M))
@@ -172,7 +172,7 @@ def _run_motor(ctx: StepContext) -> None:
 
 
 def _stems(ctx: StepContext, ahead: DriftAhead) -> bool:
-    """Whether she can sail against the drift, faster than it, in the wind that there is, and may be told to."""
+    """Whether the boat can sail against the drift, faster than it, in the wind that there is, and may be told to."""
     wind, boat = ctx.wind_now, ctx.voyage.boat
     if wind is None or wind[1] < STEERAGE_MPS or not ctx.snapshot.permissions.may_set_mode or ctx.snapshot.unsure:
         return False
@@ -185,7 +185,7 @@ def _stems(ctx: StepContext, ahead: DriftAhead) -> bool:
 
 
 def _nothing(ctx: StepContext) -> None:
-    """LOITER is asked for whenever she drifts."""
+    """LOITER is asked for whenever the boat drifts."""
 
 
 def _always(ctx: StepContext, ahead: DriftAhead) -> bool:  # noqa: ARG001
@@ -246,9 +246,9 @@ def _stop(ctx: StepContext, ahead: DriftAhead) -> None:
 
 
 def lies_in_loiter(ctx: StepContext) -> bool:
-    """Return whether she is at the loiter that ends the mission, or has a clear way to it near by.
+    """Return whether the boat is at the loiter that ends the mission, or has a clear way to it near by.
 
-    Its place was chosen for its room; a loiter begun where she lies would have what room there is.
+    Its place was chosen for its room; a loiter begun where it lies would have what room there is.
     """
     route, boat = ctx.state.mission.route, ctx.boat_en
     if route is None or boat is None or ctx.ahead():
@@ -263,7 +263,7 @@ def lies_in_loiter(ctx: StepContext) -> bool:
 def is_cramped(ctx: StepContext) -> bool:
     """Return whether a loiter begun here would be sailed onto something, in a wind that fills the sails.
 
-    Who lies in irons beside a wall is better helped by her way on, which was planned clear of it.
+    Who lies in irons beside a wall is better helped by the boat's way on, which was planned clear of it.
     """
     wind, boat = ctx.wind_now, ctx.reckoned_en
     if wind is None or boat is None or wind[1] < LIGHT_MPS:
@@ -272,7 +272,7 @@ def is_cramped(ctx: StepContext) -> bool:
 
 
 def _loiters(ctx: StepContext, ahead: DriftAhead | None) -> bool:
-    """Keep LOITER, or ask for it where she drifts; a person who sets AUTO meanwhile is let have it."""
+    """Keep LOITER, or ask for it where it drifts; a person who sets AUTO meanwhile is let have it."""
     status, state, memory = ctx.autopilot, ctx.state, ctx.state.adrift
     if status is None or not ctx.snapshot.permissions.may_set_mode:
         return False

@@ -1,6 +1,6 @@
 """A stop that we did not ask for: whose doing it is, and the taking over of one that is nobody's wish.
 
-She stops being sailed when the mode leaves the ones that sail a mission or a course, or she is disarmed. The cause is
+It stops being sailed when the mode leaves the ones that sail a mission or a course, or it is disarmed. The cause is
 sought among the signs around that moment, on both sides of it: on a slow link the sign comes after the mode. Without
 one it was a person, and so it was when the sticks or the mode switch moved.
 """
@@ -39,7 +39,7 @@ ASKED_S = 30.0        # an AUTO that shows so long after it was accepted is the 
 FILTER_S = 30.0       # a heartbeat that is critical so soon after the filter failed is critical because of it
 NEAR_S = 25.0         # somebody else's way is let be until what it leads over is so near: a LOITER needs half of it
 SLOW_MPS = 1.0
-HULL_M = 2.0          # the way of her antenna is not that of her hull
+HULL_M = 2.0          # the way of the boat's antenna is not that of its hull
 CLOSER_M = 1.0        # what leads away from something is let be
 KEPT_OFF, KEPT_OFF_S = "kept off", 1800.0
 _SAILED_TO = frozenset(
@@ -206,7 +206,7 @@ def _begin(way: list[PointEn], far_m: float) -> list[PointEn]:
 
 
 def is_answered(ctx: StepContext) -> bool:
-    """Return whether she lies in a stop that is ours to end."""
+    """Return whether the boat lies in a stop that is ours to end."""
     status = ctx.autopilot
     held = status is not None and ctx.state.operator.stop is not None and (
         status.mode is ctx.state.steering.own_mode or ctx.is_leaving)
@@ -322,7 +322,7 @@ def operator_has_it(ctx: StepContext) -> bool:
 
 
 def _taken(ctx: StepContext) -> str:
-    """Return in words what she was put into, and by which failsafe if by one."""
+    """Return in words what the boat was put into, and by which failsafe if by one."""
     status, stop = ctx.autopilot, ctx.state.operator.stop
     mode = status.mode.name if status is not None and status.mode is not None else "unknown"
     what = f"mode {mode}" if status is None or status.is_armed else f"mode {mode}, disarmed"

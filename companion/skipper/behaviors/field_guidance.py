@@ -51,14 +51,14 @@ LAG_S = 3.0                   # a boat of a few metres gathers its speed in this
 HORIZON_S = 60.0
 QUICK_RADPS = math.radians(20.0)   # a boat that turns faster ends its boards on the station by tacking
 WEAK = 5.0                    # of 10: what else a field says must be weaker for a station to be kept
-AROUND_M = 60.0               # outside a vessel's disc: nearer than this she is not on a station
+AROUND_M = 60.0               # outside a vessel's disc: nearer than this it is not on a station
 ROOM_M = 12.0                 # of the boards and loops about a station, beyond what is kept clear of the shore
 STOP_M = 3.0                  # a motorboat lies still this near to its station
 SLOW = 0.3                    # of full thrust, at least: a motorboat is slower in a turn, or circles a mark inside it
-PATIENCE_S = 5.0      # without a heading ArduRover's GUIDED stops her after 3 s: a field that is weak keeps its last
+PATIENCE_S = 5.0      # without a heading ArduRover's GUIDED stops it after 3 s: a field that is weak keeps its last
 BACK_S = 10.0         # a field that was given up has said something for so long
 LEAVE_S = 45.0        # a plan from here takes a few seconds; one that is not found is the ladder's
-STEP_S = 1.5          # what made her leave, an order or the end, is seen a step after it asked for the plan
+STEP_S = 1.5          # what made the boat leave, an order or the end, is seen a step after it asked for the plan
 INSIDE_M = 1.5        # a vessel is in the water when it is so far in: its position is noisy
 
 
@@ -129,7 +129,7 @@ def habits(ctx: StepContext, tws_mps: float) -> GuidanceSettings:
         is_sailing=ctx.config.sails,
         no_go_half_rad=ctx.planned_no_go_rad, polar_twa_rad=tuple(map(float, twa)),
         polar_mps=tuple(map(float, speed)), turn_rate_radps=boat.turn_rate_radps, tack_s=max(1.0, boat.tack_loss_s),
-        lag_s=LAG_S, horizon_s=HORIZON_S, keep_m=ctx.config.margin_floor_m + boat.hull.reach_m,   # of her place
+        lag_s=LAG_S, horizon_s=HORIZON_S, keep_m=ctx.config.margin_floor_m + boat.hull.reach_m,   # of the boat's place
     )
 
 
@@ -165,7 +165,7 @@ def heading(ctx: StepContext) -> Setpoint | None:
 
 
 def _slowed(setpoint: Setpoint, seen: Situation) -> Setpoint:
-    """Return what is told to a motorboat: she is slower through sharp turns."""
+    """Return what is told to a motorboat: the boat is slower through sharp turns."""
     ahead = math.cos(wrap_pi(setpoint.heading_rad - seen.heading_rad))
     return replace(setpoint, thrust=min(setpoint.thrust, max(SLOW, ahead)) if setpoint.thrust > 0.0 else 0.0)
 
@@ -204,7 +204,7 @@ def _composed(ctx: StepContext, seen: Situation, field: Composed) -> Setpoint:
 
 
 def _station(ctx: StepContext, seen: Situation, field: Composed, conditions: FieldConditions) -> Station | None:
-    """Return the station to keep: she is there, under sail, with room, and nothing else presses."""
+    """Return the station to keep: the boat is there, under sail, with room, and nothing else presses."""
     place = field.tree.station_en
     if place is None or conditions.twd_from_rad is None:
         return None
@@ -332,9 +332,9 @@ def keeps_station(ctx: StepContext) -> bool:
 
 
 # -------- Goals that are sailed by a field of their own: when it steers, when it is over, and when it leads nowhere.
-# A field that says nothing of where to go, or that cannot be steered by, is given up by name: she makes for the goal's
-# place by plan, in AUTO, and loiters there until it says something again. From a field to a plan she is steered on by
-# the plain one to where she is bound for, until a plan from where she has come to is on board.
+# A field that says nothing of where to go, or that cannot be steered by, is given up by name: it makes for the goal's
+# place by plan, in AUTO, and loiters there until it says something again. From a field to a plan it is steered on by
+# the plain one to where it is bound for, until a plan from where it has come to is on board.
 
 
 def follow_field(ctx: StepContext) -> None:
@@ -360,7 +360,7 @@ def follow_field(ctx: StepContext) -> None:
 
 
 def _is_left(ctx: StepContext, since_s: float) -> bool:
-    """Return whether she need not be steered on: a plan asked for since then is in place, or none can be waited for."""
+    """Return whether nothing need be steered on: a plan asked for since then is in place, or none can be waited for."""
     state, bound = ctx.state, diversion(ctx)
     goes_on = state.voyage.sailing and not state.voyage.over and (
         bound.has_place if bound is not None else ctx.gate is not None)

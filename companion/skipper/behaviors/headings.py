@@ -4,7 +4,7 @@ Per leg the heading is that from the previous waypoint to the current one, not f
 the wind is what makes it fast. Near the destination it is the course from the boat; near a buoy the course to the
 buoy plus 30 degrees, and no manoeuvre there leads to the buoy's side of what is wanted (section 3.2.4: "to the left of
 the desired heading", for a buoy to port). Drift is added as in equation 3 of chapter 2. What plans promise of clearance
-is of the leg's line, and his heading leads along it from wherever the last turn ended: so she is led back to it
+is of the leg's line, and his heading leads along it from wherever the last turn ended: so it is led back to it
 (``back_to_line_rad``), which is ours. Heading setpoints have no protection of ArduRover's against the no-go zone
 either: ``sailable_rad`` is ours, too.
 
@@ -107,16 +107,17 @@ def desired_heading_rad(ctx: StepContext) -> float | None:
     off_wind = difference_rad(along, twd)
     is_last = ctx.state.mission.index == ctx.last_waypoint() and distance_m(boat, leg[1]) < ctx.config.grid_size_m
     if is_last or distance_m(*leg) < 1.0 or abs(off_wind) < half:
-        # On a leg that the wind has closed she goes about where the other tack is nearer to its end.
+        # On a leg that the wind has closed the boat goes about where the other tack is nearer to its end.
         return sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), vehicle.heading_rad, twd, half)
-    # Back to the line on the leg's own tack: through the wind she would come to it sooner, and be on the wrong one.
+    # Back to the line on the leg's own tack: through the wind the boat would come to it sooner, and be on the wrong
+    # one.
     back = back_to_line_rad(cross_track_m(boat, *leg), ctx.speed_mps)
     side = math.copysign(1.0, off_wind)
     return wrap_pi(twd + side * max(half, side * off_wind + side * back))
 
 
 def course_rad(ctx: StepContext) -> float | None:
-    """Return the course over ground that she is steered on now, None when it cannot be told."""
+    """Return the course over ground that the boat is steered on now, None when it cannot be told."""
     heading, vehicle = desired_heading_rad(ctx), ctx.snapshot.vehicle
     if heading is None or vehicle is None:
         return None
@@ -132,7 +133,7 @@ def _is_at_buoy(gate: Gate | None, boat: PointEn) -> bool:
 
 REACT_S = 8.0        # a step to see it, a plan, its upload and reading back, the turn: six seconds; and two to spare
 LEAST_M = 2.0        # how far the autopilot wanders off its line
-SLOW_MPS = 0.5       # slower she does not come far in that time
+SLOW_MPS = 0.5       # slower the boat does not come far in that time
 HAIR_M = 0.5
 
 
@@ -148,7 +149,7 @@ def ahead_of(ctx: StepContext) -> DriftAhead | None:
         return None
     course = bearing_rad(boat, leg[1])
     if status.mode is Mode.GUIDED and ctx.is_closed(boat, leg[1], ctx.wind_now):
-        steered = course_rad(ctx)   # nothing turns her there but another plan
+        steered = course_rad(ctx)   # nothing turns the boat there but another plan
         if steered is None:
             return None
         course, left_m = steered, math.inf

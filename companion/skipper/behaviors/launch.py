@@ -76,7 +76,7 @@ def start(ctx: StepContext) -> None:
 
 
 def _misplaced(ctx: StepContext) -> str:
-    """Return what is wrong with where she lies, empty: nothing that would keep a plan from starting there."""
+    """Return what is wrong with where the boat lies, empty: nothing that would keep a plan from starting there."""
     here = ctx.boat_en
     if here is None:
         return ""
@@ -92,7 +92,7 @@ def _misplaced(ctx: StepContext) -> str:
 
 
 def finished(ctx: StepContext) -> None:
-    """Nothing is left to sail: all goals were reached before this start. Watch her if she is under way."""
+    """Nothing is left to sail: all goals were reached before this start. Watch the boat if it is under way."""
     status = ctx.autopilot
     if status is not None and status.is_armed and status.mode is Mode.AUTO and ctx.state.mission.route is not None:
         ctx.set(
@@ -201,7 +201,8 @@ def _stale(ctx: StepContext) -> str:
         return wrong
     age_s, config = ctx.t_s - ctx.state.plans.last_s, ctx.config
     clear_m = ctx.voyage.area.path_clearance_m([boat, leg[1]])
-    # From below the floor a way that comes no nearer than she lies leads her out; another plan would be no other way.
+    # From below the floor a way that comes no nearer than the boat lies leads it out; another plan would be no other
+    # way.
     here_m = float(ctx.voyage.area.clearance_m([boat])[0])
     if clear_m < min(config.margin_floor_m, config.margin_m, here_m - HAIR_M):
         where = f"{max(0.0, clear_m):.0f} m from {ctx.voyage.area.nearest_name(boat)} on the way to the first waypoint"

@@ -1,6 +1,6 @@
 """Orders: each is judged once, refused with its reason before anything moves, or taken; what stands is seen through.
 
-What an order makes her do is a diversion like any other (``companion.skipper.planning.diversions``) or a plan that is
+What an order makes it do is a diversion like any other (``companion.skipper.planning.diversions``) or a plan that is
 asked for; nothing is uploaded here. The same order of the same station within ten seconds is a repetition, for its
 answer may have been lost: it gets the same answer, and nothing is done twice.
 """
@@ -30,7 +30,7 @@ from companion.skipper.way.voyage import PointEn
 
 REMEMBERED_S = 10.0   # longer than any station repeats a command that is not answered
 STATIONS = 8          # whose last order is remembered
-HERE_M = 40.0         # a loiter that is farther from her than this is not here
+HERE_M = 40.0         # a loiter that is farther from the boat than this is not here
 CODE = "order"        # what is said of orders
 # The key of the mission's [operator] that permits what comes on each way, and the name of it in ``Permissions``.
 _PERMITTED_BY = {MAVLINK: "orders", LOCAL: "local_orders", FAR: "far_orders"}
@@ -113,7 +113,7 @@ def _stand(
 
 
 def _hindrance(ctx: StepContext, *, ashore: bool = False) -> str:
-    """Return why she cannot be sent anywhere now; empty: she can. ``ashore``: nor need she be under way."""
+    """Return why the boat cannot be sent anywhere now; empty: it can. ``ashore``: nor need it be under way."""
     state = ctx.state
     if not state.vehicle.is_ours:
         return f"no orders: {state.why}"
@@ -143,7 +143,7 @@ def _hold(ctx: StepContext, order: Order) -> Answer:
     if route is not None and boat is not None and ctx.state.pending.upload is None and not ctx.ahead() and (
         distance_m(boat, route.points_en_m[-1]) > HERE_M
     ):
-        hold(ctx, _why(ctx), anew=True)   # on her way to the loiter that ends the mission: that is not here
+        hold(ctx, _why(ctx), anew=True)   # on the boat's way to the loiter that ends the mission: that is not here
     return answer
 
 
@@ -164,7 +164,7 @@ def _go_on(ctx: StepContext, _: Order) -> Answer:
         plans=changed(ctx.state.plans, retry=PATIENT),
         progress=changed(ctx.state.progress, history=()))
     if was.verb is Verb.STOP and ctx.state.voyage.sailing:
-        # As when a person gives her back: what is on board is compared, and planned from where she is.
+        # As when a person gives the boat back: what is on board is compared, and planned from where it is.
         ctx.set(
             mission=changed(ctx.state.mission, checked=False, read_since_s=ctx.t_s),
             operator=changed(ctx.state.operator, is_back=True))
@@ -288,7 +288,7 @@ def _let_go_of_plan(ctx: StepContext) -> None:
 
 # --------------------------------------------------------------------------------------------- standing
 def _see_through(ctx: StepContext) -> None:
-    """End an order to sail to a place once she is there: the goals that are left are next."""
+    """End an order to sail to a place once the boat is there: the goals that are left are next."""
     standing, bound, boat = ctx.state.orders.standing, diversion(ctx), ctx.boat_en
     if standing is None or bound is None or bound.kind is not Kind.GOAL or boat is None or (
             not ctx.state.voyage.sailing):
@@ -301,7 +301,7 @@ def _see_through(ctx: StepContext) -> None:
 
 
 def holds_ashore(ctx: StepContext) -> bool:
-    """Say that an order keeps her from being set sailing, while it does."""
+    """Say that an order keeps the boat from being set sailing, while it does."""
     status, standing = ctx.autopilot, ctx.state.orders.standing
     is_under_way = ctx.state.voyage.sailing or (
         ctx.state.mission.route is not None and status is not None and status.is_armed and status.mode is Mode.AUTO)
@@ -312,7 +312,7 @@ def holds_ashore(ctx: StepContext) -> bool:
 
 
 def leaves_alone(ctx: StepContext) -> bool:
-    """Say that she is given up, while she is; True: nothing is asked of her."""
+    """Say that the boat is given up, while it is; True: nothing is asked of it."""
     if not ctx.is_given_up:
         return False
     ctx.phase(Phase.OPERATOR if ctx.state.voyage.sailing else Phase.WAITING,

@@ -1,14 +1,14 @@
 """What is done while it is doubted where the boat is.
 
-A position in doubt: what is safe where it says that the boat is, and where she was and has sailed on from?
+A position in doubt: what is safe where it says that the boat is, and where it was and has sailed on from?
 The autopilot takes a new position and sails by it, true or not. Until there is evidence (``companion.skipper.way
 .integrity``) nothing is planned from it, and where the reckoned place is not clear ahead the boat loiters: ArduRover's
 LOITER turns in circles of 12 m about a point, and where on earth that is does not matter to it, while HOLD drifts. That
 the new place is not clear, either, is no reason against it: nobody sails inside a rock, and what jumps is false more
 often than true.
 
-Once held she stays held until the position is believed. A jump moves the point of a LOITER that is sailed already, and
-she would make for it over whatever lies between: then she is put into HOLD and into LOITER again, which begins here. So
+Once held it stays held until the position is believed. A jump moves the point of a LOITER that is sailed already, and
+it would make for it over whatever lies between: then it is put into HOLD and into LOITER again, which begins here. So
 is a boat that was driven off the point, by a wrong wind or in a calm, until something lay between.
 """
 
@@ -38,14 +38,14 @@ from companion.skipper.way.position_plausibility import (
 )
 from companion.skipper.way.voyage import PointEn
 
-AHEAD_S = 20.0        # what the boat sails until a LOITER that is asked for now has her, and some more
+AHEAD_S = 20.0        # what the boat sails until a LOITER that is asked for now has it, and some more
 SLOW_MPS = 1.0
 GLITCH_S = 3.0        # a position that is back sooner has done no harm
 SAVE_S = 30.0         # between two places that are saved
-STRAYS_M = 25.0       # what a boat in LOITER or HOLD is off her place when she is found again
-LEAST_REACH_M = 30.0  # a start finds her so near to where she was, whatever the clocks say
+STRAYS_M = 25.0       # what a boat in LOITER or HOLD is off its place when it is found again
+LEAST_REACH_M = 30.0  # a start finds the boat so near to where it was, whatever the clocks say
 UNKNOWN_S = 120.0     # how long a start has taken when no clock tells
-BEATEN_MPS = 10.0     # the wind in which she may have sailed meanwhile
+BEATEN_MPS = 10.0     # the wind in which the boat may have sailed meanwhile
 POINT_S = 5.0         # after LOITER was accepted what is told may still be the distance of the leg before it
 POINT_SHUT = "the loiter's point cannot be sailed to from here"
 CODE = "position doubted"

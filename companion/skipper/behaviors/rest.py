@@ -1,7 +1,7 @@
-"""The end of a voyage, and of a diversion: she loiters, and is watched.
+"""The end of a voyage, and of a diversion: the boat loiters, and is watched.
 
 A voyage is over when all goals are reached (and home, where the mission ends there), or its time is up. From then on
-nothing is planned but the way back to her place, should she be dragged off it and the straight way not be clear; the
+nothing is planned but the way back to its place, should it be dragged off it and the straight way not be clear; the
 watch goes on until somebody ends the program.
 """
 
@@ -29,7 +29,7 @@ UNTIL_TOLD = "until told to go on"
 
 
 def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
-    """Lie at the end of a diversion; True while she does."""
+    """Lie at the end of a diversion; True while the boat does."""
     if not is_at_rest(ctx) or ctx.state.steering.own_mode in STOPPING:
         return False
     if ctx.is_raised(OUT_OF_TIME) and ctx.config.ends.end(OUT_OF_TIME) is not End.SAY and not (
@@ -55,7 +55,7 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
 
 
 def _how_long(ctx: StepContext) -> str:
-    """Return how long a diversion that nobody ordered keeps her."""
+    """Return how long a diversion that nobody ordered keeps the boat."""
     until = next((ENDINGS[name].until for name in BY_RANK if ENDINGS[name].until and ctx.is_raised(name)
                   and ctx.config.ends.end(name) is not End.SAY), "")
     return until or ANSWERED.get(ctx.state.operator.answering, TAKEN)
@@ -81,7 +81,7 @@ def rest(ctx: StepContext) -> None:
         return
     stopped = ctx.state.steering.own_mode in STOPPING and ctx.autopilot is not None and (
         ctx.autopilot.mode is ctx.state.steering.own_mode)
-    # the loiter's place is the same wherever she has been
+    # the loiter's place is the same wherever the boat has been
     ctx.set(operator=changed(ctx.state.operator, is_back=False))
     why = waits_for(ctx) if stopped else ""
     if why:
@@ -97,7 +97,7 @@ def _raised(ctx: StepContext) -> str:
 
 
 def _end(ctx: StepContext, why: str, *, arrived: bool) -> None:
-    """The voyage is over: remember where she is to rest."""
+    """The voyage is over: remember where the boat is to rest."""
     _let_go_of_plans(ctx)
     route = ctx.state.mission.route
     place = route.points_en_m[-1] if route is not None and route.points_en_m else ctx.boat_en

@@ -46,13 +46,13 @@ from companion.skipper.way.voyage import PointEn
 from companion.traffic.plans import MIN_INTERVAL_S
 
 LEAD_S = 3.5         # a step to see it, the command, and the turn until the boat goes no farther that way
-LEAST_MPS = 1.0      # slower she may not get through the wind
+LEAST_MPS = 1.0      # slower the boat may not get through the wind
 APART_S = 6.0        # between two tacks: the autopilot's own 5 s, and a step
 LOOK_S = 8.0         # of the other tack, which must be better
 GAIN_M = 1.0
 NEXT_S = 2.0         # the tack that is asked for in the next step begins so far on
 LAST_S = 20.0        # so near the leg's end the layline decides, which the autopilot sees
-TURNING = 0.5        # of her angle to the wind, more or less: then she is turning, or has borne away
+TURNING = 0.5        # of the boat's angle to the wind, more or less: then it is turning, or has borne away
 
 
 def short_tack(ctx: StepContext) -> None:
@@ -76,7 +76,7 @@ def short_tack(ctx: StepContext) -> None:
         return   # the leg is open: the autopilot follows it
     off = difference_rad(wind[0], vehicle.heading_rad)
     if not 0.5 * ctx.no_go_half_rad < abs(off) < 1.5 * ctx.no_go_half_rad:
-        return   # she is not close-hauled: turning, or bearing away
+        return   # the boat is not close-hauled: turning, or bearing away
     side = 1.0 if off >= 0.0 else -1.0
     floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
     now_m = _clearance_m(ctx, boat, vehicle.heading_rad, LEAD_S)
@@ -91,10 +91,10 @@ def short_tack(ctx: StepContext) -> None:
 
 
 def _may_fail(ctx: StepContext, boat: PointEn, wind: tuple[float, float], floor_m: float) -> bool:
-    """Return whether a tack in the next step may fail, as often in a row as is likely, and she keeps the floor.
+    """Return whether a tack in the next step may fail, as often in a row as is likely, and the boat keeps the floor.
 
-    While she lies the current that is believed carries her, planned for or not, and as much as is not told brings her
-    nearer to whatever is near; she is blown back, or is not, or is set to lee.
+    While it lies the current that is believed carries it, planned for or not, and as much as is not told brings it
+    nearer to whatever is near; it is blown back, or is not, or is set to lee.
     """
     vehicle, water = ctx.snapshot.vehicle, ctx.snapshot.current
     chance = ctx.state.tacking.chance(ctx.voyage.boat.tack_fails)
@@ -130,12 +130,12 @@ def _failed(
 
 
 def _clearance_m(ctx: StepContext, boat: PointEn, course_rad: float, span_s: float) -> float:
-    """Return how clear the water is that a heading takes her through in ``span_s``, the current with her [m]."""
+    """Return how clear the water is that a heading takes the boat through in ``span_s``, the current with it [m]."""
     return ctx.voyage.area.path_clearance_m([boat, _there(ctx, boat, course_rad, span_s)])
 
 
 def _there(ctx: StepContext, boat: PointEn, course_rad: float, span_s: float) -> PointEn:
-    """Return where a heading takes her in ``span_s``."""
+    """Return where a heading takes the boat in ``span_s``."""
     (east, north), through_m = ctx.current_en_mps, math.hypot(*ctx.through_en_mps) * span_s
     return moved((boat[0] + east * span_s, boat[1] + north * span_s), course_rad, through_m)
 
@@ -199,7 +199,7 @@ def stand_off(ctx: StepContext) -> bool:
     if not stands_off(ctx):
         return False
     if not is_at_end(ctx) and ctx.state.position.doubt is None and ctx.state.pending.upload is None:
-        _consider(ctx)   # from where she is known to be, while her loiter is begun anew
+        _consider(ctx)   # from where the boat is known to be, while its loiter is begun anew
     return True
 
 
@@ -294,10 +294,10 @@ def _sail_on(ctx: StepContext) -> None:
 
 
 def _goes_on_at_once(ctx: StepContext) -> bool:
-    """Return whether she is sailed home by the autopilot, straight, while the way on board is clear from here.
+    """Return whether the boat is sailed home by the autopilot, straight, while the way on board is clear from here.
 
-    RTL and SmartRTL turn her, at full speed, towards whatever lies between her and home, in the three seconds or more
-    that a plan and its upload take; AUTO takes one, and a plan made under way begins where she will be.
+    RTL and SmartRTL turn it, at full speed, towards whatever lies between it and home, in the three seconds or more
+    that a plan and its upload take; AUTO takes one, and a plan made under way begins where it will be.
     """
     state = ctx.state
     return state.steering.own_mode in HOMEWARD and state.pending.upload is None and bool(ctx.ahead()) and (
@@ -305,9 +305,9 @@ def _goes_on_at_once(ctx: StepContext) -> bool:
 
 
 def _is_way_clear(ctx: StepContext) -> bool:
-    """Return whether what is left of the way on board, straight from where she is, comes no nearer than it may.
+    """Return whether what is left of the way on board, straight from where the boat is, comes no nearer than it may.
 
-    That is the margin's floor, or what she has about her now where that is less.
+    That is the margin's floor, or what the boat has about it now where that is less.
     """
     boat, leg, area = ctx.boat_en, ctx.leg(), ctx.voyage.area
     if boat is None or leg is None:
@@ -317,7 +317,7 @@ def _is_way_clear(ctx: StepContext) -> bool:
 
 
 def _is_outside(ctx: StepContext) -> bool:
-    """Return whether she is where no mission may lead: outside the fence, or over something."""
+    """Return whether the boat is where no mission may lead: outside the fence, or over something."""
     here = ctx.snapshot.position_en_m
     return here is not None and float(ctx.voyage.area.clearance_m([here])[0]) <= 0.0
 

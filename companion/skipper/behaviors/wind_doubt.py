@@ -45,7 +45,7 @@ AHEAD_S = 3.0                       # what the boat sails on until it turns on t
 WAY_MPS = 0.3                       # made good towards it: slower the leg is not sailed
 TURNS_S = 20.0                      # from lying head to wind until it is
 STRAYS_M = 15.0                     # from the loiter's point: LOITER turns in circles of 12 m
-LEAST_M = 1.0                       # beside the hull: what the rest of a leg that she was set off must keep
+LEAST_M = 1.0                       # beside the hull: what the rest of a leg that it was set off must keep
 HAIR_M = 0.5
 
 
@@ -116,7 +116,7 @@ def seeks_sea_room(ctx: StepContext) -> bool:
         return True
     if wind is None or left_s >= HORIZON_S or ctx.t_s < state.pending.upload_retry.not_before_s:
         return False
-    runs_s = 0.0 if goes_astern(ctx) else AHEAD_S   # a sheet that draws stops her at once
+    runs_s = 0.0 if goes_astern(ctx) else AHEAD_S   # a sheet that draws stops the boat at once
     ahead = (boat[0] + runs_s * vehicle.velocity_en_mps[0], boat[1] + runs_s * vehicle.velocity_en_mps[1])
     found = _sea_room(
         water, boat, ahead, wind, no_go_half_rad=ctx.no_go_half_rad, clear_m=(ctx.config.margin_m, floor_m))
@@ -209,7 +209,7 @@ def holds(ctx: StepContext) -> bool:
     if state.by_field.resort.engaged or not ctx.snapshot.permissions.may_set_mode or not status.ekf_ok:
         return False
     if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
-        if memory.loiter_en_m is None:   # by a wrong wind she may be carried off it, which is a drift
+        if memory.loiter_en_m is None:   # by a wrong wind the boat may be carried off it, which is a drift
             ctx.set(adrift=replace(memory, loiter_en_m=ctx.boat_en))
         ctx.phase(Phase.HOLDING, f"{why}: waiting in a loiter until the wind is known")
         return True

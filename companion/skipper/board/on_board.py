@@ -162,7 +162,7 @@ def _is_ours_again(ctx: StepContext) -> bool:
 def _take_over(ctx: StepContext, items: tuple[MissionItem, ...], saved: Persisted | None) -> None:
     """Take a list of ours that is no list we know: an earlier voyage's, or one whose upload was not saved.
 
-    A boat that sails by it keeps it until there is a plan from where she is; else it is replaced.
+    A boat that sails by it keeps it until there is a plan from where it is; else it is replaced.
     """
     saved = saved or Persisted(voyage=ctx.voyage.name, gate=0, sailing=True, route=None, pending=None)
     if not _under_way(ctx):
@@ -211,7 +211,7 @@ def _adopt(ctx: StepContext, saved: Persisted, what: str = "ours") -> None:
         mission=changed(ctx.state.mission, index=index, own_index=index),
         steering=changed(ctx.state.steering, own_mode=saved.own_mode),
         adrift=replace(ctx.state.adrift, motor=saved.motor),
-        operator=changed(ctx.state.operator, is_back=saved.own_mode in STOPPING),   # she has drifted since
+        operator=changed(ctx.state.operator, is_back=saved.own_mode in STOPPING),   # the boat has drifted since
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         voyage=changed(
             ctx.state.voyage, sailing=_under_way(ctx) or (saved.sailing and status is not None and status.is_armed)))

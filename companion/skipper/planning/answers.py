@@ -94,7 +94,7 @@ def _note_latency(ctx: StepContext, pending: PendingPlan, outcome: PlanOutcome) 
 
 
 def _may_still_turn_before(ctx: StepContext, waypoint_en: PointEn) -> bool:
-    """Return whether a plan from the boat begins well before a waypoint: else she would turn beyond it."""
+    """Return whether a plan from the boat begins well before a waypoint: else it would turn beyond it."""
     boat = ctx.boat_en
     begins_m = ctx.speed_mps * (ctx.plan_lead_s + UPLOAD_LATENCY_S)
     return boat is not None and distance_m(boat, waypoint_en) > 2.0 * begins_m

@@ -40,7 +40,7 @@ def request(
 ) -> bool:
     """Ask for a plan from item ``from_index`` of the route or, with None, from the boat; False when it cannot be.
 
-    It is planned for where she is bound for on a diversion, else for the gate after the one that item ``from_index``
+    It is planned for where it is bound for on a diversion, else for the gate after the one that item ``from_index``
     completes or leads to, and behind the last one home where the mission ends there. ``lacks`` says why not.
     """
     current, ladder = ctx.snapshot.current, steps(ctx)
@@ -117,7 +117,7 @@ def _start(ctx: StepContext, from_index: int | None) -> Start | None:
     if boat is None or vehicle is None or is_impossible(ctx.voyage.area, boat, margin_m=ctx.config.margin_m):
         return None
     if from_index is None:
-        # Stopped, or turning in circles, she is where she is.
+        # Stopped, or turning in circles, the boat is where it is.
         stopped = ctx.state.steering.own_mode in {Mode.HOLD, Mode.LOITER}
         sailing = ctx.state.voyage.sailing and vehicle.speed_mps > SLOW_MPS and not stopped
         ahead = ctx.plan_lead_s + UPLOAD_LATENCY_S if sailing else 0.0
@@ -127,7 +127,7 @@ def _start(ctx: StepContext, from_index: int | None) -> Start | None:
         bow = vehicle.heading_rad if ctx.snapshot.current.is_significant else heading
         tacking = ctx.state.tacking
         if tacking.is_counted:
-            bow = tacking.settled_rad   # she lies in irons, and falls off to her old tack
+            bow = tacking.settled_rad   # the boat lies in irons, and falls off to its old tack
         return Start(en_m=place, heading_rad=bow, after_s=ahead)
     if route is None or not ctx.state.mission.index <= from_index < len(route.items):
         return None

@@ -21,20 +21,20 @@ from companion.skipper.way.voyage import PointEn
 IRONS_MEMORY_S = 600.0
 TACKS_FAIL_AFTER = TRIES    # failures in a row, or times in irons within IRONS_MEMORY_S, before tacks are left
 WIDEST_M = 50.0         # a wider corridor is no corridor ...
-WIDEST_BY_SHIFTS_M = 200.0   # ... but where she tacks on the shifts: then its edges are seldom met
-CARRIED_S = 2.5         # of a tack, at the corridor's edge: where the water takes her meanwhile
+WIDEST_BY_SHIFTS_M = 200.0   # ... but where the boat tacks on the shifts: then its edges are seldom met
+CARRIED_S = 2.5         # of a tack, at the corridor's edge: where the water takes the boat meanwhile
 OFF_LINE_M = 2.0        # so near the line a leg that begins anew is the same leg
 FOLLOWS_RAD = math.radians(10.0)   # this far outside its no-go zone the autopilot keeps to the line
 # A tack takes this long: who should have tacked a moment ago is tacking [s].
 TACKING_S = 4.0
 # Below this speed the time to a waypoint says nothing [m/s].
 MIN_SPEED_MPS = 0.2
-# A boat that makes less than this part of her polar's speed is gathering way, out of a tack: she will soon make it.
+# A boat that makes less than this part of its polar's speed is gathering way, out of a tack: it will soon make it.
 GATHERING_WAY = 0.8
 
 
 def tacks_fail(ctx: StepContext) -> bool:
-    """Return whether tacks failed, or she was in irons, so often of late that they are not tried."""
+    """Return whether tacks failed, or the boat was in irons, so often of late that they are not tried."""
     recent = [t for t in ctx.state.steering.irons_s if ctx.t_s - t < IRONS_MEMORY_S]
     tacking, given = ctx.state.tacking, ctx.voyage.boat.tack_fails
     in_a_row = tacking.in_a_row if given > 0.0 and ctx.t_s - tacking.failed_s < IRONS_MEMORY_S else 0
@@ -44,7 +44,7 @@ def tacks_fail(ctx: StepContext) -> bool:
 def boards_within_m(ctx: StepContext) -> float | None:
     """Return what the boards of the autopilot's beat keep within, to either side of the leg [m].
 
-    The overshoot of a tack at the corridor's edge is in it, and where the current sets her meanwhile. None without a
+    The overshoot of a tack at the corridor's edge is in it, and where the current sets it meanwhile. None without a
     corridor: the autopilot then sails to the layline, wherever that is.
     """
     corridor, wind = ctx.tack_corridor_m, ctx.wind_mean
@@ -84,7 +84,8 @@ def problem_beat(ctx: StepContext, margin_m: float) -> dict[str, Any] | None:
     boat, by_shifts = ctx.voyage.boat, shifting(ctx)
     tack_s = 2.0 * ctx.no_go_half_rad / boat.turn_rate_radps + boat.tack_loss_s
     return {
-        # the angle that her bow is held at, with leeway too: a leg at her course's angle she would be held below
+        # the angle that the boat's bow is held at, with leeway too: on a leg at its course's angle it would be held
+        # below
         "no_go_half_deg": math.degrees(ctx.no_go_half_rad),
         "corridor_m": ctx.tack_corridor_m,
         "clearance_m": max(0.0, room - margin_m),
@@ -113,7 +114,7 @@ def is_left_to_beat(ctx: StepContext, a: PointEn, b: PointEn) -> bool:
 
 
 def beaten_within_m(ctx: StepContext) -> float:
-    """Return how far off the present leg the autopilot's own beat takes her [m]; 0 where it does not beat.
+    """Return how far off the present leg the autopilot's own beat takes the boat [m]; 0 where it does not beat.
 
     It beats where the leg lies in the no-go zone, by the wind that there is or by its mean: a lift does not end a beat.
     """
@@ -123,7 +124,7 @@ def beaten_within_m(ctx: StepContext) -> float:
     return (boards_within_m(ctx) or 0.0) if is_left_to_beat(ctx, *leg) else 0.0
 
 
-# ---------------------- When she tacks next: planned, or the autopilot's own on a leg that it beats.
+# ---------------------- When the boat tacks next: planned, or the autopilot's own on a leg that it beats.
 
 
 class Seen(Protocol):
@@ -159,7 +160,7 @@ def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
     On a leg inside its no-go zone the autopilot beats: it keeps the tack that it comes on until the edge of its
     corridor, or until the other tack fetches the waypoint; in GUIDED it does not beat, and such a leg is planned anew.
     The end of a mission, a loiter, is no course. Legs ahead are sailed at the polar's speed, this one at the boat's
-    own, once she has way on.
+    own, once it has way on.
     """
     route, snapshot = seen.state.mission.route, seen.snapshot
     vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind

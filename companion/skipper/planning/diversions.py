@@ -1,4 +1,4 @@
-"""Where she is bound for when it is not the next goal: a refuge, home, her place to rest, or just to stay.
+"""Where the boat is bound for when it is not the next goal: a refuge, home, its place to rest, or just to stay.
 
 A diversion is found anew in every step from what is raised and what is being answered; the route says which one its end
 serves. It is planned like any leg and ends in a loiter, so that nothing is ever sailed straight and unlooked at.
@@ -30,7 +30,7 @@ FENCE_SAID_S = 600.0     # between two words on a fence that is drawn
 
 
 def diversion(ctx: StepContext) -> Diversion | None:
-    """Return where she is bound for instead of the next goal, None: nowhere.
+    """Return where the boat is bound for instead of the next goal, None: nowhere.
 
     It is found once, and anew only when a part of the state that it is made of has been replaced.
     """
@@ -48,13 +48,13 @@ def _find(ctx: StepContext) -> Diversion | None:
 
 
 def is_composed(ctx: StepContext) -> bool:
-    """Return whether it is the field of the goal that is next that steers her now."""
+    """Return whether it is the field of the goal that is next that steers it now."""
     memory, gate = ctx.state.by_field, ctx.gate
     return memory.composed and memory.left_s is None and gate is not None and gate.field is not None
 
 
 def _off_field(ctx: StepContext) -> Diversion | None:
-    """Return where she waits while the field of the goal that is next cannot be sailed, None: it can."""
+    """Return where the boat waits while the field of the goal that is next cannot be sailed, None: it can."""
     gate, may = ctx.gate, ctx.snapshot.permissions
     if gate is None or gate.field is None or ctx.state.voyage.over:
         return None
@@ -69,7 +69,7 @@ def _off_field(ctx: StepContext) -> Diversion | None:
 
 
 def _in_box(ctx: StepContext) -> Diversion | None:
-    """Return where she stays in the box that is next."""
+    """Return where the boat stays in the box that is next."""
     gate = ctx.gate
     if gate is None or gate.box is None or ctx.state.voyage.over:
         return None
@@ -80,7 +80,7 @@ def _in_box(ctx: StepContext) -> Diversion | None:
 
 
 def _before_start(ctx: StepContext) -> Diversion | None:
-    """Return where she waits for the gun of the start line that is next."""
+    """Return where the boat waits for the gun of the start line that is next."""
     gate = ctx.gate
     if gate is None or gate.line is None or ctx.state.voyage.over or not waits_for_gun(ctx, gate):
         return None
@@ -102,7 +102,7 @@ def pressing(ctx: StepContext) -> Diversion | None:
         f"the autopilot's {state.operator.answering} failsafe")
     if answer is Answer.SHELTER:
         is_battery = state.operator.answering == "battery"
-        # she is stopped: something must be done
+        # the boat is stopped: something must be done
         end = End.REFUGE if not is_battery or ends.end(BATTERY) is End.SAY else ends.end(BATTERY)
         why = ENDINGS[BATTERY].because if is_battery and ctx.is_raised(BATTERY) else why
         return _found(ctx, end, why) or _stay(ctx, why)
@@ -115,7 +115,7 @@ def pressing(ctx: StepContext) -> Diversion | None:
 
 
 def _ordered(ctx: StepContext) -> Diversion | None:
-    """Return the diversion of the order that stands, None: there is none, or she is given up."""
+    """Return the diversion of the order that stands, None: there is none, or the boat is given up."""
     order = ctx.state.orders.standing
     if order is None or order.verb is Verb.STOP:
         return None
@@ -131,8 +131,8 @@ def _ordered(ctx: StepContext) -> Diversion | None:
 
 
 def _at_the_end(ctx: StepContext) -> Diversion | None:
-    """Return where she is bound for when time, light, shore or a wind for her are gone, or the goals are reached, or
-    she is off her place."""  # noqa: D205, D209
+    """Return where the boat is bound for when time, light, shore or wind are gone, or the goals are reached, or
+    it is off its place."""  # noqa: D205, D209
     state = ctx.state
     if not state.voyage.over:
         ended = _ended_early(ctx, over_orders=False)
@@ -161,12 +161,12 @@ def _ended_early(ctx: StepContext, *, over_orders: bool) -> Diversion | None:
 
 
 def _kept_in(ctx: StepContext) -> Diversion | None:
-    """Return where she waits when the autopilot's own fence lies between her and the next goal."""
+    """Return where the boat waits when the autopilot's own fence lies between it and the next goal."""
     fence, trouble = _fence_before(ctx, ctx.gate)
     here = ctx.boat_en
     if fence is None:
         return None
-    # From the edge a loiter strays across it: she goes so far in, and is there when she has come there.
+    # From the edge a loiter strays across it: it goes so far in, and is there when it has come there.
     room_m = min(ctx.config.margin_m + 2.0 * ctx.config.loiter_radius_m, fence.most_room_m)
     name = f"a place inside {fence.words}"
     route = ctx.state.mission.route
@@ -222,7 +222,7 @@ def homeward(ctx: StepContext) -> Diversion | None:
 
 
 def _stay(ctx: StepContext, why: str) -> Diversion | None:
-    """Return a diversion to stay, None outside the fence or over something: from there she sails on first."""
+    """Return a diversion to stay, None outside the fence or over something: from there the boat sails on first."""
     here = ctx.snapshot.position_en_m
     if here is not None and float(ctx.voyage.area.clearance_m([here])[0]) <= 0.0:
         return None
@@ -262,7 +262,7 @@ def place_trouble(ctx: StepContext, what: str, en_m: PointEn) -> str:
     if not far_m <= ctx.voyage.far_m:
         return f"{what} is {far_m / 1000.0:.0f} km from this water"
     if far_m > ctx.voyage.area.reach_m:
-        return ""   # what lies there is seen when she comes there
+        return ""   # what lies there is seen when the boat comes there
     clearance = float(ctx.voyage.area.clearance_m([en_m])[0])
     floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
     if clearance < floor_m:
@@ -281,7 +281,7 @@ def _home(ctx: StepContext, why: str) -> Diversion | None:
 
 
 def _back(ctx: StepContext) -> Diversion | None:
-    """Return the way back to where she is to rest, when she is off it and the straight way is not clear."""
+    """Return the way back to where the boat is to rest, when it is off it and the straight way is not clear."""
     rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
     off = ctx.is_raised(DRAGGED) or bool(ctx.state.operator.answering)
     if rest is None or boat is None or not (off or _is_bound(ctx, REST)):
@@ -305,7 +305,7 @@ def gate_for(ctx: StepContext, bound: Diversion) -> Gate:
 
 
 def is_at_rest(ctx: StepContext) -> bool:
-    """Return whether she is in the loiter at the end of the diversion that she is on."""
+    """Return whether the boat is in the loiter at the end of the diversion that it is on."""
     bound, route = diversion(ctx), ctx.state.mission.route
     if bound is None or route is None or ctx.ahead():
         return False

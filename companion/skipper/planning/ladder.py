@@ -35,7 +35,7 @@ def rungs(config: SkipperConfig, *, track_m: float = 0.0, in_current: bool = Fal
     ``track_m`` is what the boat may be beside a straight leg: a margin that leaves less would be planned for nothing,
     and where the mission's own leaves less, the first thing is a wider one.
     ``in_current``: planned with one. What is given up first there are the courses that the autopilot keeps to as lines
-    (``pinches``): closer to the wind it steers for the waypoint, and the current sets her off the line by metres.
+    (``pinches``): closer to the wind it steers for the waypoint, and the current sets it off the line by metres.
     With delta_s the limit on the whole path's risk is given up.
     """
     limit = config.max_path_risk

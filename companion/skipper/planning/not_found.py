@@ -21,7 +21,7 @@ FOUL = "current too strong"   # the code under which it is said
 TRIES = 3              # of a planner that does not answer, before the next step of the ladder
 LESS, LEAST_EFFORT = 0.5, 0.05   # of the planning budget: after each request that was not answered; never less
 MORE = 1.2             # ... and after each that was
-HOLD_ROOM = 2.0   # times the loiter's radius: she may lie here for hours, and a HOLD carries her off before help comes
+HOLD_ROOM = 2.0   # times the loiter's radius: it may lie here for hours, and a HOLD carries it off before help comes
 
 
 def asks_again(ctx: StepContext, pending: PendingPlan, reason: str) -> bool:
@@ -116,13 +116,13 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
 
 
 def _foul(ctx: StepContext, pending: PendingPlan) -> str:
-    """Return why the current keeps her from where the plan leads, empty: it does not."""
+    """Return why the current keeps the boat from where the plan leads, empty: it does not."""
     water = ctx.water
     return "" if water is None else water.trouble(pending.start_en_m, pending.problem.goal_en)
 
 
 def _wait_against(ctx: StepContext, pending: PendingPlan, foul: str, *, count: int) -> None:
-    """Wait for a weaker current: here where she is carried clear, else where she will be (the ladder's last step).
+    """Wait for a weaker current: here where the boat is carried clear, else where it will be (the ladder's last step).
 
     No margin and no promise given up makes way against a current: the steps between are left out.
     """

@@ -4,7 +4,7 @@ Under the rules of the road (``companion.traffic.colregs``) a change of course i
 not across the other's bow (rule 15). All three are regions that go with time, so that every planner that knows moving
 discs obeys them, and nothing else of it changes:
 
-- ahead of a vessel that we give way to a row of discs goes before her bow, as long as she sails in ``AHEAD_S``. What is
+- ahead of a vessel that we give way to a row of discs goes before its bow, as long as it sails in ``AHEAD_S``. What is
   left is to pass astern, or so far ahead that there is no risk. (Fujii's and Coldwell's domains are longer ahead, too.)
 - a disc stands on our old course in front of us for the first moments: its tangents are 30 degrees off the course, so
   that a change of course is no smaller. When the change has shown, it is gone, and the way may come back.
@@ -45,13 +45,13 @@ def held_of(ctx: StepContext, vessel: Vessel) -> OngoingEncounter | None:
 
 
 def is_stood_on_to(ctx: StepContext, vessel: Vessel) -> bool:
-    """Return whether a vessel is left to keep out of our way: no plan is made because of her."""
+    """Return whether a vessel is left to keep out of our way: no plan is made because of it."""
     if ctx.config.traffic_policy is not Policy.RULES:
         return False
     held = held_of(ctx, vessel)
     if held is not None:
         return held.stands_on
-    # A boat that hardly moves meets nobody: she has no course to keep.
+    # A boat that hardly moves meets nobody: it has no course to keep.
     return ctx.speed_mps >= LEAST_MPS and any(
         a.encounter.role is Role.STAND_ON for a in ctx.state.traffic.watch
         if (a.vessel.mmsi, a.vessel.branch) == (vessel.mmsi, vessel.branch))

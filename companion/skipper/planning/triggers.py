@@ -86,7 +86,7 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
     if ctx.guidance is Guidance.FIELD and ctx.steers:
         if is_composed(ctx) and route is not None and ctx.state.progress.gate in route.gate_of:
-            return None   # what is on board leads to the goal's place: that is where she goes when she is not steered
+            return None   # what is on board leads to the goal's place: that is where it goes when it is not steered
         return _at_end(ctx) or _extension(ctx, bound)   # the mission on board need not be the way that is sailed
     trigger = _traffic(ctx)
     if trigger is None and not ctx.is_raised("wind untrusted"):
@@ -102,7 +102,7 @@ REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.
 
 
 def _diversion(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
-    """She is bound for somewhere else than her route leads to: a diversion that begins, or one that is over."""
+    """The boat is bound for somewhere else than its route leads to: a diversion that begins, or one that is over."""
     route = ctx.state.mission.route
     leads_to = route.bound_for if route is not None else ""
     is_first = ctx.state.plans.retry.failures == 0   # then the wait between two tries counts
@@ -132,7 +132,7 @@ def _traffic(ctx: StepContext) -> Trigger | None:
 
 
 def board_end(ctx: StepContext, leg: tuple[PointEn, PointEn]) -> PointEn:
-    """Return where she turns next: a board is a chain of short legs where the zone that it keeps out of grows."""
+    """Return where the boat turns next: a board is a chain of short legs where the zone that it keeps out of grows."""
     course, before, end = bearing_rad(*leg), *leg
     for point in ctx.ahead()[1:]:
         before, end = end, point
@@ -261,7 +261,7 @@ def _extension(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
     elif ends >= len(ctx.gates) - 1 and homeward(ctx) is None:
         return None
     elif 0 <= ends < len(ctx.gates) - 1 and waits_for_gun(ctx, ctx.gates[ends + 1]):
-        return None   # where she waits is planned for when it is next
+        return None   # where the boat waits is planned for when it is next
     left = path_length_m([boat, *ctx.ahead()])
     if left > (ctx.config.look_ahead_s + ctx.late_s) * max(ctx.speed_mps, 1.0) or not may_restart_leg(ctx):
         return None

@@ -111,7 +111,7 @@ def take_upload(ctx: StepContext, outcome: UploadOutcome) -> None:
 def is_riskier(problem: Problem, old: Sequence[Leg], new: Sequence[Leg]) -> bool:
     """Return whether the old legs are too risky to stay beside the new ones.
 
-    That is above the limit on a path's risk, where the mission has one; or with tacks that may bring her onto
+    That is above the limit on a path's risk, where the mission has one; or with tacks that may bring the boat onto
     something when they fail, where the new legs have fewer or less likely ones.
     """
     before = of_risky(tacks_at_risk(problem, old))
@@ -119,7 +119,7 @@ def is_riskier(problem: Problem, old: Sequence[Leg], new: Sequence[Leg]) -> bool
 
 
 def is_begun_risky(problem: Problem, legs: Sequence[Leg]) -> bool:
-    """Return whether the turn that begins the legs is a tack that may bring her onto something when it fails."""
+    """Return whether the turn that begins the legs is a tack that may bring the boat onto something when it fails."""
     return any(tack.is_risky and tack.leg == 0 and not legs[0].is_beat for tack in tacks_at_risk(problem, legs))
 
 
@@ -168,7 +168,7 @@ def refusal(ctx: StepContext, route: Route, set_current: int | None, pending: Pe
     first = ctx.state.mission.index if set_current is None else set_current - 1
     heading_rad, begins = vehicle.heading_rad, boat
     if set_current is not None and pending.from_index is None and not pending.lead_in:
-        # where she is by the time that it is on board
+        # where the boat is by the time that it is on board
         begins, heading_rad = pending.start_en_m, problem.start_heading_rad
     new = [begins, *route.points_en_m[first:-1]]
     old, ahead, leg = [boat, *ctx.ahead()], ctx.ahead(), ctx.leg()

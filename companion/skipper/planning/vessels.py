@@ -36,7 +36,7 @@ ALIKE_S = 300.0              # successive ways are compared over this time
 SETTLED_M = 50.0             # discs this uncertain grow no more: else later ones would close a lake
 UNKNOWN_S = 30.0             # a vessel of unknown course could be anywhere soon: only the next moments count
 NEAREST = 12                 # vessels that a plan looks at: half of them those that come nearest, if both go on or we
-#                              stay; then those that could be met soonest, however she turns and we do
+#                              stay; then those that could be met soonest, however the boat turns and we do
 OWN_MPS = 4.0                # no boat of ours closes faster by itself
 FAR_RISK = 1e-2              # that a vessel is nearer than counted when those that could be met are chosen
 HAIR_M = 1.0                 # a boat within a disc is let out of it: the disc ends this much before the boat

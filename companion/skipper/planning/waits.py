@@ -1,6 +1,6 @@
 """Waiting on the way: for a start line's gun, and in a box.
 
-When the gun is, where she waits for it, when she must sail to be at the line; how long she stays in a box.
+When the gun is, where the boat waits for it, when it must sail to be at the line; how long it stays in a box.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ FARTHEST_M = 70.0
 SIDES_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0)   # of the course across the line, from the wait to it
 SAILABLE_RAD = math.radians(8.0)   # outside the no-go zone by this, the leg to the line is one board
 SLOWEST_MPS = 0.3
-RESERVE_S = 8.0       # later than the estimate: gusts carry her there 4 s before it (measured), and early is worse
-NEAR_M = 120.0        # from farther away the time is not foreseen so well: she goes to the line first, and waits there
+RESERVE_S = 8.0       # later than the estimate: gusts carry the boat there 4 s before it (measured), and early is worse
+NEAR_M = 120.0        # from farther away the time is not foreseen so well: it goes to the line first, and waits there
 FAR_SHARE = 0.6
 
 
@@ -48,7 +48,7 @@ def gun_in_s(ctx: StepContext, line: Line) -> float | None:
 
 
 def waits_for_gun(ctx: StepContext, gate: Gate) -> bool:
-    """Return whether it is too early to sail for a gate's line: from where she is she would be there before the gun."""
+    """Return whether it is too early to sail for a gate's line: from where it is it would be there before the gun."""
     line = gate.line
     if line is None or not line.is_start or ctx.state.progress.released == gate.goal:
         return False
@@ -57,7 +57,7 @@ def waits_for_gun(ctx: StepContext, gate: Gate) -> bool:
 
 
 def _to_line_s(ctx: StepContext, gate: Gate) -> float:
-    """Return how long she sails to the line at the soonest [s]; the plan and its upload come on top of it."""
+    """Return how long the boat sails to the line at the soonest [s]; the plan and its upload come on top of it."""
     boat, wind, line = ctx.boat_en, ctx.wind_mean, gate.line
     if boat is None or wind is None or line is None or ctx.gate is not gate or ahead_m(line, boat) >= 0.0:
         return 0.0
@@ -99,7 +99,7 @@ def waiting_en(ctx: StepContext, gate: Gate) -> PointEn:
 
 
 def stay_left_s(ctx: StepContext, gate: Gate) -> float:
-    """Return how long she still stays in a gate's box, or sails by its field [s]; inf: until told, or not yet."""
+    """Return how long the boat still stays in a gate's box, or sails by its field [s]; inf: until told, or not yet."""
     inside, box = ctx.state.progress.inside, gate.box or gate.field
     if box is None or box.for_s is None or inside is None or inside.goal != gate.goal:
         return math.inf

@@ -28,9 +28,9 @@ class ReplanReason(enum.Enum):
     OPERATOR_BACK = "operator_back"
     OBSTACLE = "obstacle"              # the area or the traffic changed
     REFUGE = "refuge"                  # the battery is critical, or the voyage out of time
-    HOME = "home"                      # all goals are reached, or the autopilot wants her home
-    REST = "rest"                      # dragged off the place where she loiters
-    ORDER = "order"                    # somebody asked for it, or she has come out of irons
+    HOME = "home"                      # all goals are reached, or the autopilot wants the boat home
+    REST = "rest"                      # dragged off the place where the boat loiters
+    ORDER = "order"                    # somebody asked for it, or it has come out of irons
     RETRY = "retry"                    # a step of the ladder after nothing was found
     MISMATCH = "mismatch"              # the mission on the autopilot is not the one that was uploaded
 

@@ -59,7 +59,7 @@ from companion.skipper.way.stemming import Water
 from companion.skipper.way.voyage import PointEn, Voyage
 
 FRESH_S = 3.0          # a part older than this is not acted upon
-GAINS_MPS = 1.0        # a fix with this much more speed than she can have gained is a jump, as one that is JUMP_M off
+GAINS_MPS = 1.0        # a fix with this much more speed than it can have gained is a jump, as one that is JUMP_M off
 SHOWS_S = 2.5          # a command that was accepted shows in the next heartbeats: it is not repeated before that
 DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
 
@@ -249,7 +249,7 @@ class StepContext:
 
     @property
     def plan_lead_s(self) -> float:
-        """What she sails until a plan that is asked for now is on board, uploading aside [s]."""
+        """What the boat sails until a plan that is asked for now is on board, uploading aside [s]."""
         return self.config.plan_budget_s + self.state.plans.latency.usually_late_s
 
     @property
@@ -275,7 +275,7 @@ class StepContext:
 
     @property
     def plans_in_doubt(self) -> bool:
-        """Whether a plan is made from a position that is not believed: where she cannot be kept in a LOITER instead.
+        """Whether a plan is made from a position that is not believed: where no LOITER can be kept instead.
 
         Sailed by the autopilot, on a way that is shut, a plan that is clear from where it believes to be is better.
         """
@@ -301,9 +301,9 @@ class StepContext:
 
     @property
     def jump_m(self) -> float:
-        """How much farther the boat is from where her last fix has her sail than she can have turned away [m].
+        """How much farther the boat is from where its last fix has it sail than it can have turned away [m].
 
-        At a leap's 8 m/s a second would hide what a margin is: she is held against her own speed.
+        At a leap's 8 m/s a second would hide what a margin is: it is held against its own speed.
         """
         here, last, vehicle = self.snapshot.position_en_m, self.state.position.last_seen, self.snapshot.vehicle
         age = self.snapshot.vehicle_age_s
@@ -338,7 +338,7 @@ class StepContext:
 
     @property
     def through_en_mps(self) -> tuple[float, float]:
-        """Her velocity less that current [m/s]: over the ground where none is significant; 0 when unknown."""
+        """The boat's velocity less that current [m/s]: over the ground where none is significant; 0 when unknown."""
         vehicle, (east, north) = self.snapshot.vehicle, self.current_en_mps
         return (0.0, 0.0) if vehicle is None else (
             vehicle.velocity_en_mps[0] - east, vehicle.velocity_en_mps[1] - north)
@@ -373,7 +373,7 @@ class StepContext:
 
     @property
     def tack_corridor_m(self) -> float:
-        """SAIL_XTRACK_MAX; 0, none, where she is steered in GUIDED: nothing tacks her at its edge there."""
+        """SAIL_XTRACK_MAX; 0, none, where the boat is steered in GUIDED: nothing tacks it at its edge there."""
         limits = self.snapshot.limits
         if self.steers_plans:
             return 0.0
@@ -417,12 +417,12 @@ class StepContext:
 
     @property
     def is_given_up(self) -> bool:
-        """Whether she was given up by order: nothing is asked of her."""
+        """Whether the boat was given up by order: nothing is asked of it."""
         return is_given_up(self.state)
 
     @property
     def is_leaving(self) -> bool:
-        """Whether she shows a stop still, or GUIDED, that an order of ours, on its way or just accepted, ends."""
+        """Whether the boat shows a stop still, or GUIDED, that an order of ours, on its way or just accepted, ends."""
         status, state, own = self.autopilot, self.state, self.state.steering.own_mode
         if status is None or own is None or own is status.mode:
             return False
@@ -438,7 +438,7 @@ class StepContext:
 
     @property
     def guidance(self) -> Guidance:
-        """What steers her now: the mission's guidance, or the field of the goal that is next."""
+        """What steers the boat now: the mission's guidance, or the field of the goal that is next."""
         return Guidance.FIELD if self.state.by_field.composed else self.config.guidance
 
     @property
@@ -461,13 +461,13 @@ class StepContext:
 
     @property
     def is_by_field(self) -> bool:
-        """Whether a field steers her now, in GUIDED."""
+        """Whether a field steers the boat now, in GUIDED."""
         status = self.autopilot
         return self.steers and self.guidance is Guidance.FIELD and status is not None and status.mode is Mode.GUIDED
 
     @property
     def sails_in(self) -> Mode:
-        """The mode that she sails in: GUIDED where she is steered, else AUTO."""
+        """The mode that the boat sails in: GUIDED where it is steered, else AUTO."""
         return Mode.GUIDED if self.steers else Mode.AUTO
 
     def leg(self) -> tuple[PointEn, PointEn] | None:

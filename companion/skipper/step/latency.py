@@ -61,7 +61,7 @@ class PlannerLatency:
 
     @property
     def usually_late_s(self) -> float:
-        """How much farther than on a fast computer she has sailed when an answer is there, as a rule [s]."""
+        """How much farther than on a fast computer the boat has sailed when an answer is there, as a rule [s]."""
         return self._beyond_s(self.median_s)
 
     def patience_s(self, least_s: float) -> float:

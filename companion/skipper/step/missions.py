@@ -125,7 +125,7 @@ class Tail:
     start_en: PointEn
     points_en: tuple[PointEn, ...]
     gate: int                  # -1: the last point completes nothing (a nearer goal, the local plan's horizon)
-    is_place: bool = False     # she is to loiter at its end, and nowhere near by
+    is_place: bool = False     # the boat is to loiter at its end, and nowhere near by
 
 
 def splice(

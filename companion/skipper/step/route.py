@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from companion.messages import MissionItem
 from companion.skipper.way.voyage import PointEn
 
-HOME_RADIUS_M = 15.0     # home is where she was armed: a place in the water or at its edge, not a mark
+HOME_RADIUS_M = 15.0     # home is where the boat was armed: a place in the water or at its edge, not a mark
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,12 +49,12 @@ class Kind(enum.Enum):
 
     REFUGE = "refuge"
     HOME = "home"
-    REST = "rest"            # back to where she loitered
+    REST = "rest"            # back to where the boat loitered
     GOAL = "goal"            # a place that somebody named
     INSIDE = "inside"        # back into the autopilot's own fence
     START = "start"          # before a start line, until the gun
     BOX = "box"              # water to stay in
-    FIELD = "field"          # where she waits while a goal's field cannot be sailed
+    FIELD = "field"          # where the boat waits while a goal's field cannot be sailed
     STAY = "stay"            # where there is room near by
 
 
@@ -67,7 +67,7 @@ class Diversion:
     why: str
     en_m: PointEn = (0.0, 0.0)
     radius_m: float = HOME_RADIUS_M
-    is_ordered: bool = False     # it lasts until she is told to go on
+    is_ordered: bool = False     # it lasts until it is told to go on
     until: str = ""              # what it lasts for, where that is known
 
     @property

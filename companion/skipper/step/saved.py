@@ -30,7 +30,7 @@ _DEFAULTS: dict[str, Any] = {
     "bound_for": "", "expected_clearance_m": None, "median_s": None, "late_s": None}
 
 
-# ------------------- The order that stands: what the boat was told to do until she is told to go on.
+# ------------------- The order that stands: what the boat was told to do until it is told to go on.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -106,11 +106,11 @@ class Persisted:
     standing: Standing | None = None   # the order that stands
     skipped: int = 0                   # goals given up by order
     set_sail_utc_s: float | None = None   # Unix time of setting sail
-    inside: tuple[int, float] | None = None   # the goal whose box she stays in, Unix time of entry
+    inside: tuple[int, float] | None = None   # the goal whose box the boat stays in, Unix time of entry
     searched: tuple[tuple[float, float], ...] = ()   # the track of the search that is next
     covered: tuple[tuple[int, float], ...] = ()      # goals searched, and the share that was seen
     tacks: tuple[int, int] = (0, 0)    # tried, and of these failed
-    place: SavedPlace | None = None    # where she was
+    place: SavedPlace | None = None    # where the boat was
     latency: PlannerLatency = NO_ANSWERS   # of the planner on this computer
     water: GeoPoint | None = None      # the origin of all metres here; None: the mission's
 

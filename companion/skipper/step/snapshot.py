@@ -93,7 +93,7 @@ class Disbelieved:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParameterChanged:
-    """Somebody has set a parameter that changes what a sensor says or how she sails: what it was and is, in words."""
+    """Somebody has set a parameter that changes what a sensor says or how the boat sails: old and new, in words."""
 
     name: str
     text: str

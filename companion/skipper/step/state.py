@@ -41,15 +41,15 @@ class Tacking:
         tried, failed: of this voyage.
         in_a_row: failures since the last that came off.
         failed_s: when the last failed.
-        side: of the wind when she was last settled on a tack: 1 starboard, -1 port, 0 never.
-        settled_rad: her heading then, and ``settled_s`` when.
-        settled_mps: her speed then.
+        side: of the wind when the boat was last settled on a tack: 1 starboard, -1 port, 0 never.
+        settled_rad: its heading then, and ``settled_s`` when.
+        settled_mps: its speed then.
         slowest_mps: the least since the tack that is being tried began.
         began_s: since when a tack is being tried, None: none is.
-        is_counted: that one was counted as failed: she lies in irons.
-        began_en_m: where she was then, None: not known.
-        irons_s: the longest that she has lain.
-        starboard_lee_mps, port_lee_mps: the fastest that she was set then, abeam to the lee of that tack, beside the
+        is_counted: that one was counted as failed: it lies in irons.
+        began_en_m: where it was then, None: not known.
+        irons_s: the longest that it has lain.
+        starboard_lee_mps, port_lee_mps: the fastest that it was set then, abeam to the lee of that tack, beside the
             current that is believed.
 
     """
@@ -155,9 +155,9 @@ PATIENT = Retry()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """She was being sailed and no longer is: since when, what she was put into, and by what (``FAILSAFES``).
+    """The boat was being sailed and no longer is: since when, what it was put into, and by what (``FAILSAFES``).
 
-    ``before_s`` is when she was last seen being sailed: the change of mode is between the two.
+    ``before_s`` is when it was last seen being sailed: the change of mode is between the two.
     """
 
     t_s: float
@@ -214,7 +214,7 @@ class ByField:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Inside:
-    """Since when she is in the box of a goal, or sails by its field, and by the autopilot's clock (None: not known)."""
+    """Since when the boat is in a goal's box, or sails by its field, and by the autopilot's clock (None: not known)."""
 
     goal: int
     t_s: float
@@ -238,7 +238,7 @@ class Answered:
 class Charge:
     """The battery's share when its fall began, and the last that was told.
 
-    ``is_short``: it has not covered the way to where she can wait, since then; on that way it covers it again.
+    ``is_short``: it has not covered the way to where it can wait, since then; on that way it covers it again.
     """
 
     since_s: float
@@ -292,12 +292,12 @@ class GoalProgress:
     approaches: tuple[Approach, ...] = ()   # where the way to a goal began, see companion.skipper.way.gates
     bearing_rad: float = 0.0           # how far the boat has come round the buoy that is next, see gates.bearing_on
     closest_m: float = float("inf")    # smallest distance to the present gate so far
-    is_blind: bool = False             # the voyage was taken up again: what she passed meanwhile was not seen
-    released: int = -1                 # the goal at whose line she no longer waits for the gun, or in whose box
-    inside: Inside | None = None       # the box that she stays in
+    is_blind: bool = False             # the voyage was taken up again: what the boat passed meanwhile was not seen
+    released: int = -1                 # the goal at whose line the boat no longer waits for the gun, or in whose box
+    inside: Inside | None = None       # the box that the boat stays in
     searched: tuple[PointEn, ...] = ()  # the track of the search that is next
     covered: tuple[tuple[int, float], ...] = ()   # goals searched, and the share that was seen
-    task: str = ""                     # how far she is with it, in words
+    task: str = ""                     # how far the boat is with it, in words
     reached: tuple[int, ...] = ()      # goals reached, in order
     missed: int = 0                    # buoys passed on the wrong side and sailed again
     missed_s: float | None = None      # when a gate was missed to which no upload since leads
@@ -314,9 +314,9 @@ class VoyageState:
     last_step_s: float = float("-inf")  # ... counted from step to step
     set_sail_utc_s: float | None = None  # Unix time of setting sail, by the autopilot's clock
     home_reached: bool = False         # the way home that follows the last goal is sailed
-    over: str = ""                     # why the voyage is over: what is left is to watch her loiter; empty: it is not
+    over: str = ""                     # why the voyage is over: what is left is to watch its loiter; empty: it is not
     arrived: bool = False              # ... with all goals reached, and home where the mission ends there
-    rest_en_m: PointEn | None = None   # where she loiters since
+    rest_en_m: PointEn | None = None   # where the boat loiters since
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -355,13 +355,13 @@ class Pending:
 class OperatorState:
     """Who has the boat when we have not: a person, or one of the autopilot's failsafes."""
 
-    since_s: float | None = None       # since when a person has her
-    given_back_s: float = float("-inf")  # when a person last gave her back
+    since_s: float | None = None       # since when a person has the boat
+    given_back_s: float = float("-inf")  # when a person last gave the boat back
     is_back: bool = False              # AUTO has come back: plan from where the boat is now
     signs: Signs = Signs()
-    stop: Stop | None = None           # she is not being sailed though she was
+    stop: Stop | None = None           # the boat is not being sailed though it was
     answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
-    sent_home: bool = False            # ... which put her into RTL
+    sent_home: bool = False            # ... which put the boat into RTL
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -385,15 +385,15 @@ class PositionState:
     lost_s: float | None = None        # since when the autopilot's filter has had no position
     disputed_s: float | None = None    # since when two receivers have said different things
     anew: Mode | None = None           # a LOITER whose point jumped with the position is begun anew: what shows next
-    place: SavedPlace | None = None    # where she is believed or reckoned to be, for who comes after a kill
-    restored: SavedPlace | None = None  # where she was before this start, until the first fix is held against it
+    place: SavedPlace | None = None    # where the boat is believed or reckoned to be, for who comes after a kill
+    restored: SavedPlace | None = None  # where the boat was before this start, until the first fix is held against it
 
 
 @dataclass(frozen=True, kw_only=True)
 class Orders:
     """What was ordered from ashore or aboard (``companion.orders``)."""
 
-    standing: Standing | None = None   # the order that stands until she is told to go on
+    standing: Standing | None = None   # the order that stands until the boat is told to go on
     answered: tuple[Answered, ...] = ()  # the last order of each who gave one lately
     skipped: int = 0                   # goals given up by order
 
@@ -446,7 +446,7 @@ class SkipperState:
     steering: SteeringState = SteeringState()
     by_field: ByField = ByField()
     adrift: Adrift = Adrift()
-    tacking: Tacking = NO_TACKS        # what her tacks have told
+    tacking: Tacking = NO_TACKS        # what the boat's tacks have told
     position: PositionState = PositionState()
     orders: Orders = Orders()
     alarms: Alarms = Alarms()
@@ -455,7 +455,7 @@ class SkipperState:
 
 
 def is_given_up(state: SkipperState) -> bool:
-    """Return whether the boat was given up by order: nothing is asked of her."""
+    """Return whether the boat was given up by order: nothing is asked of it."""
     return state.orders.standing is not None and state.orders.standing.verb is Verb.STOP
 
 
@@ -479,7 +479,7 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         standing=standing_saved(state), skipped=state.orders.skipped, set_sail_utc_s=state.voyage.set_sail_utc_s,
         inside=None if state.progress.inside is None or state.progress.inside.utc_s is None
         else (state.progress.inside.goal, state.progress.inside.utc_s),
-        searched=state.progress.searched[:-1], covered=state.progress.covered,   # the last point moves with her
+        searched=state.progress.searched[:-1], covered=state.progress.covered,   # the last point moves with the boat
         tacks=(state.tacking.tried, state.tacking.failed), place=state.position.place,
         latency=state.plans.latency,
     )

@@ -1,7 +1,7 @@
 """The boat's limits of wind as chance constraints: how likely the forecast is to break one within the plan's time.
 
 At each instant ``delta_s`` is promised, as of the no-go zone: so a limit is broken where the wind is beyond it with
-more than ``1 - delta_s`` at the worst instant from now until nine of ten winds have brought her there. Before setting
+more than ``1 - delta_s`` at the worst instant from now until nine of ten winds have brought it there. Before setting
 sail that is a reason to wait; under way ``[safety] strong_wind`` and ``light_wind`` say what is done.
 """
 
@@ -41,12 +41,12 @@ def too_strong(ctx: StepContext) -> float | None:
 
 
 def too_light(ctx: StepContext) -> float | None:
-    """Return the same of less wind than she makes way in."""
+    """Return the same of less wind than the boat makes way in."""
     return _share(ctx, _light(ctx))
 
 
 def winds_wanted(ctx: StepContext) -> list[str]:
-    """Return what she waits for before setting sail, in words; empty: the wind will do."""
+    """Return what the boat waits for before setting sail, in words; empty: the wind will do."""
     boat, allowed, out = ctx.voyage.boat, _allowed(ctx), []
     for chance, name, limit in ((_strong(ctx), "less wind: above", boat.max_tws_mps),
                                 (_light(ctx), "more wind: below", boat.min_tws_mps)):

@@ -14,7 +14,7 @@ from companion.messages import WindForecast
 from companion.skipper.step.context import StepContext
 
 WORTH = 0.01                   # tacked on where it gains at least this share of the speed made good
-NARROWEST_M = 20.0             # in a narrower corridor she meets the edge before a shift
+NARROWEST_M = 20.0             # in a narrower corridor the boat meets the edge before a shift
 LEG_RAD = math.radians(25.0)   # a leg farther off the mean wind is sailed on one tack for the most part
 SOON_S, LONG_S = 30.0, 300.0   # horizons: mean and spread are read by the longer, how fast it shifts by both
 TAU_S = (15.0, 600.0)
@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 STEP_S = 2.0
 PLACES, SHIFTS = 21, 13
 SPREADS = 3.0          # the shifts that are looked at reach so many spreads to either side ...
-WITHIN_RAD = math.radians(5.0)   # ... and no farther than this within the angle that she sails: both tacks lead up
+WITHIN_RAD = math.radians(5.0)   # ... and no farther than this within the angle that the boat sails: both tacks lead up
 MOST_ROUNDS = 250
 NEAR_M = 0.01          # of what steps gain: then the values are settled
 OUTSIDE_M = 1e3        # what going on out of the corridor costs: nobody does
@@ -40,7 +40,7 @@ class Shifting:
 
     @property
     def tack_s(self) -> float:
-        """What a tack at the edges alone would cost where she makes as much good; 0 at the least [s]."""
+        """What a tack at the edges alone would cost where the boat makes as much good; 0 at the least [s]."""
         return max(0.0, self.table.crossing_s * (self.table.straight_mps / self.table.made_good_mps - 1.0))
 
 
@@ -67,7 +67,7 @@ def shifts_of(
 ) -> Shifting | None:
     """Return what a forecast's shifts are worth; None where it is too little, or not for this corridor or leg.
 
-    ``speed_mps`` is hers close-hauled at ``half_rad``, ``tack_s`` what a tack costs, ``ahead_m`` what is left of the
+    ``speed_mps`` is its own close-hauled at ``half_rad``, ``tack_s`` what a tack costs, ``ahead_m`` what is left of the
     leg: to go wider than the laylines through its end is to sail too far, so they narrow the corridor.
     """
     while NARROWEST_M <= corridor_m > ahead_m * math.tan(half_rad):
@@ -103,8 +103,8 @@ def _by(forecast: WindForecast, horizon_s: float) -> int:
 # --------------------
 # Tacking on the shifts: what a tack now is worth on a beat in a corridor, from how far and how fast the wind shifts.
 # The wind is taken to wander about its mean as an Ornstein-Uhlenbeck process of the forecast's spread and correlation
-# time; she sails close-hauled, and must tack at the corridor's edge. What is made good along the leg in the long run
-# is then a function of three things that she sees: her place in the corridor, the shift, and her tack. Its best
+# time; it sails close-hauled, and must tack at the corridor's edge. What is made good along the leg in the long run
+# is then a function of three things that it sees: its place in the corridor, the shift, and its tack. Its best
 # policy is a dynamic programme over these (undiscounted, relative values): tack, or stand on. How many tacks there
 # are, and that a tack near the edge comes too late for the next shift, comes out of it.
 #
@@ -137,7 +137,7 @@ class ShiftTable:
 
     @property
     def plainly_mps(self) -> float:
-        """What is made good where she tacks at the corridor's edges alone."""
+        """What is made good where the boat tacks at the corridor's edges alone."""
         return self.straight_mps * self.crossing_s / (self.crossing_s + self.tack_s)
 
     def gain_s(self, off_m: float, shift_rad: float, *, is_port: bool) -> float:
@@ -154,7 +154,8 @@ def shift_table(
 ) -> ShiftTable:
     """Return the table for a leg that is ``leg_rad`` to the right of the mean wind [rad].
 
-    ``speed_mps`` is what she makes close-hauled, ``half_rad`` off the wind. It takes 10 ms: ask with round figures.
+    ``speed_mps`` is what the boat makes close-hauled, ``half_rad`` off the wind. It takes 10 ms: ask with round
+    figures.
     """
     reach_rad = min(SPREADS * spread_rad, half_rad - WITHIN_RAD)
     places, shifts = np.linspace(-corridor_m, corridor_m, PLACES), np.linspace(-reach_rad, reach_rad, SHIFTS)
@@ -188,7 +189,7 @@ def shift_table(
         if float(change.max()) - gained_m < NEAR_M:
             break
     longest_s = 2.0 * corridor_m / (speed_mps * math.sin(half_rad))
-    # at the edge she must tack: what that gains is no more than a board
+    # at the edge the boat must tack: what that gains is no more than a board
     worth_s = np.minimum((stand[::-1] - loss_m - stand) / mean_mps, longest_s)
     return ShiftTable(
         corridor_m=corridor_m, reach_rad=reach_rad, worth_s=worth_s,

@@ -146,7 +146,7 @@ def _corridor(ctx: StepContext) -> float | None:
     """Share of the corridor used; in open water the grid size bounds it, not the margin, and a beat its own boards."""
     boat, leg = ctx.boat_en, ctx.leg()
     if boat is None or leg is None or not ctx.ahead() or ctx.state.steering.own_mode in STOPPING or is_composed(ctx):
-        return None      # stopped, or by a field of her own, she follows no leg
+        return None      # stopped, or by a field of the boat's own, it follows no leg
     if distance_m(*leg) < 1.0:
         return 0.0
     if along_m(boat, *leg) < 0.0:
@@ -260,7 +260,7 @@ _MEASURES: dict[str, Callable[[StepContext], float | None]] = {
 
 
 # --------------------
-# How long the charge lasts at the rate at which it has fallen, against the way to a place where she can wait.
+# How long the charge lasts at the rate at which it has fallen, against the way to a place where it can wait.
 # The rate is the mean since the charge was last seen to rise: a figure in whole percents tells nothing over a minute.
 # The way is a straight one, lengthened by ``DETOUR``.
 
@@ -297,7 +297,7 @@ def lasts_s(ctx: StepContext) -> float | None:
 
 
 def way_s(ctx: StepContext) -> float | None:
-    """Return how long she needs to the nearest refuge, or home where there is none [s]; None: there is neither."""
+    """Return how long the boat needs to the nearest refuge, or home where there is none [s]; None: there is neither."""
     boat, wind, status = ctx.boat_en, ctx.wind_mean, ctx.autopilot
     places = [refuge.en_m for refuge in ctx.voyage.refuges]
     if not places and status is not None and status.home is not None and not home_trouble(ctx):

@@ -1,10 +1,10 @@
 """Watches tacks: which come off, which fail; what is done about one that failed.
 
-A tack is tried when her heading, and not the wind, has brought the bow near the wind, or nearer and to a stop: the wind
-over a boat in irons is not that of 5 s ago, and a vane may be turned. It has come off when she is settled on the other
-tack, and failed when she is back on the old one, having lain near the wind for ``ABORTED_S`` or lost her way there, or
-lies there for ``LIES_S``. A wind that heads her and makes her bear away is no tack: her heading has turned the other
-way.
+A tack is tried when the boat's heading, and not the wind, has brought the bow near the wind, or nearer and to a stop:
+the wind over a boat in irons is not that of 5 s ago, and a vane may be turned. It has come off when it is settled on
+the other tack, and failed when it is back on the old one, having lain near the wind for ``ABORTED_S`` or lost its way
+there, or lies there for ``LIES_S``. A wind that heads it and makes it bear away is no tack: its heading has turned the
+other way.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from companion.skipper.way.voyage import PointEn
 
 SETTLED_RAD = math.radians(30.0)
 NEAR_RAD = math.radians(20.0)      # of the wind, of which the mean of 5 s is known
-TURNED_RAD = math.radians(15.0)    # towards it, since she was settled
-ABORTED_S = 5.0                    # back sooner, she was told otherwise: an upload has begun her leg anew ...
-STOPPED = 0.4                      # ... unless her speed fell to less than this share: in a tack it falls to half
+TURNED_RAD = math.radians(15.0)    # towards it, since it was settled
+ABORTED_S = 5.0                    # back sooner, the boat was told otherwise: an upload has begun its leg anew ...
+STOPPED = 0.4                      # ... unless its speed fell to less than this share: in a tack it falls to half
 LIES_S = 8.0                       # as the watchdog "in irons" has it
 FORGET_S = 20.0                    # settled longer ago than this, whatever follows is no tack from there
-LEAST_TWS_MPS = 1.5                # in less she does as she likes
+LEAST_TWS_MPS = 1.5                # in less the boat does as it likes
 NEAR_SOLID_M = 60.0                # a tack that failed so near something asks for a new plan
-MOST_IRONS_S = 60.0                # more is a lull that she waited in: no room of a tack would be enough ever after
+MOST_IRONS_S = 60.0                # more is a lull that it waited in: no room of a tack would be enough ever after
 MOST_LEE_MPS = 1.0                 # more is a position that has jumped
 TACK_FAILED = "a tack failed"
 
 
 def watch_tacks(ctx: StepContext) -> None:
-    """Follow her tacks for one step."""
+    """Follow the boat's tacks for one step."""
     now, vehicle, wind, status = ctx.state.tacking, ctx.snapshot.vehicle, ctx.wind_now, ctx.autopilot
     sails = ctx.state.voyage.sailing and ctx.config.sails and status is not None and (
         status.is_armed and status.mode in {Mode.AUTO, Mode.GUIDED})
@@ -57,13 +57,13 @@ def watch_tacks(ctx: StepContext) -> None:
 
 
 def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, speed_mps: float) -> Tacking:
-    """Return what is known of her tacks with one more look at her heading, and at her speed through the water."""
+    """Return what is known of tacks with one more look at the boat's heading, and at its speed through the water."""
     off = difference_rad(twd_from_rad, heading_rad)
     side = 1 if off > 0.0 else -1
     fresh = now.side != 0 and t_s - now.settled_s <= FORGET_S
     if now.began_s is not None and not now.is_counted and t_s - now.began_s >= LIES_S and abs(off) < SETTLED_RAD:
         now = _counted(replace(now, is_counted=True, settled_s=t_s), t_s, failed=True)
-    # Yawing in a sea she is beyond that angle for a moment while she lies, and settled on no tack.
+    # Yawing in a sea the boat is beyond that angle for a moment while it lies, and settled on no tack.
     lies = now.began_s is not None and speed_mps < STOPPED * now.settled_mps and side == now.side
     if abs(off) >= SETTLED_RAD and not lies:
         if now.began_s is not None and not now.is_counted:
@@ -85,9 +85,9 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, 
 def lain(
     now: Tacking, then: Tacking, t_s: float, boat_en_m: PointEn | None, twd_from_rad: float, current_en_mps: PointEn,
 ) -> Tacking:
-    """Return ``then`` with what the failure that it ends has told: how long she lay, how fast she was set to lee.
+    """Return ``then`` with what the failure that it ends has told: how long it lay, how fast it was set to lee.
 
-    What the believed current and her way on (``companion.boat.failed_tack``) explain is not counted.
+    What the believed current and its way on (``companion.boat.failed_tack``) explain is not counted.
     """
     if now.began_s is None or t_s <= now.began_s:
         return then
@@ -112,13 +112,13 @@ def _counted(now: Tacking, t_s: float, *, failed: bool) -> Tacking:
 
 
 def _through_the_eye(now: Tacking, heading_rad: float, off_rad: float) -> bool:
-    """Return whether she has come to this side with the bow through the wind, by her own turn."""
+    """Return whether the boat has come to this side with the bow through the wind, by its own turn."""
     turned = now.side * difference_rad(heading_rad, now.settled_rad)
     return turned >= 2.0 * TURNED_RAD and abs(off_rad) < 0.5 * math.pi
 
 
 def _failed(ctx: StepContext, tacking: Tacking) -> None:
-    """Say so, and ask for a plan from here where she has little room, or has tried often enough."""
+    """Say so, and ask for a plan from here where the boat has little room, or has tried often enough."""
     given, boat = ctx.voyage.boat.tack_fails, ctx.boat_en
     told = "" if given <= 0.0 else (
         f": the next one does by {100.0 * tacking.chance(given):.0f} %, "

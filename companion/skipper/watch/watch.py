@@ -136,7 +136,7 @@ def speak_of_stop(ctx: StepContext) -> None:
 
 
 def _ahead(ctx: StepContext, here: PointEn, velocity: tuple[float, float]) -> DriftAhead:
-    """Follow the drift; in RTL the straight way to where the autopilot takes her. A loiter goes nowhere.
+    """Follow the drift; in RTL the straight way to where the autopilot takes the boat. A loiter goes nowhere.
 
     Outside the fence the fence is left out.
     """
@@ -185,7 +185,7 @@ def _remedy(ctx: StepContext) -> str:
 
 # --------------------
 # What is said of the current: when plans begin to reckon with one, when it has become another, and what is not known.
-# A tide table that has ended, or that no time can be found in, is said as soon as she is under way and every half hour.
+# A tide table that has ended, or that no time can be found in, is said as soon as it is under way and every half hour.
 
 
 def watch_water(ctx: StepContext) -> None:

@@ -21,7 +21,7 @@ from companion.messages import AutopilotStatus
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.voyage import Area, PointEn, Voyage
 
-COARSE_M = 0.5     # home follows the boat while she is disarmed: not every step makes another area
+COARSE_M = 0.5     # home follows the boat while it is disarmed: not every step makes another area
 OUTSIDE_M = 5.0    # so far outside, an autopilot that keeps a fence has said so
 STEP_M = 5.0
 
@@ -98,7 +98,7 @@ class Drawn:
         return f"{what} is {where} {self.words}: draw it anew, or switch it off"
 
     def place_inside(self, area: Area, from_en: PointEn, room_m: float) -> PointEn:  # noqa: ARG002 - as a circle's
-        """Return the nearest place with ``room_m`` about it; where she is without one."""
+        """Return the nearest place with ``room_m`` about it; where it is without one."""
         return self.left.roomy_en(from_en, room_m) or from_en
 
 

@@ -37,7 +37,7 @@ STRAIGHT_RAD = math.radians(60.0)   # a bend the other way up to this is passed 
 KEEP_SHARE = 0.5                    # the disc around the buoy that plans avoid, as a share of the rounding radius
 BARRIER_M = 60.0                    # shortest barrier
 SWEEP_RADIUS_M = 7.0                # the autopilot leaves a sweep's end 3 to 5 m before it
-BOX_RADIUS_M = 8.0                  # her loiter lies this near to a box's roomiest place, and nearer as it is planned
+BOX_RADIUS_M = 8.0                  # its loiter lies this near to a box's roomiest place, and nearer as it is planned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,8 +66,8 @@ class Gate:
     ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the approach's
     beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With ``line`` it
     is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place before it. With
-    ``box`` it is where she stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before there
-    are any, of none. With ``field`` she is steered by that, and it is where the mission on board leads meanwhile.
+    ``box`` it is where it stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before there
+    are any, of none. With ``field`` it is steered by that, and it is where the mission on board leads meanwhile.
     """
 
     en_m: PointEn

@@ -78,7 +78,7 @@ def judge(
     ``level`` is the central probability of the forecast's interval that each leg must be clear of; 0 asks for the
     present wind alone. A leg inside the zone is timed as the beat that it will become; with ``beat_room_m`` of clear
     water about it, it is as good as any other. Wind and angles are over the ground, as the autopilot has them; in a
-    current a leg along which she makes no way at all is as bad as one head to wind.
+    current a leg along which it makes no way at all is as bad as one head to wind.
     """
     time_s, spare, worst = 0.0, math.inf, -1
     heading = start_heading_rad
@@ -131,7 +131,7 @@ def predicted_beat(
     """Predict the sailing of a leg that the wind has closed (ArduRover: the no-go angle, tack at the corridor).
 
     On the tack that the boat is on it sails at exactly the no-go angle off the wind until the corridor's edge
-    (``corridor_m``; 0: until the layline) or until it is past the target. In a current, what she makes good of that
+    (``corridor_m``; 0: until the layline) or until it is past the target. In a current, what it makes good of that
     heading at ``speed_mps`` through the water.
     """
     tack = 1.0 if difference_rad(twd_from_rad, heading_rad) >= 0.0 else -1.0   # +1: wind over starboard

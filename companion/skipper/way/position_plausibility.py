@@ -8,7 +8,7 @@ by itself. What ends the doubt is evidence, or so long a time that no echo and n
 - the filter had lost its position before, and the jump is no longer than what it may have erred by: the earlier place
   was the guess;
 - a second receiver says the same for a while;
-- a person who has seen her gives her back;
+- a person who has seen it gives it back;
 - the place where the boat is reckoned lies inside something solid;
 - it stays for ten minutes where the boat can be, filter and receiver agreeing. A forger who is more patient than that
   is not found out by a boat with one receiver.
@@ -51,7 +51,7 @@ class Evidence:
         is_well: the filter is well, and its receiver says the same.
         second_en_m: what a second receiver says, None without one or its fix.
         room_m: to the nearest solid thing [m], here or where the boat is reckoned, whichever is less.
-        is_given: a person has given her to the companion since the doubt began.
+        is_given: a person has given it to the companion since the doubt began.
     """
 
     t_s: float
@@ -110,7 +110,7 @@ class PositionDoubt:
         east, north = seen.velocity_en_mps
         place = (self.reckoned_en_m[0] + dt_s * east, self.reckoned_en_m[1] + dt_s * north)
         if seen.is_contradicted and seen.second_en_m is not None:
-            place = seen.second_en_m   # where the other receiver has her is better than reckoned
+            place = seen.second_en_m   # where the other receiver has the boat is better than reckoned
         speaks_against = seen.is_jump or seen.is_contradicted or not (seen.is_possible and seen.is_well)
         confirmed_s = seen.t_s if self.confirmed_s is None else self.confirmed_s
         return replace(

@@ -1,8 +1,8 @@
-"""A current that she cannot stem: what it makes of her, and the nearest water in which she can bear that.
+"""A current that the boat cannot stem: what it makes of it, and the nearest water in which it can bear that.
 
-Where the current is stronger than what she makes against it she cannot lie at anchor, nor loiter: she is carried,
-slowest when she sails against it as well as she can, which is what a loiter up-current makes her do. That is waiting,
-and good where the water that she is carried over is clear. Where it is not, she goes first to where it is.
+Where the current is stronger than what the boat makes against it, it cannot lie at anchor, nor loiter: it is carried,
+slowest when it sails against it as well as it can, which is what a loiter up-current makes it do. That is waiting,
+and good where the water that it is carried over is clear. Where it is not, it goes first to where it is.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ DIRECTIONS = 24
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Water:
-    """Boat, wind over the ground (from, speed) and current [m/s east, north] of a moment; her no-go half angle."""
+    """Boat, wind over the ground (from, speed) and current [m/s east, north] of a moment; its no-go half angle."""
 
     boat: Boat
     wind: tuple[float, float]
@@ -31,7 +31,7 @@ class Water:
     no_go_half_rad: float
 
     def made_good_mps(self, course_rad: float) -> float | None:
-        """Return what she makes good along a course over the ground, None where that is no way to speak of."""
+        """Return what the boat makes good along a course over the ground, None where that is no way to speak of."""
         from_rad, tws_mps = over_water(*self.wind, self.current_en_mps)
         made = made_good_mps(self.boat, course_rad, twd_from_rad=from_rad, tws_mps=tws_mps,
                              current_en_mps=self.current_en_mps, no_go_half_rad=self.no_go_half_rad)
@@ -39,13 +39,13 @@ class Water:
 
     @property
     def carried_en_mps(self) -> tuple[float, float]:
-        """How she is carried when she sails against it as well as she can; 0, 0: she can hold."""
+        """How the boat is carried when it sails against it as well as it can; 0, 0: it can hold."""
         from_rad, tws_mps = over_water(*self.wind, self.current_en_mps)
         return slowest_en_mps(self.boat, twd_from_rad=from_rad, tws_mps=tws_mps, current_en_mps=self.current_en_mps,
                               no_go_half_rad=self.no_go_half_rad)
 
     def trouble(self, here: PointEn, there: PointEn) -> str:
-        """Return why she cannot sail from here to there, in words; empty: the current does not keep her from it."""
+        """Return why the boat cannot sail from here to there, in words; empty: the current does not keep it from it."""
         drift_mps = math.hypot(*self.current_en_mps)
         if drift_mps == 0.0 or self.made_good_mps(bearing_rad(here, there)) is not None:
             return ""
@@ -55,12 +55,12 @@ class Water:
 
 
 def is_clear(water: Water, area: Area, place: PointEn, floor_m: float) -> bool:
-    """Return whether she is carried clear from a place for as long as a drift is looked ahead."""
+    """Return whether the boat is carried clear from a place for as long as a drift is looked ahead."""
     return drift_ahead(area, place, water.carried_en_mps, floor_m=floor_m).is_clear
 
 
 def waiting_place(water: Water, area: Area, here: PointEn, floor_m: float) -> PointEn | None:
-    """Return the nearest place in time that she can reach and from which she is carried clear; None: there is none.
+    """Return the nearest place in time that the boat can reach and from which it is carried clear; None: there is none.
 
     ``here`` itself where that is so.
     """

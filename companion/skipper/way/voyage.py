@@ -81,9 +81,9 @@ class Until(enum.Enum):
 
     TOLD = "told"
     TIME = "time"
-    PLACE = "place"            # she is at the goal
+    PLACE = "place"            # the boat is at the goal
     VESSEL = "vessel"          # another vessel is in its water
-    OUTSIDE = "outside"        # she is outside of its water
+    OUTSIDE = "outside"        # the boat is outside of its water
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,7 +113,7 @@ class Goal:
     With ``side`` the position is the buoy's, which the boat rounds at ``rounding_m``; with ``line`` it is the middle
     between the marks, with ``box`` the roomiest place in it, with
     ``search`` one inside. ``bandwidth_m`` bounds the way from the goal before (or
-    the start) to this one: half the width of Büsser's band (section 4.2). With ``field`` she is steered by that, and
+    the start) to this one: half the width of Büsser's band (section 4.2). With ``field`` it is steered by that, and
     the position is where the mission on board leads meanwhile.
     """
 

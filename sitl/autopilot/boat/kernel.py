@@ -51,7 +51,7 @@ def hash01(seed: int, number: int) -> float:
 WINDAGE = 0.25
 # Angles to the wind at which the shares of speed are stated, straight between and level beyond them.
 BEAT_RAD, REACH_RAD, RUN_RAD = math.radians(45.0), math.radians(90.0), math.radians(150.0)
-# A boat in irons lies so far off the wind, on the tack that she came from; she sails again beyond the other.
+# A boat in irons lies so far off the wind, on the tack that it came from; it sails again beyond the other.
 IRONS_RAD, FILLED_RAD = math.radians(15.0), math.radians(50.0)
 SETTLING_HZ, FALLING_RADPS = 0.5, 0.35
 
@@ -75,7 +75,7 @@ def side_mps(
 
 @kernel
 def speed_share(angle_rad: float, beat: float, reach: float, run: float) -> float:
-    """Return the share of the polar's speed that she makes at an angle to the true wind."""
+    """Return the share of the polar's speed that the boat makes at an angle to the true wind."""
     if angle_rad < REACH_RAD:
         return beat + (reach - beat) * clip((angle_rad - BEAT_RAD) / (REACH_RAD - BEAT_RAD), 0.0, 1.0)
     return reach + (run - reach) * clip((angle_rad - REACH_RAD) / (RUN_RAD - REACH_RAD), 0.0, 1.0)
@@ -83,10 +83,10 @@ def speed_share(angle_rad: float, beat: float, reach: float, run: float) -> floa
 
 @kernel
 def falls_off(angle_rad: float, is_caught: bool) -> tuple[float, bool]:
-    """Return the turn [rad/s] of a boat whose tack failed, and whether she sails again.
+    """Return the turn [rad/s] of a boat whose tack failed, and whether it sails again.
 
-    ``angle_rad`` is where the wind is, positive on the side of the tack that she came from, and a positive turn
-    brings it ahead. Caught, she lies near head to wind; then she falls off to the old tack.
+    ``angle_rad`` is where the wind is, positive on the side of the tack that it came from, and a positive turn
+    brings it ahead. Caught, it lies near head to wind; then it falls off to the old tack.
     """
     if is_caught:
         return SETTLING_HZ * (angle_rad - IRONS_RAD), False
@@ -130,7 +130,7 @@ def polar_force(speed_mps: float, force: float, awa_rad: float, sail_rad: float,
     """Return the driving force [N] of a boat whose polar says ``speed_mps``; ``force`` is that of SIM_Sailboat's sail.
 
     Sheeted as the autopilot does for full speed it balances the drag at that speed; eased by the sail's ideal angle of
-    attack it is none. Near head to wind the sail pushes her astern as it does there.
+    attack it is none. Near head to wind the sail pushes it astern as it does there.
     """
     eased = sail_rad - clip(abs(awa_rad) - ideal_rad, 0.0, 0.5 * math.pi)
     drawing = 1.0 - clip(eased / max(ideal_rad, 0.1), 0.0, 1.0)
@@ -178,9 +178,9 @@ S_INDIRECT = 66
 S_WANT_SPEED = 69                                             # desired speed, accelerated at P_ACCEL
 S_GPS_E, S_GPS_N = 67, 68                                       # error of the position that the autopilot believes
 S_COMPASS = 70                                                  # error of the heading that it believes [rad]
-# of a boat that is not the plan's (``P_OTHER``): leeway to starboard [m/s], the share of her speed that waves leave,
-# the turn that they give her [rad/s], a number on 0..1 for the next tack, tacks tried and failed, the tack that she was
-# last settled on (its sign of the wind's angle), whether this one was tried, until when she lies in irons
+# of a boat that is not the plan's (``P_OTHER``): leeway to starboard [m/s], the share of its speed that waves leave,
+# the turn that they give it [rad/s], a number on 0..1 for the next tack, tacks tried and failed, the tack that it was
+# last settled on (its sign of the wind's angle), whether this one was tried, until when it lies in irons
 S_SIDE, S_SEA, S_WOBBLE, S_LOT, S_TRIES, S_FAILED, S_TACK_SIDE, S_TRIED, S_IRONS_END = range(72, 81)
 S_SIZE = 82
 
@@ -213,7 +213,7 @@ WIND_DELAY_S = 5.0
 HEAD_TO_WIND_RAD = math.radians(12.0)
 SETTLED_RAD = math.radians(30.0)
 IRONS_DRAG = 4.0                  # in irons, sails and rudder across the stream: of the hull's own drag
-FALLING_OFF_S = 8.0               # at most, until she sails again
+FALLING_OFF_S = 8.0               # at most, until the boat sails again
 # AP_WindVane filters with dt = 0.05 s, but its 20 Hz task runs at every second loop: 25 Hz.
 VANE_DT_S = 0.05
 VANE_LOOPS = 2
