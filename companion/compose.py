@@ -41,12 +41,12 @@ from companion.field.tree import (
 from companion.field.values import GuidanceSettings, Situation
 from companion.fold import Waters
 from companion.geo.frame import LocalFrame
-from companion.geofence import Code, Finding, LocalArea, Mission, Severity
+from companion.geofence import Code, Finding, FindingLevel, LocalArea, Mission
 from companion.geofence.mission import (
     AtomOptions,
-    ByField,
     CircleAtomOptions,
-    Gate,
+    GoalField,
+    GoalGate,
     HeadingAtomOptions,
     LeaveAtomOptions,
     LineAtomOptions,
@@ -161,7 +161,7 @@ MOST_ATOMS = 64
 RANGE_M = 50_000.0
 
 
-def composed_field_of(mission: Mission, number: int, by_field: ByField, frame: LocalFrame) -> Composed:
+def composed_field_of(mission: Mission, number: int, by_field: GoalField, frame: LocalFrame) -> Composed:
     """Return the field of the mission's goal ``number`` (from 1). Raises InputError with the place and a remedy."""
     source, place = str(mission.path), f"[[goal]] {number} field"
     atoms = atoms_of(mission, frame)
@@ -237,12 +237,12 @@ def field_findings_of(mission: Mission) -> tuple[Finding, ...]:
         found = float(lengths(tree, preview_conditions(mission, place), np.array([place]))[0])
         if found < LEAST and tree.station_en is None and goal.field.until != "place":
             out.append(Finding(
-                severity=Severity.WARNING, code=Code.FIELD, place=f"[[goal]] {number} field",
+                severity=FindingLevel.WARNING, code=Code.FIELD, place=f"[[goal]] {number} field",
                 text=f"{tree.text} has no value at the goal's own place ({found:.2f} of 10): she would not be steered",
                 remedy="place it where the field leads somewhere"))
     left = [name for name in mission.options.field if name not in told]
     if left:
-        out.append(Finding(severity=Severity.WARNING, code=Code.FIELD, place="[field]",
+        out.append(Finding(severity=FindingLevel.WARNING, code=Code.FIELD, place="[field]",
                            text=f"no goal is sailed by {listed(left)}", remedy="name it in a goal's field"))
     return tuple(out)
 
@@ -307,7 +307,10 @@ def voyage_of(mission: Mission) -> Voyage:
 
 
 def waters_of(mission: Mission) -> Waters | None:
-    """Return what makes a passage's voyage about a place, with the area that a plan from there can meet; None: none."""
+    """Return what makes a passage's voyage about a place, with the area that a plan from there can meet.
+
+    None for a voyage that is sailed in one frame.
+    """
     if not mission.is_passage:
         return None
     reach_m = (mission.passage.recentre_m or RECENTRE_M) + HORIZONS * mission.skipper.horizon_m + BEYOND_M
@@ -345,7 +348,7 @@ def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
     )
 
 
-def _line(gate: Gate | None, frame: LocalFrame) -> Line | None:
+def _line(gate: GoalGate | None, frame: LocalFrame) -> Line | None:
     if gate is None:
         return None
     return Line(

@@ -17,7 +17,7 @@ from companion.boat import AutopilotLimits, Boat
 from companion.current import over_water
 from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.messages import Command, Mode
-from companion.skipper.step import Route, SkipperState, Snapshot, WindView
+from companion.skipper.step import Route, SkipperState, Snapshot, WindEstimate
 from companion.skipper.way import PointEn, Voyage, cross_track_m, gates_of, moved
 
 Winds = tuple[tuple[float, float], ...]   # from [rad] and speed [m/s], for WIND_S each
@@ -246,7 +246,7 @@ def _entered(before: PointEn, at: PointEn, mark: tuple[PointEn, float]) -> float
     return 0.0 if c <= 0.0 or a == 0.0 else (-b - math.sqrt(max(0.0, b * b - a * c))) / a
 
 
-def _winds(wind: WindView, twd_rad: float, tws_mps: float) -> Winds:
+def _winds(wind: WindEstimate, twd_rad: float, tws_mps: float) -> Winds:
     """Return the wind that is expected (from [rad], speed [m/s]) at the middle of each ``WIND_S`` from now."""
     forecast = wind.forecast
     if forecast is None:

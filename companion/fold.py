@@ -60,8 +60,8 @@ from companion.skipper.step import (
     Snapshot,
     WaypointReached,
     WindBefore,
+    WindEstimate,
     WindHealth,
-    WindView,
 )
 from companion.traffic import TargetLimits, Targets
 from companion.wind import Estimator, WindStatus, WindTracker, WindVerdict, make
@@ -113,17 +113,17 @@ class StepWind:
                            weight=1.0 if is_turned else status.weight,
                            speed_weight=1.0 if is_turned else status.speed_weight)
 
-    def view(self, t_s: float) -> WindView:
+    def view(self, t_s: float) -> WindEstimate:
         """Return the wind at ``t_s``."""
         status = self.room.status(t_s)
         table = self.room.forecast_table(t_s)
         if status is None or table is None or self._first_s is None:
-            return WindView()
+            return WindEstimate()
         mean_rad, _, mean_mps, _ = self._mean90.forecast(0.0)
         now_rad, _, now_mps, _ = self._mean5.forecast(0.0)
         record_s = t_s - self._first_s
         health = _health(status, record_s)
-        return WindView(
+        return WindEstimate(
             health=health,
             forecast=table,
             mean_twd_from_rad=wrap_pi(mean_rad),
@@ -481,7 +481,7 @@ class VoyageFold:
             outcomes=tuple(self._outcomes),
         )
 
-    def _unsure(self, t_s: float, wind: WindView) -> str:
+    def _unsure(self, t_s: float, wind: WindEstimate) -> str:
         """Return why neither wind nor water may be planned with now, in words; empty: they may.
 
         A wind that is learned anew is believed when the boat has sailed by it as it should, or has not told for long.
@@ -493,7 +493,7 @@ class VoyageFold:
             self._anew = ""
         return f"{self._anew}: the wind is learned anew" if self._anew else self.current.motion_doubt
 
-    def _wind_before(self, wind: WindView, *, unsure: str) -> WindBefore | None:
+    def _wind_before(self, wind: WindEstimate, *, unsure: str) -> WindBefore | None:
         """Return the wind as it was before it came to be doubted, None while it is believed or where that is not known.
 
         It is known where the vane's offset was changed, and where the direction leapt.
@@ -517,7 +517,7 @@ class VoyageFold:
             return None
         return status.utc_at_boot_s + status.boot_s + max(0.0, t_s - status.t_s)
 
-    def _sailing(self, t_s: float, wind: WindView) -> Sailing | None:
+    def _sailing(self, t_s: float, wind: WindEstimate) -> Sailing | None:
         """Return what the present tells of the current, None without a position or a wind."""
         vehicle, status = self._vehicle, self._autopilot
         if vehicle is None or wind.present_twd_from_rad is None or wind.present_tws_mps is None:

@@ -52,7 +52,7 @@ from companion.field.tree import (
 from companion.field.values import Clearance, GuidanceSettings, GuidanceState, Intent, Situation
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.geo.frame import LocalFrame
-from companion.geofence import Code, Finding, LocalArea, Mission, Severity
+from companion.geofence import Code, Finding, FindingLevel, LocalArea, Mission
 from companion.geofence.check import AreaConditions, check_area
 from companion.geofence.mission import AreaOptions, kind_of, place_troubles, read_mission
 from companion.planner import Plan, Problem
@@ -149,7 +149,7 @@ def check_mission(
     told = {Code.START_OUTSIDE, Code.GOAL_OUTSIDE} if troubles else set()
     return CheckedMission(mission=mission, refusals=troubles, findings=(
         *mission.findings, *(() if troubles else field_findings_of(mission)),
-        *(f for f in found if f.severity is not Severity.ERROR or f.code not in told)))
+        *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told)))
 
 
 def require_sailable(mission: Mission) -> Mission:

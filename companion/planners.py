@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Key:
+class MissionKey:
     """How a mission's ``[planner]`` sets a number: its key, and its bounds or the words for it.
 
     A key in ``_deg`` sets a number in radians, one in ``_kn`` one in m/s, of which 0 is None. Of two words for a number
@@ -47,7 +47,7 @@ class Key:
 
 def _set_by(key: str, default: T, **bounds: Any) -> T:
     """Return a field of settings that a mission sets by ``key``."""
-    return field(default=default, metadata={"key": Key(key=key, is_flag=isinstance(default, bool), **bounds)})
+    return field(default=default, metadata={"key": MissionKey(key=key, is_flag=isinstance(default, bool), **bounds)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +125,7 @@ class Algorithm:
     warm_expansions: int = 2000      # what compiles or loads all of its kernels, before a budget begins
 
     @property
-    def keys(self) -> dict[str, Key]:
+    def keys(self) -> dict[str, MissionKey]:
         """The numbers that a mission may set, by their names among the settings."""
         own = () if self.settings is None else fields(self.settings)
         return {each.name: each.metadata["key"] for each in own if "key" in each.metadata}

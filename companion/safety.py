@@ -280,7 +280,7 @@ EMPTY = " is critical "   # in the battery's words, when the second of its limit
 OVER = "cleared"      # ends a text that says that something is over
 
 
-class Answer(enum.Enum):
+class Recovery(enum.Enum):
     """What is done about a stop that nobody asked for, where the mission permits it (``set_auto``)."""
 
     LEAVE = "nothing: a person must look at her first"
@@ -291,12 +291,12 @@ class Answer(enum.Enum):
     @property
     def words(self) -> str:
         """What is done, in a few words."""
-        return {Answer.LEAVE: "left to a person", Answer.SAIL_ON: "sail on", Answer.STAY: "loiter near by",
-                Answer.SHELTER: "to the nearest refuge"}[self]
+        return {Recovery.LEAVE: "left to a person", Recovery.SAIL_ON: "sail on", Recovery.STAY: "loiter near by",
+                Recovery.SHELTER: "to the nearest refuge"}[self]
 
 
 # What a mission may say of the failsafes in place of the table (``[safety] ..._failsafe``).
-CHOICES = {"leave": Answer.LEAVE, "sail_on": Answer.SAIL_ON, "stay": Answer.STAY, "refuge": Answer.SHELTER}
+CHOICES = {"leave": Recovery.LEAVE, "sail_on": Recovery.SAIL_ON, "stay": Recovery.STAY, "refuge": Recovery.SHELTER}
 WORD_OF = {answer: word for word, answer in CHOICES.items()}
 
 
@@ -307,7 +307,7 @@ class Cause:
     name: str
     texts: tuple[str, ...]
     shown: str
-    answer: Answer
+    answer: Recovery
     key: str = ""              # what a mission may say of it in ``[safety]``
     waits_for: str = ""        # what must be over before the answer begins
     press: str = "AUTO to sail on, LOITER to stay, MANUAL to take her"
@@ -320,23 +320,23 @@ SHORE = "shore link"
 FAILSAFES: tuple[Cause, ...] = (
     Cause(name="position", key="position_failsafe", texts=("EKF variance", "EKF failsafe"),
           shown="HEARTBEAT critical with the filter ill",
-          answer=Answer.SAIL_ON, waits_for="the filter well again, evidence for the position; meanwhile LOITER",
+          answer=Recovery.SAIL_ON, waits_for="the filter well again, evidence for the position; meanwhile LOITER",
           press="MANUAL to take her; AUTO when the position is back",
           why="ArduRover holds when its filter loses the position, and never goes back by itself"),
-    Cause(name="crash", texts=("Crash:",), shown="", answer=Answer.LEAVE,
+    Cause(name="crash", texts=("Crash:",), shown="", answer=Recovery.LEAVE,
           press="MANUAL to take her; AUTO if she floats upright",
           why="knocked down or aground: whether she may sail is not to be told from here"),
     Cause(name="battery", key="battery_failsafe", texts=("Battery ",),
-          shown="SYS_STATUS: battery not healthy", answer=Answer.SHELTER,
+          shown="SYS_STATUS: battery not healthy", answer=Recovery.SHELTER,
           press="AUTO to sail on, MANUAL to take her",
           why="what is left takes her to a place that was chosen for it"),
     Cause(name="fence", key="fence_failsafe", texts=(),
-          shown="FENCE_STATUS: breached, or one breach more", answer=Answer.SAIL_ON,
+          shown="FENCE_STATUS: breached, or one breach more", answer=Recovery.SAIL_ON,
           press="AUTO to let the mission sail her back, MANUAL to take her",
           why="a sailboat in HOLD drifts on outside, RTL sails straight; no new action follows while a breach lasts"),
     Cause(name="shore link", key="shore_failsafe", texts=("Radio Failsafe", "GCS Failsafe"),
           shown="HEARTBEAT critical with the filter well",
-          answer=Answer.STAY,
+          answer=Recovery.STAY,
           why="who wants her to stop out of range of radio or station wants her to stay, not to drift; ArduRover gives "
               "the loss of the one the other's name where it looks for both"),
 )

@@ -59,7 +59,7 @@ class SailOptions:
         disk: what is written to.
         archive: the older voyages beside this one and what all may take together; None: they are left alone.
         is_again: sail the mission again although the saved state says that it has arrived.
-        settings: what a drawing that is adopted under way is sailed with; None: none is adopted.
+        settings: what a drawing that is adopted under way is sailed with; None: drawings are not adopted.
         known: hashes of missions on the autopilot that ours may take the place of: the drawing that is sailed.
         socket: where orders from on board are taken; None: nowhere.
         http: where the live page is served; None: nowhere.

@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 
 def print_findings(findings: tuple[Finding, ...], source: str) -> bool:
     """Print findings and return whether one of them is an error."""
-    from companion.geofence import Severity
+    from companion.geofence import FindingLevel
 
     for finding in findings:
         print(finding.line(source))
-    return any(f.severity is Severity.ERROR for f in findings)
+    return any(f.severity is FindingLevel.ERROR for f in findings)
 
 
 def print_losses(losses: tuple[Finding, ...], out: str) -> None:
@@ -56,12 +56,12 @@ def write_out(
     written: Written, out: str, *, lossy: bool, force: bool, remedy: str = "choose another format",
 ) -> None:
     """Write a file, or refuse: when it would hold nothing, or protect less than its source without ``--lossy``."""
-    from companion.geofence import Severity
+    from companion.geofence import FindingLevel
 
     print_losses(written.losses, out)
     if written.is_empty:
         raise JobError(f"{out}: not written: it would be empty; {remedy}")
-    if any(f.severity is Severity.ERROR for f in written.losses) and not lossy:
+    if any(f.severity is FindingLevel.ERROR for f in written.losses) and not lossy:
         raise JobError(f"{out}: not written: zones would be missing; {remedy}, or say --lossy")
     write_files({out: written.data}, force=force)
 

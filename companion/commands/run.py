@@ -296,7 +296,7 @@ async def _sail(
     """Sail; return the summary. Raises KeyboardInterrupt: it was ended before it began, or a second time."""
     from companion.planner.worker import PlannerWorker
 
-    ending = Ending()
+    ending = SignalEnding()
     async with PlannerWorker(algorithm=mission.skipper.planner, nursery=nursery) as planner:
         # The child loads its kernels while this process imports the rest.
         from companion.app.sail import sail
@@ -338,7 +338,7 @@ async def _get_ready(planner: PlannerWorker, out: Console, manager: ServiceManag
             raise JobError(f"the planner's process did not start: {error!r}") from error
 
 
-class Ending:
+class SignalEnding:
     """How SIGINT and SIGTERM end a voyage: before it is begun, and when they come again, at once.
 
     Handlers of the event loop would wait for its turn, which comes late while libraries are loaded.

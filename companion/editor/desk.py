@@ -382,7 +382,7 @@ class EditorApi:
         return await asyncio.to_thread(self._exported, asked)
 
     def _exported(self, asked: _Asked) -> dict[str, Any]:
-        from companion.geofence import Severity
+        from companion.geofence import FindingLevel
         from companion.geofence.formats import write
         from companion.geofence.mission import document_of, goal_losses
 
@@ -399,7 +399,7 @@ class EditorApi:
         if made.is_empty:
             raise InputError(name, "", "would be empty: there is nothing in the mission that this format carries")
         return {"name": name, "data": base64.b64encode(made.data).decode(),
-                "is_lossy": any(f.severity is Severity.ERROR for f in made.losses),
+                "is_lossy": any(f.severity is FindingLevel.ERROR for f in made.losses),
                 "losses": [{"severity": f.severity.value, "text": f.text} for f in losses]}
 
 

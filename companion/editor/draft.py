@@ -18,7 +18,7 @@ from companion.editor.sketch import Shape, Sketch, options_of
 from companion.editor.toml import rewritten
 from companion.errors import InputError, JobError
 from companion.geo.frame import LocalFrame
-from companion.geofence import Area, Mission, Severity
+from companion.geofence import Area, FindingLevel, Mission
 from companion.geofence.area import parts
 from companion.geofence.mission import PERMITS, MissionOptions, PointOptions, load_area
 from companion.geofence.shapes import center_of
@@ -142,7 +142,7 @@ def looked_at(draft: Draft, from_deg: float | None) -> tuple[CheckedMission, dic
     area = mission.area if mission is not None else _area_alone(draft)
     rows = [_of_error(error, draft, area) for error in judged.refusals]
     rows += [_row(f.severity, f.place, f.text, f.remedy, area) for f in judged.findings]
-    is_bad = any(row["severity"] == Severity.ERROR.value for row in rows)
+    is_bad = any(row["severity"] == FindingLevel.ERROR.value for row in rows)
     return judged, {"findings": rows, "is_in_order": not is_bad, **_grown(area, draft, mission)}
 
 
@@ -161,10 +161,10 @@ def _area_alone(draft: Draft) -> Area:
 def _of_error(error: InputError, draft: Draft, area: Area) -> dict[str, Any]:
     source = "" if error.source == str(draft.path) else error.source.removeprefix(f"{draft.path.parent}/")
     place = ": ".join(part for part in (source, error.place) if part)
-    return _row(Severity.ERROR, place, error.problem, error.remedy, area)
+    return _row(FindingLevel.ERROR, place, error.problem, error.remedy, area)
 
 
-def _row(severity: Severity, place: str, text: str, remedy: str, area: Area) -> dict[str, Any]:
+def _row(severity: FindingLevel, place: str, text: str, remedy: str, area: Area) -> dict[str, Any]:
     """Return a finding; ``at`` is where it is (lat, lon), ``of`` and ``number`` what it is about."""
     match = _PLACE.search(place)
     words = [word for word in (match.groups() if match else ()) if word]

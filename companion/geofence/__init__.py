@@ -5,12 +5,24 @@ metres for the planner. ``read(path)`` reads any single file into a ``Document``
 """
 
 from companion.geofence.area import Area, Fence, LocalArea
-from companion.geofence.document import Code, Document, Finding, Severity
+from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.registry import read
 from companion.geofence.mission.mission import Mission, load_mission
 from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
 
 __all__ = [
-    "Area", "Circle", "Code", "Document", "Fence", "Finding", "LocalArea", "Mission", "Obstacle", "Severity",
-    "Zone", "ZoneKind", "load_mission", "read",
+    "Area",
+    "Circle",
+    "Code",
+    "Document",
+    "Fence",
+    "Finding",
+    "FindingLevel",
+    "LocalArea",
+    "Mission",
+    "Obstacle",
+    "Zone",
+    "ZoneKind",
+    "load_mission",
+    "read",
 ]

@@ -191,7 +191,7 @@ class LocalArea:
         return area
 
     def roomy_en(self, near_en: tuple[float, float], room_m: float) -> tuple[float, float] | None:
-        """Return the place nearest to ``near_en`` that has ``room_m`` about it, or half of that, or ...; None: none."""
+        """Return the place nearest to ``near_en`` that has ``room_m`` about it, or half of that, ...; None: nowhere."""
         here = shapely.points(near_en)
         while room_m >= SLACK_M:
             water = self.water(room_m)

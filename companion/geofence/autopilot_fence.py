@@ -24,7 +24,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.geofence.area import Area, parts
-from companion.geofence.document import Severity
+from companion.geofence.document import FindingLevel
 from companion.geofence.formats.fence_items import (
     MAX_FENCE_ITEMS,
     MAX_RING,
@@ -302,7 +302,7 @@ def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: 
     """
     findings = Findings()
     zones, _ = items_to_zones(items, findings)
-    if any(f.severity is Severity.ERROR for f in findings):
+    if any(f.severity is FindingLevel.ERROR for f in findings):
         return findings[0].text
     plane = plane_of(area, inside[0])
     slack_m = 1e-6

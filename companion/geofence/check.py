@@ -16,7 +16,7 @@ from companion.geo.angles import difference_rad, heading_of
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, LocalArea, buffer_in, parts
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
-from companion.geofence.document import Code, Finding, Severity
+from companion.geofence.document import Code, Finding, FindingLevel
 from companion.geofence.formats.fence_items import MAX_FENCE_ITEMS, zones_to_items
 from companion.geofence.formats.rings import Findings
 from companion.geofence.shapes import Circle, Zone, ZoneKind, center_of, polygon_en
@@ -66,7 +66,7 @@ def check_area(area: Area, conditions: AreaConditions) -> tuple[Finding, ...]:
         _way_through(local, conditions, findings)
         _gaps(local, conditions, findings)
     _items(area, conditions, findings)
-    order = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.NOTE: 2}
+    order = {FindingLevel.ERROR: 0, FindingLevel.WARNING: 1, FindingLevel.NOTE: 2}
     return tuple(sorted(findings, key=lambda f: order[f.severity]))
 
 
@@ -84,18 +84,18 @@ def _inclusions(area: Area, frame: LocalFrame, findings: Findings) -> None:
     pieces = [p for p in parts(both) if p.area > 0.0]
     if not pieces:
         findings.add(
-            Severity.ERROR, Code.DISJOINT_INCLUSIONS, names,
+            FindingLevel.ERROR, Code.DISJOINT_INCLUSIONS, names,
             "the keep-in zones do not all overlap: ArduPilot intersects them and no water is left",
             "draw one zone round all the water",
         )
     elif len(pieces) > 1:
         findings.add(
-            Severity.WARNING, Code.DISJOINT_INCLUSIONS, names,
+            FindingLevel.WARNING, Code.DISJOINT_INCLUSIONS, names,
             f"the keep-in zones overlap in {len(pieces)} separate pieces", "draw one zone round the water to sail in",
         )
     if pieces and any(shapely.difference(p, both).area > 1.0 for p in polygons):
         findings.add(
-            Severity.WARNING, Code.INTERSECTED_INCLUSIONS, names,
+            FindingLevel.WARNING, Code.INTERSECTED_INCLUSIONS, names,
             f"ArduPilot intersects keep-in zones: of {', '.join(_hectares(p) for p in polygons)} only "
             f"{_hectares(both)} is left to sail in", "draw one zone round all the water",
         )
@@ -108,10 +108,10 @@ def _holes(area: Area, findings: Findings) -> None:
         count = len(zone.shape.interiors)
         if zone.kind is ZoneKind.INCLUSION:
             text = f"has {count} hole(s): fences of autopilots have none, so each becomes a keep-out zone"
-            findings.add(Severity.NOTE, Code.HOLE, zone.name or "keep-in zone", text)
+            findings.add(FindingLevel.NOTE, Code.HOLE, zone.name or "keep-in zone", text)
         else:
             text = f"has {count} hole(s): water inside an obstacle is given up unless the boat starts in it"
-            findings.add(Severity.WARNING, Code.HOLE, zone.name or "keep-out zone", text)
+            findings.add(FindingLevel.WARNING, Code.HOLE, zone.name or "keep-out zone", text)
 
 
 def _places(local: LocalArea, conditions: AreaConditions, findings: Findings) -> None:
@@ -123,12 +123,12 @@ def _places(local: LocalArea, conditions: AreaConditions, findings: Findings) ->
         here = local.frame.en_from_geo(point)
         problem = trouble_at(local, here)
         if problem:
-            findings.add(Severity.ERROR, code, name, problem, "move it into free water or correct the area")
+            findings.add(FindingLevel.ERROR, code, name, problem, "move it into free water or correct the area")
             continue
         clearance_m = float(local.clearance_m([here])[0])
         if conditions.margin_m is not None and clearance_m < conditions.margin_m:
             findings.add(
-                Severity.WARNING, code, name,
+                FindingLevel.WARNING, code, name,
                 f"has {clearance_m:.1f} m of free water, less than the margin of {conditions.margin_m:g} m",
                 "move it off, or lower the margin",
             )
@@ -153,7 +153,7 @@ def _round_the_water(local: LocalArea, conditions: AreaConditions, findings: Fin
     else:
         return
     findings.add(
-        Severity.NOTE, Code.ROUND_THE_WATER, name, f"is a keep-out zone, and {why}",
+        FindingLevel.NOTE, Code.ROUND_THE_WATER, name, f"is a keep-out zone, and {why}",
         "if the water is inside it, read it with --kind inclusion (mission new: --fence; a mission: [area] fence)",
     )
 
@@ -166,7 +166,7 @@ def _sticking_out(local: LocalArea, findings: Findings) -> None:
             continue
         outside = shapely.disjoint(local.limits, polygon)
         findings.add(
-            Severity.NOTE if outside else Severity.WARNING, Code.OBSTACLE_OUTSIDE_FENCE, name,
+            FindingLevel.NOTE if outside else FindingLevel.WARNING, Code.OBSTACLE_OUTSIDE_FENCE, name,
             "lies outside the fence and changes nothing" if outside
             else f"sticks out of the fence by {_hectares(shapely.difference(polygon, local.limits))}",
             "" if outside else "is one of the two in the wrong place?",
@@ -204,14 +204,14 @@ def _way_through(local: LocalArea, conditions: AreaConditions, findings: Finding
         return
     low, high = 0.0, conditions.margin_m
     if not _connected(local, places, 0.0):
-        findings.add(Severity.ERROR, Code.UNREACHABLE, "", "there is no water between the start and every goal",
+        findings.add(FindingLevel.ERROR, Code.UNREACHABLE, "", "there is no water between the start and every goal",
                      "correct the fence or the obstacles")
         return
     while high - low > 0.1:
         middle = (low + high) / 2.0
         low, high = (middle, high) if _connected(local, places, middle) else (low, middle)
     findings.add(
-        Severity.ERROR, Code.UNREACHABLE, "",
+        FindingLevel.ERROR, Code.UNREACHABLE, "",
         f"at a margin of {conditions.margin_m:g} m there is no way between the start and every goal",
         f"there is one at {low:.1f} m",
     )
@@ -226,7 +226,7 @@ def _gaps(local: LocalArea, conditions: AreaConditions, findings: Findings) -> N
     if margin_m <= 0.0 or len(bodies) < 2:
         return
     if len(bodies) > MAX_OBSTACLES:
-        findings.add(Severity.NOTE, Code.NARROW_GAP, "", f"gaps between {len(bodies)} obstacles are not looked for")
+        findings.add(FindingLevel.NOTE, Code.NARROW_GAP, "", f"gaps between {len(bodies)} obstacles are not looked for")
         return
     widest_m = 2.0 * margin_m / math.cos(min(conditions.no_go_half_rad, math.radians(85.0)))
     shapes = [b for _, b in bodies]
@@ -252,7 +252,7 @@ def _gaps(local: LocalArea, conditions: AreaConditions, findings: Findings) -> N
     found.sort(key=lambda f: (f[0], f[1].place))
     findings.extend(f for _, f in found[:MAX_GAPS])
     if len(found) > MAX_GAPS:
-        findings.add(Severity.NOTE, Code.NARROW_GAP, "", f"{len(found) - MAX_GAPS} more narrow gaps are not listed")
+        findings.add(FindingLevel.NOTE, Code.NARROW_GAP, "", f"{len(found) - MAX_GAPS} more narrow gaps are not listed")
 
 
 def _gap(
@@ -261,7 +261,7 @@ def _gap(
     """Return what is wrong with a gap whose way through is ``course_rad`` (or its opposite)."""
     if width_m < 2.0 * margin_m:
         return Finding(
-            severity=Severity.WARNING, code=Code.NARROW_GAP, place=place,
+            severity=FindingLevel.WARNING, code=Code.NARROW_GAP, place=place,
             text=f"the gap of {width_m:.1f} m is closed at a margin of {margin_m:g} m, which needs {2 * margin_m:g} m",
         )
     if conditions.twd_from_rad is None:
@@ -275,7 +275,7 @@ def _gap(
     if width_m >= needed_m:
         return None
     return Finding(
-        severity=Severity.WARNING, code=Code.NARROW_GAP, place=place,
+        severity=FindingLevel.WARNING, code=Code.NARROW_GAP, place=place,
         text=f"the gap of {width_m:.1f} m is too narrow to beat through in this wind: the margin of {margin_m:g} m "
         f"on both sides of a close-hauled course needs {needed_m:.1f} m",
     )
@@ -289,15 +289,16 @@ def _items(area: Area, conditions: AreaConditions, findings: Findings) -> None:
         return
     text = f"the area takes {count} fence items where ArduRover holds {MAX_FENCE_ITEMS}"
     if conditions.margin_m is None or conditions.start is None:
-        findings.add(Severity.WARNING, Code.TOO_MANY_ITEMS, "", text,
+        findings.add(FindingLevel.WARNING, Code.TOO_MANY_ITEMS, "", text,
                      "it can be simplified within a margin: give --margin and --start")
         return
     result = fence_for_autopilot(area, conditions.margin_m, inside=[conditions.start, *conditions.goals])
     if result.status is FenceStatus.OK:
         findings.add(
-            Severity.NOTE, Code.TOO_MANY_ITEMS, "",
+            FindingLevel.NOTE, Code.TOO_MANY_ITEMS, "",
             f"{text}; simplified it takes {len(result.items)} and uses {result.used_m:.1f} m of the "
             f"{conditions.margin_m:g} m margin",
         )
     else:
-        findings.add(Severity.WARNING, Code.TOO_MANY_ITEMS, "", f"{text}, and it cannot be simplified: {result.reason}")
+        findings.add(FindingLevel.WARNING, Code.TOO_MANY_ITEMS, "",
+                     f"{text}, and it cannot be simplified: {result.reason}")

@@ -15,7 +15,7 @@ from companion.words import one_line
 
 # Findings: what is wrong, or worth knowing, about a fence, an obstacle file or a mission, and where.
 
-class Severity(enum.Enum):
+class FindingLevel(enum.Enum):
     """How bad a finding is."""
 
     ERROR = "error"        # the boat must not sail with it
@@ -57,7 +57,7 @@ class Code(enum.Enum):
 class Finding:
     """One thing found: ``place`` says where in the file (``line 3``, ``features[2]``), ``remedy`` what to do."""
 
-    severity: Severity
+    severity: FindingLevel
     code: Code
     place: str
     text: str
@@ -77,7 +77,7 @@ class Finding:
 def require_clean(findings: tuple[Finding, ...], source: str) -> None:
     """Raise the first error among ``findings`` as InputError; pass when there is none."""
     for finding in findings:
-        if finding.severity is Severity.ERROR:
+        if finding.severity is FindingLevel.ERROR:
             raise finding.as_error(source)
 
 

@@ -63,7 +63,7 @@ LAKE = AlarmLimits(warn_cpa_m=50.0, warn_tcpa_s=90.0, act_cpa_m=20.0, act_tcpa_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Approach:
+class ClosestApproach:
     """The closest approach if both go on as they do, and the picture now.
 
     ``distance_m`` and ``now_m`` are between hulls (0: they touch). ``bearing_rad`` is from us to the other, true.
@@ -80,7 +80,7 @@ class Approach:
     sigma_m: float
 
 
-def cpa(own: OwnShip, vessel: Vessel, t_s: float) -> Approach:
+def cpa(own: OwnShip, vessel: Vessel, t_s: float) -> ClosestApproach:
     """Return the closest approach of ``own`` and ``vessel``, both taken on to ``t_s``."""
     there = predict(vessel, t_s)
     dt = t_s - own.t_s
@@ -104,7 +104,7 @@ def cpa(own: OwnShip, vessel: Vessel, t_s: float) -> Approach:
     now = _gap(a, b, half_a, half_b)
     ahead = _crosses_ahead(a, b, va, vb, half_b, math.hypot(*there.velocity_en_mps))
     later = predict(vessel, t_s + time_s)
-    return Approach(
+    return ClosestApproach(
         distance_m=max(0.0, gap - radius), time_s=time_s, now_m=max(0.0, now - radius),
         bearing_rad=wrap_two_pi(math.atan2(-ex, -ey)), is_closing=time_s > 0.0, crosses_ahead=ahead,
         sigma_m=max(later.sigma_along_m, later.sigma_across_m),
@@ -130,7 +130,7 @@ def peril_m(
     return max(0.0, gap_m) + (PERIL_MPS * time_s if time_s > 0.0 else OPENING_M)
 
 
-def alarm_of(approach: Approach, limits: AlarmLimits, growth_m: float = 0.0) -> Alarm:
+def alarm_of(approach: ClosestApproach, limits: AlarmLimits, growth_m: float = 0.0) -> Alarm:
     """Return the alarm: CPA and TCPA both under their limits; ``growth_m`` is taken off the CPA."""
     near = approach.distance_m - growth_m
     if approach.now_m <= 0.0:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from companion.geo.angles import difference_rad, wrap_pi
-from companion.traffic.approach import Alarm, AlarmLimits, Approach, OwnShip, alarm_of, cpa
+from companion.traffic.approach import Alarm, AlarmLimits, ClosestApproach, OwnShip, alarm_of, cpa
 from companion.traffic.predict import MotionUncertainty, motion_of
 from companion.traffic.targets import TrafficPicture
 from companion.traffic.vessel import (
@@ -83,7 +83,7 @@ def is_sailing_vessel(vessel: Vessel) -> bool:
     return vessel.ship_type == TYPE_SAILING and vessel.nav_status in {None, 15}
 
 
-def classify(own: OwnShip, vessel: Vessel, approach: Approach, twd_from_rad: float | None) -> Encounter:
+def classify(own: OwnShip, vessel: Vessel, approach: ClosestApproach, twd_from_rad: float | None) -> Encounter:
     """Return which rule governs and who gives way.
 
     Rule 13 comes first (it overrides 12 and 18), then 18, then 12 between two sailing vessels.
@@ -117,7 +117,9 @@ def classify(own: OwnShip, vessel: Vessel, approach: Approach, twd_from_rad: flo
     return _under_power(vessel, approach, ours, theirs)
 
 
-def _overtaking(own: OwnShip, vessel: Vessel, approach: Approach, ours: float, theirs: float) -> Encounter | None:
+def _overtaking(
+    own: OwnShip, vessel: Vessel, approach: ClosestApproach, ours: float, theirs: float,
+) -> Encounter | None:
     """Return the verdict of rule 13, or None where nobody overtakes."""
     if not approach.is_closing:
         return None
@@ -148,7 +150,7 @@ def wind_side(heading_rad: float, twd_from_rad: float) -> str:
     return "starboard" if difference_rad(twd_from_rad, heading_rad) > 0.0 else "port"
 
 
-def _two_sails(approach: Approach, ours: float, theirs: float, twd_from_rad: float | None) -> Encounter:
+def _two_sails(approach: ClosestApproach, ours: float, theirs: float, twd_from_rad: float | None) -> Encounter:
     if twd_from_rad is None:
         return Encounter(rule=Rule.SAILING, role=Role.GIVE_WAY, reason="the wind is not known")
     tack = wind_side(ours, twd_from_rad)
@@ -168,7 +170,7 @@ def _two_sails(approach: Approach, ours: float, theirs: float, twd_from_rad: flo
     return Encounter(rule=Rule.SAILING, role=Role.STAND_ON, reason=f"both on {tack} tack, she is to windward")
 
 
-def _under_power(vessel: Vessel, approach: Approach, ours: float, theirs: float) -> Encounter:
+def _under_power(vessel: Vessel, approach: ClosestApproach, ours: float, theirs: float) -> Encounter:
     above = _above_sail(vessel)
     if above or is_sailing_vessel(vessel):
         return Encounter(rule=Rule.RESPONSIBILITIES, role=Role.GIVE_WAY, reason=above or "she is under sail")
@@ -187,7 +189,7 @@ class Assessment:
     """One vessel seen from our boat."""
 
     vessel: Vessel
-    approach: Approach
+    approach: ClosestApproach
     alarm: Alarm
     encounter: Encounter
     age_s: float
@@ -307,7 +309,7 @@ class OngoingEncounter:
             return True
         return self.encounter.rule is Rule.CROSSING and self.evident and self.side == "port"
 
-    def sentence(self, approach: Approach) -> str:
+    def sentence(self, approach: ClosestApproach) -> str:
         """Return one line: who, where from, what the rules give and what we do."""
         rule = f"rule {self.encounter.rule.value}: {self.encounter.reason}"
         where = {"ahead": "comes from ahead", "astern": "comes from astern"}.get(

@@ -47,7 +47,7 @@ class TimedLeg(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlainLeg:
-    """A leg of one's own making."""
+    """A leg in time of one's own making: of a route, from now on [s]."""
 
     from_en: tuple[float, float]
     to_en: tuple[float, float]

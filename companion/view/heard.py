@@ -57,7 +57,7 @@ class HeardFold:
             alarms=alarms, boat=self._boat(t_s, report, vehicle), wind=_wind(report, vehicle), water=_water(report),
             plan=_plan(report), vessels=heard_vessel(
                 None if status is None else status.traffic, None if age_s is None else age_s.get("traffic")),
-            orders=values.Orders(standing=None if status is None or not status.order else values.StandingView(
+            orders=values.OrdersView(standing=None if status is None or not status.order else values.StandingView(
                 verb=status.order, words=status.order, age_s=rounded(status.order_age_s, 0))),
             figures=values.Figures(
                 tacks=None if status is None else status.tacks, replans=None if status is None else status.replans,

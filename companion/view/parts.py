@@ -204,11 +204,11 @@ def refuges_of(voyage: Voyage) -> tuple[values.PlaceView, ...]:
         values.PlaceView(name=r.name, at_en_m=place(r.en_m), radius_m=rounded(r.radius_m, 1)) for r in voyage.refuges)
 
 
-def orders_of(step: Step) -> values.Orders:
+def orders_of(step: Step) -> values.OrdersView:
     """Return the order that stands, the last answer, and what is permitted on board."""
     state, t_s = step.state, step.snapshot.t_s
     standing, last = state.orders.standing, max(state.orders.answered, key=lambda a: a.t_s, default=None)
-    return values.Orders(
+    return values.OrdersView(
         standing=None if standing is None else values.StandingView(
             verb=standing.verb.value, words=standing.words, by=standing.by, age_s=rounded(standing.age_s(t_s), 0),
             at_en_m=None if standing.en_m is None else place(standing.en_m)),

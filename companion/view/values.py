@@ -374,7 +374,7 @@ class StandingView:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Orders:
+class OrdersView:
     """The order that stands, the last answer, and what the mission permits whoever may open the socket on board."""
 
     standing: StandingView | None = None
@@ -452,7 +452,7 @@ class View:
     refuges: tuple[PlaceView, ...] = ()
     home: PlaceView | None = None
     safe_end: PlaceView | None = None
-    orders: Orders = Orders()
+    orders: OrdersView = OrdersView()
     figures: Figures = Figures()
     shown: tuple[FigureView, ...] = ()
     health: tuple[Part, ...] = ()

@@ -13,7 +13,7 @@ from companion import cli
 from companion.app.options import SailOptions, at_once
 from companion.app.sail import sail
 from companion.clock import now_s, run_virtual
-from companion.commands.run import Ending
+from companion.commands.run import SignalEnding
 from companion.geofence import load_mission
 from companion.program.arguments import absent_device
 from sitl.autopilot import MemoryLink
@@ -45,7 +45,7 @@ def test_a_signal_ends_what_is_not_begun_stops_a_voyage_and_ends_it_the_second_t
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
     async def voyage():
-        ending = Ending()
+        ending = SignalEnding()
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGTERM)
         stop = ending.asked()

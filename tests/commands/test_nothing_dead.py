@@ -29,7 +29,7 @@ from companion.compose import (
 )
 from companion.geofence import load_mission
 from companion.geofence.mission.options import ATOMS, KINDS, tables
-from companion.safety import CHOICES, ENDINGS, FAILSAFES, SETTINGS, TABLE, WORD_OF, Answer, End
+from companion.safety import CHOICES, ENDINGS, FAILSAFES, SETTINGS, TABLE, WORD_OF, End, Recovery
 from companion.skipper.step.config import Permissions
 from companion.skipper.way.gates import gates_of
 from sitl import cli as sitl_cli
@@ -366,7 +366,7 @@ def test_every_watchdog_is_raised_in_a_scenario():
 
 def test_every_failsafe_that_is_answered_is_in_a_scenario():
     told = {code for path in Path("sitl/scenarios").glob("*.toml") for code in load_scenario(path).expect.alerts}
-    answered = {f"{cause.name} failsafe" for cause in FAILSAFES if cause.answer is not Answer.LEAVE}
+    answered = {f"{cause.name} failsafe" for cause in FAILSAFES if cause.answer is not Recovery.LEAVE}
     assert answered - told == set()
 
 

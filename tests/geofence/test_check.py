@@ -7,7 +7,7 @@ import pytest
 from shapely.geometry import Polygon
 
 from companion.geo.frame import LocalFrame
-from companion.geofence import Area, Circle, Code, Fence, Obstacle, Severity, Zone, ZoneKind
+from companion.geofence import Area, Circle, Code, Fence, FindingLevel, Obstacle, Zone, ZoneKind
 from companion.geofence.check import AreaConditions, check_area
 from companion.messages import GeoPoint
 
@@ -49,7 +49,7 @@ def found(area, **conditions):
 ])
 def test_a_shore_that_is_drawn_round_the_water_is_mentioned(area, conditions, why):
     """It was "1 keep-out zone: in order" (issue 13, what still made him stop)."""
-    finding = found(area, **conditions).get((Code.ROUND_THE_WATER, Severity.NOTE))
+    finding = found(area, **conditions).get((Code.ROUND_THE_WATER, FindingLevel.NOTE))
     assert (finding is None) == (why is None)
     if why is not None:
         assert why in finding.text
@@ -65,36 +65,36 @@ def test_a_good_area_has_no_findings():
 
 def test_inclusions_that_ardupilot_would_intersect():
     apart = Area(fence=Fence((keep_in(box(-200, -200, 0, 200), "w"), keep_in(box(50, -200, 200, 200), "e"))))
-    fault = found(apart)[Code.DISJOINT_INCLUSIONS, Severity.ERROR]
+    fault = found(apart)[Code.DISJOINT_INCLUSIONS, FindingLevel.ERROR]
     assert "no water is left" in fault.text
     assert fault.place == "w, e"
     lapping = Area(fence=Fence((keep_in(box(-200, -200, 50, 200), "w"), keep_in(box(0, -200, 200, 200), "e"))))
-    assert "2 ha is left" in found(lapping)[Code.INTERSECTED_INCLUSIONS, Severity.WARNING].text
+    assert "2 ha is left" in found(lapping)[Code.INTERSECTED_INCLUSIONS, FindingLevel.WARNING].text
 
 
 def test_holes():
     ring = Polygon(box(-100, 100, 100, 200).exterior, [box(-20, 130, 20, 160).exterior])
     area = Area(obstacles=(Obstacle(shape=ring, name="atoll"),))
-    assert found(area)[Code.HOLE, Severity.WARNING].place == "atoll"
-    assert (Code.HOLE, Severity.NOTE) in found(Area(fence=Fence((keep_in(ring),))))
+    assert found(area)[Code.HOLE, FindingLevel.WARNING].place == "atoll"
+    assert (Code.HOLE, FindingLevel.NOTE) in found(Area(fence=Fence((keep_in(ring),))))
 
 
 def test_places_in_the_wrong_place():
     area = Area(obstacles=(rock(-10, -10, 10, 10, "under"),), fence=Fence((keep_in(box(-200, -200, 200, 200)),)))
     faults = found(area, start=ORIGIN, goals=(goal(0, 500), goal(15, 0)), margin_m=10.0)
-    assert "inside the obstacle 'under'" in faults[Code.START_OUTSIDE, Severity.ERROR].text
-    assert faults[Code.GOAL_OUTSIDE, Severity.ERROR].place == "goal 1"
-    assert "has 5.0 m of free water" in faults[Code.GOAL_OUTSIDE, Severity.WARNING].text
+    assert "inside the obstacle 'under'" in faults[Code.START_OUTSIDE, FindingLevel.ERROR].text
+    assert faults[Code.GOAL_OUTSIDE, FindingLevel.ERROR].place == "goal 1"
+    assert "has 5.0 m of free water" in faults[Code.GOAL_OUTSIDE, FindingLevel.WARNING].text
 
 
 def test_gaps_too_narrow_for_the_margin_and_the_wind():
     area = Area(obstacles=(rock(-100, 50, -12, 80, "west"), rock(12, 50, 100, 80, "east")))
-    closed = found(area, margin_m=13.0)[Code.NARROW_GAP, Severity.WARNING]
+    closed = found(area, margin_m=13.0)[Code.NARROW_GAP, FindingLevel.WARNING]
     assert "24.0 m is closed at a margin of 13 m" in closed.text
     assert closed.place.startswith("west / east at 50.800")
     assert found(area, margin_m=10.0) == {}
     # wind straight through the gap: close-hauled at 47 degrees the same margin needs 20 / cos 47 = 29.3 m
-    beating = found(area, margin_m=10.0, twd_from_rad=0.0)[Code.NARROW_GAP, Severity.WARNING]
+    beating = found(area, margin_m=10.0, twd_from_rad=0.0)[Code.NARROW_GAP, FindingLevel.WARNING]
     assert "needs 29.3 m" in beating.text
     assert found(area, margin_m=10.0, twd_from_rad=math.radians(90.0)) == {}
     between = Area(obstacles=(*area.obstacles, rock(-5, 30, 5, 100, "plug")))
@@ -104,12 +104,12 @@ def test_gaps_too_narrow_for_the_margin_and_the_wind():
 def test_no_way_through_names_the_margin_that_opens_one():
     wall = (rock(-600, 50, -12, 80, "west"), rock(12, 50, 600, 80, "east"))
     area = Area(obstacles=wall, fence=Fence((keep_in(box(-300, -100, 300, 300)),)))
-    fault = found(area, start=ORIGIN, goals=(goal(0, 200),), margin_m=15.0)[Code.UNREACHABLE, Severity.ERROR]
+    fault = found(area, start=ORIGIN, goals=(goal(0, 200),), margin_m=15.0)[Code.UNREACHABLE, FindingLevel.ERROR]
     assert "at a margin of 15 m" in fault.text
     # the gap of 24 m holds twice 12 m; margins are drawn up to 5 % wide, and the search stops at 0.1 m
     assert 11.3 <= float(fault.remedy.removeprefix("there is one at ").removesuffix(" m")) <= 12.0
     shut = Area(obstacles=(rock(-600, 50, 600, 80, "bar"),), fence=area.fence)
-    fault = found(shut, start=ORIGIN, goals=(goal(0, 200),), margin_m=15.0)[Code.UNREACHABLE, Severity.ERROR]
+    fault = found(shut, start=ORIGIN, goals=(goal(0, 200),), margin_m=15.0)[Code.UNREACHABLE, FindingLevel.ERROR]
     assert "no water between" in fault.text
 
 
@@ -117,23 +117,24 @@ def test_obstacles_that_stick_out_of_the_fence():
     fence = Fence((keep_in(box(-200, -200, 200, 200)),))
     area = Area(obstacles=(rock(150, 50, 250, 80, "spit"), rock(300, 0, 320, 20, "far")), fence=fence)
     faults = found(area)
-    assert faults[Code.OBSTACLE_OUTSIDE_FENCE, Severity.WARNING].place == "spit"
-    assert "0.15 ha" in faults[Code.OBSTACLE_OUTSIDE_FENCE, Severity.WARNING].text
-    assert faults[Code.OBSTACLE_OUTSIDE_FENCE, Severity.NOTE].place == "far"
+    assert faults[Code.OBSTACLE_OUTSIDE_FENCE, FindingLevel.WARNING].place == "spit"
+    assert "0.15 ha" in faults[Code.OBSTACLE_OUTSIDE_FENCE, FindingLevel.WARNING].text
+    assert faults[Code.OBSTACLE_OUTSIDE_FENCE, FindingLevel.NOTE].place == "far"
 
 
 def test_more_vertices_than_the_autopilot_holds():
     t = 2.0 * np.pi * np.arange(200) / 200
     en = np.column_stack([150.0 * np.cos(t), 300.0 + 150.0 * np.sin(t)])
     area = Area(obstacles=(Obstacle(shape=Polygon(FRAME.array_lonlat_from_en(en)), name="big"),))
-    assert "200 fence items" in found(area)[Code.TOO_MANY_ITEMS, Severity.WARNING].text
-    assert "simplified it takes 1" in found(area, start=ORIGIN, margin_m=10.0)[Code.TOO_MANY_ITEMS, Severity.NOTE].text
+    assert "200 fence items" in found(area)[Code.TOO_MANY_ITEMS, FindingLevel.WARNING].text
+    simpler = found(area, start=ORIGIN, margin_m=10.0)[Code.TOO_MANY_ITEMS, FindingLevel.NOTE]
+    assert "simplified it takes 1" in simpler.text
     tight = found(area, start=ORIGIN, margin_m=0.05)
-    assert "cannot be simplified" in tight[Code.TOO_MANY_ITEMS, Severity.WARNING].text
+    assert "cannot be simplified" in tight[Code.TOO_MANY_ITEMS, FindingLevel.WARNING].text
 
 
 @pytest.mark.parametrize("radius_m", [30.0])
 def test_circles_count_too(radius_m):
     area = Area(obstacles=(Obstacle(shape=Circle(goal(-20 - radius_m, 100), radius_m), name="c"),
                            Obstacle(shape=Circle(goal(20 + radius_m, 100), radius_m), name="d")))
-    assert "the gap of 39" in found(area, margin_m=25.0)[Code.NARROW_GAP, Severity.WARNING].text
+    assert "the gap of 39" in found(area, margin_m=25.0)[Code.NARROW_GAP, FindingLevel.WARNING].text

@@ -11,7 +11,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import ALL_PERMITTED, Guidance
-from companion.skipper.step.snapshot import WindHealth, WindView
+from companion.skipper.step.snapshot import WindEstimate, WindHealth
 from companion.skipper.step.state import Phase
 from companion.skipper.way import Composed, Until
 from companion.skipper.way.geometry import distance_m
@@ -143,7 +143,7 @@ def test_without_a_wind_the_field_is_given_up_and_the_autopilot_sails_by_its_own
     world = make(goal(field("ring", Until.TIME, 400.0, ring=RING)))
     assert world.run(60, lambda w: w.mode is Mode.GUIDED)
     world.run(30)
-    world.extra = {"wind": WindView(health=WindHealth.NONE)}
+    world.extra = {"wind": WindEstimate(health=WindHealth.NONE)}
     assert world.run(10, lambda w: "no field" in codes(w))
     assert "no wind is known" in next(text for code, text in said(world) if code == "no field")
     assert world.run(20, lambda w: w.mode is Mode.AUTO)

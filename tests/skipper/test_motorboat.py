@@ -12,7 +12,7 @@ from companion.messages import Mode
 from companion.skipper.rules import Skipper
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.snapshot import WindView
+from companion.skipper.step.snapshot import WindEstimate
 from companion.skipper.step.state import Phase
 from companion.skipper.way import Composed, Until
 from companion.skipper.way.geometry import distance_m
@@ -28,7 +28,7 @@ def make(*goals, obstacles=(), wind=None, **config):
     world = World(skipper=Skipper(voyage=voyage, config=SkipperConfig(sails=False, **config)), identity=IDENTITY,
                   expansions=1500, no_go=0.0)
     if wind is None:
-        world.extra = {"wind": WindView()}      # none was ever told
+        world.extra = {"wind": WindEstimate()}      # none was ever told
     return world
 
 

@@ -27,8 +27,8 @@ from companion.skipper.step.snapshot import (
     UploadOutcome,
     UploadResult,
     WaypointReached,
+    WindEstimate,
     WindHealth,
-    WindView,
 )
 from companion.skipper.step.state import Phase
 from companion.skipper.watch.document import markdown
@@ -234,7 +234,7 @@ EVENTS = {
     # what may be missing
     "no autopilot": lambda s: replace(s, autopilot=None, heartbeat_age_s=None),
     "no vehicle": lambda s: replace(s, vehicle=None, vehicle_age_s=None, position_en_m=None),
-    "no wind": lambda s: replace(s, wind=WindView()),
+    "no wind": lambda s: replace(s, wind=WindEstimate()),
     "no forecast": wind(forecast=None),
     "wind light": wind(health=WindHealth.LIGHT),
     "no limits": lambda s: replace(s, limits=None),

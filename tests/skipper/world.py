@@ -44,8 +44,8 @@ from companion.skipper.step.snapshot import (
     UploadOutcome,
     UploadResult,
     WaypointReached,
+    WindEstimate,
     WindHealth,
-    WindView,
 )
 from companion.skipper.step.state import SkipperState
 from companion.skipper.way.geometry import bearing_rad, cross_track_m, distance_m, is_past, moved
@@ -326,7 +326,7 @@ class World:
             identity=self.identity,
             t_s=self.t, vehicle=vehicle, vehicle_age_s=0.1, position_en_m=here, autopilot=status, autopilot_age_s=0.2,
             heartbeat_age_s=self.heartbeat_age, permissions=self.permissions,
-            wind=WindView(health=self.wind_health, forecast=forecast(self.t, mean, mean_tws, self.sigma),
+            wind=WindEstimate(health=self.wind_health, forecast=forecast(self.t, mean, mean_tws, self.sigma),
                           mean_twd_from_rad=mean, mean_tws_mps=mean_tws, sigma_twd_rad=self.sigma,
                           present_twd_from_rad=present, present_tws_mps=tws, record_s=100.0 + self.t),
             limits=AutopilotLimits(

@@ -22,7 +22,7 @@ import pyte
 import pytest
 
 from companion.terminal.screen import ENTER, LEAVE
-from companion.view.values import Orders
+from companion.view.values import OrdersView
 from tests.terminal.test_dashboard import VIEW
 
 PATIENCE_S = 30.0
@@ -64,7 +64,7 @@ class Boat:
             while not self._is_over:
                 if not is_silent:
                     number += 1
-                    view = replace(VIEW, t_s=600.0 + number, orders=Orders(permitted=self.permitted),
+                    view = replace(VIEW, t_s=600.0 + number, orders=OrdersView(permitted=self.permitted),
                                    age_s=8.0 if self.is_silent else 0.4)
                     wire.sendall(msgspec.json.encode({"view": view, "events": ()}) + b"\n")
                 is_silent = self.is_silent    # its last word is old already: a test waits less

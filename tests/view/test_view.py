@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from companion.fold import Step
 from companion.geo.angles import difference_rad
 from companion.messages import CompanionStatus, GeoPoint, VehicleState, WindForecast
-from companion.skipper.step import SkipperConfig, SkipperState, Snapshot, WindHealth, WindView
+from companion.skipper.step import SkipperConfig, SkipperState, Snapshot, WindEstimate, WindHealth
 from companion.telemetry.folder import TLOG, VoyageFigures
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
 from companion.view.parts import _risk_left, apparent, laylines_of, no_go_of
@@ -192,7 +192,7 @@ def forecast(sigma_deg):
 
 def step_at(here, sigma_deg=(2.0, 6.0, 12.0), heading_deg=310.0):
     heading = math.radians(heading_deg)
-    wind = WindView(health=WindHealth.GOOD, forecast=forecast(sigma_deg), mean_twd_from_rad=0.0, mean_tws_mps=5.0,
+    wind = WindEstimate(health=WindHealth.GOOD, forecast=forecast(sigma_deg), mean_twd_from_rad=0.0, mean_tws_mps=5.0,
                     present_twd_from_rad=0.0, present_tws_mps=5.0)
     snapshot = Snapshot(t_s=0.0, vehicle=vehicle(2.0 * math.sin(heading), 2.0 * math.cos(heading), heading),
                         position_en_m=here, wind=wind)

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from shapely.geometry import Polygon
 
-from companion.geofence.document import Code, Severity
+from companion.geofence.document import Code, FindingLevel
 from companion.geofence.formats.losses import Losses, without_holes
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
@@ -65,7 +65,7 @@ def zones_to_items(
         items.extend(_item(command, wrap_lon_deg(float(x)), float(y), float(len(vertices))) for x, y in vertices)
         moved |= not all(_exact(float(v)) for v in vertices.ravel())
     if moved:
-        losses.add(Severity.NOTE, "coordinates are rounded to 1e-7 degrees (at most 6 mm) and radii to float32")
+        losses.add(FindingLevel.NOTE, "coordinates are rounded to 1e-7 degrees (at most 6 mm) and radii to float32")
     return tuple(items), losses
 
 
@@ -122,7 +122,7 @@ def items_to_zones(
             if radius_m > 0.0 and math.isfinite(radius_m):
                 zones.append(Zone(kind=_CIRCLE[Command(item.command)], shape=Circle(item.point, radius_m)))
             else:
-                findings.add(Severity.ERROR, Code.DEGENERATE, place, f"the circle's radius is {radius_m:g} m",
+                findings.add(FindingLevel.ERROR, Code.DEGENERATE, place, f"the circle's radius is {radius_m:g} m",
                              "give it a positive radius")
             index += 1
         elif item.command in _VERTEX:
@@ -135,7 +135,7 @@ def items_to_zones(
             run = items[index:end]
             if count < 3 or len(run) != count:
                 findings.add(
-                    Severity.ERROR, Code.FORMAT, place,
+                    FindingLevel.ERROR, Code.FORMAT, place,
                     f"the polygon announces {item.params[0]:g} vertices and {len(run)} follow",
                     "each vertex carries the number of vertices; at least 3",
                 )
@@ -149,7 +149,7 @@ def items_to_zones(
             )
             index += count
         else:
-            findings.add(Severity.ERROR, Code.FORMAT, place, f"command {item.command} does not belong in a fence",
+            findings.add(FindingLevel.ERROR, Code.FORMAT, place, f"command {item.command} does not belong in a fence",
                          "commands 5000 to 5004 do")
             index += 1
     return tuple(zones), return_point

@@ -13,7 +13,7 @@ from typing import Any
 from shapely.geometry import LineString, Point, Polygon
 
 from companion.errors import InputError
-from companion.geofence.document import Code, Document, Mark, Severity, Track
+from companion.geofence.document import Code, Document, FindingLevel, Mark, Track
 from companion.geofence.formats.losses import Losses, Written, leave_out
 from companion.geofence.formats.rings import polygons_from_rings
 from companion.geofence.formats.routes import Reading, RoutePoint, items_of, pins_as_dangers, pins_as_route
@@ -42,7 +42,7 @@ class _GeoJsonReading(Reading):
         name_node = properties.get("name")
         name = str(name_node.value) if name_node is not None and isinstance(name_node.value, str | int) else ""
         if geometry is None:
-            self.findings.add(Severity.ERROR, Code.EMPTY, node.path, "the feature has no geometry",
+            self.findings.add(FindingLevel.ERROR, Code.EMPTY, node.path, "the feature has no geometry",
                               "draw it or remove it")
             return
         self.geometry(geometry, properties, name)
@@ -59,7 +59,7 @@ class _GeoJsonReading(Reading):
             for member in members:
                 self.geometry(member, properties, name, depth + 1)
             if not members:
-                self.findings.add(Severity.ERROR, Code.EMPTY, node.path, "the collection is empty",
+                self.findings.add(FindingLevel.ERROR, Code.EMPTY, node.path, "the collection is empty",
                                   "draw it or remove it")
             return
         coordinates = node.member("coordinates")
@@ -67,7 +67,7 @@ class _GeoJsonReading(Reading):
             single = shape.removeprefix("Multi")
             members = list(coordinates)
             if not members:
-                self.findings.add(Severity.ERROR, Code.EMPTY, node.path, f"the {shape} is empty",
+                self.findings.add(FindingLevel.ERROR, Code.EMPTY, node.path, f"the {shape} is empty",
                                   "draw it or remove it")
             for member in members:
                 self._single(single, member, properties, kind=kind, name=name, margin_m=margin_m)
@@ -100,13 +100,13 @@ class _GeoJsonReading(Reading):
             if role is not None and role.value == "track":
                 self.tracks.append(self._track(points, properties, name, coordinates))
             elif len(set(points)) < 2:
-                self.findings.add(Severity.ERROR, Code.DEGENERATE, place, "the line has fewer than two points",
+                self.findings.add(FindingLevel.ERROR, Code.DEGENERATE, place, "the line has fewer than two points",
                                   "draw it or remove it")
             elif self._on_globe(points, place):
                 self.marks.append(Mark(geometry=LineString(points), kind=kind, name=name, margin_m=margin_m))
         elif shape == "Point":
             if isinstance(coordinates.value, list) and not coordinates.value:
-                self.findings.add(Severity.ERROR, Code.EMPTY, place, "the point is empty", "draw it or remove it")
+                self.findings.add(FindingLevel.ERROR, Code.EMPTY, place, "the point is empty", "draw it or remove it")
                 return
             self._point(self._position(coordinates), coordinates, properties, kind=kind, name=name, margin_m=margin_m)
         else:
@@ -168,7 +168,7 @@ class _GeoJsonReading(Reading):
         for x, y in points:
             if abs(y) > 90.0 or abs(x) > 360.0:
                 self.findings.add(
-                    Severity.ERROR, Code.SWAPPED_AXES, place, f"latitude {y:g} is outside ±90 degrees",
+                    FindingLevel.ERROR, Code.SWAPPED_AXES, place, f"latitude {y:g} is outside ±90 degrees",
                     "GeoJSON writes longitude first: swap them",
                 )
                 return False
@@ -211,7 +211,7 @@ def read_geojson(
     if crs is not None:
         named = json.dumps(crs.value)
         if not any(word in named for word in ("CRS84", "4326", "4979")):
-            reading.findings.add(Severity.ERROR, Code.WRONG_SRID, "crs", f"{named[:60]} is not WGS 84",
+            reading.findings.add(FindingLevel.ERROR, Code.WRONG_SRID, "crs", f"{named[:60]} is not WGS 84",
                                  "export it as WGS 84 (RFC 7946)")
     if root_kind == "FeatureCollection":
         for feature in root.member("features"):
@@ -237,7 +237,8 @@ def read_geojson(
         findings=tuple(reading.findings),
     )
     if document.is_empty and not reading.findings:
-        reading.findings.add(Severity.ERROR, Code.EMPTY, "", "holds no feature", "an empty file is not 'no obstacles'")
+        reading.findings.add(
+            FindingLevel.ERROR, Code.EMPTY, "", "holds no feature", "an empty file is not 'no obstacles'")
         return Document(source=source, format="geojson", findings=tuple(reading.findings))
     return document
 

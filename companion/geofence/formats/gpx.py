@@ -17,7 +17,7 @@ import gpxpy.gpx
 from shapely.geometry import Point
 
 from companion.errors import InputError
-from companion.geofence.document import Code, Document, Mark, Severity, Track
+from companion.geofence.document import Code, Document, FindingLevel, Mark, Track
 from companion.geofence.formats.fence_items import ring_of
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out, without_holes
 from companion.geofence.formats.routes import Reading, RoutePoint, items_of, line_as_area, pins_as_route, route_of
@@ -74,8 +74,8 @@ def read_gpx(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
         _track(track, f"trk {number}", reading)
     if reading.route or reading.tracks:
         for _, _, name in reading.pins:
-            reading.findings.add(Severity.NOTE, Code.DROPPED, "", f"the waypoint {name} is no part of a route and is "
-                                 "not used")
+            reading.findings.add(FindingLevel.NOTE, Code.DROPPED, "",
+                                 f"the waypoint {name} is no part of a route and is not used")
     else:
         pins_as_route(reading.pins, reading.route, reading.places, reading.findings)
     items, names = items_of(reading.route)
@@ -85,7 +85,7 @@ def read_gpx(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
         rally=tuple(reading.rally), tracks=tuple(reading.tracks), findings=tuple(reading.findings),
     )
     if document.is_empty and not reading.findings:
-        reading.findings.add(Severity.ERROR, Code.EMPTY, "", "holds no route, track or waypoint")
+        reading.findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no route, track or waypoint")
         return Document(source=source, format="gpx", findings=tuple(reading.findings))
     return document
 
@@ -117,7 +117,7 @@ def _route(node: Any, place: str, reading: _GpxReading) -> None:
     if role in _KINDS or (reading.areas and role != _MISSION):
         reading.line(points, _KINDS.get(role, reading.kind), node.name or "", place)
     elif reading.route:
-        reading.findings.add(Severity.WARNING, Code.FORMAT, place,
+        reading.findings.add(FindingLevel.WARNING, Code.FORMAT, place,
                              "the file has several routes; the first is the mission, this one is kept as a track")
         reading.tracks.append(Track(points=tuple(points), name=node.name or ""))
     else:

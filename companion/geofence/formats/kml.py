@@ -16,7 +16,7 @@ from xml.sax.saxutils import escape
 from shapely.geometry import LineString, Point, Polygon
 
 from companion.errors import InputError
-from companion.geofence.document import Code, Document, Mark, Severity, Track
+from companion.geofence.document import Code, Document, FindingLevel, Mark, Track
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out
 from companion.geofence.formats.mission_planner import decimal
 from companion.geofence.formats.rings import polygons_from_rings
@@ -91,7 +91,7 @@ class _KmlReading(Reading):
         """Return whether all positions exist, with a finding if not."""
         for x, y, _ in coordinates:
             if abs(y) > 90.0 or abs(x) > 360.0:
-                self.findings.add(Severity.ERROR, Code.SWAPPED_AXES, place,
+                self.findings.add(FindingLevel.ERROR, Code.SWAPPED_AXES, place,
                                   f"latitude {y:g} is outside ±90 degrees", "KML writes longitude first")
                 return False
         return True
@@ -113,12 +113,12 @@ def read_kml(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
         data_of = _extended(placemark)
         shapes = list(_shapes(placemark))
         if not shapes:
-            reading.findings.add(Severity.WARNING, Code.EMPTY, place, "has no geometry that can be read")
+            reading.findings.add(FindingLevel.WARNING, Code.EMPTY, place, "has no geometry that can be read")
         for shape in shapes:
             _shape(shape, name, data_of, place, reading=reading)
     for element in root.iter():
         if local_name(element) in {"NetworkLink", "GroundOverlay"}:
-            reading.findings.add(Severity.WARNING, Code.DROPPED, "", f"a {local_name(element)} is not followed")
+            reading.findings.add(FindingLevel.WARNING, Code.DROPPED, "", f"a {local_name(element)} is not followed")
     has_line = bool(reading.tracks) or any(isinstance(m.geometry, LineString) for m in reading.marks)
     if reading.route or has_line:
         reading.marks.extend(pins_as_dangers(reading.pins, kind, reading.findings))
@@ -130,8 +130,8 @@ def read_kml(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
         item_names=names, home=reading.places.get("home"), return_point=reading.places.get("return"),
         rally=tuple(reading.rally), tracks=tuple(reading.tracks), findings=tuple(reading.findings),
     )
-    if document.is_empty and not any(f.severity is Severity.ERROR for f in reading.findings):
-        reading.findings.add(Severity.ERROR, Code.EMPTY, "", "holds no placemark with a shape")
+    if document.is_empty and not any(f.severity is FindingLevel.ERROR for f in reading.findings):
+        reading.findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no placemark with a shape")
         return Document(source=source, format="kml", findings=tuple(reading.findings))
     return document
 
@@ -178,7 +178,7 @@ def _shape(element: Any, name: str, data_of: dict[str, str], place: str, *, read
         return
     coordinates = reading.coordinates(element, place)
     if not coordinates:
-        reading.findings.add(Severity.ERROR, Code.EMPTY, place, f"the {shape} is empty", "draw it or remove it")
+        reading.findings.add(FindingLevel.ERROR, Code.EMPTY, place, f"the {shape} is empty", "draw it or remove it")
         return
     if not reading.on_globe(coordinates, place):
         return
@@ -201,7 +201,7 @@ def _shape(element: Any, name: str, data_of: dict[str, str], place: str, *, read
             points=track_points(lonlat), times_s=tuple(times) if len(times) == len(lonlat) else None, name=name,
         ))
     elif len(set(lonlat)) < 2:
-        reading.findings.add(Severity.ERROR, Code.DEGENERATE, place, "the line has fewer than two points",
+        reading.findings.add(FindingLevel.ERROR, Code.DEGENERATE, place, "the line has fewer than two points",
                              "draw it or remove it")
     else:
         reading.marks.append(Mark(geometry=LineString(unwrapped(lonlat)), kind=kind, name=name, margin_m=margin_m))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from shapely.geometry import Polygon
 
-from companion.geofence.document import Code, Document, Finding, Severity
+from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.shapes import CIRCLE_SIDES, Circle, Zone, ZoneKind, drawn
 from companion.words import counted
 
@@ -38,12 +38,12 @@ _FIELDS = {"return": "return_point"}
 class Losses(list[Finding]):
     """The losses of one writing."""
 
-    def add(self, severity: Severity, text: str, remedy: str = "") -> None:
+    def add(self, severity: FindingLevel, text: str, remedy: str = "") -> None:
         """Append one loss."""
         self.append(Finding(severity=severity, code=Code.NOT_CARRIED, place="", text=text, remedy=remedy))
 
     def drop(
-        self, what: str, count: int, *, severity: Severity = Severity.WARNING, why: str = "", remedy: str = "",
+        self, what: str, count: int, *, severity: FindingLevel = FindingLevel.WARNING, why: str = "", remedy: str = "",
     ) -> None:
         """Say that ``count`` things, ``what`` in the singular, are not carried."""
         if count:
@@ -59,12 +59,12 @@ def leave_out(losses: Losses, document: Document, carried: Iterable[str]) -> Non
     kept = set(carried)
     if not any(getattr(document, _FIELDS.get(what, what)) for what in _WORDS if what in kept):
         words = ", ".join(_WORDS[what] for what in _WORDS if what in kept)
-        losses.append(Finding(severity=Severity.ERROR, code=Code.EMPTY, place="",
+        losses.append(Finding(severity=FindingLevel.ERROR, code=Code.EMPTY, place="",
                               text=f"would hold nothing: the source has no {words}"))
     if "zones" not in kept:
-        losses.drop("zone", len(document.zones), severity=Severity.ERROR)
+        losses.drop("zone", len(document.zones), severity=FindingLevel.ERROR)
     if "marks" not in kept:
-        losses.drop("point or line obstacle", len(document.marks), severity=Severity.ERROR,
+        losses.drop("point or line obstacle", len(document.marks), severity=FindingLevel.ERROR,
                     remedy="say --point-radius M to draw them")
     if "items" not in kept:
         losses.drop("mission item", len(document.items))
@@ -73,15 +73,15 @@ def leave_out(losses: Losses, document: Document, carried: Iterable[str]) -> Non
     if "tracks" not in kept:
         losses.drop("track", len(document.tracks))
     if "return" not in kept and document.return_point is not None:
-        losses.add(Severity.WARNING, "the fence's return point is not carried by this format")
+        losses.add(FindingLevel.WARNING, "the fence's return point is not carried by this format")
     if "home" not in kept and document.home is not None:
-        losses.add(Severity.NOTE, "the home position is not carried by this format")
+        losses.add(FindingLevel.NOTE, "the home position is not carried by this format")
     if "zones" in kept and "names" not in kept and any(z.name for z in document.zones):
-        losses.add(Severity.NOTE, "the names of zones are not carried by this format")
+        losses.add(FindingLevel.NOTE, "the names of zones are not carried by this format")
     if "items" in kept and "item names" not in kept and any(document.item_names):
-        losses.add(Severity.NOTE, "the names of waypoints are not carried by this format")
+        losses.add(FindingLevel.NOTE, "the names of waypoints are not carried by this format")
     if "margins" not in kept and any(z.margin_m is not None for z in document.zones):
-        losses.add(Severity.WARNING, "the zones' own margins are not carried by this format")
+        losses.add(FindingLevel.WARNING, "the zones' own margins are not carried by this format")
 
 
 def as_polygon(zone: Zone, losses: Losses) -> Polygon:
@@ -89,7 +89,7 @@ def as_polygon(zone: Zone, losses: Losses) -> Polygon:
     if isinstance(zone.shape, Circle):
         side = "around" if zone.kind is ZoneKind.EXCLUSION else "inside"
         losses.add(
-            Severity.NOTE,
+            FindingLevel.NOTE,
             f"the circle {zone.name or 'of ' + format(zone.shape.radius_m, 'g') + ' m'} is drawn as "
             f"{CIRCLE_SIDES} sides {side} it",
         )
@@ -117,7 +117,7 @@ def without_holes(zones: Sequence[Zone], losses: Losses) -> list[Zone]:
                      margin_m=zone.margin_m)
                 for i, ring in enumerate(zone.shape.interiors)
             )
-            losses.add(Severity.NOTE, f"{count} hole(s) of {name} become keep-out zones of their own")
+            losses.add(FindingLevel.NOTE, f"{count} hole(s) of {name} become keep-out zones of their own")
         else:
-            losses.add(Severity.WARNING, f"{count} hole(s) of {name} are filled: the water inside is given up")
+            losses.add(FindingLevel.WARNING, f"{count} hole(s) of {name} are filled: the water inside is given up")
     return out

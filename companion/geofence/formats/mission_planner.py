@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from companion.errors import InputError
-from companion.geofence.document import Code, Document, Severity
+from companion.geofence.document import Code, Document, FindingLevel
 from companion.geofence.formats.fence_items import FENCE_COMMANDS, items_to_zones, ring_of, zones_to_items
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out, without_holes
 from companion.geofence.formats.rings import Findings, polygons_from_rings
@@ -61,7 +61,7 @@ def _row(fields: list[str], source: str, place: str, findings: Findings) -> tupl
     params: list[float] = []
     for index, field in enumerate(fields[4:8], start=1):
         if field.lower() in {"nan", "-nan"}:
-            findings.add(Severity.NOTE, Code.DROPPED, f"{place} p{index}", "nan (unset) is read as 0")
+            findings.add(FindingLevel.NOTE, Code.DROPPED, f"{place} p{index}", "nan (unset) is read as 0")
             params.append(0.0)
         else:
             params.append(number(field, source, f"{place} p{index}"))
@@ -71,7 +71,7 @@ def _row(fields: list[str], source: str, place: str, findings: Findings) -> tupl
     )
     if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
         findings.add(
-            Severity.ERROR, Code.SWAPPED_AXES if abs(lon_deg) <= 90.0 else Code.OUT_OF_RANGE, place,
+            FindingLevel.ERROR, Code.SWAPPED_AXES if abs(lon_deg) <= 90.0 else Code.OUT_OF_RANGE, place,
             f"{lat_deg:g}, {lon_deg:g} is not on the globe", "the file writes latitude before longitude",
         )
         lat_deg = lon_deg = 0.0
@@ -87,7 +87,7 @@ def _sorted_out(rows: list[tuple[int, MissionItem]], source: str, findings: Find
     """Tell missions, fences and rally points apart by their commands."""
     for position, (seq, _) in enumerate(rows):
         if seq != position + (rows[0][0] if rows[0][0] in {0, 1} else 0):
-            findings.add(Severity.ERROR, Code.FORMAT, f"item {seq}", f"stands where item {position} should be",
+            findings.add(FindingLevel.ERROR, Code.FORMAT, f"item {seq}", f"stands where item {position} should be",
                          "is a line missing?")
             break
     first = rows[0][0] if rows else 0
@@ -102,11 +102,11 @@ def _sorted_out(rows: list[tuple[int, MissionItem]], source: str, findings: Find
         if home.lat_deg == 0.0 and home.lon_deg == 0.0:
             home = None
     if mission and (fence or rally):
-        findings.add(Severity.WARNING, Code.FORMAT, "", "mixes mission items with fence or rally items",
+        findings.add(FindingLevel.WARNING, Code.FORMAT, "", "mixes mission items with fence or rally items",
                      "autopilots hold them in separate lists")
     zones, return_point = items_to_zones(fence, findings)
     if not rows:
-        findings.add(Severity.ERROR, Code.EMPTY, "", "holds no item")
+        findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no item")
     return Document(
         source=source, format="waypoints", zones=zones, items=tuple(mission), home=home, rally=tuple(rally),
         return_point=return_point, findings=tuple(findings),
@@ -126,7 +126,7 @@ def write_waypoints(document: Document, *, part: str = "") -> Written:
         home = document.home
         if home is None:
             home = next((i.point for i in document.items if i.lat_e7 or i.lon_e7), GeoPoint(lat_deg=0.0, lon_deg=0.0))
-            losses.add(Severity.NOTE, "row 0 (home, which ArduPilot overwrites) is the first waypoint")
+            losses.add(FindingLevel.NOTE, "row 0 (home, which ArduPilot overwrites) is the first waypoint")
         first = MissionItem(
             command=Command.NAV_WAYPOINT, lat_e7=round(home.lat_deg * 1e7), lon_e7=round(home.lon_deg * 1e7), frame=0
         )
@@ -174,7 +174,7 @@ def read_fen(text: str, source: str) -> Document:
     findings = Findings()
     rows = _rows(text.split("\n"), source, findings)
     if len(rows) < 2:
-        findings.add(Severity.ERROR, Code.EMPTY, "", "holds no fence ring",
+        findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no fence ring",
                      "line 1 is the return point, the ring follows")
         return Document(source=source, format="fen", findings=tuple(findings))
     lon_deg, lat_deg, place = rows[0]
@@ -182,7 +182,7 @@ def read_fen(text: str, source: str) -> Document:
     if abs(lat_deg) <= 90.0:
         return_point = GeoPoint(lat_deg=lat_deg, lon_deg=wrap_lon_deg(lon_deg))
     else:
-        findings.add(Severity.ERROR, Code.SWAPPED_AXES, place, f"latitude {lat_deg:g} is outside ±90 degrees",
+        findings.add(FindingLevel.ERROR, Code.SWAPPED_AXES, place, f"latitude {lat_deg:g} is outside ±90 degrees",
                      "a .fen writes latitude before longitude")
     polygons = polygons_from_rings([[r[:2] for r in rows[1:]]], ZoneKind.INCLUSION, "ring", findings)
     return Document(
@@ -214,7 +214,7 @@ def read_poly(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION) ->
             for p in polygons_from_rings([[r[:2] for r in rows]], kind, place, findings)
         )
     if not zones and not findings:
-        findings.add(Severity.ERROR, Code.EMPTY, "", "holds no ring")
+        findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no ring")
     return Document(source=source, format="poly", zones=tuple(zones), findings=tuple(findings))
 
 
@@ -232,7 +232,7 @@ def read_rally(text: str, source: str) -> Document:
             raise InputError(source, place, f"{line[:40]!r} is not 'RALLY lat lon alt ...'")
         lat_deg, lon_deg, alt_m = (number(f, source, place) for f in fields[1:4])
         if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
-            findings.add(Severity.ERROR, Code.SWAPPED_AXES, place, f"{lat_deg:g}, {lon_deg:g} is not on the globe",
+            findings.add(FindingLevel.ERROR, Code.SWAPPED_AXES, place, f"{lat_deg:g}, {lon_deg:g} is not on the globe",
                          "the file writes latitude first")
             continue
         rally.append(MissionItem(
@@ -262,7 +262,7 @@ def _rows(lines: list[str], source: str, findings: Findings, *, first: int = 1) 
         if len(rows) > MAX_POSITIONS:
             raise InputError(source, place, f"holds more than {MAX_POSITIONS} positions", "simplify it")
     if commas:
-        findings.add(Severity.NOTE, Code.FORMAT, "", "decimal commas are read as points")
+        findings.add(FindingLevel.NOTE, Code.FORMAT, "", "decimal commas are read as points")
     return rows
 
 
@@ -272,7 +272,7 @@ def write_fen(document: Document) -> Written:
     leave_out(losses, document, {"zones", "return"})
     inside = [z for z in without_holes(document.zones, losses) if z.kind is ZoneKind.INCLUSION]
     others = len(without_holes(document.zones, Losses())) - min(1, len(inside))
-    losses.drop("zone", others, severity=Severity.ERROR, why="a .fen holds one keep-in ring")
+    losses.drop("zone", others, severity=FindingLevel.ERROR, why="a .fen holds one keep-in ring")
     lines = ["#saved by companion (Mission Planner fence: return point, then the ring)"]
     if inside:
         polygon = as_polygon(inside[0], losses)
@@ -281,7 +281,7 @@ def write_fen(document: Document) -> Written:
         if point is None:
             middle = polygon.representative_point()
             point = GeoPoint(lat_deg=float(middle.y), lon_deg=wrap_lon_deg(float(middle.x)))
-            losses.add(Severity.NOTE, "the return point is set to a point inside, for want of one")
+            losses.add(FindingLevel.NOTE, "the return point is set to a point inside, for want of one")
         lines.append(f"{decimal(point.lat_deg)} {decimal(point.lon_deg)}")
         lines.extend(f"{decimal(lat)} {decimal(lon)}" for lat, lon in (*ring, ring[0]))
     return Written(("\n".join(lines) + "\n").encode(), tuple(losses))
@@ -292,11 +292,11 @@ def write_poly(document: Document) -> Written:
     losses = Losses()
     leave_out(losses, document, {"zones"})
     zones = without_holes(document.zones, losses)
-    losses.drop("zone", max(0, len(zones) - 1), severity=Severity.ERROR, why="a .poly holds one ring")
+    losses.drop("zone", max(0, len(zones) - 1), severity=FindingLevel.ERROR, why="a .poly holds one ring")
     lines = ["#saved by companion (Mission Planner polygon)"]
     if zones:
         ring = ring_of(as_polygon(zones[0], losses))
-        losses.add(Severity.NOTE, f"that the ring is an {zones[0].kind.value} zone is not carried by this format")
+        losses.add(FindingLevel.NOTE, f"that the ring is an {zones[0].kind.value} zone is not carried by this format")
         lines.extend(f"{decimal(lat)} {decimal(lon)}" for lat, lon in (*ring, ring[0]))
     return Written(("\n".join(lines) + "\n").encode(), tuple(losses))
 

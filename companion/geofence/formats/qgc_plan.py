@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from companion.geofence.document import Code, Document, Severity
+from companion.geofence.document import Code, Document, FindingLevel
 from companion.geofence.formats.fence_items import ring_of
 from companion.geofence.formats.losses import Losses, Written, leave_out, without_holes
 from companion.geofence.formats.rings import Findings, polygons_from_rings
@@ -71,7 +71,7 @@ def _point(node: JsonNode, findings: Findings) -> GeoPoint | None:
     if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
         swapped = abs(lat_deg) <= 180.0 and abs(lon_deg) <= 90.0
         findings.add(
-            Severity.ERROR, Code.SWAPPED_AXES if swapped else Code.OUT_OF_RANGE, node.path,
+            FindingLevel.ERROR, Code.SWAPPED_AXES if swapped else Code.OUT_OF_RANGE, node.path,
             f"{lat_deg:g}, {lon_deg:g} is not on the globe", "a .plan writes latitude first",
         )
         return None
@@ -98,7 +98,7 @@ def _items(mission: JsonNode, findings: Findings) -> list[MissionItem]:
         if item.command == Command.DO_JUMP:
             target = ids.get(int(item.params[0]))
             if target is None:
-                findings.add(Severity.ERROR, Code.FORMAT, f"mission.items[{index}]",
+                findings.add(FindingLevel.ERROR, Code.FORMAT, f"mission.items[{index}]",
                              f"jumps to item {item.params[0]:g}, which is not there", "set the jump's target again")
             elif target != item.params[0]:
                 items[index] = MissionItem(
@@ -116,10 +116,10 @@ def _expanded(node: JsonNode, findings: Findings) -> list[JsonNode]:
     stored = stored if stored is not None else node.get("Items")
     simple = [n for n in stored] if stored is not None else []  # noqa: C416 - iterating checks the list
     if simple:
-        findings.add(Severity.NOTE, Code.EXPANDED, node.path, f"the {name} is expanded to its {len(simple)} items")
+        findings.add(FindingLevel.NOTE, Code.EXPANDED, node.path, f"the {name} is expanded to its {len(simple)} items")
     else:
         findings.add(
-            Severity.ERROR, Code.EXPANDED, node.path, f"the {name} has no stored items to expand",
+            FindingLevel.ERROR, Code.EXPANDED, node.path, f"the {name} has no stored items to expand",
             "open the plan in QGroundControl 4 and save it again, or replace the survey by waypoints",
         )
     return simple
@@ -135,7 +135,7 @@ def _simple_item(node: JsonNode, findings: Findings) -> MissionItem:
     values = [0.0 if p.value is None else p.number() for p in raw[:7]]
     lat_deg, lon_deg = values[4], values[5]
     if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
-        findings.add(Severity.ERROR, Code.SWAPPED_AXES, node.path, f"{lat_deg:g}, {lon_deg:g} is not on the globe",
+        findings.add(FindingLevel.ERROR, Code.SWAPPED_AXES, node.path, f"{lat_deg:g}, {lon_deg:g} is not on the globe",
                      "a .plan writes latitude first")
         lat_deg = lon_deg = 0.0
     continues = node.get("autoContinue")
@@ -165,7 +165,7 @@ def _zones(fence: JsonNode, findings: Findings) -> list[Zone]:
         center = _point(circle.member("center"), findings)
         radius_m = circle.member("radius").number(0.0, 1e7)
         if radius_m <= 0.0:
-            findings.add(Severity.ERROR, Code.DEGENERATE, node.path, "the circle's radius is 0", "give it a radius")
+            findings.add(FindingLevel.ERROR, Code.DEGENERATE, node.path, "the circle's radius is 0", "give it a radius")
         elif center is not None:
             zones.append(Zone(kind=kind, shape=Circle(center, radius_m)))
     return zones
@@ -194,7 +194,7 @@ def write_plan(document: Document) -> Written:
         first = next((i for i in document.items if i.lat_e7 or i.lon_e7), None)
         home = first.point if first is not None else None
         if home is not None:
-            losses.add(Severity.NOTE, "the planned home is set to the first waypoint, for want of a home")
+            losses.add(FindingLevel.NOTE, "the planned home is set to the first waypoint, for want of a home")
     fence: dict[str, Any] = {"version": 2, "circles": circles, "polygons": polygons}
     if document.return_point is not None:
         fence["breachReturn"] = [document.return_point.lat_deg, document.return_point.lon_deg, 0]

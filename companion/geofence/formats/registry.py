@@ -13,7 +13,7 @@ import shapely
 
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
-from companion.geofence.document import Code, Document, Finding, Severity
+from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.geojson import read_geojson, write_geojson
 from companion.geofence.formats.gpx import read_gpx, write_gpx
 from companion.geofence.formats.kml import read_kml, unzip_kmz, write_kml, write_kmz
@@ -144,7 +144,7 @@ def _write_wkt(document: Document, *, srid: bool = False) -> Written:
     leave_out(losses, document, {"zones", "marks", "names"})
     for zone in document.zones:
         if isinstance(zone.shape, Circle):
-            losses.add(Severity.NOTE, f"the circle {zone.name or '(unnamed)'} is drawn as a polygon")
+            losses.add(FindingLevel.NOTE, f"the circle {zone.name or '(unnamed)'} is drawn as a polygon")
     return Written(write_wkt(document, srid=srid).encode(), tuple(losses))
 
 
@@ -252,7 +252,7 @@ def check_place(document: Document, near: GeoPoint, far_m: float = FAR_M) -> Doc
                 code = Code.SWAPPED_AXES
                 remedy = 'latitude and longitude look swapped: try --axis latlon (in a mission: axis = "latlon")'
         finding = Finding(
-            severity=Severity.ERROR, code=code, place=name,
+            severity=FindingLevel.ERROR, code=code, place=name,
             text=f"lies {distance_m / 1000.0:.0f} km from the mission, at {center.lat_deg:.4f}, {center.lon_deg:.4f}",
             remedy=remedy,
         )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from companion.geofence.document import Code, Finding, Severity
+from companion.geofence.document import Code, Finding, FindingLevel
 from companion.geofence.shapes import ZoneKind, unwrapped
 
 Ring = Sequence[Sequence[float]]
@@ -36,7 +36,7 @@ _REDRAW = "redraw it, or write the repair with 'companion fence convert --repair
 class Findings(list[Finding]):
     """The findings of one reading, in order."""
 
-    def add(self, severity: Severity, code: Code, place: str, text: str, remedy: str = "") -> None:
+    def add(self, severity: FindingLevel, code: Code, place: str, text: str, remedy: str = "") -> None:
         """Append one finding."""
         self.append(Finding(severity=severity, code=code, place=place, text=text, remedy=remedy))
 
@@ -62,11 +62,11 @@ def polygons_from_rings(
             coordinates = unwrapped(coordinates, near_lon_deg=float(fixed[0][0, 0]))
         fixed.append(coordinates)
     if not fixed:
-        findings.add(Severity.ERROR, Code.EMPTY, place, "the polygon has no vertices", "draw it or remove it")
+        findings.add(FindingLevel.ERROR, Code.EMPTY, place, "the polygon has no vertices", "draw it or remove it")
         return []
     polygon = Polygon(fixed[0], fixed[1:])
     if is_hopeless(polygon):
-        findings.add(Severity.ERROR, Code.SELF_CROSSING, place, f"the ring crosses itself; {_TANGLED}", _REDRAW)
+        findings.add(FindingLevel.ERROR, Code.SELF_CROSSING, place, f"the ring crosses itself; {_TANGLED}", _REDRAW)
         return []
     if polygon.is_valid and polygon.area > 0.0:
         return [polygon]
@@ -76,12 +76,12 @@ def polygons_from_rings(
 def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, closed: bool) -> NDArray[np.float64]:
     """Return the ring closed, finite and continuous; an empty array when it is no ring."""
     if coordinates.shape[0] == 0:
-        findings.add(Severity.ERROR, Code.EMPTY, place, "the ring has no vertices", "draw it or remove it")
+        findings.add(FindingLevel.ERROR, Code.EMPTY, place, "the ring has no vertices", "draw it or remove it")
         return coordinates
     bad = ~np.isfinite(coordinates).all(axis=1)
     if bad.any():
         findings.add(
-            Severity.ERROR, Code.NOT_FINITE, f"{place} vertex {int(np.argmax(bad)) + 1}",
+            FindingLevel.ERROR, Code.NOT_FINITE, f"{place} vertex {int(np.argmax(bad)) + 1}",
             "a coordinate is not a finite number", "write degrees",
         )
         return np.empty((0, 2))
@@ -89,14 +89,14 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
     if not is_closed:
         if closed:
             findings.add(
-                Severity.ERROR, Code.UNCLOSED, place,
+                FindingLevel.ERROR, Code.UNCLOSED, place,
                 f"the ring is not closed: it starts at {_at(coordinates[0])} and ends at {_at(coordinates[-1])}",
                 "repeat the first vertex at the end (a repair would)",
             )
         coordinates = np.vstack([coordinates, coordinates[:1]])
     if np.unique(coordinates, axis=0).shape[0] < 3:
         findings.add(
-            Severity.ERROR, Code.DEGENERATE, place, "the ring has fewer than three different vertices",
+            FindingLevel.ERROR, Code.DEGENERATE, place, "the ring has fewer than three different vertices",
             "draw an area, or a POINT or LINESTRING with a radius",
         )
         return np.empty((0, 2))
@@ -106,11 +106,11 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
         coordinates = unwrapped(coordinates)
         if float(np.ptp(coordinates[:, 0])) > DATE_LINE_DEG:
             findings.add(
-                Severity.WARNING, Code.ANTIMERIDIAN, place,
+                FindingLevel.WARNING, Code.ANTIMERIDIAN, place,
                 "the ring spans more than 180 degrees of longitude and is read as crossing the antimeridian",
             )
         if not math.isclose(coordinates[0, 0], coordinates[-1, 0], abs_tol=1e-6):
-            findings.add(Severity.ERROR, Code.ANTIMERIDIAN, place, "the ring goes round a pole", "cut it in two")
+            findings.add(FindingLevel.ERROR, Code.ANTIMERIDIAN, place, "the ring goes round a pole", "cut it in two")
             return np.empty((0, 2))
     return coordinates
 
@@ -121,7 +121,7 @@ def _on_globe(coordinates: NDArray[np.float64], place: str, findings: Findings) 
     if lat_bad.any():
         vertex = coordinates[int(np.argmax(lat_bad))]
         findings.add(
-            Severity.ERROR, Code.SWAPPED_AXES if abs(vertex[0]) <= 90.0 else Code.OUT_OF_RANGE, place,
+            FindingLevel.ERROR, Code.SWAPPED_AXES if abs(vertex[0]) <= 90.0 else Code.OUT_OF_RANGE, place,
             f"latitude {vertex[1]:g} is outside ±90 degrees",
             'latitude and longitude look swapped: try --axis latlon (or axis = "latlon")'
             if abs(vertex[0]) <= 90.0 else "write WGS 84 degrees",
@@ -130,7 +130,7 @@ def _on_globe(coordinates: NDArray[np.float64], place: str, findings: Findings) 
     lon_bad = np.abs(coordinates[:, 0]) > 360.0
     if lon_bad.any():
         findings.add(
-            Severity.ERROR, Code.OUT_OF_RANGE, place,
+            FindingLevel.ERROR, Code.OUT_OF_RANGE, place,
             f"longitude {coordinates[int(np.argmax(lon_bad)), 0]:g} is outside ±180 degrees", "write WGS 84 degrees",
         )
     return not lon_bad.any()
@@ -153,7 +153,7 @@ def _repaired(polygon: Polygon, kind: ZoneKind, place: str, findings: Findings) 
     code = Code.SELF_CROSSING if "intersect" in reason.lower() else Code.DEGENERATE
     name = "the ring crosses itself" if code is Code.SELF_CROSSING else "the polygon is not valid"
     findings.add(
-        Severity.ERROR, code, place, f"{name} ({_plain(reason)}); {effect}",
+        FindingLevel.ERROR, code, place, f"{name} ({_plain(reason)}); {effect}",
         _REDRAW,
     )
     return pieces

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from shapely.geometry import LineString, Point
 
-from companion.geofence.document import Code, Document, Mark, Severity, Track
+from companion.geofence.document import Code, Document, FindingLevel, Mark, Track
 from companion.geofence.formats.losses import Losses
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import Zone, ZoneKind, unwrapped, wrap_lon_deg
@@ -47,7 +47,7 @@ def route_of(document: Document, losses: Losses) -> list[RoutePoint]:
         out.append((item.point, item.alt_m, name))
     losses.drop("placeless mission command", placeless)
     if plain:
-        losses.add(Severity.WARNING, f"{plain} mission items become plain waypoints in this format")
+        losses.add(FindingLevel.WARNING, f"{plain} mission items become plain waypoints in this format")
     return out
 
 
@@ -77,14 +77,15 @@ def pins_as_route(
             route.append(pin)
     if route:
         start = ", the one called start for the start" if len(route) < len(pins) else ""
-        findings.add(Severity.NOTE, Code.FORMAT, "",
+        findings.add(FindingLevel.NOTE, Code.FORMAT, "",
                      f"{counted(len(route), 'pin')} taken for places to sail to, in the file's order{start}")
 
 
 def pins_as_dangers(pins: Sequence[RoutePoint], kind: ZoneKind, findings: Findings) -> list[Mark]:
     """Return pins beside a line, which tells the way itself, as what they are on a chart of dangers."""
     if pins:
-        findings.add(Severity.NOTE, Code.FORMAT, "", f"{counted(len(pins), 'pin')} beside the line taken for dangers")
+        findings.add(
+            FindingLevel.NOTE, Code.FORMAT, "", f"{counted(len(pins), 'pin')} beside the line taken for dangers")
     return [Mark(geometry=Point(p.lon_deg, p.lat_deg), kind=kind, name=name) for p, _, name in pins]
 
 

@@ -19,7 +19,7 @@ from shapely.geometry import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from companion.errors import InputError
-from companion.geofence.document import Code, Document, Mark, Severity
+from companion.geofence.document import Code, Document, FindingLevel, Mark
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.formats.untrusted import MAX_POSITIONS, require_shallow
 from companion.geofence.shapes import Zone, ZoneKind, drawn, wrap_lon_deg
@@ -92,7 +92,7 @@ def read_wkt(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, lat
             _collect(name, body, statement, kind, findings=findings, zones=zones, marks=marks)
         held += scanner.positions
     if not zones and not marks and not findings:
-        findings.add(Severity.ERROR, Code.EMPTY, "", "holds no geometry", "an empty file is not 'no obstacles'")
+        findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no geometry", "an empty file is not 'no obstacles'")
     return Document(
         source=source, format="wkt", zones=tuple(zones), marks=tuple(marks), findings=tuple(findings)
     )
@@ -105,7 +105,7 @@ def _collect(
     own, place = statement.kind or kind, f"line {statement.line}"
     if body is None:
         findings.add(
-            Severity.ERROR, Code.EMPTY, place, f"{name} EMPTY holds nothing",
+            FindingLevel.ERROR, Code.EMPTY, place, f"{name} EMPTY holds nothing",
             "draw it or remove it; an empty obstacle is not 'no obstacles'",
         )
         return
@@ -113,7 +113,7 @@ def _collect(
         coordinates = [tuple(c) for c in body] if isinstance(body, list) else []
         if any(abs(y) > 90.0 or abs(x) > 360.0 for x, y in coordinates):
             findings.add(
-                Severity.ERROR, Code.SWAPPED_AXES, place, "a position is not on the globe (lat ±90, lon ±180)",
+                FindingLevel.ERROR, Code.SWAPPED_AXES, place, "a position is not on the globe (lat ±90, lon ±180)",
                 "are they swapped? try --axis latlon",
             )
             return
@@ -185,7 +185,7 @@ class _Scanner:
             self._at = srid.end()
             if srid.group(1) not in {"0", "4326"}:
                 findings.add(
-                    Severity.ERROR, Code.WRONG_SRID, f"line {line}", f"SRID {srid.group(1)} is not WGS 84 degrees",
+                    FindingLevel.ERROR, Code.WRONG_SRID, f"line {line}", f"SRID {srid.group(1)} is not WGS 84 degrees",
                     "transform it to EPSG:4326 first (ST_Transform, QGIS 'Save as')",
                 )
         self._kind, self._word = self._next()
@@ -248,7 +248,7 @@ class _Scanner:
             return
         if dims:
             self._findings.add(
-                Severity.NOTE, Code.DROPPED, self._place(), f"the {dims} coordinates are not used"
+                FindingLevel.NOTE, Code.DROPPED, self._place(), f"the {dims} coordinates are not used"
             )
         yield from self._body(name)
 

@@ -12,7 +12,7 @@ import msgspec
 
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
-from companion.geofence.document import Code, Document, Finding, Severity
+from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.fence_items import items_to_zones
 from companion.geofence.formats.losses import Written
 from companion.geofence.formats.qgc_plan import read_plan, write_plan
@@ -86,7 +86,7 @@ class DrawnCourse:
     @property
     def refusals(self) -> tuple[Finding, ...]:
         """What of it cannot be sailed."""
-        return tuple(f for f in self.findings if f.severity is Severity.ERROR)
+        return tuple(f for f in self.findings if f.severity is FindingLevel.ERROR)
 
 
     def skipper(self, options: SkipperOptions) -> SkipperOptions:
@@ -124,7 +124,8 @@ def course_of(items: Sequence[MissionItem]) -> DrawnCourse:
     final = walked[-1] if walked and end != "home" else None
     station_s = 0.0 if final is None else max(0.0, _stay_s(items[final - 1]))
     if final is not None and station_s > 0.0:
-        found.say(final, f"{found.name(final)} of {station_s:g} s is the last: she stays until told", "", Severity.NOTE)
+        found.say(
+            final, f"{found.name(final)} of {station_s:g} s is the last: she stays until told", "", FindingLevel.NOTE)
     stays = {n: max(0.0, _stay_s(items[n - 1])) for n in walked}
     if final is not None and walked.count(final) == 1:
         stays[final] = 0.0   # the mission's own end keeps the boat
@@ -145,8 +146,8 @@ class _Found:
     def name(self, number: int) -> str:
         return command_name(self._items[number - 1].command)
 
-    def say(self, number: int, text: str, remedy: str = REDRAW, severity: Severity = Severity.ERROR) -> None:
-        code = Code.NOT_CARRIED if severity is Severity.ERROR else Code.DROPPED
+    def say(self, number: int, text: str, remedy: str = REDRAW, severity: FindingLevel = FindingLevel.ERROR) -> None:
+        code = Code.NOT_CARRIED if severity is FindingLevel.ERROR else Code.DROPPED
         self._findings.setdefault((number, text), Finding(
             severity=severity, code=code, place=f"item {number}", text=text, remedy=remedy))
 
@@ -286,7 +287,7 @@ def drawn_mission(document: Document, settings: MissionOptions, path: Path, plan
         InputError: a file that the settings name, or what they say, cannot be believed.
     """
     course = course_of(document.items)
-    refusals = [*(f for f in document.findings if f.severity is Severity.ERROR), *course.refusals]
+    refusals = [*(f for f in document.findings if f.severity is FindingLevel.ERROR), *course.refusals]
     refusals += [_refusal(f"rally point {n}", "has no place (0, 0)") for n, r in enumerate(document.rally, start=1)
                  if not (r.lat_e7 or r.lon_e7)]
     if not document.items:
@@ -318,7 +319,7 @@ def drawn_mission(document: Document, settings: MissionOptions, path: Path, plan
                 for place, problem, remedy in place_troubles(mission)]
     if refusals:
         return DrawnMission(mission=None, refusals=tuple(refusals))
-    notes = [f for f in (*document.findings, *course.findings) if f.severity is not Severity.ERROR]
+    notes = [f for f in (*document.findings, *course.findings) if f.severity is not FindingLevel.ERROR]
     if not any(z.kind is ZoneKind.INCLUSION for z in mission.area.fence.zones):
         solids = "nothing but its keep-out zones" if mission.area.solids else "nothing at all"
         notes.append(_note(f"there is no fence to stay inside of: {solids} limits the water that a plan may use"))
@@ -349,8 +350,8 @@ def offer(items: Sequence[MissionItem], *, adopts: bool) -> str:
 
 
 def _refusal(place: str, text: str, remedy: str = REDRAW) -> Finding:
-    return Finding(severity=Severity.ERROR, code=Code.NOT_CARRIED, place=place, text=text, remedy=remedy)
+    return Finding(severity=FindingLevel.ERROR, code=Code.NOT_CARRIED, place=place, text=text, remedy=remedy)
 
 
 def _note(text: str) -> Finding:
-    return Finding(severity=Severity.NOTE, code=Code.NOT_CARRIED, place="", text=text)
+    return Finding(severity=FindingLevel.NOTE, code=Code.NOT_CARRIED, place="", text=text)

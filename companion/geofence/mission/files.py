@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from companion.geofence.document import Document, Finding, Severity
+from companion.geofence.document import Document, Finding, FindingLevel
 from companion.geofence.formats.losses import Losses, Written
 from companion.geofence.formats.registry import write
 from companion.geofence.mission.autopilot_mission import MissionStop, course_of
@@ -38,17 +38,17 @@ def goal_losses(mission: Mission) -> Losses:
     """Return what of a mission no other format carries."""
     losses = Losses()
     if any(g.rounding for g in mission.goals):
-        losses.add(Severity.WARNING, "the side on which marks are left is not carried by this format")
+        losses.add(FindingLevel.WARNING, "the side on which marks are left is not carried by this format")
     if any(g.gate is not None for g in mission.goals):
-        losses.add(Severity.WARNING, "of a gate only the middle between its marks is carried by this format")
+        losses.add(FindingLevel.WARNING, "of a gate only the middle between its marks is carried by this format")
     if any(g.box or g.search for g in mission.goals):
-        losses.add(Severity.WARNING, "of a box or a search only its roomiest place is carried by this format")
+        losses.add(FindingLevel.WARNING, "of a box or a search only its roomiest place is carried by this format")
     if any(g.field for g in mission.goals):
-        losses.add(Severity.WARNING, "of a field only the place where the mission leads meanwhile is carried by this "
-                   "format")
+        losses.add(FindingLevel.WARNING,
+                   "of a field only the place where the mission leads meanwhile is carried by this format")
     plain = replace_defaults(mission.options)
     if plain:
-        losses.add(Severity.NOTE, f"the mission's own settings ({', '.join(plain)}) are not carried by this format")
+        losses.add(FindingLevel.NOTE, f"the mission's own settings ({', '.join(plain)}) are not carried by this format")
     return losses
 
 
@@ -93,8 +93,8 @@ def mission_files(
     losses = Losses()
     course = course_of(() if goals else document.items)
     for finding in course.findings:
-        is_loss = finding.severity is Severity.ERROR
-        losses.add(Severity.WARNING if is_loss else Severity.NOTE,
+        is_loss = finding.severity is FindingLevel.ERROR
+        losses.add(FindingLevel.WARNING if is_loss else FindingLevel.NOTE,
                    f"{finding.place}: {finding.text}" + (": not carried over" if is_loss else ""))
     names = document.item_names or ("",) * len(document.items)
     points = [MissionStop(number=n, point=point).goal("", radius_m) for n, point in enumerate(goals, start=1)]

@@ -36,7 +36,7 @@ WATER_M = 3000.0     # across: what a field speaks of, or leads out of, is looke
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Gate:
+class GoalGate:
     """Two marks to pass between, the port one on the port hand; with a time a start line.
 
     ``keep_m`` is kept clear of each; ``not_before_s`` is Unix time, ``after_s`` counts from setting sail.
@@ -50,7 +50,7 @@ class Gate:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Box:
+class GoalBox:
     """Water to stay in: for ``for_s`` from entry on, None: until told to go on."""
 
     shape: Shape
@@ -58,7 +58,7 @@ class Box:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Search:
+class GoalSearch:
     """Water to be looked at: what is seen from the track is ``swath_m`` wide; ``coverage`` of it is asked for."""
 
     shape: Shape
@@ -67,7 +67,7 @@ class Search:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ByField:
+class GoalField:
     """A field to sail by: its expression, what ends it, the water that this speaks of."""
 
     text: str
@@ -77,7 +77,7 @@ class ByField:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Goal:
+class MissionGoal:
     """A mark, reached inside ``radius_m``; ``rounding`` says which side of the boat it is left to.
 
     With ``gate`` two marks to pass between: ``point`` is the middle, and ``radius_m`` about it is for previews alone.
@@ -91,10 +91,10 @@ class Goal:
     rounding: str | None = None
     name: str = ""
     bandwidth_m: float | None = None
-    gate: Gate | None = None
-    box: Box | None = None
-    search: Search | None = None
-    field: ByField | None = None
+    gate: GoalGate | None = None
+    box: GoalBox | None = None
+    search: GoalSearch | None = None
+    field: GoalField | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,11 +119,11 @@ class GoalReader:
             return GeoPoint(lat_deg=options.start.lat, lon_deg=options.start.lon)
         return self._goal(options.goal[0], "[[goal]] 1", Area()).point
 
-    def goals_of(self, options: MissionOptions, area: Area) -> tuple[Goal, ...]:
+    def goals_of(self, options: MissionOptions, area: Area) -> tuple[MissionGoal, ...]:
         """Return the goals; ``area`` is what leaves room in a box."""
         return tuple(self._goal(goal, f"[[goal]] {n}", area) for n, goal in enumerate(options.goal, start=1))
 
-    def _goal(self, goal: GoalOptions, place: str, area: Area) -> Goal:
+    def _goal(self, goal: GoalOptions, place: str, area: Area) -> MissionGoal:
         if isinstance(goal, GateOptions):
             return _gate(goal, str(self.path), place)
         if isinstance(goal, BoxOptions):
@@ -132,8 +132,8 @@ class GoalReader:
             return self._search(goal, place, area)
         point = GeoPoint(lat_deg=goal.lat, lon_deg=goal.lon)
         if isinstance(goal, FieldOptions):
-            return Goal(point=point, radius_m=goal.radius_m, name=goal.name, field=self._by_field(goal, place))
-        return Goal(point=point, radius_m=goal.radius_m, rounding=goal.rounding, name=goal.name,
+            return MissionGoal(point=point, radius_m=goal.radius_m, name=goal.name, field=self._by_field(goal, place))
+        return MissionGoal(point=point, radius_m=goal.radius_m, rounding=goal.rounding, name=goal.name,
                     bandwidth_m=goal.bandwidth_m)
 
     def waters_of(self, options: MissionOptions) -> dict[str, Shape]:
@@ -141,7 +141,7 @@ class GoalReader:
         return {name: self._water(atom.polygon, f"[field.{name}] polygon") for name, atom in options.field.items()
                 if isinstance(atom, LeaveAtomOptions)}
 
-    def _by_field(self, goal: FieldOptions, place: str) -> ByField:
+    def _by_field(self, goal: FieldOptions, place: str) -> GoalField:
         source, needs_water = str(self.path), goal.until in {"vessel", "outside"}
         if goal.until == "time" and goal.for_s is None:
             raise InputError(source, f"{place} until", '"time" says no time', "add for_s")
@@ -151,7 +151,7 @@ class GoalReader:
             raise InputError(source, f"{place} polygon", f'until = "{goal.until}" does not ask for any water',
                              'leave it out, or write until = "vessel" or "outside"')
         shape = None if goal.polygon is None else self._water(goal.polygon, f"{place} polygon")
-        return ByField(text=goal.field, until=goal.until, for_s=goal.for_s, shape=shape)
+        return GoalField(text=goal.field, until=goal.until, for_s=goal.for_s, shape=shape)
 
     def _water(self, text: str, place: str) -> Shape:
         shape = self._shape(text, place)
@@ -162,7 +162,7 @@ class GoalReader:
                              f"{WATER_M / 1000.0:g} km are the most for what a field leads out of or watches")
         return shape
 
-    def _box(self, goal: BoxOptions, place: str, area: Area) -> Goal:
+    def _box(self, goal: BoxOptions, place: str, area: Area) -> MissionGoal:
         shape = self._shape(goal.polygon, f"{place} polygon")
         frame = LocalFrame(center_of(shape))
         water = free_water(shape, frame, area)
@@ -171,10 +171,10 @@ class GoalReader:
         if room is None or room_m < LOITER_ROOM_M:
             raise InputError(str(self.path), place, f"the roomiest place in it has {room_m:.0f} m about it: a loiter "
                              f"needs {LOITER_ROOM_M:g} m", "draw a larger box, or in freer water")
-        return Goal(point=frame.geo_from_en(*room.coords[0]), radius_m=room_m, name=goal.name,
-                    box=Box(shape=shape, for_s=goal.for_s))
+        return MissionGoal(point=frame.geo_from_en(*room.coords[0]), radius_m=room_m, name=goal.name,
+                    box=GoalBox(shape=shape, for_s=goal.for_s))
 
-    def _search(self, goal: SearchOptions, place: str, area: Area) -> Goal:
+    def _search(self, goal: SearchOptions, place: str, area: Area) -> MissionGoal:
         shape = self._shape(goal.polygon, f"{place} polygon")
         frame = LocalFrame(center_of(shape))
         whole, water = polygon_en(shape, frame, cover=False), free_water(shape, frame, area)
@@ -190,8 +190,8 @@ class GoalReader:
             raise InputError(str(self.path), f"{place} swath_m", f"{goal.swath_m:g} m is wider than the area itself",
                              "write what is seen from the track, or make it a point to sail to")
         room = shapely.maximum_inscribed_circle(water, tolerance=0.5)
-        return Goal(point=frame.geo_from_en(*room.coords[0]), radius_m=float(room.length), name=goal.name,
-                    search=Search(shape=shape, swath_m=goal.swath_m, coverage=goal.coverage))
+        return MissionGoal(point=frame.geo_from_en(*room.coords[0]), radius_m=float(room.length), name=goal.name,
+                    search=GoalSearch(shape=shape, swath_m=goal.swath_m, coverage=goal.coverage))
 
     def _shape(self, text: str, place: str) -> Shape:
         """Return the one polygon or circle that WKT, or a file, holds."""
@@ -231,7 +231,7 @@ def refuges_of(options: MissionOptions) -> tuple[RefugePoint, ...]:
         for n, r in enumerate(options.refuge, start=1))
 
 
-def _gate(goal: GateOptions, source: str, place: str) -> Goal:
+def _gate(goal: GateOptions, source: str, place: str) -> MissionGoal:
     port, starboard = _point(goal.port_mark), _point(goal.starboard_mark)
     frame = LocalFrame(port)
     east_m, north_m = frame.en_from_geo(starboard)
@@ -246,9 +246,10 @@ def _gate(goal: GateOptions, source: str, place: str) -> Goal:
     if width_m > WIDEST_M:
         raise InputError(source, place, f"its marks are {width_m / 1000.0:.1f} km apart",
                          "are lat and lon right? a line is 2 km long at the most")
-    gate = Gate(port=port, starboard=starboard, keep_m=goal.mark_radius_m, after_s=goal.after_s,
+    gate = GoalGate(port=port, starboard=starboard, keep_m=goal.mark_radius_m, after_s=goal.after_s,
                 not_before_s=None if goal.not_before is None else goal.not_before.timestamp())
-    return Goal(point=frame.geo_from_en(0.5 * east_m, 0.5 * north_m), radius_m=PREVIEW_M, name=goal.name, gate=gate)
+    middle = frame.geo_from_en(0.5 * east_m, 0.5 * north_m)
+    return MissionGoal(point=middle, radius_m=PREVIEW_M, name=goal.name, gate=gate)
 
 
 def _point(mark: MarkOptions) -> GeoPoint:

@@ -14,10 +14,10 @@ from companion.disk import open_regular
 from companion.errors import InputError, unreadable
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
-from companion.geofence.document import Code, Document, Finding, Severity
+from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.registry import FAR_M, check_place, parse, read
 from companion.geofence.formats.untrusted import decode
-from companion.geofence.mission.goals import Gate, Goal, GoalReader, RefugePoint, refuges_of
+from companion.geofence.mission.goals import GoalGate, GoalReader, MissionGoal, RefugePoint, refuges_of
 from companion.geofence.mission.options import (
     AreaOptions,
     AutopilotOptions,
@@ -50,7 +50,7 @@ class Mission:
     """
 
     options: MissionOptions
-    goals: tuple[Goal, ...]
+    goals: tuple[MissionGoal, ...]
     start: GeoPoint | None
     area: Area
     path: Path
@@ -289,7 +289,7 @@ def load_area(
             _require(path, str(mission_path), f"[area] {key}", "paths are relative to the mission file")
             document = read(path, kind=kind, axis=options.axis, near=origin, areas=True,
                             far_m=far_m).require_clean()
-        findings.extend(f for f in document.findings if f.severity is not Severity.NOTE)
+        findings.extend(f for f in document.findings if f.severity is not FindingLevel.NOTE)
         return document
 
     for name in options.obstacles:
@@ -389,7 +389,7 @@ def trouble_at(local: LocalArea, point_en: tuple[float, float]) -> str:
     return ""
 
 
-def gate_trouble(gate: Gate, frame: LocalFrame, local: LocalArea, floor_m: float) -> str:
+def gate_trouble(gate: GoalGate, frame: LocalFrame, local: LocalArea, floor_m: float) -> str:
     """Return why a gate cannot be sailed through ("" when it can): what stands nearer to its opening than the floor."""
     marks = np.asarray([frame.en_from_geo(gate.port), frame.en_from_geo(gate.starboard)])
     share = gate.keep_m / float(np.hypot(*(marks[1] - marks[0])))
@@ -423,4 +423,4 @@ def name_findings(name: str | None, path: Path) -> tuple[Finding, ...]:
         remedy = "write it with letters and digits"
     else:
         return ()
-    return (Finding(severity=Severity.WARNING, code=Code.FORMAT, place="name", text=text, remedy=remedy),)
+    return (Finding(severity=FindingLevel.WARNING, code=Code.FORMAT, place="name", text=text, remedy=remedy),)

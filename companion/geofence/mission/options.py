@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 from msgspec import Meta, Struct
 
-from companion.planners import ALGORITHMS, Key
+from companion.planners import ALGORITHMS, MissionKey
 from companion.safety import CHOICES, ENDINGS, FAILSAFES, SETTINGS, WORD_OF, End, Setting
 
 # ``[[goal]]``: what a mission TOML may say of a goal, one struct per kind. Without ``kind`` it is a point.
@@ -312,7 +312,7 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """The same over a satellite link (``companion run --far``)."""
 
 
-def _planner_key(key: Key) -> tuple[str, Any, None]:
+def _planner_key(key: MissionKey) -> tuple[str, Any, None]:
     """Return a number of a planner as a field: its key, what it may be; not said it is the planner's default."""
     if key.words:
         return key.key, Literal[key.words] | None, None

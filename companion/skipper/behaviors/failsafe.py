@@ -23,14 +23,14 @@ from companion.safety import (
     RECEIVER,
     SHORE,
     STOPPING,
-    Answer,
+    Recovery,
     standing,
     told_by,
 )
 from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.state import PATIENT, Adrift, ByField, Phase, Signs, Stop
+from companion.skipper.step.state import PATIENT, Adrift, FieldSteering, Phase, Signs, Stop
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.voyage import PointEn
 
@@ -139,7 +139,7 @@ def take_over(ctx: StepContext) -> bool:
     if stop is None or not stop.is_armed or stop.cause == PERSON or not (may.may_set_mode and may.may_upload):
         return False
     answer = ctx.config.ends.answer(stop.cause)
-    if answer is None or answer is Answer.LEAVE or stop.mode is None:
+    if answer is None or answer is Recovery.LEAVE or stop.mode is None:
         return False
     ctx.set(
         steering=changed(ctx.state.steering, own_mode=stop.mode),
@@ -240,7 +240,7 @@ def follow_answer(ctx: StepContext) -> None:
             ctx.set(
                 operator=changed(ctx.state.operator, answering="", stop=replace(stop, cause=PERSON)),
                 steering=changed(ctx.state.steering, own_mode=None))
-        elif stop is not None and ctx.config.ends.answer(stop.cause) is not Answer.LEAVE:
+        elif stop is not None and ctx.config.ends.answer(stop.cause) is not Recovery.LEAVE:
             ctx.set(operator=changed(ctx.state.operator, answering=stop.cause))   # a better sign came late
         return
     if ctx.autopilot.mode is Mode.AUTO and not _has_asked_for_auto(ctx):
@@ -249,7 +249,7 @@ def follow_answer(ctx: StepContext) -> None:
         return
     # of the others a person says so
     is_over = state.operator.answering == SHORE and SHORE not in state.operator.signs.standing
-    if is_over or ctx.config.ends.answer(state.operator.answering) is Answer.SAIL_ON:
+    if is_over or ctx.config.ends.answer(state.operator.answering) is Recovery.SAIL_ON:
         ctx.set(operator=changed(ctx.state.operator, answering=""))
 
 
@@ -272,7 +272,7 @@ def begin_again(ctx: StepContext) -> None:
         mission=changed(ctx.state.mission, checked=False, read_since_s=ctx.t_s),
         steering=changed(ctx.state.steering, own_mode=None, until_s=None),
         pending=changed(ctx.state.pending, command=None),
-        by_field=ByField(),
+        by_field=FieldSteering(),
         operator=changed(ctx.state.operator, answering="", stop=None, signs=Signs()),
         adrift=Adrift())
     if not keeps:
@@ -299,7 +299,7 @@ def operator_has_it(ctx: StepContext) -> bool:
             operator=changed(ctx.state.operator, since_s=ctx.t_s),
             pending=changed(ctx.state.pending, plan=None, command=None),
             steering=changed(ctx.state.steering, own_mode=None, until_s=None),
-            by_field=ByField())
+            by_field=FieldSteering())
         if take_over(ctx):
             return False
         ctx.phase(Phase.OPERATOR, f"{_taken(ctx)}, not by us: the companion does nothing until AUTO comes back")

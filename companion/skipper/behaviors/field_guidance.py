@@ -32,7 +32,7 @@ from companion.skipper.planning.waits import stay_left_s, utc_s
 from companion.skipper.step.actions import ReplanReason, SteerHeading
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.state import ByField, Inside
+from companion.skipper.step.state import FieldSteering, Inside
 from companion.skipper.step.state import Phase as Doing
 from companion.skipper.way.gates import Gate, marks_of
 from companion.skipper.way.geometry import distance_m
@@ -244,12 +244,12 @@ def last_resort(ctx: StepContext) -> bool:
     elif memory.seen_guided and status.mode is Mode.AUTO and not is_busy(ctx, Mode.GUIDED.name):
         ctx.set(
             steering=changed(ctx.state.steering, own_mode=None),
-            by_field=ByField(not_before_s=ctx.t_s + LEFT_ALONE_S))
+            by_field=FieldSteering(not_before_s=ctx.t_s + LEFT_ALONE_S))
         ctx.say(Severity.NOTICE, "last resort over", "somebody set AUTO: the field lets go", every_s=0.0)
         return False
     resort = memory.resort.step(ctx.t_s, too_near=raised, can_plan=_is_planned(ctx), clear_s=0.0)
     if memory.resort.engaged and not resort.engaged:
-        ctx.set(by_field=ByField())
+        ctx.set(by_field=FieldSteering())
         ctx.say(Severity.NOTICE, "last resort over", f"the way is clear again after "
                  f"{ctx.t_s - memory.resort.since_s:.0f} s: back to AUTO and the plan", every_s=0.0)
         return False

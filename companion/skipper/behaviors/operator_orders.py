@@ -23,7 +23,7 @@ from companion.skipper.step.actions import Acknowledge, CancelPlan, ReplanReason
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Kind
 from companion.skipper.step.saved import Standing
-from companion.skipper.step.state import PATIENT, Answered, ByField, Phase
+from companion.skipper.step.state import PATIENT, Answered, FieldSteering, Phase
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import PointEn
@@ -242,7 +242,7 @@ def _stop(ctx: StepContext, order: Order) -> Answer:
     ctx.set(
         pending=changed(ctx.state.pending, read=None, command=None),
         steering=changed(ctx.state.steering, until_s=None),
-        by_field=ByField(),
+        by_field=FieldSteering(),
         plans=changed(ctx.state.plans, asked="", ready_route=None))
     mode = "an unknown mode" if status is None or status.mode is None else status.mode.name
     upload = ", but for the end of an upload that is under way" if is_busy else ""

@@ -30,7 +30,7 @@ from companion.skipper.step.snapshot import WindBefore
 from companion.skipper.step.state import Phase
 from companion.skipper.way.drift import HORIZON_S, drift_ahead
 from companion.skipper.way.geometry import distance_m, moved
-from companion.skipper.way.voyage import Area, PointEn, water_at
+from companion.skipper.way.voyage import AreaLike, PointEn, water_at
 
 SAID_S = 60.0                       # between two words on a wind that is not known
 SEA_ROOM = "sea room"               # the rung of a route that leads there, and the code under which it is said
@@ -140,7 +140,7 @@ def seeks_sea_room(ctx: StepContext) -> bool:
     return True
 
 
-def _is_on_the_way(ctx: StepContext, water: Area, boat: PointEn, place: PointEn) -> bool:
+def _is_on_the_way(ctx: StepContext, water: AreaLike, boat: PointEn, place: PointEn) -> bool:
     """Return whether the leg to sea room is clear, and sailed, just begun, or ends in a loiter that is not driven off.
 
     Not whether the winds of now allow it: what a turned vane tells of the true wind changes with the boat's own speed.
@@ -155,7 +155,7 @@ def _is_on_the_way(ctx: StepContext, water: Area, boat: PointEn, place: PointEn)
     return made_good_mps >= WAY_MPS or ctx.t_s - ctx.state.mission.uploaded_s < TURNS_S
 
 
-def _left_s(water: Area, place: PointEn, wind: DoubtedWind, floor_m: float) -> float:
+def _left_s(water: AreaLike, place: PointEn, wind: DoubtedWind, floor_m: float) -> float:
     """Return for how long a LOITER that begins at a place keeps the floor [s], at most ``HORIZON_S``."""
     east, north = wind.drift_en_mps
     least_s = HORIZON_S
@@ -167,7 +167,8 @@ def _left_s(water: Area, place: PointEn, wind: DoubtedWind, floor_m: float) -> f
 
 
 def _sea_room(
-    water: Area, boat: PointEn, ahead: PointEn, wind: DoubtedWind, *, no_go_half_rad: float, clear_m: Sequence[float],
+    water: AreaLike, boat: PointEn, ahead: PointEn, wind: DoubtedWind, *, no_go_half_rad: float,
+    clear_m: Sequence[float],
 ) -> tuple[PointEn, float] | None:
     """Return the nearest place from which a LOITER drifts clear, else the one from which it does so longest [s].
 

@@ -101,7 +101,7 @@ def _may_still_turn_before(ctx: StepContext, waypoint_en: PointEn) -> bool:
 
 
 def _place(ctx: StepContext, pending: PendingPlan) -> tuple[int | None, int | None]:
-    """Return how many items stay and which seq must be made current (None: none; keep None: too late)."""
+    """Return how many items stay and which seq must be made current (None: as it is; keep None: too late)."""
     state, k = ctx.state, pending.from_index
     if state.mission.route is None or state.mission.foreign:
         return 0, 1

@@ -12,12 +12,12 @@ from dataclasses import replace
 from companion.boat import Boat
 from companion.messages import Severity
 from companion.orders import Verb
-from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, Answer, End
+from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, End, Recovery
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step.config import SafeEnd, SkipperConfig
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import HOME_RADIUS_M, Diversion, Kind
-from companion.skipper.way.autopilot_fence import Circle, Drawn
+from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
 from companion.skipper.way.gates import Gate, marks_of
 from companion.skipper.way.geometry import disc_wkt, distance_m
 from companion.skipper.way.voyage import PointEn, Refuge
@@ -100,7 +100,7 @@ def pressing(ctx: StepContext) -> Diversion | None:
     answer = ends.answer(state.operator.answering)
     why = "the autopilot has lost its link to the shore" if state.operator.answering == SHORE else (
         f"the autopilot's {state.operator.answering} failsafe")
-    if answer is Answer.SHELTER:
+    if answer is Recovery.SHELTER:
         is_battery = state.operator.answering == "battery"
         # the boat is stopped: something must be done
         end = End.REFUGE if not is_battery or ends.end(BATTERY) is End.SAY else ends.end(BATTERY)
@@ -109,7 +109,7 @@ def pressing(ctx: StepContext) -> Diversion | None:
     ended = _ended_early(ctx, over_orders=True)
     if ended is not None:
         return ended
-    if answer is Answer.STAY:
+    if answer is Recovery.STAY:
         return (_home(ctx, why) if state.operator.sent_home else None) or _stay(ctx, why)
     return None
 
@@ -185,7 +185,7 @@ def fenced_off(ctx: StepContext, gate: Gate | None) -> str:
     return _fence_before(ctx, gate)[1]
 
 
-def _fence_before(ctx: StepContext, gate: Gate | None) -> tuple[Circle | Drawn | None, str]:
+def _fence_before(ctx: StepContext, gate: Gate | None) -> tuple[HomeCircle | Drawn | None, str]:
     """Return the autopilot's own fence that a goal cannot be sailed to for, and why; None: there is none."""
     if gate is not None and not ctx.state.voyage.over:
         floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)

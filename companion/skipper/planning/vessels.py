@@ -24,7 +24,7 @@ from companion.skipper.way.voyage import PointEn
 from companion.traffic import Conflict, Vessel, check_legs, path_distance_m, peril_m, planning_discs, predict
 from companion.traffic.colregs import expected
 from companion.traffic.occupancy import Keep
-from companion.traffic.plans import TimedLeg, pressing
+from companion.traffic.plans import PlainLeg, TimedLeg, pressing
 from companion.traffic.predict import tail_factor
 
 PART_BY_RUNG = (1.0, 4.0, 8.0)   # times the vessels' part of the promise, by the ladder's rung
@@ -40,16 +40,6 @@ NEAREST = 12                 # vessels that a plan looks at: half of them those 
 OWN_MPS = 4.0                # no boat of ours closes faster by itself
 FAR_RISK = 1e-2              # that a vessel is nearer than counted when those that could be met are chosen
 HAIR_M = 1.0                 # a boat within a disc is let out of it: the disc ends this much before the boat
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Leg:
-    """A leg of the route in time, from now on [s]; ``companion.traffic.plans.TimedLeg``."""
-
-    from_en: PointEn
-    to_en: PointEn
-    start_s: float
-    end_s: float
 
 
 def near(ctx: StepContext) -> tuple[Vessel, ...]:
@@ -150,7 +140,7 @@ def shares(ctx: StepContext, start_en: PointEn, after_s: float, rung: int, delta
     return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)
 
 
-def timed_legs(ctx: StepContext, points: Sequence[PointEn] | None = None) -> tuple[Leg, ...]:
+def timed_legs(ctx: StepContext, points: Sequence[PointEn] | None = None) -> tuple[PlainLeg, ...]:
     """Return a way from the boat through ``points``, or what is left of the route, timed by the polar in mean wind."""
     boat, wind, vehicle = ctx.boat_en, ctx.wind_mean, ctx.snapshot.vehicle
     if boat is None or wind is None or vehicle is None:
@@ -168,7 +158,7 @@ def timed_legs(ctx: StepContext, points: Sequence[PointEn] | None = None) -> tup
             speed *= math.cos(closed) / math.cos(twa)   # the autopilot will beat there
         begin = t_s + abs(difference_rad(course, heading)) / model.turn_rate_radps
         t_s = begin + length / max(speed, LOST_MPS)
-        legs.append(Leg(from_en=a, to_en=b, start_s=begin, end_s=t_s))
+        legs.append(PlainLeg(from_en=a, to_en=b, start_s=begin, end_s=t_s))
         heading = course
     return tuple(legs)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from companion.orders import ALL
 from companion.planners import AUTO, PlannerChoice
-from companion.safety import CAUSES, CHOICES, ENDINGS, SETTINGS, Answer, End
+from companion.safety import CAUSES, CHOICES, ENDINGS, SETTINGS, End, Recovery
 from companion.traffic import Policy
 
 
@@ -62,7 +62,7 @@ class Ends:
         value = dict(self.said).get(key, SETTINGS[key].default)
         return None if value is None else float(value)
 
-    def answer(self, cause: str) -> Answer | None:
+    def answer(self, cause: str) -> Recovery | None:
         """Return what is done about a stop by this cause, None: it is nobody's failsafe."""
         known = CAUSES.get(cause)
         return None if known is None else CHOICES.get(str(dict(self.said).get(known.key)), known.answer)

@@ -34,7 +34,7 @@ from companion.skipper.step.state import (
     Adrift,
     Alarms,
     Announced,
-    ByField,
+    FieldSteering,
     GoalProgress,
     LoadedMission,
     OperatorState,
@@ -52,7 +52,7 @@ from companion.skipper.step.state import (
     VoyageState,
     is_given_up,
 )
-from companion.skipper.way.autopilot_fence import Circle, Drawn, circle_of, drawn_of
+from companion.skipper.way.autopilot_fence import Drawn, HomeCircle, circle_of, drawn_of
 from companion.skipper.way.gates import Approach, Gate, gates_of
 from companion.skipper.way.geometry import bearing_rad
 from companion.skipper.way.stemming import Water
@@ -83,7 +83,7 @@ def permitted(action: Action, permissions: Permissions) -> bool:
     return True
 
 
-def _kept_in(voyage: Voyage, drawn: Drawn | None, circle: Circle | None) -> Voyage:
+def _kept_in(voyage: Voyage, drawn: Drawn | None, circle: HomeCircle | None) -> Voyage:
     """Return the voyage in what the autopilot's own fence leaves of its water."""
     if drawn is not None:
         voyage = replace(voyage, area=drawn.left)
@@ -122,7 +122,7 @@ class StepContext:
         wants: tuple[str, ...] | None = None, vehicle: VehicleIdentity | None = None,
         mission: LoadedMission | None = None, progress: GoalProgress | None = None, voyage: VoyageState | None = None,
         plans: Planning | None = None, pending: Pending | None = None, operator: OperatorState | None = None,
-        steering: SteeringState | None = None, by_field: ByField | None = None, adrift: Adrift | None = None,
+        steering: SteeringState | None = None, by_field: FieldSteering | None = None, adrift: Adrift | None = None,
         tacking: Tacking | None = None, position: PositionState | None = None, orders: Orders | None = None,
         alarms: Alarms | None = None, traffic: TrafficState | None = None, announced: Announced | None = None,
     ) -> None:
@@ -385,7 +385,7 @@ class StepContext:
         return replace(self.config, no_go_half_rad=self.no_go_half_rad, tack_corridor_m=self.tack_corridor_m)
 
     @property
-    def fences(self) -> tuple[Circle | Drawn, ...]:
+    def fences(self) -> tuple[HomeCircle | Drawn, ...]:
         """The autopilot's own fences, where it has any that matter."""
         return tuple(fence for fence in (self.circle, self.drawn) if fence is not None)
 

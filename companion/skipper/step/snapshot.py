@@ -40,7 +40,7 @@ class WindHealth(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WindView:
+class WindEstimate:
     """The wind now and to come. ``mean`` is the 90 s mean and ``present`` the 5 s mean (Büsser 3.1.1)."""
 
     health: WindHealth = WindHealth.NONE
@@ -184,7 +184,7 @@ class Snapshot:
     autopilot: AutopilotStatus | None = None
     autopilot_age_s: float | None = None
     heartbeat_age_s: float | None = None
-    wind: WindView = WindView()
+    wind: WindEstimate = WindEstimate()
     current: WaterCurrent = STILL_WATER
     doubt: WindAngleUncertainty | None = None
     unsure: str = ""                       # why no plan may be made for wind and water now, in words; empty: it may
@@ -229,13 +229,13 @@ def wind_mean(snapshot: Snapshot) -> tuple[float, float] | None:
 # if it has one, tells is on record and in the status, and steers nothing.
 
 
-def still_air(t_s: float) -> WindView:
+def still_air(t_s: float) -> WindEstimate:
     """Return the wind that a motorboat is planned in: steady, believed, and of no consequence."""
     n = len(_HORIZONS_S)
     forecast = WindForecast(
         t_s=t_s, horizon_s=_HORIZONS_S, mean_twd_from_rad=np.zeros(n), sigma_twd_rad=np.full(n, SIGMA_RAD),
         mean_tws_mps=np.full(n, SPEED_MPS), sigma_tws_mps=np.full(n, SIGMA_RAD), level=_LEVELS,
         half_width_rad=np.full((n, len(_LEVELS)), SIGMA_RAD), correlation_time_s=3600.0)
-    return WindView(
+    return WindEstimate(
         health=WindHealth.GOOD, forecast=forecast, mean_twd_from_rad=0.0, mean_tws_mps=SPEED_MPS,
         sigma_twd_rad=SIGMA_RAD, present_twd_from_rad=0.0, present_tws_mps=SPEED_MPS, record_s=SETTLED_S)

@@ -194,7 +194,7 @@ class Adrift:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ByField:
+class FieldSteering:
     """Steering by field: the memory of the guidance and of the station keeper, and the last resort's."""
 
     resort: LastResort = field(default_factory=LastResort)
@@ -444,7 +444,7 @@ class SkipperState:
     pending: Pending = Pending()
     operator: OperatorState = OperatorState()
     steering: SteeringState = SteeringState()
-    by_field: ByField = ByField()
+    by_field: FieldSteering = FieldSteering()
     adrift: Adrift = Adrift()
     tacking: Tacking = NO_TACKS        # what the boat's tacks have told
     position: PositionState = PositionState()

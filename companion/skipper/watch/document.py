@@ -14,8 +14,8 @@ from companion.safety import (
     SETTINGS,
     TABLE,
     WORD_OF,
-    Answer,
     Cause,
+    Recovery,
     Setting,
     Watchdog,
 )
@@ -100,7 +100,7 @@ def _row(dog: Watchdog) -> str:
 
 def _cause(cause: Cause) -> str:
     words = ", ".join(f"`{text.strip()} …`" for text in cause.texts) or "–"
-    first = f"waits for {cause.waits_for}; " if cause.waits_for and cause.answer is not Answer.LEAVE else ""
+    first = f"waits for {cause.waits_for}; " if cause.waits_for and cause.answer is not Recovery.LEAVE else ""
     return (f"| {cause.name} | {words} | {cause.shown or '–'} | {first}{cause.answer.value} | {cause.press} | "
             f"{cause.why} |\n")
 

@@ -19,7 +19,7 @@ from companion.boat import AutopilotLimits
 from companion.geofence import Zone
 from companion.messages import AutopilotStatus
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from companion.skipper.way.voyage import Area, PointEn, Voyage
+from companion.skipper.way.voyage import AreaLike, PointEn, Voyage
 
 COARSE_M = 0.5     # home follows the boat while it is disarmed: not every step makes another area
 OUTSIDE_M = 5.0    # so far outside, an autopilot that keeps a fence has said so
@@ -27,7 +27,7 @@ STEP_M = 5.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Circle:
+class HomeCircle:
     """Around home, local [m]."""
 
     en_m: PointEn
@@ -56,7 +56,7 @@ class Circle:
         return (f"{what} is {self.radius_m - inside_m:.0f} m from home, {where} {self.words}: "
                 "FENCE_TYPE 4 on the autopilot keeps to polygons only, FENCE_RADIUS widens it")
 
-    def place_inside(self, area: Area, from_en: PointEn, room_m: float) -> PointEn:
+    def place_inside(self, area: AreaLike, from_en: PointEn, room_m: float) -> PointEn:
         """Return the place nearest to ``from_en`` on the way home that has ``room_m`` about it; home without one."""
         course = bearing_rad(self.en_m, from_en)
         far_m = min(self.radius_m, distance_m(self.en_m, from_en)) - room_m
@@ -73,7 +73,7 @@ class Drawn:
     """What is drawn on the autopilot: the water that it takes of the voyage's, and the area that it leaves."""
 
     taken: BaseGeometry
-    left: Area
+    left: AreaLike
 
     words: ClassVar[str] = "the fence that is drawn on the autopilot"
     most_room_m: ClassVar[float] = math.inf
@@ -97,13 +97,13 @@ class Drawn:
         where = "outside" if inside_m < 0.0 else f"less than {floor_m:g} m inside"
         return f"{what} is {where} {self.words}: draw it anew, or switch it off"
 
-    def place_inside(self, area: Area, from_en: PointEn, room_m: float) -> PointEn:  # noqa: ARG002 - as a circle's
+    def place_inside(self, area: AreaLike, from_en: PointEn, room_m: float) -> PointEn:  # noqa: ARG002 - as a circle's
         """Return the nearest place with ``room_m`` about it; where it is without one."""
         return self.left.roomy_en(from_en, room_m) or from_en
 
 
 def drawn_of(
-    area: Area, zones: tuple[Zone, ...], limits: AutopilotLimits | None, margin_m: float, *, is_off: bool,
+    area: AreaLike, zones: tuple[Zone, ...], limits: AutopilotLimits | None, margin_m: float, *, is_off: bool,
 ) -> Drawn | None:
     """Return what is drawn on the autopilot, None: it is off, or takes no water that the margin leaves."""
     if is_off or not zones or (limits is not None and not limits.fence_polygons):
@@ -114,7 +114,7 @@ def drawn_of(
 
 def circle_of(
     voyage: Voyage, limits: AutopilotLimits | None, status: AutopilotStatus | None, here_en: PointEn | None,
-) -> Circle | None:
+) -> HomeCircle | None:
     """Return the circle that the autopilot keeps, None: none is known, or it keeps none.
 
     FENCE_STATUS is told while a fence is on, by FENCE_ENABLE or only until the next reboot. A boat outside of a circle
@@ -126,7 +126,7 @@ def circle_of(
         return None
     home = voyage.frame.en_from_geo(status.home)
     en_m = (round(home[0] / COARSE_M) * COARSE_M, round(home[1] / COARSE_M) * COARSE_M)
-    circle = Circle(en_m=en_m, radius_m=limits.fence_circle_m - COARSE_M)
+    circle = HomeCircle(en_m=en_m, radius_m=limits.fence_circle_m - COARSE_M)
     if here_en is not None and not status.fence_breached and circle.inside_m(here_en) < -OUTSIDE_M:
         return None
     return circle if math.isfinite(math.hypot(*en_m)) and circle.radius_m > 0.0 else None

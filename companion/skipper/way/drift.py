@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_two_pi
 from companion.skipper.way.geometry import bearing_rad
-from companion.skipper.way.voyage import Area, PointEn
+from companion.skipper.way.voyage import AreaLike, PointEn
 
 HORIZON_S = 300.0   # time to wake a crew, clear an anchor and let it go
 HAIR_M = 1e-6       # what rounding may make of a distance
@@ -66,7 +66,7 @@ class DriftAhead:
 
 
 def drift_ahead(
-    area: Area, here_en_m: PointEn, velocity_en_mps: tuple[float, float], *, floor_m: float,
+    area: AreaLike, here_en_m: PointEn, velocity_en_mps: tuple[float, float], *, floor_m: float,
     horizon_s: float = HORIZON_S,
 ) -> DriftAhead:
     """Follow a drift from a place for ``horizon_s`` and say what it meets.

@@ -30,7 +30,7 @@ from companion.skipper.way.line import (
     wings_wkt,
 )
 from companion.skipper.way.sweeps import Sweep
-from companion.skipper.way.voyage import Area, Box, Composed, Goal, Line, PointEn, Search, Side, Voyage
+from companion.skipper.way.voyage import AreaLike, Box, Composed, Goal, Line, PointEn, Search, Side, Voyage
 
 ARC_RAD = math.radians(100.0)       # gates around a buoy are at most this far apart
 STRAIGHT_RAD = math.radians(60.0)   # a bend the other way up to this is passed with one gate, not with a loop
@@ -159,7 +159,7 @@ def _sweep(goal: Goal, index: int, name: str, approach: Approach, discs: tuple[s
 
 
 def _cross(
-    goal: Goal, index: int, name: str, before: PointEn | None, after: PointEn | None, area: Area,
+    goal: Goal, index: int, name: str, before: PointEn | None, after: PointEn | None, area: AreaLike,
 ) -> list[Gate]:
     """Return the gates that cross a line: a place beyond it, and one before it where the way begins elsewhere."""
     line = goal.line

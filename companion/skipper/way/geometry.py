@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from companion.geo.angles import difference_rad, heading_of, wrap_pi
-from companion.skipper.way.voyage import Area, PointEn
+from companion.skipper.way.voyage import AreaLike, PointEn
 
 BEAR_AWAY_RAD = math.radians(100.0)  # a beam reach with a little to spare: every boat gathers way on it
 LOOK_M = 40.0                        # water looked at on either side before bearing away
@@ -106,7 +106,7 @@ def polygon_wkt(ring: list[PointEn]) -> str:
 # -------- Turning the boat when the helm alone does not do it: out of irons, and gybing round instead of tacking.
 
 
-def bear_away_rad(boat_en: PointEn, heading_rad: float, twd_from_rad: float, area: Area) -> float:
+def bear_away_rad(boat_en: PointEn, heading_rad: float, twd_from_rad: float, area: AreaLike) -> float:
     """Return the heading [rad] to gather way on: 100° off the wind, on the side that is clear or nearer."""
     tack = 1.0 if difference_rad(twd_from_rad, heading_rad) >= 0.0 else -1.0
     options = [wrap_pi(twd_from_rad - side * BEAR_AWAY_RAD) for side in (tack, -tack)]
@@ -126,7 +126,8 @@ def is_tack(before_rad: float, after_rad: float, twd_from_rad: float) -> bool:
 
 
 def gybe_round(
-    start_en: PointEn, points: Sequence[PointEn], *, twd_from_rad: float, radius_m: float, area: Area, floor_m: float,
+    start_en: PointEn, points: Sequence[PointEn], *, twd_from_rad: float, radius_m: float, area: AreaLike,
+    floor_m: float,
 ) -> tuple[PointEn, ...]:
     """Return the waypoints with each tack replaced by a turn the other way round, where there is room for it.
 

@@ -19,7 +19,7 @@ from companion.current import over_water
 from companion.geo.angles import difference_rad
 from companion.messages import WindForecast
 from companion.skipper.way.geometry import bearing_rad, cross_track_m, distance_m, moved
-from companion.skipper.way.voyage import Area, PointEn
+from companion.skipper.way.voyage import AreaLike, PointEn
 
 SHORT_LEG_M = 3.0   # the autopilot turns within this: its angle does not matter
 LOST_MPS = 0.2      # a leg inside the no-go zone is sailed by the autopilot's own tacks at no less than this
@@ -69,7 +69,7 @@ def mean_twd_rad(forecast: WindForecast, horizon_s: float) -> float:
 
 
 def judge(
-    path: Sequence[PointEn], *, boat: Boat, no_go_half_rad: float, twd_from_rad: float, tws_mps: float, area: Area,
+    path: Sequence[PointEn], *, boat: Boat, no_go_half_rad: float, twd_from_rad: float, tws_mps: float, area: AreaLike,
     start_heading_rad: float | None = None, forecast: WindForecast | None = None, level: float = 0.0,
     after_s: float = 0.0, beat_room_m: float | None = None, current_en_mps: tuple[float, float] = (0.0, 0.0),
 ) -> Verdict:
@@ -125,7 +125,7 @@ class Drift:
 
 def predicted_beat(
     boat_en: PointEn, heading_rad: float, leg_from: PointEn, target: PointEn, *, twd_from_rad: float,
-    no_go_half_rad: float, corridor_m: float, area: Area, speed_mps: float = 1.0,
+    no_go_half_rad: float, corridor_m: float, area: AreaLike, speed_mps: float = 1.0,
     current_en_mps: tuple[float, float] = (0.0, 0.0),
 ) -> Drift:
     """Predict the sailing of a leg that the wind has closed (ArduRover: the no-go angle, tack at the corridor).

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from companion.skipper.way.geometry import along_m, barrier_wkt, bearing_rad, cross_track_m, distance_m, moved
-from companion.skipper.way.voyage import Area, Line, PointEn
+from companion.skipper.way.voyage import AreaLike, Line, PointEn
 
 BEFORE_M = 25.0     # the place before the line: room to settle on the course across it
 BEYOND_M = 14.0     # the place beyond: the autopilot leaves a waypoint 3 to 5 m early, and must have crossed by then
@@ -88,7 +88,7 @@ def crossing_en(line: Line, before: PointEn | None, after: PointEn | None) -> Po
     return moved(line.port_en_m, bearing_rad(line.port_en_m, line.starboard_en_m), at_m)
 
 
-def wings_wkt(line: Line, area: Area, way_m: float) -> tuple[str, ...]:
+def wings_wkt(line: Line, area: AreaLike, way_m: float) -> tuple[str, ...]:
     """Return a thin wedge from each mark outwards as WKT: what keeps a plan from going round the marks.
 
     It reaches so far that round its end is no short cut for a way of ``way_m``, or to the first land.

@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.skipper.way.voyage import Area, PointEn
+from companion.skipper.way.voyage import AreaLike, PointEn
 
 ERROR_M = 5.0         # of a good fix, and of a chart's outline beside its margin
 BACK_M = 15.0         # back where it was reckoned misses that by no more, and ...
@@ -148,6 +148,6 @@ class PositionDoubt:
         return f"it has stayed for {LASTS_S / 60.0:.0f} minutes" if settled_s >= LASTS_S else ""
 
 
-def is_impossible(area: Area, en_m: PointEn, *, margin_m: float, error_m: float = ERROR_M) -> bool:
+def is_impossible(area: AreaLike, en_m: PointEn, *, margin_m: float, error_m: float = ERROR_M) -> bool:
     """Return whether a place is so deep inside something solid that no error of fix and chart explains it."""
     return float(area.unfenced.clearance_m([en_m])[0]) < -(margin_m + error_m)

@@ -14,7 +14,7 @@ from companion.boat import Boat, made_good_mps, slowest_en_mps
 from companion.current import over_water
 from companion.skipper.way.drift import drift_ahead
 from companion.skipper.way.geometry import bearing_rad, moved
-from companion.skipper.way.voyage import Area, PointEn
+from companion.skipper.way.voyage import AreaLike, PointEn
 
 LEAST_MPS = 0.05       # a way made good that is slower than this is none: it would be lost in a gust
 PLACES_M = (40.0, 80.0, 160.0, 320.0, 640.0)
@@ -54,12 +54,12 @@ class Water:
         return f"cannot make way against {drift_mps:.1f} m/s{lost}"
 
 
-def is_clear(water: Water, area: Area, place: PointEn, floor_m: float) -> bool:
+def is_clear(water: Water, area: AreaLike, place: PointEn, floor_m: float) -> bool:
     """Return whether the boat is carried clear from a place for as long as a drift is looked ahead."""
     return drift_ahead(area, place, water.carried_en_mps, floor_m=floor_m).is_clear
 
 
-def waiting_place(water: Water, area: Area, here: PointEn, floor_m: float) -> PointEn | None:
+def waiting_place(water: Water, area: AreaLike, here: PointEn, floor_m: float) -> PointEn | None:
     """Return the nearest place in time that the boat can reach and from which it is carried clear; None: there is none.
 
     ``here`` itself where that is so.

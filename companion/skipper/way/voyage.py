@@ -1,6 +1,6 @@
 """The voyage as a value: where to go, which side of the buoys, where not to be.
 
-Positions are local (east, north) [m] in ``Voyage.frame``. ``Area`` is what the skipper asks of the geography;
+Positions are local (east, north) [m] in ``Voyage.frame``. ``AreaLike`` is what the skipper asks of the geography;
 ``companion.geofence`` provides it.
 """
 
@@ -129,7 +129,7 @@ class Goal:
     field: Composed | None = None
 
 
-class Area(Protocol):
+class AreaLike(Protocol):
     """What the skipper asks of the geography (local metres); ``companion.geofence.LocalArea`` is one."""
 
     def clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
@@ -141,11 +141,11 @@ class Area(Protocol):
         ...
 
     @property
-    def unfenced(self) -> Area:
+    def unfenced(self) -> AreaLike:
         """The obstacles alone: for a boat that has got outside the limits."""
         ...
 
-    def within(self, centre_en: PointEn, radius_m: float, name: str) -> Area:
+    def within(self, centre_en: PointEn, radius_m: float, name: str) -> AreaLike:
         """Return the area with one limit more: a circle."""
         ...
 
@@ -153,7 +153,7 @@ class Area(Protocol):
         """Return the water that a fence's zones take and that the margin leaves; empty where there is none."""
         ...
 
-    def without(self, taken: BaseGeometry, name: str) -> Area:
+    def without(self, taken: BaseGeometry, name: str) -> AreaLike:
         """Return the area whose limits leave ``taken`` out, too."""
         ...
 
@@ -183,13 +183,13 @@ class Area(Protocol):
         ...
 
 
-def outside_m(area: Area, en_m: PointEn) -> float:
+def outside_m(area: AreaLike, en_m: PointEn) -> float:
     """Return how far outside the limits a place is [m], 0 inside them and over an obstacle."""
     clearance = float(area.clearance_m([en_m])[0])
     return max(0.0, -clearance) if clearance < float(area.unfenced.clearance_m([en_m])[0]) else 0.0
 
 
-def water_at(area: Area, en_m: PointEn) -> Area:
+def water_at(area: AreaLike, en_m: PointEn) -> AreaLike:
     """Return what there is to keep clear of from a place on: outside the limits only the obstacles."""
     return area.unfenced if outside_m(area, en_m) > 0.0 else area
 
@@ -217,7 +217,7 @@ class Voyage:
     name: str
     frame: LocalFrame
     goals: tuple[Goal, ...]
-    area: Area = field(compare=False)
+    area: AreaLike = field(compare=False)
     boat: Boat = field(compare=False)
     laps: int = 1
     refuges: tuple[Refuge, ...] = ()

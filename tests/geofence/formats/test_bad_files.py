@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from companion.errors import InputError
 from companion.geofence.area import Area, Fence
 from companion.geofence.check import AreaConditions, check_area
-from companion.geofence.document import Code, Severity
+from companion.geofence.document import Code, FindingLevel
 from companion.geofence.formats.registry import check_place, parse, write
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import ZoneKind
@@ -40,7 +40,7 @@ def found(text: str, extension: str = ".wkt", **options) -> list:
 ])
 def test_wkt_faults_are_found(text, code, words):
     findings = found(text)
-    assert [f.code for f in findings if f.severity is Severity.ERROR] == ([code] if code else [])
+    assert [f.code for f in findings if f.severity is FindingLevel.ERROR] == ([code] if code else [])
     if code:
         fault = next(f for f in findings if f.code is code)
         assert words in fault.text + fault.remedy
@@ -125,7 +125,7 @@ def test_a_repair_never_makes_the_sea_larger(ring, kind):
     if Polygon(ring).is_valid:
         return
     assert findings
-    assert findings[0].severity is Severity.ERROR
+    assert findings[0].severity is FindingLevel.ERROR
     union = shapely.union_all(pieces)
     faces = list(shapely.get_parts(shapely.polygonize([shapely.node(shapely.linearrings([*ring, ring[0]]))])))
     for face in faces:
@@ -286,7 +286,7 @@ def test_fuzzed_files_are_refused_in_one_line_or_read(extension, data):
             assert not zone.shape.is_empty
     for name in ("wkt", "geojson", "plan", "waypoints", "gpx", "kml", "fen", "poly"):
         write(document, "", format_name=name)
-    if not any(f.severity is Severity.ERROR for f in document.findings):
+    if not any(f.severity is FindingLevel.ERROR for f in document.findings):
         inside = tuple(z for z in document.zones if z.kind is ZoneKind.INCLUSION)
         check_area(Area(obstacles=document.as_obstacles(10.0), fence=Fence(inside)), AreaConditions(margin_m=12.0))
 
@@ -307,7 +307,7 @@ def test_a_cut_file_is_never_a_smaller_fence_without_a_word(extension):
             part = parse(good[:at], "f" + extension, extension=extension)
         except InputError:
             continue
-        errors = [f for f in part.findings if f.severity is Severity.ERROR]
+        errors = [f for f in part.findings if f.severity is FindingLevel.ERROR]
         same = len(part.zones) == len(whole.zones) and all(
             a == b or a.shape.equals(b.shape) for a, b in zip(part.zones, whole.zones, strict=True)
         )

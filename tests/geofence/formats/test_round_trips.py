@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Polygon
 
-from companion.geofence.document import Document, Severity
+from companion.geofence.document import Document, FindingLevel
 from companion.geofence.formats.registry import parse, write
 from companion.geofence.shapes import Circle, ZoneKind
 from tests.geofence.strategies import QUIET, documents
@@ -24,7 +24,7 @@ EXTENSION = {
 def there_and_back(document: Document, name: str, **options) -> tuple[Document, tuple]:
     written = write(document, "", format_name=name, **options)
     back = parse(written.data, f"x{EXTENSION[name]}", extension=EXTENSION[name])
-    assert not [f for f in back.findings if f.severity is Severity.ERROR], back.findings
+    assert not [f for f in back.findings if f.severity is FindingLevel.ERROR], back.findings
     return back, written.losses
 
 
@@ -56,7 +56,7 @@ def test_geojson_carries_everything(document):
 @given(documents(holes=False, tracks=False, marks=False, names=False, margins=False))
 def test_plan_carries_mission_fence_and_rally(document):
     back, losses = there_and_back(document, "plan")
-    assert all(f.severity is Severity.NOTE for f in losses) or document.is_empty, losses
+    assert all(f.severity is FindingLevel.NOTE for f in losses) or document.is_empty, losses
     assert sorted(map(repr, map(zone_key, back.zones))) == sorted(map(repr, map(zone_key, document.zones)))
     assert (back.items, back.rally, back.return_point) == (document.items, document.rally, document.return_point)
     if document.home is not None:
@@ -105,7 +105,7 @@ def test_gpx_carries_routes_areas_and_tracks(document):
     if document.is_empty:
         return
     back, losses = there_and_back(document, "gpx")
-    assert all(f.severity is Severity.NOTE for f in losses), losses
+    assert all(f.severity is FindingLevel.NOTE for f in losses), losses
     assert [zone_key(z) for z in back.zones] == [zone_key(z) for z in document.zones]
     assert sorted(map(repr, map(mark_key, back.marks))) == sorted(map(repr, map(mark_key, document.marks)))
     assert (back.items, back.rally, back.tracks) == (document.items, document.rally, document.tracks)
@@ -118,7 +118,7 @@ def test_kml_carries_routes_areas_and_tracks(document, name):
     if document.is_empty:
         return
     back, losses = there_and_back(document, name)
-    assert all(f.severity is Severity.NOTE for f in losses), losses
+    assert all(f.severity is FindingLevel.NOTE for f in losses), losses
     assert [zone_key(z) for z in back.zones] == [zone_key(z) for z in document.zones]
     assert [mark_key(m) for m in back.marks] == [mark_key(m) for m in document.marks]
     assert (back.items, back.rally, back.tracks) == (document.items, document.rally, document.tracks)
@@ -174,6 +174,6 @@ def test_no_pair_of_formats_makes_the_sea_larger(first, second, document):
 def test_what_is_left_out_is_announced():
     document = parse(b"Rock|exclusion|POLYGON ((0 0, 1 0, 1 1, 0 0))\n|exclusion|POINT (2 2)\n", "a.wkt")
     losses = write(document, "b.fen").losses
-    assert {f.severity for f in losses} >= {Severity.ERROR}
+    assert {f.severity for f in losses} >= {FindingLevel.ERROR}
     assert any("keep-in ring" in f.text for f in losses)
     assert any("point or line" in f.text for f in losses)

@@ -8,7 +8,7 @@ import pytest
 from shapely.geometry import box
 
 from companion.messages import Command, MissionItem, Mode, StatusText, waypoint
-from companion.safety import CAUSES, FAILSAFES, WORD_OF, Answer
+from companion.safety import CAUSES, FAILSAFES, WORD_OF, Recovery
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import Ends
 from companion.skipper.step.state import Phase
@@ -68,7 +68,7 @@ def test_each_cause_is_known_by_its_sign_before_or_after_the_change_of_mode(what
         text(world, words)
     world.run(2)
     assert world.state.operator.stop.cause == cause
-    expected = {c.name: c.answer is not Answer.LEAVE for c in FAILSAFES}.get(cause, False)
+    expected = {c.name: c.answer is not Recovery.LEAVE for c in FAILSAFES}.get(cause, False)
     assert bool(world.state.operator.answering) is expected
     assert (world.state.phase is Phase.OPERATOR) is not expected
 
@@ -379,7 +379,7 @@ def test_a_loiter_that_cannot_be_sailed_to_any_more_is_laid_anew():
 @pytest.mark.parametrize(("name", "words", "is_over"), [
     ("battery", "", False), ("shore link", "Radio Failsafe", True), ("position", "EKF failsafe", False),
 ])
-@pytest.mark.parametrize("answer", list(Answer))
+@pytest.mark.parametrize("answer", list(Recovery))
 def test_the_mission_says_what_is_done_about_each(name, words, is_over, answer):
     """``[safety] ..._failsafe``: left alone, sailed on, stayed near by, or to the refuge; the end of a sign."""
     refuge = (40.0, 90.0)
@@ -391,7 +391,7 @@ def test_the_mission_says_what_is_done_about_each(name, words, is_over, answer):
     if words:
         text(world, words)
     world.run(3)
-    if answer is Answer.LEAVE:
+    if answer is Recovery.LEAVE:
         world.run(120)
         assert world.mode is Mode.HOLD
         assert world.state.phase is Phase.OPERATOR
@@ -399,10 +399,10 @@ def test_the_mission_says_what_is_done_about_each(name, words, is_over, answer):
     assert said(world, f"{name} failsafe")
     assert world.run(60, lambda w: w.mode is Mode.AUTO)
     world.run(260)
-    if answer is Answer.SAIL_ON:
+    if answer is Recovery.SAIL_ON:
         assert world.position[0] > 300.0
         return
-    place = refuge if answer is Answer.SHELTER else here
+    place = refuge if answer is Recovery.SHELTER else here
     assert distance_m(world.position, place) < 60.0
     assert world.state.phase is Phase.HOLDING
     world.shown.pop("battery_failed", None)

@@ -13,7 +13,7 @@ from companion.geofence import Zone, ZoneKind
 from companion.messages import AutopilotStatus, Command, Mode
 from companion.skipper.step import actions as act
 from companion.skipper.step.state import Phase
-from companion.skipper.way.autopilot_fence import OUTSIDE_M, Circle, Drawn, circle_of, drawn_of
+from companion.skipper.way.autopilot_fence import OUTSIDE_M, Drawn, HomeCircle, circle_of, drawn_of
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal, outside_m, water_at
 from tests.skipper.test_voyage import make, said
@@ -52,7 +52,7 @@ def test_a_circle_that_the_autopilot_does_not_complain_of_is_not_where_we_believ
 @settings(max_examples=60)
 @given(st.floats(20.0, 2000.0), st.floats(0.0, 2.0 * math.pi), st.floats(0.0, 3.0))
 def test_what_it_leaves_is_inside_of_it_and_nearly_all_of_it(radius_m, course, share):
-    circle = Circle(en_m=(30.0, -20.0), radius_m=radius_m)
+    circle = HomeCircle(en_m=(30.0, -20.0), radius_m=radius_m)
     place = (30.0 + share * radius_m * math.sin(course), -20.0 + share * radius_m * math.cos(course))
     left = area().within(circle.en_m, circle.radius_m, circle.words)
     room = float(left.clearance_m([place])[0])
