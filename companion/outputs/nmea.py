@@ -13,9 +13,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import reduce
-from operator import xor
 from typing import Any, cast
+
+from pyais.util import compute_checksum
 
 from companion.addresses import OutputName
 from companion.clock import now_s
@@ -47,7 +47,7 @@ def sentence(kind: str, *fields: str) -> str:
         raise ValueError(f"{kind} has {len(body) + _FRAME} characters, NMEA 0183 allows {MAX_CHARACTERS}")
     if not re.fullmatch(r"[ -~]*", body) or re.search(r"[$!*\\^~]", body) or any("," in field for field in fields):
         raise ValueError(f"{kind} holds a character that NMEA 0183 keeps for itself: {body!r}")
-    return f"${body}*{reduce(xor, body.encode('ascii'), 0):02X}\r\n"
+    return f"${body}*{compute_checksum('$' + body):02X}\r\n"
 
 
 def name_of(text: str) -> str:

@@ -10,12 +10,11 @@ import json
 import math
 from collections import OrderedDict
 from dataclasses import dataclass, replace
-from functools import reduce
-from operator import xor
 from typing import Any
 
 import pyais
 from pyais.exceptions import AISBaseException
+from pyais.util import compute_checksum
 
 from companion.geo import MPS_PER_KNOT
 from companion.messages import AisReport, GeoPoint
@@ -145,12 +144,12 @@ def decode_nmea(line: str | bytes, t_s: float) -> AisReport | None:
 
 def has_right_checksum(text: str) -> bool:
     """Return whether the sentence's checksum is there and right. *00 is a checksum like any other."""
-    body, star, given = text[1:].partition("*")
-    if not star or len(given) < 2:
+    body, _, given = text.partition("*")
+    if not text.isascii() or "\x7f" in body or len(given) < 2:
         return False
     try:
-        return int(given[:2], 16) == reduce(xor, body.encode("ascii"), 0) and "\x7f" not in body
-    except ValueError:      # not ASCII (UnicodeEncodeError is one), or no hexadecimal number
+        return bool(int(given[:2], 16) == compute_checksum(body))
+    except ValueError:
         return False
 
 
