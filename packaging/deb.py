@@ -58,7 +58,7 @@ def environment(stage: Path, work: Path) -> None:
     if not done.exists():
         print("deb: installing libraries", flush=True)
         run(work / "pip/bin/python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "hatchling",
-            "setuptools")
+            "setuptools", "shtab")
         run(*pip, "--require-hashes", "-r", ROOT / "requirements.lock")
         done.touch()
     shutil.rmtree(work / "wheel", ignore_errors=True)
@@ -75,9 +75,10 @@ def environment(stage: Path, work: Path) -> None:
             elif not KEPT.search(path.as_posix()):
                 path.unlink()
     print("deb: compiling kernels", flush=True)
-    tools = next((work / "pip").glob("lib/python3.*/site-packages"))   # setuptools, for the compiler
-    run("/usr/bin/env", f"PYTHONPATH={tools}", home / "bin/python", "-B", "-m", "companion.kernels.carry", cwd=work)
-    run(home / "bin/python", "-B", ROOT / "packaging/pages.py", work / "pages", cwd=work)
+    tools = next((work / "pip").glob("lib/python3.*/site-packages"))   # setuptools, for the compiler; shtab
+    python = ("/usr/bin/env", f"PYTHONPATH={tools}", home / "bin/python", "-B")
+    run(*python, "-m", "companion.kernels.carry", cwd=work)
+    run(*python, ROOT / "packaging/pages.py", work / "pages", cwd=work)
     for path in (home / "bin").iterdir():   # of the place where they will be
         if path.is_file() and not path.is_symlink():
             if path.name not in {"companion", "sitl"}:
@@ -122,7 +123,8 @@ def around(stage: Path, work: Path) -> None:
     put(ROOT / "packaging/debian/lintian-overrides", stage / f"usr/share/lintian/overrides/{NAME}")
     for name in ("companion", "sitl"):
         link(stage / "usr/bin" / name, f"{HOME}/bin/{name}")
-        put(work / "pages/completions" / name, stage / "usr/share/bash-completion/completions" / name)
+        put(work / "pages/bash" / name, stage / "usr/share/bash-completion/completions" / name)
+        put(work / "pages/zsh" / name, stage / f"usr/share/zsh/vendor-completions/_{name}")
     for page in (work / "pages/man1").iterdir():
         zipped(stage / f"usr/share/man/man1/{page.name}.gz", page.read_bytes())
     documents = stage / "usr/share/doc" / NAME

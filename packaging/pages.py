@@ -1,6 +1,6 @@
-"""Manual pages and bash completion, made of the command lines' own parsers.
+"""Manual pages and shell completion, made of the command lines' own parsers.
 
-    python packaging/pages.py DIR       writes DIR/man1/*.1 and DIR/completions/{companion,sitl}
+    python packaging/pages.py DIR       writes DIR/man1/*.1 and DIR/{bash,zsh}/{companion,sitl}
 
 A page for each program and for each of its commands: what ``--help`` says, so they cannot tell of an option that is not
 there.
@@ -12,12 +12,15 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import shtab
+
 import companion.cli
 import sitl.cli
 from companion import __version__
 from companion.program import Parser
 
 PROGRAMS = (companion.cli.PROGRAM, sitl.cli.PROGRAM)
+SHELLS = ("bash", "zsh")
 
 
 def escaped(text: str) -> str:
@@ -65,43 +68,10 @@ def groups(parser: Parser) -> Iterator[tuple[str, list[tuple[str, str]]]]:
             yield group.title or "options", entries
 
 
-def completion(program: str, parser: Parser) -> str:
-    """Return what bash completes: commands and their commands, options, then file names."""
-    cases = []
-
-    def add(path: str, of: Parser) -> None:
-        options = [o for a in of._actions for o in a.option_strings if a.help is not argparse.SUPPRESS]
-        cases.append(f'    "{path}") words="{" ".join([*of.commands, *options])}" ;;')
-        for name, inner in of.commands.items():
-            add(f"{path} {name}", inner)
-
-    add(program, parser)
-    function = f"_{program}_complete"
-    return "\n".join([
-        f"# bash completion of {program}, made of its parsers",
-        f"{function}() {{",
-        '  local word="${COMP_WORDS[COMP_CWORD]}" path="${COMP_WORDS[0]##*/}" words="" n',
-        "  for ((n = 1; n < COMP_CWORD && n < 3; n++)); do",
-        '    [[ "${COMP_WORDS[n]}" == -* ]] && break',
-        '    path="$path ${COMP_WORDS[n]}"',
-        "  done",
-        "  while :; do",
-        '    case "$path" in',
-        *cases,
-        "    esac",
-        '    [[ -n "$words" || "$path" != *" "* ]] && break',
-        '    path="${path% *}"',
-        "  done",
-        '  COMPREPLY=($(compgen -W "$words" -- "$word"))',
-        "}",
-        f"complete -o default -F {function} {program}",
-    ]) + "\n"
-
-
 def main(folder: Path) -> None:
     """Write all of them."""
-    pages, completions = folder / "man1", folder / "completions"
-    for place in (pages, completions):
+    pages = folder / "man1"
+    for place in (pages, *(folder / shell for shell in SHELLS)):
         place.mkdir(parents=True, exist_ok=True)
     for program in PROGRAMS:
         parser = program.parser()
@@ -112,7 +82,8 @@ def main(folder: Path) -> None:
                 told = parsed.description or f"a command of {program.name} {name}"
                 pages.joinpath(f"{program.name}-{name}-{within}.1").write_text(
                     page(parsed, told.splitlines()[0].rstrip(".")))
-        completions.joinpath(program.name).write_text(completion(program.name, parser))
+        for shell in SHELLS:
+            folder.joinpath(shell, program.name).write_text(shtab.complete(parser, shell))
 
 
 if __name__ == "__main__":

@@ -44,11 +44,16 @@ def test_every_command_has_a_page_and_is_completed(tmp_path):
         assert {program.name, *(f"{program.name}-{name}" for name in program.names)} <= pages
     assert "companion-mission-new" in pages
     assert r"\-\-from\-autopilot" in (tmp_path / "man1/companion-run.1").read_text()
-    asked = f"""source {tmp_path}/completions/companion
-COMP_WORDS=(companion fence up); COMP_CWORD=2; _companion_complete; echo "${{COMPREPLY[@]}}"
-COMP_WORDS=(companion run x.toml --dry); COMP_CWORD=3; _companion_complete; echo "${{COMPREPLY[@]}}" """
+    asked = f"""source {tmp_path}/bash/companion
+asked() {{
+    COMP_WORDS=(companion "$@") COMP_CWORD=$#
+    _shtab_companion companion "${{@: -1}}"
+    echo "${{COMPREPLY[@]}}"
+}}
+asked fence up; asked run x.toml --dry; asked plan x.toml --algorithm rrt"""
     done = subprocess.run(["bash", "-c", asked], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["upload", "--dry-run"]
+    assert done.stdout.split() == ["upload", "--dry-run", "rrtstar"]
+    assert (tmp_path / "zsh/sitl").read_text().startswith("#compdef sitl\n")
 
 
 @pytest.mark.parametrize("script", sorted(PACKAGING.glob("*.sh")) + sorted(PACKAGING.glob("debian/p*")), ids=str)
