@@ -60,8 +60,8 @@ def scenario(part, number, folder):
             stream.write(f"{t_s:.2f},{np.degrees(twd_rad) % 360.0:.3f},{tws_mps:.3f}\n")
     head, _, rest = BEAT.read_text(encoding="utf-8").partition("[wind]")
     _, _, tail = rest.partition("\n\n")
-    mission = BEAT.parents[3] / "missions" / "beat-500.toml"
-    text = head.replace('"beat-500"', f'"{name}"').replace('"../../../missions/beat-500.toml"', f'"{mission}"')
+    mission = BEAT.parents[2] / "missions" / "beat-500.toml"
+    text = head.replace('"beat-500"', f'"{name}"').replace('"../../missions/beat-500.toml"', f'"{mission}"')
     path = folder / f"{name}.toml"
     path.write_text(f'{text}[wind]\nmodel = "recorded"\nfile = "{wind.name}"\n\n{tail}', encoding="utf-8")
     return path

@@ -1,11 +1,11 @@
-"""The missions that come with the program: inside it where it is installed, beside it in a checkout."""
+"""The missions to learn from: inside the program where it is installed, beside it in a checkout."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-# Those to learn from, the simplest first; the others are what scenarios and tests sail.
-TEACHING = (
+# The simplest first; what else scenarios and tests sail lies in sitl/missions.
+NAMES = (
     "lake", "rocks", "bay", "bay-with-care", "archipelago", "buoy-course", "gates", "box", "search", "field-ring",
 )
 _HERE = Path(__file__).resolve().parent

@@ -67,9 +67,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     add_new(verbs)
     add_edit(verbs)
 
-    example = verbs.add_parser("example", help="write the missions that come with the program, to begin from")
+    example = verbs.add_parser("example", help="write ten missions to begin from, and say what each is")
     example.add_argument("folder", type=Path, metavar="DIR")
-    example.add_argument("--all", action="store_true", help="those that scenarios and tests sail, too")
     example.set_defaults(run=_example)
 
     convert = verbs.add_parser("convert", help="write a mission in another format and say what it does not carry")
@@ -100,12 +99,9 @@ def _example(args: argparse.Namespace) -> int:
     from companion import examples
     from companion.disk import Disk, reason
 
-    every = sorted(path for path in examples.folder().iterdir() if path.suffix in {".toml", ".wkt"})
-    missions = [path for path in every if path.suffix == ".toml"]
-    if not args.all:
-        missions = [examples.folder() / f"{name}.toml" for name in examples.TEACHING]
+    missions = [examples.folder() / f"{name}.toml" for name in examples.NAMES]
     told = {path: path.read_text(encoding="utf-8") for path in missions}
-    files = [path for path in every if path in told or any(f'"{path.name}"' in text for text in told.values())]
+    files = sorted(path for path in examples.folder().iterdir() if path.suffix in {".toml", ".wkt"})
     there = [path.name for path in files if (args.folder / path.name).exists()]
     if there:
         raise InputError(str(args.folder), there[0], "is there already", "name another folder: nothing is written over")

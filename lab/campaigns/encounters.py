@@ -60,7 +60,7 @@ def draw(seed: int, kind: Kind, policy: Policy) -> Scenario:
     mission = "meeting-shoal" if rng.random() < SHOAL else "meeting"
     longer_s = 90.0 if kind == "overtaking" else 50.0
     return Scenario(
-        name=f"{kind}-{seed}", mission=f"../../missions/{mission}.toml", limit_s=AT_S + event.meet_s + longer_s,
+        name=f"{kind}-{seed}", mission=f"../missions/{mission}.toml", limit_s=AT_S + event.meet_s + longer_s,
         wind=WindSpec(model="ou", from_deg=round(twd_deg, 1), tws_mps=round(rng.uniform(3.5, 8.0), 2),
                       sd_deg=round(rng.uniform(3.0, 7.0), 1), tws_sd_mps=round(rng.uniform(0.1, 0.5), 2)),
         events=(event,), policy=policy, expect=ExpectSpec(arrived=None, max_silence_s=None))

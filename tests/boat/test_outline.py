@@ -38,7 +38,7 @@ def test_the_voyages_clearance_is_the_hulls():
 
 
 def test_length_and_beam_come_from_the_mission(tmp_path):
-    text = Path("missions/open-water.toml").read_text(encoding="utf-8")
+    text = Path("sitl/missions/open-water.toml").read_text(encoding="utf-8")
     path = tmp_path / "m.toml"
     path.write_text(text + "\n[boat]\nlength_m = 4.2\nbeam_m = 1.1\nmotor = true\n", encoding="utf-8")
     mission = load_mission(path)

@@ -47,7 +47,7 @@ def test_the_check_tells_the_winds_that_she_sails_in(tmp_path, capsys):
 
 
 def test_a_passage_is_told_of_the_circle(capsys):
-    assert cli.main(["mission", "check", "missions/ocean.toml"]) == 0
+    assert cli.main(["mission", "check", "sitl/missions/ocean.toml"]) == 0
     assert "FENCE_TYPE 4" in capsys.readouterr().out
 
 

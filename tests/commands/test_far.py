@@ -128,7 +128,7 @@ def test_what_is_no_status_is_one_line(key, capsys, source, why):
 
 
 def test_a_boat_without_a_key_for_it_is_not_begun(tmp_path, capsys):
-    words = ["run", "missions/open-water.toml", "--link", "udpin:127.0.0.1:1"]
+    words = ["run", "sitl/missions/open-water.toml", "--link", "udpin:127.0.0.1:1"]
     assert cli.main([*words, "--far", str(tmp_path / "far")]) == 2
     assert "has no key; make one with `companion key new" in capsys.readouterr().err
     assert cli.main([*words, "--far-key", "k"]) == 2

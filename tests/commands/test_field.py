@@ -1,7 +1,6 @@
 """``companion field``: a field in words and as a picture, and what is refused."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,11 +9,9 @@ from companion.cli import main
 from companion.geofence import load_mission
 from companion.mission_check import field_preview, field_track, heading_fan, without_value
 
-MISSIONS = Path("missions")
-
 
 def mission(name):
-    return load_mission(MISSIONS / f"{name}.toml")
+    return load_mission(f"sitl/missions/{name}.toml")
 
 
 def test_a_field_in_words(capsys):
@@ -29,14 +26,14 @@ def test_a_field_in_words(capsys):
 
 def test_a_field_as_a_picture(tmp_path, capsys):
     out = tmp_path / "field.png"
-    assert main(["field", "missions/field-square.toml", "--goal", "2", "--fans", "--plot", str(out)]) == 0
+    assert main(["field", "sitl/missions/field-square.toml", "--goal", "2", "--fans", "--plot", str(out)]) == 0
     assert out.read_bytes().startswith(b"\x89PNG")
     assert "out of 4.0 ha of water" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("arguments", "says"), [
-    (["missions/block.toml"], '[[goal]]: no goal is sailed by a field; write kind = "field" in one'),
-    (["missions/field-lane.toml", "--goal", "2"], "[[goal]] 2: is not sailed by a field; name one that is: 1"),
+    (["sitl/missions/block.toml"], '[[goal]]: no goal is sailed by a field; write kind = "field" in one'),
+    (["sitl/missions/field-lane.toml", "--goal", "2"], "[[goal]] 2: is not sailed by a field; name one that is: 1"),
     (["missions/none.toml"], "no such file"),
 ])
 def test_what_is_refused_is_one_line(arguments, says, capsys):
@@ -51,7 +48,7 @@ def test_the_track_by_a_field_comes_to_its_end_and_stays_off_what_is_solid():
     track = field_track(seen)
     assert math.dist(track[-1, 1:3], seen.place_en) <= 12.0
     assert np.hypot(track[:, 1] - 120.0, track[:, 2]).min() > 15.0
-    ring = field_preview(mission("field-ring"))
+    ring = field_preview(load_mission("missions/field-ring.toml"))
     assert ring.area.clearance_m(field_track(ring)[:, 1:3]).min() > 6.0
     assert len(field_track(ring, 50.0)) == 50
 

@@ -81,7 +81,10 @@ def test_a_fence_of_nothing_is_not_uploaded(tmp_path):
         require_sailable(load_mission(tmp_path / "m.toml"))
 
 
-@pytest.mark.parametrize("path", sorted(MISSIONS.glob("*.toml")), ids=lambda p: p.stem)
+EVERY = sorted([*MISSIONS.glob("*.toml"), *Path("sitl/missions").glob("*.toml")])
+
+
+@pytest.mark.parametrize("path", EVERY, ids=lambda p: p.stem)
 def test_every_example_can_be_sailed(path):
     require_sailable(permitted(load_mission(path), load_scenario(path)))
 

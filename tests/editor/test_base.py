@@ -38,9 +38,12 @@ def why_locked(path):
 OVER_THE_DATE_LINE = {"date-line", "ocean"}
 
 
-@pytest.mark.parametrize("path", sorted(Path("missions").glob("*.toml")), ids=lambda p: p.stem)
+MISSIONS = sorted([*Path("missions").glob("*.toml"), *Path("sitl/missions").glob("*.toml")])
+
+
+@pytest.mark.parametrize("path", MISSIONS, ids=lambda p: p.stem)
 def test_every_example_is_drawn_and_its_draft_is_itself(path, tmp_path):
-    shutil.copytree("missions", tmp_path / "m")
+    shutil.copytree(path.parent, tmp_path / "m")
     path = tmp_path / "m" / path.name
     base = read_base(path)
     assert bool(base.locked) == (path.stem in OVER_THE_DATE_LINE)

@@ -23,7 +23,7 @@ from companion.geofence.mission.options import (
 )
 from companion.geofence.mission.text import dump_options
 
-MISSIONS = sorted(Path("missions").glob("*.toml"))
+MISSIONS = sorted([*Path("missions").glob("*.toml"), *Path("sitl/missions").glob("*.toml")])
 latitudes = st.integers(-900_000_000, 900_000_000).map(lambda n: n / 1e7)
 longitudes = st.integers(-1_800_000_000, 1_800_000_000).map(lambda n: n / 1e7)
 names = st.text("abc 'é\"\\#[]=", max_size=8)

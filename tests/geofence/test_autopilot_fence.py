@@ -19,7 +19,8 @@ from companion.geofence.shapes import unwrapped
 from companion.messages import GeoPoint
 from tests.geofence.strategies import QUIET
 
-MISSIONS = sorted((pathlib.Path(__file__).parents[2] / "missions").glob("*.toml"))
+ROOT = pathlib.Path(__file__).parents[2]
+MISSIONS = sorted(path for folder in ("missions", "sitl/missions") for path in (ROOT / folder).glob("*.toml"))
 
 
 def ground(shape, frame: LocalFrame, sides: int = 360) -> Polygon:

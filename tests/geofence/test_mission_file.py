@@ -15,7 +15,8 @@ from companion.geofence.mission.options import tables
 from companion.geofence.mission.text import dump_options, parse_options
 from tests.geofence.strategies import QUIET
 
-MISSIONS = sorted((pathlib.Path(__file__).parents[2] / "missions").glob("*.toml"))
+ROOT = pathlib.Path(__file__).parents[2]
+MISSIONS = sorted(path for folder in ("missions", "sitl/missions") for path in (ROOT / folder).glob("*.toml"))
 ROCK = "POLYGON ((-1.301 50.801, -1.300 50.801, -1.300 50.802, -1.301 50.802, -1.301 50.801))"
 GOOD = """
 [start]
@@ -150,7 +151,7 @@ WORDS = [b"nan", b"-inf", b"1e999", b"true", b"[]", b"{}", b"1979-05-27", b"'x'"
 @settings(**QUIET, max_examples=250)
 @given(st.data())
 def test_a_damaged_mission_is_refused_in_one_line_or_read(data):
-    good = (MISSIONS[0].parent / "archipelago.toml").read_bytes()
+    good = (ROOT / "missions/archipelago.toml").read_bytes()
     at = data.draw(st.integers(0, len(good)))
     word = data.draw(st.sampled_from(WORDS) | st.binary(max_size=4))
     bad = good[:at] + word + good[at + data.draw(st.integers(0, 6)):]

@@ -83,7 +83,7 @@ def test_the_demo_sails_without_any(sailed):
 
 @pytest.mark.parametrize(("words", "library"), [
     (["report", "v"], "matplotlib"),
-    (["mission", "check", str(Path("missions/by-rrtstar.toml").absolute())], "filterpy"),
+    (["mission", "check", str(Path("sitl/missions/by-rrtstar.toml").absolute())], "filterpy"),
     (["mission", "edit", "m.toml"], "tomlkit"),
     (["mission", "download", "m.plan", "--link", "udpin:127.0.0.1:14599"], "mavsdk"),
 ])

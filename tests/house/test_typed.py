@@ -73,7 +73,7 @@ def test_every_command_line_of_a_page_is_understood(page, monkeypatch, tmp_path)
 def test_the_examples_of_a_help_are_understood_and_name_what_an_installed_program_has(name, monkeypatch, tmp_path):
     program, command = name
     monkeypatch.chdir(tmp_path)
-    companion.commands.mission._example(argparse.Namespace(folder=Path("missions"), all=False))
+    companion.commands.mission._example(argparse.Namespace(folder=Path("missions")))
     monkeypatch.setenv("COLUMNS", "1000")
     text = helps(PROGRAMS[program].parser(command))
     assert "sitl/scenarios" not in text

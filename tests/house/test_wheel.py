@@ -37,12 +37,26 @@ def test_the_boat_carries_no_laboratory_and_the_laboratory_nothing_else(installe
 
 
 def test_it_holds_what_it_needs(installed):
-    inside, beside = (sorted(p.name for p in folder.glob("*.toml"))
-                      for folder in (installed / "companion" / "missions", Path("missions")))
-    assert inside == beside
+    for there, here in (("companion/missions", "missions"), ("sitl/missions", "sitl/missions")):
+        inside, beside = (sorted(p.relative_to(folder) for p in folder.rglob("*.*"))
+                          for folder in (installed / there, Path(here)))
+        assert inside == beside
     assert (installed / "companion" / "kernels.txt").is_file()
     points, = installed.glob("*.dist-info/entry_points.txt")
     assert "[companion.commands]\nrehearse = sitl.rehearse.command" in points.read_text()
+
+
+def test_every_scenario_has_its_mission(installed, tmp_path):
+    asked = """
+from pathlib import Path
+import sitl
+from sitl.scenario.scenario import load_scenario
+paths = sorted(Path(sitl.__file__).parent.glob("scenarios/**/*.toml"))
+print(len(paths), [path.stem for path in paths if not load_scenario(path).mission_path(path).is_file()])
+"""
+    done = subprocess.run([sys.executable, "-c", asked], cwd=tmp_path, capture_output=True, text=True, check=True,
+                          env={**os.environ, "PYTHONPATH": str(installed)})
+    assert done.stdout == f"{len(list(Path('sitl/scenarios').rglob('*.toml')))} []\n"
 
 
 def test_it_sails_from_an_empty_folder(installed, tmp_path):

@@ -70,7 +70,8 @@ CASES = {
 
 def seen_of(case, tmp_path):
     name, number, wind = CASES[case]
-    path = Path(f"missions/{name}.toml") if name else tmp_path / "mixed.toml"
+    folder = "missions" if name == "field-ring" else "sitl/missions"
+    path = Path(folder, f"{name}.toml") if name else tmp_path / "mixed.toml"
     if name is None:
         path.write_text(MIXED)
     mission = load_mission(path)

@@ -94,7 +94,7 @@ def test_an_obstacle_is_called_by_its_name(capsys, file, tmp_path):
 
 
 def test_a_missions_obstacles_keep_their_names_in_its_problem():
-    mission = load_mission("missions/two-channels.toml")
+    mission = load_mission("sitl/missions/two-channels.toml")
     frame = mission.frame()
     goal = frame.en_from_geo(mission.goals[0].point)
 

@@ -13,7 +13,7 @@ from companion.geofence import load_mission
 from companion.mission_check import AssumedWind, expected_current, legs, planned_legs
 from companion.planner import Plan, plan
 
-SOUTH = Path("missions/southern-tide.toml")
+SOUTH = Path("sitl/missions/southern-tide.toml")
 WIND = AssumedWind(from_deg=0.0, speed_mps=5.0)
 HIGH_S = 1_795_262_400.0      # 2026-11-21T12:00:00Z
 

@@ -58,8 +58,14 @@ def test_a_missing_file_is_one_line(tmp_path):
 
 
 def test_a_mission_is_a_scenario():
-    scenario = load_scenario(Path("missions/open-water.toml"))
+    scenario = load_scenario(Path("sitl/missions/open-water.toml"))
     assert scenario.mission == "open-water.toml"
+
+
+def test_a_water_that_is_in_both_folders_is_the_same():
+    both = [path for path in Path("sitl/missions").glob("*.wkt") if Path("missions", path.name).exists()]
+    assert len(both) == 5
+    assert [path.name for path in both if path.read_bytes() != Path("missions", path.name).read_bytes()] == []
 
 
 def test_of_a_mission_the_fence_is_not_the_circle_of_300_m_that_an_autopilot_comes_with():

@@ -13,7 +13,7 @@ from companion.skipper.step.state import Phase
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import ExpectSpec, Scenario, WindSpec
 
-MISSIONS = Path(__file__).parents[2] / "missions"
+MISSIONS = Path(__file__).parents[2] / "sitl/missions"
 
 
 def sailed(tmp_path, *, from_deg, sd_deg=0.1, mission="open-water.toml"):

@@ -48,7 +48,7 @@ def sailed(tmp_path_factory):
     out = tmp_path_factory.mktemp("pictures") / "v"
     scenario = Scenario(name="open-water", mission="open-water.toml", limit_s=150.0, wind=WindSpec(sd_deg=2.0),
                         expect=ExpectSpec())
-    run_virtual(run_embedded(scenario, MISSIONS / "scenario.toml", 1, out, expansions=2000))
+    run_virtual(run_embedded(scenario, ROOT / "sitl/missions/scenario.toml", 1, out, expansions=2000))
     return out
 
 
@@ -103,7 +103,7 @@ def test_the_plans_picture_tells_obstacles_from_their_margin_and_keeps_the_colou
     drawn, tmp_path, capsys,
 ):
     """It drew obstacles grown by the margin, called them obstacles, and its no-go colours were in no legend."""
-    assert cli.main(["plan", str(MISSIONS / "two-channels.toml"), "--plot", str(tmp_path / "p.png"),
+    assert cli.main(["plan", str(ROOT / "sitl/missions/two-channels.toml"), "--plot", str(tmp_path / "p.png"),
                      "--expansions", "500", "--algorithm", "rrtstar"]) == 0
     names, said, _ = words(drawn[0])
     assert {"obstacles", "margin of 10 m: no plan enters", "no-go zone of the boat"} <= names

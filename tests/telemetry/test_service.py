@@ -87,7 +87,7 @@ def test_companion_run_tells_the_manager_while_it_waits_for_an_autopilot(manager
     environment, listening = manager
     link = f"udpin:127.0.0.1:{free_port()}"
     ended = subprocess.run(
-        [sys.executable, "-m", "companion.cli", "run", "missions/open-water.toml", "--link", link, "--out",
+        [sys.executable, "-m", "companion.cli", "run", "sitl/missions/open-water.toml", "--link", link, "--out",
          str(tmp_path / "voyage"), "--state", str(tmp_path / "voyage/state.json"), "--wait", "3"],
         env={**os.environ, **environment}, capture_output=True, text=True, timeout=300, check=False)
     assert ended.returncode == 1

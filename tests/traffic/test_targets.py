@@ -154,7 +154,7 @@ def test_a_flood_of_new_numbers_pushes_out_no_ship_on_collision_course_and_costs
 
 
 def test_the_voyage_tells_the_targets_where_its_boat_is() -> None:
-    mission = load_mission(Path("missions/open-water.toml"))
+    mission = load_mission(Path("sitl/missions/open-water.toml"))
     voyage = voyage_of(mission)
     fold = VoyageFold(Skipper(voyage=voyage, config=config_of(mission)), WindTracker(), permissions_of(mission))
 

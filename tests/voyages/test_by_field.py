@@ -50,7 +50,7 @@ def test_intruders_from_other_sides(tmp_path, bearing_deg, gap_m):
 
 
 def test_without_permission_nothing_is_steered(tmp_path):
-    text = Path("missions/intruder.toml").read_text()
+    text = Path("sitl/missions/intruder.toml").read_text()
     assert "guided = true" in text
     (tmp_path / "m.toml").write_text(text.replace("guided = true", "guided = false"))
     scenario = msgspec.structs.replace(load_scenario(LAST_RESORT), mission="m.toml")
@@ -66,7 +66,7 @@ def test_two_boats_that_do_not_look_meet(tmp_path):
     scenario = load_scenario(FOLDER / "two-boats.toml")
     mission = load_mission(FOLDER / scenario.mission)
     assert mission.traffic.feeds
-    text = Path("missions/intruder.toml").read_text().replace('feeds = ["udpin:127.0.0.1:47013"]', "feeds = []")
+    text = Path("sitl/missions/intruder.toml").read_text().replace('feeds = ["udpin:127.0.0.1:47013"]', "feeds = []")
     (tmp_path / "m.toml").write_text(text)
     blind = sail(tmp_path / "s.toml", 0, tmp_path / "out", msgspec.structs.replace(scenario, mission="m.toml"))
     seeing = sail(FOLDER / "two-boats.toml", 0, tmp_path / "seeing")

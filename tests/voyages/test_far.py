@@ -99,7 +99,7 @@ def test_an_order_that_comes_two_hours_late_counts_for_nothing(tmp_path, seed):
 
 def test_what_the_mission_does_not_permit_is_refused_and_told(tmp_path):
     scenario = msgspec.structs.replace(
-        load_scenario(SOURCE), mission="../../missions/open-water.toml", limit_s=120.0, exit_on_arrival=False,
+        load_scenario(SOURCE), mission="../missions/open-water.toml", limit_s=120.0, exit_on_arrival=False,
         satellite=SatelliteSpec(delay_s=1.0, delay_most_s=5.0),
         events=(EventSpec(at_s=20.0, kind="far_order", order="hold", answer="refused"),),
         expect=ExpectSpec(arrived=None))

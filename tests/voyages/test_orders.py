@@ -117,7 +117,7 @@ def test_the_state_says_what_she_was_told(tmp_path):
 
 
 def test_what_the_mission_does_not_permit_is_refused_and_she_sails_on(tmp_path):
-    mission = Path("missions/open-water.toml").read_text().replace('orders = "all"\n', "")
+    mission = Path("sitl/missions/open-water.toml").read_text().replace('orders = "all"\n', "")
     (tmp_path / "m.toml").write_text(mission)
     scenario = msgspec.structs.replace(
         load_scenario(HOLD), mission="m.toml", limit_s=300.0, expect=ExpectSpec(alerts=("order",), within_m=40.0),

@@ -68,7 +68,7 @@ def port():
 
 
 def with_feeds(folder, *feeds):
-    text = Path("missions/fairway.toml").read_text()
+    text = Path("sitl/missions/fairway.toml").read_text()
     assert "[traffic]" in text
     names = ", ".join(f'"{f}"' for f in feeds)
     head, tail = text.split("safe_distance_m", 1)

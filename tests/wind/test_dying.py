@@ -100,7 +100,7 @@ def test_a_weight_of_nothing_still_only_moves_the_clock(name):
 
 
 def test_the_skippers_means_fall_with_the_wind():
-    mission = load_mission(Path("missions/open-water.toml"))
+    mission = load_mission(Path("sitl/missions/open-water.toml"))
     skipper = Skipper(voyage=voyage_of(mission), config=config_of(mission))
     fold = VoyageFold(skipper, WindTracker(), permissions_of(mission))
     seen = {}

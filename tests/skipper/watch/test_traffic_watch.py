@@ -43,7 +43,7 @@ def test_the_default_limits_are_a_lakes():
 
 
 def test_the_missions_safe_distance_and_time_are_the_limits(tmp_path):
-    text = Path("missions/fairway.toml").read_text(encoding="utf-8")
+    text = Path("sitl/missions/fairway.toml").read_text(encoding="utf-8")
     text = text.replace("safe_distance_m = 50.0", "safe_distance_m = 80.0\nsafe_time_s = 200.0")
     (tmp_path / "m.toml").write_text(text)
     found = limits(config_of(load_mission(tmp_path / "m.toml")))

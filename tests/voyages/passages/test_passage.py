@@ -190,7 +190,7 @@ def test_the_record_is_in_the_chart_s_metres(watched):
 @pytest.mark.timeout(4 * 3600)
 def test_ocean_four_hundred_kilometres_with_ten_restarts(tmp_path):
     path = FOLDER / "ocean.toml"
-    scenario, mission = load_scenario(path), load_mission("missions/ocean.toml")
+    scenario, mission = load_scenario(path), load_mission("sitl/missions/ocean.toml")
     goals = [mission.start, *(g.point for g in mission.goals)]
     resident, off = [], [0.0, 0.0, 0.0]
 
