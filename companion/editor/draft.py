@@ -141,7 +141,7 @@ def looked_at(draft: Draft, from_deg: float | None) -> tuple[CheckedMission, dic
     mission = judged.mission
     area = mission.area if mission is not None else _area_alone(draft)
     rows = [_of_error(error, draft, area) for error in judged.refusals]
-    rows += [_row(f.severity, f.place, f.text, f.remedy, area) for f in judged.findings]
+    rows += [_row(f.severity, _place_in(f.source, f.place, draft), f.text, f.remedy, area) for f in judged.findings]
     is_bad = any(row["severity"] == FindingLevel.ERROR.value for row in rows)
     return judged, {"findings": rows, "is_in_order": not is_bad, **_grown(area, draft, mission)}
 
@@ -159,9 +159,13 @@ def _area_alone(draft: Draft) -> Area:
 
 
 def _of_error(error: InputError, draft: Draft, area: Area) -> dict[str, Any]:
-    source = "" if error.source == str(draft.path) else error.source.removeprefix(f"{draft.path.parent}/")
-    place = ": ".join(part for part in (source, error.place) if part)
-    return _row(FindingLevel.ERROR, place, error.problem, error.remedy, area)
+    return _row(FindingLevel.ERROR, _place_in(error.source, error.place, draft), error.problem, error.remedy, area)
+
+
+def _place_in(source: str, place: str, draft: Draft) -> str:
+    """Return a place with its file, if that is another than the mission's."""
+    name = "" if source == str(draft.path) else source.removeprefix(f"{draft.path.parent}/")
+    return ": ".join(part for part in (name, place) if part)
 
 
 def _row(severity: FindingLevel, place: str, text: str, remedy: str, area: Area) -> dict[str, Any]:
@@ -186,7 +190,7 @@ def _middle_of(name: str, area: Area) -> list[float] | None:
             middle = center_of(solid.shape)
             return [middle.lat_deg, middle.lon_deg]
     for n, zone in enumerate(area.fence.inclusions, start=1):
-        if name in {zone.name or f"zone {n}", "the fence", "keep-in zone"}:
+        if name in {zone.name or f"fence {n}", "the fence", "keep-in zone"}:
             middle = center_of(zone.shape)
             return [middle.lat_deg, middle.lon_deg]
     return None

@@ -80,7 +80,7 @@ def _inclusions(area: Area, frame: LocalFrame, findings: Findings) -> None:
         return
     polygons = [polygon_en(z.shape, frame, cover=False) for z in zones]
     both = shapely.intersection_all(polygons)
-    names = ", ".join(z.name or f"zone {i + 1}" for i, z in enumerate(zones))
+    names = ", ".join(z.name or f"fence {i + 1}" for i, z in enumerate(zones))
     pieces = [p for p in parts(both) if p.area > 0.0]
     if not pieces:
         findings.add(

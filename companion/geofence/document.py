@@ -55,23 +55,27 @@ class Code(enum.Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One thing found: ``place`` says where in the file (``line 3``, ``features[2]``), ``remedy`` what to do."""
+    """One thing found: ``place`` says where in the file (``line 3``, ``features[2]``), ``remedy`` what to do.
+
+    ``source`` is the file, where it is another than the one that was asked about.
+    """
 
     severity: FindingLevel
     code: Code
     place: str
     text: str
     remedy: str = ""
+    source: str = ""
 
     def line(self, source: str = "") -> str:
         """Return the finding as one line."""
-        where = ": ".join(part for part in (source, self.place) if part)
+        where = ": ".join(part for part in (self.source or source, self.place) if part)
         remedy = f"; {self.remedy}" if self.remedy else ""
         return one_line(f"{where}: {self.severity.value}: {self.text}{remedy}")
 
     def as_error(self, source: str) -> InputError:
         """Return the finding as the error that ends a command."""
-        return InputError(source, self.place, self.text, self.remedy)
+        return InputError(self.source or source, self.place, self.text, self.remedy)
 
 
 def require_clean(findings: tuple[Finding, ...], source: str) -> None:

@@ -137,6 +137,28 @@ def test_the_fence_must_hold_start_and_goal(tmp_path):
         load(tmp_path, text, lake="POINT (-1.3 50.8)")
 
 
+def test_what_has_no_name_has_one_number_in_the_area_and_on_the_page(tmp_path):
+    rock = "POLYGON (({0} 50.801, {1} 50.801, {1} 50.802, {0} 50.802, {0} 50.801))"
+    mission = load(tmp_path, GOOD.replace('["rock.wkt"]', '["a.wkt", "b.wkt"]'),
+                   a=f"POINT (-1.3030 50.803)\n{rock.format(-1.3020, -1.3015)}",
+                   b=f"Otter|{rock.format(-1.3010, -1.3005)}\n{rock.format(-1.2990, -1.2985)}")
+    local = mission.area.local(mission.frame())
+    assert local.names == ("obstacle 1", "obstacle 2", "Otter", "obstacle 4")   # as in sketch.test.mjs
+    assert local.polygons[1].area < local.polygons[0].area   # the point's circle
+    assert sorted(local.obstacle_names()) == sorted(local.names)   # the page's and the plan's
+
+
+def test_what_a_file_of_the_area_is_warned_of_is_said_in_its_name(tmp_path):
+    with pytest.raises(InputError, match=r"rock\.wkt: obstacle 2: lies .* from the mission"):
+        load(tmp_path, rock=f"{ROCK}\n{ROCK.replace('50.80', '51.90')}")
+    (tmp_path / "rock.kml").write_text(
+        "<kml><Document><NetworkLink/><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>"
+        "-1.301,50.801 -1.300,50.801 -1.300,50.802 -1.301,50.801"
+        "</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></Document></kml>")
+    finding, = load(tmp_path, GOOD.replace("rock.wkt", "rock.kml")).findings
+    assert finding.line("m.toml") == f"{tmp_path}/rock.kml: warning: a NetworkLink is not followed"
+
+
 def test_points_become_circles_of_the_configured_radius(tmp_path):
     mission = load(tmp_path, GOOD + "point_radius_m = 25.0\n", rock="POINT (-1.302 50.801)")
     local = mission.area.local(mission.frame())

@@ -159,13 +159,23 @@ export function places(sketch) {
   return out.filter((p) => p !== null && p !== undefined);
 }
 
+/** Which of the obstacles, or of the fences, a shape is, as `companion mission check` numbers them: file by file, in each
+ * what has an area before points and lines. @param {Sketch} sketch @param {number} n */
+function numberOf(sketch, n) {
+  const shape = sketch.shapes[n], files = [...new Set(sketch.shapes.map((other) => other.of ?? ""))];
+  /** @param {Shape | undefined} of */
+  const rank = (of) => 2 * files.indexOf(of?.of ?? "") + (of?.type === "point" || of?.type === "line" ? 1 : 0);
+  return 1 + sketch.shapes.filter((other, m) => (other.zone === "inclusion") === (shape?.zone === "inclusion")
+    && (rank(other) < rank(shape) || (rank(other) === rank(shape) && m < n))).length;
+}
+
 /** What a thing is called. @param {Sketch} sketch @param {Ref} ref */
 export function called(sketch, ref) {
   if (ref.of === "start") return "Start";
   if (ref.of === "refuge") return sketch.refuges[ref.n]?.name || `Refuge ${ref.n + 1}`;
   if (ref.of === "goal") { const goal = sketch.goals[ref.n]; return goal?.name || `${{ point: "Mark", gate: "Gate", box: "Box", search: "Search", field: "Field" }[goal?.kind ?? "point"]} ${ref.n + 1}`; }
   const shape = sketch.shapes[ref.n];
-  return shape?.name || `${shape?.zone === "inclusion" ? "Fence" : shape?.type === "point" || shape?.type === "circle" ? "Rock" : shape?.type === "line" ? "Line" : "Obstacle"} ${ref.n + 1}`;
+  return shape?.name || `${shape?.zone === "inclusion" ? "fence" : "obstacle"} ${numberOf(sketch, ref.n)}`;
 }
 
 /** Is a place within a ring? @param {Point[]} ring @param {Point} at */

@@ -238,7 +238,9 @@ def write(document: Document, path: str | Path, *, format_name: str = "", part: 
 def check_place(document: Document, near: GeoPoint, far_m: float = FAR_M) -> Document:
     """Return the document with a finding if part of it lies more than ``far_m`` from ``near``."""
     frame = LocalFrame(near)
-    places = [(z.name or f"zone {i + 1}", z.shape) for i, z in enumerate(document.zones)]
+    places = [(z.name or f"{noun} {i + 1}", z.shape)
+              for noun, kind in (("fence", ZoneKind.INCLUSION), ("obstacle", ZoneKind.EXCLUSION))
+              for i, z in enumerate(z for z in document.zones if z.kind is kind)]
     places += [(m.name or f"mark {i + 1}", m.geometry) for i, m in enumerate(document.marks)]
     for name, shape in places:
         center = center_of(shape)

@@ -289,7 +289,8 @@ def load_area(
             _require(path, str(mission_path), f"[area] {key}", "paths are relative to the mission file")
             document = read(path, kind=kind, axis=options.axis, near=origin, areas=True,
                             far_m=far_m).require_clean()
-        findings.extend(f for f in document.findings if f.severity is not FindingLevel.NOTE)
+        findings.extend(replace(f, source=str(path)) for f in document.findings
+                        if f.severity is not FindingLevel.NOTE)
         return document
 
     for name in options.obstacles:

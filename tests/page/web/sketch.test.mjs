@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { changed, degrees, distanceTo, History, inserted, middle, moved, placeOf, places, removed, reordered, toEn, toPlace, within, withGoal } from "../../../companion/editor/web/sketch.js";
+import { called, changed, degrees, distanceTo, History, inserted, middle, moved, placeOf, places, removed, reordered, toEn, toPlace, within, withGoal } from "../../../companion/editor/web/sketch.js";
 
 const FRAME = { lat: 50.817, lon: -1.31, lat_m: 111250, lon_m: 70450 };
 const empty = () => ({ revision: "r", name: "m", start: null, goals: [], refuges: [], shapes: [], margin_m: 12, margin_floor_m: 6, point_radius_m: 10, end: "loiter", laps: 1 });
@@ -20,6 +20,12 @@ test("metres and degrees are each other's inverse, over the antimeridian too", (
     assert.ok(Math.hypot(back[0] - en[0], back[1] - en[1]) < 0.02);
   }
   assert.ok(toPlace({ ...FRAME, lon: 179.999 }, [900, 0])[1] < 0);
+});
+
+test("what has no name has the number that the check gives it: file by file, what has an area before points", () => {
+  const shape = (type, of, zone = "exclusion", name = "") => ({ type, zone, rings: [square], of, name });
+  const sketch = { ...empty(), shapes: [shape("point", "a.wkt"), shape("polygon", "a.wkt"), shape("polygon", "b.wkt", "exclusion", "Otter"), shape("circle", "b.wkt"), shape("polygon", "shore.wkt", "inclusion")] };
+  assert.deepEqual(sketch.shapes.map((_, n) => called(sketch, { of: "shape", n })), ["obstacle 2", "obstacle 1", "Otter", "obstacle 4", "fence 1"]);
 });
 
 test("what is moved is there, and nothing else is elsewhere", () => {
