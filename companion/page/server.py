@@ -134,7 +134,7 @@ class Page:
         """Let in who may ask for it; return how many bytes are read. Raises Refused."""
         if request.method != b"POST":
             return 0
-        if path not in {"/api/order", "/api/preview"}:
+        if path not in {"/api/order", "/api/preview", "/api/token"}:
             raise HttpRefusal(404, "there is nothing to post to here")
         if not self._takes_orders:
             raise HttpRefusal(403, "orders are not taken here: begin with --http-token FILE")
@@ -143,6 +143,8 @@ class Page:
 
     async def reply(self, request: h11.Request, path: str, body: bytes) -> HttpReply | Stream:
         """Answer a request. Raises Refused."""
+        if path == "/api/token" and request.method == b"POST":
+            return HttpReply(data=b'{"error":null}')   # who got here has it
         if request.method == b"POST":
             return HttpReply(data=await self._order(body, is_preview=path == "/api/preview"))
         if path == "/api/stream" and isinstance(self._source, LiveSource):

@@ -126,6 +126,11 @@ def test_faults_of_the_obstacles(tmp_path, wkt, words):
         assert word in str(error.value), str(error.value)
 
 
+def test_a_file_without_goals_is_told_of_those_that_are_drawn(tmp_path):
+    with pytest.raises(InputError, match=r"goal: is missing; .* --from-autopilot FILE, or from_autopilot = true"):
+        load(tmp_path, GOOD.replace("[[goal]]\nlat = 50.805\nlon = -1.3005\n", ""))
+
+
 def test_the_fence_must_hold_start_and_goal(tmp_path):
     text = GOOD.replace('["rock.wkt"]', '["rock.wkt"]\nfence = "lake.wkt"')
     lake = "POLYGON ((-1.31 50.79, -1.29 50.79, -1.29 50.804, -1.31 50.804, -1.31 50.79))"

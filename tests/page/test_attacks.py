@@ -99,14 +99,23 @@ def test_every_answer_forbids_frames_and_whatever_is_foreign_and_none_allows_oth
 
 
 # ------------------------------------------------------------------------------------------------- the token
+@pytest.mark.parametrize("path", ["/api/order", "/api/token"])
 @pytest.mark.parametrize("token", ["", "wrong", TOKEN[:-1], TOKEN + "x", "ä" * 28])
-def test_without_the_token_no_order_is_taken(token):
+def test_without_the_token_no_order_is_taken(token, path):
     async def talk(browser, *_):
-        return await browser.order(token=token)
+        return await browser.order(token=token, path=path)
 
     (status, _), orders = taking_orders(talk)
     assert status in {400, 401}
     assert orders == []
+
+
+def test_with_it_the_page_is_told_that_it_is_the_one():
+    async def talk(browser, *_):
+        return await browser.order("", path="/api/token")
+
+    (status, answer), orders = taking_orders(talk)
+    assert (status, answer, orders) == (200, {"error": None}, [])
 
 
 def test_with_it_an_order_is_and_its_answer_comes_back():

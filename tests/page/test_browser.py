@@ -294,20 +294,20 @@ def test_an_order_asks_for_the_token_once_and_a_wrong_one_is_told(sailed):
         verbs = window.js("return [...document.querySelectorAll('[data-verb]')].map((b) => b.dataset.verb)")
         assert verbs == ["hold", "go_on"]
 
-        def order(token=None):
+        def order(*tokens):
             window.click("[data-verb=hold]")
-            if token is not None:
+            for n, token in enumerate(tokens):
                 window.until("return document.getElementById('token') !== null")
                 window.keys(token, "\n")
+                if n + 1 < len(tokens):   # refused where it is given
+                    window.until("return document.getElementById('tokenanswer').textContent.includes('wrong')")
+                    assert window.js("return document.getElementById('confirm')") is None
             window.until("return document.getElementById('confirm') !== null && document.getElementById('dialog').open")
             assert window.barriers() == []
             window.click("#confirm")
             window.until("return !document.getElementById('dialog').open")
 
-        order("a-wrong-token-of-24-letters-x")
-        window.until("return document.getElementById('answer').textContent.includes('token')")
-        assert asked.orders == []
-        order("the-right-token-of-24-letters")
+        order("a-wrong-token-of-24-letters-x", "the-right-token-of-24-letters")
         window.until("return document.getElementById('answer').textContent.includes('holding')")
         order()
         assert asked.orders == ["hold", "hold"]

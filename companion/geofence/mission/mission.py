@@ -33,7 +33,7 @@ from companion.geofence.mission.options import (
     TrafficOptions,
     WindOptions,
 )
-from companion.geofence.mission.text import parse_options, read_options
+from companion.geofence.mission.text import GOAL_MISSING, parse_options, read_options
 from companion.geofence.shapes import Obstacle, Shape, Zone, ZoneKind
 from companion.messages import GeoPoint
 from companion.words import file_name
@@ -211,7 +211,7 @@ def read_mission(path: Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
         raise InputError(str(path), "from_autopilot", "the goals of this mission are drawn on the autopilot, not here",
                          "companion run reads them there and sails them")
     if not options.goal:
-        raise InputError(str(path), "goal", "is missing", "add [[goal]] with lat and lon")
+        raise InputError(str(path), "goal", "is missing", GOAL_MISSING)
     return assembled(options, path, given=given)
 
 

@@ -50,6 +50,10 @@ def parse_options(text: str, source: str) -> MissionOptions:
         raise _input_error(str(error), source, raw) from None
 
 
+GOAL_MISSING = ("add [[goal]] with lat and lon; goals drawn in a ground station are sailed by "
+                "companion run --from-autopilot FILE, or from_autopilot = true in it")
+
+
 def dump_options(options: MissionOptions) -> str:
     """Return the options as TOML, leaving out what has its default."""
     data = without_defaults(options)
@@ -160,7 +164,7 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
     missing = re.search(r"missing required field `(.+)`", problem)
     if missing:
         key = missing.group(1)
-        remedy = "add [[goal]] with lat and lon" if key == "goal" else "add it"
+        remedy = GOAL_MISSING if key == "goal" else "add it"
         return InputError(source, f"{place} {key}".strip(), "is missing", remedy)
     if place.endswith(" kind") and place.startswith("[[goal]]"):
         kind = _value_at(raw, path)

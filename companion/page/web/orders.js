@@ -119,16 +119,23 @@ async function confirm(verb, words, where) {
 /** @returns {Promise<boolean>} whether there is one */
 function askToken() {
   const field = /** @type {HTMLInputElement} */ (el("input", { type: "password", id: "token", autocomplete: "off", "aria-label": "Token" }));
+  const says = el("p", { id: "tokenanswer", role: "status", class: "warn" });
   const ok = el("button", { type: "submit", class: "primary" }, "Use it");
   const cancel = el("button", { type: "button" }, "Cancel");
-  const form = el("form", { method: "dialog" }, el("h2", { id: "dialogtitle" }, "Token"), el("p", {}, "Orders need the token in the file that --http-token names, on board. It is kept until this window is closed."), field, el("div", { class: "buttons" }, ok, cancel));
+  const form = el("form", { method: "dialog" }, el("h2", { id: "dialogtitle" }, "Token"), el("p", {}, "Orders need the token in the file that --http-token names, on board. It is kept until this window is closed."), field, says, el("div", { class: "buttons" }, ok, cancel));
   dialog.replaceChildren(form);
   dialog.showModal();
   return new Promise((resolve) => {
     cancel.addEventListener("click", () => dialog.close());
-    form.addEventListener("submit", (event) => {
+    form.addEventListener("submit", async (event) => {
       event.preventDefault();
       token = field.value.trim();
+      const { error } = await post("/api/token", "");
+      if (error) {
+        token = "";
+        says.textContent = `Refused: ${error}`;
+        return field.select();
+      }
       try { sessionStorage.setItem("token", token); } catch { /* kept in this page alone */ }
       dialog.close();
     });
