@@ -28,7 +28,7 @@ from companion.disk import Disk
 from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
-from companion.telemetry.folder import DECISIONS, VERDICT
+from companion.telemetry.folder import DECISIONS, SUMMARY, VERDICT
 from sitl.faults import LINK_EVENTS, Relay, break_vane, impair
 from sitl.run.boats import LiveBoat, RealBoat, SimulatedBoat
 from sitl.run.embedded import TRUTH_EVERY_S, ends_of, marks_of, solid_of
@@ -274,9 +274,9 @@ async def _run(
         await companion.start()
         # The scenario's clock starts when the companion does its first work, as it does on the embedded autopilot.
         await companion.opened(folder / DECISIONS)
-        began_s = now_s()
+        began_s, summary_path = now_s(), folder / SUMMARY
         side = [
-            asyncio.create_task(_watch(boat, frame, truth, others, began_s), name="judge"),
+            asyncio.create_task(follow(boat, frame, truth, others, began_s, summary_path), name="judge"),
             *(asyncio.create_task(_event(e, began_s, boat, frame, companion, others, relay), name=f"event {e.kind}")
               for e in scenario.events),
         ]
@@ -287,7 +287,6 @@ async def _run(
                 task.cancel()
         played = await asyncio.gather(*side, return_exceptions=True)
     errors = [f"{t.get_name()}: {e!r}" for t, e in zip(side, played, strict=True) if isinstance(e, Exception)]
-    summary_path = folder / "summary.json"
     if not summary_path.is_file():
         raise JobError(f"the companion left no summary in {folder}; its exit code was {companion.exit_code}")
     summary: dict[str, Any] = json.loads(summary_path.read_bytes())
@@ -304,10 +303,15 @@ async def _run(
     return verdict
 
 
-async def _watch(boat: LiveBoat, frame: LocalFrame, truth: TrueTrack, others: Others, began_s: float) -> None:
-    """Note where the boat is from the moment it sails, and how near the others come."""
+async def follow(
+    boat: LiveBoat, frame: LocalFrame, truth: TrueTrack, others: Others, began_s: float, summary: Path,
+) -> None:
+    """Note where the boat is from the moment it sails, and how near the others come, until the voyage is summed up.
+
+    The companion goes on after its summary: it draws a picture, for a minute where it has a twentieth of a core.
+    """
     sails = False
-    while True:
+    while not summary.exists():
         fix = boat.fix()
         if fix is not None:
             sails = sails or fix.sails

@@ -23,7 +23,8 @@ from companion.traffic.nmea import NmeaDecoder
 from sitl.ardurover.simulation import find
 from sitl.autopilot import AisVessel, VaneFault, VaneState
 from sitl.faults.link_faults import FaultyVane, Relay, impair
-from sitl.run.live import run_live
+from sitl.run.boats import LiveFix
+from sitl.run.live import follow, run_live
 from sitl.scenario.scenario import EventSpec, load_scenario
 from sitl.scenario.traffic import Others, distance_m, free_port, sentences, ship_of
 from sitl.scenario.verdict import TrueTrack
@@ -166,6 +167,29 @@ def test_a_relay_carries_both_ways_and_its_link_is_cut_for_a_while():
     numbers = [m.time_boot_ms for m in mav.MAVLink(None).parse_buffer(b"".join(heard))]
     assert numbers == [1, 2, 5]
     assert [m.time_boot_ms for m in mav.MAVLink(None).parse_buffer(b"".join(heard_by_boat))] == [0, 3]
+
+
+class Afloat:
+    """A boat that sails, and whose companion sums the voyage up after ten seconds and draws for a minute."""
+
+    def __init__(self, summary):
+        self.began_s, self.summary = now_s(), summary
+
+    def fix(self):
+        if now_s() - self.began_s >= 10.0:
+            self.summary.touch()
+        return LiveFix(position=ORIGIN, heading_rad=0.0, speed_mps=2.0, wind=(0.0, 5.0), sails=True)
+
+
+def test_the_voyage_is_over_with_its_summary_however_long_the_picture_takes(tmp_path):
+    """At a quarter of a core a voyage of 45 s was said to have taken 130."""
+    async def watched():
+        truth, summary = TrueTrack(), tmp_path / "summary.json"
+        others = Others(FRAME, Constant(0.0, 5.0), 0, port=free_port())
+        await asyncio.wait_for(follow(Afloat(summary), FRAME, truth, others, now_s(), summary), 70.0)
+        return truth.t_s[-1] - truth.t_s[0]
+
+    assert run_virtual(watched()) == pytest.approx(10.0, abs=0.5)
 
 
 PROGRAM = find()
