@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from bench import shares
 from bench.shares import plans_of
 from sitl.run.live import CpuShare, cpu_share, family_of, run_live
 from sitl.scenario import load_scenario
@@ -71,3 +72,41 @@ def test_with_a_tenth_of_a_core_she_arrives_clean(tmp_path):
     assert verdict.figures["contacts"] == 0
     assert verdict.figures["min_clearance_m"] >= 6.0   # the floor of its margin
     assert plans_of(tmp_path / "decisions.jsonl").first_s is not None
+
+
+def voyage(share, seed, time_s, **more):
+    return {"water": "pond", "share": share, "seed": seed, "passed": True, "arrived": True, "time_s": time_s,
+            "kills": 0, "min_clearance_m": 5.0 + seed, "took_s": [1.0, 2.0, 4.0 / share], "budgets_s": [2.0, 1.0],
+            "first_s": 1.5, **more}
+
+
+def test_times_are_held_against_the_full_cores_of_the_same_seed():
+    """The mean of all voyages at each share was another's: a seed that did not arrive made a computer seem faster."""
+    records = [voyage(1.0, 0, 100.0), voyage(1.0, 1, 300.0), voyage(0.25, 0, 110.0),
+               {"water": "pond", "share": 0.25, "seed": 1, "passed": False, "arrived": False, "kills": 3, "checks": []}]
+    row = shares.figures("pond", 0.25, records)
+    assert (row["voyages"], row["arrived"], row["passed"], row["kills"]) == (2, 1, 1, 3)
+    assert row["of_full"] == pytest.approx(1.1)
+    assert (row["median_s"], row["late_s"], row["worst_s"]) == (2.0, 16.0, 16.0)
+    assert (row["first_s"], row["budget_s"], row["clearance_m"]) == (1.5, 1.0, 5.0)
+    assert shares.told(row) == ["pond", "0.25", "2", "1", "1", "110", "+10.0 %", "5.0", "3", "2.0", "16.0", "16.0",
+                                "1.5", "1.00", "3"]
+    assert shares.figures("pond", 0.05, records) == {}
+
+
+def test_a_voyage_without_a_verdict_is_told_and_fails_the_run(tmp_path, monkeypatch, capsys):
+    """It exits with 1; what there is already is not sailed again."""
+    sailed = []
+
+    def sail(job):
+        sailed.append(job.case.share)
+        return {"water": "pond", "share": job.case.share, "seed": job.seed, "passed": False, "arrived": False,
+                "kills": 0, "checks": [{"name": "no room", "passed": False}]}
+
+    monkeypatch.setattr(shares, "sail", sail)
+    monkeypatch.setattr(shares, "compile_ahead", lambda: None)
+    words = ["pond", "--shares", "0.25", "0.1", "--out", str(tmp_path / "s.jsonl")]
+    assert shares.main(words) == 1
+    assert "FAILED pond at 0.1, seed 0: no room" in capsys.readouterr().out
+    assert shares.main([*words, "--shares", "0.25", "0.05"]) == 1
+    assert sailed == [0.25, 0.1, 0.05]
