@@ -4,9 +4,10 @@ The autopilot is the simulated one over UDP or the real ArduRover; the companion
 boat. The judge is a third party on another link: it reads where the boat is, plays the operator and the fates,
 sails the other vessels, and never talks to the companion but as an AIS receiver or a radio would.
 
-By the kernel's own quota where that may be set (cgroup version 2 or 1, as root or in a folder that was handed to the
-user), else by stopping and continuing the processes in turn (SIGSTOP, SIGCONT), in slices of a tenth of a second. The
-quota is the better likeness: it counts what is really used, and stops nobody who is idle.
+A share of a core is the kernel's own quota where that may be set (cgroup version 2 or 1, as root or in a folder that
+was handed to the user), else had by stopping and continuing the processes in turn (SIGSTOP, SIGCONT), in slices of a
+tenth of a second. The quota is the better likeness: it counts what is really used, stops nobody who is idle, and what
+is under it goes before whatever else this machine does, as do boat and judge: a busy machine makes no slower computer.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,7 @@ from sitl.scenario import (
 
 PERIOD_S = 0.1
 CGROUPS = Path("/sys/fs/cgroup")
+AHEAD = 32   # times the weight of another control group, or of a session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,32 +104,51 @@ def family_of(pid: int) -> list[int]:
 
 @contextlib.asynccontextmanager
 async def cpu_share(share: float) -> AsyncIterator[CpuShare]:
-    """Make a share of a core, and take it away when all that was put under it has ended."""
-    folder = _quota(share)
-    try:
-        yield CpuShare(share=share, cgroup=folder)
-    finally:
-        if folder is not None:
-            with contextlib.suppress(OSError):
-                folder.rmdir()
+    """Make a share of a core, and take it away when all that was put under it has ended.
 
-
-def _quota(share: float) -> Path | None:
-    """Return a new control group with the share as its quota, None where none may be made."""
+    Meanwhile this process, and what it starts from now on, goes before other load.
+    """
     period_us = int(PERIOD_S * 1e6)
     quota_us = max(1000, int(share * period_us))
-    for parent, settings in (
-        (CGROUPS / "cpu", {"cpu.cfs_period_us": f"{period_us}", "cpu.cfs_quota_us": f"{quota_us}"}),
-        (CGROUPS, {"cpu.max": f"{quota_us} {period_us}"}),
-    ):
-        folder = parent / f"sitl-share-{os.getpid()}"
+    folder = _group("share", {"cpu.shares": f"{1024 * AHEAD}", "cpu.cfs_period_us": f"{period_us}",
+                              "cpu.cfs_quota_us": f"{quota_us}"},
+                    {"cpu.weight": f"{100 * AHEAD}", "cpu.max": f"{quota_us} {period_us}"})
+    ahead = _group("ahead", {"cpu.shares": f"{1024 * AHEAD}"}, {"cpu.weight": f"{100 * AHEAD}"})
+    own = None if ahead is None else _own_group(ahead.parent)
+    try:
+        if ahead is not None and own is not None:
+            (ahead / "cgroup.procs").write_text(str(os.getpid()))
+        yield CpuShare(share=share, cgroup=folder)
+    finally:
+        with contextlib.suppress(OSError):
+            if own is not None:
+                (own / "cgroup.procs").write_text(str(os.getpid()))
+        for group in (folder, ahead):
+            with contextlib.suppress(OSError):
+                if group is not None:
+                    group.rmdir()
+
+
+def _own_group(root: Path) -> Path | None:
+    """Return the folder, below ``root``, of the control group that this process is in."""
+    for line in Path("/proc/self/cgroup").read_text(encoding="utf-8").splitlines():
+        _, controllers, path = line.split(":", 2)
+        if "cpu" in controllers.split(",") or (root == CGROUPS and not controllers):
+            return root / path.lstrip("/")
+    return None
+
+
+def _group(name: str, version_1: Mapping[str, str], version_2: Mapping[str, str]) -> Path | None:
+    """Return a new control group with the settings of its version, None where none may be made."""
+    for parent, settings in ((CGROUPS / "cpu", version_1), (CGROUPS, version_2)):
+        folder = parent / f"sitl-{name}-{os.getpid()}"
         with contextlib.suppress(OSError):
             folder.mkdir()
             try:
-                for name, value in settings.items():
-                    if not (folder / name).exists():
-                        raise FileNotFoundError(name)
-                    (folder / name).write_text(value)
+                for file, value in settings.items():
+                    if not (folder / file).exists():
+                        raise FileNotFoundError(file)
+                    (folder / file).write_text(value)
             except OSError:
                 folder.rmdir()
                 raise
@@ -249,6 +270,7 @@ async def _run(
     port = free_port()
     others = Others(frame, wind, seed, port=port)
     async with contextlib.AsyncExitStack() as stack:
+        share = None if cpu is None else await stack.enter_async_context(cpu_share(cpu))
         boat: LiveBoat
         if kind == "ardurover":
             boat = await stack.enter_async_context(RealBoat.start(scenario, mission, wind, program, pace, folder))
@@ -259,7 +281,6 @@ async def _run(
             relay = await stack.enter_async_context(Relay(boat.link, seed=seed))
             link = relay.link
         feeds = ["--feed", f"udpin:127.0.0.1:{port}"] if any(e.kind in TRAFFIC for e in scenario.events) else []
-        share = None if cpu is None else await stack.enter_async_context(cpu_share(cpu))
         companion = _Companion([
             sys.executable, "-m", "companion.cli", "run", str(mission_path), "--link", link, "--out", str(folder),
             "--state", str(folder / "state.json"), "--seed", str(seed), "--speedup", f"{pace:g}",
