@@ -16,7 +16,7 @@ from sitl.scenario.scenario import ExpectSpec, Scenario, WindSpec
 MISSIONS = Path(__file__).parents[2] / "sitl/missions"
 
 
-def sailed(tmp_path, *, from_deg, sd_deg=0.1, mission="open-water.toml"):
+def sailed(tmp_path, *, from_deg, sd_deg=0.1, mission="open-water.toml", seed=1):
     """Return (t_s, shown, on starboard tack) of each step under way, and the times of the tacks sailed."""
     shown = []
 
@@ -30,7 +30,8 @@ def sailed(tmp_path, *, from_deg, sd_deg=0.1, mission="open-water.toml"):
 
     scenario = Scenario(name="tacks", mission=mission, limit_s=500.0, expect=ExpectSpec(),
                         wind=WindSpec(tws_mps=5.0, from_deg=from_deg, sd_deg=sd_deg))
-    run_virtual(run_embedded(scenario, MISSIONS / "scenario.toml", 1, tmp_path / "v", expansions=3000, on_status=see))
+    run_virtual(run_embedded(
+        scenario, MISSIONS / "scenario.toml", seed, tmp_path / "v", expansions=3000, on_status=see))
     tacks = [b[0] for a, b in itertools.pairwise(shown) if a[2] != b[2]]
     return shown, tacks
 
@@ -46,6 +47,15 @@ def test_the_autopilots_own_beats_are_foreseen(tmp_path):
         errors += [abs(t + s - after) for t, s in board]
     assert statistics.median(errors) < 2.0
     assert max(s for t, s, _ in shown if s is not None and t > tacks[0]) < 60.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_tack_that_the_waypoint_before_it_has_begun_is_now(tmp_path, seed):
+    """The leg is the next one already, the boat still on the old tack: the next tack is not the one after this."""
+    shown, tacks = sailed(tmp_path, from_deg=0.0, sd_deg=5.0, mission="archipelago.toml", seed=seed)
+    turning = [s for t, s, _ in shown if any(tack - 1.5 < t < tack for tack in tacks)]
+    assert len(turning) >= len(tacks) >= 4
+    assert sum(s is not None and s <= 5.0 for s in turning) >= 0.8 * len(turning)
 
 
 @pytest.mark.parametrize("from_deg", [90.0, 180.0, 250.0])

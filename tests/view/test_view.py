@@ -57,9 +57,9 @@ def test_the_chance_of_being_forced_off_the_plan_is_what_its_legs_add_up_to(beat
 
 
 def test_a_tack_that_the_autopilot_makes_by_itself_is_told_as_such(beat):
-    told = {bool(leg.is_beat): view.plan.next_tack_is_planned for view in beat.under_way
+    told = {(bool(leg.is_beat), view.plan.next_tack_is_planned) for view in beat.under_way
             for leg in view.plan.legs[:1] if view.plan.next_tack_s is not None and leg.is_beat is not None}
-    assert told.get(True) is False or told.get(False) is True
+    assert (True, False) in told
     for view in beat.under_way:
         assert (view.plan.next_tack_s is None) == (view.plan.next_tack_is_planned is None)
 
