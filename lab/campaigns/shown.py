@@ -187,7 +187,10 @@ def told(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def shown(scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: bool) -> Experiment[bool]:
-    """Return the voyages of each scenario, or of what ``sitl mismatch`` draws; a table of each kind and of all."""
+    """Return the voyages of each scenario, or of what ``sitl mismatch`` draws; a table of each kind and of all.
+
+    The seeds run on from one scenario to the next: two voyages of one seed would be of one wind.
+    """
     from sitl.rehearse.mismatch_sampling import draw
 
     def sum_up(sailed: CampaignResults) -> ExperimentSummary:
@@ -202,7 +205,8 @@ def shown(scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: b
         water = {} if job.case else {"hash": file_hash(job.scenario)}
         return {"scenario": _name(job), **water, "seed": job.seed}
 
-    every = range(first_seed, first_seed + seeds)
-    jobs = [Job(scenario=draw(seed).source, case=True, seed=seed) for seed in every] if mismatch else [
-        Job(scenario=path, case=False, seed=seed) for path in scenarios or SCENARIOS for seed in every]
+    paths = scenarios or SCENARIOS
+    every = range(first_seed, first_seed + seeds * (1 if mismatch else len(paths)))
+    jobs = [Job(scenario=draw(seed).source, case=True, seed=seed) if mismatch else
+            Job(scenario=paths[n // seeds], case=False, seed=seed) for n, seed in enumerate(every)]
     return Experiment(name="shown", sail=sail, key=key, sum_up=sum_up, jobs=jobs)

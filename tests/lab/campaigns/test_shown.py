@@ -64,3 +64,9 @@ def test_the_demo_shows_what_comes():
     assert math.isfinite(row(rows, "wind in 60 s")["held"])
     experiment = shown([DEMO], seeds=2, first_seed=1, mismatch=False)
     assert experiment.key(experiment.jobs[0]) != experiment.key(experiment.jobs[1])
+
+
+def test_no_two_voyages_are_of_one_wind():
+    jobs = shown([], seeds=2, first_seed=3, mismatch=False).jobs
+    seeds = [job.seed for job in jobs]
+    assert seeds == list(range(3, 3 + 2 * len({job.scenario for job in jobs})))
