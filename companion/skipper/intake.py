@@ -172,9 +172,10 @@ def locate(ctx: StepContext) -> None:
 
 def remember_fix(ctx: StepContext) -> None:
     """Keep the position for the next step's look at jumps."""
-    here, age = ctx.snapshot.position_en_m, ctx.snapshot.vehicle_age_s
-    if here is not None and age is not None and age <= FRESH_S:
-        ctx.set(position=changed(ctx.state.position, last_seen=Fix(t_s=ctx.t_s - age, en_m=here)))
+    here, vehicle, age = ctx.snapshot.position_en_m, ctx.snapshot.vehicle, ctx.snapshot.vehicle_age_s
+    if here is not None and vehicle is not None and age is not None and age <= FRESH_S:
+        ctx.set(position=changed(ctx.state.position, last_seen=Fix(
+            t_s=ctx.t_s - age, en_m=here, velocity_en_mps=vehicle.velocity_en_mps)))
 
 
 def notice_truncation(ctx: StepContext) -> None:

@@ -29,7 +29,8 @@ HELD = {"orders": {"standing": Standing(verb=Verb.HOLD, by="crew", name="here", 
 NOTHING_LEFT = {"progress": {"gate": 99}}
 ASHORE = {"mission": {"checked": True, "route": None}, "voyage": {"sailing": False}}
 DOUBT = {"position": {"doubt": PositionDoubt(
-    since_s=0.0, t_s=0.0, settled_s=0.0, reckoned_en_m=(0.0, 0.0), why="it jumped")}}
+    since_s=0.0, t_s=0.0, settled_s=0.0, reckoned_en_m=(0.0, 0.0), velocity_en_mps=(0.0, 0.0),
+    why="it jumped")}}
 DRIFTS = {"alarms": {"raised": (Raised(name="drifting", since_s=0.0),)}}
 IN_LOITER, IN_GUIDED = {"steering": {"own_mode": Mode.LOITER}}, {"steering": {"own_mode": Mode.GUIDED}}
 IN_IRONS = {"steering": {"until_s": 1e9, "heading_rad": 0.0, "own_mode": Mode.GUIDED}}

@@ -80,7 +80,8 @@ def test_everything_that_is_remembered_is_where_it_was():
             "searched": ((1.0, 2.0), (3.0, 4.0)),
             "approaches": (Approach(goal=0, en_m=(7.0, 8.0), sweeps=(((0.0, 0.0), (9.0, 9.0)),)),)},
         position={"doubt": PositionDoubt(
-            since_s=1.0, t_s=1.0, settled_s=1.0, reckoned_en_m=(30.0, 40.0), why="it jumped")},
+            since_s=1.0, t_s=1.0, settled_s=1.0, reckoned_en_m=(30.0, 40.0), velocity_en_mps=(1.0, 0.0),
+            why="it jumped")},
         adrift=Adrift(places=(Fix(t_s=0.0, en_m=(5.0, 6.0)),), ground_en_mps=(0.5, 0.0)),
         orders={"standing": Standing(verb=Verb.GOAL, by="crew", name="there", en_m=(100.0, 200.0))})
     shift = shifted(world)

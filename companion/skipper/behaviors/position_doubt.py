@@ -24,7 +24,7 @@ from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.planning.waits import utc_s
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.saved import SavedPlace
-from companion.skipper.step.state import Phase
+from companion.skipper.step.state import Fix, Phase
 from companion.skipper.way.geometry import moved
 from companion.skipper.way.position_plausibility import (
     DISPUTED_S,
@@ -32,6 +32,7 @@ from companion.skipper.way.position_plausibility import (
     LASTS_S,
     LOST_ERRS_MPS,
     LOST_S,
+    SILENT_S,
     Evidence,
     PositionDoubt,
     is_impossible,
@@ -41,11 +42,9 @@ from companion.skipper.way.voyage import PointEn
 AHEAD_S = 20.0        # what the boat sails until a LOITER that is asked for now has it, and some more
 SLOW_MPS = 1.0
 GLITCH_S = 3.0        # a position that is back sooner has done no harm
-SAVE_S = 30.0         # between two places that are saved
-STRAYS_M = 25.0       # what a boat in LOITER or HOLD is off its place when it is found again
-LEAST_REACH_M = 30.0  # a start finds the boat so near to where it was, whatever the clocks say
+SAVE_S = 30.0         # between two places that are saved ...
+NEAR_M, NEAR_S = 100.0, 5.0   # ... and with something so near, where a jump matters that is no longer than that
 UNKNOWN_S = 120.0     # how long a start has taken when no clock tells
-BEATEN_MPS = 10.0     # the wind in which the boat may have sailed meanwhile
 POINT_S = 5.0         # after LOITER was accepted what is told may still be the distance of the leg before it
 POINT_SHUT = "the loiter's point cannot be sailed to from here"
 CODE = "position doubted"
@@ -113,8 +112,11 @@ def _begun(ctx: StepContext, seen: Evidence) -> PositionDoubt | None:
     lost_s = 0.0 if state.position.lost_s is None else ctx.t_s - state.position.lost_s
     lost_m = ERROR_M + LOST_ERRS_MPS * lost_s if lost_s >= LOST_S else 0.0
     if seen.is_jump and last is not None:
+        silent_s = seen.t_s - last.t_s
+        gap = f" in a silence of {silent_s:.0f} s" if silent_s > SILENT_S else ""
         begun = PositionDoubt(since_s=ctx.t_s, t_s=last.t_s, settled_s=seen.t_s, reckoned_en_m=last.en_m,
-                              lost_m=lost_m, why=f"it jumped {ctx.jump_m:.0f} m")
+                              velocity_en_mps=last.velocity_en_mps, lost_m=lost_m,
+                              why=f"it jumped {ctx.jump_m:.0f} m{gap}")
         return begun.after(seen)
     if seen.is_contradicted and seen.second_en_m is not None:
         disputed_s = state.position.disputed_s if state.position.disputed_s is not None else ctx.t_s
@@ -122,7 +124,7 @@ def _begun(ctx: StepContext, seen: Evidence) -> PositionDoubt | None:
         if ctx.t_s - disputed_s >= DISPUTED_S:
             off_m = math.dist(seen.second_en_m, seen.en_m)
             return PositionDoubt(since_s=ctx.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=seen.second_en_m,
-                                 farthest_m=off_m, is_dispute=True,
+                                 velocity_en_mps=seen.velocity_en_mps, farthest_m=off_m, is_dispute=True,
                                  why=f"a second receiver is {off_m:.0f} m away from it")
     elif state.position.disputed_s is not None:
         ctx.set(position=changed(ctx.state.position, disputed_s=None))
@@ -134,27 +136,29 @@ def _begun(ctx: StepContext, seen: Evidence) -> PositionDoubt | None:
         deep_m = -float(ctx.voyage.area.unfenced.clearance_m([seen.en_m])[0])
         name = ctx.voyage.area.nearest_name(seen.en_m) or "an obstacle"
         return PositionDoubt(since_s=ctx.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=seen.en_m,
-                             error_m=deep_m + ctx.config.margin_m, why=f"it is {deep_m:.0f} m inside {name}")
+                             velocity_en_mps=seen.velocity_en_mps, error_m=deep_m + ctx.config.margin_m,
+                             why=f"it is {deep_m:.0f} m inside {name}")
     return None
 
 
 def _since_the_last_start(ctx: StepContext, before: SavedPlace, seen: Evidence) -> PositionDoubt | None:
     """Return the doubt of a fix that is not where the boat can have come to since it was saved, or was in doubt."""
-    now_s, saved = utc_s(ctx), ctx.state.mission.adoptable
-    passed_s = UNKNOWN_S if now_s is None else max(0.0, now_s - before.utc_s)
-    is_held = saved is not None and saved.own_mode in {Mode.LOITER, Mode.HOLD}
-    fastest_mps = ctx.voyage.boat.polar.max_speed_mps(BEATEN_MPS) + ctx.snapshot.current.drift_mps + SLOW_MPS
-    reach_m = before.error_m + (min(STRAYS_M, fastest_mps * passed_s) if is_held else fastest_mps * passed_s)
-    off_m = math.dist(before.en_m, seen.en_m)
+    now_s, saved, late_s = utc_s(ctx), ctx.state.mission.adoptable, ctx.t_s - seen.t_s
+    if now_s is not None and now_s < before.utc_s:
+        now_s = None   # a clock that was set back since tells nothing
+    passed_s = UNKNOWN_S if now_s is None else max(0.0, now_s - late_s - before.utc_s)
+    last = Fix(t_s=seen.t_s - passed_s, en_m=before.en_m, velocity_en_mps=before.velocity_en_mps)
+    off_m = ctx.innovation_m(last, held_in=None if saved is None else saved.own_mode)
     was_doubted = before.farthest_m > 0.0 and passed_s < LASTS_S
-    if not was_doubted and (now_s is None or off_m <= reach_m + LEAST_REACH_M):
+    if not was_doubted and (now_s is None or off_m < JUMP_M):
         return None
-    text = "in doubt before this start" if was_doubted else (
-        f"{off_m:.0f} m from where she was {passed_s:.0f} s ago")
+    why = "it is in doubt before this start" if was_doubted else (
+        f"it jumped {off_m:.0f} m in the {passed_s:.0f} s before this start")
     doubt = PositionDoubt(
-        since_s=ctx.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=before.en_m, error_m=reach_m,
-        farthest_m=max(before.farthest_m, off_m), why=f"it is {text}")
-    return None if doubt.is_back(seen.en_m) else doubt
+        since_s=ctx.t_s, t_s=last.t_s, settled_s=seen.t_s, reckoned_en_m=last.en_m,
+        velocity_en_mps=last.velocity_en_mps, error_m=before.error_m, farthest_m=before.farthest_m,
+        why=why).after(seen)
+    return None if was_doubted and doubt.is_back(seen.en_m) else doubt
 
 
 def _follow_filter(ctx: StepContext) -> None:
@@ -168,16 +172,21 @@ def _follow_filter(ctx: StepContext) -> None:
 
 
 def _remember(ctx: StepContext, here: PointEn, doubt: PositionDoubt | None) -> None:
-    """Keep for who comes after a kill where the boat is, every ``SAVE_S`` and when a doubt begins or ends."""
-    now_s, before = utc_s(ctx), ctx.state.position.place
-    if now_s is None or not ctx.state.voyage.sailing:
-        return
-    is_same = before is not None and (before.farthest_m > 0.0) == (doubt is not None)
-    if is_same and before is not None and before.utc_s // SAVE_S == now_s // SAVE_S:
+    """Keep for who comes after a kill where the boat is, and how fast; and at once when a doubt begins or ends."""
+    now_s, before, vehicle, age = (
+        utc_s(ctx), ctx.state.position.place, ctx.snapshot.vehicle, ctx.snapshot.vehicle_age_s)
+    if now_s is None or vehicle is None or age is None or not ctx.state.voyage.sailing:
         return
     en_m = here if doubt is None else doubt.reckoned_en_m
+    if before is not None and (before.farthest_m > 0.0) == (doubt is not None):
+        passed_s = abs(now_s - age - before.utc_s)
+        is_near = passed_s >= NEAR_S and float(ctx.voyage.area.unfenced.clearance_m([en_m])[0]) < NEAR_M
+        if passed_s < SAVE_S and not is_near:
+            return
+    east, north = vehicle.velocity_en_mps
     ctx.set(position=changed(ctx.state.position, place=SavedPlace(
-        utc_s=round(now_s, 1), en_m=(round(en_m[0], 1), round(en_m[1], 1)),
+        utc_s=round(now_s - age, 1), en_m=(round(en_m[0], 1), round(en_m[1], 1)),
+        velocity_en_mps=(round(east, 2), round(north, 2)),
         error_m=0.0 if doubt is None else round(doubt.error_m, 1),
         farthest_m=0.0 if doubt is None else max(JUMP_M, round(doubt.farthest_m, 1)))))
 

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
-from companion.mavlink.wire import MEMORY_S
 from companion.messages import AutopilotStatus, Mode, Severity
 from companion.safety import JUMP_M, STOPPING
 from companion.skipper.step.actions import (
@@ -35,6 +34,7 @@ from companion.skipper.step.state import (
     Alarms,
     Announced,
     FieldSteering,
+    Fix,
     GoalProgress,
     LoadedMission,
     OperatorState,
@@ -55,11 +55,12 @@ from companion.skipper.step.state import (
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle, circle_of, drawn_of
 from companion.skipper.way.gates import Approach, Gate, gates_of
 from companion.skipper.way.geometry import bearing_rad
+from companion.skipper.way.position_plausibility import innovation_m
 from companion.skipper.way.stemming import Water
 from companion.skipper.way.voyage import PointEn, Voyage
 
 FRESH_S = 3.0          # a part older than this is not acted upon
-GAINS_MPS = 1.0        # a fix with this much more speed than it can have gained is a jump, as one that is JUMP_M off
+BEATEN_MPS = 10.0      # the wind in which the boat may have sailed while nobody looked
 SHOWS_S = 2.5          # a command that was accepted shows in the next heartbeats: it is not repeated before that
 DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
 
@@ -301,20 +302,27 @@ class StepContext:
 
     @property
     def jump_m(self) -> float:
-        """How much farther the boat is from where its last fix has it sail than it can have turned away [m].
+        """How much farther the boat is off than its last fix, however long ago, can have led it [m].
 
         At a leap's 8 m/s a second would hide what a margin is: it is held against its own speed.
         """
-        here, last, vehicle = self.snapshot.position_en_m, self.state.position.last_seen, self.snapshot.vehicle
-        age = self.snapshot.vehicle_age_s
-        if here is None or last is None or vehicle is None or age is None or self.state.position.back_s == self.t_s:
+        last = self.state.position.last_seen
+        return 0.0 if last is None or self.state.position.back_s == self.t_s else self.innovation_m(last)
+
+    def innovation_m(self, last: Fix, held_in: Mode | None = None) -> float:
+        """Return how much farther the boat is off than ``last`` can have led it [m].
+
+        ``held_in``: the mode that it was left in, where no state says so yet.
+        """
+        here, vehicle, age = self.snapshot.position_en_m, self.snapshot.vehicle, self.snapshot.vehicle_age_s
+        if here is None or vehicle is None or age is None:
             return 0.0
-        elapsed_s = max(0.0, self.t_s - age - last.t_s)
-        if elapsed_s > MEMORY_S:
-            return 0.0
-        east, north = vehicle.velocity_en_mps
-        reckoned = (last.en_m[0] + east * elapsed_s, last.en_m[1] + north * elapsed_s)
-        return max(0.0, math.dist(here, reckoned) - (vehicle.speed_mps + GAINS_MPS) * elapsed_s)
+        status, own = self.snapshot.autopilot, held_in or self.state.steering.own_mode
+        return innovation_m(
+            (here[0] - last.en_m[0], here[1] - last.en_m[1]), max(0.0, self.t_s - age - last.t_s),
+            last.velocity_en_mps, vehicle.velocity_en_mps,
+            fastest_mps=self.voyage.boat.polar.max_speed_mps(BEATEN_MPS) + self.snapshot.current.drift_mps,
+            is_held=own in {Mode.LOITER, Mode.HOLD} and status is not None and status.mode is own)
 
     @property
     def speed_mps(self) -> float:

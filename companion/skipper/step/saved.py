@@ -72,13 +72,15 @@ class Standing:
 class SavedPlace:
     """Where the boat was at ``utc_s``, by the autopilot's clock: as it was believed, or reckoned while it was not.
 
-    ``farthest_m``: how far off that place the doubted position was at the most; 0: it was believed.
+    ``velocity_en_mps``: as it was told then [m/s]; ``farthest_m``: how far off that place the doubted position was at
+    the most; 0: it was believed.
     """
 
     utc_s: float
     en_m: tuple[float, float]
     error_m: float = 0.0
     farthest_m: float = 0.0
+    velocity_en_mps: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,14 +190,17 @@ def _latency(data: Any) -> PlannerLatency:
 
 
 def _place_to_list(place: SavedPlace | None) -> list[float] | None:
-    return None if place is None else [place.utc_s, *place.en_m, place.error_m, place.farthest_m]
+    return None if place is None else [
+        place.utc_s, *place.en_m, place.error_m, place.farthest_m, *place.velocity_en_mps]
 
 
 def _place_from_list(data: Any) -> SavedPlace | None:
     if data is None:
         return None
-    utc_s, east, north, error_m, farthest_m = (_number(value) for value in data)
-    return SavedPlace(utc_s=utc_s, en_m=(east, north), error_m=abs(error_m), farthest_m=abs(farthest_m))
+    utc_s, east, north, error_m, farthest_m, *velocity = (_number(value) for value in data[:7])
+    east_mps, north_mps = velocity or (0.0, 0.0)   # of states that were saved before there was any
+    return SavedPlace(utc_s=utc_s, en_m=(east, north), error_m=abs(error_m), farthest_m=abs(farthest_m),
+                      velocity_en_mps=(east_mps, north_mps))
 
 
 def _approach_to_list(approach: Approach) -> list[Any]:

@@ -127,10 +127,11 @@ class PendingUpload:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fix:
-    """A position, and when."""
+    """A position, and when; and how fast the boat was there [m/s, east north]."""
 
     t_s: float
     en_m: PointEn
+    velocity_en_mps: PointEn = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

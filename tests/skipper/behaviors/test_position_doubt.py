@@ -1,5 +1,7 @@
 """A position that jumped: believed when it is back, and stood off from while the other place is not clear ahead."""
 
+import itertools
+import math
 from dataclasses import replace
 
 import pytest
@@ -8,9 +10,10 @@ import shapely.ops
 
 from companion.messages import Mode, StatusText
 from companion.skipper.step import actions as act
+from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from tests.skipper.test_voyage import GOAL, is_done, make, said
+from tests.skipper.test_voyage import GOAL, ISLANDS, is_done, make, said
 from tests.skipper.world import FRAME, restarted
 
 
@@ -210,11 +213,66 @@ def test_a_position_that_jumped_while_the_companion_was_dead_is_doubted_by_who_c
     world = make(shown={"utc_at_boot_s": UTC_S})
     assert world.run(600, is_near_an_island)
     restarted(world)
-    world.position_offset = (400.0, -300.0)
+    world.position_offset = (70.0, -40.0)    # farther than she sails in the seconds since her place was saved
     assert world.run(10, lambda w: w.state.position.doubt is not None)
-    assert "s ago" in world.state.position.doubt.why
+    assert "before this start" in world.state.position.doubt.why
     world.position_offset = (0.0, 0.0)
     assert world.run(3, lambda w: w.state.position.doubt is None)
+
+
+def silent(world, seconds):
+    """Let the boat sail on while the link is dead; the companion lives."""
+    for _ in range(seconds):
+        world.extra = {"vehicle_age_s": 1e3, "heartbeat_age_s": 1e3, "position_en_m": None}
+        world.step()
+    world.extra = {}
+
+
+@pytest.mark.parametrize("silent_s", [6, 15])
+def test_a_position_that_jumped_while_the_link_was_silent_is_doubted_as_one_that_was_seen_to(silent_s):
+    world = make()
+    assert world.run(600, is_near_an_island)
+    silent(world, silent_s)
+    lie(world)
+    assert world.run(6, lambda w: w.mode is Mode.LOITER)
+    assert raised(world)
+    assert "in a silence of" in world.state.position.doubt.why
+    since = len(world.actions)
+    world.run(60)
+    assert not asked(world, since)
+    world.position_offset = (0.0, 0.0)
+    assert world.run(12, lambda w: w.mode is Mode.AUTO)
+    assert world.run(1500, is_done)
+
+
+@pytest.mark.parametrize("silent_s", [5, 20, 60])
+def test_what_she_sails_on_by_herself_in_a_silence_is_no_jump(silent_s):
+    world = make()
+    world.run(40)
+    for _ in range(4):
+        silent(world, silent_s)
+        world.run(15)
+    assert not said(world, "position doubted")
+    assert not raised(world)
+    assert world.run(1500, is_done)
+
+
+@pytest.mark.parametrize(("obstacles", "every_s"), [(ISLANDS, 5.0), ((), 30.0)])
+def test_her_place_is_saved_with_her_speed_and_oftener_near_something_solid(obstacles, every_s):
+    world = make(obstacles=obstacles, shown={"utc_at_boot_s": UTC_S})
+    world.run(40)
+    places = []
+    for _ in range(90):
+        world.step()
+        place = world.state.position.place
+        if place is not None and place not in places:
+            places.append(place)
+    apart_s = [b.utc_s - a.utc_s for a, b in itertools.pairwise(places)]
+    assert min(apart_s) == pytest.approx(every_s, abs=0.2)
+    assert max(apart_s) <= 30.2, "farther than 100 m off it is seldomer"
+    assert math.hypot(*places[-1].velocity_en_mps) > 1.0
+    saved = Persisted.from_dict(world.skipper.persisted(world.state).to_dict())
+    assert saved.place == places[-1]
 
 
 def test_an_ordinary_restart_doubts_nothing():

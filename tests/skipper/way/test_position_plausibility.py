@@ -13,6 +13,7 @@ from companion.skipper.way.position_plausibility import (
     QUIET_S,
     Evidence,
     PositionDoubt,
+    innovation_m,
     is_impossible,
 )
 from tests.skipper.world import area
@@ -22,7 +23,8 @@ HERE = Evidence(t_s=0.0, en_m=(500.0, 0.0), velocity_en_mps=(0.0, 2.0), room_m=4
 
 def doubt(**changes):
     return PositionDoubt(**{
-        "since_s": 0.0, "t_s": 0.0, "reckoned_en_m": (0.0, 0.0), "farthest_m": 500.0, "settled_s": 0.0,
+        "since_s": 0.0, "t_s": 0.0, "reckoned_en_m": (0.0, 0.0), "velocity_en_mps": HERE.velocity_en_mps,
+        "farthest_m": 500.0, "settled_s": 0.0,
         "why": "it jumped 500 m", **changes})
 
 
@@ -99,3 +101,33 @@ def test_a_place_is_impossible_only_deeper_in_something_solid_than_margin_and_er
     assert not is_impossible(water, (15.0 + ERROR_M - 1.0, 100.0), margin_m=15.0)
     assert not is_impossible(water, (-50.0, 0.0), margin_m=15.0)
     assert not is_impossible(water, (600.0, 0.0), margin_m=15.0)      # outside the fence there is water
+
+
+AHEAD, BACK, RIGHT, STILL = (0.0, 2.0), (0.0, -2.0), (2.0, 0.0), (0.0, 0.2)
+
+
+@pytest.mark.parametrize(("way_en_m", "dt_s", "before_mps", "now_mps"), [
+    ((0.0, 20.0), 10.0, AHEAD, AHEAD),       # sailed on
+    ((20.0, 0.0), 20.0, AHEAD, BACK),        # turned round, and abeam of where she was
+    ((18.0, 20.0), 20.0, AHEAD, RIGHT),
+    ((0.0, 40.0), 60.0, RIGHT, RIGHT),       # beaten across: two tacks on end
+    ((0.0, 100.0), 40.0, STILL, STILL),      # in irons at both ends, and sailed between them
+])
+def test_what_she_can_have_sailed_in_a_silence_is_no_jump(way_en_m, dt_s, before_mps, now_mps):
+    assert innovation_m(way_en_m, dt_s, before_mps, now_mps, fastest_mps=5.0) == 0.0
+
+
+@pytest.mark.parametrize(("way_en_m", "dt_s", "is_held"), [
+    ((70.0, 0.0), 15.0, False),              # across her way, 70 m in 15 s
+    ((0.0, 80.0), 20.0, False),              # along it, at 4 m/s
+    ((0.0, -40.0), 15.0, False),             # back, and still under way ahead
+    ((60.0, 0.0), 40.0, True),               # a loiter does not go so far in any time
+])
+def test_what_she_cannot_have_sailed_in_a_silence_is_a_jump(way_en_m, dt_s, is_held):
+    assert innovation_m(way_en_m, dt_s, AHEAD, AHEAD, fastest_mps=5.0, is_held=is_held) >= 10.0
+
+
+def test_over_a_silence_she_is_reckoned_on_by_the_mean_of_both_speeds_and_may_have_turned():
+    after = doubt(velocity_en_mps=(0.0, 1.0)).after(replace(HERE, t_s=20.0, velocity_en_mps=(0.0, 2.0)))
+    assert after.reckoned_en_m == pytest.approx((0.0, 30.0))
+    assert after.error_m == pytest.approx(60.0)
