@@ -530,7 +530,9 @@ class VoyageFold:
         return Sailing(
             t_s=vehicle.t_s, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
             twd_from_rad=wind.present_twd_from_rad,
-            tws_mps=wind.present_tws_mps, is_driven=is_driven, age_s=t_s - vehicle.t_s, roll_rad=vehicle.roll_rad)
+            tws_mps=wind.present_tws_mps, is_driven=is_driven,
+            is_heard=wind.health is not WindHealth.UNTRUSTED or self.current.doubts_wind,
+            age_s=t_s - vehicle.t_s, roll_rad=vehicle.roll_rad)
 
 
 def begun(

@@ -144,7 +144,8 @@ NEW_WATER_MPS, NEW_WATER_SPREADS = 0.5, 3.0   # ... no stronger than so many of 
 class Sailing:
     """One moment of the boat: velocity over ground [m/s], heading, and the wind over the ground.
 
-    ``is_driven``: its sails are sheeted and nothing else drives it; ``age_s``: of the velocity and the heading;
+    ``is_driven``: its sails are sheeted and nothing else drives it; ``is_heard``: the wind is what the vane says now;
+    ``age_s``: of the velocity and the heading;
     ``roll_rad``: positive to starboard, None where it is not told.
     """
 
@@ -154,6 +155,7 @@ class Sailing:
     twd_from_rad: float
     tws_mps: float
     is_driven: bool
+    is_heard: bool = True
     age_s: float = 0.0
     roll_rad: float | None = None
 
@@ -193,6 +195,8 @@ class CurrentEstimator:
         if now is None:
             return
         last, self._last = self._last, now
+        if self._check is not None and now.is_heard:
+            self._check.follow_wind(t_s, now.twd_from_rad, now.tws_mps, is_driven=now.is_driven)
         if last is None or not now.is_driven or now.age_s > LATE_S:
             self._unsteady_s, self._means = t_s, None
             if self._check is not None:

@@ -8,7 +8,9 @@ wrote, not a current of 3 m/s that came within a second. What tells:
   current could explain.
 - **Heel.** It heels to windward.
 - **The direction's leap.** A front turns the wind, too, but then it sails by it. A direction that has leapt before it
-  ceased to sail as it should is the sensor's doing; less is enough then, and a shorter time.
+  ceased to sail as it should is the sensor's doing; less is enough then, and a shorter time. No front turns the wind
+  by ``TURNED_RAD`` within a minute: a direction that has leapt so far is doubted whatever the boat does, on a reach,
+  where the wind from the other side would have it sail as fast, and at its mooring.
 
 What sets it across its heading as well is no wind's doing: a current's, which the filter takes up, or a compass's,
 which "heading against course" tells.
@@ -42,8 +44,12 @@ FITS_S = 20.0                      # of readings that fit end a doubt
 NEW_WIND_S = 90.0                  # likewise in another direction than before, on headings far apart
 FAR_APART_RAD = math.radians(70.0)
 JUMP_RAD = math.radians(40.0)      # of the direction's 5 s mean against what it was half a minute and more ago
+TURNED_RAD, LASTS_S = math.radians(125.0), 5.0   # of the same, for so long: no shift
+STEADY = 0.7                       # the length of the mean of the directions before: less is a wind that swings about
+MOORED_S = 600.0                   # of a boat that does not sail by it: a wind that stays so long is a new one
 BEFORE_S, MEMORY_S = 30.0, 90.0
 KEPT_EVERY_S = 5.0
+LEAST_BEFORE = 4                   # of the directions before: fewer may be of the moment when the vane was put right
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +94,9 @@ class MotionCheck:
         self._directions: deque[tuple[float, float]] = deque()   # of the wind, one in 5 s
         self._before_rad: float | None = None                    # where it came from before it leapt ...
         self._leapt_s = -math.inf                                # ... and when it was seen to have
+        self._wind_s: float | None = None                        # of the last wind that was followed
+        self._far_s = self._back_s = self._moored_s = 0.0        # it has been turned, back, and not sailed by, for
+        self._is_leap = False                                    # it is doubted for its leap alone
         self._fitted: list[float] = []                           # headings on which the boat sailed as it should
 
     @property
@@ -102,7 +111,6 @@ class MotionCheck:
     def update(self, t_s: float, now: MotionSample) -> None:
         """Take the moment at ``t_s``."""
         self.is_odd = False
-        self._follow_direction(t_s, now)
         if self._t_s is None or t_s <= self._t_s:
             self._t_s, self._heading_rad, self._turned_s = t_s, now.heading_rad, t_s
             return
@@ -147,20 +155,46 @@ class MotionCheck:
             (self._heel_rad > 0.0) == (now.twa_rad > 0.0))
 
     # ------------------------------------------------------------------------------------ the direction
-    def _follow_direction(self, t_s: float, now: MotionSample) -> None:
+    def follow_wind(self, t_s: float, twd_from_rad: float, tws_mps: float, *, is_driven: bool) -> None:
+        """Take the wind at ``t_s`` as the vane tells it, whether the boat sails by it or not."""
+        if tws_mps < LEAST_TWS_MPS:
+            return   # a light air has no direction
+        dt_s = 0.0 if self._wind_s is None else max(0.0, min(5.0, t_s - self._wind_s))
+        self._wind_s = t_s
         kept = self._directions
         if not kept or t_s - kept[-1][0] >= KEPT_EVERY_S:
-            kept.append((t_s, now.twd_from_rad))
+            kept.append((t_s, twd_from_rad))
         while t_s - kept[0][0] > MEMORY_S:
             kept.popleft()
+        if self._is_leap:
+            self._look_for_its_return(twd_from_rad, dt_s, is_driven=is_driven)
         old = [direction for then_s, direction in kept if t_s - then_s > BEFORE_S]
         if self.doubt or not old:
             return
-        was = math.atan2(sum(map(math.sin, old)), sum(map(math.cos, old)))
-        if abs(difference_rad(now.twd_from_rad, was)) > JUMP_RAD:
+        east, north = sum(map(math.sin, old)) / len(old), sum(map(math.cos, old)) / len(old)
+        was = math.atan2(east, north)
+        by_rad = difference_rad(twd_from_rad, was)
+        if abs(by_rad) > JUMP_RAD:
             if not self._has_leapt(t_s):
                 self._before_rad = was
             self._leapt_s = t_s
+        is_turned = abs(by_rad) >= TURNED_RAD and len(old) >= LEAST_BEFORE and math.hypot(east, north) >= STEADY
+        self._far_s = self._far_s + dt_s if is_turned else 0.0
+        if self._far_s >= LASTS_S:
+            self._is_leap = self.is_winds = True
+            self.fits_s, self._fitted, self._before_rad = 0.0, [], was
+            self._back_s = self._moored_s = 0.0
+            self.doubt = (f"the wind's direction leapt by {math.degrees(by_rad):+.0f}°, farther than a wind shifts: "
+                          "the vane was turned, or its offset")
+
+    def _look_for_its_return(self, twd_from_rad: float, dt_s: float, *, is_driven: bool) -> None:
+        """End the doubt of a leap that is over, or that has stayed for so long where nobody sails by it."""
+        assert self._before_rad is not None
+        is_back = abs(difference_rad(twd_from_rad, self._before_rad)) <= JUMP_RAD
+        self._back_s = self._back_s + dt_s if is_back else 0.0
+        self._moored_s = 0.0 if is_driven else self._moored_s + dt_s
+        if self._back_s >= FITS_S or self._moored_s >= MOORED_S:
+            self.settle()
 
     def _has_leapt(self, t_s: float) -> bool:
         return t_s - self._leapt_s <= BEFORE_S
@@ -198,4 +232,5 @@ class MotionCheck:
         self.doubt, self.is_odd, self.is_winds = "", False, False
         self._odd_s = self.fits_s = 0.0
         self._fitted, self._before_rad, self._leapt_s = [], None, -math.inf
+        self._is_leap, self._far_s = False, 0.0
         self._directions.clear()

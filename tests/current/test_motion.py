@@ -175,3 +175,41 @@ def test_who_stands_still_or_lies_in_irons_tells_nothing(now):
 def test_turning_all_the_time_tells_nothing():
     moments = [boat(float(t), 12.0 * t, -0.7) for t in range(200)]
     assert not sails(moments)[0].motion_doubt
+
+
+@pytest.mark.parametrize("turned_deg", [130.0, 180.0, -140.0])
+def test_a_direction_that_leaps_farther_than_a_wind_shifts_is_doubted_though_she_sails_as_fast(turned_deg):
+    """On a reach the wind from the other side would have her sail alike: her motion tells nothing."""
+    speed = POLAR.speed_mps(math.radians(90.0), 5.0)
+    reach = [boat(float(t), 90.0, speed) for t in range(1, 80)]
+    angle = math.radians(turned_deg - 90.0)
+    after = [boat(80.0 + t, 90.0, POLAR.speed_mps(angle, 5.0), twd_deg=turned_deg) for t in range(60)]
+    estimator, when = sails([*reach, *after])
+    assert len(when) == 1
+    assert when[0] < 80.0 + 10.0
+    assert estimator.doubts_wind
+    assert estimator.wind_before_rad == pytest.approx(0.0)
+    assert estimator.view().drift_mps < 0.1
+    sails([boat(140.0 + t, 90.0, speed) for t in range(40)], estimator)
+    assert not estimator.motion_doubt, "put right"
+
+
+def test_a_wind_that_shifts_by_less_is_none():
+    speed = POLAR.speed_mps(math.radians(90.0), 5.0)
+    reach = [boat(float(t), 90.0, speed) for t in range(1, 80)]
+    after = [boat(80.0 + t, 210.0, speed, twd_deg=120.0) for t in range(60)]
+    assert not sails([*reach, *after])[1]
+
+
+def test_a_light_air_and_one_that_swings_about_have_no_direction_that_leaps():
+    for tws_mps, twd_deg in ((1.0, lambda t: 180.0 * (t > 80)), (5.0, lambda t: 7.0 * t)):
+        moments = [boat(float(t), 90.0, 0.0, twd_deg=twd_deg(t), tws_mps=tws_mps) for t in range(1, 160)]
+        assert not sails(moments)[1]
+
+
+def test_at_her_mooring_a_leap_is_doubted_until_it_has_stayed_for_ten_minutes():
+    moments = [replace(boat(float(t), 90.0, 0.0, twd_deg=180.0 * (t > 80)), is_driven=False) for t in range(1, 800)]
+    estimator, when = sails(moments)
+    assert estimator.motion_doubt == ""
+    assert len(when) == 2
+    assert when[1] - when[0] == pytest.approx(600.0, abs=2.0)

@@ -118,6 +118,8 @@ def launch(ctx: StepContext) -> None:
         return
     ctx.say(Severity.INFO, "safe ends", announcement(ctx.config, ctx.voyage.boat), every_s=math.inf)
     wanted = winds_wanted(ctx)
+    if ctx.snapshot.unsure:
+        wanted.append(f"a wind that is known ({ctx.snapshot.unsure})")
     if wanted and not (status.mode is Mode.AUTO and status.is_armed):
         ctx.set(voyage=changed(ctx.state.voyage, sailing=False))
         ctx.phase(Phase.WAITING, f"not setting sail: waiting for {' and '.join(wanted)}")

@@ -189,3 +189,14 @@ def test_a_loiter_whose_point_lies_beyond_something_is_begun_anew(obstacles, ane
     assert modes == ([Mode.HOLD, Mode.LOITER] if anew else [])
     world.run(10)
     assert world.mode is Mode.LOITER
+
+
+def test_at_her_mooring_she_does_not_set_sail_by_a_wind_that_is_doubted():
+    world = make()
+    assert world.run(60, lambda w: w.state.mission.route is not None and not w.armed)
+    world.extra["unsure"] = WHY
+    world.run(30)
+    assert not world.armed
+    assert "a wind that is known" in world.state.why
+    world.extra["unsure"] = ""
+    assert world.run(60, lambda w: w.mode is Mode.AUTO and w.armed)
