@@ -9,7 +9,8 @@ often than true.
 
 Once held it stays held until the position is believed. A jump moves the point of a LOITER that is sailed already, and
 it would make for it over whatever lies between: then it is put into HOLD and into LOITER again, which begins here. So
-is a boat that was driven off the point, by a wrong wind or in a calm, until something lay between.
+is a boat that was driven off the point, by a wrong wind or in a calm, until something lay between. In HOLD nobody
+steers and the boat runs on: while that leads onto something, and LOITER is turning the boat away from it, HOLD waits.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from __future__ import annotations
 import math
 
 from companion.frozen import changed
+from companion.geo.angles import heading_of
 from companion.messages import Mode, Severity
 from companion.safety import CRITICAL, HOMEWARD, JUMP_M
 from companion.skipper.behaviors.drifting import AWAY_M, stops_drift
@@ -46,6 +48,8 @@ SAVE_S = 30.0         # between two places that are saved ...
 NEAR_M, NEAR_S = 100.0, 5.0   # ... and with something so near, where a jump matters that is no longer than that
 UNKNOWN_S = 120.0     # how long a start has taken when no clock tells
 POINT_S = 5.0         # after LOITER was accepted what is told may still be the distance of the leg before it
+RUNS_S = 8.0          # how far a boat runs on in HOLD, where its sails are eased, in seconds at its speed of now
+LEAST_M = 2.0         # beside the hull, of what it runs on towards
 POINT_SHUT = "the loiter's point cannot be sailed to from here"
 CODE = "position doubted"
 
@@ -278,6 +282,8 @@ def _begin_anew(ctx: StepContext) -> None:
     if shown not in {Mode.LOITER, Mode.HOLD} or state.steering.own_mode not in {Mode.LOITER, Mode.HOLD}:
         ctx.set(position=changed(ctx.state.position, anew=None))
     elif state.position.anew is Mode.HOLD and shown is Mode.LOITER:
+        if _turns_away(ctx):
+            return
         set_mode(ctx, Mode.HOLD, f"{POINT_SHUT}: loitering anew")
     elif shown is Mode.LOITER or (
         state.position.doubt is None and (state.pending.plan is not None or state.pending.upload is not None)
@@ -285,3 +291,16 @@ def _begin_anew(ctx: StepContext) -> None:
         ctx.set(position=changed(ctx.state.position, anew=None))
     elif set_mode(ctx, Mode.LOITER, "loitering anew where she is"):
         ctx.set(position=changed(ctx.state.position, anew=Mode.LOITER))
+
+
+def _turns_away(ctx: StepContext) -> bool:
+    """Return whether LOITER is turning the boat away from something that it would run onto in HOLD."""
+    status, vehicle, place = ctx.autopilot, ctx.snapshot.vehicle, ctx.reckoned_en
+    if status is None or vehicle is None or place is None or status.target_bearing_rad is None:
+        return False
+    area, run_m = ctx.voyage.area, RUNS_S * vehicle.speed_mps
+    runs_on = moved(place, heading_of(*vehicle.velocity_en_mps), run_m)
+    on_m = area.path_clearance_m([place, runs_on])
+    if on_m >= min(ctx.voyage.boat.hull.reach_m + LEAST_M, float(area.clearance_m([place])[0])):
+        return False
+    return area.path_clearance_m([place, moved(place, status.target_bearing_rad, run_m)]) > on_m

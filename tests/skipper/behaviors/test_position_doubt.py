@@ -175,6 +175,27 @@ def test_a_loiter_whose_point_jumps_with_the_position_is_begun_anew():
     assert not said(world, "operator")
 
 
+@pytest.mark.parametrize("is_turning", [True, False])
+def test_before_a_loiter_is_begun_anew_hold_waits_until_loiter_has_turned_her_away_from_what_is_ahead(is_turning):
+    """In HOLD nobody steers: she ran on, and ashore. Where LOITER leads there as well HOLD does not wait."""
+    world = on_land()
+    world.run(10)
+    place = world.state.position.doubt.reckoned_en_m
+    rock = min(world.skipper.voyage.area.polygons, key=lambda p: p.distance(shapely.Point(place)))
+    near = shapely.ops.nearest_points(rock, shapely.Point(place))[0]
+    away_m, onto = distance_m(place, (near.x, near.y)), bearing_rad(place, (near.x, near.y))
+    world.shown = {"waypoint_distance_m": 60.0, "target_bearing_rad": onto + (math.pi if is_turning else 0.0)}
+    world.position_offset = (world.position_offset[0] + 70.0, world.position_offset[1])
+    since = len(world.actions)
+    for _ in range(2):
+        world.heading, world.speed = onto, away_m / 5.0    # ashore in less than 7 s
+        world.step()
+    assert (not asked(world, since)) is is_turning
+    world.heading = onto + math.pi
+    world.run(8)
+    assert [a.mode for a in asked(world, since)] == [Mode.HOLD, Mode.LOITER]
+
+
 def test_a_start_in_the_middle_of_an_island_is_none():
     world = make(obstacles=(shapely.box(-100.0, 100.0, 100.0, 300.0),))
     world.position = (-5.0, 200.0)
