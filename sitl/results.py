@@ -135,7 +135,7 @@ class Comparison:
 
 
 def compare(before: Table, after: Table) -> Comparison:
-    """Hold ``after`` against ``before``.
+    """Hold ``after`` against ``before``. Of one scenario each, they may be two: what pairs them then is the seed.
 
     Raises:
         InputError: they are of different campaigns, or have no job in common.
@@ -145,6 +145,9 @@ def compare(before: Table, after: Table) -> Comparison:
                          "compare two files of one campaign")
     first, second = _by_job(before), _by_job(after)
     both = [job for job in first if job in second]
+    if not both and len(_scenarios(before)) == len(_scenarios(after)) == 1:   # two settings of one thing
+        first, second = _by_job(before, "scenario"), _by_job(after, "scenario")
+        both = [job for job in first if job in second]
     if not both:
         raise InputError("results", "", "no job is in both files", "compare files with the same scenarios and seeds")
     names = [name for name in before.keys if name not in UNPAIRED and name != "seed"]
@@ -167,8 +170,12 @@ def compare(before: Table, after: Table) -> Comparison:
                                         if first[job].get("hash") != second[job].get("hash"))))
 
 
-def _by_job(table: Table) -> dict[tuple[Any, ...], Row]:
-    names = [name for name in table.keys if name not in UNPAIRED]
+def _scenarios(table: Table) -> set[Any]:
+    return {row.get("scenario") for row in table.rows}
+
+
+def _by_job(table: Table, *unpaired: str) -> dict[tuple[Any, ...], Row]:
+    names = [name for name in table.keys if name not in UNPAIRED and name not in unpaired]
     return {tuple(row.get(name) for name in names): row for row in table.rows}
 
 
@@ -185,7 +192,8 @@ def _pair(job: tuple[Any, ...], before: Row, after: Row) -> SeedPair:
             worse.append(0.0 if was is None or now is None else measure.worse * (
                 now / was - 1.0 if measure.kind == "ratio" else now - was))
     *words, seed = job
-    return SeedPair(name=f"{', '.join(map(str, words))} seed {seed}", before=before, after=after, worse=tuple(worse))
+    name = f"{', '.join(map(str, words))} seed {seed}".strip()
+    return SeedPair(name=name, before=before, after=after, worse=tuple(worse))
 
 
 def _change(group: str, measure: Measure, pairs: Sequence[tuple[Row, Row]]) -> FigureChange | None:

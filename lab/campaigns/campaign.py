@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import shutil
 import statistics
@@ -12,10 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from companion.errors import InputError
 from companion.words import file_name
-from sitl.results import columns
+from sitl.results import columns, compare
+from sitl.results import told as told_pairs
 from sitl.run.variation import AS_IT_SAYS, Method, can_be_sailed
-from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key
+from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key, Table
+from sitl.scenario import verdict_line
 
 FAILURES = Path("campaign-failures")
 
@@ -27,7 +29,7 @@ def sail(job: Job[Method]) -> dict[str, Any]:
     from sitl.scenario import load_scenario
 
     scenario = load_scenario(job.scenario)
-    told = _name(scenario.name, job.case)
+    told = _name(scenario.name, job.scenario, job.case)
     name = f"{file_name(told)}-{job.seed:04d}"
     place = job.keep / name if job.keep else None
     if place is not None:
@@ -50,8 +52,10 @@ def sail(job: Job[Method]) -> dict[str, Any]:
     return {**verdict, "scenario": told}
 
 
-def _name(scenario: str, method: Method) -> str:
-    return f"{scenario}, {method.told}" if method.told else scenario
+def _name(scenario: str, path: Path, method: Method) -> str:
+    """Return what a setting is called: by its file, too, where that is a copy whose scenario kept its name."""
+    name = scenario if scenario == path.stem else f"{scenario} ({path.stem})"
+    return f"{name}, {method.told}" if method.told else name
 
 
 def key_of(job: Job[Method]) -> Key:
@@ -63,21 +67,38 @@ def campaign(
     scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, keep: Path | None = None,
     methods: Sequence[Method] = (AS_IT_SAYS,),
 ) -> Experiment[Method]:
-    """Return the voyages of each scenario by each method that its mission allows; a table, and what failed."""
+    """Return the voyages of each scenario by each method that its mission allows; a table, and what failed.
+
+    Two settings are compared, too: their voyages of a seed have the same weather as far as both say the same of it.
+
+    Raises:
+        InputError: two of them would have one name.
+    """
     from sitl.run.embedded import mission_of
     from sitl.scenario import load_scenario
 
     loaded = [load_scenario(path) for path in scenarios]
     missions = [mission_of(scenario, path) for scenario, path in zip(loaded, scenarios, strict=True)]
-    ways = [(scenario.name, path, method) for scenario, path, mission in zip(loaded, scenarios, missions, strict=True)
+    ways = [(_name(scenario.name, path, method), path, method)
+            for scenario, path, mission in zip(loaded, scenarios, missions, strict=True)
             for method in methods if method.guidance is None or can_be_sailed(mission, method.guidance)]
+    names = [name for name, _, _ in ways]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError("sitl campaign", twice, "is two of the scenarios", "give one another name = or file name")
 
     def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = sailed.records
-        table = [figures(name, [r for r in records if r["scenario"] == name])
-                 for name in (_name(name, method) for name, _, method in ways)]
+        by_name = {name: [r for r in records if r["scenario"] == name] for name in names}
+        table = [figures(name, found) for name, found in by_name.items()]
         rate = sum(t["sailed_s"] for t in table) / sailed.cpu_s if sailed.now == len(records) and sailed.cpu_s else None
         lines = [*told(table), sailed.took + (f"; {rate:.0f} times real time per core" if rate else "")]
+        if len(names) == 2:
+            first, second = (Table(campaign="campaign", by=sailed.held.by, keys=("seed",), rows=tuple(
+                {**r["figures"], "passed": r["passed"], "seed": r["seed"]} for r in by_name[name])) for name in names)
+            if {row["seed"] for row in first.rows} & {row["seed"] for row in second.rows}:
+                lines += ["", f"{names[0]} (first) and {names[1]} (second), seed by seed:",
+                          *told_pairs(compare(first, second)).splitlines()]
         for record in sorted((r for r in records if not r["passed"]), key=lambda r: (r["scenario"], r["seed"])):
             bad = "; ".join(f"{c['name']}: {c['figure']}" for c in record["checks"] if not c["passed"])
             lines.append(f"FAILED {record['scenario']} seed {record['seed']}: {bad[:300]}")
@@ -85,8 +106,7 @@ def campaign(
                                  is_good=all(r["passed"] for r in records))
 
     return Experiment(
-        name="campaign", sail=sail, key=key_of, sum_up=sum_up,
-        line=lambda record: json.dumps(record, separators=(",", ":")),
+        name="campaign", sail=sail, key=key_of, sum_up=sum_up, line=verdict_line,
         jobs=[Job(scenario=path, seed=first_seed + k, keep=keep, case=method)
               for _, path, method in ways for k in range(runs)])
 

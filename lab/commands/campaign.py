@@ -15,8 +15,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
         "campaign", help=summary,
-        description="Sail a scenario over many seeds on the embedded autopilot: one JSON line per run, then a table "
-        "of success, time, tacks, replans, clearance and risk. A failing seed is named and repeats exactly.",
+        description="Sail a scenario over many seeds on the embedded autopilot: a line per voyage, then a table of "
+        "success, time, tacks, replans, clearance and risk. A failing seed is named and repeats exactly. Of two "
+        "scenarios, or one by two methods, the voyages are compared seed by seed.",
         epilog="Example: sitl campaign demo --runs 50",
     )
     parser.add_argument("scenarios", type=scenario_file, nargs="+", metavar="SCENARIO",

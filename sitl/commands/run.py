@@ -12,7 +12,7 @@ from typing import Any
 
 from companion.program.arguments import chart_option, http_address, moment, number, out_folder, whole
 from companion.program.commands import missing
-from companion.words import counted, file_name
+from companion.words import file_name
 
 OURS = {path.stem: path for path in (Path(__file__).resolve().parents[1] / "scenarios").rglob("*.toml")}
 
@@ -170,13 +170,9 @@ def words(figure: Any) -> str:
 
 def print_verdict(verdict: Any) -> None:
     """Print the checks, each with its figure."""
+    from sitl.scenario import verdict_line
+
     for check in verdict.checks:
         print(f"{'pass' if check.passed else 'FAIL'}  {check.name}: {words(check.figure)} "
               f"(wanted: {words(check.required)})")
-    f = verdict.figures
-    print(f"{'PASSED' if verdict.passed else 'FAILED'}  {verdict.scenario} seed {verdict.seed}: "
-          f"{f['time_s']:.0f} s and {counted(f['tacks'], 'tack')} in all, {f['distance_m']:.0f} m, "
-          f"{counted(f['replans'], 'replan')}, " + (
-              "nothing to be clear of" if f["min_clearance_m"] is None else
-              f"clearance {f['min_clearance_m']:.1f} m" + (
-                  "" if f.get("promised_clearance_m") is None else f" (promised {f['promised_clearance_m']:.1f} m)")))
+    print(verdict_line(verdict.to_dict()))

@@ -35,6 +35,7 @@ from sitl.scenario.verdict import (
     count_tacks,
     judge,
     station_score,
+    verdict_line,
 )
 
 __all__ = [
@@ -43,5 +44,5 @@ __all__ = [
     "Scenario", "ScenarioVerdict", "SensorsSpec", "StationScore", "TrueTrack", "WavesSpec", "WindSpec", "beginning",
     "count_tacks", "duty", "free_port", "is_all_ordinary", "judge", "load_scenario", "met_by", "own_polar",
     "recentre_m", "scenario_departures", "scenario_text", "scenario_waters", "scenario_wind", "station_score",
-    "tasks_of",
+    "tasks_of", "verdict_line",
 ]

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from companion.boat import Hull, outline_en_m
+from companion.words import counted, one_line
 from sitl.scenario.colregs import Met, judge_encounter
 from sitl.scenario.scenario import ExpectSpec
 from sitl.scenario.tasks import Tasks
@@ -436,3 +437,19 @@ def judge(
             "end_reason": summary.get("end_reason"),
         },
     )
+
+
+def verdict_line(record: Mapping[str, Any]) -> str:
+    """Return a verdict's record in one line: what voyage it was, and its figures or why there are none."""
+    f = record["figures"]
+    if f:
+        words = (f"{f['time_s']:.0f} s and {counted(f['tacks'], 'tack')} in all, {f['distance_m']:.0f} m, "
+                 f"{counted(f['replans'], 'replan')}, ")
+        words += ("nothing to be clear of" if f["min_clearance_m"] is None else
+                  f"clearance {f['min_clearance_m']:.1f} m")
+        if f["min_clearance_m"] is not None and f.get("promised_clearance_m") is not None:
+            words += f" (promised {f['promised_clearance_m']:.1f} m)"
+    else:
+        words = "; ".join(f"{check['name']}: {check['figure']}" for check in record["checks"] if not check["passed"])
+    outcome = "PASSED" if record["passed"] else "FAILED"
+    return one_line(f"{outcome}  {record['scenario']} seed {record['seed']}: {words}")

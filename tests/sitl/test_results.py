@@ -43,6 +43,14 @@ def test_the_same_is_the_same():
     assert "8 pairs, 8 of them the same in every figure\nno figure that is measured here changed\nnot worse" in text
 
 
+def test_two_files_of_a_scenario_each_are_two_settings_and_paired_by_seed():
+    found = compare(table(noisy(range(8), 1)), table(noisy(range(8), 1, 1.1, scenario="gusty", water="def")))
+    assert len(found.pairs) == 8
+    assert change_of(found, "time").change == pytest.approx(1.1)
+    with pytest.raises(InputError, match="no job is in both"):
+        compare(table(noisy(range(8), 1)), table([row(1, scenario="a"), row(2, scenario="b")]))
+
+
 def test_a_ratio_is_of_pairs_and_its_interval_holds_it():
     before = noisy(range(20), 1)
     after = [{**r, "time_s": r["time_s"] * 1.1} for r in before]
