@@ -43,14 +43,17 @@ class Writes(Protocol):
 
 
 class SafeStream:
-    """A text stream on which nothing but ``control`` moves a cursor; else as the stream that it writes to."""
+    """A text stream on which nothing but ``control`` moves a cursor; else as the stream that it writes to.
+
+    What the stream's encoding does not have (degrees, in a C locale) is a question mark.
+    """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
         """Write text as ``printable`` shows it."""
-        self._stream.write(printable(text))
+        self.control(printable(text))
         return len(text)
 
     def writelines(self, lines: Iterable[str]) -> None:
@@ -60,7 +63,10 @@ class SafeStream:
 
     def control(self, text: str) -> None:
         """Write text as it is."""
-        self._stream.write(text)
+        try:
+            self._stream.write(text)
+        except UnicodeEncodeError:
+            self._stream.write(text.encode(self._stream.encoding, "replace").decode(self._stream.encoding))
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
@@ -248,6 +254,10 @@ class Program:
         arguments = with_negative_values(sys.argv[1:] if argv is None else argv)
         command = next((a for a in arguments if not a.startswith("-")), None)
         try:
+            strange = next((a for a in arguments if re.search("[\ud800-\udfff]", a)), None)
+            if strange is not None:   # records and states are UTF-8 and could not name it
+                raise InputError(self.name, one_line(strange), f"is not in this system's encoding "
+                                 f"({sys.getfilesystemencoding()})", "rename it, or set LANG=C.UTF-8")
             if command is not None and command not in self._known() and command not in self.names:
                 raise self._unknown(command)
             args = self.parser(command or "").parse_args(arguments)

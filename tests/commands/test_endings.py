@@ -110,3 +110,16 @@ def test_a_port_that_is_not_there_is_told_first(tmp_path, capsys):
     by_path.touch()
     assert absent_device(f"{by_path}:57600") == ""
     assert absent_device("COM3").startswith("COM3: no such device")
+
+
+@pytest.mark.parametrize(("words", "code", "said"), [
+    (["mission", "check", "a.toml"], 0, "N?rdliche B?je"), (["mission", "check", "ü.toml"], 2, "rename it, or set LANG"),
+])
+def test_a_terminal_without_umlauts_is_told_in_question_marks(tmp_path, words, code, said):
+    for name in ("a", "ü"):
+        (tmp_path / f"{name}.toml").write_text(MISSION.replace('"a"', '"Nördliche Böje"'), encoding="utf-8")
+    run = subprocess.run([sys.executable, "-m", "companion", *words], cwd=tmp_path, capture_output=True, text=True,
+                         check=False, env={**HERE, "PYTHONUTF8": "0", "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"})
+    assert run.returncode == code, run.stderr
+    assert said in run.stdout + run.stderr
+    assert (run.stdout + run.stderr).count("\n") == 1
