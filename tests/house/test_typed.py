@@ -1,4 +1,4 @@
-"""What README and the guides tell a reader to type: README's lines and benches are run, in an empty folder, in order.
+"""What README and the pages tell a reader to type: README's lines and benches are run, in an empty folder, in order.
 
 Every other line is understood by its program, and not run: it names a link, a file or a cluster of the reader's own.
 """
@@ -23,10 +23,11 @@ from sitl import cli as sitl_cli
 from sitl.scenario.traffic import free_port
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs" / "guides").glob("*.md"))]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PROGRAMS = {"companion": cli.PROGRAM, "sitl": sitl_cli.PROGRAM}
 # What stands for something of the reader's own, and a word of its kind.
 STANDS_FOR = {"LINK": "tcp:127.0.0.1:5760", "LAT,LON": "50.817,-1.31", "VERB": "hold", "ADDRESS": "local", "[ARGS]": ""}
+WORDS = {"N": "3", "S": "3", "NAME": "demo", "SCENARIO": "demo", "PICTURE": "p.png"}
 # Of README, what a test is no place for.
 NOT_RUN = {"make demo": "CI runs it", "make test": "this is it", "python3 -m venv": "CI makes one",
            "pip install": "CI installs it"}
@@ -50,7 +51,8 @@ def quoted(page):
 def words_of(line):
     for name, word in STANDS_FOR.items():
         line = line.replace(name, word)
-    return [word for word in shlex.split(line) if word not in ("&", "&&")]
+    line = re.sub(r"sitl (run|campaign) FILE", r"sitl \1 demo", line)
+    return [WORDS.get(word, word) for word in shlex.split(line) if word not in ("&", "&&")]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
