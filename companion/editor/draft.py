@@ -197,15 +197,17 @@ def _middle_of(name: str, area: Area) -> list[float] | None:
 
 
 def _grown(area: Area, draft: Draft, mission: Mission | None) -> dict[str, Any]:
-    """Return what the margin adds to the obstacles, and what it leaves of the limits, as (lat, lon) rings."""
+    """Return what the margin adds to the obstacles and takes from the limits, as (lat, lon) rings."""
     shapes = [o.shape for o in area.solids] + [z.shape for z in area.fence.inclusions]
     if not shapes:
-        return {"grown": [], "water": []}
+        return {"grown": []}
     frame = mission.frame() if mission is not None else LocalFrame(center_of(shapes[0]))
     local, margin_m = area.local(frame), draft.options.area.margin_m
+    grown = [local.buffered(margin_m)] if local.polygons else []
     water = local.water(margin_m)
-    return {"grown": _rings(parts(local.buffered(margin_m)), frame) if local.polygons else [],
-            "water": [] if water is None else _rings(parts(water), frame)}
+    if local.limits is not None and water is not None:
+        grown.append(shapely.difference(local.limits, water))
+    return {"grown": _rings(parts(shapely.union_all(grown)), frame)}
 
 
 def _rings(polygons: Sequence[shapely.Polygon], frame: LocalFrame) -> list[list[list[list[float]]]]:

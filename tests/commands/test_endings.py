@@ -113,7 +113,8 @@ def test_a_port_that_is_not_there_is_told_first(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("words", "code", "said"), [
-    (["mission", "check", "a.toml"], 0, "N?rdliche B?je"), (["mission", "check", "ü.toml"], 2, "rename it, or set LANG"),
+    (["mission", "check", "a.toml"], 0, "N?rdliche B?je"),
+    (["mission", "check", "ü.toml"], 2, "rename it, or set LANG"),
 ])
 def test_a_terminal_without_umlauts_is_told_in_question_marks(tmp_path, words, code, said):
     for name in ("a", "ü"):

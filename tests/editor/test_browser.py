@@ -144,6 +144,10 @@ def test_what_is_dragged_typed_and_put_in_order_is_saved_and_undone(archipelago)
         board.settled()
         assert board.barriers() == []
         keep(board, "editor-changed")
+        board.click("#help")
+        assert board.js("return [document.activeElement.id, document.getElementById('dialog').scrollTop]") == [
+            "dialogtitle", 0]
+        board.keys("\ue00c")
         board.saved()
         goals = [(goal.rounding, goal.point.lat_deg) for goal in load_mission(archipelago).goals]
         assert goals[0] == ("port", 50.817)

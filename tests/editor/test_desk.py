@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -62,7 +63,10 @@ def test_a_draft_is_judged_as_the_check_does_and_nothing_is_written(bay):
     good, bad, plan = with_editor(bay, talk)
     assert good[0] == 200
     assert good[1]["is_in_order"]
-    assert good[1]["grown"]
+    hatched = shapely.union_all([shapely.Polygon(shape[0], shape[1:]) for shape in good[1]["grown"]])
+    for solid in (load_mission(bay).area.obstacles[0].shape, load_mission(bay).area.fence.inclusions[0].shape):
+        edge = shapely.transform(solid.exterior, lambda lonlat: lonlat[:, ::-1])
+        assert shapely.covers(shapely.buffer(hatched, 1e-7), edge)   # the obstacle's margin, and the fence's
     errors = [f for f in bad[1]["findings"] if f["severity"] == "error"]
     assert (errors[0]["of"], errors[0]["number"]) == ("goal", 0)
     assert "is inside the obstacle" in errors[0]["text"]

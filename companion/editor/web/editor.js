@@ -8,7 +8,7 @@ import * as tables from "./tables.js";
 
 /** @typedef {import("./sketch.js").Sketch} Sketch @typedef {import("./sketch.js").Ref} Ref @typedef {import("./sketch.js").Place} Place @typedef {import("./sketch.js").Point} Point @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Area} Area */
 /** @typedef {{severity: string, place: string, text: string, remedy: string, at: Place | null, of: "start" | "goal" | "refuge" | null, number: number | null}} Finding */
-/** @typedef {{findings: Finding[], is_in_order: boolean, grown: Place[][][], water: Place[][][]}} Found */
+/** @typedef {{findings: Finding[], is_in_order: boolean, grown: Place[][][]}} Found */
 /** @typedef {{to: string, why: string, way: Place[], time_s: number, late_s: number | null, length_m: number, risk: number | null, risks: (number | null)[], tacks: number, gybes: number, clearance_m: number | null}} Leg */
 /** @typedef {{error: string, legs: Leg[], time_s: number, length_m: number, tacks: number, gybes: number, clearance_m: number | null}} Plan */
 /** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string, charts: import("./charts.js").Chart[]}} State */
@@ -147,7 +147,7 @@ function trouble(words) {
 async function check(signal) {
   const { status, found: told } = await post("/api/check", { sketch: history.now, from_deg: Number(input("windfrom").value) || 0 }, signal);
   if (status === 409 || status === 0 || status === 401) return;
-  found = status === 200 ? told : { findings: [{ severity: "error", place: "", text: told.error, remedy: "", at: null, of: null, number: null }], is_in_order: false, grown: [], water: [] };
+  found = status === 200 ? told : { findings: [{ severity: "error", place: "", text: told.error, remedy: "", at: null, of: null, number: null }], is_in_order: false, grown: [] };
   findings();
   show();
   if (input("plans").checked) soon("plan", PLAN_MS - CHECK_MS, planned); else planWords();
@@ -254,7 +254,7 @@ async function load() {
   history = new History(told.sketch);
   draft = null;
   selected = null;
-  if (isFirst) { windMps = told.wind.speed_mps; input("windfrom").value = String(told.wind.from_deg); shownWind(); tables.build(editor); chart.build(editor); map.lay(told.charts); }
+  if (isFirst) { windMps = told.wind.speed_mps; input("windfrom").value = String(told.wind.from_deg); typedWind(); shownWind(); tables.build(editor); chart.build(editor); map.lay(told.charts); }
   take(told, true);
   changed();
   whole();
@@ -338,7 +338,7 @@ function help() {
   const close = el("button", { type: "button" }, "Close");
   close.addEventListener("click", () => dialog.close());
   const tools = chart.TOOLS.map(([, key, words, , means]) => /** @type {[string, string]} */ ([key, `${words}: ${means}`]));
-  dialog.replaceChildren(el("h2", { id: "dialogtitle" }, "Keys and signs"), el("dl", { class: "keys" }, ...[...tools, ...KEYS].map(([key, words]) => el("div", {}, el("dt", {}, el("kbd", {}, key)), el("dd", {}, words)))),
+  dialog.replaceChildren(el("h2", { id: "dialogtitle", tabindex: "-1", autofocus: true }, "Keys and signs"), el("dl", { class: "keys" }, ...[...tools, ...KEYS].map(([key, words]) => el("div", {}, el("dt", {}, el("kbd", {}, key)), el("dd", {}, words)))),
     el("p", {}, "Hatched is what the margin adds; blue is the plan, warmer and thicker where a leg risks more; the thin dashes are the order of the course. The curved arrows say on which side a mark is left, the straight ones which way a gate is sailed."), el("div", { class: "buttons" }, close));
   dialog.showModal();
 }
@@ -377,6 +377,18 @@ function cycle(name) {
   field.dispatchEvent(new Event("change"));
 }
 
+/** The wind as it was typed before this page was loaded again. */
+function typedWind() {
+  try {
+    const kept = JSON.parse(sessionStorage.getItem(windKey()) ?? "null");
+    if (kept) [input("windfrom").value, windMps, input("windspread").value] = kept;
+  } catch { /* none is kept */ }
+}
+
+function windKey() {
+  return `wind of ${state.folder}/${state.file}`;
+}
+
 function shownWind() {
   get("windunit").textContent = speedUnit();
   input("windspeed").value = String(Number((units.speeds === "kn" ? windMps / KNOT_MPS : windMps).toFixed(1)));
@@ -410,6 +422,7 @@ function settings() {
     if (!input(name).checkValidity() || input(name).value === "") return void input(name).reportValidity();
     const typed = Number(input("windspeed").value);
     if (name === "windspeed") windMps = units.speeds === "kn" ? typed * KNOT_MPS : typed;
+    try { sessionStorage.setItem(windKey(), JSON.stringify([input("windfrom").value, windMps, input("windspread").value])); } catch { /* not kept */ }
     show();
     soon("check", 0, check);
   });
