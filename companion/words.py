@@ -56,6 +56,26 @@ def file_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "voyage"
 
 
+_KINDS = {"float": "a number", "int": "a whole number", "str": "a text in quotes", "bool": "true or false",
+          "array": "a list", "object": "a table", "datetime": "a date with its time"}
+_BOUNDS = {">=": "of at least", "<=": "of at most", ">": "above", "<": "below"}
+
+
+def expected(problem: str) -> str:
+    """Return what msgspec found wrong, in words.
+
+    >>> expected("Expected `float` >= 5.0"), expected("Expected `str | null`, got `int`")
+    ('expected a number of at least 5.0', 'expected a text in quotes, got a whole number')
+    """
+    def kinds(match: re.Match[str]) -> str:
+        found = [_KINDS.get(name, name) for name in match[1].split(" | ") if name != "null"]
+        return " or ".join(found) or "nothing"
+
+    words = re.sub(r"`([a-z]+(?: \| [a-z]+)*)`", kinds, problem)
+    words = re.sub(r" (>=|<=|>|<) ", lambda match: f" {_BOUNDS[match[1]]} ", words)
+    return words[:1].lower() + words[1:]
+
+
 def choices(kind: Any, path: str) -> tuple[str, ...]:
     """Return the words that an option may be: of the struct ``kind``, at msgspec's path (``$.skipper.end``)."""
     for key in re.findall(r"\.(\w+)", path):

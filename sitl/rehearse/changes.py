@@ -15,7 +15,7 @@ from companion.errors import InputError
 from companion.geofence import Mission
 from companion.mission_check import require_sailable
 from companion.program.arguments import duration
-from companion.words import counted
+from companion.words import counted, expected
 from sitl.results import Comparison, compare
 from sitl.results import FigureChange as Difference
 from sitl.run.variation import Variation
@@ -75,7 +75,7 @@ def change_of(text: str, mission: Mission) -> MissionChange:
         try:
             msgspec.convert(plain[TABLES[name]], type(getattr(mission.options, TABLES[name])))
         except msgspec.ValidationError as error:
-            raise InputError("--try", text, str(error).partition(" - at ")[0], _REMEDY) from None
+            raise InputError("--try", text, expected(str(error).partition(" - at ")[0]), _REMEDY) from None
         require_sailable(change.variation.mission(mission))
     return change
 

@@ -24,7 +24,7 @@ from companion.boat import Polar
 from companion.compose import RECENTRE_M, polar_of
 from companion.errors import InputError
 from companion.geofence import Mission
-from companion.words import choices
+from companion.words import choices, expected
 from sitl.autopilot import EPOCH_S, FRAME_M, Departures, Sensors, Waves
 from sitl.scenario.colregs import Craft, Manner
 from sitl.world import AR1, Constant, CurrentModel, Gusty, Later, Lee, Recorded, Scripted, Waters, WindEvent, WindModel
@@ -429,7 +429,7 @@ def _place(error: msgspec.ValidationError) -> str:
 
 
 def _sentence(error: msgspec.ValidationError) -> str:
-    return str(error).partition(" - at ")[0]
+    return expected(str(error).partition(" - at ")[0])
 
 
 def _suggestion(error: msgspec.ValidationError) -> str:

@@ -105,7 +105,7 @@ def test_what_is_written_is_read_again():
 @pytest.mark.parametrize(("old", "new", "says"), [
     ('kind = "circle"', 'kind = "cicle"', "[field.ring] kind: 'cicle' is no kind of atom; did you mean \"circle\"?"),
     ('kind = "circle"\n', "", "[field.ring] kind: is missing"),
-    ("radius_m = 60.0", "radius_m = 1.0", "[field.ring] radius_m: expected `float` >= 5.0"),
+    ("radius_m = 60.0", "radius_m = 1.0", "[field.ring] radius_m: expected a number of at least 5.0"),
     ("radius_m = 60.0", "", "[field.ring] radius_m: is missing; add it"),
     ("range_m", "rang_m", "[field.islet] rang_m: unknown key; did you mean 'range_m'?"),
     ("[field.ring]", "[field.max]", "[field.max]: is no name that an expression can have"),

@@ -131,6 +131,18 @@ def test_a_file_without_goals_is_told_of_those_that_are_drawn(tmp_path):
         load(tmp_path, GOOD.replace("[[goal]]\nlat = 50.805\nlon = -1.3005\n", ""))
 
 
+@pytest.mark.parametrize(("value", "said"), [
+    ('"50.8"', "[start] lat: '50.8' is wrong: expected a number"),
+    ("[50.8]", "[start] lat: expected a number, got a list"),
+    ("-91.0", "[start] lat: -91.0 is wrong: expected a number of at least -90.0"),
+])
+def test_a_value_of_another_kind_is_told_in_words(tmp_path, value, said):
+    with pytest.raises(InputError) as error:
+        load(tmp_path, GOOD.replace("lat = 50.8\n", f"lat = {value}\n"))
+    assert str(error.value).startswith(f"{tmp_path}/m.toml: {said}")
+    assert "`" not in str(error.value)
+
+
 def test_the_fence_must_hold_start_and_goal(tmp_path):
     text = GOOD.replace('["rock.wkt"]', '["rock.wkt"]\nfence = "lake.wkt"')
     lake = "POLYGON ((-1.31 50.79, -1.29 50.79, -1.29 50.804, -1.31 50.804, -1.31 50.79))"

@@ -16,7 +16,7 @@ import tomli_w
 from companion.errors import InputError
 from companion.geofence.formats.untrusted import decode, read_bytes
 from companion.geofence.mission.options import ATOMS, KINDS, AtomOptions, MissionOptions, PointOptions, tables
-from companion.words import choices
+from companion.words import choices, expected
 
 MAX_TOML_BYTES = 1024 * 1024
 
@@ -110,7 +110,7 @@ def _refuse_odd_atoms(atoms: object, source: str) -> None:
                                  f"did you mean {near[0]!r}?" if near else "known keys: " + ", ".join(fields)) from None
             if missing:
                 raise InputError(source, f"{table} {missing.group(1)}", "is missing", "add it") from None
-            raise InputError(source, f"{table} {key}".rstrip(), problem[:1].lower() + problem[1:]) from None
+            raise InputError(source, f"{table} {key}".rstrip(), expected(problem)) from None
 
 
 def _refuse_odd_numbers(value: object, source: str, place: str) -> None:
@@ -179,7 +179,8 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
     swap = ""
     if place.endswith(" lat") and isinstance(value, int | float) and abs(value) > 90.0:
         swap = "are lat and lon swapped? write degrees within ±90"
-    return InputError(source, place, shown + problem[:1].lower() + problem[1:], swap)
+    words = expected(problem)
+    return InputError(source, place, shown + words.partition(", got ")[0] if shown else words, swap)
 
 
 def _short(value: object) -> str:

@@ -34,6 +34,7 @@ from companion.telemetry.folder.recorder import (
     read_jsonl,
     read_part,
 )
+from companion.words import expected
 
 DAMAGED = "is the folder damaged, or another program's? take it from its copy"
 _WORDS = ("mode", "phase")
@@ -308,4 +309,4 @@ def _converted(raw: object, kind: type[T], path: Path, place: str = "") -> T:
         return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:
         problem, _, where = str(error).partition(" - at `$")
-        raise InputError(str(path), place + where.strip("`."), problem[:1].lower() + problem[1:], DAMAGED) from None
+        raise InputError(str(path), place + where.strip("`."), expected(problem), DAMAGED) from None
