@@ -18,6 +18,7 @@ Judge = Callable[[NDArray[np.float64]], float]
 LATE = 1.1     # of the seconds: another path is not judged beyond
 SETTLES = 5.0  # times what the first path takes: so long it soon gets better, and is not judged yet
 SETTLED = 0.25  # ... and no longer than this share of the seconds
+FASTER = 0.8    # of the time of the path that was judged last: another way, which is judged at once
 
 
 class Effort:
@@ -37,6 +38,7 @@ class Effort:
         self.has_answer = self.is_at_risk = False
         self._judge: Judge | None = None
         self._judge_at_s: float | None = None    # None: nothing has been judged
+        self._judged_s = 0.0                     # the time of the path that was judged last
         self._first: NDArray[np.float64] | None = None    # the first path, until then
         self.used = 0
         self.first_s: float | None = None
@@ -105,15 +107,19 @@ class Effort:
             return min(SETTLES * self.first_s, SETTLED * self.budget_s)
         return self._judge_at_s
 
-    def improved(self, path: Callable[[], NDArray[np.float64]]) -> bool:
-        """Have a path judged that is better than those before, if it is time; return whether it was."""
+    def improved(self, path: Callable[[], NDArray[np.float64]], time_s: float) -> bool:
+        """Have a path judged that is better than those before, if it is time; return whether it was.
+
+        It is time at once where it takes far less, ``time_s``, than the one that was judged last.
+        """
         judge = self._judge
         if judge is None or self.first_s is None:
             return False
-        if self.elapsed_s < self.hears_at_s:
+        is_far_faster = time_s < FASTER * self._judged_s and self.has_time(self.needed_s)
+        if self.elapsed_s < self.hears_at_s and not is_far_faster:
             self._first = path() if self._first is None else self._first
             return False
-        self._judge = None    # what the judge itself searches is not judged again
+        self._judge, self._judged_s = None, time_s    # what the judge itself searches is not judged again
         self._judge_at_s = judge(path())
         if self._first is not None and (not self.has_answer or self.is_at_risk) and self.has_time(self.needed_s):
             self._judge_at_s = judge(self._first)
@@ -162,9 +168,9 @@ class _Part(Effort):
         super().found()
         self._whole.found()
 
-    def improved(self, path: Callable[[], NDArray[np.float64]]) -> bool:
+    def improved(self, path: Callable[[], NDArray[np.float64]], time_s: float) -> bool:
         began_s = self.elapsed_s
-        is_judged = self._whole.improved(path)
+        is_judged = self._whole.improved(path, time_s)
         self.budget_s += self.elapsed_s - began_s    # what the judgement took is none of this part's
         return is_judged
 

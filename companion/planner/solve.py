@@ -244,7 +244,7 @@ def _solved(
         search = with_beats(search, problem.beat)
 
     whole = _whole(search, problem)
-    answers = _Answers(problem, effort, empty, on_better)
+    answers = _Answers(problem, effort, empty, on_better, lambda p, effort, seed: search(resolved(p), effort, seed))
     is_within = problem.risk is None or algorithm.bounds_path_risk
     if is_within and (on_better is not None or (problem.tracking is not None and empty.algorithm == "auto")):
         effort.listen(answers.judge)
@@ -260,9 +260,10 @@ class _Answers:
     """The best answer so far of a search in seconds, and what judging it takes."""
 
     def __init__(
-        self, problem: Problem, effort: Effort, empty: Plan, on_better: Callable[[Plan], None] | None,
+        self, problem: Problem, effort: Effort, empty: Plan, on_better: Callable[[Plan], None] | None, search: Search,
     ) -> None:
         self._problem, self._effort, self._empty, self._on_better = problem, effort, empty, on_better
+        self._search, self._has_looked = search, False
         self.best: Plan | None = None
 
     def judge(self, waypoints_en: NDArray[np.float64]) -> float:
@@ -276,13 +277,17 @@ class _Answers:
         needed_s = effort.elapsed_s - began_s
         if problem.tracking is not None and judged.is_feasible:
             from companion.planner.track.expected import expected
-            from companion.planner.track.kept import laid
+            from companion.planner.track.kept import laid, roomier
 
             is_kept, spare_s = expected(problem, path, judged.legs).is_kept, TRIED * effort.budget_s
             needed_s = effort.elapsed_s - began_s
             if not is_kept:
                 path, seen = laid(problem, path, None, Effort(spare_s, None))
                 is_kept = seen.is_kept
+                if not is_kept and not self._has_looked:
+                    self._has_looked = True
+                    other = roomier(self._search, problem, path, effort, self._empty.seed, laying_s=spare_s)
+                    path, is_kept = (path, False) if other is None else (other, True)
         found = None
         if judged.is_feasible and is_kept:
             then_s = effort.elapsed_s

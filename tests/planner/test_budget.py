@@ -117,22 +117,44 @@ def test_one_judgement_is_of_a_path_that_has_settled(clock):
     assert elapsed_s > min(effort.SETTLES * first_s, effort.SETTLED * 0.9 * 0.4)
 
 
+def test_the_way_between_two_piers_is_found_and_not_only_the_one_round_them(clock):
+    """Of 2 s of a core two plans in three were the way round all, 160 s; of a quarter of that each was."""
+    p, handed = recorded("piers-start"), []
+    found = plan(p, budget_s=0.6, on_better=handed.append)
+    assert found.cost_s < 120.0
+    assert expected(p, found.waypoints_en).is_kept
+    assert handed[-1].cost_s < 120.0   # while the search went on, too
+
+
+def test_a_path_that_is_far_faster_than_the_one_that_was_judged_is_judged_at_once():
+    """It was judged when three times as long had gone by as the last judgement had ended at: at the end, or never."""
+    now = effort.Effort(1e6, None)
+    asked = []
+    now.listen(lambda path: asked.append(float(path[0])) or 1e5)
+    now.first_s, now.has_answer = 0.0, True
+    assert now.improved(lambda: np.array([1.0]), 100.0)
+    assert not now.improved(lambda: np.array([2.0]), 85.0)
+    assert now.improved(lambda: np.array([3.0]), 70.0)
+    assert not now.improved(lambda: np.array([4.0]), 60.0)
+    assert asked == [1.0, 3.0]
+
+
 def test_the_first_path_is_judged_where_what_it_settled_to_is_no_answer():
     now = effort.Effort(1e6, None)
     asked = []
     now.listen(lambda path: asked.append(float(path[0])) or 1e3)
     now.first_s = 1e5
-    assert not now.improved(lambda: np.array([1.0]))   # it may settle
+    assert not now.improved(lambda: np.array([1.0]), 100.0)   # it may settle
     now.first_s = 0.0
-    assert now.improved(lambda: np.array([2.0]))
+    assert now.improved(lambda: np.array([2.0]), 90.0)
     assert asked == [2.0, 1.0]
     now = effort.Effort(1e6, None)
     asked = []
     now.listen(lambda path: asked.append(float(path[0])) or setattr(now, "has_answer", True) or 1e3)
     now.first_s = 1e5
-    now.improved(lambda: np.array([1.0]))
+    now.improved(lambda: np.array([1.0]), 100.0)
     now.first_s = 0.0
-    assert now.improved(lambda: np.array([2.0]))
+    assert now.improved(lambda: np.array([2.0]), 90.0)
     assert asked == [2.0]
 
 

@@ -38,18 +38,18 @@ def test_a_path_is_judged_when_it_is_time_and_not_within_its_own_judgement():
 
     def judge(path):
         judged.append(path)
-        assert not effort.improved(lambda: path)
+        assert not effort.improved(lambda: path, 100.0)
         return 1e3   # the next one then
 
     effort.listen(judge)
     effort.first_s = 0.0
     part = effort.part(0.5)
-    assert part.improved(lambda: np.zeros((2, 2)))
-    assert not part.improved(lambda: np.ones((2, 2)))
+    assert part.improved(lambda: np.zeros((2, 2)), 100.0)
+    assert not part.improved(lambda: np.ones((2, 2)), 100.0)
     assert len(judged) == 1
     steps = Effort(None, 100)
     steps.listen(judge)
-    assert not steps.improved(lambda: np.zeros((2, 2)))
+    assert not steps.improved(lambda: np.zeros((2, 2)), 100.0)
 
 
 def test_a_part_does_not_pay_for_the_judgement(monkeypatch):
@@ -59,7 +59,7 @@ def test_a_part_does_not_pay_for_the_judgement(monkeypatch):
     effort.listen(lambda _: now.__setitem__(0, now[0] + 2.0) or 99.0)
     effort.found()
     part = effort.part(0.3)
-    assert part.improved(lambda: np.zeros((2, 2)))
+    assert part.improved(lambda: np.zeros((2, 2)), 100.0)
     assert part.remaining_s == pytest.approx(3.0)
     effort.needed_s, effort.has_answer = 4.0, True
     now[0] = 4.9

@@ -153,7 +153,7 @@ def search(
         if tree.best >= 0:
             effort.found()
             cost = float(tree.node[tree.best, kernels.C])
-            if cost < judged and effort.improved(lambda: tree.path_to(tree.best)):
+            if cost < judged and effort.improved(lambda: tree.path_to(tree.best), cost):
                 judged = cost
     trace = {
         "tree": tree.edges(), "states": tree.size, "rewired": int(tree.count[kernels.REWIRED]),

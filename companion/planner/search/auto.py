@@ -152,7 +152,7 @@ class Searcher:
         if self.best is None:
             return
         points = self.best.points
-        if points is not self._judged and self.effort.improved(self.waypoints_en):
+        if points is not self._judged and self.effort.improved(self.waypoints_en, self.best.cost_s):
             self._judged = points
 
     def waypoints_en(self) -> Floats:

@@ -43,6 +43,9 @@ BEAT_MORE_M = 1.0           # of room for a beat whose boards come too near
 MEET_M = 60.0               # legs that meet farther from their corners do not meet
 BEYOND_M = (0.0, 3.0, 6.0)  # an arc's ends, on along the legs around it, before the leg between them is long enough
 SPARE = 1.001               # of that length
+NARROWER_M = (4.0, 2.0)     # the water of another search, where the track of the first does not keep the floor
+NARROWER_SHARE, NARROWER_TIME_SHARE = 0.15, 0.06   # of the expansions, or of the seconds, for each
+DEAR = 1.3                  # times the time of the path that cannot be sailed: what takes longer is another way
 
 
 def with_track(search: Search, judge: Judge | None = None) -> Search:
@@ -68,9 +71,51 @@ def with_track(search: Search, judge: Judge | None = None) -> Search:
                 path, seen = laid(problem, [(float(x), float(y)) for x, y in again.waypoints_en], judge, effort)
         if seen.is_kept:
             return replace(outcome, waypoints_en=np.asarray(path))
+        other = roomier(search, problem, path, effort, seed, judge)
+        if other is not None:
+            return replace(outcome, waypoints_en=np.asarray(other))
         return replace(outcome, waypoints_en=None, status=PlanStatus.TIMEOUT, reason=lacking(problem, seen))
 
     return tracked
+
+
+def roomier(
+    search: Search, problem: Problem, path: Path, effort: Effort, seed: int, judge: Judge | None = None,
+    laying_s: float | None = None,
+) -> Path | None:
+    """Return a path that keeps the floor, of those that a search in narrower water finds, None: none does.
+
+    The longer a search has, the closer its path clings to what is solid, by arcs and tacks of ever shorter legs; where
+    there is little room none of that can be sailed, and the way round everything, which can, is several times as long.
+
+    Args:
+        search: of the path that does not keep the floor.
+        problem: its problem, in which what is found is judged.
+        path: that does not keep it; one that takes little longer is not looked beyond.
+        effort: of which the search takes its share.
+        seed: of the search.
+        judge: as of ``laid``.
+        laying_s: what the changes to a path may take [s], None: what is left.
+    """
+    best: tuple[float, Path] | None = None
+    exact = _scorer(problem) if judge is None else judge
+    enough_s = DEAR * exact(path).time_s
+    for more_m in NARROWER_M:
+        again = effort.again(NARROWER_SHARE, NARROWER_TIME_SHARE)
+        if not effort.has_time(AGAIN_S if math.isinf(again.budget_s) else again.budget_s):
+            break
+        found = search(replace(problem, clearance_floor_m=problem.clearance_floor_m + more_m), again, seed)
+        effort.spend(again.used)
+        if found.waypoints_en is None:
+            continue
+        other, seen = laid(problem, [(float(x), float(y)) for x, y in found.waypoints_en], judge,
+                           effort if laying_s is None else Effort(laying_s, None))
+        judged = exact(other)
+        if seen.is_kept and judged.is_feasible and (best is None or judged.time_s < best[0]):
+            best = judged.time_s, other
+        if best is not None and best[0] <= enough_s:
+            break
+    return None if best is None else best[1]
 
 
 def lacking(problem: Problem, seen: ExpectedTrack) -> str:

@@ -19,6 +19,7 @@ from companion.planner import Plan, PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.track import expected
 from companion.planner.track.expected import curve_mps
+from companion.planner.track.kept import laid
 
 MARGIN_M, FLOOR_M = 12.0, 6.0
 WALLS = [shapely.box(*(-150.0, y, 40.0, y + 0.8) if n % 2 == 0 else (-40.0, y, 150.0, y + 0.8))
@@ -119,10 +120,21 @@ def test_a_plan_says_it_in_its_json_and_reads_it_back():
 
 
 def test_a_floor_that_cannot_be_kept_is_no_plan_and_says_where():
-    found = plan(problem(tracking={"floor_m": 14.0}), expansions=15_000, seed=1)
+    found = plan(problem(tracking={"floor_m": 80.0}), expansions=15_000, seed=1)
     assert found.status is PlanStatus.TIMEOUT
-    assert "the floor is 14.0 m" in found.reason
+    assert "the floor is 80.0 m" in found.reason
     assert "east" in found.reason
+
+
+def test_where_the_closest_path_cannot_keep_the_floor_one_with_more_room_does():
+    """The search has clung to the walls for as long as it had: it was no plan at all, with 12 m of margin and less."""
+    tracked = problem(tracking={"floor_m": 14.0})
+    found = plan(tracked, expansions=15_000, seed=1)
+    assert found.expected_clearance_m >= 14.0
+    assert evaluate(tracked, found.waypoints_en).is_feasible
+    lines = plan(replace(tracked, tracking=None), expansions=15_000, seed=1)
+    assert not laid(tracked, [tuple(p) for p in lines.waypoints_en])[1].is_kept
+    assert found.lower_bound_s <= lines.cost_s   # the bound is the problem's own, not the narrower water's
 
 
 def test_open_water_has_nothing_to_be_clear_of():
