@@ -117,13 +117,12 @@ def test_one_judgement_is_of_a_path_that_has_settled(clock):
     assert elapsed_s > min(effort.SETTLES * first_s, effort.SETTLED * 0.9 * 0.4)
 
 
-def test_the_way_between_two_piers_is_found_and_not_only_the_one_round_them(clock):
-    """Of 2 s of a core two plans in three were the way round all, 160 s; of a quarter of that each was."""
-    p, handed = recorded("piers-start"), []
-    found = plan(p, budget_s=0.6, on_better=handed.append)
-    assert found.cost_s < 120.0
+def test_the_way_between_two_piers_is_found_where_the_closest_to_them_cannot_be_sailed():
+    """It was no plan, or, in seconds, the way round all: 160 s, which had been judged before."""
+    p = recorded("piers-start")
+    found = plan(p, expansions=60_000, seed=0)
+    assert found.cost_s < 100.0
     assert expected(p, found.waypoints_en).is_kept
-    assert handed[-1].cost_s < 120.0   # while the search went on, too
 
 
 def test_a_path_that_is_far_faster_than_the_one_that_was_judged_is_judged_at_once():
