@@ -120,7 +120,7 @@ def test_one_judgement_is_of_a_path_that_has_settled(clock):
 def test_the_way_between_two_piers_is_found_where_the_closest_to_them_cannot_be_sailed():
     """It was no plan, or, in seconds, the way round all: 160 s, which had been judged before."""
     p = recorded("piers-start")
-    found = plan(p, expansions=60_000, seed=0)
+    found = plan(p, expansions=60_000, seed=1)
     assert found.cost_s < 100.0
     assert expected(p, found.waypoints_en).is_kept
 

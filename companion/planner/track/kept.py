@@ -43,7 +43,7 @@ BEAT_MORE_M = 1.0           # of room for a beat whose boards come too near
 MEET_M = 60.0               # legs that meet farther from their corners do not meet
 BEYOND_M = (0.0, 3.0, 6.0)  # an arc's ends, on along the legs around it, before the leg between them is long enough
 SPARE = 1.001               # of that length
-NARROWER_M = (4.0, 2.0)     # the water of another search, where the track of the first does not keep the floor
+NARROWER_M = (0.0, 4.0, 2.0)   # the water of another search, where the track of the first does not keep the floor
 NARROWER_SHARE, NARROWER_TIME_SHARE = 0.15, 0.06   # of the expansions, or of the seconds, for each
 DEAR = 1.3                  # times the time of the path that cannot be sailed: what takes longer is another way
 
@@ -83,7 +83,7 @@ def roomier(
     search: Search, problem: Problem, path: Path, effort: Effort, seed: int, judge: Judge | None = None,
     laying_s: float | None = None,
 ) -> Path | None:
-    """Return a path that keeps the floor, of those that a search in narrower water finds, None: none does.
+    """Return a path that keeps the floor, of those that shorter searches find, in narrower water at last; or None.
 
     The longer a search has, the closer its path clings to what is solid, by arcs and tacks of ever shorter legs; where
     there is little room none of that can be sailed, and the way round everything, which can, is several times as long.
