@@ -2,21 +2,26 @@
 
 The libraries and the machine code of all kernels are then in the memory once, for the companion and its planner
 together. A fork of a process with threads, or with an event loop that turns, is not safe; so the nursery is made before
-either and has none itself. It is never needed: where there is none, or it dies, a planner is started as a program of
-its own.
+either and has none itself. One that dies is begun anew as a program of its own (``python -m companion.planner.nursery
+FD``), which shares the memory with its planners alone. It is never needed: where there is none, or it is not ready, a
+planner is started as a program of its own.
 """
 
 from __future__ import annotations
 
 import contextlib
 import gc
+import math
 import os
 import signal
 import socket
 import struct
+import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NoReturn
 
 from companion.errors import JobError
@@ -25,6 +30,15 @@ from companion.kernels.memory import let_go, trim
 
 _PID = struct.Struct("<q")
 _PATIENCE_S = 1.0   # a fork takes milliseconds, and the voyage's loop waits for it
+_REST_S = 10.0      # until one is begun anew: what kills it at once must not have the processor for itself
+NURSERY_READY = b"r"
+NURSERY = "--nursery"   # of the worker's program: be a nursery on the socket of this number
+
+
+def call_process(name: str) -> None:
+    """Give the calling process the name by which ``ps``, ``top`` and the journal know it, of 15 letters at the most."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/comm").write_text(name, encoding="ascii")
 
 
 class Nursery:
@@ -32,6 +46,8 @@ class Nursery:
 
     def __init__(self, control: socket.socket, serve: Callable[[Any, Any], None], pid: int = 0) -> None:
         self._control, self._serve, self._pid = control, serve, pid
+        self._program: subprocess.Popen[bytes] | None = None   # where it is one of its own
+        self._is_ready, self._begun_s = True, -math.inf
 
     @classmethod
     def begin(cls, serve: Callable[[Any, Any], None]) -> Nursery | None:
@@ -46,10 +62,7 @@ class Nursery:
         from companion.planner.solve import warm
 
         warm()
-        gc.collect()
-        gc.freeze()   # what is there now is never looked at again, so its pages stay shared
-        trim()
-        let_go("libllvmlite")   # if it was loaded at all: nobody calls it any more
+        settle()
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(AttributeError, OSError, ValueError):
                 stream.flush()
@@ -57,13 +70,53 @@ class Nursery:
         pid = os.fork()
         if pid == 0:
             ours.close()
-            _until_the_end(cls(theirs, serve)._tend)  # noqa: SLF001
+            _until_the_end(cls(theirs, serve).tend)
         theirs.close()
         ours.settimeout(_PATIENCE_S)
         return cls(ours, serve, pid)
 
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._pid
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it runs."""
+        if self._program is not None:
+            return self._program.poll() is None
+        try:
+            return os.waitpid(self._pid, os.WNOHANG) == (0, 0)
+        except ChildProcessError:
+            return False
+
+    def revive(self) -> bool:
+        """Begin it anew, if it has died and that was not just done; return whether it was. It does not wait."""
+        if self.is_alive or time.monotonic() < self._begun_s + _REST_S:
+            return False
+        self._control.close()
+        self._control, theirs = socket.socketpair()
+        with theirs:
+            self._program = subprocess.Popen(  # noqa: S603 - our own program
+                [sys.executable, "-m", "companion.planner.worker", NURSERY, str(theirs.fileno())],
+                pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, start_new_session=True)
+        self._control.settimeout(_PATIENCE_S)
+        self._pid, self._is_ready, self._begun_s = self._program.pid, False, time.monotonic()
+        return True
+
+    def _hear(self) -> None:
+        """Note that it is ready, when it has said so. Raises JobError: it has not."""
+        if not self._is_ready:
+            try:
+                self._is_ready = self._control.recv(1, socket.MSG_DONTWAIT) == NURSERY_READY
+            except OSError:
+                self._is_ready = False
+        if not self._is_ready:
+            raise JobError("no planner could be forked: the nursery is not ready")
+
     def planner(self) -> tuple[int, socket.socket]:
         """Return a new planner's process id and the socket to it. Raises JobError: there is nobody to fork it."""
+        self._hear()
         ours, theirs = socket.socketpair()
         try:
             with theirs:
@@ -71,19 +124,26 @@ class Nursery:
                 (pid,) = _PID.unpack(self._control.recv(_PID.size))
         except (OSError, struct.error) as error:
             ours.close()
+            if self.is_alive:   # it hangs, and would keep the loop waiting again
+                os.kill(self._pid, signal.SIGKILL)
             raise JobError(f"no planner could be forked: {error}") from error
         return pid, ours
 
     def close(self) -> None:
         """End the nursery; the planners end with their own sockets."""
         self._control.close()
+        if self._program is not None:
+            self._program.kill()
+            self._program.wait()
         with contextlib.suppress(OSError):
             os.waitpid(self._pid, 0)
 
     # ------------------------------------------------------------------------------- in the nursery
-    def _tend(self) -> None:
+    def tend(self) -> None:
         """Fork a planner for each socket that comes, until the companion has gone."""
-        os.setsid()   # Ctrl-C is for the companion, which ends the planner itself
+        with contextlib.suppress(OSError):
+            os.setsid()   # Ctrl-C is for the companion, which ends the planner itself
+        call_process("nursery")
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)
         signal.signal(signal.SIGCHLD, signal.SIG_IGN)   # nobody waits for a planner: none is left as a zombie
@@ -99,11 +159,20 @@ class Nursery:
             self._control.sendall(_PID.pack(pid))
 
     def _plan(self, fd: int) -> None:
+        call_process("planner")
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         with contextlib.suppress(OSError):
             os.nice(5)
         with os.fdopen(fd, "rb") as source, os.fdopen(os.dup(fd), "wb") as sink:
             self._serve(source, sink)
+
+
+def settle() -> None:
+    """Make the memory of a process that has loaded all what its forks will share, and give back the rest."""
+    gc.collect()
+    gc.freeze()   # what is there now is never looked at again, so its pages stay shared
+    trim()
+    let_go("libllvmlite")   # if it was loaded at all: nobody calls it any more
 
 
 def _until_the_end(work: Callable[[], None]) -> NoReturn:

@@ -14,6 +14,7 @@ import logging
 import math
 import os
 import pickle
+import socket
 import struct
 import sys
 import threading
@@ -31,7 +32,7 @@ from companion.errors import JobError
 from companion.kernels.build import prepare
 from companion.kernels.memory import trim
 from companion.planner.child import Child, Forked, Started
-from companion.planner.nursery import Nursery
+from companion.planner.nursery import NURSERY, NURSERY_READY, Nursery, call_process, settle
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
 from companion.planner.solve import DEFAULT_BUDGET_S, plan
@@ -53,6 +54,7 @@ SPEED_TRIES = 3
 LEAST_RUN_S = 0.05    # a shorter plan does not tell how much of the processor there was
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PULSE_S = 0.5
+_LOOK_S = 0.2         # between two looks whether child and nursery live
 _SILENCE_S = 60.0
 """A child that gets ready may take as long as it takes, and says once in ``_BEAT_S`` that it lives; this long without a
 word [s] and it is taken for hung."""
@@ -128,7 +130,9 @@ class PlannerWorker:
 
     ``async with PlannerWorker() as planner`` starts the child and returns at once: it warms up while the loop runs
     and the first request waits for it: ``auto`` always, and ``algorithm``. With a ``nursery`` the child is forked
-    there, warm for ``auto`` from the beginning. ``restarts`` counts replacements.
+    there, warm for ``auto`` from the beginning. A child that dies is replaced at once, between two requests too, and
+    so is the nursery: on a tenth of a core the next answer would else wait for half a minute's loading. ``restarts``
+    counts replacements of the child.
     """
 
     def __init__(
@@ -138,8 +142,9 @@ class PlannerWorker:
         self._grace_s, self._nursery = grace_s, nursery if algorithm == "auto" else None
         self._command = command or [sys.executable, "-m", "companion.planner.worker", algorithm]
         self._child: Child | None = None
-        self._is_warm, self._silence_s = False, math.inf
+        self._is_warm, self._was_warm, self._silence_s = False, False, math.inf
         self._lock = asyncio.Lock()
+        self._watch: asyncio.Task[None] | None = None
         self.restarts = 0
 
     @property
@@ -155,12 +160,14 @@ class PlannerWorker:
     async def __aenter__(self) -> Self:
         """Start the child; it warms up by itself."""
         await self._start()
+        self._watch = asyncio.create_task(self._keep(), name="planner's watch")
         return self
 
     async def __aexit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the child."""
+        await ended(self._watch)
         await self._stop()
 
     async def ready(self, say: Callable[[str], None] = lambda _: None) -> None:
@@ -234,6 +241,21 @@ class PlannerWorker:
                         elapsed_s=effort_s() - began_s)
 
     # ------------------------------------------------------------------------------------ the child
+    async def _keep(self) -> None:
+        """Replace child and nursery when they die."""
+        while True:
+            await asyncio.sleep(_LOOK_S)
+            if self._nursery is not None and self._nursery.revive():
+                _LOG.warning("the planners' nursery died; it is begun anew")
+            if not self._was_warm or self._lock.locked():   # whoever gets it ready or has it sees it by himself
+                continue
+            async with self._lock:
+                if not self.is_alive:
+                    _LOG.warning("the planner's worker died; it is replaced")
+                    await self._replace()
+                with contextlib.suppress(OSError, EOFError):   # the next request is told of it
+                    await self._warm()
+
     async def _start(self) -> None:
         self._is_warm, self._silence_s = False, math.inf
         if self._nursery is not None:
@@ -241,7 +263,6 @@ class PlannerWorker:
                 self._child = await Forked.begin(self._nursery)
             except JobError as error:
                 _LOG.warning("%s; it is started as a program of its own", error)
-                self._nursery = None
             else:
                 return
         self._child = await Started.begin(self._command)
@@ -252,6 +273,7 @@ class PlannerWorker:
             word = await self._answer(self._silence_s)
             self._silence_s = _SILENCE_S
             self._is_warm = word == _READY
+            self._was_warm = self._was_warm or self._is_warm
             if not self._is_warm:
                 say(word.decode())
 
@@ -332,6 +354,7 @@ def serve(algorithm: str = "auto") -> None:
     source = sys.stdin.buffer
     sink = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # whatever prints must not break the frames
+    call_process("planner")
     with contextlib.suppress(OSError):
         os.nice(5)
 
@@ -410,5 +433,20 @@ def _write(sink: Any, payload: bytes) -> None:
     sink.flush()
 
 
+def be_nursery(fd: int) -> None:
+    """Be a nursery on the socket ``fd``, in a program of its own."""
+    from companion.planner.solve import warm
+
+    control = socket.socket(fileno=fd)
+    warm()
+    settle()
+    with contextlib.suppress(OSError):   # who began it has gone: the nursery sees it, and ends
+        control.sendall(NURSERY_READY)
+    Nursery(control, answer_requests).tend()
+
+
 if __name__ == "__main__":
-    serve(*sys.argv[1:2])
+    if sys.argv[1:2] == [NURSERY]:
+        be_nursery(int(sys.argv[2]))
+    else:
+        serve(*sys.argv[1:2])

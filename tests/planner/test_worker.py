@@ -46,6 +46,7 @@ def test_plans_dies_hangs_and_comes_back():
 # A fork of a test's own process, which has threads, would not be safe.
 NURSED = """
 import asyncio, os, signal, sys
+from pathlib import Path
 from companion.clock import run
 from companion.kernels.build import prepare
 from companion.planner import PlanStatus, Problem, plan
@@ -53,8 +54,17 @@ from companion.planner.nursery import Nursery
 from companion.planner.worker import PlannerWorker, answer_requests
 from tests.planner.problems import simple
 
+def name_of(pid):
+    return Path(f"/proc/{pid}/comm").read_text().strip()
+
 prepare(("companion",), say=lambda _: None)
 nursery = Nursery.begin(answer_requests)
+
+async def killed(worker):
+    dead = worker.pid
+    os.kill(dead, signal.SIGKILL)   # with nothing asked for
+    while worker.pid in {None, dead}:
+        await asyncio.sleep(0.05)
 
 async def main():
     p = Problem.from_json(simple())
@@ -62,28 +72,58 @@ async def main():
     async with PlannerWorker(grace_s=1.0, nursery=nursery) as worker:
         await worker.ready()
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
-        os.kill(worker.pid, signal.SIGKILL)
-        await asyncio.sleep(0.2)
-        assert not worker.is_alive
+        await killed(worker)
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
         os.kill(worker.pid, signal.SIGSTOP)
         assert (await worker.plan(p, budget_s=0.1)).status is PlanStatus.UNANSWERED
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
-        os.kill(nursery._pid, signal.SIGKILL)   # with nobody to fork, it is started
-        os.kill(worker.pid, signal.SIGKILL)
-        await asyncio.sleep(0.2)
+        assert [name_of(worker.pid), name_of(nursery.pid)] == ["planner", "nursery"]
+        first = nursery.pid
+        os.kill(nursery.pid, signal.SIGKILL)   # with nobody to fork, it is started
+        await killed(worker)
+        assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
+        assert name_of(worker.pid) == "planner"
+        while nursery.pid == first or name_of(nursery.pid) != "nursery":   # ... and another nursery begun
+            await asyncio.sleep(0.1)
+        await killed(worker)
+        assert "--nursery" in Path(f"/proc/{worker.pid}/cmdline").read_text()   # its child again
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
         print(worker.restarts)
 
 run(main())
 nursery.close()
+assert not nursery.is_alive
 """
 
 
 def test_forked_by_a_nursery_it_plans_the_same_dies_hangs_and_comes_back():
+    """A nursery that had died stayed dead, and every planner after it loaded everything for itself."""
     done = subprocess.run([sys.executable, "-c", NURSED], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (0, "3\n"), done.stderr
+    assert (done.returncode, done.stdout) == (0, "4\n"), done.stderr
     assert "it is started as a program of its own" in done.stderr
+    assert "the planners' nursery died; it is begun anew" in done.stderr
+
+
+def test_a_child_that_dies_with_nothing_asked_for_is_there_again_when_something_is(monkeypatch):
+    """It was started by the next request, which waited for its kernels: 25 s on a tenth of a core."""
+    async def main():
+        async with PlannerWorker() as planner:
+            await planner.ready()
+            dead = planner.pid
+            os.kill(dead, signal.SIGKILL)
+            until_s = now_s() + 60.0
+            while planner.pid in {None, dead} or not planner._is_warm:
+                assert now_s() < until_s
+                await asyncio.sleep(0.05)
+            assert planner.restarts == 1
+            monkeypatch.setattr(planner, "_warm", nothing)    # there is nothing to wait for
+            assert (await planner.plan(Problem.from_json(simple()), expansions=1_000)).has_path
+            assert planner.restarts == 1
+
+    async def nothing():
+        pass
+
+    run(main())
 
 
 def test_a_process_with_threads_is_not_forked():
