@@ -88,15 +88,11 @@ def plans_of(decisions: Path) -> Plans:
 
 
 def planners(pid: int) -> Iterator[int]:
-    """Yield the planner's processes below ``sitl run``: the leaves below the companion."""
+    """Yield the planner's processes below ``sitl run``, by their name."""
     for member in family_of(pid):
-        try:
-            words = Path(f"/proc/{member}/cmdline").read_bytes().split(b"\0")
-        except OSError:
-            continue
-        if b"companion.cli" in words and b"run" in words:
-            children = [child for child in family_of(member) if child != member]
-            yield from (child for child in children if len(family_of(child)) == 1)
+        with contextlib.suppress(OSError):
+            if Path(f"/proc/{member}/comm").read_text(encoding="utf-8") == "planner\n":
+                yield member
 
 
 def sail(job: Job[SlowComputer]) -> dict[str, Any]:
