@@ -26,6 +26,7 @@ from companion.skipper.step import (
     Action,
     Announce,
     Outcome,
+    Phase,
     PlanOutcome,
     ReadOutcome,
     RequestPlan,
@@ -375,6 +376,9 @@ class VoyageFigures:
                 self._no_go_counted = True
         else:
             self._in_no_go_since = None
+        if step.state.phase is Phase.HOLDING:   # she circles round a point: no manoeuvre of the voyage's
+            self._side, self._pending = 0, None
+            return
         side = 1 if off_rad > 0.0 else -1
         if self._side == 0:
             self._side = side
