@@ -193,7 +193,11 @@ def _worst(
 
 
 def _words(outcome: RehearsalOutcome, sailed: CampaignResults, *, is_told: bool) -> list[str]:
-    lines = [*(() if is_told else told(outcome.known)), f"{outcome.ends}; {sailed.took}"]
+    lines = [f"{outcome.ends}; {sailed.took}"]
+    if not outcome.known.records:
+        return [*lines, "no chances yet, for the first seed is not done: more --minutes, and the same command goes on"]
+    if not is_told:
+        lines = [*told(outcome.known), *lines]
     if is_told and not outcome.changes:
         lines.append("what changes are worth: there was no time for it; more --minutes, and the same command goes on")
     if outcome.changes:

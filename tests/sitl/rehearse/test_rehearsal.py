@@ -21,9 +21,10 @@ from sitl.rehearse import rehearsal
 from sitl.rehearse.estimates import clock, estimates_of, told, why_bad
 from sitl.rehearse.picture import shares_of
 from sitl.rehearse.prepared import prepared
-from sitl.rehearse.rehearsal import Follower, Limits
+from sitl.rehearse.rehearsal import Follower, Limits, RehearsalOutcome, _words
 from sitl.rehearse.voyage import RehearsalCase, key_of
-from sitl.runner import Job, ScenarioBundle
+from sitl.runner import CampaignResults, Job, ScenarioBundle, made_by
+from sitl.runner.result_store import StoredResults
 
 ROCKS = Path("missions/rocks.toml").resolve()
 
@@ -269,3 +270,12 @@ def test_what_cannot_be_rehearsed_is_said_at_once_in_one_line(tmp_path, monkeypa
     lines = [line for line in err.replace("\r", "\n").splitlines() if line and "compiling" not in line]
     assert len(lines) == 1
     assert told_ in lines[0]
+
+
+def test_where_the_first_voyage_was_not_done_no_chances_are_told():
+    outcome = RehearsalOutcome(known=estimates_of([None, {"seed": 1}]), ends="the time is over")
+    sailed = CampaignResults(records=[{"seed": 1}], held=StoredResults(campaign="rehearsal", by=made_by()), lost=[],
+                             now=1, wall_s=47.0, cpu_s=5.3)
+    assert _words(outcome, sailed, is_told=False) == [
+        "the time is over; 1 voyage in 47 s, 5.30 CPU s each",
+        "no chances yet, for the first seed is not done: more --minutes, and the same command goes on"]
