@@ -190,8 +190,12 @@ class Source:
 
     @property
     def words(self) -> str:
-        """Whom to name."""
-        return {LOCAL: "somebody on board", FAR: "somebody far away"}.get(self.kind, f"{self.system}/{self.component}")
+        """Whom to name: on the air by the system id, of which 255 is a ground station's, and 254 ours ashore."""
+        if self.kind == LOCAL:
+            return "somebody on board"
+        if self.kind == FAR:
+            return "somebody far away"
+        return {255: "the ground station", 254: "somebody ashore"}.get(self.system, f"system {self.system}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

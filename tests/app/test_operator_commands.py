@@ -31,7 +31,7 @@ def test_orders_wait_for_the_step_and_the_rest_is_sent_away():
         assert len(await give(command(1), command(2))) == 1
         orders = operator.take()
         assert [o.wanted.verb for o in orders] == [Verb.HOLD, Verb.GO_ON]
-        assert {(o.source.words, o.authority) for o in orders} == {("255/190", "unsigned")}
+        assert {(o.source.words, o.authority) for o in orders} == {("the ground station", "unsigned")}
         assert operator.take() == []
         assert (await give(command(1, number=wire.MAV_CMD_DO_SET_MODE)))[1:] == [(176, 3)]
         await give(command(1, component=190), command(1, component=0), command(1, component=1))

@@ -111,7 +111,7 @@ def test_killed_while_she_holds_she_holds_on_and_goes_on_when_told(tmp_path, sav
 def test_the_state_says_what_she_was_told(tmp_path):
     sail(tmp_path, [order(40.0, "hold")], limit_s=120.0, exit_on_arrival=False, expect=ExpectSpec(**PARKED))
     standing = json.loads((tmp_path / "state.json").read_text())["standing"]
-    assert (standing["verb"], standing["by"]) == ("hold", "254/190")
+    assert (standing["verb"], standing["by"]) == ("hold", "somebody ashore")
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["end_phase"] == "holding"
 

@@ -67,7 +67,7 @@ def test_hold_is_here_and_lasts_until_told_to_go_on(guidance):
         world.step()
         assert distance_m(world.position, here) < 60.0
     assert world.state.phase is Phase.HOLDING
-    assert "ordered by 255/190; waiting until told to go on" in world.state.why
+    assert "ordered by the ground station; waiting until told to go on" in world.state.why
     assert world.count(act.UploadMission) == 2, "the first plan and the loiter"
     assert answer(world, "go_on").text == "the end of hold: on to A"
     assert world.run(1500, is_done)
@@ -134,7 +134,7 @@ def test_held_ashore_she_is_not_set_sailing():
     world.run(120)
     assert not world.armed
     assert world.state.phase is Phase.WAITING
-    assert "held, ordered by 255/190" in world.state.why
+    assert "held, ordered by the ground station" in world.state.why
     answer(world, "go_on")
     assert world.run(120, is_sailing)
 
@@ -180,7 +180,7 @@ def test_a_second_place_takes_the_place_of_the_first():
     world.run(20)
     given = answer(world, geo(150.0, 100.0), by=(254, 190))
     assert "in place of goal" in given.text
-    assert "ordered by 255/190" in given.text
+    assert "ordered by the ground station" in given.text
     assert world.run(600, lambda w: w.state.orders.standing is None)
     assert distance_m(world.position, (150.0, 100.0)) <= 12.0
 
@@ -252,7 +252,7 @@ def test_given_up_nothing_is_asked_of_her_until_told_to_go_on():
     world.run(200)
     assert moves(world) == before
     assert world.count(act.RequestPlan) == len([a for _, a in world.actions if isinstance(a, act.RequestPlan)])
-    assert "given up, ordered by 255/190" in world.state.why
+    assert "given up, ordered by the ground station" in world.state.why
     assert answer(world, "hold").text.startswith("she is given up")
     assert answer(world, "why").result is Result.DONE
     answer(world, "go_on")
@@ -371,9 +371,9 @@ def test_of_two_stations_in_one_step_the_later_one_stands_and_both_are_told():
     world.step()
     first, second = answers(world)[-2:]
     assert ((first.system, second.system), second.result) == ((255, 254), Result.DONE)
-    assert "in place of hold, ordered by 255/190" in second.text
+    assert "in place of hold, ordered by the ground station" in second.text
     assert world.state.orders.standing.verb is Verb.HOME
-    assert any("in place of hold, ordered by 255/190" in text for text in said(world))
+    assert any("in place of hold, ordered by the ground station" in text for text in said(world))
 
 
 def test_a_person_who_has_her_is_not_overruled():
