@@ -213,12 +213,10 @@ def write_instance(folder: Path, name: str, mission: dict[str, Any], settings: s
     Raises:
         InputError: it could not be sailed; nothing is written.
     """
-    import tomli_w
-
     from companion.disk import Disk
-    from companion.geofence.mission import load_mission, load_settings
+    from companion.geofence.mission import load_mission, load_settings, toml
 
-    files = {f"{name}.toml": tomli_w.dumps(mission).encode(), f"{name}.env": settings.encode()}
+    files = {f"{name}.toml": toml(mission).encode(), f"{name}.env": settings.encode()}
     if polar is not None:
         files[polar.name] = polar.read_bytes()
     with tempfile.TemporaryDirectory() as scratch:

@@ -71,6 +71,7 @@ def test_it_finds_the_autopilot_writes_a_mission_that_can_be_sailed_and_runs_the
     assert "nothing was changed" in out
     assert "margin" not in out   # the doctor praises what it writes
     assert sorted(p.name for p in tmp_path.iterdir()) == ["lake.env", "lake.toml"]
+    assert "\n[[goal]]\nlat = " in (tmp_path / "lake.toml").read_text()   # and so is the next one, written by hand
     assert f"LINK={serial}:921600\n" in (tmp_path / "lake.env").read_text()
     mission = load_mission(tmp_path / "lake.toml")
     assert (mission.autopilot.system, mission.operator.arm, mission.operator.set_auto) == (7, False, False)

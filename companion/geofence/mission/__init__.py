@@ -39,7 +39,7 @@ from companion.geofence.mission.options import (
     WindOptions,
     kind_of,
 )
-from companion.geofence.mission.text import parse_options, read_options, without_defaults
+from companion.geofence.mission.text import parse_options, read_options, toml, without_defaults
 
 __all__ = [
     "NO_NAME",
@@ -90,6 +90,7 @@ __all__ = [
     "read_kept",
     "read_mission",
     "read_options",
+    "toml",
     "without_defaults",
     "zones_only",
 ]

@@ -6,6 +6,7 @@ import datetime as dt
 import difflib
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,25 @@ def dump_options(options: MissionOptions) -> str:
         "name", "description", "from_autopilot", "start", "goal", "field", "refuge", "area", "wind", "current", "risk",
         "boat", "autopilot", "operator", "skipper", "planner", "passage", "safety", "traffic", "output"]
     # whatever has no place in the order yet comes last, and is not lost
-    return tomli_w.dumps({k: data[k] for k in (*order, *data) if k in data})
+    return toml({k: data[k] for k in (*order, *data) if k in data})
+
+
+def toml(data: Mapping[str, Any]) -> str:
+    """Return the text of a mission file: each goal and refuge with a header of its own, to which more can be added."""
+    pieces = [tomli_w.dumps({k: v for k, v in data.items() if not isinstance(v, dict) and not _is_tables(v)})]
+    for key, value in data.items():
+        if isinstance(value, dict):
+            pieces.append(tomli_w.dumps({key: value}))
+        elif _is_tables(value):
+            for item in value:
+                own = {k: v for k, v in item.items() if not isinstance(v, dict)}
+                inner = "".join(f"[{key}.{k}]\n{tomli_w.dumps(v)}" for k, v in item.items() if isinstance(v, dict))
+                pieces.append(f"[[{key}]]\n{tomli_w.dumps(own)}{inner}")
+    return "\n".join(piece for piece in pieces if piece)
+
+
+def _is_tables(value: object) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(item, dict) for item in value)
 
 
 def without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
