@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, cast
 
-from pyais.util import compute_checksum
-
 from companion.addresses import OutputName
 from companion.clock import now_s
 from companion.geo import M_PER_NM, MPS_PER_KNOT
@@ -42,6 +40,8 @@ def sentence(kind: str, *fields: str) -> str:
     Raises:
         ValueError: it is longer than ``MAX_CHARACTERS``, or a field holds a character that would end it.
     """
+    from pyais.util import compute_checksum  # 4 MB, for who has an instrument or a receiver
+
     body = ",".join((TALKER + kind, *fields))
     if len(body) + _FRAME > MAX_CHARACTERS:
         raise ValueError(f"{kind} has {len(body) + _FRAME} characters, NMEA 0183 allows {MAX_CHARACTERS}")

@@ -172,7 +172,7 @@ def settle() -> None:
     gc.collect()
     gc.freeze()   # what is there now is never looked at again, so its pages stay shared
     trim()
-    let_go("libllvmlite")   # if it was loaded at all: nobody calls it any more
+    let_go()   # of the libraries that were read to be loaded, half is never called: what is comes back by itself
 
 
 def _until_the_end(work: Callable[[], None]) -> NoReturn:

@@ -9,12 +9,9 @@ from __future__ import annotations
 import json
 import math
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
-
-import pyais
-from pyais.exceptions import AISBaseException
-from pyais.util import compute_checksum
 
 from companion.geo import MPS_PER_KNOT
 from companion.messages import AisReport, GeoPoint
@@ -51,9 +48,13 @@ class NmeaDecoder:
     """Sentences to reports; keeps the fragments of messages in several sentences, bounded in number and time.
 
     pyais decodes; its own assemblers (3.3) forget no fragment by time, drop what comes out of order and count nothing.
+    It is loaded with the first decoder: it takes 4 MB, and most boats have no receiver.
     """
 
     def __init__(self) -> None:
+        import pyais
+
+        self._decoded: Callable[..., Any] = pyais.decode
         self.counts = DecodeCounts()
         self._pending: OrderedDict[tuple[str, int, str, str], tuple[float, dict[int, str]]] = OrderedDict()
 
@@ -122,11 +123,7 @@ class NmeaDecoder:
 
     def _decode(self, parts: list[str], t_s: float) -> AisReport | None:
         try:
-            message = pyais.decode(*parts)
-            report = report_from_pyais(message, t_s)
-        except (AISBaseException, ValueError, TypeError, IndexError, KeyError, OverflowError):
-            self.counts.bad_payload += 1
-            return None
+            report = report_from_pyais(self._decoded(*parts), t_s)
         except Exception:  # a decoder's surprise at noise must not end the feed
             self.counts.bad_payload += 1
             return None
@@ -144,6 +141,8 @@ def decode_nmea(line: str | bytes, t_s: float) -> AisReport | None:
 
 def has_right_checksum(text: str) -> bool:
     """Return whether the sentence's checksum is there and right. *00 is a checksum like any other."""
+    from pyais.util import compute_checksum
+
     body, _, given = text.partition("*")
     if not text.isascii() or "\x7f" in body or len(given) < 2:
         return False
