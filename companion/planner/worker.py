@@ -51,7 +51,7 @@ docs were measured. ``speed`` is held against it."""
 STARTS = 3            # of a child that dies while it gets ready, at the beginning of a voyage
 SPEED_EXPANSIONS = 5_000
 SPEED_TRIES = 3
-LEAST_RUN_S = 0.05    # a shorter plan does not tell how much of the processor there was
+LEAST_RUN_S = 0.05    # a shorter run does not tell how much of the processor there was
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PULSE_S = 0.5
 _LOOK_S = 0.2         # between two looks whether child and nursery live
@@ -103,6 +103,7 @@ class InlinePlanner:
         self.virtual_s, self.expansions = virtual_s, expansions
         self.is_alive = True
         self.restarts = 0
+        self.share = 1.0
 
     async def __aenter__(self) -> Self:
         """Nothing to start."""
@@ -132,7 +133,7 @@ class PlannerWorker:
     and the first request waits for it: ``auto`` always, and ``algorithm``. With a ``nursery`` the child is forked
     there, warm for ``auto`` from the beginning. A child that dies is replaced at once, between two requests too, and
     so is the nursery: on a tenth of a core the next answer would else wait for half a minute's loading. ``restarts``
-    counts replacements of the child.
+    counts replacements of the child; ``share`` is what the child got of the processor when it became ready.
     """
 
     def __init__(
@@ -146,6 +147,7 @@ class PlannerWorker:
         self._lock = asyncio.Lock()
         self._watch: asyncio.Task[None] | None = None
         self.restarts = 0
+        self.share = 1.0
 
     @property
     def is_alive(self) -> bool:
@@ -272,9 +274,11 @@ class PlannerWorker:
         while not self._is_warm:
             word = await self._answer(self._silence_s)
             self._silence_s = _SILENCE_S
-            self._is_warm = word == _READY
+            self._is_warm = word.startswith(_READY)
             self._was_warm = self._was_warm or self._is_warm
-            if not self._is_warm:
+            if self._is_warm:
+                self.share = float(word[len(_READY):])
+            else:
                 say(word.decode())
 
     async def _stop(self) -> None:
@@ -374,8 +378,9 @@ def answer_requests(source: Any, sink: Any) -> None:
     An answer is whether it is the last, and a plan or what failed; plans that can be sailed come before it as they are
     found.
     """
+    began_s, cpu_s = effort_s(), time.process_time()
     own_speed = speed()
-    _write(sink, _READY)
+    _write(sink, _READY + f"{_share_since(began_s, cpu_s):.3f}".encode())
     while True:
         head = source.read(_LENGTH.size)
         if len(head) < _LENGTH.size:
@@ -386,14 +391,18 @@ def answer_requests(source: Any, sink: Any) -> None:
         try:
             found = plan(
                 request.pop("problem"), **request, on_better=lambda found: _write(sink, pickle.dumps((False, found))))
-            taken_s = effort_s() - began_s
-            share = min(1.0, (time.process_time() - cpu_s) / taken_s) if taken_s >= LEAST_RUN_S else 1.0
-            answer = replace(found, speed=own_speed * share)
+            answer = replace(found, speed=own_speed * _share_since(began_s, cpu_s))
         except Exception as error:
             answer = f"{type(error).__name__}: {error}"
         _write(sink, pickle.dumps((True, answer)))
         del request, answer
         trim()   # the next plan may be an hour away
+
+
+def _share_since(began_s: float, cpu_s: float) -> float:
+    """Return what this process has had of a processor since the stopwatch and its own clock told these [s], 0 to 1."""
+    taken_s = effort_s() - began_s
+    return min(1.0, max(0.001, (time.process_time() - cpu_s) / taken_s)) if taken_s >= LEAST_RUN_S else 1.0
 
 
 class _Pulse:

@@ -6,18 +6,22 @@ taken for somebody else's mission.
 
 import asyncio
 
-from companion.app.executor import Executor
+import pytest
+
+from companion.app.executor import FIRST_MOST, Executor
 from companion.clock import now_s, run_virtual
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.messages import GeoPoint, Mode, waypoint
+from companion.planner import Problem
 from companion.planner.worker import InlinePlanner
-from companion.skipper.step.actions import ReadMission, SetMode, UploadMission
+from companion.skipper.step.actions import ReadMission, ReplanReason, RequestPlan, SetMode, UploadMission
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import CommandResult, UploadResult
 from sitl.autopilot import HOME, AutopilotConfig, Impairment, MemoryLink, serve
 from sitl.autopilot import Autopilot as SimulatedAutopilot
 from sitl.world.environment import Constant
+from tests.planner.problems import simple
 
 ITEMS = tuple(waypoint(GeoPoint(lat_deg=HOME.lat_deg + 0.001 * n, lon_deg=HOME.lon_deg)) for n in range(1, 31))
 CONFIG = SkipperConfig()
@@ -77,3 +81,33 @@ def test_an_order_that_the_skipper_has_given_up_is_not_carried_out_late():
     assert upload_s < CONFIG.upload_timeout_s
     assert command.result is CommandResult.TIMEOUT
     assert seen == [Mode.MANUAL, len(ITEMS)]
+
+
+class Asked(InlinePlanner):
+    """A planner that gets a share of the processor, and is asked for plans of so many seconds."""
+
+    def __init__(self, share):
+        super().__init__(expansions=500)
+        self.share, self.budgets_s = share, []
+
+    async def plan(self, problem, *, budget_s=None, **more):
+        self.budgets_s.append(budget_s)
+        return await super().plan(problem, **more)
+
+
+@pytest.mark.parametrize(("share", "longer"), [(1.0, 1.0), (0.25, 2.0), (0.1, 10.0 ** 0.5), (0.01, FIRST_MOST)])
+def test_the_first_plan_gets_longer_on_a_slow_computer_and_no_other(share, longer):
+    """On a quarter of a core it was made of half a second, and led round everything: three times the way."""
+    planner = Asked(share)
+
+    async def main():
+        executor = Executor(None, planner, lambda _: None)
+        running = asyncio.create_task(executor.run())
+        for number, reason in enumerate((ReplanReason.START, ReplanReason.WAYPOINT)):
+            executor.submit([RequestPlan(request_id=number, problem=Problem.from_json(simple()), reason=reason,
+                                         budget_s=2.0, seed=number, from_seq=None)])
+            await asyncio.sleep(5.0)
+        running.cancel()
+
+    run_virtual(main())
+    assert planner.budgets_s == [pytest.approx(2.0 * longer), 2.0]

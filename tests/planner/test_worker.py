@@ -282,6 +282,37 @@ def test_a_child_that_shows_life_is_not_killed_for_slowness():
     run(main())
 
 
+# A child that sleeps for four fifths of the time in which it gets ready.
+SLEEPY = """
+import sys, time
+from companion.planner import worker
+from companion.planner.solve import warm
+
+warm()
+measured = worker.speed
+
+def speed():
+    cpu_s = time.process_time()
+    found = measured()
+    time.sleep(4.0 * (time.process_time() - cpu_s))
+    return found
+
+worker.speed = speed
+worker.answer_requests(sys.stdin.buffer, sys.stdout.buffer)
+"""
+
+
+def test_a_child_says_what_it_gets_of_the_processor_when_it_is_ready():
+    """Before the first answer nobody knew, and the first plan is the one that all others begin with."""
+    async def main():
+        async with PlannerWorker(command=[sys.executable, "-c", SLEEPY]) as planner:
+            assert planner.share == 1.0
+            await planner.ready()
+            assert 0.01 < planner.share < 0.25
+
+    run(main())
+
+
 def test_a_child_that_has_had_its_budget_and_does_not_end_is_hung():
     async def main():
         async with PlannerWorker(grace_s=0.5, command=[sys.executable, "-c", STARVED.format(slices=9999)]) as planner:

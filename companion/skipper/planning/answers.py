@@ -83,8 +83,11 @@ def _note_latency(ctx: StepContext, pending: PendingPlan, outcome: PlanOutcome) 
     plan = outcome.plan
     if plan is not None and plan.status is PlanStatus.UNANSWERED:
         return
+    took_s = ctx.t_s - pending.t_s
+    if pending.reason is ReplanReason.START and plan is not None and plan.speed is not None:   # it may be given longer
+        took_s -= max(0.0, plan.elapsed_s - ctx.config.first_plan_budget_s)
     latency = ctx.state.plans.latency.with_answer(
-        ctx.t_s - pending.t_s, ctx.config.plan_budget_s, None if plan is None else plan.speed)
+        took_s, ctx.config.plan_budget_s, None if plan is None else plan.speed)
     ctx.set(plans=changed(ctx.state.plans, latency=latency))
     if latency.is_slow:
         earlier = f"; it is asked {ctx.late_s:.0f} s earlier" if ctx.late_s > 0.0 else ""
