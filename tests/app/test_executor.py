@@ -95,7 +95,7 @@ class Asked(InlinePlanner):
         return await super().plan(problem, **more)
 
 
-@pytest.mark.parametrize(("share", "longer"), [(1.0, 1.0), (0.25, 2.0), (0.1, 10.0 ** 0.5), (0.01, FIRST_MOST)])
+@pytest.mark.parametrize(("share", "longer"), [(1.0, 1.0), (0.25, 2.297), (0.1, 3.981), (0.01, FIRST_MOST)])
 def test_the_first_plan_gets_longer_on_a_slow_computer_and_no_other(share, longer):
     """On a quarter of a core it was made of half a second, and led round everything: three times the way."""
     planner = Asked(share)
@@ -110,4 +110,4 @@ def test_the_first_plan_gets_longer_on_a_slow_computer_and_no_other(share, longe
         running.cancel()
 
     run_virtual(main())
-    assert planner.budgets_s == [pytest.approx(2.0 * longer), 2.0]
+    assert planner.budgets_s == [pytest.approx(2.0 * longer, rel=1e-3), 2.0]
