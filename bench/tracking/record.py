@@ -13,14 +13,14 @@ from bench.tracking.trials import SPREAD_TAU_S, Trial
 from companion.clock import now_s, run, run_virtual
 from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
-from companion.mavlink.autopilot import Autopilot as Pilot
+from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.microservices import TransferOutcome
 from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.transports import open_link
 from companion.messages import Command, Mode, waypoint
 from sitl.ardurover import ArduRover, require
-from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot import Truth as Now
 from sitl.world import WindModel
 from sitl.world.environment import AR1, Constant
@@ -69,7 +69,7 @@ def sail_ardurover(trial: Trial, speedup: float) -> Track:
             ArduRover(require(), HOME, wind, heading_rad=trial.first_rad, speedup=speedup,
                       parameters=_parameters(trial)) as rover,
             Link(open_link(rover.link), identity=IDENTITY, streams=()) as link,
-            Pilot(link, timeout_s=30.0 * speedup) as pilot,
+            Autopilot(link, timeout_s=30.0 * speedup) as pilot,
         ):
             return await _sail(trial, pilot, wind, lambda: rover.truth)
 
@@ -80,21 +80,21 @@ def sail_simulated(trial: Trial) -> Track:
     """Sail a trial on the simulated autopilot."""
     async def voyage() -> Track:
         wind = _wind(trial)
-        autopilot = Autopilot(AutopilotConfig(
+        autopilot = SimulatedAutopilot(AutopilotConfig(
             home=HOME, heading_rad=trial.first_rad, is_warm=True, is_moored=True,
             parameters=_parameters(trial)), wind, seed=trial.seed)
         wires = MemoryLink("shore", seed=trial.seed)
         async with (
             serve(autopilot, [wires.far]),
             Link(wires.near, identity=IDENTITY, streams=()) as link,
-            Pilot(link) as pilot,
+            Autopilot(link) as pilot,
         ):
             return await _sail(trial, pilot, wind, lambda: autopilot.truth)
 
     return run_virtual(voyage())
 
 
-async def _sail(trial: Trial, pilot: Pilot, wind: Risen, now: Callable[[], Now]) -> Track:
+async def _sail(trial: Trial, pilot: Autopilot, wind: Risen, now: Callable[[], Now]) -> Track:
     frame = LocalFrame(HOME)
     points = [waypoint(frame.geo_from_en(*p)) for p in trial.points_en_m]
     loiter = waypoint(frame.geo_from_en(*trial.points_en_m[-1]), command=Command.NAV_LOITER_UNLIM)

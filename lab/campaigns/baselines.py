@@ -30,7 +30,7 @@ from companion.compose import boat_of
 from companion.errors import JobError, LinkError
 from companion.geofence import Mission, load_mission
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
-from companion.mavlink.autopilot import Autopilot as Pilot
+from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.microservices import TransferOutcome
 from companion.mavlink.reception import LinkIdentity
@@ -38,7 +38,7 @@ from companion.mavlink.transports import open_link
 from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
 from lab.campaigns.ablation import interval
 from sitl.ardurover import ArduRover, require
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot import Truth as Now
 from sitl.results import markdown
 from sitl.run.embedded import TRUTH_EVERY_S, run_embedded, solid_of
@@ -163,7 +163,7 @@ class BaselineTrack:
 class _Observer:
     track: BaselineTrack
 
-    def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:  # noqa: ARG002 - the interface has it
+    def truth(self, t_s: float, autopilot: SimulatedAutopilot, link: MemoryLink) -> None:  # noqa: ARG002 - the interface has it
         self.track.add(t_s, autopilot.truth)
 
     def life(self, start_s: float, end_s: float) -> None:
@@ -226,14 +226,14 @@ def sail_alone(scenario: Scenario, path: Path, seed: int) -> BaselineVoyage:
 
     async def voyage() -> None:
         mission, wind = track.mission, HeldWind(scenario_wind(scenario, path, seed))
-        autopilot = Autopilot(
+        autopilot = SimulatedAutopilot(
             AutopilotConfig(home=mission.start or mission.origin, heading_rad=_heading_rad(mission), is_warm=True,
                             is_moored=True, parameters=scenario.parameters, polar=own_polar(mission)), wind, seed=seed)
         wires = MemoryLink("shore", seed=seed)
         async with (
             serve(autopilot, [wires.far]),
             Link(wires.near, identity=LinkIdentity(system=255, component=190), streams=()) as link,
-            Pilot(link) as pilot,
+            Autopilot(link) as pilot,
         ):
             wind.release()
             await _sail(pilot, track, lambda: autopilot.truth, scenario.limit_s)
@@ -265,7 +265,7 @@ def sail_ardurover(
             ArduRover(require(), start, wind, heading_rad=heading_rad, speedup=speedup,
                       parameters=parameters) as rover,
             Link(open_link(rover.link), identity=LinkIdentity(system=255, component=190), streams=()) as link,
-            Pilot(link, timeout_s=30.0 * speedup) as pilot,
+            Autopilot(link, timeout_s=30.0 * speedup) as pilot,
         ):
             if who == "dijkstra" and has_obstacles:
                 places = [start, *(g.point for g in mission.goals)]
@@ -296,7 +296,7 @@ def _heading_rad(mission: Mission) -> float:
     return math.radians(mission.options.start.heading_deg) if mission.options.start else 0.0
 
 
-async def _sail(pilot: Pilot, track: BaselineTrack, now: Callable[[], Now | None], limit_s: float) -> None:
+async def _sail(pilot: Autopilot, track: BaselineTrack, now: Callable[[], Now | None], limit_s: float) -> None:
     """Upload a waypoint per goal, arm, set AUTO, and watch until the last goal or the limit.
 
     The last waypoint is there twice: the mission then ends beyond the goal's radius for nobody.

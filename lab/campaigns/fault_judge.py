@@ -62,7 +62,7 @@ from companion.geo.frame import LocalFrame
 from companion.messages import Command, Mode
 from companion.skipper.behaviors import CALL
 from companion.skipper.step import Announce, UploadMission
-from sitl.autopilot import Autopilot, MemoryLink
+from sitl.autopilot import MemoryLink, SimulatedAutopilot
 from sitl.scenario import CALL_HOLDS_S, EventSpec, HullTrack, Scenario
 
 # What stands behind an excuse, as kinds of events.
@@ -253,7 +253,7 @@ class Watch:
             if isinstance(action, UploadMission):
                 self.ours.add(mission_key((i.command, i.lat_e7, i.lon_e7) for i in action.items))
 
-    def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:
+    def truth(self, t_s: float, autopilot: SimulatedAutopilot, link: MemoryLink) -> None:
         """Note where the boat is, where it believes to be, who steers, and what it sails by."""
         truth, pilot = autopilot.truth, autopilot.core.chart.point(autopilot.core.vehicle.position)
         helm = WhoSteers.ADRIFT

@@ -27,7 +27,7 @@ from companion.messages import GeoPoint
 from companion.skipper.behaviors import TOLD_S
 from companion.skipper.step import Phase
 from companion.skipper.step import actions as act
-from sitl.autopilot import EPOCH_S, Autopilot, AutopilotConfig, MemoryLink, RadioChannel, serve
+from sitl.autopilot import EPOCH_S, AutopilotConfig, MemoryLink, RadioChannel, SimulatedAutopilot, serve
 from sitl.faults import FORGERIES, FaultyPlanner, Forger, Forgery, SignedEnd, Signer
 from sitl.world import AR1
 
@@ -82,7 +82,7 @@ HOSTILITIES = (BLIND, LISTENING, AGAINST_A_KEY)
 class _Trial:
     """The run of one forger."""
 
-    autopilot: Autopilot
+    autopilot: SimulatedAutopilot
     air: RadioChannel
     forger: Forger
     rate_hz: float
@@ -120,7 +120,7 @@ def _ordered(action: act.Action) -> str:
             }.get(type(action), "")
 
 
-def _false(step: Step, autopilot: Autopilot) -> list[str]:
+def _false(step: Step, autopilot: SimulatedAutopilot) -> list[str]:
     """Return what a step takes for true that is not."""
     truth, snapshot = autopilot.truth, step.snapshot
     status, vehicle, out = snapshot.autopilot, snapshot.vehicle, []
@@ -165,7 +165,7 @@ async def _measure(
     mission_path.write_text(_MISSION, encoding="utf-8")
     mission = load_mission(mission_path)
     assert mission.start is not None
-    autopilot = Autopilot(
+    autopilot = SimulatedAutopilot(
         AutopilotConfig(home=mission.start, heading_rad=math.pi / 2.0, is_warm=True, is_moored=True),
         AR1(TWD_RAD, TWS_MPS, seed=1, sd_rad=math.radians(3.0)), seed=1)
     line = MemoryLink("hostile", seed=1)
@@ -219,7 +219,7 @@ async def _window(trial: _Trial, burst: Sequence[Forgery], *, in_a_read: bool) -
     return seen
 
 
-def _is_quiet(step: Step, autopilot: Autopilot) -> bool:
+def _is_quiet(step: Step, autopilot: SimulatedAutopilot) -> bool:
     state = step.state
     return not (
         _false(step, autopilot) or state.vehicle.doubt or state.alarms.raised or state.mission.foreign

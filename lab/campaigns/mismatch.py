@@ -26,7 +26,7 @@ from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import Mode
 from companion.telemetry.folder import DECISIONS
-from sitl.autopilot import Autopilot, MemoryLink
+from sitl.autopilot import MemoryLink, SimulatedAutopilot
 from sitl.rehearse.mismatch_sampling import SampledMismatch, draw
 from sitl.run.variation import Variation, drawn_method
 from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key
@@ -57,7 +57,7 @@ class Legs:
     sailed: list[SailedSpan] = field(default_factory=list)
     _last: tuple[tuple[float, float], tuple[float, float]] | None = None
 
-    def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:
+    def truth(self, t_s: float, autopilot: SimulatedAutopilot, link: MemoryLink) -> None:
         """Look at the autopilot."""
         del link
         truth = autopilot.truth

@@ -29,13 +29,13 @@ from companion.errors import LinkError
 from companion.field.station import Station, StationState, keep
 from companion.field.values import RESEND_S, GuidanceSettings, Situation
 from companion.geo.frame import LocalFrame
-from companion.mavlink.autopilot import Autopilot as Facade
+from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.transports import open_link
 from companion.messages import Command, MissionItem, Mode, VehicleState, WindSample, waypoint
 from lab.tasks.wrsc2013 import LEAVE_WITHIN_S, ORIGIN, Wrsc2013Score, broadcast, draw, score
 from lab.tasks.wrsc2013_skippers import HALF_M, FieldSkipper
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, Truth, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, Truth, serve
 from sitl.scenario import station_score
 from sitl.world import AR1
 
@@ -59,7 +59,7 @@ def ardurover_habits(tws_mps: float, **changes: float | bool) -> GuidanceSetting
 class Steering:
     """Heading setpoints to one autopilot in GUIDED, each from what was last heard of boat and wind."""
 
-    def __init__(self, facade: Facade, frame: LocalFrame, *, needs_wind: bool = True) -> None:
+    def __init__(self, facade: Autopilot, frame: LocalFrame, *, needs_wind: bool = True) -> None:
         self._facade, self._frame, self._needs_wind = facade, frame, needs_wind
         self._vehicle: VehicleState | None = None
         self._wind: WindSample | None = None
@@ -114,7 +114,7 @@ class Steering:
 
 
 async def sail_guided(
-    facade: Facade, truth: Callable[[], Truth], frame: LocalFrame, decide: Decide, until: Callable[[float], bool],
+    facade: Autopilot, truth: Callable[[], Truth], frame: LocalFrame, decide: Decide, until: Callable[[float], bool],
     limit_s: float, *, needs_wind: bool = True,
 ) -> list[tuple[float, float, float, float, float]]:
     """Steer by ``decide`` while the truth is sampled each half second; return its rows."""
@@ -137,7 +137,7 @@ async def sail_guided(
 
 
 def with_boat(
-    wind: AR1, seed: int, heading_rad: float, job: Callable[[Facade, Callable[[], Truth]], Any], autopilot: str,
+    wind: AR1, seed: int, heading_rad: float, job: Callable[[Autopilot, Callable[[], Truth]], Any], autopilot: str,
     speedup: float, model: str = "sailboat",
 ) -> Any:
     """Run ``job`` with a boat: the simulated autopilot in virtual time, or the real ArduRover in a hurry."""
@@ -145,9 +145,9 @@ def with_boat(
         config = AutopilotConfig(home=ORIGIN, heading_rad=heading_rad, is_warm=True, is_moored=True)
         memory = MemoryLink(seed=seed)
         async with (
-            serve(Autopilot(config, wind, seed), [memory.far]) as server,
+            serve(SimulatedAutopilot(config, wind, seed), [memory.far]) as server,
             Link(memory.near) as link,
-            Facade(link) as facade,
+            Autopilot(link) as facade,
         ):
             await asyncio.sleep(3.0)
             return await job(facade, lambda: server.truth)
@@ -158,7 +158,7 @@ def with_boat(
         async with (
             ArduRover(require(), ORIGIN, wind, heading_rad=heading_rad, speedup=speedup, model=model) as boat,
             Link(open_link(boat.link)) as link,
-            Facade(link) as facade,
+            Autopilot(link) as facade,
         ):
             await asyncio.sleep(15.0)
             return await job(facade, lambda: boat.truth)
@@ -169,7 +169,7 @@ def with_boat(
 
 
 async def _sail_mission(
-    facade: Facade, truth: Callable[[], Truth], items: list[MissionItem], until: Callable[[float], bool],
+    facade: Autopilot, truth: Callable[[], Truth], items: list[MissionItem], until: Callable[[float], bool],
     limit_s: float,
 ) -> list[tuple[float, float, float, float, float]]:
     """Sail a mission in AUTO while the truth is sampled each half second; return its rows."""
@@ -202,7 +202,7 @@ def run_wrsc(seed: int, autopilot: str = "embedded", speedup: float = 8.0) -> Wr
     def decide(seen: Situation) -> tuple[float, float]:
         return skipper.decide(seen, broadcast(course, seen.t_s, rng, frame))
 
-    async def job(facade: Facade, truth: Callable[[], Truth]) -> Any:
+    async def job(facade: Autopilot, truth: Callable[[], Truth]) -> Any:
         # The real boat drifts while it boots: it sails to the middle first, before the clock of the task starts.
         start = truth()
         if math.hypot(start.east_m, start.north_m) > 30.0:
@@ -241,7 +241,7 @@ def run_station(
         state, setpoint = keep(state, seen, station, ardurover_habits(seen.tws_mps))
         return setpoint.heading_rad, setpoint.thrust
 
-    async def job(facade: Facade, truth: Callable[[], Truth]) -> Any:
+    async def job(facade: Autopilot, truth: Callable[[], Truth]) -> Any:
         inside: list[float] = []
 
         def over(t_s: float) -> bool:

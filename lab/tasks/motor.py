@@ -25,7 +25,7 @@ from companion.field.values import GuidanceSettings, GuidanceState, MovingObstac
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea
-from companion.mavlink.autopilot import Autopilot as Facade
+from companion.mavlink.autopilot import Autopilot
 from lab.tasks.guided import sail_guided, with_boat
 from lab.tasks.wrsc2013 import ORIGIN
 from sitl.autopilot import Truth
@@ -147,7 +147,7 @@ def run_ardurover(seed: int, speedup: float = 8.0) -> MotorScore:
     """Run ArduRover's motorboat in GUIDED, the wind from the first mark."""
     pilot = MotorPilot(seed, 3.0)
 
-    async def job(facade: Facade, truth: Callable[[], Truth]) -> Any:
+    async def job(facade: Autopilot, truth: Callable[[], Truth]) -> Any:
         return await sail_guided(facade, truth, LocalFrame(ORIGIN), pilot.decide,
                                  lambda _: pilot.mark >= len(MARKS), LIMIT_S, needs_wind=False)
 

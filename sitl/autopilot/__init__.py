@@ -2,7 +2,7 @@
 
 A pure core and a thin shell. The core turns bytes and time into bytes::
 
-    autopilot = Autopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=1)
+    autopilot = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=1)
     autopilot.receive(link_id, data)          # MAVLink 2 from a companion or a ground station, any chunks
     autopilot.step(0.02)                      # simulated time passes, always in whole loops of 20 ms
     data = autopilot.take_outgoing(link_id)   # what it wants to send there
@@ -21,7 +21,7 @@ The shell joins it to transports and to the event loop's clock, whatever that is
 ``cut`` and ``mend``.
 """
 
-from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.autopilot import SimulatedAutopilot
 from sitl.autopilot.boat.kernel import TACK_RETRY_S
 from sitl.autopilot.boat.parameters import check_parameters
 from sitl.autopilot.boat.vehicle import no_go_half_rad, settled_polar, tack_loss_s
@@ -43,8 +43,28 @@ from sitl.autopilot.protocol.telemetry import AisVessel
 from sitl.autopilot.server import serve
 
 __all__ = [
-    "EPOCH_S", "FRAME_M", "HOME", "TACK_RETRY_S", "AisVessel", "Autopilot", "AutopilotConfig", "Departures",
-    "FrameStream", "GpsFault", "Impairment", "MemoryEnd", "MemoryLink", "RadioChannel", "Sensors", "Truth",
-    "VaneFault", "VaneState", "Waves", "check_parameters", "no_go_half_rad", "serve", "settled_polar",
+    "EPOCH_S",
+    "FRAME_M",
+    "HOME",
+    "TACK_RETRY_S",
+    "AisVessel",
+    "AutopilotConfig",
+    "Departures",
+    "FrameStream",
+    "GpsFault",
+    "Impairment",
+    "MemoryEnd",
+    "MemoryLink",
+    "RadioChannel",
+    "Sensors",
+    "SimulatedAutopilot",
+    "Truth",
+    "VaneFault",
+    "VaneState",
+    "Waves",
+    "check_parameters",
+    "no_go_half_rad",
+    "serve",
+    "settled_polar",
     "tack_loss_s",
 ]

@@ -23,7 +23,7 @@ from sitl.world import WindModel
 _CHUNK = 50
 
 
-class Autopilot:
+class SimulatedAutopilot:
     """One boat with its autopilot. See the package for how it is used."""
 
     def __init__(self, config: AutopilotConfig, wind: WindModel, seed: int) -> None:

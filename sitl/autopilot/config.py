@@ -112,7 +112,7 @@ class AutopilotConfig:
         uid: of its board, as AUTOPILOT_VERSION tells it.
         vehicle_type: MAV_TYPE of its heartbeat; another than a boat's is a neighbour that only speaks like one.
         parameters: values other than the fresh boat's, by name.
-        battery_v: at the start; ``Autopilot.set_battery`` changes it.
+        battery_v: at the start; ``SimulatedAutopilot.set_battery`` changes it.
         has_ftp: offer MAVFTP; small boards are built without it.
         polar: of a boat that is not the simulator's own; None: the simulator's.
         has_motor: an auxiliary motor, run by DO_AUX_FUNCTION 74.
@@ -147,8 +147,8 @@ class AutopilotConfig:
 class Truth:
     """What is so, whatever the sensors and the telemetry say. Read by judges and plots, never by a companion.
 
-    ``t_s`` is the simulated time since the ``Autopilot`` was made (a reboot does not set it back); the wind is the
-    true wind that acts on the boat now. Metres are east and north of ``AutopilotConfig.home``, as said there.
+    ``t_s`` is the simulated time since the ``SimulatedAutopilot`` was made (a reboot does not set it back); the wind is
+    the true wind that acts on the boat now. Metres are east and north of ``AutopilotConfig.home``, as said there.
     """
 
     t_s: float

@@ -15,7 +15,7 @@ from typing import Any
 from companion.clock import ended, now_s
 from companion.errors import LinkError
 from companion.mavlink.transports import LinkName, Transport, open_link, parse_link
-from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.autopilot import SimulatedAutopilot
 from sitl.autopilot.config import Truth
 from sitl.autopilot.link import LOOP_S
 
@@ -29,7 +29,7 @@ MAX_PEERS = 8
 class Server:
     """A running simulated autopilot."""
 
-    def __init__(self, autopilot: Autopilot) -> None:
+    def __init__(self, autopilot: SimulatedAutopilot) -> None:
         self.autopilot = autopilot
         self.lag_s = 0.0
         self._ports: dict[int, Any] = {}
@@ -219,7 +219,7 @@ async def _listen(
 
 
 @contextlib.asynccontextmanager
-async def serve(autopilot: Autopilot, endpoints: Sequence[Transport | str | None]) -> AsyncIterator[Server]:
+async def serve(autopilot: SimulatedAutopilot, endpoints: Sequence[Transport | str | None]) -> AsyncIterator[Server]:
     """Run ``autopilot`` on the running loop's clock while the block runs.
 
     Args:

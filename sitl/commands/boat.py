@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from companion.boat import read_polar
     from companion.errors import LinkError
     from companion.mavlink.transports import parse_link
-    from sitl.autopilot import Autopilot, AutopilotConfig, check_parameters, serve
+    from sitl.autopilot import AutopilotConfig, SimulatedAutopilot, check_parameters, serve
     from sitl.world import parse_wind
 
     parameters: dict[str, float] = {}
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
         is_moored=args.moored, sysid=args.sysid, parameters=parameters,
         polar=None if args.polar is None else read_polar(args.polar).polar, epoch_s=begins.timestamp(),
     )
-    autopilot = Autopilot(config, parse_wind(args.wind, seed=args.seed), args.seed)
+    autopilot = SimulatedAutopilot(config, parse_wind(args.wind, seed=args.seed), args.seed)
     endpoints = [f"tcpin:{args.host}:{args.port}"] if args.port else []
     endpoints += [f"udpin:{args.host}:{args.udp}"] if args.udp else []
     for target in args.udp_out:

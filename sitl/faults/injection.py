@@ -15,19 +15,19 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.clock import now_s
 from companion.geo.frame import LocalFrame
-from companion.mavlink.autopilot import Autopilot as Pilot
+from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.reception import OWN_COMPONENT, LinkIdentity
 from companion.mavlink.transports import Transport
 from companion.mavlink.wire import Codec
 from companion.messages import GeoPoint, MissionItem, Mode, waypoint
 from sitl.autopilot import (
-    Autopilot,
     AutopilotConfig,
     GpsFault,
     MemoryEnd,
     MemoryLink,
     RadioChannel,
+    SimulatedAutopilot,
     VaneFault,
     VaneState,
     serve,
@@ -45,7 +45,7 @@ PERSONS = frozenset({"mode", "arm", "disarm", "set_current"})
 FAILURES = frozenset({"radio_lost", "station", "knockdown", "battery", "leak", "sensor"})
 
 
-async def play(event: EventSpec, autopilot: Autopilot, station: MemoryEnd) -> None:
+async def play(event: EventSpec, autopilot: SimulatedAutopilot, station: MemoryEnd) -> None:
     """Let one event happen, and end it after ``for_s``; ``station`` is the ground station's own end of a link."""
     lasts_s = math.inf if event.for_s is None else event.for_s
     if event.kind == "mode" and event.by == "radio":
@@ -102,7 +102,7 @@ async def _station(shore: MemoryEnd, until_s: float) -> None:
 class Observer(Protocol):
     """Whoever looks at a run from the outside, beside its judge."""
 
-    def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:
+    def truth(self, t_s: float, autopilot: SimulatedAutopilot, link: MemoryLink) -> None:
         """Look at the autopilot; called every ``TRUTH_EVERY_S`` of a run, from its first moment."""
 
     def life(self, start_s: float, end_s: float) -> None:
@@ -113,7 +113,7 @@ class Observer(Protocol):
 class SimulatedWorld:
     """What a running scenario shares between its tasks."""
 
-    autopilot: Autopilot
+    autopilot: SimulatedAutopilot
     link: MemoryLink
     shore: MemoryLink
     station: MemoryLink      # a ground station that beats, where a scenario has one
@@ -254,7 +254,7 @@ async def _neighbour(world: SimulatedWorld, event: EventSpec) -> None:
     """Be another boat's autopilot that comes into range; it is nobody's to order about."""
     await _begins(event)
     here = world.autopilot.truth.position
-    other = Autopilot(
+    other = SimulatedAutopilot(
         AutopilotConfig(home=GeoPoint(lat_deg=here.lat_deg + 0.01, lon_deg=here.lon_deg), sysid=event.system,
                         uid=b"neighbour", vehicle_type=event.vehicle_type, is_warm=True, is_moored=True),
         world.wind, seed=world.seed + event.system)
@@ -283,7 +283,7 @@ async def _spoof(world: SimulatedWorld, event: EventSpec) -> None:
     world.forgers.remove(forger)
 
 
-def _ours(autopilot: Autopilot, frame: LocalFrame) -> tuple[Motion, float]:
+def _ours(autopilot: SimulatedAutopilot, frame: LocalFrame) -> tuple[Motion, float]:
     """Return how our boat truly moves, and its heading [rad]."""
     now = autopilot.truth
     return (frame.en_from_geo(now.position), now.velocity_en_mps), now.heading_rad
@@ -301,7 +301,7 @@ async def _upload_foreign(end: MemoryEnd, items: list[MissionItem]) -> None:
     """Upload ``items`` as a ground station does: over a link of its own, as 255/190."""
     async with (
         Link(end, identity=LinkIdentity(system=255, component=190), streams=()) as link,
-        Pilot(link) as pilot,
+        Autopilot(link) as pilot,
     ):
         await pilot.upload_mission(items, method="items")
 

@@ -19,7 +19,7 @@ from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.skipper.step import Announce
-from sitl.autopilot import Autopilot, MemoryLink
+from sitl.autopilot import MemoryLink, SimulatedAutopilot
 from sitl.rehearse.changes import CAMPAIGN, MissionChange
 from sitl.rehearse.sampling import Doubts, drawn
 from sitl.runner import Experiment, Job, Key, file_hash
@@ -53,7 +53,7 @@ class Trace:
     en_m: list[tuple[float, float]] = field(default_factory=list)
     heading_rad: list[float] = field(default_factory=list)
 
-    def truth(self, t_s: float, autopilot: Autopilot, link: MemoryLink) -> None:
+    def truth(self, t_s: float, autopilot: SimulatedAutopilot, link: MemoryLink) -> None:
         """Look at the autopilot."""
         del link
         truth = autopilot.truth

@@ -36,7 +36,7 @@ from companion.skipper.behaviors import CALL
 from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT
 from companion.wind import Estimator, WindTracker
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.faults import (
     KEY,
     REDRAWN,
@@ -162,7 +162,7 @@ async def run_embedded(
     heading_deg = scenario.start_heading_deg
     if heading_deg is None:
         heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
-    autopilot = Autopilot(
+    autopilot = SimulatedAutopilot(
         AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
                         parameters=scenario.parameters, has_ftp=scenario.has_ftp, has_motor=mission.boat.motor,
                         is_motorboat=mission.autopilot.frame == "motor",

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from companion.clock import run
 from companion.geofence import load_mission
-from sitl.autopilot import EPOCH_S, Autopilot, AutopilotConfig, serve
+from sitl.autopilot import EPOCH_S, AutopilotConfig, SimulatedAutopilot, serve
 from sitl.scenario import load_scenario, own_polar, recentre_m, scenario_departures, scenario_waters, scenario_wind
 
 
@@ -32,7 +32,7 @@ def main() -> int:
     mission = load_mission(scenario.mission_path(args.scenario))
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     home, wind = mission.start or mission.origin, scenario_wind(scenario, args.scenario, args.seed)
-    autopilot = Autopilot(
+    autopilot = SimulatedAutopilot(
         AutopilotConfig(home=home, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
                         parameters=scenario.parameters, polar=own_polar(mission), epoch_s=args.epoch,
                          is_motorboat=mission.autopilot.frame == "motor", departures=scenario_departures(scenario),

@@ -18,8 +18,7 @@ from companion.planner.worker import InlinePlanner
 from companion.skipper.step.actions import ReadMission, ReplanReason, RequestPlan, SetMode, UploadMission
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import CommandResult, UploadResult
-from sitl.autopilot import HOME, AutopilotConfig, Impairment, MemoryLink, serve
-from sitl.autopilot import Autopilot as SimulatedAutopilot
+from sitl.autopilot import HOME, AutopilotConfig, Impairment, MemoryLink, SimulatedAutopilot, serve
 from sitl.world.environment import Constant
 from tests.planner.problems import simple
 

@@ -23,7 +23,7 @@ from companion.errors import InputError
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.guard import BACKOFF_CAP_S, HELD_S, Auxiliary, Guard, reason
-from companion.mavlink.autopilot import Autopilot as Pilot
+from companion.mavlink.autopilot import Autopilot
 from companion.outputs import Outputs, checked_displays, outputs
 from companion.page import Address
 from companion.planner.worker import InlinePlanner
@@ -33,7 +33,7 @@ from companion.telemetry.folder.recorder import read_jsonl
 from companion.telemetry.state_file import StateFile
 from companion.traffic.feeds import Feeds
 from companion.view import ViewFold
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.scenario.traffic import free_port
 from sitl.world.environment import Constant
 
@@ -71,8 +71,8 @@ FAULTS = {
     Auxiliary.SOCKET: ((local_clients, "_clear"), (Path, "is_socket")),
     Auxiliary.OUTPUTS: ((outputs, "lines_of"),),
     Auxiliary.FAR: ((SatelliteMailbox, "_begin"), (SatelliteMailbox, "_take_orders"), (SatelliteMailbox, "_tell")),
-    Auxiliary.RADIO: ((Pilot, "send_status"),),
-    Auxiliary.HIGH_LATENCY: ((app._Shell, "_seen"), (Pilot, "send_high_latency")),
+    Auxiliary.RADIO: ((Autopilot, "send_status"),),
+    Auxiliary.HIGH_LATENCY: ((app._Shell, "_seen"), (Autopilot, "send_high_latency")),
     Auxiliary.STATUS: ((app, "companion_status"),),
     Auxiliary.VIEW: ((ViewFold, "take"),),
     Auxiliary.RECORDS: ((Logbook, "begin"), (Logbook, "step"), (Logbook, "note")),
@@ -135,9 +135,10 @@ def test_with_all_that_is_beside_her_broken_at_the_start_and_under_way_she_arriv
         for owner, name in faults:
             break_it(monkeypatch, owner, name, OTHERS.get(what, WINDOWS))
     tasks, adoptions, said, alerts, guard = set(), [], [], {}, Watched()
-    begin, say = Adoption.__init__, Pilot.say
+    begin, say = Adoption.__init__, Autopilot.say
     monkeypatch.setattr(Adoption, "__init__", lambda self, *args: (adoptions.append(self), begin(self, *args))[1])
-    monkeypatch.setattr(Pilot, "say", lambda self, severity, text: (said.append(text), say(self, severity, text))[1])
+    monkeypatch.setattr(
+        Autopilot, "say", lambda self, severity, text: (said.append(text), say(self, severity, text))[1])
     monkeypatch.setattr(app, "OperatorCommands", Wanting)
     (tmp_path / "m.toml").write_text(MISSION.format(feed=free_port(), nmea=free_port()))
     mission = load_mission(tmp_path / "m.toml")
@@ -149,7 +150,7 @@ def test_with_all_that_is_beside_her_broken_at_the_start_and_under_way_she_arriv
             adoptions[0].ask()
 
     async def sailed():
-        autopilot = Autopilot(AutopilotConfig(home=mission.origin, is_warm=True), Constant(0.0, 5.0), seed=1)
+        autopilot = SimulatedAutopilot(AutopilotConfig(home=mission.origin, is_warm=True), Constant(0.0, 5.0), seed=1)
         wires = MemoryLink("boat", seed=1)
         async with serve(autopilot, [wires.far]):
             tasks.update({f"not {task.get_name()}" for task in asyncio.all_tasks()})

@@ -18,8 +18,7 @@ from companion.errors import JobError, LinkError
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.signing import SigningStore, make_key, read_key
-from sitl.autopilot import Autopilot as Boat
-from sitl.autopilot import AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.scenario.traffic import free_port
 from sitl.world.environment import Constant
 
@@ -36,7 +35,7 @@ def key(tmp_path):
 async def moored():
     """A boat with two ports: the USB, which takes unsigned frames with a key too, and a radio's."""
     usb, radio = MemoryLink("usb"), MemoryLink("radio")
-    boat = Boat(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=1)
+    boat = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=1)
     async with serve(boat, [usb.far, radio.far]):
         yield usb, radio, boat
 

@@ -16,7 +16,7 @@ from companion.errors import LinkError
 from companion.geofence import load_mission
 from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, SigningStore
 from companion.messages import GeoPoint, MissionItem
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot.memory_link import frames
 from sitl.faults.spoofing import Signer
 from sitl.world.environment import parse_wind
@@ -190,7 +190,7 @@ def test_a_new_mission_has_the_margin_that_the_doctor_finds_enough(tmp_path, cap
 def doctor(parameters, *, apply=False, prepare=None, signing=None):
     """Run the doctor against the simulated autopilot over a link in memory."""
     async def consult():
-        autopilot = Autopilot(
+        autopilot = SimulatedAutopilot(
             AutopilotConfig(home=GeoPoint(lat_deg=50.8, lon_deg=-1.3), heading_rad=0.0, is_warm=True, is_moored=True,
                             parameters=parameters), parse_wind("5@0"), seed=1)
         link = MemoryLink("doctor", seed=1)

@@ -27,8 +27,7 @@ from companion.skipper.step.config import Permissions
 from companion.skipper.step.snapshot import Disbelieved, ParameterChanged, WindHealth
 from companion.wind import WindTracker
 from companion.wind.parameters import VaneParameters
-from sitl.autopilot import Autopilot as SimulatedAutopilot
-from sitl.autopilot import AutopilotConfig, serve
+from sitl.autopilot import AutopilotConfig, SimulatedAutopilot, serve
 from sitl.world.environment import Constant
 from tests.skipper.world import with_parts
 

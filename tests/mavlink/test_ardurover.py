@@ -15,8 +15,7 @@ from companion.mavlink.wire.companion_status import StatusReader
 from companion.mavlink.wire.items import first_difference, mission_hash, sailed
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, Mode, StatusText, waypoint
 from sitl.ardurover.simulation import ArduRover, find
-from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, serve
-from sitl.autopilot import Autopilot as SimulatedAutopilot
+from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot.memory_link import frames
 from sitl.world.environment import Constant
 

@@ -16,8 +16,7 @@ from companion.mavlink.wire.companion_status import StatusReader
 from companion.mavlink.wire.frames import Drop
 from companion.mavlink.wire.items import canonical, mission_hash, sailed
 from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
-from sitl.autopilot import Autopilot as SimulatedAutopilot
-from sitl.autopilot import AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot.memory_link import Impairment
 from sitl.world.environment import Constant
 

@@ -20,8 +20,7 @@ from companion.mavlink.wire import codec
 from companion.mavlink.wire.frames import Codec, Drop, SigningState
 from companion.mavlink.wire.items import mission_hash
 from companion.messages import Command, GeoPoint, Mode, waypoint
-from sitl.autopilot import Autopilot as SimulatedAutopilot
-from sitl.autopilot import AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.world.environment import Constant
 
 BEAT = wire.MAVLink_heartbeat_message(11, 3, 0, 4, 3, 3)

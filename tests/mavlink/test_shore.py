@@ -9,8 +9,7 @@ from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.reception import SHORE, LinkIdentity
 from companion.messages import Mode
-from sitl.autopilot import Autopilot as Boat
-from sitl.autopilot import AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.world.environment import Constant
 from tests.mavlink.test_autopilot import mission, set_sail
 
@@ -20,8 +19,8 @@ from tests.mavlink.test_autopilot import mission, set_sail
 ])
 def test_who_looked_in_and_left_is_no_station_that_was_lost(identity, mode):
     async def work():
-        boat = Boat(AutopilotConfig(is_warm=True, parameters={"FS_GCS_ENABLE": 1.0, "FS_ACTION": 2.0}),
-                    Constant(0.0, 5.0), seed=1)
+        boat = SimulatedAutopilot(AutopilotConfig(is_warm=True, parameters={"FS_GCS_ENABLE": 1.0, "FS_ACTION": 2.0}),
+                                  Constant(0.0, 5.0), seed=1)
         on_board, ashore = MemoryLink("on board"), MemoryLink("ashore")
         async with serve(boat, [on_board.far, ashore.far]), Link(on_board.near) as link, Autopilot(link) as autopilot:
             await set_sail(autopilot, mission(2))

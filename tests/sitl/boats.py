@@ -16,7 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.clock import now_s, run_virtual
 from companion.geo.frame import LocalFrame
-from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.world.environment import Constant, WindModel
 
 FRAME = LocalFrame(HOME)
@@ -62,7 +62,7 @@ class Client:
     """A client of the simulated boat that keeps everything it hears with its time."""
 
     write: Callable[[bytes], None]
-    autopilot: Autopilot
+    autopilot: SimulatedAutopilot
     component: int = 191
     system: int = 1
     heard: list[tuple[float, Any]] = field(default_factory=list)
@@ -169,7 +169,7 @@ def sail(
             is_warm=is_warm, is_moored=is_moored, heading_rad=math.radians(heading_deg), parameters=parameters,
             has_motor=has_motor,
         )
-        autopilot = Autopilot(config, wind or Constant(0.0, 5.0), seed)
+        autopilot = SimulatedAutopilot(config, wind or Constant(0.0, 5.0), seed)
         link = MemoryLink(seed=seed)
         client = Client(link.near.write, autopilot)
         await link.near.open(client.on_bytes)

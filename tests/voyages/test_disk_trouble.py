@@ -21,7 +21,7 @@ from companion.mavlink.wire.frames import Codec
 from companion.planner.worker import InlinePlanner
 from companion.replay import replay
 from companion.telemetry.folder.recorder import read_jsonl
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import EventSpec, ExpectSpec, Scenario, WindSpec
 from sitl.world.environment import Constant
@@ -151,7 +151,7 @@ def test_a_dry_run_leaves_the_state_of_a_voyage_that_is_interrupted(short, tmp_p
     mission = load_mission(short / "mission.toml")
 
     async def dry():
-        autopilot = Autopilot(AutopilotConfig(home=mission.origin, is_warm=True), Constant(0.0, 5.0), seed=1)
+        autopilot = SimulatedAutopilot(AutopilotConfig(home=mission.origin, is_warm=True), Constant(0.0, 5.0), seed=1)
         wires = MemoryLink("dry", seed=1)
         async with serve(autopilot, [wires.far]):
             return await app.sail(mission, wires.near, InlinePlanner(), tmp_path / "dry", SailOptions(

@@ -19,7 +19,7 @@ from companion.disk import Disk
 from companion.errors import TransferError, UnreadableError
 from companion.geofence import load_mission, read
 from companion.geofence.mission import load_settings
-from companion.mavlink.autopilot import Autopilot as Ours
+from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.reception import SHORE
 from companion.mavlink.wire.codec import mission_item
@@ -27,7 +27,7 @@ from companion.messages import GeoPoint, waypoint
 from companion.orders import Result, give, phrase
 from companion.replay import replay
 from companion.skipper.board.mark import are_marked, marked
-from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.faults.computer_faults import FaultyPlanner
 from sitl.world.environment import AR1
 from tests.sitl.boats import FRAME, Client
@@ -60,8 +60,9 @@ class Bay:
         self.state_path = tmp_path / "voyages" / "bay.state.json"
         self.plan = plan_path(self.state_path)
         self.folder = tmp_path / "voyages" / "first"
-        self.boat = Autopilot(AutopilotConfig(home=HOME, heading_rad=math.pi / 2, is_warm=True, is_moored=True),
-                              AR1(0.0, 6.0, seed=1, sd_rad=0.05), seed=1)
+        self.boat = SimulatedAutopilot(
+            AutopilotConfig(home=HOME, heading_rad=math.pi / 2, is_warm=True, is_moored=True),
+            AR1(0.0, 6.0, seed=1, sd_rad=0.05), seed=1)
         self.line, self.radio = MemoryLink("companion", seed=1), MemoryLink("station", seed=2)
         self.station = Client(self.radio.near.write, self.boat, system=255, component=190)
         self.crew = MemoryLink("crew", seed=3)
@@ -267,7 +268,7 @@ def test_an_upload_of_ours_that_was_cut_short_over_the_drawing_is_known(tmp_path
         await bay.draw()
         keep((await bay.find()).document, bay.plan, Disk())
         drawn = await bay.on_board()
-        async with Link(bay.line.near) as link, Ours(link) as autopilot:
+        async with Link(bay.line.near) as link, Autopilot(link) as autopilot:
             half = [*marked([replace(drawn[0], lat_e7=drawn[0].lat_e7 + 500)]), *drawn[1:]]
             assert (await autopilot.upload_mission(half)).is_ok
         return await bay.find()
@@ -309,7 +310,7 @@ def test_a_list_of_ours_without_its_drawing_is_not_taken_for_one(tmp_path):
     bay = Bay(tmp_path)
 
     async def work():
-        async with Link(bay.line.near) as link, Ours(link) as autopilot:
+        async with Link(bay.line.near) as link, Autopilot(link) as autopilot:
             items = marked([waypoint(GeoPoint(lat_deg=51.101, lon_deg=-1.3)),
                             waypoint(GeoPoint(lat_deg=51.101, lon_deg=-1.3), command=17)])
             assert (await autopilot.upload_mission(items)).is_ok

@@ -18,7 +18,7 @@ from companion.geofence import load_mission
 from companion.mavlink.wire.frames import Codec
 from companion.messages import Mode
 from companion.replay import replay
-from sitl.autopilot import Autopilot, AutopilotConfig, MemoryLink, RadioChannel, serve
+from sitl.autopilot import AutopilotConfig, MemoryLink, RadioChannel, SimulatedAutopilot, serve
 from sitl.faults.computer_faults import FaultyPlanner
 from sitl.world.environment import AR1
 
@@ -55,7 +55,7 @@ class World:
         for name, change in configs.items():
             config = AutopilotConfig(**{"home": self.mission.start, "heading_rad": math.pi / 2, "is_warm": True,
                                         "is_moored": True, "uid": name.encode(), **change})
-            self.boats[name] = Autopilot(config, AR1(0.0, 6.0, seed=1, sd_rad=0.05), seed=1)
+            self.boats[name] = SimulatedAutopilot(config, AR1(0.0, 6.0, seed=1, sd_rad=0.05), seed=1)
             self.lines[name] = MemoryLink(name, seed=1)
         self.air = RadioChannel(*(line.near for line in self.lines.values()))
         self.steps = []

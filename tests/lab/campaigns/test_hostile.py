@@ -26,7 +26,7 @@ from lab.campaigns.hostile import (
     written,
 )
 from sitl import cli
-from sitl.autopilot import Autopilot, AutopilotConfig, serve
+from sitl.autopilot import AutopilotConfig, SimulatedAutopilot, serve
 from sitl.faults.spoofing import FORGERIES, Forger, ManInTheMiddle, Signer, SpoofingPlan
 from sitl.world.environment import Constant
 
@@ -123,7 +123,7 @@ def free_port():
 
 def test_between_a_live_boat_and_a_companion_it_passes_on_and_adds_its_own():
     boat_port, companion_port = free_port(), free_port()
-    boat = Autopilot(AutopilotConfig(is_warm=True, is_moored=True), Constant(0.0, 5.0), 1)
+    boat = SimulatedAutopilot(AutopilotConfig(is_warm=True, is_moored=True), Constant(0.0, 5.0), 1)
     plan = SpoofingPlan(forgeries=FORGERIES[:1], rate_hz=20.0, count=40, for_s=12.0)
     middle = ManInTheMiddle(f"udpout:127.0.0.1:{boat_port}", f"udpout:127.0.0.1:{companion_port}", plan)
 

@@ -17,11 +17,11 @@ from companion.clock import now_s, run_virtual
 from companion.messages import GeoPoint, Mode
 from sitl.autopilot import (
     AisVessel,
-    Autopilot,
     AutopilotConfig,
     GpsFault,
     Impairment,
     MemoryLink,
+    SimulatedAutopilot,
     VaneFault,
     VaneState,
     serve,
@@ -100,7 +100,7 @@ def test_parameters() -> None:
 
 
 def test_new_names_of_4_7() -> None:
-    autopilot = Autopilot(AutopilotConfig(is_warm=True, new_parameter_names=True), Constant(0.0, 5.0), 0)
+    autopilot = SimulatedAutopilot(AutopilotConfig(is_warm=True, new_parameter_names=True), Constant(0.0, 5.0), 0)
     assert autopilot.core.parameters.entry("SYSID_MYGCS") is None
     assert autopilot.core.parameters.entry("MAV_GCS_SYSID")[1] == 255.0
     assert autopilot.core.parameters.set("MAV_GCS_SYSID", 250.0)
@@ -110,7 +110,7 @@ def test_new_names_of_4_7() -> None:
 # ------------------------------------------------------------------------------------------------------ routing
 def two_ports(job: Any) -> Any:
     async def main() -> Any:
-        autopilot = Autopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), 1)
+        autopilot = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), 1)
         links = [MemoryLink(f"port {n}", seed=n) for n in range(2)]
         companion = Client(links[0].near.write, autopilot)
         shore = Client(links[1].near.write, autopilot, component=190, system=255)
@@ -582,7 +582,7 @@ def test_wind_set_by_parameter() -> None:
 def voyage(seed: int, step_s: float | None = None) -> tuple[str, Any]:
     """Sail half a mission in a shifting wind over a bad link; returns a hash of all bytes and the end."""
     async def main() -> tuple[str, Any]:
-        autopilot = Autopilot(AutopilotConfig(is_warm=True), AR1(0.0, 5.0, seed=seed, tws_sd_mps=0.5), seed)
+        autopilot = SimulatedAutopilot(AutopilotConfig(is_warm=True), AR1(0.0, 5.0, seed=seed, tws_sd_mps=0.5), seed)
         bad = Impairment(loss=0.1, duplicate=0.1, reorder=0.1, corrupt=0.02, delay_s=0.05)
         link = MemoryLink(seed=seed, impairment=bad)
         client = Client(link.near.write, autopilot)
@@ -614,7 +614,7 @@ def test_a_seed_repeats_bit_for_bit() -> None:
 
 def test_the_core_does_not_depend_on_how_time_is_cut() -> None:
     def run(steps: list[float]) -> tuple[bytes, Any]:
-        autopilot = Autopilot(AutopilotConfig(is_warm=True), AR1(1.0, 5.0, seed=9), 9)
+        autopilot = SimulatedAutopilot(AutopilotConfig(is_warm=True), AR1(1.0, 5.0, seed=9), 9)
         autopilot.open_link(0)
         autopilot.pilot.arming.arm(force=True)
         autopilot.core.vehicle.sail_leg((0.0, 0.0), (300.0, 0.0), None, is_corner=False, goes_on=False)
@@ -648,7 +648,7 @@ def test_noise_and_broken_frames_are_survived() -> None:
         mav.MAVLink_request_data_stream_message(1, 1, 77, 0, 1),
         mav.MAVLink_mission_set_current_message(1, 1, 65535),
     ]
-    autopilot = Autopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), 0)
+    autopilot = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), 0)
     for _ in range(400):
         data = b""
         for _ in range(rng.randrange(1, 5)):
@@ -676,7 +676,7 @@ def test_noise_and_broken_frames_are_survived() -> None:
 
 
 def test_an_unread_port_does_not_grow() -> None:
-    autopilot = Autopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), 0)
+    autopilot = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), 0)
     autopilot.open_link(0)
     autopilot.step(300.0)
     assert len(autopilot.take_outgoing(0)) <= 65536

@@ -9,13 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.clock import run, run_virtual
-from companion.mavlink.autopilot import Autopilot as Pilot
+from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.transports import open_link
 from companion.messages import Command, GeoPoint, MissionItem, waypoint
 from companion.skipper.board.mark import are_marked, marked
 from sitl.ardurover.simulation import ArduRover, find
-from sitl.autopilot import HOME, Autopilot, AutopilotConfig, MemoryLink, serve
+from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.world.environment import Constant
 
 PLACES = st.builds(
@@ -83,8 +83,9 @@ async def stored(link, pilot, method):
 @pytest.mark.parametrize("method", ["ftp", "items"])
 def test_it_outlives_an_autopilots_storage(method):
     async def voyage():
-        autopilot, wires = Autopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=1), MemoryLink("m", seed=1)
-        async with serve(autopilot, [wires.far]), Link(wires.near) as link, Pilot(link) as pilot:
+        autopilot = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=1)
+        wires = MemoryLink("m", seed=1)
+        async with serve(autopilot, [wires.far]), Link(wires.near) as link, Autopilot(link) as pilot:
             return await stored(link, pilot, method)
 
     assert are_marked(run_virtual(voyage()))
@@ -96,7 +97,7 @@ def test_it_outlives_an_autopilots_storage(method):
 def test_it_outlives_the_real_ones_storage_and_a_reboot(method, tmp_path):
     async def voyage():
         async with ArduRover(find(), HOME, Constant(0.0, 5.0), speedup=8.0, folder=tmp_path) as boat, \
-                Link(open_link(boat.link)) as link, Pilot(link) as pilot:
+                Link(open_link(boat.link)) as link, Autopilot(link) as pilot:
             before = await stored(link, pilot, method)
             await asyncio.sleep(10.0)
             boat.reboot()
