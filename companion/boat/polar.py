@@ -205,7 +205,7 @@ def avalon() -> Polar:
         [1] G.-A. Büsser, Design and Implementation of a Navigation Algorithm for an Autonomous Sailboat, 2009.
 
     >>> round(avalon().speed_mps(math.radians(90.0), 10.0 * MPS_PER_KNOT) / MPS_PER_KNOT, 2)
-    6.56
+    6.55
     """
     twa = np.radians(np.arange(181.0))
     per_wind = np.clip(np.polyval(AVALON_COEFFICIENTS, twa), 0.0, None)

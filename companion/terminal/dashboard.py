@@ -48,7 +48,7 @@ def unit_text(*, knots: bool) -> str:
 def direction_text(angle_deg: float | None) -> str:
     """Return a direction of three digits.
 
-    >>> direction(7.2), direction(359.8)
+    >>> direction_text(7.2), direction_text(359.8)
     ('007°', '000°')
     """
     return "-" if angle_deg is None else f"{round(angle_deg) % 360:03d}°"
@@ -57,7 +57,7 @@ def direction_text(angle_deg: float | None) -> str:
 def side_text(angle_deg: float | None) -> str:
     """Return an angle at the bow with its side: S starboard, P port.
 
-    >>> side(-38.2), side(120.0)
+    >>> side_text(-38.2), side_text(120.0)
     ('38°P', '120°S')
     """
     return "-" if angle_deg is None else f"{abs(angle_deg):.0f}°{'S' if angle_deg >= 0.0 else 'P'}"
@@ -66,7 +66,7 @@ def side_text(angle_deg: float | None) -> str:
 def span_text(seconds: float | None) -> str:
     """Return a time span.
 
-    >>> span(42.0), span(100.0), span(5000.0)
+    >>> span_text(42.0), span_text(100.0), span_text(5000.0)
     ('42 s', '1:40', '1 h 23')
     """
     if seconds is None:
@@ -80,7 +80,7 @@ def span_text(seconds: float | None) -> str:
 def length_text(value_m: float | None) -> str:
     """Return a distance.
 
-    >>> length(12.4), length(1852.0)
+    >>> length_text(12.4), length_text(1852.0)
     ('12 m', '1.9 km')
     """
     return "-" if value_m is None else f"{value_m:.0f} m" if value_m < 1000.0 else f"{value_m / 1000.0:.1f} km"

@@ -188,7 +188,7 @@ def percent(share: Share) -> str:
     """Return a share's interval.
 
     >>> percent(share_of(50, 100))
-    '35 to 65 %'
+    '34 to 66 %'
     """
     low, high = 100.0 * share.low, 100.0 * share.high
     return f"{low:.0f} to {high:.0f} %" if high >= 10.0 else f"{low:.1f} to {high:.1f} %"
