@@ -12,7 +12,7 @@ from companion.errors import InputError
 from companion.geofence.area import Area, Fence
 from companion.geofence.check import AreaConditions, check_area
 from companion.geofence.document import Code, FindingLevel
-from companion.geofence.formats.registry import check_place, parse, write
+from companion.geofence.formats.registry import FORMATS, check_place, parse, write
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import ZoneKind
 from companion.messages import GeoPoint
@@ -242,7 +242,14 @@ GOOD = {
     ".gpx": b"<gpx version='1.1'><rte><rtept lat='1' lon='2'><name>A</name></rtept></rte></gpx>",
     ".kml": b"<kml><Document><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>0,0 0.01,0 0.01,0.01 0,0"
             b"</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></Document></kml>",
+    ".rally": b"RALLY\t0.001\t0.001\t40\t20\t0\t0\n",
+    ".ewkt": b"SRID=4326;POLYGON ((0 0, 0.01 0, 0.01 0.01, 0 0.01, 0 0))\n",
 }
+
+
+def test_every_format_has_a_file_to_be_changed():
+    assert set(GOOD) == {row.endings[0] for row in FORMATS if row.name != "kmz"}   # a KMZ is a KML, packed
+    assert len({ending for row in FORMATS for ending in row.endings}) == sum(len(row.endings) for row in FORMATS)
 
 
 def refused_or_read(data: bytes, extension: str):
@@ -284,7 +291,7 @@ def test_fuzzed_files_are_refused_in_one_line_or_read(extension, data):
         if hasattr(zone.shape, "is_valid"):
             assert zone.shape.is_valid
             assert not zone.shape.is_empty
-    for name in ("wkt", "geojson", "plan", "waypoints", "gpx", "kml", "fen", "poly"):
+    for name in (row.name for row in FORMATS if row.name not in {"kmz", "rally"}):
         write(document, "", format_name=name)
     if not any(f.severity is FindingLevel.ERROR for f in document.findings):
         inside = tuple(z for z in document.zones if z.kind is ZoneKind.INCLUSION)
