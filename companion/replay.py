@@ -151,7 +151,7 @@ class RecordedInput:
         ends = [*(start[0] for start in self._starts[1:]), last_s]
         fed: dict[float, list[dict[str, Any]]] = {}
         for record in self._decisions:
-            if record["kind"] in {"ais", "others", "order", "fence read"}:
+            if record["kind"] in {"ais", "others", "order", "fence read", "planner process"}:
                 fed.setdefault(float(record["t_s"]), []).append(record)
         for (start_s, persisted, known, epoch_s), end_s, gap_s in zip(
                 self._starts, ends, _gaps(self._decisions), strict=True):
@@ -195,6 +195,8 @@ class RecordedInput:
                         fold.event(Order.from_dict(record["order"]))
                     elif record["kind"] == "fence read":
                         fold.fence(_items(record["items"]))
+                    elif record["kind"] == "planner process":
+                        fold.planner_alive(bool(record["alive"]))
                     else:
                         fold.others(tuple(record["neighbours"]), has_company=record["company"],
                                     has_shore=record.get("shore", False))

@@ -115,6 +115,7 @@ class _Shell:
         self._fences: list[tuple[MissionItem, ...]] = []   # that were read of the autopilot since the last step
         self._system: int | None = None            # of our autopilot, as heard
         self._others = NOBODY
+        self._planner_alive = True
         self._autopilot: Autopilot | None = None
         self._crew: OperatorCommands | None = None
         self._counted = LinkStats()
@@ -275,7 +276,11 @@ class _Shell:
 
     # --------------------------------------------------------------------------------------- steps
     def _tick(self, t_s: float, link: Link) -> Step:
-        """Fold what the feeds heard, after this step's messages as a replay does, and step."""
+        """Fold what is no message or outcome, recorded, after this step's messages as a replay does, and step."""
+        if self.planner.is_alive != self._planner_alive:
+            self._planner_alive = not self._planner_alive
+            self._note(t_s, {"kind": "planner process", "alive": self._planner_alive})
+            self.fold.planner_alive(self._planner_alive)
         if link.has_autopilot:
             others = others_on(link, named=self._named)
             if others != self._others:
@@ -299,7 +304,6 @@ class _Shell:
         done_s: float | None = None
         while True:
             t_s = self.log.now_s()
-            self.fold.planner_alive(self.planner.is_alive)
             step = self._tick(t_s, link)
             await self._after_step(step, link)
             executor.submit(step.actions)

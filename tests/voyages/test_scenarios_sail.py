@@ -25,7 +25,7 @@ FOLDER = Path("sitl/scenarios")
 # What is folded again from the record: the new inputs of a failsafe's answer and of a watched rest among them.
 REPLAYED = {
     "station-lost", "mode-switch", "at-rest", "watched", "rules-head-on", "field-ring", "field-square", "far-north",
-    "tacks-fail"}
+    "tacks-fail", "planner-dead"}
 LONG = {"endurance", "far-away", "ocean"}
 # Sailed with seed 0 by tests of their own, which ask for the verdict and for more: test_traffic, test_by_field and
 # test_passage.
