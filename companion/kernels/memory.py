@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-_HEAD = re.compile(r"([0-9a-f]+)-([0-9a-f]+) r-.p \S+ \S+ \d+ +(/.*)")   # private, and cannot be written
+_HEAD = re.compile(r"([0-9a-f]+)-([0-9a-f]+) r-.p \S+ \S+ \d+ +/.*")   # private, and cannot be written
 _SMAPS = Path("/proc/self/smaps")
 
 
@@ -20,8 +20,8 @@ def trim() -> None:
         return
 
 
-def let_go(library: str = "") -> int:
-    """Drop the clean pages of libraries whose file name begins so (of all); return how many bytes were mapped there.
+def let_go() -> int:
+    """Drop the clean pages of the libraries that are loaded; return how many bytes were mapped there.
 
     What was read of a library to load it lies in the memory of a process that never calls it again: 70 MB of LLVM's
     own code where kernels were compiled, 15 MB of the others. A page of a file that nobody has written to can be
@@ -34,12 +34,12 @@ def let_go(library: str = "") -> int:
     except (OSError, AttributeError):
         return 0
     advise.argtypes = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int
-    return sum(end - begin for begin, end in clean(text, library)
+    return sum(end - begin for begin, end in clean(text)
                if advise(begin, end - begin, mmap.MADV_DONTNEED) == 0)
 
 
-def clean(smaps: str, library: str) -> Iterator[tuple[int, int]]:
-    """Yield where the parts of a library begin and end that were never written to.
+def clean(smaps: str) -> Iterator[tuple[int, int]]:
+    """Yield where the parts of files that were never written to begin and end.
 
     What the linker has put in (relocations) is not in the file: a part with one such page, which counts as anonymous,
     is left alone.
@@ -48,8 +48,7 @@ def clean(smaps: str, library: str) -> Iterator[tuple[int, int]]:
     for line in smaps.splitlines():
         head = _HEAD.fullmatch(line)
         if head:
-            begin, end, path = head.groups()
-            place = (int(begin, 16), int(end, 16)) if Path(path).name.startswith(library) else None
+            place = int(head[1], 16), int(head[2], 16)
         elif place is not None and line.startswith("Anonymous:") and line.split()[1] == "0":
             yield place
         elif "-" in line.partition(" ")[0]:

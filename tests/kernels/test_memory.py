@@ -20,7 +20,6 @@ def of_files_kb():
     return sums["Rss"] - sums["Anonymous"]
 
 before = of_files_kb()
-assert let_go("no such library") == 0
 assert let_go() > 0
 print(before - of_files_kb())
 assert np.linalg.inv(2.0 * np.eye(3))[1, 1] == 0.5

@@ -183,7 +183,7 @@ def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
         off_rad = difference_rad(wind_rad, heading_of(end[0] - start[0], end[1] - start[1]))
         is_closed = abs(off_rad) < no_go_rad
         if not is_closed and (off_rad > 0.0) != side and abs(off_rad) < math.pi / 2.0:
-            # On the leg that is sailed: the boat turns to it now.
+            # Of the leg that is sailed, too: the boat is turning to it.
             return NextTack(time_s, is_planned=True)
         speed_mps = max(MIN_SPEED_MPS, polar.speed_mps(max(abs(off_rad), no_go_rad), tws_mps))
         has_way = number == 0 and vehicle.speed_mps > GATHERING_WAY * speed_mps
