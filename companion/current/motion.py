@@ -8,9 +8,9 @@ wrote, not a current of 3 m/s that came within a second. What tells:
   current could explain.
 - **Heel.** It heels to windward.
 - **The direction's leap.** A front turns the wind, too, but then it sails by it. A direction that has leapt before it
-  ceased to sail as it should is the sensor's doing; less is enough then, and a shorter time. No front turns the wind
-  by ``TURNED_RAD`` within a minute: a direction that has leapt so far is doubted whatever the boat does, on a reach,
-  where the wind from the other side would have it sail as fast, and at its mooring.
+  ceased to sail as it should is the sensor's doing; less is enough then, and a shorter time. Hardly a front turns
+  the wind by ``TURNED_RAD`` within a minute: a direction that has leapt so far is doubted whatever the boat does, on
+  a reach, where the wind from the other side would have it sail as fast, and at its mooring.
 
 What sets it across its heading as well is no wind's doing: a current's, which the filter takes up, or a compass's,
 which "heading against course" tells.
