@@ -8,9 +8,10 @@ wrote, not a current of 3 m/s that came within a second. What tells:
   current could explain.
 - **Heel.** It heels to windward.
 - **The direction's leap.** A front turns the wind, too, but then it sails by it. A direction that has leapt before it
-  ceased to sail as it should is the sensor's doing; less is enough then, and a shorter time. Hardly a front turns
+  ceased to sail as it should is the sensor's doing; less is enough then, and a shorter time. Few fronts turn
   the wind by ``TURNED_RAD`` within a minute: a direction that has leapt so far is doubted whatever the boat does, on
-  a reach, where the wind from the other side would have it sail as fast, and at its mooring.
+  a reach, where the wind from the other side would have it sail as fast, and at its mooring. It is believed once the
+  boat has sailed by it for long enough, on headings far apart, held in a loiter as it is.
 
 What sets it across its heading as well is no wind's doing: a current's, which the filter takes up, or a compass's,
 which "heading against course" tells.
@@ -18,6 +19,7 @@ which "heading against course" tells.
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections import deque
 from dataclasses import dataclass
@@ -41,8 +43,11 @@ HEEL_S = 10.0                      # of the mean heel
 SURE_S, JUMPED_S = 20.0, 8.0       # of odd readings, without a jump of the direction and after one
 FORGETS = 0.5                      # a reading that fits takes back so much of one that does not
 FITS_S = 20.0                      # of readings that fit end a doubt
-NEW_WIND_S = 90.0                  # likewise in another direction than before, on headings far apart
-FAR_APART_RAD = math.radians(70.0)
+NEW_WIND_S, NEW_WIND_RATIO = 40.0, 4.0   # likewise of a wind from elsewhere, and so many times those that do not, ...
+FAR_APART_RAD = math.radians(70.0)       # ... on headings far apart, of the last ...
+TALLY_S = 300.0                    # ... so long: odd moments while a front passes are forgotten, too
+LOITER_SETTLES_S = 2.0             # for the tally: held in a loiter a boat turns every few seconds
+GAINS_MPS2 = 0.1                   # a boat that gains on its polar at that rate is on its way to it
 JUMP_RAD = math.radians(40.0)      # of the direction's 5 s mean against what it was half a minute and more ago
 TURNED_RAD, LASTS_S = math.radians(125.0), 5.0   # of the same, for so long: no shift
 STEADY = 0.7                       # the length of the mean of the directions before: less is a wind that swings about
@@ -77,6 +82,31 @@ class MotionSample:
     roll_rad: float | None = None
 
 
+class _Tally:
+    """Of the moments of a doubt: for how long the boat sailed as it should, on which headings, and for how long not.
+
+    A row without a break is not to be had: a boat that is held circles, and a front comes with gusts.
+    """
+
+    def __init__(self) -> None:
+        self._fits_s = self._odd_s = 0.0
+        self._bows = 0j      # the sum of the bow's unit vectors over the time that fits
+
+    def take(self, dt_s: float, heading_rad: float, *, fits: bool) -> None:
+        keep = math.exp(-dt_s / TALLY_S)
+        self._fits_s, self._odd_s, self._bows = keep * self._fits_s, keep * self._odd_s, keep * self._bows
+        if fits:
+            self._fits_s += dt_s
+            self._bows += cmath.rect(dt_s, heading_rad)
+        else:
+            self._odd_s += dt_s
+
+    @property
+    def tells_of_a_new_wind(self) -> bool:
+        is_on_many_headings = abs(self._bows) <= self._fits_s * math.cos(0.5 * FAR_APART_RAD)
+        return self._fits_s >= max(NEW_WIND_S, NEW_WIND_RATIO * self._odd_s) and is_on_many_headings
+
+
 class MotionCheck:
     """A fold over moments of a boat that sails: is the wind, or the water, to be doubted?
 
@@ -87,7 +117,7 @@ class MotionCheck:
     def __init__(self) -> None:
         self.doubt, self.is_odd, self.is_winds = "", False, False
         self._t_s: float | None = None
-        self._heading_rad = 0.0
+        self._heading_rad = self._along_mps = 0.0
         self._turned_s = -math.inf
         self.fits_s = self._odd_s = 0.0
         self._heel_rad = 0.0
@@ -97,7 +127,7 @@ class MotionCheck:
         self._wind_s: float | None = None                        # of the last wind that was followed
         self._far_s = self._back_s = self._moored_s = 0.0        # it has been turned, back, and not sailed by, for
         self._is_leap = False                                    # it is doubted for its leap alone
-        self._fitted: list[float] = []                           # headings on which the boat sailed as it should
+        self._tally = _Tally()                                   # of the doubt that is
 
     @property
     def before_rad(self) -> float | None:
@@ -112,24 +142,34 @@ class MotionCheck:
         """Take the moment at ``t_s``."""
         self.is_odd = False
         if self._t_s is None or t_s <= self._t_s:
-            self._t_s, self._heading_rad, self._turned_s = t_s, now.heading_rad, t_s
+            self._t_s, self._heading_rad, self._turned_s, self._along_mps = t_s, now.heading_rad, t_s, now.along_mps
             return
         dt_s, self._t_s = min(5.0, t_s - self._t_s), t_s
+        gains_mps2, self._along_mps = (now.along_mps - self._along_mps) / dt_s, now.along_mps
         if now.roll_rad is not None:
             self._heel_rad += -math.expm1(-dt_s / HEEL_S) * (now.roll_rad - self._heel_rad)
         if abs(difference_rad(now.heading_rad, self._heading_rad)) > TURNING_RAD_S * dt_s:
             self._turned_s = t_s
         self._heading_rad = now.heading_rad
-        if t_s - self._turned_s < SETTLES_S or now.tws_mps < LEAST_TWS_MPS:
+        settled_s = t_s - self._turned_s
+        if now.tws_mps < LEAST_TWS_MPS or settled_s < LOITER_SETTLES_S:
             return
         fits = self._fits(t_s, now)
         if fits is None:
+            return
+        is_on_its_way = gains_mps2 * math.copysign(1.0, now.speed_mps - now.along_mps) >= GAINS_MPS2
+        if self.is_winds and (fits or not is_on_its_way):
+            self._tally.take(dt_s, now.heading_rad, fits=fits)
+            if self._tally.tells_of_a_new_wind:
+                self.settle()
+                return
+        if settled_s < SETTLES_S:
             return
         self.is_odd = not fits
         self.fits_s = self.fits_s + dt_s if fits else 0.0
         self._odd_s = max(0.0, self._odd_s - FORGETS * dt_s) if fits else self._odd_s + dt_s
         if self.doubt:
-            self._look_for_an_end(now, fits=fits)
+            self._look_for_an_end(now)
         elif self._odd_s >= (JUMPED_S if self._has_leapt(t_s) else SURE_S):
             self._begin(t_s, now)
 
@@ -182,7 +222,7 @@ class MotionCheck:
         self._far_s = self._far_s + dt_s if is_turned else 0.0
         if self._far_s >= LASTS_S:
             self._is_leap = self.is_winds = True
-            self.fits_s, self._fitted, self._before_rad = 0.0, [], was
+            self.fits_s, self._tally, self._before_rad = 0.0, _Tally(), was
             self._back_s = self._moored_s = 0.0
             self.doubt = (f"the wind's direction leapt by {math.degrees(by_rad):+.0f}°, farther than a wind shifts: "
                           "the vane was turned, or its offset")
@@ -202,7 +242,7 @@ class MotionCheck:
     # ---------------------------------------------------------------------------------------- the doubt
     def _begin(self, t_s: float, now: MotionSample) -> None:
         heels = self._heels_to_windward(now)
-        self.fits_s, self._fitted, self.is_winds = 0.0, [], heels or self._has_leapt(t_s)
+        self.fits_s, self._tally, self.is_winds = 0.0, _Tally(), heels or self._has_leapt(t_s)
         how = "astern" if now.along_mps < 0.0 else "ahead"
         moves = f"she makes {abs(now.along_mps):.1f} m/s {how} where {now.speed_mps:.1f} m/s were to be expected"
         if heels:
@@ -215,22 +255,16 @@ class MotionCheck:
         else:
             self.doubt = f"{moves}: no current comes so suddenly, the wind or the water is another than is measured"
 
-    def _look_for_an_end(self, now: MotionSample, *, fits: bool) -> None:
-        if not fits:
-            self._fitted = []
-            return
-        self._fitted.append(now.heading_rad)
+    def _look_for_an_end(self, now: MotionSample) -> None:
         is_back = not self.is_winds or self._before_rad is None or (
             abs(difference_rad(now.twd_from_rad, self._before_rad)) <= JUMP_RAD)
-        is_told = self.fits_s >= NEW_WIND_S and any(
-            abs(difference_rad(a, self._fitted[0])) > FAR_APART_RAD for a in self._fitted)
-        if is_told or (is_back and self.fits_s >= FITS_S):
+        if is_back and self.fits_s >= FITS_S:
             self.settle()
 
     def settle(self) -> None:
         """End a doubt: what is measured is believed from here on."""
         self.doubt, self.is_odd, self.is_winds = "", False, False
         self._odd_s = self.fits_s = 0.0
-        self._fitted, self._before_rad, self._leapt_s = [], None, -math.inf
+        self._tally, self._before_rad, self._leapt_s = _Tally(), None, -math.inf
         self._is_leap, self._far_s = False, 0.0
         self._directions.clear()

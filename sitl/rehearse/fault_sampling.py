@@ -126,7 +126,7 @@ def _gps_lost(rng: random.Random, at_s: float) -> SampledFault:
 
 # ------------------------------------------------------------------------------------- wind and water
 def _shift(rng: random.Random, at_s: float) -> SampledFault:
-    return one(at_s=at_s, kind="wind_shift", veer_deg=round(rng.uniform(-120.0, 120.0), 1), over_s=length(rng))
+    return one(at_s=at_s, kind="wind_shift", veer_deg=round(rng.uniform(-180.0, 180.0), 1), over_s=length(rng))
 
 
 def _calm(rng: random.Random, at_s: float) -> SampledFault:

@@ -94,6 +94,32 @@ def test_a_front_by_which_she_sails_is_no_turned_vane():
     assert not estimator.motion_doubt
 
 
+def loiters(for_s, twd_deg, *, share=1.0, first_s=FIRST_S):
+    """Held, she reaches to and fro across the loiter's point for some seconds each, and turns."""
+    speed = share * POLAR.speed_mps(math.radians(65.0), 5.0)
+    moments, off = [], 65.0
+    for t in range(1, int(for_s) + 1):
+        if t % 12 == 0:
+            off = -off
+        moments.append(boat(first_s + t, twd_deg + off, speed, twd_deg=twd_deg))
+    return moments
+
+
+def test_a_front_in_which_she_is_held_is_believed_once_she_loiters_by_it():
+    """Held by its leap alone she turns every few seconds: no row without a break is to be had there."""
+    estimator, when = sails([*beats(FIRST_S), *loiters(600.0, 150.0)])
+    assert len(when) == 2, "doubted, and believed"
+    assert when[0] - FIRST_S < 20.0
+    assert when[1] - when[0] < 400.0
+    assert not estimator.motion_doubt
+
+
+def test_a_loiter_that_is_not_sailed_as_the_wind_says_ends_no_doubt():
+    estimator, when = sails([*beats(FIRST_S), *loiters(900.0, 150.0, share=0.2)])
+    assert len(when) == 1
+    assert estimator.doubts_wind
+
+
 @pytest.mark.parametrize("current", [(0.0, -2.0), (1.5, 0.0), (-0.8, 0.8)])
 def test_a_tide_that_sets_in_at_once_is_followed_as_it_was(current):
     """The water of foul-tide: it sets her across her headings, too."""
