@@ -18,6 +18,8 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from companion.frozen import changed
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Command, Mode, Severity, waypoint
@@ -28,7 +30,7 @@ from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.snapshot import WindBefore
 from companion.skipper.step.state import Phase
-from companion.skipper.way.drift import HORIZON_S, drift_ahead
+from companion.skipper.way.drift import HORIZON_S, floor_after_s
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.voyage import AreaLike, PointEn, water_at
 
@@ -38,6 +40,7 @@ ASTERN_SHARE = 0.2                  # of the wind's speed: how fast a LOITER by 
 SPREAD_RAD = math.radians(15.0)     # of the true wind while it is not measured
 PAD_RAD = math.radians(10.0)        # outside the true no-go zone, for the same reason
 EASED_RAD = math.radians(10.0)      # a sheet that is eased farther than this for the true wind does not draw
+LOOKS_EVERY_S = 5.0                 # for sea room: hundreds of legs and drifts are tried
 ROOMY_S = 60.0                      # of drift gained: for less the boat is not sent elsewhere
 RINGS_M = (40.0, 60.0, 80.0, 120.0, 160.0, 240.0)
 DIRECTIONS = 36
@@ -109,17 +112,22 @@ def seeks_sea_room(ctx: StepContext) -> bool:
             ctx.phase(Phase.HOLDING, state.pending.upload.route.why)
         return leads_there
     left_s = HORIZON_S if wind is None else _left_s(water, boat, wind, floor_m)
-    if route.rung == SEA_ROOM and (left_s >= HORIZON_S or _is_on_the_way(ctx, water, boat, route.points_en_m[-1])):
+    if route.rung == SEA_ROOM and _is_on_the_way(ctx, water, boat, route.points_en_m[-1]):
         if state.steering.own_mode is not None:
             hand_back(ctx)
         ctx.phase(Phase.HOLDING, route.why)
         return True
-    if wind is None or left_s >= HORIZON_S or ctx.t_s < state.pending.upload_retry.not_before_s:
+    if wind is None or left_s >= HORIZON_S or _stays(ctx, boat, wind) or ctx.t_s < max(
+            state.pending.upload_retry.not_before_s, state.adrift.looked_s + LOOKS_EVERY_S):
         return False
+    ctx.set(adrift=replace(state.adrift, looked_s=ctx.t_s))
     runs_s = 0.0 if goes_astern(ctx) else AHEAD_S   # a sheet that draws stops the boat at once
     ahead = (boat[0] + runs_s * vehicle.velocity_en_mps[0], boat[1] + runs_s * vehicle.velocity_en_mps[1])
-    found = _sea_room(
-        water, boat, ahead, wind, no_go_half_rad=ctx.no_go_half_rad, clear_m=(ctx.config.margin_m, floor_m))
+    starts = [ahead]
+    if status.mode is Mode.LOITER:   # it turns in circles: the leg begins anywhere about here
+        starts += [moved(boat, math.radians(off), AHEAD_S * vehicle.speed_mps) for off in (0.0, 90.0, 180.0, 270.0)]
+    found = sea_room(
+        water, boat, starts, wind, no_go_half_rad=ctx.no_go_half_rad, clear_m=(ctx.config.margin_m, floor_m))
     if found is None or found[1] < left_s + ROOMY_S:
         return False
     _stop_planning(ctx)
@@ -135,9 +143,20 @@ def seeks_sea_room(ctx: StepContext) -> bool:
         gate_of=(*route.gate_of[:keep], -1), rung=SEA_ROOM, risk=None, cost_s=None, median_s=None, late_s=None,
         bound_for="", why=text)
     upload(ctx, away, keep + 1, text)
+    if not state.adrift.loitered:
+        ctx.set(adrift=replace(ctx.state.adrift, loiter_en_m=None))   # the next LOITER begins elsewhere
     ctx.say(Severity.WARNING, SEA_ROOM, text, every_s=0.0)
     ctx.phase(Phase.HOLDING, text)
     return True
+
+
+def _stays(ctx: StepContext, boat: PointEn, wind: DoubtedWind) -> bool:
+    """Return whether LOITER has kept its place for so long that the drift foreseen would have left it twice over."""
+    memory, status = ctx.state.adrift, ctx.autopilot
+    if status is None or status.mode is not Mode.LOITER or memory.loiter_en_m is None or goes_astern(ctx):
+        return False
+    drifts_m = (ctx.t_s - memory.loiter_s) * math.hypot(*wind.drift_en_mps)
+    return distance_m(boat, memory.loiter_en_m) < STRAYS_M and drifts_m >= 2.0 * STRAYS_M
 
 
 def _is_on_the_way(ctx: StepContext, water: AreaLike, boat: PointEn, place: PointEn) -> bool:
@@ -155,32 +174,41 @@ def _is_on_the_way(ctx: StepContext, water: AreaLike, boat: PointEn, place: Poin
     return made_good_mps >= WAY_MPS or ctx.t_s - ctx.state.mission.uploaded_s < TURNS_S
 
 
-def _left_s(water: AreaLike, place: PointEn, wind: DoubtedWind, floor_m: float) -> float:
-    """Return for how long a LOITER that begins at a place keeps the floor [s], at most ``HORIZON_S``."""
+def _left_s(
+    water: AreaLike, place: PointEn, wind: DoubtedWind, floor_m: float, *, beyond_s: float = 0.0,
+) -> float:
+    """Return for how long a LOITER that begins at a place keeps the floor [s], at most ``HORIZON_S``.
+
+    Anything up to ``beyond_s`` where it does so for no longer than that.
+    """
     east, north = wind.drift_en_mps
     least_s = HORIZON_S
-    for off in (-SPREAD_RAD, 0.0, SPREAD_RAD):
+    for off in (0.0, -SPREAD_RAD, SPREAD_RAD):
         velocity = (east * math.cos(off) + north * math.sin(off), north * math.cos(off) - east * math.sin(off))
-        found = drift_ahead(water, place, velocity, floor_m=floor_m)
-        least_s = min(least_s, HORIZON_S if found.floor_s is None else found.floor_s)
+        least_s = min(least_s, floor_after_s(water, place, velocity, floor_m=floor_m))
+        if least_s <= beyond_s:
+            break
     return least_s
 
 
-def _sea_room(
-    water: AreaLike, boat: PointEn, ahead: PointEn, wind: DoubtedWind, *, no_go_half_rad: float,
+def sea_room(
+    water: AreaLike, boat: PointEn, starts: Sequence[PointEn], wind: DoubtedWind, *, no_go_half_rad: float,
     clear_m: Sequence[float],
 ) -> tuple[PointEn, float] | None:
     """Return the nearest place from which a LOITER drifts clear, else the one from which it does so longest [s].
 
-    It is reached straight from the boat, and from where it will have come to when it turns, ``clear_m`` of everything:
-    the first of these with which a clear place is found, else any. None where no such leg is clear.
+    It is reached straight from each of the ``starts``, where the boat may have come to when it turns, ``clear_m`` of
+    everything:
+    the first of these with which a clear place is found, else any. The told wind may be right after all (a front): then
+    the boat circles there, and a place has room for that. None where no such leg is clear.
     """
     best: tuple[PointEn, float] | None = None
     for least_m in clear_m:
         for place in _places(boat, wind, no_go_half_rad):
-            if water.path_clearance_m([boat, ahead, place]) < least_m:
+            if float(water.clearance_m(np.array([place]))[0]) < least_m + STRAYS_M or (
+                    min(water.path_clearance_m([boat, start, place]) for start in starts) < least_m):
                 continue
-            left_s = _left_s(water, place, wind, least_m)
+            left_s = _left_s(water, place, wind, least_m, beyond_s=0.0 if best is None else best[1])
             if best is None or left_s > best[1]:
                 best = place, left_s
             if left_s >= HORIZON_S:
@@ -211,7 +239,7 @@ def holds(ctx: StepContext) -> bool:
         return False
     if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
         if memory.loiter_en_m is None:   # by a wrong wind the boat may be carried off it, which is a drift
-            ctx.set(adrift=replace(memory, loiter_en_m=ctx.boat_en))
+            ctx.set(adrift=replace(memory, loiter_en_m=ctx.boat_en, loiter_s=ctx.t_s))
         ctx.phase(Phase.HOLDING, f"{why}: waiting in a loiter until the wind is known")
         return True
     if state.steering.until_s is not None:      # out of irons, it was believed

@@ -190,8 +190,10 @@ class Adrift:
     places: tuple[Fix, ...] = ()       # of the last minute, of a boat that hardly moves
     since_s: float | None = None       # since when a drift onto something is being stopped
     loitered: bool = False             # LOITER has shown in this calm: it is not asked for again
-    loiter_en_m: PointEn | None = None # where it began
+    loiter_en_m: PointEn | None = None # where it began ...
+    loiter_s: float = float("inf")     # ... and when, of a wind that is doubted
     motor: bool = False                # the autopilot has accepted to run it
+    looked_s: float = float("-inf")    # when sea room was looked for last
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from shapely.geometry import box
 
 from companion.geo.angles import difference_rad
 from companion.messages import Command, Mode
-from companion.skipper.behaviors.wind_doubt import SEA_ROOM, DoubtedWind
+from companion.skipper.behaviors.wind_doubt import SEA_ROOM, STRAYS_M, DoubtedWind, sea_room
 from companion.skipper.step import ParameterChanged, Permissions, WindBefore
 from companion.skipper.step import actions as act
 from companion.skipper.step.state import Phase
@@ -119,6 +119,36 @@ def test_a_loiter_that_would_be_driven_onto_a_rock_waits_for_sea_room():
     assert len(said(world, SEA_ROOM)) == 1
     world.extra = {}
     assert world.run(600, is_done), "sailed on when the wind is known"
+
+
+def test_a_place_has_room_to_circle_in_and_is_reached_from_all_of_the_loiter():
+    """Should the told wind be right after all: sent 40 m on to an islet, a boat that was held in a front touched it."""
+    wind = DoubtedWind(true_from_rad=0.0, told_from_rad=math.radians(150.0), drift_en_mps=(0.0, -1.0))
+    lee, half_rad, boat = box(-60.0, -60.0, 25.0, -40.0), math.radians(45.0), (0.0, 0.0)
+    starts = [(8.0, 0.0), (0.0, 8.0), (0.0, -8.0), (-8.0, 0.0)]
+    found = sea_room(area(lee), boat, starts, wind, no_go_half_rad=half_rad, clear_m=(15.0, 8.0))
+    assert found is not None
+    east, north = found[0]
+    for islet in (box(east - 2.0, north + 18.0, east + 2.0, north + 22.0),
+                  box(0.5 * east - 1.0, 0.5 * north + 16.0, 0.5 * east + 1.0, 0.5 * north + 18.0)):
+        water = area(lee, islet)
+        other = sea_room(water, boat, starts, wind, no_go_half_rad=half_rad, clear_m=(15.0, 8.0))
+        assert other is not None
+        assert other[0] != found[0]
+        assert water.clearance_m([other[0]])[0] >= 8.0 + STRAYS_M
+        assert min(water.path_clearance_m([start, other[0]]) for start in starts) >= 8.0
+
+
+def test_a_loiter_that_has_kept_its_place_is_not_left_for_sea_room():
+    """It would have been driven off by now, were the wind another than is told: it was a front."""
+    world = north_of_the_rock()
+    world.permissions = Permissions(may_set_mode=True)
+    doubted(world)
+    assert world.run(5, lambda w: w.mode is Mode.LOITER)
+    world.run(60)
+    world.permissions = Permissions(may_set_mode=True, may_upload=True)
+    world.run(30)
+    assert not said(world, SEA_ROOM)
 
 
 @pytest.mark.parametrize(("obstacles", "turned_deg"), [((), 90.0), ((ROCK,), 30.0)])

@@ -7,10 +7,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.skipper.way.drift import drift_ahead
+from companion.skipper.way.drift import HORIZON_S, drift_ahead, floor_after_s
 from tests.skipper.world import area
 
 ROCK = shapely.box(100.0, -20.0, 140.0, 20.0)
+SPEEDS = st.floats(-2.0, 2.0).map(lambda mps: round(mps, 3))
 
 
 def test_a_drift_onto_a_rock_is_timed_to_the_floor_and_to_the_contact():
@@ -38,6 +39,18 @@ def test_beyond_the_horizon_and_away_it_is_clear():
         assert ahead.is_clear
         assert ahead.name == ""
     assert drift_ahead(area(), (0.0, 0.0), (1.0, 0.0), floor_m=8.0).sentence() == "drifting 1 m/s towards 090°, clear"
+
+
+@given(x=st.floats(-60.0, 160.0), y=st.floats(-60.0, 60.0), east=SPEEDS, north=SPEEDS,
+       floor_m=st.floats(0.0, 15.0))
+def test_the_floor_is_met_when_the_looks_along_the_whole_way_say(x, y, east, north, floor_m):
+    water = area(ROCK, limits=shapely.box(-80.0, -80.0, 180.0, 80.0))
+    ahead = drift_ahead(water, (x, y), (east, north), floor_m=floor_m)
+    found_s = floor_after_s(water, (x, y), (east, north), floor_m=floor_m)
+    if ahead.floor_s is not None and ahead.clearance_m < floor_m - 2.0:
+        assert found_s == pytest.approx(ahead.floor_s, abs=2.0 * HORIZON_S / 240.0)
+    elif ahead.is_clear:
+        assert found_s == HORIZON_S
 
 
 def test_a_boat_that_lies_still_too_near_is_there_already():
