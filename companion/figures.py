@@ -1,7 +1,8 @@
 """Figures of the moment, one row each: page, line, ``companion watch``, radio and ``companion report`` derive from it.
 
-A row says how a figure is told from a step, in SI units and radians, and what it is called. On board and from a record
-it is computed; over the radio it comes under the row's name as a NAMED_VALUE_FLOAT, which any ground station plots.
+A row says how a figure is computed from a step, in SI units and radians, and what it is called. On board and from a
+record it is computed; over the radio it comes under the row's name as a NAMED_VALUE_FLOAT, which any ground station
+plots: in degrees where it is an angle, as the companion's other floats are.
 What needs more than a number (a plan's legs, a vessel) is a part of the view (``companion.view.values``).
 """
 
@@ -13,15 +14,15 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from companion.fold import Step
-from companion.geo.angles import heading_of
+from companion.geo.angles import heading_of, wrap_pi
 
-Kind = Literal["speed", "distance", "time", "bearing", "share", "number"]
+Kind = Literal["speed", "distance", "time", "bearing", "angle", "share", "number"]
 EVERYWHERE = frozenset({"page", "line", "watch", "radio", "report"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """One row. ``kind`` is its unit: m/s, m, s, rad clockwise from true north, a share of 1, or none."""
+    """One row. ``kind`` is its unit: m/s, m, s, rad clockwise from north, rad to starboard, a share of 1, or none."""
 
     name: str                                # over the radio: co_ and at most seven characters more
     label: str
@@ -43,20 +44,23 @@ FIGURES: tuple[Figure, ...] = (
     Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page", "report"})),
 )
 BY_NAME = {figure.name: figure for figure in FIGURES}
-_UNITS = {"speed": " m/s", "distance": " m", "time": " s", "bearing": "°", "share": " %", "number": ""}
+_UNITS = {"speed": " m/s", "distance": " m", "time": " s", "bearing": "°", "angle": "°", "share": " %", "number": ""}
 
 
 def told(step: Step, where: str) -> dict[str, float]:
-    """Return by name what can be told now of the figures that are shown there: page, line, watch, radio or report."""
-    values = {figure.name: figure.of(step) for figure in FIGURES if where in figure.shown}
-    return {name: value for name, value in values.items() if value is not None and math.isfinite(value)}
+    """Return by name what can be told now of the figures that are shown there: page, line, watch, radio or report.
+
+    Bearings are in degrees from 0 to 360, angles in degrees from -180 to 180, the rest as the rows compute it.
+    """
+    values = {figure: figure.of(step) for figure in FIGURES if where in figure.shown}
+    return {figure.name: _outside(figure, value)
+            for figure, value in values.items() if value is not None and math.isfinite(value)}
 
 
-def shown_value(figure: Figure, value: float) -> float:
-    """Return a value as it is shown: degrees, per cent, else in its unit."""
+def _outside(figure: Figure, value: float) -> float:
     if figure.kind == "bearing":
         return round(math.degrees(value), 1) % 360.0
-    return round(100.0 * value, 1) if figure.kind == "share" else round(value, 2)
+    return round(math.degrees(wrap_pi(value)), 1) if figure.kind == "angle" else value
 
 
 def in_words(values: Mapping[str, float]) -> list[str]:
@@ -66,7 +70,9 @@ def in_words(values: Mapping[str, float]) -> list[str]:
 
 
 def _shown(figure: Figure, value: float) -> str:
-    return f"{shown_value(figure, value):g}{_UNITS[figure.kind]}"
+    if figure.kind == "angle":
+        return f"{abs(value):g}° {'P' if value < 0.0 else 'S'}"
+    return f"{round(100.0 * value, 1) if figure.kind == 'share' else round(value, 2):g}{_UNITS[figure.kind]}"
 
 
 @dataclass(slots=True)

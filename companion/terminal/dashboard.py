@@ -254,8 +254,8 @@ def _figures(view: View, *, knots: bool) -> list[Row]:
 def _text_of(figure: FigureView, *, knots: bool) -> str:
     if figure.kind == "speed":
         return f"{speed_text(figure.value, knots=knots)} {unit_text(knots=knots)}"
-    return {"distance": length_text, "time": span_text, "bearing": direction_text, "share": share_text}.get(
-        figure.kind, number_text)(figure.value)
+    return {"distance": length_text, "time": span_text, "bearing": direction_text, "angle": side_text,
+            "share": share_text}.get(figure.kind, number_text)(figure.value)
 
 
 def _wind(view: View, *, knots: bool) -> Row:

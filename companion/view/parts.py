@@ -232,8 +232,7 @@ def shown(told: Mapping[str, float]) -> tuple[values.FigureView, ...]:
     """Return figures of the table by their names as the page shows them; those of another release are left out."""
     return tuple(
         values.FigureView(
-            name=name, label=figure.label, kind=figure.kind, hint=figure.hint,
-            value=compass(value) if figure.kind == "bearing" else rounded(value, 4))
+            name=name, label=figure.label, kind=figure.kind, hint=figure.hint, value=rounded(value, 4))
         for name, value in told.items() if (figure := FIGURES_BY_NAME.get(name)) is not None)
 
 

@@ -403,11 +403,14 @@ class Figures:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FigureView:
-    """A figure of the table (``companion.figures``): its value is m/s, m, s, degrees, a share of 1, or a number."""
+    """A figure of the table (``companion.figures``): its value is m/s, m, s, degrees, a share of 1, or a number.
+
+    ``bearing`` is clockwise from north, ``angle`` positive to starboard.
+    """
 
     name: str
     label: str
-    kind: Literal["speed", "distance", "time", "bearing", "share", "number"]
+    kind: Literal["speed", "distance", "time", "bearing", "angle", "share", "number"]
     value: float
     hint: str = ""
 

@@ -95,11 +95,13 @@ export interface Event {
 
 /**
  * A figure of the table (``companion.figures``): its value is m/s, m, s, degrees, a share of 1, or a number.
+ *
+ *     ``bearing`` is clockwise from north, ``angle`` positive to starboard.
  */
 export interface Figure {
   name: string;
   label: string;
-  kind: "bearing" | "distance" | "number" | "share" | "speed" | "time";
+  kind: "angle" | "bearing" | "distance" | "number" | "share" | "speed" | "time";
   value: number;
   hint: string;
 }

@@ -30,14 +30,6 @@ def step():
     return Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
 
 
-@pytest.fixture
-def table(monkeypatch):
-    """The table with a row of the test's own, which is shown everywhere."""
-    row = Figure(name="co_test", label="test way", kind="bearing", of=lambda step: math.radians(41.26), hint="why")
-    monkeypatch.setattr(figures, "FIGURES", (*FIGURES, row))
-    monkeypatch.setitem(BY_NAME, row.name, row)
-
-
 def test_each_row_has_a_name_of_its_own_that_the_radio_carries():
     names = [figure.name for figure in FIGURES]
     assert len({*names, *FLOATS, SLOW}) == len(names) + len(FLOATS) + 1
@@ -60,9 +52,20 @@ def test_vmg_is_the_speed_against_the_wind(step):
     assert told(step, "page")["co_vmg"] == pytest.approx(east * math.sin(wind) + north * math.cos(wind))
 
 
-def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(step, table):
-    assert in_words(told(step, "line"))[-1] == "test way 41.3°"
-    assert "test way 41.3°" in progress_text(step, None)
+@pytest.mark.parametrize(("kind", "of_deg", "line", "page", "watch"), [
+    ("bearing", 41.26, "41.3°", 41.3, "041°"),
+    ("bearing", 359.96, "0°", 0.0, "000°"),
+    ("angle", -41.26, "41.3° P", -41.3, "41°P"),
+    ("angle", 318.74 - 180.0, "138.7° S", 138.7, "139°S"),
+])
+def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(
+        step, monkeypatch, kind, of_deg, line, page, watch):
+    row = Figure(name="co_test", label="test way", kind=kind, of=lambda step: math.radians(of_deg), hint="why")
+    monkeypatch.setattr(figures, "FIGURES", (*FIGURES, row))
+    monkeypatch.setitem(BY_NAME, row.name, row)
+    assert in_words(told(step, "line"))[-1] == f"test way {line}"
+    assert f"test way {line}" in progress_text(step, None)
+    assert told(step, "radio")["co_test"] == page
     status = CompanionStatus(t_s=1.0, state="standard", figures=tuple(told(step, "radio").items()))
     sender, receiver, reader = Codec(1, 191), Codec(254, 25), StatusReader()
     for turn in range(4):
@@ -71,8 +74,8 @@ def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(step, table):
                 assert reader.take(1.0, message)
     view, _ = HeardFold().take(2.0, reader.report(2.0), None, None)
     assert [(f.label, f.kind, f.value, f.hint) for f in view.shown if f.name == "co_test"] == [
-        ("test way", "bearing", 41.3, "why")]
-    assert ("test way", "041°") in [row[:2] for row in body_of(view, knots=True, columns=80)]
+        ("test way", kind, page, "why")]
+    assert ("test way", watch) in [row[:2] for row in body_of(view, knots=True, columns=80)]
     assert HeardFold().take(60.0, reader.report(60.0), None, None)[0].shown == ()   # long not heard
 
 

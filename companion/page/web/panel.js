@@ -70,7 +70,7 @@ function one(name, value, unit, kind = "", hint = "") {
 /** A figure of the table, by its kind. @param {import("../../view/view").Figure} f */
 function shown(f) {
   const [text, unit] = f.kind === "speed" ? [speed(f.value), speedUnit()] : f.kind === "distance" ? [distance(f.value), ""] : f.kind === "time" ? [duration(f.value), ""]
-    : f.kind === "bearing" ? [bearing(f.value), bearingUnit()] : f.kind === "share" ? [percent(f.value), ""] : [figure(f.value, 1), ""];
+    : f.kind === "bearing" ? [bearing(f.value), bearingUnit()] : f.kind === "angle" ? [atBow(f.value), ""] : f.kind === "share" ? [percent(f.value), ""] : [figure(f.value, 1), ""];
   return one(f.label, text ?? NONE, unit ?? "", "", f.hint);
 }
 
