@@ -71,7 +71,7 @@ async def redraw(transport: Transport, event: EventSpec, frame: LocalFrame) -> s
             done = await pilot.upload_mission(items, method="items")
         else:
             answer = await pilot.enable_fence(enabled=False)
-            if event.state == "off":
+            if event.its_state == "off":
                 return "" if answer.is_ok else f"the fence could not be switched off at {event.at_s:g} s"
             circle = waypoint(there, command=Command.NAV_FENCE_CIRCLE_INCLUSION)
             done = await pilot.upload_fence([replace(circle, params=(event.radius_m, 0.0, 0.0, 0.0))])

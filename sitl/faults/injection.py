@@ -247,7 +247,7 @@ async def _company(world: SimulatedWorld, event: EventSpec) -> None:
 
 
 def _refuse(world: SimulatedWorld, event: EventSpec) -> None:
-    world.autopilot.pilot.refuse(event.state or "arm")
+    world.autopilot.pilot.refuse(event.its_state)
 
 
 async def _neighbour(world: SimulatedWorld, event: EventSpec) -> None:
@@ -291,7 +291,7 @@ def _ours(autopilot: SimulatedAutopilot, frame: LocalFrame) -> tuple[Motion, flo
 
 async def break_vane(set_vane: Callable[[VaneFault], None], event: EventSpec) -> None:
     """Break the vane as ``event`` says, and mend it after ``for_s``."""
-    set_vane(VaneFault(state=VaneState(event.state or "ok"), value_rad=math.radians(event.value_deg)))
+    set_vane(VaneFault(state=VaneState(event.its_state), value_rad=math.radians(event.value_deg)))
     if event.for_s is not None:
         await asyncio.sleep(event.for_s)
         set_vane(VaneFault())
@@ -327,7 +327,7 @@ _BY_KIND: dict[str, _Inject] = {
         lambda world, e: world.autopilot.set_current(math.radians(e.set_deg), e.drift_mps),
         lambda world: world.autopilot.set_current(0.0, 0.0)),
     "disk": _switched(
-        lambda world, e: world.disk.become(e.state or "full"), lambda world: world.disk.become("ok")),
+        lambda world, e: world.disk.become(e.its_state), lambda world: world.disk.become("ok")),
     "kill_planner": _at(lambda world, _: world.planner.die()),
     "planner_hang": _at(
         lambda world, e: world.planner.hang(math.inf if e.for_s is None else now_s() + e.for_s)),

@@ -98,7 +98,7 @@ LINK_EVENTS = frozenset({"link_cut", "link_half", "link_quality"})
 
 async def impair(line: MemoryLink, event: EventSpec) -> None:
     """Cut or impair ``line`` as ``event`` says, and mend it after ``for_s``."""
-    end = line.near if event.state == "unheard" else line.far    # whose words are lost
+    end = line.near if event.kind == "link_half" and event.its_state == "unheard" else line.far   # whose words are lost
     if event.kind == "link_cut":
         line.cut()
     elif event.kind == "link_half":

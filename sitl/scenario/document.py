@@ -90,7 +90,8 @@ def _kinds(lines: list[str]) -> Iterator[tuple[str, str]]:
         elif more := _GOES_ON.match(line):
             found[-1][1] += " " + more[1]
     for names, told in found:
-        yield names, _cell(told)
+        states = ", ".join(scenario.STATES.get(names.strip("`"), ()))
+        yield names, _cell(re.sub(r"\bstate\b", f"state ({states})", told) if states else told)
 
 
 def _cell(text: str) -> str:

@@ -24,8 +24,9 @@ from companion.boat import Polar
 from companion.compose import RECENTRE_M, polar_of
 from companion.errors import InputError
 from companion.geofence import Mission
+from companion.messages import Mode
 from companion.words import choices, expected
-from sitl.autopilot import EPOCH_S, FRAME_M, Departures, Sensors, Waves
+from sitl.autopilot import EPOCH_S, FRAME_M, Departures, Sensors, VaneState, Waves
 from sitl.scenario.colregs import Craft, Manner
 from sitl.world import AR1, Constant, CurrentModel, Gusty, Later, Lee, Recorded, Scripted, Waters, WindEvent, WindModel
 
@@ -139,26 +140,26 @@ EventKind = Literal[
     "set_current",       # seq, for_s: the ground station makes an item of the mission current, and insists
     "parameter",         # parameter, value: set by the ground station, for good
     "home",              # east_m, north_m: the ground station moves home there
-    "fence",             # radius_m about east_m, north_m: it draws another fence and switches it on; state: off
+    "fence",             # radius_m about east_m, north_m: it draws another fence and switches it on; state
     "rally",             # east_m, north_m: it draws the list of rally points anew, this one alone
     "edit_item",         # seq, east_m, north_m: it moves one item of the mission and uploads the list again
-    "refused",           # state: arm, or a mode by name; for_s: the autopilot refuses it
+    "refused",           # state, for_s: the autopilot refuses it
     "company",           # another companion speaks on the link with our ids; for_s
     "reboot",            # the autopilot restarts
     "link_cut",          # for_s (none: for good)
-    "link_half",         # state: unheard (the companion hears and is not heard) | deaf; for_s
+    "link_half",         # state: the companion hears and is not heard, or hears nothing; for_s
     "link_quality",      # loss, duplicate, reorder, delay_s, corrupt, noise
     "neighbour",         # another boat's autopilot, system, is on the link; for_s; vehicle_type
     "spoof",             # forgery ("MESSAGE: what it says", of sitl.faults.spoofing), rate_hz, listens, for_s
     "gps_jump",          # east_m, north_m, for_s, is_resisted (noticed by the EKF, as on the real one)
     "gps_lost",          # for_s
     "compass",           # value_deg to starboard, for_s: what the autopilot believes
-    "vane",              # state: frozen | offset | spikes | ok; value_deg
+    "vane",              # state, value_deg
     "kill_companion",    # restart_after_s: SIGKILL in the middle of whatever it does; saved, aged_s, clock_step_s
     "kill_planner",      # its process dies; the next request starts another
     "planner_hang",      # for_s: requests are not answered in time
     "planner_starved",   # its process gets no more memory; a replaced one does
-    "disk",              # state: full | sick | read_only | ok; for_s: the companion's
+    "disk",              # state, for_s: the companion's
     "foreign_mission",   # somebody uploads another mission
     "battery",           # volts
     "leak",              # for_s: the bilge's switch is wet
@@ -179,6 +180,15 @@ EventKind = Literal[
 
 
 Outlet = Literal["page", "page token", "socket", "satellite"]
+
+# What an event's ``state`` may be, by its kind; the first of them is meant where it is left out.
+STATES: dict[str, tuple[str, ...]] = {
+    "fence": ("on", "off"),
+    "refused": ("arm", *Mode.__members__),
+    "link_half": ("deaf", "unheard"),
+    "vane": tuple(state.value for state in VaneState),
+    "disk": ("full", "sick", "read_only", "ok"),
+}
 
 
 class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -260,6 +270,11 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     receiver: Literal["autopilot", "feed"] = "autopilot"   # who hears that vessel's AIS
     goal_east_m: float = 0.0
     goal_north_m: float = 0.0
+
+    @property
+    def its_state(self) -> str:
+        """Return its ``state``, or what that is where it is left out."""
+        return self.state or STATES[self.kind][0]
 
 
 # What a boat must bear without coming nearer to anything than its mission allows.
@@ -406,6 +421,10 @@ def load_scenario(path: Path) -> Scenario:
         raise InputError(str(path), "events", "far_order needs a satellite link", "add a table [satellite]")
     if any(event.kind == "sensor" and not event.sensor for event in scenario.events):
         raise InputError(str(path), "events", "sensor has no name", 'write sensor = "NAME", as a script tells it')
+    for event in scenario.events:
+        if event.state is not None and event.state not in STATES.get(event.kind, ()):
+            known = ", ".join(STATES.get(event.kind, ())) or "none"
+            raise InputError(str(path), "events", f"{event.kind} has no state {event.state!r}", f"known: {known}")
     if not scenario.mission_path(path).is_file():
         raise InputError(str(path), "mission", f"there is no file {scenario.mission}", "paths start at the scenario")
     return scenario

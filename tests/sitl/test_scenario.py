@@ -36,6 +36,8 @@ def test_our_scenarios_load_and_their_weather_repeats(path):
     ("name='x'\nmission='m.toml'\n[wind]\nmodel='gale'", "wind.model", "gale"),
     ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='kraken'", "events", "kraken"),
     ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='far_order'", "events", "[satellite]"),
+    ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='vane'\nstate='frozn'", "events", "frozen"),
+    ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='leak'\nstate='on'", "events", "known: none"),
     ("name='x'\nmission='m.toml'\n[satellite]\nlos=1", "", "loss"),
     ("name=", "", "TOML"),
 ])
