@@ -132,7 +132,7 @@ def _is_at_buoy(gate: Gate | None, boat: PointEn) -> bool:
 
 
 REACT_S = 8.0        # a step to see it, a plan, its upload and reading back, the turn: six seconds; and two to spare
-LEAST_M = 2.0        # how far the autopilot wanders off its line
+OFF_LINE_M = 2.0        # how far the autopilot wanders off its line
 SLOW_MPS = 0.5       # slower the boat does not come far in that time
 HAIR_M = 0.5
 
@@ -157,7 +157,7 @@ def ahead_of(ctx: StepContext) -> DriftAhead | None:
     here_m = float(water.clearance_m([boat])[0])
     found = drift_ahead(
         water, boat, (speed * math.sin(course), speed * math.cos(course)),
-        floor_m=max(0.0, min(hull_m + LEAST_M, here_m - HAIR_M)), horizon_s=min(REACT_S, left_m / speed))
+        floor_m=max(0.0, min(hull_m + OFF_LINE_M, here_m - HAIR_M)), horizon_s=min(REACT_S, left_m / speed))
     return None if found.is_clear else found
 
 

@@ -49,7 +49,7 @@ NEAR_M, NEAR_S = 100.0, 5.0   # ... and with something so near, where a jump mat
 UNKNOWN_S = 120.0     # how long a start has taken when no clock tells
 POINT_S = 5.0         # after LOITER was accepted what is told may still be the distance of the leg before it
 RUNS_S = 8.0          # how far a boat runs on in HOLD, where its sails are eased, in seconds at its speed of now
-LEAST_M = 2.0         # beside the hull, of what it runs on towards
+BESIDE_HULL_M = 2.0         # of what it runs on towards
 POINT_SHUT = "the loiter's point cannot be sailed to from here"
 CODE = "position doubted"
 
@@ -301,6 +301,6 @@ def _turns_away(ctx: StepContext) -> bool:
     area, run_m = ctx.voyage.area, RUNS_S * vehicle.speed_mps
     runs_on = moved(place, heading_of(*vehicle.velocity_en_mps), run_m)
     on_m = area.path_clearance_m([place, runs_on])
-    if on_m >= min(ctx.voyage.boat.hull.reach_m + LEAST_M, float(area.clearance_m([place])[0])):
+    if on_m >= min(ctx.voyage.boat.hull.reach_m + BESIDE_HULL_M, float(area.clearance_m([place])[0])):
         return False
     return area.path_clearance_m([place, moved(place, status.target_bearing_rad, run_m)]) > on_m

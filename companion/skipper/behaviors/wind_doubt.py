@@ -48,7 +48,7 @@ AHEAD_S = 3.0                       # what the boat sails on until it turns on t
 WAY_MPS = 0.3                       # made good towards it: slower the leg is not sailed
 TURNS_S = 20.0                      # from lying head to wind until it is
 STRAYS_M = 15.0                     # from the loiter's point: LOITER turns in circles of 12 m
-LEAST_M = 1.0                       # beside the hull: what the rest of a leg that it was set off must keep
+LEG_CLEAR_M = 1.0                       # beside the hull: what the rest of a leg that it was set off must keep
 HAIR_M = 0.5
 
 
@@ -165,7 +165,7 @@ def _is_on_the_way(ctx: StepContext, water: AreaLike, boat: PointEn, place: Poin
     Not whether the winds of now allow it: what a turned vane tells of the true wind changes with the boat's own speed.
     """
     left_m, vehicle = distance_m(boat, place), ctx.snapshot.vehicle
-    if vehicle is None or water.path_clearance_m([boat, place]) < ctx.voyage.boat.hull.reach_m + LEAST_M:
+    if vehicle is None or water.path_clearance_m([boat, place]) < ctx.voyage.boat.hull.reach_m + LEG_CLEAR_M:
         return False
     if left_m < STRAYS_M:
         return not goes_astern(ctx)
