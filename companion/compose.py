@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import msgspec
@@ -358,37 +357,35 @@ def _line(gate: GoalGate | None, frame: LocalFrame) -> Line | None:
 
 def config_of(mission: Mission) -> SkipperConfig:
     """Return the skipper's thresholds; what the mission does not say keeps its default."""
-    options = mission.skipper
-    changes: dict[str, Any] = {
-        "sails": mission.autopilot.frame == "sailboat",
-        "delta_s": mission.risk.delta_s,
-        "max_path_risk": mission.risk.max_path_risk,
-        "delta_s_ladder": tuple(d for d in SkipperConfig().delta_s_ladder if d < mission.risk.delta_s),
-        "margin_m": mission.margin_m,
-        "margin_floor_m": mission.margin_floor_m,
-        "planner": planner_of(mission),
-        "plan_budget_s": options.planning_budget_s,
-        "first_plan_budget_s": options.planning_budget_s,
-        "autopilot_beats": options.autopilot_beats, "shifts": options.shifts,
-        "shift_tacks_apart_s": 60.0 / options.tacks_per_minute,
-        "replan_policy": ReplanPolicy(options.replan),
-        "guidance": Guidance(options.guidance),
-        "station_s": options.station_s,
-        "adopts": mission.options.from_autopilot,
-        "ends": Ends.of(**msgspec.structs.asdict(mission.safety)),
-        "voyage_timeout_s": options.voyage_timeout_s,
-        "min_replan_interval_s": options.min_replan_s,
-        "traffic_clearance_m": mission.traffic.safe_distance_m,
-        "traffic_time_s": mission.traffic.safe_time_s,
-        "traffic_policy": Policy(mission.traffic.policy),
-        "wind_change_rad": math.radians(options.wind_shift_deg),
-        "grid_size_m": options.off_track_m,
-        "horizon_m": options.horizon_m,
-        "safe_end": SafeEnd.RETURN if options.end == "home" else SafeEnd.LOITER,
-    }
-    if options.max_replan_s is not None:
-        changes["plan_age_s"] = options.max_replan_s
-    return replace(SkipperConfig(), **changes)
+    options, default = mission.skipper, SkipperConfig()
+    return SkipperConfig(
+        sails=mission.autopilot.frame == "sailboat",
+        delta_s=mission.risk.delta_s,
+        max_path_risk=mission.risk.max_path_risk,
+        delta_s_ladder=tuple(d for d in default.delta_s_ladder if d < mission.risk.delta_s),
+        margin_m=mission.margin_m,
+        margin_floor_m=mission.margin_floor_m,
+        planner=planner_of(mission),
+        plan_budget_s=options.planning_budget_s,
+        first_plan_budget_s=options.planning_budget_s,
+        autopilot_beats=options.autopilot_beats, shifts=options.shifts,
+        shift_tacks_apart_s=60.0 / options.tacks_per_minute,
+        replan_policy=ReplanPolicy(options.replan),
+        guidance=Guidance(options.guidance),
+        station_s=options.station_s,
+        adopts=mission.options.from_autopilot,
+        ends=Ends.of(**msgspec.structs.asdict(mission.safety)),
+        voyage_timeout_s=options.voyage_timeout_s,
+        min_replan_interval_s=options.min_replan_s,
+        traffic_clearance_m=mission.traffic.safe_distance_m,
+        traffic_time_s=mission.traffic.safe_time_s,
+        traffic_policy=Policy(mission.traffic.policy),
+        wind_change_rad=math.radians(options.wind_shift_deg),
+        grid_size_m=options.off_track_m,
+        horizon_m=options.horizon_m,
+        safe_end=SafeEnd.RETURN if options.end == "home" else SafeEnd.LOITER,
+        plan_age_s=default.plan_age_s if options.max_replan_s is None else options.max_replan_s,
+    )
 
 
 def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
