@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from companion.geo.angles import mean_direction_rad
 from companion.plots.chart import save
+from companion.wind import NAMES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,11 +40,9 @@ Array = NDArray[np.float64]
 
 TRUE, BAND, MEDIAN = "#1f5fa8", "#e08a1e", "#b3541e"      # true wind is blue, as on other displays
 PORT, STARBOARD, PLAIN = "#c1272d", "#2e8b3d", "#1f5fa8"
-_COLOURS = {
-    "default": "#b3541e", "kalman": "#777777", "mean90": "#1f5fa8", "mean5": "#6fa8dc", "ou": "#2e8b3d",
-    "arma": "#8e44ad", "garch": "#c2185b",
-}
-_MARKS = {"default": "o", "kalman": "s", "mean90": "^", "mean5": "v", "ou": "D", "arma": "P", "garch": "X"}
+# Of the estimators' curves, in the order of their table; one more gets the next.
+_STYLES = (("#b3541e", "o"), ("#777777", "s"), ("#2e8b3d", "D"), ("#8e44ad", "P"), ("#c2185b", "X"), ("#1f5fa8", "^"),
+           ("#6fa8dc", "v"), ("#8c6d1f", "<"), ("#17a2a2", ">"), ("#222222", "*"))
 _STRIP_MIN = 60.0
 _LAG_S = 600.0
 
@@ -202,7 +201,7 @@ def draw_reliability(axes: Axes, scores: Sequence[Score]) -> None:
         if score.pit.size:
             inside = 2.0 * np.abs(score.pit - 0.5)
             axes.plot(100.0 * level, [100.0 * float(np.mean(inside <= p)) for p in level],
-                      color=_COLOURS.get(score.estimator, "black"), lw=2.0 if score is scores[0] else 1.1,
+                      color=_style(score)[0], lw=2.0 if score is scores[0] else 1.1,
                       label=score.estimator)
     axes.set_xlabel("promised: within interval [%]")
     axes.set_ylabel("observed [%]")
@@ -211,6 +210,11 @@ def draw_reliability(axes: Axes, scores: Sequence[Score]) -> None:
     axes.set_ylim(0, 100)
     axes.grid(alpha=0.3)
     _legend_or_reason(axes)
+
+
+def _style(score: Score) -> tuple[str, str]:
+    """Return colour and mark of an estimator's curves."""
+    return _STYLES[NAMES.index(score.estimator) % len(_STYLES)]
 
 
 def _legend_or_reason(axes: Axes) -> None:
@@ -224,8 +228,9 @@ def draw_crps(axes: Axes, scores: Sequence[Score]) -> None:
     """Draw CRPS by horizon."""
     for score in scores:
         if score.horizons:
+            colour, mark = _style(score)
             axes.plot([h.horizon_s for h in score.horizons], [math.degrees(h.crps_rad) for h in score.horizons],
-                      marker=_MARKS.get(score.estimator, "o"), ms=4, color=_COLOURS.get(score.estimator, "black"),
+                      color=colour, marker=mark, ms=4,
                       lw=2.0 if score is scores[0] else 1.1, label=score.estimator)
     axes.set_xscale("log")
     axes.set_xlim(8, 750)
