@@ -24,6 +24,7 @@ from companion.boat import Polar
 from companion.compose import RECENTRE_M, polar_of
 from companion.errors import InputError
 from companion.geofence import Mission
+from companion.geofence.mission import without_defaults
 from companion.messages import Mode
 from companion.words import choices, expected
 from sitl.autopilot import EPOCH_S, FRAME_M, Departures, Sensors, VaneState, Waves
@@ -467,22 +468,7 @@ def _suggestion(error: msgspec.ValidationError) -> str:
 
 def scenario_text(scenario: Scenario) -> str:
     """Return the TOML of a scenario; files in it are named as it names them."""
-    return tomli_w.dumps(_plain(scenario))
-
-
-def _plain(struct: msgspec.Struct) -> dict[str, Any]:
-    out: dict[str, Any] = {}
-    for field in msgspec.structs.fields(struct):
-        value = getattr(struct, field.name)
-        if value is None or (field.default is not msgspec.NODEFAULT and value == field.default):
-            continue
-        if isinstance(value, msgspec.Struct):
-            out |= {field.name: table} if (table := _plain(value)) else {}
-        elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
-            out[field.name] = [_plain(inner) for inner in value]
-        elif value not in ({}, ()):
-            out[field.name] = value
-    return out
+    return tomli_w.dumps(without_defaults(scenario))
 
 
 def scenario_wind(scenario: Scenario, source: Path, seed: int) -> WindModel:

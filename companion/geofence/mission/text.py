@@ -66,7 +66,10 @@ def dump_options(options: MissionOptions) -> str:
 
 
 def toml(data: Mapping[str, Any]) -> str:
-    """Return the text of a mission file: each goal and refuge with a header of its own, to which more can be added."""
+    """Return the text of a mission file: each goal and refuge with a header of its own, to which more can be added.
+
+    tomli_w alone puts short tables into one array, behind which ``[[goal]]`` may not stand any more.
+    """
     pieces = [tomli_w.dumps({k: v for k, v in data.items() if not isinstance(v, dict) and not _is_tables(v)})]
     for key, value in data.items():
         if isinstance(value, dict):
@@ -84,18 +87,18 @@ def _is_tables(value: object) -> bool:
 
 
 def without_defaults(struct: msgspec.Struct) -> dict[str, Any]:
-    """Return what a table of a mission file says where all that has its default is left out."""
+    """Return what a table of a file says where all that has its default is left out."""
     tag = struct.__struct_config__.tag
     is_default = tag is None or (tag == "point" and isinstance(struct, PointOptions))
     out: dict[str, Any] = {} if is_default else {"kind": tag}
     for field in msgspec.structs.fields(struct):
-        value = getattr(struct, field.name)
-        if value is None or value == {} or (field.default is not msgspec.NODEFAULT and value == field.default):
+        value, made = getattr(struct, field.name), field.default_factory
+        if value is None or value == (field.default if made is msgspec.NODEFAULT else made()):
             continue
         if isinstance(value, msgspec.Struct):
             out[field.name] = without_defaults(value)
         elif isinstance(value, dict):
-            out[field.name] = {key: without_defaults(inner) for key, inner in value.items()}
+            out[field.name] = {k: without_defaults(v) if isinstance(v, msgspec.Struct) else v for k, v in value.items()}
         elif isinstance(value, tuple):
             out[field.name] = [without_defaults(v) if isinstance(v, msgspec.Struct) else v for v in value]
         else:
