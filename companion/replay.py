@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -151,7 +151,7 @@ class RecordedInput:
         ends = [*(start[0] for start in self._starts[1:]), last_s]
         fed: dict[float, list[dict[str, Any]]] = {}
         for record in self._decisions:
-            if record["kind"] in {"ais", "others", "order", "fence read", "planner process"}:
+            if record["kind"] in _FED:
                 fed.setdefault(float(record["t_s"]), []).append(record)
         for (start_s, persisted, known, epoch_s), end_s, gap_s in zip(
                 self._starts, ends, _gaps(self._decisions), strict=True):
@@ -189,17 +189,7 @@ class RecordedInput:
                 fold.take_outcome(float(record["t_s"]), outcome)
             for record in fed.get(t_s, ()):
                 with believed(folder / DECISIONS, f"t_s = {record['t_s']}"):
-                    if record["kind"] == "ais":
-                        fold.take(ais_of(record))
-                    elif record["kind"] == "order":
-                        fold.event(Order.from_dict(record["order"]))
-                    elif record["kind"] == "fence read":
-                        fold.fence(_items(record["items"]))
-                    elif record["kind"] == "planner process":
-                        fold.planner_alive(bool(record["alive"]))
-                    else:
-                        fold.others(tuple(record["neighbours"]), has_company=record["company"],
-                                    has_shore=record.get("shore", False))
+                    _FED[record["kind"]](fold, record)
             step = fold.tick(t_s)
             yield Folded(
                 t_s=t_s, step=step, messages=n_messages, lost=unread, recorded=recorded.get(t_s, []),
@@ -302,6 +292,17 @@ def _items(rows: list[list[Any]]) -> tuple[MissionItem, ...]:
     return tuple(
         MissionItem(command=c, lat_e7=lat, lon_e7=lon, alt_m=alt, frame=frame, params=(p[0], p[1], p[2], p[3]))
         for c, lat, lon, alt, frame, p in rows)
+
+
+# What the fold is told between messages and outcomes, by the kind of record that says so.
+_FED: dict[str, Callable[[VoyageFold, dict[str, Any]], None]] = {
+    "ais": lambda fold, record: fold.take(ais_of(record)),
+    "order": lambda fold, record: fold.event(Order.from_dict(record["order"])),
+    "fence read": lambda fold, record: fold.fence(_items(record["items"])),
+    "planner process": lambda fold, record: fold.planner_alive(bool(record["alive"])),
+    "others": lambda fold, record: fold.others(
+        tuple(record["neighbours"]), has_company=record["company"], has_shore=record.get("shore", False)),
+}
 
 
 def _outcome(record: dict[str, Any]) -> Outcome:
