@@ -5,8 +5,8 @@ on the autopilot tells) has been at or beyond ``enter`` for ``enter_s``, and cle
 ``exit``, which has a hysteresis, for ``exit_s``. Its number stands for it where there is no room for words. A row with
 ``ends`` ends the voyage early, as the mission's ``[safety]`` has it. All that names watchdogs derives from here: the
 keys of ``[safety]`` and their defaults, the diversions and their order, what is announced, the numbers on the air, the
-severities on the page and ashore, Signal K, and docs/reference/watchdogs.md (by ``python -m
-companion.skipper.watch.document``).
+severities on the page and ashore, Signal K, and docs/reference/watchdogs.md (by
+``python -m bench.pages``).
 
 ``FAILSAFES`` is the second table: why the autopilot changed its mode by itself. ArduRover keeps the reason in its log
 and tells none over MAVLink: a cause is known by its signs. A sign is the beginning of a text, or of something that the

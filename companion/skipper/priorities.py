@@ -1,11 +1,7 @@
-"""What the boat does when several things want doing: behaviors in one order, of which the first that acts has the step.
-
-``python -m companion.skipper.priorities`` prints the list as it stands in docs/reference/skipper.md.
-"""
+"""What the boat does when several things want doing: of behaviors in one order the first that acts has the step."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -31,8 +27,6 @@ from companion.skipper.board.vehicle_identity import stand_by
 from companion.skipper.intake import notice_truncation
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Phase
-
-MADE_BY = "<!-- made by python -m companion.skipper.priorities -->"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,13 +134,3 @@ def act(ctx: StepContext) -> None:
     for behavior in BEHAVIORS:
         if behavior.act(ctx):
             return
-
-
-def markdown() -> str:
-    """Return the list as it stands in docs/reference/skipper.md."""
-    rows = [f"| {n} | {b.name} | {b.when} | {b.does} |" for n, b in enumerate(BEHAVIORS, start=1)]
-    return "\n".join([MADE_BY, "", "| | behavior | when | does |", "|--:|---|---|---|", *rows, ""])
-
-
-if __name__ == "__main__":
-    sys.stdout.write(markdown())

@@ -2,7 +2,7 @@
 
 It is a form for the outside, as a file is: angles are degrees, directions true and clockwise from north, and the wind's
 is where it comes from. Places are metres east and north of the area's origin. What is not known is None, never 0. The
-JSON form has these names; ``python -m companion.view.schema`` writes its schema and the page's types from here.
+JSON form has these names; ``python -m bench.pages`` writes its schema and the page's types from here.
 """
 
 from __future__ import annotations

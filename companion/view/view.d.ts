@@ -1,4 +1,4 @@
-// Made by python -m companion.view.schema from companion/view/values.py. Do not edit.
+// Made by python -m bench.pages from companion/view/values.py. Do not edit.
 
 /**
  * Where the boat is expected ``in_s`` from now, and on which tack; nine in ten are within ``within_m`` of there.

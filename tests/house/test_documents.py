@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bench import rooms
+from bench import pages, rooms
 from bench.layered import implied
 from sitl import cli
 
@@ -27,6 +27,11 @@ def conf():
 @pytest.mark.parametrize("root", rooms.PICTURES)
 def test_the_pictures_of_the_rooms_are_current(root):
     assert rooms.PICTURES[root].read_text() == rooms.picture(root), "run: python -m bench.rooms"
+
+
+@pytest.mark.parametrize("path", pages.made(), ids=lambda path: path.name)
+def test_what_is_made_of_the_code_is_current(path):
+    assert path.read_text() == pages.made()[path], "run: python -m bench.pages"
 
 
 def test_the_list_of_rooms_is_current():

@@ -1,13 +1,11 @@
 """Orders as words, as records, as buttons and as a page."""
 
 import json
-from pathlib import Path
 
 import pytest
 
 from companion.errors import InputError
 from companion.orders import TABLE, Order, Place, Source, Verb, Wanted, permitted, phrase, qgc_actions
-from companion.orders.document import table
 
 
 @pytest.mark.parametrize(("words", "wanted"), [
@@ -69,7 +67,3 @@ def test_the_buttons_are_what_qgroundcontrol_reads():
     assert numbers == [row.number for row in TABLE if row.button]
     assert len({action["label"] for action in file["actions"]}) == len(numbers)
     assert 6.0 not in numbers, "a goal needs typing"
-
-
-def test_the_page_has_the_table_as_it_is():
-    assert table() in Path("docs/guides/orders.md").read_text(encoding="utf-8")

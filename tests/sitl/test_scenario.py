@@ -13,7 +13,6 @@ from companion.errors import InputError
 from sitl import cli
 from sitl.autopilot import EPOCH_S
 from sitl.scenario import scenario as scenario_module
-from sitl.scenario.document import page
 from sitl.scenario.scenario import beginning, load_scenario, scenario_wind
 from sitl.scenario.traffic import PORTS, free_port
 
@@ -87,10 +86,8 @@ def test_the_example_is_a_scenario_that_can_be_read_and_nothing_is_written_over(
     assert load_scenario(folder / "all.toml").current is not None
 
 
-def test_the_page_of_all_keys_is_current_and_says_something_of_each():
-    made = page(Path("sitl/scenario/scenario.py").read_text())
-    assert Path("docs/reference/scenarios.md").read_text() == made, (
-        "run: python -m sitl.scenario.document > docs/reference/scenarios.md")
+def test_the_page_of_all_keys_says_something_of_each():
+    made = Path("docs/reference/scenarios.md").read_text()
     assert re.findall(r"^.*\| (?:of )? *\|$", made, re.MULTILINE) == []
     tables = [c for c in vars(scenario_module).values() if isinstance(c, type) and issubclass(c, msgspec.Struct)]
     keys = {key for table in tables for key in table.__struct_fields__}

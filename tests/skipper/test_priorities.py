@@ -4,14 +4,13 @@ import copy
 import math
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 import shapely
 
 from companion.messages import Mode
 from companion.orders import Verb
-from companion.skipper.priorities import BEHAVIORS, act, markdown
+from companion.skipper.priorities import BEHAVIORS, act
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import Standing
 from companion.skipper.step.snapshot import WindBefore
@@ -20,7 +19,6 @@ from tests.skipper.test_voyage import ISLANDS
 from tests.skipper.test_walk import on_collision_course, states
 from tests.skipper.world import with_parts
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "skipper.md"
 NAMES = [behavior.name for behavior in BEHAVIORS]
 PAIRS = list(pairwise(NAMES))
 
@@ -128,10 +126,6 @@ def after(ctx, do):
     trial = copy.copy(ctx)
     trial.actions = list(ctx.actions)
     return do(trial), (trial.state.phase, trial.state.why, [type(action) for action in trial.actions])
-
-
-def test_the_page_tells_the_order():
-    assert markdown() in PAGE.read_text(), "python -m companion.skipper.priorities"
 
 
 def test_of_every_two_neighbours_it_is_known_whether_their_order_matters():

@@ -31,7 +31,6 @@ from companion.skipper.step.snapshot import (
     WindHealth,
 )
 from companion.skipper.step.state import Phase
-from companion.skipper.watch.document import markdown
 from companion.skipper.way.geometry import bearing_rad, moved
 from companion.skipper.way.voyage import Goal, Side
 from companion.traffic import TrafficPicture
@@ -472,11 +471,3 @@ def test_who_ends_a_voyage_says_that_the_mission_has_it_and_no_two_have_one_rank
     ends = [dog for dog in TABLE if dog.ends is not None]
     assert ends == [dog for dog in TABLE if dog.response is Response.AS_SET]
     assert len({dog.ends.rank for dog in ends}) == len(ends)
-
-
-def test_the_document_is_current():
-    from pathlib import Path
-
-    path = Path(__file__).parents[2] / "docs" / "reference" / "watchdogs.md"
-    text = path.read_text(encoding="utf-8")
-    assert text == markdown(), "run: python -m companion.skipper.watch.document > docs/reference/watchdogs.md"

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bench.pages import schema
 from companion.fold import Step
 from companion.geo.angles import difference_rad
 from companion.messages import CompanionStatus, GeoPoint, VehicleState, WindForecast
@@ -17,7 +18,6 @@ from companion.skipper.step import SkipperConfig, SkipperState, Snapshot, WindEs
 from companion.telemetry.folder import TLOG, VoyageFigures
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
 from companion.view.parts import _risk_left, apparent, laylines_of, no_go_of
-from companion.view.schema import files, schema
 from tests.view.conftest import write_mission
 
 RULES = {name: jsonschema.Draft202012Validator({**schema(), "$ref": f"#/$defs/{name}"})
@@ -26,11 +26,6 @@ RULES = {name: jsonschema.Draft202012Validator({**schema(), "$ref": f"#/$defs/{n
 
 def valid(of, name="View"):
     RULES[name].validate(json.loads(msgspec.json.encode(of)))
-
-
-def test_the_schema_and_the_pages_types_are_those_of_the_values():
-    for path, text in files().items():
-        assert path.read_text() == text, f"{path.name}: run python -m companion.view.schema"
 
 
 def test_every_view_event_and_area_of_a_voyage_is_what_the_schema_says(beat):

@@ -14,7 +14,6 @@ from companion.orders.far import (
     FarOrder,
     FarStatus,
     Reply,
-    document,
     order,
     pack_beginning,
     pack_order,
@@ -221,6 +220,5 @@ def test_the_numbers_are_those_of_the_rooms_that_own_the_words():
     assert {alarm.name.lower() for alarm in Alarm} == set(status.ALARMS)
 
 
-def test_the_page_has_the_tables_of_the_code():
-    assert document.tables() in by_the_page.PAGE.read_text(), "python -m companion.orders.far.document"
+def test_the_sizes_are_those_that_are_paid_for():
     assert (order.SIZE, order.BEGINNING_SIZE, status.SIZE) == (24, 15, 42)
