@@ -20,7 +20,8 @@ class PlanStatus(enum.Enum):
     OPTIMAL = "optimal"          # found, and within 0.1 % of a proved lower bound
     FOUND = "found"              # found; the search ended before the bound was met
     INFEASIBLE = "infeasible"    # proved: no path exists
-    TIMEOUT = "timeout"          # the effort ended without a path and without a proof
+    NOT_FOUND = "not found"      # searched to its end, or what was found may not be sailed: no proof that there is none
+    TIMEOUT = "timeout"          # the effort ended first, without a path and without a proof
     INVALID = "invalid"          # the problem cannot be planned at all
     UNANSWERED = "unanswered"    # the planner died, hung or failed: nothing is known of the problem
 

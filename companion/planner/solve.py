@@ -133,7 +133,7 @@ def with_beats(search: Search, beat: Beat) -> Search:
             if sailing.status is PlanStatus.INFEASIBLE and cut_off(make_world(closed)) is None:
                 # The wind closes what is sailed and the corridor what is beaten: no proof for a path of both.
                 reason = f"no path was found; without beats {sailing.reason}"
-                return replace(sailing, status=PlanStatus.TIMEOUT, reason=reason)
+                return replace(sailing, status=PlanStatus.NOT_FOUND, reason=reason)
             return sailing
         if sailing.waypoints_en is None:
             return bounded(replace(beating, lower_bound_s=math.inf))
@@ -361,7 +361,7 @@ def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> 
     judged = evaluate(problem, outcome.waypoints_en)
     if not judged.is_feasible:
         reason = "the search's path did not pass the exact check: " + judged.reasons[0]
-        return replace(spent, status=PlanStatus.TIMEOUT, reason=reason, why=Why(text=reason))
+        return replace(spent, status=PlanStatus.NOT_FOUND, reason=reason, why=Why(text=reason))
     bound = min(outcome.lower_bound_s, judged.time_s)
     gap = judged.time_s / bound - 1.0 if bound > 0.0 else (0.0 if judged.time_s <= 0.0 else math.inf)
     status = PlanStatus.OPTIMAL if gap <= OPTIMAL_GAP else PlanStatus.FOUND

@@ -2,8 +2,8 @@
 
 Both planners here have one method, ``await plan(problem, ...)``. ``PlannerWorker`` runs ``plan`` in a child, so
 the event loop never waits for it; ``InlinePlanner`` runs it at once and lets the loop's clock pass a stated time,
-for the virtual clock where there may be no process. Planner trouble is an outcome (``PlanStatus.TIMEOUT`` with
-the reason), never an exception.
+for the virtual clock where there may be no process. Planner trouble is an outcome (``PlanStatus.UNANSWERED``
+with the reason), never an exception.
 """
 
 from __future__ import annotations

@@ -292,7 +292,7 @@ def search(
         fits = grid_m * math.sqrt(grid.memory_bytes / settings.memory_bytes)
         reason = (f"a grid of {grid_m:.3g} m needs {grid.memory_bytes / 1e6:.0f} MB, more than the "
                   f"{settings.memory_bytes / 1e6:.0f} MB allowed; one of {fits:.3g} m would fit")
-        return Outcome(waypoints_en=None, status=PlanStatus.TIMEOUT, reason=reason, trace=trace)
+        return Outcome(waypoints_en=None, status=PlanStatus.NOT_FOUND, reason=reason, trace=trace)
     return _run(problem, effort, settings, grid, trace)
 
 
@@ -328,7 +328,7 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
     goal_heading = target_heading(courses, way[:, 1] > 0.0, heading_of(gx - sx, gy - sy))
     if goal_heading < 0:
         reason = "none of the 16 headings can be sailed in this wind"
-        return Outcome(waypoints_en=None, status=PlanStatus.TIMEOUT, reason=reason, trace=trace)
+        return Outcome(waypoints_en=None, status=PlanStatus.NOT_FOUND, reason=reason, trace=trace)
     states = grid.columns * grid.rows * kernels.HEADINGS + 1
     g, clock = np.full(states, np.inf), np.zeros(states)
     parent, closed = np.full(states, -1, dtype=np.int32), np.zeros(states, dtype=np.bool_)
@@ -359,11 +359,13 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
         )))
     trace |= {"expanded": int(count[kernels.EXPANDED]), "seen": int(count[kernels.SEEN])}
     if count[kernels.REACHED] != 1:
-        why = "no path on this grid" if count[kernels.HEAP] == 0 else "the effort ended first"
+        status, why = PlanStatus.TIMEOUT, "the effort ended first"
         if count[kernels.REACHED] < 0:
             why = "the heap is full"
+        elif count[kernels.HEAP] == 0:
+            status, why = PlanStatus.NOT_FOUND, "no path on this grid"
         reason = f"{why}: {grid.columns} x {grid.rows} nodes of {trace['grid_m']:.3g} m, {trace['expanded']} expanded"
-        return Outcome(waypoints_en=None, status=PlanStatus.TIMEOUT, reason=reason, trace=trace)
+        return Outcome(waypoints_en=None, status=status, reason=reason, trace=trace)
     effort.found()
     goal_state = grid.goal * kernels.HEADINGS + goal_heading
     trace["objective"] = float(g[goal_state])

@@ -108,5 +108,5 @@ def keep_share(problem: Problem, plan: Plan) -> Plan:
     """Return the plan, or it without its path where that risks more for vessels at some instant than they are given."""
     if not plan.has_path or is_kept(problem, plan.legs):
         return plan
-    return replace(plan, status=PlanStatus.TIMEOUT, reason=ABOVE, waypoints_en=np.empty((0, 2)), legs=(),
+    return replace(plan, status=PlanStatus.NOT_FOUND, reason=ABOVE, waypoints_en=np.empty((0, 2)), legs=(),
                    cost_s=math.inf, first_s=None, why=Why(text=ABOVE))

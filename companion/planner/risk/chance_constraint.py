@@ -333,7 +333,7 @@ def keep_limit(problem: Problem, plan: Plan) -> Plan:
         return plan
     reason = (f"the path found has a risk of {100.0 * plan.risk:.3g} %, above the limit of "
               f"{100.0 * problem.risk.max_path_risk:.3g} %")
-    return replace(plan, status=PlanStatus.TIMEOUT, reason=reason, waypoints_en=np.empty((0, 2)), legs=(),
+    return replace(plan, status=PlanStatus.NOT_FOUND, reason=reason, waypoints_en=np.empty((0, 2)), legs=(),
                    cost_s=math.inf, first_s=None, why=Why(text=reason))
 
 

@@ -74,7 +74,7 @@ def with_track(search: Search, judge: Judge | None = None) -> Search:
         other = roomier(search, problem, path, effort, seed, judge)
         if other is not None:
             return replace(outcome, waypoints_en=np.asarray(other))
-        return replace(outcome, waypoints_en=None, status=PlanStatus.TIMEOUT, reason=lacking(problem, seen))
+        return replace(outcome, waypoints_en=None, status=PlanStatus.NOT_FOUND, reason=lacking(problem, seen))
 
     return tracked
 

@@ -159,7 +159,7 @@ def test_what_wind_and_corridor_close_between_them_is_not_proved_impossible() ->
     fence = "POLYGON ((-30 -30, 30 -30, 30 430, -30 430, -30 -30))"
     narrow = BEAT | {"clearance_m": 32.0}
     assert solve(problem(wind=wild, fence=fence, beat=None)).status is PlanStatus.INFEASIBLE
-    assert solve(problem(wind=wild, fence=fence, beat=narrow)).status is PlanStatus.TIMEOUT
+    assert solve(problem(wind=wild, fence=fence, beat=narrow)).status is PlanStatus.NOT_FOUND
     floor = problem(fence=fence, beat=None, clearance_floor_m=32.0)
     assert "clearance floor" in solve(floor).reason   # and not: no fence at all
     wall = "POLYGON ((-31 200, 31 200, 31 220, -31 220, -31 200))"

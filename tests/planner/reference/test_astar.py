@@ -138,7 +138,7 @@ def test_the_goal_heading_is_the_bearing_turned_out_of_the_wind():
 def test_the_grid_refuses_to_grow_past_its_memory_and_says_what_would_fit():
     outcome, _ = run(problem(), grid_m=0.01)
     assert outcome.waypoints_en is None
-    assert outcome.status is PlanStatus.TIMEOUT
+    assert outcome.status is PlanStatus.NOT_FOUND
     assert "MB allowed" in outcome.reason
     fits = float(outcome.reason.split("one of ")[1].split(" m")[0])
     grid = grid_of(problem(), 1.1 * fits)
@@ -164,7 +164,7 @@ def test_a_ship_is_a_disc_where_it_would_be_met():
 def test_a_walled_in_goal_ends_with_its_reason():
     wall = "POLYGON((-60 740,60 740,60 860,-60 860,-60 740),(-40 760,40 760,40 840,-40 840,-40 760))"
     answer = plan(problem(obstacles=[wall]), algorithm="astar", expansions=10**8)
-    assert answer.status is PlanStatus.TIMEOUT
+    assert answer.status is PlanStatus.NOT_FOUND
     assert "no path on this grid" in answer.reason
 
 

@@ -121,7 +121,7 @@ def test_a_plan_says_it_in_its_json_and_reads_it_back():
 
 def test_a_floor_that_cannot_be_kept_is_no_plan_and_says_where():
     found = plan(problem(tracking={"floor_m": 80.0}), expansions=15_000, seed=1)
-    assert found.status is PlanStatus.TIMEOUT
+    assert found.status is PlanStatus.NOT_FOUND
     assert "the floor is 80.0 m" in found.reason
     assert "east" in found.reason
 
