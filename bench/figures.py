@@ -24,6 +24,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
+from bench.fields import atoms_figure, encounter_figure, trees_figure
 from bench.papers import DELTA_6A, DELTA_6B, NOISY_DEG, STEADY_DEG, four_polygons, lake, two_channels
 from companion.planner.problem import evaluate
 
@@ -33,6 +34,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
+from bench.winds import simulate_entries
 from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.mission_check import field_preview, field_track, heading_fan
@@ -40,9 +42,8 @@ from companion.planner import Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.plan import Plan, PlanStatus
 from companion.planner.reference.astar import search as search_astar
-from companion.planner.risk import simulate_entries
 from companion.planners import AstarSettings
-from companion.plots.field import atoms_figure, encounter_figure, field_figure, trees_figure
+from companion.plots.field import field_figure
 from companion.plots.plan import draw_plan
 from companion.plots.wind import filter_figure
 from companion.wind.study import characterise, parse_csv

@@ -4,7 +4,7 @@
 
 The futures are drawn here from what is stated of vessels (``companion.traffic.predict.MotionUncertainty``: each error
 one draw for the whole future, the course followed as ``predict`` does) and of our own timing, without any code of the
-planner; the winds as in ``companion.planner.risk.chance_constraint.simulate_entries``. "Met" is a boat nearer to a
+planner; the winds as in ``bench.winds.simulate_entries``. "Met" is a boat nearer to a
 ship's middle than both hulls and the clearance asked for. The share of voyages that are met, or forced into the no-go
 zone, must be at most what was promised, and where it binds (1 %) at least a third of it.
 """
@@ -17,11 +17,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from bench.winds import simulate_entries
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from companion.planner import Problem, plan
 from companion.planner.problem import BoatLimits, ProblemWind, RiskLimit, Sigma, evaluate
-from companion.planner.risk import path_risk, simulate_entries
+from companion.planner.risk import path_risk
 from companion.traffic import Vessel
 from companion.traffic.occupancy import Keep, planning_discs
 from companion.traffic.predict import manoeuvre_s2, motion_of, predict

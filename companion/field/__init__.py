@@ -3,11 +3,10 @@
 Fields are small frozen values that compose (``Sum``, ``Rotated``, ``Shifted``, ``Enlarged``, ``Gain``) and are
 evaluated on arrays; the last step projects what they say out of the no-go zone, with a hysteresis q::
 
-    field = Line().shifted(0.0, 20.0) + RepulsivePoint().shifted(x, y)
+    field = AttractiveLine().shifted(0.0, 20.0) + RepulsivePoint().shifted(x, y)
     vectors = field(points_en)                                       # (n, 2) -> (n, 2)
-    sailing = Projection(field, twd_from_rad=0.0, zone=LineZone(...))
+    sailing = Projection(field, twd_from_rad=0.0, zone=HysteresisZone(...))
     vector, q = sailing.steer((east, north), q)                      # the boat's own evaluation moves q
 
-``FieldGuidance`` is the step machine that sails a boat by them in GUIDED: (state, situation) -> (state, setpoint).
-``line_following`` is Jaulin and Le Bars' controller, ``motor_commands`` Schmitt's u1 and u2.
+``guidance.step`` sails a boat by them in GUIDED: (state, situation) -> (state, setpoint).
 """

@@ -17,10 +17,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.field.controllers import line_following
 from companion.field.guidance import go_to, helm, step
 from companion.field.station import Station, StationState, keep
 from companion.field.values import GuidanceSettings, GuidanceState, Situation
+from lab.tasks.controllers import line_following
 from sitl.scenario import TASK_S, StationScore, station_score
 from sitl.world import LENGTH_M, SimulatedVaimos, habits_for, wind_for
 

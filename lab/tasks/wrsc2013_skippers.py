@@ -13,7 +13,6 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.field.controllers import line_following
 from companion.field.guidance import LastResort, go_to, helm, step
 from companion.field.look_ahead import way_out_rad
 from companion.field.values import GuidanceSettings, GuidanceState, Intent, MovingObstacle, Situation
@@ -26,6 +25,7 @@ from companion.traffic import TargetLimits, Targets, Vessel, check_legs, decide,
 from companion.traffic.occupancy import Keep
 from companion.traffic.plans import Conflict, Decision
 from companion.traffic.predict import STEADY, risk_factor
+from lab.tasks.controllers import line_following
 from sitl.world import LENGTH_M
 
 HALF_M = 100.0

@@ -1,6 +1,6 @@
 """The world: wind, and boats as physics."""
 
-from sitl.world.boats import LENGTH_M, MotorBoat, SimulatedVaimos, habits_for, polar_at, summary, wind_for
+from sitl.world.boats import LENGTH_M, SimulatedVaimos, habits_for, polar_at, summary, wind_for
 from sitl.world.environment import (
     AR1,
     Constant,
@@ -25,7 +25,6 @@ __all__ = [
     "Gusty",
     "Later",
     "Lee",
-    "MotorBoat",
     "Process",
     "Recorded",
     "Scripted",

@@ -2,10 +2,10 @@
 
 from companion.planner.risk.arrival import arrival, limits_in_words
 from companion.planner.risk.arrival import in_words as arrival_in_words
-from companion.planner.risk.chance_constraint import path_risk, simulate_entries, with_risk
+from companion.planner.risk.chance_constraint import path_risk, with_risk
 from companion.planner.risk.tacks import of_risky, tacks_at_risk
 
 __all__ = [
-    "arrival", "arrival_in_words", "limits_in_words", "of_risky", "path_risk", "simulate_entries", "tacks_at_risk",
+    "arrival", "arrival_in_words", "limits_in_words", "of_risky", "path_risk", "tacks_at_risk",
     "with_risk",
 ]

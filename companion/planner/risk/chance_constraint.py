@@ -15,8 +15,8 @@ no-go half angle. Passing through the wind in a tack does not count; X runs on w
 
 ``PathRisk.total`` comes from the density of the winds still free, moved through time on a grid, absorbed in the
 zone, with Chernoff's correction for what happens between steps, times ``PROMISE_FACTOR``; it is the promise that
-`python -m bench.reliability` checks against simulated winds. ``PathRisk.boole`` is the union bound over entries and
-up-crossings that CC-RRT* can add up edge by edge (``risk_kernels.leg_risk``).
+`python -m bench.reliability` checks against simulated winds. ``kernels.leg_risk`` is the union bound over entries and
+up-crossings, which the reference RRT* adds up edge by edge.
 """
 
 from __future__ import annotations
@@ -177,7 +177,6 @@ class PathRisk:
         vessels: What vessels add (``companion.planner.risk.chance_constraint``).
         tacks: Those that may fail onto something (``companion.planner.risk.tacks``).
         total: What is promised: wind, vessels and tacks together by the union bound, at most 1.
-        boole: The union bound over entries and up-crossings, at most 1.
         correlation_time_s: Of the wind [s].
     """
 
@@ -187,7 +186,6 @@ class PathRisk:
     vessels: VesselRisk
     tacks: tuple[TackAtRisk, ...]
     total: float
-    boole: float
     correlation_time_s: float
 
     @property
@@ -223,12 +221,8 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
     first = np.zeros(len(legs))
     if legs and process.model != kernels.NONE:
         _first_passage((start, end), twa, half, process, first)
-    boole, before_twa, before_t = 0.0, 0.0, -1.0
     out = []
     for i, leg in enumerate(legs):
-        args = (process.model, process.s0, process.s1, process.rho, process.tau, process.table_t, process.table_s)
-        boole += kernels.leg_risk(start[i], end[i], twa[i], before_twa, before_t, half, *args)
-        before_twa, before_t = twa[i], end[i]
         worst = max(
             _instant(abs(twa[i]) - half, kernels.sigma_at(t, process.model, process.s0, process.s1, process.rho,
                                                            process.table_t, process.table_s))
@@ -241,7 +235,6 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
     return PathRisk(
         legs=tuple(out), computed=computed, wind=wind, vessels=vessels, tacks=tacks,
         total=min(1.0, wind + vessels.total + sum(tack.risk for tack in tacks)),
-        boole=float(min(1.0, boole)),
         correlation_time_s=process.correlation_time_s,
     )
 
@@ -302,27 +295,6 @@ def with_parts(why: Why, problem: Problem, risk: PathRisk) -> Why:
         },
     }
     return Why(text=f"{why.text} {text}".strip(), data={**why.data, **data})
-
-
-def simulate_entries(
-    problem: Problem, plan: Plan | Sequence[Leg], *, winds: int = 2000, step_s: float = 0.5, seed: int = 0,
-) -> NDArray[np.int64]:
-    """Return for each simulated wind the leg on which it first forces the boat into the no-go zone, or -1.
-
-    The winds are exact draws of the assumed process every ``step_s`` seconds and at each leg's ends.
-    """
-    legs = plan.legs if isinstance(plan, Plan) else tuple(plan)
-    hits = np.full(winds, -1, dtype=np.int64)
-    p = process_of(problem)
-    if legs and p.model != kernels.NONE:
-        kernels.simulate(
-            np.array([leg.start_s for leg in legs], dtype=np.float64),
-            np.array([leg.end_s for leg in legs], dtype=np.float64),
-            _angles(legs), float(problem.boat.no_go_half_rad),
-            p.model, float(p.s0), float(p.s1), float(p.rho), float(p.tau), p.table_t, p.table_s, float(step_s),
-            np.random.default_rng(seed), winds, hits,
-        )
-    return hits
 
 
 # ------------------------------------------------------------------------------ planning within a limit

@@ -296,42 +296,6 @@ def leg_risk(  # type: ignore[no-untyped-def]
     return min(1.0, entry + total)
 
 
-@kernel
-def simulate(  # type: ignore[no-untyped-def]
-    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, step_s, generator, count, hits,
-):
-    """Fill hits[i] with the leg on which simulated wind i first forces the boat into the no-go zone, else -1.
-
-    An independent check of ``first_passage``: exact draws of X every ``step_s`` seconds and at each leg's ends.
-    """
-    two_pi = 2.0 * math.pi
-    for i in range(count):
-        hits[i] = -1
-        t = 0.0
-        z = generator.standard_normal()
-        for k in range(start_s.shape[0]):
-            for phase in range(2):
-                stop = start_s[k] if phase == 0 else end_s[k]
-                at_start = phase == 1
-                while t < stop or at_start:
-                    if not at_start:
-                        move = min(step_s, stop - t)
-                        r = correlation(t, move, model, s0, s1, rho, tau, table_t, table_s)
-                        z = r * z + math.sqrt(max(0.0, 1.0 - r * r)) * generator.standard_normal()
-                        t = stop if move >= stop - t else t + move
-                    at_start = False
-                    if phase == 1:
-                        x = z * sigma_at(t, model, s0, s1, rho, table_t, table_s)
-                        off = (twa_rad[k] - x + math.pi) % two_pi - math.pi
-                        if abs(off) < half_rad - 1e-9:
-                            hits[i] = k
-                            break
-                if hits[i] >= 0:
-                    break
-            if hits[i] >= 0:
-                break
-
-
 FAR_SIGMAS = 6.5       # farther outside than this nothing happens
 LEAST_SIGMA_M = 0.3    # a spread is not taken smaller: no report is better
 MOST_ANGLES = 1440

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bench.vessels import SCENES, holds, keep_of, met, problem, ship
+from bench.winds import simulate_entries
 from companion.messages import Target
 from companion.planner import Plan, Problem, plan
 from companion.planner.explain import explain
@@ -17,7 +18,7 @@ from companion.planner.problem.json_write import to_dict
 from companion.planner.problem.parts import RiskLimit
 from companion.planner.problem.value import defect_of, resolved, sigmas_for
 from companion.planner.risk import kernels
-from companion.planner.risk.chance_constraint import path_risk, simulate_entries
+from companion.planner.risk.chance_constraint import path_risk
 from companion.traffic.predict import tail_factor
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.field.controllers import line_following, motor_commands, rudder_for, sail_for
+from lab.tasks.controllers import line_following, motor_commands, rudder_for, sail_for
 from sitl.world.boats import STEP_S, VaimosParameters, state_at, step
 
 angle = st.floats(-math.pi, math.pi)

@@ -8,11 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.field.controllers import motor_commands
 from companion.geo.angles import wrap_pi
-from lab.tasks.motor import HABITS, run, run_ardurover
+from lab.tasks.controllers import motor_commands
+from lab.tasks.motor import HABITS, MotorBoat, run, run_ardurover
 from sitl.ardurover.simulation import find
-from sitl.world.boats import MotorBoat
 
 
 def test_both_motors_at_one_half_go_straight_at_two_metres_a_second() -> None:
