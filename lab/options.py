@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from companion.planners import ALGORITHMS
 
 if TYPE_CHECKING:
-    from sitl.run.variation import Method
+    from lab.methods import Method
 
 ALL = "all"   # of what may be drawn
 
@@ -35,7 +35,7 @@ def add_methods(parser: argparse.ArgumentParser) -> None:
 
 def methods_of(guidances: Sequence[str] | None, planners: Sequence[str] | None) -> list[Method]:
     """Return the methods that were asked for, one of the mission's own where none was."""
-    from sitl.run.variation import Method
+    from lab.methods import Method
 
     own: Sequence[None] = (None,)
     return [Method(guidance=guidance, planner=planner) for guidance in guidances or own for planner in planners or own]
@@ -43,15 +43,15 @@ def methods_of(guidances: Sequence[str] | None, planners: Sequence[str] | None) 
 
 def compile_planners(draws: Sequence[str]) -> None:
     """Compile what the voyages need, and the planners where they are drawn."""
+    from lab.methods import PLANNERS
     from sitl.run.compiled import compile_ahead
-    from sitl.run.variation import PLANNERS
 
     for planner in PLANNERS if "planner" in draws else PLANNERS[:1]:
         compile_ahead(planner)
 
 
 def _drawable(text: str, more: tuple[str, ...] = ()) -> tuple[str, ...]:
-    from sitl.run.variation import DRAWABLE
+    from lab.methods import DRAWABLE
 
     known = (*DRAWABLE, *more)
     wanted = tuple(_among(part.strip(), (*known, ALL)) for part in text.split(","))
@@ -59,13 +59,13 @@ def _drawable(text: str, more: tuple[str, ...] = ()) -> tuple[str, ...]:
 
 
 def _guidance(text: str) -> str:
-    from sitl.run.variation import GUIDANCES
+    from lab.methods import GUIDANCES
 
     return _among(text, GUIDANCES)
 
 
 def _planner(text: str) -> str:
-    from sitl.run.variation import PLANNERS
+    from lab.methods import PLANNERS
 
     return _among(text, PLANNERS)
 

@@ -15,8 +15,9 @@ import numpy as np
 from companion.errors import InputError
 from companion.geofence import Mission
 from companion.planners import ALGORITHMS, AUTO
+from lab.methods import foreknown, unspread
 from sitl.results import columns
-from sitl.run.variation import Variation, foreknown, unspread
+from sitl.run.variation import Variation
 from sitl.runner import SCENARIO_FOLDER, CampaignResults, Experiment, ExperimentSummary, Job
 
 SCENARIOS = tuple(

@@ -13,9 +13,9 @@ from typing import Any
 
 from companion.errors import InputError
 from companion.words import file_name
+from lab.methods import AS_IT_SAYS, Method, can_be_sailed
 from sitl.results import columns, compare
 from sitl.results import told as told_pairs
-from sitl.run.variation import AS_IT_SAYS, Method, can_be_sailed
 from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key, Table
 from sitl.scenario import verdict_line
 

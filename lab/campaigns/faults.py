@@ -25,6 +25,17 @@ import shapely
 from companion.clock import RealTimeLoop
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode
+from lab.campaigns.drawn_faults import (
+    BESIDE,
+    KINDS,
+    MODES,
+    Jump,
+    draw,
+    draw_beside,
+    draw_jump,
+    draw_planner,
+    draw_turned_vane,
+)
 from lab.campaigns.fault_judge import (
     ALERT_S,
     EXCUSES,
@@ -37,18 +48,8 @@ from lab.campaigns.fault_judge import (
     mission_key,
     operator_spans,
 )
-from sitl.rehearse.fault_sampling import (
-    BESIDE,
-    KINDS,
-    MODES,
-    Jump,
-    draw,
-    draw_beside,
-    draw_jump,
-    draw_planner,
-    draw_turned_vane,
-)
-from sitl.run.variation import DRAWABLE, Method, Variation, drawn_method
+from lab.methods import DRAWABLE, Method, drawn_method
+from sitl.run.variation import Variation
 from sitl.runner import SCENARIO_FOLDER, CampaignResults, Experiment, ExperimentSummary, Job
 from sitl.scenario import EventSpec, Scenario, is_all_ordinary, load_scenario
 

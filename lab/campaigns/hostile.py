@@ -21,14 +21,15 @@ from companion.errors import InputError
 from companion.fold import Step
 from companion.geo.angles import difference_rad
 from companion.geofence import load_mission
-from companion.mavlink.reads import READS
 from companion.mavlink.signing import SigningStore
 from companion.messages import GeoPoint
 from companion.skipper.behaviors import TOLD_S
 from companion.skipper.step import Phase
 from companion.skipper.step import actions as act
+from lab.campaigns.reads import READS
+from lab.campaigns.signed_link import SignedEnd, Signer
 from sitl.autopilot import EPOCH_S, AutopilotConfig, MemoryLink, RadioChannel, SimulatedAutopilot, serve
-from sitl.faults import FORGERIES, FaultyPlanner, Forger, Forgery, SignedEnd, Signer
+from sitl.faults import FORGERIES, FaultyPlanner, Forger, Forgery
 from sitl.world import AR1
 
 BEGIN, END = "<!-- made by `sitl hostile --document docs/reference/mavlink.md` -->", "<!-- end of the table -->"

@@ -26,9 +26,10 @@ from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import Mode
 from companion.telemetry.folder import DECISIONS
+from lab.methods import drawn_method
 from sitl.autopilot import MemoryLink, SimulatedAutopilot
 from sitl.rehearse.mismatch_sampling import SampledMismatch, draw
-from sitl.run.variation import Variation, drawn_method
+from sitl.run.variation import Variation
 from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key
 
 # A plan's waypoint and the autopilot's are one where they are this near: degrees x 1e7 are a centimetre.

@@ -24,10 +24,10 @@ import msgspec
 
 from companion.disk import Disk
 from companion.words import counted
-from lab.campaigns import faults, mismatch
+from lab.campaigns import drawn_faults, faults, mismatch
 from lab.campaigns.fault_judge import UNEXCUSED
 from sitl.options import CampaignOptions
-from sitl.rehearse import fault_sampling, mismatch_sampling
+from sitl.rehearse import mismatch_sampling
 from sitl.runner import Experiment, Job, file_hash
 from sitl.scenario import Scenario, load_scenario, scenario_text
 
@@ -140,7 +140,7 @@ class SearchCase:
 def drawn_of(job: Job[SearchCase]) -> Scenario:
     """Return the scenario of a job, with all that was drawn for it."""
     if job.case.what == "faults":
-        return fault_sampling.drawn_by(job.case.point.draws(), load_scenario(job.scenario))
+        return drawn_faults.drawn_by(job.case.point.draws(), load_scenario(job.scenario))
     return mismatch_sampling.drawn_by(job.case.point.draws(), job.scenario).scenario
 
 

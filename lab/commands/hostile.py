@@ -56,7 +56,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from companion.mavlink.reads import ASHORE, READS
+    from lab.campaigns.reads import ASHORE, READS
     from sitl.faults import FORGERIES
 
     if args.list:
@@ -98,9 +98,10 @@ def _measure(document: Path | None) -> int:
 def _stand_between(args: argparse.Namespace) -> int:
     """Forge on a live link."""
     from companion.clock import run as run_loop
-    from companion.mavlink.reads import READS
     from companion.mavlink.transports import parse_link
-    from sitl.faults import FORGERIES, ManInTheMiddle, SpoofingPlan
+    from lab.campaigns.reads import READS
+    from lab.campaigns.signed_link import ManInTheMiddle, SpoofingPlan
+    from sitl.faults import FORGERIES
 
     for option, value, low, high in (("--rate", args.rate, 0.0, MAX_RATE_HZ), ("--count", args.count, 0, MAX_COUNT),
                                      ("--for", args.for_s, 0.0, MAX_S)):

@@ -5,7 +5,7 @@ from sitl.faults.ground_station import REDRAWN, give_order, redraw, set_paramete
 from sitl.faults.injection import Observer, SimulatedWorld, break_vane, channel, inject
 from sitl.faults.link_faults import LINK_EVENTS, Relay, impair
 from sitl.faults.satellite_link import KEY, Satellite
-from sitl.faults.spoofing import FORGERIES, Forger, Forgery, ManInTheMiddle, SignedEnd, Signer, SpoofingPlan
+from sitl.faults.spoofing import FORGERIES, Forger, Forgery
 
 __all__ = [
     "FORGERIES",
@@ -16,14 +16,10 @@ __all__ = [
     "Forger",
     "Forgery",
     "KillablePlanner",
-    "ManInTheMiddle",
     "Observer",
     "Relay",
     "Satellite",
-    "SignedEnd",
-    "Signer",
     "SimulatedWorld",
-    "SpoofingPlan",
     "break_vane",
     "channel",
     "give_order",

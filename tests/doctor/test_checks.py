@@ -16,9 +16,9 @@ from companion.errors import LinkError
 from companion.geofence import load_mission
 from companion.mavlink.signing import EPOCH_S, TICKS_PER_S, SigningStore
 from companion.messages import GeoPoint, MissionItem
+from lab.campaigns.signed_link import Signer
 from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot.memory_link import frames
-from sitl.faults.spoofing import Signer
 from sitl.world.environment import parse_wind
 from tests.sitl.boats import boat_process
 

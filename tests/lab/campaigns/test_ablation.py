@@ -12,9 +12,9 @@ from companion.clock import run_virtual
 from companion.messages import WindSample, WindSource
 from companion.wind import Forecaster
 from lab.campaigns.ablation import AS_IT_IS, SCENARIOS, VARIATIONS, interval, table
+from lab.methods import MEAN_S, foreknown, unspread
 from sitl import cli
 from sitl.run.embedded import mission_of, run_embedded
-from sitl.run.variation import MEAN_S, foreknown, unspread
 from sitl.scenario import load_scenario
 from sitl.world.environment import parse_wind
 

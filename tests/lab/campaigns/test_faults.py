@@ -15,6 +15,19 @@ from companion.geo.frame import LocalFrame
 from companion.guard import Auxiliary
 from companion.messages import GeoPoint, Mode
 from companion.telemetry.folder.recorder import read_jsonl
+from lab.campaigns.drawn_faults import (
+    BESIDE,
+    CREEPS_MPS,
+    KINDS,
+    LONG_S,
+    MODES,
+    NEAR_M,
+    SHORT_S,
+    draw,
+    draw_beside,
+    draw_jump,
+    draw_turned_vane,
+)
 from lab.campaigns.fault_judge import (
     EXCUSES,
     REACTION_S,
@@ -29,19 +42,6 @@ from sitl import cli
 from sitl.autopilot import EPOCH_S
 from sitl.faults.spoofing import forgery_named
 from sitl.options import CampaignOptions
-from sitl.rehearse.fault_sampling import (
-    BESIDE,
-    CREEPS_MPS,
-    KINDS,
-    LONG_S,
-    MODES,
-    NEAR_M,
-    SHORT_S,
-    draw,
-    draw_beside,
-    draw_jump,
-    draw_turned_vane,
-)
 from sitl.runner import Job
 from sitl.scenario.scenario import EventSpec, Outlet, load_scenario
 

@@ -11,7 +11,6 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.clock import run
 from companion.errors import InputError
 from companion.mavlink.link import Link
-from companion.mavlink.reads import ASHORE, READS
 from companion.mavlink.transports import open_link
 from companion.mavlink.wire.frames import Codec, Drop, SigningState
 from lab.campaigns.hostile import (
@@ -25,9 +24,11 @@ from lab.campaigns.hostile import (
     rows,
     written,
 )
+from lab.campaigns.reads import ASHORE, READS
+from lab.campaigns.signed_link import ManInTheMiddle, Signer, SpoofingPlan
 from sitl import cli
 from sitl.autopilot import AutopilotConfig, SimulatedAutopilot, serve
-from sitl.faults.spoofing import FORGERIES, Forger, ManInTheMiddle, Signer, SpoofingPlan
+from sitl.faults.spoofing import FORGERIES, Forger
 from sitl.world.environment import Constant
 
 DOCUMENT = Path("docs/reference/mavlink.md")

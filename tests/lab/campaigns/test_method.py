@@ -6,13 +6,14 @@ from pathlib import Path
 import pytest
 
 from lab.campaigns.campaign import campaign
+from lab.campaigns.drawn_faults import draw
 from lab.campaigns.faults import BASE, FaultCase, faults, job_of, method_of, sail, told
 from lab.campaigns.mismatch import MismatchCase, mismatch
+from lab.methods import DRAWABLE, GUIDANCES, PLANNERS, Method, can_be_sailed
 from lab.options import add_draw, add_methods, methods_of
 from sitl import cli
-from sitl.rehearse.fault_sampling import draw
 from sitl.run.embedded import mission_of
-from sitl.run.variation import DRAWABLE, GUIDANCES, PLANNERS, Method, Variation, can_be_sailed
+from sitl.run.variation import Variation
 from sitl.scenario import load_scenario
 
 HERE = Path("sitl/scenarios")

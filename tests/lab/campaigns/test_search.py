@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lab.campaigns import search
+from lab.campaigns import drawn_faults, search
 from lab.campaigns.faults import BASE
 from lab.campaigns.search import LENGTH, NARROW, Point, SearchCase, Splitting, Tape, blind, drawn_of, moved
 from sitl import cli
-from sitl.rehearse import fault_sampling, mismatch_sampling
+from sitl.rehearse import mismatch_sampling
 from sitl.runner import Experiment, Job
 from sitl.scenario import load_scenario
 
@@ -30,7 +30,7 @@ def test_a_stream_gives_its_numbers_and_goes_on_the_same_behind_its_end():
 def test_whatever_a_stream_holds_can_be_drawn(numbers, seed):
     point = Point(seed=seed, numbers=tuple(numbers))
     base = load_scenario(BASE)
-    assert fault_sampling.drawn_by(point.draws(), base) == fault_sampling.drawn_by(point.draws(), base)
+    assert drawn_faults.drawn_by(point.draws(), base) == drawn_faults.drawn_by(point.draws(), base)
     mismatch_sampling.drawn_by(point.draws(), NARROW)
 
 
