@@ -246,15 +246,13 @@ def field_findings_of(mission: Mission) -> tuple[Finding, ...]:
     return tuple(out)
 
 
-def preview_conditions(mission: Mission, at_en: tuple[float, float], twd_from_rad: float | None = None,
-            tws_mps: float | None = None) -> FieldConditions:
-    """Return a boat that lies at ``at_en`` in the wind that previews assume, or in another."""
-    from_rad = math.radians(mission.wind.preview_from_deg) if twd_from_rad is None else twd_from_rad
-    speed_mps = mission.wind.preview_speed_mps if tws_mps is None else tws_mps
+def preview_conditions(mission: Mission, at_en: tuple[float, float]) -> FieldConditions:
+    """Return a boat that lies at ``at_en`` in the wind that previews assume."""
     sails = mission.autopilot.frame == "sailboat"
     return FieldConditions(
-        seen=Situation(t_s=0.0, en_m=at_en, velocity_en_mps=(0.0, 0.0), heading_rad=0.0, tws_mps=speed_mps,
-                       twd_from_rad=from_rad if sails else None),
+        seen=Situation(t_s=0.0, en_m=at_en, velocity_en_mps=(0.0, 0.0), heading_rad=0.0,
+                       tws_mps=mission.wind.preview_speed_mps,
+                       twd_from_rad=math.radians(mission.wind.preview_from_deg) if sails else None),
         habits=GuidanceSettings(
             is_sailing=sails, no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
             turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s), tack_s=max(1.0, mission.boat.tack_loss_s)))

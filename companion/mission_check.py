@@ -498,10 +498,10 @@ def _around(places: list[PointEn], composed: Composed) -> tuple[PointEn, float]:
     return (float(0.5 * (low[0] + high[0])), float(0.5 * (low[1] + high[1]))), half
 
 
-def heading_fan(seen: FieldPreview, q: int = 1) -> HeadingFan:
+def heading_fan(seen: FieldPreview) -> HeadingFan:
     """Return the candidate headings where the boat is, weighed by the polar."""
     at, habits, twd = np.array([seen.here_en]), seen.conditions.habits, seen.conditions.twd_from_rad
-    wanted, chosen = (math.atan2(v[0][0], v[0][1]) for v in (seen.wanted(at), seen.sailable(at, q)))
+    wanted, chosen = (math.atan2(v[0][0], v[0][1]) for v in (seen.wanted(at), seen.sailable(at)))
     if twd is None:
         speeds = np.full(len(FAN_RAD), habits.polar_mps[-1])
     else:
@@ -560,9 +560,9 @@ def _clearance(area: LocalArea) -> Clearance | None:
     return area.clearance_m if area.polygons or area.limits is not None else None
 
 
-def without_value(seen: FieldPreview, count: int = 25) -> float:
+def without_value(seen: FieldPreview) -> float:
     """Return the share of the square in which the field says nothing of where to go."""
-    side = np.linspace(-seen.half_m, seen.half_m, count)
+    side = np.linspace(-seen.half_m, seen.half_m, 25)
     east, north = np.meshgrid(side + seen.centre_en[0], side + seen.centre_en[1])
     points = np.column_stack([east.ravel(), north.ravel()])
     conditions = replace(seen.conditions, way_out_rad=0.0)

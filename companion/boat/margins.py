@@ -122,8 +122,7 @@ class Margin:
 
 
 def required_margin(
-    limits: AutopilotLimits, *, speed_mps: float, hull: Hull | None = None, largest_turn_rad: float = math.pi / 2.0,
-    legs_can_enter_no_go: bool = True,
+    limits: AutopilotLimits, *, speed_mps: float, hull: Hull | None = None, legs_can_enter_no_go: bool = True,
 ) -> Margin:
     """Return the margin that the autopilot's behaviour asks for.
 
@@ -131,21 +130,17 @@ def required_margin(
         limits: The autopilot's parameters.
         speed_mps: Highest boat speed expected [m/s, 0 or more].
         hull: Size and position error; a 1 m boat with plain GPS when None.
-        largest_turn_rad: Largest heading change at a waypoint of the plan [rad, 0..π].
         legs_can_enter_no_go: Whether a wind shift that is not excluded can put a leg into SAIL_NO_GO_ANGLE.
 
     Raises:
-        ValueError: when speed or turn is out of range.
+        ValueError: when the speed is out of range.
     """
     if not (math.isfinite(speed_mps) and speed_mps >= 0.0):
         raise ValueError(f"speed {speed_mps} m/s must be 0 or more")
-    if not 0.0 <= largest_turn_rad <= math.pi + 1e-9:
-        raise ValueError(f"turn {largest_turn_rad} rad is outside 0..π")
     hull = hull or Hull()
     radius_m = max(limits.wp_radius_m, limits.turn_radius_m)
-    # The chord from one leg to the next, each a radius from the corner, is at most this far from both legs.
-    cut_m = 0.5 * radius_m * math.sin(max(largest_turn_rad, math.pi / 2.0))
-    overshoot_m = CORNER_S * speed_mps * min(1.0, largest_turn_rad / (math.pi / 2.0))
+    # The chord from one leg to the next, each a radius from the corner, is at most half of one from both legs.
+    cut_m, overshoot_m = 0.5 * radius_m, CORNER_S * speed_mps
     corner_m = max(cut_m, overshoot_m)
     track_m = TRACK_S * speed_mps
     corridor = legs_can_enter_no_go and limits.sail_xtrack_max_m > 0.0

@@ -127,11 +127,11 @@ class Autopilot:
         return self.status
 
     async def _wait_status(
-        self, holds: Callable[[AutopilotStatus], bool], since_s: float, timeout_s: float = CONFIRM_S
+        self, holds: Callable[[AutopilotStatus], bool], since_s: float,
     ) -> bool:
         """Wait until a status heard at ``since_s`` or later fulfils ``holds``."""
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(timeout_s):
+            async with asyncio.timeout(CONFIRM_S):
                 while True:
                     status = self.status
                     if status is not None and status.t_s >= since_s and holds(status):

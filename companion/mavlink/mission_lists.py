@@ -279,12 +279,12 @@ class MissionLists:
 
 
 def compared(
-    items: Sequence[MissionItem], read: ReadResult, method: Method, part: slice = slice(None)
+    items: Sequence[MissionItem], read: ReadResult, method: Method,
 ) -> TransferResult:
-    """Return how a write of ``items`` ended, by the ``part`` of what was read back that should equal them."""
+    """Return how a write of ``items`` ended, by what was read back."""
     if read.items is None:
         return TransferResult(outcome=read.outcome, text=read.text, method=method)
-    difference = first_difference(items, read.items[part])
+    difference = first_difference(items, read.items)
     outcome = TransferOutcome.MISMATCH if difference else TransferOutcome.OK
     return TransferResult(outcome=outcome, text=difference, method=method, count=len(read.items))
 

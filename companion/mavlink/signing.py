@@ -69,11 +69,11 @@ def make_key(path: Path, passphrase: str = "") -> None:
 class SigningStore:
     """The signing state of one link and the file that its timestamp survives in."""
 
-    def __init__(self, key_file: Path, unix_s: float, *, link_id: int = 0) -> None:
+    def __init__(self, key_file: Path, unix_s: float) -> None:
         self._path = key_file.with_name(key_file.name + ".timestamp")
         stored, damage = _stored(self._path)
         clock = min(max(0, int((unix_s - EPOCH_S) * TICKS_PER_S)), _MOST_STORED)
-        self.state = SigningState(key=read_key(key_file), link_id=link_id, timestamp=max(clock, stored))
+        self.state = SigningState(key=read_key(key_file), link_id=0, timestamp=max(clock, stored))
         self._stored = 0
         self.save()
         if damage:

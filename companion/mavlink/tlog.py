@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.errors import InputError
-from companion.mavlink.wire.frames import STX, Codec, Message
+from companion.mavlink.wire.frames import STX
 
 _STAMP = struct.Struct(">Q")
 # Stamps outside 2000..2100 are damage, not time [µs].
@@ -74,11 +74,3 @@ def read_tlog(path: Path) -> list[TlogRecord]:
     if data and not records:
         raise InputError(str(path), "", "no MAVLink frame in it", "give a .tlog file")
     return records
-
-
-def messages_of(records: Iterator[TlogRecord] | list[TlogRecord]) -> Iterator[tuple[float, Message]]:
-    """Yield (seconds since 1970, message) of records; frames that do not decode are left out."""
-    codec = Codec(1, 191)
-    for record in records:
-        for message in codec.feed(record.frame):
-            yield record.unix_us / 1e6, message

@@ -92,16 +92,15 @@ def rmc(utc_s: float | None, point: GeoPoint | None, speed_mps: float | None, co
 
 def apb(
     right_of_leg_m: float, leg_rad: float, bearing_rad: float, name: str, *, is_inside: bool, is_past: bool,
-    steer_rad: float | None = None,
 ) -> str:
-    """Return what an autopilot needs: the distance off the leg, the leg's and the waypoint's bearing, what to steer.
+    """Return what an autopilot needs: the distance off the leg, the leg's bearing, the waypoint's, which it steers.
 
     ``is_inside`` the circle of arrival; ``is_past`` the line across the leg at the waypoint.
     """
     off, side = _off_track(right_of_leg_m)
     return sentence(
         "APB", "A", "A", off, side, "N", _flag(is_inside), _flag(is_past), _degrees(leg_rad), "T", name,
-        _degrees(bearing_rad), "T", _degrees(bearing_rad if steer_rad is None else steer_rad), "T")
+        _degrees(bearing_rad), "T", _degrees(bearing_rad), "T")
 
 
 def rmb(

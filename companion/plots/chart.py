@@ -73,10 +73,10 @@ def scale_bar(axes: Axes) -> None:
                   fontsize=8, zorder=10)
 
 
-def legend_above(axes: Any, *, columns: int = 4) -> None:
+def legend_above(axes: Any) -> None:
     """Put the legend over the axes, where no curve runs."""
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, fontsize=8, frameon=False,
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8, frameon=False,
                     borderaxespad=0.1)
 
 

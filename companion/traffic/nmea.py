@@ -134,11 +134,6 @@ class NmeaDecoder:
         return report
 
 
-def decode_nmea(line: str | bytes, t_s: float) -> AisReport | None:
-    """Return the report in a single-sentence message, or None for anything else."""
-    return NmeaDecoder().feed(line, t_s)
-
-
 def has_right_checksum(text: str) -> bool:
     """Return whether the sentence's checksum is there and right. *00 is a checksum like any other."""
     from pyais.util import compute_checksum

@@ -67,22 +67,20 @@ class Conflict:
 
 
 def check_legs(
-    legs: Sequence[TimedLeg], discs: Sequence[Target], *, now_s: float = 0.0, plan_t0_s: float = 0.0
+    legs: Sequence[TimedLeg], discs: Sequence[Target],
 ) -> tuple[Conflict, ...]:
     """Return where the plan meets the discs, the earliest meeting of each vessel, in order of time.
 
     Args:
-        legs: of the plan; times count from ``plan_t0_s`` on the discs' time scale (negative: sailed for a while).
+        legs: of the plan, their times on the discs' scale; what was sailed before 0, which is now, is not looked at.
         discs: made for now.
-        now_s: only the plan after this moment on the discs' scale is looked at.
-        plan_t0_s: the plan's start on the discs' time scale.
 
     """
     found: dict[int, Conflict] = {}
     for i, leg in enumerate(legs):
-        begin, end = leg.start_s + plan_t0_s, leg.end_s + plan_t0_s
+        begin, end = leg.start_s, leg.end_s
         for disc in discs:
-            lo, hi = max(begin, disc.from_s, now_s), min(end, disc.until_s)
+            lo, hi = max(begin, disc.from_s, 0.0), min(end, disc.until_s)
             if hi < lo or not math.isfinite(begin):
                 continue
             hit = _enters(leg, begin, end, lo, hi, disc)

@@ -11,9 +11,6 @@ import math
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
-import numpy as np
-from numpy.typing import NDArray
-
 from companion.traffic.vessel import FISHING, TYPE_FISHING, TYPE_PLEASURE, TYPE_SAILING, Vessel
 
 # A turn that is reported goes on for this long and then stops; no vessel is believed to circle for ever.
@@ -91,14 +88,6 @@ class Prediction:
     sigma_along_m: float
     sigma_across_m: float
     reach_m: float
-
-    @property
-    def covariance_m2(self) -> NDArray[np.float64]:
-        """Return the (2, 2) covariance in east, north [m²]."""
-        s, c = math.sin(self.course_rad), math.cos(self.course_rad)
-        axes = np.array([[s, c], [c, -s]])
-        variance = np.diag([self.sigma_along_m**2, self.sigma_across_m**2])
-        return np.asarray(axes @ variance @ axes.T, dtype=np.float64)
 
     def radius_m(self, risk: float) -> float:
         """Return the radius about the mean that the hull leaves with probability ``risk`` at most [m].

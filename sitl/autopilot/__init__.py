@@ -24,7 +24,6 @@ The shell joins it to transports and to the event loop's clock, whatever that is
 from sitl.autopilot.autopilot import SimulatedAutopilot
 from sitl.autopilot.boat.kernel import TACK_RETRY_S
 from sitl.autopilot.boat.parameters import check_parameters
-from sitl.autopilot.boat.vehicle import no_go_half_rad, settled_polar, tack_loss_s
 from sitl.autopilot.config import (
     EPOCH_S,
     FRAME_M,
@@ -63,8 +62,5 @@ __all__ = [
     "VaneState",
     "Waves",
     "check_parameters",
-    "no_go_half_rad",
     "serve",
-    "settled_polar",
-    "tack_loss_s",
 ]

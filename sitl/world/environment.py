@@ -206,14 +206,12 @@ class Later:
 class WindEvent:
     """Something that happens to the wind from ``at_s``, brought in evenly over ``over_s`` and gone after ``for_s``.
 
-    ``veer_rad`` turns it (positive: clockwise), ``tws_factor`` multiplies its speed, ``tws_mps`` replaces it.
-    A shift, a dying wind (``tws_mps=0``), a returning one (a second event, or ``for_s``), a gust (``tws_factor``
-    with ``for_s``) are all of this form.
+    ``veer_rad`` turns it (positive: clockwise), ``tws_mps`` replaces its speed. A shift, a dying wind (``tws_mps=0``),
+    a returning one (a second event, or ``for_s``), a gust are all of this form.
     """
 
     at_s: float
     veer_rad: float = 0.0
-    tws_factor: float = 1.0
     tws_mps: float | None = None
     over_s: float = 0.0
     for_s: float = math.inf
@@ -243,8 +241,7 @@ class Scripted:
             share = event.share(t_s)
             if share > 0.0:
                 twd += share * event.veer_rad
-                goal = event.tws_mps if event.tws_mps is not None else tws * event.tws_factor
-                tws += share * (goal - tws)
+                tws += share * ((tws if event.tws_mps is None else event.tws_mps) - tws)
         return wrap_two_pi(twd), max(0.0, tws)
 
 

@@ -3,15 +3,22 @@
 from pathlib import Path
 
 from companion.mavlink.microservices.command import Party
-from companion.mavlink.tlog import messages_of, read_tlog
+from companion.mavlink.tlog import read_tlog
+from companion.mavlink.wire import Codec
 
 DATA = Path(__file__).parent / "data"
 PARTY = Party(1, 1, 1, 191)
 
 
+def messages_of(records):
+    """Return [(seconds since 1970, message)] of records of a log."""
+    codec = Codec(1, 191)
+    return [(record.unix_us / 1e6, message) for record in records for message in codec.feed(record.frame)]
+
+
 def load(name):
     """Return [(seconds from the first record, message)] of a recording."""
-    records = list(messages_of(read_tlog(DATA / f"{name}.tlog")))
+    records = messages_of(read_tlog(DATA / f"{name}.tlog"))
     start_s = records[0][0]
     return [(t_s - start_s, message) for t_s, message in records]
 

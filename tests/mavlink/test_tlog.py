@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.errors import InputError
-from companion.mavlink.tlog import messages_of, parse_tlog, read_tlog, stamp
-from tests.mavlink.golden import DATA
+from companion.mavlink.tlog import parse_tlog, read_tlog, stamp
+from tests.mavlink.golden import DATA, messages_of
 
 RAW = (DATA / "beat.tlog").read_bytes()
 RECORDS = list(parse_tlog(RAW))

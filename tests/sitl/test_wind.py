@@ -66,7 +66,7 @@ def test_events_compose() -> None:
     wind = Scripted(Constant(math.radians(350.0), 5.0), (
         WindEvent(at_s=10.0, veer_rad=math.radians(20.0), over_s=10.0),
         WindEvent(at_s=50.0, tws_mps=0.0, over_s=5.0, for_s=20.0),
-        WindEvent(at_s=100.0, tws_factor=1.5, for_s=5.0),
+        WindEvent(at_s=100.0, tws_mps=7.5, for_s=5.0),
     ))
     assert wind.at(9.0) == (pytest.approx(math.radians(350.0)), 5.0)
     assert math.degrees(difference_rad(wind.at(15.0)[0], 0.0)) == pytest.approx(0.0, abs=1e-6)

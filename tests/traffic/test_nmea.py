@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyais.encode import encode_dict
 
-from companion.traffic.nmea import MAX_PENDING, NmeaDecoder, decode_json, decode_nmea, has_right_checksum
+from companion.traffic.nmea import MAX_PENDING, NmeaDecoder, decode_json, has_right_checksum
 
 TYPE1 = "!AIVDM,1,1,,A,15M:Ih0P0vJmfCPHvp88IVd1P000,0*64"
 TYPE3 = "!AIVDM,1,1,,A,3815;hUw00wfUdHMPfQ4s8WT0D`r,0*00"
@@ -21,7 +21,7 @@ def sentences(**fields: object) -> list[str]:
 
 
 def test_a_position_report() -> None:
-    r = decode_nmea(TYPE1, 12.0)
+    r = NmeaDecoder().feed(TYPE1, 12.0)
     assert r is not None
     assert (r.mmsi, r.t_s) == (366123456, 12.0)
     assert r.position is not None
@@ -33,7 +33,7 @@ def test_a_position_report() -> None:
 
 
 def test_checksum_00_is_a_checksum() -> None:
-    r = decode_nmea(TYPE3, 0.0)
+    r = NmeaDecoder().feed(TYPE3, 0.0)
     assert r is not None
     assert r.nav_status == 5
 
@@ -41,11 +41,11 @@ def test_checksum_00_is_a_checksum() -> None:
 def test_not_available_is_unknown() -> None:
     lines = sentences(type=1, mmsi=235000001, lat=51.0, lon=-1.0, course=360.0, speed=102.3, heading=511, turn=-128,
                       status=15)
-    r = decode_nmea(lines[0], 0.0)
+    r = NmeaDecoder().feed(lines[0], 0.0)
     assert r is not None
     assert (r.course_rad, r.speed_mps, r.heading_rad, r.turn_rate_radps, r.nav_status) == (None,) * 5
     lines = sentences(type=1, mmsi=235000001, lat=91.0, lon=181.0, course=10.0, speed=5.0, heading=10)
-    r = decode_nmea(lines[0], 0.0)
+    r = NmeaDecoder().feed(lines[0], 0.0)
     assert r is not None
     assert r.position is None
 
@@ -72,7 +72,7 @@ def test_fragments_out_of_order_are_put_together_and_late_ones_dropped() -> None
 
 
 def test_class_b() -> None:
-    r = decode_nmea(sentences(type=18, mmsi=235000003, lat=51.0, lon=-1.0, course=90.0, speed=4.0)[0], 0.0)
+    r = NmeaDecoder().feed(sentences(type=18, mmsi=235000003, lat=51.0, lon=-1.0, course=90.0, speed=4.0)[0], 0.0)
     assert r is not None
     assert r.is_class_b
 
@@ -119,7 +119,7 @@ def test_any_payload_with_a_right_checksum_is_a_finite_report_or_nothing(payload
         check ^= ord(c)
     line = f"!{body}*{check:02X}"
     assert has_right_checksum(line)
-    r = decode_nmea(line, 1.0)
+    r = NmeaDecoder().feed(line, 1.0)
     if r is not None:
         for value in (r.course_rad, r.heading_rad):
             assert value is None or 0.0 <= value < 2.0 * math.pi

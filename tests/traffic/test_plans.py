@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -33,7 +34,8 @@ def test_a_meeting_is_found_with_its_time() -> None:
 
 def test_what_is_sailed_already_does_not_count() -> None:
     assert check_legs([LEG], [disc(0.0, 20.0)])
-    assert check_legs([LEG], [disc(0.0, 20.0, begin=0.0)], plan_t0_s=-60.0) == ()
+    sailed = replace(LEG, start_s=LEG.start_s - 60.0, end_s=LEG.end_s - 60.0)
+    assert check_legs([sailed], [disc(0.0, 20.0, begin=0.0)]) == ()
 
 
 number = st.floats(-300.0, 300.0)

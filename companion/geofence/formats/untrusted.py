@@ -78,11 +78,11 @@ def point_commas(line: str) -> str:
     return _DECIMAL_COMMA.sub(r"\1.\2", line)
 
 
-def require_shallow(text: str, source: str, *, opening: str = "([{", closing: str = ")]}") -> None:
+def require_shallow(text: str, source: str) -> None:
     """Raise InputError if brackets nest deeper than ``MAX_DEPTH`` (parsers written with recursion die of it)."""
     depth = 0
-    for match in re.finditer("[" + re.escape(opening + closing) + "]", text):
-        depth += 1 if match.group() in opening else -1
+    for match in re.finditer(r"[(\[{)\]}]", text):
+        depth += 1 if match.group() in "([{" else -1
         if depth > MAX_DEPTH:
             line = text.count("\n", 0, match.start()) + 1
             raise InputError(source, f"line {line}", f"brackets nest deeper than {MAX_DEPTH}")

@@ -336,15 +336,12 @@ class _Scanner:
         return (values[1], values[0]) if self._latlon else (values[0], values[1])
 
 
-def write_wkt(document: Document, *, with_kinds: bool = True, srid: bool = False) -> str:
-    """Return the document's zones and marks as WKT, one per line, full precision.
-
-    ``with_kinds`` writes ``name|kind|`` before each (plain WKT has nowhere to put it).
-    """
-    lines = ["# name|kind|WKT, longitude before latitude (WGS 84)"] if with_kinds else []
+def write_wkt(document: Document, *, srid: bool = False) -> str:
+    """Return the document's zones and marks as WKT, ``name|kind|`` before each, one per line, full precision."""
+    lines = ["# name|kind|WKT, longitude before latitude (WGS 84)"]
     for name, kind, geometry in _geometries(document):
-        prefix = f"{_clean(name)}|{kind.value}|" if with_kinds else ""
-        lines.append(f"{prefix}{'SRID=4326;' if srid else ''}{shapely.to_wkt(geometry, rounding_precision=-1)}")
+        wkt = shapely.to_wkt(geometry, rounding_precision=-1)
+        lines.append(f"{_clean(name)}|{kind.value}|{'SRID=4326;' if srid else ''}{wkt}")
     return "\n".join(lines) + "\n"
 
 

@@ -192,7 +192,7 @@ def band(voyage: Voyage, gate: Gate, start_en: PointEn, aim_en: PointEn) -> Poly
 def problem_dict(
     voyage: Voyage, gate: Gate, *, start: Start, aim: Aim, forecast: WindForecast,
     margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
-    extra_obstacles: Sequence[str] = (), title: str = "", beat: dict[str, Any] | None = None,
+    title: str = "", beat: dict[str, Any] | None = None,
     max_path_risk: float | None = None, tracking: dict[str, Any] | None = None,
     current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0, doubt: WindAngleUncertainty | None = None,
     failing: dict[str, Any] | None = None, is_wind_known: bool = True,
@@ -243,7 +243,7 @@ def problem_dict(
         "title": title,
         "start": {"x": start.en_m[0], "y": start.en_m[1], "heading_deg": math.degrees(wrap_two_pi(start.heading_rad))},
         "goal": {"x": aim.en_m[0], "y": aim.en_m[1], "radius": aim.radius_m},
-        "obstacles": [*obstacles, *gate.keep_out, *extra_obstacles],
+        "obstacles": [*obstacles, *gate.keep_out],
         "fence": fence,
         "wind": wind,
         "boat": boat,

@@ -82,10 +82,10 @@ def waypoint_done(
 # -------- Barriers: what stands on no chart and is kept out of all the same, as WKT polygons for the planner.
 
 
-def disc_wkt(center: PointEn, radius_m: float, sides: int = 16) -> str:
-    """Return a polygon around a disc."""
-    r = radius_m / math.cos(math.pi / sides)
-    ring = [moved(center, 2.0 * math.pi * n / sides, r) for n in range(sides)]
+def disc_wkt(center: PointEn, radius_m: float) -> str:
+    """Return a polygon of sixteen sides around a disc."""
+    r = radius_m / math.cos(math.pi / 16)
+    ring = [moved(center, 2.0 * math.pi * n / 16, r) for n in range(16)]
     return polygon_wkt(ring)
 
 

@@ -188,6 +188,6 @@ class PositionDoubt:
         return f"it has stayed for {LASTS_S / 60.0:.0f} minutes" if settled_s >= LASTS_S else ""
 
 
-def is_impossible(area: AreaLike, en_m: PointEn, *, margin_m: float, error_m: float = ERROR_M) -> bool:
+def is_impossible(area: AreaLike, en_m: PointEn, *, margin_m: float) -> bool:
     """Return whether a place is so deep inside something solid that no error of fix and chart explains it."""
-    return float(area.unfenced.clearance_m([en_m])[0]) < -(margin_m + error_m)
+    return float(area.unfenced.clearance_m([en_m])[0]) < -(margin_m + ERROR_M)

@@ -48,7 +48,6 @@ class _Upload:
     last_index: int
     asked_s: float
     heard_s: float
-    is_partial: bool
 
 
 class TransferServer:
@@ -121,7 +120,7 @@ class TransferServer:
         if m.count == 0:
             self._finish(kind, link, sender)
             return
-        self._upload = _Upload(kind, link, sender, 0, m.count - 1, t_s, t_s, is_partial=False)
+        self._upload = _Upload(kind, link, sender, 0, m.count - 1, t_s, t_s)
         self._ask(self._upload, t_s)
 
     def _partial(self, m: Any, kind: int, link: int, sender: tuple[int, int], t_s: float) -> None:
@@ -134,7 +133,7 @@ class TransferServer:
             self._ack(link, sender, mav.MAV_MISSION_ERROR, kind)
             self._voice.announce(mav.MAV_SEVERITY_WARNING, "Flight plan update rejected")
             return
-        self._upload = _Upload(kind, link, sender, m.start_index, m.end_index, t_s, t_s, is_partial=True)
+        self._upload = _Upload(kind, link, sender, m.start_index, m.end_index, t_s, t_s)
         self._ask(self._upload, t_s)
 
     def _item(self, m: Any, kind: int, link: int, sender: tuple[int, int], t_s: float) -> None:
