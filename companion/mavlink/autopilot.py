@@ -60,7 +60,6 @@ class Autopilot:
         self.link = link
         self._is_fed = assembler is not None
         self.assembler = assembler or VehicleAssembler()
-        self._bad = self.assembler.dropped_by_type.copy()
         self._lists = MissionLists(link, lambda: self.assembler.status)
         self._timeout_s = timeout_s
         self._listeners: list[OnValue] = []
@@ -112,10 +111,6 @@ class Autopilot:
         if message.get_srcSystem() != self.link.target_system:
             return
         values = () if self._is_fed else self.assembler.take(t_s, message)
-        bad = self.assembler.dropped_by_type.get(kind, 0)
-        if bad > self._bad.get(kind, 0):
-            self._bad[kind] = bad
-            self.link.monitor.bad_value(t_s, kind)
         for value in values if self._listeners else ():
             for callback in tuple(self._listeners):
                 self.link.guard(getattr(callback, "__qualname__", repr(callback)), callback, value)

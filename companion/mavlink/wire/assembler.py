@@ -113,7 +113,6 @@ class VehicleAssembler:
 
     def __init__(self) -> None:
         self.dropped: Counter[Drop] = Counter()
-        self.dropped_by_type: Counter[str] = Counter()
         self.reboots = 0
         self._status: AutopilotStatus | None = None
         self._texts = codec.TextAssembler()
@@ -175,7 +174,6 @@ class VehicleAssembler:
         except (ValueError, OverflowError, TypeError):
             reason = Drop.BAD_VALUE
         self.dropped[reason] += 1
-        self.dropped_by_type[kind] += 1
         return []
 
     def _notice_boot(self, message: Message) -> None:

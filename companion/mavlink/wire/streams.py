@@ -1,7 +1,4 @@
-"""The table of streams: which message, how often, and from what age on it is stale. Pure.
-
-Health asks three things apart: is it fresh, does it come at its rate, can its values be trusted.
-"""
+"""The table of streams: which message, how often, and from what age on it is stale. Pure."""
 
 from __future__ import annotations
 
@@ -59,65 +56,32 @@ DEFAULT_STREAMS = (
 RATE_WINDOW_S = 10.0
 
 
-@dataclass(frozen=True, slots=True)
-class StreamHealth:
-    """One stream now. ``age_s`` is None when it was never heard."""
-
-    stream: Stream
-    age_s: float | None
-    rate_hz: float
-    is_fresh: bool
-    is_on_rate: bool
-    is_trusted: bool
-
-
 class StreamMonitor:
-    """Watches the streams of one link. ``heard`` on every message, ``health`` when asked."""
+    """Watches the streams of one link: ``heard`` on every message."""
 
     def __init__(self, table: Iterable[Stream] = DEFAULT_STREAMS) -> None:
         self.table = tuple(table)
-        self._by_name = {s.name: s for s in self.table}
         self._times: dict[str, deque[float]] = {s.name: deque(maxlen=128) for s in self.table}
-        self._bad: dict[str, deque[float]] = {s.name: deque(maxlen=16) for s in self.table}
 
     def heard(self, t_s: float, name: str) -> None:
-        """Note a good message."""
+        """Note a message."""
         times = self._times.get(name)
         if times is not None:
             times.append(t_s)
 
-    def bad_value(self, t_s: float, name: str) -> None:
-        """Note a message whose value could not be believed."""
-        bad = self._bad.get(name)
-        if bad is not None:
-            bad.append(t_s)
-
-    def age_s(self, t_s: float, name: str) -> float | None:
-        """Return the age of the newest message [s], None when never heard."""
-        times = self._times.get(name)
-        return t_s - times[-1] if times else None
-
-    def health(self, t_s: float) -> tuple[StreamHealth, ...]:
-        """Return the health of every stream of the table."""
-        return tuple(self._health(t_s, stream) for stream in self.table)
-
-    def below_rate(self, t_s: float) -> tuple[Stream, ...]:
-        """Return the vital streams that come at less than half of the rate asked for."""
-        return tuple(s for s in self.table if s.is_vital and not self._health(t_s, s).is_on_rate)
-
-    def _health(self, t_s: float, stream: Stream) -> StreamHealth:
+    def rate_hz(self, t_s: float, stream: Stream) -> float:
+        """Return the rate at which a stream comes [Hz], 0 when it is stale."""
         times = self._times[stream.name]
+        if not times or t_s - times[-1] > stream.stale_s:
+            return 0.0
         # rates below 0.5 Hz need a longer window to hold a few messages
         window_s = max(RATE_WINDOW_S, 4.0 / stream.rate_hz) if stream.rate_hz > 0.0 else RATE_WINDOW_S
-        recent = _since(times, t_s, window_s)
-        rate_hz = recent / window_s
-        age_s = t_s - times[-1] if times else None
-        is_fresh = age_s is not None and age_s <= stream.stale_s
-        bad = _since(self._bad[stream.name], t_s, window_s)
-        return StreamHealth(
-            stream=stream, age_s=age_s, rate_hz=rate_hz, is_fresh=is_fresh,
-            is_on_rate=rate_hz >= 0.5 * stream.rate_hz and is_fresh, is_trusted=is_fresh and bad * 4 <= recent,
-        )
+        return _since(times, t_s, window_s) / window_s
+
+    def below_rate(self, t_s: float) -> tuple[Stream, ...]:
+        """Return the vital streams that are stale, or come at less than half of the rate asked for."""
+        return tuple(s for s in self.table if s.is_vital and (
+            not (rate_hz := self.rate_hz(t_s, s)) or rate_hz < 0.5 * s.rate_hz))
 
 
 def _since(times: deque[float], t_s: float, window_s: float) -> int:

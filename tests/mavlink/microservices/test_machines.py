@@ -227,23 +227,17 @@ def test_renamed_parameters_know_both_names():
     assert all(len(name) <= 16 for name in ALIASES.values())
 
 
-def test_health_tells_fresh_from_on_rate_from_trusted():
+def test_a_stream_is_below_its_rate_when_it_is_slow_or_stale():
     table = (Stream("WIND", 2.0, 5.0, is_vital=True), Stream("ATTITUDE", 5.0, 2.0, is_vital=True))
     monitor = StreamMonitor(table)
-    wind, attitude = monitor.health(0.0)
-    assert (wind.is_fresh, wind.age_s) == (False, None)
+    assert monitor.below_rate(0.0) == table
     for i in range(40):
         monitor.heard(i * 0.5, "WIND")
     for i in range(20):
         monitor.heard(float(i), "ATTITUDE")
-    wind, attitude = monitor.health(19.6)
-    assert (wind.is_fresh, wind.is_on_rate, wind.is_trusted) == (True, True, True)
-    assert (attitude.is_fresh, attitude.is_on_rate) == (True, False)
+    assert monitor.rate_hz(19.6, table[0]) == pytest.approx(2.0)
     assert [s.name for s in monitor.below_rate(19.6)] == ["ATTITUDE"]
-    for i in range(8):
-        monitor.bad_value(19.0 + i * 0.1, "WIND")
-    assert not monitor.health(19.8)[0].is_trusted
-    assert not monitor.health(25.0)[0].is_fresh
+    assert monitor.below_rate(25.0) == table
 
 
 def test_a_signing_timestamp_that_cannot_be_stored_ends_nothing(tmp_path):
