@@ -160,15 +160,7 @@ class WindSource(enum.Enum):
 
     AUTOPILOT_TRUE = "autopilot_true"          # WIND: low-passed by WNDVN_TRUE_FILT
     APPARENT = "apparent"                      # AppWnd* with heading and ground velocity, ours
-    RECORD = "record"
-    SIMULATED = "simulated"
-
-
-class WindReference(enum.Enum):
-    """What the wind moves against."""
-
-    GROUND = "ground"
-    WATER = "water"
+    SIMULATED = "simulated"                    # by a study or a test: nothing has filtered it
 
 
 class WindQuality(enum.Enum):
@@ -184,13 +176,12 @@ class WindQuality(enum.Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WindSample:
-    """One reading of the true wind: from where [rad, true north], how fast [m/s]."""
+    """One reading of the true wind over ground: from where [rad, true north], how fast [m/s]."""
 
     t_s: float
     twd_from_rad: float
     tws_mps: float
     source: WindSource = WindSource.AUTOPILOT_TRUE
-    reference: WindReference = WindReference.GROUND
     quality: WindQuality = WindQuality.GOOD
 
     def __post_init__(self) -> None:

@@ -69,12 +69,6 @@ class Encounter:
     role: Role
     reason: str
 
-    def must_act(self, alarm: Alarm, policy: Policy = Policy.KEEP_CLEAR) -> bool:
-        """Must we keep out of its way now?"""
-        if alarm is Alarm.NONE:
-            return False
-        return policy is Policy.KEEP_CLEAR or self.role is not Role.STAND_ON or alarm >= Alarm.ACT
-
 
 def is_sailing_vessel(vessel: Vessel) -> bool:
     """Return whether AIS says it sails. Type 36 without a status counts, a status of motoring (0) does not."""
@@ -338,7 +332,7 @@ def act_limits(own: OwnShip, vessel: Vessel, clearance_m: float, *, other_acts: 
 
 def follow(
     held: Sequence[OngoingEncounter], own: OwnShip, seen: Sequence[Assessment], *, t_s: float, clearance_m: float,
-    twd_from_rad: float | None, policy: Policy = Policy.RULES,
+    twd_from_rad: float | None,
 ) -> tuple[OngoingEncounter, ...]:
     """Return the encounters after a look round.
 
@@ -349,7 +343,6 @@ def follow(
         t_s: now.
         clearance_m: between hulls, what is safe.
         twd_from_rad: where the wind comes from.
-        policy: how we act on the rules.
 
     """
     known = {(h.mmsi, h.branch): h for h in held}
@@ -359,7 +352,7 @@ def follow(
         after = _begun(own, one, clearance_m, t_s, twd_from_rad) if before is None else (
             _gone_on(before, own, one, t_s, twd_from_rad))
         if after is not None:
-            out.append(_judged(after, own, one, clearance_m, policy))
+            out.append(_judged(after, own, one, clearance_m))
     return tuple(sorted(out, key=lambda h: (h.mmsi, h.branch)))
 
 
@@ -409,12 +402,12 @@ def _meets_again(held: OngoingEncounter, own: OwnShip, vessel: Vessel, t_s: floa
 
 
 def _judged(
-    held: OngoingEncounter, own: OwnShip, one: Assessment, clearance_m: float, policy: Policy
+    held: OngoingEncounter, own: OwnShip, one: Assessment, clearance_m: float,
 ) -> OngoingEncounter:
     then, now = held.other_course_rad, one.vessel.course_rad
     other_acts = then is not None and now is not None and abs(difference_rad(now, then)) >= ACTS_RAD
     alarm = alarm_of(one.approach, act_limits(own, one.vessel, clearance_m, other_acts=other_acts))
-    must_act = held.evident or held.encounter.role is not Role.STAND_ON or held.encounter.must_act(alarm, policy)
+    must_act = held.evident or held.encounter.role is not Role.STAND_ON or alarm >= Alarm.ACT
     return replace(held, must_act=must_act, evident=must_act and held.encounter.role is Role.STAND_ON,
                    cpa_m=one.approach.distance_m)
 

@@ -5,9 +5,9 @@ With all vectors in the local east-north frame and "from" vectors pointing at wh
     A = W + V,     A = aws (sin(heading + awa), cos(heading + awa)),    twd = atan2(W_east, W_north)        (a)
 
 where A is the apparent and W the true wind's from-vector and V the boat's velocity: sailing into the wind adds to
-it. V over ground gives wind over ground, which is what ArduRover reports; V through the water gives what the sails
-feel in a current. The combination is made of readings of one instant and before any filter: filtering first and
-combining afterwards puts a false shift into every tack (ArduPilot pull request 17139).
+it. V over ground gives wind over ground, which is what ArduRover reports. The combination is made of readings
+of one instant and before any filter: filtering first and combining afterwards puts a false shift into every tack
+(ArduPilot pull request 17139).
 """
 
 from __future__ import annotations
@@ -15,17 +15,15 @@ from __future__ import annotations
 import math
 
 from companion.geo.angles import heading_of, wrap_pi
-from companion.messages import ApparentWind, VehicleState, WindQuality, WindReference, WindSample, WindSource
+from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
 
 LIGHT_MPS = 1.0                          # [m/s] below this the direction is nearly without meaning (recorded wind)
 TURNING_RADPS = math.radians(10.0)       # [rad/s] no wave, a manoeuvre: compass and vane lag
 STALE_S = 1.0                            # [s] apparent wind and vehicle further apart than this are not one instant
 
 
-def true_wind(
-    apparent: ApparentWind, vehicle: VehicleState, *, current_en_mps: tuple[float, float] | None = None,
-) -> WindSample:
-    """Return the unfiltered true wind; over ground, or over water when the current (its motion, east north) is given.
+def true_wind(apparent: ApparentWind, vehicle: VehicleState) -> WindSample:
+    """Return the unfiltered true wind over ground.
 
     Its quality is TURNING in a manoeuvre, LIGHT below 1 m/s, SUSPECT when the two readings are not of one instant.
 
@@ -38,9 +36,7 @@ def true_wind(
     """
     angle = vehicle.heading_rad + apparent.awa_rad
     ve, vn = vehicle.velocity_en_mps
-    ce, cn = current_en_mps if current_en_mps is not None else (0.0, 0.0)
-    east = apparent.aws_mps * math.sin(angle) - (ve - ce)                                     # (a)
-    north = apparent.aws_mps * math.cos(angle) - (vn - cn)
+    east, north = apparent.aws_mps * math.sin(angle) - ve, apparent.aws_mps * math.cos(angle) - vn   # (a)
     speed = math.hypot(east, north)
     if abs(apparent.t_s - vehicle.t_s) > STALE_S:
         quality = WindQuality.SUSPECT
@@ -55,7 +51,6 @@ def true_wind(
         twd_from_rad=heading_of(east, north) if speed > 0.0 else wrap_pi(angle),
         tws_mps=min(100.0, speed),
         source=WindSource.APPARENT,
-        reference=WindReference.GROUND if current_en_mps is None else WindReference.WATER,
         quality=quality,
     )
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from companion.traffic import LAKE, Alarm, Policy, Role, Rule, Targets, assess, classify, cpa
+from companion.traffic import LAKE, Alarm, Role, Rule, Targets, assess, classify, cpa
 from tests.traffic.conftest import FRAME, own, report, vessel
 
 SAIL = {"nav_status": 8, "size": (5.0, 5.0, 2.0, 2.0)}
@@ -83,15 +83,6 @@ def test_at_anchor_or_unknown_is_kept_clear_of() -> None:
     assert encounter(((0, 0), 0), ((0, 300), 0), speed=0.0, nav_status=1).role is Role.KEEP_CLEAR
     we, ship = own(), vessel((100.0, 100.0), None, None)
     assert classify(we, ship, cpa(we, ship, 0.0), 0.0).role is Role.KEEP_CLEAR
-
-
-def test_the_default_never_relies_on_being_stand_on() -> None:
-    e = encounter(((0, 0), 90), ((400, 200), 180), speed=5.0, nav_status=0)
-    assert e.role is Role.STAND_ON
-    assert e.must_act(Alarm.WARN)
-    assert not e.must_act(Alarm.WARN, Policy.RULES)
-    assert e.must_act(Alarm.ACT, Policy.RULES)
-    assert not e.must_act(Alarm.NONE)
 
 
 def test_the_status_shows_the_worst_first() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from companion.traffic import SEA, Alarm, Policy, Role, Rule, TrafficPicture, assess
+from companion.traffic import SEA, Alarm, Role, Rule, TrafficPicture, assess
 from companion.traffic.colregs import ACTS_RAD, HOLDING, OVER_S, act_limits, expected, follow
 from companion.traffic.predict import SHIP, motion_of
 from tests.traffic.conftest import own, vessel
@@ -18,10 +18,10 @@ SAIL = {"nav_status": 8, "ship_type": 36}
 WIND = 0.0
 
 
-def look(held, we, ship, t_s=0.0, wind_rad=WIND, policy=Policy.RULES):
+def look(held, we, ship, t_s=0.0, wind_rad=WIND):
     we, ship = replace(we, t_s=t_s), replace(ship, t_s=t_s, heard_s=t_s)
     seen = assess(we, TrafficPicture(t_s=t_s, vessels=(ship,)), SEA, wind_rad)
-    return follow(held, we, seen, t_s=t_s, clearance_m=CLEAR_M, twd_from_rad=wind_rad, policy=policy)
+    return follow(held, we, seen, t_s=t_s, clearance_m=CLEAR_M, twd_from_rad=wind_rad)
 
 
 def crossing(from_deg=90.0, away_s=100.0, our_mps=3.0, her_mps=5.0, miss_m=0.0, **more):
@@ -48,11 +48,6 @@ def test_power_that_crosses_is_stood_on_to_and_then_it_is_for_us():
     # It stays so: she comes to turn too late, and we have begun.
     [late] = look((after,), *crossing(away_s=limit_s + 30.0, **POWER), t_s=3.0)
     assert late.evident
-
-
-def test_keeping_clear_of_everyone_never_stands_on():
-    [held] = look((), *crossing(**POWER), policy=Policy.KEEP_CLEAR)
-    assert held.must_act
 
 
 def test_who_has_turned_may_pass_nearer():

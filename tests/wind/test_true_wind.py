@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.geo.angles import wrap_pi
-from companion.messages import ApparentWind, GeoPoint, VehicleState, WindQuality, WindReference, WindSample, WindSource
+from companion.messages import ApparentWind, GeoPoint, VehicleState, WindQuality, WindSample, WindSource
 from companion.wind import VaneParameters, apparent_wind, true_wind
 
 HERE = GeoPoint(lat_deg=0.0, lon_deg=0.0)
@@ -36,7 +36,6 @@ def test_worked_examples(heading, speed, awa, aws, twd, tws):
     assert abs(wrap_pi(found.twd_from_rad - math.radians(twd))) < 1e-3
     assert found.tws_mps == pytest.approx(tws, abs=1e-3)
     assert found.source is WindSource.APPARENT
-    assert found.reference is WindReference.GROUND
 
 
 @settings(max_examples=200)
@@ -65,18 +64,6 @@ def test_turning_the_world_turns_the_wind(awa, aws, heading, speed, turn):
     assert b.tws_mps == pytest.approx(a.tws_mps, abs=1e-9)
     if a.tws_mps > 0.01:
         assert abs(wrap_pi(b.twd_from_rad - a.twd_from_rad - turn)) < 1e-6
-
-
-def test_a_current_turns_ground_wind_into_water_wind():
-    """Drifting in still air with a current of 1 m/s to the east: 1 m/s from the east is felt over the water."""
-    drifting = boat(0.0, 1.0, course_deg=90.0)
-    felt = ApparentWind(t_s=0.0, awa_rad=math.radians(90.0), aws_mps=1.0)
-    over_ground = true_wind(felt, drifting)
-    over_water = true_wind(felt, drifting, current_en_mps=(1.0, 0.0))
-    assert over_ground.tws_mps == pytest.approx(0.0, abs=1e-9)
-    assert over_water.tws_mps == pytest.approx(1.0)
-    assert math.degrees(over_water.twd_from_rad) == pytest.approx(90.0)
-    assert over_water.reference is WindReference.WATER
 
 
 def test_quality():

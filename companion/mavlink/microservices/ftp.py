@@ -23,7 +23,7 @@ _HEAD = struct.Struct("<HBBBBBBI")
 _PAYLOAD_BYTES = 251
 CHUNK_BYTES = 239
 
-TERMINATE, RESET, OPEN_READ, READ, CREATE, WRITE, BURST_READ = 1, 2, 4, 5, 6, 7, 15
+TERMINATE, RESET, OPEN_READ, READ, CREATE, WRITE = 1, 2, 4, 5, 6, 7
 ACK, NAK = 128, 129
 _EOF, _UNKNOWN_COMMAND, _NOT_FOUND = 6, 7, 10
 # What opening a file is refused with while a session of a program that died is still open: ArduRover says 1 (failed),
@@ -186,14 +186,12 @@ class FtpWrite(_Ftp):
 
 
 class FtpRead(_Ftp):
-    """Reads a file chunk by chunk, or in bursts where gaps are filled chunk by chunk."""
+    """Reads a file chunk by chunk."""
 
-    def __init__(self, party: Party, path: str, *, seq: int = 0, burst: bool = False) -> None:
+    def __init__(self, party: Party, path: str, *, seq: int = 0) -> None:
         super().__init__(party, path, seq)
-        self._burst = burst
         self._chunks: dict[int, bytes] = {}
         self._end_at: int | None = None
-        self._closing: FtpResult | None = None
 
     def start(self, t_s: float) -> list[Message]:
         """Open the file."""
@@ -201,8 +199,6 @@ class FtpRead(_Ftp):
 
     def receive(self, t_s: float, message: Message) -> list[Message]:
         """Go on to the next chunk."""
-        if self._request.opcode == BURST_READ:
-            return self._burst_chunk(t_s, message)
         packet = self._answer(message)
         if packet is None:
             return []
@@ -221,36 +217,9 @@ class FtpRead(_Ftp):
             return self._finish()
         if opcode == OPEN_READ:
             self._session = packet.session
-            if self._burst:
-                return self._ask(t_s, BURST_READ, size=CHUNK_BYTES, offset=0)
         elif packet.offset == self._request.offset and packet.data:
             self._chunks[packet.offset] = packet.data
         return self._next(t_s)
-
-    def _burst_chunk(self, t_s: float, message: Message) -> list[Message]:
-        """Take one of many answers to one request; their numbers run on, so only offsets tell them apart."""
-        if (
-            message.get_type() != "FILE_TRANSFER_PROTOCOL" or not self._party.is_from_target(message)
-            or not self._party.is_for_us(message)
-        ):
-            return []
-        packet = unpack(message.payload)
-        if packet.req_opcode != BURST_READ or packet.session != self._session:
-            return []
-        self._seq = packet.seq
-        if packet.opcode == NAK:
-            if self._error(packet) == _EOF:
-                return self._next(t_s)
-            return self._refused(packet)
-        self._chunks[packet.offset] = packet.data
-        self._retry.progress(t_s)
-        return self._next(t_s) if packet.burst_complete else []
-
-    def tick(self, t_s: float) -> list[Message]:
-        """Repeat, give up, or after a burst that stopped go on chunk by chunk."""
-        if self._request.opcode == BURST_READ and self._chunks:
-            return self._next(t_s)
-        return super().tick(t_s)
 
     def _next(self, t_s: float) -> list[Message]:
         """Ask for the first byte that is missing, or close."""

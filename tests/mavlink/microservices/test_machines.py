@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.errors import InputError
 from companion.mavlink.microservices.command import Party, Retransmission, TransferOutcome
-from companion.mavlink.microservices.ftp import FtpRead, FtpWrite, Packet, unpack
+from companion.mavlink.microservices.ftp import FtpWrite, Packet, unpack
 from companion.mavlink.microservices.mission import ListDownload, ListUpload
 from companion.mavlink.microservices.parameters import ALIASES, ParamList, names_of
 from companion.mavlink.signing import AHEAD_S, EPOCH_S, TICKS_PER_S, SigningStore, read_key
@@ -134,44 +134,6 @@ def test_a_download_over_a_bad_line_is_exact(seed):
     peer.talk(machine)
     assert machine.result.outcome is TransferOutcome.OK
     assert [i.lat_e7 for i in machine.result.items] == [i.lat_e7 for i in ITEMS]
-
-
-@pytest.mark.parametrize("lost", [set(), {3}, {0, 1, 5}, {9}])
-def test_a_burst_read_fills_its_gaps(lost):
-    data = bytes(random.Random(1).randbytes(2300))
-    machine = FtpRead(PARTY, "@PARAM/param.pck", seq=100, burst=True)
-
-    def message(packet):
-        raw = wire.MAVLink_file_transfer_protocol_message(0, 1, 191, packet.pack())
-        return Codec(1, 191).feed(Codec(1, 1).pack(raw))[0]
-
-    queue, sent_reads = machine.start(0.0), 0
-    for _ in range(100):
-        if machine.result is not None:
-            break
-        request = unpack(queue[0].payload)
-        seq, opcode = request.seq + 1, request.opcode
-        queue = []
-        if opcode == 4:
-            queue += machine.receive(0.1, message(Packet(seq, 2, 128, 4, opcode, 0, 0, b"\0\0\0\0")))
-        elif opcode == 15:
-            for i, at in enumerate(range(0, len(data), 239)):
-                if i not in lost:
-                    queue += machine.receive(0.2, message(Packet(
-                        seq + i, 2, 128, 0, 15, int(at + 239 >= len(data)), at, data[at:at + 239])))
-            if not queue:
-                queue = machine.tick(machine.wake_s)
-        elif opcode == 5:
-            sent_reads += 1
-            part = data[request.offset:request.offset + 239]
-            nak = Packet(seq, 2, 129, 0, 5, 0, 0, bytes([6]))
-            queue += machine.receive(0.3, message(
-                Packet(seq, 2, 128, 0, 5, 0, request.offset, part) if part else nak))
-        else:
-            queue += machine.receive(0.4, message(Packet(seq, 2, 128, 0, opcode)))
-    assert machine.result.outcome is TransferOutcome.OK
-    assert machine.result.data == data
-    assert sent_reads <= len(lost) + 1
 
 
 @pytest.mark.parametrize("error", [1, 5])

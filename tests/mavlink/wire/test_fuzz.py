@@ -51,7 +51,6 @@ def machines():
         ListUpload(PARTY, kind, ITEMS), ListUpload(PARTY, kind, ITEMS, first=2, partial=True),
         ListDownload(PARTY, kind), ListClear(PARTY, kind), CommandSend(PARTY, 1, ()), ParamRead(PARTY, ["A"]),
         ParamSet(PARTY, "A", 1.0), ParamList(PARTY), FtpWrite(PARTY, "x", b"y" * 500), FtpRead(PARTY, "x"),
-        FtpRead(PARTY, "x", burst=True),
     ]
 
 
