@@ -27,6 +27,7 @@ from companion.view.values import Level, compass
 from companion.words import counted
 
 LOUD = Severity.INFO
+LEAST_RISK = 0.001      # a smaller chance is not worth a line
 Facts = tuple[tuple[str, str], ...]
 
 
@@ -81,7 +82,7 @@ def happenings(step: Step, phase: str, why: dict[int, str]) -> Iterable[Happenin
         yield Happening(kind="phase", title=step.state.phase.value, text=step.state.why, level="notice")
     for action in step.actions:
         if isinstance(action, RequestPlan):
-            yield Happening(kind="ask", title=f"plan asked for: {action.reason.value.replace('_', ' ')}",
+            yield Happening(kind="ask", title=f"plan asked for: {action.reason.words}",
                             text=action.text, facts=_facts(action))
         elif isinstance(action, UploadMission):
             facts = [("items", str(len(action.items)))]
@@ -127,9 +128,9 @@ def _plan(outcome: PlanOutcome, why: str) -> Happening:
     if tacks:
         facts.append(("tacks", str(tacks)))
     if plan.risk is not None:
-        facts.append(("risk of the whole way", f"{100.0 * plan.risk:.0f} %"))
-    if plan.tack_risk:
-        facts.append(("of tacks that fail", f"{100.0 * plan.tack_risk:.2g} %"))
+        facts.append(("off the plan", f"{100.0 * plan.risk:.0f} %"))
+    if plan.tack_risk >= LEAST_RISK:
+        facts.append(("of it by tacks that fail", f"{100.0 * plan.tack_risk:.1f} %"))
     if plan.expected_clearance_m is not None:
         facts.append(("clearance expected", f"{plan.expected_clearance_m:.1f} m"))
     clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]

@@ -418,7 +418,7 @@ def _name(ctx: StepContext) -> None:
         return
     step = f" ({route.rung})" if route.rung else ""
     if state.pending.plan is not None:
-        ctx.phase(Phase.NEW_CALCULATION, f"planning: {state.pending.plan.reason.value}")
+        ctx.phase(Phase.NEW_CALCULATION, f"planning: {state.pending.plan.reason.words}")
         return
     raised = ", ".join(r.name for r in state.alarms.raised)
     tail = (f"; {state.progress.task}" if state.progress.task else "") + (f"; {raised}" if raised else "")

@@ -168,7 +168,7 @@ def _keep_old(ctx: StepContext, pending: PendingPlan, plan: Plan) -> bool:
     )))
     ctx.say(
         Severity.INFO, "plan kept",
-        f"{pending.reason.value}: the old plan stays ({old.time_s:.0f} s; a new one gains {max(0.0, gain):.1f} s)",
+        f"{pending.reason.words}: the old plan stays ({old.time_s:.0f} s; a new one gains {max(0.0, gain):.1f} s)",
         every_s=0.0,
     )
     return True
@@ -216,7 +216,7 @@ def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, 
                 ctx.state.mission,
                 route=replace(
                     route, items=ctx.state.mission.route.items, points_en_m=ctx.state.mission.route.points_en_m)))
-        ctx.say(Severity.INFO, "plan kept", f"{pending.reason.value}: the new plan is the old one", every_s=0.0)
+        ctx.say(Severity.INFO, "plan kept", f"{pending.reason.words}: the new plan is the old one", every_s=0.0)
         return ""
     way = route.points_en_m[ctx.state.mission.index if set_current is None else set_current - 1:-1]
     met = meetings(ctx)
@@ -225,7 +225,7 @@ def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, 
     _look_at_time(ctx, route)
     clear = said(expected_m, ctx.config.margin_floor_m)
     return upload(
-        ctx, route, set_current, f"{pending.reason.value}: {facts.why}{clear}", change=change, planned=pending)
+        ctx, route, set_current, f"{pending.reason.words}: {facts.why}{clear}", change=change, planned=pending)
 
 
 def _gybed_round(ctx: StepContext, pending: PendingPlan, start: PointEn, points: list[PointEn]) -> tuple[PointEn, ...]:

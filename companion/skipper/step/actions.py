@@ -34,6 +34,11 @@ class ReplanReason(enum.Enum):
     RETRY = "retry"                    # a step of the ladder after nothing was found
     MISMATCH = "mismatch"              # the mission on the autopilot is not the one that was uploaded
 
+    @property
+    def words(self) -> str:
+        """Return it as it is said."""
+        return self.value.replace("_", " ")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RequestPlan:
