@@ -505,11 +505,17 @@ def plan_of(
         median_s=rounded(route.median_s, 0), late_s=rounded(route.late_s, 0),
         there_s=rounded(eta.there_s, 0), there_late_s=rounded(eta.there_late_s, 0),
         expected_clearance_m=rounded(route.expected_clearance_m, 1),
-        bound_s=None if chosen is None else rounded(chosen.plan.lower_bound_s, 1), replans=state.plans.replans,
+        bound_s=_bound_s(route, chosen), replans=state.plans.replans,
         next_tack_s=None if tack is None else rounded(tack.in_s, 0),
         next_tack_is_planned=None if tack is None else tack.is_planned,
         leg=min(begin + 1, count) if count else None, count=count,
         legs=left)
+
+
+def _bound_s(route: Route, chosen: Chosen | None) -> float | None:
+    """Return what no plan is faster than [s]; None: it is not known of what is left of a plan that was kept."""
+    is_whole = chosen is not None and route.cost_s == chosen.plan.cost_s
+    return rounded(chosen.plan.lower_bound_s, 1) if chosen is not None and is_whole else None
 
 
 def _risk_left(route: Route, left: tuple[values.LegView, ...]) -> float | None:

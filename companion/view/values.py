@@ -264,7 +264,10 @@ class LegView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanView:
-    """The plan that is sailed: ``legs`` from the one that is next; what was promised, why it was chosen."""
+    """The plan that is sailed: ``legs`` from the one that is next; what was promised, why it was chosen.
+
+    ``age_s``: since it was made, or held against a new one and kept; its wind and its times are of then.
+    """
 
     number: int | None = None
     age_s: float | None = None
@@ -272,7 +275,7 @@ class PlanView:
     why: str = ""
     rung: str = ""                       # the step of the ladder on which it was found; empty: as configured
     bound_for: str = ""
-    twd_from_deg: float | None = None    # the wind that it was made for
+    twd_from_deg: float | None = None    # the wind that it was judged in
     tws_mps: float | None = None
     delta_s: float | None = None
     promised_risk: float | None = None   # at each instant
@@ -280,12 +283,12 @@ class PlanView:
     vessel_risk: float | None = None
     margin_m: float | None = None
     cost_s: float | None = None
-    median_s: float | None = None        # from the plan's start to its end, in half the winds of the spread ...
+    median_s: float | None = None        # from there to the plan's end, in half the winds of the spread ...
     late_s: float | None = None          # ... and in nine of ten
     there_s: float | None = None         # from now until the next goal is reached, at the pace that the boat keeps ...
     there_late_s: float | None = None    # ... and in nine cases of ten
     expected_clearance_m: float | None = None   # of the hull on the track that is expected
-    bound_s: float | None = None         # no plan is faster than that
+    bound_s: float | None = None         # no plan is faster than that; None of a plan that was kept
     replans: int | None = None
     next_tack_s: float | None = None
     next_tack_is_planned: bool | None = None    # by the plan; False: the autopilot's own, where its corridor ends

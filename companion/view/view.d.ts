@@ -244,6 +244,8 @@ export interface Place {
 
 /**
  * The plan that is sailed: ``legs`` from the one that is next; what was promised, why it was chosen.
+ *
+ *     ``age_s``: since it was made, or held against a new one and kept; its wind and its times are of then.
  */
 export interface Plan {
   number: number | null;

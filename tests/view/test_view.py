@@ -14,10 +14,10 @@ from bench.pages import schema
 from companion.fold import Step
 from companion.geo.angles import difference_rad
 from companion.messages import CompanionStatus, GeoPoint, VehicleState, WindForecast
-from companion.skipper.step import SkipperConfig, SkipperState, Snapshot, WindEstimate, WindHealth
+from companion.skipper.step import PlanOutcome, SkipperConfig, SkipperState, Snapshot, WindEstimate, WindHealth
 from companion.telemetry.folder import TLOG, VoyageFigures
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
-from companion.view.parts import _risk_left, apparent, laylines_of, no_go_of
+from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of
 from tests.view.conftest import write_mission
 
 RULES = {name: jsonschema.Draft202012Validator({**schema(), "$ref": f"#/$defs/{name}"})
@@ -49,6 +49,20 @@ def test_the_chance_of_being_forced_off_the_plan_is_what_its_legs_add_up_to(beat
     for view in beat.under_way:
         known = [leg.risk for leg in view.plan.legs if leg.risk is not None]
         assert view.plan.path_risk is None or view.plan.path_risk >= max(known, default=0.0) - 1e-9
+
+
+def test_the_bound_of_a_plan_is_not_told_of_what_is_left_of_it(beat):
+    """A plan that was kept was told to take 2:17, "no less than 3:07": the bound was of the whole way."""
+    view, step = next((view, step) for view, step in zip(beat.views, beat.steps, strict=True)
+                      if view.plan is not None and view.plan.bound_s)
+    route = step.state.mission.route
+    plan = next(o.plan for s in beat.steps for o in s.snapshot.outcomes
+                if isinstance(o, PlanOutcome) and o.request_id == route.plan_id and o.plan is not None)
+    chosen = Chosen(t_s=0.0, reason="start", plan=plan)
+    assert _bound_s(replace(route, cost_s=plan.cost_s), chosen) == pytest.approx(plan.lower_bound_s, abs=0.06)
+    assert _bound_s(replace(route, cost_s=plan.cost_s - 20.0), chosen) is None
+    for view in beat.under_way:
+        assert view.plan.bound_s is None or view.plan.cost_s >= view.plan.bound_s - 0.1
 
 
 def test_a_tack_that_the_autopilot_makes_by_itself_is_told_as_such(beat):

@@ -1,6 +1,6 @@
 // The wind dial: the boat's bow up, the wind on it, where she cannot sail now and later, the laylines, the shifts lately.
 import { picture, svg } from "./dom.js";
-import { bearing, bearingUnit, speed, speedUnit, units } from "./format.js";
+import { bearing, bearingUnit, NONE, speed, speedUnit, units } from "./format.js";
 import { onDial, path, sector, wrap } from "./geometry.js";
 
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Past} Past */
@@ -70,7 +70,7 @@ function arrow(at, letter, kind, radius) {
 function corner(x, y, anchor, name, value, unit) {
   const top = y < 0;
   return [svg("text", { x, y: top ? y - 4 : y + 14, class: "cornername", "text-anchor": anchor }, name),
-    svg("text", { x, y: top ? y + 20 : y - 3, class: "cornervalue", "text-anchor": anchor }, value + (unit ? ` ${unit}` : ""))];
+    svg("text", { x, y: top ? y + 20 : y - 3, class: "cornervalue", "text-anchor": anchor }, value + (unit && value !== NONE ? ` ${unit}` : ""))];
 }
 
 /** Where the wind was lately: dots that fade, and the arc between its limits. @param {View | null} view @param {Past | null} past @param {number} up */

@@ -59,6 +59,6 @@ export function say(id, text) {
 export function table(caption, head, rows) {
   return el("table", {}, el("caption", {}, caption),
     el("thead", {}, el("tr", {}, ...head.map((text) => el("th", { scope: "col" }, text)))),
-    el("tbody", {}, ...rows.map((row) => el("tr", {}, ...row.map((cell, n) =>
+    el("tbody", {}, ...rows.length === 0 ? [el("tr", {}, el("th", { scope: "row", colspan: String(head.length) }, "none"))] : rows.map((row) => el("tr", {}, ...row.map((cell, n) =>
       n === 0 ? el("th", { scope: "row" }, cell) : el("td", {}, cell))))));
 }

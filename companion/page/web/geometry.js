@@ -157,6 +157,16 @@ export function marks(low, high, most, steps = [1, 2, 5]) {
   return out;
 }
 
+/** Times to be marked on an axis: those of the clock that are round in it [s]. @param {number} begin @param {number} end @param {number} most @param {number | null} unix_s of the time 0; null: the voyage's own time is the clock */
+export function minutes(begin, end, most, unix_s) {
+  const off = unix_s ?? 0, from = (begin + off) / 60, until = (end + off) / 60;
+  const [first, second] = marks(0, until - from, most);
+  const every = Math.max(1, (second ?? 1) - (first ?? 0));
+  const out = [];
+  for (let at = Math.ceil(from / every) * every; at <= until; at += every) out.push(60 * at - off);
+  return out;
+}
+
 /** A scale bar: a round length and its pixels, at most so wide. @param {number} scale px a metre @param {number} most px */
 export function scaleBar(scale, most) {
   const longest = most / scale;

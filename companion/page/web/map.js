@@ -374,7 +374,7 @@ function places(view, at) {
     let line = y;
     while (taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - line) < 12)) line += 12;
     taken.push([x, line]);
-    const isCut = x + 7 * text.length > camera.width;
+    const isCut = x + 8 * text.length > camera.width;
     children.push(svg("text", { x: isCut ? x - 18 : x, y: line, class: `word ${kind}`, "text-anchor": isCut ? "end" : "start" }, text));
   }
   state.area?.names?.forEach((name, n) => {
@@ -454,7 +454,7 @@ function furniture(view, wind) {
   ];
   if (wind !== null) {
     children.push(svg("g", { transform: `translate(${camera.width - 72} 34) rotate(${wind - camera.up})`, class: "windarrow" }, svg("path", { d: "M0 18V-10M-5 8L0 18L5 8" })),
-      svg("text", { x: camera.width - 72, y: 68, "text-anchor": "middle", class: "word wind" }, bearing(view?.wind?.mean_twd_from_deg ?? wind)));
+      svg("text", { x: camera.width - 72, y: 68, "text-anchor": "middle", class: "word wind" }, view?.wind?.mean_twd_from_deg == null ? bearing(wind) : `mean ${bearing(view.wind.mean_twd_from_deg)}`));
   }
   fill("furniture", children);
 }

@@ -60,6 +60,8 @@ function alarms(view) {
 
 const THERE = "The time until the next goal is reached, at the pace that the boat has lately kept; in nine cases of ten it is there by the second figure.";
 const TACK = "By the plan; 'about' is the autopilot's own, on a leg that it beats: when that comes goes with the wind.";
+const JUDGED = "When the plan was made, or last held against a new one and kept: wind and times beside it are of then.";
+const BEAT = "A beat: the autopilot tacks by itself along this line, so the line may lie in the no-go zone.";
 const OFF_PLAN = "The chance that the boat is forced off the plan before the next goal: that the wind makes it tack or bear away unplanned, or that a vessel comes too near.";
 
 /** @param {string} name @param {string} value @param {string} unit @param {string} [kind] @param {string} [hint] */
@@ -94,9 +96,9 @@ function plan(view) {
   const p = view?.plan;
   say("planwhy", p ? p.why || "The plan in force gives no reason." : view ? "There is no plan." : "");
   const facts = !p ? [] : [
-    ["plan", `${p.number ?? NONE}${p.reason ? `, for ${p.reason.replaceAll("_", " ")}` : ""}`], ["age", duration(p.age_s)],
-    ["made for", p.twd_from_deg === null ? NONE : `${bearing(p.twd_from_deg)} ${speed(p.tws_mps)} ${speedUnit()}`],
-    ["time", p.cost_s === null ? NONE : `${duration(p.cost_s)}${p.bound_s ? `, no less than ${duration(p.bound_s)}` : ""}`],
+    ["plan", `${p.number ?? NONE}${p.reason ? `, for ${p.reason.replaceAll("_", " ")}` : ""}`], ["judged", p.age_s === null ? NONE : `${duration(p.age_s)} ago`, JUDGED],
+    ["in a wind of", p.twd_from_deg === null ? NONE : `${bearing(p.twd_from_deg)} ${speed(p.tws_mps)} ${speedUnit()}`],
+    ["time from then", p.cost_s === null ? NONE : `${duration(p.cost_s)}${p.bound_s ? `, no less than ${duration(p.bound_s)}` : ""}`],
     ["in the wind's spread", p.median_s === null ? NONE : `${duration(p.median_s)}, nine of ten ${p.late_s === null ? "not in any time" : duration(p.late_s)}`],
     ["there in", p.there_s === null ? NONE : `${duration(p.there_s)}, nine of ten ${duration(p.there_late_s)}`, THERE], ["off the plan", percent(p.path_risk), OFF_PLAN],
     ["margin", distance(p.margin_m)], ["clearance expected", distance(p.expected_clearance_m)], ["leg", `${p.leg ?? NONE} of ${p.count ?? NONE}`],
@@ -105,8 +107,8 @@ function plan(view) {
   const legs = p?.legs ?? [];
   const first = p?.leg ?? 1;
   keep("plantable", table("Legs that are left; spare: nearest beyond the margin", ["leg", "off plan", "course", "TWA", "length", "no-go", "spare"], legs.map((leg, n) => [
-    `${first + n}${leg.is_loiter ? " loiter" : leg.manoeuvre ? ` ${leg.manoeuvre}` : leg.is_beat ? " beat" : ""}`, el("span", { class: `risk r${riskClass(leg.risk)}` }, percent(leg.risk)),
-    bearing(leg.course_deg), atBow(leg.twa_deg), leg.is_loiter ? NONE : distance(leg.length_m), figure(leg.no_go_half_deg, 0, "°"), distance(leg.clearance_m)])));
+    leg.is_loiter ? `${first + n} loiter` : el("span", leg.is_beat ? { title: BEAT } : {}, `${first + n} ${[leg.manoeuvre, leg.is_beat ? "beat" : ""].filter(Boolean).join(", ")}`), el("span", { class: `risk r${riskClass(leg.risk)}` }, percent(leg.risk)),
+    bearing(leg.course_deg), atBow(leg.twa_deg), leg.is_loiter ? NONE : distance(leg.length_m), leg.is_beat ? NONE : figure(leg.no_go_half_deg, 0, "°"), distance(leg.clearance_m)])));
 }
 
 /** Replace a table without moving who reads it. @param {string} id @param {Element} content */

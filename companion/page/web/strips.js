@@ -1,7 +1,7 @@
 // Histories: direction, strength, speed, clearance; with what was forecast a minute before, and what is forecast now.
 import { picture, svg } from "./dom.js";
 import { bearing, clock, distance, scaled, speed, speedUnit } from "./format.js";
-import { marks, path, unwrapped, wrap } from "./geometry.js";
+import { marks, minutes, path, unwrapped, wrap } from "./geometry.js";
 
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Past} Past @typedef {import("./geometry.js").Point} Point */
 /** @typedef {{name: string, unit: string, values: (number | null)[], low: (number | null)[], high: (number | null)[], ahead: [number, number, number][], other: [number, number][], label: (v: number) => string, now: string, least: number, line: number | null, floor: number | null, steps: number[]}} Strip */
@@ -34,11 +34,10 @@ export function show(view, past, margin, other = null) {
   const t = cut(past.t_s);
   const x = (/** @type {number} */ at) => LEFT + (width - LEFT - RIGHT) * (at - begin) / Math.max(1, end - begin);
   const children = [];
-  const every = Math.max(60, marks(0, (end - begin) / 60, Math.max(2, Math.floor(width / 130)), [1, 2, 5])[1] ?? 1) && 60 * (marks(0, (end - begin) / 60, Math.max(2, Math.floor(width / 130)), [1, 2, 5])[1] ?? 1);
   const bottom = TOP + 4 * (TALL + GAP) - GAP;
-  for (let at = Math.ceil(begin / every) * every; at <= end; at += every) {
+  for (const at of minutes(begin, end, Math.max(2, Math.floor(width / 130)), past.unix_s)) {
     children.push(svg("path", { class: "grid", d: path([[x(at), TOP], [x(at), bottom]]) }),
-      svg("text", { x: x(at), y: bottom + 15, class: "axis middle" }, past.unix_s === null ? clock(null, at) : clock(past.unix_s + at).slice(0, 5)));
+      svg("text", { x: x(at), y: bottom + 15, class: "axis middle" }, past.unix_s === null ? clock(null, at) : clock(Math.round(past.unix_s + at)).slice(0, 5)));
   }
   for (const [n, strip] of strips(view, past, cut, now, margin).entries()) {
     if (other) {

@@ -56,6 +56,17 @@ test("marks are round, within, and not too many", () => {
   }
 });
 
+test("a time on the axis is where the clock says it", () => {
+  for (const unix of [1780913597.4, 1780913640, null]) {
+    for (const [begin, end] of [[0, 95], [12.5, 700], [3600, 90000]]) {
+      const at = g.minutes(begin, end, 5, unix);
+      assert.ok(at.length >= 1 && at.length <= 6 && at.every((t) => t >= begin && t <= end), String(at));
+      // what is written beside it is cut to minutes: nothing may be cut
+      for (const t of at) near(Math.round((unix ?? 0) + t) % 60, 0);
+    }
+  }
+});
+
 test("a leg's risk has three classes, and unknown is none of them", () => {
   assert.deepEqual([0, 0.019, 0.02, 0.099, 0.1, null].map(g.riskClass), ["0", "0", "1", "1", "2", "unknown"]);
 });
