@@ -1,7 +1,7 @@
 """Where the boat will be, and when it is there: the present wind, and the pace that it keeps.
 
 The boat is walked along the legs that are left as the autopilot steers: straight to a waypoint where that can be
-sailed, else close-hauled within its corridor, at its polar's speed, with the time that turns take. ``Pace`` is what it
+sailed, else close-hauled within its corridor, at its polar's speed, with the time that tacks lose. ``Pace`` is what it
 has lately made of such walks: a boat that is slower than its polar, or loses more in its tacks, is there later.
 """
 
@@ -27,7 +27,7 @@ STEP_S = 5.0          # of a walk
 REACH_S = 900.0       # walked so far in steps; the legs beyond that are taken whole
 WIND_S = 30.0         # the wind is taken to be one for so long
 SLOW_MPS = 0.2        # the least that it is taken to make
-TURN_RAD = math.radians(15.0)   # a smaller turn costs nothing
+SHARPEST_RAD = math.radians(150.0)   # a turn that is sharper cuts no more of its corner
 LOOK_S = 30.0         # a walk to the end of the leg that is sailed then is held against what comes ...
 TRIED_S = 20.0        # ... after so long
 KEPT = math.exp(-TRIED_S / 150.0)   # of a try's weight with each that follows: they count for two and a half minutes
@@ -271,7 +271,7 @@ class _Walker:
         self.is_starboard = difference_rad(self._twd_rad, heading_rad) > 0.0   # the wind is to the right of the bow
 
     def steer(self, time_s: float, at: PointEn, start: PointEn, end: PointEn) -> tuple[PointEn, float]:
-        """Return the velocity over ground [m/s] from ``at`` along the leg, and what the turn to it takes [s]."""
+        """Return the velocity over ground [m/s] from ``at`` along the leg, and what a tack or gybe to it loses [s]."""
         wind = self._winds[min(int(time_s / WIND_S), len(self._winds) - 1)]
         self._twd_rad, self._tws_mps = over_water(*wind, self._current)
         was_starboard = self.is_starboard
@@ -286,11 +286,16 @@ class _Walker:
             velocity_en = self._along(course_rad, off_rad)
         turn_rad = abs(difference_rad(course_rad, self._heading_rad))
         self._heading_rad = course_rad
-        lost_s = turn_rad / self._boat.turn_rate_radps if turn_rad > TURN_RAD else 0.0
-        if was_starboard != self.is_starboard:
-            is_tack = abs(difference_rad(self._twd_rad, course_rad)) < math.pi / 2.0
-            lost_s += self._boat.tack_loss_s if is_tack else self._boat.gybe_loss_s
-        return velocity_en, lost_s
+        if was_starboard == self.is_starboard:
+            return velocity_en, 0.0
+        is_tack = abs(difference_rad(self._twd_rad, course_rad)) < math.pi / 2.0
+        loss_s = self._boat.tack_loss_s if is_tack else self._boat.gybe_loss_s
+        return velocity_en, max(0.0, loss_s - self._cut_s(turn_rad))
+
+    def _cut_s(self, turn_rad: float) -> float:
+        """Return what a turn saves against its corner [s]: a boat that turns keeps her way, and sails an arc."""
+        half_rad = 0.5 * min(turn_rad, SHARPEST_RAD)
+        return 2.0 * (math.tan(half_rad) - half_rad) / self._boat.turn_rate_radps
 
     def whole_s(self, at: PointEn, end: PointEn) -> float:
         """Return how long the way to ``end`` takes, beaten where it asks for that [s]."""

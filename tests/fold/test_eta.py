@@ -1,13 +1,15 @@
 """Where the boat will be and when it is there: what is told held against what came."""
 
+import math
 import statistics
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from companion.boat import AutopilotLimits, Boat, ardurover_sitl
 from companion.clock import run_virtual
-from companion.eta import PRIOR_PACE, TRIED_S, PaceTrial
+from companion.eta import PRIOR_PACE, TRIED_S, PaceTrial, _Walker
 from companion.messages import Mode
 from companion.skipper.step import Announce
 from sitl.run.embedded import run_embedded
@@ -90,6 +92,21 @@ def test_a_boat_that_is_not_its_polars_is_there_when_it_is(share):
     assert pace.left_s(100.0) == pytest.approx(100.0 / share, rel=0.1)
     barely = replace(pace, prior=0.0, tries=2.0, took_s=40.0, made_s=40.0 * pace.share)
     assert pace.left_s(100.0) < pace.late_s(100.0, 0.0) < pace.late_s(100.0, 0.2) < barely.late_s(100.0, 0.2)
+
+
+def test_a_boat_that_turns_keeps_her_way():
+    """Each tack stood still for its turn and its loss: 7 s, 40 s too many in a beat of six tacks."""
+    boat = Boat(polar=ardurover_sitl(), turn_rate_radps=math.radians(30.0), tack_loss_s=4.0, gybe_loss_s=2.0)
+    limits = AutopilotLimits(sail_no_go_angle_rad=math.radians(45.0), sail_xtrack_max_m=0.0)
+
+    def lost(heading_deg, to_deg):
+        walker = _Walker(((0.0, 5.0),), (0.0, 0.0), boat, limits, heading_rad=math.radians(heading_deg))
+        end = (100.0 * math.sin(math.radians(to_deg)), 100.0 * math.cos(math.radians(to_deg)))
+        return walker.steer(0.0, (0.0, 0.0), (0.0, 0.0), end)[1]
+
+    assert lost(-50.0, -120.0) == 0.0                            # a turn alone
+    assert lost(-50.0, 50.0) == pytest.approx(2.78, abs=0.05)    # the arc is 1.2 s shorter than the corner
+    assert lost(-155.0, 155.0) == pytest.approx(1.88, abs=0.05)
 
 
 def test_a_walk_on_another_plan_or_after_a_pause_tells_nothing():
