@@ -31,11 +31,11 @@ SHARPEST_RAD = math.radians(150.0)   # a turn that is sharper cuts no more of it
 LOOK_S = 30.0         # a walk to the end of the leg that is sailed then is held against what comes ...
 TRIED_S = 20.0        # ... after so long
 KEPT = math.exp(-TRIED_S / 150.0)   # of a try's weight with each that follows: they count for two and a half minutes
-PRIOR = 3.0           # tries that the polar counts as at first
+PRIOR = 1.5           # tries that the polar counts as at first
 SLOWEST, FASTEST = 0.25, 1.6    # of the polar: what is outside says something else than how fast it sails
-PACE_SPREAD = 0.25    # standard deviation of what TRIED_S of sailing make of a walk
-HERE_M, STRAYS = 2.5, 0.45   # nine boats in ten are within so much of a place, and of the way to it (sitl shown)
-LATE_LEAST_S = 2.0    # ... and of any time
+SPREAD, SPREAD_TRIES = 0.15, 2.0   # standard deviation of what tries make of a walk, and how many it counts as at first
+HERE_M, STRAYS = 2.5, 2.0   # nine in ten are within so much of a place, and of the pace's doubt of the way (sitl shown)
+LATE_LEAST_S = 1.0    # standard deviation of any time
 LATE_SIGMAS = 1.28    # of a normal: nine in ten are below
 
 
@@ -68,13 +68,15 @@ class Pace:
     """How much of a walk the boat makes good: of the last minutes, in tries of ``TRIED_S``.
 
     ``tries`` is how many it rests on, the older the less, ``took_s`` what they took and ``made_s`` by how much less was
-    then left to be walked; ``prior`` is what the polar counts beside them, and ``tried`` the walk that is being sailed.
+    then left to be walked; ``scatter`` is the sum of the squares by which each was off the pace before it. ``prior`` is
+    what the polar counts beside them, and ``tried`` the walk that is being sailed.
     """
 
     tries: float = 0.0
     prior: float = PRIOR
     took_s: float = 0.0
     made_s: float = 0.0
+    scatter: float = 0.0
     tried: PaceTrial | None = None
 
     @property
@@ -83,6 +85,19 @@ class Pace:
         prior_s = self.prior * TRIED_S
         return 1.0 if self.tries == 0.0 else min(
             max((self.made_s + prior_s) / (self.took_s + prior_s), SLOWEST), FASTEST)
+
+    @property
+    def spread(self) -> float:
+        """Return the standard deviation of what a try makes of its walk, as the last ones show it."""
+        return math.sqrt((SPREAD_TRIES * SPREAD * SPREAD + self.scatter) / (SPREAD_TRIES + self.tries))
+
+    @property
+    def doubt(self) -> float:
+        """Return how far off the pace may be in what comes.
+
+        A boat that is not its polar's on this course is not on the next, by another share.
+        """
+        return math.hypot(self.spread, 1.0 - self.share)
 
     def is_due(self, t_s: float, plan_id: int) -> bool:
         """Return whether a walk is to be begun: the last one is over, or was of another plan."""
@@ -96,8 +111,10 @@ class Pace:
         tried, after = self.tried, replace(self, tried=fresh)
         if tried is None or left_s is None or t_s - tried.t_s > 1.5 * TRIED_S:
             return after
+        took_s, made_s = t_s - tried.t_s, tried.walk_s - left_s
         return replace(after, tries=KEPT * self.tries + 1.0, prior=KEPT * self.prior,
-                       took_s=KEPT * self.took_s + t_s - tried.t_s, made_s=KEPT * self.made_s + tried.walk_s - left_s)
+                       took_s=KEPT * self.took_s + took_s, made_s=KEPT * self.made_s + made_s,
+                       scatter=KEPT * self.scatter + (made_s / took_s - self.share) ** 2)
 
     def left_s(self, walk_s: float) -> float:
         """Return how long a walk of ``walk_s`` will take [s]: half of the boats are there."""
@@ -109,8 +126,8 @@ class Pace:
         What is not known of the pace itself goes with the time, what tacks and gusts do with its root.
         """
         time_s = self.left_s(walk_s)
-        each = PACE_SPREAD / self.share
-        known = each / math.sqrt(max(1.0, self.tries + self.prior))
+        each = self.spread / self.share
+        known = math.hypot(each / math.sqrt(max(1.0, self.tries + self.prior)), 1.0 - self.share)
         sigma_s = math.hypot(time_s * math.hypot(spread, known), each * math.sqrt(TRIED_S * time_s), LATE_LEAST_S)
         return time_s + LATE_SIGMAS * sigma_s
 
@@ -140,7 +157,8 @@ def eta_of(snapshot: Snapshot, state: SkipperState, voyage: Voyage, pace: Pace) 
         return UNKNOWN
     way_m = itertools.accumulate(
         (math.dist(a.at_en_m, b.at_en_m) for a, b in itertools.pairwise(walk.points)), initial=0.0)
-    points = tuple(replace(p, in_s=round(pace.left_s(p.in_s), 1), within_m=HERE_M + STRAYS * so_far_m)
+    strays = STRAYS * pace.doubt
+    points = tuple(replace(p, in_s=round(pace.left_s(p.in_s), 1), within_m=HERE_M + strays * so_far_m)
                    for p, so_far_m in zip(walk.points, way_m, strict=True))
     if walk.goal_s is None:
         return Eta(points=points)

@@ -94,6 +94,24 @@ def test_a_boat_that_is_not_its_polars_is_there_when_it_is(share):
     assert pace.left_s(100.0) < pace.late_s(100.0, 0.0) < pace.late_s(100.0, 0.2) < barely.late_s(100.0, 0.2)
 
 
+def test_within_two_minutes_a_boat_that_is_slower_is_told_so_and_doubted():
+    slow, fit = paced(0.8, seconds=120.0), paced(1.0, seconds=120.0)
+    assert slow.share == pytest.approx(0.8, abs=0.05)
+    assert slow.doubt > 1.4 * fit.doubt
+    assert slow.late_s(100.0 * slow.share, 0.0) > fit.late_s(100.0, 0.0) + 5.0   # the same time, and less sure
+
+
+def test_what_tries_scatter_widens_what_is_told():
+    even, uneven = PRIOR_PACE, PRIOR_PACE
+    for n in range(8):
+        trial = PaceTrial(t_s=0.0, plan_id=1, until=0, winds=(), walk_s=100.0)
+        even = replace(even, tried=trial).seen(TRIED_S, 100.0 - TRIED_S, None)
+        uneven = replace(uneven, tried=trial).seen(TRIED_S, 100.0 - TRIED_S * (1.4 if n % 2 else 0.6), None)
+    assert even.spread < 0.1 < 0.3 < uneven.spread
+    assert uneven.share == pytest.approx(1.0, abs=0.1)
+    assert uneven.late_s(100.0, 0.0) - 100.0 / uneven.share > 2.0 * (even.late_s(100.0, 0.0) - 100.0)
+
+
 def test_a_boat_that_turns_keeps_her_way():
     """Each tack stood still for its turn and its loss: 7 s, 40 s too many in a beat of six tacks."""
     boat = Boat(polar=ardurover_sitl(), turn_rate_radps=math.radians(30.0), tack_loss_s=4.0, gybe_loss_s=2.0)
