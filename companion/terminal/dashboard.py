@@ -373,9 +373,7 @@ def _power(view: View) -> Row:
 
 def _speeds(view: View, *, knots: bool) -> Row:
     boat, polar = view.boat, view.polar
-    twa_deg = None if view.wind is None else view.wind.twa_deg
-    target = None if polar is None or twa_deg is None else polar.at_mps(twa_deg)
-    ratio = boat.sog_mps / target if target and boat.sog_mps is not None else None
+    ratio = None if polar is None else polar.live_share()
     heel = "" if boat.roll_deg is None else f", heel {abs(boat.roll_deg):.0f}°{'S' if boat.roll_deg > 0.0 else 'P'}"
     return "VMG", (f"{speed_text(boat.vmg_mps, knots=knots)} {unit_text(knots=knots)}"
                    f"{'' if ratio is None else f', polar {share_text(ratio)}'}{heel}"), Style.PLAIN

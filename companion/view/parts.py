@@ -443,15 +443,18 @@ def _meets_s(here: PointEn, vehicle: VehicleState, mark_en: PointEn, course_rad:
 
 
 def polar_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.PolarView | None:
-    """Return the polar in the present wind with the boat's point; None without a wind."""
+    """Return the polar in the present wind with the boat's point, both over the water; None without a wind."""
     wind, vehicle = step.snapshot.wind, step.snapshot.vehicle
     tws_mps = wind.mean_tws_mps if wind.mean_tws_mps is not None else wind.present_tws_mps
     if tws_mps is None:
         return None
     polar = voyage.boat.polar
-    angles, speeds = polar.curve(tws_mps)
     no_go_rad = planned_no_go_rad(config, voyage, step.snapshot.limits)
     twd_rad = wind.present_twd_from_rad
+    current = step.snapshot.current.planned_en_mps
+    if twd_rad is not None:
+        twd_rad, tws_mps = over_water(twd_rad, tws_mps, current)
+    angles, speeds = polar.curve(tws_mps)
     beat, run = best_angles(voyage.boat, round(tws_mps, 1), no_go_rad)
     has_way = vehicle is not None and twd_rad is not None
     return values.PolarView(
@@ -460,7 +463,8 @@ def polar_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.PolarV
         beat_deg=degrees(beat), run_deg=degrees(run),
         live_twa_deg=signed(difference_rad(twd_rad, vehicle.heading_rad))
         if has_way and vehicle is not None and twd_rad is not None else None,
-        live_mps=rounded(vehicle.speed_mps) if vehicle is not None else None)
+        live_mps=None if vehicle is None else rounded(math.hypot(
+            *(v - c for v, c in zip(vehicle.velocity_en_mps, current, strict=True)))))
 
 
 def _at(forecast: WindForecast, at_s: float, name: str) -> float:

@@ -117,9 +117,15 @@ class Laylines:
     lines: tuple[Layline, ...] = ()
 
 
+CARRIES_DEG = 8.0     # so much closer to the wind than her best angle a boat sails by the way that she has
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolarView:
-    """The speed by true wind angle in the wind of ``tws_mps``: nodes, linear between; best angles; the boat on it."""
+    """The speed by true wind angle in the wind of ``tws_mps``: nodes, linear between; best angles; the boat on it.
+
+    All of it over the water, in the current that is planned with.
+    """
 
     name: str
     tws_mps: float
@@ -137,6 +143,14 @@ class PolarView:
             if low <= angle <= high and high > low:
                 return slow + (fast - slow) * (angle - low) / (high - low)
         return None
+
+    def live_share(self) -> float | None:
+        """Return what the boat makes of it, as a share; None close to the wind, where she carries her way."""
+        if self.live_twa_deg is None or self.live_mps is None:
+            return None
+        target = self.at_mps(self.live_twa_deg)
+        is_told = target is not None and target > 0.1 and abs(self.live_twa_deg) > (self.beat_deg or 0.0) - CARRIES_DEG
+        return self.live_mps / target if is_told and target is not None else None
 
 
 def metres(value_m: float) -> float:

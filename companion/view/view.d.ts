@@ -278,6 +278,8 @@ export interface Plan {
 
 /**
  * The speed by true wind angle in the wind of ``tws_mps``: nodes, linear between; best angles; the boat on it.
+ *
+ *     All of it over the water, in the current that is planned with.
  */
 export interface Polar {
   name: string;

@@ -11,13 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.pages import schema
+from companion.current import STILL_WATER, over_water
 from companion.fold import Step
 from companion.geo.angles import difference_rad
 from companion.messages import CompanionStatus, GeoPoint, VehicleState, WindForecast
 from companion.skipper.step import PlanOutcome, SkipperConfig, SkipperState, Snapshot, WindEstimate, WindHealth
 from companion.telemetry.folder import TLOG, VoyageFigures
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
-from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of
+from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of, polar_of
 from tests.view.conftest import write_mission
 
 RULES = {name: jsonschema.Draft202012Validator({**schema(), "$ref": f"#/$defs/{name}"})
@@ -63,6 +64,31 @@ def test_the_bound_of_a_plan_is_not_told_of_what_is_left_of_it(beat):
     assert _bound_s(replace(route, cost_s=plan.cost_s - 20.0), chosen) is None
     for view in beat.under_way:
         assert view.plan.bound_s is None or view.plan.cost_s >= view.plan.bound_s - 0.1
+
+
+def test_what_the_boat_makes_of_her_polar_is_of_the_water(beat):
+    """In a current of a quarter of her speed her share of the polar was told of her way over the ground."""
+    step = next(s for s in beat.steps if s.snapshot.vehicle is not None and s.snapshot.vehicle.speed_mps > 1.5)
+    voyage, config = step.voyage, SkipperConfig()
+    still = polar_of(step, voyage, config)
+    current = (0.4, -0.3)
+    vehicle, wind = step.snapshot.vehicle, step.snapshot.wind
+    carried = replace(vehicle, velocity_en_mps=tuple(
+        v + c for v, c in zip(vehicle.velocity_en_mps, current, strict=True)))
+    twd_rad, tws_mps = over_water(wind.present_twd_from_rad, wind.mean_tws_mps, current)
+    water = replace(STILL_WATER, east_mps=current[0], north_mps=current[1], is_significant=True)
+    moving = polar_of(replace(step, snapshot=replace(step.snapshot, vehicle=carried, current=water)), voyage, config)
+    assert moving.live_mps == pytest.approx(still.live_mps, abs=0.011)
+    assert moving.tws_mps == pytest.approx(tws_mps, abs=0.01)
+    assert math.radians(moving.live_twa_deg) == pytest.approx(difference_rad(twd_rad, vehicle.heading_rad), abs=0.01)
+
+
+def test_close_to_the_wind_no_share_of_the_polar_is_told():
+    polar = values.PolarView(name="", tws_mps=5.0, live_twa_deg=-75.0, live_mps=1.5, twa_deg=(60.0, 90.0),
+                             speed_mps=(1.0, 3.0), beat_deg=45.0)
+    assert polar.live_share() == pytest.approx(0.75)
+    assert replace(polar, beat_deg=84.0).live_share() is None
+    assert replace(polar, live_mps=None).live_share() is None
 
 
 def test_a_tack_that_the_autopilot_makes_by_itself_is_told_as_such(beat):
