@@ -25,6 +25,10 @@ TACK_HOLDS_S = 4.0                   # a tack that is kept for less was the sea
 WIND_S = (60.0, 120.0, 300.0)
 WIND_MEAN_S = 10.0                   # the wind that came is the mean of so long: a vane trembles
 LEVEL = 0.8                          # of the wind's bands that are scored
+FORCED = frozenset({"plan asked for: no go", "plan asked for: off leg"})   # the log's words: she is forced off the plan
+POLAR_OFF = 0.1                      # a boat that is the polar's sails within so much of it
+CHORD_S = 5.0                        # the way that is held against the log is measured in such chords: fixes tremble
+WAY_OFF = 0.05                       # a way that is so near to it holds
 SCENARIOS = tuple(SCENARIO_FOLDER / f"{name}.toml" for name in (
     "demo", "two-channels", "upwind", "downwind", "narrow-channel", "current-across", "figures/slalom",
     "figures/beat-500"))
@@ -40,7 +44,9 @@ def sail(job: Job[bool]) -> dict[str, Any]:
     scenario = draw(job.seed).scenario if job.case else load_scenario(job.scenario)
     with job.folder() as folder:
         run_virtual(run_embedded(scenario, job.scenario, job.seed, folder))
-        return {"scenario": _name(job), "seed": job.seed, **scored(folder)}
+        record = {"scenario": _name(job), "seed": job.seed, **scored(folder)}
+    # what a boat makes of its polar is known of one that is the polar's
+    return {**record, "polar": []} if job.case else record
 
 
 def _name(job: Job[bool]) -> str:
@@ -51,13 +57,15 @@ def scored(folder: Path) -> dict[str, Any]:
     """Return the figures of a recorded voyage beside what came, as lists of pairs and triples."""
     from companion.view import recorded_views
 
-    views = [view for view, _ in recorded_views(folder).moments]
+    moments = list(recorded_views(folder).moments)
+    views = [view for view, _ in moments]
     times = [view.t_s for view in views]
     goals = [view.figures.goals_reached or 0 for view in views]
     reached_s = [next(t for t, n in zip(times, goals, strict=True) if n >= k) for k in range(1, max(goals) + 1)]
     places = [view.boat.at_en_m for view in views]
     tacks_s = tacked_s(times, [view.boat.tack for view in views])
-    out: dict[str, list[Any]] = {"there": [], "tack": [], "wind": [], "place": [], "clear": []}
+    out: dict[str, list[Any]] = {"there": [], "tack": [], "wind": [], "place": [], "clear": [], "polar": []}
+    forced_s = [view.t_s for view, events in moments if any(event.title in FORCED for event in events)]
     last_s = -math.inf
     for view in views:
         plan = view.plan
@@ -82,7 +90,49 @@ def scored(folder: Path) -> dict[str, Any]:
                 out["wind"].append([band.horizon_s, off_deg <= band.half_deg[view.wind.levels.index(LEVEL)]])
         if plan.expected_clearance_m is not None and view.boat.clearance_m is not None:
             out["clear"].append([plan.number, plan.expected_clearance_m, view.boat.clearance_m])
-    return {**out, "clear": _least(out["clear"])}
+        if (share := None if view.polar is None else view.polar.live_share()) is not None:
+            out["polar"].append(round(share, 3))
+    end = views[-1].figures
+    return {**out, "clear": _least(out["clear"]), "legs": _leg_risks(views, forced_s),
+            "whole": _plan_risks(views, reached_s, forced_s), "way": [[end.distance_m, _way_m(times, places)]],
+            "turns": [[end.tacks, len(tacks_s)]]}
+
+
+def _leg_risks(views: Sequence[Any], forced_s: Sequence[float]) -> list[list[Any]]:
+    """Return, for each leg that was begun, the chance that was told then, and whether she was forced off it."""
+    begun: list[tuple[float, float | None]] = []
+    leg, last_s = None, 0.0
+    for view in views:
+        is_sailed = view.plan is not None and view.state.is_sailing and not view.state.is_over
+        legs: tuple[Any, ...] = view.plan.legs if is_sailed else ()
+        at = (view.plan.number, legs[0].to_en_m) if legs and not legs[0].is_loiter else None
+        if at != leg:
+            begun.append((view.t_s, legs[0].risk if at is not None else None))
+            leg = at
+        last_s = view.t_s
+    ends = [t_s for t_s, _ in begun[1:]] + [last_s]
+    return [[risk, any(t_s < t <= end for t in forced_s)]
+            for (t_s, risk), end in zip(begun, ends, strict=True) if risk is not None]
+
+
+def _plan_risks(views: Sequence[Any], reached_s: Sequence[float], forced_s: Sequence[float]) -> list[list[Any]]:
+    """Return, for each plan, the chance that it told at first, and whether she was forced off before its goal."""
+    out: dict[int, list[Any]] = {}
+    for view in views:
+        plan, goal = view.plan, view.figures.goals_reached or 0
+        if plan is not None and plan.number not in out and plan.path_risk is not None and view.state.is_sailing and (
+                goal < len(reached_s)):
+            out[plan.number] = [plan.path_risk, any(view.t_s < t <= reached_s[goal] for t in forced_s)]
+    return list(out.values())
+
+
+def _way_m(times: Sequence[float], places: Sequence[Any]) -> float:
+    """Return the length of the way [m], in chords of ``CHORD_S``."""
+    chords: list[tuple[float, Any]] = []
+    for t_s, place in zip(times, places, strict=True):
+        if place is not None and (not chords or t_s - chords[-1][0] >= CHORD_S):
+            chords.append((t_s, place))
+    return round(sum(math.dist(a, b) for (_, a), (_, b) in pairwise(chords)), 1)
 
 
 def tacked_s(times: Sequence[float], tacks: Sequence[str | None]) -> list[float]:
@@ -158,6 +208,18 @@ def table_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     clears = [row for record in records for row in record["clear"]]
     rows.append(_row("clearance expected of a plan, m", [met - told for told, met in clears],
                      [met >= told for told, met in clears]))
+    for name, kind in (("off the plan, on a leg", "legs"), ("off the plan, until the goal", "whole")):
+        chances = [row for record in records for row in record[kind]]
+        rows.append({**_row(name, [], [not came for _, came in chances]),
+                     "median_share": statistics.mean(told - came for told, came in chances) if chances else None})
+    polar = [share - 1.0 for record in records for share in record["polar"]]
+    rows.append(_row("share of the polar", [], [abs(off) <= POLAR_OFF for off in polar], share=polar))
+    ways = [row for record in records for row in record["way"]]
+    rows.append(_row("distance sailed, m", [told - way for told, way in ways],
+                     [abs(told - way) <= WAY_OFF * way for told, way in ways],
+                     share=[(told - way) / way for told, way in ways if way]))
+    turns = [row for record in records for row in record["turns"]]
+    rows.append(_row("tacks counted", [told - came for told, came in turns], [told == came for told, came in turns]))
     return [row for row in rows if row["shown"]]
 
 

@@ -2,17 +2,29 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
-from lab.campaigns.shown import AHEAD_S, sail, shown, table_of, tacked_s, told
+from lab.campaigns.shown import (
+    AHEAD_S,
+    _leg_risks,
+    _plan_risks,
+    _way_m,
+    sail,
+    shown,
+    table_of,
+    tacked_s,
+    told,
+)
 from sitl.runner import Job
 
 DEMO = Path("sitl/scenarios/demo.toml")
 
 
 def voyage(**changed):
-    return {"there": [], "tack": [], "place": [], "wind": [], "clear": []} | changed
+    return {"there": [], "tack": [], "place": [], "wind": [], "clear": [], "legs": [], "whole": [], "polar": [],
+            "way": [], "turns": []} | changed
 
 
 def row(rows, figure):
@@ -42,6 +54,43 @@ def test_places_winds_and_clearances_are_counted_by_their_own_bands():
         assert row(rows, figure)["held"] == 0.5
     assert len(told(rows).splitlines()) == 4
     assert "nan" not in told(rows)
+
+
+def test_a_chance_is_held_against_how_often_it_came():
+    rows = table_of([voyage(legs=[[0.2, False], [0.0, True], [0.1, False], [0.1, False]], whole=[[0.5, True]])])
+    assert row(rows, "off the plan, on a leg")["median_share"] == pytest.approx(0.1 - 0.25)
+    assert row(rows, "off the plan, on a leg")["held"] == 0.75
+    assert row(rows, "off the plan, until the goal")["median_share"] == pytest.approx(-0.5)
+
+
+def test_the_polar_the_way_and_the_tacks_are_what_they_were():
+    rows = table_of([voyage(polar=[0.95, 1.2], way=[[110.0, 100.0]], turns=[[6, 6]]),
+                     voyage(polar=[1.0], way=[[99.0, 100.0]], turns=[[118, 6]])])
+    assert row(rows, "share of the polar")["held"] == pytest.approx(2 / 3)
+    assert row(rows, "share of the polar")["median_share"] == pytest.approx(0.0)
+    assert row(rows, "distance sailed, m")["held"] == 0.5
+    assert row(rows, "tacks counted")["held"] == 0.5
+
+
+def seen(t_s, number, to_en, risk, *, whole=0.2, goals=0):
+    leg = SimpleNamespace(to_en_m=to_en, is_loiter=False, risk=risk)
+    return SimpleNamespace(
+        t_s=t_s, plan=SimpleNamespace(number=number, legs=(leg,), path_risk=whole),
+        state=SimpleNamespace(is_sailing=True, is_over=False), figures=SimpleNamespace(goals_reached=goals))
+
+
+def test_she_is_forced_off_the_leg_that_she_is_on_and_off_the_plans_before():
+    views = [seen(0.0, 1, (0, 9), 0.1), seen(1.0, 1, (0, 9), 0.4), seen(2.0, 1, (9, 9), 0.2),
+             seen(5.0, 2, (9, 0), 0.0, whole=0.3), seen(9.0, 2, (9, 0), 0.0), seen(10.0, 2, (9, 0), 0.0, goals=1)]
+    assert _leg_risks(views, [4.0]) == [[0.1, False], [0.2, True], [0.0, False]]
+    assert _plan_risks(views, [10.0], [4.0]) == [[0.2, True], [0.3, False]]
+    assert _plan_risks(views, [], [4.0]) == []   # a goal that was never reached
+
+
+def test_a_way_is_measured_in_chords():
+    times = [float(t) for t in range(101)]
+    trembling = [(2.0 * t, 1.0 if int(t) % 2 else -1.0) for t in times]
+    assert _way_m(times, trembling) == pytest.approx(200.0, rel=0.03)
 
 
 def test_a_tack_is_one_that_is_kept():
