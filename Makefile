@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test test-long test-faults draws check docs slowest campaign nightly nightly-reference bench figures deb release clean
+.PHONY: env demo test test-long test-faults draws check docs slowest campaign nightly nightly-reference bench measured figures deb release clean
 env: $(ENV)
 
 # What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
@@ -109,6 +109,12 @@ bench: $(ENV)
 	$(BIN)/python -m bench
 	$(BIN)/python -m bench.budgets --overrun
 	$(BIN)/python -m bench.reliability
+
+# What the pages show of a command's output, measured again and written there with date and commit; less than an hour of two
+# quiet cores.
+measured: $(ENV)
+	@$(KERNELS)
+	$(BIN)/python -m bench.measured
 
 # The papers' figures and the pictures of the rooms, into docs/figures.
 figures: $(ENV)

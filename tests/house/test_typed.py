@@ -1,13 +1,15 @@
 """What README and the pages tell a reader to type: README's lines and benches are run, in an empty folder, in order.
 
-Every other line is understood by its program, and not run: it names a link, a file or a cluster of the reader's own.
+So are lines of other pages that need neither a boat nor long. Every other is understood by its program, and not run.
 """
 
 import argparse
 import contextlib
+import math
 import os
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -31,6 +33,14 @@ WORDS = {"N": "3", "S": "3", "NAME": "demo", "SCENARIO": "demo", "PICTURE": "p.p
 # Of README, what a test is no place for.
 NOT_RUN = {"make demo": "CI runs it", "make test": "this is it", "python3 -m venv": "CI makes one",
            "pip install": "CI installs it"}
+# What a page says that is run as it stands, in one folder, and what lies there for the reader's own files.
+CHEAP = re.compile(r"(companion (--version|mission (example|check|convert) |fence (check|convert) |plan |field "
+                   r"|key new |far (order|begin) |order --qgc |report |view .* --export |wind RECORD)|sitl example )")
+OWN = {"MISSION.toml": "missions/field-ring.toml", "FILE": "missions/bay.toml", "P.png": "p.png", "OUT": "out.plan",
+       "PROBLEM.json": "island.json", "bench/problems/channels-noisy.json": "island.json",
+       "MISSION": "missions/bay.toml",
+       "RECORD.csv": "record.csv", "RECORD": "record.csv", "RECORDS": "record.csv", "missions": "more",
+       "voyages/20260714T101500Z-archipelago": "voyages/one"}
 NAMES_A_COMMAND = re.compile("are required|expected one argument")   # and not a line to type
 UNDER_WAY, ENDS_S = "under way", 60.0
 
@@ -202,6 +212,31 @@ def test_the_bench_of_an_evening_from_an_empty_folder(tmp_path):
         done(example, tmp_path)
         with typed(run.replace(":5760", f":{port}"), tmp_path) as shell:
             until(shell, UNDER_WAY)
+
+
+def cheap_lines():
+    """Return the lines of the pages that are whole and run as they stand, none twice, as their words."""
+    lines = dict.fromkeys(line for page in PAGES[2:] for line in (*blocks(page), *quoted(page)) if CHEAP.match(line))
+    for line in lines:
+        program, *words = words_of(line)
+        with contextlib.suppress(InputError):
+            if words != ["--version"]:
+                PROGRAMS[program].parser(words[0]).parse_args(words)
+            yield program, *(f"by-{program}" if word == "DIR" else OWN.get(word, word) for word in words)
+
+
+def test_what_pages_say_that_is_cheap_is_run(tmp_path):
+    """In one folder, in the pages' order, beside missions, a problem, a wind record and a voyage of the reader's."""
+    done("companion mission example missions", tmp_path)
+    done("sitl run rocks", tmp_path)
+    next((tmp_path / "voyages").iterdir()).rename(tmp_path / "voyages" / "one")
+    (tmp_path / "record.csv").write_text("t_s,wind_from_deg,wind_speed_ms\n" + "".join(
+        f"{t},{200 + 10 * math.sin(t / 90):.1f},{6 + math.sin(t / 37):.2f}\n" for t in range(0, 2400, 2)))
+    shutil.copy(ROOT / "bench" / "problems" / "channels-noisy.json", tmp_path / "island.json")
+    lines = [" ".join(word if "*" in word else shlex.quote(word) for word in words) for words in cheap_lines()]
+    assert len(lines) > 15
+    for line in lines:
+        assert "Traceback" not in done(line, tmp_path), line
 
 
 def test_a_guide_that_rehearses_does(tmp_path):
