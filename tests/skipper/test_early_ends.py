@@ -89,7 +89,7 @@ def test_out_of_time_she_may_only_say_so_and_sails_on():
     world = under_way(Ends.of(out_of_time=End.SAY), voyage_timeout_s=60.0)
     assert world.run(600, is_done)
     assert world.state.voyage.arrived
-    assert [entry[2].partition(": ")[2] for entry in said(world, "out of time")] == ["say so"]
+    assert [": " in entry[2] for entry in said(world, "out of time")] == [False]
 
 
 def test_an_order_stands_over_darkness_but_not_over_a_leak():

@@ -246,7 +246,8 @@ def watch(ctx: StepContext) -> None:
         dog = BY_NAME[name]
         value = measure(ctx, name)
         figure = "" if value is None or not dog.unit else f" ({value:.1f} {dog.unit})"
-        ctx.say(dog.severity, name, f"{name}{figure}: {_done_about(ctx, dog)}", every_s=0.0)
+        done = _done_about(ctx, dog)
+        ctx.say(dog.severity, name, f"{name}{figure}" + f": {done}" * (done != Response.SAY.value), every_s=0.0)
     ctx.fresh = tuple(fresh)
 
 

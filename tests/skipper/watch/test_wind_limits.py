@@ -75,7 +75,7 @@ def test_too_little_is_said_and_sailed_on_in():
     assert world.run(120, lambda w: w.state.voyage.sailing)
     world.wind = lambda t: (0.0, 2.6)
     assert world.run(900, is_done)
-    assert [text.partition(": ")[2] for _, _, text in said(world, "light wind")] == ["say so"]
+    assert [": " in text for _, _, text in said(world, "light wind")] == [False]
 
 
 def test_without_limits_nothing_is_watched():
