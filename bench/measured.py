@@ -81,8 +81,9 @@ def main() -> int:
                             capture_output=True).stdout.strip()
     today = dt.datetime.now(dt.UTC).date()
     for _, path in _pages():
-        text = path.read_text(encoding="utf-8")
-        path.write_text(again(text, _shell, f"{today}, commit {commit}", words), encoding="utf-8")
+        for block in _BLOCK.finditer(path.read_text(encoding="utf-8")):   # each is written as it comes
+            made = again(block[0], _shell, f"{today}, commit {commit}", words)
+            path.write_text(path.read_text(encoding="utf-8").replace(block[0], made), encoding="utf-8")
     table = ages({name: path.read_text(encoding="utf-8") for name, path in _pages()}, today)
     text = FIGURES.read_text(encoding="utf-8")
     FIGURES.write_text(_AGES.sub(lambda _: table, text), encoding="utf-8")
