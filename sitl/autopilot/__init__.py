@@ -42,25 +42,7 @@ from sitl.autopilot.protocol.telemetry import AisVessel
 from sitl.autopilot.server import serve
 
 __all__ = [
-    "EPOCH_S",
-    "FRAME_M",
-    "HOME",
-    "TACK_RETRY_S",
-    "AisVessel",
-    "AutopilotConfig",
-    "Departures",
-    "FrameStream",
-    "GpsFault",
-    "Impairment",
-    "MemoryEnd",
-    "MemoryLink",
-    "RadioChannel",
-    "Sensors",
-    "SimulatedAutopilot",
-    "Truth",
-    "VaneFault",
-    "VaneState",
-    "Waves",
-    "check_parameters",
-    "serve",
+    "EPOCH_S", "FRAME_M", "HOME", "TACK_RETRY_S", "AisVessel", "AutopilotConfig", "Departures", "FrameStream",
+    "GpsFault", "Impairment", "MemoryEnd", "MemoryLink", "RadioChannel", "Sensors", "SimulatedAutopilot", "Truth",
+    "VaneFault", "VaneState", "Waves", "check_parameters", "serve",
 ]

@@ -39,9 +39,8 @@ from companion.telemetry.folder.records import (
 )
 
 __all__ = [
-    "DECISIONS", "DEFAULT_BUDGET_BYTES", "PICTURE", "STATE", "SUMMARY", "TLOG", "TRACK", "VERDICT", "VOYAGE",
-    "Logbook", "RecordedChart", "RecordedPlan", "Recorder", "VoyageArchive", "VoyageFigures", "VoyageRecord",
-    "action_record", "ais_of", "ais_record", "believed", "fence_record", "is_from_the_start", "jsonable",
-    "order_record", "outcome_record", "parts", "read_decisions", "read_description", "read_rows", "read_voyage",
-    "require_files",
+    "DECISIONS", "DEFAULT_BUDGET_BYTES", "PICTURE", "STATE", "SUMMARY", "TLOG", "TRACK", "VERDICT", "VOYAGE", "Logbook",
+    "RecordedChart", "RecordedPlan", "Recorder", "VoyageArchive", "VoyageFigures", "VoyageRecord", "action_record",
+    "ais_of", "ais_record", "believed", "fence_record", "is_from_the_start", "jsonable", "order_record",
+    "outcome_record", "parts", "read_decisions", "read_description", "read_rows", "read_voyage", "require_files",
 ]
