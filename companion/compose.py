@@ -60,14 +60,7 @@ from companion.geofence.shapes import polygon_en
 from companion.messages import GeoPoint
 from companion.orders import ALL, Verb, unknown
 from companion.planners import ALGORITHMS, AUTO, PlannerChoice
-from companion.skipper.step import (
-    Ends,
-    Guidance,
-    Permissions,
-    ReplanPolicy,
-    SafeEnd,
-    SkipperConfig,
-)
+from companion.skipper.step import Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.way import FAR_M, Box, Composed, Goal, Line, Refuge, Search, Side, Until, Voyage
 from companion.traffic import Policy, TargetLimits
 from companion.traffic.feeds import parse_feed
@@ -473,8 +466,8 @@ def _unix_s(text: str) -> float | None:
 
 
 def target_limits_of(mission: Mission) -> TargetLimits:
-    """Return how long an unheard vessel is remembered."""
-    return TargetLimits(expire_s=mission.traffic.drop_after_s)
+    """Return how long an unheard vessel is remembered, and which one is ours."""
+    return TargetLimits(expire_s=mission.traffic.drop_after_s, own_mmsi=mission.traffic.own_mmsi)
 
 
 def feeds_of(mission: Mission) -> tuple[str, ...]:

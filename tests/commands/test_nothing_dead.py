@@ -131,7 +131,7 @@ OTHER = {
         **{cause.key: next(word for word in CHOICES if word != WORD_OF[cause.answer])
            for cause in FAILSAFES if cause.key},
     },
-    "traffic": {"feeds": ["udpin:127.0.0.1:10110"], "safe_distance_m": 60.0, "safe_time_s": 80.0,
+    "traffic": {"feeds": ["udpin:127.0.0.1:10110"], "safe_distance_m": 60.0, "safe_time_s": 80.0, "own_mmsi": 211234560,
                 "drop_after_s": 300.0, "policy": "rules"},
     "output": {"nmea": ["udp:127.0.0.1:10110"], "signalk": ["tcp:127.0.0.1:8375"], "signalk_token": "token"},
 }

@@ -445,6 +445,8 @@ class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     policy: Literal["keep clear", "rules"] = "keep clear"
     """Keep clear of everyone, whatever the rules of the road give us; or stand on where they say so, and give way
     early, by much and astern where they ask for it."""
+    own_mmsi: Annotated[int, Meta(ge=1, le=999_999_999)] | None = None
+    """Our own transponder's: what is heard of it, by a receiver on board or by way of a server, is no other vessel."""
 
 
 class OutputOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
