@@ -4,8 +4,7 @@ Pure rules. ``Skipper(voyage=..., config=...).step(state, snapshot) -> (state, a
 """
 
 from companion.skipper.rules import Skipper
-from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.state import SkipperState
+from companion.skipper.step import SkipperConfig, SkipperState
 from companion.skipper.way.voyage import Voyage
 
 __all__ = ["Skipper", "SkipperConfig", "SkipperState", "Voyage"]

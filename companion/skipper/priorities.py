@@ -25,8 +25,7 @@ from companion.skipper.behaviors.wind_doubt import holds, seeks_sea_room
 from companion.skipper.board.on_board import mission_is_known
 from companion.skipper.board.vehicle_identity import stand_by
 from companion.skipper.intake import notice_truncation
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.state import Phase
+from companion.skipper.step import Phase, StepContext
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

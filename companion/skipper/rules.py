@@ -29,17 +29,12 @@ from companion.skipper.planning.diversions import speak_of_fence
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.priorities import act
-from companion.skipper.step.actions import Action, RequestPlan
-from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.saved import Persisted
-from companion.skipper.step.snapshot import Snapshot
+from companion.skipper.step import Action, Persisted, RequestPlan, SkipperConfig, SkipperState, Snapshot, StepContext
 from companion.skipper.step.state import (
     LoadedMission,
     Orders,
     Planning,
     PositionState,
-    SkipperState,
     Tacking,
     VehicleIdentity,
     VoyageState,
@@ -50,8 +45,7 @@ from companion.skipper.step.state import (
 from companion.skipper.watch.measures import follow_charge
 from companion.skipper.watch.tacks import watch_tacks
 from companion.skipper.watch.watch import look_out, speak_of_stop, watch, watch_water
-from companion.skipper.way.gates import gates_of
-from companion.skipper.way.voyage import Voyage
+from companion.skipper.way import Voyage, gates_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

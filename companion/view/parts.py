@@ -20,15 +20,7 @@ from companion.planner import Leg, Plan
 from companion.safety import BY_NAME
 from companion.skipper.planning import next_tack
 from companion.skipper.step import Route, SkipperConfig, WindHealth
-from companion.skipper.way import (
-    Goal,
-    PointEn,
-    Side,
-    Voyage,
-    gates_of,
-    half_width_rad,
-    mean_twd_rad,
-)
+from companion.skipper.way import Goal, PointEn, Side, Voyage, gates_of, half_width_rad, mean_twd_rad
 from companion.telemetry.console import DISK, GONE
 from companion.telemetry.folder import VoyageFigures
 from companion.traffic import Alarm, Assessment

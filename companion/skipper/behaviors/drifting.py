@@ -22,9 +22,8 @@ from companion.skipper.behaviors.helm import is_busy, run_motor, set_mode
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import ROOMIER_M
 from companion.skipper.step.state import Fix, Phase
+from companion.skipper.way import PointEn, distance_m, water_at
 from companion.skipper.way.drift import DriftAhead, drift_ahead
-from companion.skipper.way.geometry import distance_m
-from companion.skipper.way.voyage import PointEn, water_at
 
 STEERAGE_MPS = 0.4     # less wind than this moves no boat that could be steered
 DRIFT_MPS = 0.15       # a slower velocity is a receiver's noise

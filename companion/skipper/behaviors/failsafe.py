@@ -28,11 +28,9 @@ from companion.safety import (
     told_by,
 )
 from companion.skipper.behaviors.helm import is_busy, set_mode
-from companion.skipper.step.actions import CancelPlan
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.state import PATIENT, Adrift, FieldSteering, Phase, Signs, Stop
-from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from companion.skipper.way.voyage import PointEn
+from companion.skipper.step import CancelPlan, Phase, StepContext
+from companion.skipper.step.state import PATIENT, Adrift, FieldSteering, Signs, Stop
+from companion.skipper.way import PointEn, bearing_rad, distance_m, moved
 
 TOLD_S = 5.0          # a sign this long before or after the change of mode belongs to it
 ASKED_S = 30.0        # an AUTO that shows so long after it was accepted is the one that was asked for

@@ -29,14 +29,11 @@ from companion.skipper.planning.diversions import diversion, is_composed
 from companion.skipper.planning.right_of_way import held_of
 from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
 from companion.skipper.planning.waits import stay_left_s, utc_s
-from companion.skipper.step.actions import ReplanReason, SteerHeading
-from companion.skipper.step.config import Guidance
-from companion.skipper.step.context import StepContext
+from companion.skipper.step import Guidance, ReplanReason, SteerHeading, StepContext
 from companion.skipper.step.state import FieldSteering, Inside
 from companion.skipper.step.state import Phase as Doing
-from companion.skipper.way.gates import Gate, marks_of
-from companion.skipper.way.geometry import distance_m
-from companion.skipper.way.voyage import Composed, PointEn, Until
+from companion.skipper.way import Composed, Gate, PointEn, Until, distance_m
+from companion.skipper.way.gates import marks_of
 from companion.traffic import Vessel, predict
 from companion.traffic.colregs import expected
 

@@ -19,12 +19,9 @@ from companion.frozen import changed
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Mode, Severity
 from companion.skipper.behaviors.helm import is_busy, set_mode
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.state import Phase
+from companion.skipper.step import Phase, StepContext
+from companion.skipper.way import Gate, PointEn, Side, bearing_rad, cross_track_m, distance_m, water_at
 from companion.skipper.way.drift import DriftAhead, drift_ahead
-from companion.skipper.way.gates import Gate
-from companion.skipper.way.geometry import bearing_rad, cross_track_m, distance_m
-from companion.skipper.way.voyage import PointEn, Side, water_at
 
 DRIFT_LIMIT_RAD = math.radians(20.0)  # more is not leeway but a current or a compass error
 STEERAGE_MPS = 0.5                    # slower than this the drift angle means nothing

@@ -13,11 +13,7 @@ from companion.skipper.behaviors.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.diversions import announcement, fenced_off, home_trouble
 from companion.skipper.planning.uploads import upload
-from companion.skipper.step.actions import ReplanReason
-from companion.skipper.step.config import SafeEnd
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.snapshot import WindHealth
-from companion.skipper.step.state import Phase
+from companion.skipper.step import Phase, ReplanReason, SafeEnd, StepContext, WindHealth
 from companion.skipper.step.wind_limits import winds_wanted
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.geometry import distance_m, leg_distance_m

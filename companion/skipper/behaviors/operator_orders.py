@@ -24,9 +24,7 @@ from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Kind
 from companion.skipper.step.saved import Standing
 from companion.skipper.step.state import PATIENT, Answered, FieldSteering, Phase
-from companion.skipper.way.gates import Approach
-from companion.skipper.way.geometry import distance_m
-from companion.skipper.way.voyage import PointEn
+from companion.skipper.way import Approach, PointEn, distance_m
 
 REMEMBERED_S = 10.0   # longer than any station repeats a command that is not answered
 STATIONS = 8          # whose last order is remembered

@@ -27,7 +27,7 @@ from companion.skipper.planning.waits import utc_s
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.saved import SavedPlace
 from companion.skipper.step.state import Fix, Phase
-from companion.skipper.way.geometry import moved
+from companion.skipper.way import PointEn, moved
 from companion.skipper.way.position_plausibility import (
     DISPUTED_S,
     ERROR_M,
@@ -39,7 +39,6 @@ from companion.skipper.way.position_plausibility import (
     PositionDoubt,
     is_impossible,
 )
-from companion.skipper.way.voyage import PointEn
 
 AHEAD_S = 20.0        # what the boat sails until a LOITER that is asked for now has it, and some more
 SLOW_MPS = 1.0

@@ -14,11 +14,7 @@ from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
 from companion.skipper.planning.diversions import home_trouble, is_at_rest, pressing
-from companion.skipper.step.actions import CancelPlan
-from companion.skipper.step.config import SafeEnd
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.route import Diversion, Kind
-from companion.skipper.step.state import Phase
+from companion.skipper.step import CancelPlan, Diversion, Kind, Phase, SafeEnd, StepContext
 
 ANSWERED = {
     "": "for a person",

@@ -35,11 +35,7 @@ from companion.skipper.planning.right_of_way import stands_on
 from companion.skipper.planning.triggers import find_trigger, is_buoy
 from companion.skipper.planning.vessels import near
 from companion.skipper.planning.waits import stay_left_s
-from companion.skipper.step.actions import ReplanReason, SteerHeading
-from companion.skipper.step.config import Guidance
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.route import Diversion
-from companion.skipper.step.state import Phase
+from companion.skipper.step import Diversion, Guidance, Phase, ReplanReason, SteerHeading, StepContext
 from companion.skipper.step.wind_shifts import shifting
 from companion.skipper.way.geometry import along_m, bear_away_rad, bearing_rad, cross_track_m, distance_m, moved
 from companion.skipper.way.voyage import PointEn

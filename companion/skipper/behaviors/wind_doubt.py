@@ -26,10 +26,7 @@ from companion.messages import Command, Mode, Severity, waypoint
 from companion.skipper.behaviors.drifting import goes_astern
 from companion.skipper.behaviors.helm import hand_back, is_busy, set_mode
 from companion.skipper.planning.uploads import upload
-from companion.skipper.step.actions import CancelPlan
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.snapshot import WindBefore
-from companion.skipper.step.state import Phase
+from companion.skipper.step import CancelPlan, Phase, StepContext, WindBefore
 from companion.skipper.way.drift import HORIZON_S, floor_after_s
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.voyage import AreaLike, PointEn, water_at

@@ -15,12 +15,9 @@ from companion.mavlink.wire import mission_hash
 from companion.messages import Command, MissionItem, Mode, Severity
 from companion.safety import STOPPING
 from companion.skipper.board.mark import are_marked, marked
-from companion.skipper.step.actions import AdoptDrawing, ReadMission
-from companion.skipper.step.context import StepContext
+from companion.skipper.step import AdoptDrawing, Persisted, Phase, ReadMission, Route, StepContext
 from companion.skipper.step.missions import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
-from companion.skipper.step.route import Route
-from companion.skipper.step.saved import Persisted
-from companion.skipper.step.state import Inside, Phase, saved_of
+from companion.skipper.step.state import Inside, saved_of
 from companion.words import counted
 
 REMEDY = "it is not resumed; waiting for [operator] replace_foreign, or an order, to allow its replacement"

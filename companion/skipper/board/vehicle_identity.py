@@ -9,9 +9,7 @@ from __future__ import annotations
 from companion.frozen import changed
 from companion.mavlink.vehicle_identity import ROVERS, Identity, type_words
 from companion.messages import Severity
-from companion.skipper.step.actions import CancelPlan, StopOrders
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.state import Phase
+from companion.skipper.step import CancelPlan, Phase, StepContext, StopOrders
 
 BOAT_CLASS = 2         # FRAME_CLASS of ArduRover
 SAY_EVERY_S = 60.0

@@ -22,12 +22,10 @@ from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.track import of_way, said
 from companion.skipper.planning.uploads import is_begun_risky, is_riskier, upload
 from companion.skipper.planning.vessels import apart_m, meetings
-from companion.skipper.step.actions import Change, ReplanReason
-from companion.skipper.step.context import StepContext
+from companion.skipper.step import Kind, Phase, PlanOutcome, ReplanReason, Route, StepContext
+from companion.skipper.step.actions import Change
 from companion.skipper.step.missions import Tail, splice
-from companion.skipper.step.route import Kind, Route
-from companion.skipper.step.snapshot import PlanOutcome
-from companion.skipper.step.state import PendingPlan, Phase, Retry
+from companion.skipper.step.state import PendingPlan, Retry
 from companion.skipper.way.geometry import distance_m, gybe_round, moved
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide

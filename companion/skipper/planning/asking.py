@@ -18,15 +18,10 @@ from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.planning.track import problem_tracking, steps
 from companion.skipper.planning.vessels import shares
-from companion.skipper.step.actions import CancelPlan, ReplanReason, RequestPlan
-from companion.skipper.step.context import StepContext
+from companion.skipper.step import CancelPlan, Diversion, ReplanReason, RequestPlan, StepContext, WindHealth
 from companion.skipper.step.missions import path_length_m
-from companion.skipper.step.route import Diversion
-from companion.skipper.step.snapshot import WindHealth
 from companion.skipper.step.state import PendingPlan
-from companion.skipper.way.gates import Gate
-from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from companion.skipper.way.judge import half_width_rad
+from companion.skipper.way import Gate, bearing_rad, distance_m, half_width_rad, moved
 from companion.skipper.way.position_plausibility import is_impossible
 from companion.skipper.way.stemming import waiting_place
 

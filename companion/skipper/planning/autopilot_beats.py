@@ -11,12 +11,9 @@ from companion.boat.failed_tack import TRIES
 from companion.boat.tracking import GuidanceModel, beat_band_m
 from companion.geo.angles import difference_rad, heading_of
 from companion.messages import Command, Mode
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.snapshot import Snapshot
-from companion.skipper.step.state import SkipperState
+from companion.skipper.step import SkipperState, Snapshot, StepContext
 from companion.skipper.step.wind_shifts import shifting
-from companion.skipper.way.geometry import bearing_rad, cross_track_m, moved
-from companion.skipper.way.voyage import PointEn
+from companion.skipper.way import PointEn, bearing_rad, cross_track_m, moved
 
 IRONS_MEMORY_S = 600.0
 TACKS_FAIL_AFTER = TRIES    # failures in a row, or times in irons within IRONS_MEMORY_S, before tacks are left

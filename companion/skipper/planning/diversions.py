@@ -14,9 +14,8 @@ from companion.messages import Severity
 from companion.orders import Verb
 from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, End, Recovery
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
-from companion.skipper.step.config import SafeEnd, SkipperConfig
-from companion.skipper.step.context import StepContext
-from companion.skipper.step.route import HOME_RADIUS_M, Diversion, Kind
+from companion.skipper.step import Diversion, Kind, SafeEnd, SkipperConfig, StepContext
+from companion.skipper.step.route import HOME_RADIUS_M
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
 from companion.skipper.way.gates import Gate, marks_of
 from companion.skipper.way.geometry import disc_wkt, distance_m

@@ -22,8 +22,7 @@ from dataclasses import replace
 
 from companion.messages import Target
 from companion.skipper.step.context import StepContext
-from companion.skipper.way.geometry import distance_m, moved
-from companion.skipper.way.voyage import PointEn
+from companion.skipper.way import PointEn, distance_m, moved
 from companion.traffic import Policy, Role, Vessel, predict
 from companion.traffic.colregs import APPARENT_RAD, OngoingEncounter
 

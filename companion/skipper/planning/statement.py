@@ -23,10 +23,7 @@ from companion.messages import WindForecast
 from companion.planner.problem import strength_dict
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.wind_limits import strength_of
-from companion.skipper.way.gates import Gate
-from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from companion.skipper.way.judge import half_width_rad, mean_twd_rad
-from companion.skipper.way.voyage import PointEn, Voyage
+from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m, half_width_rad, mean_twd_rad, moved
 
 # The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
 REPAIR_RINGS_M = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 140.0, 210.0, 320.0, 480.0, 720.0, 1080.0,

@@ -14,16 +14,10 @@ from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_rest
 from companion.skipper.planning.diversions import HOME, diversion, homeward, is_composed
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
-from companion.skipper.step.actions import ReplanReason
-from companion.skipper.step.config import Guidance, ReplanPolicy
-from companion.skipper.step.context import StepContext
+from companion.skipper.step import Diversion, Guidance, Kind, Phase, ReplanPolicy, ReplanReason, Route, StepContext
 from companion.skipper.step.missions import NO_PLAN, path_length_m
-from companion.skipper.step.route import Diversion, Kind, Route
-from companion.skipper.step.state import Phase
-from companion.skipper.way.gates import Gate
-from companion.skipper.way.geometry import bearing_rad, distance_m
-from companion.skipper.way.judge import half_width_rad, predicted_beat
-from companion.skipper.way.voyage import PointEn
+from companion.skipper.way import Gate, PointEn, bearing_rad, distance_m, half_width_rad
+from companion.skipper.way.judge import predicted_beat
 from companion.traffic import Decision, decide
 from companion.traffic.plans import MIN_INTERVAL_S
 

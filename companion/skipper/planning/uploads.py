@@ -17,15 +17,12 @@ from companion.skipper.board.mark import marked
 from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
 from companion.skipper.planning.track import of_way
 from companion.skipper.planning.vessels import meetings
-from companion.skipper.step.actions import Change, UploadMission
-from companion.skipper.step.context import StepContext
+from companion.skipper.step import Route, StepContext, UploadMission, UploadOutcome, UploadResult
+from companion.skipper.step.actions import Change
 from companion.skipper.step.missions import common_prefix, stopgap
-from companion.skipper.step.route import Route
-from companion.skipper.step.snapshot import UploadOutcome, UploadResult
 from companion.skipper.step.state import PendingPlan, PendingUpload, Retry
-from companion.skipper.way.geometry import distance_m
+from companion.skipper.way import PointEn, distance_m
 from companion.skipper.way.judge import judge
-from companion.skipper.way.voyage import PointEn
 
 SPARE_M = 0.3          # a boat below the floor may come no nearer than this more: the turn away takes room
 TACKS_RISK = 1e-3      # a chance of contact by failed tacks is greater than another by more than this

@@ -18,9 +18,8 @@ from companion.messages import Target
 from companion.planner.problem import VESSELS_SHARE, sigmas_for, vessel_count
 from companion.skipper.planning.right_of_way import MEET_SHARE, bow_discs, held_of, is_stood_on_to, regions
 from companion.skipper.step.context import StepContext
-from companion.skipper.way.geometry import bearing_rad, distance_m
+from companion.skipper.way import PointEn, bearing_rad, distance_m
 from companion.skipper.way.judge import LOST_MPS
-from companion.skipper.way.voyage import PointEn
 from companion.traffic import Conflict, Vessel, check_legs, path_distance_m, peril_m, planning_discs, predict
 from companion.traffic.colregs import expected
 from companion.traffic.occupancy import Keep

@@ -9,10 +9,8 @@ import math
 
 from companion.geo.angles import difference_rad
 from companion.skipper.step.context import StepContext
-from companion.skipper.way.gates import Gate
-from companion.skipper.way.geometry import bearing_rad, distance_m, moved
+from companion.skipper.way import Gate, Line, PointEn, bearing_rad, distance_m, moved
 from companion.skipper.way.line import ahead_m, course_rad
-from companion.skipper.way.voyage import Line, PointEn
 
 WAIT_M = 40.0         # from where the line is crossed: the loiter swings 12 m, and drifts
 FARTHEST_M = 70.0

@@ -20,8 +20,9 @@ from companion.skipper.step.actions import (
     UploadMission,
 )
 from companion.skipper.step.config import Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import ends_safely
-from companion.skipper.step.route import Route
+from companion.skipper.step.route import Diversion, Kind, Route
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import (
     AutopilotRebooted,
@@ -47,10 +48,10 @@ from companion.skipper.step.state import Phase, SkipperState, is_given_up
 
 __all__ = [
     "Acknowledge", "Action", "AdoptDrawing", "Announce", "Arm", "AutopilotRebooted", "CancelPlan", "CommandOutcome",
-    "CommandResult", "Disbelieved", "Ends", "Event", "Guidance", "MissionOnBoard", "ModeChanged", "Outcome",
-    "ParameterChanged", "Permissions", "Persisted", "Phase", "PlanOutcome", "ReadMission", "ReadOutcome",
+    "CommandResult", "Disbelieved", "Diversion", "Ends", "Event", "Guidance", "Kind", "MissionOnBoard", "ModeChanged",
+    "Outcome", "ParameterChanged", "Permissions", "Persisted", "Phase", "PlanOutcome", "ReadMission", "ReadOutcome",
     "ReplanPolicy", "ReplanReason", "RequestPlan", "Route", "RunMotor", "SafeEnd", "SetCurrent", "SetMode",
-    "SkipperConfig", "SkipperState", "Snapshot", "SteerHeading", "StopOrders", "Tack", "UploadFence", "UploadMission",
-    "UploadOutcome", "UploadResult", "WaypointReached", "WindBefore", "WindEstimate", "WindHealth", "ends_safely",
-    "is_given_up",
+    "SkipperConfig", "SkipperState", "Snapshot", "SteerHeading", "StepContext", "StopOrders", "Tack", "UploadFence",
+    "UploadMission", "UploadOutcome", "UploadResult", "WaypointReached", "WindBefore", "WindEstimate", "WindHealth",
+    "ends_safely", "is_given_up",
 ]

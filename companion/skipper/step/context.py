@@ -52,12 +52,10 @@ from companion.skipper.step.state import (
     VoyageState,
     is_given_up,
 )
+from companion.skipper.way import Approach, Gate, PointEn, Voyage, bearing_rad, gates_of
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle, circle_of, drawn_of
-from companion.skipper.way.gates import Approach, Gate, gates_of
-from companion.skipper.way.geometry import bearing_rad
 from companion.skipper.way.position_plausibility import innovation_m
 from companion.skipper.way.stemming import Water
-from companion.skipper.way.voyage import PointEn, Voyage
 
 FRESH_S = 3.0          # a part older than this is not acted upon
 BEATEN_MPS = 10.0      # the wind in which the boat may have sailed while nobody looked

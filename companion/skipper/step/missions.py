@@ -18,8 +18,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import Command, MissionItem, waypoint
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.route import Route
-from companion.skipper.way.geometry import bearing_rad, distance_m, moved
-from companion.skipper.way.voyage import PointEn, Voyage
+from companion.skipper.way import PointEn, Voyage, bearing_rad, distance_m, moved
 
 ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
 

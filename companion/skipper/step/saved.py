@@ -11,8 +11,7 @@ from companion.messages import GeoPoint, MissionItem, Mode
 from companion.orders import BY_VERB, Verb
 from companion.skipper.step.latency import KEPT, NO_ANSWERS, PlannerLatency
 from companion.skipper.step.route import Route
-from companion.skipper.way.gates import Approach
-from companion.skipper.way.voyage import PointEn
+from companion.skipper.way import Approach, PointEn
 
 FORMAT = 1
 MAX_ITEMS = 2000       # no autopilot holds more

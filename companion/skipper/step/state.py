@@ -18,9 +18,8 @@ from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.latency import NO_ANSWERS, PlannerLatency
 from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted, SavedPlace, Standing
-from companion.skipper.way.gates import Approach
+from companion.skipper.way import Approach, PointEn
 from companion.skipper.way.position_plausibility import PositionDoubt
-from companion.skipper.way.voyage import PointEn
 from companion.traffic import Assessment
 from companion.traffic.colregs import OngoingEncounter
 

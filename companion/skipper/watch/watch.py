@@ -13,8 +13,7 @@ from companion.safety import BY_NAME, CAUSES, HOMEWARD, PERSON, TABLE, Response,
 from companion.skipper.behaviors.drifting import STEERAGE_MPS, is_driven_astern
 from companion.skipper.behaviors.failsafe import TOLD_S, is_answered
 from companion.skipper.planning.diversions import words
-from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.context import StepContext
+from companion.skipper.step import SkipperConfig, StepContext
 from companion.skipper.step.state import Raised
 from companion.skipper.watch.measures import measure
 from companion.skipper.way.drift import DriftAhead, drift_ahead
