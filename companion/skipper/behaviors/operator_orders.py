@@ -21,7 +21,7 @@ from companion.skipper.planning.diversions import diversion, home_trouble, is_at
 from companion.skipper.planning.not_found import hold
 from companion.skipper.step.actions import Acknowledge, CancelPlan, ReplanReason, RequestPlan, StopOrders
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.route import Kind
+from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.saved import Standing
 from companion.skipper.step.state import PATIENT, Answered, FieldSteering, Phase
 from companion.skipper.way import Approach, PointEn, distance_m
@@ -288,7 +288,7 @@ def _let_go_of_plan(ctx: StepContext) -> None:
 def _see_through(ctx: StepContext) -> None:
     """End an order to sail to a place once the boat is there: the goals that are left are next."""
     standing, bound, boat = ctx.state.orders.standing, diversion(ctx), ctx.boat_en
-    if standing is None or bound is None or bound.kind is not Kind.GOAL or boat is None or (
+    if standing is None or bound is None or bound.kind is not DiversionKind.GOAL or boat is None or (
             not ctx.state.voyage.sailing):
         return
     off_m = distance_m(boat, bound.en_m)

@@ -14,7 +14,7 @@ from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
 from companion.skipper.planning.diversions import home_trouble, is_at_rest, pressing
-from companion.skipper.step import CancelPlan, Diversion, Kind, Phase, SafeEnd, StepContext
+from companion.skipper.step import CancelPlan, Diversion, DiversionKind, Phase, SafeEnd, StepContext
 
 ANSWERED = {
     "": "for a person",
@@ -34,17 +34,18 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
         reached = len(ctx.state.progress.reached)
         _end(ctx, f"out of time: {reached} of {len(ctx.voyage.legs)} goals reached", arrived=False)
         return True
-    if bound.kind is Kind.HOME and ctx.gate is None and not ctx.state.operator.answering and not bound.is_ordered:
+    if (bound.kind is DiversionKind.HOME and ctx.gate is None and not ctx.state.operator.answering
+            and not bound.is_ordered):
         ctx.set(voyage=changed(ctx.state.voyage, home_reached=True))
         rest(ctx)
         return True
-    if bound.kind is Kind.REST:
+    if bound.kind is DiversionKind.REST:
         return False
     _let_go_of_plans(ctx)
     if repair(ctx):
         return True
     hand_back(ctx)
-    where = "staying near by" if bound.kind is Kind.STAY else f"at {bound.name}"
+    where = "staying near by" if bound.kind is DiversionKind.STAY else f"at {bound.name}"
     how_long = UNTIL_TOLD if bound.is_ordered else bound.until or _how_long(ctx)
     ctx.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
     return True

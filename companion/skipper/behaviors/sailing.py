@@ -217,7 +217,7 @@ def sail_on(ctx: StepContext) -> bool:
     stopped = ctx.state.steering.own_mode in STOPPING
     if not stopped or ctx.autopilot is None or ctx.autopilot.mode is not ctx.state.steering.own_mode:
         return False
-    _sail_on(ctx)
+    _plan_and_resume(ctx)
     return True
 
 
@@ -262,8 +262,8 @@ def follow_route(ctx: StepContext) -> bool:
     return True
 
 
-def _sail_on(ctx: StepContext) -> None:
-    """Out of a stop that nobody asked for, or a LOITER of ours: plan from where the boat is now, then AUTO."""
+def _plan_and_resume(ctx: StepContext) -> None:
+    """End a stop that nobody asked for, or our own LOITER: plan from where the boat is now, then set AUTO."""
     why = waits_for(ctx)
     if why or repair(ctx):
         ctx.phase(Phase.HOLDING, why or "waiting for the mission to be put right before sailing on")

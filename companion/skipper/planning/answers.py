@@ -22,7 +22,7 @@ from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.track import of_way, said
 from companion.skipper.planning.uploads import is_begun_risky, is_riskier, upload
 from companion.skipper.planning.vessels import apart_m, meetings
-from companion.skipper.step import Kind, Phase, PlanOutcome, ReplanReason, Route, StepContext
+from companion.skipper.step import DiversionKind, Phase, PlanOutcome, ReplanReason, Route, StepContext
 from companion.skipper.step.actions import Change
 from companion.skipper.step.missions import Tail, splice
 from companion.skipper.step.state import PendingPlan, Retry
@@ -193,7 +193,7 @@ def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, 
     bound = diversion(ctx)
     tail = Tail(
         start_en=start, points_en=tuple(points), gate=pending.gate,
-        is_place=bound is not None and bound.kind is Kind.BOX and bound.name == pending.facts.bound_for)
+        is_place=bound is not None and bound.kind is DiversionKind.BOX and bound.name == pending.facts.bound_for)
     facts = replace(
         pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
         median_s=_time(plan.arrival, "median_s"), late_s=_time(plan.arrival, "late_s"),

@@ -14,7 +14,7 @@ from companion.messages import Severity
 from companion.orders import Verb
 from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, End, Recovery
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
-from companion.skipper.step import Diversion, Kind, SafeEnd, SkipperConfig, StepContext
+from companion.skipper.step import Diversion, DiversionKind, SafeEnd, SkipperConfig, StepContext
 from companion.skipper.step.route import HOME_RADIUS_M
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
 from companion.skipper.way.gates import Gate, marks_of
@@ -63,8 +63,8 @@ def _off_field(ctx: StepContext) -> Diversion | None:
         return None
     left_s = stay_left_s(ctx, gate)
     until = "until it can be sailed, or told to go on" if math.isinf(left_s) else f"{left_s:.0f} s more"
-    return Diversion(kind=Kind.FIELD, name=f"the place of {gate.name}", why=why, en_m=gate.en_m, radius_m=gate.radius_m,
-                  until=until)
+    return Diversion(kind=DiversionKind.FIELD, name=f"the place of {gate.name}", why=why, en_m=gate.en_m,
+                     radius_m=gate.radius_m, until=until)
 
 
 def _in_box(ctx: StepContext) -> Diversion | None:
@@ -74,7 +74,7 @@ def _in_box(ctx: StepContext) -> Diversion | None:
         return None
     left_s = stay_left_s(ctx, gate)
     until = "until told to go on" if gate.box.for_s is None else f"{left_s:.0f} s more"
-    return Diversion(kind=Kind.BOX, name=f"the box {gate.name}", why="to stay in it", en_m=gate.en_m,
+    return Diversion(kind=DiversionKind.BOX, name=f"the box {gate.name}", why="to stay in it", en_m=gate.en_m,
                   radius_m=gate.radius_m, until=until)
 
 
@@ -90,7 +90,7 @@ def _before_start(ctx: StepContext) -> Diversion | None:
     route = ctx.state.mission.route
     is_bound = route is not None and route.bound_for == name and route.points_en_m
     place = route.points_en_m[ctx.last_waypoint()] if route is not None and is_bound else waiting_en(ctx, gate)
-    return Diversion(kind=Kind.START, name=name, why=why, en_m=place, until=until)
+    return Diversion(kind=DiversionKind.START, name=name, why=why, en_m=place, until=until)
 
 
 def pressing(ctx: StepContext) -> Diversion | None:
@@ -122,9 +122,9 @@ def _ordered(ctx: StepContext) -> Diversion | None:
         found = _stay(ctx, order.why)
         return None if found is None else replace(found, is_ordered=True)
     kind, name, radius_m = {
-        Verb.REFUGE: (Kind.REFUGE, f"the refuge {order.name}".rstrip(), HOME_RADIUS_M),
-        Verb.HOME: (Kind.HOME, HOME, HOME_RADIUS_M),
-    }.get(order.verb, (Kind.GOAL, order.name, GOAL_RADIUS_M))
+        Verb.REFUGE: (DiversionKind.REFUGE, f"the refuge {order.name}".rstrip(), HOME_RADIUS_M),
+        Verb.HOME: (DiversionKind.HOME, HOME, HOME_RADIUS_M),
+    }.get(order.verb, (DiversionKind.GOAL, order.name, GOAL_RADIUS_M))
     radius_m = next((r.radius_m for r in ctx.voyage.refuges if r.en_m == order.en_m), radius_m)
     return Diversion(kind=kind, name=name, why=order.why, en_m=order.en_m, radius_m=radius_m, is_ordered=True)
 
@@ -176,7 +176,7 @@ def _kept_in(ctx: StepContext) -> Diversion | None:
             return staying
     place = route.points_en_m[ctx.last_waypoint()] if route is not None and is_bound else (
         fence.place_inside(ctx.voyage.area, here, room_m))
-    return Diversion(kind=Kind.INSIDE, name=name, why=trouble, en_m=place)
+    return Diversion(kind=DiversionKind.INSIDE, name=name, why=trouble, en_m=place)
 
 
 def fenced_off(ctx: StepContext, gate: Gate | None) -> str:
@@ -225,7 +225,7 @@ def _stay(ctx: StepContext, why: str) -> Diversion | None:
     here = ctx.snapshot.position_en_m
     if here is not None and float(ctx.voyage.area.clearance_m([here])[0]) <= 0.0:
         return None
-    return Diversion(kind=Kind.STAY, name="", why=why)
+    return Diversion(kind=DiversionKind.STAY, name="", why=why)
 
 
 def _refuge(ctx: StepContext, why: str) -> Diversion | None:
@@ -239,7 +239,8 @@ def _refuge(ctx: StepContext, why: str) -> Diversion | None:
     if chosen is None:
         by_distance = sorted(refuges, key=lambda r: distance_m(here, r.en_m) if here is not None else 0.0)
         chosen = by_distance[ctx.state.plans.retry.failures % len(by_distance)]
-    return Diversion(kind=Kind.REFUGE, name=refuge_name(chosen), why=why, en_m=chosen.en_m, radius_m=chosen.radius_m)
+    return Diversion(kind=DiversionKind.REFUGE, name=refuge_name(chosen), why=why, en_m=chosen.en_m,
+                     radius_m=chosen.radius_m)
 
 
 def refuge_name(refuge: Refuge) -> str:
@@ -276,7 +277,7 @@ def _home(ctx: StepContext, why: str) -> Diversion | None:
     status = ctx.snapshot.autopilot
     if home_trouble(ctx) or status is None or status.home is None:
         return None
-    return Diversion(kind=Kind.HOME, name=HOME, why=why, en_m=ctx.voyage.frame.en_from_geo(status.home))
+    return Diversion(kind=DiversionKind.HOME, name=HOME, why=why, en_m=ctx.voyage.frame.en_from_geo(status.home))
 
 
 def _back(ctx: StepContext) -> Diversion | None:
@@ -287,7 +288,7 @@ def _back(ctx: StepContext) -> Diversion | None:
         return None
     if not _is_bound(ctx, REST) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
         return None   # the autopilot's own loiter goes back there
-    return Diversion(kind=Kind.REST, name=REST, why="she is off the place where she was to rest", en_m=rest)
+    return Diversion(kind=DiversionKind.REST, name=REST, why="she is off the place where she was to rest", en_m=rest)
 
 
 def _is_bound(ctx: StepContext, name: str) -> bool:
@@ -308,7 +309,7 @@ def is_at_rest(ctx: StepContext) -> bool:
     bound, route = diversion(ctx), ctx.state.mission.route
     if bound is None or route is None or ctx.ahead():
         return False
-    return bound.kind is Kind.STAY or route.bound_for == bound.name
+    return bound.kind is DiversionKind.STAY or route.bound_for == bound.name
 
 
 POLICY_WORDS = {

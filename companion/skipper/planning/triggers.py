@@ -14,7 +14,16 @@ from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_rest
 from companion.skipper.planning.diversions import HOME, diversion, homeward, is_composed
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
-from companion.skipper.step import Diversion, Guidance, Kind, Phase, ReplanPolicy, ReplanReason, Route, StepContext
+from companion.skipper.step import (
+    Diversion,
+    DiversionKind,
+    Guidance,
+    Phase,
+    ReplanPolicy,
+    ReplanReason,
+    Route,
+    StepContext,
+)
 from companion.skipper.step.missions import NO_PLAN, path_length_m
 from companion.skipper.way import Gate, PointEn, bearing_rad, distance_m, half_width_rad
 from companion.skipper.way.judge import predicted_beat
@@ -89,10 +98,11 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
     return trigger or _extension(ctx, bound) or _wind(ctx) or _unsure(ctx) or _waypoint(ctx)
 
 
-REASONS = {Kind.REFUGE: ReplanReason.REFUGE, Kind.HOME: ReplanReason.HOME, Kind.REST: ReplanReason.REST,
-           Kind.GOAL: ReplanReason.ORDER, Kind.INSIDE: ReplanReason.OBSTACLE,
-           Kind.START: ReplanReason.NEXT_GOAL, Kind.BOX: ReplanReason.NEXT_GOAL,
-           Kind.FIELD: ReplanReason.RETRY}
+REASONS = {DiversionKind.REFUGE: ReplanReason.REFUGE, DiversionKind.HOME: ReplanReason.HOME,
+           DiversionKind.REST: ReplanReason.REST, DiversionKind.GOAL: ReplanReason.ORDER,
+           DiversionKind.INSIDE: ReplanReason.OBSTACLE,
+           DiversionKind.START: ReplanReason.NEXT_GOAL, DiversionKind.BOX: ReplanReason.NEXT_GOAL,
+           DiversionKind.FIELD: ReplanReason.RETRY}
 
 
 def _diversion(ctx: StepContext, bound: Diversion | None) -> Trigger | None:

@@ -379,7 +379,7 @@ class StepContext:
 
     @property
     def tack_corridor_m(self) -> float:
-        """SAIL_XTRACK_MAX; 0, none, where the boat is steered in GUIDED: nothing tacks it at its edge there."""
+        """How far off its line the autopilot tacks [m], SAIL_XTRACK_MAX; 0 in GUIDED, where it never does."""
         limits = self.snapshot.limits
         if self.steers_plans:
             return 0.0

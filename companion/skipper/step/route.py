@@ -44,7 +44,7 @@ class Route:
     bound_for: str = ""                # the diversion that its end serves; empty: the goals
 
 
-class Kind(enum.Enum):
+class DiversionKind(enum.Enum):
     """What kind of diversion."""
 
     REFUGE = "refuge"
@@ -62,7 +62,7 @@ class Kind(enum.Enum):
 class Diversion:
     """Where to, and why. ``name`` is what a route is bound for; a STAY has no place."""
 
-    kind: Kind
+    kind: DiversionKind
     name: str
     why: str
     en_m: PointEn = (0.0, 0.0)
@@ -73,9 +73,9 @@ class Diversion:
     @property
     def has_place(self) -> bool:
         """Whether there is a place to plan for."""
-        return self.kind is not Kind.STAY
+        return self.kind is not DiversionKind.STAY
 
     @property
     def sentence(self) -> str:
         """Where to and why."""
-        return f"{'staying near by' if self.kind is Kind.STAY else f'to {self.name}'}: {self.why}"
+        return f"{'staying near by' if self.kind is DiversionKind.STAY else f'to {self.name}'}: {self.why}"

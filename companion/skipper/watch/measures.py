@@ -14,7 +14,7 @@ from companion.skipper.behaviors.drifting import meets_in_s, sails
 from companion.skipper.behaviors.field_guidance import meets_in
 from companion.skipper.planning.autopilot_beats import beaten_within_m
 from companion.skipper.planning.diversions import diversion, home_trouble, is_composed
-from companion.skipper.step import Kind, StepContext, WindHealth
+from companion.skipper.step import DiversionKind, StepContext, WindHealth
 from companion.skipper.step.state import Charge
 from companion.skipper.step.wind_limits import too_light, too_strong
 from companion.skipper.way.geometry import along_m, cross_track_m, distance_m
@@ -232,7 +232,7 @@ def _dragged(ctx: StepContext) -> float | None:
     if rest is None or boat is None:
         return None
     bound = diversion(ctx)
-    return distance_m(boat, rest) if bound is None or bound.kind is Kind.REST else None
+    return distance_m(boat, rest) if bound is None or bound.kind is DiversionKind.REST else None
 
 
 def _planner(ctx: StepContext) -> float | None:
