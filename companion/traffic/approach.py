@@ -76,7 +76,6 @@ class ClosestApproach:
     now_m: float
     bearing_rad: float
     is_closing: bool
-    crosses_ahead: bool      # we pass ahead of its bow, within its course line, before it gets there
     sigma_m: float
 
 
@@ -102,11 +101,10 @@ def cpa(own: OwnShip, vessel: Vessel, t_s: float) -> ClosestApproach:
     time_s = _closest_time(a, b, va, vb, half_a, half_b)
     gap = _gap(a + va * time_s, b + vb * time_s, half_a, half_b)
     now = _gap(a, b, half_a, half_b)
-    ahead = _crosses_ahead(a, b, va, vb, half_b, math.hypot(*there.velocity_en_mps))
     later = predict(vessel, t_s + time_s)
     return ClosestApproach(
         distance_m=max(0.0, gap - radius), time_s=time_s, now_m=max(0.0, now - radius),
-        bearing_rad=wrap_two_pi(math.atan2(-ex, -ey)), is_closing=time_s > 0.0, crosses_ahead=ahead,
+        bearing_rad=wrap_two_pi(math.atan2(-ex, -ey)), is_closing=time_s > 0.0,
         sigma_m=max(later.sigma_along_m, later.sigma_across_m),
     )
 
@@ -169,10 +167,3 @@ def _closest_time(a: float, b: float, va: float, vb: float, half_a: float, half_
         return enter
     # Equal distances (a parallel course) keep the earliest.
     return min(times, key=lambda t: (round(_gap(a + va * t, b + vb * t, half_a, half_b), 6), t))
-
-
-def _crosses_ahead(a: float, b: float, va: float, vb: float, half_b: float, their_mps: float) -> bool:
-    """Do we cross the other's bow line in front of its stem?"""
-    if their_mps < 0.3 or abs(va) < 1e-9 or a * va > 0.0:
-        return False
-    return b - vb * a / va > half_b

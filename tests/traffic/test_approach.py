@@ -60,12 +60,6 @@ def test_on_top_of_us_is_a_touch_not_a_crash() -> None:
     assert too_near(discs, own())
 
 
-def test_crossing_ahead_is_seen() -> None:
-    ship = vessel((0.0, -400.0), 0.0, 5.0)
-    assert cpa(own((-60.0, 0.0), 90.0, 3.0), ship, 0.0).crosses_ahead
-    assert not cpa(own((-300.0, 0.0), 90.0, 2.0), ship, 0.0).crosses_ahead
-
-
 angle = st.floats(0.0, 359.0)
 coordinate = st.floats(-2000.0, 2000.0)
 
