@@ -36,34 +36,20 @@ from companion.view import ViewFold
 from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.scenario.traffic import free_port
 from sitl.world.environment import Constant
+from tests.one_mark import one_mark
 
 # When everything beside the voyage is broken [s]: from before its start, and again under way.
 WINDOWS = ((0.0, 12.0), (80.0, 95.0))
 OTHERS = {Auxiliary.VIEW: ((0.0, 12.0), (115.0, 130.0)),     # without a view nothing of it fails to be shown
           Auxiliary.OUTPUTS: ((0.0, 24.0), (80.0, 95.0)),
           Auxiliary.FENCE: ((0.0, 50.0),)}                   # once the boat is ours
-MISSION = """
-name = "reach"
-[start]
-lat = 50.8170000
-lon = -1.3100000
-heading_deg = 90.0
-[[goal]]
-lat = 50.8170000
-lon = -1.3071600
-radius_m = 10.0
-[area]
-margin_m = 10.0
-[operator]
-arm = true
-set_auto = true
-local_orders = ["hold"]
+MISSION = one_mark("reach", (50.8170000, -1.3071600), 90.0, rock=False, tables="""local_orders = ["hold"]
 upload_fence = true
 [traffic]
 feeds = ["udpin:127.0.0.1:{feed}"]
 [output]
 nmea = ["udp:127.0.0.1:{nmea}"]
-"""
+""")
 
 # What is called of each of them, at its start and under way. What is added to ``Auxiliary`` is added here.
 FAULTS = {

@@ -12,31 +12,15 @@ from companion.telemetry.folder import VoyageFigures
 from companion.view import ViewFold
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import EventSpec, Scenario, WindSpec
+from tests.one_mark import one_mark
 
-MISSION = """
-name = "beat"
-[start]
-lat = 50.8170000
-lon = -1.3100000
-heading_deg = 60.0
-[[goal]]
-name = "mark"
-lat = 50.8179000
-lon = -1.3100000
-radius_m = 10.0
+MISSION = one_mark("beat", (50.8179000, -1.3100000), 60.0, tables="""orders = ["hold", "go_on"]
+local_orders = "all"
 [[refuge]]
 name = "Bay"
 lat = 50.8172000
 lon = -1.3085000
-[area]
-obstacles = ["rock.wkt"]
-margin_m = 10.0
-[operator]
-arm = true
-set_auto = true
-orders = ["hold", "go_on"]
-local_orders = "all"
-"""
+""")
 ROCK = "rock|exclusion|POLYGON ((-1.3104 50.8173, -1.3101 50.8173, -1.3101 50.8175, -1.3104 50.8175, -1.3104 50.8173))"
 
 

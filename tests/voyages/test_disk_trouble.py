@@ -25,26 +25,10 @@ from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serv
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import EventSpec, ExpectSpec, Scenario, WindSpec
 from sitl.world.environment import Constant
+from tests.one_mark import one_mark
 
 # A reach of 200 m past a rock.
-MISSION = """
-name = "reach"
-[start]
-lat = 50.8170000
-lon = -1.3100000
-heading_deg = 90.0
-[[goal]]
-name = "mark"
-lat = 50.8170000
-lon = -1.3071600
-radius_m = 10.0
-[area]
-obstacles = ["rock.wkt"]
-margin_m = 10.0
-[operator]
-arm = true
-set_auto = true
-"""
+MISSION = one_mark("reach", (50.8170000, -1.3071600), 90.0)
 ROCK = "rock|exclusion|POLYGON ((-1.3088 50.8167, -1.3085 50.8167, -1.3085 50.8169, -1.3088 50.8169, -1.3088 50.8167))"
 
 

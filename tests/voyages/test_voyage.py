@@ -13,27 +13,10 @@ from companion.replay import replay
 from companion.telemetry.folder.reading import read_voyage
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import EventSpec, ExpectSpec, Scenario, WindSpec, load_scenario
+from tests.one_mark import one_mark
 
-SHORT_MISSION = """
-name = "short"
-[start]
-lat = 50.8170000
-lon = -1.3100000
-heading_deg = 60.0
-[[goal]]
-name = "mark"
-lat = 50.8181
-lon = -1.3100000
-radius_m = 10.0
-[area]
-obstacles = ["rock.wkt"]
-margin_m = 10.0
-[risk]
-delta_s = 0.85
-[operator]
-arm = true
-set_auto = true
-"""
+SHORT_MISSION = one_mark("short", (50.8181, -1.3100000), 60.0).replace(
+    "[operator]", "[risk]\ndelta_s = 0.85\n[operator]")
 # A rock right between the boat and the mark, 30 m wide.
 ROCK = "rock|exclusion|POLYGON ((-1.3102 50.8175, -1.3098 50.8175, -1.3098 50.8177, -1.3102 50.8177, -1.3102 50.8175))"
 
