@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from companion.commands.output import force_option, refuse_existing, write_files
 from companion.errors import InputError, JobError, unreadable
-from companion.program.arguments import duration, system_id, whole
+from companion.program.arguments import add_command, duration, system_id, whole
 
 if TYPE_CHECKING:
     from companion.orders.far import FarStatus
@@ -44,10 +44,7 @@ Exit codes: 0 done, 1 not, 2 a file or option that cannot be believed.
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command with its verbs."""
-    parser = subparsers.add_parser(
-        "far", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = add_command(subparsers, "far", summary, _EPILOG)
     verbs = parser.add_subparsers(dest="verb", metavar="order|begin|status", required=True)
     order = verbs.add_parser("order", help="make an order of 24 bytes")
     order.add_argument("words", nargs="+", metavar="VERB [ARGS]", help="the order, as for `companion order`")

@@ -18,7 +18,7 @@ from companion.commands.output import (
     write_out,
 )
 from companion.errors import InputError, JobError
-from companion.program.arguments import number, picture, place, system_id
+from companion.program.arguments import add_command, number, picture, place, system_id
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -43,10 +43,7 @@ Exit codes: 0 in order, 1 faults found or a failed transfer, 2 a file or option 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command with its four verbs."""
-    parser = subparsers.add_parser(
-        "fence", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = add_command(subparsers, "fence", summary, _EPILOG)
     verbs = parser.add_subparsers(dest="verb", metavar="check|convert|upload|download", required=True)
     check = verbs.add_parser("check", help="find and name what is wrong with a fence, an obstacle file, a mission")
     check.add_argument("file", metavar="FILE")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.commands.output import patience
-from companion.program.arguments import out_file, picture, whole, wind
+from companion.program.arguments import add_command, out_file, picture, whole, wind
 
 if TYPE_CHECKING:
     from companion.geofence import Mission
@@ -29,9 +29,7 @@ Exit codes: 0 told or drawn, 2 the mission cannot be read, or has no field.
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command's options."""
-    parser = subparsers.add_parser(
-        "field", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = add_command(subparsers, "field", summary, _EPILOG)
     parser.add_argument("file", metavar="FILE", help="a mission TOML")
     parser.add_argument("--goal", type=whole(at_least=1), metavar="N", help="its number (else the first by a field)")
     parser.add_argument("--wind", type=wind, metavar="SPEED@FROM",

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.errors import InputError, JobError, LinkError
-from companion.program.arguments import system_id
+from companion.program.arguments import add_command, system_id
 
 if TYPE_CHECKING:
     from companion.mavlink.autopilot import Autopilot
@@ -49,10 +49,7 @@ BEHIND_TICKS = 60 * 100_000
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command with its three verbs."""
-    parser = subparsers.add_parser(
-        "key", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = add_command(subparsers, "key", summary, _EPILOG)
     verbs = parser.add_subparsers(dest="verb", metavar="new|set|remove", required=True)
     new = verbs.add_parser("new", help="make a key file that only you can read")
     new.add_argument("file", type=Path, metavar="FILE")

@@ -22,7 +22,17 @@ from companion.commands.output import (
     write_out,
 )
 from companion.errors import InputError, JobError
-from companion.program.arguments import chart_option, host_name, http_address, number, picture, place, system_id, wind
+from companion.program.arguments import (
+    add_command,
+    chart_option,
+    host_name,
+    http_address,
+    number,
+    picture,
+    place,
+    system_id,
+    wind,
+)
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -54,10 +64,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     """Add the command with its verbs."""
     from companion.commands.fence import link_options
 
-    parser = subparsers.add_parser(
-        "mission", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = add_command(subparsers, "mission", summary, _EPILOG)
     verbs = parser.add_subparsers(dest="verb", metavar="check|new|edit|example|convert|upload|download", required=True)
     check = verbs.add_parser("check", help="read a mission as the boat would and name what is wrong")
     check.add_argument("file", metavar="FILE")

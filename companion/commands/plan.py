@@ -16,7 +16,7 @@ from companion.errors import InputError
 from companion.planner.courses import courses
 from companion.planner.problem import evaluate
 from companion.planners import ALGORITHMS
-from companion.program.arguments import number, out_file, picture, whole, wind
+from companion.program.arguments import add_command, number, out_file, picture, whole, wind
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -40,10 +40,7 @@ problem cannot be read or planned.
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command's options."""
-    parser = subparsers.add_parser(
-        "plan", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = add_command(subparsers, "plan", summary, _EPILOG)
     parser.add_argument("problem", metavar="PROBLEM.json", help="the planning problem, or a mission TOML, planned from "
                         "goal to goal in a wind held steady")
     parser.add_argument("--wind", type=wind, metavar="SPEED@FROM",

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from companion.errors import InputError
-from companion.program.arguments import out_file, picture
+from companion.program.arguments import add_command, out_file, picture
 
 if TYPE_CHECKING:
     from companion.wind.study import Ar1Fit, Characterisation, HorizonScore, Record, Score
@@ -43,10 +43,7 @@ _REFERENCES = ("kalman", "mean90")  # drawn beside whatever was asked for
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command's options."""
-    parser = subparsers.add_parser(
-        "wind", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = add_command(subparsers, "wind", summary, _EPILOG)
     parser.add_argument(
         "record", metavar="RECORD", nargs="+", type=Path, help="CSV, tlog, ArduPilot .bin, or a folder of CSV")
     parser.add_argument(

@@ -6,6 +6,7 @@ everything a command is given is believed before it begins to work.
 
 from __future__ import annotations
 
+import argparse
 import datetime as dt
 import ipaddress
 import math
@@ -20,6 +21,15 @@ from companion.messages import GeoPoint
 _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]{0,252}[A-Za-z0-9])?")
 # What matplotlib writes without a further program.
 PICTURES = (".png", ".svg", ".pdf", ".jpg")
+
+
+def add_command(
+    subparsers: argparse._SubParsersAction[argparse.ArgumentParser], name: str, summary: str, epilog: str,
+) -> argparse.ArgumentParser:
+    """Add a command that its summary describes; the lines of ``epilog`` stay as they are."""
+    return subparsers.add_parser(
+        name, help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter)
 
 
 def number(

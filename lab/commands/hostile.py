@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 from companion.errors import InputError
-from companion.program.arguments import number, system_id, whole
+from companion.program.arguments import add_command, number, system_id, whole
 
 MAX_COUNT, MAX_RATE_HZ, MAX_S = 100_000, 500.0, 3600.0
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
@@ -30,10 +30,7 @@ frames and {MAX_S:g} s: it is a test, not a weapon.
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command."""
-    parser = subparsers.add_parser(
-        "hostile", help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=_EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = add_command(subparsers, "hostile", summary, _EXAMPLE)
     parser.add_argument("--list", action="store_true", help="name the forgeries and end")
     parser.add_argument("--document", type=Path, metavar="FILE", help="write the measured table into FILE")
     parser.add_argument("--boat", metavar="LINK", help="the boat's port: udpout:127.0.0.1:14555, tcp:127.0.0.1:5760")

@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import math
 import sys
-from collections.abc import AsyncIterator, Awaitable
+from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -164,14 +164,8 @@ class SimulatedBoat:
             await self._pilot.set_mode(Mode[event.mode or "HOLD"])
         elif event.kind == "reboot":
             await self._pilot.link.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0)
-        elif event.kind == "foreign_mission":
-            await _upload_foreign(self._judge_url, event, frame)
-        elif event.kind == "order":
-            await _answered(give_order(open_link(self._judge_url), event, frame))
-        elif event.kind == "parameter":
-            await _answered(set_parameter(open_link(self._judge_url), event))
-        elif event.kind in REDRAWN:
-            await _answered(redraw(open_link(self._judge_url), event, frame))
+        else:
+            await _from_ashore(self._judge_url, event, frame)
 
 
 class RealBoat:
@@ -229,14 +223,6 @@ class RealBoat:
             rover.set_mode(Mode[event.mode or "HOLD"])
         elif event.kind == "reboot":
             rover.reboot()
-        elif event.kind == "foreign_mission":
-            await _upload_foreign(rover.shore_link, event, frame)
-        elif event.kind == "order":
-            await _answered(give_order(open_link(rover.shore_link), event, frame))
-        elif event.kind == "parameter":
-            await _answered(set_parameter(open_link(rover.shore_link), event))
-        elif event.kind in REDRAWN:
-            await _answered(redraw(open_link(rover.shore_link), event, frame))
         elif event.kind in {"arm", "disarm"}:
             rover.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, float(event.kind == "arm"))
         elif event.kind == "radio_lost":
@@ -253,18 +239,28 @@ class RealBoat:
             rover.set_gps_jump(there.lat_deg - frame.origin.lat_deg, there.lon_deg - frame.origin.lon_deg)
         elif event.kind == "gps_lost":
             rover.set_gps(is_lost=True)
+        else:
+            await _from_ashore(rover.shore_link, event, frame)
         if event.kind in {"gps_jump", "gps_lost"} and event.for_s is not None:
             await asyncio.sleep(event.for_s)
             rover.set_gps_jump(0.0, 0.0)
             rover.set_gps(is_lost=False)
 
 
-async def _answered(told: Awaitable[str]) -> None:
-    """Do what somebody ashore does, over a link of his own.
+async def _from_ashore(url: str, event: EventSpec, frame: LocalFrame) -> None:
+    """Do what somebody ashore does, over a link of his own; nothing for an event that is another's.
 
     Raises:
         JobError: it was not answered as the scenario expects.
     """
-    trouble = await told
+    trouble = ""
+    if event.kind == "foreign_mission":
+        await _upload_foreign(url, event, frame)
+    elif event.kind == "order":
+        trouble = await give_order(open_link(url), event, frame)
+    elif event.kind == "parameter":
+        trouble = await set_parameter(open_link(url), event)
+    elif event.kind in REDRAWN:
+        trouble = await redraw(open_link(url), event, frame)
     if trouble:
         raise JobError(trouble)
