@@ -56,7 +56,7 @@ from companion.geofence import Code, Finding, FindingLevel, LocalArea, Mission
 from companion.geofence.check import AreaConditions, check_area
 from companion.geofence.mission import AreaOptions, kind_of, place_troubles, read_mission
 from companion.planner import Plan, Problem
-from companion.planner.problem import assumed, strength_dict
+from companion.planner.problem import assumed
 from companion.safety import LIGHT_WIND, STRONG_WIND
 from companion.skipper.planning import HOME_RADIUS_M
 from companion.skipper.way import Composed, Until
@@ -260,7 +260,7 @@ def leg_problem(
         "obstacles": local.obstacles_wkt(mission.margin_m),
         "obstacle_names": local.obstacle_names(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here_en),
         "wind": {"from_deg": wind.from_deg, "speed_mps": wind.speed_mps, "sigma": wind.sigma(),
-                 **({"strength": strength_dict(assumed(wind.speed_mps))} if sails else {})},
+                 **({"strength": assumed(wind.speed_mps).to_dict()} if sails else {})},
         "boat": {**boat.problem_boat(wind.speed_mps), **({"speeds": boat.problem_speeds()} if sails else {})},
         "delta_s": mission.risk.delta_s, **water,
     })

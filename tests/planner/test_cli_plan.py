@@ -12,7 +12,7 @@ from companion.geofence import load_mission
 from companion.mission_check import AssumedWind, leg_problem
 from companion.planner import ALGORITHMS, Problem
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.json_write import to_dict
+from tests.planner.problem_json import to_dict
 
 GOOD = {
     "id": "pond", "title": "Across the pond", "start": {"x": 0, "y": 0, "heading_deg": 0},

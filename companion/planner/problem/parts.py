@@ -229,6 +229,11 @@ class Strength:
         numbers = (*self.horizon_s, *self.mean_mps, *self.sigma_mps, self.correlation_s)
         return all(math.isfinite(x) and x >= 0.0 for x in numbers) and self.correlation_s > 0.0
 
+    def to_dict(self) -> dict[str, object]:
+        """Return its JSON object."""
+        return {"horizon_s": list(self.horizon_s), "mean_mps": list(self.mean_mps), "sigma_mps": list(self.sigma_mps),
+                "correlation_s": self.correlation_s, "known": self.is_known}
+
     def mean_at(self, t_s: ArrayLike) -> NDArray[np.float64]:
         """Return what is expected at times [m/s]."""
         return np.interp(np.asarray(t_s, dtype=np.float64), self.horizon_s, self.mean_mps)

@@ -20,7 +20,6 @@ from companion.current import STILL_WATER, WaterCurrent, WindAngleUncertainty, f
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import WindForecast
-from companion.planner.problem import strength_dict
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.wind_limits import strength_of
 from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m, half_width_rad, mean_twd_rad, moved
@@ -88,7 +87,7 @@ def wind_part(
             "sigma_deg": [float(x) for x in np.degrees(np.hypot(sigma, offset))],
             "half_width_deg": [float(x) for x in np.degrees(half + offset)],
         },
-        "strength": strength_dict(strength_of(forecast, after_s=after_s, is_known=is_known)),
+        "strength": strength_of(forecast, after_s=after_s, is_known=is_known).to_dict(),
     }
 
 

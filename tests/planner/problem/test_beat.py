@@ -15,8 +15,8 @@ from bench.winds import simulate_entries
 from companion.errors import InputError
 from companion.planner import Plan, PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import beat_s, beaten, evaluate
-from companion.planner.problem.json_write import to_dict
 from companion.planner.risk.chance_constraint import path_risk
+from tests.planner.problem_json import to_dict
 
 BEAT = {"no_go_half_deg": 45.0, "corridor_m": 10.0, "clearance_m": 8.0, "tack_s": 1.8}
 BLOCK = "POLYGON ((-60 150, 60 150, 60 210, -60 210, -60 150))"

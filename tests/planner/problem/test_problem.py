@@ -13,8 +13,8 @@ from scipy.stats import norm
 
 from companion.errors import InputError
 from companion.planner import Plan, PlanStatus, Problem, plan
-from companion.planner.problem.json_write import to_dict
 from companion.planner.problem.parts import interpolated
+from tests.planner.problem_json import to_dict
 from tests.planner.problems import box, random_problems, simple
 
 

@@ -13,7 +13,6 @@ from companion.messages import Target
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.json_write import to_dict
 from companion.planner.problem.parts import Current, RiskLimit, Sigma
 from companion.planner.problem.value import resolved, uncertain
 from companion.planner.reference import rrtstar_kernels as kernels
@@ -22,6 +21,7 @@ from companion.planner.reference.vessels import carried, is_kept, keep_share
 from companion.planner.reference.world import world_of
 from companion.planner.risk.chance_constraint import path_risk, vessel_risk
 from companion.planners import RrtstarSettings
+from tests.planner.problem_json import to_dict
 
 EFFORT = 1200
 

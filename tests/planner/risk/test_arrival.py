@@ -14,8 +14,8 @@ from companion.planner import Problem, plan
 from companion.planner.explain import explain
 from companion.planner.plan import Plan
 from companion.planner.problem import defect_of, evaluate
-from companion.planner.problem.json_write import to_dict
 from companion.planner.risk.arrival import arrival, in_words, limits_in_words
+from tests.planner.problem_json import to_dict
 
 BOAT = Boat(polar=ardurover_sitl())
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from companion.boat.failed_tack import RISKY
 from companion.planner import Problem, plan
 from companion.planner.problem import evaluate
-from companion.planner.problem.json_write import to_dict
 from companion.planner.problem.value import defect_of
 from companion.planner.risk.chance_constraint import path_risk
 from companion.planner.risk.tacks import of_risky, tacks_at_risk
 from companion.planner.solve import CONTACT_S, DEARER
+from tests.planner.problem_json import to_dict
 
 BOAT = {"no_go_half_deg": 45.0, "max_twa_deg": 180.0, "turn_rate_rad_s": 0.5, "tack_loss_s": 3.0,
         "speed": {"model": "constant", "v_mps": 2.0}}

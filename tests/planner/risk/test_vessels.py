@@ -14,12 +14,12 @@ from companion.messages import Target
 from companion.planner import Plan, Problem, plan
 from companion.planner.explain import explain
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.json_write import to_dict
 from companion.planner.problem.parts import RiskLimit
 from companion.planner.problem.value import defect_of, resolved, sigmas_for
 from companion.planner.risk import kernels
 from companion.planner.risk.chance_constraint import path_risk
 from companion.traffic.predict import tail_factor
+from tests.planner.problem_json import to_dict
 
 
 @pytest.mark.parametrize("clearance_m", [0.0, 50.0])

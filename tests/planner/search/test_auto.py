@@ -14,13 +14,13 @@ from hypothesis import strategies as st
 
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
-from companion.planner.problem.json_write import to_dict
 from companion.planner.search.annealing import anneal
 from companion.planner.search.gauge import make_gauge
 from companion.planner.search.kernels import is_free
 from companion.planner.search.lattice import run_lattice
 from companion.planner.search.moves import check_path, corner
 from companion.planner.search.world import make_world
+from tests.planner.problem_json import to_dict
 from tests.planner.problems import FOLDER, box, load, random_problems, simple
 
 BEST = json.loads((FOLDER.parent / "best_known.json").read_text(encoding="utf-8"))

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from companion.planner import Problem, plan
 from companion.planner.explain import explain, turns
 from companion.planner.problem.evaluate import evaluate, manoeuvre
-from companion.planner.problem.json_write import to_dict
 from companion.planner.search.annealing import anneal
 from companion.planner.search.bound import Bound
 from companion.planner.search.gauge import make_gauge
 from companion.planner.search.kernels import turn_guess, turn_time
 from companion.planner.search.moves import WAYS, check_path, overshoot, round_vector, rounded
 from companion.planner.search.world import make_world
+from tests.planner.problem_json import to_dict
 from tests.planner.problems import FOLDER, box, load, random_problems, simple
 
 DEG = math.pi / 180.0

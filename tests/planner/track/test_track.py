@@ -213,7 +213,7 @@ def test_the_tracking_is_written_and_read_back():
 
 
 def _written(value):
-    from companion.planner.problem.json_write import to_dict
+    from tests.planner.problem_json import to_dict
 
     return to_dict(value)
 

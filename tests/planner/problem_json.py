@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import shapely
 
 from companion.boat.failed_tack import IRONS_S
 from companion.messages import Spread
 from companion.planner.problem.json_read import HELM_KEYS
+from companion.planner.problem.tracking import Tracking
 from companion.planner.problem.value import LEG_SAVING, Problem
-
-if TYPE_CHECKING:
-    from companion.planner.problem.parts import Strength
-    from companion.planner.problem.tracking import Tracking
 
 
 def _wkt(geometry: shapely.Geometry) -> str:
@@ -60,7 +57,7 @@ def to_dict(p: Problem) -> dict[str, Any]:
         "obstacles": [_wkt(g) for g in p.obstacles],
         "fence": None if p.fence is None else _wkt(p.fence),
         "wind": {"from_deg": deg(p.wind.twd_from_rad), "speed_mps": p.wind.tws_mps, "sigma": sigma,
-                 **({} if p.wind.strength is None else {"strength": strength_dict(p.wind.strength)})},
+                 **({} if p.wind.strength is None else {"strength": p.wind.strength.to_dict()})},
         "boat": {
             "no_go_half_deg": deg(p.boat.no_go_half_rad), "max_twa_deg": deg(p.boat.max_twa_rad),
             "turn_rate_rad_s": p.boat.turn_rate_radps,
@@ -111,12 +108,6 @@ def to_dict(p: Problem) -> dict[str, Any]:
     if p.zone is not None:
         out["zone"] = {"from_deg": deg(p.zone.from_rad), "half_deg": deg(p.zone.half_rad)}
     return out | dict(p.extra)
-
-
-def strength_dict(s: Strength) -> dict[str, Any]:
-    """Return the JSON object of a wind's strength."""
-    return {"horizon_s": list(s.horizon_s), "mean_mps": list(s.mean_mps), "sigma_mps": list(s.sigma_mps),
-            "correlation_s": s.correlation_s, "known": s.is_known}
 
 
 def _tracking_dict(t: Tracking) -> dict[str, Any]:
