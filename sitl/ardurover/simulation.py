@@ -346,7 +346,7 @@ class ArduRover:
         position = GeoPoint(lat_deg=sim.lat / 1e7, lon_deg=sim.lng / 1e7)
         east, north = self._frame.en_from_geo(position)
         ve, vn = moving.vy / 100.0, moving.vx / 100.0
-        beat, servos, mission = (self._seen.get(n) for n in ("HEARTBEAT", "SERVO_OUTPUT_RAW", "MISSION_CURRENT"))
+        beat, mission = (self._seen.get(n) for n in ("HEARTBEAT", "MISSION_CURRENT"))
         twd, tws = self._wind_here()
         return Truth(
             t_s=self.t_s, boot_s=self._boot_s, east_m=east, north_m=north, position=position,
@@ -355,8 +355,6 @@ class ArduRover:
             mode=_KNOWN_MODES.get(beat.custom_mode, Mode.HOLD) if beat else Mode.INITIALISING,
             is_armed=bool(beat and beat.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED),
             mission_seq=mission.seq if mission else 0, tacks=self._tacks,
-            sail_rad=math.radians((servos.servo4_raw - 1000) * 0.09) if servos else 0.0,
-            rudder=(servos.servo1_raw - 1500) / 500.0 if servos else 0.0,
         )
 
     def _send(self, message: Any) -> None:

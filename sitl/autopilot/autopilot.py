@@ -120,8 +120,7 @@ class SimulatedAutopilot:
             speed_mps=math.hypot(float(s[k.S_VE]), float(s[k.S_VN])),
             velocity_en_mps=(float(s[k.S_VE]), float(s[k.S_VN])), twd_from_rad=wrap_two_pi(float(s[k.S_WDIR])),
             tws_mps=float(s[k.S_WSPD]), mode=self.pilot.helm.mode, is_armed=self.core.is_armed,
-            mission_seq=self.pilot.helm.mission.current_seq, tacks=int(s[k.S_TACKS]), sail_rad=float(s[k.S_SAIL]),
-            rudder=float(s[k.S_RUDDER]),
+            mission_seq=self.pilot.helm.mission.current_seq, tacks=int(s[k.S_TACKS]),
         )
 
     def reboot(self) -> None:

@@ -165,8 +165,6 @@ class Truth:
     is_armed: bool
     mission_seq: int
     tacks: int
-    sail_rad: float
-    rudder: float
 
 
 class VaneState(enum.Enum):

@@ -36,7 +36,6 @@ class ListResult:
     outcome: TransferOutcome
     text: str = ""
     ack: int | None = None
-    requests: int = 0
 
 
 class ListUpload:
@@ -60,7 +59,6 @@ class ListUpload:
         self._texts = Texts(party)
         self._sent: set[int] = set()
         self._heard_s = 0.0
-        self._requests = 0
         self._restarts = 0
         self._refusal: int | None = None
         self._wake_s = 0.0
@@ -93,7 +91,6 @@ class ListUpload:
         item = self._items.get(message.seq)
         if item is None:
             return []
-        self._requests += 1
         self._heard_s = t_s
         self._sent.add(message.seq)
         self._wake_s = t_s + (LAST_ACK_WAIT_S if len(self._sent) == len(self._items) else UPLOAD_DEAD_S)
@@ -147,7 +144,7 @@ class ListUpload:
         return f"{words}: {said}" if said else words
 
     def _end(self, outcome: TransferOutcome, text: str, ack: int | None = None) -> list[Message]:
-        self.result = ListResult(outcome=outcome, text=text, ack=ack, requests=self._requests)
+        self.result = ListResult(outcome=outcome, text=text, ack=ack)
         return []
 
 
