@@ -47,7 +47,7 @@ from companion.plots.field import field_figure
 from companion.plots.plan import draw_plan
 from companion.plots.wind import filter_figure
 from companion.wind.study import characterise, parse_csv
-from companion.wind.study.records import weather
+from lab.simulated_wind import weather
 from lab.tasks.wrsc2013 import HALF_M
 from lab.tasks.wrsc2013 import run as run_wrsc2013
 

@@ -31,10 +31,10 @@ from companion.wind.study import (
     SCORED_LEVELS,
     Record,
     asked_rows,
-    equation_17,
     parse_csv,
     targets,
 )
+from lab.simulated_wind import equation_17
 
 Array = NDArray[np.float64]
 

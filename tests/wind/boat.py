@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from companion.messages import ApparentWind, GeoPoint, VehicleState, WindSample, WindSource
 from companion.wind import WindTracker, apparent_wind
-from companion.wind.study.records import weather
+from lab.simulated_wind import weather
 
 HERE = GeoPoint(lat_deg=47.0, lon_deg=8.0)
 

@@ -12,8 +12,8 @@ from companion.plots.wind import filter_figure
 from companion.wind import make
 from companion.wind.estimators.kalman import R_DEG, WINDOW
 from companion.wind.study import Record, characterise, runs, score
-from companion.wind.study.records import weather
 from companion.wind.study.score import NOISES_DEG, WINDOWS
+from lab.simulated_wind import weather
 from tests.wind.test_command import write_csv
 
 NOISE_DEG = 6.0

@@ -10,7 +10,7 @@ from companion.cli import main
 from companion.commands.wind import read_record
 from companion.errors import InputError
 from companion.mavlink.tlog import stamp
-from companion.wind.study.records import weather
+from lab.simulated_wind import weather
 
 
 def write_csv(path, record, *, extra=True):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from companion.errors import InputError
 from companion.geo.angles import wrap_pi
 from companion.wind import HORIZONS_S, NAMES, Estimator, make
-from companion.wind.study.records import equation_17, weather
+from lab.simulated_wind import equation_17, weather
 
 WIND = weather(3, seconds=2400.0, mean_rad=2.0)
 

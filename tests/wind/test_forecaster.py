@@ -8,8 +8,8 @@ import pytest
 from companion.wind import Forecaster
 from companion.wind.estimators import forecaster_kernels as kernel
 from companion.wind.estimators.forecaster import CONSTANTS
-from companion.wind.study.records import NOISE_RADPS, RHO_HZ, equation_17, weather
 from companion.wind.study.score import HORIZONS_S
+from lab.simulated_wind import NOISE_RADPS, RHO_HZ, equation_17, weather
 from lab.wind_fit import Prepared, crps_circular, figures
 
 STATIONARY_RAD = NOISE_RADPS / math.sqrt(1.0 - (1.0 - RHO_HZ) ** 2)      # 18.7 deg, equation 17 at 1 s

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from companion.errors import InputError
 from companion.wind import make
-from companion.wind.study.records import NOISE_RADPS, RHO_HZ, Record, equation_17, fit_ar1, parse_csv, weather
+from companion.wind.study.records import Record, fit_ar1, parse_csv
 from companion.wind.study.score import crps_circular, crps_normal, score
+from lab.simulated_wind import NOISE_RADPS, RHO_HZ, equation_17, weather
 
 
 def test_the_kalman_filter_is_equations_1_to_8():

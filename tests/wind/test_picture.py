@@ -9,7 +9,7 @@ import pytest
 from companion.plots.wind import autocorrelation, wind_figure
 from companion.wind import make
 from companion.wind.study import score
-from companion.wind.study.records import NOISE_RADPS, RHO_HZ, equation_17
+from lab.simulated_wind import NOISE_RADPS, RHO_HZ, equation_17
 
 STATIONARY_DEG = math.degrees(NOISE_RADPS / math.sqrt(1.0 - (1.0 - RHO_HZ) ** 2))
 

@@ -1,6 +1,6 @@
 """Recorded wind: records, scores of forecasts over them, and what an AR(1) fits to them."""
 
-from companion.wind.study.records import Ar1Fit, Record, equation_17, fit_ar1, parse_csv
+from companion.wind.study.records import Ar1Fit, Record, fit_ar1, parse_csv
 from companion.wind.study.score import (
     FEWEST,
     HORIZONS_S,
@@ -18,5 +18,5 @@ from companion.wind.study.score import (
 
 __all__ = [
     "FEWEST", "HORIZONS_S", "SCORED_LEVELS", "Ar1Fit", "Characterisation", "HorizonScore", "Record",
-    "Score", "asked_rows", "average", "characterise", "equation_17", "fit_ar1", "parse_csv", "runs", "score", "targets",
+    "Score", "asked_rows", "average", "characterise", "fit_ar1", "parse_csv", "runs", "score", "targets",
 ]
