@@ -241,7 +241,7 @@ def lines_of(status: FarStatus, unix_s: float) -> list[str]:
     goal = f"goal {_figure(s.goal)} of {_figure(s.goals)}, {_figure(s.goal_m)} m to it"
     wind = f"wind from {_degrees(s.twd_from_rad, '03.0f')} ± {_degrees(s.twd_sigma_rad, '.0f')} deg, "
     safe = None if s.promised_risk is None else 1.0 - s.promised_risk
-    plan = f"plan {_figure(s.plan_age_s, '.0f', 1.0 / 60.0)} min old, P(safe) {_figure(safe, '.2f')}"
+    plan = f"plan {_figure(s.plan_age_s, '.0f', 1.0 / 60.0)} min old, outside no-go {_figure(safe, '.2f')}"
     vessels = f"; vessels: {s.alarm}, CPA {_figure(s.cpa_m)} m" if s.alarm else ""
     lines = [
         f"{when} (number {s.sequence})",

@@ -123,9 +123,9 @@ def in_words(record: VoyageRecord) -> list[str]:
         promised = "" if s.promised_clearance_m is None else f" (plans expected {s.promised_clearance_m:.1f} m or more)"
         lines.append(f"Nearest to an obstacle or the fence: {s.min_clearance_m:.1f} m{promised}, {touched}.")
     if s.promised_risk is not None:
-        whole = f" and {100.0 * s.path_risk:.0f} % over a whole way" if s.path_risk is not None else ""
-        lines.append(f"Chance that plans gave the wind to force her into the no-go zone: up to "
-                     f"{100.0 * s.promised_risk:.0f} % at each instant{whole}; entered {_times(s.no_go_entries)}.")
+        whole = "" if s.path_risk is None else f"Off the plan: up to {100.0 * s.path_risk:.0f} % was told. "
+        lines.append(f"{whole}At each instant the wind had up to {100.0 * s.promised_risk:.0f} % to force her into "
+                     f"the no-go zone; entered {_times(s.no_go_entries)}.")
     lines += ranges_in_words(s.figures)
     if s.servos:
         moved = "; ".join(f"output {number} {_times(servo.movements)}, {servo.travel_us} us in all"

@@ -197,7 +197,7 @@ def traffic_line(seen: dict[str, Any]) -> str:
             f"CPA {worst['cpa_m']:.0f} m {when}, {worst['role']} (rule {worst['rule']})")
     if seen["promised_risk"]:
         each, whole = 100.0 * seen["promised_risk"], 100.0 * seen["path_risk"]
-        parts.append(f"risk {each:.1f} % at each instant, {whole:.1f} % in all")
+        parts.append(f"too near one: {each:.1f} % at each instant, {whole:.1f} % on the way")
     if seen["feeds"]:
         parts.append(f"{seen['silent_feeds']} of {seen['feeds']} feeds silent")
     if seen["silence_s"] is not None:
@@ -241,7 +241,7 @@ def _write_text(d: dict[str, Any], units: str) -> None:
           f"  ({(goal['index'] or 0) + 1} of {show(goal['count'])})")
     print(f"  TWD {show(wind['twd_deg'], '03.0f')}±{show(wind['sigma_deg'])}°"
           f"  TWS {show(wind['tws_mps'], '.1f', factor)} {unit}  (age {show(wind['age_s'], '.1f')} s)"
-          f" | P(safe) {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
+          f" | outside no-go {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
           f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {replans}")
     if d["current"] is not None:
         print(f"  current sets {show(d['current']['set_deg'], '03.0f')}°"

@@ -164,7 +164,7 @@ class Plan:
         if not self.has_path:
             return f"{self.status.value}: {self.reason}"
         length_m = sum(leg.length_m for leg in self.legs)
-        risk = "" if self.risk is None else f", {100.0 * self.risk:.1f} % risk of the whole path"
+        risk = "" if self.risk is None else f", {100.0 * self.risk:.1f} % off the plan"
         return (f"{self.status.value}: {counted(len(self.legs), 'leg')}, {length_m:.0f} m, {self.cost_s:.0f} s "
                 f"(at least {self.lower_bound_s:.0f} s){risk}")
 

@@ -15,7 +15,7 @@ def test_a_recipe_runs(number, tmp_path, monkeypatch, capsys):
     exec(compile(RECIPES[number].replace("runs=20", "runs=1"), f"recipe {number}", "exec"), {})
     said = capsys.readouterr().out
     assert re.search((
-        r"optimal: \d legs, \d+ m, \d+ s \(at least \d+ s\), [\d.]+ % risk", r"in 5 min from \d+ \+- \d+ deg",
+        r"optimal: \d legs, \d+ m, \d+ s \(at least \d+ s\), [\d.]+ % off the plan", r"in 5 min from \d+ \+- \d+ deg",
                       r"1\d\d\.\d* \d+")[number], said), said
 
 

@@ -168,9 +168,9 @@ function planWords() {
   if (!input("plans").checked) plan = null;
   words.textContent = plan === null ? "" : history.now.goals.length === 0 ? "Nothing to plan yet." : plan.error ? `No plan: ${plan.error}.` : legs.length === 0 ? "Nothing to plan yet." : "";
   words.classList.toggle("warn", Boolean(plan?.error) && history.now.goals.length > 0);
-  const facts = plan === null || legs.length === 0 ? [] : [["time", duration(plan.time_s)], ["way", distance(plan.length_m)], ["tacks, gybes", `${plan.tacks}, ${plan.gybes}`], ["room beyond margin", distance(plan.clearance_m)]];
+  const facts = plan === null || legs.length === 0 ? [] : [["time", duration(plan.time_s)], ["way", distance(plan.length_m)], ["tacks, gybes", `${plan.tacks}, ${plan.gybes}`], ["beyond the margin", distance(plan.clearance_m)], ...(legs.length === 1 ? [["off the plan", percent(legs[0]?.risk)]] : [])];
   get("planfacts").replaceChildren(...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
-  get("plantable").replaceChildren(...(plan && legs.length > 1 ? [table("Legs", ["to", "time", "in nine winds of ten", "way", "tacks", "risk"], legs.map((leg) => [leg.to, duration(leg.time_s), duration(leg.late_s), distance(leg.length_m), String(leg.tacks), percent(leg.risk)]))] : []));
+  get("plantable").replaceChildren(...(plan && legs.length > 1 ? [table("Legs", ["to", "time", "nine winds of ten", "way", "tacks", "off plan"], legs.map((leg) => [leg.to, duration(leg.time_s), duration(leg.late_s), distance(leg.length_m), String(leg.tacks), percent(leg.risk)]))] : []));
   const first = legs[0]?.why;
   if (plan && !plan.error && first && legs.length === 1) words.textContent = first;
   /** @type {Point[]} */ const way = [];
@@ -339,7 +339,7 @@ function help() {
   close.addEventListener("click", () => dialog.close());
   const tools = chart.TOOLS.map(([, key, words, , means]) => /** @type {[string, string]} */ ([key, `${words}: ${means}`]));
   dialog.replaceChildren(el("h2", { id: "dialogtitle", tabindex: "-1", autofocus: true }, "Keys and signs"), el("dl", { class: "keys" }, ...[...tools, ...KEYS].map(([key, words]) => el("div", {}, el("dt", {}, el("kbd", {}, key)), el("dd", {}, words)))),
-    el("p", {}, "Hatched is what the margin adds; blue is the plan, warmer and thicker where a leg risks more; the thin dashes are the order of the course. The curved arrows say on which side a mark is left, the straight ones which way a gate is sailed."), el("div", { class: "buttons" }, close));
+    el("p", {}, "Hatched is what the margin adds; blue is the plan, warmer and thicker where she is more likely to be forced off a leg; the thin dashes are the order of the course. The curved arrows say on which side a mark is left, the straight ones which way a gate is sailed."), el("div", { class: "buttons" }, close));
   dialog.showModal();
 }
 

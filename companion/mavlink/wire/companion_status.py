@@ -355,7 +355,7 @@ def high_latency2(
 ) -> Message | None:
     """Return the message, None while the position or the mode is not known: it has no number for that.
 
-    custom1 is the plan's P(safe) [%], -1 without a plan; custom2 the number of the worst watchdog that is raised.
+    custom1 is the plan's delta_s [%], -1 without a plan; custom2 the number of the worst watchdog that is raised.
     """
     if vehicle is None or autopilot is None or autopilot.mode is None:
         return None

@@ -284,7 +284,7 @@ def with_parts(why: Why, problem: Problem, risk: PathRisk) -> Why:
     """Return the words and data of a plan with what its promise is made of."""
     part = problem.vessels_share
     named = ", ".join(f"{name} {100.0 * value:.2g} %" for name, value in risk.vessels.by_name[:3])
-    text = (f"Risk of the whole path {100.0 * risk.total:.2g} %: wind {100.0 * risk.wind:.2g} %, vessels "
+    text = (f"Off the plan {100.0 * risk.total:.2g} %: wind {100.0 * risk.wind:.2g} %, vessels "
             f"{100.0 * risk.vessels.total:.2g} % ({named}). At each instant {100.0 * (1.0 - problem.delta_s):.2g} %: "
             f"wind {100.0 * (1.0 - problem.wind_delta_s):.2g} %, vessels {100.0 * part:.2g} %.")
     data = {
