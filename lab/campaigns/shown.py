@@ -95,7 +95,18 @@ def scored(folder: Path) -> dict[str, Any]:
     end = views[-1].figures
     return {**out, "clear": _least(out["clear"]), "legs": _leg_risks(views, forced_s),
             "whole": _plan_risks(views, reached_s, forced_s), "way": [[end.distance_m, _way_m(times, places)]],
-            "turns": [[end.tacks, len(tacks_s)]]}
+            "turns": [_turns(views, tacks_s)]}
+
+
+def _turns(views: Sequence[Any], tacks_s: Sequence[float]) -> list[int]:
+    """Return how many tacks and gybes were counted under way, and how many there were."""
+    sailed = [view for view in views if view.state.is_sailing and not view.state.is_over]
+    if not sailed:
+        return [0, 0]
+    end = sailed[-1]
+    # one that has just been made is not yet seen to be kept
+    came = sum(sailed[0].t_s <= t_s <= end.t_s - TACK_HOLDS_S for t_s in tacks_s)
+    return [(end.figures.tacks or 0) + (end.figures.gybes or 0), came]
 
 
 def _leg_risks(views: Sequence[Any], forced_s: Sequence[float]) -> list[list[Any]]:
@@ -219,7 +230,8 @@ def table_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
                      [abs(told - way) <= WAY_OFF * way for told, way in ways],
                      share=[(told - way) / way for told, way in ways if way]))
     turns = [row for record in records for row in record["turns"]]
-    rows.append(_row("tacks counted", [told - came for told, came in turns], [told == came for told, came in turns]))
+    rows.append(_row("tacks and gybes counted", [told - came for told, came in turns],
+                     [told == came for told, came in turns]))
     return [row for row in rows if row["shown"]]
 
 

@@ -69,7 +69,7 @@ def test_the_polar_the_way_and_the_tacks_are_what_they_were():
     assert row(rows, "share of the polar")["held"] == pytest.approx(2 / 3)
     assert row(rows, "share of the polar")["median_share"] == pytest.approx(0.0)
     assert row(rows, "distance sailed, m")["held"] == 0.5
-    assert row(rows, "tacks counted")["held"] == 0.5
+    assert row(rows, "tacks and gybes counted")["held"] == 0.5
 
 
 def seen(t_s, number, to_en, risk, *, whole=0.2, goals=0):
