@@ -27,6 +27,7 @@ from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.program import control
+from companion.skipper.planning import next_tack
 from companion.skipper.step import Announce, Phase
 from companion.telemetry.folder.records import sigma_ahead_rad
 from companion.words import one_line, printable
@@ -218,7 +219,7 @@ class ProgressLine:
 
     def show(self, status: CompanionStatus, step: Step) -> None:
         """Show one step."""
-        text = progress_text(step, status.next_tack_s)
+        text = progress_text(step)
         if status.alert_code in {DISK, GONE}:
             text += f" | {status.alert_text}"
         said, self._notes = self._notes, []
@@ -254,7 +255,7 @@ def wrapped(lines: list[str], columns: int) -> list[str]:
     return [part for line in lines for part in textwrap.wrap(line, max(20, columns), subsequent_indent="    ") or [""]]
 
 
-def progress_text(step: Step, next_tack_s: float | None) -> str:
+def progress_text(step: Step) -> str:
     """Return the line: state, waypoint, wind mean and spread, next tack, cross-track, clearance, arrival."""
     snapshot, state = step.snapshot, step.state
     autopilot, wind, route = snapshot.autopilot, snapshot.wind, state.mission.route
@@ -273,8 +274,9 @@ def progress_text(step: Step, next_tack_s: float | None) -> str:
     if snapshot.vehicle is not None:
         parts.append(f"{snapshot.vehicle.speed_mps:.1f} m/s")
     if under_way:
-        if next_tack_s is not None:
-            parts.append(f"next tack {next_tack_s:.0f} s")
+        tack = next_tack(step, step.voyage.boat.polar)
+        if tack is not None:
+            parts.append(f"next tack {'' if tack.is_planned else 'about '}{tack.in_s:.0f} s")
         if autopilot is not None and autopilot.cross_track_m is not None:
             parts.append(f"xt {autopilot.cross_track_m:+.1f} m")
     if state.progress.task:
@@ -284,12 +286,12 @@ def progress_text(step: Step, next_tack_s: float | None) -> str:
         parts.append(f"order {state.orders.standing.words} of {state.orders.standing.by}, {minutes:.0f} min")
     if route is not None:
         if route.expected_clearance_m is not None:
-            parts.append(f"clear {route.expected_clearance_m:.1f} m")
+            parts.append(f"clearance expected {route.expected_clearance_m:.1f} m")
         eta = step.eta()
         if under_way and eta.there_s is not None:
             late = "" if eta.there_late_s is None else f" (90 %: {eta.there_late_s:.0f} s)"
             parts.append(f"there in {eta.there_s:.0f} s{late}")
-        parts.append(f"plans {state.plans.replans}")
+        parts.append(f"replans {state.plans.replans}")
     parts += in_words(told(step, "line"))
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)

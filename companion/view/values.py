@@ -305,7 +305,7 @@ class PlanView:
     bound_s: float | None = None         # no plan is faster than that; None of a plan that was kept
     replans: int | None = None
     next_tack_s: float | None = None
-    next_tack_is_planned: bool | None = None    # by the plan; False: the autopilot's own, where its corridor ends
+    next_tack_is_planned: bool | None = None    # at the end of this leg; False: the autopilot's own, or farther on
     leg: int | None = None               # the leg that is sailed, from 1 ...
     count: int | None = None             # ... of so many
     legs: tuple[LegView, ...] = ()

@@ -205,7 +205,7 @@ def table_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         rows.append(_row(f"there in, of {low:.0f}{until} s", [e for e, _, _ in left], [h for _, _, h in left],
                          share=[e / s for e, s, _ in left]))
     tacks = [row for record in records for row in record["tack"]]
-    for name, planned in (("next tack, of the plan", True), ("next tack, the autopilot's own", False)):
+    for name, planned in (("next tack, of the plan", True), ("next tack, about", False)):
         own = [(told, came) for told, came, is_planned in tacks if is_planned == planned]
         rows.append(_row(name, [told - came for told, came in own if came is not None],
                          [came is not None and abs(told - came) <= TACK_OFF_S for told, came in own]))

@@ -64,7 +64,7 @@ def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(
     monkeypatch.setattr(figures, "FIGURES", (*FIGURES, row))
     monkeypatch.setitem(BY_NAME, row.name, row)
     assert in_words(told(step, "line"))[-1] == f"test way {line}"
-    assert f"test way {line}" in progress_text(step, None)
+    assert f"test way {line}" in progress_text(step)
     assert told(step, "radio")["co_test"] == page
     status = CompanionStatus(t_s=1.0, state="standard", figures=tuple(told(step, "radio").items()))
     sender, receiver, reader = Codec(1, 191), Codec(254, 25), StatusReader()

@@ -12,6 +12,7 @@ import shapely
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.skipper import Skipper
+from companion.skipper.planning import next_tack
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.config import SkipperConfig
 from companion.telemetry.console import ProgressLine, left_behind, progress_text
@@ -64,10 +65,13 @@ def test_the_line_tells_the_clearance_and_when_she_is_there():
     world.run(5)
     step = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
     route = world.state.mission.route
-    assert f"clear {route.expected_clearance_m:.1f} m" in progress_text(step, None)
-    left = re.search(r"there in (\d+) s \(90 %: (\d+) s\)", progress_text(step, None))
+    assert f"clearance expected {route.expected_clearance_m:.1f} m" in progress_text(step)
+    tack = next_tack(step, step.voyage.boat.polar)
+    assert ("next tack" in progress_text(step)) == (tack is not None)
+    assert ("next tack about" in progress_text(step)) == (tack is not None and not tack.is_planned)
+    left = re.search(r"there in (\d+) s \(90 %: (\d+) s\)", progress_text(step))
     assert (float(left[1]), float(left[2])) == pytest.approx((step.eta().there_s, step.eta().there_late_s), abs=0.6)
-    assert "there in" not in progress_text(replace(step, state=with_parts(step.state, mission={"route": None})), None)
+    assert "there in" not in progress_text(replace(step, state=with_parts(step.state, mission={"route": None})))
 
 
 def _with(state, **changes):

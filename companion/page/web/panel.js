@@ -59,7 +59,7 @@ function alarms(view) {
 }
 
 const THERE = "The time until the next goal is reached, at the pace that the boat has lately kept; in nine cases of ten it is there by the second figure.";
-const TACK = "By the plan; 'about' is the autopilot's own, on a leg that it beats: when that comes goes with the wind.";
+const TACK = "At the end of the leg that is sailed; 'about' is the autopilot's own, on a leg that it beats, which goes with the wind, or one behind a waypoint, where a new plan may change it.";
 const JUDGED = "When the plan was made, or last held against a new one and kept: wind and times beside it are of then.";
 const BEAT = "A beat: the autopilot tacks by itself along this line, so the line may lie in the no-go zone.";
 const OFF_PLAN = "The chance that the boat is forced off the plan before the next goal: that the wind makes it tack or bear away unplanned, or that a vessel comes too near.";

@@ -139,7 +139,10 @@ class Seen(Protocol):
 
 
 class NextTack(NamedTuple):
-    """The next tack: when [s], and whether the plan has it; else it is the autopilot's own."""
+    """The next tack: when [s], and whether it is the plan's, at the end of the leg that is sailed.
+
+    Else it is the autopilot's own, or behind a waypoint at which a new plan is asked for.
+    """
 
     in_s: float
     is_planned: bool
@@ -181,7 +184,7 @@ def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
         is_closed = abs(off_rad) < no_go_rad
         if not is_closed and (off_rad > 0.0) != side and abs(off_rad) < math.pi / 2.0:
             # Of the leg that is sailed, too: the boat is turning to it.
-            return NextTack(time_s, is_planned=True)
+            return NextTack(time_s, is_planned=number <= 1)
         speed_mps = max(MIN_SPEED_MPS, polar.speed_mps(max(abs(off_rad), no_go_rad), tws_mps))
         has_way = number == 0 and vehicle.speed_mps > GATHERING_WAY * speed_mps
         if is_closed:

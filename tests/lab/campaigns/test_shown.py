@@ -43,8 +43,8 @@ def test_a_time_that_is_told_wrong_shows():
 def test_a_tack_that_does_not_come_does_not_hold_and_is_of_its_own_kind():
     rows = table_of([voyage(tack=[[10.0, 12.0, True], [10.0, 40.0, False], [30.0, None, False]])])
     assert row(rows, "next tack, of the plan")["held"] == 1.0
-    assert row(rows, "next tack, the autopilot's own")["held"] == 0.0
-    assert row(rows, "next tack, the autopilot's own")["shown"] == 2
+    assert row(rows, "next tack, about")["held"] == 0.0
+    assert row(rows, "next tack, about")["shown"] == 2
 
 
 def test_places_winds_and_clearances_are_counted_by_their_own_bands():

@@ -2,14 +2,16 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from companion.boat import constant
 from companion.geo.angles import difference_rad
-from companion.messages import Mode
+from companion.messages import Command, Mode
 from companion.skipper.behaviors.drifting import CALL
 from companion.skipper.behaviors.headings import (
     back_to_line_rad,
@@ -18,7 +20,7 @@ from companion.skipper.behaviors.headings import (
     drift_correction_rad,
     sailable_rad,
 )
-from companion.skipper.planning.autopilot_beats import next_tack_s, room_m
+from companion.skipper.planning.autopilot_beats import next_tack, next_tack_s, room_m
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import StepContext
@@ -263,3 +265,19 @@ def test_out_of_irons_she_is_steered_on_and_not_given_to_auto():
     world.run(40)
     assert not any(isinstance(a, act.SetMode) and a.mode is Mode.AUTO for _, a in world.actions[before:])
     assert world.speed > 1.0
+
+
+def test_a_tack_behind_a_waypoint_is_told_as_about():
+    """At each waypoint a new plan is asked for: "next tack 44 s" was 86 s away, for it made the board longer."""
+    def told(*points):
+        route = SimpleNamespace(items=[SimpleNamespace(command=Command.NAV_WAYPOINT)] * len(points),
+                                leg_from_en_m=[(0.0, 0.0), *points[:-1]], points_en_m=list(points))
+        vehicle = SimpleNamespace(speed_mps=2.0, heading_rad=math.radians(60.0), velocity_en_mps=(1.7, 1.0))
+        wind = SimpleNamespace(mean_twd_from_rad=0.0, present_twd_from_rad=0.0, mean_tws_mps=5.0, present_tws_mps=5.0)
+        snapshot = SimpleNamespace(vehicle=vehicle, position_en_m=(0.0, 0.0), wind=wind, limits=None, autopilot=None)
+        return next_tack(SimpleNamespace(snapshot=snapshot, state=SimpleNamespace(
+            mission=SimpleNamespace(route=route, index=0))), constant(2.0))
+
+    east, on, back = (86.6, 50.0), (173.2, 100.0), (86.6, 150.0)
+    assert told(east, (0.0, 100.0)) == pytest.approx((50.0, True), abs=0.1)    # at the end of this leg
+    assert told(east, on, back) == pytest.approx((100.0, False), abs=0.1)
