@@ -31,10 +31,11 @@ SHARPEST_RAD = math.radians(150.0)   # a turn that is sharper cuts no more of it
 LOOK_S = 30.0         # a walk to the end of the leg that is sailed then is held against what comes ...
 TRIED_S = 20.0        # ... after so long
 KEPT = math.exp(-TRIED_S / 150.0)   # of a try's weight with each that follows: they count for two and a half minutes
-PRIOR = 1.5           # tries that the polar counts as at first
+PRIOR = 1.0           # tries that the polar counts as at first
 SLOWEST, FASTEST = 0.25, 1.6    # of the polar: what is outside says something else than how fast it sails
 SPREAD, SPREAD_TRIES = 0.15, 2.0   # standard deviation of what tries make of a walk, and how many it counts as at first
-HERE_M, STRAYS = 2.5, 2.0   # nine in ten are within so much of a place, and of the pace's doubt of the way (sitl shown)
+HERE_M, STRAYS = 2.5, 2.2   # nine in ten are within so much of a place, and of the pace's doubt of the way (sitl shown)
+ELSEWHERE = 1.5       # of how far a boat is from her polar here: how far she may be from that in what comes
 LATE_LEAST_S = 1.0    # standard deviation of any time
 LATE_SIGMAS = 1.28    # of a normal: nine in ten are below
 
@@ -127,7 +128,7 @@ class Pace:
         """
         time_s = self.left_s(walk_s)
         each = self.spread / self.share
-        known = math.hypot(each / math.sqrt(max(1.0, self.tries + self.prior)), 1.0 - self.share)
+        known = math.hypot(each / math.sqrt(max(1.0, self.tries + self.prior)), ELSEWHERE * (1.0 - self.share))
         sigma_s = math.hypot(time_s * math.hypot(spread, known), each * math.sqrt(TRIED_S * time_s), LATE_LEAST_S)
         return time_s + LATE_SIGMAS * sigma_s
 
