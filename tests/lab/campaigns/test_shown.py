@@ -106,6 +106,11 @@ def test_the_demo_shows_what_comes():
     for figure in ("there in, of 0 to 30 s", "there in, of 30 to 60 s", "there in, of 60 to 120 s"):
         assert abs(row(rows, figure)["median_error"]) <= 15.0
         assert row(rows, figure)["held"] >= 0.7
+    assert abs(row(rows, "there in, of 120 to 300 s")["median_error"]) <= 20.0
+    assert row(rows, "there in, of 120 to 300 s")["held"] >= 0.8
+    assert abs(row(rows, "share of the polar")["median_share"]) <= 0.05
+    assert row(rows, "tacks and gybes counted")["held"] == 1.0
+    assert row(rows, "distance sailed")["held"] == 1.0
     for ahead_s in AHEAD_S[:3]:
         assert row(rows, f"place in {ahead_s} s")["held"] >= 0.75
     assert row(rows, "next tack, of the plan")["held"] >= 0.5
