@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
+import os
 import sys
 from collections.abc import AsyncIterator
 from dataclasses import dataclass
@@ -126,7 +127,7 @@ class SimulatedBoat:
         process = await asyncio.create_subprocess_exec(
             sys.executable, "-m", "sitl.run.live_boat", str(source), "--seed", str(seed), "--speedup", f"{pace:g}",
             "--epoch", f"{epoch_s:.0f}", "--endpoint", f"udpout:127.0.0.1:{port}",
-            "--endpoint", f"udpin:127.0.0.1:{judge_port}",
+            "--endpoint", f"udpin:127.0.0.1:{judge_port}", "--parent", str(os.getpid()),
         )
         judge_url = f"udpout:127.0.0.1:{judge_port}"
         try:

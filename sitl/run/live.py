@@ -262,6 +262,9 @@ async def _run(
     scenario: Scenario, source: Path, seed: int, folder: Path, kind: str, program: Path | None, pace: float,
     truth: TrueTrack, page: Sequence[str], cpu: float | None,
 ) -> ScenarioVerdict:
+    here = asyncio.current_task()
+    assert here is not None
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, here.cancel)   # it must leave nobody behind
     mission_path = scenario.mission_path(source)
     mission = load_mission(mission_path)
     wind = scenario_wind(scenario, source, seed)
@@ -289,9 +292,6 @@ async def _run(
             "--permit", "arm", *(["--permit", "set_auto"] if scenario.set_auto else []),
         ], share)
         stack.push_async_callback(companion.stop)
-        here = asyncio.current_task()
-        assert here is not None
-        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, here.cancel)   # it must leave nobody behind
         await companion.start()
         # The scenario's clock starts when the companion does its first work, as it does on the embedded autopilot.
         await companion.opened(folder / DECISIONS)

@@ -27,6 +27,7 @@ def main() -> int:
     parser.add_argument("--speedup", type=float, default=1.0)
     parser.add_argument("--epoch", type=float, default=EPOCH_S, metavar="UNIX_S")
     parser.add_argument("--endpoint", action="append", required=True, metavar="LINK")
+    parser.add_argument("--parent", type=int, default=os.getppid(), metavar="PID", help="end with this process")
     args = parser.parse_args()
     scenario = load_scenario(args.scenario)
     mission = load_mission(scenario.mission_path(args.scenario))
@@ -41,11 +42,9 @@ def main() -> int:
         wind, args.seed,
     )
 
-    parent = os.getppid()
-
     async def sail() -> None:
         async with serve(autopilot, args.endpoint) as server:
-            while await server.wait(args.speedup) and os.getppid() == parent:   # each second of the wall
+            while await server.wait(args.speedup) and os.getppid() == args.parent:   # each second of the wall
                 pass
 
     try:
