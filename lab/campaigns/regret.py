@@ -24,9 +24,8 @@ from lab.campaigns.baselines import (
     scenario_of,
     voyage_of,
 )
-from lab.campaigns.sail_trial import no_go_half_rad, settled_polar, tack_loss_s
 from lab.perfect_information import Best, Race, RaceBoat, RaceMark, Weather, best
-from sitl.autopilot import TACK_RETRY_S
+from sitl.autopilot import TACK_RETRY_S, no_go_half_rad, settled_polar, tack_loss_s
 from sitl.results import markdown
 from sitl.run.embedded import solid_of
 from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job

@@ -24,6 +24,7 @@ The shell joins it to transports and to the event loop's clock, whatever that is
 from sitl.autopilot.autopilot import SimulatedAutopilot
 from sitl.autopilot.boat.kernel import TACK_RETRY_S
 from sitl.autopilot.boat.parameters import check_parameters
+from sitl.autopilot.boat.sail_trial import no_go_half_rad, settled_polar, tack_loss_s
 from sitl.autopilot.config import (
     EPOCH_S,
     FRAME_M,
@@ -44,5 +45,5 @@ from sitl.autopilot.server import serve
 __all__ = [
     "EPOCH_S", "FRAME_M", "HOME", "TACK_RETRY_S", "AisVessel", "AutopilotConfig", "Departures", "FrameStream",
     "GpsFault", "Impairment", "MemoryEnd", "MemoryLink", "RadioChannel", "Sensors", "SimulatedAutopilot", "Truth",
-    "VaneFault", "VaneState", "Waves", "check_parameters", "serve",
+    "VaneFault", "VaneState", "Waves", "check_parameters", "no_go_half_rad", "serve", "settled_polar", "tack_loss_s",
 ]

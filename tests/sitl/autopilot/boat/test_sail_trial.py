@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from companion.boat.polar import ardurover_sitl
-from lab.campaigns.sail_trial import no_go_half_rad, settled_polar, tack_loss_s
+from sitl.autopilot import no_go_half_rad, settled_polar, tack_loss_s
 
 
 def test_the_settled_speeds_are_those_that_were_measured_on_the_real_program():
