@@ -236,10 +236,14 @@ class CurrentEstimator:
         east, north = made.real - current[0], made.imag - current[1]
         sigma = math.sqrt(max(0.0, float(np.array([sin, cos]) @ self._p[:2, :2] @ np.array([sin, cos]))))
         was = check.doubt
-        check.update(t_s, MotionSample(
+        mean = MotionSample(
             along_mps=east * sin + north * cos, across_mps=east * cos - north * sin,
             speed_mps=speed * self.scale, twa_rad=twa, twd_from_rad=now.twd_from_rad, tws_mps=now.tws_mps,
-            heading_rad=heading_rad, sigma_mps=sigma, roll_rad=now.roll_rad))
+            heading_rad=heading_rad, sigma_mps=sigma, roll_rad=now.roll_rad)
+        east, north = now.velocity_en_mps[0] - current[0], now.velocity_en_mps[1] - current[1]
+        sin, cos = math.sin(now.heading_rad), math.cos(now.heading_rad)
+        check.update(t_s, mean, replace(
+            mean, along_mps=east * sin + north * cos, across_mps=east * cos - north * sin, heading_rad=now.heading_rad))
         if not check.doubt:
             self._trial = None
             return check.is_odd

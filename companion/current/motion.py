@@ -43,10 +43,9 @@ HEEL_S = 10.0                      # of the mean heel
 SURE_S, JUMPED_S = 20.0, 8.0       # of odd readings, without a jump of the direction and after one
 FORGETS = 0.5                      # a reading that fits takes back so much of one that does not
 FITS_S = 20.0                      # of readings that fit end a doubt
-NEW_WIND_S, NEW_WIND_RATIO = 40.0, 4.0   # likewise of a wind from elsewhere, and so many times those that do not, ...
+NEW_WIND_S, NEW_WIND_RATIO = 60.0, 4.0   # likewise of a wind from elsewhere, and so many times those that do not, ...
 FAR_APART_RAD = math.radians(70.0)       # ... on headings far apart, of the last ...
 TALLY_S = 300.0                    # ... so long: odd moments while a front passes are forgotten, too
-LOITER_SETTLES_S = 2.0             # for the tally: held in a loiter a boat turns every few seconds
 GAINS_MPS2 = 0.1                   # a boat that gains on its polar at that rate is on its way to it
 JUMP_RAD = math.radians(40.0)      # of the direction's 5 s mean against what it was half a minute and more ago
 TURNED_RAD, LASTS_S = math.radians(125.0), 5.0   # of the same, for so long: no shift
@@ -138,32 +137,33 @@ class MotionCheck:
         """Take note that nobody knows how the boat is driven: what is settled begins anew."""
         self._t_s = None
 
-    def update(self, t_s: float, now: MotionSample) -> None:
-        """Take the moment at ``t_s``."""
+    def update(self, t_s: float, now: MotionSample, at_once: MotionSample | None = None) -> None:
+        """Take the moment at ``t_s``; ``at_once`` is it without the means, for a boat that turns every few seconds."""
+        at_once = at_once or now
         self.is_odd = False
         if self._t_s is None or t_s <= self._t_s:
-            self._t_s, self._heading_rad, self._turned_s, self._along_mps = t_s, now.heading_rad, t_s, now.along_mps
+            self._t_s, self._heading_rad, self._turned_s, self._along_mps = t_s, now.heading_rad, t_s, at_once.along_mps
             return
         dt_s, self._t_s = min(5.0, t_s - self._t_s), t_s
-        gains_mps2, self._along_mps = (now.along_mps - self._along_mps) / dt_s, now.along_mps
+        gains_mps2, self._along_mps = (at_once.along_mps - self._along_mps) / dt_s, at_once.along_mps
         if now.roll_rad is not None:
             self._heel_rad += -math.expm1(-dt_s / HEEL_S) * (now.roll_rad - self._heel_rad)
         if abs(difference_rad(now.heading_rad, self._heading_rad)) > TURNING_RAD_S * dt_s:
             self._turned_s = t_s
         self._heading_rad = now.heading_rad
-        settled_s = t_s - self._turned_s
-        if now.tws_mps < LEAST_TWS_MPS or settled_s < LOITER_SETTLES_S:
+        if now.tws_mps < LEAST_TWS_MPS:
             return
-        fits = self._fits(t_s, now)
-        if fits is None:
-            return
-        is_on_its_way = gains_mps2 * math.copysign(1.0, now.speed_mps - now.along_mps) >= GAINS_MPS2
-        if self.is_winds and (fits or not is_on_its_way):
-            self._tally.take(dt_s, now.heading_rad, fits=fits)
+        if self.is_winds and (fits := self._fits(t_s, at_once)) is not None:
+            is_on_its_way = gains_mps2 * math.copysign(1.0, at_once.speed_mps - at_once.along_mps) >= GAINS_MPS2
+            if fits or not is_on_its_way:
+                self._tally.take(dt_s, at_once.heading_rad, fits=fits)
             if self._tally.tells_of_a_new_wind:
                 self.settle()
                 return
-        if settled_s < SETTLES_S:
+        if t_s - self._turned_s < SETTLES_S:
+            return
+        fits = self._fits(t_s, now)
+        if fits is None:
             return
         self.is_odd = not fits
         self.fits_s = self.fits_s + dt_s if fits else 0.0
