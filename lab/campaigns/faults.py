@@ -78,6 +78,7 @@ EXPANSIONS = 4_000
 # Seeds of the campaign (not of the worker's) that are known to fail, and why nothing of ours would help.
 KNOWN: Mapping[int, str] = {
     198: "a calm in 15 s, 0.8 m/s of current and a rock 9 m off: only a skipper who knew of the calm would keep clear",
+    525: "the same, 0.5 m/s of current: the calm's last breath comes from ahead, and stops her 9 m from the rock",
 }
 WORKER_PACE = 2.0    # faster, two seconds of a busy machine would count as silence
 
