@@ -93,7 +93,8 @@ def run(args: argparse.Namespace) -> int:
           f"{'' if args.at else '; --at names another time'}", flush=True)
     own = load_mission(scenario.mission_path(args.scenario)).options.operator
     if not (own.arm and own.set_auto) and scenario.set_auto:
-        print("the simulated boat may be armed and set to AUTO; on the water [operator] of the mission forbids it")
+        print("the simulated boat may be armed and set to AUTO; on the water [operator] of the mission forbids it",
+              flush=True)
     if args.http is not None:
         host, port = args.http
         print(f"the page: http://{f'[{host}]' if ':' in host else host}:{port}/ once the companion is up", flush=True)
