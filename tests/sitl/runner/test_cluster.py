@@ -85,14 +85,15 @@ def test_a_killed_worker_and_a_scheduler_that_is_started_again_lose_nothing(clus
 
     def on_record(record):
         seen.append(record["seed"])
-        if len(seen) == JOBS // 2:
-            assert sum(process.poll() == -signal.SIGKILL for process in cluster.workers) == 1
+        is_one_killed = sum(process.poll() == -signal.SIGKILL for process in cluster.workers) == 1
+        if not done and len(seen) >= JOBS // 2 and is_one_killed:   # on a busy machine its job may come later
             done.update({seed: count for seed, count in attempts(folder).items() if seed in seen})
             cluster.kill()
             cluster.begin()
 
     out = tmp_path / "far.jsonl"
     far = quick(jobs, line=on_record).results(CampaignOptions(dask=cluster.address, out=out))
+    assert done
     assert sorted(seen) == list(range(JOBS))
     assert (far.now, far.lost) == (JOBS, [])
     said = capsys.readouterr().err
