@@ -99,7 +99,7 @@ def loiters(for_s, twd_deg, *, share=1.0, first_s=FIRST_S):
     speed = share * POLAR.speed_mps(math.radians(65.0), 5.0)
     moments, off = [], 65.0
     for t in range(1, int(for_s) + 1):
-        if t % 12 == 0:
+        if t % 6 == 0:
             off = -off
         moments.append(boat(first_s + t, twd_deg + off, speed, twd_deg=twd_deg))
     return moments
@@ -116,6 +116,14 @@ def test_a_front_in_which_she_is_held_is_believed_once_she_loiters_by_it():
 
 def test_a_loiter_that_is_not_sailed_as_the_wind_says_ends_no_doubt():
     estimator, when = sails([*beats(FIRST_S), *loiters(900.0, 150.0, share=0.2)])
+    assert len(when) == 1
+    assert estimator.doubts_wind
+
+
+def test_a_loiter_of_which_a_third_is_not_sailed_as_the_wind_says_ends_no_doubt():
+    moments = [replace(now, velocity_en_mps=(0.2 * now.velocity_en_mps[0], 0.2 * now.velocity_en_mps[1]))
+               if n // 6 % 3 == 0 else now for n, now in enumerate(loiters(900.0, 150.0))]
+    estimator, when = sails([*beats(FIRST_S), *moments])
     assert len(when) == 1
     assert estimator.doubts_wind
 
