@@ -160,6 +160,15 @@ class Sailing:
     roll_rad: float | None = None
 
 
+def _through_water(
+    velocity_en_mps: tuple[float, float], current_en_mps: tuple[float, float], heading_rad: float,
+) -> tuple[float, float]:
+    """Return a velocity over ground as one through the water, ahead and to starboard [m/s]."""
+    east, north = velocity_en_mps[0] - current_en_mps[0], velocity_en_mps[1] - current_en_mps[1]
+    sin, cos = math.sin(heading_rad), math.cos(heading_rad)
+    return east * sin + north * cos, east * cos - north * sin
+
+
 class CurrentEstimator:
     """The filter. A deterministic fold of what it is given: no clock, no file.
 
@@ -233,17 +242,15 @@ class CurrentEstimator:
         twa, speed = self._speed_with(now, current, float(self._x[5]))
         heading_rad, made = cmath.phase(means[0]), means[1]
         sin, cos = math.sin(heading_rad), math.cos(heading_rad)
-        east, north = made.real - current[0], made.imag - current[1]
+        along, across = _through_water((made.real, made.imag), current, heading_rad)
         sigma = math.sqrt(max(0.0, float(np.array([sin, cos]) @ self._p[:2, :2] @ np.array([sin, cos]))))
         was = check.doubt
         mean = MotionSample(
-            along_mps=east * sin + north * cos, across_mps=east * cos - north * sin,
+            along_mps=along, across_mps=across,
             speed_mps=speed * self.scale, twa_rad=twa, twd_from_rad=now.twd_from_rad, tws_mps=now.tws_mps,
             heading_rad=heading_rad, sigma_mps=sigma, roll_rad=now.roll_rad)
-        east, north = now.velocity_en_mps[0] - current[0], now.velocity_en_mps[1] - current[1]
-        sin, cos = math.sin(now.heading_rad), math.cos(now.heading_rad)
-        check.update(t_s, mean, replace(
-            mean, along_mps=east * sin + north * cos, across_mps=east * cos - north * sin, heading_rad=now.heading_rad))
+        along, across = _through_water(now.velocity_en_mps, current, now.heading_rad)
+        check.update(t_s, mean, replace(mean, along_mps=along, across_mps=across, heading_rad=now.heading_rad))
         if not check.doubt:
             self._trial = None
             return check.is_odd

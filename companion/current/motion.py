@@ -137,9 +137,8 @@ class MotionCheck:
         """Take note that nobody knows how the boat is driven: what is settled begins anew."""
         self._t_s = None
 
-    def update(self, t_s: float, now: MotionSample, at_once: MotionSample | None = None) -> None:
+    def update(self, t_s: float, now: MotionSample, at_once: MotionSample) -> None:
         """Take the moment at ``t_s``; ``at_once`` is it without the means, for a boat that turns every few seconds."""
-        at_once = at_once or now
         self.is_odd = False
         if self._t_s is None or t_s <= self._t_s:
             self._t_s, self._heading_rad, self._turned_s, self._along_mps = t_s, now.heading_rad, t_s, at_once.along_mps

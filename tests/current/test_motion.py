@@ -201,7 +201,7 @@ def test_heel_to_windward_tells_of_a_vane_whose_speed_does_not():
 def test_who_stands_still_or_lies_in_irons_tells_nothing(now):
     check = MotionCheck()
     for t in range(200):
-        check.update(float(t), now)
+        check.update(float(t), now, now)
     assert not check.doubt
     assert check.fits_s == 0.0
 
