@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from companion.frozen import changed
-from companion.messages import Severity
+from companion.messages import Mode, Severity
 from companion.planner import Leg, Problem
 from companion.planner.problem import evaluate, resolved
 from companion.planner.risk import of_risky, path_risk, tacks_at_risk
@@ -174,10 +174,15 @@ def refusal(ctx: StepContext, route: Route, set_current: int | None, pending: Pe
         problem, old, heading_rad=vehicle.heading_rad, before_en=None, sailed_m=sailed_m, has_loops=has_loops)
     seen = of_way(problem, new, heading_rad=heading_rad, before_en=None, has_loops=has_loops,
                   sailed_m=sailed_m if set_current is None else 0.0)
-    low = _below_floor(problem, seen, before if ahead else None, here_m=here_m)
+    low = _below_floor(problem, seen, before if ahead and _is_sailed(ctx) else None, here_m=here_m)
     if low or not ahead or not is_open(ctx, pending, before):
         return low
     return _less(ctx, pending, new, old, heading_rad=heading_rad)
+
+
+def _is_sailed(ctx: StepContext) -> bool:
+    """Return whether the autopilot sails the mission on board, or we by it, rather than loiter."""
+    return ctx.autopilot is not None and ctx.autopilot.mode in {Mode.AUTO, Mode.GUIDED}
 
 
 def _below_floor(problem: Problem, new: ExpectedTrack, old: ExpectedTrack | None, *, here_m: float) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import shapely
 
+from companion.messages import Mode
 from companion.planner import plan
 from companion.skipper.behaviors.helm import leave_passed
 from companion.skipper.planning.answers import take_plan
@@ -112,6 +113,20 @@ def test_from_below_the_floor_only_what_comes_no_nearer_goes_on_board():
 
     assert refused((20.0, 120.0)) == ""
     assert "the boat is" in refused((-14.0, 115.0))
+
+
+@pytest.mark.parametrize(("mode", "is_admitted"), [(Mode.AUTO, True), (Mode.LOITER, False)])
+def test_what_is_on_board_and_not_sailed_excuses_no_way_onto_a_rock(mode, is_admitted):
+    """In LOITER the boat need not go: that the way on board leads onto the rock, too, made one of -7 m good enough."""
+    world = sailing(way=((-20.0, 110.0), GOAL))
+    beside = (-7.0, 100.0)
+    world.position, world.mode, world.state = beside, mode, with_parts(world.state, position={"last_seen": None})
+    ctx = turn_of(world)
+    assert request(ctx, ReplanReason.OFF_LEG)
+    ways = ((-11.0, 115.0), GOAL, ctx.state.mission.route.points_en_m[-1])
+    route = replace(ctx.state.mission.route, points_en_m=ways, items=ctx.state.mission.route.items[:1] * 3,
+                    leg_from_en_m=(beside, *ways[:-1]), gate_of=(-1, 0, -1))
+    assert (refusal(ctx, route, 1, replace(ctx.state.pending.plan, start_en_m=beside)) == "") is is_admitted
 
 
 def test_an_item_that_was_passed_during_its_upload_is_not_turned_back_for():
