@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from companion.addresses import Displays, OutputName, parse_nmea, parse_signalk
-from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant, read_polar
+from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant, polar_of_table, read_polar
 from companion.current import STILL, Prior, read_table
 from companion.current.prior import table_lines
 from companion.disk import read_regular
@@ -43,6 +43,7 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import Code, Finding, FindingLevel, LocalArea, Mission
 from companion.geofence.mission import (
     AtomOptions,
+    BoatFile,
     CircleAtomOptions,
     GoalField,
     GoalGate,
@@ -55,6 +56,7 @@ from companion.geofence.mission import (
     RepulsivePointAtomOptions,
     StationAtomOptions,
     free_water,
+    read_boat_file,
 )
 from companion.geofence.shapes import polygon_en
 from companion.messages import GeoPoint
@@ -69,7 +71,7 @@ from companion.words import listed
 
 __all__ = [
     "RECENTRE_M", "boat_of", "config_of", "displays_of", "estimator_of", "feeds_of", "permissions_of", "planner_of",
-    "polar_of", "target_limits_of", "voyage_of", "water_of", "waters_of",
+    "polar_of", "polar_of_file", "target_limits_of", "voyage_of", "water_of", "waters_of",
 ]
 
 _POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
@@ -78,6 +80,8 @@ _POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon"
 def polar_of(mission: Mission) -> Polar:
     """Return the mission's polar."""
     path = mission.polar_path
+    if path is not None and path.suffix == ".toml":
+        return polar_of_file(read_boat_file(path), str(path))
     if path is not None:
         file = read_polar(path)
         if file.warnings:
@@ -91,6 +95,12 @@ def polar_of(mission: Mission) -> Polar:
                              'write "ardurover", "avalon", a polar file beside the mission, or a speed in m/s')
         return maker()
     return constant(float(polar))
+
+
+def polar_of_file(file: BoatFile, source: str) -> Polar:
+    """Return the polar of a boat file that came from ``source``. Raises InputError."""
+    table = file.polar
+    return polar_of_table(table.twa_deg, table.tws_mps, table.speed_mps, name=file.name, source=source)
 
 
 def boat_of(mission: Mission) -> Boat:
@@ -117,6 +127,7 @@ def boat_of(mission: Mission) -> Boat:
         max_tws_mps=mission.boat.max_tws_mps,
         min_tws_mps=mission.boat.min_tws_mps,
         tack_fails=mission.boat.tack_fails if mission.boat.can_tack else 0.0,
+        speed_error=mission.boat.speed_error_percent / 100.0,
     )
 
 

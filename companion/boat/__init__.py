@@ -6,6 +6,7 @@
 """
 
 from companion.boat.boat import Boat, Hull, can_hold, made_good_mps, outline_en_m, slowest_en_mps
+from companion.boat.guess import GuessedBoat, Sizes, guessed, guessed_text
 from companion.boat.margins import (
     AutopilotLimits,
     ProposedMargin,
@@ -14,10 +15,20 @@ from companion.boat.margins import (
     required_margin,
     widest_corridor_m,
 )
-from companion.boat.polar import Polar, ardurover_sitl, avalon, constant, parse_polar, read_polar
+from companion.boat.polar import (
+    Polar,
+    ardurover_sitl,
+    avalon,
+    constant,
+    parse_polar,
+    pol_text,
+    polar_of_table,
+    read_polar,
+)
 
 __all__ = [
-    "AutopilotLimits", "Boat", "Hull", "Polar", "ProposedMargin", "ardurover_sitl", "avalon", "can_hold",
-    "constant", "made_good_mps", "narrowest_corridor_m", "outline_en_m", "parse_polar", "proposed_margin",
-    "read_polar", "required_margin", "slowest_en_mps", "widest_corridor_m",
+    "AutopilotLimits", "Boat", "GuessedBoat", "Hull", "Polar", "ProposedMargin", "Sizes", "ardurover_sitl", "avalon",
+    "can_hold", "constant", "guessed", "guessed_text", "made_good_mps", "narrowest_corridor_m", "outline_en_m",
+    "parse_polar", "pol_text", "polar_of_table", "proposed_margin", "read_polar", "required_margin", "slowest_en_mps",
+    "widest_corridor_m",
 ]

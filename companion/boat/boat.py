@@ -53,6 +53,7 @@ class Boat:
         max_tws_mps: More wind than this the boat is not to be out in [m/s]; None: there is no such limit.
         min_tws_mps: In less than this the boat makes no way [m/s].
         tack_fails: The chance that a tack fails [0..1), before any was seen; 0: they are not reckoned to fail.
+        speed_error: How far all speeds of the polar may be off together, as the deviation of the logarithm [0..1].
         leeway_rad: On a beat, the apparent wind 30 degrees off its bow and three times as fast as it; see ``leeway``.
     """
 
@@ -70,6 +71,7 @@ class Boat:
     max_tws_mps: float | None = None
     min_tws_mps: float | None = None
     tack_fails: float = 0.0
+    speed_error: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.no_go_half_rad < math.pi:
@@ -84,6 +86,8 @@ class Boat:
                 raise ValueError(f"{name} is {value}; it must be 0 s or more")
         if not 0.0 <= self.leeway_rad < math.pi / 4.0:
             raise ValueError(f"leeway of {math.degrees(self.leeway_rad):.1f}° is outside 0..45°")
+        if not 0.0 <= self.speed_error <= 1.0:
+            raise ValueError(f"speed_error is {self.speed_error}; it must be from 0 to 1")
         if not 0.0 <= self.tack_fails < 1.0:
             raise ValueError(f"tack_fails is {self.tack_fails}; it must be a chance from 0 to below 1")
         if self.gybe_room_m is not None and not (math.isfinite(self.gybe_room_m) and self.gybe_room_m >= 0.0):
@@ -136,6 +140,8 @@ class Boat:
             out["tack_loss_s"] = self.tack_loss_s
         if self.gybe_loss_s > 0.0:
             out["gybe_loss_s"] = self.gybe_loss_s
+        if self.speed_error > 0.0:
+            out["speed_error"] = self.speed_error
         if not self.can_tack:
             out["can_tack"] = False
         for name in ("gybe_room_m", "max_tws_mps", "min_tws_mps"):

@@ -16,6 +16,7 @@ import bisect
 import csv
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from itertools import pairwise
@@ -288,6 +289,30 @@ def parse_polar(text: str, *, source: str = "polar") -> PolarFile:
         raise InputError(source, f"line {lines[0][0]}", "no header of wind speeds",
                          "start with a line like TWA\\TWS;4;6;8;10")
     return _parse_grid(lines[numeric[0]:], source)
+
+
+def polar_of_table(
+    twa_deg: ArrayLike, tws_mps: ArrayLike, speed_mps: Sequence[Sequence[float]], *, name: str, source: str,
+) -> Polar:
+    """Return the polar of a boat file's table. Raises InputError where it is none."""
+    remedy = "speed_mps has a row for each of twa_deg, with a speed for each of tws_mps"
+    if len({len(row) for row in speed_mps}) > 1:
+        raise InputError(source, "[polar]", "its rows are not of one length", remedy)
+    try:
+        return Polar(twa_rad=np.radians(np.asarray(twa_deg)), tws_mps=np.asarray(tws_mps),
+                     speed_mps_table=np.asarray(speed_mps), name=name)
+    except ValueError as error:
+        raise InputError(source, "[polar]", str(error), remedy) from None
+
+
+def pol_text(polar: Polar, share: float = 1.0) -> str:
+    """Return a polar in knots, as ``read_polar`` and OpenCPN take it, its speeds times ``share``."""
+    winds = [w for w in polar.tws_mps.tolist() if w > 0.0] or [5.0]
+    lines = ["TWA\\TWS;" + ";".join(f"{w / MPS_PER_KNOT:.2f}" for w in winds)]
+    for angle in polar.twa_rad.tolist():
+        speeds = (share * polar.speed_mps(angle, w) / MPS_PER_KNOT for w in winds)
+        lines.append(f"{math.degrees(angle):g};" + ";".join(f"{v:.2f}" for v in speeds))
+    return "\n".join(lines) + "\n"
 
 
 # ------------------------------------------------------------------------------------------- cells

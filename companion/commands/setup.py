@@ -11,15 +11,20 @@ import stat
 import sys
 import tempfile
 from argparse import ArgumentTypeError
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from companion.errors import CompanionError, InputError, JobError, LinkError
 from companion.program.arguments import number, place, system_id
 
+if TYPE_CHECKING:
+    from companion.boat import Sizes
+
 FOLDER = Path("/etc/companion")
+SIMULATOR = "the simulator's boat"
 NO_GO_DEG = number("deg", at_least=20.0, at_most=80.0)
 
 _EPILOG = """\
@@ -56,9 +61,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
                         help="where it is to sail; repeat it for more, in order")
     parser.add_argument("--drawn", action="store_true",
                         help="the goals are drawn in a ground station and uploaded to the autopilot")
-    parser.add_argument("--polar", type=Path, metavar="FILE", help="of the boat (default: the simulator's boat)")
+    boat = parser.add_mutually_exclusive_group()
+    boat.add_argument("--boat", type=sizes, metavar="M,KG,M2",
+                      help="the boat's length, displacement and sail area, of which its file is guessed (1.5,20,0.9)")
+    boat.add_argument("--polar", type=Path, metavar="FILE", help="of the boat (default: the simulator's boat)")
     parser.add_argument("--no-go", type=NO_GO_DEG, metavar="DEG",
-                        help="what the boat can sail to the wind (default: 47)")
+                        help="what the boat can sail to the wind (default: 47, or what is guessed)")
     parser.add_argument("--dir", type=Path, default=FOLDER, metavar="DIR",
                         help=f"where the unit looks (default: {FOLDER})")
     parser.add_argument("--yes", action="store_true", help="ask nothing: the defaults hold where nothing is given")
@@ -81,10 +89,16 @@ def run(args: argparse.Namespace) -> int:
     if not args.drawn:
         args.start = args.start or ask("where she starts, LAT,LON", None, place)
         args.goal = args.goal or [ask("where she is to sail, LAT,LON", None, place)]
-    args.no_go = args.no_go or ask("how near to the wind she sails [deg]", 47.0, NO_GO_DEG)
-    written = write_instance(args.dir, args.name, mission_of(args, link, system), settings_of(link), args.polar)
+    if args.polar is None and args.boat is None:
+        args.boat = ask("her length [m], displacement [kg] and sail area [m2], as 1.5,20,0.9", SIMULATOR,
+                        lambda text: None if text == SIMULATOR else sizes(text))
+    if args.boat is None:
+        args.no_go = args.no_go or ask("how near to the wind she sails [deg]", 47.0, NO_GO_DEG)
+    written = write_instance(args.dir, args.name, mission_of(args, link, system), settings_of(link), boat_of(args))
     for path in written:
         print(f"{path}: written")
+    if args.polar is None and args.boat is None:
+        print("her speeds are those of the simulator's boat; --boat 1.5,20,0.9 guesses them of her sizes")
     code = 0 if args.no_doctor else _examine(written[0], link, system)
     print(f"[operator] of {written[0]} permits nothing yet. To start: "
           f"sudo systemctl enable --now companion@{args.name}")
@@ -131,6 +145,20 @@ def _examine(mission: Path, link: str, system: int | None) -> int:
     parser = Parser(prog="companion")
     doctor.add_parser(parser.add_subparsers(), "")
     return doctor.run(parser.parse_args(words))
+
+
+def sizes(text: str) -> Sizes:
+    """Take a boat's length, displacement and sail area."""
+    from companion.boat import Sizes
+
+    parts = text.split(",")
+    if len(parts) != 3:
+        raise ArgumentTypeError(f"{text!r} is not three numbers: length [m], displacement [kg], sail area [m2]")
+    try:
+        length_m, displacement_kg, sail_area_m2 = map(float, parts)
+        return Sizes(length_m=length_m, displacement_kg=displacement_kg, sail_area_m2=sail_area_m2)
+    except ValueError as error:
+        raise ArgumentTypeError(str(error)) from None
 
 
 def yes_or_no(text: str) -> bool:
@@ -181,9 +209,9 @@ def margin_of(link: str | None, system: int | None) -> dict[str, float]:
 
 def mission_of(args: argparse.Namespace, link: str | None, system: int | None) -> dict[str, Any]:
     """Return the mission, as its file has it; its operator permits nothing."""
-    boat: dict[str, Any] = {"no_go_half_deg": args.no_go}
-    if args.polar is not None:
-        boat["polar"] = args.polar.name
+    boat: dict[str, Any] = {} if args.no_go is None else {"no_go_half_deg": args.no_go}
+    for name in boat_of(args):
+        boat["polar" if args.boat is None else "file"] = name
     mission: dict[str, Any] = {"name": args.name}
     if args.drawn:
         mission["from_autopilot"] = True
@@ -198,6 +226,18 @@ def mission_of(args: argparse.Namespace, link: str | None, system: int | None) -
     return mission
 
 
+def boat_of(args: argparse.Namespace) -> dict[str, bytes]:
+    """Return the file of the boat, by its name: a polar that is there, or what is guessed of its sizes."""
+    if args.polar is not None:
+        return {args.polar.name: args.polar.read_bytes()}
+    if args.boat is None:
+        return {}
+    from companion.boat import guessed, guessed_text
+
+    text = guessed_text(args.name, args.boat, guessed(args.boat), f"{datetime.now(UTC):%Y-%m-%d}")
+    return {f"{args.name}-boat.toml": text.encode()}
+
+
 def _place(point: Any) -> dict[str, float]:
     return {"lat": point.lat_deg, "lon": point.lon_deg}
 
@@ -207,7 +247,9 @@ def settings_of(link: str) -> str:
     return f"# How companion@ reaches the autopilot; OPTIONS= has more options of `companion run`.\nLINK={link}\n"
 
 
-def write_instance(folder: Path, name: str, mission: dict[str, Any], settings: str, polar: Path | None) -> list[Path]:
+def write_instance(
+    folder: Path, name: str, mission: dict[str, Any], settings: str, boat: Mapping[str, bytes],
+) -> list[Path]:
     """Write them once the mission has been read as the boat will read it; return the paths, the mission's first.
 
     Raises:
@@ -216,9 +258,7 @@ def write_instance(folder: Path, name: str, mission: dict[str, Any], settings: s
     from companion.disk import Disk
     from companion.geofence.mission import load_mission, load_settings, toml
 
-    files = {f"{name}.toml": toml(mission).encode(), f"{name}.env": settings.encode()}
-    if polar is not None:
-        files[polar.name] = polar.read_bytes()
+    files = {f"{name}.toml": toml(mission).encode(), f"{name}.env": settings.encode(), **boat}
     with tempfile.TemporaryDirectory() as scratch:
         for file, data in files.items():
             Path(scratch, file).write_bytes(data)

@@ -156,6 +156,7 @@ def _climate(path: Path, spec: WindSpec, off: tuple[float, float]) -> Given:
     return Given(told=f"a climate of {len(cells)} winds, {path.name}{about}", spec=spec, error=off, cells=tuple(cells))
 
 
+DRAWN_PERCENT = 8.7    # the deviation of what a drawn polar errs by as a whole
 OF_ONES_OWN = 0.5      # the error of a polar that was made for this boat, as a share of another's
 LEEWAY_SPREAD = 0.3    # of a leeway that the mission gives, as a share of it
 # Where a stranger sends the boat is clear water only where `sitl faults` sails.
@@ -199,6 +200,8 @@ def drawn(seed: int, base: Scenario, mission: Mission, doubts: Doubts) -> tuple[
 def _nearer(scenario: Scenario, mission: Mission, share: float) -> Scenario:
     """Return a scenario whose boat, sea and sensors are nearer to the plan's, or farther from it."""
     polar = share * (OF_ONES_OWN if mission.polar_path is not None else 1.0)
+    if mission.boat.speed_error_percent > 0.0:
+        polar = share * mission.boat.speed_error_percent / DRAWN_PERCENT
     wind = scenario.wind
     wind = msgspec.structs.replace(
         wind, gust_spread=min(1.0, share * wind.gust_spread), stronger_per_km=share * wind.stronger_per_km,

@@ -110,7 +110,8 @@ OTHER = {
     "area": {"obstacles": ["point.wkt"], "fence": "fence.wkt", "axis": "latlon", "margin_m": 14.0,
              "margin_floor_m": 7.0, "point_radius_m": 15.0},
     "risk": {"delta_s": 0.8, "max_path_risk": 0.3},
-    "boat": {"polar": 2.0, "no_go_half_deg": 50.0, "max_twa_deg": 170.0, "turn_rate_deg_s": 20.0, "tack_loss_s": 6.0,
+    "boat": {"file": "boat.toml", "speed_error_percent": 20.0, "polar": 2.0,
+             "no_go_half_deg": 50.0, "max_twa_deg": 170.0, "turn_rate_deg_s": 20.0, "tack_loss_s": 6.0,
              "gybe_loss_s": 3.0, "can_tack": False, "gybe_room_m": 40.0, "length_m": 3.0, "beam_m": 1.5, "motor": True,
              "leeway_deg": 4.0, "max_tws_mps": 11.0, "min_tws_mps": 1.5, "tack_fails": 0.2},
     "autopilot": {"system": 7, "frame": "motor"},
@@ -135,13 +136,21 @@ OTHER = {
                 "drop_after_s": 300.0, "policy": "rules"},
     "output": {"nmea": ["udp:127.0.0.1:10110"], "signalk": ["tcp:127.0.0.1:8375"], "signalk_token": "token"},
 }
+BOAT = """name = "b"
+[boat]
+length_m = 2.0
+[polar]
+tws_mps = [5.0]
+twa_deg = [60, 180]
+speed_mps = [[1.0], [1.5]]
+"""
 # What does not sail: pictures and previews, and what `companion run` itself takes. Tried below.
 DRAWN = {("start", "heading_deg"), ("wind", "preview_from_deg")}
 RUN = {("skipper", "expansions"), ("skipper", "seed"), ("autopilot", "system")}   # the last: test_whose
 
 
 def folder_with(path):
-    for name, text in (("rock.wkt", ROCK), ("fence.wkt", FENCE), ("point.wkt", POINT)):
+    for name, text in (("rock.wkt", ROCK), ("fence.wkt", FENCE), ("point.wkt", POINT), ("boat.toml", BOAT)):
         (path / name).write_text(text)
     return path
 

@@ -16,7 +16,8 @@ from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.registry import FAR_M, check_place, parse, read
-from companion.geofence.formats.untrusted import decode
+from companion.geofence.formats.untrusted import decode, read_bytes
+from companion.geofence.mission.boat_file import with_boat_file
 from companion.geofence.mission.goals import GoalGate, GoalReader, MissionGoal, RefugePoint, refuges_of
 from companion.geofence.mission.options import (
     AreaOptions,
@@ -33,7 +34,7 @@ from companion.geofence.mission.options import (
     TrafficOptions,
     WindOptions,
 )
-from companion.geofence.mission.text import GOAL_MISSING, parse_options, read_options
+from companion.geofence.mission.text import GOAL_MISSING, MAX_TOML_BYTES, parse_options
 from companion.geofence.shapes import Obstacle, Shape, Zone, ZoneKind
 from companion.messages import GeoPoint
 from companion.words import file_name
@@ -206,7 +207,7 @@ def load_mission(path: str | Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mi
 
 def read_mission(path: Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
     """Read a mission as ``load_mission`` does, without a look at whether its places lie in free water."""
-    options = parse_options(decode(given[path], str(path)), str(path)) if path in given else read_options(path)
+    options = _options_of(path, given)
     if options.from_autopilot and not options.goal:
         raise InputError(str(path), "from_autopilot", "the goals of this mission are drawn on the autopilot, not here",
                          "companion run reads them there and sails them")
@@ -215,10 +216,17 @@ def read_mission(path: Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
     return assembled(options, path, given=given)
 
 
+def _options_of(path: Path, given: Mapping[Path, bytes]) -> MissionOptions:
+    """Return the options of a mission with what its boat's file says."""
+    text = decode(given[path] if path in given else read_bytes(path, max_bytes=MAX_TOML_BYTES), str(path))
+    options = parse_options(text, str(path))
+    return msgspec.structs.replace(options, boat=with_boat_file(options.boat, text, path))
+
+
 def load_settings(path: str | Path) -> MissionOptions:
     """Read a mission TOML whose goals are drawn on the autopilot: all but the goals. Raises InputError."""
     path = Path(path)
-    options = read_options(path)
+    options = _options_of(path, AS_IT_IS)
     if options.goal:
         raise InputError(str(path), "[[goal]]", "the goals are those that are drawn on the autopilot",
                          "take them out of this file, or sail it without --from-autopilot")

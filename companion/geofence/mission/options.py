@@ -243,9 +243,13 @@ class RiskOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """``[boat]``: what the boat can do."""
 
+    file: str | None = None
+    """The boat's own file beside the mission (``companion boat guess``): what is not said here is as it says."""
     polar: str | Positive = "ardurover"
     """``ardurover`` (the simulator's), ``avalon`` (Büsser's eq. 4.1), a polar file beside the mission, or a constant
     speed [m/s]."""
+    speed_error_percent: Annotated[float, Meta(ge=0.0, le=60.0)] = 0.0
+    """How far all speeds of the polar may be off together [%, standard deviation]: arrivals spread by it."""
     no_go_half_deg: Annotated[float, Meta(ge=0.0, lt=90.0)] = 47.0
     max_twa_deg: Annotated[float, Meta(gt=90.0, le=180.0)] = 180.0
     turn_rate_deg_s: Annotated[float, Meta(gt=0.0, le=360.0)] = 30.0

@@ -95,7 +95,8 @@ class BoatLimits:
     turning round the long way needs; None: five turning radii at full speed. ``speeds`` is the polar in other winds.
     More wind than ``max_tws_mps``, or less than ``min_tws_mps``, it is not to be out in (None: no limit).
     ``tack_fails`` is the chance that a tack fails, below 1; 0: what then comes is not looked at. It then lies for
-    ``irons_s``, set to lee at ``lee_mps`` (on starboard tack, on port) beside what the water does.
+    ``irons_s``, set to lee at ``lee_mps`` (on starboard tack, on port) beside what the water does. ``speed_error`` is
+    how far all its speeds may be off together: the standard deviation of the logarithm.
     """
 
     no_go_half_rad: float
@@ -113,6 +114,7 @@ class BoatLimits:
     tack_fails: float = 0.0
     irons_s: float = IRONS_S
     lee_mps: tuple[float, ...] = (0.0, 0.0)
+    speed_error: float = 0.0
 
     @property
     def room_m(self) -> float:

@@ -250,6 +250,7 @@ def defect_of(p: Problem) -> str | None:
         (b.tack_loss_s >= 0.0 and b.gybe_loss_s >= 0.0, "a tack or gybe loss is negative"),
         ((b.gybe_room_m or 0.0) >= 0.0, "gybe_room_m is negative"),
         (0.0 <= b.tack_fails < 1.0, f"tack_fails {b.tack_fails:g} is outside 0 <= tack_fails < 1"),
+        (0.0 <= b.speed_error <= 1.0, f"speed_error {b.speed_error:g} is outside 0 to 1"),
         (0.0 <= b.irons_s < math.inf, "irons_s is no time of 0 s or more"),
         (len(b.lee_mps) == 2 and all(0.0 <= lee < math.inf for lee in b.lee_mps),
          "lee_mps is not two speeds, each 0 or more"),

@@ -4,7 +4,8 @@ Less wind costs more than as much more wind gains, and no speed is below none: s
 symmetric, and its median is later than the plan's own time. The plan is sailed on paper in ``WINDS`` drawn winds.
 Strength and direction are independent Gauss-Markov processes of the problem's own spreads. In each, a leg's progress at
 an instant is its planned one times the ratio of its speeds in that wind and in the plan's; where the wind has closed a
-leg it beats along it. Turns take their time in any wind, and a tack that fails takes ``FAILED_S`` more.
+leg it beats along it. Turns take their time in any wind, and a tack that fails takes ``FAILED_S`` more. A boat whose
+speeds may all be off together takes a drawn factor longer.
 
 Where a step is long against the correlation time, the mean over a step has less spread than an instant: the
 remainder is averaged over within the step.
@@ -16,6 +17,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,7 +158,14 @@ def _times_s(problem: Problem, legs: Sequence[Leg], strength: Strength, speeds: 
     at_turn = np.clip(np.rint((turn - turns[0]) / (turns[1] - turns[0])), 0, NODES_RAD - 1).astype(np.int64)
     edges = np.array([t for leg in legs for t in (leg.start_s, leg.end_s)])
     times = np.asarray(_sailed(edges, np.ascontiguousarray(table), at_wind, at_turn, step_s))
-    return times + _lost_s(problem, legs, noise[2])
+    return (times + _lost_s(problem, legs, noise[2])) * _slower(problem.boat.speed_error)
+
+
+@functools.lru_cache(maxsize=4)
+def _slower(speed_error: float) -> Floats:
+    """Return how much longer a boat whose speeds are all off by one factor takes in each wind: its even quantiles."""
+    ranks = (np.random.default_rng(SEED).permutation(WINDS) + 0.5) / WINDS
+    return np.exp(speed_error * np.array([NormalDist().inv_cdf(float(p)) for p in ranks]))
 
 
 def _progress(problem: Problem, legs: Sequence[Leg], speeds: Speeds, winds: Floats, turns: Floats) -> Floats:

@@ -55,6 +55,15 @@ def simulated(tws, sigma, tau, length_m, planned_s, count=4000, step_s=0.5):
     return np.quantile(out, [0.1, 0.5, 0.9])
 
 
+def test_a_boat_whose_speeds_may_be_off_spreads_its_arrivals_by_that():
+    """In a wind that does not spread, its quantiles are those of the factor alone."""
+    p = problem(sigma=1e-3, boat=replace(BOAT, speed_error=0.35))
+    planned_s = reach(p)[-1].end_s
+    found = arrival(p, reach(p))
+    for quantile, z in ((found.early_s, -1.2816), (found.median_s, 0.0), (found.late_s, 1.2816)):
+        assert quantile == pytest.approx(planned_s * math.exp(0.35 * z), rel=0.02)
+
+
 @pytest.mark.parametrize(("tws", "sigma", "tau"), [
     (5.0, 1.0, 5.0), (5.0, 1.5, 60.0), (4.0, 1.0, 600.0), (8.0, 2.0, 20.0)])
 def test_the_quantiles_are_those_of_an_independent_simulation(tws, sigma, tau):

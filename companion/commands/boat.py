@@ -1,0 +1,171 @@
+"""``companion boat``: a file that says what one boat can do: guessed before the first log, shown, compared."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from companion.errors import InputError
+from companion.program.arguments import add_command, number, out_file, picture
+
+if TYPE_CHECKING:
+    from companion.boat import Polar
+    from companion.geofence.mission import BoatFile
+
+_EPILOG = """\
+examples:
+  companion boat guess --length 1.5 --displacement 20 --sail-area 0.9 --out pepper.toml
+  companion boat show pepper.toml --plot pepper.png
+  companion boat show pepper.toml --pol pepper.pol            (for OpenCPN and qtVlm)
+  companion boat compare pepper.toml ardurover
+
+A mission names the file: file = "pepper.toml" in its [boat].
+Exit codes: 0 written or told, 2 a file or a number cannot be believed.
+"""
+TWA_DEG = (40.0, 45.0, 52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0, 165.0, 180.0)
+MOST_WINDS = 7      # columns of a table
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
+    """Add the command with its three verbs."""
+    parser = add_command(subparsers, "boat", summary, _EPILOG)
+    verbs = parser.add_subparsers(dest="verb", metavar="guess|show|compare", required=True)
+    guess = verbs.add_parser("guess", help="a boat file from three sizes, for a boat that nobody has sailed yet")
+    guess.add_argument("--length", type=number("m", above=0.0, at_most=100.0), required=True, metavar="M",
+                       help="over all [m]")
+    guess.add_argument("--displacement", type=number("kg", above=0.0, at_most=1e6), required=True, metavar="KG",
+                       help="as she sails [kg]")
+    guess.add_argument("--sail-area", type=number("m2", above=0.0, at_most=1e4), required=True, metavar="M2",
+                       help="of all but a spinnaker [m2]")
+    guess.add_argument("--beam", type=number("m", above=0.0, at_most=30.0), metavar="M",
+                       help="[m] (default: 0.3 of the length)")
+    guess.add_argument("--name", help="what she is called (default: the file's name)")
+    guess.add_argument("--out", type=out_file, metavar="FILE.toml", help="write it there (default: print it)")
+    guess.add_argument("--force", action="store_true", help="take the place of a file that is there")
+    guess.set_defaults(run=_guess)
+    show = verbs.add_parser("show", help="her speeds, best angles and what is not known of her")
+    show.add_argument("file", metavar="FILE", help="a boat file, a polar file, ardurover or avalon")
+    show.add_argument("--plot", type=picture, metavar="P.png", help="draw the polar, with its band")
+    show.add_argument("--pol", type=out_file, metavar="FILE.pol", help="write the polar in knots, as OpenCPN reads it")
+    show.add_argument("--quantile", type=number(above=0.0, at_most=0.5), default=0.5, metavar="P",
+                      help="of the speeds in --pol, below which she is with this chance (default: 0.5; careful: 0.1)")
+    show.add_argument("--force", action="store_true", help="take the place of a .pol that is there")
+    show.set_defaults(run=_show)
+    compare = verbs.add_parser("compare", help="how much faster one is than the other")
+    for name in ("first", "second"):
+        compare.add_argument(name, metavar=name.upper(), help="a boat file, a polar file, ardurover or avalon")
+    compare.set_defaults(run=_compare)
+
+
+def _guess(args: argparse.Namespace) -> int:
+    from companion.boat import Sizes, guessed, guessed_text
+    from companion.commands.output import write_files
+
+    try:
+        sizes = Sizes(length_m=args.length, displacement_kg=args.displacement, sail_area_m2=args.sail_area)
+    except ValueError as error:
+        raise InputError("companion boat guess", "", str(error), "give what a scale and a tape say") from None
+    name = args.name or (args.out.stem if args.out is not None else "my boat")
+    text = guessed_text(name, sizes, guessed(sizes), f"{datetime.now(UTC):%Y-%m-%d}", args.beam)
+    if args.out is None:
+        print(text, end="")
+        return 0
+    write_files({str(args.out): text.encode()}, force=args.force)
+    print(f'{args.out}: written; a mission beside it names it: [boat] file = "{args.out.name}"')
+    return 0
+
+
+def _show(args: argparse.Namespace) -> int:
+    polar, boat = _boat(args.file)
+    error = 0.0 if boat is None else boat.boat.speed_error_percent / 100.0
+    print("\n".join([*_words(args.file, boat), *_angles(polar), *_table("boat speed [m/s]", polar, _speeds)]))
+    if args.pol is not None:
+        from statistics import NormalDist
+
+        from companion.boat import pol_text
+        from companion.commands.output import write_files
+
+        slower = math.exp(error * NormalDist().inv_cdf(args.quantile))
+        write_files({str(args.pol): pol_text(polar, slower).encode()}, force=args.force)
+        print(f"{args.pol}: written")
+    if args.plot is not None:
+        from companion.commands.output import patience
+        from companion.plots.polar import save_polar
+
+        with patience("drawing"):
+            save_polar(polar, error, args.plot, title=polar.name)
+        print(f"{args.plot}: drawn")
+    return 0
+
+
+def _compare(args: argparse.Namespace) -> int:
+    first, second = (_boat(name)[0] for name in (args.first, args.second))
+
+    def shares(polar: Polar, twa_deg: float, tws_mps: float) -> str:
+        one, other = (p.speed_mps(math.radians(twa_deg), tws_mps) for p in (polar, second))
+        return "-" if one <= 0.0 or other <= 0.0 else f"{100.0 * (other / one - 1.0):+.0f}"
+
+    print("\n".join(_table(f"how much faster {args.second} is than {args.first} [%]", first, shares)))
+    return 0
+
+
+def _boat(name: str) -> tuple[Polar, BoatFile | None]:
+    """Return a polar by its file or name, and the boat file that it is of, None: it is none."""
+    from companion.boat import ardurover_sitl, avalon, read_polar
+    from companion.geofence.mission import read_boat_file
+
+    makers = {"ardurover": ardurover_sitl, "avalon": avalon}
+    if name in makers:
+        return makers[name](), None
+    if Path(name).suffix == ".toml":
+        from companion.compose import polar_of_file
+
+        boat = read_boat_file(Path(name))
+        return polar_of_file(boat, name), boat
+    return read_polar(name).polar, None
+
+
+def _words(name: str, boat: BoatFile | None) -> list[str]:
+    if boat is None:
+        return [f"{name}: speeds alone; `companion boat guess` writes a file that says more"]
+    o = boat.boat
+    tacks = (f"turns {o.turn_rate_deg_s:g} degrees/s; a tack costs {o.tack_loss_s:g} s and fails in "
+             f"{100.0 * o.tack_fails:g} %; leeway {o.leeway_deg:g} degrees")
+    return [
+        f"{boat.name}: {boat.made or 'nobody says how it was made'}",
+        f"{o.length_m:g} x {o.beam_m:g} m; not nearer to the wind than {o.no_go_half_deg:g} degrees; {tacks}",
+        "her speeds are taken to be as they stand here" if o.speed_error_percent == 0.0 else
+        f"her speeds may all be off by {o.speed_error_percent:g} % (standard deviation): arrivals spread by it",
+    ]
+
+
+def _winds(polar: Polar) -> list[float]:
+    winds = [float(w) for w in polar.tws_mps if w > 0.0] or [5.0]
+    return winds[::math.ceil(len(winds) / MOST_WINDS)]
+
+
+def _angles(polar: Polar) -> list[str]:
+    lines = ["", _row("wind [m/s]", [f"{w:.1f}" for w in _winds(polar)])]
+    for what, best in (("beat", polar.best_beat), ("run", polar.best_run)):
+        found = [best(w) for w in _winds(polar)]
+        lines += [_row(f"best {what} [deg]", [f"{math.degrees(a.twa_rad):.0f}" for a in found]),
+                  _row("  made good [m/s]", [f"{a.vmg_mps:.2f}" for a in found])]
+    return lines
+
+
+def _speeds(polar: Polar, twa_deg: float, tws_mps: float) -> str:
+    return f"{polar.speed_mps(math.radians(twa_deg), tws_mps):.2f}"
+
+
+def _table(title: str, polar: Polar, cell: Callable[[Polar, float, float], str]) -> list[str]:
+    winds = _winds(polar)
+    return ["", title, _row("TWA, wind [m/s]", [f"{w:.1f}" for w in winds]), *(
+        _row(f"  {twa:.0f}", [cell(polar, twa, w) for w in winds]) for twa in TWA_DEG)]
+
+
+def _row(name: str, cells: list[str]) -> str:
+    return f"{name:<18}" + "".join(f"{text:>7}" for text in cells)

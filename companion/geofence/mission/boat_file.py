@@ -1,0 +1,84 @@
+"""The boat file: what one boat can do, in a TOML of its own that the missions of that boat name.
+
+``[boat]`` has the keys of a mission's ``[boat]``, ``[polar]`` the boat's speeds. What a mission says itself counts
+before what its boat's file says.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from companion.errors import InputError
+from companion.geofence.formats.untrusted import decode, read_bytes
+from companion.geofence.mission.options import BoatOptions
+from companion.words import expected
+
+MAX_BYTES = 1_000_000
+OWN = ("file", "polar")   # keys of a mission's [boat] that are none of the boat's
+
+
+class PolarTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[polar]``: boat speed through the water [m/s], a row for each true wind angle."""
+
+    tws_mps: tuple[float, ...]
+    twa_deg: tuple[float, ...]
+    speed_mps: tuple[tuple[float, ...], ...]
+
+
+class BoatFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A boat file as it is read."""
+
+    name: str
+    polar: PolarTable
+    made: str = ""
+    """How, of what and when, in words."""
+    boat: BoatOptions = msgspec.field(default_factory=BoatOptions)
+
+
+def read_boat_file(path: Path) -> BoatFile:
+    """Read a boat file. Raises InputError naming the key, what is wrong and the remedy."""
+    return parse_boat_file(decode(read_bytes(path, max_bytes=MAX_BYTES), str(path)), str(path))
+
+
+def parse_boat_file(text: str, source: str) -> BoatFile:
+    """Return the boat that ``text`` tells of; see ``read_boat_file``."""
+    raw = _raw(text, source)
+    table = raw.get("boat")
+    for key in OWN:
+        if isinstance(table, dict) and key in table:
+            raise InputError(source, f"[boat] {key}", "has no place in a boat file", "the speeds are in [polar]")
+    try:
+        return msgspec.convert(raw, BoatFile)
+    except msgspec.ValidationError as error:
+        what, _, where = str(error).partition(" - at `$")
+        raise InputError(
+            source, where.strip("`."), expected(what), "companion boat guess writes an example") from None
+
+
+def with_boat_file(options: BoatOptions, mission_text: str, path: Path) -> BoatOptions:
+    """Return a mission's ``[boat]`` with what its boat file says wherever the mission itself is silent.
+
+    Raises InputError: the file cannot be read.
+    """
+    if options.file is None:
+        return options
+    named = path.parent / options.file
+    try:
+        text = decode(read_bytes(named, max_bytes=MAX_BYTES), str(named))
+    except InputError as error:
+        raise InputError(str(path), f"[boat] file {named}", error.problem, "companion boat guess writes one") from None
+    parse_boat_file(text, str(named))
+    said = {key: value for key, value in _raw(mission_text, str(path)).get("boat", {}).items() if key != "file"}
+    return msgspec.convert({"polar": options.file, **_raw(text, str(named)).get("boat", {}), **said}, BoatOptions)
+
+
+def _raw(text: str, source: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise InputError(source, "", f"is not TOML: {str(error)[:80]}") from None

@@ -1,0 +1,47 @@
+"""The picture of a boat's polar: a curve for each wind, and the band that its speeds may lie in."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
+
+from companion.boat import Polar
+from companion.plots.chart import save
+
+NINETY = 1.645      # standard deviations to either side that nine in ten lie in
+MOST_CURVES = 4
+
+
+def save_polar(polar: Polar, speed_error: float, path: str | Path, *, title: str) -> None:
+    """Draw a polar; ``speed_error`` is the deviation of the logarithm of all its speeds."""
+    save(polar_figure(polar, speed_error, title=title), path)
+
+
+def polar_figure(polar: Polar, speed_error: float, *, title: str) -> Figure:
+    """Return the picture: the wind comes from above, boat speed [m/s] outward, starboard tack on the right."""
+    figure = plt.figure(figsize=(6.4, 7.6))
+    axes = figure.add_subplot(projection="polar")
+    assert isinstance(axes, PolarAxes)
+    axes.set_theta_zero_location("N")
+    axes.set_theta_direction(-1)
+    axes.set_thetamax(180.0)
+    winds = [float(w) for w in polar.tws_mps if w > 0.0] or [5.0]
+    angles = np.radians(np.arange(0.0, 181.0, 1.0))
+    for n, tws_mps in enumerate(winds[::-1][::math.ceil(len(winds) / MOST_CURVES)]):
+        speeds, colour = polar.speeds_mps(angles, tws_mps), plt.get_cmap("viridis")(0.2 + 0.22 * n)
+        axes.plot(angles, speeds, color=colour, label=f"{tws_mps:.1f} m/s of wind")
+        if speed_error > 0.0 and n == 0:
+            low, high = (speeds * math.exp(sign * NINETY * speed_error) for sign in (-1.0, 1.0))
+            axes.fill_between(angles, low, high, color=colour, alpha=0.15, label="nine in ten, of that wind")
+    axes.set_title(f"{title}: boat speed [m/s]")
+    axes.legend(loc="center right", bbox_to_anchor=(0.36, 0.93), fontsize=8, framealpha=1.0)
+    return figure
