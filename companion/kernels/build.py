@@ -14,6 +14,7 @@ import multiprocessing
 import os
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -28,6 +29,8 @@ from companion.kernels.places import looked_in, mark, sweep, written_to
 KILLED = 9            # exit code where the compiling processes were killed
 PROCESS_MB = 250      # of memory that each process may take, ...
 KERNELS_A_PROCESS = 12   # which is what so many kernels make of it
+# Of processes that are ended, what multiprocessing clears away after them is none of the user's business.
+_QUIET = ("-W", "ignore::UserWarning:multiprocessing.resource_tracker")
 _TRIES = 3            # of processes that die: short of memory, most likely
 
 
@@ -68,7 +71,7 @@ def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
     if is_ready(packages):
         return
     # In a session of its own: Ctrl-C is for this process, which ends its children itself.
-    with subprocess.Popen([sys.executable, "-m", "companion.kernels.build", *packages],  # noqa: S603 - our own program
+    with subprocess.Popen([sys.executable, *_QUIET, "-m", "companion.kernels.build", *packages],  # noqa: S603 - ours
                           stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, start_new_session=True) as compiling:
         try:
             assert compiling.stdout is not None
@@ -80,7 +83,7 @@ def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
                 say(progress.say(time.monotonic() - began_s, first))
             code = compiling.wait()
         finally:
-            compiling.kill()   # its processes see it, and leave after the kernel in hand
+            compiling.kill()   # its processes see it, and leave
     if code != 0:
         why = "killed, most likely for want of memory" if code in {KILLED, -KILLED} else f"exit code {code}"
         say(f"kernels cannot be compiled ahead ({why}): they are compiled one by one as they are called")
@@ -100,7 +103,8 @@ def compile_listed(packages: Sequence[str]) -> int:
     while left:
         at_once = hands()
         try:
-            with ProcessPoolExecutor(at_once, context) as pool:   # anew for each batch: what compiles grows
+            # anew for each batch: what compiles grows
+            with ProcessPoolExecutor(at_once, context, initializer=leave_with_parent) as pool:
                 jobs = {pool.submit(_compile, entry): entry for entry in left[:at_once * KERNELS_A_PROCESS]}
                 for job in as_completed(jobs):
                     job.result()
@@ -112,6 +116,27 @@ def compile_listed(packages: Sequence[str]) -> int:
             if deaths == _TRIES:
                 return KILLED
     return 0
+
+
+def leave_with_parent() -> None:
+    """Let this process of a pool end when the one that it works for does: by itself it would wait for work for ever."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        _leave_after(parent.join)
+
+
+def _leave_after(wait: Callable[[], None]) -> None:
+    def leave() -> None:
+        wait()
+        os._exit(1)
+
+    threading.Thread(target=leave, name="parent", daemon=True).start()
+
+
+def _orphaned() -> None:
+    asker = os.getppid()
+    while os.getppid() == asker:
+        time.sleep(0.2)
 
 
 def _compile(entry: Entry) -> None:
@@ -129,6 +154,7 @@ def hands() -> int:
 
 
 if __name__ == "__main__":
+    _leave_after(_orphaned)
     try:
         sys.exit(compile_listed(sys.argv[1:]))
     except BrokenPipeError:   # who asked for it has gone; there is nobody to flush for either

@@ -15,17 +15,17 @@ import os
 import queue
 import signal
 import tempfile
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import ALL_COMPLETED, FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any, TypeVar
 
 from companion.errors import JobError
+from companion.kernels.build import leave_with_parent
 from sitl.runner.job import UnfitError
 from sitl.runner.result_store import MadeBy, made_by
 
@@ -156,13 +156,7 @@ def _begin(scratch: str) -> None:
     """Begin a worker: Ctrl-C is its parent's, it does not outlive that, and what it leaves is in ``scratch``."""
     tempfile.tempdir = scratch
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    if parent is not None:
-        def leave() -> None:
-            parent.join()
-            os._exit(1)
-
-        threading.Thread(target=leave, name="parent", daemon=True).start()
+    leave_with_parent()
 
 
 LOCAL = "local"
