@@ -19,6 +19,10 @@ _EXAMPLE = """examples:
 """
 
 
+# What `companion doctor` asks for in place of ArduPilot's defaults: this boat is one that was set up to be sailed.
+SET_UP = {"FS_THR_ENABLE": 2.0, "AVOID_ENABLE": 0.0}
+
+
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
@@ -46,7 +50,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument("--at", type=moment, metavar="TIME",
                         help="the time that its GPS tells, as 2026-11-24T08:00Z (default: now)")
     parser.add_argument("--sysid", type=whole(at_least=1, at_most=255), default=1, help="MAVLink system id (default 1)")
-    parser.add_argument("--param", metavar="NAME=VALUE", action="append", default=[], help="set a parameter")
+    parser.add_argument("--param", metavar="NAME=VALUE", action="append", default=[],
+                        help="set a parameter; it has been set up as 'companion doctor' asks: "
+                             + ", ".join(f"{name}={value:g}" for name, value in SET_UP.items()))
     parser.add_argument("--polar", type=Path, metavar="FILE", help="a boat that sails by this polar")
     parser.add_argument("--for", dest="for_s", type=number("s", above=0.0), metavar="S",
                         help="end after S simulated seconds")
@@ -80,6 +86,7 @@ def run(args: argparse.Namespace) -> int:
         if not sign or not name:
             raise InputError("--param", text, "is not a parameter", "write NAME=VALUE")
     check_parameters(parameters)
+    parameters = SET_UP | parameters
     begins = args.at or dt.datetime.now(dt.UTC).replace(microsecond=0)
     config = AutopilotConfig(
         home=args.home, heading_rad=math.radians(args.heading), is_warm=args.warm,
