@@ -1,14 +1,14 @@
 """Where the program begins: whoever ends it while it loads ends it at once, without a traceback."""
 
-from __future__ import annotations
-
-import signal
 import sys
+
+# Built into the interpreter, as nothing else that could come first: while a file is read Ctrl-C would be a traceback.
+from _signal import SIG_DFL, SIGINT, signal  # type: ignore[import-not-found]
 
 
 def main() -> int:
     """Run one command of this process and return its exit code."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)   # until a command runs, which may have something to put in order
+    signal(SIGINT, SIG_DFL)   # until a command runs, which may have something to put in order
     from companion.cli import main as run
 
     return run()

@@ -101,6 +101,19 @@ runpy.run_module("companion", run_name="__main__")
     assert (run.returncode, err) == (-signal.SIGINT, "")
 
 
+@pytest.mark.parametrize("program", ["companion", "sitl"])
+def test_nothing_is_read_from_a_file_before_ctrl_c_is_provided_for(program):
+    """``signal`` and ``__future__`` are files: some of them printed the traceback of an import."""
+    script = f"""
+import sys
+before = {{*sys.modules}}
+import {program}.__main__
+print(*({{*sys.modules}} - before - {{*sys.builtin_module_names}}))
+"""
+    run = subprocess.run([sys.executable, "-S", "-c", script], capture_output=True, text=True, check=True, env=HERE)
+    assert {*run.stdout.split()} == {program, f"{program}.__main__"}
+
+
 def test_a_port_that_is_not_there_is_told_first(tmp_path, capsys):
     """The first words were 30 s of "nothing yet"."""
     assert cli.main(["status", "--link", str(tmp_path / "ttyUSB0:57600"), "--once", "--timeout", "0.2"]) != 0
