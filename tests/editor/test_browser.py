@@ -3,6 +3,7 @@
 With $SCREENSHOTS naming a folder, pictures are left there.
 """
 
+import itertools
 import shutil
 from pathlib import Path
 
@@ -244,6 +245,20 @@ def test_by_day_and_by_night_on_a_phone_and_exported(archipelago, tmp_path):
         board.js("document.getElementById('course').scrollIntoView()")
         keep(board, "editor-phone-tables")
         assert board.complaints() == []
+
+
+@pytest.mark.parametrize("window", [{}, {"width": 390, "height": 844, "phone": True}])
+def test_where_a_course_ends_where_it_begins_each_word_can_be_read(window):
+    """The lake's last goal, its safe end, is 5 m from its start."""
+    with edited(Path("missions") / "lake.toml") as url, Board(**window) as board:
+        board.open(url)
+        board.settled()
+        words = board.js("return [...document.querySelectorAll('#map text.word')].map((word) => { "
+                         "const r = word.getBoundingClientRect();"
+                         "return [word.textContent, r.left, r.top + 3, r.right, r.bottom - 3]; })")
+    assert {"start", "safe end"} <= {word for word, *_ in words}
+    for (one, *a), (other, *b) in itertools.combinations(words, 2):
+        assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1], (one, other)
 
 
 def test_a_chart_lies_under_the_drawing_and_an_empty_mission_begins_on_it(tmp_path):

@@ -165,6 +165,8 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(record):
         window.js("companion.timeline.go(companion.timeline.index(60))")
         window.until("return companion.view.t_s > 59")
         assert window.js("return document.documentElement.scrollWidth") <= 390
+        assert window.js("return [...document.querySelectorAll('.scroll')].filter("
+                         "(box) => box.scrollWidth > box.clientWidth).map((box) => box.id)") == []
         assert window.barriers() == []
         keep(window, "phone")
         assert window.complaints() == []

@@ -320,7 +320,11 @@ function over(at, camera) {
   });
   if (sketch.start) { const [x, y] = on(sketch.start.at); out.push(svg("text", { x: x + 10, y: y + 14, class: "word" }, "start")); }
   const last = sketch.goals.length - 1, home = sketch.end === "home" ? sketch.start?.at : last >= 0 ? placeOf(sketch, { of: "goal", n: last }) : null;
-  if (home) { const [x, y] = on(home); out.push(svg("circle", { cx: x, cy: y, r: 15, class: "safeend" }), svg("text", { x: x + 18, y: y + 18, class: "word small safe" }, "safe end")); }
+  if (home) {
+    const [x, y] = on(home), start = sketch.start ? on(sketch.start.at) : null;
+    const below = start && Math.abs(start[0] - x) < 50 && Math.abs(start[1] - y) < 20 ? start[1] + 30 : y + 18;   // the word at the start is above it
+    out.push(svg("circle", { cx: x, cy: y, r: 15, class: "safeend" }), svg("text", { x: x + 18, y: below, class: "word small safe" }, "safe end"));
+  }
   sketch.shapes.forEach((shape, n) => { if (selected?.of !== "shape" || selected.n !== n) name(shape, on, camera, out); });
   chosen(sketch, selected, on, out);
   if (pending.length > 0) {
