@@ -240,8 +240,15 @@ def test_nor_does_one_that_the_campaign_or_the_search_found(seed):
 @pytest.mark.campaign
 @pytest.mark.xfail(strict=True, reason="found and not mended")
 @pytest.mark.parametrize("seed", [
-    198, 60496028, 106980778, 1261850702, 1262423428, 1494742110, 1632617857, 1896519915, 2045914046])
+    198, 106980778, 1261850702, 1494742110, 1632617857, 1896519915, 2045914046])
 def test_what_was_found_and_is_not_mended_fails_still(seed):
+    assert all(sail_kept(seed, again)["passed"] for again in range(6))
+
+
+# They touched: a jump that the autopilot's filter takes late, and a fence of 49 m enabled under way.
+@pytest.mark.campaign
+@pytest.mark.parametrize("seed", [60496028, 1262423428])
+def test_what_was_found_and_is_mended_passes_whatever_the_noise(seed):
     assert all(sail_kept(seed, again)["passed"] for again in range(6))
 
 
