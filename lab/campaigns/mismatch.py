@@ -26,9 +26,9 @@ from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import Mode
 from companion.telemetry.folder import DECISIONS
+from lab.campaigns.drawn_mismatch import SampledMismatch, draw
 from lab.methods import drawn_method
 from sitl.autopilot import MemoryLink, SimulatedAutopilot
-from sitl.rehearse.mismatch_sampling import SampledMismatch, draw
 from sitl.run.variation import Variation
 from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key
 

@@ -24,10 +24,9 @@ import msgspec
 
 from companion.disk import Disk
 from companion.words import counted
-from lab.campaigns import drawn_faults, faults, mismatch
+from lab.campaigns import drawn_faults, drawn_mismatch, faults, mismatch
 from lab.campaigns.fault_judge import UNEXCUSED
 from sitl.options import CampaignOptions
-from sitl.rehearse import mismatch_sampling
 from sitl.runner import Experiment, Job, file_hash
 from sitl.scenario import Scenario, load_scenario, scenario_text
 
@@ -124,7 +123,7 @@ class Splitting:
 
 
 # The water of `sitl mismatch` in which the floor was broken.
-NARROW = mismatch_sampling.WATERS[2]
+NARROW = drawn_mismatch.WATERS[2]
 What = Literal["mismatch", "faults"]
 
 
@@ -141,7 +140,7 @@ def drawn_of(job: Job[SearchCase]) -> Scenario:
     """Return the scenario of a job, with all that was drawn for it."""
     if job.case.what == "faults":
         return drawn_faults.drawn_by(job.case.point.draws(), load_scenario(job.scenario))
-    return mismatch_sampling.drawn_by(job.case.point.draws(), job.scenario).scenario
+    return drawn_mismatch.drawn_by(job.case.point.draws(), job.scenario).scenario
 
 
 def sail(job: Job[SearchCase]) -> dict[str, Any]:
@@ -152,7 +151,7 @@ def sail(job: Job[SearchCase]) -> dict[str, Any]:
         touched = [contact["excuse"] == UNEXCUSED for contact in record["contacts"]]
         near_m, drawn = record["clearance_m"], record["events"]
     else:
-        drawn_boat = mismatch_sampling.drawn_by(job.case.point.draws(), job.scenario)
+        drawn_boat = drawn_mismatch.drawn_by(job.case.point.draws(), job.scenario)
         record = mismatch.sail_drawn(drawn_boat, mismatch.job_of(job.seed))
         touched = [True] * (record.get("contacts") or 0)
         near_m, drawn = record.get("min_clearance_m"), record["kinds"]

@@ -37,7 +37,7 @@ SCENARIOS = tuple(SCENARIO_FOLDER / f"{name}.toml" for name in (
 def sail(job: Job[bool]) -> dict[str, Any]:
     """Sail a job, in the case True with what ``sitl mismatch`` draws; return what was shown beside what came."""
     from companion.clock import run_virtual
-    from sitl.rehearse.mismatch_sampling import draw
+    from lab.campaigns.drawn_mismatch import draw
     from sitl.run.embedded import run_embedded
     from sitl.scenario import load_scenario
 
@@ -265,7 +265,7 @@ def shown(scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: b
 
     The seeds run on from one scenario to the next: two voyages of one seed would be of one wind.
     """
-    from sitl.rehearse.mismatch_sampling import draw
+    from lab.campaigns.drawn_mismatch import draw
 
     def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         names = list(dict.fromkeys(record["scenario"] for record in sailed.records))

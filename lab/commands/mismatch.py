@@ -41,8 +41,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from lab.campaigns.drawn_mismatch import KINDS
     from lab.campaigns.mismatch import MismatchCase, job_of, mismatch, sail
-    from sitl.rehearse.mismatch_sampling import KINDS
     from sitl.runner import sail_kept
 
     compile_planners(args.draw)

@@ -1,4 +1,4 @@
-"""Draws a boat, a sea and sensors that are not the plan's from a seed, over the waters of the repository.
+"""Draws a boat, a sea and sensors that are not the plan's.
 
 Each kind of mismatch is there in half of the voyages, in whatever strength: from hardly anything to what a small boat
 meets on a bad day. None is so strong that no boat could sail in it: where it is, staying ashore is the answer.
@@ -8,85 +8,24 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import msgspec
 
 from companion.geofence import Mission
 from sitl.scenario import (
     CurrentSpec,
-    ExpectSpec,
     HullSpec,
     LeeSpec,
     Scenario,
     SensorsSpec,
     WavesSpec,
     WindSpec,
-    load_scenario,
 )
 
-_HERE = Path(__file__).parents[1] / "scenarios"
-WATERS = (
-    _HERE / "demo.toml", _HERE / "two-channels.toml", _HERE / "narrow-channel.toml", _HERE / "figures" / "block.toml",
-    _HERE / "figures" / "slalom.toml", _HERE / "lee-shore.toml", _HERE / "faults" / "rocks.toml", _HERE / "gates.toml",
-    _HERE / "gybing.toml", _HERE / "home.toml", _HERE / "upwind.toml",
-    _HERE / "figures" / "two-channels-rough.toml",
-)
 Spec = TypeVar("Spec", HullSpec, SensorsSpec)
-LIMIT_S = 1500.0
-MAX_SILENCE_S = 10.0
 EVEN = 0.5              # of the voyages that have a kind of mismatch
-KINDS = ("gusts", "wind over the water", "current", "waves", "polar", "leeway", "tacks fail", "vane", "compass",
-         "position")
 MOON_S = 44_712.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SampledMismatch:
-    """What a seed is.
-
-    Attributes:
-        source: the scenario's file.
-        scenario: with what was drawn for it.
-        kinds: what differs, by name.
-    """
-
-    source: Path
-    scenario: Scenario
-    kinds: tuple[str, ...]
-
-    def told(self) -> dict[str, Any]:
-        """Return the tables that were drawn, in plain values that are not the default."""
-        made = {name: getattr(self.scenario, name) for name in ("wind", "current", "waves", "boat", "sensors")}
-        return {name: _differing(spec) for name, spec in made.items() if spec is not None}
-
-
-def _differing(spec: msgspec.Struct) -> dict[str, Any]:
-    plain = {f.name: f.default for f in msgspec.structs.fields(spec)}
-    return {key: value for key, value in msgspec.to_builtins(spec).items() if value != plain[key]}
-
-
-def draw(seed: int, *, only: tuple[str, ...] | None = None) -> SampledMismatch:
-    """Return what a seed is; waters take turns, so that seeds in a row are sailed on all of them.
-
-    ``only`` are kinds that every voyage has, and no others; empty, the control. The water and the mean wind of a seed
-    are the same whatever it has.
-    """
-    return drawn_by(random.Random(f"mismatch {seed}"), WATERS[seed % len(WATERS)], only=only)
-
-
-def drawn_by(rng: random.Random, source: Path, *, only: tuple[str, ...] | None = None) -> SampledMismatch:
-    """Return what is drawn by ``rng`` over the water of a scenario's file; ``only`` as of ``draw``."""
-    from sitl.run.embedded import mission_of
-
-    scenario = load_scenario(source)
-    wind = msgspec.structs.replace(scenario.wind, tws_mps=_round(rng.uniform(3.5, 8.0)))
-    drawn, kinds = departing(rng, msgspec.structs.replace(scenario, wind=wind), mission_of(scenario, source),
-                             only=only)
-    return SampledMismatch(source=source, kinds=kinds, scenario=msgspec.structs.replace(
-        drawn, limit_s=LIMIT_S, expect=ExpectSpec(arrived=None, max_silence_s=MAX_SILENCE_S)))
 
 
 def departing(
@@ -94,8 +33,8 @@ def departing(
 ) -> tuple[Scenario, tuple[str, ...]]:
     """Return a scenario with what its plan does not know of, each kind in half of them, and the kinds.
 
-    ``only`` as of ``draw``. What is drawn of boat, sea, sensors takes the place of what the scenario has; its wind is
-    kept and departed from.
+    ``only`` are kinds that it has, and no others. What is drawn of boat, sea, sensors takes the place of what the
+    scenario has; its wind is kept and departed from.
     """
     kinds: list[str] = []
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lab.campaigns.drawn_mismatch import KINDS, LIMIT_S, WATERS, draw
 from lab.campaigns.mismatch import (
     SailedSpan,
     arrival_promised,
@@ -22,7 +23,6 @@ from lab.campaigns.mismatch import (
     told,
 )
 from sitl import cli
-from sitl.rehearse.mismatch_sampling import KINDS, LIMIT_S, WATERS, draw
 from sitl.runner import ResultStore
 from sitl.scenario import HullSpec, SensorsSpec
 

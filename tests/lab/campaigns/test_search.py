@@ -8,11 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lab.campaigns import drawn_faults, search
+from lab.campaigns import drawn_faults, drawn_mismatch, search
 from lab.campaigns.faults import BASE
 from lab.campaigns.search import LENGTH, NARROW, Point, SearchCase, Splitting, Tape, blind, drawn_of, moved
 from sitl import cli
-from sitl.rehearse import mismatch_sampling
 from sitl.runner import Experiment, Job
 from sitl.scenario import load_scenario
 
@@ -31,13 +30,13 @@ def test_whatever_a_stream_holds_can_be_drawn(numbers, seed):
     point = Point(seed=seed, numbers=tuple(numbers))
     base = load_scenario(BASE)
     assert drawn_faults.drawn_by(point.draws(), base) == drawn_faults.drawn_by(point.draws(), base)
-    mismatch_sampling.drawn_by(point.draws(), NARROW)
+    drawn_mismatch.drawn_by(point.draws(), NARROW)
 
 
 def test_blind_points_draw_what_seeds_draw():
     """By how often each kind of mismatch is there: half of the search."""
     rng = random.Random(1)
-    kinds = [set(mismatch_sampling.drawn_by(blind(rng).draws(), NARROW).kinds) for _ in range(80)]
+    kinds = [set(drawn_mismatch.drawn_by(blind(rng).draws(), NARROW).kinds) for _ in range(80)]
     for kind in ("gusts", "polar", "vane", "position"):
         assert 26 <= sum(kind in found for found in kinds) <= 54
 
