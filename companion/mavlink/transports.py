@@ -50,7 +50,6 @@ class TransportStats:
     bytes_in: int = 0
     bytes_out: int = 0
     writes_dropped: int = 0
-    bytes_dropped: int = 0
     foreign_datagrams: int = 0
     connections: int = 0
     failed_connections: int = 0
@@ -232,7 +231,6 @@ class StreamEndpoint(_Endpoint):
         wire = self._wire
         if wire is None or wire.is_closing() or wire.get_write_buffer_size() + len(data) > MAX_WRITE_BUFFER_BYTES:
             self._stats.writes_dropped += 1
-            self._stats.bytes_dropped += len(data)
             return
         wire.write(data)
         self._stats.bytes_out += len(data)
@@ -360,7 +358,6 @@ class DatagramEndpoint(_Endpoint):
             or wire.get_write_buffer_size() + len(data) > MAX_WRITE_BUFFER_BYTES
         ):
             self._stats.writes_dropped += 1
-            self._stats.bytes_dropped += len(data)
             return
         wire.sendto(data, self._peer if self._link.kind == "udpin" else None)
         self._stats.bytes_out += len(data)

@@ -36,7 +36,6 @@ class DecodeCounts:
     bad_checksum: int = 0
     bad_payload: int = 0         # a right checksum around nonsense
     bad_fragment: int = 0        # out of order, incomplete, too late
-    own: int = 0                 # AIVDO: our own transponder
 
     @property
     def refused(self) -> int:
@@ -79,11 +78,8 @@ class NmeaDecoder:
             counts.bad_checksum += 1
             return None
         fields = text[1:].partition("*")[0].split(",")
-        if len(fields[0]) != 5 or fields[0][2:] not in {"VDM", "VDO"}:
+        if len(fields[0]) != 5 or fields[0][2:] != "VDM":   # VDO is our own transponder
             counts.other += 1
-            return None
-        if fields[0][2:] == "VDO":
-            counts.own += 1
             return None
         parts = self._collect(fields, text, t_s)
         if parts is None:

@@ -123,7 +123,6 @@ class MemoryEnd:
         """Send every frame in ``data`` on its own way through the link."""
         if self._on_bytes is None or self._link.is_cut or self.is_mute:
             self._stats.writes_dropped += 1
-            self._stats.bytes_dropped += len(data)
             return
         self._stats.bytes_out += len(data)
         faults = self._link.impairment

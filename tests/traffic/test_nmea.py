@@ -87,7 +87,7 @@ def test_bad_checksum_is_counted() -> None:
 def test_own_transponder_is_not_traffic() -> None:
     d = NmeaDecoder()
     assert d.feed("!AIVDO,1,1,,A,15M:Ih0P0vJmfCPHvp88IVd1P000,0*66", 0.0) is None
-    assert d.counts.own == 1
+    assert (d.counts.other, d.counts.refused) == (1, 0)
 
 
 def test_fragments_are_bounded() -> None:

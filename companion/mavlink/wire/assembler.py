@@ -1,21 +1,22 @@
 """Folds the autopilot's messages into the values that the companion works with. Pure.
 
-``VehicleAssembler.take`` never raises: what cannot be believed is counted in ``dropped`` and left out. A change of mode
-or arming is a fact when two of three heartbeats show it, or one behind the acknowledgement of a command that makes it;
-a position that leaps is one when the next ones stay there; a breach of the fence when it is told twice.
+``VehicleAssembler.take`` never raises: what cannot be believed is left out, as is what is older than what was used.
+A change of mode or arming is a fact when two of three heartbeats show it, or one behind the acknowledgement of a
+command that makes it; a position that leaps is one when the next ones stay there; a breach of the fence when it is told
+twice.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
+from collections import deque
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.frozen import changed
 from companion.mavlink.wire import codec
-from companion.mavlink.wire.frames import Drop, Message
+from companion.mavlink.wire.frames import Message
 from companion.messages import (
     AisReport,
     ApparentWind,
@@ -112,7 +113,6 @@ class VehicleAssembler:
     """One autopilot, from its messages to values; the caller passes messages of that system only."""
 
     def __init__(self) -> None:
-        self.dropped: Counter[Drop] = Counter()
         self.reboots = 0
         self._status: AutopilotStatus | None = None
         self._texts = codec.TextAssembler()
@@ -167,14 +167,8 @@ class VehicleAssembler:
                 return []
             self._notice_boot(message)
             return self._take(t_s, kind, message)
-        except _Stale:
-            reason = Drop.STALE
-        except _Leap:
-            reason = Drop.LEAP
         except (ValueError, OverflowError, TypeError):
-            reason = Drop.BAD_VALUE
-        self.dropped[reason] += 1
-        return []
+            return []
 
     def _notice_boot(self, message: Message) -> None:
         boot_ms = getattr(message, "time_boot_ms", None)
@@ -193,7 +187,7 @@ class VehicleAssembler:
         if kind == "ATTITUDE":
             attitude = codec.attitude(message)
             if self._attitude is not None and attitude.boot_s <= self._attitude.boot_s:
-                raise _Stale
+                return []
             self._attitude = attitude
             return []
         if kind == "GLOBAL_POSITION_INT":
@@ -211,13 +205,13 @@ class VehicleAssembler:
     def _position(self, t_s: float, message: Message) -> list[Value]:
         boot_s = message.time_boot_ms / 1e3
         if boot_s <= self._position_boot_s:
-            raise _Stale
+            return []
         attitude = self._attitude
         if attitude is not None and abs(boot_s - attitude.boot_s) > ATTITUDE_MAX_AGE_S:
             attitude = None
         state = codec.vehicle_state(t_s, message, attitude)
         if state is not None and not self._fixes.take(state):
-            raise _Leap
+            return []
         self._position_boot_s = boot_s
         return [] if state is None else [state]
 
@@ -239,7 +233,7 @@ class VehicleAssembler:
             return []
         boot_ms = message.time_boot_ms
         if boot_ms <= self._apparent_ms and self._apparent_ms - boot_ms < REBOOT_BACK_S * 1e3:
-            raise _Stale
+            return []
         self._apparent[message.name] = (boot_ms, message.value)
         halves = [self._apparent.get(name) for name in _APPARENT]
         speed, angle = halves
@@ -351,14 +345,6 @@ class VehicleAssembler:
 
     def _believed(self) -> tuple[tuple[str, float], ...]:
         return tuple(sorted((name, value) for name, (_, _, value) in self._sensed.items() if value is not None))
-
-
-class _Stale(Exception):  # noqa: N818 - a signal inside this module
-    """The message is older than one already used, or repeats it."""
-
-
-class _Leap(Exception):  # noqa: N818 - a signal inside this module
-    """The position is not where the boat can be, and nothing agrees with it yet."""
 
 
 def _mission_state(value: int) -> MissionState:

@@ -136,12 +136,9 @@ class Drop(enum.Enum):
     FOREIGN_SYSTEM = "messages of another system"
     OWN_IDS = "messages with our own ids: echoes, or a second companion"
     DUPLICATE = "frames received twice"
-    BAD_VALUE = "messages with a value that is not a number or out of range"
-    STALE = "messages older than one already used"
     WRONG_CLOCK = "messages whose boot time is not the autopilot's"
     OUT_OF_STEP = "messages whose number is out of step with the autopilot's"
     HELD = "messages that waited while we were held up, and were not the next of the autopilot's"
-    LEAP = "positions that nothing before or after them agrees with"
 
 
 @dataclass(slots=True)

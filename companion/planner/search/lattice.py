@@ -92,8 +92,8 @@ def _wound(
 def lattice_search(
     g: SegmentGrid, b: BoatModel, origin: Floats, axes: Floats, shape: Ints, steps: Ints, goal: Floats, box: Floats,
     gauge: Floats, slack: float, bound: float, max_pops: int, shot_m: float, side: int,
-) -> tuple[float, Floats, int, bool]:
-    """Search; return (arrival time, points (n, 2), states expanded, exhausted).
+) -> tuple[float, Floats, int]:
+    """Search; return (arrival time, points (n, 2), states expanded).
 
     ``origin``: x, y, TWA and time of the start;
     ``axes`` (2, 2): axis vectors in rows [m]; ``shape``: ni, nj, i0, j0 of the start, and the
@@ -148,7 +148,6 @@ def lattice_search(
         came[s] = _START
         keys, items, size = push(keys, items, size, cost[s], s)
     pops = 0
-    exhausted = True
     while size > 0:
         f, s = keys[0], items[0]
         size = pop(keys, items, size)
@@ -159,7 +158,6 @@ def lattice_search(
         done[s] = 1
         pops += 1
         if pops > max_pops:
-            exhausted = False
             break
         node, k = s // nd, s % nd
         i, j = node // nj, node % nj
@@ -260,7 +258,7 @@ def lattice_search(
             came[s1] = label
             keys, items, size = push(keys, items, size, f1, s1)
     if best_state < 0:
-        return math.inf, np.empty((0, 2)), pops, exhausted
+        return math.inf, np.empty((0, 2)), pops
     # ---- back along the parents; only the points where the course changes are kept
     count, s, last = 1, best_state, -1
     path = np.empty((4096, 2))
@@ -290,17 +288,16 @@ def lattice_search(
             s = node * nd + (k - 1) % nd
         else:
             s = node * nd + (k + 1) % nd
-    return best, path[:count][::-1].copy(), pops, exhausted
+    return best, path[:count][::-1].copy(), pops
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LatticeResult:
-    """What one lattice gave: cost, points (n, 2) in the wind frame (None: no path), effort, was it exhausted."""
+    """What one lattice gave: cost, points (n, 2) in the wind frame (None: no path), effort."""
 
     cost_s: float
     points: Floats | None
     pops: int
-    exhausted: bool
 
 
 def _steps(reach: int) -> list[tuple[int, int]]:
@@ -380,15 +377,15 @@ def run_lattice(
             steps.append((a, di, dj))
     steps.sort()
     if not steps or ni * nj * len(steps) > 24_000_000:
-        return LatticeResult(cost_s=math.inf, points=None, pops=0, exhausted=False)
-    cost, points, pops, exhausted = lattice_search(
+        return LatticeResult(cost_s=math.inf, points=None, pops=0)
+    cost, points, pops = lattice_search(
         world.grid, b, np.array(origin), axes, np.array([ni, nj, -low[0], -low[1], *_leeward(b, axes)], np.int32),
         np.array([(i, j) for _, i, j in steps], np.int32), np.array(goal),
         np.array(box), gauge.table, goal[2] * gauge.table_max, bound_s, max_pops, 6.0 * max(sizes), side,
     )
     found = math.isfinite(cost) and len(points) > 0
     return LatticeResult(cost_s=float(cost) if found else math.inf, points=points if found else None,
-                         pops=int(pops), exhausted=bool(exhausted))
+                         pops=int(pops))
 
 
 # A search whose close-hauled courses follow the no-go zone as it moves: for wind that gets uncertain quickly.
@@ -552,4 +549,4 @@ def run_drift(
     )
     found = math.isfinite(time_s) and len(points) > 1
     return LatticeResult(cost_s=float(time_s) if found else math.inf, points=points if found else None,
-                         pops=int(pops), exhausted=False)
+                         pops=int(pops))
