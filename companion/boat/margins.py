@@ -24,7 +24,7 @@ CORNER_S = 1.4              # |cross-track| <= 4 m at 2.9 m/s just after the cor
 # Narrower than this a corridor is crossed, at 45 degrees to the line, in less than 7 s; the autopilot tacks at most
 # every 5 s and would do little else.
 NARROWEST_S = 2.5
-DEFAULT_PAD_RAD = math.radians(2.0)  # legs planned at NO_GO + 2 degrees made no tacks of their own
+PAD_RAD = math.radians(2.0)  # legs planned at NO_GO + 2 degrees made no tacks of their own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,9 +84,9 @@ class AutopilotLimits:
                 ("RCMAP_ROLL", "RCMAP_THROTTLE", "MODE_CH"), default.rc_channels, strict=True)),
         )
 
-    def planned_no_go_rad(self, *, pad_rad: float = DEFAULT_PAD_RAD) -> float:
+    def planned_no_go_rad(self) -> float:
         """Return the no-go half angle to plan with: the autopilot's own plus a pad, so it adds no tacks."""
-        return self.sail_no_go_angle_rad + pad_rad
+        return self.sail_no_go_angle_rad + PAD_RAD
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -159,7 +159,7 @@ def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> 
 
 
 async def diagnose(
-    transport: Transport, needs: Needs, *, wait_s: float = 30.0, listen_s: float = LISTEN_S, apply: bool = False,
+    transport: Transport, needs: Needs, *, wait_s: float = 30.0, apply: bool = False,
     signing: SigningStore | None = None, system: int | None = None, speed: float | None = None,
 ) -> tuple[tuple[DoctorFinding, ...], tuple[ParameterFix, ...]]:
     """Read everything, judge it, and set what is to be set if ``apply``.
@@ -177,14 +177,14 @@ async def diagnose(
     async with Link(transport, identity=own, target_system=system, signing=signing) as link:
         await link.wait_autopilot(wait_s)
         async with Autopilot(link) as autopilot:
-            seen = await read(autopilot, listen_s, has_key=signing is not None)
+            seen = await read(autopilot, has_key=signing is not None)
             findings = examine(replace(seen, planner_speed=speed), needs)
             changes = await _apply(autopilot, findings) if apply else ()
             return findings, changes
 
 
-async def read(autopilot: Autopilot, listen_s: float = LISTEN_S, *, has_key: bool = False) -> Examined:
-    """Read parameters, version, mission and fence, and count messages for ``listen_s``."""
+async def read(autopilot: Autopilot, *, has_key: bool = False) -> Examined:
+    """Read parameters, version, mission and fence, and count messages for LISTEN_S."""
     from companion.clock import now_s
     from companion.doctor import RATES_HZ, Examined
 
@@ -200,7 +200,7 @@ async def read(autopilot: Autopilot, listen_s: float = LISTEN_S, *, has_key: boo
     began_s = now_s()
     stop = autopilot.link.subscribe(count)
     try:
-        await asyncio.sleep(listen_s)
+        await asyncio.sleep(LISTEN_S)
         elapsed_s = max(now_s() - began_s, 1e-3)
     finally:
         stop()

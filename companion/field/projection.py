@@ -135,11 +135,14 @@ class Projection:
         return np.asarray(inside, dtype=np.bool_)
 
 
+_AHEAD_HALF_RAD = math.radians(110.0)
+_ALWAYS_M = 30.0
+
+
 def near_and_ahead(
-    own_en: tuple[float, float], heading_rad: float | None, other_en: tuple[float, float], *,
-    near_m: float = 300.0, half_angle_rad: float = math.radians(110.0), always_m: float = 30.0,
+    own_en: tuple[float, float], heading_rad: float | None, other_en: tuple[float, float], *, near_m: float = 300.0,
 ) -> bool:
-    """Return whether an obstacle matters: within ``near_m`` and in the sector ahead, or within ``always_m`` anywhere.
+    """Return whether an obstacle matters: within ``near_m`` and in the sector ahead, or within _ALWAYS_M anywhere.
 
     Schmitt's section 4.2: obstacles behind a robot that sails forwards do not influence its field.
     """
@@ -147,6 +150,6 @@ def near_and_ahead(
     d = math.hypot(de, dn)
     if d > near_m:
         return False
-    if d < always_m or heading_rad is None:
+    if d < _ALWAYS_M or heading_rad is None:
         return True
-    return abs(wrap_pi(math.atan2(de, dn) - heading_rad)) <= half_angle_rad
+    return abs(wrap_pi(math.atan2(de, dn) - heading_rad)) <= _AHEAD_HALF_RAD

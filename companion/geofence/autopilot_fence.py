@@ -418,10 +418,8 @@ class _Solid:
     margin_m: float            # what the planner keeps from it
 
 
-def fence_for_autopilot(
-    area: Area, margin_m: float, *, inside: Sequence[GeoPoint], max_items: int = MAX_FENCE_ITEMS,
-) -> AutopilotFence:
-    """Return the area as at most ``max_items`` fence items.
+def fence_for_autopilot(area: Area, margin_m: float, *, inside: Sequence[GeoPoint]) -> AutopilotFence:
+    """Return the area as at most MAX_FENCE_ITEMS fence items.
 
     ``margin_m`` is what the planner keeps clear of obstacles and limits; ``inside`` are the places (start, goals)
     that the boat must be able to sail to, the first of them in the water that counts. Same input, same output.
@@ -451,11 +449,11 @@ def fence_for_autopilot(
             continue
         items, _ = zones_to_items(zones)
         stored = storage_bytes(items)
-        if len(items) > max_items or stored > STORAGE_BYTES or any(_sides(z) > MAX_RING for z in zones):
+        if len(items) > MAX_FENCE_ITEMS or stored > STORAGE_BYTES or any(_sides(z) > MAX_RING for z in zones):
             status = FenceStatus.TOO_MANY_ITEMS
             worst = sorted(((_sides(z), z.name or z.kind.value) for z in zones), reverse=True)[:3]
             last = (
-                f"{len(items)} items of {stored} bytes are needed where the autopilot holds {max_items} items in "
+                f"{len(items)} items of {stored} bytes are needed where the autopilot holds {MAX_FENCE_ITEMS} items in "
                 f"{STORAGE_BYTES} bytes, even with "
                 f"{step * margin_m:.1f} m of the {margin_m:g} m margin used; most go to "
                 + ", ".join(f"{name} ({n})" for n, name in worst) + "; raise margin_m, merge or drop obstacles"

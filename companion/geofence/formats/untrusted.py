@@ -55,10 +55,10 @@ def decode(data: bytes, source: str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n").removeprefix("\ufeff")
 
 
-def number(text: str, source: str, place: str, *, decimal_comma: bool = False) -> float:
+def number(text: str, source: str, place: str) -> float:
     """Return a finite number. Raises InputError naming the place."""
     try:
-        value = float(text.replace(",", ".") if decimal_comma else text)
+        value = float(text)
     except ValueError:
         hint = "write a decimal point" if "," in text else ""
         raise InputError(source, place, f"{text[:40]!r} is not a number", hint) from None
