@@ -77,9 +77,21 @@ def test_beats_through_islands_to_a_goal_upwind(seed, beats):
 
 
 def test_runs_to_a_goal_downwind():
+    """Between the islands, never by the lee of them, and about as fast as her polar lets her get down wind."""
     world = make(wind=lambda t: (math.pi, 6.0))
-    assert world.run(600, is_done)
+    assert world.run(60, lambda w: w.state.voyage.sailing)
+    began, places = world.t, [(world.position, world.heading)]
+    assert world.run(600, lambda w: places.append((w.position, w.heading)) or is_done(w))
     assert world.clearance() > world.skipper.config.margin_floor_m
+    assert world.state.progress.reached == (0,)
+    assert distance_m(world.position, GOAL.en_m) < 10.0
+    by_north = [place[1] for place, _ in places]
+    assert all(b > a - 1.0 for a, b in pairwise(by_north))
+    assert all(abs(difference_rad(math.pi, heading)) > math.radians(90.0) for _, heading in places[5:])
+    off_wind = np.radians(np.arange(91.0, 181.0))
+    polar = world.skipper.voyage.boat.polar
+    best_mps = max(-math.cos(a) * polar.speed_mps(a, 6.0) for a in off_wind)
+    assert world.t - began < 1.2 * GOAL.en_m[1] / best_mps
 
 
 @pytest.mark.parametrize("off_m", [1.0, 5.0])
@@ -155,6 +167,38 @@ def test_a_90_degree_shift_in_mid_leg():
     assert world.run(1200, is_done)
     reasons = {a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)}
     assert reasons & {act.ReplanReason.WIND_SHIFT, act.ReplanReason.NO_GO}
+
+
+def plans_for(world, reason):
+    return [t for t, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is reason]
+
+
+@pytest.mark.parametrize(("turned_deg", "plans"), [(19.0, 0), (-19.0, 0), (21.0, 1), (-21.0, 1)])
+def test_the_mean_of_the_wind_has_turned_by_twenty_degrees(turned_deg, plans):
+    """Büsser 3.2.1, on a reach without a waypoint: by 19 degrees no plan, by 21 one."""
+    world = make(Goal(en_m=(700.0, 0.0), radius_m=6.0), obstacles=(),
+                 wind=lambda t: (math.radians(turned_deg if t > 50.0 else 0.0), 5.0))
+    assert world.run(50)
+    assert world.state.voyage.sailing
+    assert world.run(120)
+    assert len(plans_for(world, act.ReplanReason.WIND_SHIFT)) == plans
+
+
+@pytest.mark.parametrize(("more_m", "is_planned"), [(-1.0, False), (1.0, True)])
+def test_off_the_leg_by_more_than_is_allowed(more_m, is_planned):
+    """Büsser 3.2.1, in open water: the grid's cell is what is allowed."""
+    world = make(Goal(en_m=(700.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0))
+    assert world.run(60)
+    assert world.state.voyage.sailing
+    sail, off_m = world.sail, world.skipper.config.grid_size_m + more_m
+
+    def set_off(dt):
+        sail(dt)
+        world.position = (world.position[0], off_m)
+
+    world.sail = set_off
+    assert world.run(40)
+    assert bool(plans_for(world, act.ReplanReason.OFF_LEG)) == is_planned
 
 
 def test_a_plan_is_made_anew_when_it_is_old():

@@ -142,8 +142,13 @@ def test_four_ships_at_once_and_the_paths_look_alike(tmp_path):
     assert len({v for d in records for v in d.get("vessels", ())}) == 4
     assert all(b - a >= 20.0 for a, b in pairwise(asked))
     changes = [d for d in records if d.get("action") == "UploadMission" and "path_distance_m" in d]
-    for change in changes:
-        assert change["path_distance_m"] <= ALIKE_M or change["old_route"] != "safe"
+    given_up = [d for d in changes if d["old_route"] != "safe"]
+    assert [d["old_route"].split()[1] for d in given_up] == [f"21100000{n}" for n in range(1, 5)]   # as they are heard
+    assert max(d["path_distance_m"] for d in given_up) > ALIKE_M
+    safe_since = [t for t in asked if t > given_up[-1]["t_s"]]
+    assert len(safe_since) > 2
+    assert all(d["path_distance_m"] <= ALIKE_M for d in changes if d["old_route"] == "safe")
+    assert sum(d["t_s"] > given_up[-1]["t_s"] for d in changes) < len(safe_since)   # it stays
     shared = [d for d in records if d.get("action") == "RequestPlan" and d.get("vessels")]
     for plan in shared:
         assert plan["instant"]["wind"] + plan["instant"]["vessels"] == pytest.approx(1.0 - plan["delta_s"])

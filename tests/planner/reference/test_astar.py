@@ -1,9 +1,11 @@
 """AVALON's A*: its grid, its costs one by one, its goal heading, its ships, its memory."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.effort import Effort
@@ -146,19 +148,26 @@ def test_the_grid_refuses_to_grow_past_its_memory_and_says_what_would_fit():
 
 
 def test_a_ship_is_a_disc_where_it_would_be_met():
-    ship = {"x": -900, "y": 400, "vx": 3.0, "vy": 0.0, "radius_m": 60}
+    ship = {"x": -400, "y": 400, "vx": 3.0, "vy": 0.0, "radius_m": 60}
     p = problem(wind={"from_deg": 90, "speed_mps": 5, "sigma": {"model": "none"}}, targets=[ship])
     discs = ship_discs(p, AstarSettings())
     assert len(discs) > 0
     mean = np.mean(np.interp(np.linspace(45, 160, 60), AVALON_TWA, AVALON_MPS))
     for x, y, radius in discs:  # eq. 4.7
-        t = (x + 900.0) / 3.0
+        t = (x + 400.0) / 3.0
         assert abs(t - math.hypot(x, y) / mean) < 20.0
         assert radius == pytest.approx(60.0)
-    _, judged = run(p)
+    (_, alone), (_, judged) = run(replace(p, targets=())), run(p)
     assert judged is not None
     assert judged.is_feasible, judged.reasons
+    assert alone.is_feasible
+    assert [any(_cuts(leg, disc) for leg in way.legs for disc in discs) for way in (alone, judged)] == [True, False]
     assert len(ship_discs(problem(), AstarSettings())) == 0
+
+
+def _cuts(leg, disc):
+    """Return whether a leg, by shapely, goes through a disc (x, y, radius)."""
+    return shapely.LineString([leg.from_en, leg.to_en]).distance(shapely.Point(disc[:2])) < disc[2] - 1e-6
 
 
 def test_a_walled_in_goal_ends_with_its_reason():

@@ -140,6 +140,24 @@ def test_a_boat_set_off_her_leg_comes_back_to_it():
     assert abs(cross_track_m(world.position, *leg)) < 1.0
 
 
+@pytest.mark.parametrize("across_mps", [0.7, -0.7])
+@pytest.mark.parametrize("leeway_rad", [0.0, 0.1])
+def test_a_leg_is_made_good_across_a_current_and_leeway_by_equation_3(across_mps, leeway_rad):
+    """Led back to her line alone she comes to lie where that balances the drift: two metres and more to lee of it."""
+    world = by_heading(Goal(en_m=(0.0, 400.0)), obstacles=(), wind=BEAM)
+
+    def pushed(t):   # the wind is from port: leeway is to starboard
+        aside = leeway_rad * world.speed
+        return across_mps + aside * math.cos(world.heading), -aside * math.sin(world.heading)
+
+    world.current = pushed
+    assert world.run(60, is_steered)
+    world.run(30)
+    leg, off = turn_of(world).leg(), []
+    assert world.run(30, lambda w: off.append(cross_track_m(w.position, *leg)) or len(off) == 25)
+    assert max(map(abs, off)) < 0.5, off
+
+
 @pytest.mark.parametrize("off_m", [6.0, -6.0])
 def test_close_hauled_she_comes_back_on_the_legs_own_tack(off_m):
     world = by_heading(Goal(en_m=(200.0, 170.0)), Goal(en_m=(300.0, 0.0)), obstacles=(), wind=lambda t: (0.0, 5.0))
