@@ -397,7 +397,7 @@ class SkipperOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     seed: Annotated[int, Meta(ge=0)] = 0
     min_replan_s: NonNegative = 10.0
     max_replan_s: Positive | None = None
-    """Replan at the latest after this long; None: never for time alone."""
+    """Replan at the latest after this long; None: after 60 minutes."""
     wind_shift_deg: Annotated[float, Meta(gt=0.0, le=180.0)] = 20.0
     """Replan when the mean wind has turned this far from the plan's."""
     off_track_m: Positive = 30.0

@@ -85,8 +85,8 @@ def test_the_turning_cost_makes_fewer_turns():
     _, plain = run(p, turn_s_per_rad=0.0)
     _, smooth = run(p, turn_s_per_rad=8.0)
     turning = [sum(abs(leg.turn_rad) for leg in judged.legs) for judged in (plain, smooth)]
-    assert turning[1] <= turning[0]
-    assert len(smooth.legs) <= len(plain.legs)
+    assert turning[1] < turning[0]
+    assert len(smooth.legs) < len(plain.legs)
 
 
 def test_the_tack_cost_makes_fewer_tacks_and_the_tunnel_keeps_to_the_line():
