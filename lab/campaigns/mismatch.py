@@ -3,7 +3,8 @@
 A leg's promise is the probability that the true wind puts its heading into the no-go zone, from the spread and the
 angle that it was planned with; what came of it is looked at once, half way along the leg. Both are of the bow through
 the water and of the wind over it: what the sails feel. Where there is a current or leeway the bow is the one that
-keeps the boat on the leg in them.
+keeps the boat on the leg in them. A leg that the autopilot begins elsewhere than the plan (an upload begins it where
+the boat is) has another course, and the promise is of the plan's: how far off it is stands beside.
 
 Each is sailed on the embedded autopilot under the virtual clock. A voyage passes that touches nothing, is never silent
 and ends without an unhandled error; one below the margin's floor is counted and named. Arriving is counted, not
@@ -22,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.current import over_water
-from companion.geo.angles import wrap_pi
+from companion.geo.angles import heading_of, wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import Mode
 from companion.telemetry.folder import DECISIONS
@@ -46,6 +47,7 @@ class SailedSpan:
 
     t_s: float
     end_en_m: tuple[float, float]
+    course_rad: float
     bow_rad: float
     twd_from_rad: float
 
@@ -75,9 +77,10 @@ class Legs:
         self._last = begin, end
         current = autopilot.core.vehicle.current_en_mps
         through = truth.velocity_en_mps[0] - current[0], truth.velocity_en_mps[1] - current[1]
+        course_rad = heading_of(end[0] - begin[0], end[1] - begin[1])
         self.sailed.append(SailedSpan(
-            t_s=t_s, end_en_m=self.frame.en_from_geo(autopilot.core.chart.point(end)),
-            bow_rad=bow_rad(math.atan2(end[0] - begin[0], end[1] - begin[1]), current, through, truth.heading_rad),
+            t_s=t_s, end_en_m=self.frame.en_from_geo(autopilot.core.chart.point(end)), course_rad=course_rad,
+            bow_rad=bow_rad(course_rad, current, through, truth.heading_rad),
             twd_from_rad=over_water(truth.twd_from_rad, truth.tws_mps, current)[0]))
 
     def life(self, start_s: float, end_s: float) -> None:
@@ -117,7 +120,7 @@ def legs_promised(folder: Path, sailed: list[SailedSpan], half_rad: float) -> li
     """Return of each sailed leg that a plan of the record holds: its promise, what came, whose its tacks were.
 
     ``off_deg`` is how far the wind's angle to the bow was from the planned one, positive to starboard; ``sigma_deg``
-    how far it was expected to be.
+    how far it was expected to be; ``course_off_deg`` how far the leg's own course was from the planned one.
     """
     plans = [(d["t_s"], d["plan"]["legs"]) for d in decisions(folder) if d["kind"] == "plan" and d.get("plan")]
     found = []
@@ -128,9 +131,11 @@ def legs_promised(folder: Path, sailed: list[SailedSpan], half_rad: float) -> li
             continue
         twa_rad, sigma_rad = math.radians(planned["twa_deg"]), math.radians(planned["sigma_deg"])
         came_rad = wrap_pi(leg.twd_from_rad - leg.bow_rad)
+        planned_rad = heading_of(planned["to"][0] - planned["from"][0], planned["to"][1] - planned["from"][1])
         found.append({
             "promised": round(chance_of_no_go(twa_rad, sigma_rad, half_rad), 5), "came": abs(came_rad) < half_rad,
             "sigma_deg": round(planned["sigma_deg"], 2), "off_deg": round(math.degrees(wrap_pi(came_rad - twa_rad)), 2),
+            "course_off_deg": round(math.degrees(wrap_pi(leg.course_rad - planned_rad)), 2),
             "is_beat": bool(planned.get("is_beat"))})
     return found
 

@@ -1,9 +1,10 @@
 """Reliability: what was promised with a probability, and how often it came, over the voyages of a campaign.
 
-Of each leg that a plan sails itself: the chance that the true wind puts its heading into the no-go zone, and whether
-the wind's angle to the bow was in the central intervals of its spread. Of each voyage: whether it came below the
-margin's floor, by how much was not the plan's; its time as a share of what the first plan promised; and whether it was
-later than each quantile of that plan's arrival.
+Of each leg that a plan sails itself: the chance that the true wind puts its heading into the no-go zone, and, where it
+was sailed on the plan's course, whether the wind's angle to the bow was in the central intervals of its spread. A leg
+that was begun elsewhere has another course, which no spread of the wind is about: it is counted by itself. Of each
+voyage: whether it came below the margin's floor, by how much was not the plan's; its time as a share of what the first
+plan promised; and whether it was later than each quantile of that plan's arrival.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from lab.campaigns.mismatch import QUANTILES, share_interval
 
 EDGES = (0.0, 0.001, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)     # of what is promised; the last of a bin belongs to it
 LEVELS = (0.5, 0.8, 0.9, 0.95)                           # of central intervals
+SAME_COURSE_DEG = 10.0                                   # a leg farther off the plan's course was begun elsewhere
 KINDS = ((0, 0), (1, 3), (4, 5), (6, 7), (8, 10))        # how much is not the plan's: from, to
 
 
@@ -60,9 +62,26 @@ def no_go_curve(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
     return bins
 
 
-def coverage(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
-    """Return how often the wind's angle to the boat's bow was in the central interval of each level, as of a normal."""
+def where_begun(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
+    """Return how often legs were in the no-go zone, by whether they were sailed on the plan's course."""
     legs = _own_legs(records)
+    return [Bin(promised=statistics.fmean(leg["promised"] for leg in mine), name=name,
+                came=sum(leg["came"] for leg in mine), of=len(mine))
+            for name, is_same in (("plan's course", True), ("begun elsewhere", False))
+            if (mine := [leg for leg in legs if _is_on_course(leg) == is_same])]
+
+
+def _is_on_course(leg: Mapping[str, Any]) -> bool:
+    # of a record from before it was told: nobody knows, and it was counted as if it were
+    return abs(float(leg.get("course_off_deg", 0.0))) <= SAME_COURSE_DEG
+
+
+def coverage(records: Sequence[Mapping[str, Any]]) -> list[Bin]:
+    """Return how often the wind's angle to the bow was in the central interval of each level, as of a normal.
+
+    Of legs on the plan's course.
+    """
+    legs = [leg for leg in _own_legs(records) if _is_on_course(leg)]
     wide = [(level, NormalDist().inv_cdf(0.5 + 0.5 * level)) for level in LEVELS if legs]
     return [Bin(promised=level, name=f"central {100.0 * level:g} %", of=len(legs),
                 came=sum(abs(leg["off_deg"]) <= z * leg["sigma_deg"] for leg in legs)) for level, z in wide]
@@ -102,6 +121,7 @@ def told(records: Sequence[Mapping[str, Any]]) -> str:
     lines = [f"{len(records)} voyages"]
     for title, bins in (("in the no-go zone half way along a leg that the plan sails itself, by what was promised",
                          no_go_curve(records)),
+                        ("the same, by where the leg was begun", where_begun(records)),
                         ("the wind's angle to her bow there, in the intervals of its spread", coverage(records)),
                         ("below the margin's floor, by how many things were not the plan's", floor_curve(records)),
                         ("later than the plan's quantiles of arrival", late_curve(records))):
@@ -126,6 +146,7 @@ def to_dict(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         return [{"name": b.name, "promised": b.promised, "came": b.came, "of": b.of, "interval": list(b.interval)}
                 for b in bins]
 
-    return {"voyages": len(records), "no_go": plain(no_go_curve(records)), "coverage": plain(coverage(records)),
+    return {"voyages": len(records), "no_go": plain(no_go_curve(records)),
+            "where_begun": plain(where_begun(records)), "coverage": plain(coverage(records)),
             "floor": plain(floor_curve(records)), "late": plain(late_curve(records)),
             "time_shares": time_shares(records)}

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from lab.campaigns.reliability import coverage, floor_curve, late_curve, no_go_curve, time_shares, told
+from lab.campaigns.reliability import coverage, floor_curve, late_curve, no_go_curve, time_shares, told, where_begun
 from sitl import cli
 from sitl.runner import ResultStore
 
@@ -47,6 +47,17 @@ def test_a_spread_that_is_true_holds_its_share_and_one_that_is_half_of_it_does_n
     assert all(b.interval[0] <= b.promised <= b.interval[1] for b in true)
     assert all(b.interval[1] < b.promised for b in half)
     assert coverage([]) == []
+
+
+def test_a_leg_that_was_begun_elsewhere_is_no_promise_of_the_wind():
+    kept = list(honest(300))
+    stub = {"promised": 0.05, "came": True, "is_beat": False, "sigma_deg": 9.0, "off_deg": -35.0}
+    strays = [voyage(400 + n, [{**stub, "course_off_deg": -30.0}]) for n in range(100)]
+    assert coverage(kept + strays) == coverage(kept)
+    on, elsewhere = where_begun(kept + strays)
+    assert (on.of, elsewhere.of, elsewhere.came) == (3000, 100, 100)
+    assert on.interval[0] <= on.promised <= on.interval[1]
+    assert "begun elsewhere: promised   5.0 %, came 100.0 %" in told(strays)
 
 
 def test_the_floor_is_counted_by_how_much_differs():
