@@ -36,6 +36,9 @@ SLOWEST, FASTEST = 0.25, 1.6    # of the polar: what is outside says something e
 SPREAD, SPREAD_TRIES = 0.15, 2.0   # standard deviation of what tries make of a walk, and how many it counts as at first
 HERE_M, STRAYS = 2.5, 2.2   # nine in ten are within so much of a place, and of the pace's doubt of the way (sitl shown)
 ELSEWHERE = 1.5       # of how far a boat is from her polar here: how far she may be from that in what comes
+UNTRIED = 0.25        # likewise of a boat that has shown nothing yet; a try halves it (sitl shown)
+SHIFTS = 0.3          # of the spread of a plan's time: the boat sees how the wind begins, which the plan did not
+EVENS_OUT = 0.45      # of a try's scatter, with the root of the time: what one loses the next one gains
 LATE_LEAST_S = 1.0    # standard deviation of any time
 LATE_SIGMAS = 1.28    # of a normal: nine in ten are below
 
@@ -122,14 +125,16 @@ class Pace:
         return walk_s / self.share
 
     def late_s(self, walk_s: float, spread: float) -> float:
-        """Return by when nine boats in ten have made a walk [s]; ``spread``: the wind's part of it, of the whole time.
+        """Return by when nine boats in ten have made a walk [s]; ``spread``: that of a plan's time in the wind, of it.
 
         What is not known of the pace itself goes with the time, what tacks and gusts do with its root.
         """
         time_s = self.left_s(walk_s)
         each = self.spread / self.share
-        known = math.hypot(each / math.sqrt(max(1.0, self.tries + self.prior)), ELSEWHERE * (1.0 - self.share))
-        sigma_s = math.hypot(time_s * math.hypot(spread, known), each * math.sqrt(TRIED_S * time_s), LATE_LEAST_S)
+        known = math.hypot(each / math.sqrt(max(1.0, self.tries + self.prior)), ELSEWHERE * (1.0 - self.share),
+                           UNTRIED / (1.0 + self.tries))
+        sigma_s = math.hypot(time_s * math.hypot(SHIFTS * spread, known),
+                             EVENS_OUT * each * math.sqrt(TRIED_S * time_s), LATE_LEAST_S)
         return time_s + LATE_SIGMAS * sigma_s
 
 

@@ -199,11 +199,14 @@ def table_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return a row for each figure and class of it: how often it was shown, its error and how often it held."""
     rows = []
     there = [row for record in records for row in record["there"]]
-    for low, high in pairwise(LEFT_S):
-        left = [(told - left, left, left <= late) for left, told, late in there if low < left <= high]
-        until = " or more" if math.isinf(high) else f" to {high:.0f}"
-        rows.append(_row(f"there in, of {low:.0f}{until} s", [e for e, _, _ in left], [h for _, _, h in left],
-                         share=[e / s for e, s, _ in left]))
+    # By what was left, and by what was told: of the voyages that take long most were told too little, whoever tells.
+    for by, column in (("of", 0), ("told", 1)):
+        for low, high in pairwise(LEFT_S):
+            mine = [(told - left, left, left <= late) for left, told, late in
+                    (row for row in there if low < row[column] <= high)]
+            until = " or more" if math.isinf(high) else f" to {high:.0f}"
+            rows.append(_row(f"there in, {by} {low:.0f}{until} s", [e for e, _, _ in mine], [h for _, _, h in mine],
+                             share=[e / s for e, s, _ in mine]))
     tacks = [row for record in records for row in record["tack"]]
     for name, planned in (("next tack, of the plan", True), ("next tack, about", False)):
         own = [(told, came) for told, came, is_planned in tacks if is_planned == planned]

@@ -16,11 +16,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "shown", help=summary,
         description="Sail scenarios on the embedded autopilot, fold their records into the views that a page shows, "
         "and hold every figure against what came: the time until the goal is reached and by when in nine cases of "
-        "ten, by what was left; the next tack; the places in 10 to 120 s with their nine-in-ten radius; the wind in "
-        "one, two and five minutes; the clearance that a plan expected; the chance of being forced off the plan; the "
-        "share of the polar, the distance, tacks and gybes. 'error' is told less came in the median, 'of it' as a "
-        "share of what was left, '90 %' what nine in ten errors are below, 'held' how often it came as it was told. "
-        "Of a chance 'of it' is what was told in the mean less how often it came, 'held' how often it did not come.",
+        "ten, by what was left and by what was told; the next tack; the places in 10 to 120 s with their nine-in-ten "
+        "radius; the wind in one, two and five minutes; the clearance that a plan expected; the chance of being forced "
+        "off the plan; the share of the polar, the distance, tacks and gybes. 'error' is told less came in the "
+        "median, 'of it' as a share of what was left, '90 %' what nine in ten errors are below, 'held' how often it "
+        "came as it was told. Of a chance 'of it' is what was told in the mean less how often it came, 'held' how "
+        "often it did not come.",
         epilog="Example: sitl shown demo --seeds 10",
     )
     parser.add_argument("scenarios", type=scenario_file, nargs="*", metavar="SCENARIO",

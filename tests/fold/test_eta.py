@@ -101,6 +101,16 @@ def test_within_two_minutes_a_boat_that_is_slower_is_told_so_and_doubted():
     assert slow.late_s(100.0 * slow.share, 0.0) > fit.late_s(100.0, 0.0) + 5.0   # the same time, and less sure
 
 
+def test_a_boat_that_has_shown_nothing_is_doubted_and_one_that_keeps_her_pace_is_not():
+    assert PRIOR_PACE.late_s(200.0, 0.0) > 270.0
+    assert PRIOR_PACE.late_s(200.0, 0.0) - 200.0 > 3.0 * (paced(1.0, seconds=120.0).late_s(200.0, 0.0) - 200.0)
+    kept = paced(1.0)
+    assert kept.late_s(200.0, 0.0) < 225.0
+    uneven = replace(PRIOR_PACE, tries=8.0, prior=0.0, took_s=160.0, made_s=160.0, scatter=8.0 * 0.3**2)
+    assert uneven.late_s(40.0, 0.0) < 47.5                            # what one try loses the next one gains
+    assert kept.late_s(200.0, 0.1) < 200.0 * (1.0 + 1.28 * 0.1)      # she sees how the wind of the plan began
+
+
 def test_what_tries_scatter_widens_what_is_told():
     even, uneven = PRIOR_PACE, PRIOR_PACE
     for n in range(8):

@@ -38,6 +38,8 @@ def test_a_time_that_is_told_wrong_shows():
     assert there["median_error"] == 2.0
     assert there["p90_error"] == 116.0
     assert there["held"] == pytest.approx(2 / 3)
+    assert row(rows, "there in, told 0 to 30 s")["shown"] == 2
+    assert row(rows, "there in, told 120 to 300 s")["median_error"] == 116.0
 
 
 def test_a_tack_that_does_not_come_does_not_hold_and_is_of_its_own_kind():
