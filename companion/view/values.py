@@ -494,6 +494,8 @@ class Sample:
     tws_mps: float | None = None
     clearance_m: float | None = None
     starboard: bool | None = None          # tack
+    polar_twa_deg: float | None = None     # of the wind over the water, as the polar is ...
+    polar_mps: float | None = None         # ... and the speed through it
     ahead_twd_deg: float | None = None     # the forecast's mean for a minute ahead ...
     ahead_half_deg: float | None = None    # ... and the half width that holds 80 %
     ahead_tws_mps: float | None = None
@@ -514,6 +516,8 @@ class Past:
     tws_mps: tuple[float | None, ...] = ()
     clearance_m: tuple[float | None, ...] = ()
     starboard: tuple[bool | None, ...] = ()
+    polar_twa_deg: tuple[float | None, ...] = ()
+    polar_mps: tuple[float | None, ...] = ()
     ahead_twd_deg: tuple[float | None, ...] = ()
     ahead_half_deg: tuple[float | None, ...] = ()
     ahead_tws_mps: tuple[float | None, ...] = ()
@@ -555,13 +559,15 @@ def _carried(sample: Sample, shift: Shift) -> Sample:
 
 def sample_of(view: View) -> Sample:
     """Return what the track and the strips keep of a view."""
-    boat, wind = view.boat, view.wind
+    boat, wind, polar = view.boat, view.wind, view.polar
     minute = None if wind is None else next((b for b in wind.bands if b.horizon_s == 60.0), None)
     east, north = boat.at_en_m or (None, None)
     return Sample(
         t_s=view.t_s, east_m=east, north_m=north, heading_deg=boat.heading_deg, sog_mps=boat.sog_mps,
         clearance_m=boat.clearance_m, starboard=None if boat.tack is None else boat.tack == "starboard",
         twd_from_deg=None if wind is None else wind.twd_from_deg, tws_mps=None if wind is None else wind.tws_mps,
+        polar_twa_deg=None if polar is None else polar.live_twa_deg,
+        polar_mps=None if polar is None else polar.live_mps,
         ahead_twd_deg=None if minute is None else minute.twd_from_deg,
         ahead_half_deg=None if minute is None or len(minute.half_deg) < 2 else minute.half_deg[1],
         ahead_tws_mps=None if minute is None else minute.tws_mps,

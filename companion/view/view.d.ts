@@ -227,6 +227,8 @@ export interface Past {
   tws_mps: (number | null)[];
   clearance_m: (number | null)[];
   starboard: (boolean | null)[];
+  polar_twa_deg: (number | null)[];
+  polar_mps: (number | null)[];
   ahead_twd_deg: (number | null)[];
   ahead_half_deg: (number | null)[];
   ahead_tws_mps: (number | null)[];

@@ -83,6 +83,16 @@ def test_what_the_boat_makes_of_her_polar_is_of_the_water(beat):
     assert math.radians(moving.live_twa_deg) == pytest.approx(difference_rad(twd_rad, vehicle.heading_rad), abs=0.01)
 
 
+def test_where_she_was_on_her_polar_is_of_the_water_as_where_she_is():
+    """Her past dots were of her way over the ground beside a point, and a polar, of the water."""
+    polar = values.PolarView(name="", tws_mps=5.0, live_twa_deg=-75.0, live_mps=1.5, twa_deg=(), speed_mps=())
+    view = values.View(source="live", name="", t_s=1.0, state=values.StateView(phase="sailing"), polar=polar,
+                       boat=values.BoatView(sog_mps=2.0, heading_deg=10.0))
+    kept = Past.of([sample_of(view), sample_of(replace(view, polar=None))], None)
+    assert kept.polar_mps == (1.5, None)
+    assert kept.polar_twa_deg == (-75.0, None)
+
+
 def test_close_to_the_wind_no_share_of_the_polar_is_told():
     polar = values.PolarView(name="", tws_mps=5.0, live_twa_deg=-75.0, live_mps=1.5, twa_deg=(60.0, 90.0),
                              speed_mps=(1.0, 3.0), beat_deg=45.0)

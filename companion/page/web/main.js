@@ -58,6 +58,7 @@ function remember(past, view) {
   past.t_s.push(view.t_s); past.east_m.push(east); past.north_m.push(north); past.heading_deg.push(view.boat.heading_deg);
   past.sog_mps.push(view.boat.sog_mps); past.twd_from_deg.push(view.wind?.twd_from_deg ?? null); past.tws_mps.push(view.wind?.tws_mps ?? null);
   past.clearance_m.push(view.boat.clearance_m); past.starboard.push(view.boat.tack === null ? null : view.boat.tack === "starboard");
+  past.polar_twa_deg.push(view.polar?.live_twa_deg ?? null); past.polar_mps.push(view.polar?.live_mps ?? null);
   past.ahead_twd_deg.push(minute?.twd_from_deg ?? null); past.ahead_half_deg.push(minute?.half_deg[1] ?? null);
   past.ahead_tws_mps.push(minute?.tws_mps ?? null); past.ahead_tws_sigma_mps.push(minute?.tws_sigma_mps ?? null);
   if (past.t_s.length > KEPT) for (const column of Object.values(past)) if (Array.isArray(column)) column.splice(0, KEPT / 10);

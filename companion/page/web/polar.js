@@ -1,7 +1,7 @@
 // The polar in the present wind, the boat's point and where it was lately, the best angles, the no-go zone.
 import { picture, svg } from "./dom.js";
 import { figure, scaled, speed, speedUnit } from "./format.js";
-import { marks, onDial, path, sector, wrap } from "./geometry.js";
+import { marks, onDial, path, sector } from "./geometry.js";
 
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Past} Past @typedef {import("./geometry.js").Point} Point */
 
@@ -41,10 +41,10 @@ export function show(view, past) {
     }
   }
   if (past) for (let n = Math.max(0, past.t_s.length - 4000); n < past.t_s.length; n += 3) {
-    const ago = view.t_s - (past.t_s[n] ?? 0), twd = past.twd_from_deg[n], heading = past.heading_deg[n], sog = past.sog_mps[n];
-    if (ago < 0 || ago > 300 || twd == null || heading == null || sog == null) continue;
-    const [x, y] = onDial(wrap(twd - heading), r(sog));
-    out.push(svg("circle", { cx: x.toFixed(1), cy: y.toFixed(1), r: 1.7, class: twd - heading > 0 ? "was" : "was", opacity: (0.75 - 0.65 * ago / 300).toFixed(2) }));
+    const ago = view.t_s - (past.t_s[n] ?? 0), twa = past.polar_twa_deg[n], speed = past.polar_mps[n];
+    if (ago < 0 || ago > 300 || twa == null || speed == null) continue;
+    const [x, y] = onDial(twa, r(speed));
+    out.push(svg("circle", { cx: x.toFixed(1), cy: y.toFixed(1), r: 1.7, class: "was", opacity: (0.75 - 0.65 * ago / 300).toFixed(2) }));
   }
   let share = "";
   if (polar.live_twa_deg !== null && polar.live_mps !== null) {
