@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from companion.geofence import Mission
     from companion.geofence.mission import MissionOptions
     from companion.guard import Guard
-    from companion.planner.nursery import Nursery
+    from companion.planner.fork_server import ForkServer
     from companion.planner.worker import PlannerWorker
     from companion.telemetry.console import Console
     from companion.telemetry.systemd import ServiceManager
@@ -147,7 +147,7 @@ def _run(args: argparse.Namespace) -> int:
     from companion.guard import Guard
     from companion.mavlink.transports import parse_link
     from companion.mission_check import require_sailable
-    from companion.planner.nursery import Nursery
+    from companion.planner.fork_server import ForkServer
     from companion.planner.worker import answer_requests
     from companion.telemetry.console import Console
     from companion.traffic.feeds import parse_feed
@@ -171,18 +171,18 @@ def _run(args: argparse.Namespace) -> int:
 
     # before there are threads, locks and sockets: those of the consoles are the first
     with contextlib.ExitStack() as stack:
-        nursery = Nursery.begin(answer_requests)
-        if nursery is not None:
-            stack.callback(nursery.close)
+        fork_server = ForkServer.begin(answer_requests)
+        if fork_server is not None:
+            stack.callback(fork_server.close)
         out, err = stack.enter_context(Console(sys.stdout)), stack.enter_context(Console(sys.stderr))
         # what is logged must not wait for a terminal either
         stack.enter_context(contextlib.redirect_stderr(cast("TextIO", err)))
-        return _start(args, settings, sailed, name, nursery, out, err)
+        return _start(args, settings, sailed, name, fork_server, out, err)
 
 
 def _start(
     args: argparse.Namespace, settings: MissionOptions | None, sailed: MissionToSail | None, name: str,
-    nursery: Nursery | None, out: Console, err: Console,
+    fork_server: ForkServer | None, out: Console, err: Console,
 ) -> int:
     """Sail what is named, and what is drawn one after the other; return the exit code."""
     from companion.telemetry.systemd import ServiceManager
@@ -197,7 +197,7 @@ def _start(
                 sailed = read_drawn(args, settings, folder, state_path, signing_of(args.signing_key), manager, err)
             if sailed is None:
                 return NOT_THERE
-            code = _voyage(args, sailed, folder, state_path, manager, nursery, out, err)
+            code = _voyage(args, sailed, folder, state_path, manager, fork_server, out, err)
             if code is not None:
                 return code
             number += 1
@@ -213,7 +213,7 @@ def _new_folder(named: Path | None, name: str, number: int) -> Path:
 
 def _voyage(
     args: argparse.Namespace, sailed: MissionToSail, folder: Path, state_path: Path, manager: ServiceManager,
-    nursery: Nursery | None, out: Console, err: Console,
+    fork_server: ForkServer | None, out: Console, err: Console,
 ) -> int | None:
     """Sail; return the exit code, None when the voyage has given way to what was drawn under way."""
     from companion.app.from_autopilot import ADOPTED
@@ -256,7 +256,7 @@ def _voyage(
         )
 
     summary = run_loop(
-        _sail(mission, transport, folder, options, manager, nursery, out, told, guard), speedup=args.speedup)
+        _sail(mission, transport, folder, options, manager, fork_server, out, told, guard), speedup=args.speedup)
     # the next voyage waits for no picture, and where nobody was heard there is nothing to draw
     if summary["time_s"] is not None and not summary["arrived_before"] and summary["end_reason"] != ADOPTED:
         _report(folder, err)
@@ -291,13 +291,13 @@ def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 async def _sail(
     mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager,
-    nursery: Nursery | None, out: Console, told: Displays, guard: Guard,
+    fork_server: ForkServer | None, out: Console, told: Displays, guard: Guard,
 ) -> dict[str, Any]:
     """Sail; return the summary. Raises KeyboardInterrupt: it was ended before it began, or a second time."""
     from companion.planner.worker import PlannerWorker
 
     ending = SignalEnding()
-    async with PlannerWorker(algorithm=mission.skipper.planner, nursery=nursery) as planner:
+    async with PlannerWorker(algorithm=mission.skipper.planner, fork_server=fork_server) as planner:
         # The child loads its kernels while this process imports the rest.
         from companion.app.sail import sail
         from companion.guard import Auxiliary

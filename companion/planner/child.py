@@ -9,7 +9,7 @@ import signal
 from collections.abc import Sequence
 from typing import Protocol
 
-from companion.planner.nursery import Nursery
+from companion.planner.fork_server import ForkServer
 
 
 class Child(Protocol):
@@ -62,15 +62,15 @@ class Started:
 
 
 class Forked:
-    """A process of the nursery; its end is the end of its socket."""
+    """A process of the fork server; its end is the end of its socket."""
 
     def __init__(self, pid: int, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.pid, self.reader, self.writer = pid, reader, writer
 
     @classmethod
-    async def begin(cls, nursery: Nursery) -> Forked:
+    async def begin(cls, fork_server: ForkServer) -> Forked:
         """Have it forked. Raises JobError: there is nobody to do it."""
-        pid, connection = nursery.planner()
+        pid, connection = fork_server.planner()
         return cls(pid, *await asyncio.open_connection(sock=connection))
 
     @property

@@ -32,7 +32,7 @@ from companion.errors import JobError
 from companion.kernels.build import prepare
 from companion.kernels.memory import trim
 from companion.planner.child import Child, Forked, Started
-from companion.planner.nursery import NURSERY, NURSERY_READY, Nursery, call_process, settle
+from companion.planner.fork_server import FORK_SERVER, FORK_SERVER_READY, ForkServer, call_process, settle
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
 from companion.planner.solve import DEFAULT_BUDGET_S, plan
@@ -54,7 +54,7 @@ SPEED_TRIES = 3
 LEAST_RUN_S = 0.05    # a shorter run does not tell how much of the processor there was
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PULSE_S = 0.5
-_LOOK_S = 0.2         # between two looks whether child and nursery live
+_LOOK_S = 0.2         # between two looks whether child and fork server live
 _SILENCE_S = 60.0
 """A child that gets ready may take as long as it takes, and says once in ``_BEAT_S`` that it lives; this long without a
 word [s] and it is taken for hung."""
@@ -130,17 +130,17 @@ class PlannerWorker:
     """A child process with warm kernels, one request at a time; a second caller waits for the first.
 
     ``async with PlannerWorker() as planner`` starts the child and returns at once: it warms up while the loop runs
-    and the first request waits for it: ``auto`` always, and ``algorithm``. With a ``nursery`` the child is forked
+    and the first request waits for it: ``auto`` always, and ``algorithm``. With a ``fork_server`` the child is forked
     there, warm for ``auto`` from the beginning. A child that dies is replaced at once, between two requests too, and
-    so is the nursery: on a tenth of a core the next answer would else wait for half a minute's loading. ``restarts``
-    counts replacements of the child; ``share`` is what the child got of the processor when it became ready.
+    so is the fork server: on a tenth of a core the next answer would else wait for half a minute's loading.
+    ``restarts`` counts replacements of the child; ``share`` is what it got of the processor when it became ready.
     """
 
     def __init__(
         self, *, grace_s: float = DEFAULT_GRACE_S, command: list[str] | None = None, algorithm: str = "auto",
-        nursery: Nursery | None = None,
+        fork_server: ForkServer | None = None,
     ) -> None:
-        self._grace_s, self._nursery = grace_s, nursery if algorithm == "auto" else None
+        self._grace_s, self._fork_server = grace_s, fork_server if algorithm == "auto" else None
         self._command = command or [sys.executable, "-m", "companion.planner.worker", algorithm]
         self._child: Child | None = None
         self._is_warm, self._was_warm, self._silence_s = False, False, math.inf
@@ -244,11 +244,11 @@ class PlannerWorker:
 
     # ------------------------------------------------------------------------------------ the child
     async def _keep(self) -> None:
-        """Replace child and nursery when they die."""
+        """Replace child and fork server when they die."""
         while True:
             await asyncio.sleep(_LOOK_S)
-            if self._nursery is not None and self._nursery.revive():
-                _LOG.warning("the planners' nursery died; it is begun anew")
+            if self._fork_server is not None and self._fork_server.revive():
+                _LOG.warning("the planners' fork server died; it is begun anew")
             if not self._was_warm or self._lock.locked():   # whoever gets it ready or has it sees it by himself
                 continue
             async with self._lock:
@@ -260,9 +260,9 @@ class PlannerWorker:
 
     async def _start(self) -> None:
         self._is_warm, self._silence_s = False, math.inf
-        if self._nursery is not None:
+        if self._fork_server is not None:
             try:
-                self._child = await Forked.begin(self._nursery)
+                self._child = await Forked.begin(self._fork_server)
             except JobError as error:
                 _LOG.warning("%s; it is started as a program of its own", error)
             else:
@@ -442,20 +442,20 @@ def _write(sink: Any, payload: bytes) -> None:
     sink.flush()
 
 
-def be_nursery(fd: int) -> None:
-    """Be a nursery on the socket ``fd``, in a program of its own."""
+def be_fork_server(fd: int) -> None:
+    """Be a fork server on the socket ``fd``, in a program of its own."""
     from companion.planner.solve import warm
 
     control = socket.socket(fileno=fd)
     warm()
     settle()
-    with contextlib.suppress(OSError):   # who began it has gone: the nursery sees it, and ends
-        control.sendall(NURSERY_READY)
-    Nursery(control, answer_requests).tend()
+    with contextlib.suppress(OSError):   # who began it has gone: the fork server sees it, and ends
+        control.sendall(FORK_SERVER_READY)
+    ForkServer(control, answer_requests).tend()
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == [NURSERY]:
-        be_nursery(int(sys.argv[2]))
+    if sys.argv[1:2] == [FORK_SERVER]:
+        be_fork_server(int(sys.argv[2]))
     else:
         serve(*sys.argv[1:2])

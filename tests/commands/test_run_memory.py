@@ -72,7 +72,7 @@ def test_it_is_small_with_its_planner_and_leaves_no_process_behind(boat, carried
         try:
             wait_for_plans(tmp_path / "voyage/decisions.jsonl", 1)
             pids = family(companion.pid)
-            assert len(pids) == 3   # the companion, the nursery, the planner
+            assert len(pids) == 3   # the companion, the fork server, the planner
             maps = "".join(Path(f"/proc/{pid}/maps").read_text() for pid in pids)
             assert [name for name in ASHORE if name in maps] == []
             assert sum(map(memory_mb, pids)) < MOST_MB

@@ -14,7 +14,7 @@ import pytest
 
 from companion.clock import now_s, run, run_virtual
 from companion.planner import PlanStatus, Problem, plan, worker
-from companion.planner.nursery import Nursery
+from companion.planner.fork_server import ForkServer
 from companion.planner.worker import InlinePlanner, PlannerWorker
 from tests.planner.problems import load, simple
 
@@ -50,7 +50,7 @@ from pathlib import Path
 from companion.clock import run
 from companion.kernels.build import prepare
 from companion.planner import PlanStatus, Problem, plan
-from companion.planner.nursery import Nursery
+from companion.planner.fork_server import ForkServer
 from companion.planner.worker import PlannerWorker, answer_requests
 from tests.planner.problems import simple
 
@@ -58,7 +58,7 @@ def name_of(pid):
     return Path(f"/proc/{pid}/comm").read_text().strip()
 
 prepare(("companion",), say=lambda _: None)
-nursery = Nursery.begin(answer_requests)
+fork_server = ForkServer.begin(answer_requests)
 
 async def killed(worker):
     dead = worker.pid
@@ -69,7 +69,7 @@ async def killed(worker):
 async def main():
     p = Problem.from_json(simple())
     wanted = plan(p, expansions=3_000, seed=2).waypoints_en.tolist()
-    async with PlannerWorker(grace_s=1.0, nursery=nursery) as worker:
+    async with PlannerWorker(grace_s=1.0, fork_server=fork_server) as worker:
         await worker.ready()
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
         await killed(worker)
@@ -77,31 +77,31 @@ async def main():
         os.kill(worker.pid, signal.SIGSTOP)
         assert (await worker.plan(p, budget_s=0.1)).status is PlanStatus.UNANSWERED
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
-        assert [name_of(worker.pid), name_of(nursery.pid)] == ["planner", "nursery"]
-        first = nursery.pid
-        os.kill(nursery.pid, signal.SIGKILL)   # with nobody to fork, it is started
+        assert [name_of(worker.pid), name_of(fork_server.pid)] == ["planner", "fork-server"]
+        first = fork_server.pid
+        os.kill(fork_server.pid, signal.SIGKILL)   # with nobody to fork, it is started
         await killed(worker)
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
         assert name_of(worker.pid) == "planner"
-        while nursery.pid == first or name_of(nursery.pid) != "nursery":   # ... and another nursery begun
+        while fork_server.pid == first or name_of(fork_server.pid) != "fork-server":   # ... and another is begun
             await asyncio.sleep(0.1)
         await killed(worker)
-        assert "--nursery" in Path(f"/proc/{worker.pid}/cmdline").read_text()   # its child again
+        assert "--fork-server" in Path(f"/proc/{worker.pid}/cmdline").read_text()   # its child again
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
         print(worker.restarts)
 
 run(main())
-nursery.close()
-assert not nursery.is_alive
+fork_server.close()
+assert not fork_server.is_alive
 """
 
 
-def test_forked_by_a_nursery_it_plans_the_same_dies_hangs_and_comes_back():
-    """A nursery that had died stayed dead, and every planner after it loaded everything for itself."""
+def test_forked_by_a_fork_server_it_plans_the_same_dies_hangs_and_comes_back():
+    """A fork server that had died stayed dead, and every planner after it loaded everything for itself."""
     done = subprocess.run([sys.executable, "-c", NURSED], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "4\n"), done.stderr
     assert "it is started as a program of its own" in done.stderr
-    assert "the planners' nursery died; it is begun anew" in done.stderr
+    assert "the planners' fork server died; it is begun anew" in done.stderr
 
 
 def test_a_child_that_dies_with_nothing_asked_for_is_there_again_when_something_is(monkeypatch):
@@ -131,7 +131,7 @@ def test_a_process_with_threads_is_not_forked():
     other = threading.Thread(target=waiting.wait)
     other.start()
     try:
-        assert Nursery.begin(worker.answer_requests) is None
+        assert ForkServer.begin(worker.answer_requests) is None
     finally:
         waiting.set()
         other.join()

@@ -1,10 +1,10 @@
-"""A nursery of planners: a process forked from this one when all is loaded, which forks a planner when it is asked.
+"""The planners' fork server: a process forked from this one when all is loaded, which forks a planner when it is asked.
 
 The libraries and the machine code of all kernels are then in the memory once, for the companion and its planner
-together. A fork of a process with threads, or with an event loop that turns, is not safe; so the nursery is made before
-either and has none itself. One that dies is begun anew as a program of its own (``python -m companion.planner.nursery
-FD``), which shares the memory with its planners alone. It is never needed: where there is none, or it is not ready, a
-planner is started as a program of its own.
+together. A fork of a process with threads, or with an event loop that turns, is not safe; so it is made before either
+and has none itself. One that dies is begun anew as a program of its own (``python -m companion.planner.worker
+--fork-server FD``), which shares the memory with its planners alone. It is never needed: where there is none, or it is
+not ready, a planner is started as a program of its own.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from companion.kernels.memory import let_go, trim
 _PID = struct.Struct("<q")
 _PATIENCE_S = 1.0   # a fork takes milliseconds, and the voyage's loop waits for it
 _REST_S = 10.0      # until one is begun anew: what kills it at once must not have the processor for itself
-NURSERY_READY = b"r"
-NURSERY = "--nursery"   # of the worker's program: be a nursery on the socket of this number
+FORK_SERVER_READY = b"r"
+FORK_SERVER = "--fork-server"   # of the worker's program: be a fork server on the socket of this number
 
 
 def call_process(name: str) -> None:
@@ -41,7 +41,7 @@ def call_process(name: str) -> None:
         Path("/proc/self/comm").write_text(name, encoding="ascii")
 
 
-class Nursery:
+class ForkServer:
     """The way to the process that forks planners."""
 
     def __init__(self, control: socket.socket, serve: Callable[[Any, Any], None], pid: int = 0) -> None:
@@ -50,7 +50,7 @@ class Nursery:
         self._is_ready, self._begun_s = True, -math.inf
 
     @classmethod
-    def begin(cls, serve: Callable[[Any, Any], None]) -> Nursery | None:
+    def begin(cls, serve: Callable[[Any, Any], None]) -> ForkServer | None:
         """Load everything and fork; return None where that would not be safe or kernels have to be compiled first.
 
         Args:
@@ -98,7 +98,7 @@ class Nursery:
         self._control, theirs = socket.socketpair()
         with theirs:
             self._program = subprocess.Popen(  # noqa: S603 - our own program
-                [sys.executable, "-m", "companion.planner.worker", NURSERY, str(theirs.fileno())],
+                [sys.executable, "-m", "companion.planner.worker", FORK_SERVER, str(theirs.fileno())],
                 pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, start_new_session=True)
         self._control.settimeout(_PATIENCE_S)
         self._pid, self._is_ready, self._begun_s = self._program.pid, False, time.monotonic()
@@ -108,11 +108,11 @@ class Nursery:
         """Note that it is ready, when it has said so. Raises JobError: it has not."""
         if not self._is_ready:
             try:
-                self._is_ready = self._control.recv(1, socket.MSG_DONTWAIT) == NURSERY_READY
+                self._is_ready = self._control.recv(1, socket.MSG_DONTWAIT) == FORK_SERVER_READY
             except OSError:
                 self._is_ready = False
         if not self._is_ready:
-            raise JobError("no planner could be forked: the nursery is not ready")
+            raise JobError("no planner could be forked: the fork server is not ready")
 
     def planner(self) -> tuple[int, socket.socket]:
         """Return a new planner's process id and the socket to it. Raises JobError: there is nobody to fork it."""
@@ -130,7 +130,7 @@ class Nursery:
         return pid, ours
 
     def close(self) -> None:
-        """End the nursery; the planners end with their own sockets."""
+        """End the fork server; the planners end with their own sockets."""
         self._control.close()
         if self._program is not None:
             self._program.kill()
@@ -138,12 +138,12 @@ class Nursery:
         with contextlib.suppress(OSError):
             os.waitpid(self._pid, 0)
 
-    # ------------------------------------------------------------------------------- in the nursery
+    # ------------------------------------------------------------------------------- in the fork server
     def tend(self) -> None:
         """Fork a planner for each socket that comes, until the companion has gone."""
         with contextlib.suppress(OSError):
             os.setsid()   # Ctrl-C is for the companion, which ends the planner itself
-        call_process("nursery")
+        call_process("fork-server")
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)
         signal.signal(signal.SIGCHLD, signal.SIG_IGN)   # nobody waits for a planner: none is left as a zombie
