@@ -1,7 +1,8 @@
 """Reproduce the papers' figures into docs/figures: ``python -m bench.figures [name ...]`` (make figures).
 
-- wolsieffer-6: four polygons; up wind at 60 %, no solution at 66 % where the Kalman filter's variance grows, down
-  wind at both. The tree is the reference RRT*'s.
+- wolsieffer-2: a rock to leeward, and a shift: the path of the moment's wind collides, that of its spread does not.
+- wolsieffer-6: four polygons; up wind at 60 and 66 % by two growths of the Kalman filter's variance, the second of
+  which leaves no solution at 66 %, down wind at both. The tree is the reference RRT*'s.
 - wolsieffer-7: two channels; the wind just lets the right-hand one be sailed, noise closes it, down wind.
 - busser-5-1 .. busser-5-4: AVALON's costs added one by one: sailing time alone; turning; estimate and tunnel;
   other winds.
@@ -25,7 +26,21 @@ from pathlib import Path
 import matplotlib as mpl
 
 from bench.fields import atoms_figure, encounter_figure, trees_figure
-from bench.papers import DELTA_6A, DELTA_6B, NOISY_DEG, STEADY_DEG, four_polygons, lake, two_channels
+from bench.papers import (
+    AS_SHUT,
+    AS_WIDE,
+    DELTA_6A,
+    DELTA_6B,
+    NOISY_DEG,
+    SHIFT_2_DEG,
+    SIGMA_2_DEG,
+    STEADY_DEG,
+    fallen_off,
+    four_polygons,
+    lake,
+    lee_rock,
+    two_channels,
+)
 from companion.planner.problem import evaluate
 
 mpl.use("Agg")
@@ -66,13 +81,25 @@ def save(figure, name):
 
 
 # ------------------------------------------------------------------------------------- Wolsieffer
+def wolsieffer_2():
+    figure, axes = plt.subplots(1, 2, figsize=(11.0, 5.6), layout="constrained")
+    shift = np.radians(SHIFT_2_DEG)
+    for ax, sigma_deg, text in ((axes[0], 0.0, "the wind of the moment"), (axes[1], SIGMA_2_DEG, "the wind's spread")):
+        p = lee_rock(sigma_deg)
+        answer = plan(p, expansions=4000)
+        draw_plan(ax, p, answer, title=f"planned in {text}; dashed: the wind {SHIFT_2_DEG:.0f}° to the right")
+        ax.plot(*fallen_off(p, answer.waypoints_en, shift).T, "--", color="tab:red")
+    save(figure, "wolsieffer-2")
+
+
 def wolsieffer_6():
-    figure, axes = plt.subplots(2, 2, figsize=(11.0, 12.4), layout="constrained")
-    for ax, letter, is_up, delta in (
-        (axes[0, 0], "a", True, DELTA_6A), (axes[0, 1], "b", True, DELTA_6B),
-        (axes[1, 0], "c", False, DELTA_6A), (axes[1, 1], "d", False, DELTA_6B),
+    figure, axes = plt.subplots(3, 2, figsize=(11.0, 18.4), layout="constrained")
+    for ax, letter, is_up, delta, growth in (
+        (axes[0, 0], "a, as wide as his", True, DELTA_6A, AS_WIDE), (axes[0, 1], "b", True, DELTA_6B, AS_WIDE),
+        (axes[1, 0], "a, so that b is shut", True, DELTA_6A, AS_SHUT), (axes[1, 1], "b", True, DELTA_6B, AS_SHUT),
+        (axes[2, 0], "c", False, DELTA_6A, AS_SHUT), (axes[2, 1], "d", False, DELTA_6B, AS_SHUT),
     ):
-        p = four_polygons(delta, is_up=is_up)
+        p = four_polygons(delta, is_up=is_up, growth=growth)
         answer = plan(p, algorithm="rrtstar", expansions=6000, seed=1)
         way = "up" if is_up else "down"
         result = f"{answer.cost_s:.0f} s"
@@ -82,7 +109,8 @@ def wolsieffer_6():
         if answer.has_path:
             first, last = (2.0 * np.degrees(p.no_go_half_rad(t)) for t in (0.0, answer.legs[-1].end_s))
             result += f", no-go zone {first:.0f}° wide, at the end {last:.0f}°"
-        draw_plan(ax, p, answer, title=f"({letter}) {way} wind, {100 * delta:.0f} %: {result}", fans=answer.has_path)
+        title = f"({letter}) {way} wind, {100 * delta:.0f} %, {growth:g}°/√s:\n{result}"
+        draw_plan(ax, p, answer, title=title, fans=answer.has_path)
     save(figure, "wolsieffer-6")
 
 
@@ -222,6 +250,7 @@ WRSC_SEED = 9
 
 
 FIGURES = {
+    "wolsieffer-2": wolsieffer_2,
     "wolsieffer-6": wolsieffer_6, "wolsieffer-7": wolsieffer_7, "busser-5-1": busser_5_1, "busser-5-2": busser_5_2,
     "busser-5-3": busser_5_3, "busser-5-4": busser_5_4, "risk": risk, "wind-filter": wind_filter,
     "wind-filter-recorded": wind_filter_recorded, "field-atoms": field_atoms, "field-trees": field_trees,

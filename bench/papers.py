@@ -41,16 +41,42 @@ def kalman(from_deg, sigma0, growth):
 DELTA_6A, DELTA_6B = 0.60, 0.66
 
 
-def four_polygons(delta_s, *, is_up):
+# [deg per root second] of the filter's spread. His text gives none. With the first the zone is 110 degrees wide at the
+# end of (a), as his caption says, but then a path is found at 66 % too; with the second none is, and it is 133 wide.
+AS_WIDE, AS_SHUT = 2.1, 3.82
+
+
+def four_polygons(delta_s, *, is_up, growth=AS_SHUT):
     """Figure 6.
 
     With the half angle at 45 + c sqrt(t) degrees the boat gets 0.157 v / c^2 to windward (c in radians) before the
-    zone is 180 degrees wide: at 66 % that is 311 m here, at 60 % 824 m.
+    zone is 180 degrees wide: with ``AS_SHUT`` at 66 % that is 311 m here, at 60 % 824 m.
     """
     low, high = end(0, 0, heading_deg=0), end(20, 330, heading_deg=180)
     start, goal = (low, high) if is_up else (high, low)
     return problem(start=start, goal=end(goal["x"], goal["y"], radius=4), obstacles=FOUR, boat=WOLSIEFFER,
-                   wind=kalman(0.0, 0.0, 3.82), delta_s=delta_s)
+                   wind=kalman(0.0, 0.0, growth), delta_s=delta_s)
+
+
+def lee_rock(sigma0_deg):
+    """Figure 2: a goal that the wind of the moment just lets be laid, close along a rock to leeward."""
+    return problem(start=end(0, 0, heading_deg=45), goal=end(200, 203, radius=5), boat=WOLSIEFFER, delta_s=0.9,
+                   obstacles=["POLYGON((70 60,140 130,165 100,100 35,70 60))"], wind=kalman(0.0, sigma0_deg, 0.0))
+
+
+SHIFT_2_DEG, SIGMA_2_DEG = 10.0, 8.0
+
+
+def fallen_off(p, waypoints_en, shift_rad):
+    """Return where a path leads when the wind has shifted and the boat falls off to the edge of its no-go zone."""
+    points = np.asarray(waypoints_en)
+    track = [points[0]]
+    for step in np.diff(points, axis=0):
+        twd, course = p.wind.twd_from_rad + shift_rad, np.arctan2(step[0], step[1])
+        twa = (course - twd + np.pi) % (2.0 * np.pi) - np.pi
+        heading = twd + np.copysign(max(abs(twa), p.boat.no_go_half_rad), twa)
+        track.append(track[-1] + np.hypot(*step) * np.array([np.sin(heading), np.cos(heading)]))
+    return np.array(track)
 
 
 WIND_7_DEG = -30.0
