@@ -9,6 +9,7 @@ import argparse
 import csv
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 from companion.geofence import load_mission
@@ -16,7 +17,7 @@ from companion.messages import GeoPoint
 
 WATER = Path(__file__).parent / "figure-7"
 CHANNEL = {"steady": "right", "noisy": "left", "down": "right"}   # as his picture has it, north up
-MIDDLE_M = (190.0, 210.0)   # north of the origin: here there is nothing between the channels but the island
+MIDDLE_M = 200.0   # north of the origin: here there is nothing between the channels but the island
 
 
 def channel(voyage: Path) -> str:
@@ -25,7 +26,8 @@ def channel(voyage: Path) -> str:
     with (voyage / "track.csv").open() as file:
         track = [frame.en_from_geo(GeoPoint(lat_deg=float(row["lat_deg"]), lon_deg=float(row["lon_deg"])))
                  for row in csv.DictReader(file) if row["lat_deg"]]
-    sides = {"right" if east > 0.0 else "left" for east, north in track if MIDDLE_M[0] < north < MIDDLE_M[1]}
+    sides = {"right" if a[0] + b[0] > 0.0 else "left" for a, b in pairwise(track)
+             if (a[1] - MIDDLE_M) * (b[1] - MIDDLE_M) <= 0.0}
     return " and ".join(sorted(sides)) or "neither"
 
 
