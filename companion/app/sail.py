@@ -47,13 +47,18 @@ from companion.skipper.step import Phase, Snapshot
 from companion.telemetry.console import DISK, GONE, left_behind
 from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, fence_record, order_record, outcome_record
 from companion.telemetry.state_file import StateFile
-from companion.telemetry.status import TelemetrySender, companion_status, speak_high_latency, unix_of_boat
+from companion.telemetry.status import (
+    CLOCK_OFF_S,
+    TelemetrySender,
+    companion_status,
+    speak_high_latency,
+    unix_of_boat,
+)
 from companion.traffic.feeds import Feeds
 
 STEP_S = 1.0
 TEND_EVERY_S = 5.0        # records are synced, and taken up again after trouble
 LOOP_WATCH_S = 0.1
-CLOCK_OFF_S = 10.0        # from here on it is recorded
 # With ``exit_on_arrival`` the loiter is watched for a moment before the program ends [s].
 LINGER_S = 5.0
 LINGER_BUSY_S = 60.0

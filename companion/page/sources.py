@@ -136,6 +136,8 @@ class LiveSource:
         if self.area is not None and area is not None and area.hash != self.area.hash:
             self.trail.follow(self.area.frame, area.frame)   # a passage: the metres count from elsewhere now
         self.area = area
+        if view.unix_s is not None:
+            self.unix_s = view.unix_s - view.t_s
         self.trail.add(sample_of(view))
         self.hub.publish(view, events)
 

@@ -117,6 +117,9 @@ def _alert(step: Step) -> tuple[str, str]:
     return "", step.state.why
 
 
+CLOCK_OFF_S = 10.0     # of this computer's clock against the autopilot's: from here on it is said
+
+
 def unix_of_boat(snapshot: Snapshot, t_s: float) -> float | None:
     """Return the time at ``t_s`` [s since 1970] by the autopilot's clock, which GPS sets; None: it has not told one.
 

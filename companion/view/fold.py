@@ -14,6 +14,7 @@ from companion.planner.explain import bounds_in_words
 from companion.skipper.step import Announce, PlanOutcome, RequestPlan, SkipperConfig
 from companion.skipper.way import PointEn, Voyage
 from companion.telemetry.folder import VoyageFigures
+from companion.telemetry.status import CLOCK_OFF_S, unix_of_boat
 from companion.view import parts, values
 from companion.view.area import area_of
 from companion.view.events import Event, happenings
@@ -37,7 +38,10 @@ PLANS_KEPT = 4        # a route may be spliced from as many
 
 
 class ViewFold:
-    """Turns steps into views and events. ``epoch_s``: the Unix time [s] of the voyage's t_s = 0, None: not known."""
+    """Turns steps into views and events. ``epoch_s``: the Unix time [s] of the voyage's t_s = 0, None: not known.
+
+    Where that is off the autopilot's clock, which GPS sets and by which it is dark, the autopilot's is shown.
+    """
 
     def __init__(
         self, voyage: Voyage, config: SkipperConfig, *, source: values.Source = "live", epoch_s: float | None = None,
@@ -61,6 +65,9 @@ class ViewFold:
     ) -> tuple[values.View, tuple[Event, ...]]:
         """Return the view at a step, and what happened in it."""
         t_s = step.snapshot.t_s
+        boat_s = unix_of_boat(step.snapshot, t_s)
+        if boat_s is not None and (self._epoch_s is None or abs(boat_s - t_s - self._epoch_s) >= CLOCK_OFF_S):
+            self._epoch_s = boat_s - t_s
         self._follow(step.voyage)
         self._note(step)
         events = []

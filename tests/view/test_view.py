@@ -14,7 +14,8 @@ from bench.pages import schema
 from companion.current import STILL_WATER, over_water
 from companion.fold import Step
 from companion.geo.angles import difference_rad
-from companion.messages import CompanionStatus, GeoPoint, VehicleState, WindForecast
+from companion.messages import AutopilotStatus, CompanionStatus, GeoPoint, VehicleState, WindForecast
+from companion.page.sources import LiveSource
 from companion.skipper.step import PlanOutcome, SkipperConfig, SkipperState, Snapshot, WindEstimate, WindHealth
 from companion.telemetry.folder import TLOG, VoyageFigures
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
@@ -187,6 +188,24 @@ def fold_of(tmp_path):
 
     mission = load_mission(write_mission(tmp_path))
     return ViewFold(voyage_of(mission), config_of(mission))
+
+
+@pytest.mark.parametrize(("off_s", "epoch_s"), [(86_400.0, 1_000.0 + 86_400.0), (3.0, 1_000.0)])
+def test_the_time_of_day_is_the_autopilots_where_this_computers_is_another(tmp_path, off_s, epoch_s):
+    """In a live simulation the page told the hour at the desk beside "it is dark" of the mission's own date."""
+    fold = fold_of(tmp_path)
+    fold = ViewFold(fold._voyage, fold._config, epoch_s=1_000.0)
+    autopilot = AutopilotStatus(t_s=5.0, boot_s=7.0, utc_at_boot_s=1_000.0 + off_s - 2.0)
+    step = Step(snapshot=Snapshot(t_s=5.0), state=SkipperState(), actions=(), voyage=fold._voyage)
+    status = CompanionStatus(t_s=5.0, state="idle")
+    before, _ = fold.take(step, status, VoyageFigures())
+    told = replace(step, snapshot=Snapshot(t_s=6.0, autopilot=autopilot))
+    view, _ = fold.take(told, status, VoyageFigures())
+    assert before.unix_s == 1_005.0        # nobody has told another
+    assert view.unix_s == epoch_s + 6.0
+    live = LiveSource(name="test", unix_s=1_000.0)
+    live.show(view, (), None)
+    assert live.unix_s == epoch_s          # the strips' clock is the page's
 
 
 def test_what_is_not_known_is_null_and_never_nought(tmp_path):

@@ -55,6 +55,7 @@ function remember(past, view) {
   if (last !== undefined && view.t_s <= last + 0.3) return;
   const minute = view.wind?.bands.find((b) => b.horizon_s === 60);
   const [east, north] = view.boat.at_en_m ?? [null, null];
+  if (view.unix_s !== null) past.unix_s = view.unix_s - view.t_s;
   past.t_s.push(view.t_s); past.east_m.push(east); past.north_m.push(north); past.heading_deg.push(view.boat.heading_deg);
   past.sog_mps.push(view.boat.sog_mps); past.twd_from_deg.push(view.wind?.twd_from_deg ?? null); past.tws_mps.push(view.wind?.tws_mps ?? null);
   past.clearance_m.push(view.boat.clearance_m); past.starboard.push(view.boat.tack === null ? null : view.boat.tack === "starboard");
