@@ -70,11 +70,11 @@ from companion.wind import Estimator, make
 from companion.words import listed
 
 __all__ = [
-    "RECENTRE_M", "boat_of", "config_of", "displays_of", "estimator_of", "feeds_of", "permissions_of", "planner_of",
-    "polar_of", "polar_of_file", "target_limits_of", "voyage_of", "water_of", "waters_of",
+    "POLARS", "RECENTRE_M", "boat_of", "config_of", "displays_of", "estimator_of", "feeds_of", "permissions_of",
+    "planner_of", "polar_of", "polar_of_file", "target_limits_of", "voyage_of", "water_of", "waters_of",
 ]
 
-_POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
+POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
 
 
 def polar_of(mission: Mission) -> Polar:
@@ -89,7 +89,7 @@ def polar_of(mission: Mission) -> Polar:
         return file.polar
     polar = mission.boat.polar
     if isinstance(polar, str):
-        maker = _POLARS.get(polar)
+        maker = POLARS.get(polar)
         if maker is None:
             raise InputError(str(mission.path), "[boat] polar", f"there is no polar {polar!r}",
                              'write "ardurover", "avalon", a polar file beside the mission, or a speed in m/s')

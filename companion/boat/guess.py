@@ -24,7 +24,7 @@ from companion.boat.polar import Polar
 
 GRAVITY_MPS2, WATER_KGPM3 = 9.81, 1025.0
 SAIL, WEIGHT = 0.6, 0.0042      # sail area over length squared, displacement over that of a cube of water: the middle
-# AVALON's published polar is 50 % above what is guessed of her; robots that crossed oceans were as far below.
+# A judgement, no measurement: AVALON's published polar is 50 % above what is guessed of her.
 SPEED_ERROR_PERCENT = 35.0
 NEAR_WIND_DEG = 4.0             # an autopilot by a vane sails so much less near to the wind than a crew by telltales
 BEAT_TWS_MPS = 5.0

@@ -115,15 +115,13 @@ def _compare(args: argparse.Namespace) -> int:
 
 def _boat(name: str) -> tuple[Polar, BoatFile | None]:
     """Return a polar by its file or name, and the boat file that it is of, None: it is none."""
-    from companion.boat import ardurover_sitl, avalon, read_polar
+    from companion.boat import read_polar
+    from companion.compose import POLARS, polar_of_file
     from companion.geofence.mission import read_boat_file
 
-    makers = {"ardurover": ardurover_sitl, "avalon": avalon}
-    if name in makers:
-        return makers[name](), None
+    if name in POLARS:
+        return POLARS[name](), None
     if Path(name).suffix == ".toml":
-        from companion.compose import polar_of_file
-
         boat = read_boat_file(Path(name))
         return polar_of_file(boat, name), boat
     return read_polar(name).polar, None
