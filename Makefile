@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test test-long test-faults draws check docs slowest campaign nightly nightly-reference bench measured figures deb release clean
+.PHONY: env demo test test-long test-faults draws check format docs slowest campaign nightly nightly-reference bench measured figures deb release clean
 env: $(ENV)
 
 # What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
@@ -73,11 +73,17 @@ draws: $(ENV)
 	  $$(grep -rlE "^ *@given|StateMachine" tests)
 
 check: $(ENV)
+	$(BIN)/ruff format --check -q .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 	@$(MAKE) --no-print-directory docs
 	@! grep -nE '^-|://' requirements*.lock  # neither a host nor an option: names, versions and hashes only
+
+# Lay out every file as `make check` wants it.
+format: $(ENV)
+	$(BIN)/ruff check -q --fix --select I .
+	$(BIN)/ruff format -q .
 
 # The documentation, from docs/ and the docstrings: strict, offline, whole in itself.
 docs: $(ENV)

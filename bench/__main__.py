@@ -48,23 +48,31 @@ def run_one(path, problem, planner, budget_s, seed):
     if planner in OURS:
         answer = plan(problem, algorithm=planner, budget_s=budget_s, seed=seed)
         return {
-            "status": answer.status.value, "cost_s": answer.cost_s if answer.has_path else None,
+            "status": answer.status.value,
+            "cost_s": answer.cost_s if answer.has_path else None,
             "bound_s": answer.lower_bound_s if math.isfinite(answer.lower_bound_s) else None,
-            "first_s": answer.first_s, "elapsed_s": time.perf_counter() - began,
+            "first_s": answer.first_s,
+            "elapsed_s": time.perf_counter() - began,
         }
     command = [sys.executable, "-m", "bench.ompl_planners", str(path), planner[5:], str(budget_s), str(seed)]
     way = None
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=budget_s + 60.0, check=False,
-                              cwd=HERE.parent)
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=budget_s + 60.0, check=False, cwd=HERE.parent
+        )
         lines = done.stdout.strip().splitlines()
         way = json.loads(lines[-1]) if done.returncode == 0 and lines else None
     except subprocess.TimeoutExpired:
         pass
     judged = evaluate(problem, way) if way else None
     good = judged is not None and judged.is_feasible
-    return {"status": "found" if good else "timeout", "cost_s": judged.time_s if good else None, "bound_s": None,
-            "first_s": None, "elapsed_s": time.perf_counter() - began}
+    return {
+        "status": "found" if good else "timeout",
+        "cost_s": judged.time_s if good else None,
+        "bound_s": None,
+        "first_s": None,
+        "elapsed_s": time.perf_counter() - began,
+    }
 
 
 def schedule(args, planners):
@@ -88,8 +96,12 @@ def compare(args, planners):
     rows = json.loads(kept.read_text(encoding="utf-8"))["rows"] if kept is not None and kept.exists() else []
     known = {(r["problem"], r["planner"], r["budget_s"], r["seed"]) for r in rows}
     longest = _longest_s(runs)
-    print(f"{len(runs)} runs, {len(known)} of them made already: at most {longest / 60.0:.0f} minutes and usually half "
-          "of that (a run ends when its path is proved good enough)", file=sys.stderr, flush=True)
+    print(
+        f"{len(runs)} runs, {len(known)} of them made already: at most {longest / 60.0:.0f} minutes and usually half "
+        "of that (a run ends when its path is proved good enough)",
+        file=sys.stderr,
+        flush=True,
+    )
     began, problem, last = time.monotonic(), None, None
     for i, (path, planner, budget_s, seed) in enumerate(runs):
         if path != last:
@@ -99,9 +111,13 @@ def compare(args, planners):
         row = run_one(path, problem, planner, budget_s, seed)
         rows.append({"problem": problem.id, "planner": planner, "budget_s": budget_s, "seed": seed, **row})
         if i + 1 == len(runs) or runs[i + 1][0] != path or time.monotonic() - began > 60.0 * (1 + len(rows)):
-            left = _longest_s(runs[i + 1:])
-            print(f"{i + 1:5}/{len(runs)}  {problem.id:24} {(time.monotonic() - began) / 60.0:5.1f} min, "
-                  f"at most {left / 60.0:.0f} more", file=sys.stderr, flush=True)
+            left = _longest_s(runs[i + 1 :])
+            print(
+                f"{i + 1:5}/{len(runs)}  {problem.id:24} {(time.monotonic() - began) / 60.0:5.1f} min, "
+                f"at most {left / 60.0:.0f} more",
+                file=sys.stderr,
+                flush=True,
+            )
             if kept is not None:
                 kept.write_text(json.dumps({"rows": rows}) + "\n", encoding="utf-8")
     return rows
@@ -130,18 +146,30 @@ def summary(rows):
             if not mine:
                 continue
             solved = [n for n in best if all(r["cost_s"] is not None for r in mine if r["problem"] == n)]
-            known = [n for n in hopeless
-                     if all(r["status"] in {"infeasible", "invalid"} for r in mine if r["problem"] == n)]
+            known = [
+                n for n in hopeless if all(r["status"] in {"infeasible", "invalid"} for r in mine if r["problem"] == n)
+            ]
             with_path = [r for r in mine if r["cost_s"] is not None]
             first = [r["first_s"] for r in with_path if r["first_s"] is not None]
-            out.append({
-                "planner": planner, "budget_s": budget_s, "solved": len(solved), "solvable": len(best),
-                "recognised": len(known), "hopeless": len(hopeless),
-                "first_ms": _spread([1000.0 * f for f in first]),
-                "over_bound": _spread([r["cost_s"] / bound[r["problem"]] - 1.0 for r in with_path
-                                       if bound.get(r["problem"], 0.0) > 0.0]),
-                "over_best": _spread([r["cost_s"] / best[r["problem"]] - 1.0 for r in with_path]),
-            })
+            out.append(
+                {
+                    "planner": planner,
+                    "budget_s": budget_s,
+                    "solved": len(solved),
+                    "solvable": len(best),
+                    "recognised": len(known),
+                    "hopeless": len(hopeless),
+                    "first_ms": _spread([1000.0 * f for f in first]),
+                    "over_bound": _spread(
+                        [
+                            r["cost_s"] / bound[r["problem"]] - 1.0
+                            for r in with_path
+                            if bound.get(r["problem"], 0.0) > 0.0
+                        ]
+                    ),
+                    "over_best": _spread([r["cost_s"] / best[r["problem"]] - 1.0 for r in with_path]),
+                }
+            )
     return out
 
 
@@ -193,15 +221,28 @@ def islands(vertices, size_m, seed=0, per=None):
 
 
 def board(size_m, shapes):
-    return Problem.from_json({
-        "id": "", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 0},
-        "goal": {"x": 0, "y": size_m, "radius": max(5.0, 0.002 * size_m)}, "obstacles": shapes, "fence": None,
-        "wind": {"from_deg": 10.0, "speed_mps": 5.0,
-                 "sigma": {"model": "ar1", "sigma0_deg": 3.0, "sigma_inf_deg": 9.0, "rho_hz": 0.03}},
-        "boat": {"no_go_half_deg": 45.0, "max_twa_deg": 180.0, "turn_rate_rad_s": 0.5,
-                 "speed": {"model": "constant", "v_mps": 1.5}},
-        "delta_s": 0.7,
-    })
+    return Problem.from_json(
+        {
+            "id": "",
+            "title": "",
+            "start": {"x": 0, "y": 0, "heading_deg": 0},
+            "goal": {"x": 0, "y": size_m, "radius": max(5.0, 0.002 * size_m)},
+            "obstacles": shapes,
+            "fence": None,
+            "wind": {
+                "from_deg": 10.0,
+                "speed_mps": 5.0,
+                "sigma": {"model": "ar1", "sigma0_deg": 3.0, "sigma_inf_deg": 9.0, "rho_hz": 0.03},
+            },
+            "boat": {
+                "no_go_half_deg": 45.0,
+                "max_twa_deg": 180.0,
+                "turn_rate_rad_s": 0.5,
+                "speed": {"model": "constant", "v_mps": 1.5},
+            },
+            "delta_s": 0.7,
+        }
+    )
 
 
 def scaling(budget_s):
@@ -224,15 +265,22 @@ def _scaled(kind, value, problem, budget_s):
     first = f"{answer.first_s:.3f}" if answer.first_s is not None else answer.status.value
     gap = f"{100 * answer.gap:.2f}" if math.isfinite(answer.gap) else "-"
     print(f"| {value:,.0f} | {first} | {took:.2f} | {gap} |".replace(",", " "), flush=True)
-    return {"kind": kind, "value": value, "first_s": answer.first_s, "elapsed_s": took, "status": answer.status.value,
-            "gap": answer.gap if math.isfinite(answer.gap) else None}
+    return {
+        "kind": kind,
+        "value": value,
+        "first_s": answer.first_s,
+        "elapsed_s": took,
+        "status": answer.status.value,
+        "gap": answer.gap if math.isfinite(answer.gap) else None,
+    }
 
 
 def main(argv=None):
     has_ompl = importlib.util.find_spec("ompl") is not None
     every = [*OURS, *(f"ompl-{name}" for name in OMPL)]
-    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="python -m bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("problems", nargs="*", help="problem files (default: bench/problems)")
     parser.add_argument("--budgets", nargs="+", type=float, default=[0.1, 1.0, 10.0], metavar="S")
     parser.add_argument("--seeds", type=int, default=2, help="at budgets below 5 s; one above")
@@ -259,8 +307,9 @@ def main(argv=None):
         show(lines)
     scaled = scaling(1.0) if args.scaling or not args.problems else []
     if args.json:
-        Path(args.json).write_text(json.dumps({"rows": rows, "summary": lines, "scaling": scaled}, indent=1) + "\n",
-                                   encoding="utf-8")
+        Path(args.json).write_text(
+            json.dumps({"rows": rows, "summary": lines, "scaling": scaled}, indent=1) + "\n", encoding="utf-8"
+        )
     return 0
 
 

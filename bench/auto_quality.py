@@ -50,15 +50,22 @@ def main() -> None:
                 over = 100.0 * (answer.cost_s / best[name]["time_s"] - 1.0)
                 first = 1e3 * (answer.first_s or 0.0)
                 rows.append((over, 100.0 * answer.gap, first))
-                print(f"{name:24}{seed:3}{over:17.3f}{100.0 * answer.gap:14.2f}{first:10.1f}{len(answer.legs):6}",
-                      flush=True)
+                print(
+                    f"{name:24}{seed:3}{over:17.3f}{100.0 * answer.gap:14.2f}{first:10.1f}{len(answer.legs):6}",
+                    flush=True,
+                )
         table = np.array(rows)
         if len(table):
-            for label, column, share in (("cost over best known, %", 0, 90), ("cost over lower bound, %", 1, 90),
-                                         ("first path, ms", 2, 90)):
+            for label, column, share in (
+                ("cost over best known, %", 0, 90),
+                ("cost over lower bound, %", 1, 90),
+                ("first path, ms", 2, 90),
+            ):
                 middle, high = np.percentile(table[:, column], [50, share])
-                print(f"  {label:26} median {middle:8.3f}   p90 {high:8.3f}   worst {table[:, column].max():8.3f}"
-                      f"   ({len(table)} runs)")
+                print(
+                    f"  {label:26} median {middle:8.3f}   p90 {high:8.3f}   worst {table[:, column].max():8.3f}"
+                    f"   ({len(table)} runs)"
+                )
     if args.update:
         lines = [json.dumps(k) + ":" + json.dumps(best[k], separators=(",", ":")) for k in sorted(best)]
         (HERE / "best_known.json").write_text("{" + ",\n".join(lines) + "}\n", encoding="utf-8")

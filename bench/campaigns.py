@@ -105,8 +105,10 @@ def main(argv=None):
             out = CampaignOptions(workers=means.workers, dask=means.dask, out=Path(folder) / f"{name}.jsonl")
             many = spent(count, lambda out=out, count=count: empty(count, out))
             added_s[name] = (many.cpu_s - few.cpu_s) / (count - 10)
-            print(f"  {name:18} {1000 * added_s[name]:6.2f} ms CPU a job, {few.cpu_s:5.1f} s CPU to begin and end",
-                  flush=True)
+            print(
+                f"  {name:18} {1000 * added_s[name]:6.2f} ms CPU a job, {few.cpu_s:5.1f} s CPU to begin and end",
+                flush=True,
+            )
         if not args.voyages:
             return 0
         seeds = range(args.voyages)
@@ -123,12 +125,16 @@ def main(argv=None):
             inner += [fact["cpu_s"] for fact in facts]
         print("largest worker: " + ", ".join(f"{name} {mb:.0f} MB" for name, mb in peaks))
         each_s = statistics.median(inner)
-        print(f"a voyage: {each_s:.2f} s CPU (median); the runner adds " + ", ".join(
-            f"{name} {100 * s / each_s:.2f} %" for name, s in added_s.items()))
+        print(
+            f"a voyage: {each_s:.2f} s CPU (median); the runner adds "
+            + ", ".join(f"{name} {100 * s / each_s:.2f} %" for name, s in added_s.items())
+        )
         last = [s for name, s in added_s.items() if "dask" in name][-1]
-        print(f"on paper: {VOYAGES} voyages by {MACHINES} machines of {CORES} cores like these: "
-              f"{VOYAGES * each_s / MACHINES / CORES / 60.0:.1f} min, of which one scheduler and client are busy "
-              f"{VOYAGES * last / 60.0:.1f} min of one core")
+        print(
+            f"on paper: {VOYAGES} voyages by {MACHINES} machines of {CORES} cores like these: "
+            f"{VOYAGES * each_s / MACHINES / CORES / 60.0:.1f} min, of which one scheduler and client are busy "
+            f"{VOYAGES * last / 60.0:.1f} min of one core"
+        )
     return 0
 
 

@@ -1,6 +1,6 @@
 """Wolsieffer's figure 7, sailed: by which channel, in a steady wind, under noise, and down wind.
 
-    python -m bench.channels --seeds 10 --out FOLDER [--autopilot ardurover]
+python -m bench.channels --seeds 10 --out FOLDER [--autopilot ardurover]
 """
 
 from __future__ import annotations
@@ -16,18 +16,24 @@ from companion.geofence import load_mission
 from companion.messages import GeoPoint
 
 WATER = Path(__file__).parent / "figure-7"
-CHANNEL = {"steady": "right", "noisy": "left", "down": "right"}   # as his picture has it, north up
-MIDDLE_M = 200.0   # north of the origin: here there is nothing between the channels but the island
+CHANNEL = {"steady": "right", "noisy": "left", "down": "right"}  # as his picture has it, north up
+MIDDLE_M = 200.0  # north of the origin: here there is nothing between the channels but the island
 
 
 def channel(voyage: Path) -> str:
     """Return by which channel a recorded voyage passed the island: ``left``, ``right``, or what else it did."""
     frame = load_mission(WATER / "mission-up.toml").frame()
     with (voyage / "track.csv").open() as file:
-        track = [frame.en_from_geo(GeoPoint(lat_deg=float(row["lat_deg"]), lon_deg=float(row["lon_deg"])))
-                 for row in csv.DictReader(file) if row["lat_deg"]]
-    sides = {"right" if a[0] + b[0] > 0.0 else "left" for a, b in pairwise(track)
-             if (a[1] - MIDDLE_M) * (b[1] - MIDDLE_M) <= 0.0}
+        track = [
+            frame.en_from_geo(GeoPoint(lat_deg=float(row["lat_deg"]), lon_deg=float(row["lon_deg"])))
+            for row in csv.DictReader(file)
+            if row["lat_deg"]
+        ]
+    sides = {
+        "right" if a[0] + b[0] > 0.0 else "left"
+        for a, b in pairwise(track)
+        if (a[1] - MIDDLE_M) * (b[1] - MIDDLE_M) <= 0.0
+    }
     return " and ".join(sorted(sides)) or "neither"
 
 
@@ -41,8 +47,19 @@ def main() -> int:
     for name, wanted in CHANNEL.items():
         for seed in range(args.seeds):
             folder = args.out / f"{name}-{seed}"
-            run = [sys.executable, "-m", "sitl.cli", "run", str(WATER / f"{name}.toml"), "--seed", str(seed),
-                   "--autopilot", args.autopilot, "--out", str(folder)]
+            run = [
+                sys.executable,
+                "-m",
+                "sitl.cli",
+                "run",
+                str(WATER / f"{name}.toml"),
+                "--seed",
+                str(seed),
+                "--autopilot",
+                args.autopilot,
+                "--out",
+                str(folder),
+            ]
             done = subprocess.run(run, capture_output=True, text=True, check=False)
             taken = channel(folder)
             wrong += done.returncode != 0 or taken != wanted

@@ -22,12 +22,11 @@ from companion.field.vector_fields import (
 )
 from companion.plots.field import BLUE, GREEN, GREY, RED, SAND, draw_boat, draw_wind, draw_zone, grid
 
-EVERY_S = 20.0   # between drawn boats
+EVERY_S = 20.0  # between drawn boats
 
 
 def draw_field(
-    ax: Axes, field: Field | Projection, half_m: float, *, count: int = 21, fan: bool = False,
-    colour: str = BLUE,
+    ax: Axes, field: Field | Projection, half_m: float, *, count: int = 21, fan: bool = False, colour: str = BLUE
 ) -> None:
     """Draw the arrows of a field; ``fan`` adds the sector of possible directions of a projected one."""
     points = grid(half_m, count)
@@ -42,8 +41,20 @@ def draw_field(
             turn = np.linspace(a, b, 7)
             edge = p + 0.62 * step * np.column_stack([np.sin(turn), np.cos(turn)])
             ax.add_patch(Polygon(np.vstack([p, edge]), closed=True, facecolor=SAND, alpha=0.38, edgecolor="none"))
-    ax.quiver(points[:, 0], points[:, 1], drawn[:, 0], drawn[:, 1], angles="xy", scale_units="xy", scale=1.0,
-              color=colour, width=0.0032, headwidth=4.0, headlength=5.0, zorder=3)
+    ax.quiver(
+        points[:, 0],
+        points[:, 1],
+        drawn[:, 0],
+        drawn[:, 1],
+        angles="xy",
+        scale_units="xy",
+        scale=1.0,
+        color=colour,
+        width=0.0032,
+        headwidth=4.0,
+        headlength=5.0,
+        zorder=3,
+    )
     ax.set(xlim=(-half_m, half_m), ylim=(-half_m, half_m))
     ax.set_aspect("equal")
     ax.grid(visible=False)
@@ -54,8 +65,10 @@ def atoms_figure() -> Figure:
     figure = Figure(figsize=(12.0, 8.2), layout="constrained")
     axes = figure.subplots(2, 3)
     atoms: list[tuple[str, Field, float]] = [
-        ("6.1 Line following", AttractiveLine(), 120.0), ("6.2 Circle following (10 m)", AttractiveCircle(), 25.0),
-        ("6.3 Attractive point", AttractivePoint(), 12.0), ("6.4 Repulsive line", RepulsiveLine(), 200.0),
+        ("6.1 Line following", AttractiveLine(), 120.0),
+        ("6.2 Circle following (10 m)", AttractiveCircle(), 25.0),
+        ("6.3 Attractive point", AttractivePoint(), 12.0),
+        ("6.4 Repulsive line", RepulsiveLine(), 200.0),
         ("6.5 Repulsive point", RepulsivePoint(), 200.0),
     ]
     for ax, (title, field, half) in zip(axes.flat, atoms, strict=False):
@@ -75,8 +88,14 @@ def atoms_figure() -> Figure:
     axes.flat[3].set_ylabel("north [m]", fontsize=8)
     last = axes.flat[5]
     last.axis("off")
-    last.text(0.0, 0.6, "Arrows: direction of the field; their length grows with\nthe square root of its strength "
-              "(nominal 10, repulsive\nup to 20 with a Gaussian of 100 m).", fontsize=9, va="center")
+    last.text(
+        0.0,
+        0.6,
+        "Arrows: direction of the field; their length grows with\nthe square root of its strength "
+        "(nominal 10, repulsive\nup to 20 with a Gaussian of 100 m).",
+        fontsize=9,
+        va="center",
+    )
     figure.suptitle("Schmitt's atomic vector fields", fontsize=12)
     return figure
 
@@ -88,8 +107,10 @@ def trees_figure() -> Figure:
     one, two = (-110.0, 10.0), (40.0, 55.0)
     line = HysteresisZone(at_en=(0.0, 0.0), course_rad=math.pi / 2.0)
     point = HysteresisZone.of_point((0.0, 0.0), twd_from_rad)
-    boats = (("Boat 1: line following", AttractiveLine() + RepulsivePoint().shifted(*two), line, one, two),
-             ("Boat 2: attractive point", AttractivePoint() + RepulsivePoint().shifted(*one), point, two, one))
+    boats = (
+        ("Boat 1: line following", AttractiveLine() + RepulsivePoint().shifted(*two), line, one, two),
+        ("Boat 2: attractive point", AttractivePoint() + RepulsivePoint().shifted(*one), point, two, one),
+    )
     for ax, (title, field, zone, own, other) in zip(figure.subplots(1, 2), boats, strict=True):
         tree = Projection(field=field, twd_from_rad=twd_from_rad, zone=zone)
         draw_field(ax, tree, 200.0, count=21, fan=True)
@@ -106,8 +127,14 @@ def trees_figure() -> Figure:
 
 
 def encounter_figure(
-    track: NDArray[np.float64], intruder: NDArray[np.float64], *, half_m: float, twd_from_rad: float, tws_mps: float,
-    title: str, entered_s: float,
+    track: NDArray[np.float64],
+    intruder: NDArray[np.float64],
+    *,
+    half_m: float,
+    twd_from_rad: float,
+    tws_mps: float,
+    title: str,
+    entered_s: float,
 ) -> Figure:
     """Return the square, both tracks with boats at equal times, and where they were nearest.
 
@@ -135,12 +162,24 @@ def encounter_figure(
         draw_boat(ax, (float(track[i, 1]), float(track[i, 2])), float(track[i, 3]), 9.0, RED)
         draw_boat(ax, (float(intruder[i, 0]), float(intruder[i, 1])), course, 9.0, BLUE)
         for p in (track[i, 1:3], intruder[i]):
-            ax.annotate(f"{k * EVERY_S:.0f} s", (float(p[0]), float(p[1])), textcoords="offset points",
-                        xytext=(6, 5), fontsize=7, annotation_clip=True)
+            ax.annotate(
+                f"{k * EVERY_S:.0f} s",
+                (float(p[0]), float(p[1])),
+                textcoords="offset points",
+                xytext=(6, 5),
+                fontsize=7,
+                annotation_clip=True,
+            )
     d = np.hypot(*(track[:, 1:3] - intruder).T)
     i = int(np.argmin(d))
-    ax.plot([track[i, 1], intruder[i, 0]], [track[i, 2], intruder[i, 1]], color=GREEN, lw=1.3, ls=":",
-            label=f"nearest, {d[i]:.0f} m between centres")
+    ax.plot(
+        [track[i, 1], intruder[i, 0]],
+        [track[i, 2], intruder[i, 1]],
+        color=GREEN,
+        lw=1.3,
+        ls=":",
+        label=f"nearest, {d[i]:.0f} m between centres",
+    )
     reach = 1.45 * half_m
     ax.set_xlim(-reach, reach)
     ax.set_ylim(-reach, reach)

@@ -95,9 +95,12 @@ def wolsieffer_2():
 def wolsieffer_6():
     figure, axes = plt.subplots(3, 2, figsize=(11.0, 18.4), layout="constrained")
     for ax, letter, is_up, delta, growth in (
-        (axes[0, 0], "a, as wide as his", True, DELTA_6A, AS_WIDE), (axes[0, 1], "b", True, DELTA_6B, AS_WIDE),
-        (axes[1, 0], "a, so that b is shut", True, DELTA_6A, AS_SHUT), (axes[1, 1], "b", True, DELTA_6B, AS_SHUT),
-        (axes[2, 0], "c", False, DELTA_6A, AS_SHUT), (axes[2, 1], "d", False, DELTA_6B, AS_SHUT),
+        (axes[0, 0], "a, as wide as his", True, DELTA_6A, AS_WIDE),
+        (axes[0, 1], "b", True, DELTA_6B, AS_WIDE),
+        (axes[1, 0], "a, so that b is shut", True, DELTA_6A, AS_SHUT),
+        (axes[1, 1], "b", True, DELTA_6B, AS_SHUT),
+        (axes[2, 0], "c", False, DELTA_6A, AS_SHUT),
+        (axes[2, 1], "d", False, DELTA_6B, AS_SHUT),
     ):
         p = four_polygons(delta, is_up=is_up, growth=growth)
         answer = plan(p, algorithm="rrtstar", expansions=6000, seed=1)
@@ -117,7 +120,8 @@ def wolsieffer_6():
 def wolsieffer_7():
     figure, axes = plt.subplots(1, 3, figsize=(13.0, 5.6), layout="constrained")
     for ax, letter, is_up, sigma0_deg, text in (
-        (axes[0], "a", True, STEADY_DEG, "steady wind"), (axes[1], "b", True, NOISY_DEG, "noisy wind"),
+        (axes[0], "a", True, STEADY_DEG, "steady wind"),
+        (axes[1], "b", True, NOISY_DEG, "noisy wind"),
         (axes[2], "c", False, NOISY_DEG, "down wind"),
     ):
         p = two_channels(sigma0_deg, is_up=is_up)
@@ -134,23 +138,38 @@ def sail(p, **settings):
     if outcome.waypoints_en is None:
         return Plan(status=PlanStatus.TIMEOUT, reason=outcome.reason, waypoints_en=np.empty((0, 2))), outcome
     judged = evaluate(p, outcome.waypoints_en)
-    return Plan(status=PlanStatus.FOUND, reason="", waypoints_en=outcome.waypoints_en, legs=judged.legs,
-                cost_s=judged.time_s, algorithm="astar"), outcome
+    return Plan(
+        status=PlanStatus.FOUND,
+        reason="",
+        waypoints_en=outcome.waypoints_en,
+        legs=judged.legs,
+        cost_s=judged.time_s,
+        algorithm="astar",
+    ), outcome
 
 
 def panel(ax, p, letter, text, **settings):
     answer, outcome = sail(p, **settings)
     turns = max(0, len(answer.legs) - 1)
-    result = outcome.reason if not answer.has_path else \
-        f"{answer.cost_s:.0f} s, {turns} turns, {outcome.trace['expanded']} nodes"
+    result = (
+        outcome.reason
+        if not answer.has_path
+        else f"{answer.cost_s:.0f} s, {turns} turns, {outcome.trace['expanded']} nodes"
+    )
     draw_plan(ax, p, answer, title=f"({letter}) {text}\n{result}", fans=False)
 
 
 def busser_5_1():
     figure, axes = plt.subplots(1, 2, figsize=(10.0, 6.2), layout="constrained")
     for ax, letter, knots in ((axes[0], "a", 10.0), (axes[1], "b", 20.0)):
-        panel(ax, lake(0.0, knots), letter, f"sailing time only, {knots:.0f} kn from 0°", turn_s_per_rad=0.0,
-              heuristic_mps=None)
+        panel(
+            ax,
+            lake(0.0, knots),
+            letter,
+            f"sailing time only, {knots:.0f} kn from 0°",
+            turn_s_per_rad=0.0,
+            heuristic_mps=None,
+        )
     save(figure, "busser-5-1")
 
 
@@ -239,11 +258,22 @@ def field_composed():
 def wrsc2013():
     sailed = run_wrsc2013(WRSC_SEED)
     course, score = sailed.course, sailed.score
-    title = (f"WRSC 2013, seed {WRSC_SEED}, by field: nearest hulls {score.least_m:.0f} m, "
-             f"out after {score.left_after_s:.0f} s")
-    save(encounter_figure(
-        sailed.track, sailed.intruder, half_m=HALF_M, twd_from_rad=course.twd_from_rad, tws_mps=course.tws_mps,
-        title=title, entered_s=course.entry_s), "wrsc2013-field")
+    title = (
+        f"WRSC 2013, seed {WRSC_SEED}, by field: nearest hulls {score.least_m:.0f} m, "
+        f"out after {score.left_after_s:.0f} s"
+    )
+    save(
+        encounter_figure(
+            sailed.track,
+            sailed.intruder,
+            half_m=HALF_M,
+            twd_from_rad=course.twd_from_rad,
+            tws_mps=course.tws_mps,
+            title=title,
+            entered_s=course.entry_s,
+        ),
+        "wrsc2013-field",
+    )
 
 
 WRSC_SEED = 9
@@ -251,10 +281,19 @@ WRSC_SEED = 9
 
 FIGURES = {
     "wolsieffer-2": wolsieffer_2,
-    "wolsieffer-6": wolsieffer_6, "wolsieffer-7": wolsieffer_7, "busser-5-1": busser_5_1, "busser-5-2": busser_5_2,
-    "busser-5-3": busser_5_3, "busser-5-4": busser_5_4, "risk": risk, "wind-filter": wind_filter,
-    "wind-filter-recorded": wind_filter_recorded, "field-atoms": field_atoms, "field-trees": field_trees,
-    "field-composed": field_composed, "wrsc2013-field": wrsc2013,
+    "wolsieffer-6": wolsieffer_6,
+    "wolsieffer-7": wolsieffer_7,
+    "busser-5-1": busser_5_1,
+    "busser-5-2": busser_5_2,
+    "busser-5-3": busser_5_3,
+    "busser-5-4": busser_5_4,
+    "risk": risk,
+    "wind-filter": wind_filter,
+    "wind-filter-recorded": wind_filter_recorded,
+    "field-atoms": field_atoms,
+    "field-trees": field_trees,
+    "field-composed": field_composed,
+    "wrsc2013-field": wrsc2013,
 }
 
 

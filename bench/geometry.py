@@ -1,6 +1,6 @@
 """Geometry at speed: many segments, points and distances against a coast in one call each, beside shapely's own.
 
-    python bench/geometry.py [--segments 100000] [--vertices 10000]
+python bench/geometry.py [--segments 100000] [--vertices 10000]
 """
 
 import argparse
@@ -45,8 +45,10 @@ def main():
     polygons = coast(rng, 40, args.vertices // 40, extent_m)
     began = time.perf_counter()
     index = PolygonIndex(polygons)
-    print(f"{index.edge_count} edges, {len(polygons)} islands, {2 * extent_m / 1000:g} km square; "
-          f"index built in {1e3 * (time.perf_counter() - began):.0f} ms (compilation included)")
+    print(
+        f"{index.edge_count} edges, {len(polygons)} islands, {2 * extent_m / 1000:g} km square; "
+        f"index built in {1e3 * (time.perf_counter() - began):.0f} ms (compilation included)"
+    )
     union = shapely.union_all(polygons)
     shapely.prepare(union)
     index.intersects(np.zeros((1, 4)))
@@ -58,9 +60,12 @@ def main():
         segments = np.hstack([start, start + rng.normal(0.0, mean_m, (args.segments, 2))])
         ours_ms, ours = best_ms(lambda s=segments: index.intersects(s))
         theirs_ms, theirs = best_ms(
-            lambda s=segments: shapely.intersects(union, shapely.linestrings(s.reshape(-1, 2, 2))), repeats=1)
-        print(f"{args.segments} segments of ~{1.25 * mean_m:5.0f} m       {ours_ms:10.1f}{theirs_ms:14.1f}  "
-              f"{int((ours != theirs).sum())}")
+            lambda s=segments: shapely.intersects(union, shapely.linestrings(s.reshape(-1, 2, 2))), repeats=1
+        )
+        print(
+            f"{args.segments} segments of ~{1.25 * mean_m:5.0f} m       {ours_ms:10.1f}{theirs_ms:14.1f}  "
+            f"{int((ours != theirs).sum())}"
+        )
     points = rng.uniform(-extent_m, extent_m, (args.segments, 2))
     ours_ms, ours = best_ms(lambda: index.contains(points))
     theirs_ms, theirs = best_ms(lambda: shapely.contains_xy(union, points[:, 0], points[:, 1]), repeats=1)
@@ -68,8 +73,10 @@ def main():
     few = points[:2000]
     ours_ms, ours = best_ms(lambda: index.distance_m(few))
     theirs_ms, theirs = best_ms(lambda: shapely.distance(union.boundary, shapely.points(few)), repeats=1)
-    print(f"2000 distances                      {ours_ms:8.1f}{theirs_ms:14.1f}  "
-          f"{float(np.abs(np.abs(ours) - theirs).max()):.1e} m")
+    print(
+        f"2000 distances                      {ours_ms:8.1f}{theirs_ms:14.1f}  "
+        f"{float(np.abs(np.abs(ours) - theirs).max()):.1e} m"
+    )
 
 
 if __name__ == "__main__":

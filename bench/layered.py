@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
 
-NAME_PX, TEXT_PX = 13.0, 10.5            # sizes of type
-CHARACTER = 0.52                         # mean width of a character, as a share of its size
-PAD, GAP_X, GAP_Y = 8.0, 10.0, 34.0      # inside a box, between boxes of a floor, between floors [px]
-SLOT_PX = 4.0                            # what an arrow takes where it passes a floor
-SWEEPS = 24                              # the drawings here stand still after a dozen
+NAME_PX, TEXT_PX = 13.0, 10.5  # sizes of type
+CHARACTER = 0.52  # mean width of a character, as a share of its size
+PAD, GAP_X, GAP_Y = 8.0, 10.0, 34.0  # inside a box, between boxes of a floor, between floors [px]
+SLOT_PX = 4.0  # what an arrow takes where it passes a floor
+SWEEPS = 24  # the drawings here stand still after a dozen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,7 +104,7 @@ def implied(edges: Mapping[str, Iterable[str]]) -> set[tuple[str, str]]:
 
     def reach(name: str, way: tuple[str, ...]) -> set[str]:
         if name in way:
-            raise ValueError("a circle: " + " -> ".join((*way[way.index(name):], name)))
+            raise ValueError("a circle: " + " -> ".join((*way[way.index(name) :], name)))
         if name not in below:
             below[name] = {far for near in edges.get(name, ()) for far in {near} | reach(near, (*way, name))}
         return below[name]
@@ -124,8 +124,11 @@ def draw(floors: Sequence[Sequence[Box]], edges: Iterable[tuple[str, str]]) -> D
     heights = [max(box.height_px for box in floor) for floor in floors]
     tops = [sum(heights[:i]) + GAP_Y * i for i in range(len(floors))]
     lines = [_arrow([(slot, tops[slot.floor], heights[slot.floor]) for slot in way], left) for way in ways]
-    boxes = [_box(slot.box, slot.x - left, tops[slot.floor] + (heights[slot.floor] - slot.box.height_px) / 2.0)
-             for slot in slots if slot.box is not None]
+    boxes = [
+        _box(slot.box, slot.x - left, tops[slot.floor] + (heights[slot.floor] - slot.box.height_px) / 2.0)
+        for slot in slots
+        if slot.box is not None
+    ]
     return Drawing((*lines, *boxes), right - left, tops[-1] + heights[-1])
 
 
@@ -229,9 +232,10 @@ def _box(box: Box, x: float, y: float) -> str:
         for chip in row:
             wide = _chip_px(chip)
             parts.append(
-                f'<g><title>{escape(chip.words)}</title>'
+                f"<g><title>{escape(chip.words)}</title>"
                 f'<rect class="chip {chip.kind}" x="{at:.0f}" y="{y + 7.0:.0f}" width="{wide:.0f}" height="16"/>'
-                f'<text class="words" x="{at + wide / 2.0:.0f}" y="{y + 18.5:.0f}">{escape(chip.name)}</text></g>')
+                f'<text class="words" x="{at + wide / 2.0:.0f}" y="{y + 18.5:.0f}">{escape(chip.name)}</text></g>'
+            )
             at += wide + 4.0
         y += 20.0
     return "".join(parts)

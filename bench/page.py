@@ -24,11 +24,13 @@ async def _ask(port: int, path: str) -> tuple[asyncio.StreamReader, asyncio.Stre
     while True:
         try:
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        except OSError:   # not there yet
+        except OSError:  # not there yet
             await asyncio.sleep(0.2)
         else:
-            writer.write(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nAccept-Encoding: gzip\r\n"
-                         "Connection: close\r\n\r\n".encode())
+            writer.write(
+                f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nAccept-Encoding: gzip\r\n"
+                "Connection: close\r\n\r\n".encode()
+            )
             return reader, writer
 
 
@@ -54,7 +56,7 @@ async def _again(port: int) -> None:
 
 async def _deaf(port: int) -> None:
     _, writer = await _ask(port, "/api/stream")
-    writer.transport.pause_reading()   # type: ignore[attr-defined]
+    writer.transport.pause_reading()  # type: ignore[attr-defined]
     await asyncio.Event().wait()
 
 
@@ -87,8 +89,10 @@ def main() -> int:
     with watched(port):
         seen = live(args.seconds, "--http", str(port))
     for name, figures in (("alone", alone), (f"{WATCHERS} watch, one is deaf", seen)):
-        print(f"{name}: {100 * figures['cpu_core_mean']:.1f} % of a core, {figures['memory_mb']:.0f} MB, "
-              f"the loop held for at most {1e3 * figures['loop_held_max_s']:.1f} ms")
+        print(
+            f"{name}: {100 * figures['cpu_core_mean']:.1f} % of a core, {figures['memory_mb']:.0f} MB, "
+            f"the loop held for at most {1e3 * figures['loop_held_max_s']:.1f} ms"
+        )
     print(f"a client costs {100 * (seen['cpu_core_mean'] - alone['cpu_core_mean']) / WATCHERS:.2f} % of a core")
     return 0
 

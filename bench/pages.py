@@ -82,9 +82,17 @@ a.parquet`, the same for `b.toml`, then `sitl results compare a.parquet b.parque
 """
 # The tables in the order of the page: the class, how its table is written.
 _TABLES = {
-    "Scenario": "At the top", "WindSpec": "`[wind]`", "LeeSpec": "`[[wind.lees]]`", "CurrentSpec": "`[current]`",
-    "WavesSpec": "`[waves]`", "HullSpec": "`[boat]`", "SensorsSpec": "`[sensors]`", "SatelliteSpec": "`[satellite]`",
-    "ExpectSpec": "`[expect]`", "HeldSpec": "`[expect.held]`", "EventSpec": "`[[events]]`",
+    "Scenario": "At the top",
+    "WindSpec": "`[wind]`",
+    "LeeSpec": "`[[wind.lees]]`",
+    "CurrentSpec": "`[current]`",
+    "WavesSpec": "`[waves]`",
+    "HullSpec": "`[boat]`",
+    "SensorsSpec": "`[sensors]`",
+    "SatelliteSpec": "`[satellite]`",
+    "ExpectSpec": "`[expect]`",
+    "HeldSpec": "`[expect.held]`",
+    "EventSpec": "`[[events]]`",
 }
 _KEY = re.compile(r"^    (\w+): ([^#]+?)(?: = ([^#]+?))?\s*(?:#\s*(.*))?$")
 _GOES_ON = re.compile(r"^\s{8,}#\s*(.*)$")
@@ -94,11 +102,17 @@ _KIND = re.compile(r'^    ((?:"\w+",\s*)+)(?:#\s*(.*))?$')
 def made() -> dict[Path, str]:
     """Return what is made of the code: {file: its text}."""
     view = schema()
-    between = {"docs/guides/orders.md": verbs(), "docs/reference/far.md": layouts(),
-               "docs/reference/skipper.md": behaviors()}
+    between = {
+        "docs/guides/orders.md": verbs(),
+        "docs/reference/far.md": layouts(),
+        "docs/reference/skipper.md": behaviors(),
+    }
     whole = {
-        "docs/reference/watchdogs.md": watchdogs(), "docs/reference/scenarios.md": scenarios(),
-        "companion/view/view.schema.json": json.dumps(view, indent=1) + "\n", "companion/view/view.d.ts": types(view)}
+        "docs/reference/watchdogs.md": watchdogs(),
+        "docs/reference/scenarios.md": scenarios(),
+        "companion/view/view.schema.json": json.dumps(view, indent=1) + "\n",
+        "companion/view/view.d.ts": types(view),
+    }
     texts = whole | {path: _put(path, part) for path, part in between.items()}
     return {ROOT / path: text for path, text in texts.items()}
 
@@ -113,7 +127,9 @@ def verbs() -> str:
     head = ["| order | param1 | means | stands | refused when |", "|---|---|---|---|---|"]
     rows = [
         f"| `{row.verb}{f' {row.takes}' if row.takes else ''}` | {row.number} | {row.means} | "
-        f"{'yes' if row.stands else '-'} | {row.refused} |" for row in VERBS]
+        f"{'yes' if row.stands else '-'} | {row.refused} |"
+        for row in VERBS
+    ]
     return "\n".join([*head, *rows, ""])
 
 
@@ -122,7 +138,8 @@ def layouts() -> str:
     head = ["| byte | type | field | unit | not known | what |", "|---|---|---|---|---|---|"]
     parts = []
     for title, layout, size in (
-        ("The order", order.LAYOUT, order.SIZE), ("The beginning", order.BEGINNING_LAYOUT, order.BEGINNING_SIZE),
+        ("The order", order.LAYOUT, order.SIZE),
+        ("The beginning", order.BEGINNING_LAYOUT, order.BEGINNING_SIZE),
         ("The status", status.LAYOUT, status.SIZE),
     ):
         code = f"| {layout.size} | {SEAL_BYTES} bytes | `code` | - | - | the authentication code |"
@@ -138,19 +155,33 @@ def behaviors() -> str:
 
 def watchdogs() -> str:
     """Return docs/reference/watchdogs.md."""
-    return "".join((
-        DOGS_HEAD, *map(_row, TABLE), ENDS_HEAD, *map(_ending, BY_RANK), FIGURES_HEAD, *map(_figure, SETTINGS.values()),
-        *(f"| `{cause.key}` | `{WORD_OF[cause.answer]}` | when the {cause.name} failsafe has |\n"
-          for cause in FAILSAFES if cause.key),
-        CAUSES_HEAD, *map(_cause, FAILSAFES)))
+    return "".join(
+        (
+            DOGS_HEAD,
+            *map(_row, TABLE),
+            ENDS_HEAD,
+            *map(_ending, BY_RANK),
+            FIGURES_HEAD,
+            *map(_figure, SETTINGS.values()),
+            *(
+                f"| `{cause.key}` | `{WORD_OF[cause.answer]}` | when the {cause.name} failsafe has |\n"
+                for cause in FAILSAFES
+                if cause.key
+            ),
+            CAUSES_HEAD,
+            *map(_cause, FAILSAFES),
+        )
+    )
 
 
 def _ending(name: str) -> str:
     ending = ENDINGS[name]
     marks = "†" * ending.sails_on + "‡" * ending.over_orders
     asked = f"; watched with `{ending.asked_by}`" if ending.asked_by else ""
-    return (f'| `{ending.key}`{marks} | `{ending.default}` | {ending.because}: watchdog "{name}"{asked} | '
-            f"{ending.until or 'the voyage is over'} |\n")
+    return (
+        f'| `{ending.key}`{marks} | `{ending.default}` | {ending.because}: watchdog "{name}"{asked} | '
+        f"{ending.until or 'the voyage is over'} |\n"
+    )
 
 
 def _figure(setting: Setting) -> str:
@@ -161,19 +192,27 @@ def _row(dog: Watchdog) -> str:
     sign, back = ("≥", "≤") if dog.enter >= dog.exit else ("≤", "≥")
     unit = f" {dog.unit}" if dog.unit else ""
     mark = "*" if dog.at_rest else "°" if dog.loitering else ""
-    return " | ".join((
-        f"| {dog.name}{mark}", str(dog.number), dog.watches,
-        f"{sign} {dog.enter:g}{unit} for {dog.enter_s:g} s",
-        f"{back} {dog.exit:g}{unit} for {dog.exit_s:g} s", dog.severity.name.lower(), dog.response.value,
-        f"{dog.why} |\n",
-    ))
+    return " | ".join(
+        (
+            f"| {dog.name}{mark}",
+            str(dog.number),
+            dog.watches,
+            f"{sign} {dog.enter:g}{unit} for {dog.enter_s:g} s",
+            f"{back} {dog.exit:g}{unit} for {dog.exit_s:g} s",
+            dog.severity.name.lower(),
+            dog.response.value,
+            f"{dog.why} |\n",
+        )
+    )
 
 
 def _cause(cause: Cause) -> str:
     words = ", ".join(f"`{text.strip()} …`" for text in cause.texts) or "–"
     first = f"waits for {cause.waits_for}; " if cause.waits_for and cause.answer is not Recovery.LEAVE else ""
-    return (f"| {cause.name} | {words} | {cause.shown or '–'} | {first}{cause.answer.value} | {cause.press} | "
-            f"{cause.why} |\n")
+    return (
+        f"| {cause.name} | {words} | {cause.shown or '–'} | {first}{cause.answer.value} | {cause.press} | "
+        f"{cause.why} |\n"
+    )
 
 
 def scenarios() -> str:
@@ -187,12 +226,17 @@ def scenarios() -> str:
         last = node.end_lineno or node.lineno
         end = next((n.lineno - 2 for n in node.body if isinstance(n, ast.FunctionDef)), last)
         said = " ".join((ast.get_docstring(node) or "").split("\n\n")[0].split()).replace("``", "`")
-        rows = [f"| `{key}` | {default} | {told or _read_by(key, kinds)} |"
-                for key, default, told in _keys(lines[node.lineno:end])]
+        rows = [
+            f"| `{key}` | {default} | {told or _read_by(key, kinds)} |"
+            for key, default, told in _keys(lines[node.lineno : end])
+        ]
         table = "\n".join(["| key | default | what it is |", "|---|---|---|", *rows])
         parts.append(f"## {title}\n\n{said}\n\n{table}\n")
-    parts.append("## Kinds of events\n\n| `kind` | the keys that it reads, and what happens |\n|---|---|\n"
-                 + "\n".join(f"| {names} | {told} |" for names, told in kinds) + "\n")
+    parts.append(
+        "## Kinds of events\n\n| `kind` | the keys that it reads, and what happens |\n|---|---|\n"
+        + "\n".join(f"| {names} | {told} |" for names, told in kinds)
+        + "\n"
+    )
     return "\n".join(parts)
 
 
@@ -225,7 +269,7 @@ def _default(text: str | None) -> str:
 def _kinds(lines: list[str]) -> Iterator[tuple[str, str]]:
     start = next(n for n, line in enumerate(lines) if line.startswith("EventKind"))
     found: list[list[str]] = []
-    for line in lines[start + 1:]:
+    for line in lines[start + 1 :]:
         if line.startswith("]"):
             break
         if match := _KIND.match(line):
@@ -253,8 +297,11 @@ def schema() -> dict[str, Any]:
             for part in component["properties"].values():
                 part.pop("default", None)
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema", "$id": "companion.view/1",
-        "title": "companion.view/1", "$ref": "#/$defs/View", "$defs": dict(sorted(components.items())),
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": "companion.view/1",
+        "title": "companion.view/1",
+        "$ref": "#/$defs/View",
+        "$defs": dict(sorted(components.items())),
     }
 
 

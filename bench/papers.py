@@ -12,16 +12,22 @@ from companion.geo import MPS_PER_KNOT
 from companion.planner import Problem
 
 FOUR = [
-    "POLYGON((-110 95,-35 80,-20 130,-75 165,-110 95))", "POLYGON((25 60,95 75,80 130,30 120,25 60))",
-    "POLYGON((-60 210,0 190,25 240,-25 275,-60 210))", "POLYGON((60 190,130 175,140 250,85 260,60 190))",
+    "POLYGON((-110 95,-35 80,-20 130,-75 165,-110 95))",
+    "POLYGON((25 60,95 75,80 130,30 120,25 60))",
+    "POLYGON((-60 210,0 190,25 240,-25 275,-60 210))",
+    "POLYGON((60 190,130 175,140 250,85 260,60 190))",
 ]
 CHANNELS = [  # an island between two shores: a channel on its left, one on its right
     "POLYGON((-40 80,30 60,60 160,45 300,-20 320,-60 220,-40 80))",
     "POLYGON((-400 -50,-210 -50,-150 120,-165 260,-130 380,-170 480,-400 480,-400 -50))",
     "POLYGON((120 -50,400 -50,400 480,170 480,125 340,140 180,120 -50))",
 ]
-WOLSIEFFER = {"no_go_half_deg": 45.0, "max_twa_deg": 180.0, "turn_rate_rad_s": 0.5,
-              "speed": {"model": "constant", "v_mps": 1.5}}
+WOLSIEFFER = {
+    "no_go_half_deg": 45.0,
+    "max_twa_deg": 180.0,
+    "turn_rate_rad_s": 0.5,
+    "speed": {"model": "constant", "v_mps": 1.5},
+}
 
 
 def problem(**parts):
@@ -33,8 +39,11 @@ def end(x, y, **more):
 
 
 def kalman(from_deg, sigma0, growth):
-    return {"from_deg": from_deg, "speed_mps": 5.0,
-            "sigma": {"model": "kalman", "sigma0_deg": sigma0, "growth_deg_per_sqrt_s": growth}}
+    return {
+        "from_deg": from_deg,
+        "speed_mps": 5.0,
+        "sigma": {"model": "kalman", "sigma0_deg": sigma0, "growth_deg_per_sqrt_s": growth},
+    }
 
 
 # ------------------------------------------------------------------------------------- Wolsieffer
@@ -54,14 +63,26 @@ def four_polygons(delta_s, *, is_up, growth=AS_SHUT):
     """
     low, high = end(0, 0, heading_deg=0), end(20, 330, heading_deg=180)
     start, goal = (low, high) if is_up else (high, low)
-    return problem(start=start, goal=end(goal["x"], goal["y"], radius=4), obstacles=FOUR, boat=WOLSIEFFER,
-                   wind=kalman(0.0, 0.0, growth), delta_s=delta_s)
+    return problem(
+        start=start,
+        goal=end(goal["x"], goal["y"], radius=4),
+        obstacles=FOUR,
+        boat=WOLSIEFFER,
+        wind=kalman(0.0, 0.0, growth),
+        delta_s=delta_s,
+    )
 
 
 def lee_rock(sigma0_deg):
     """Figure 2: a goal that the wind of the moment just lets be laid, close along a rock to leeward."""
-    return problem(start=end(0, 0, heading_deg=45), goal=end(200, 203, radius=5), boat=WOLSIEFFER, delta_s=0.9,
-                   obstacles=["POLYGON((70 60,140 130,165 100,100 35,70 60))"], wind=kalman(0.0, sigma0_deg, 0.0))
+    return problem(
+        start=end(0, 0, heading_deg=45),
+        goal=end(200, 203, radius=5),
+        boat=WOLSIEFFER,
+        delta_s=0.9,
+        obstacles=["POLYGON((70 60,140 130,165 100,100 35,70 60))"],
+        wind=kalman(0.0, sigma0_deg, 0.0),
+    )
 
 
 SHIFT_2_DEG, SIGMA_2_DEG = 10.0, 8.0
@@ -87,8 +108,13 @@ def two_channels(sigma0_deg, *, is_up):
     """Figure 7."""
     up = {"start": end(0, -20, heading_deg=0), "goal": end(10, 420, radius=4)}
     down = {"start": end(10, 420, heading_deg=180), "goal": end(0, -20, radius=4)}
-    return problem(**(up if is_up else down), obstacles=CHANNELS, boat=WOLSIEFFER,
-                   wind=kalman(WIND_7_DEG, sigma0_deg, 0.05), delta_s=0.75)
+    return problem(
+        **(up if is_up else down),
+        obstacles=CHANNELS,
+        boat=WOLSIEFFER,
+        wind=kalman(WIND_7_DEG, sigma0_deg, 0.05),
+        delta_s=0.75,
+    )
 
 
 # ----------------------------------------------------------------------------------------- Büsser
@@ -99,7 +125,9 @@ def lake(wind_from, knots=10.0):
     island = ", ".join(f"{120 + 90 * np.cos(a):.2f} {560 + 90 * np.sin(a):.2f}" for a in angles[:-1])
     first = f"{120 + 90:.2f} 560.00"
     return problem(
-        start=end(0, 0, heading_deg=0), goal=end(40, 900, radius=10), boat=boat,
+        start=end(0, 0, heading_deg=0),
+        goal=end(40, 900, radius=10),
+        boat=boat,
         obstacles=["POLYGON((-120 250,-20 250,-20 350,-120 350,-120 250))", f"POLYGON(({island}, {first}))"],
         wind={"from_deg": wind_from, "speed_mps": knots * MPS_PER_KNOT, "sigma": {"model": "none"}},
         fence="POLYGON((-450 -100,550 -100,550 1000,-450 1000,-450 -100))",

@@ -56,8 +56,10 @@ class Groups:
         else:
             used_s, held_s = int(self.read("cpuacct.usage")) / 1e9, int(stat["throttled_time"]) / 1e9
             peak = self.read("memory.max_usage_in_bytes")
-        return (f"processor {used_s:.1f} s, held back {held_s:.1f} s; memory at most {int(peak) / 1e6:.0f} MB "
-                "with what the kernel keeps of its files")
+        return (
+            f"processor {used_s:.1f} s, held back {held_s:.1f} s; memory at most {int(peak) / 1e6:.0f} MB "
+            "with what the kernel keeps of its files"
+        )
 
     def remove(self) -> None:
         for folder in self.folders:
@@ -84,10 +86,14 @@ def main() -> int:
             summary = json.loads((folder / "summary.json").read_text())
             plans = [json.loads(line) for line in (folder / "decisions.jsonl").read_text().splitlines()]
             took = sorted(p["plan"]["elapsed_s"] for p in plans if p["kind"] == "plan" and p.get("plan"))
-        print(f"arrived {summary['arrived']} after {summary['time_s']:.0f} s, contacts {summary['contacts']}, "
-              f"smallest clearance {summary['min_clearance_m']} m")
-        print(f"first step after {started_s:.1f} s; planner restarts {summary['planner_restarts']}; "
-              f"plans {len(took)}, the longest {took[-1] if took else 0:.1f} s")
+        print(
+            f"arrived {summary['arrived']} after {summary['time_s']:.0f} s, contacts {summary['contacts']}, "
+            f"smallest clearance {summary['min_clearance_m']} m"
+        )
+        print(
+            f"first step after {started_s:.1f} s; planner restarts {summary['planner_restarts']}; "
+            f"plans {len(took)}, the longest {took[-1] if took else 0:.1f} s"
+        )
         print(groups.took())
         return 0 if summary["arrived"] else 1
     finally:

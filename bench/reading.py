@@ -86,17 +86,31 @@ def _swapped(ring: list[LonLat]) -> str:
 
 
 def _geojson(features: list[tuple[str, object]], *, indent: int | None = None) -> str:
-    return json.dumps({"type": "FeatureCollection", "features": [
-        {"type": "Feature", "properties": {}, "geometry": {"type": kind, "coordinates": shape}}
-        for kind, shape in features]}, indent=indent)
+    return json.dumps(
+        {
+            "type": "FeatureCollection",
+            "features": [
+                {"type": "Feature", "properties": {}, "geometry": {"type": kind, "coordinates": shape}}
+                for kind, shape in features
+            ],
+        },
+        indent=indent,
+    )
 
 
 def _plan(polygons: list[list[LonLat]], items: list[LonLat]) -> str:
-    return json.dumps({
-        "fileType": "Plan", "geoFence": {"circles": [], "polygons": [
-            {"inclusion": False, "polygon": [[y, x] for x, y in ring[:-1]]} for ring in polygons]},
-        "mission": {"items": [{"type": "SimpleItem", "command": 16, "params": [0, 0, 0, 0, y, x, 0]}
-                              for x, y in items]}})
+    return json.dumps(
+        {
+            "fileType": "Plan",
+            "geoFence": {
+                "circles": [],
+                "polygons": [{"inclusion": False, "polygon": [[y, x] for x, y in ring[:-1]]} for ring in polygons],
+            },
+            "mission": {
+                "items": [{"type": "SimpleItem", "command": 16, "params": [0, 0, 0, 0, y, x, 0]} for x, y in items]
+            },
+        }
+    )
 
 
 def _waypoints(rows: list[tuple[int, int, LonLat]]) -> str:
@@ -118,8 +132,11 @@ def _kml(shapes: list[str]) -> str:
 
 
 def _kml_polygon(ring: list[LonLat]) -> str:
-    return ("<Polygon><outerBoundaryIs><LinearRing><coordinates>" + _pairs(ring, ",", "\n")
-            + "</coordinates></LinearRing></outerBoundaryIs></Polygon>")
+    return (
+        "<Polygon><outerBoundaryIs><LinearRing><coordinates>"
+        + _pairs(ring, ",", "\n")
+        + "</coordinates></LinearRing></outerBoundaryIs></Polygon>"
+    )
 
 
 def _name(rings: list[list[LonLat]]) -> str:
@@ -132,8 +149,9 @@ FILES: dict[str, dict[str, Callable[[int], str]]] = {
         "a coast, a vertex a line": lambda n: f"POLYGON ((\n{_pairs(coast(n), ' ', chr(44) + chr(10))}))\n",
         "a coast on one line": lambda n: f"POLYGON (({_pairs(coast(n), ' ', ', ')}))\n",
         "rocks, one a line": lambda n: "\n".join(f"POLYGON (({_pairs(r, ' ', ', ')}))" for r in rocks(n)),
-        "rocks in a collection, with heights": lambda n: "GEOMETRYCOLLECTION (" + ",\n".join(
-            f"POLYGON Z (({_pairs(r, ' ', ' 0, ')} 0))" for r in rocks(n)) + ")",
+        "rocks in a collection, with heights": lambda n: (
+            "GEOMETRYCOLLECTION (" + ",\n".join(f"POLYGON Z (({_pairs(r, ' ', ' 0, ')} 0))" for r in rocks(n)) + ")"
+        ),
         "rocks with unclosed rings": lambda n: "\n".join(f"POLYGON (({_pairs(r[:-1], ' ', ', ')}))" for r in rocks(n)),
         "a coast that crosses itself": lambda n: f"POLYGON (({_pairs(crossing(n), ' ', ', ')}))",
         "a tangle": lambda n: f"POLYGON (({_pairs(tangle(n), ' ', ', ')}))",
@@ -155,23 +173,24 @@ FILES: dict[str, dict[str, Callable[[int], str]]] = {
         "waypoints": lambda n: _waypoints([(16, 0, p) for p in places(n)]),
         "a coast": lambda n: _waypoints([(5002, n - 1, p) for p in coast(n)[:-1]]),
         "rocks": lambda n: _waypoints([(5002, 4, p) for r in rocks(n) for p in r[:-1]]),
-        "fence vertices without a ring": lambda n: _waypoints(
-            [(5001 + k % 2, n, p) for k, p in enumerate(places(n))]),
+        "fence vertices without a ring": lambda n: _waypoints([(5001 + k % 2, n, p) for k, p in enumerate(places(n))]),
     },
     "fen": {"a coast": lambda n: "# a\n" + _swapped([ORIGIN, *coast(n - 1)])},
     "poly": {"a coast": lambda n: _swapped(coast(n)), "rocks": lambda n: _name(rocks(n))},
     "gpx": {
         "a route": lambda n: _gpx(f"<rte>{_gpx_points('rtept', coast(n))}</rte>"),
         "a track": lambda n: _gpx(f"<trk><trkseg>{_gpx_points('trkpt', coast(n))}</trkseg></trk>"),
-        "routes": lambda n: _gpx("".join(
-            f"<rte><type>exclusion</type>{_gpx_points('rtept', r)}</rte>" for r in rocks(n))),
+        "routes": lambda n: _gpx(
+            "".join(f"<rte><type>exclusion</type>{_gpx_points('rtept', r)}</rte>" for r in rocks(n))
+        ),
         "waypoints": lambda n: _gpx(_gpx_points("wpt", places(n))),
     },
     "kml": {
         "a coast": lambda n: _kml([_kml_polygon(coast(n))]),
         "rocks": lambda n: _kml([_kml_polygon(r) for r in rocks(n)]),
         "rocks in one placemark": lambda n: _kml(
-            ["<MultiGeometry>" + "".join(_kml_polygon(r) for r in rocks(n)) + "</MultiGeometry>"]),
+            ["<MultiGeometry>" + "".join(_kml_polygon(r) for r in rocks(n)) + "</MultiGeometry>"]
+        ),
         "points": lambda n: _kml([f"<Point><coordinates>{x},{y}</coordinates></Point>" for x, y in places(n)]),
     },
 }
@@ -249,8 +268,12 @@ def main(argv: list[str] | None = None) -> int:
                     bytes_each = rose / n
                     cells.append(f"{took:.2f}" + (f" ({n:,})" if n != wanted else ""))
                 grew = f"{power(figures[-2], figures[-1]):.2f}" if len(figures) > 1 else ""
-                print(f"| {name} | {way} | " + " | ".join(cells)
-                      + f" | {1e6 * figures[-1][1] / figures[-1][0]:.1f} | {bytes_each:.0f} | {grew} |", flush=True)
+                print(
+                    f"| {name} | {way} | "
+                    + " | ".join(cells)
+                    + f" | {1e6 * figures[-1][1] / figures[-1][0]:.1f} | {bytes_each:.0f} | {grew} |",
+                    flush=True,
+                )
     print(f"\nPython {sys.version.split()[0]}, {os.cpu_count()} cores; processor seconds, the better of two")
     return 0
 

@@ -30,7 +30,7 @@ from sitl.run.compiled import compile_ahead
 BEAT = Path(__file__).parents[1] / "sitl" / "scenarios" / "figures" / "beat-500.toml"
 WHO, AGAINST = "shifts", "alone-embedded"
 APART_S, LASTS_S, GAP_S, MOST = 600.0, 1200.0, 20.0, 8
-LEAST_S = 700.0                     # of a window at a record's end: longer than most voyages
+LEAST_S = 700.0  # of a window at a record's end: longer than most voyages
 MEAN_MPS, CALMEST_MPS = 2.5, 0.8
 RESAMPLED = 10_000
 
@@ -40,8 +40,15 @@ def windows(record):
     found, begins_s = 0, float(record.t_s[0])
     while found < MOST and begins_s + LEAST_S <= record.t_s[-1]:
         inside = (record.t_s >= begins_s) & (record.t_s < begins_s + LASTS_S)
-        part = replace(record, t_s=record.t_s[inside] - begins_s, twd_from_rad=record.twd_from_rad[inside],
-                       tws_mps=record.tws_mps[inside], turning=record.turning[inside], heading_rad=None, awa_rad=None)
+        part = replace(
+            record,
+            t_s=record.t_s[inside] - begins_s,
+            twd_from_rad=record.twd_from_rad[inside],
+            tws_mps=record.tws_mps[inside],
+            turning=record.turning[inside],
+            heading_rad=None,
+            awa_rad=None,
+        )
         begins_s += APART_S
         if len(part) < 2 or part.t_s[-1] < LEAST_S - GAP_S or np.diff(part.t_s).max() > GAP_S:
             continue
@@ -68,10 +75,16 @@ def scenario(part, number, folder):
 
 
 def main(argv=None):
-    parser = argparse.ArgumentParser(prog="python -m bench.recorded", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", type=Path, nargs="?", default=os.environ.get("COMPANION_WIND_DATA"),
-                        help="of CSV records (default: $COMPANION_WIND_DATA)")
+    parser = argparse.ArgumentParser(
+        prog="python -m bench.recorded", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "folder",
+        type=Path,
+        nargs="?",
+        default=os.environ.get("COMPANION_WIND_DATA"),
+        help="of CSV records (default: $COMPANION_WIND_DATA)",
+    )
     parser.add_argument("--workers", type=int, metavar="W", help="voyages at a time (default: one per core)")
     parser.add_argument("--out", type=Path, metavar="FILE", help="keep the voyages; those in it are not sailed again")
     args = parser.parse_args(argv)
@@ -95,10 +108,15 @@ def main(argv=None):
 def tell(records, record_of):
     """Print what was gained: over all windows, and by record."""
     times = {(r["who"], r["scenario"]): r["time_s"] for r in records if r["arrived"] and not r["contacts"]}
-    shares = {name: times[NAMES[WHO], name] / times[NAMES[AGAINST], name]
-              for name in record_of if {(NAMES[who], name) for who in (WHO, AGAINST)} <= times.keys()}
-    logs = {stem: np.log([share for name, share in shares.items() if record_of[name] == stem])
-            for stem in sorted({record_of[name] for name in shares})}
+    shares = {
+        name: times[NAMES[WHO], name] / times[NAMES[AGAINST], name]
+        for name in record_of
+        if {(NAMES[who], name) for who in (WHO, AGAINST)} <= times.keys()
+    }
+    logs = {
+        stem: np.log([share for name, share in shares.items() if record_of[name] == stem])
+        for stem in sorted({record_of[name] for name in shares})
+    }
     print("| record | windows | mean % |\n|---|--:|--:|")
     for stem, of_it in logs.items():
         print(f"| {stem} | {len(of_it)} | {percent(of_it.mean()):+.1f} |")
@@ -106,9 +124,11 @@ def tell(records, record_of):
     sums, counts = (np.array([f(x) for x in logs.values()])[drawn].sum(axis=1) for f in (np.sum, len))
     low, high = np.quantile(sums / counts, (0.025, 0.975))
     every = np.concatenate(list(logs.values()))
-    print(f"{len(every)} of {len(record_of)} windows sailed clean by both, {sum(every < 0.0)} of them faster: "
-          f"{percent(every.mean()):+.1f} % ({percent(low):+.1f} to {percent(high):+.1f}) on the mean, "
-          f"median {percent(statistics.median(every)):+.1f}, worst window {percent(every.max()):+.1f}")
+    print(
+        f"{len(every)} of {len(record_of)} windows sailed clean by both, {sum(every < 0.0)} of them faster: "
+        f"{percent(every.mean()):+.1f} % ({percent(low):+.1f} to {percent(high):+.1f}) on the mean, "
+        f"median {percent(statistics.median(every)):+.1f}, worst window {percent(every.max()):+.1f}"
+    )
 
 
 def percent(log_share):

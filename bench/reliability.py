@@ -101,10 +101,16 @@ def check(path, limit, args):
     noise = 4.0 * math.sqrt(instant * (1.0 - instant) / args.winds)
     binds = answer.risk >= LEAST_PROMISE
     row |= {
-        "cost_s": answer.cost_s, "legs": len(answer.legs), "promise": answer.risk, "share": share,
-        "ratio": share / answer.risk if answer.risk > 0.0 else None, "binds": binds,
+        "cost_s": answer.cost_s,
+        "legs": len(answer.legs),
+        "promise": answer.risk,
+        "share": share,
+        "ratio": share / answer.risk if answer.risk > 0.0 else None,
+        "binds": binds,
         "holds": share <= answer.risk and (not binds or share >= answer.risk / 3.0),
-        "instant_promise": instant, "instant_share": worst, "held": limit is None and margin_deg < 0.1,
+        "instant_promise": instant,
+        "instant_share": worst,
+        "held": limit is None and margin_deg < 0.1,
         "instant_holds": worst <= instant + noise,
     }
     return row
@@ -122,8 +128,10 @@ def main(argv=None):
     paths = args.problems or sorted((HERE / "problems").glob("*.json"))
     rows = []
     print(f"{args.winds} winds each, a step of {args.step:g} s")
-    print(f"{'problem':22} {'limit':>6} {'cost s':>7} {'promise':>8} {'forced':>8} {'ratio':>6}      "
-          f"{'instant':>8} {'worst':>7}")
+    print(
+        f"{'problem':22} {'limit':>6} {'cost s':>7} {'promise':>8} {'forced':>8} {'ratio':>6}      "
+        f"{'instant':>8} {'worst':>7}"
+    )
     for path in paths:
         for limit in LIMITS:
             row = check(path, limit, args)
@@ -138,15 +146,20 @@ def main(argv=None):
                 continue
             ratio = "-" if row["ratio"] is None else f"{row['ratio']:.2f}"
             verdict = "ok" if row["holds"] else "NO"
-            print(f"{name:22} {given:>6} {row['cost_s']:7.0f} {100 * row['promise']:6.1f} % "
-                  f"{100 * row['share']:6.1f} % {ratio:>6} {verdict:>4} {100 * row['instant_promise']:6.1f} % "
-                  f"{100 * row['instant_share']:5.1f} %{' held' if row['held'] else ''}"
-                  f"{'' if row['instant_holds'] else ' NO'}", flush=True)
+            print(
+                f"{name:22} {given:>6} {row['cost_s']:7.0f} {100 * row['promise']:6.1f} % "
+                f"{100 * row['share']:6.1f} % {ratio:>6} {verdict:>4} {100 * row['instant_promise']:6.1f} % "
+                f"{100 * row['instant_share']:5.1f} %{' held' if row['held'] else ''}"
+                f"{'' if row['instant_holds'] else ' NO'}",
+                flush=True,
+            )
     sailed = [r for r in rows if "share" in r]
     binding = [r for r in sailed if r["binds"]]
-    print(f"{sum(r['holds'] for r in sailed)} of {len(sailed)} promises hold; "
-          f"{len(binding)} bind, forced / promised from {min((r['ratio'] for r in binding), default=0):.2f} "
-          f"to {max((r['ratio'] for r in binding), default=0):.2f}")
+    print(
+        f"{sum(r['holds'] for r in sailed)} of {len(sailed)} promises hold; "
+        f"{len(binding)} bind, forced / promised from {min((r['ratio'] for r in binding), default=0):.2f} "
+        f"to {max((r['ratio'] for r in binding), default=0):.2f}"
+    )
     if args.json:
         Path(args.json).write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     return 0 if all(r["holds"] and r["instant_holds"] for r in sailed) else 1

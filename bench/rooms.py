@@ -30,8 +30,10 @@ text{font-family:system-ui,-apple-system,"Segoe UI","DejaVu Sans",sans-serif;tex
 .pure{fill:#dcecf5}.shell{fill:#fbf3e0}.arrow{fill:none;stroke:#7c8d9a;stroke-width:1.1;marker-end:url(#head)}
 .paper{fill:#fff}
 """
-HEAD = ('<defs><marker id="head" viewBox="0 0 8 8" refX="6" refY="4" markerWidth="7" markerHeight="7" orient="auto">'
-        '<path d="M0 0L8 4L0 8z" fill="#7c8d9a"/></marker></defs>')
+HEAD = (
+    '<defs><marker id="head" viewBox="0 0 8 8" refX="6" refY="4" markerWidth="7" markerHeight="7" orient="auto">'
+    '<path d="M0 0L8 4L0 8z" fill="#7c8d9a"/></marker></defs>'
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,8 +111,9 @@ def ranked(edges: dict[str, set[str]], rooms: list[str]) -> list[tuple[str, ...]
 
 def _room(room: str, held: Laws) -> Box:
     apart = [shell for shell in sorted(held.shells) if shell.startswith(room + ".")]
-    chips = [Chip(name=name.split(".")[-1], words=first_line(name), kind=held.kind(name))
-             for name in inner(room) + apart]
+    chips = [
+        Chip(name=name.split(".")[-1], words=first_line(name), kind=held.kind(name)) for name in inner(room) + apart
+    ]
     words = first_line(room).replace("`", "").rstrip(".")
     return Box(name=room.split(".")[1], words=words, kind=held.kind(room), chips=tuple(chips))
 
@@ -123,21 +126,31 @@ def picture(root: str) -> str:
     drawing = draw([[_room(room, held) for room in floor] for floor in ranked(edges, rooms(root))], arrows)
     margin, below = 14.0, 40.0
     width, height = max(drawing.width_px, 600.0) + 2 * margin, drawing.height_px + 2 * margin + below
-    return "\n".join([
-        (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
-         f'role="img" aria-label="The rooms of {root}, floor above floor, and the imports between them">'),
-        f"<style>{STYLE}</style>", HEAD,
-        f'<rect class="paper" width="{width:.0f}" height="{height:.0f}"/>',
-        f'<g transform="translate({(width - drawing.width_px) / 2.0:.0f} {margin:.0f})">', *drawing.elements, "</g>",
-        *_legend(margin, height - 26.0),
-        "</svg>\n",
-    ])
+    return "\n".join(
+        [
+            (
+                f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" width="{width:.0f}" '
+                f'role="img" aria-label="The rooms of {root}, floor above floor, and the imports between them">'
+            ),
+            f"<style>{STYLE}</style>",
+            HEAD,
+            f'<rect class="paper" width="{width:.0f}" height="{height:.0f}"/>',
+            f'<g transform="translate({(width - drawing.width_px) / 2.0:.0f} {margin:.0f})">',
+            *drawing.elements,
+            "</g>",
+            *_legend(margin, height - 26.0),
+            "</svg>\n",
+        ]
+    )
 
 
 def rooms(root: str) -> list[str]:
     """Name the rooms of a root package: what stands directly inside it."""
-    found = [path.stem if path.suffix else path.name for path in sorted((ROOT / root).iterdir())
-             if (path.suffix == ".py" and path.stem != "__init__") or (path / "__init__.py").exists()]
+    found = [
+        path.stem if path.suffix else path.name
+        for path in sorted((ROOT / root).iterdir())
+        if (path.suffix == ".py" and path.stem != "__init__") or (path / "__init__.py").exists()
+    ]
     return [f"{root}.{name}" for name in found]
 
 

@@ -35,18 +35,22 @@ from sitl.world import AR1, Constant
 
 HALF_RAD = math.radians(45.0)
 RADIUS_M = 10.0
-LISTENS_S, READY_S = 8, 35     # moored: the vane is heard from, she sets sail
-NOW_S = 5                      # what the wind is now: the mean of so long
+LISTENS_S, READY_S = 8, 35  # moored: the vane is heard from, she sets sail
+NOW_S = 5  # what the wind is now: the mean of so long
 BASE_M = 30.0
 
 
 def sail(seed, wind, length_m, corridor_m, *, by_shifts, tack_s):
     """Return (time [s], tacks) of one beat."""
     spread_deg, tau_s = wind
-    weather = Constant(0.0, 5.0) if spread_deg == 0.0 else AR1(
-        0.0, 5.0, seed=seed, sd_rad=math.radians(spread_deg), rho_hz=1.0 / tau_s, tws_sd_mps=0.3)
-    vehicle = Vehicle(weather, Parameters({"SAIL_XTRACK_MAX": corridor_m}), heading_rad=math.radians(60.0),
-                      is_moored=True, seed=seed)
+    weather = (
+        Constant(0.0, 5.0)
+        if spread_deg == 0.0
+        else AR1(0.0, 5.0, seed=seed, sd_rad=math.radians(spread_deg), rho_hz=1.0 / tau_s, tws_sd_mps=0.3)
+    )
+    vehicle = Vehicle(
+        weather, Parameters({"SAIL_XTRACK_MAX": corridor_m}), heading_rad=math.radians(60.0), is_moored=True, seed=seed
+    )
     forecaster, state, heard = Forecaster(), vehicle.state, deque(maxlen=NOW_S)
     asked_s, apart_s = -math.inf, SkipperConfig().shift_tacks_apart_s
     for t in range(1, READY_S + 3 * round(length_m)):
@@ -76,10 +80,18 @@ def pays(forecast, now_rad, state, to_goal, corridor_m, tack_s):
     x, ahead_m = to_goal
     off_rad = difference_rad(now_rad, state[S_YAW])
     if abs(difference_rad(now_rad, math.atan2(-x, ahead_m))) >= HALF_RAD or (
-            abs(abs(off_rad) - HALF_RAD) > TURNING * HALF_RAD):
+        abs(abs(off_rad) - HALF_RAD) > TURNING * HALF_RAD
+    ):
         return False
-    beat = shifts_of(forecast, corridor_m=corridor_m, speed_mps=ardurover_sitl().speed_mps(HALF_RAD, state[S_TWS]),
-                     half_rad=HALF_RAD, tack_s=tack_s, leg_rad=0.0, ahead_m=ahead_m)
+    beat = shifts_of(
+        forecast,
+        corridor_m=corridor_m,
+        speed_mps=ardurover_sitl().speed_mps(HALF_RAD, state[S_TWS]),
+        half_rad=HALF_RAD,
+        tack_s=tack_s,
+        leg_rad=0.0,
+        ahead_m=ahead_m,
+    )
     if beat is None or math.hypot(x, ahead_m) / beat.table.made_good_mps < LAST_S:
         return False
     return beat.table.gain_s(x, difference_rad(now_rad, beat.mean_rad), is_port=off_rad < 0.0) > 0.0
@@ -90,8 +102,9 @@ def row(wind, args):
     seeds = range(1 if wind[0] == 0.0 else args.seeds)
 
     def sailed(corridor_m, *, by_shifts):
-        return np.array([sail(seed, wind, args.length, corridor_m, by_shifts=by_shifts, tack_s=args.tack)
-                         for seed in seeds])
+        return np.array(
+            [sail(seed, wind, args.length, corridor_m, by_shifts=by_shifts, tack_s=args.tack) for seed in seeds]
+        )
 
     told = "steady" if wind[0] == 0.0 else f"{wind[0]:g}°, {wind[1]:g} s"
     base = sailed(BASE_M, by_shifts=False)[:, 0]
@@ -105,18 +118,27 @@ def row(wind, args):
 
 
 def main(argv=None):
-    parser = argparse.ArgumentParser(prog="python -m bench.shifts", description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog="python -m bench.shifts", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--seeds", type=int, default=24)
     parser.add_argument("--length", type=float, default=500.0, metavar="M")
     parser.add_argument("--corridor", type=float, default=200.0, metavar="M", help="the wider one's")
-    parser.add_argument("--winds", nargs="+", type=wind_of, metavar="DEG,S",
-                        default=[STEADY, (9.0, 28.0), (18.6, 28.0), (9.0, 120.0), (9.0, 600.0)])
+    parser.add_argument(
+        "--winds",
+        nargs="+",
+        type=wind_of,
+        metavar="DEG,S",
+        default=[STEADY, (9.0, 28.0), (18.6, 28.0), (9.0, 120.0), (9.0, 600.0)],
+    )
     parser.add_argument("--tack", type=float, default=1.0, metavar="S", help="what a tack is believed to cost")
     args = parser.parse_args(argv)
     wide = f"{args.corridor:g} m"
-    print(f"| wind | {BASE_M:g} m, s | {wide}, edges alone | {wide}, by shifts | tacks | worst pair |\n"
-          "|---|--:|--:|--:|--:|--:|", flush=True)
+    print(
+        f"| wind | {BASE_M:g} m, s | {wide}, edges alone | {wide}, by shifts | tacks | worst pair |\n"
+        "|---|--:|--:|--:|--:|--:|",
+        flush=True,
+    )
     for wind in args.winds:
         print(f"| {' | '.join(row(wind, args))} |", flush=True)
     return 0

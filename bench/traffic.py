@@ -29,8 +29,12 @@ from companion.traffic.plans import PlainLeg
 SECONDS = 60
 NEAREST = 12
 FRAME = LocalFrame(GeoPoint(lat_deg=50.8, lon_deg=-1.3))
-ROUTE = [PlainLeg(from_en=(300.0 * i, 0.0), to_en=(300.0 * i + 300.0, 100.0 * (i % 2)), start_s=150.0 * i,
-                  end_s=150.0 * i + 150.0) for i in range(8)]
+ROUTE = [
+    PlainLeg(
+        from_en=(300.0 * i, 0.0), to_en=(300.0 * i + 300.0, 100.0 * (i % 2)), start_s=150.0 * i, end_s=150.0 * i + 150.0
+    )
+    for i in range(8)
+]
 
 
 def sentences(vessels: int) -> list[list[bytes]]:
@@ -44,8 +48,15 @@ def sentences(vessels: int) -> list[list[bytes]]:
         for i in range(vessels):
             run, c = float(speeds[i]) * t, math.radians(float(courses[i]))
             point = FRAME.geo_from_en(float(places[i, 0]) + run * math.sin(c), float(places[i, 1]) + run * math.cos(c))
-            values = {"type": 1, "mmsi": 211000000 + i, "lat": point.lat_deg, "lon": point.lon_deg,
-                      "course": courses[i], "speed": speeds[i] * 1.944, "heading": int(courses[i])}
+            values = {
+                "type": 1,
+                "mmsi": 211000000 + i,
+                "lat": point.lat_deg,
+                "lon": point.lon_deg,
+                "course": courses[i],
+                "speed": speeds[i] * 1.944,
+                "heading": int(courses[i]),
+            }
             row.append(encode_dict(values, talker_id="AI", sentence_type="VDM")[0].encode())
         out.append(row)
     return out

@@ -32,15 +32,22 @@ HORIZON_S = 450.0
 FUTURES = 6000
 FRAME = LocalFrame(GeoPoint(lat_deg=51.1, lon_deg=-1.3))
 LEAST_PROMISE = 0.01
-SHOWN_RATIO = 0.002     # below it 6,000 futures do not tell a third from nothing
+SHOWN_RATIO = 0.002  # below it 6,000 futures do not tell a third from nothing
 
 
 def ship(en, course_deg, speed_mps, half_m=50.0, **more):
     """Return a vessel at t = 0, ``half_m`` from its middle to its bow."""
     course = math.radians(course_deg)
-    values = {"mmsi": 211000001, "t_s": 0.0, "heard_s": 0.0, "antenna_en_m": en, "course_rad": course,
-              "speed_mps": speed_mps, "heading_rad": course,
-              "hull": hull_of(half_m, half_m, 0.2 * half_m, 0.2 * half_m, is_class_b=False)}
+    values = {
+        "mmsi": 211000001,
+        "t_s": 0.0,
+        "heard_s": 0.0,
+        "antenna_en_m": en,
+        "course_rad": course,
+        "speed_mps": speed_mps,
+        "heading_rad": course,
+        "hull": hull_of(half_m, half_m, 0.2 * half_m, 0.2 * half_m, is_class_b=False),
+    }
     return Vessel(**(values | more))
 
 
@@ -63,12 +70,18 @@ def problem(ships, keep, delta_s=0.7, **change):
     """Return 900 m to the east across the wind, among ships."""
     targets = planning_discs(ships, 0.0, keep)
     values = {
-        "start_en": (0.0, 0.0), "start_heading_rad": math.pi / 2, "goal_en": (900.0, 0.0), "goal_radius_m": 10.0,
-        "wind": ProblemWind(twd_from_rad=0.0, tws_mps=5.0, sigma=Sigma(
-            model="ar1", sigma0_rad=0.05, sigma_inf_rad=0.1, rho_hz=0.03)),
-        "boat": BoatLimits(no_go_half_rad=math.radians(45.0), turn_rate_radps=0.5, polar_twa_rad=(0.0, math.pi),
-                           polar_mps=(2.0, 2.0)),
-        "delta_s": delta_s, "targets": targets,
+        "start_en": (0.0, 0.0),
+        "start_heading_rad": math.pi / 2,
+        "goal_en": (900.0, 0.0),
+        "goal_radius_m": 10.0,
+        "wind": ProblemWind(
+            twd_from_rad=0.0, tws_mps=5.0, sigma=Sigma(model="ar1", sigma0_rad=0.05, sigma_inf_rad=0.1, rho_hz=0.03)
+        ),
+        "boat": BoatLimits(
+            no_go_half_rad=math.radians(45.0), turn_rate_radps=0.5, polar_twa_rad=(0.0, math.pi), polar_mps=(2.0, 2.0)
+        ),
+        "delta_s": delta_s,
+        "targets": targets,
     }
     return Problem(**(values | change))
 
@@ -92,7 +105,8 @@ def met(ships, legs, keep, n=FUTURES, seed=3):
             held = manoeuvre_s2(tau, m.hold_s)
             along = m.position_m * draw[0] + m.speed_mps * tau * draw[1] + m.accel_mps2 * held * draw[2]
             across = m.position_m * draw[3] + other.speed_mps * (
-                m.course_rad * tau * draw[4] + m.turn_radps * held * draw[5])
+                m.course_rad * tau * draw[4] + m.turn_radps * held * draw[5]
+            )
             s, c = math.sin(there.course_rad), math.cos(there.course_rad)
             x, y = there.mean_en_m[0] + along * s + across * c, there.mean_en_m[1] + along * c - across * s
             hit |= np.hypot(east[:, k] - x, north[:, k] - y) < near_m
@@ -110,16 +124,20 @@ def main():
     """Print the table."""
     argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     print(f"{FUTURES} futures each")
-    print(f"{'scene':16} {'clearance':>9} {'way':>9} {'time s':>7} {'promised':>9} {'met':>7} {'ratio':>6}   "
-          f"{'with wind':>9} {'either':>7}")
+    print(
+        f"{'scene':16} {'clearance':>9} {'way':>9} {'time s':>7} {'promised':>9} {'met':>7} {'ratio':>6}   "
+        f"{'with wind':>9} {'either':>7}"
+    )
     for clearance_m in (0.0, 50.0):
         keep = keep_of(clearance_m)
         for name, ships in SCENES.items():
             p = problem(ships, keep)
             limited = replace(p, risk=RiskLimit(max_path_risk=0.01))
-            ways = {"straight": evaluate(p, [(0.0, 0.0), (900.0, 0.0)]).legs,
-                    "planned": plan(p, expansions=4000, seed=1).legs,
-                    "limit 1 %": plan(limited, expansions=40_000, seed=1).legs}
+            ways = {
+                "straight": evaluate(p, [(0.0, 0.0), (900.0, 0.0)]).legs,
+                "planned": plan(p, expansions=4000, seed=1).legs,
+                "limit 1 %": plan(limited, expansions=40_000, seed=1).legs,
+            }
             for way, legs in ways.items():
                 if not legs:
                     print(f"{name:16} {clearance_m:7.0f} m {way:>9}  no path")
@@ -129,10 +147,12 @@ def main():
                 share = float(np.mean(hit))
                 ratio = share / risk.vessels.total if risk.vessels.total >= SHOWN_RATIO else math.nan
                 good = holds(risk.vessels.total, share) and holds(risk.total, either)
-                print(f"{name:16} {clearance_m:7.0f} m {way:>9} {legs[-1].end_s:7.0f} "
-                      f"{100 * risk.vessels.total:7.2f} % {100 * share:5.2f} % {ratio:6.2f}   "
-                      f"{100 * risk.total:7.2f} % {100 * either:5.2f} %"
-                      f"{'' if good else '  BROKEN'}")
+                print(
+                    f"{name:16} {clearance_m:7.0f} m {way:>9} {legs[-1].end_s:7.0f} "
+                    f"{100 * risk.vessels.total:7.2f} % {100 * share:5.2f} % {ratio:6.2f}   "
+                    f"{100 * risk.total:7.2f} % {100 * either:5.2f} %"
+                    f"{'' if good else '  BROKEN'}"
+                )
 
 
 if __name__ == "__main__":

@@ -87,12 +87,27 @@ def afloat(folder: Path, *options: str, **more: Any) -> Iterator[tuple[subproces
     ``more`` goes to the companion's process. It is ended with the body, if it has not ended by itself.
     """
     port = free_port()
-    boat = subprocess.Popen([
-        sys.executable, "-m", "sitl.run.live_boat", str(SCENARIO), "--endpoint", f"udpout:127.0.0.1:{port}"])
+    boat = subprocess.Popen(
+        [sys.executable, "-m", "sitl.run.live_boat", str(SCENARIO), "--endpoint", f"udpout:127.0.0.1:{port}"]
+    )
     began = time.monotonic()
     companion = subprocess.Popen(
-        [sys.executable, "-m", "companion.cli", "run", str(MISSION), "--link", f"udpin:127.0.0.1:{port}",
-         "--out", str(folder), "--state", str(folder.parent / "state.json"), *options], **more)
+        [
+            sys.executable,
+            "-m",
+            "companion.cli",
+            "run",
+            str(MISSION),
+            "--link",
+            f"udpin:127.0.0.1:{port}",
+            "--out",
+            str(folder),
+            "--state",
+            str(folder.parent / "state.json"),
+            *options,
+        ],
+        **more,
+    )
     track = folder / "track.csv"
     try:
         while companion.poll() is None and not (track.is_file() and track.read_bytes().count(b"\n") > 1):
@@ -125,8 +140,12 @@ def live(seconds: float, *options: str) -> dict[str, float]:
             mean_load, card_bytes_per_s = (cpu_s(main) - cpu0) / took_s, (written_bytes(main) - written0) / took_s
         summary = json.loads((folder / "summary.json").read_text())
     return {
-        "start_s": start_s, "cpu_core_mean": mean_load, "cpu_core_median": sorted(loads)[len(loads) // 2],
-        "memory_mb": worst, "alone_mb": alone, "card_mb_per_day": card_bytes_per_s * 86_400.0 / 1e6,
+        "start_s": start_s,
+        "cpu_core_mean": mean_load,
+        "cpu_core_median": sorted(loads)[len(loads) // 2],
+        "memory_mb": worst,
+        "alone_mb": alone,
+        "card_mb_per_day": card_bytes_per_s * 86_400.0 / 1e6,
         "loop_held_max_s": summary["loop_held_max_s"],
     }
 
@@ -154,10 +173,14 @@ def main() -> int:
     args = parser.parse_args()
     figures = live(args.seconds) | virtual()
     print(f"start, kernels cached            {figures['start_s']:.1f} s")
-    print(f"companion while sailing          {100 * figures['cpu_core_median']:.1f} % of a core "
-          f"(mean {100 * figures['cpu_core_mean']:.1f} %)")
-    print(f"memory with the planner's worker {figures['memory_mb']:.0f} MB beside the simulator, whose libraries it "
-          f"shares; counted alone {figures['alone_mb']:.0f} MB")
+    print(
+        f"companion while sailing          {100 * figures['cpu_core_median']:.1f} % of a core "
+        f"(mean {100 * figures['cpu_core_mean']:.1f} %)"
+    )
+    print(
+        f"memory with the planner's worker {figures['memory_mb']:.0f} MB beside the simulator, whose libraries it "
+        f"shares; counted alone {figures['alone_mb']:.0f} MB"
+    )
     print(f"what reaches a card              {figures['card_mb_per_day']:.0f} MB a day")
     print(f"event loop held at most          {1000 * figures['loop_held_max_s']:.0f} ms")
     print(f"demo under the virtual clock     {figures['times_real_time']:.0f} times real time")

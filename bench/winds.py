@@ -17,7 +17,7 @@ from companion.planner.risk.kernels import NONE, correlation, sigma_at
 
 
 def simulate_entries(
-    problem: Problem, plan: Plan | Sequence[Leg], *, winds: int = 2000, step_s: float = 0.5, seed: int = 0,
+    problem: Problem, plan: Plan | Sequence[Leg], *, winds: int = 2000, step_s: float = 0.5, seed: int = 0
 ) -> NDArray[np.int64]:
     """Return for each simulated wind the leg on which it first forces the boat into the no-go zone, or -1.
 
@@ -26,21 +26,31 @@ def simulate_entries(
     legs = plan.legs if isinstance(plan, Plan) else tuple(plan)
     hits = np.full(winds, -1, dtype=np.int64)
     p = process_of(problem)
-    twa = [math.pi if leg.is_beat else wrap_pi(-leg.twa_rad) for leg in legs]   # a beat follows the wind
+    twa = [math.pi if leg.is_beat else wrap_pi(-leg.twa_rad) for leg in legs]  # a beat follows the wind
     if legs and p.model != NONE:
         simulate(
             np.array([leg.start_s for leg in legs], dtype=np.float64),
             np.array([leg.end_s for leg in legs], dtype=np.float64),
-            np.array(twa, dtype=np.float64), float(problem.boat.no_go_half_rad),
-            p.model, float(p.s0), float(p.s1), float(p.rho), float(p.tau), p.table_t, p.table_s, float(step_s),
-            np.random.default_rng(seed), winds, hits,
+            np.array(twa, dtype=np.float64),
+            float(problem.boat.no_go_half_rad),
+            p.model,
+            float(p.s0),
+            float(p.s1),
+            float(p.rho),
+            float(p.tau),
+            p.table_t,
+            p.table_s,
+            float(step_s),
+            np.random.default_rng(seed),
+            winds,
+            hits,
         )
     return hits
 
 
 @kernel
 def simulate(  # type: ignore[no-untyped-def]
-    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, step_s, generator, count, hits,
+    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, step_s, generator, count, hits
 ):
     """Fill hits[i] with the leg on which simulated wind i first forces the boat into the no-go zone, else -1.
 

@@ -8,7 +8,7 @@ from _signal import SIG_DFL, SIGINT, signal  # type: ignore[import-not-found]
 
 def main() -> int:
     """Run one command of this process and return its exit code."""
-    signal(SIGINT, SIG_DFL)   # until a command runs, which may have something to put in order
+    signal(SIGINT, SIG_DFL)  # until a command runs, which may have something to put in order
     from companion.cli import main as run
 
     return run()

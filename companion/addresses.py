@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 from companion.errors import InputError
 
 LOOPBACK = "127.0.0.1"
-STREAM = "/signalk/v1/stream"   # of a Signal K server
+STREAM = "/signalk/v1/stream"  # of a Signal K server
 _NMEA = "write udp:HOST:PORT, or tcp:[HOST:]PORT to be a server (default HOST: 127.0.0.1)"
 _SIGNALK = "write ws://HOST:3000 or tcp:HOST:8375"
 
@@ -72,5 +72,6 @@ def parse_signalk(text: str) -> OutputName:
         raise InputError("--signalk", text, "is no Signal K server", _SIGNALK)
     port = port or (443 if parts.scheme == "wss" else 80)
     path = parts.path if parts.path not in {"", "/"} else STREAM
-    return OutputName(text=text, kind=parts.scheme, host=host, port=port,
-                      url=f"{parts.scheme}://{parts.netloc}{path}?subscribe=none")
+    return OutputName(
+        text=text, kind=parts.scheme, host=host, port=port, url=f"{parts.scheme}://{parts.netloc}{path}?subscribe=none"
+    )

@@ -29,7 +29,7 @@ def now_s() -> float:
     return asyncio.get_running_loop().time()
 
 
-ASK_EVERY = 64   # turns of a virtual loop that has no sockets
+ASK_EVERY = 64  # turns of a virtual loop that has no sockets
 
 
 class RealTimeLoop(asyncio.SelectorEventLoop):

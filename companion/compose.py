@@ -70,8 +70,21 @@ from companion.wind import Estimator, make
 from companion.words import listed
 
 __all__ = [
-    "POLARS", "RECENTRE_M", "boat_of", "config_of", "displays_of", "estimator_of", "feeds_of", "permissions_of",
-    "planner_of", "polar_of", "polar_of_file", "target_limits_of", "voyage_of", "water_of", "waters_of",
+    "POLARS",
+    "RECENTRE_M",
+    "boat_of",
+    "config_of",
+    "displays_of",
+    "estimator_of",
+    "feeds_of",
+    "permissions_of",
+    "planner_of",
+    "polar_of",
+    "polar_of_file",
+    "target_limits_of",
+    "voyage_of",
+    "water_of",
+    "waters_of",
 ]
 
 POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
@@ -91,8 +104,12 @@ def polar_of(mission: Mission) -> Polar:
     if isinstance(polar, str):
         maker = POLARS.get(polar)
         if maker is None:
-            raise InputError(str(mission.path), "[boat] polar", f"there is no polar {polar!r}",
-                             'write "ardurover", "avalon", a polar file beside the mission, or a speed in m/s')
+            raise InputError(
+                str(mission.path),
+                "[boat] polar",
+                f"there is no polar {polar!r}",
+                'write "ardurover", "avalon", a polar file beside the mission, or a speed in m/s',
+            )
         return maker()
     return constant(float(polar))
 
@@ -107,11 +124,19 @@ def boat_of(mission: Mission) -> Boat:
     """Return the mission's boat; one that does not sail has no no-go zone, and tacks cost it nothing."""
     if mission.autopilot.frame == "motor":
         if isinstance(mission.boat.polar, str):
-            raise InputError(str(mission.path), "[boat] polar", "a motor boat has no polar, and hers is "
-                             f"{mission.boat.polar!r}", "write her speed [m/s]: polar = 2.0")
-        return Boat(polar=polar_of(mission), no_go_half_rad=0.0, has_motor=True,
-                    turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s),
-                    hull=Hull(length_m=mission.boat.length_m, beam_m=mission.boat.beam_m))
+            raise InputError(
+                str(mission.path),
+                "[boat] polar",
+                f"a motor boat has no polar, and hers is {mission.boat.polar!r}",
+                "write her speed [m/s]: polar = 2.0",
+            )
+        return Boat(
+            polar=polar_of(mission),
+            no_go_half_rad=0.0,
+            has_motor=True,
+            turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s),
+            hull=Hull(length_m=mission.boat.length_m, beam_m=mission.boat.beam_m),
+        )
     return Boat(
         polar=polar_of(mission),
         no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
@@ -142,21 +167,24 @@ def planner_of(mission: Mission) -> PlannerChoice:
     expansions = given.pop("expansions", None)
     if expansions is not None and algorithm == AUTO.algorithm:
         others = " and ".join(f'"{name}"' for name in ALGORITHMS if name != AUTO.algorithm)
-        raise InputError(str(mission.path), "[planner] expansions", f"is for {others}",
-                         "write [skipper] expansions for auto's")
+        raise InputError(
+            str(mission.path), "[planner] expansions", f"is for {others}", "write [skipper] expansions for auto's"
+        )
     keys = {name: {key.key for key in row.keys.values()} for name, row in ALGORITHMS.items()}
     for key in given:
         if key not in keys[algorithm]:
             whose = next(name for name, own in keys.items() if key in own)
-            raise InputError(str(mission.path), f"[planner] {key}",
-                             f"is a number of {whose!r}, and this mission plans by {algorithm!r}",
-                             f'write [skipper] planner = "{whose}", or leave it out')
+            raise InputError(
+                str(mission.path),
+                f"[planner] {key}",
+                f"is a number of {whose!r}, and this mission plans by {algorithm!r}",
+                f'write [skipper] planner = "{whose}", or leave it out',
+            )
     if "tunnel" in given and "tunnel_width_m" not in given:
         raise InputError(str(mission.path), "[planner] tunnel", "a tunnel has a width", "add tunnel_width_m")
     if algorithm == AUTO.algorithm:
         return AUTO
-    return PlannerChoice(
-        algorithm=algorithm, settings=ALGORITHMS[algorithm].settings_of(given), expansions=expansions)
+    return PlannerChoice(algorithm=algorithm, settings=ALGORITHMS[algorithm].settings_of(given), expansions=expansions)
 
 
 LEAST_LINE_M = 1.0
@@ -170,12 +198,19 @@ def composed_field_of(mission: Mission, number: int, by_field: GoalField, frame:
     atoms = atoms_of(mission, frame)
     expression = parse(by_field.text, tuple(atoms), source, place)
     if projects(expression) and mission.autopilot.frame == "motor":
-        raise InputError(source, place, f"{PROJECT}(...) keeps out of the no-go zone, and a motor boat has none",
-                         "write what is in its brackets alone")
+        raise InputError(
+            source,
+            place,
+            f"{PROJECT}(...) keeps out of the no-go zone, and a motor boat has none",
+            "write what is in its brackets alone",
+        )
     tree = FieldTree(expression=expression, atoms=tuple((name, atoms[name]) for name in names_in(expression)))
     return Composed(
-        tree=tree, until=Until(by_field.until), for_s=by_field.for_s,
-        water_en=None if by_field.shape is None else polygon_en(by_field.shape, frame, cover=False))
+        tree=tree,
+        until=Until(by_field.until),
+        for_s=by_field.for_s,
+        water_en=None if by_field.shape is None else polygon_en(by_field.shape, frame, cover=False),
+    )
 
 
 def atoms_of(mission: Mission, frame: LocalFrame) -> dict[str, Atom]:
@@ -186,8 +221,12 @@ def atoms_of(mission: Mission, frame: LocalFrame) -> dict[str, Atom]:
     out: dict[str, Atom] = {}
     for name, atom in options.items():
         if not is_name(name):
-            raise InputError(source, f"[field.{name[:40]}]", "is no name that an expression can have",
-                             f"write letters, digits and _, a letter first; {MAX} and {PROJECT} mean something else")
+            raise InputError(
+                source,
+                f"[field.{name[:40]}]",
+                "is no name that an expression can have",
+                f"write letters, digits and _, a letter first; {MAX} and {PROJECT} mean something else",
+            )
         out[name] = _atom(mission, name, atom, frame)
     return out
 
@@ -202,8 +241,12 @@ def require_fields(mission: Mission) -> None:
         if isinstance(atom, LineAtomOptions | RepulsiveLineAtomOptions):
             length_m = math.hypot(*_en(atom.end, LocalFrame(_geo(atom.start))))
             if length_m < LEAST_LINE_M:
-                raise InputError(str(mission.path), f"[field.{name}]", f"start and end are {length_m:.1f} m apart",
-                                 "a line has two places")
+                raise InputError(
+                    str(mission.path),
+                    f"[field.{name}]",
+                    f"start and end are {length_m:.1f} m apart",
+                    "a line has two places",
+                )
     for number, goal in enumerate(mission.goals, start=1):
         if goal.field is None:
             continue
@@ -211,9 +254,12 @@ def require_fields(mission: Mission) -> None:
             places = (getattr(made, key, None) for key in ("at_en", "from_en", "to_en"))
             far_m = max((math.hypot(*place) for place in places if place is not None), default=0.0)
             if not far_m <= RANGE_M:
-                raise InputError(str(mission.path), f"[field.{name}]",
-                                 f"is {far_m / 1000.0:.0f} km from [[goal]] {number}, which is sailed by it",
-                                 "are lat and lon swapped? a field is sailed within 50 km")
+                raise InputError(
+                    str(mission.path),
+                    f"[field.{name}]",
+                    f"is {far_m / 1000.0:.0f} km from [[goal]] {number}, which is sailed by it",
+                    "are lat and lon swapped? a field is sailed within 50 km",
+                )
 
 
 def field_words(mission: Mission) -> tuple[str, ...]:
@@ -239,14 +285,26 @@ def field_findings_of(mission: Mission) -> tuple[Finding, ...]:
         place = frame.en_from_geo(goal.point)
         found = float(lengths(tree, preview_conditions(mission, place), np.array([place]))[0])
         if found < LEAST and tree.station_en is None and goal.field.until != "place":
-            out.append(Finding(
-                severity=FindingLevel.WARNING, code=Code.FIELD, place=f"[[goal]] {number} field",
-                text=f"{tree.text} has no value at the goal's own place ({found:.2f} of 10): she would not be steered",
-                remedy="place it where the field leads somewhere"))
+            out.append(
+                Finding(
+                    severity=FindingLevel.WARNING,
+                    code=Code.FIELD,
+                    place=f"[[goal]] {number} field",
+                    text=f"{tree.text} has no value at the goal's own place ({found:.2f} of 10): it cannot steer there",
+                    remedy="place it where the field leads somewhere",
+                )
+            )
     left = [name for name in mission.options.field if name not in told]
     if left:
-        out.append(Finding(severity=FindingLevel.WARNING, code=Code.FIELD, place="[field]",
-                           text=f"no goal is sailed by {listed(left)}", remedy="name it in a goal's field"))
+        out.append(
+            Finding(
+                severity=FindingLevel.WARNING,
+                code=Code.FIELD,
+                place="[field]",
+                text=f"no goal is sailed by {listed(left)}",
+                remedy="name it in a goal's field",
+            )
+        )
     return tuple(out)
 
 
@@ -254,12 +312,21 @@ def preview_conditions(mission: Mission, at_en: tuple[float, float]) -> FieldCon
     """Return a boat that lies at ``at_en`` in the wind that previews assume."""
     sails = mission.autopilot.frame == "sailboat"
     return FieldConditions(
-        seen=Situation(t_s=0.0, en_m=at_en, velocity_en_mps=(0.0, 0.0), heading_rad=0.0,
-                       tws_mps=mission.wind.preview_speed_mps,
-                       twd_from_rad=math.radians(mission.wind.preview_from_deg) if sails else None),
+        seen=Situation(
+            t_s=0.0,
+            en_m=at_en,
+            velocity_en_mps=(0.0, 0.0),
+            heading_rad=0.0,
+            tws_mps=mission.wind.preview_speed_mps,
+            twd_from_rad=math.radians(mission.wind.preview_from_deg) if sails else None,
+        ),
         habits=GuidanceSettings(
-            is_sailing=sails, no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
-            turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s), tack_s=max(1.0, mission.boat.tack_loss_s)))
+            is_sailing=sails,
+            no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
+            turn_rate_radps=math.radians(mission.boat.turn_rate_deg_s),
+            tack_s=max(1.0, mission.boat.tack_loss_s),
+        ),
+    )
 
 
 def _atom(mission: Mission, name: str, atom: AtomOptions, frame: LocalFrame) -> Atom:
@@ -326,24 +393,35 @@ def waters_of(mission: Mission) -> Waters | None:
 def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
     goals = tuple(
         Goal(
-            en_m=frame.en_from_geo(g.point), radius_m=g.radius_m, name=g.name, side=_SIDES[g.rounding],
+            en_m=frame.en_from_geo(g.point),
+            radius_m=g.radius_m,
+            name=g.name,
+            side=_SIDES[g.rounding],
             rounding_m=max(g.radius_m, mission.margin_m) if g.rounding else 12.0,
             bandwidth_m=mission.skipper.bandwidth_m if g.bandwidth_m is None else g.bandwidth_m,
             line=_line(g.gate, frame),
-            box=None if g.box is None else Box(
-                area_en=polygon_en(g.box.shape, frame, cover=False), for_s=g.box.for_s),
-            search=None if g.search is None else Search(
-                area_en=free_water(g.search.shape, frame, mission.area), swath_m=g.search.swath_m,
-                coverage=g.search.coverage),
+            box=None if g.box is None else Box(area_en=polygon_en(g.box.shape, frame, cover=False), for_s=g.box.for_s),
+            search=None
+            if g.search is None
+            else Search(
+                area_en=free_water(g.search.shape, frame, mission.area),
+                swath_m=g.search.swath_m,
+                coverage=g.search.coverage,
+            ),
             field=None if g.field is None else composed_field_of(mission, number, g.field, frame),
         )
         for number, g in enumerate(mission.goals, start=1)
     )
     return Voyage(
-        name=mission.name, frame=frame, goals=goals, area=area, boat=boat_of(mission),
+        name=mission.name,
+        frame=frame,
+        goals=goals,
+        area=area,
+        boat=boat_of(mission),
         laps=mission.skipper.laps,
         refuges=tuple(
-            Refuge(name=r.name, en_m=frame.en_from_geo(r.point), radius_m=r.radius_m) for r in mission.refuges),
+            Refuge(name=r.name, en_m=frame.en_from_geo(r.point), radius_m=r.radius_m) for r in mission.refuges
+        ),
         recentre_m=(mission.passage.recentre_m or RECENTRE_M) if mission.is_passage else None,
         far_m=max(FAR_M, mission.passage.leg_m or 0.0),
     )
@@ -353,8 +431,12 @@ def _line(gate: GoalGate | None, frame: LocalFrame) -> Line | None:
     if gate is None:
         return None
     return Line(
-        port_en_m=frame.en_from_geo(gate.port), starboard_en_m=frame.en_from_geo(gate.starboard), keep_m=gate.keep_m,
-        not_before_s=gate.not_before_s, after_s=gate.after_s)
+        port_en_m=frame.en_from_geo(gate.port),
+        starboard_en_m=frame.en_from_geo(gate.starboard),
+        keep_m=gate.keep_m,
+        not_before_s=gate.not_before_s,
+        after_s=gate.after_s,
+    )
 
 
 def config_of(mission: Mission) -> SkipperConfig:
@@ -370,7 +452,8 @@ def config_of(mission: Mission) -> SkipperConfig:
         planner=planner_of(mission),
         plan_budget_s=options.planning_budget_s,
         first_plan_budget_s=options.planning_budget_s,
-        autopilot_beats=options.autopilot_beats, shifts=options.shifts,
+        autopilot_beats=options.autopilot_beats,
+        shifts=options.shifts,
         shift_tacks_apart_s=60.0 / options.tacks_per_minute,
         replan_policy=ReplanPolicy(options.replan),
         guidance=Guidance(options.guidance),
@@ -399,8 +482,12 @@ def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
         orders=_orders(mission, "orders", mission.operator.orders),
         local_orders=_orders(mission, "local_orders", mission.operator.local_orders),
         far_orders=_orders(mission, "far_orders", mission.operator.far_orders),
-        may_upload=operator.set_auto, may_upload_fence=operator.upload_fence, may_arm=operator.arm,
-        may_set_mode=operator.set_auto, may_steer=operator.guided, may_replace_foreign=operator.replace_foreign,
+        may_upload=operator.set_auto,
+        may_upload_fence=operator.upload_fence,
+        may_arm=operator.arm,
+        may_set_mode=operator.set_auto,
+        may_steer=operator.guided,
+        may_replace_foreign=operator.replace_foreign,
     )
 
 
@@ -431,9 +518,12 @@ def _kalman(mission: Mission) -> dict[str, Any]:
     """Return the numbers of Wolsieffer's filter that the mission gives. Raises InputError for another estimator."""
     given = {key: value for key in _KALMAN if (value := getattr(mission.wind, key)) is not None}
     if given and mission.wind.estimator != "kalman":
-        raise InputError(str(mission.path), f"[wind] {next(iter(given))}",
-                         f"is for the estimator \"kalman\", and this mission's is {mission.wind.estimator!r}",
-                         'write estimator = "kalman", or leave it out')
+        raise InputError(
+            str(mission.path),
+            f"[wind] {next(iter(given))}",
+            f'is for the estimator "kalman", and this mission\'s is {mission.wind.estimator!r}',
+            'write estimator = "kalman", or leave it out',
+        )
     return {_KALMAN[key]: value for key, value in given.items()}
 
 
@@ -449,14 +539,25 @@ def water_of(mission: Mission) -> Prior:
     source = str(mission.path)
     if path is None:
         if current.drift_mps is None or (current.set_deg is None and current.drift_mps > 0.0):
-            raise InputError(source, "[current]", "set_deg and drift_mps are not both there",
-                             "write where it goes and how fast, or a table")
+            raise InputError(
+                source,
+                "[current]",
+                "set_deg and drift_mps are not both there",
+                "write where it goes and how fast, or a table",
+            )
         set_rad = math.radians(current.set_deg or 0.0)
-        return Prior(east_mps=current.drift_mps * math.sin(set_rad), north_mps=current.drift_mps * math.cos(set_rad),
-                     sigma_mps=current.sigma_mps)
+        return Prior(
+            east_mps=current.drift_mps * math.sin(set_rad),
+            north_mps=current.drift_mps * math.cos(set_rad),
+            sigma_mps=current.sigma_mps,
+        )
     if current.set_deg is not None or current.drift_mps is not None:
-        raise InputError(source, "[current] table", "a table and a constant current exclude one another",
-                         "leave out set_deg and drift_mps, or the table")
+        raise InputError(
+            source,
+            "[current] table",
+            "a table and a constant current exclude one another",
+            "leave out set_deg and drift_mps, or the table",
+        )
     try:
         text = read_regular(path).decode("utf-8-sig")
     except OSError as error:
@@ -503,20 +604,27 @@ def displays_of(mission: Mission) -> Displays:
         InputError: a name is none, or there is a token for nobody.
     """
     output = mission.output
-    nmea, signalk = (_named(mission, *named) for named in (
-        ("nmea", output.nmea, parse_nmea), ("signalk", output.signalk, parse_signalk)))
+    nmea, signalk = (
+        _named(mission, *named)
+        for named in (("nmea", output.nmea, parse_nmea), ("signalk", output.signalk, parse_signalk))
+    )
     if output.signalk_token is not None and all(name.kind == "tcp" for name in signalk):
-        raise InputError(str(mission.path), "[output] signalk_token", "there is no WebSocket to use it on",
-                         'name the server: signalk = ["ws://HOST:3000"]')
+        raise InputError(
+            str(mission.path),
+            "[output] signalk_token",
+            "there is no WebSocket to use it on",
+            'name the server: signalk = ["ws://HOST:3000"]',
+        )
     token = None if output.signalk_token is None else mission.path.parent / output.signalk_token
     return Displays(nmea=nmea, signalk=signalk, token_file=token)
 
 
 def _named(
-    mission: Mission, key: str, names: tuple[str, ...], parse: Callable[[str], OutputName],
+    mission: Mission, key: str, names: tuple[str, ...], parse: Callable[[str], OutputName]
 ) -> tuple[OutputName, ...]:
     try:
         return tuple(parse(name) for name in dict.fromkeys(names))
     except InputError as error:
-        raise InputError(str(mission.path), f"[output] {key}", f"{error.place!r} {error.problem}",
-                         error.remedy) from error
+        raise InputError(
+            str(mission.path), f"[output] {key}", f"{error.place!r} {error.problem}", error.remedy
+        ) from error

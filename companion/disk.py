@@ -25,8 +25,13 @@ RESERVE_BYTES = 8 << 20
 RESERVE_SHARE = 0.1
 NEW = ".new"
 
-_KINDS = ((stat.S_ISFIFO, "a FIFO"), (stat.S_ISSOCK, "a socket"), (stat.S_ISCHR, "a device"),
-          (stat.S_ISBLK, "a device"), (stat.S_ISLNK, "a link"))
+_KINDS = (
+    (stat.S_ISFIFO, "a FIFO"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISLNK, "a link"),
+)
 # What a wrong name raises, and a sick disk does not.
 _MISTAKES = frozenset({errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP, errno.EISDIR})
 
@@ -102,7 +107,7 @@ class Disk:
                         done += self.write(fd, data[done:])
                     with contextlib.suppress(OSError):
                         before = path.lstat().st_mode if mode is None else stat.S_IFREG | mode
-                        if stat.S_ISREG(before):   # the rights of what a link leads to are another file's
+                        if stat.S_ISREG(before):  # the rights of what a link leads to are another file's
                             os.fchmod(fd, before & 0o777)
                     if is_durable:
                         self.sync(fd)
@@ -113,7 +118,7 @@ class Disk:
         except OSError as error:
             for new in beside.values():
                 with contextlib.suppress(OSError):
-                    new.unlink()   # a full disk needs the room
+                    new.unlink()  # a full disk needs the room
             error.filename = str(path)
             raise
         if is_durable:
@@ -126,7 +131,7 @@ class Disk:
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
         try:
             return os.open(path, flags, 0o644)
-        except FileExistsError:   # a power cut left it, or others did
+        except FileExistsError:  # a power cut left it, or others did
             path.unlink()
             return os.open(path, flags, 0o644)
 
@@ -148,7 +153,7 @@ class Disk:
         try:
             self.sync(fd)
         except OSError as error:
-            if error.errno not in {errno.EINVAL, errno.ENOTSUP}:   # some file systems cannot, and need not
+            if error.errno not in {errno.EINVAL, errno.ENOTSUP}:  # some file systems cannot, and need not
                 raise
         finally:
             os.close(fd)
@@ -166,7 +171,7 @@ def open_regular(path: Path, *, follows_links: bool = True) -> BinaryIO:
     Raises:
         OSError: it is none (EINVAL), is a link where none is followed, or cannot be opened.
     """
-    _require_regular(path.stat(follow_symlinks=follows_links).st_mode)   # opening may do something to a device
+    _require_regular(path.stat(follow_symlinks=follows_links).st_mode)  # opening may do something to a device
     more = 0 if follows_links else os.O_NOFOLLOW
     return io.open(path, "rb", opener=lambda name, flags: _opened(name, flags | more))  # noqa: UP020 - as pathlib calls it
 
@@ -174,7 +179,7 @@ def open_regular(path: Path, *, follows_links: bool = True) -> BinaryIO:
 def _opened(path: str, flags: int) -> int:
     fd = os.open(path, flags | os.O_NONBLOCK | os.O_CLOEXEC | os.O_NOCTTY)
     try:
-        _require_regular(os.fstat(fd).st_mode)   # it may be another by now
+        _require_regular(os.fstat(fd).st_mode)  # it may be another by now
     except OSError:
         os.close(fd)
         raise

@@ -25,9 +25,9 @@ __all__ = ["RATES_HZ", "DoctorFinding", "Examined", "Level", "Needs", "examine"]
 class Level(enum.IntEnum):
     """How bad it is."""
 
-    INFO = 0       # good to know
-    WARNING = 1    # may spoil a voyage
-    ERROR = 2      # will
+    INFO = 0  # good to know
+    WARNING = 1  # may spoil a voyage
+    ERROR = 2  # will
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,18 +47,18 @@ class DoctorFinding:
 class Needs:
     """What the voyage needs of the autopilot; the defaults are those of a mission that says nothing."""
 
-    no_go_half_rad: float = math.radians(45.0)   # the boat's, as the plans use it
+    no_go_half_rad: float = math.radians(45.0)  # the boat's, as the plans use it
     margin_m: float = 15.0
     margin_floor_m: float = 8.0
     goal_radius_m: float = 5.0
     loiter_radius_m: float = 15.0
     speed_mps: float = 3.0
     hull: Hull = field(default_factory=Hull)
-    reach_m: float = 0.0                         # farthest place of the voyage from home
-    has_fence: bool = False                      # the mission wants its fence on the autopilot
-    has_refuge: bool = False                     # the mission names a place for a critical battery
-    sails: bool = True                           # False: a motor boat
-    can_tack: bool = True                        # False: it gybes round, and no corridor of tacks is of use
+    reach_m: float = 0.0  # farthest place of the voyage from home
+    has_fence: bool = False  # the mission wants its fence on the autopilot
+    has_refuge: bool = False  # the mission names a place for a critical battery
+    sails: bool = True  # False: a motor boat
+    can_tack: bool = True  # False: it gybes round, and no corridor of tacks is of use
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,11 +70,12 @@ class Examined:
     mission: Sequence[MissionItem] | None = None
     fence: Sequence[MissionItem] | None = None
     rates_hz: Mapping[str, float] | None = None
-    system_id: int | None = None                 # of its heartbeats
-    uid: str | None = None                       # of its board, "" when it tells none
-    is_signed: bool = False                      # its frames carry signatures
-    has_key: bool = False                        # ours do too
-    planner_speed: float | None = None           # of this computer, as a share of the reference core
+    system_id: int | None = None  # of its heartbeats
+    uid: str | None = None  # of its board, "" when it tells none
+    is_signed: bool = False  # its frames carry signatures
+    has_key: bool = False  # ours do too
+    planner_speed: float | None = None  # of this computer, as a share of the reference core
+
 
 class Report:
     """The findings so far, about the parameters that were read."""
@@ -88,12 +89,13 @@ class Report:
         return lookup(self.parameters, name)
 
     def add(
-        self, level: Level, code: str, what: str, why: str, *, name: str | None = None, wanted: float | None = None,
+        self, level: Level, code: str, what: str, why: str, *, name: str | None = None, wanted: float | None = None
     ) -> None:
         """Add a finding, about parameter ``name`` if one is given."""
         value = self.get(name) if name is not None else None
         self.findings.append(
-            DoctorFinding(level=level, code=code, what=what, why=why, parameter=name, value=value, wanted=wanted))
+            DoctorFinding(level=level, code=code, what=what, why=why, parameter=name, value=value, wanted=wanted)
+        )
 
     def expect(self, level: Level, name: str, wanted: float, why: str) -> None:
         """Add a finding if a parameter was answered and is not as wanted."""
@@ -102,13 +104,20 @@ class Report:
             self.add(level, name.lower(), f"{name} is {value:g}", why, name=name, wanted=wanted)
 
 
-FENCE_ITEMS = 84             # what every board holds (672 bytes of storage, 8 each)
+FENCE_ITEMS = 84  # what every board holds (672 bytes of storage, 8 each)
 POLYGON_BIT = 4
 RATES_HZ = {"WIND": 0.9, "GLOBAL_POSITION_INT": 0.9, "ATTITUDE": 0.9, "MISSION_CURRENT": 0.4, "EKF_STATUS_REPORT": 0.4}
-OLDEST = (4, 2)              # before it the boat is steered by L1 and the upwind corridor differs
-MODES_FS = {0: "nothing", 1: "RTL", 2: "HOLD", 3: "SmartRTL or RTL or HOLD", 4: "SmartRTL or HOLD", 5: "a disarming",
-            6: "LOITER or HOLD"}
-ADRIFT = frozenset({2, 4, 5})   # what leaves a sailboat to drift: the boat's sails are eased and nobody steers
+OLDEST = (4, 2)  # before it the boat is steered by L1 and the upwind corridor differs
+MODES_FS = {
+    0: "nothing",
+    1: "RTL",
+    2: "HOLD",
+    3: "SmartRTL or RTL or HOLD",
+    4: "SmartRTL or HOLD",
+    5: "a disarming",
+    6: "LOITER or HOLD",
+}
+ADRIFT = frozenset({2, 4, 5})  # what leaves a sailboat to drift: the boat's sails are eased and nobody steers
 DRIFTS = "a sailboat in HOLD eases her sails and drifts, out of a fence and onto whatever is there"
 
 
@@ -119,28 +128,58 @@ def fence(report: Report, seen: Examined, needs: Needs) -> None:
     on = enabled is not None and enabled != 0
     if kind is not None and int(kind) & AutopilotLimits.CIRCLE_BIT and radius is not None and (on or needs.has_fence):
         inside = needs.reach_m + needs.margin_m <= radius
-        report.add(Level.INFO if inside else Level.ERROR, "home circle",
-                   f"FENCE_TYPE {kind:g} includes the circle of {radius:g} m around home",
-                   "the voyage stays inside it" if inside else
-                   f"the voyage goes {needs.reach_m:.0f} m from home and breaches it; 4 means polygons only",
-                   name="FENCE_TYPE", wanted=None if inside else float(POLYGON_BIT))
+        report.add(
+            Level.INFO if inside else Level.ERROR,
+            "home circle",
+            f"FENCE_TYPE {kind:g} includes the circle of {radius:g} m around home",
+            "the voyage stays inside it"
+            if inside
+            else f"the voyage goes {needs.reach_m:.0f} m from home and breaches it; 4 means polygons only",
+            name="FENCE_TYPE",
+            wanted=None if inside else float(POLYGON_BIT),
+        )
     if on and seen.fence is not None and not seen.fence and kind is not None and int(kind) == POLYGON_BIT:
-        report.add(Level.WARNING, "empty fence", "a polygon fence is enabled and there is none on the autopilot",
-                   "it guards nothing", name="FENCE_ENABLE", wanted=0.0)
+        report.add(
+            Level.WARNING,
+            "empty fence",
+            "a polygon fence is enabled and there is none on the autopilot",
+            "it guards nothing",
+            name="FENCE_ENABLE",
+            wanted=0.0,
+        )
     if seen.fence is not None and len(seen.fence) > FENCE_ITEMS:
-        report.add(Level.ERROR, "fence size", f"{len(seen.fence)} fence items; boards hold {FENCE_ITEMS}",
-                   "the rest is not there: simplify it with 'companion fence'")
+        report.add(
+            Level.ERROR,
+            "fence size",
+            f"{len(seen.fence)} fence items; boards hold {FENCE_ITEMS}",
+            "the rest is not there: simplify it with 'companion fence'",
+        )
     if not on and needs.has_fence:
-        report.add(Level.WARNING, "fence off", "FENCE_ENABLE is 0 and the mission wants its fence on the autopilot",
-                   "the last line of defence is missing", name="FENCE_ENABLE", wanted=1.0)
+        report.add(
+            Level.WARNING,
+            "fence off",
+            "FENCE_ENABLE is 0 and the mission wants its fence on the autopilot",
+            "the last line of defence is missing",
+            name="FENCE_ENABLE",
+            wanted=1.0,
+        )
     if on and action is not None:
         does = MODES_FS.get(int(action), f"action {action:g}")
         drifts = needs.sails and int(action) in ADRIFT
         level = Level.ERROR if drifts else Level.WARNING if action == 0 else Level.INFO
-        report.add(level, "fence action", f"on a breach: {does}" if action else "on a breach: only a report",
-                   "the fence stops nothing" if action == 0 else DRIFTS if drifts else
-                   "it coasts about 7 m on at 3 m/s and sails straight home; with [operator] set_auto the companion "
-                   "plans the way back inside", name="FENCE_ACTION", wanted=1.0 if action == 0 or drifts else None)
+        report.add(
+            level,
+            "fence action",
+            f"on a breach: {does}" if action else "on a breach: only a report",
+            "the fence stops nothing"
+            if action == 0
+            else DRIFTS
+            if drifts
+            else "it coasts about 7 m on at 3 m/s and sails straight home; with [operator] set_auto the companion "
+            "plans the way back inside",
+            name="FENCE_ACTION",
+            wanted=1.0 if action == 0 or drifts else None,
+        )
 
 
 def failsafes(report: Report, needs: Needs) -> None:
@@ -151,34 +190,63 @@ def failsafes(report: Report, needs: Needs) -> None:
     drift = f"; {DRIFTS}" if drifts else ""
     does = MODES_FS.get(int(action), f"action {action:g}") if action is not None else "an action that was not read"
     if radio == 1.0:
-        report.add(bad, "radio failsafe", f"FS_THR_ENABLE is 1: out of RC range the boat goes to {does}",
-                   f"a voyage beyond RC range ends there; 2 continues the mission in AUTO{drift}", name="FS_THR_ENABLE",
-                   wanted=2.0)
+        report.add(
+            bad,
+            "radio failsafe",
+            f"FS_THR_ENABLE is 1: out of RC range the boat goes to {does}",
+            f"a voyage beyond RC range ends there; 2 continues the mission in AUTO{drift}",
+            name="FS_THR_ENABLE",
+            wanted=2.0,
+        )
     elif radio == 0.0:
-        report.add(Level.INFO, "radio failsafe", "FS_THR_ENABLE is 0: losing the RC does nothing",
-                   "the mission goes on", name="FS_THR_ENABLE")
+        report.add(
+            Level.INFO,
+            "radio failsafe",
+            "FS_THR_ENABLE is 0: losing the RC does nothing",
+            "the mission goes on",
+            name="FS_THR_ENABLE",
+        )
     if station == 0.0:
-        report.add(Level.INFO, "station failsafe", "FS_GCS_ENABLE is 0: losing the ground station does nothing",
-                   "the mission goes on to its safe end; losing the companion never triggers anything",
-                   name="FS_GCS_ENABLE")
+        report.add(
+            Level.INFO,
+            "station failsafe",
+            "FS_GCS_ENABLE is 0: losing the ground station does nothing",
+            "the mission goes on to its safe end; losing the companion never triggers anything",
+            name="FS_GCS_ENABLE",
+        )
     elif station is not None:
         quirk = station == 2.0 and radio not in {None, 0.0, 2.0}
         if station != 2.0 or quirk:
             report.add(
-                bad, "station failsafe",
+                bad,
+                "station failsafe",
                 f"FS_GCS_ENABLE is {station:g}: losing the ground station means {does}",
-                "with FS_THR_ENABLE 1 'continue in AUTO' is ignored: set that to 2" if quirk else
-                f"a voyage beyond its range ends there; 2 continues the mission in AUTO{drift}",
-                name="FS_THR_ENABLE" if quirk else "FS_GCS_ENABLE", wanted=2.0)
+                "with FS_THR_ENABLE 1 'continue in AUTO' is ignored: set that to 2"
+                if quirk
+                else f"a voyage beyond its range ends there; 2 continues the mission in AUTO{drift}",
+                name="FS_THR_ENABLE" if quirk else "FS_GCS_ENABLE",
+                wanted=2.0,
+            )
     if report.get("FS_EKF_ACTION") in {0.0, 2.0}:
-        report.add(Level.WARNING, "EKF failsafe", f"FS_EKF_ACTION is {report.get('FS_EKF_ACTION'):g}: a lost position "
-                   "stops nothing", "the boat sails on by a position that is wrong; in HOLD she drifts, and with "
-                   "[operator] set_auto sails on when it is back", name="FS_EKF_ACTION", wanted=1.0)
+        report.add(
+            Level.WARNING,
+            "EKF failsafe",
+            f"FS_EKF_ACTION is {report.get('FS_EKF_ACTION'):g}: a lost position stops nothing",
+            "the boat sails on by a position that is wrong; in HOLD she drifts, and with "
+            "[operator] set_auto sails on when it is back",
+            name="FS_EKF_ACTION",
+            wanted=1.0,
+        )
     crash, angle = report.get("FS_CRASH_CHECK"), report.get("CRASH_ANGLE")
     if crash not in {None, 0.0} or angle not in {None, 0.0}:
-        report.add(Level.WARNING, "crash check", "FS_CRASH_CHECK or CRASH_ANGLE is on",
-                   "a becalmed or heeled sailboat looks crashed and is disarmed", wanted=0.0,
-                   name="FS_CRASH_CHECK" if crash else "CRASH_ANGLE")
+        report.add(
+            Level.WARNING,
+            "crash check",
+            "FS_CRASH_CHECK or CRASH_ANGLE is on",
+            "a becalmed or heeled sailboat looks crashed and is disarmed",
+            wanted=0.0,
+            name="FS_CRASH_CHECK" if crash else "CRASH_ANGLE",
+        )
     _battery(report, needs)
 
 
@@ -188,28 +256,57 @@ def _battery(report: Report, needs: Needs) -> None:
     for name in ("BATT_FS_LOW_ACT", "BATT_FS_CRT_ACT"):
         action = report.get(name)
         if action is not None and needs.sails and int(action) in ADRIFT:
-            report.add(Level.ERROR, "battery failsafe", f"{name} is {action:g}: a low battery means "
-                       f"{MODES_FS[int(action)]}", DRIFTS, name=name, wanted=1.0)
+            report.add(
+                Level.ERROR,
+                "battery failsafe",
+                f"{name} is {action:g}: a low battery means {MODES_FS[int(action)]}",
+                DRIFTS,
+                name=name,
+                wanted=1.0,
+            )
     if report.get("BATT_FS_LOW_ACT") == 0.0:
-        leads = "makes for the mission's refuge" if needs.has_refuge else (
-            "would make for a refuge, if the mission named one ([[refuge]])")
-        report.add(Level.INFO, "battery failsafe", "BATT_FS_LOW_ACT is 0: a low battery does nothing on the autopilot",
-                   f"the companion says so, and at 10 % {leads}", name="BATT_FS_LOW_ACT")
+        leads = (
+            "makes for the mission's refuge"
+            if needs.has_refuge
+            else ("would make for a refuge, if the mission named one ([[refuge]])")
+        )
+        report.add(
+            Level.INFO,
+            "battery failsafe",
+            "BATT_FS_LOW_ACT is 0: a low battery does nothing on the autopilot",
+            f"the companion says so, and at 10 % {leads}",
+            name="BATT_FS_LOW_ACT",
+        )
 
 
 def identity(report: Report, seen: Examined) -> None:
     """Look at the system ids."""
     own, station = report.get("SYSID_THISMAV"), report.get("SYSID_MYGCS")
     if own is not None and seen.system_id is not None and int(own) != seen.system_id:
-        report.add(Level.WARNING, "system id", f"it calls itself {seen.system_id} and its parameter says {own:g}",
-                   "a change of SYSID_THISMAV takes a reboot", name="SYSID_THISMAV")
+        report.add(
+            Level.WARNING,
+            "system id",
+            f"it calls itself {seen.system_id} and its parameter says {own:g}",
+            "a change of SYSID_THISMAV takes a reboot",
+            name="SYSID_THISMAV",
+        )
     if seen.uid == "":
-        report.add(Level.INFO, "board", "the autopilot tells no UID of its board",
-                   "that it has become another one under way cannot be seen")
+        report.add(
+            Level.INFO,
+            "board",
+            "the autopilot tells no UID of its board",
+            "that it has become another one under way cannot be seen",
+        )
     if own is not None and station is not None and own == station:
-        report.add(Level.ERROR, "system id", f"SYSID_MYGCS is the vehicle's own id {own:g}",
-                   "the companion then counts as the ground station: its heartbeat keeps the station failsafe from "
-                   "working, and its death triggers it", name="SYSID_MYGCS", wanted=255.0)
+        report.add(
+            Level.ERROR,
+            "system id",
+            f"SYSID_MYGCS is the vehicle's own id {own:g}",
+            "the companion then counts as the ground station: its heartbeat keeps the station failsafe from "
+            "working, and its death triggers it",
+            name="SYSID_MYGCS",
+            wanted=255.0,
+        )
 
 
 def signing(report: Report, seen: Examined) -> None:
@@ -217,13 +314,20 @@ def signing(report: Report, seen: Examined) -> None:
     if seen.is_signed and not seen.has_key:
         answers = bool(seen.parameters)
         report.add(
-            Level.WARNING if answers else Level.ERROR, "signing",
+            Level.WARNING if answers else Level.ERROR,
+            "signing",
             "the autopilot signs its messages and no key was given",
-            "it answers unsigned ones on this port (as on USB), not on others: give --signing-key FILE" if answers else
-            "it refuses what is not signed: give --signing-key FILE, to 'companion run' as well")
+            "it answers unsigned ones on this port (as on USB), not on others: give --signing-key FILE"
+            if answers
+            else "it refuses what is not signed: give --signing-key FILE, to 'companion run' as well",
+        )
     elif not seen.is_signed and not seen.has_key:
-        report.add(Level.INFO, "signing", "nothing is signed: whoever can send to the autopilot orders the boat",
-                   "where a stranger can (a telemetry radio), give it a key: 'companion key new', 'companion key set'")
+        report.add(
+            Level.INFO,
+            "signing",
+            "nothing is signed: whoever can send to the autopilot orders the boat",
+            "where a stranger can (a telemetry radio), give it a key: 'companion key new', 'companion key set'",
+        )
 
 
 def version(report: Report, seen: Examined) -> None:
@@ -241,15 +345,27 @@ def mission(report: Report, seen: Examined) -> None:
         report.add(Level.WARNING, "mission", "the mission could not be read", "it cannot be told whose it is")
         return
     if seen.mission and not ends_safely(seen.mission):
-        report.add(Level.WARNING, "mission end", f"the mission on board ({len(seen.mission)} items) has no safe end",
-                   "after its last item the boat does what MIS_DONE_BEHAVE says")
+        report.add(
+            Level.WARNING,
+            "mission end",
+            f"the mission on board ({len(seen.mission)} items) has no safe end",
+            "after its last item the boat does what MIS_DONE_BEHAVE says",
+        )
     held = [n for n, item in enumerate(seen.mission, start=1) if item.command == 16 and item.params[0] > 0.0]
     if held:
-        report.add(Level.INFO, "waiting waypoints", f"item {held[0]} waits {seen.mission[held[0] - 1].params[0]:g} s",
-                   "a sailboat circles while it waits")
+        report.add(
+            Level.INFO,
+            "waiting waypoints",
+            f"item {held[0]} waits {seen.mission[held[0] - 1].params[0]:g} s",
+            "a sailboat circles while it waits",
+        )
     if seen.mission:
-        report.add(Level.INFO, "mission", f"a mission of {len(seen.mission)} items is on board",
-                   "unless it is the companion's own it is neither resumed nor replaced without permission")
+        report.add(
+            Level.INFO,
+            "mission",
+            f"a mission of {len(seen.mission)} items is on board",
+            "unless it is the companion's own it is neither resumed nor replaced without permission",
+        )
 
 
 def streams(report: Report, seen: Examined) -> None:
@@ -259,8 +375,12 @@ def streams(report: Report, seen: Examined) -> None:
     for name, wanted in RATES_HZ.items():
         rate = seen.rates_hz.get(name, 0.0)
         if rate < 0.1:
-            report.add(Level.ERROR, "streams", f"no {name} is heard", "it was asked for and does not come: a router in "
-                       "between, or another system id?")
+            report.add(
+                Level.ERROR,
+                "streams",
+                f"no {name} is heard",
+                "it was asked for and does not come: a router in between, or another system id?",
+            )
         elif rate < wanted:
             report.add(Level.WARNING, "streams", f"{name} comes {rate:.1f} times a second", f"{wanted:g} are needed")
 
@@ -269,14 +389,20 @@ def examine(seen: Examined, needs: Needs) -> tuple[DoctorFinding, ...]:
     """Return the findings, worst first, each once."""
     report = Report(seen.parameters)
     if not seen.parameters:
-        report.add(Level.ERROR, "no parameters", "no parameter was answered",
-                   "what is not signed is not answered on this link" if seen.is_signed and not seen.has_key else
-                   "is another program using the link, or does a router in between let nothing through to it?")
+        report.add(
+            Level.ERROR,
+            "no parameters",
+            "no parameter was answered",
+            "what is not signed is not answered on this link"
+            if seen.is_signed and not seen.has_key
+            else "is another program using the link, or does a router in between let nothing through to it?",
+        )
     else:
         report.expect(Level.ERROR, "FRAME_CLASS", 2.0, "no order is given to anything but a boat")
         for why in believable(seen.parameters)[1]:
-            report.add(Level.ERROR, "impossible", why, "the companion sails by the default in its place",
-                       name=why.split()[0])
+            report.add(
+                Level.ERROR, "impossible", why, "the companion sails by the default in its place", name=why.split()[0]
+            )
         if needs.sails:
             _boat(report, needs)
             _wind(report)
@@ -293,32 +419,54 @@ def examine(seen: Examined, needs: Needs) -> tuple[DoctorFinding, ...]:
     _computer(report, seen)
     return tuple(sorted(report.findings, key=lambda f: (-f.level, f.code)))
 
+
 def _boat(report: Report, needs: Needs) -> None:
     report.expect(Level.ERROR, "SAIL_ENABLE", 1.0, "without it the autopilot sails into the wind")
     no_go = report.get("SAIL_NO_GO_ANGLE")
     planned = math.degrees(needs.no_go_half_rad)
     if no_go is not None and no_go > planned + 0.5:
-        report.add(Level.INFO, "no-go", f"SAIL_NO_GO_ANGLE {no_go:g}° is wider than the boat's {planned:g}°",
-                   f"plans keep to {no_go + 2.0:g}°: if the boat points higher, lower the parameter",
-                   name="SAIL_NO_GO_ANGLE")
+        report.add(
+            Level.INFO,
+            "no-go",
+            f"SAIL_NO_GO_ANGLE {no_go:g}° is wider than the boat's {planned:g}°",
+            f"plans keep to {no_go + 2.0:g}°: if the boat points higher, lower the parameter",
+            name="SAIL_NO_GO_ANGLE",
+        )
     if no_go is not None and no_go < planned - 5.0:
-        report.add(Level.WARNING, "no-go", f"SAIL_NO_GO_ANGLE {no_go:g}° is narrower than the boat's {planned:g}°",
-                   "in a header the autopilot points higher than the boat sails", name="SAIL_NO_GO_ANGLE",
-                   wanted=planned)
-    limits = AutopilotLimits.from_params(believable({
-        name: value for name in AutopilotLimits.PARAMETERS if (value := report.get(name)) is not None})[0])
+        report.add(
+            Level.WARNING,
+            "no-go",
+            f"SAIL_NO_GO_ANGLE {no_go:g}° is narrower than the boat's {planned:g}°",
+            "in a header the autopilot points higher than the boat sails",
+            name="SAIL_NO_GO_ANGLE",
+            wanted=planned,
+        )
+    limits = AutopilotLimits.from_params(
+        believable({name: value for name in AutopilotLimits.PARAMETERS if (value := report.get(name)) is not None})[0]
+    )
     if not needs.can_tack:
         if limits.sail_xtrack_max_m > 0.0:
-            report.add(Level.WARNING, "corridor", f"SAIL_XTRACK_MAX is {limits.sail_xtrack_max_m:g}, and this boat "
-                       "cannot tack", "when a shift closes a leg the autopilot tries to tack at that corridor's edge; "
-                       "at 0 it sails on, and the companion gybes round", name="SAIL_XTRACK_MAX", wanted=0.0)
+            report.add(
+                Level.WARNING,
+                "corridor",
+                f"SAIL_XTRACK_MAX is {limits.sail_xtrack_max_m:g}, and this boat cannot tack",
+                "when a shift closes a leg the autopilot tries to tack at that corridor's edge; "
+                "at 0 it sails on, and the companion gybes round",
+                name="SAIL_XTRACK_MAX",
+                wanted=0.0,
+            )
     else:
         _corridor(report, needs, limits)
     loiter = report.get("SAIL_LOIT_RADIUS")
     if loiter is not None and 2.5 * loiter > needs.loiter_radius_m:
-        report.add(Level.WARNING, "loiter", f"SAIL_LOIT_RADIUS {loiter:g} m needs about {2.5 * loiter:.0f} m of room",
-                   f"the mission's end is chosen with {needs.loiter_radius_m:g} m", name="SAIL_LOIT_RADIUS",
-                   wanted=math.floor(needs.loiter_radius_m / 2.5))
+        report.add(
+            Level.WARNING,
+            "loiter",
+            f"SAIL_LOIT_RADIUS {loiter:g} m needs about {2.5 * loiter:.0f} m of room",
+            f"the mission's end is chosen with {needs.loiter_radius_m:g} m",
+            name="SAIL_LOIT_RADIUS",
+            wanted=math.floor(needs.loiter_radius_m / 2.5),
+        )
     report.expect(Level.INFO, "LOIT_TYPE", 1.0, "a sailboat keeps moving in a loiter; 1 turns it bow to the point")
 
 
@@ -332,75 +480,133 @@ def _corridor(report: Report, needs: Needs, limits: AutopilotLimits) -> None:
         wanted = narrowest_m if fitting_m is None else fitting_m
         if corridor_m <= 0.0:
             what = "SAIL_XTRACK_MAX is 0: no corridor when a shift closes a leg"
-            why = ("the autopilot then sails long boards to the layline, wherever that is; the companion reacts, but "
-                   "if it dies nothing bounds the boat")
+            why = (
+                "the autopilot then sails long boards to the layline, wherever that is; the companion reacts, but "
+                "if it dies nothing bounds the boat"
+            )
         else:
             what = f"SAIL_XTRACK_MAX {corridor_m:g} m is soon crossed at {speed_mps:.1f} m/s"
             why = "when a shift closes a leg the autopilot does little but tack"
         report.add(Level.WARNING, "corridor", what, why, name="SAIL_XTRACK_MAX", wanted=wanted)
     if proposed.margin.total_m > needs.margin_m + 1e-6:
         narrows = fitting_m is not None and fitting_m < corridor_m
-        report.add(Level.WARNING, "margin", f"the margin of {needs.margin_m:g} m is less than "
-                   f"{proposed.margin.describe()}", "when a shift closes a leg the autopilot beats in its corridor: "
-                   f"{'narrow it, or ' if narrows else ''}plan with [area] margin_m = {proposed.margin_m:g}",
-                   name="SAIL_XTRACK_MAX", wanted=fitting_m if narrows else None)
+        report.add(
+            Level.WARNING,
+            "margin",
+            f"the margin of {needs.margin_m:g} m is less than {proposed.margin.describe()}",
+            "when a shift closes a leg the autopilot beats in its corridor: "
+            f"{'narrow it, or ' if narrows else ''}plan with [area] margin_m = {proposed.margin_m:g}",
+            name="SAIL_XTRACK_MAX",
+            wanted=fitting_m if narrows else None,
+        )
 
 
 def _wind(report: Report) -> None:
     kind = report.get("WNDVN_TYPE")
     speed = report.get("WNDVN_SPEED_TYPE")
     if kind == 0:
-        report.add(Level.ERROR, "vane", "WNDVN_TYPE is 0: no wind vane",
-                   "arming is refused, and nothing can be planned", name="WNDVN_TYPE")
+        report.add(
+            Level.ERROR,
+            "vane",
+            "WNDVN_TYPE is 0: no wind vane",
+            "arming is refused, and nothing can be planned",
+            name="WNDVN_TYPE",
+        )
     elif kind in {1.0, 2.0}:
-        report.add(Level.ERROR, "vane", f"WNDVN_TYPE is {kind:g}: the wind is the heading at arming, not a measurement",
-                   "it may serve a short try in steady wind, no voyage", name="WNDVN_TYPE")
+        report.add(
+            Level.ERROR,
+            "vane",
+            f"WNDVN_TYPE is {kind:g}: the wind is the heading at arming, not a measurement",
+            "it may serve a short try in steady wind, no voyage",
+            name="WNDVN_TYPE",
+        )
     elif kind == 11.0:
-        report.add(Level.ERROR, "vane", "WNDVN_TYPE is 11: the simulator's apparent wind, which the model never fills",
-                   "the boat tacks at random", name="WNDVN_TYPE", wanted=10.0)
+        report.add(
+            Level.ERROR,
+            "vane",
+            "WNDVN_TYPE is 11: the simulator's apparent wind, which the model never fills",
+            "the boat tacks at random",
+            name="WNDVN_TYPE",
+            wanted=10.0,
+        )
     if speed == 0:
-        report.add(Level.WARNING, "wind speed", "WNDVN_SPEED_TYPE is 0: no wind speed sensor",
-                   "the autopilot's true wind is then vane plus heading: wrong whenever the boat moves",
-                   name="WNDVN_SPEED_TYPE")
+        report.add(
+            Level.WARNING,
+            "wind speed",
+            "WNDVN_SPEED_TYPE is 0: no wind speed sensor",
+            "the autopilot's true wind is then vane plus heading: wrong whenever the boat moves",
+            name="WNDVN_SPEED_TYPE",
+        )
     minimum = report.get("WNDVN_SPEED_MIN")
     if minimum is not None and minimum > 0.0:
-        report.add(Level.INFO, "held wind", f"below WNDVN_SPEED_MIN {minimum:g} m/s the old true wind is held",
-                   "it looks fresh; the wind watch marks it as held", name="WNDVN_SPEED_MIN")
+        report.add(
+            Level.INFO,
+            "held wind",
+            f"below WNDVN_SPEED_MIN {minimum:g} m/s the old true wind is held",
+            "it looks fresh; the wind watch marks it as held",
+            name="WNDVN_SPEED_MIN",
+        )
     cut_hz = report.get("WNDVN_TRUE_FILT")
     if cut_hz is not None and cut_hz > 0.0:
         lag_s = 1.0 / (2.0 * math.pi * cut_hz)
         level = Level.INFO if lag_s < 5.0 else Level.WARNING
-        report.add(level, "wind filter", f"WNDVN_TRUE_FILT {cut_hz:g} Hz: the true wind lags {lag_s:.1f} s",
-                   "the forecaster accounts for it; a longer lag delays the answer to a header", name="WNDVN_TRUE_FILT",
-                   wanted=None if lag_s < 5.0 else 0.05)
+        report.add(
+            level,
+            "wind filter",
+            f"WNDVN_TRUE_FILT {cut_hz:g} Hz: the true wind lags {lag_s:.1f} s",
+            "the forecaster accounts for it; a longer lag delays the answer to a header",
+            name="WNDVN_TRUE_FILT",
+            wanted=None if lag_s < 5.0 else 0.05,
+        )
 
 
 def _navigation(report: Report, needs: Needs) -> None:
     radius = report.get("WP_RADIUS")
     if radius is not None and radius > needs.goal_radius_m:
-        report.add(Level.WARNING, "waypoint radius",
-                   f"WP_RADIUS {radius:g} m is more than the goal's radius {needs.goal_radius_m:g} m",
-                   "waypoints count as reached, and corners are cut, that far off",
-                   name="WP_RADIUS", wanted=max(1.0, math.floor(min(needs.goal_radius_m, 3.0))))
+        report.add(
+            Level.WARNING,
+            "waypoint radius",
+            f"WP_RADIUS {radius:g} m is more than the goal's radius {needs.goal_radius_m:g} m",
+            "waypoints count as reached, and corners are cut, that far off",
+            name="WP_RADIUS",
+            wanted=max(1.0, math.floor(min(needs.goal_radius_m, 3.0))),
+        )
     avoid = report.get("AVOID_ENABLE")
     if avoid is not None and avoid != 0:
-        report.add(Level.WARNING, "avoidance", f"AVOID_ENABLE is {avoid:g}",
-                   "near a fence the autopilot eases the sail, and outside an inclusion fence it may never move again "
-                   "(ArduPilot issue 34218); it does not keep the boat out either", name="AVOID_ENABLE", wanted=0.0)
+        report.add(
+            Level.WARNING,
+            "avoidance",
+            f"AVOID_ENABLE is {avoid:g}",
+            "near a fence the autopilot eases the sail, and outside an inclusion fence it may never move again "
+            "(ArduPilot issue 34218); it does not keep the boat out either",
+            name="AVOID_ENABLE",
+            wanted=0.0,
+        )
     oa_type = report.get("OA_TYPE")
     if oa_type is not None and oa_type != 0:
-        report.add(Level.WARNING, "two planners", f"OA_TYPE is {oa_type:g}",
-                   "the autopilot's path planner knows no wind and bends the companion's legs", name="OA_TYPE",
-                   wanted=0.0)
-    report.expect(Level.WARNING, "MIS_RESTART", 0.0,
-                  "at 1 every return to AUTO begins the mission again at its first item")
+        report.add(
+            Level.WARNING,
+            "two planners",
+            f"OA_TYPE is {oa_type:g}",
+            "the autopilot's path planner knows no wind and bends the companion's legs",
+            name="OA_TYPE",
+            wanted=0.0,
+        )
+    report.expect(
+        Level.WARNING, "MIS_RESTART", 0.0, "at 1 every return to AUTO begins the mission again at its first item"
+    )
     if report.get("MIS_DONE_BEHAVE") == 0:
-        report.add(Level.INFO, "mission end", "MIS_DONE_BEHAVE is 0: HOLD after the last item",
-                   "HOLD drifts; the companion's missions end in a loiter of their own", name="MIS_DONE_BEHAVE",
-                   wanted=1.0)
+        report.add(
+            Level.INFO,
+            "mission end",
+            "MIS_DONE_BEHAVE is 0: HOLD after the last item",
+            "HOLD drifts; the companion's missions end in a loiter of their own",
+            name="MIS_DONE_BEHAVE",
+            wanted=1.0,
+        )
 
 
-LATE, NARROW = 0.03, 0.3   # of the reference core: plans come late; in narrow water they are not as fast
+LATE, NARROW = 0.03, 0.3  # of the reference core: plans come late; in narrow water they are not as fast
 
 
 def _computer(report: Report, seen: Examined) -> None:
@@ -412,8 +618,18 @@ def _computer(report: Report, seen: Examined) -> None:
     if speed >= NARROW:
         report.add(Level.INFO, "computer", what, "as good as plans can be, and in time")
     elif speed >= LATE:
-        report.add(Level.INFO, "computer", what, "plans come in time; in narrow water they are somewhat slower ways: "
-                   "less is looked at in their budget ([skipper] planning_budget_s)")
+        report.add(
+            Level.INFO,
+            "computer",
+            what,
+            "plans come in time; in narrow water they are somewhat slower ways: "
+            "less is looked at in their budget ([skipper] planning_budget_s)",
+        )
     else:
-        report.add(Level.WARNING, "computer", what, "plans come late, and are asked for so much earlier; is something "
-                   "else at work on it, or is it throttled by heat or a weak supply?")
+        report.add(
+            Level.WARNING,
+            "computer",
+            what,
+            "plans come late, and are asked for so much earlier; is something "
+            "else at work on it, or is it throttled by heat or a weak supply?",
+        )

@@ -33,7 +33,7 @@ class InputError(CompanionError):
         self.source, self.place, self.problem, self.remedy = source, place, problem, remedy
         where = f"{source}: {place}" if place else source
         text = f"{where}: {problem}" + (f"; {remedy}" if remedy else "")
-        super().__init__("\\n".join(text.split("\n")))   # a name may hold the end of a line
+        super().__init__("\\n".join(text.split("\n")))  # a name may hold the end of a line
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
         """Return how it is made again in another process."""
@@ -47,7 +47,8 @@ class UnreadableError(InputError):
 def unreadable(source: str, error: OSError, place: str = "", remedy: str = "check the path") -> InputError:
     """Return what to raise for a file that could not be read: tried again unless its name or its rights are wrong."""
     is_wrong = isinstance(error, PermissionError | IsADirectoryError | NotADirectoryError) or (
-        error.errno == errno.EINVAL)   # a FIFO, a device: ``companion.disk.open_regular``
+        error.errno == errno.EINVAL
+    )  # a FIFO, a device: ``companion.disk.open_regular``
     problem = "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error.strerror or error})"
     return (InputError if is_wrong else UnreadableError)(source, place, problem, remedy)
 

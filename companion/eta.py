@@ -20,27 +20,27 @@ from companion.messages import Command, Mode
 from companion.skipper.step import Route, SkipperState, Snapshot, WindEstimate
 from companion.skipper.way import PointEn, Voyage, cross_track_m, gates_of, moved
 
-Winds = tuple[tuple[float, float], ...]   # from [rad] and speed [m/s], for WIND_S each
+Winds = tuple[tuple[float, float], ...]  # from [rad] and speed [m/s], for WIND_S each
 
-FOLLOWS = frozenset({Mode.AUTO, Mode.GUIDED})   # the modes in which the boat follows the legs on board
-STEP_S = 5.0          # of a walk
-REACH_S = 900.0       # walked so far in steps; the legs beyond that are taken whole
-WIND_S = 30.0         # the wind is taken to be one for so long
-SLOW_MPS = 0.2        # the least that it is taken to make
-SHARPEST_RAD = math.radians(150.0)   # a turn that is sharper cuts no more of its corner
-LOOK_S = 30.0         # a walk to the end of the leg that is sailed then is held against what comes ...
-TRIED_S = 20.0        # ... after so long
-KEPT = math.exp(-TRIED_S / 150.0)   # of a try's weight with each that follows: they count for two and a half minutes
-PRIOR = 1.0           # tries that the polar counts as at first
-SLOWEST, FASTEST = 0.25, 1.6    # of the polar: what is outside says something else than how fast it sails
-SPREAD, SPREAD_TRIES = 0.15, 2.0   # standard deviation of what tries make of a walk, and how many it counts as at first
-HERE_M, STRAYS = 2.5, 2.2   # nine in ten are within so much of a place, and of the pace's doubt of the way (sitl shown)
-ELSEWHERE = 1.5       # of how far a boat is from her polar here: how far she may be from that in what comes
-UNTRIED = 0.25        # likewise of a boat that has shown nothing yet; a try halves it (sitl shown)
-SHIFTS = 0.3          # of the spread of a plan's time: the boat sees how the wind begins, which the plan did not
-EVENS_OUT = 0.45      # of a try's scatter, with the root of the time: what one loses the next one gains
-LATE_LEAST_S = 1.0    # standard deviation of any time
-LATE_SIGMAS = 1.28    # of a normal: nine in ten are below
+FOLLOWS = frozenset({Mode.AUTO, Mode.GUIDED})  # the modes in which the boat follows the legs on board
+STEP_S = 5.0  # of a walk
+REACH_S = 900.0  # walked so far in steps; the legs beyond that are taken whole
+WIND_S = 30.0  # the wind is taken to be one for so long
+SLOW_MPS = 0.2  # the least that it is taken to make
+SHARPEST_RAD = math.radians(150.0)  # a turn that is sharper cuts no more of its corner
+LOOK_S = 30.0  # a walk to the end of the leg that is sailed then is held against what comes ...
+TRIED_S = 20.0  # ... after so long
+KEPT = math.exp(-TRIED_S / 150.0)  # of a try's weight with each that follows: they count for two and a half minutes
+PRIOR = 1.0  # tries that the polar counts as at first
+SLOWEST, FASTEST = 0.25, 1.6  # of the polar: what is outside says something else than how fast it sails
+SPREAD, SPREAD_TRIES = 0.15, 2.0  # standard deviation of what tries make of a walk, and how many it counts as at first
+HERE_M, STRAYS = 2.5, 2.2  # nine in ten are within so much of a place, and of the pace's doubt of the way (sitl shown)
+ELSEWHERE = 1.5  # of how far a boat is from her polar here: how far she may be from that in what comes
+UNTRIED = 0.25  # likewise of a boat that has shown nothing yet; a try halves it (sitl shown)
+SHIFTS = 0.3  # of the spread of a plan's time: the boat sees how the wind begins, which the plan did not
+EVENS_OUT = 0.45  # of a try's scatter, with the root of the time: what one loses the next one gains
+LATE_LEAST_S = 1.0  # standard deviation of any time
+LATE_SIGMAS = 1.28  # of a normal: nine in ten are below
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,8 +87,9 @@ class Pace:
     def share(self) -> float:
         """Return the pace as a share of the polar's."""
         prior_s = self.prior * TRIED_S
-        return 1.0 if self.tries == 0.0 else min(
-            max((self.made_s + prior_s) / (self.took_s + prior_s), SLOWEST), FASTEST)
+        return (
+            1.0 if self.tries == 0.0 else min(max((self.made_s + prior_s) / (self.took_s + prior_s), SLOWEST), FASTEST)
+        )
 
     @property
     def spread(self) -> float:
@@ -116,9 +117,14 @@ class Pace:
         if tried is None or left_s is None or t_s - tried.t_s > 1.5 * TRIED_S:
             return after
         took_s, made_s = t_s - tried.t_s, tried.walk_s - left_s
-        return replace(after, tries=KEPT * self.tries + 1.0, prior=KEPT * self.prior,
-                       took_s=KEPT * self.took_s + took_s, made_s=KEPT * self.made_s + made_s,
-                       scatter=KEPT * self.scatter + (made_s / took_s - self.share) ** 2)
+        return replace(
+            after,
+            tries=KEPT * self.tries + 1.0,
+            prior=KEPT * self.prior,
+            took_s=KEPT * self.took_s + took_s,
+            made_s=KEPT * self.made_s + made_s,
+            scatter=KEPT * self.scatter + (made_s / took_s - self.share) ** 2,
+        )
 
     def left_s(self, walk_s: float) -> float:
         """Return how long a walk of ``walk_s`` will take [s]: half of the boats are there."""
@@ -131,10 +137,14 @@ class Pace:
         """
         time_s = self.left_s(walk_s)
         each = self.spread / self.share
-        known = math.hypot(each / math.sqrt(max(1.0, self.tries + self.prior)), ELSEWHERE * (1.0 - self.share),
-                           UNTRIED / (1.0 + self.tries))
-        sigma_s = math.hypot(time_s * math.hypot(SHIFTS * spread, known),
-                             EVENS_OUT * each * math.sqrt(TRIED_S * time_s), LATE_LEAST_S)
+        known = math.hypot(
+            each / math.sqrt(max(1.0, self.tries + self.prior)),
+            ELSEWHERE * (1.0 - self.share),
+            UNTRIED / (1.0 + self.tries),
+        )
+        sigma_s = math.hypot(
+            time_s * math.hypot(SHIFTS * spread, known), EVENS_OUT * each * math.sqrt(TRIED_S * time_s), LATE_LEAST_S
+        )
         return time_s + LATE_SIGMAS * sigma_s
 
 
@@ -162,10 +172,13 @@ def eta_of(snapshot: Snapshot, state: SkipperState, voyage: Voyage, pace: Pace) 
     if walk is None or state.mission.route is None:
         return UNKNOWN
     way_m = itertools.accumulate(
-        (math.dist(a.at_en_m, b.at_en_m) for a, b in itertools.pairwise(walk.points)), initial=0.0)
+        (math.dist(a.at_en_m, b.at_en_m) for a, b in itertools.pairwise(walk.points)), initial=0.0
+    )
     strays = STRAYS * pace.doubt
-    points = tuple(replace(p, in_s=round(pace.left_s(p.in_s), 1), within_m=HERE_M + strays * so_far_m)
-                   for p, so_far_m in zip(walk.points, way_m, strict=True))
+    points = tuple(
+        replace(p, in_s=round(pace.left_s(p.in_s), 1), within_m=HERE_M + strays * so_far_m)
+        for p, so_far_m in zip(walk.points, way_m, strict=True)
+    )
     if walk.goal_s is None:
         return Eta(points=points)
     spread = _wind_spread(state.mission.route)
@@ -181,8 +194,13 @@ def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -
     if not pace.is_due(snapshot.t_s, route.plan_id):
         return pace
     walk = _walk(snapshot, state, voyage, whole_s=LOOK_S)
-    fresh = None if walk is None or walk.last < 0 else PaceTrial(
-        t_s=snapshot.t_s, plan_id=route.plan_id, until=walk.last, winds=walk.winds, walk_s=walk.points[-1].in_s)
+    fresh = (
+        None
+        if walk is None or walk.last < 0
+        else PaceTrial(
+            t_s=snapshot.t_s, plan_id=route.plan_id, until=walk.last, winds=walk.winds, walk_s=walk.points[-1].in_s
+        )
+    )
     left = None
     if tried is not None and tried.plan_id == route.plan_id and state.mission.index <= tried.until:
         left = _walk(snapshot, state, voyage, until=tried.until, winds=tried.winds)
@@ -200,12 +218,17 @@ def _wind_spread(route: Route) -> float:
 class _Walked:
     points: tuple[ExpectedPlace, ...]
     winds: Winds
-    last: int                  # the item to whose end it has come, -1: none
+    last: int  # the item to whose end it has come, -1: none
     goal_s: float | None
 
 
 def _walk(
-    snapshot: Snapshot, state: SkipperState, voyage: Voyage, *, whole_s: float = math.inf, until: int | None = None,
+    snapshot: Snapshot,
+    state: SkipperState,
+    voyage: Voyage,
+    *,
+    whole_s: float = math.inf,
+    until: int | None = None,
     winds: Winds | None = None,
 ) -> _Walked | None:
     """Walk along the legs that are left; None where the boat is not being sailed.
@@ -215,13 +238,21 @@ def _walk(
     """
     here, wind, vehicle, route = snapshot.position_en_m, snapshot.wind, snapshot.vehicle, state.mission.route
     autopilot = snapshot.autopilot
-    if here is None or vehicle is None or route is None or wind.mean_twd_from_rad is None or (
-            wind.mean_tws_mps is None) or not state.voyage.sailing or state.voyage.over or autopilot is None or (
-            autopilot.mode not in FOLLOWS):
+    if (
+        here is None
+        or vehicle is None
+        or route is None
+        or wind.mean_twd_from_rad is None
+        or (wind.mean_tws_mps is None)
+        or not state.voyage.sailing
+        or state.voyage.over
+        or autopilot is None
+        or (autopilot.mode not in FOLLOWS)
+    ):
         return None
     limits = snapshot.limits or AutopilotLimits()
     if autopilot.mode is Mode.GUIDED:
-        limits = replace(limits, sail_xtrack_max_m=0.0)   # GUIDED has no corridor
+        limits = replace(limits, sail_xtrack_max_m=0.0)  # GUIDED has no corridor
     winds = _winds(wind, wind.mean_twd_from_rad, wind.mean_tws_mps) if winds is None else winds
     walker = _Walker(winds, snapshot.current.planned_en_mps, voyage.boat, limits, heading_rad=vehicle.heading_rad)
     gates = gates_of(voyage, state.progress.approaches)
@@ -249,7 +280,7 @@ def _walk(
                 goal_s = time_s + part * step_s
             time_s += step_s
             points.append(ExpectedPlace(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
-        if math.dist(at, end) > limits.wp_radius_m:   # what is farther is taken whole
+        if math.dist(at, end) > limits.wp_radius_m:  # what is farther is taken whole
             time_s, at = time_s + walker.whole_s(at, end), end
             if until is not None or whole_s < math.inf:
                 points.append(ExpectedPlace(in_s=time_s, at_en_m=at, is_starboard=walker.is_starboard))
@@ -266,7 +297,7 @@ def _entered(before: PointEn, at: PointEn, mark: tuple[PointEn, float]) -> float
     step = (at[0] - before[0], at[1] - before[1])
     off = (before[0] - east, before[1] - north)
     a, b = step[0] ** 2 + step[1] ** 2, off[0] * step[0] + off[1] * step[1]
-    c = off[0] ** 2 + off[1] ** 2 - radius_m ** 2
+    c = off[0] ** 2 + off[1] ** 2 - radius_m**2
     return 0.0 if c <= 0.0 or a == 0.0 else (-b - math.sqrt(max(0.0, b * b - a * c))) / a
 
 
@@ -276,7 +307,7 @@ def _winds(wind: WindEstimate, twd_rad: float, tws_mps: float) -> Winds:
     if forecast is None:
         return ((twd_rad, tws_mps),)
     at_s = (np.arange(math.ceil(REACH_S / WIND_S)) + 0.5) * WIND_S
-    at_s = at_s[:1 + int(np.searchsorted(at_s, forecast.horizon_s[-1]))]
+    at_s = at_s[: 1 + int(np.searchsorted(at_s, forecast.horizon_s[-1]))]
     twd = np.interp(at_s, forecast.horizon_s, np.unwrap(forecast.mean_twd_from_rad))
     tws = np.interp(at_s, forecast.horizon_s, forecast.mean_tws_mps)
     return tuple(zip(twd.tolist(), tws.tolist(), strict=True))
@@ -286,13 +317,12 @@ class _Walker:
     """Steers as the autopilot does in the wind that is expected and a steady current."""
 
     def __init__(
-        self, winds: Winds, current_en_mps: PointEn, boat: Boat, limits: AutopilotLimits,
-        *, heading_rad: float,
+        self, winds: Winds, current_en_mps: PointEn, boat: Boat, limits: AutopilotLimits, *, heading_rad: float
     ) -> None:
         self._winds = winds
         self._twd_rad, self._tws_mps = over_water(*winds[0], current_en_mps)
         self._current, self._boat, self._limits, self._heading_rad = current_en_mps, boat, limits, heading_rad
-        self.is_starboard = difference_rad(self._twd_rad, heading_rad) > 0.0   # the wind is to the right of the bow
+        self.is_starboard = difference_rad(self._twd_rad, heading_rad) > 0.0  # the wind is to the right of the bow
 
     def steer(self, time_s: float, at: PointEn, start: PointEn, end: PointEn) -> tuple[PointEn, float]:
         """Return the velocity over ground [m/s] from ``at`` along the leg, and what a tack or gybe to it loses [s]."""
@@ -342,8 +372,9 @@ class _Walker:
 
     def _over_ground(self, heading_rad: float) -> PointEn:
         """Return the velocity over ground on a heading [m/s]."""
-        speed_mps = max(SLOW_MPS, self._boat.polar.speed_mps(
-            abs(difference_rad(self._twd_rad, heading_rad)), self._tws_mps))
+        speed_mps = max(
+            SLOW_MPS, self._boat.polar.speed_mps(abs(difference_rad(self._twd_rad, heading_rad)), self._tws_mps)
+        )
         east, north = unit_en(heading_rad)
         return speed_mps * east + self._current[0], speed_mps * north + self._current[1]
 

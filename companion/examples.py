@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 # The simplest first; what else scenarios and tests sail lies in sitl/missions.
-NAMES = (
-    "lake", "rocks", "bay", "bay-with-care", "archipelago", "buoy-course", "gates", "box", "search", "field-ring",
-)
+NAMES = ("lake", "rocks", "bay", "bay-with-care", "archipelago", "buoy-course", "gates", "box", "search", "field-ring")
 _HERE = Path(__file__).resolve().parent
 
 

@@ -24,11 +24,11 @@ EVERYWHERE = frozenset({"page", "line", "watch", "radio", "report"})
 class Figure:
     """One row. ``kind`` is its unit: m/s, m, s, rad clockwise from north, rad to starboard, a share of 1, or none."""
 
-    name: str                                # over the radio: co_ and at most seven characters more
+    name: str  # over the radio: co_ and at most seven characters more
     label: str
     kind: Kind
-    of: Callable[[Step], float | None]       # None: it cannot be told now
-    hint: str = ""                           # what it means, where there is room
+    of: Callable[[Step], float | None]  # None: it cannot be told now
+    hint: str = ""  # what it means, where there is room
     shown: frozenset[str] = EVERYWHERE
 
 
@@ -40,9 +40,11 @@ def vmg_mps(step: Step) -> float | None:
     return vehicle.speed_mps * math.cos(twd_rad - heading_of(*vehicle.velocity_en_mps))
 
 
+# fmt: off
 FIGURES: tuple[Figure, ...] = (
     Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page", "report"})),
 )
+# fmt: on
 BY_NAME = {figure.name: figure for figure in FIGURES}
 _UNITS = {"speed": " m/s", "distance": " m", "time": " s", "bearing": "°", "angle": "°", "share": " %", "number": ""}
 
@@ -53,8 +55,11 @@ def told(step: Step, where: str) -> dict[str, float]:
     Bearings are in degrees from 0 to 360, angles in degrees from -180 to 180, the rest as the rows compute it.
     """
     values = {figure: figure.of(step) for figure in FIGURES if where in figure.shown}
-    return {figure.name: _outside(figure, value)
-            for figure, value in values.items() if value is not None and math.isfinite(value)}
+    return {
+        figure.name: _outside(figure, value)
+        for figure, value in values.items()
+        if value is not None and math.isfinite(value)
+    }
 
 
 def _outside(figure: Figure, value: float) -> float:
@@ -65,8 +70,11 @@ def _outside(figure: Figure, value: float) -> float:
 
 def in_words(values: Mapping[str, float]) -> list[str]:
     """Return figures as a line has them: label, value, unit."""
-    return [f"{figure.label} {_shown(figure, value)}"
-            for name, value in values.items() if (figure := BY_NAME.get(name)) is not None]
+    return [
+        f"{figure.label} {_shown(figure, value)}"
+        for name, value in values.items()
+        if (figure := BY_NAME.get(name)) is not None
+    ]
 
 
 def _shown(figure: Figure, value: float) -> str:
@@ -82,7 +90,7 @@ class Ranges:
     A bearing has none of these.
     """
 
-    by_name: dict[str, list[float]] = field(default_factory=dict)   # least, most, sum, count
+    by_name: dict[str, list[float]] = field(default_factory=dict)  # least, most, sum, count
 
     def take(self, step: Step) -> None:
         """Take one step."""
@@ -92,12 +100,18 @@ class Ranges:
 
     def to_dict(self) -> dict[str, dict[str, float]]:
         """Return them by the figures' names."""
-        return {name: {"least": least, "most": most, "mean": total / count}
-                for name, (least, most, total, count) in self.by_name.items() if BY_NAME[name].kind != "bearing"}
+        return {
+            name: {"least": least, "most": most, "mean": total / count}
+            for name, (least, most, total, count) in self.by_name.items()
+            if BY_NAME[name].kind != "bearing"
+        }
 
 
 def ranges_in_words(ranges: Mapping[str, Mapping[str, float]]) -> list[str]:
     """Return what ``Ranges.to_dict`` has recorded, a sentence each; a figure of another release is left out."""
-    return [f"{figure.label}: {_shown(figure, of['least'])} to {_shown(figure, of['most'])}, "
-            f"{_shown(figure, of['mean'])} in the mean."
-            for name, of in ranges.items() if (figure := BY_NAME.get(name)) is not None]
+    return [
+        f"{figure.label}: {_shown(figure, of['least'])} to {_shown(figure, of['most'])}, "
+        f"{_shown(figure, of['mean'])} in the mean."
+        for name, of in ranges.items()
+        if (figure := BY_NAME.get(name)) is not None
+    ]

@@ -72,10 +72,16 @@ __all__ = ["Step", "VoyageFold", "Waters", "begun"]
 SETTLED_S = 20.0
 
 # A spiking vane is not among them: its spikes are not fed, and what is left is widened.
-_UNTRUSTED = frozenset({
-    WindVerdict.FROZEN, WindVerdict.SILENT, WindVerdict.HELD, WindVerdict.SYNTHESISED, WindVerdict.NO_SPEED_SENSOR,
-    WindVerdict.TURNED,
-})
+_UNTRUSTED = frozenset(
+    {
+        WindVerdict.FROZEN,
+        WindVerdict.SILENT,
+        WindVerdict.HELD,
+        WindVerdict.SYNTHESISED,
+        WindVerdict.NO_SPEED_SENSOR,
+        WindVerdict.TURNED,
+    }
+)
 
 
 class StepWind:
@@ -105,13 +111,18 @@ class StepWind:
         self._last_s = sample.t_s
         if self._first_s is None:
             self._first_s = sample.t_s
-        self._mean90.update(sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight,
-                            speed_weight=status.speed_weight)
+        self._mean90.update(
+            sample.t_s, sample.twd_from_rad, sample.tws_mps, weight=status.weight, speed_weight=status.speed_weight
+        )
         # What a turned vane says now the autopilot sails by, and it is what the boat's motion is held against.
         is_turned = WindVerdict.TURNED in status.verdicts
-        self._mean5.update(sample.t_s, sample.twd_from_rad, sample.tws_mps,
-                           weight=1.0 if is_turned else status.weight,
-                           speed_weight=1.0 if is_turned else status.speed_weight)
+        self._mean5.update(
+            sample.t_s,
+            sample.twd_from_rad,
+            sample.tws_mps,
+            weight=1.0 if is_turned else status.weight,
+            speed_weight=1.0 if is_turned else status.speed_weight,
+        )
 
     def view(self, t_s: float) -> WindEstimate:
         """Return the wind at ``t_s``."""
@@ -170,7 +181,7 @@ class ParameterStore:
         self._answered: set[str] = set()
 
     def take(
-        self, values: Mapping[str, float], *, is_set: bool = False,
+        self, values: Mapping[str, float], *, is_set: bool = False
     ) -> tuple[dict[str, float], tuple[str, ...], tuple[ParameterChange, ...]]:
         """Take what was told; return what of it is believed, why the rest cannot be, and what somebody has changed.
 
@@ -210,9 +221,9 @@ class ParameterStore:
 
 # Modes in which the sheets are trimmed to sail; in HOLD they are eased, and by hand nobody knows.
 _SAILS = frozenset({Mode.AUTO, Mode.GUIDED, Mode.LOITER})
-VANE_OFFSET = "WNDVN_DIR_OFS"   # [deg] that the autopilot adds to what the vane says
-UNTOLD_S = 60.0       # of a boat whose motion does not tell whether the wind that is learned anew is the right one
-_NO_INDEX = 65535      # of a parameter that was set or asked for by its name: one of a list has its place in it
+VANE_OFFSET = "WNDVN_DIR_OFS"  # [deg] that the autopilot adds to what the vane says
+UNTOLD_S = 60.0  # of a boat whose motion does not tell whether the wind that is learned anew is the right one
+_NO_INDEX = 65535  # of a parameter that was set or asked for by its name: one of a list has its place in it
 
 Value = VehicleState | AutopilotStatus | WindSample | ApparentWind | StatusText | AisReport
 Waters = Callable[[GeoPoint], Voyage]
@@ -246,18 +257,25 @@ class VoyageFold:
     """
 
     def __init__(
-        self, skipper: Skipper, wind: WindTracker, permissions: Permissions, persisted: Persisted | None = None,
-        *, known: tuple[str, ...] = (), traffic: TargetLimits | None = None, waters: Waters | None = None,
+        self,
+        skipper: Skipper,
+        wind: WindTracker,
+        permissions: Permissions,
+        persisted: Persisted | None = None,
+        *,
+        known: tuple[str, ...] = (),
+        traffic: TargetLimits | None = None,
+        waters: Waters | None = None,
         water: Prior = STILL,
     ) -> None:
         self._waters = waters
         skipper, persisted = begun(skipper, persisted, waters)
         self._prior = water
         self.current = CurrentEstimator(skipper.voyage.boat.polar.speed_mps, water)
-        self._anew = ""    # why the wind is learned anew, until it is ...
-        self._anew_s: float | None = None   # ... and since when
-        self._sure_wind: tuple[float, float] | None = None   # the mean wind when it was believed last ...
-        self._offset_rad: float | None = None                # ... and by how much the vane's offset was changed since
+        self._anew = ""  # why the wind is learned anew, until it is ...
+        self._anew_s: float | None = None  # ... and since when
+        self._sure_wind: tuple[float, float] | None = None  # the mean wind when it was believed last ...
+        self._offset_rad: float | None = None  # ... and by how much the vane's offset was changed since
         self.skipper, self.permissions = skipper, permissions
         self._air = StepWind(wind)
         self.state: SkipperState = skipper.initial(persisted, known)
@@ -268,7 +286,7 @@ class VoyageFold:
         self._neighbours: tuple[str, ...] = ()
         self._has_company = False
         self._has_shore = False
-        self._shore_s: float | None = None   # when a ground station was last heard
+        self._shore_s: float | None = None  # when a ground station was last heard
         self._parameters = ParameterStore()
         self._disbelieved: set[str] = set()
         self._targets = Targets.empty(skipper.voyage.frame, traffic)
@@ -276,7 +294,7 @@ class VoyageFold:
         self._autopilot: AutopilotStatus | None = None
         self._heartbeat_s: float | None = None
         self._mission = MissionOnBoard()
-        self._fence: tuple[Zone, ...] = ()   # drawn on the autopilot
+        self._fence: tuple[Zone, ...] = ()  # drawn on the autopilot
         self._mode: Mode | None = None
         self._planner_alive = True
         self._events: list[Event] = []
@@ -306,8 +324,10 @@ class VoyageFold:
             elif kind == "MISSION_ITEM_REACHED":
                 self._events.append(WaypointReached(seq=int(message.seq)))
             elif kind == "PARAM_VALUE":
-                self.parameters({message.param_id: float(message.param_value)}, is_set=(
-                    message.param_index == _NO_INDEX and self.state.voyage.sailing))
+                self.parameters(
+                    {message.param_id: float(message.param_value)},
+                    is_set=(message.param_index == _NO_INDEX and self.state.voyage.sailing),
+                )
             elif kind == "AUTOPILOT_VERSION":
                 self._uid_s = t_s
                 self._identity = self._identity.told(message.get_srcSystem(), autopilot_version(message).uid)
@@ -337,8 +357,13 @@ class VoyageFold:
             self._events.append(value)
         elif isinstance(value, AisReport):
             own = self._vehicle
-            self._targets = self._targets.heard(value) if own is None else self._targets.heard(
-                value, self.skipper.voyage.frame.en_from_geo(own.position), own.velocity_en_mps)
+            self._targets = (
+                self._targets.heard(value)
+                if own is None
+                else self._targets.heard(
+                    value, self.skipper.voyage.frame.en_from_geo(own.position), own.velocity_en_mps
+                )
+            )
 
     def take_outcome(self, t_s: float, outcome: Outcome) -> None:
         """Take the outcome of an earlier action, known at ``t_s``."""
@@ -383,7 +408,7 @@ class VoyageFold:
             if change.name == VANE_OFFSET and change.before is not None:
                 self._offset_rad = (self._offset_rad or 0.0) + math.radians(change.after - change.before)
             elif change.effect is Effect.HEADING:
-                self._sure_wind = None   # it was told by another compass
+                self._sure_wind = None  # it was told by another compass
             self._air.begin_anew()
             learns = ": wind, current and polar are learned anew"
         elif change.effect is Effect.BOAT:
@@ -431,8 +456,13 @@ class VoyageFold:
         self.state, actions = self.skipper.step(self.state, snapshot)
         self._pace = paced(self._pace, snapshot, self.state, self.skipper.voyage)
         return Step(
-            snapshot=snapshot, state=self.state, actions=actions, voyage=self.skipper.voyage, shift=shift,
-            pace=self._pace)
+            snapshot=snapshot,
+            state=self.state,
+            actions=actions,
+            voyage=self.skipper.voyage,
+            shift=shift,
+            pace=self._pace,
+        )
 
     def _follow(self) -> Shift | None:
         """Replace the frame by one about the boat when it has left its water; None: it has not."""
@@ -467,8 +497,10 @@ class VoyageFold:
             wind_before=self._wind_before(wind, unsure=unsure),
             mission=self._mission,
             identity=replace(
-                self._identity, vehicle_type=None if autopilot is None else autopilot.vehicle_type,
-                is_contested=self._witness.clock.is_contested(t_s)),
+                self._identity,
+                vehicle_type=None if autopilot is None else autopilot.vehicle_type,
+                is_contested=self._witness.clock.is_contested(t_s),
+            ),
             neighbours=self._neighbours,
             has_company=self._has_company,
             shore_age_s=None if self._shore_s is None else t_s - self._shore_s,
@@ -523,26 +555,36 @@ class VoyageFold:
         if vehicle is None or wind.present_twd_from_rad is None or wind.present_tws_mps is None:
             return None
         is_driven = (
-            self.skipper.config.sails and not self.state.adrift.motor and status is not None and status.is_armed
+            self.skipper.config.sails
+            and not self.state.adrift.motor
+            and status is not None
+            and status.is_armed
             and status.mode in _SAILS
-            and (wind.health in {WindHealth.GOOD, WindHealth.LIGHT} or self.current.doubts_wind or (
-                self._anew != "" and wind.health is WindHealth.SETTLING)))
+            and (
+                wind.health in {WindHealth.GOOD, WindHealth.LIGHT}
+                or self.current.doubts_wind
+                or (self._anew != "" and wind.health is WindHealth.SETTLING)
+            )
+        )
         return Sailing(
-            t_s=vehicle.t_s, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
+            t_s=vehicle.t_s,
+            velocity_en_mps=vehicle.velocity_en_mps,
+            heading_rad=vehicle.heading_rad,
             twd_from_rad=wind.present_twd_from_rad,
-            tws_mps=wind.present_tws_mps, is_driven=is_driven,
+            tws_mps=wind.present_tws_mps,
+            is_driven=is_driven,
             is_heard=wind.health is not WindHealth.UNTRUSTED or self.current.doubts_wind,
-            age_s=t_s - vehicle.t_s, roll_rad=vehicle.roll_rad)
+            age_s=t_s - vehicle.t_s,
+            roll_rad=vehicle.roll_rad,
+        )
 
 
-def begun(
-    skipper: Skipper, persisted: Persisted | None, waters: Waters | None,
-) -> tuple[Skipper, Persisted | None]:
+def begun(skipper: Skipper, persisted: Persisted | None, waters: Waters | None) -> tuple[Skipper, Persisted | None]:
     """Return the skipper and the saved state in one frame: that of the saved state, where the voyage is a passage."""
     own = skipper.voyage.frame
     saved = own if persisted is None or persisted.water is None else LocalFrame(persisted.water)
     if waters is not None and (saved != own or not math.isfinite(skipper.voyage.area.reach_m)):
         skipper = replace(skipper, voyage=waters(saved.origin))
-    if persisted is not None and waters is None and saved != own:   # it was one when it was saved
+    if persisted is not None and waters is None and saved != own:  # it was one when it was saved
         persisted = replace(carried(persisted, Shift(saved, own)), water=None)
     return skipper, persisted

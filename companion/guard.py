@@ -21,8 +21,8 @@ T = TypeVar("T")
 Told = Callable[[str, str], None]
 
 BACKOFF_BASE_S, BACKOFF_CAP_S = 0.5, 15.0
-HELD_S = 30.0            # what held for so long is well again, and its pauses start from their beginning
-MOST_CHARACTERS = 160    # of a reason
+HELD_S = 30.0  # what held for so long is well again, and its pauses start from their beginning
+MOST_CHARACTERS = 160  # of a reason
 
 
 class Auxiliary(StrEnum):
@@ -33,7 +33,7 @@ class Auxiliary(StrEnum):
     CHARTS = "charts of the page"
     SOCKET = "orders on board"
     OUTPUTS = "other displays"
-    SIGNALK_TOKEN = "Signal K token"    # noqa: S105 - a name
+    SIGNALK_TOKEN = "Signal K token"  # noqa: S105 - a name
     FAR = "satellite link"
     RADIO = "status on the radio"
     HIGH_LATENCY = "high latency status"
@@ -52,7 +52,7 @@ class Auxiliary(StrEnum):
 
 
 async def kept(
-    live: Callable[[], Awaitable[object]], failed: Callable[[str], None], *, seed: int = 0, pace: float = 1.0,
+    live: Callable[[], Awaitable[object]], failed: Callable[[str], None], *, seed: int = 0, pace: float = 1.0
 ) -> None:
     """Run ``live`` until it returns; whatever it raises ``failed`` hears in words, and after a pause it runs again.
 
@@ -69,10 +69,10 @@ async def kept(
             if task is None or task.cancelling():
                 raise
             why = "it was cancelled"
-        except Exception as error:   # whatever it is, it is not worth the voyage
+        except Exception as error:  # whatever it is, it is not worth the voyage
             why = reason(error)
             task = asyncio.current_task()
-            if task is not None and task.cancelling():   # its last act failed
+            if task is not None and task.cancelling():  # its last act failed
                 failed(why)
                 return
         else:
@@ -96,7 +96,7 @@ def reason(error: BaseException) -> str:
 def _now_s() -> float:
     try:
         return now_s()
-    except RuntimeError:   # before there is a loop
+    except RuntimeError:  # before there is a loop
         return 0.0
 
 
@@ -111,14 +111,15 @@ class Guard:
     def __init__(self, told: Told = lambda _name, _why: None, *, seed: int = 0, pace: float = 1.0) -> None:
         self.told, self.gone = told, dict[str, str]()
         self._seed, self._pace = seed, pace
-        self._failed_s: dict[str, float] = {}    # infinite: for good
-        self._down: set[str] = set()             # tasks between two attempts
+        self._failed_s: dict[str, float] = {}  # infinite: for good
+        self._down: set[str] = set()  # tasks between two attempts
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._is_telling = False
 
     # --------------------------------------------------------------------------------------------- what is guarded
     def keep(self, name: str, live: Callable[[], Awaitable[object]]) -> None:
         """Run ``live`` as a task of that name until ``end``, again and again where it fails."""
+
         async def once() -> None:
             self._down.discard(name)
             await live()
@@ -128,13 +129,14 @@ class Guard:
             self.lost(name, why)
 
         self._tasks[name] = asyncio.create_task(
-            kept(once, failed, seed=self._seed + len(self._tasks), pace=self._pace), name=f"auxiliary: {name}")
+            kept(once, failed, seed=self._seed + len(self._tasks), pace=self._pace), name=f"auxiliary: {name}"
+        )
 
     def call(self, name: str, work: Callable[[], T]) -> T | None:
         """Return what ``work`` returns, None where it fails."""
         try:
             return work()
-        except Exception as error:   # as above
+        except Exception as error:  # as above
             self.lost(name, reason(error))
             return None
 
@@ -142,7 +144,7 @@ class Guard:
         """Return what ``work`` returns in the end, None where it fails."""
         try:
             return await work()
-        except Exception as error:   # as above
+        except Exception as error:  # as above
             self.lost(name, reason(error))
             return None
 
@@ -151,7 +153,7 @@ class Guard:
         for task in self._tasks.values():
             task.cancel()
         for name, task in self._tasks.items():
-            await self.wait(name, lambda task=task: ended(task))   # type: ignore[misc]
+            await self.wait(name, lambda task=task: ended(task))  # type: ignore[misc]
         self._tasks.clear()
 
     # ------------------------------------------------------------------------------------------------ what is gone
@@ -180,7 +182,7 @@ class Guard:
         return "; ".join(f"without the {name}: {why}" for name, why in self.gone.items())
 
     def _tell(self, name: str, why: str) -> None:
-        if self._is_telling:   # what tells may be what is gone
+        if self._is_telling:  # what tells may be what is gone
             return
         self._is_telling = True
         with contextlib.suppress(Exception):

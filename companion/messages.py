@@ -85,8 +85,13 @@ class VehicleState:
 
     def __post_init__(self) -> None:
         _finite(
-            t_s=self.t_s, boot_s=self.boot_s, ve=self.velocity_en_mps[0], vn=self.velocity_en_mps[1],
-            heading_rad=self.heading_rad, roll_rad=self.roll_rad, yaw_rate_radps=self.yaw_rate_radps,
+            t_s=self.t_s,
+            boot_s=self.boot_s,
+            ve=self.velocity_en_mps[0],
+            vn=self.velocity_en_mps[1],
+            heading_rad=self.heading_rad,
+            roll_rad=self.roll_rad,
+            yaw_rate_radps=self.yaw_rate_radps,
         )
 
     @property
@@ -107,8 +112,8 @@ class AutopilotStatus:
     system_status: int = 0
     ekf_ok: bool = False
     gps_fix: int | None = None
-    gps: GeoPoint | None = None          # what its receiver says, the filter apart; None: no fix
-    gps2: GeoPoint | None = None         # the same of a second receiver, where there is one
+    gps: GeoPoint | None = None  # what its receiver says, the filter apart; None: no fix
+    gps2: GeoPoint | None = None  # the same of a second receiver, where there is one
     mission_seq: int | None = None
     mission_total: int | None = None
     mission_state: MissionState = MissionState.UNKNOWN
@@ -117,17 +122,17 @@ class AutopilotStatus:
     cross_track_m: float | None = None  # positive: the boat is to the RIGHT of its leg (the wire has the reverse)
     battery_v: float | None = None
     battery_remaining: float | None = None
-    battery_failed: bool | None = None   # its battery failsafe has spoken, or the monitor is ill
-    receiver_lost: bool | None = None    # it hears no transmitter
-    fence_on: bool | None = None         # it has told of a fence, and does; None: never
+    battery_failed: bool | None = None  # its battery failsafe has spoken, or the monitor is ill
+    receiver_lost: bool | None = None  # it hears no transmitter
+    fence_on: bool | None = None  # it has told of a fence, and does; None: never
     fence_breached: bool | None = None
-    fence_breaches: int | None = None    # since the boot; outside the home circle one more every 20 m
+    fence_breaches: int | None = None  # since the boot; outside the home circle one more every 20 m
     last_reached_seq: int | None = None
-    rc_us: tuple[int, ...] = ()          # what the receiver hears, by channel from 1 [us]
-    servo_us: tuple[int, ...] = ()       # what its servo outputs are told, by number from 1 [us]; 0: nothing
+    rc_us: tuple[int, ...] = ()  # what the receiver hears, by channel from 1 [us]
+    servo_us: tuple[int, ...] = ()  # what its servo outputs are told, by number from 1 [us]; 0: nothing
     home: GeoPoint | None = None
-    utc_at_boot_s: float | None = None   # Unix time of its start, once it knows the time
-    sensors: tuple[tuple[str, float], ...] = ()   # told now by a script on it, by name (``companion.safety.SENSORS``)
+    utc_at_boot_s: float | None = None  # Unix time of its start, once it knows the time
+    sensors: tuple[tuple[str, float], ...] = ()  # told now by a script on it, by name (``companion.safety.SENSORS``)
 
     def sensor(self, name: str) -> float | None:
         """Return what a script on the autopilot tells under this name, None: nothing now."""
@@ -158,19 +163,19 @@ class StatusText:
 class WindSource(enum.Enum):
     """Who made the sample."""
 
-    AUTOPILOT_TRUE = "autopilot_true"          # WIND: low-passed by WNDVN_TRUE_FILT
-    APPARENT = "apparent"                      # AppWnd* with heading and ground velocity, ours
-    SIMULATED = "simulated"                    # by a study or a test: nothing has filtered it
+    AUTOPILOT_TRUE = "autopilot_true"  # WIND: low-passed by WNDVN_TRUE_FILT
+    APPARENT = "apparent"  # AppWnd* with heading and ground velocity, ours
+    SIMULATED = "simulated"  # by a study or a test: nothing has filtered it
 
 
 class WindQuality(enum.Enum):
     """How far the sample may be believed."""
 
     GOOD = "good"
-    TURNING = "turning"          # within a manoeuvre: compass and vane lag
-    LIGHT = "light"              # direction nearly without meaning
-    HELD = "held"                # the autopilot holds an old value
-    SUSPECT = "suspect"          # a fault detector objects
+    TURNING = "turning"  # within a manoeuvre: compass and vane lag
+    LIGHT = "light"  # direction nearly without meaning
+    HELD = "held"  # the autopilot holds an old value
+    SUSPECT = "suspect"  # a fault detector objects
     INVALID = "invalid"
 
 
@@ -296,8 +301,19 @@ class Spread:
     @property
     def numbers(self) -> tuple[float, ...]:
         """All figures, for a check that they are finite."""
-        return (self.x_m, self.y_m, self.course_rad, self.keep_m, self.along_m, self.along_mps, self.across_m,
-                self.across_mps, self.own_mps, self.sigma_m, self.sigma_mps)
+        return (
+            self.x_m,
+            self.y_m,
+            self.course_rad,
+            self.keep_m,
+            self.along_m,
+            self.along_mps,
+            self.across_m,
+            self.across_mps,
+            self.own_mps,
+            self.sigma_m,
+            self.sigma_mps,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -403,27 +419,32 @@ class TrafficStatus:
     """
 
     vessels: int = 0
-    refused: int = 0                   # reports and sentences left out: too old, too far, damaged
-    feeds: int = 0                     # AIS feeds of our own ...
-    silent_feeds: int = 0              # ... and those unheard for a minute
-    shared_mmsi: int = 0               # two vessels with one MMSI, times
+    refused: int = 0  # reports and sentences left out: too old, too far, damaged
+    feeds: int = 0  # AIS feeds of our own ...
+    silent_feeds: int = 0  # ... and those unheard for a minute
+    shared_mmsi: int = 0  # two vessels with one MMSI, times
     clock_jumps: int = 0
-    silence_s: float | None = None     # since any report; None: never
+    silence_s: float | None = None  # since any report; None: never
     promised_risk: float | None = None  # the vessels' part of what the plan promises at each instant ...
-    path_risk: float | None = None      # ... and of the whole path
+    path_risk: float | None = None  # ... and of the whole path
     name: str = ""
     alarm: str = ""
     role: str = ""
     rule: str = ""
-    range_m: float | None = None       # between hulls, as is what follows
+    range_m: float | None = None  # between hulls, as is what follows
     bearing_rad: float | None = None
     cpa_m: float | None = None
     tcpa_s: float | None = None
 
     def __post_init__(self) -> None:
         _finite(promised_risk=self.promised_risk, path_risk=self.path_risk)
-        _finite(silence_s=self.silence_s, range_m=self.range_m, bearing_rad=self.bearing_rad, cpa_m=self.cpa_m,
-                tcpa_s=self.tcpa_s)
+        _finite(
+            silence_s=self.silence_s,
+            range_m=self.range_m,
+            bearing_rad=self.bearing_rad,
+            cpa_m=self.cpa_m,
+            tcpa_s=self.tcpa_s,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -436,20 +457,20 @@ class CompanionStatus:
     """
 
     t_s: float
-    state: str                                # the skipper's phase in words
-    goal_index: int | None = None             # the goal sailed for now, from 0
+    state: str  # the skipper's phase in words
+    goal_index: int | None = None  # the goal sailed for now, from 0
     goal_count: int | None = None
-    waypoint_seq: int | None = None           # as MISSION_CURRENT counts: 1 is the first after home
+    waypoint_seq: int | None = None  # as MISSION_CURRENT counts: 1 is the first after home
     waypoint_count: int | None = None
     waypoint_distance_m: float | None = None
     goal_distance_m: float | None = None
-    cross_track_m: float | None = None        # positive: right of the leg
-    clearance_m: float | None = None          # to the nearest obstacle or fence now
+    cross_track_m: float | None = None  # positive: right of the leg
+    clearance_m: float | None = None  # to the nearest obstacle or fence now
     twd_from_rad: float | None = None
     twd_sigma_rad: float | None = None
     tws_mps: float | None = None
     tws_sigma_mps: float | None = None
-    current_set_rad: float | None = None      # where the current that plans reckon with goes; None: none is known
+    current_set_rad: float | None = None  # where the current that plans reckon with goes; None: none is known
     current_drift_mps: float | None = None
     next_tack_s: float | None = None
     promised_risk: float | None = None
@@ -459,22 +480,34 @@ class CompanionStatus:
     tacks: int | None = None
     battery_v: float | None = None
     position: GeoPoint | None = None
-    bytes_out_per_s: float | None = None      # own traffic
-    traffic: TrafficStatus | None = None      # None: no vessel was ever heard and there is no feed
-    order: str = ""                           # the verb of the order that stands; empty: none does
+    bytes_out_per_s: float | None = None  # own traffic
+    traffic: TrafficStatus | None = None  # None: no vessel was ever heard and there is no feed
+    order: str = ""  # the verb of the order that stands; empty: none does
     order_age_s: float | None = None
-    plan_answer_s: float | None = None        # nine plans of ten take so long, told of a slow computer; None: it is not
-    figures: tuple[tuple[str, float], ...] = ()   # of the table (``companion.figures``), by name; sent beside the wind
-    alert_code: str = ""                      # the rule or watchdog that speaks; empty: all is well
+    plan_answer_s: float | None = None  # nine plans of ten take so long, told of a slow computer; None: it is not
+    figures: tuple[tuple[str, float], ...] = ()  # of the table (``companion.figures``), by name; sent beside the wind
+    alert_code: str = ""  # the rule or watchdog that speaks; empty: all is well
     alert_text: str = ""
 
     def __post_init__(self) -> None:
         _finite(
-            t_s=self.t_s, waypoint_distance_m=self.waypoint_distance_m, goal_distance_m=self.goal_distance_m,
-            cross_track_m=self.cross_track_m, clearance_m=self.clearance_m, twd_from_rad=self.twd_from_rad,
-            twd_sigma_rad=self.twd_sigma_rad, tws_mps=self.tws_mps, tws_sigma_mps=self.tws_sigma_mps,
-            current_set_rad=self.current_set_rad, current_drift_mps=self.current_drift_mps,
-            next_tack_s=self.next_tack_s, promised_risk=self.promised_risk, plan_age_s=self.plan_age_s,
-            battery_v=self.battery_v, bytes_out_per_s=self.bytes_out_per_s, order_age_s=self.order_age_s,
-            plan_answer_s=self.plan_answer_s, **dict(self.figures),
+            t_s=self.t_s,
+            waypoint_distance_m=self.waypoint_distance_m,
+            goal_distance_m=self.goal_distance_m,
+            cross_track_m=self.cross_track_m,
+            clearance_m=self.clearance_m,
+            twd_from_rad=self.twd_from_rad,
+            twd_sigma_rad=self.twd_sigma_rad,
+            tws_mps=self.tws_mps,
+            tws_sigma_mps=self.tws_sigma_mps,
+            current_set_rad=self.current_set_rad,
+            current_drift_mps=self.current_drift_mps,
+            next_tack_s=self.next_tack_s,
+            promised_risk=self.promised_risk,
+            plan_age_s=self.plan_age_s,
+            battery_v=self.battery_v,
+            bytes_out_per_s=self.bytes_out_per_s,
+            order_age_s=self.order_age_s,
+            plan_answer_s=self.plan_answer_s,
+            **dict(self.figures),
         )

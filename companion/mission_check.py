@@ -63,7 +63,12 @@ from companion.skipper.way import Composed, Until
 from companion.words import counted
 
 __all__ = [
-    "AssumedWind", "CheckedMission", "FieldPreview", "HeadingFan", "check_mission", "current_words_of",
+    "AssumedWind",
+    "CheckedMission",
+    "FieldPreview",
+    "HeadingFan",
+    "check_mission",
+    "current_words_of",
     "require_sailable",
 ]
 
@@ -80,33 +85,49 @@ def current_words_of(mission: Mission, unix_s: float) -> tuple[str, ...]:
     prior = water_of(mission)
     strongest = prior.strongest_mps
     if not prior.rows:
-        lines = [(f"current: sets {math.degrees(math.atan2(prior.east_mps, prior.north_mps)) % 360.0:03.0f}° "
-                 f"{strongest:.2f} m/s, give or take {prior.sigma_mps:.2f} m/s")]
+        lines = [
+            (
+                f"current: sets {math.degrees(math.atan2(prior.east_mps, prior.north_mps)) % 360.0:03.0f}° "
+                f"{strongest:.2f} m/s, give or take {prior.sigma_mps:.2f} m/s"
+            )
+        ]
     else:
-        first, last = (f"{dt.datetime.fromtimestamp(row.utc_s, dt.UTC):%Y-%m-%d %H:%M}"
-                       for row in (prior.rows[0], prior.rows[-1]))
-        lines = [(f"current: {prior.name}, {counted(len(prior.rows), 'row')} from {first} to {last} UTC, at most "
-                 f"{strongest:.2f} m/s, give or take {prior.sigma_mps:.2f} m/s")]
+        first, last = (
+            f"{dt.datetime.fromtimestamp(row.utc_s, dt.UTC):%Y-%m-%d %H:%M}" for row in (prior.rows[0], prior.rows[-1])
+        )
+        lines = [
+            (
+                f"current: {prior.name}, {counted(len(prior.rows), 'row')} from {first} to {last} UTC, at most "
+                f"{strongest:.2f} m/s, give or take {prior.sigma_mps:.2f} m/s"
+            )
+        ]
         said = prior.at(unix_s).verdict
         lines += [f"current: now {said}"] if said else []
     if not _holds(mission, prior):
         tws_mps = mission.wind.preview_speed_mps
-        lines.append(f"current: in {tws_mps:g} m/s of wind from {mission.wind.preview_from_deg:03.0f}° she cannot make "
-                     f"way against {strongest:.2f} m/s in every direction")
+        lines.append(
+            f"current: in {tws_mps:g} m/s of wind from {mission.wind.preview_from_deg:03.0f}° she cannot make "
+            f"way against {strongest:.2f} m/s in every direction"
+        )
     return tuple(lines)
 
 
 def _holds(mission: Mission, prior: Prior) -> bool:
     """Return whether the boat can stem the strongest of it, whichever way it sets, in the wind of previews."""
     boat, drift = boat_of(mission), prior.strongest_mps
-    sets = [2.0 * math.pi * n / _DIRECTIONS for n in range(_DIRECTIONS)] if prior.rows else [
-        math.atan2(prior.east_mps, prior.north_mps)]
+    sets = (
+        [2.0 * math.pi * n / _DIRECTIONS for n in range(_DIRECTIONS)]
+        if prior.rows
+        else [math.atan2(prior.east_mps, prior.north_mps)]
+    )
     for set_rad in sets:
         current = drift * math.sin(set_rad), drift * math.cos(set_rad)
         from_rad, tws_mps = over_water(
-            math.radians(mission.wind.preview_from_deg), mission.wind.preview_speed_mps, current)
-        if not can_hold(boat, twd_from_rad=from_rad, tws_mps=tws_mps, current_en_mps=current,
-                        no_go_half_rad=boat.no_go_half_rad):
+            math.radians(mission.wind.preview_from_deg), mission.wind.preview_speed_mps, current
+        )
+        if not can_hold(
+            boat, twd_from_rad=from_rad, tws_mps=tws_mps, current_en_mps=current, no_go_half_rad=boat.no_go_half_rad
+        ):
             return False
     return True
 
@@ -127,7 +148,7 @@ class CheckedMission:
 
 
 def check_mission(
-    path: Path, *, from_deg: float | None = None, given: Mapping[Path, bytes] | None = None,
+    path: Path, *, from_deg: float | None = None, given: Mapping[Path, bytes] | None = None
 ) -> CheckedMission:
     """Read a mission and its area as the boat will, and look for what is wrong with it: never raises InputError.
 
@@ -141,15 +162,27 @@ def check_mission(
             require_sailable(mission)
     except InputError as error:
         return CheckedMission(mission=None, refusals=(error,))
-    found = check_area(mission.area, AreaConditions(
-        start=mission.start, goals=tuple(g.point for g in mission.goals), margin_m=mission.margin_m,
-        is_passage=mission.is_passage,
-        twd_from_rad=math.radians(mission.wind.preview_from_deg if from_deg is None else from_deg),
-        no_go_half_rad=math.radians(mission.boat.no_go_half_deg)))
+    found = check_area(
+        mission.area,
+        AreaConditions(
+            start=mission.start,
+            goals=tuple(g.point for g in mission.goals),
+            margin_m=mission.margin_m,
+            is_passage=mission.is_passage,
+            twd_from_rad=math.radians(mission.wind.preview_from_deg if from_deg is None else from_deg),
+            no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
+        ),
+    )
     told = {Code.START_OUTSIDE, Code.GOAL_OUTSIDE} if troubles else set()
-    return CheckedMission(mission=mission, refusals=troubles, findings=(
-        *mission.findings, *(() if troubles else field_findings_of(mission)),
-        *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told)))
+    return CheckedMission(
+        mission=mission,
+        refusals=troubles,
+        findings=(
+            *mission.findings,
+            *(() if troubles else field_findings_of(mission)),
+            *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told),
+        ),
+    )
 
 
 def require_sailable(mission: Mission) -> Mission:
@@ -178,46 +211,82 @@ def require_sailable(mission: Mission) -> Mission:
 def _require_consistent(mission: Mission, source: str) -> None:
     area, operator, skipper = mission.options.area, mission.operator, mission.skipper
     if area.margin_floor_m > max(area.margin_m, AreaOptions().margin_floor_m):
-        raise InputError(source, "[area] margin_floor_m",
-                         f"{area.margin_floor_m:g} m is more than margin_m, {area.margin_m:g} m",
-                         "the margin is reduced down to the floor: write a smaller floor or a larger margin")
+        raise InputError(
+            source,
+            "[area] margin_floor_m",
+            f"{area.margin_floor_m:g} m is more than margin_m, {area.margin_m:g} m",
+            "the margin is reduced down to the floor: write a smaller floor or a larger margin",
+        )
     boat = mission.boat
     if boat.max_tws_mps is not None and boat.min_tws_mps is not None and boat.min_tws_mps >= boat.max_tws_mps:
-        raise InputError(source, "[boat] min_tws_mps",
-                         f"{boat.min_tws_mps:g} m/s is not below max_tws_mps, {boat.max_tws_mps:g} m/s",
-                         "no wind is both: write a smaller min_tws_mps or a larger max_tws_mps")
+        raise InputError(
+            source,
+            "[boat] min_tws_mps",
+            f"{boat.min_tws_mps:g} m/s is not below max_tws_mps, {boat.max_tws_mps:g} m/s",
+            "no wind is both: write a smaller min_tws_mps or a larger max_tws_mps",
+        )
     limit = next((key for key in ("max_tws_mps", "min_tws_mps") if getattr(boat, key) is not None), None)
     if limit is not None and mission.autopilot.frame == "motor":
-        raise InputError(source, f"[boat] {limit}", "is for a boat that sails: no wind is looked at for a motor boat",
-                         'leave it out, or write frame = "sailboat" in [autopilot]')
+        raise InputError(
+            source,
+            f"[boat] {limit}",
+            "is for a boat that sails: no wind is looked at for a motor boat",
+            'leave it out, or write frame = "sailboat" in [autopilot]',
+        )
     missing = [key for key in ("guided", "set_auto") if not getattr(operator, key)]
     if skipper.guidance != "plan" and missing:
-        raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" steers in GUIDED, which nobody allows',
-                         f"write {' and '.join(f'{key} = true' for key in missing)} in [operator], "
-                         'or guidance = "plan"')
+        raise InputError(
+            source,
+            "[skipper] guidance",
+            f'"{skipper.guidance}" steers in GUIDED, which nobody allows',
+            f'write {" and ".join(f"{key} = true" for key in missing)} in [operator], or guidance = "plan"',
+        )
     if skipper.guidance == "heading" and mission.autopilot.frame == "motor":
-        raise InputError(source, "[skipper] guidance", '"heading" is for a boat that sails',
-                         'write guidance = "plan" or "field", or frame = "sailboat" in [autopilot]')
+        raise InputError(
+            source,
+            "[skipper] guidance",
+            '"heading" is for a boat that sails',
+            'write guidance = "plan" or "field", or frame = "sailboat" in [autopilot]',
+        )
     by_field = next((n for n, goal in enumerate(mission.goals, start=1) if goal.field is not None), None)
     if by_field is not None and missing:
-        raise InputError(source, f"[[goal]] {by_field} kind", "a field is steered in GUIDED, which nobody allows",
-                         f"write {' and '.join(f'{key} = true' for key in missing)} in [operator]")
+        raise InputError(
+            source,
+            f"[[goal]] {by_field} kind",
+            "a field is steered in GUIDED, which nobody allows",
+            f"write {' and '.join(f'{key} = true' for key in missing)} in [operator]",
+        )
     kinds = [(n, kind_of(goal)) for n, goal in enumerate(mission.options.goal, start=1)]
     task = next(((n, kind) for n, kind in kinds if kind not in {"point", "field"}), None)
     if skipper.guidance != "plan" and task is not None:
-        raise InputError(source, "[skipper] guidance", f'"{skipper.guidance}" knows nothing of the {task[1]}, [[goal]] '
-                         f"{task[0]}", 'write guidance = "plan"')
+        raise InputError(
+            source,
+            "[skipper] guidance",
+            f'"{skipper.guidance}" knows nothing of the {task[1]}, [[goal]] {task[0]}',
+            'write guidance = "plan"',
+        )
     passage = mission.passage
     if passage.leg_m is None and passage.recentre_m is not None:
-        raise InputError(source, "[passage] recentre_m", "is of a passage, and nothing says how long its legs are",
-                         "add leg_m, the longest leg in metres, or leave it out")
+        raise InputError(
+            source,
+            "[passage] recentre_m",
+            "is of a passage, and nothing says how long its legs are",
+            "add leg_m, the longest leg in metres, or leave it out",
+        )
     if skipper.max_replan_s is not None and skipper.max_replan_s < skipper.min_replan_s:
-        raise InputError(source, "[skipper] max_replan_s",
-                         f"{skipper.max_replan_s:g} s is less than min_replan_s, {skipper.min_replan_s:g} s",
-                         "write a larger one, or a smaller min_replan_s")
+        raise InputError(
+            source,
+            "[skipper] max_replan_s",
+            f"{skipper.max_replan_s:g} s is less than min_replan_s, {skipper.min_replan_s:g} s",
+            "write a larger one, or a smaller min_replan_s",
+        )
     if operator.upload_fence and not (mission.area.solids or mission.area.fence.zones):
-        raise InputError(source, "[operator] upload_fence", "there is no area to make a fence of",
-                         "name its files in [area], or write upload_fence = false")
+        raise InputError(
+            source,
+            "[operator] upload_fence",
+            "there is no area to make a fence of",
+            "name its files in [area], or write upload_fence = false",
+        )
 
 
 PROBE_M = 100.0
@@ -239,8 +308,16 @@ class AssumedWind:
 
 
 def leg_problem(
-    mission: Mission, here_en: tuple[float, float], heading_deg: float, goal_en: tuple[float, float], radius_m: float,
-    *, wind: AssumedWind, title: str = "", local: LocalArea | None = None, current: WaterCurrent = STILL_WATER,
+    mission: Mission,
+    here_en: tuple[float, float],
+    heading_deg: float,
+    goal_en: tuple[float, float],
+    radius_m: float,
+    *,
+    wind: AssumedWind,
+    title: str = "",
+    local: LocalArea | None = None,
+    current: WaterCurrent = STILL_WATER,
 ) -> Problem:
     """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady.
 
@@ -253,17 +330,26 @@ def leg_problem(
         from_rad, speed_mps = over_water(math.radians(wind.from_deg), wind.speed_mps, current.en_mps)
         wind = replace(wind, from_deg=math.degrees(from_rad), speed_mps=speed_mps)
         water["current"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
-    return Problem.from_json({
-        "id": mission.name, "title": title,
-        "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
-        "goal": {"x": goal_en[0], "y": goal_en[1], "radius": radius_m},
-        "obstacles": local.obstacles_wkt(mission.margin_m),
-        "obstacle_names": local.obstacle_names(mission.margin_m), "fence": local.fence_wkt(mission.margin_m, here_en),
-        "wind": {"from_deg": wind.from_deg, "speed_mps": wind.speed_mps, "sigma": wind.sigma(),
-                 **({"strength": assumed(wind.speed_mps).to_dict()} if sails else {})},
-        "boat": {**boat.problem_boat(wind.speed_mps), **({"speeds": boat.problem_speeds()} if sails else {})},
-        "delta_s": mission.risk.delta_s, **water,
-    })
+    return Problem.from_json(
+        {
+            "id": mission.name,
+            "title": title,
+            "start": {"x": here_en[0], "y": here_en[1], "heading_deg": heading_deg % 360.0},
+            "goal": {"x": goal_en[0], "y": goal_en[1], "radius": radius_m},
+            "obstacles": local.obstacles_wkt(mission.margin_m),
+            "obstacle_names": local.obstacle_names(mission.margin_m),
+            "fence": local.fence_wkt(mission.margin_m, here_en),
+            "wind": {
+                "from_deg": wind.from_deg,
+                "speed_mps": wind.speed_mps,
+                "sigma": wind.sigma(),
+                **({"strength": assumed(wind.speed_mps).to_dict()} if sails else {}),
+            },
+            "boat": {**boat.problem_boat(wind.speed_mps), **({"speeds": boat.problem_speeds()} if sails else {})},
+            "delta_s": mission.risk.delta_s,
+            **water,
+        }
+    )
 
 
 def expected_current(mission: Mission, unix_s: float | None) -> WaterCurrent:
@@ -272,8 +358,12 @@ def expected_current(mission: Mission, unix_s: float | None) -> WaterCurrent:
     ``unix_s``: when; without it a tide table tells nothing. Raises InputError as ``water_of``.
     """
     expected = water_of(mission).at(unix_s)
-    found = WaterCurrent(east_mps=expected.east_mps, north_mps=expected.north_mps, var_ee=expected.sigma_mps**2,
-                         var_nn=expected.sigma_mps**2)
+    found = WaterCurrent(
+        east_mps=expected.east_mps,
+        north_mps=expected.north_mps,
+        var_ee=expected.sigma_mps**2,
+        var_nn=expected.sigma_mps**2,
+    )
     return replace(found, is_significant=found.is_worth_planning(was=True))
 
 
@@ -284,7 +374,7 @@ def leg_names(mission: Mission) -> list[str]:
 
 
 def legs(
-    mission: Mission, wind: AssumedWind, *, goes_home: bool = True, unix_s: float | None = None,
+    mission: Mission, wind: AssumedWind, *, goes_home: bool = True, unix_s: float | None = None
 ) -> Generator[Problem, Plan, None]:
     """Yield the problem of each leg of one lap, and be sent its plan; end with the first that has no path.
 
@@ -305,8 +395,17 @@ def legs(
         targets.append((mission.start, HOME_RADIUS_M, "home"))
     for point, radius_m, title in targets:
         blows = replace(wind, from_deg=wind.from_deg + _north_deg(frame, here)) if mission.is_passage else wind
-        answer = yield leg_problem(mission, here, heading_deg, frame.en_from_geo(point), radius_m, wind=blows,
-                                   title=title, local=local, current=expected_current(mission, unix_s))
+        answer = yield leg_problem(
+            mission,
+            here,
+            heading_deg,
+            frame.en_from_geo(point),
+            radius_m,
+            wind=blows,
+            title=title,
+            local=local,
+            current=expected_current(mission, unix_s),
+        )
         if not answer.has_path:
             return
         unix_s = None if unix_s is None else unix_s + answer.cost_s
@@ -330,22 +429,29 @@ def passage_words(mission: Mission) -> str:
     bands = sorted({goal.bandwidth_m for goal in voyage_of(mission).goals if goal.bandwidth_m is not None})
     widths = " and ".join(f"{band / 1000.0:g}" for band in bands)
     band = f"bands of {widths} km to either side" if bands else "no band"
-    return (f"a passage of {sum(lengths_km):.0f} km, the longest leg {max(lengths_km):.0f} km, {band}; "
-            f"plans for {mission.skipper.horizon_m / 1000.0:g} km at a time, the frame moves along every "
-            f"{(mission.passage.recentre_m or RECENTRE_M) / 1000.0:g} km")
+    return (
+        f"a passage of {sum(lengths_km):.0f} km, the longest leg {max(lengths_km):.0f} km, {band}; "
+        f"plans for {mission.skipper.horizon_m / 1000.0:g} km at a time, the frame moves along every "
+        f"{(mission.passage.recentre_m or RECENTRE_M) / 1000.0:g} km"
+    )
 
 
 def wind_limit_words(mission: Mission) -> str:
     """Return in words the winds that the boat sets sail in, empty: in any."""
     boat = mission.boat
-    limits = [f"{word} {limit:g} m/s" for word, limit in (
-        ("more than", boat.max_tws_mps), ("less than", boat.min_tws_mps)) if limit is not None]
+    limits = [
+        f"{word} {limit:g} m/s"
+        for word, limit in (("more than", boat.max_tws_mps), ("less than", boat.min_tws_mps))
+        if limit is not None
+    ]
     if not limits:
         return ""
     allowed = 100.0 * (1.0 - mission.risk.delta_s)
     strong, light = (mission.safety.end(name).value for name in (STRONG_WIND, LIGHT_WIND))
-    return (f"she does not set sail where {' or '.join(limits)} of wind is forecast with over {allowed:.0f} % at any "
-            f"instant of the plan; under way [safety] has {strong!r} for strong wind and {light!r} for light")
+    return (
+        f"she does not set sail where {' or '.join(limits)} of wind is forecast with over {allowed:.0f} % at any "
+        f"instant of the plan; under way [safety] has {strong!r} for strong wind and {light!r} for light"
+    )
 
 
 def planned_legs(walk: Generator[Problem, Plan, None], answer: Callable[[Problem], Plan]) -> list[Plan]:
@@ -367,8 +473,8 @@ def continued_plans(walk: Generator[Problem, Plan, None], plan: Plan) -> Problem
 
 
 PointEn = tuple[float, float]
-TRACK_S = 600.0          # a preview is no voyage
-AROUND = 0.3             # of the picture's half width, beyond what lies in it
+TRACK_S = 600.0  # a preview is no voyage
+AROUND = 0.3  # of the picture's half width, beyond what lies in it
 LEAST_HALF_M = 80.0
 LAG_S = 3.0
 FAN_RAD = np.radians(np.arange(0.0, 360.0, 5.0))
@@ -418,8 +524,12 @@ class FieldPreview:
         twd = self.conditions.twd_from_rad
         if twd is None:
             return None
-        return Projection(field=field_of(self.tree, self.conditions), twd_from_rad=twd, zone=self.zone,
-                          no_go_half_rad=self.conditions.habits.no_go_half_rad)
+        return Projection(
+            field=field_of(self.tree, self.conditions),
+            twd_from_rad=twd,
+            zone=self.zone,
+            no_go_half_rad=self.conditions.habits.no_go_half_rad,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -437,7 +547,7 @@ class HeadingFan:
 
 
 def field_preview(
-    mission: Mission, *, number: int | None = None, wind: tuple[float, float] | None = None,
+    mission: Mission, *, number: int | None = None, wind: tuple[float, float] | None = None
 ) -> FieldPreview:
     """Return the field of goal ``number`` (from 1; None: the first that has one) in ``wind`` (m/s, from [deg]).
 
@@ -451,32 +561,59 @@ def field_preview(
     throughout = mission.skipper.guidance == "field"
     source, every = str(mission.path), [n for n, g in enumerate(voyage.goals, 1) if g.field is not None or throughout]
     if not every:
-        raise InputError(source, "[[goal]]", "no goal is sailed by a field",
-                         'write kind = "field" in one, or [skipper] guidance = "field"')
+        raise InputError(
+            source,
+            "[[goal]]",
+            "no goal is sailed by a field",
+            'write kind = "field" in one, or [skipper] guidance = "field"',
+        )
     if number is not None and number not in every:
-        raise InputError(source, f"[[goal]] {number}", "is not sailed by a field",
-                         f"name one that is: {', '.join(map(str, every))}")
+        raise InputError(
+            source, f"[[goal]] {number}", "is not sailed by a field", f"name one that is: {', '.join(map(str, every))}"
+        )
     number = number or every[0]
     goal = voyage.goals[number - 1]
     composed = goal.field or Composed(
-        tree=FieldTree(expression=Named("mark"), atoms=(("mark", PointTo(at_en=goal.en_m)),)), until=Until.PLACE)
+        tree=FieldTree(expression=Named("mark"), atoms=(("mark", PointTo(at_en=goal.en_m)),)), until=Until.PLACE
+    )
     sails = mission.autopilot.frame == "sailboat"
     twa, speeds = boat.polar.curve(max(1.0, speed_mps))
     habits = GuidanceSettings(
-        is_sailing=sails, no_go_half_rad=boat.no_go_half_rad or NO_GO_HALF_RAD, polar_twa_rad=tuple(map(float, twa)),
-        polar_mps=tuple(map(float, speeds)), turn_rate_radps=boat.turn_rate_radps, tack_s=max(1.0, boat.tack_loss_s),
-        lag_s=LAG_S, horizon_s=60.0, keep_m=mission.margin_floor_m)
+        is_sailing=sails,
+        no_go_half_rad=boat.no_go_half_rad or NO_GO_HALF_RAD,
+        polar_twa_rad=tuple(map(float, twa)),
+        polar_mps=tuple(map(float, speeds)),
+        turn_rate_radps=boat.turn_rate_radps,
+        tack_s=max(1.0, boat.tack_loss_s),
+        lag_s=LAG_S,
+        horizon_s=60.0,
+        keep_m=mission.margin_floor_m,
+    )
     here = voyage.goals[number - 2].en_m if number > 1 else goal.en_m
     if number == 1 and mission.start is not None:
         here = voyage.frame.en_from_geo(mission.start)
-    seen = Situation(t_s=0.0, en_m=here, velocity_en_mps=(0.0, 0.0), tws_mps=speed_mps, heading_rad=0.0,
-                     twd_from_rad=math.radians(from_deg) if sails else None)
+    seen = Situation(
+        t_s=0.0,
+        en_m=here,
+        velocity_en_mps=(0.0, 0.0),
+        tws_mps=speed_mps,
+        heading_rad=0.0,
+        twd_from_rad=math.radians(from_deg) if sails else None,
+    )
     conditions = FieldConditions(seen=seen, habits=habits)
     centre, half_m = _around([here, goal.en_m], composed)
     return FieldPreview(
-        number=number, name=goal.name or f"goal {number}", composed=composed, conditions=conditions,
-        area=mission.area.local(voyage.frame), here_en=here, place_en=goal.en_m, radius_m=goal.radius_m,
-        centre_en=centre, half_m=half_m)
+        number=number,
+        name=goal.name or f"goal {number}",
+        composed=composed,
+        conditions=conditions,
+        area=mission.area.local(voyage.frame),
+        here_en=here,
+        place_en=goal.en_m,
+        radius_m=goal.radius_m,
+        centre_en=centre,
+        half_m=half_m,
+    )
 
 
 def _around(places: list[PointEn], composed: Composed) -> tuple[PointEn, float]:
@@ -506,10 +643,16 @@ def heading_fan(seen: FieldPreview) -> HeadingFan:
         speeds = np.full(len(FAN_RAD), habits.polar_mps[-1])
     else:
         twa = np.abs([difference_rad(twd, h) for h in FAN_RAD])
-        speeds = np.where(twa < habits.no_go_half_rad - 1e-9, 0.0,
-                          np.interp(twa, habits.polar_twa_rad, habits.polar_mps))
-    return HeadingFan(headings_rad=FAN_RAD, speeds_mps=speeds, worth_mps=speeds * np.cos(FAN_RAD - wanted),
-               wanted_rad=wrap_pi(wanted), chosen_rad=wrap_pi(chosen))
+        speeds = np.where(
+            twa < habits.no_go_half_rad - 1e-9, 0.0, np.interp(twa, habits.polar_twa_rad, habits.polar_mps)
+        )
+    return HeadingFan(
+        headings_rad=FAN_RAD,
+        speeds_mps=speeds,
+        worth_mps=speeds * np.cos(FAN_RAD - wanted),
+        wanted_rad=wrap_pi(wanted),
+        chosen_rad=wrap_pi(chosen),
+    )
 
 
 def field_track(seen: FieldPreview, seconds: float = TRACK_S) -> NDArray[np.float64]:
@@ -525,8 +668,13 @@ def field_track(seen: FieldPreview, seconds: float = TRACK_S) -> NDArray[np.floa
     most_s = min(seconds, seen.composed.for_s or seconds)
     for t in range(int(most_s)):
         speed = _speed(habits, twd, heading)
-        now = replace(seen.conditions.seen, t_s=float(t), en_m=here, heading_rad=heading,
-                      velocity_en_mps=(speed * math.sin(heading), speed * math.cos(heading)))
+        now = replace(
+            seen.conditions.seen,
+            t_s=float(t),
+            en_m=here,
+            heading_rad=heading,
+            velocity_en_mps=(speed * math.sin(heading), speed * math.cos(heading)),
+        )
         rows.append((float(t), *here, heading))
         if _is_over(seen, here):
             break
@@ -535,7 +683,8 @@ def field_track(seen: FieldPreview, seconds: float = TRACK_S) -> NDArray[np.floa
         conditions = replace(seen.conditions, seen=now, way_out_rad=way_out)
         if float(lengths(seen.tree, conditions, np.array([here]))[0]) >= LEAST:
             intent = Intent(
-                field=field_of(seen.tree, conditions), zone=zone_of(seen.tree, conditions), clearance=clearance)
+                field=field_of(seen.tree, conditions), zone=zone_of(seen.tree, conditions), clearance=clearance
+            )
             state, setpoint = step(state, now, intent, habits)
             turn = difference_rad(setpoint.heading_rad, heading)
             heading = wrap_pi(heading + max(-habits.turn_rate_radps, min(habits.turn_rate_radps, turn)))

@@ -120,9 +120,9 @@ class Algorithm:
 
     module: str
     settings: type[Settings] | None = None
-    bounds_path_risk: bool = False   # its tree keeps a limit on the path's risk; of others a path is judged, and redone
-    carries_vessels: bool = False    # other vessels are under its tree's own bound
-    warm_expansions: int = 2000      # what compiles or loads all of its kernels, before a budget begins
+    bounds_path_risk: bool = False  # its tree keeps a limit on the path's risk; of others a path is judged, and redone
+    carries_vessels: bool = False  # other vessels are under its tree's own bound
+    warm_expansions: int = 2000  # what compiles or loads all of its kernels, before a budget begins
 
     @property
     def keys(self) -> dict[str, MissionKey]:
@@ -135,14 +135,19 @@ class Algorithm:
         if self.settings is None:
             return None
         defaults = {each.name: each.default for each in fields(self.settings)}
-        return self.settings(**{
-            name: key.value_of(told[key.key], defaults[name]) for name, key in self.keys.items() if key.key in told})
+        return self.settings(
+            **{name: key.value_of(told[key.key], defaults[name]) for name, key in self.keys.items() if key.key in told}
+        )
 
 
 ALGORITHMS = {
     "auto": Algorithm(module="companion.planner.search.auto", warm_expansions=20_000),
-    "rrtstar": Algorithm(module="companion.planner.reference.rrtstar", settings=RrtstarSettings, bounds_path_risk=True,
-                         carries_vessels=True),
+    "rrtstar": Algorithm(
+        module="companion.planner.reference.rrtstar",
+        settings=RrtstarSettings,
+        bounds_path_risk=True,
+        carries_vessels=True,
+    ),
     "astar": Algorithm(module="companion.planner.reference.astar", settings=AstarSettings),
 }
 

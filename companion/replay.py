@@ -58,7 +58,7 @@ from companion.words import counted
 TOLERANCE = 1e-6
 # Fields of a record that say when it was written, not what was decided.
 _STAMPS = frozenset({"t_s", "utc"})
-_AFTER_S = 3600.0   # messages may have come for so long behind the last row of the track
+_AFTER_S = 3600.0  # messages may have come for so long behind the last row of the track
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,8 +117,12 @@ class RecordedInput:
     def __init__(self, folder: Path, mission_path: Path | None = None) -> None:
         require_files(folder, VOYAGE, TLOG, DECISIONS, TRACK)
         if not all(is_from_the_start(folder / name) for name in (TLOG, DECISIONS, TRACK)):
-            raise InputError(str(folder), "", "its first records were dropped for want of room",
-                             "it cannot be folded from its start; `companion report` draws what is there")
+            raise InputError(
+                str(folder),
+                "",
+                "its first records were dropped for want of room",
+                "it cannot be folded from its start; `companion report` draws what is there",
+            )
         description = read_description(folder)
         with believed(folder / VOYAGE, "[run], [mission] and [permissions]"):
             self.epoch_s = float(description["run"]["epoch_s"])
@@ -133,9 +137,14 @@ class RecordedInput:
         self.rows = _rows(folder / TRACK)
         with believed(folder / DECISIONS, "a start"):
             self._starts = [
-                (float(d["t_s"]), None if d["persisted"] is None else Persisted.from_dict(d["persisted"]),
-                 tuple(d.get("known", ())), float(d.get("epoch_s", self.epoch_s)))
-                for d in self._decisions if d["kind"] == "start"
+                (
+                    float(d["t_s"]),
+                    None if d["persisted"] is None else Persisted.from_dict(d["persisted"]),
+                    tuple(d.get("known", ())),
+                    float(d.get("epoch_s", self.epoch_s)),
+                )
+                for d in self._decisions
+                if d["kind"] == "start"
             ] or [(-1e18, None, (), self.epoch_s)]
 
     @property
@@ -154,15 +163,27 @@ class RecordedInput:
             if record["kind"] in _FED:
                 fed.setdefault(float(record["t_s"]), []).append(record)
         for (start_s, persisted, known, epoch_s), end_s, gap_s in zip(
-                self._starts, ends, _gaps(self._decisions), strict=True):
+            self._starts, ends, _gaps(self._decisions), strict=True
+        ):
             fold = VoyageFold(
-                skipper, WindTracker(estimator=estimator_of(self.mission)), self._permissions, persisted, known=known,
-                traffic=target_limits_of(self.mission), waters=waters, water=water_of(self.mission),
+                skipper,
+                WindTracker(estimator=estimator_of(self.mission)),
+                self._permissions,
+                persisted,
+                known=known,
+                traffic=target_limits_of(self.mission),
+                waters=waters,
+                water=water_of(self.mission),
             )
             yield from self._life(fold, start_s, end_s, gap_s, fed, epoch_s)
 
     def _life(
-        self, fold: VoyageFold, start_s: float, end_s: float, gap_s: float, fed: dict[float, list[dict[str, Any]]],
+        self,
+        fold: VoyageFold,
+        start_s: float,
+        end_s: float,
+        gap_s: float,
+        fed: dict[float, list[dict[str, Any]]],
         epoch_s: float,
     ) -> Iterator[Folded]:
         """Yield the steps between a start of the companion and the next; the clock may have been set between them."""
@@ -192,8 +213,13 @@ class RecordedInput:
                     _FED[record["kind"]](fold, record)
             step = fold.tick(t_s)
             yield Folded(
-                t_s=t_s, step=step, messages=n_messages, lost=unread, recorded=recorded.get(t_s, []),
-                replayed=[_plain(action_record(a, step.snapshot, self.config)) for a in step.actions])
+                t_s=t_s,
+                step=step,
+                messages=n_messages,
+                lost=unread,
+                recorded=recorded.get(t_s, []),
+                replayed=[_plain(action_record(a, step.snapshot, self.config)) for a in step.actions],
+            )
 
 
 def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
@@ -219,11 +245,20 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
             differences.append(Difference(t_s=folded.t_s, recorded=folded.recorded, replayed=folded.replayed))
     if lost and next(_frames(folder / TLOG), None) is None:
         raise InputError(
-            str(folder / TLOG), "", f"is empty, and the steps heard {counted(messages, 'message')}",
-            "nothing can be folded without them: copy the voyage's folder again")
+            str(folder / TLOG),
+            "",
+            f"is empty, and the steps heard {counted(messages, 'message')}",
+            "nothing can be folded without them: copy the voyage's folder again",
+        )
     return ReplayReport(
-        steps=steps, unrecorded=unrecorded, messages=messages, lost=lost, actions=actions, restarts=voyage.restarts,
-        differences=tuple(differences))
+        steps=steps,
+        unrecorded=unrecorded,
+        messages=messages,
+        lost=lost,
+        actions=actions,
+        restarts=voyage.restarts,
+        differences=tuple(differences),
+    )
 
 
 def _gaps(decisions: list[dict[str, Any]]) -> list[float]:
@@ -257,7 +292,7 @@ def _frames(path: Path) -> Iterator[TlogRecord]:
 
 
 def _messages(
-    path: Path, epoch_s: float, start_s: float, end_s: float, fold: VoyageFold, system: int, unheard: int,
+    path: Path, epoch_s: float, start_s: float, end_s: float, fold: VoyageFold, system: int, unheard: int
 ) -> Iterator[tuple[float, Message]]:
     """Yield the messages of the autopilot's ``system`` that are not our own, behind those that nobody heard."""
     codec = Codec(system=1, component=OWN_COMPONENT)
@@ -291,7 +326,8 @@ def _plain(record: dict[str, Any]) -> dict[str, Any]:
 def _items(rows: list[list[Any]]) -> tuple[MissionItem, ...]:
     return tuple(
         MissionItem(command=c, lat_e7=lat, lon_e7=lon, alt_m=alt, frame=frame, params=(p[0], p[1], p[2], p[3]))
-        for c, lat, lon, alt, frame, p in rows)
+        for c, lat, lon, alt, frame, p in rows
+    )
 
 
 # What the fold is told between messages and outcomes, by the kind of record that says so.
@@ -301,7 +337,8 @@ _FED: dict[str, Callable[[VoyageFold, dict[str, Any]], None]] = {
     "fence read": lambda fold, record: fold.fence(_items(record["items"])),
     "planner process": lambda fold, record: fold.planner_alive(bool(record["alive"])),
     "others": lambda fold, record: fold.others(
-        tuple(record["neighbours"]), has_company=record["company"], has_shore=record.get("shore", False)),
+        tuple(record["neighbours"]), has_company=record["company"], has_shore=record.get("shore", False)
+    ),
 }
 
 
@@ -311,14 +348,13 @@ def _outcome(record: dict[str, Any]) -> Outcome:
         return PlanOutcome(request_id=record["request_id"], plan=plan, text=record["text"])
     kind = record["outcome"]
     if kind == "UploadOutcome":
-        return UploadOutcome(
-            upload_id=record["upload_id"], result=UploadResult[record["result"]], text=record["text"])
+        return UploadOutcome(upload_id=record["upload_id"], result=UploadResult[record["result"]], text=record["text"])
     if kind == "ReadOutcome":
         items = record["items"]
         return ReadOutcome(
-            read_id=record["read_id"], text=record["text"], items=None if items is None else _items(items))
-    return CommandOutcome(
-        command_id=record["command_id"], result=CommandResult[record["result"]], text=record["text"])
+            read_id=record["read_id"], text=record["text"], items=None if items is None else _items(items)
+        )
+    return CommandOutcome(command_id=record["command_id"], result=CommandResult[record["result"]], text=record["text"])
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 
 from companion.messages import AutopilotStatus, Mode, Severity, StatusText
 
-JUMP_M = 10.0          # a fix this much farther from where the boat is reckoned than it can have turned away is a jump
-LIGHT_MPS = 0.8        # less wind than this makes no way that is worth a plan
+JUMP_M = 10.0  # a fix this much farther from where the boat is reckoned than it can have turned away is a jump
+LIGHT_MPS = 0.8  # less wind than this makes no way that is worth a plan
 
 
 class Response(enum.Enum):
@@ -50,9 +50,9 @@ class End(enum.StrEnum):
     """What is done when something ends a voyage early (``[safety]``)."""
 
     SAY = "say"
-    STAY = "stay"              # a loiter where there is room near by
-    REFUGE = "refuge"          # the nearest; without one home if the mission ends there
-    HOME = "home"              # where there is no way to it, the nearest refuge
+    STAY = "stay"  # a loiter where there is room near by
+    REFUGE = "refuge"  # the nearest; without one home if the mission ends there
+    HOME = "home"  # where there is no way to it, the nearest refuge
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,10 +60,10 @@ class Setting:
     """A figure that a mission may set in ``[safety]``: its key with the unit, its bounds, and what it means."""
 
     key: str
-    default: float | None      # None: not asked for
+    default: float | None  # None: not asked for
     above: float | None = None  # it is more than this ...
     least: float | None = None  # ... or at least this ...
-    most: float | None = None   # ... and at most this
+    most: float | None = None  # ... and at most this
     says: str
 
 
@@ -73,12 +73,12 @@ class Ending:
 
     key: str
     default: End
-    rank: int                  # the lower comes first where several are raised
+    rank: int  # the lower comes first where several are raised
     over_orders: bool = False  # it comes before the orders of the crew, too
-    sails_on: bool = False     # where there is no place to go to what is left takes the boat on; else it stays near by
+    sails_on: bool = False  # where there is no place to go to what is left takes the boat on; else it stays near by
     because: str
-    until: str = ""            # how long the boat waits there; empty: the voyage is over
-    asked_by: str = ""         # the key without which it is not watched, and not announced
+    until: str = ""  # how long the boat waits there; empty: the voyage is over
+    asked_by: str = ""  # the key without which it is not watched, and not announced
     settings: tuple[Setting, ...] = ()
 
 
@@ -87,7 +87,7 @@ class Watchdog:
     """One row: its thresholds are ``enter`` and ``exit`` in ``unit``, held for ``enter_s`` and ``exit_s``."""
 
     name: str
-    number: int                # on the air; never changed and never given again
+    number: int  # on the air; never changed and never given again
     watches: str
     enter: float
     exit: float
@@ -97,11 +97,11 @@ class Watchdog:
     severity: Severity
     response: Response
     why: str
-    at_rest: bool = False      # watched before the boat sails and when the voyage is over, too
-    loitering: bool = False    # watched when the voyage is over; without at_rest not before the boat sails
-    unsailed_enter_s: float | None = None   # in place of ``enter_s`` where nothing but a drift can move the boat
-    sensor: str = ""           # the NAMED_VALUE_FLOAT of a script on the autopilot whose value is the figure
-    notification: str = ""     # Signal K's own name for it; empty: one made of the name
+    at_rest: bool = False  # watched before the boat sails and when the voyage is over, too
+    loitering: bool = False  # watched when the voyage is over; without at_rest not before the boat sails
+    unsailed_enter_s: float | None = None  # in place of ``enter_s`` where nothing but a drift can move the boat
+    sensor: str = ""  # the NAMED_VALUE_FLOAT of a script on the autopilot whose value is the figure
+    notification: str = ""  # Signal K's own name for it; empty: one made of the name
     ends: Ending | None = None  # it ends the voyage early, as the mission's ``[safety]`` says
 
 
@@ -110,6 +110,8 @@ S = Severity
 BATTERY, DARK, OUT_OF_TIME = "battery critical", "dark", "out of time"
 STRONG_WIND, LIGHT_WIND = "strong wind", "light wind"
 
+# fmt: off
+# A row is read across.
 TABLE: tuple[Watchdog, ...] = (
     W(name="link silent", number=1,
       watches="time since the autopilot's last heartbeat", enter=3.0, exit=1.5, unit="s",
@@ -248,6 +250,7 @@ TABLE: tuple[Watchdog, ...] = (
       ends=Ending(key="light_wind", default=End.SAY, rank=7, asked_by="min_tws_mps",
                   because="less wind is forecast than she makes way in", until="until more wind is forecast")),
 )
+# fmt: on
 
 BY_NAME = {w.name: w for w in TABLE}
 
@@ -271,13 +274,13 @@ def watchdog_of(number: int) -> str:
 # --------------------
 # Why the autopilot changed its mode by itself: the causes, how each is told, and what is done about it.
 
-CRITICAL = 5          # MAV_STATE of a heartbeat while a failsafe of links or position has acted
-AUTOPILOT = 1         # the component whose texts are signs
+CRITICAL = 5  # MAV_STATE of a heartbeat while a failsafe of links or position has acted
+AUTOPILOT = 1  # the component whose texts are signs
 # What a failsafe puts a boat into; RTL and LOITER sail, but not where the voyage wants it.
 HOMEWARD = frozenset({Mode.RTL, Mode.SMART_RTL})
 STOPPING = frozenset({Mode.HOLD, Mode.LOITER, *HOMEWARD})
-EMPTY = " is critical "   # in the battery's words, when the second of its limits is passed
-OVER = "cleared"      # ends a text that says that something is over
+EMPTY = " is critical "  # in the battery's words, when the second of its limits is passed
+OVER = "cleared"  # ends a text that says that something is over
 
 
 class Recovery(enum.Enum):
@@ -291,8 +294,12 @@ class Recovery(enum.Enum):
     @property
     def words(self) -> str:
         """What is done, in a few words."""
-        return {Recovery.LEAVE: "left to a person", Recovery.SAIL_ON: "sail on", Recovery.STAY: "loiter near by",
-                Recovery.SHELTER: "to the nearest refuge"}[self]
+        return {
+            Recovery.LEAVE: "left to a person",
+            Recovery.SAIL_ON: "sail on",
+            Recovery.STAY: "loiter near by",
+            Recovery.SHELTER: "to the nearest refuge",
+        }[self]
 
 
 # What a mission may say of the failsafes in place of the table (``[safety] ..._failsafe``).
@@ -308,8 +315,8 @@ class Cause:
     texts: tuple[str, ...]
     shown: str
     answer: Recovery
-    key: str = ""              # what a mission may say of it in ``[safety]``
-    waits_for: str = ""        # what must be over before the answer begins
+    key: str = ""  # what a mission may say of it in ``[safety]``
+    waits_for: str = ""  # what must be over before the answer begins
     press: str = "AUTO to sail on, LOITER to stay, MANUAL to take her"
     why: str
 
@@ -317,6 +324,7 @@ class Cause:
 PERSON = "a person"
 SHORE = "shore link"
 
+# fmt: off
 FAILSAFES: tuple[Cause, ...] = (
     Cause(name="position", key="position_failsafe", texts=("EKF variance", "EKF failsafe"),
           shown="HEARTBEAT critical with the filter ill",
@@ -340,6 +348,7 @@ FAILSAFES: tuple[Cause, ...] = (
           why="who wants her to stop out of range of radio or station wants her to stay, not to drift; ArduRover gives "
               "the loss of the one the other's name where it looks for both"),
 )
+# fmt: on
 CAUSES = {cause.name: cause for cause in FAILSAFES}
 
 
@@ -348,7 +357,7 @@ def is_filter_ill(status: AutopilotStatus) -> bool:
     return status.system_status == CRITICAL and not status.ekf_ok
 
 
-RECEIVER = "receiver"   # no cause by itself: without FS_THR_ENABLE its silence does nothing
+RECEIVER = "receiver"  # no cause by itself: without FS_THR_ENABLE its silence does nothing
 STANDING: dict[str, Callable[[AutopilotStatus], bool]] = {
     "position": is_filter_ill,
     "battery": lambda status: bool(status.battery_failed),

@@ -38,8 +38,12 @@ def printable(text: str) -> str:
     """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or c in "\n\t" or unicodedata.category(c) == "Zs"
-                   else c.encode("unicode_escape").decode("ascii") for c in text)
+    return "".join(
+        c
+        if c.isprintable() or c in "\n\t" or unicodedata.category(c) == "Zs"
+        else c.encode("unicode_escape").decode("ascii")
+        for c in text
+    )
 
 
 def one_line(text: str) -> str:
@@ -56,8 +60,15 @@ def file_name(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "voyage"
 
 
-_KINDS = {"float": "a number", "int": "a whole number", "str": "a text in quotes", "bool": "true or false",
-          "array": "a list", "object": "a table", "datetime": "a date with its time"}
+_KINDS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "a text in quotes",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "a table",
+    "datetime": "a date with its time",
+}
 _BOUNDS = {">=": "of at least", "<=": "of at most", ">": "above", "<": "below"}
 
 
@@ -67,6 +78,7 @@ def expected(problem: str) -> str:
     >>> expected("Expected `float` >= 5.0"), expected("Expected `str | null`, got `int`")
     ('expected a number of at least 5.0', 'expected a text in quotes, got a whole number')
     """
+
     def kinds(match: re.Match[str]) -> str:
         found = [_KINDS.get(name, name) for name in match[1].split(" | ") if name != "null"]
         return " or ".join(found) or "nothing"

@@ -24,19 +24,24 @@ project = "Sailboat companion"
 copyright = "the authors; MIT licence"  # noqa: A001 - the name that Sphinx reads
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 root_doc = "docs/index"
-include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md",
-                    *(f"docs/{folder}/*.md" for folder in ("guides", "reference", "lab", "api"))]
+include_patterns = [
+    "README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "docs/*.md",
+    *(f"docs/{folder}/*.md" for folder in ("guides", "reference", "lab", "api")),
+]
 exclude_patterns = [".*", "build", "voyages"]  # not walked
 
 html_theme = "furo"
 html_title = project
-html_extra_path = ["site"]    # the index.html that leads from the site's top to docs/index.html
+html_extra_path = ["site"]  # the index.html that leads from the site's top to docs/index.html
 html_static_path = ["static"]
 html_css_files = ["wide.css"]
 html_show_sourcelink = False
 html_copy_source = False
 
-myst_heading_anchors = 4      # GitHub's anchors: other pages link to them
+myst_heading_anchors = 4  # GitHub's anchors: other pages link to them
 
 autodoc_default_options = {"members": True, "undoc-members": True, "member-order": "bysource"}
 autodoc_typehints = "signature"
@@ -45,7 +50,7 @@ autodoc_preserve_defaults = True
 maximum_signature_line_length = 80
 python_use_unqualified_type_names = True
 napoleon_numpy_docstring = False
-napoleon_use_ivar = True      # a dataclass's attributes are described once, not twice
+napoleon_use_ivar = True  # a dataclass's attributes are described once, not twice
 
 
 # --------------------------------------------------------------------------------------------------------- navigation
@@ -142,16 +147,19 @@ def members(_app: Sphinx, what: str, _name: str, member: object, _skip: bool, _o
 
 
 def signature(
-    _app: Sphinx, _what: str, _name: str, _object: object, _options: object, arguments: str | None, returns: str | None,
+    _app: Sphinx, _what: str, _name: str, _object: object, _options: object, arguments: str | None, returns: str | None
 ) -> tuple[str | None, str | None]:
     """Write a dataclass's made defaults as they can be read."""
     return arguments and arguments.replace("<factory>", "..."), returns
 
 
 # ------------------------------------------------------------------------------------------------------------ offline
-FOREIGN = re.compile(r"""<(?:script|img|iframe|source|embed|object)\b[^>]*\b(?:src|data)=["']?(?:https?:)?//"""
-                     r"""|<link\b(?![^>]*rel=["']?canonical)[^>]*\bhref=["']?(?:https?:)?//"""
-                     r"""|url\(["']?(?:https?:)?//|@import\s+["'](?:https?:)?//""", re.IGNORECASE)
+FOREIGN = re.compile(
+    r"""<(?:script|img|iframe|source|embed|object)\b[^>]*\b(?:src|data)=["']?(?:https?:)?//"""
+    r"""|<link\b(?![^>]*rel=["']?canonical)[^>]*\bhref=["']?(?:https?:)?//"""
+    r"""|url\(["']?(?:https?:)?//|@import\s+["'](?:https?:)?//""",
+    re.IGNORECASE,
+)
 
 
 def foreign_requests(site: Path) -> list[str]:

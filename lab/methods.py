@@ -18,7 +18,7 @@ from companion.wind import Estimator, WindTracker
 from sitl.run.variation import Variation
 from sitl.world import WindModel
 
-MEAN_S = 30.0       # [s] over which what will blow is averaged: a plan is of legs, not of puffs
+MEAN_S = 30.0  # [s] over which what will blow is averaged: a plan is of legs, not of puffs
 _MEAN_STEP_S = 2.0
 AHEAD_S = 300.0
 NO_SPREAD_RAD = 1e-4
@@ -28,7 +28,7 @@ class Unspread(WindTracker):
     """The wind room whose forecasts are believed to be certain: what a planner without wind uncertainty is told."""
 
     def forecast_table(
-        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None,
+        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None
     ) -> WindForecast | None:
         """Return the forecast's mean over ``AHEAD_S``, for every horizon, without any spread."""
         table = super().forecast_table(t_s, horizons_s, levels)
@@ -52,7 +52,7 @@ class Foreknown(WindTracker):
         self._wind = wind
 
     def forecast_table(
-        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None,
+        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None
     ) -> WindForecast | None:
         """Return what will blow."""
         table = super().forecast_table(t_s, horizons_s, levels)
@@ -70,9 +70,11 @@ class Foreknown(WindTracker):
 
 def _certain(table: WindForecast) -> WindForecast:
     return replace(
-        table, sigma_twd_rad=np.full_like(table.sigma_twd_rad, NO_SPREAD_RAD),
+        table,
+        sigma_twd_rad=np.full_like(table.sigma_twd_rad, NO_SPREAD_RAD),
         sigma_tws_mps=np.full_like(table.sigma_tws_mps, NO_SPREAD_RAD),
-        half_width_rad=np.zeros_like(table.half_width_rad))
+        half_width_rad=np.zeros_like(table.half_width_rad),
+    )
 
 
 def unspread(_: WindModel, estimator: Estimator) -> WindTracker:
@@ -86,8 +88,8 @@ def foreknown(wind: WindModel, estimator: Estimator) -> WindTracker:
 
 
 # ------------------------------------------------------------------------------------- guidance and planner
-GUIDANCES = ("plan", "heading", "field")    # [skipper] guidance
-PLANNERS = tuple(ALGORITHMS)                # [skipper] planner
+GUIDANCES = ("plan", "heading", "field")  # [skipper] guidance
+PLANNERS = tuple(ALGORITHMS)  # [skipper] planner
 DRAWABLE = ("guidance", "planner")
 
 

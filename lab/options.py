@@ -13,24 +13,39 @@ from companion.planners import ALGORITHMS
 if TYPE_CHECKING:
     from lab.methods import Method
 
-ALL = "all"   # of what may be drawn
+ALL = "all"  # of what may be drawn
 
 
 def add_draw(parser: argparse.ArgumentParser, more: Mapping[str, str] = MappingProxyType({})) -> None:
     """Add ``--draw``, of guidance and planner and of ``more``: what each of them is, in words."""
     words = "".join(f", {name} ({told})" for name, told in more.items())
-    parser.add_argument("--draw", type=partial(_drawable, more=tuple(more)), default=(), metavar="WHAT[,WHAT]",
-                        help="draw from each seed, too: guidance (in AUTO, by heading, by field), planner ("
-                        f"{', '.join(ALGORITHMS)}){words}; all: each of these; what else a seed is stays the same "
-                        "(default: as the mission says)")
+    parser.add_argument(
+        "--draw",
+        type=partial(_drawable, more=tuple(more)),
+        default=(),
+        metavar="WHAT[,WHAT]",
+        help="draw from each seed, too: guidance (in AUTO, by heading, by field), planner ("
+        f"{', '.join(ALGORITHMS)}){words}; all: each of these; what else a seed is stays the same "
+        "(default: as the mission says)",
+    )
 
 
 def add_methods(parser: argparse.ArgumentParser) -> None:
     """Add ``--guidance`` and ``--planner``."""
-    parser.add_argument("--guidance", type=_guidance, nargs="+", metavar="G",
-                        help="sail by each of these in place of the mission's own: plan (in AUTO), heading, field")
-    parser.add_argument("--planner", type=_planner, nargs="+", metavar="P",
-                        help="and by the plans of each of these: " + ", ".join(ALGORITHMS))
+    parser.add_argument(
+        "--guidance",
+        type=_guidance,
+        nargs="+",
+        metavar="G",
+        help="sail by each of these in place of the mission's own: plan (in AUTO), heading, field",
+    )
+    parser.add_argument(
+        "--planner",
+        type=_planner,
+        nargs="+",
+        metavar="P",
+        help="and by the plans of each of these: " + ", ".join(ALGORITHMS),
+    )
 
 
 def methods_of(guidances: Sequence[str] | None, planners: Sequence[str] | None) -> list[Method]:

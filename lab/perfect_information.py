@@ -112,10 +112,10 @@ class Best:
         return int(np.count_nonzero(np.diff(self.track[:, 3])))
 
 
-ROOM_SHARE = 0.75      # of the course's length: so far about it the chart reaches
+ROOM_SHARE = 0.75  # of the course's length: so far about it the chart reaches
 ROOM_M = 60.0
 MOST_CELLS = 200_000
-REACH = 3              # of a move of the time to go, in cells: 32 directions
+REACH = 3  # of a move of the time to go, in cells: 32 directions
 FAR_S = 1e9
 
 
@@ -214,8 +214,8 @@ def _to_go(solid: NDArray[np.bool_], moves: NDArray[np.int64], costs: Floats, go
     return out.reshape(rows, columns)
 
 
-PARTS = 3            # of a step: in each the heading follows the wind
-ANGLE_RAD = math.radians(5.0)    # between the angles that are tried
+PARTS = 3  # of a step: in each the heading follows the wind
+ANGLE_RAD = math.radians(5.0)  # between the angles that are tried
 PORT, STARBOARD = 0, 1
 
 
@@ -259,7 +259,7 @@ def steps_of(race: Race, step_s: float, until_s: float, angle_rad: float = ANGLE
 
 Ints = NDArray[np.int32]
 
-TIE_S = 1e-3    # so much less is not better: in a steady wind everything is equal
+TIE_S = 1e-3  # so much less is not better: in a steady wind everything is equal
 
 
 @kernel
@@ -310,8 +310,22 @@ def _with_room(places: Floats, about: Ints, count: int) -> tuple[Floats, Ints]:
 
 @kernel
 def march(
-    start: Floats, goals: Floats, twd: Floats, speed: Floats, angle: Floats, step_s: float, tack_s: float, board: int,
-    corner: Floats, cell_m: float, fine: int, off: Floats, clear_m: float, to_go: Floats, units: Floats, most: Floats,
+    start: Floats,
+    goals: Floats,
+    twd: Floats,
+    speed: Floats,
+    angle: Floats,
+    step_s: float,
+    tack_s: float,
+    board: int,
+    corner: Floats,
+    cell_m: float,
+    fine: int,
+    off: Floats,
+    clear_m: float,
+    to_go: Floats,
+    units: Floats,
+    most: Floats,
     until_s: float,
 ) -> tuple[float, Floats, Ints, int]:
     """Return (time [s], places (n, 2), (n, 3) of their parent, step and state, the last place).
@@ -325,7 +339,7 @@ def march(
     rows, columns = off.shape[0] * fine, off.shape[1] * fine
     rank = np.full((2 * legs, rows * columns), np.float32(FAR_S))
     owner = np.full((2 * legs, rows * columns), np.int32(-1))
-    places, about = np.empty((1 << 16, 2)), np.empty((1 << 16, 4), np.int32)   # ... and the next place of the step
+    places, about = np.empty((1 << 16, 2)), np.empty((1 << 16, 4), np.int32)  # ... and the next place of the step
     first = np.full(last + 1, np.int32(-1))
     count, best_s, best = 2, until_s, -1
     for row in range(2):
@@ -342,7 +356,7 @@ def march(
             r = int((places[here, 1] - corner[1]) / cell_m * fine)
             c = int((places[here, 0] - corner[0]) / cell_m * fine)
             if j > 0 and owner[state, r * columns + c] != here:
-                continue   # somebody better came into this cell since
+                continue  # somebody better came into this cell since
             for action in range(angle.shape[0] if j == 0 else 2 * angle.shape[0]):
                 a, is_tack = action % angle.shape[0], action >= angle.shape[0]
                 into = state ^ 1 if is_tack else state
@@ -357,8 +371,10 @@ def march(
                         sailed_s = min(part_s, max(0.0, (q + 1) * part_s - tack_s))
                     heading, way = twd[k] + side * angle[a], speed[k, a] * sailed_s
                     e1, n1 = e + way * math.sin(heading), n + way * math.cos(heading)
-                    if _between(off, corner[0], corner[1], cell_m, e1, n1) < clear_m or _between(
-                            off, corner[0], corner[1], cell_m, 0.5 * (e + e1), 0.5 * (n + n1)) < clear_m:
+                    if (
+                        _between(off, corner[0], corner[1], cell_m, e1, n1) < clear_m
+                        or _between(off, corner[0], corner[1], cell_m, 0.5 * (e + e1), 0.5 * (n + n1)) < clear_m
+                    ):
                         is_over = True
                         break
                     share = _meets(e, n, e1, n1, goals[into // 2])
@@ -444,8 +460,9 @@ def most_m(gain: Floats, last: int, part_s: float, tack_s: float, board: int) ->
 
 def bound_s(race: Race, steps: Steps, gain: Floats, units: Floats) -> float:
     """Return the time before which nobody has been at all goals; the last step's where that is not enough."""
-    ways = np.max([units @ (np.array(goal.en_m) - np.array(race.start_en_m)) - goal.radius_m for goal in race.goals],
-                  axis=0)
+    ways = np.max(
+        [units @ (np.array(goal.en_m) - np.array(race.start_en_m)) - goal.radius_m for goal in race.goals], axis=0
+    )
 
     def most(last: int) -> Floats:
         made: Floats = most_m(gain, last, steps.step_s / PARTS, steps.tack_s, steps.board)[:, 0].max(axis=0)
@@ -502,16 +519,31 @@ def best(race: Race, until_s: float, grids: tuple[tuple[float, float], ...] = GR
 
 
 def _search(
-    race: Race, chart: DistanceChart, steps: Steps, gain: Floats, units: Floats, cell_m: float, until_s: float,
+    race: Race, chart: DistanceChart, steps: Steps, gain: Floats, units: Floats, cell_m: float, until_s: float
 ) -> tuple[float, Floats] | None:
     """Return time and track, None where nothing is faster than ``until_s``."""
     last = min(steps.count - steps.board, math.ceil(until_s / steps.step_s))
     most = most_m(gain, last, steps.step_s / PARTS, steps.tack_s, steps.board)
     goals = np.array([[*goal.en_m, goal.radius_m] for goal in race.goals])
     time_s, places, about, node = march(
-        np.array(race.start_en_m), goals, steps.twd_rad, steps.speed_mps, steps.angle_rad, steps.step_s, steps.tack_s,
-        steps.board, np.array(chart.corner_m), chart.cell_m, max(1, round(chart.cell_m / cell_m)), chart.off_m,
-        race.clear_m, chart.to_go_s, units, most, until_s)
+        np.array(race.start_en_m),
+        goals,
+        steps.twd_rad,
+        steps.speed_mps,
+        steps.angle_rad,
+        steps.step_s,
+        steps.tack_s,
+        steps.board,
+        np.array(chart.corner_m),
+        chart.cell_m,
+        max(1, round(chart.cell_m / cell_m)),
+        chart.off_m,
+        race.clear_m,
+        chart.to_go_s,
+        units,
+        most,
+        until_s,
+    )
     if node < 0:
         return None
     rows: list[tuple[float, float, float, float]] = []

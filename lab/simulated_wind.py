@@ -11,20 +11,21 @@ from companion.wind.study import Record
 
 Array = NDArray[np.float64]
 
-RHO_HZ = 0.036           # Wolsieffer 2020, equation 17
-NOISE_RADPS = 0.087      # likewise; its spread is for a step of 1 s
+RHO_HZ = 0.036  # Wolsieffer 2020, equation 17
+NOISE_RADPS = 0.087  # likewise; its spread is for a step of 1 s
 
 
 def _record(name: str, t_s: Array, direction_rad: Array, speed_mps: Array) -> Record:
     return Record(
-        name=name, t_s=t_s, twd_from_rad=np.mod(direction_rad, 2.0 * math.pi), tws_mps=np.maximum(0.0, speed_mps),
+        name=name,
+        t_s=t_s,
+        twd_from_rad=np.mod(direction_rad, 2.0 * math.pi),
+        tws_mps=np.maximum(0.0, speed_mps),
         turning=np.zeros(t_s.size, dtype=np.bool_),
     )
 
 
-def ornstein_uhlenbeck(
-    rng: np.random.Generator, t_s: Array, *, rate_hz: float, sigma: float,
-) -> Array:
+def ornstein_uhlenbeck(rng: np.random.Generator, t_s: Array, *, rate_hz: float, sigma: float) -> Array:
     """Return the stationary process with sd ``sigma`` at any times: exact steps, so its spread is free of the step."""
     keep = np.exp(-rate_hz * np.diff(t_s))
     noise = rng.normal(size=t_s.size)
@@ -50,7 +51,12 @@ def equation_17(seed: int, *, seconds: float = 7200.0, dt_s: float = 1.0, mean_r
 
 
 def weather(
-    seed: int, *, seconds: float = 7200.0, dt_s: float = 1.0, mean_rad: float = 0.0, speed_mps: float = 5.0,
+    seed: int,
+    *,
+    seconds: float = 7200.0,
+    dt_s: float = 1.0,
+    mean_rad: float = 0.0,
+    speed_mps: float = 5.0,
     noise_rad: float = 0.05,
 ) -> Record:
     """Return wind as boats meet it: gusts of 8 s and 60 s, shifts of 10 min, a drift of hours, an instrument's noise.

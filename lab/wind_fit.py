@@ -25,15 +25,7 @@ from scipy.special import erf
 from companion.errors import InputError
 from companion.wind.estimators import CONSTANTS, SIGMA_MAX_RAD, normal_half_width
 from companion.wind.estimators import forecaster_kernels as kernel
-from companion.wind.study import (
-    FEWEST,
-    HORIZONS_S,
-    SCORED_LEVELS,
-    Record,
-    asked_rows,
-    parse_csv,
-    targets,
-)
+from companion.wind.study import FEWEST, HORIZONS_S, SCORED_LEVELS, Record, asked_rows, parse_csv, targets
 from lab.simulated_wind import equation_17
 
 Array = NDArray[np.float64]
@@ -45,8 +37,11 @@ _SIMULATED_WEIGHT = 0.35
 
 # Where every fit starts: round numbers that no record has influenced.
 NEUTRAL = CONSTANTS._replace(
-    survival=np.array([3.0, 1.0]), speed_survival=np.array([3.0, 1.0]), sigma=np.array([0.22, 0.0, 0.3, -0.3, 1500.0]),
-    error=np.array([0.2, 0.25]), speed_error=np.array([0.1, 0.25]),
+    survival=np.array([3.0, 1.0]),
+    speed_survival=np.array([3.0, 1.0]),
+    sigma=np.array([0.22, 0.0, 0.3, -0.3, 1500.0]),
+    error=np.array([0.2, 0.25]),
+    speed_error=np.array([0.1, 0.25]),
     quantile=np.array([normal_half_width(float(p)) for p in kernel.QUANTILE_P]),
 )
 
@@ -69,7 +64,7 @@ class Prepared:
         state = kernel.new_state(constants)
         prior = state.quantile.copy()
         out = kernel.replay(
-            state, constants, prior, self.t_s, self.x, self.speed, self.ask, np.array(HORIZONS_S), _Z, _ZP,
+            state, constants, prior, self.t_s, self.x, self.speed, self.ask, np.array(HORIZONS_S), _Z, _ZP
         )
         found = []
         for a in range(len(HORIZONS_S)):
@@ -111,7 +106,8 @@ def figures(constants: kernel.Constants, prepared: Sequence[Prepared]) -> Array:
                     np.mean(crps_circular(error, sigma)),
                     *np.mean(np.abs(error)[:, None] <= np.minimum(half, math.pi), axis=0),
                     np.mean(crps_normal(speed_error, speed_sigma)),
-                    np.mean(np.abs(error)), np.mean(np.abs(speed_error)),
+                    np.mean(np.abs(error)),
+                    np.mean(np.abs(speed_error)),
                 )
     return table
 
@@ -123,7 +119,10 @@ def _simplex(start: Array, steps: Sequence[float], objective: Callable[[Array], 
 
 
 def fit(
-    prepared: Sequence[Prepared], simulated: Sequence[Prepared], *, start: kernel.Constants = NEUTRAL,
+    prepared: Sequence[Prepared],
+    simulated: Sequence[Prepared],
+    *,
+    start: kernel.Constants = NEUTRAL,
     evaluations: int = 150,
 ) -> kernel.Constants:
     """Return the constants fitted to ``prepared`` (and, lightly, to ``simulated``)."""
@@ -134,13 +133,13 @@ def fit(
     speed_slope, speed_level = np.polyfit(log_h, np.log(table[:, 6]), 1)
     wind = float(np.mean([max(2.0, float(np.mean(p.speed))) for p in prepared]))
     start = start._replace(
-        error=np.array([math.exp(level), slope]), speed_error=np.array([math.exp(speed_level) / wind, speed_slope]),
+        error=np.array([math.exp(level), slope]), speed_error=np.array([math.exp(speed_level) / wind, speed_slope])
     )
     unit, unit_simulated = table[:, 0], np.nanmean(figures(start, simulated), axis=0)[:, 0]
 
     def unpack(th: Array) -> kernel.Constants:
         return start._replace(
-            survival=np.array([math.exp(th[0]), max(0.05, th[1])]), sigma=np.array([*th[2:6], start.sigma[4]]),
+            survival=np.array([math.exp(th[0]), max(0.05, th[1])]), sigma=np.array([*th[2:6], start.sigma[4]])
         )
 
     def objective(th: Array) -> float:
@@ -195,9 +194,7 @@ def _report(title: str, table: Array) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the fit and print it."""
-    parser = argparse.ArgumentParser(
-        prog="python -m lab.wind_fit", description="Fit the forecaster's constants."
-    )
+    parser = argparse.ArgumentParser(prog="python -m lab.wind_fit", description="Fit the forecaster's constants.")
     parser.add_argument("folder", type=Path, help="CSV records")
     parser.add_argument("--leave-one-out", action="store_true", help="also fit without each record and score it")
     parser.add_argument("--evaluations", type=int, default=150, help="of the objective, per fit (default 150)")

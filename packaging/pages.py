@@ -33,8 +33,13 @@ def page(parser: Parser, summary: str) -> str:
     """Return the manual page of a program or a command."""
     name = parser.prog.replace(" ", "-")
     usage = parser.format_usage().partition(":")[2]
-    lines = [f'.TH "{name.upper()}" "1" "" "sailboat-companion {__version__}" "Sailboat companion"', ".SH NAME",
-             f"{escaped(name)} \\- {escaped(summary)}", ".SH SYNOPSIS", escaped(" ".join(usage.split()))]
+    lines = [
+        f'.TH "{name.upper()}" "1" "" "sailboat-companion {__version__}" "Sailboat companion"',
+        ".SH NAME",
+        f"{escaped(name)} \\- {escaped(summary)}",
+        ".SH SYNOPSIS",
+        escaped(" ".join(usage.split())),
+    ]
     if parser.description:
         lines += [".SH DESCRIPTION", *paragraphs(parser.description)]
     for title, entries in groups(parser):
@@ -62,8 +67,9 @@ def groups(parser: Parser) -> Iterator[tuple[str, list[tuple[str, str]]]]:
             if isinstance(action, argparse._SubParsersAction):
                 entries += [(choice.dest, choice.help or "") for choice in action._choices_actions]
             else:
-                entries.append((formatter._format_action_invocation(action),
-                                formatter._expand_help(action) if action.help else ""))
+                entries.append(
+                    (formatter._format_action_invocation(action), formatter._expand_help(action) if action.help else "")
+                )
         if entries:
             yield group.title or "options", entries
 
@@ -81,7 +87,8 @@ def main(folder: Path) -> None:
             for within, parsed in inner.commands.items():
                 told = parsed.description or f"a command of {program.name} {name}"
                 pages.joinpath(f"{program.name}-{name}-{within}.1").write_text(
-                    page(parsed, told.splitlines()[0].rstrip(".")))
+                    page(parsed, told.splitlines()[0].rstrip("."))
+                )
         for shell in SHELLS:
             folder.joinpath(shell, program.name).write_text(shtab.complete(parser, shell))
 

@@ -21,7 +21,10 @@ def components(lock: str) -> list[dict[str, object]]:
             continue
         name, version, marker = found.groups()
         component: dict[str, object] = {
-            "type": "library", "name": name, "version": version, "purl": f"pkg:pypi/{name}@{version}",
+            "type": "library",
+            "name": name,
+            "version": version,
+            "purl": f"pkg:pypi/{name}@{version}",
             "bom-ref": f"{name}@{version}",
             "hashes": [{"alg": "SHA-256", "content": digest} for digest in re.findall(r"sha256:([0-9a-f]{64})", line)],
         }
@@ -36,10 +39,18 @@ def bill(lock: Path) -> dict[str, object]:
     version = re.search(r'__version__ = "(.+)"', (ROOT / "companion/__init__.py").read_text())[1]
     text = lock.read_text()
     return {
-        "bomFormat": "CycloneDX", "specVersion": "1.5", "version": 1,
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.5",
+        "version": 1,
         "serialNumber": f"urn:uuid:{uuid.uuid5(uuid.NAMESPACE_OID, version + text)}",
-        "metadata": {"component": {"type": "application", "name": "sailboat-companion", "version": version,
-                                   "purl": f"pkg:pypi/sailboat-companion@{version}"}},
+        "metadata": {
+            "component": {
+                "type": "application",
+                "name": "sailboat-companion",
+                "version": version,
+                "purl": f"pkg:pypi/sailboat-companion@{version}",
+            }
+        },
         "components": components(text),
     }
 

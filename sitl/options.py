@@ -32,7 +32,7 @@ class CampaignOptions:
     def part(self, jobs: Sequence[JobT]) -> Sequence[JobT]:
         """Return this part of the jobs: every N-th, so that parts take about as long."""
         number, of = self.array
-        return jobs[number - 1::of]
+        return jobs[number - 1 :: of]
 
     @property
     def file(self) -> Path | None:
@@ -44,26 +44,49 @@ class CampaignOptions:
 
 
 def add_options(
-    parser: argparse.ArgumentParser, *, workers: int | None = None, out: Path | None = None, has_out: bool = True,
+    parser: argparse.ArgumentParser, *, workers: int | None = None, out: Path | None = None, has_out: bool = True
 ) -> None:
     """Add the options that every campaign has; ``workers`` and ``out`` are what it does without them.
 
     ``has_out`` is False where the results have their place in a folder of the campaign's own.
     """
     group = parser.add_argument_group("where it is sailed, and where results stay")
-    group.add_argument("--workers", type=whole(at_least=1), default=workers, metavar="W",
-                       help=f"voyages at a time (default: {workers or 'one per core'})")
-    group.add_argument("--dask", type=_address, metavar="ADDRESS",
-                       help="by the workers of a Dask scheduler (tcp://HOST:8786, or its scheduler file), or of a "
-                            "'local' one; needs the extra [cluster]")
-    group.add_argument("--array", type=_part, default=(1, 1), metavar="I/N",
-                       help="only part I of N, into a file of its own beside --out: join them by 'sitl results join'")
+    group.add_argument(
+        "--workers",
+        type=whole(at_least=1),
+        default=workers,
+        metavar="W",
+        help=f"voyages at a time (default: {workers or 'one per core'})",
+    )
+    group.add_argument(
+        "--dask",
+        type=_address,
+        metavar="ADDRESS",
+        help="by the workers of a Dask scheduler (tcp://HOST:8786, or its scheduler file), or of a "
+        "'local' one; needs the extra [cluster]",
+    )
+    group.add_argument(
+        "--array",
+        type=_part,
+        default=(1, 1),
+        metavar="I/N",
+        help="only part I of N, into a file of its own beside --out: join them by 'sitl results join'",
+    )
     if has_out:
-        group.add_argument("--out", type=_results, default=out, metavar="FILE.jsonl",
-                           help="append each result as it comes; what it holds already is not sailed again"
-                                + (f" (default: {out})" if out else ""))
-    group.add_argument("--table", type=_table, metavar="FILE.parquet",
-                       help="write all results as a table, for 'sitl results'; needs the extra [results]")
+        group.add_argument(
+            "--out",
+            type=_results,
+            default=out,
+            metavar="FILE.jsonl",
+            help="append each result as it comes; what it holds already is not sailed again"
+            + (f" (default: {out})" if out else ""),
+        )
+    group.add_argument(
+        "--table",
+        type=_table,
+        metavar="FILE.parquet",
+        help="write all results as a table, for 'sitl results'; needs the extra [results]",
+    )
 
 
 def options_of(args: argparse.Namespace, *, out: Path | None = None) -> CampaignOptions:

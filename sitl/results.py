@@ -67,8 +67,14 @@ MEASURES = (
     Measure(name="below floor", of=_number("below_floor"), kind="share", worse=1),
     Measure(name="arrived", of=_number("arrived"), kind="share", worse=-1),
     Measure(name="time", of=_time_s, kind="ratio", worse=1, least=0.005),
-    Measure(name="clearance", of=_number("min_clearance_m", "clearance_m"), kind="difference", worse=-1, least=0.25,
-            unit="m"),
+    Measure(
+        name="clearance",
+        of=_number("min_clearance_m", "clearance_m"),
+        kind="difference",
+        worse=-1,
+        least=0.25,
+        unit="m",
+    ),
     Measure(name="silence", of=_number("silence_s"), kind="difference", worse=1, least=0.5, unit="s"),
     Measure(name="tacks", of=_number("tacks"), kind="difference", worse=0),
     Measure(name="replans", of=_number("replans"), kind="difference", worse=0),
@@ -126,12 +132,29 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
         return {
-            "changes": [{
-                "group": c.group, "measure": c.measure.name, "kind": c.measure.kind, "pairs": c.pairs,
-                "before": c.before, "after": c.after, "change": c.change, "low": c.low, "high": c.high,
-                "p_worse": c.p_worse, "worse": c.is_worse} for c in self.changes],
-            "pairs": len(self.pairs), "same": self.same, "only_before": self.only[0], "only_after": self.only[1],
-            "other_water": list(self.other_water), "worst": [p.name for p in self.pairs[:20]]}
+            "changes": [
+                {
+                    "group": c.group,
+                    "measure": c.measure.name,
+                    "kind": c.measure.kind,
+                    "pairs": c.pairs,
+                    "before": c.before,
+                    "after": c.after,
+                    "change": c.change,
+                    "low": c.low,
+                    "high": c.high,
+                    "p_worse": c.p_worse,
+                    "worse": c.is_worse,
+                }
+                for c in self.changes
+            ],
+            "pairs": len(self.pairs),
+            "same": self.same,
+            "only_before": self.only[0],
+            "only_after": self.only[1],
+            "other_water": list(self.other_water),
+            "worst": [p.name for p in self.pairs[:20]],
+        }
 
 
 def compare(before: Table, after: Table) -> Comparison:
@@ -141,11 +164,15 @@ def compare(before: Table, after: Table) -> Comparison:
         InputError: they are of different campaigns, or have no job in common.
     """
     if before.campaign != after.campaign:
-        raise InputError("results", "", f"sitl {before.campaign} and sitl {after.campaign} have no pairs",
-                         "compare two files of one campaign")
+        raise InputError(
+            "results",
+            "",
+            f"sitl {before.campaign} and sitl {after.campaign} have no pairs",
+            "compare two files of one campaign",
+        )
     first, second = _by_job(before), _by_job(after)
     both = [job for job in first if job in second]
-    if not both and len(_scenarios(before)) == len(_scenarios(after)) == 1:   # two settings of one thing
+    if not both and len(_scenarios(before)) == len(_scenarios(after)) == 1:  # two settings of one thing
         first, second = _by_job(before, "scenario"), _by_job(after, "scenario")
         both = [job for job in first if job in second]
     if not both:
@@ -157,17 +184,26 @@ def compare(before: Table, after: Table) -> Comparison:
         groups.setdefault(", ".join(str(pair[0].get(name)) for name in names), []).append(pair)
     if len(groups) > 1:
         groups = {ALL: [pair for pairs in groups.values() for pair in pairs], **groups}
-    changes = [change for group, pairs in groups.items() for measure in MEASURES
-               if (change := _change(group, measure, pairs)) is not None]
+    changes = [
+        change
+        for group, pairs in groups.items()
+        for measure in MEASURES
+        if (change := _change(group, measure, pairs)) is not None
+    ]
     judged = next(iter(groups))
     asked = max(1, sum(change.group == judged and change.measure.worse != 0 for change in changes))
     pairs = sorted((_pair(job, first[job], second[job]) for job in both), key=lambda p: p.worse, reverse=True)
     return Comparison(
-        changes=tuple(_judged(c, LEVEL / asked) if c.group == judged else c for c in changes), pairs=tuple(pairs),
+        changes=tuple(_judged(c, LEVEL / asked) if c.group == judged else c for c in changes),
+        pairs=tuple(pairs),
         same=sum(_is_same(pair.before, pair.after) for pair in pairs),
         only=(len(first) - len(both), len(second) - len(both)),
-        other_water=tuple(dict.fromkeys(str(first[job].get("scenario")) for job in both
-                                        if first[job].get("hash") != second[job].get("hash"))))
+        other_water=tuple(
+            dict.fromkeys(
+                str(first[job].get("scenario")) for job in both if first[job].get("hash") != second[job].get("hash")
+            )
+        ),
+    )
 
 
 def _scenarios(table: Table) -> set[Any]:
@@ -189,8 +225,11 @@ def _pair(job: tuple[Any, ...], before: Row, after: Row) -> SeedPair:
     for measure in MEASURES:
         if measure.worse:
             was, now = measure.of(before), measure.of(after)
-            worse.append(0.0 if was is None or now is None else measure.worse * (
-                now / was - 1.0 if measure.kind == "ratio" else now - was))
+            worse.append(
+                0.0
+                if was is None or now is None
+                else measure.worse * (now / was - 1.0 if measure.kind == "ratio" else now - was)
+            )
     *words, seed = job
     name = f"{', '.join(map(str, words))} seed {seed}".strip()
     return SeedPair(name=name, before=before, after=after, worse=tuple(worse))
@@ -198,8 +237,11 @@ def _pair(job: tuple[Any, ...], before: Row, after: Row) -> SeedPair:
 
 def _change(group: str, measure: Measure, pairs: Sequence[tuple[Row, Row]]) -> FigureChange | None:
     """Return a figure's change, None where no pair has it."""
-    found = [(was, now) for before, after in pairs
-             if (was := measure.of(before)) is not None and (now := measure.of(after)) is not None]
+    found = [
+        (was, now)
+        for before, after in pairs
+        if (was := measure.of(before)) is not None and (now := measure.of(after)) is not None
+    ]
     if not found:
         return None
     values = np.array(found, dtype=np.float64)
@@ -212,8 +254,17 @@ def _change(group: str, measure: Measure, pairs: Sequence[tuple[Row, Row]]) -> F
     before, after, change = float(values[:, 0].mean()), float(values[:, 1].mean()), float(steps.mean())
     if measure.kind == "ratio":
         before, after, change, low, high = (math.exp(x) for x in (before, after, change, low, high))
-    return FigureChange(group=group, measure=measure, pairs=len(found), before=before, after=after, change=change,
-                        low=low, high=high, p_worse=_p_worse(measure, steps, rng) if measure.worse else 1.0)
+    return FigureChange(
+        group=group,
+        measure=measure,
+        pairs=len(found),
+        before=before,
+        after=after,
+        change=change,
+        low=low,
+        high=high,
+        p_worse=_p_worse(measure, steps, rng) if measure.worse else 1.0,
+    )
 
 
 def _p_worse(measure: Measure, steps: NDArray[np.float64], rng: np.random.Generator) -> float:
@@ -222,12 +273,12 @@ def _p_worse(measure: Measure, steps: NDArray[np.float64], rng: np.random.Genera
     if measure.kind == "share":
         worse, better = int((bad > 0).sum()), int((bad < 0).sum())
         of = worse + better
-        return sum(math.comb(of, k) for k in range(worse, of + 1)) / 2.0 ** of if of else 1.0
+        return sum(math.comb(of, k) for k in range(worse, of + 1)) / 2.0**of if of else 1.0
     moved = bad[bad != 0.0]
     if not moved.size:
         return 1.0
-    if 2 ** moved.size <= DRAWS:
-        signs = 1.0 - 2.0 * ((np.arange(2 ** moved.size)[:, None] >> np.arange(moved.size)) & 1)
+    if 2**moved.size <= DRAWS:
+        signs = 1.0 - 2.0 * ((np.arange(2**moved.size)[:, None] >> np.arange(moved.size)) & 1)
         return float(((signs @ moved) >= moved.sum() - 1e-12).mean())
     signs = rng.choice((-1.0, 1.0), (DRAWS, moved.size))
     return float((((signs @ moved) >= moved.sum() - 1e-12).sum() + 1) / (DRAWS + 1))
@@ -268,13 +319,26 @@ def _figure(measure: Measure, rows: Sequence[Row]) -> str:
 
 def told(comparison: Comparison, *, most: int = 10) -> str:
     """Return a comparison: what was worse first, then the table of changes, then the seeds."""
-    lines = [f"{counted(len(comparison.pairs), 'pair')}, {comparison.same} of them the same in every figure"
-             + "".join(f"; {n} only in the {where}"
-                       for n, where in zip(comparison.only, ("first", "second"), strict=True) if n)]
+    lines = [
+        f"{counted(len(comparison.pairs), 'pair')}, {comparison.same} of them the same in every figure"
+        + "".join(
+            f"; {n} only in the {where}" for n, where in zip(comparison.only, ("first", "second"), strict=True) if n
+        )
+    ]
     lines += [f"the files of {name} are not the same in both" for name in comparison.other_water]
     rows = [("", "figure", "pairs", "first", "second", "change (95 %)", "by luck", "")]
-    rows += [(c.group, c.measure.name, str(c.pairs), *_values(c), f"{c.p_worse:.2g}" if c.measure.worse else "-",
-              "WORSE" if c.is_worse else "") for c in comparison.changes if c.change != (c.measure.kind == "ratio")]
+    rows += [
+        (
+            c.group,
+            c.measure.name,
+            str(c.pairs),
+            *_values(c),
+            f"{c.p_worse:.2g}" if c.measure.worse else "-",
+            "WORSE" if c.is_worse else "",
+        )
+        for c in comparison.changes
+        if c.change != (c.measure.kind == "ratio")
+    ]
     lines += columns(rows, left=2) if len(rows) > 1 else ["no figure that is measured here changed"]
     worst = [pair for pair in comparison.pairs if any(x > 0.0 for x in pair.worse)][:most]
     if worst:
@@ -291,8 +355,11 @@ def _values(change: FigureChange) -> tuple[str, str, str]:
     if kind == "ratio":
         return f"{c.before:.1f}", f"{c.after:.1f}", f"x {c.change:.3f} ({c.low:.3f} to {c.high:.3f})"
     if kind == "share":
-        return (f"{100 * c.before:.1f} %", f"{100 * c.after:.1f} %",
-                f"{100 * c.change:+.1f} % ({100 * c.low:+.1f} to {100 * c.high:+.1f})")
+        return (
+            f"{100 * c.before:.1f} %",
+            f"{100 * c.after:.1f} %",
+            f"{100 * c.change:+.1f} % ({100 * c.low:+.1f} to {100 * c.high:+.1f})",
+        )
     return f"{c.before:.2f}", f"{c.after:.2f}", f"{c.change:+.2f} ({c.low:+.2f} to {c.high:+.2f})"
 
 
@@ -301,8 +368,11 @@ def _figure_pair(before: Row, after: Row) -> str:
     for measure in MEASURES:
         was, now = measure.of(before), measure.of(after)
         if was is not None and now is not None and was != now:
-            parts.append(f"{measure.name} {'no' if not was else 'yes'} -> {'no' if not now else 'yes'}"
-                         if measure.kind == "share" else f"{measure.name} {was:.1f} -> {now:.1f}")
+            parts.append(
+                f"{measure.name} {'no' if not was else 'yes'} -> {'no' if not now else 'yes'}"
+                if measure.kind == "share"
+                else f"{measure.name} {was:.1f} -> {now:.1f}"
+            )
     return ", ".join(parts)
 
 
@@ -313,12 +383,17 @@ def columns(rows: Sequence[Sequence[str]], *, left: int) -> list[str]:
     ['sailor    s', 'alone   301']
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(cell.rjust(w) if n >= left else cell.ljust(w) for n, (cell, w) in enumerate(
-        zip(row, widths, strict=True))).rstrip() for row in rows]
+    return [
+        "  ".join(
+            cell.rjust(w) if n >= left else cell.ljust(w) for n, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]
 
 
 def markdown(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a Markdown table whose first two columns are words and all others numbers."""
     lines = [" | ".join(row) for row in (heads, *rows)]
-    return "\n".join(["| " + lines[0] + " |", "|---|---|" + "--:|" * (len(heads) - 2),
-                      *("| " + line + " |" for line in lines[1:])])
+    return "\n".join(
+        ["| " + lines[0] + " |", "|---|---|" + "--:|" * (len(heads) - 2), *("| " + line + " |" for line in lines[1:])]
+    )

@@ -37,7 +37,7 @@ def pytest_itemcollected(item):
         item.add_marker("long")
 
 
-@pytest.hookimpl(trylast=True)   # of what is left when the marks have been looked at
+@pytest.hookimpl(trylast=True)  # of what is left when the marks have been looked at
 def pytest_collection_modifyitems(config, items):
     """Order what several workers share; leave out, with a reason, what needs a program that a clone does not bring."""
     items[:] = long_first(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
@@ -54,7 +54,7 @@ def long_first(items, workers):
     long = [item for item in items if item.nodeid.startswith(LONG)]
     rest = [item for item in items if not item.nodeid.startswith(LONG)]
     ends = [len(rest) * n // workers for n in range(workers + 1)]
-    return [item for n in range(workers) for item in (*long[n::workers], *rest[ends[n]:ends[n + 1]])]
+    return [item for n in range(workers) for item in (*long[n::workers], *rest[ends[n] : ends[n + 1]])]
 
 
 @pytest.fixture(scope="session")
@@ -65,7 +65,7 @@ def carried():
     kept.mkdir(parents=True, exist_ok=True)
     folder = kept / digest
     with (kept / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)   # the tests' workers make it once
+        fcntl.flock(lock, fcntl.LOCK_EX)  # the tests' workers make it once
         if not (folder / places.CARRIED_FOR).exists():
             for old in kept.glob("?" * len(digest)):
                 shutil.rmtree(old)

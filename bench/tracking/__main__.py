@@ -1,10 +1,10 @@
 """How far the real ArduRover sails from the track that is predicted.
 
-    python -m bench.tracking                       the tables, from the golden recordings; a few seconds
-    python -m bench.tracking --simulated           the same for the simulated autopilot, sailed now
-    python -m bench.tracking --sail [--speedup 25] sails every trial on the real ArduRover again (15 minutes) and
-                                                   replaces the recordings
-    python -m bench.tracking --figures DIR         the pictures of docs/lab/tracking.md
+python -m bench.tracking                       the tables, from the golden recordings; a few seconds
+python -m bench.tracking --simulated           the same for the simulated autopilot, sailed now
+python -m bench.tracking --sail [--speedup 25] sails every trial on the real ArduRover again (15 minutes) and
+                                               replaces the recordings
+python -m bench.tracking --figures DIR         the pictures of docs/lab/tracking.md
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ def draw(sailed: dict[str, Track], folder: Path) -> None:
     figure, axes = plt.subplots(1, len(SHOWN), figsize=SIZE_IN)
     for ax, (name, (first, last)) in zip(axes, SHOWN, strict=True):
         trial, track = trials[name], sailed[name]
-        path = np.asarray([(0.0, 0.0), *trial.points_en_m])[first:last + 2]
+        path = np.asarray([(0.0, 0.0), *trial.points_en_m])[first : last + 2]
         ours = predicted(trial)
         part = (ours.leg >= first) & (ours.leg <= last)
         real = track[(track[:, 3] > first) & (track[:, 3] <= last + 1)]
@@ -44,8 +44,11 @@ def draw(sailed: dict[str, Track], folder: Path) -> None:
         for ax, want in ((left, False), (right, True)):
             values = np.sort(np.concatenate([r.track_m[r.is_short == want] for r in rows]))
             if len(values):
-                ax.semilogx(np.maximum(values, 0.02), np.linspace(0.0, 100.0, len(values)),
-                            label=f"{np.max(curve_mps(tws)):.1f} m/s")
+                ax.semilogx(
+                    np.maximum(values, 0.02),
+                    np.linspace(0.0, 100.0, len(values)),
+                    label=f"{np.max(curve_mps(tws)):.1f} m/s",
+                )
     for ax, title in ((left, "long legs"), (right, "near a leg of less than 4.5 s")):
         ax.axhline(99.0, color="0.7", lw=0.8)
         ax.set_title(title, fontsize=9)

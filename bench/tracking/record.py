@@ -26,7 +26,7 @@ from sitl.world import WindModel
 from sitl.world.environment import AR1, Constant
 
 EVERY_S = 0.2
-PATIENCE_S = 150.0     # without a waypoint, and the time of the longest leg
+PATIENCE_S = 150.0  # without a waypoint, and the time of the longest leg
 SLOWEST_MPS = 0.15
 IDENTITY = LinkIdentity(system=255, component=190)
 
@@ -63,11 +63,13 @@ def sail_ardurover(trial: Trial, speedup: float) -> Track:
         JobError: it does not run, does not take the mission, or does not sail it.
 
     """
+
     async def voyage() -> Track:
         wind = _wind(trial)
         async with (
-            ArduRover(require(), HOME, wind, heading_rad=trial.first_rad, speedup=speedup,
-                      parameters=_parameters(trial)) as rover,
+            ArduRover(
+                require(), HOME, wind, heading_rad=trial.first_rad, speedup=speedup, parameters=_parameters(trial)
+            ) as rover,
             Link(open_link(rover.link), identity=IDENTITY, streams=()) as link,
             Autopilot(link, timeout_s=30.0 * speedup) as pilot,
         ):
@@ -78,11 +80,16 @@ def sail_ardurover(trial: Trial, speedup: float) -> Track:
 
 def sail_simulated(trial: Trial) -> Track:
     """Sail a trial on the simulated autopilot."""
+
     async def voyage() -> Track:
         wind = _wind(trial)
-        autopilot = SimulatedAutopilot(AutopilotConfig(
-            home=HOME, heading_rad=trial.first_rad, is_warm=True, is_moored=True,
-            parameters=_parameters(trial)), wind, seed=trial.seed)
+        autopilot = SimulatedAutopilot(
+            AutopilotConfig(
+                home=HOME, heading_rad=trial.first_rad, is_warm=True, is_moored=True, parameters=_parameters(trial)
+            ),
+            wind,
+            seed=trial.seed,
+        )
         wires = MemoryLink("shore", seed=trial.seed)
         async with (
             serve(autopilot, [wires.far]),

@@ -9,8 +9,8 @@ import numpy as np
 from bench.tracking.record import Track
 
 FILE = Path("tests/boat/tracking/ardurover.npz")
-STEP_M = 0.5       # nearer to the last one a sample is left out
-CENTI = 100.0      # places are kept in whole centimetres, times in hundredths of a second, the wind in 0.01 rad
+STEP_M = 0.5  # nearer to the last one a sample is left out
+CENTI = 100.0  # places are kept in whole centimetres, times in hundredths of a second, the wind in 0.01 rad
 
 
 def thinned(track: Track) -> Track:
@@ -24,8 +24,13 @@ def thinned(track: Track) -> Track:
 
 def save(tracks: dict[str, Track], path: Path = FILE) -> None:
     """Write the tracks."""
-    np.savez_compressed(path, **{name: np.round(track * CENTI).astype(np.int32)  # type: ignore[arg-type]
-                                 for name, track in tracks.items()})
+    np.savez_compressed(
+        path,
+        **{
+            name: np.round(track * CENTI).astype(np.int32)  # type: ignore[arg-type]
+            for name, track in tracks.items()
+        },
+    )
 
 
 def load(path: Path = FILE) -> dict[str, Track]:

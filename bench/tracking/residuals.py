@@ -20,7 +20,7 @@ from sitl.autopilot.boat.vehicle import Vehicle
 from sitl.world.environment import Constant
 
 QUANTILES = (0.5, 0.9, 0.99, 1.0)
-WP_SPEED_MPS = 5.0     # of sailboat.parm
+WP_SPEED_MPS = 5.0  # of sailboat.parm
 SETTLED_LOOPS = 9000
 
 
@@ -56,8 +56,13 @@ def helm_of(trial: Trial) -> GuidanceModel:
 
 def predicted(trial: Trial) -> PredictedTrack:
     """Return the prediction for a trial of corners: from rest, in its steady wind."""
-    return predict([(0.0, 0.0), *trial.points_en_m], helm_of(trial), curve_mps=curve_mps(trial.tws_mps),
-                   twd_from_rad=0.0, speed_mps=0.0)
+    return predict(
+        [(0.0, 0.0), *trial.points_en_m],
+        helm_of(trial),
+        curve_mps=curve_mps(trial.tws_mps),
+        twd_from_rad=0.0,
+        speed_mps=0.0,
+    )
 
 
 def residuals(trial: Trial, sailed: Track) -> Residuals:
@@ -68,8 +73,11 @@ def residuals(trial: Trial, sailed: Track) -> Residuals:
     nearest = shapely.STRtree(shapely.points(track.en_m)).nearest(points)
     near = are_near_short(np.hypot(*np.diff(path, axis=0).T), float(np.max(curve_mps(trial.tws_mps))))
     return Residuals(
-        trial=trial, track_m=shapely.distance(shapely.LineString(track.en_m), points),
-        legs_m=shapely.distance(shapely.LineString(path), points), is_short=near[track.leg[nearest]])
+        trial=trial,
+        track_m=shapely.distance(shapely.LineString(track.en_m), points),
+        legs_m=shapely.distance(shapely.LineString(path), points),
+        is_short=near[track.leg[nearest]],
+    )
 
 
 def table(sailed: dict[str, Track]) -> Iterator[str]:
@@ -84,8 +92,10 @@ def table(sailed: dict[str, Track]) -> Iterator[str]:
             legs = np.concatenate([r.legs_m[r.is_short == want] for r in rows])
             if len(track):
                 figures = ", ".join(f"{q:.2f}" for q in np.quantile(track, QUANTILES))
-                yield (f"{np.max(curve_mps(tws)):.1f} m/s | {name} | {len(track)} | {figures} | "
-                       f"{np.quantile(legs, 0.99):.2f}")
+                yield (
+                    f"{np.max(curve_mps(tws)):.1f} m/s | {name} | {len(track)} | {figures} | "
+                    f"{np.quantile(legs, 0.99):.2f}"
+                )
 
 
 def beyond_m(across_m: NDArray[np.float64], corridor_m: float) -> list[float]:
@@ -99,8 +109,14 @@ def boards(trial: Trial, sailed: Track) -> tuple[list[float], list[float]]:
     leg = sailed[sailed[:, 3] == 2.0]
     since = leg[:, 0] - leg[0, 0]
     wind = np.interp(np.arange(0.0, since[-1], 0.5), since, np.unwrap(leg[:, 4]))
-    track = predict(trial.points_en_m, helm_of(trial), curve_mps=curve_mps(trial.tws_mps), twd_from_rad=wind,
-                    start_en_m=(float(leg[0, 1]), float(leg[0, 2])), heading_rad=0.0)
+    track = predict(
+        trial.points_en_m,
+        helm_of(trial),
+        curve_mps=curve_mps(trial.tws_mps),
+        twd_from_rad=wind,
+        start_en_m=(float(leg[0, 1]), float(leg[0, 2])),
+        heading_rad=0.0,
+    )
     return (beyond_m(leg[:, 1], trial.corridor_m), beyond_m(track.en_m[track.leg == 0, 0], trial.corridor_m))
 
 
@@ -110,5 +126,7 @@ def beat_table(sailed: dict[str, Track]) -> Iterator[str]:
     for t in beats():
         if t.name in sailed:
             real, ours = boards(t, sailed[t.name])
-            yield (f"{t.corridor_m:g} m, {t.tws_mps:g} m/s, {math.degrees(t.spread_rad):.1f}° | {len(real)} | "
-                   f"{np.median(real):.2f}, {max(real):.2f} | {np.median(ours):.2f}, {max(ours):.2f}")
+            yield (
+                f"{t.corridor_m:g} m, {t.tws_mps:g} m/s, {math.degrees(t.spread_rad):.1f}° | {len(real)} | "
+                f"{np.median(real):.2f}, {max(real):.2f} | {np.median(ours):.2f}, {max(ours):.2f}"
+            )

@@ -14,14 +14,14 @@ WINDS_MPS = (0.25, 1.0, 3.0, 6.0, 9.5)
 RADII_M = (1.0, 2.0, 3.0, 5.0, 10.0)
 CORNERS_DEG = (10.0, 30.0, 50.0, 70.0, 90.0, 110.0, 130.0, 150.0, 170.0)
 SHORTEST_M, LONGEST_M = 2.0, 100.0
-OPEN_DEG = (62.0, 298.0)   # courses that are clear of the no-go zone in a wind from north: 45 degrees and its pad
-LEAD_M = 60.0              # the first leg, from rest
+OPEN_DEG = (62.0, 298.0)  # courses that are clear of the no-go zone in a wind from north: 45 degrees and its pad
+LEAD_M = 60.0  # the first leg, from rest
 LEGS = {0.25: 14, 1.0: 22}  # in little wind she takes her time
 MANY = 34
 BEAT_M = 240.0
 BEAT_CORRIDORS_M = (5.0, 10.0, 20.0)
-BEAT_WINDS = ((3.0, 0.0), (5.0, 9.0), (5.0, 18.6), (9.5, 9.0))   # strength [m/s], spread [deg]
-SPREAD_TAU_S = 27.8        # of the wind's direction: Wolsieffer 2020, equation 17
+BEAT_WINDS = ((3.0, 0.0), (5.0, 9.0), (5.0, 18.6), (9.5, 9.0))  # strength [m/s], spread [deg]
+SPREAD_TAU_S = 27.8  # of the wind's direction: Wolsieffer 2020, equation 17
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,9 +59,14 @@ def corners() -> list[Trial]:
     for i, tws in enumerate(WINDS_MPS):
         for j, radius in enumerate(RADII_M):
             rng = np.random.default_rng([15, i, j])
-            out.append(Trial(
-                name=f"corners-{tws:g}-{radius:g}", points_en_m=_legs(rng, LEGS.get(tws, MANY)), tws_mps=tws,
-                wp_radius_m=radius))
+            out.append(
+                Trial(
+                    name=f"corners-{tws:g}-{radius:g}",
+                    points_en_m=_legs(rng, LEGS.get(tws, MANY)),
+                    tws_mps=tws,
+                    wp_radius_m=radius,
+                )
+            )
     return out
 
 
@@ -69,9 +74,16 @@ def beats() -> list[Trial]:
     """Return the trials of legs dead to windward that the autopilot beats, and a reach from their end."""
     points = ((0.0, 15.0), (0.0, BEAT_M), (80.0, BEAT_M - 20.0))
     return [
-        Trial(name=f"beat-{corridor:g}-{tws:g}-{spread:g}", points_en_m=points, tws_mps=tws, corridor_m=corridor,
-              spread_rad=math.radians(spread), seed=n)
-        for n, corridor in enumerate(BEAT_CORRIDORS_M) for tws, spread in BEAT_WINDS
+        Trial(
+            name=f"beat-{corridor:g}-{tws:g}-{spread:g}",
+            points_en_m=points,
+            tws_mps=tws,
+            corridor_m=corridor,
+            spread_rad=math.radians(spread),
+            seed=n,
+        )
+        for n, corridor in enumerate(BEAT_CORRIDORS_M)
+        for tws, spread in BEAT_WINDS
     ]
 
 

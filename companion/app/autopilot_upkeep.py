@@ -28,10 +28,10 @@ PARAMETER_AGAIN_S = 10.0
 # All are read again this often: what was changed, damaged or forged does not stay [s].
 PARAMETERS_EVERY_S = 300.0
 FENCE_TRIES = 5
-FENCE_EVERY_S = 15.0   # between two looks at what is drawn on the autopilot
-FENCE_AGAIN_S = 5.0    # ... when it could not be read
-FENCE_READ_S = 3.0     # that one takes at the most
-YIELDS_S = 0.1         # so soon an upload has the link to itself
+FENCE_EVERY_S = 15.0  # between two looks at what is drawn on the autopilot
+FENCE_AGAIN_S = 5.0  # ... when it could not be read
+FENCE_READ_S = 3.0  # that one takes at the most
+YIELDS_S = 0.1  # so soon an upload has the link to itself
 
 Record = Callable[[dict[str, Any]], None]
 
@@ -63,7 +63,10 @@ async def keep_parameters(fold: VoyageFold, autopilot: Autopilot) -> None:
 
 
 async def keep_fence(
-    fold: VoyageFold, autopilot: Autopilot, mission: Mission, record: Record,
+    fold: VoyageFold,
+    autopilot: Autopilot,
+    mission: Mission,
+    record: Record,
     take: Callable[[tuple[MissionItem, ...]], None],
 ) -> None:
     """Upload the fence, where it may be, once the autopilot is known to be ours, and read what somebody draws there.
@@ -74,9 +77,7 @@ async def keep_fence(
     await _read_fence(fold, autopilot, take)
 
 
-async def _read_fence(
-    fold: VoyageFold, autopilot: Autopilot, take: Callable[[tuple[MissionItem, ...]], None],
-) -> None:
+async def _read_fence(fold: VoyageFold, autopilot: Autopilot, take: Callable[[tuple[MissionItem, ...]], None]) -> None:
     """Read the fence now and then while there is one in force, and when the autopilot says anything new of it.
 
     Nothing on the link tells of a fence that is drawn anew.
@@ -89,8 +90,11 @@ async def _read_fence(
         shown = (None, None) if status is None else (status.fence_breached, status.fence_breaches)
         if shown != seen:
             seen, next_s = shown, -math.inf
-        if shown[0] is not None and now_s() >= next_s and autopilot.link.is_alive and (
-            fold.state.vehicle.is_ours and fold.state.pending.upload is None
+        if (
+            shown[0] is not None
+            and now_s() >= next_s
+            and autopilot.link.is_alive
+            and (fold.state.vehicle.is_ours and fold.state.pending.upload is None)
         ):
             items = await _fence_items(fold, autopilot)
             next_s = now_s() + (FENCE_EVERY_S if items is not None else FENCE_AGAIN_S)
@@ -172,8 +176,12 @@ class OtherStations:
 
     def to_record(self) -> dict[str, object]:
         """Return it as a record of the voyage."""
-        return {"kind": "others", "neighbours": list(self.neighbours), "company": self.has_company,
-                "shore": self.has_shore}
+        return {
+            "kind": "others",
+            "neighbours": list(self.neighbours),
+            "company": self.has_company,
+            "shore": self.has_shore,
+        }
 
 
 NOBODY = OtherStations()
@@ -186,18 +194,22 @@ async def make_way(link: Link, *, named: int | None, token: int) -> None:
         LinkError: there is one.
     """
     if named is not None:
-        await asyncio.sleep(LISTEN_S)   # without a name the link has listened this long already
+        await asyncio.sleep(LISTEN_S)  # without a name the link has listened this long already
     other = link.other_companion()
     if other is not None and yields_to(token, other):
         raise LinkError(
             f"{link.transport.name}: another companion is at work on this boat (component {OWN_COMPONENT} of "
-            f"system {link.party.target_system}): stop it first, two would give her different orders")
+            f"system {link.party.target_system}): stop it first, two would give her different orders"
+        )
 
 
 def others_on(link: Link, *, named: int | None) -> OtherStations:
     """Return who else is heard at present."""
     other = link.other_companion()
     return OtherStations(
-        neighbours=() if named is not None else tuple(
-            f"system {s.system}, {type_words(s.vehicle_type)}" for s in link.neighbours()),
-        has_company=other is not None and not other.is_starting, has_shore=link.hears_station)
+        neighbours=()
+        if named is not None
+        else tuple(f"system {s.system}, {type_words(s.vehicle_type)}" for s in link.neighbours()),
+        has_company=other is not None and not other.is_starting,
+        has_shore=link.hears_station,
+    )

@@ -65,8 +65,11 @@ _UPLOADS = {
     WireOutcome.MISMATCH: UploadResult.MISMATCH,
     WireOutcome.LINK: UploadResult.LINK,
 }
-_COMMANDS = {WireOutcome.OK: CommandResult.ACCEPTED, WireOutcome.TIMEOUT: CommandResult.TIMEOUT,
-             WireOutcome.LINK: CommandResult.TIMEOUT}
+_COMMANDS = {
+    WireOutcome.OK: CommandResult.ACCEPTED,
+    WireOutcome.TIMEOUT: CommandResult.TIMEOUT,
+    WireOutcome.LINK: CommandResult.TIMEOUT,
+}
 
 
 class Planner(Protocol):
@@ -88,8 +91,14 @@ class Planner(Protocol):
         ...
 
     async def plan(
-        self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
-        algorithm: str = "auto", settings: Settings | None = None,
+        self,
+        problem: Problem,
+        *,
+        budget_s: float | None = None,
+        expansions: int | None = None,
+        seed: int = 0,
+        algorithm: str = "auto",
+        settings: Settings | None = None,
     ) -> Plan:
         """Plan; never raises for a problem, however bad."""
         ...
@@ -99,9 +108,17 @@ class Executor:
     """The orders under way. ``run`` lives in the voyage's task group."""
 
     def __init__(
-        self, autopilot: Autopilot, planner: Planner, on_outcome: Callable[[Outcome], None], *,
-        seed: int = 0, expansions: int | None = None, budget_scale: float = 1.0, config: SkipperConfig | None = None,
-        on_adopt: Callable[[], None] = lambda: None, on_answer: Callable[[Acknowledge], None] = lambda _: None,
+        self,
+        autopilot: Autopilot,
+        planner: Planner,
+        on_outcome: Callable[[Outcome], None],
+        *,
+        seed: int = 0,
+        expansions: int | None = None,
+        budget_scale: float = 1.0,
+        config: SkipperConfig | None = None,
+        on_adopt: Callable[[], None] = lambda: None,
+        on_answer: Callable[[Acknowledge], None] = lambda _: None,
     ) -> None:
         self._autopilot, self._planner, self._on_outcome = autopilot, planner, on_outcome
         self._seed, self._expansions, self._budget_scale = seed, expansions, budget_scale
@@ -109,8 +126,8 @@ class Executor:
         self._on_adopt, self._on_answer = on_adopt, on_answer
         self._orders: deque[tuple[float, Action]] = deque()
         self._order_wanted = asyncio.Event()
-        self._order: tuple[Action, asyncio.Task[Outcome]] | None = None   # under way
-        self._cut_short = ""                                              # why it was ended
+        self._order: tuple[Action, asyncio.Task[Outcome]] | None = None  # under way
+        self._cut_short = ""  # why it was ended
         self._plan: RequestPlan | None = None
         self._plan_wanted = asyncio.Event()
         self.refused = 0
@@ -139,7 +156,7 @@ class Executor:
 
     def _enqueue(self, action: Action) -> None:
         if isinstance(action, UploadMission):
-            self._give_up(ReadMission, "an upload has overtaken it")   # what a read would tell is void by it
+            self._give_up(ReadMission, "an upload has overtaken it")  # what a read would tell is void by it
         if len(self._orders) >= MAX_WAITING:
             self.refused += 1
             self._on_outcome(_gave_up(action, f"{MAX_WAITING} orders are waiting"))
@@ -181,8 +198,12 @@ class Executor:
                 continue
             by = request.planner
             plan = await self._planner.plan(
-                request.problem, budget_s=self._budget_s(request), expansions=by.expansions or self._expansions,
-                seed=self._seed + request.seed, algorithm=by.algorithm, settings=by.settings,
+                request.problem,
+                budget_s=self._budget_s(request),
+                expansions=by.expansions or self._expansions,
+                seed=self._seed + request.seed,
+                algorithm=by.algorithm,
+                settings=by.settings,
             )
             # A request that was cancelled or overtaken while it was computed is answered by the newer one.
             if self._plan is not None and self._plan.request_id == request.request_id:
@@ -192,7 +213,7 @@ class Executor:
     def _budget_s(self, request: RequestPlan) -> float:
         """Return the real time for a plan [s]: what was asked for, less beside a hurried simulator, never nothing."""
         is_first = request.reason is ReplanReason.START
-        longer = min(FIRST_MOST, self._planner.share ** -FIRST_POWER) if is_first else 1.0
+        longer = min(FIRST_MOST, self._planner.share**-FIRST_POWER) if is_first else 1.0
         return max(min(request.budget_s, LEAST_BUDGET_S), longer * request.budget_s * self._budget_scale)
 
     async def _run_orders(self) -> None:
@@ -226,13 +247,18 @@ class Executor:
         autopilot = self._autopilot
         if isinstance(action, UploadMission):
             done = await autopilot.upload_mission(
-                action.items, keep_first=action.keep_first, set_current=action.set_current, stopgap=action.stopgap)
-            return UploadOutcome(upload_id=action.upload_id, result=_UPLOADS.get(done.outcome, UploadResult.TIMEOUT),
-                                 text=_join(done.text, f"{done.method} {done.duration_s:.2f} s"))
+                action.items, keep_first=action.keep_first, set_current=action.set_current, stopgap=action.stopgap
+            )
+            return UploadOutcome(
+                upload_id=action.upload_id,
+                result=_UPLOADS.get(done.outcome, UploadResult.TIMEOUT),
+                text=_join(done.text, f"{done.method} {done.duration_s:.2f} s"),
+            )
         if isinstance(action, UploadFence):
             done = await autopilot.upload_fence(action.items)
-            return UploadOutcome(upload_id=action.upload_id, result=_UPLOADS.get(done.outcome, UploadResult.TIMEOUT),
-                                 text=done.text)
+            return UploadOutcome(
+                upload_id=action.upload_id, result=_UPLOADS.get(done.outcome, UploadResult.TIMEOUT), text=done.text
+            )
         if isinstance(action, ReadMission):
             read = await autopilot.read_mission()
             return ReadOutcome(read_id=action.read_id, items=read.items, text=read.text)

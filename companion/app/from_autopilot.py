@@ -31,13 +31,13 @@ from companion.mission_check import require_sailable
 from companion.skipper.board.mark import are_marked, is_remnant
 from companion.telemetry.state_file import known_beside, read_state
 
-READ_TRIES = 5         # of one list; each has a patience of its own
+READ_TRIES = 5  # of one list; each has a patience of its own
 RETRY_S = 3.0
-SETTLE_S = 3.0         # between two readings that must agree: a ground station uploads one list after the other
+SETTLE_S = 3.0  # between two readings that must agree: a ground station uploads one list after the other
 MOST_READINGS = 10
 PLAN = ".drawn.plan"
-MOST_SAID = 5          # of the refusals, on the radio; the console has them all
-RADIO_WARNING = 4      # MAV_SEVERITY
+MOST_SAID = 5  # of the refusals, on the radio; the console has them all
+RADIO_WARNING = 4  # MAV_SEVERITY
 
 Say = Callable[[str], None]
 
@@ -87,17 +87,20 @@ async def read_lists(autopilot: Autopilot, say: Say) -> DrawnLists:
     for _ in range(MOST_READINGS):
         mission = await _read("mission", autopilot.read_mission, say)
         lists = DrawnLists(
-            mission=mission.items or (), home=_place_of(mission.home),
+            mission=mission.items or (),
+            home=_place_of(mission.home),
             fence=(await _read("fence", autopilot.read_fence, say)).items or (),
-            rally=(await _read("rally points", autopilot.read_rally, say)).items or ())
+            rally=(await _read("rally points", autopilot.read_rally, say)).items or (),
+        )
         if lists == before:
             return lists
         if before is not None:
             say("the drawing on the autopilot is changing: it is read again")
         before = lists
         await asyncio.sleep(SETTLE_S)
-    raise TransferError(f"the drawing on the autopilot did not come to rest in {MOST_READINGS} readings; "
-                        "end the upload and start again")
+    raise TransferError(
+        f"the drawing on the autopilot did not come to rest in {MOST_READINGS} readings; end the upload and start again"
+    )
 
 
 async def _read(what: str, ask: Callable[[], Awaitable[ReadResult]], say: Say) -> ReadResult:
@@ -110,8 +113,10 @@ async def _read(what: str, ask: Callable[[], Awaitable[ReadResult]], say: Say) -
         result = await ask()
     if result.is_ok:
         return result
-    raise TransferError(f"the {what} could not be read from the autopilot, {READ_TRIES} times: {result.text}; "
-                        "nothing was sent to the boat")
+    raise TransferError(
+        f"the {what} could not be read from the autopilot, {READ_TRIES} times: {result.text}; "
+        "nothing was sent to the boat"
+    )
 
 
 def _place_of(home: MissionItem | None) -> GeoPoint | None:
@@ -124,7 +129,7 @@ def plan_path(state_path: Path) -> Path:
 
 
 def find(
-    lists: DrawnLists, settings: MissionOptions, path: Path | None, state_path: Path, keep_at: Path,
+    lists: DrawnLists, settings: MissionOptions, path: Path | None, state_path: Path, keep_at: Path
 ) -> FoundMission:
     """Return what is to be sailed: the drawing on board, or the one that was kept where the list on board is ours.
 
@@ -142,21 +147,34 @@ def find(
     before = _kept_before(plan)
     own, others = _names(state_path)
     is_ours = bool(lists.mission) and (
-        board in {*own, *others} or are_marked(lists.mission)
-        or (before is not None and is_remnant(lists.mission, before.items)))
+        board in {*own, *others}
+        or are_marked(lists.mission)
+        or (before is not None and is_remnant(lists.mission, before.items))
+    )
     if not is_ours:
         document = lists.document()
         return FoundMission(
-            document=document, drawn=drawn_mission(document, settings, path or keep_at, keep_at), plan=keep_at,
-            is_new=True, board=board, text="the drawing on the autopilot")
+            document=document,
+            drawn=drawn_mission(document, settings, path or keep_at, keep_at),
+            plan=keep_at,
+            is_new=True,
+            board=board,
+            text="the drawing on the autopilot",
+        )
     if before is None or (board in others and board not in own):
         where = "of another voyage" if before is not None else f"and no drawing is kept at {plan}"
-        raise UnreadableError("the autopilot", "", f"the mission on board is one of ours, {where}",
-                              "draw a mission and upload it")
+        raise UnreadableError(
+            "the autopilot", "", f"the mission on board is one of ours, {where}", "draw a mission and upload it"
+        )
     day = datetime.fromtimestamp(plan.stat().st_mtime, UTC)
     return FoundMission(
-        document=before, drawn=drawn_mission(before, settings, path or plan, plan), plan=plan, is_new=False,
-        board=board, text=f"the drawing kept at {plan} ({day:%d %b %Y %H:%M} UTC): the list on board is ours")
+        document=before,
+        drawn=drawn_mission(before, settings, path or plan, plan),
+        plan=plan,
+        is_new=False,
+        board=board,
+        text=f"the drawing kept at {plan} ({day:%d %b %Y %H:%M} UTC): the list on board is ours",
+    )
 
 
 def _names(state_path: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -185,13 +203,24 @@ def keep(document: Document, plan: Path, disk: Disk, *, is_durable: bool = True)
         disk.make_folder(plan.parent)
         disk.replace(plan, kept(document).data, is_durable=is_durable)
     except OSError as error:
-        raise UnreadableError(str(plan), "", f"the drawing cannot be kept: {reason(error)}; our plan takes its place",
-                              "make room, or name another place with --state") from error
+        raise UnreadableError(
+            str(plan),
+            "",
+            f"the drawing cannot be kept: {reason(error)}; our plan takes its place",
+            "make room, or name another place with --state",
+        ) from error
 
 
 async def find_on(
-    transport: Transport, settings: MissionOptions, path: Path | None, state_path: Path, keep_at: Path, say: Say, *,
-    wait_s: float, signing: SigningStore | None = None,
+    transport: Transport,
+    settings: MissionOptions,
+    path: Path | None,
+    state_path: Path,
+    keep_at: Path,
+    say: Say,
+    *,
+    wait_s: float,
+    signing: SigningStore | None = None,
 ) -> FoundMission:
     """Read what is drawn on the autopilot behind ``transport``, and find what is to be sailed; see ``find``.
 
@@ -201,9 +230,9 @@ async def find_on(
         LinkError: no autopilot was heard, or its lists cannot be read.
         InputError: as of ``find``.
     """
-    own = LinkIdentity(component=TOOL_COMPONENT)   # by ours a companion that sails would take this for a second one
+    own = LinkIdentity(component=TOOL_COMPONENT)  # by ours a companion that sails would take this for a second one
     async with Link(
-        transport, identity=own, target_system=settings.autopilot.system, streams=(), signing=signing,
+        transport, identity=own, target_system=settings.autopilot.system, streams=(), signing=signing
     ) as link:
         await link.wait_autopilot(wait_s)
         autopilot = Autopilot(link)
@@ -217,7 +246,7 @@ async def find_on(
     return found
 
 
-ADOPTED = "adopted"   # how a voyage ends that gives way to what was drawn under way
+ADOPTED = "adopted"  # how a voyage ends that gives way to what was drawn under way
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -68,8 +68,8 @@ class OperatorCommands:
         self._link, self._authority = link, "signed" if has_key else "unsigned"
         self._waiting: list[Order] = []
         self._is_open = False
-        self._asked: dict[tuple[str, int], asyncio.Future[Answer]] = {}   # by the way and the number of who asks
-        self.wants_high_latency = False   # HIGH_LATENCY2 was asked for
+        self._asked: dict[tuple[str, int], asyncio.Future[Answer]] = {}  # by the way and the number of who asks
+        self.wants_high_latency = False  # HIGH_LATENCY2 was asked for
         link.on_command = self._hear
 
     def begin(self) -> None:
@@ -95,8 +95,9 @@ class OperatorCommands:
             return Answer(result=Result.NOT_NOW, text="the companion is not under way yet")
         answer: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
         self._asked[way, number] = answer
-        self._waiting.append(Order(
-            wanted=wanted, t_s=now_s(), authority=way, source=Source(kind=way, component=number)))
+        self._waiting.append(
+            Order(wanted=wanted, t_s=now_s(), authority=way, source=Source(kind=way, component=number))
+        )
         try:
             return await answer
         finally:
@@ -130,9 +131,15 @@ class OperatorCommands:
             return RESULTS[Result.UNKNOWN]
         if not self._is_open or len(self._waiting) >= MOST_WAITING:
             return RESULTS[Result.NOT_NOW]
-        self._waiting.append(Order(
-            wanted=wanted_of(message), t_s=now_s(), command=int(message.command), authority=self._authority,
-            source=Source(kind=MAVLINK, system=message.get_srcSystem(), component=message.get_srcComponent())))
+        self._waiting.append(
+            Order(
+                wanted=wanted_of(message),
+                t_s=now_s(),
+                command=int(message.command),
+                authority=self._authority,
+                source=Source(kind=MAVLINK, system=message.get_srcSystem(), component=message.get_srcComponent()),
+            )
+        )
         return LATER
 
 
@@ -151,7 +158,7 @@ class ViewBroadcast:
         self._made: ViewFold | None = None
         self._guard = guard
         self.watchers: list[OnView] = []
-        self.is_kept = False   # made although nobody watches yet: who comes later wants to know of the plan in force
+        self.is_kept = False  # made although nobody watches yet: who comes later wants to know of the plan in force
 
     @property
     def area(self) -> AreaView:
@@ -179,15 +186,15 @@ class ViewBroadcast:
 # All browsers are one station: an order that is sent twice in haste is done once. No connection of the socket on
 # board has this number.
 BROWSERS = 1_000_000
-PREVIEW_S = 0.5        # for a plan that is only looked at: the boat's own may have to wait for it so long
-LAST_S = 5.0           # for one that is being made when the voyage ends
+PREVIEW_S = 0.5  # for a plan that is only looked at: the boat's own may have to wait for it so long
+LAST_S = 5.0  # for one that is being made when the voyage ends
 
 
 class LivePage:
     """Shows the steps of a voyage on ``live``."""
 
     def __init__(
-        self, live: LiveSource, views: ViewBroadcast, fold: VoyageFold, planner: Planner, operator: OperatorCommands,
+        self, live: LiveSource, views: ViewBroadcast, fold: VoyageFold, planner: Planner, operator: OperatorCommands
     ) -> None:
         self._live, self._showing, self._fold, self._planner, self._crew = live, views, fold, planner, operator
         self._step: Step | None = None
@@ -214,8 +221,15 @@ class LivePage:
             return {"error": "a plan is being made: again in a moment"}
         # A task of its own: who hangs up must not end the planner's work, which would end the planner.
         self._plan = asyncio.create_task(
-            self._planner.plan(asked.problem, budget_s=PREVIEW_S, seed=asked.seed, algorithm=asked.planner.algorithm,
-                               settings=asked.planner.settings), name="preview")
+            self._planner.plan(
+                asked.problem,
+                budget_s=PREVIEW_S,
+                seed=asked.seed,
+                algorithm=asked.planner.algorithm,
+                settings=asked.planner.settings,
+            ),
+            name="preview",
+        )
         return {"order": wanted.words, **_in_figures(await asyncio.shield(self._plan))}
 
     async def end(self) -> None:
@@ -233,8 +247,14 @@ def _in_figures(plan: Plan) -> dict[str, Any]:
 
 
 async def live_page(
-    address: Address, fold: VoyageFold, planner: Planner, operator: OperatorCommands, views: ViewBroadcast, *,
-    pace: float, charts: Sequence[TileChart],
+    address: Address,
+    fold: VoyageFold,
+    planner: Planner,
+    operator: OperatorCommands,
+    views: ViewBroadcast,
+    *,
+    pace: float,
+    charts: Sequence[TileChart],
 ) -> None:
     """Serve the page of a voyage until cancelled. ``pace``: seconds of the loop for each second.
 
@@ -243,8 +263,12 @@ async def live_page(
         Exception: a step could not be shown.
     """
     verbs = fold.permissions.local_orders
-    live = LiveSource(name=fold.skipper.voyage.name, unix_s=views.epoch_s, area=views.area,
-                permitted=tuple(verb.value for verb in Verb if permitted(verb, verbs)))
+    live = LiveSource(
+        name=fold.skipper.voyage.name,
+        unix_s=views.epoch_s,
+        area=views.area,
+        permitted=tuple(verb.value for verb in Verb if permitted(verb, verbs)),
+    )
     page = LivePage(live, views, fold, planner, operator)
     if address.token:
         live.ask, live.preview = page.ask, page.preview
@@ -253,7 +277,7 @@ async def live_page(
     def show(view: View, events: tuple[Event, ...], step: Step) -> None:
         try:
             page.show(view, events, step)
-        except Exception as error:   # a new page may do better
+        except Exception as error:  # a new page may do better
             if not failed.done():
                 failed.set_exception(error)
 
@@ -266,13 +290,13 @@ async def live_page(
             await page.end()
 
 
-MAX_LINE = 500     # bytes; an order is shorter
-MOST = 8           # connections at a time: who has asked for nothing the longest makes room for the next
-MOST_WATCH = 6     # of them, who are shown the voyage: there is room for an order
-WATCH = b"watch"   # asks for the views
-STUCK_S = 10.0     # who does not read for so long is hung up on
-LOOK_S = 5.0       # whether it is still there
-PROBE_S = 0.5      # for a program that listens there and takes nobody
+MAX_LINE = 500  # bytes; an order is shorter
+MOST = 8  # connections at a time: who has asked for nothing the longest makes room for the next
+MOST_WATCH = 6  # of them, who are shown the voyage: there is room for an order
+WATCH = b"watch"  # asks for the views
+STUCK_S = 10.0  # who does not read for so long is hung up on
+LOOK_S = 5.0  # whether it is still there
+PROBE_S = 0.5  # for a program that listens there and takes nobody
 EVENTS_KEPT = 100  # for who reads late; of the views there is only the newest
 
 
@@ -303,7 +327,7 @@ async def orders_served(path: Path, operator: OperatorCommands, views: ViewBroad
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         number = next(numbers)
         try:
-            with contextlib.suppress(ConnectionError, ValueError, TimeoutError):   # gone, or a line without end
+            with contextlib.suppress(ConnectionError, ValueError, TimeoutError):  # gone, or a line without end
                 while guests.take(writer) and (line := await reader.readline()):
                     guests.is_answered(writer)
                     if line.strip() == WATCH:
@@ -323,7 +347,7 @@ async def orders_served(path: Path, operator: OperatorCommands, views: ViewBroad
     listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         listening.bind(str(path))
-        path.chmod(0o600)   # before anybody can connect: it does not listen yet
+        path.chmod(0o600)  # before anybody can connect: it does not listen yet
         server = await asyncio.start_unix_server(talk, sock=listening, limit=MAX_LINE)
     except OSError as error:
         listening.close()
@@ -332,7 +356,7 @@ async def orders_served(path: Path, operator: OperatorCommands, views: ViewBroad
         async with server:
             yield
     finally:
-        with contextlib.suppress(OSError):   # a disk that has become read-only meanwhile
+        with contextlib.suppress(OSError):  # a disk that has become read-only meanwhile
             path.unlink(missing_ok=True)
         for writer in guests:
             writer.close()
@@ -377,7 +401,8 @@ def _clear(path: Path) -> None:
             return
         except OSError as error:
             raise InputError(
-                "--socket", str(path), f"cannot be opened ({reason(error)})", "name another place") from error
+                "--socket", str(path), f"cannot be opened ({reason(error)})", "name another place"
+            ) from error
     raise InputError("--socket", str(path), "another program listens there", "name another place, or end that one")
 
 

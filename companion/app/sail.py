@@ -47,17 +47,11 @@ from companion.skipper.step import Phase, Snapshot
 from companion.telemetry.console import DISK, GONE, left_behind
 from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, fence_record, order_record, outcome_record
 from companion.telemetry.state_file import StateFile
-from companion.telemetry.status import (
-    CLOCK_OFF_S,
-    TelemetrySender,
-    companion_status,
-    speak_high_latency,
-    unix_of_boat,
-)
+from companion.telemetry.status import CLOCK_OFF_S, TelemetrySender, companion_status, speak_high_latency, unix_of_boat
 from companion.traffic.feeds import Feeds
 
 STEP_S = 1.0
-TEND_EVERY_S = 5.0        # records are synced, and taken up again after trouble
+TEND_EVERY_S = 5.0  # records are synced, and taken up again after trouble
 LOOP_WATCH_S = 0.1
 # With ``exit_on_arrival`` the loiter is watched for a moment before the program ends [s].
 LINGER_S = 5.0
@@ -68,9 +62,17 @@ OnStatus = Callable[[CompanionStatus, Step], None]
 
 
 async def sail(
-    mission: Mission, transport: Transport, planner: Planner, folder: Path, options: SailOptions,
-    *, on_status: OnStatus | None = None, on_refusal: Callable[[str], None] | None = None,
-    on_view: OnView | None = None, stop: asyncio.Event | None = None, guard: Guard | None = None,
+    mission: Mission,
+    transport: Transport,
+    planner: Planner,
+    folder: Path,
+    options: SailOptions,
+    *,
+    on_status: OnStatus | None = None,
+    on_refusal: Callable[[str], None] | None = None,
+    on_view: OnView | None = None,
+    stop: asyncio.Event | None = None,
+    guard: Guard | None = None,
 ) -> dict[str, Any]:
     """Sail ``mission`` and watch the boat at its end until stopped or out of time; return the summary.
 
@@ -93,7 +95,12 @@ class _Shell:
     """One voyage: the fold and everything around it that has a life."""
 
     def __init__(
-        self, mission: Mission, planner: Planner, recorder: Recorder, options: SailOptions, stop: asyncio.Event,
+        self,
+        mission: Mission,
+        planner: Planner,
+        recorder: Recorder,
+        options: SailOptions,
+        stop: asyncio.Event,
         guard: Guard,
     ) -> None:
         self.mission, self.recorder, self.options = mission, recorder, options
@@ -106,19 +113,23 @@ class _Shell:
         self.views = ViewBroadcast(self.voyage, self.config, options.epoch_s, guard)
         self.views.is_kept = options.socket is not None
         self.state_file = StateFile(
-            options.state_path or recorder.folder / STATE, disk=options.disk, offload=options.offload,
-            is_durable=options.is_durable, pace=1.0 / options.budget_scale)
+            options.state_path or recorder.folder / STATE,
+            disk=options.disk,
+            offload=options.offload,
+            is_durable=options.is_durable,
+            pace=1.0 / options.budget_scale,
+        )
         self.status: CompanionStatus | None = None
         self._step: Step | None = None
         self.end_reason = "stopped"
-        self._adopted = asyncio.Event()            # a drawing: this voyage gives way to it
+        self._adopted = asyncio.Event()  # a drawing: this voyage gives way to it
         self.loop_held_s = 0.0
         self._arrived_before = False
-        self._named = mission.autopilot.system     # of our autopilot: as named, or as of the voyage that goes on
+        self._named = mission.autopilot.system  # of our autopilot: as named, or as of the voyage that goes on
         self._refusals: list[str] = []
         self.feeds = Feeds()
-        self._fences: list[tuple[MissionItem, ...]] = []   # that were read of the autopilot since the last step
-        self._system: int | None = None            # of our autopilot, as heard
+        self._fences: list[tuple[MissionItem, ...]] = []  # that were read of the autopilot since the last step
+        self._system: int | None = None  # of our autopilot, as heard
         self._others = NOBODY
         self._planner_alive = True
         self._autopilot: Autopilot | None = None
@@ -132,9 +143,15 @@ class _Shell:
         try:
             async with (
                 Link(
-                    transport, sink=self.log.frame, signing=self.options.signing, is_starting=True,
-                    identity=LinkIdentity(token=self.options.token), target_system=self._named,
-                    objection=self.fold.objection, stamp=self.log.stamped_s, on_fault=self._on_fault,
+                    transport,
+                    sink=self.log.frame,
+                    signing=self.options.signing,
+                    is_starting=True,
+                    identity=LinkIdentity(token=self.options.token),
+                    target_system=self._named,
+                    objection=self.fold.objection,
+                    stamp=self.log.stamped_s,
+                    on_fault=self._on_fault,
                 ) as link,
                 contextlib.AsyncExitStack() as stack,
             ):
@@ -143,24 +160,47 @@ class _Shell:
                 operator = self._crew = OperatorCommands(link, has_key=self.options.signing is not None)
                 link.subscribe(self._on_message)
                 if self.options.http is not None:
-                    self.guard.keep(Auxiliary.PAGE, functools.partial(
-                        live_page, self.options.http, self.fold, self.planner, operator, self.views,
-                        pace=1.0 / self.options.budget_scale, charts=self.options.charts))
+                    self.guard.keep(
+                        Auxiliary.PAGE,
+                        functools.partial(
+                            live_page,
+                            self.options.http,
+                            self.fold,
+                            self.planner,
+                            operator,
+                            self.views,
+                            pace=1.0 / self.options.budget_scale,
+                            charts=self.options.charts,
+                        ),
+                    )
                 if not await self._wait_autopilot(link):
                     return self._summary()
                 autopilot = self._autopilot = await stack.enter_async_context(
-                    Autopilot(link, assembler=self.fold.assembler))
-                for text in await self.guard.wait(Auxiliary.FEEDS, functools.partial(
-                        self.feeds.open, stack, feeds_of(self.mission), self.options.seed)) or ():
+                    Autopilot(link, assembler=self.fold.assembler)
+                )
+                for text in (
+                    await self.guard.wait(
+                        Auxiliary.FEEDS,
+                        functools.partial(self.feeds.open, stack, feeds_of(self.mission), self.options.seed),
+                    )
+                    or ()
+                ):
                     self._refuse("AIS feed", text)
                 for text in self._refusals:
                     autopilot.say(int(Severity.WARNING), text)
                 adoption = Adoption(autopilot, self.options.settings, self._adopted.set)
-                executor = Executor(autopilot, self.planner, self._on_outcome, seed=self.options.seed,
-                                    expansions=self.options.expansions,
-                                    budget_scale=self.options.budget_scale, config=self.config,
-                                    on_adopt=adoption.ask, on_answer=operator.answered)
-                async with asyncio.TaskGroup() as group:   # what is worth the voyage
+                executor = Executor(
+                    autopilot,
+                    self.planner,
+                    self._on_outcome,
+                    seed=self.options.seed,
+                    expansions=self.options.expansions,
+                    budget_scale=self.options.budget_scale,
+                    config=self.config,
+                    on_adopt=adoption.ask,
+                    on_answer=operator.answered,
+                )
+                async with asyncio.TaskGroup() as group:  # what is worth the voyage
                     orders = group.create_task(executor.run(), name="executor")
                     self._keep_auxiliaries(autopilot, operator, adoption)
                     operator.begin()
@@ -187,12 +227,15 @@ class _Shell:
         keep(Auxiliary.ADOPTION, adoption.run)
         keep(Auxiliary.IDENTITY, lambda: keep_identity(self.fold, autopilot))
         keep(Auxiliary.PARAMETERS, lambda: keep_parameters(self.fold, autopilot))
-        keep(Auxiliary.FENCE, lambda: keep_fence(
-            self.fold, autopilot, self.mission, self._record, self._fences.append))
-        keep(Auxiliary.RADIO, TelemetrySender(
-            autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble).run)
-        keep(Auxiliary.HIGH_LATENCY, lambda: speak_high_latency(
-            autopilot, self._seen, lambda: operator.wants_high_latency))
+        keep(Auxiliary.FENCE, lambda: keep_fence(self.fold, autopilot, self.mission, self._record, self._fences.append))
+        keep(
+            Auxiliary.RADIO,
+            TelemetrySender(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble).run,
+        )
+        keep(
+            Auxiliary.HIGH_LATENCY,
+            lambda: speak_high_latency(autopilot, self._seen, lambda: operator.wants_high_latency),
+        )
         keep(Auxiliary.CREW, lambda: operator.watch(autopilot, self._record))
         keep(Auxiliary.RECORDS, self._tend_records)
         keep(Auxiliary.LOOP_WATCH, self._watch_loop)
@@ -201,9 +244,18 @@ class _Shell:
         """Return the mailbox of the satellite link."""
         link, options = autopilot.link, self.options
         return SatelliteMailbox(
-            far, link.party.target_system, operator, disk=options.disk, offload=options.offload,
-            is_durable=options.is_durable, seen=self._seen, is_heard=lambda: link.is_alive,
-            has_trouble=lambda: bool(self._trouble()), say=autopilot.say, record=self._record)
+            far,
+            link.party.target_system,
+            operator,
+            disk=options.disk,
+            offload=options.offload,
+            is_durable=options.is_durable,
+            seen=self._seen,
+            is_heard=lambda: link.is_alive,
+            has_trouble=lambda: bool(self._trouble()),
+            say=autopilot.say,
+            record=self._record,
+        )
 
     def _seen(self) -> tuple[CompanionStatus, Step] | None:
         """Return the newest status and the step that it tells of, None before there is one."""
@@ -224,17 +276,36 @@ class _Shell:
         if self._named is None and persisted is not None:
             self._named = persisted.system
         self.fold = VoyageFold(
-            skipper, options.room(estimator_of(self.mission)),
-            permissions_of(self.mission, dry_run=options.dry_run), persisted, known=known,
-            traffic=target_limits_of(self.mission), waters=waters, water=water_of(self.mission),
+            skipper,
+            options.room(estimator_of(self.mission)),
+            permissions_of(self.mission, dry_run=options.dry_run),
+            persisted,
+            known=known,
+            traffic=target_limits_of(self.mission),
+            waters=waters,
+            water=water_of(self.mission),
         )
         # Growing a jagged coast takes seconds; under way the loop must not wait for it.
         self.fold.skipper.prepare()
         t_s = self.log.now_s()
-        self.guard.call(Auxiliary.RECORDS, lambda: self.log.begin(
-            t_s, self.mission, self.voyage, self.fold.permissions, persisted, known, {
-                "command": options.command, "link": link, "seed": options.seed, "dry_run": options.dry_run,
-                "expansions": options.expansions}))
+        self.guard.call(
+            Auxiliary.RECORDS,
+            lambda: self.log.begin(
+                t_s,
+                self.mission,
+                self.voyage,
+                self.fold.permissions,
+                persisted,
+                known,
+                {
+                    "command": options.command,
+                    "link": link,
+                    "seed": options.seed,
+                    "dry_run": options.dry_run,
+                    "expansions": options.expansions,
+                },
+            ),
+        )
         before, self.guard.told = dict(self.guard.gone), self._changed
         for name, why in before.items():
             self._changed(name, why, is_said=True)
@@ -245,7 +316,7 @@ class _Shell:
 
     # -------------------------------------------------------------------------------------- inputs
     def _on_message(self, t_s: float, message: Any) -> None:
-        if self._system is None or message.get_srcSystem() == self._system:   # not a command of somebody ashore
+        if self._system is None or message.get_srcSystem() == self._system:  # not a command of somebody ashore
             self.log.message()
             self.fold.message(t_s, message)
 
@@ -265,7 +336,7 @@ class _Shell:
         else:
             self._autopilot.say(int(severity), text)
         self._record({"kind": "auxiliary", "what": name, "gone": bool(why), "text": text})
-        if self.on_refusal is not None and not is_said and name in _AUXILIARIES:   # an output speaks for itself
+        if self.on_refusal is not None and not is_said and name in _AUXILIARIES:  # an output speaks for itself
             self.on_refusal(text)
 
     def _on_fault(self, text: str) -> None:
@@ -345,8 +416,7 @@ class _Shell:
         waiting = asyncio.create_task(self._find(link), name="whose boat")
         stopping = asyncio.create_task(self.stop.wait(), name="stopped before")
         try:
-            while not (await asyncio.wait(
-                    [waiting, stopping], timeout=STEP_S, return_when=asyncio.FIRST_COMPLETED))[0]:
+            while not (await asyncio.wait([waiting, stopping], timeout=STEP_S, return_when=asyncio.FIRST_COMPLETED))[0]:
                 step = self._tick(self.log.now_s(), link)
                 await self._after_step(step, link)
             if not waiting.done():
@@ -369,11 +439,12 @@ class _Shell:
         guard.look()
         clearance_m = guard.call(Auxiliary.STATUS, lambda: _clearance_m(step))
         guard.call(Auxiliary.RECORDS, lambda: self.log.step(step, clearance_m))
-        if not self.options.dry_run:   # which must not take the place of a voyage that is interrupted
+        if not self.options.dry_run:  # which must not take the place of a voyage that is interrupted
             await guard.wait(Auxiliary.STATE, lambda: self.state_file.save(self.fold.skipper.persisted(step.state)))
         guard.call(Auxiliary.RECORDS, lambda: self._compare_clocks(step.snapshot))
         status = guard.call(Auxiliary.STATUS, lambda: self._status(step, clearance_m, link)) or CompanionStatus(
-            t_s=step.snapshot.t_s, state=step.state.phase.value, alert_code=GONE, alert_text=guard.sentence())
+            t_s=step.snapshot.t_s, state=step.state.phase.value, alert_code=GONE, alert_text=guard.sentence()
+        )
         self.status, self._step = status, step
         if self.on_status is not None:
             self.on_status(status, step)
@@ -381,8 +452,15 @@ class _Shell:
 
     def _status(self, step: Step, clearance_m: float | None, link: Link) -> CompanionStatus:
         """Return the status at a step; where nothing else is wrong it tells what cannot be written, or is gone."""
-        status = companion_status(step, step.voyage, self.log.figures, clearance_m, link.bytes_per_s()[1],
-                                  self.feeds.open_feeds, self.feeds.dropped)
+        status = companion_status(
+            step,
+            step.voyage,
+            self.log.figures,
+            clearance_m,
+            link.bytes_per_s()[1],
+            self.feeds.open_feeds,
+            self.feeds.dropped,
+        )
         trouble, gone = self._trouble(), self.guard.sentence()
         if status.alert_code or not (trouble or gone):
             return status
@@ -401,16 +479,28 @@ class _Shell:
         behind_s = boat_s - self.options.epoch_s - snapshot.t_s
         if abs(behind_s) >= CLOCK_OFF_S:
             when = datetime.fromtimestamp(boat_s, UTC).isoformat(timespec="seconds")
-            self._record({"kind": "clock", "behind_s": round(behind_s, 1), "text": (
-                f"it is {when} by the autopilot's clock; this computer's, which stamps these records, is "
-                f"{abs(behind_s):.0f} s {'behind' if behind_s > 0.0 else 'ahead'}")})
+            self._record(
+                {
+                    "kind": "clock",
+                    "behind_s": round(behind_s, 1),
+                    "text": (
+                        f"it is {when} by the autopilot's clock; this computer's, which stamps these records, is "
+                        f"{abs(behind_s):.0f} s {'behind' if behind_s > 0.0 else 'ahead'}"
+                    ),
+                }
+            )
 
     def _trouble(self) -> str:
         """Return what cannot be written now and why, empty when all is well."""
         state, records = self.state_file.trouble, self.recorder.trouble
-        return "; ".join(text for text in (
-            f"no state for a restart is saved: {state}" if state else "",
-            f"nothing is recorded: {records}" if records else "") if text)
+        return "; ".join(
+            text
+            for text in (
+                f"no state for a restart is saved: {state}" if state else "",
+                f"nothing is recorded: {records}" if records else "",
+            )
+            if text
+        )
 
     # ----------------------------------------------------------------------------------- companions
     async def _watch_loop(self) -> None:
@@ -447,16 +537,20 @@ class _Shell:
             **self.log.figures.to_dict(),
             "goals_reached": min(goals, len(state.progress.reached)),
             "goals": goals,
-            "searched": [{"goal": self.voyage.legs[goal].name or f"goal {goal + 1}", "covered": share}
-                         for goal, share in state.progress.covered if goal < goals],
+            "searched": [
+                {"goal": self.voyage.legs[goal].name or f"goal {goal + 1}", "covered": share}
+                for goal, share in state.progress.covered
+                if goal < goals
+            ],
             "end_phase": state.phase.value,
             "end_reason": self.end_reason,
             "end_why": state.why,
             "left_behind": "" if self._step is None else left_behind(self._step),
             "ais_feeds": [feed.sentence() for feed in self.feeds.open_feeds],
             "ais_dropped": self.feeds.dropped,
-            "frames_disbelieved": sum(self._counted.dropped[why] for why in (
-                Drop.WRONG_CLOCK, Drop.OUT_OF_STEP, Drop.HELD)),
+            "frames_disbelieved": sum(
+                self._counted.dropped[why] for why in (Drop.WRONG_CLOCK, Drop.OUT_OF_STEP, Drop.HELD)
+            ),
             "listener_faults": dict(self._counted.faults),
             "commands_unsigned": 0 if self._crew is None else self._crew.unsigned,
             "records_dropped": self.recorder.dropped,

@@ -41,19 +41,19 @@ from companion.orders.far import (
 )
 from companion.telemetry.status import far_status, unix_of_boat
 
-LOOK_S = 5.0           # into the folder
-MOST = 20              # files in one look: a flood waits
-MOST_BYTES = 1000      # no message of ours is as long, by far
-SAY_EVERY_S = 600.0    # the same words
-TRIES = 3              # looks at a file that cannot be read before it is put aside: a sick card may read it at the next
-MOST_ASIDE = 20        # files that are kept aside; further ones take the place of the one before them
-MOST_NAME = 30         # characters of a file's name that are told
-MOST_TAKEN = 100_000   # bytes of what was taken: a window of it has 4,000
+LOOK_S = 5.0  # into the folder
+MOST = 20  # files in one look: a flood waits
+MOST_BYTES = 1000  # no message of ours is as long, by far
+SAY_EVERY_S = 600.0  # the same words
+TRIES = 3  # looks at a file that cannot be read before it is put aside: a sick card may read it at the next
+MOST_ASIDE = 20  # files that are kept aside; further ones take the place of the one before them
+MOST_NAME = 30  # characters of a file's name that are told
+MOST_TAKEN = 100_000  # bytes of what was taken: a window of it has 4,000
 UNFINISHED = (NEW, ".tmp", ".part")
 IN, OUT, TAKEN, ASIDE = "in", "out/status", "taken.json", "aside"
 
 Seen = tuple[CompanionStatus, Step]
-_Mark = tuple[int, int]   # of a file: when it was changed, and which it is
+_Mark = tuple[int, int]  # of a file: when it was changed, and which it is
 
 
 class OrderHandler(Protocol):
@@ -78,21 +78,30 @@ class SatelliteMailbox:
     """
 
     def __init__(
-        self, far: SatelliteLink, system: int, operator: OrderHandler, *, disk: Disk, offload: Offload,
-        is_durable: bool, seen: Callable[[], Seen | None], is_heard: Callable[[], bool],
+        self,
+        far: SatelliteLink,
+        system: int,
+        operator: OrderHandler,
+        *,
+        disk: Disk,
+        offload: Offload,
+        is_durable: bool,
+        seen: Callable[[], Seen | None],
+        is_heard: Callable[[], bool],
         has_trouble: Callable[[], bool],
-        say: Callable[[int, str], None], record: Callable[[dict[str, Any]], None],
+        say: Callable[[int, str], None],
+        record: Callable[[dict[str, Any]], None],
     ) -> None:
         self._far, self._key, self._crew = far, FarKey(far.key, system), operator
         self._disk, self._offload, self._is_durable = disk, offload, is_durable
         self._seen, self._is_heard, self._has_trouble = seen, is_heard, has_trouble
         self._say, self._record = say, record
         self._taken = Taken()
-        self._last: tuple[int | None, Reply] | None = None   # the counter, None: of a beginning
+        self._last: tuple[int | None, Reply] | None = None  # the counter, None: of a beginning
         self._sequence = 0
         self._said_s: dict[str, float] = {}
-        self._stuck: dict[str, _Mark] = {}   # files that cannot be removed, as they were when they were read
-        self._tries: dict[str, int] = {}     # of files that cannot be read
+        self._stuck: dict[str, _Mark] = {}  # files that cannot be removed, as they were when they were read
+        self._tries: dict[str, int] = {}  # of files that cannot be read
 
     async def run(self) -> None:
         """Read and write until cancelled."""
@@ -104,7 +113,7 @@ class SatelliteMailbox:
                 if self._seen() is not None and (has_news or now_s() >= next_s):
                     next_s = now_s() + self._far.every_s
                     await self._put_out()
-            except Exception as error:   # a fault of ours here must not end the voyage
+            except Exception as error:  # a fault of ours here must not end the voyage
                 self._tell(Severity.ERROR, f"the satellite link: {error!r}")
             await asyncio.sleep(LOOK_S)
 
@@ -138,8 +147,11 @@ class SatelliteMailbox:
             try:
                 self._taken = Taken.from_dict(json.loads(data), self._key.name)
             except (ValueError, RecursionError) as error:
-                self._tell(Severity.WARNING, f"{TAKEN} is not used: {error}; what was taken before this start and has "
-                           "not expired would count again")
+                self._tell(
+                    Severity.WARNING,
+                    f"{TAKEN} is not used: {error}; what was taken before this start and has "
+                    "not expired would count again",
+                )
         self._key = self._key.since(self._taken.began)
         if self._taken.highest:
             self._last = self._taken.highest, self._taken.replies[self._taken.highest][1]
@@ -156,9 +168,17 @@ class SatelliteMailbox:
         seen = self._seen()
         assert seen is not None
         order, reply = self._last or (None, None)
-        data = pack_status(far_status(
-            *seen, sequence=self._sequence, order=order, reply=reply, is_heard=self._is_heard(),
-            has_trouble=self._has_trouble()), self._key)
+        data = pack_status(
+            far_status(
+                *seen,
+                sequence=self._sequence,
+                order=order,
+                reply=reply,
+                is_heard=self._is_heard(),
+                has_trouble=self._has_trouble(),
+            ),
+            self._key,
+        )
         self._sequence += 1
         path = self._far.folder / OUT
         await self._work(lambda: self._disk.replace(path, data, is_durable=self._is_durable))
@@ -179,7 +199,7 @@ class SatelliteMailbox:
                     continue
                 found.append((path, read_regular(path, MOST_BYTES, follows_links=False)))
             except FileNotFoundError:
-                continue       # it was taken away meanwhile
+                continue  # it was taken away meanwhile
             except OSError as error:
                 tries[name] = self._tries.get(name, 0) + 1
                 if tries[name] >= TRIES:
@@ -224,13 +244,13 @@ class SatelliteMailbox:
         for path, data in found:
             try:
                 has_news = await self._take(data) or has_news
-            except Exception as error:   # a fault of ours with one message must not keep the others out
+            except Exception as error:  # a fault of ours with one message must not keep the others out
                 bad.append((path, f"cannot be judged ({error!r})"))
             else:
-                await self._work(lambda path=path: self._remove(path))   # type: ignore[misc]
+                await self._work(lambda path=path: self._remove(path))  # type: ignore[misc]
         for path, why in bad:
             self._tell(Severity.WARNING, f"a message from far away, {path.name[:MOST_NAME]!a}, {why}: put into {ASIDE}")
-            await self._work(lambda path=path: self._put_aside(path))   # type: ignore[misc]
+            await self._work(lambda path=path: self._put_aside(path))  # type: ignore[misc]
         return has_news
 
     async def _take(self, data: bytes) -> bool:
@@ -264,7 +284,7 @@ class SatelliteMailbox:
         """Judge a beginning. Raises ValueError: it is not ours."""
         beginning = unpack_beginning(data, self._key)
         reply, taken = begun(beginning, self._taken, unix_s)
-        if taken is not self._taken or reply is not Reply.BEGUN:   # and not only come again
+        if taken is not self._taken or reply is not Reply.BEGUN:  # and not only come again
             self._tell(Severity.NOTICE, f"beginning {beginning.began} from far away: {reply}")
         if taken is not self._taken:
             await self._keep(taken)

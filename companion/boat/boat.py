@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from companion.boat.polar import Polar
 
-SPEED_ANGLES = 73   # of ``Boat.problem_speeds``: 2.5 degrees apart
+SPEED_ANGLES = 73  # of ``Boat.problem_speeds``: 2.5 degrees apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,7 +101,7 @@ class Boat:
         return min(twa_rad + leeway_at(coefficient_of(self.leeway_rad), twa_rad, tws_mps, speed), math.pi)
 
     def _made_good(
-        self, twa_rad: NDArray[np.float64], speed_mps: NDArray[np.float64], tws_mps: float,
+        self, twa_rad: NDArray[np.float64], speed_mps: NDArray[np.float64], tws_mps: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return a polar's curve by the boat's course in place of its bow's angle, and the speed along it."""
         k = coefficient_of(self.leeway_rad)
@@ -163,8 +163,11 @@ def _speeds_of(boat: Boat) -> dict[str, Any]:
         if boat.leeway_rad > 0.0:
             twa_rad, speed_mps = boat._made_good(twa_rad, speed_mps, tws_mps)  # noqa: SLF001 - the value's own module
         rows.append([round(float(v), 4) for v in np.interp(angles, twa_rad, speed_mps)])
-    return {"tws_mps": boat.polar.tws_mps.tolist(), "twa_deg": [round(float(a), 6) for a in np.degrees(angles)],
-            "v_mps": rows}
+    return {
+        "tws_mps": boat.polar.tws_mps.tolist(),
+        "twa_deg": [round(float(a), 6) for a in np.degrees(angles)],
+        "v_mps": rows,
+    }
 
 
 # Leeway: how far to leeward of its bow a boat goes through the water.
@@ -235,7 +238,12 @@ _HEADINGS, _NORMALS = 180, 360
 
 
 def made_good_mps(
-    boat: Boat, course_rad: float, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float],
+    boat: Boat,
+    course_rad: float,
+    *,
+    twd_from_rad: float,
+    tws_mps: float,
+    current_en_mps: tuple[float, float],
     no_go_half_rad: float,
 ) -> float | None:
     """Return the most that the boat makes good over the ground along a course [m/s], tacking and gybing as it takes.
@@ -263,7 +271,7 @@ def made_good_mps(
 
 
 def slowest_en_mps(
-    boat: Boat, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float,
+    boat: Boat, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float
 ) -> tuple[float, float]:
     """Return the slowest that the boat can be carried over the ground [m/s east, north]; 0, 0: it can stay.
 
@@ -277,7 +285,11 @@ def slowest_en_mps(
 
 
 def _reach(
-    boat: Boat, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float,
+    boat: Boat,
+    twd_from_rad: float,
+    tws_mps: float,
+    current_en_mps: tuple[float, float],
+    no_go_half_rad: float,
     first_rad: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return unit normals (n, 2), the first towards ``first_rad``, and how far the hull reaches along each [m/s]."""
@@ -292,8 +304,9 @@ def _reach(
 
 
 def can_hold(
-    boat: Boat, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float,
+    boat: Boat, *, twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float], no_go_half_rad: float
 ) -> bool:
     """Return whether the boat can stay where it is on the whole, and so make way everywhere (arguments as above)."""
-    return slowest_en_mps(boat, twd_from_rad=twd_from_rad, tws_mps=tws_mps, current_en_mps=current_en_mps,
-                          no_go_half_rad=no_go_half_rad) == (0.0, 0.0)
+    return slowest_en_mps(
+        boat, twd_from_rad=twd_from_rad, tws_mps=tws_mps, current_en_mps=current_en_mps, no_go_half_rad=no_go_half_rad
+    ) == (0.0, 0.0)

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from companion.geo.angles import wrap_pi
 
-SHOOT_S = 2.1        # of the boat's speed, before it lies
-FILL_S = 0.8         # of the boat's speed, on the old course until it tries again
-AGAIN_SHARE = 0.6    # of the boat's speed, at the next try
-TRIES = 2            # then the boat gybes round where there is room
-RISKY = 0.01         # one failure must not touch; several in a row may, with no more than this probability
-IRONS_S = 10.0       # it lies head to wind: the skipper bears away after 8 s (``in irons``), and that takes it two
+SHOOT_S = 2.1  # of the boat's speed, before it lies
+FILL_S = 0.8  # of the boat's speed, on the old course until it tries again
+AGAIN_SHARE = 0.6  # of the boat's speed, at the next try
+TRIES = 2  # then the boat gybes round where there is room
+RISKY = 0.01  # one failure must not touch; several in a row may, with no more than this probability
+IRONS_S = 10.0  # it lies head to wind: the skipper bears away after 8 s (``in irons``), and that takes it two
 # Of the wind's speed: hull and flogging sails. A skiff under bare poles is blown at 3 to 6 % of it.
 BLOWN_SHARE = 0.04
 # Likewise, abeam: a hull whose leeway is 5 degrees on a beat, the wind 15 degrees off its bow and its sails flogging
@@ -32,8 +32,14 @@ Track = NDArray[np.float64]
 
 
 def failed_tack(
-    corner_en: tuple[float, float], *, course_rad: float, speed_mps: float, twd_from_rad: float, tws_mps: float,
-    current_en_mps: tuple[float, float] = (0.0, 0.0), irons_s: float = IRONS_S,
+    corner_en: tuple[float, float],
+    *,
+    course_rad: float,
+    speed_mps: float,
+    twd_from_rad: float,
+    tws_mps: float,
+    current_en_mps: tuple[float, float] = (0.0, 0.0),
+    irons_s: float = IRONS_S,
 ) -> tuple[Track, Track]:
     """Return two tracks (n, 2) [m] of one failed tack: blown back while the boat lies, and not.
 

@@ -23,18 +23,18 @@ import numpy as np
 from companion.boat.polar import Polar
 
 GRAVITY_MPS2, WATER_KGPM3 = 9.81, 1025.0
-SAIL, WEIGHT = 0.6, 0.0042      # sail area over length squared, displacement over that of a cube of water: the middle
+SAIL, WEIGHT = 0.6, 0.0042  # sail area over length squared, displacement over that of a cube of water: the middle
 # A judgement, no measurement: AVALON's published polar is 50 % above what is guessed of her.
 SPEED_ERROR_PERCENT = 35.0
-NEAR_WIND_DEG = 4.0             # an autopilot by a vane sails so much less near to the wind than a crew by telltales
+NEAR_WIND_DEG = 4.0  # an autopilot by a vane sails so much less near to the wind than a crew by telltales
 BEAT_TWS_MPS = 5.0
-LEAST_NO_GO_DEG = 45.0          # ArduRover's own default
+LEAST_NO_GO_DEG = 45.0  # ArduRover's own default
 # Of a boat of a metre; by Froude's law a time grows as the root of the length.
 TURN_RATE_DEG_S, TACK_LOSS_S = 30.0, 4.0
-TACK_FAILS = 0.05               # one in twenty, until some were seen
+TACK_FAILS = 0.05  # one in twenty, until some were seen
 LEEWAY_DEG = 5.0
 LEAST_M, MOST_M = 0.3, 40.0
-BEAM = 0.3             # of the length
+BEAM = 0.3  # of the length
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,12 +53,13 @@ class Sizes:
         if not LEAST_M <= self.length_m <= MOST_M:
             raise ValueError(f"a length of {self.length_m:g} m; from {LEAST_M:g} to {MOST_M:g} m can be guessed at")
         for value, middle, what, unit in (
-            (self.displacement_kg, WEIGHT * WATER_KGPM3 * self.length_m ** 3, "a displacement", "kg"),
-            (self.sail_area_m2, SAIL * self.length_m ** 2, "a sail area", "m2"),
+            (self.displacement_kg, WEIGHT * WATER_KGPM3 * self.length_m**3, "a displacement", "kg"),
+            (self.sail_area_m2, SAIL * self.length_m**2, "a sail area", "m2"),
         ):
             if not middle / 6.0 <= value <= 6.0 * middle:
-                raise ValueError(f"{what} of {value:g} {unit}; of a boat of {self.length_m:g} m it is about "
-                                 f"{middle:.2g} {unit}")
+                raise ValueError(
+                    f"{what} of {value:g} {unit}; of a boat of {self.length_m:g} m it is about {middle:.2g} {unit}"
+                )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,8 +81,11 @@ def guessed(sizes: Sizes) -> GuessedBoat:
     beat_deg = math.degrees(polar.best_beat(BEAT_TWS_MPS).twa_rad)
     slow = math.sqrt(sizes.length_m)
     return GuessedBoat(
-        polar=polar, no_go_half_deg=max(LEAST_NO_GO_DEG, float(round(beat_deg + NEAR_WIND_DEG))),
-        turn_rate_deg_s=round(TURN_RATE_DEG_S / slow, 1), tack_loss_s=round(TACK_LOSS_S * slow, 1))
+        polar=polar,
+        no_go_half_deg=max(LEAST_NO_GO_DEG, float(round(beat_deg + NEAR_WIND_DEG))),
+        turn_rate_deg_s=round(TURN_RATE_DEG_S / slow, 1),
+        tack_loss_s=round(TACK_LOSS_S * slow, 1),
+    )
 
 
 def guessed_polar(sizes: Sizes) -> Polar:
@@ -89,15 +93,22 @@ def guessed_polar(sizes: Sizes) -> Polar:
     rows = _rows()
     angles = [float(name) for name in list(rows[0])[3:]]
     fast_mps = math.sqrt(GRAVITY_MPS2 * sizes.length_m)
-    sail = sizes.sail_area_m2 / sizes.length_m ** 2 / SAIL
-    weight = sizes.displacement_kg / (WATER_KGPM3 * sizes.length_m ** 3) / WEIGHT
+    sail = sizes.sail_area_m2 / sizes.length_m**2 / SAIL
+    weight = sizes.displacement_kg / (WATER_KGPM3 * sizes.length_m**3) / WEIGHT
     columns = [
         np.array([float(row[f"{angle:g}"]) for angle in angles])
-        * sail ** float(row["sail"]) * weight ** float(row["weight"]) * fast_mps for row in rows]
-    table = np.maximum.accumulate(np.column_stack(columns), axis=1)   # more wind makes no boat of the table slower
+        * sail ** float(row["sail"])
+        * weight ** float(row["weight"])
+        * fast_mps
+        for row in rows
+    ]
+    table = np.maximum.accumulate(np.column_stack(columns), axis=1)  # more wind makes no boat of the table slower
     return Polar(
-        twa_rad=np.radians(np.array(angles)), tws_mps=np.array([float(row["wind"]) * fast_mps for row in rows]),
-        speed_mps_table=table, name=f"guessed, {sizes.length_m:g} m")
+        twa_rad=np.radians(np.array(angles)),
+        tws_mps=np.array([float(row["wind"]) * fast_mps for row in rows]),
+        speed_mps_table=table,
+        name=f"guessed, {sizes.length_m:g} m",
+    )
 
 
 def _rows() -> list[dict[str, str]]:

@@ -18,9 +18,9 @@ from typing import ClassVar
 
 from companion.boat.boat import Hull
 
-TRACK_S = 0.85              # |cross-track| <= 2.4 m at 2.93 m/s on reaches and close-hauled legs
+TRACK_S = 0.85  # |cross-track| <= 2.4 m at 2.93 m/s on reaches and close-hauled legs
 CORRIDOR_OVERSHOOT_S = 0.45  # 0.9 m beyond the corridor at 2.0 m/s before the tack has turned the boat
-CORNER_S = 1.4              # |cross-track| <= 4 m at 2.9 m/s just after the corners of a planned beat
+CORNER_S = 1.4  # |cross-track| <= 4 m at 2.9 m/s just after the corners of a planned beat
 # Narrower than this a corridor is crossed, at 45 degrees to the line, in less than 7 s; the autopilot tacks at most
 # every 5 s and would do little else.
 NARROWEST_S = 2.5
@@ -32,21 +32,32 @@ class AutopilotLimits:
     """The autopilot's parameters that decide where the boat goes; ArduRover's sailboat defaults."""
 
     PARAMETERS: ClassVar[tuple[str, ...]] = (
-        "SAIL_NO_GO_ANGLE", "SAIL_XTRACK_MAX", "WP_RADIUS", "TURN_RADIUS", "WP_SPEED", "WP_ACCEL", "WP_JERK",
-        "ATC_ACCEL_MAX", "FENCE_ENABLE", "FENCE_ACTION", "FENCE_TYPE", "FENCE_RADIUS")
-    CIRCLE_BIT: ClassVar[int] = 2   # of FENCE_TYPE
+        "SAIL_NO_GO_ANGLE",
+        "SAIL_XTRACK_MAX",
+        "WP_RADIUS",
+        "TURN_RADIUS",
+        "WP_SPEED",
+        "WP_ACCEL",
+        "WP_JERK",
+        "ATC_ACCEL_MAX",
+        "FENCE_ENABLE",
+        "FENCE_ACTION",
+        "FENCE_TYPE",
+        "FENCE_RADIUS",
+    )
+    CIRCLE_BIT: ClassVar[int] = 2  # of FENCE_TYPE
     POLYGON_BIT: ClassVar[int] = 4
 
     sail_no_go_angle_rad: float = math.radians(45.0)
     sail_xtrack_max_m: float = 10.0  # 0: no corridor, long boards to the layline
     wp_radius_m: float = 2.0
     turn_radius_m: float = 0.9
-    wp_speed_mps: float | None = None   # of the point that the boat follows, not the boat's; None: it was not read
-    wp_accel_mps2: float = 1.0       # of that point
+    wp_speed_mps: float | None = None  # of the point that the boat follows, not the boat's; None: it was not read
+    wp_accel_mps2: float = 1.0  # of that point
     wp_jerk_mps3: float = 1.0
     fence_action: int | None = None  # None: no fence guards this obstacle; 0 report .. 4, see FENCE_ACTION
-    fence_circle_m: float | None = None   # radius of the fence around home, if something would be done about it
-    fence_polygons: bool = True      # what is drawn on the autopilot is kept, too
+    fence_circle_m: float | None = None  # radius of the fence around home, if something would be done about it
+    fence_polygons: bool = True  # what is drawn on the autopilot is kept, too
     rc_channels: tuple[int, ...] = (1, 3, 8)  # of the rudder, the throttle and the mode switch, from 1
 
     def __post_init__(self) -> None:
@@ -71,17 +82,21 @@ class AutopilotLimits:
         is_circled = action > 0 and bool(int(params.get("FENCE_TYPE", 0.0)) & cls.CIRCLE_BIT)
         return cls(
             sail_no_go_angle_rad=math.radians(
-                params.get("SAIL_NO_GO_ANGLE", math.degrees(default.sail_no_go_angle_rad))),
+                params.get("SAIL_NO_GO_ANGLE", math.degrees(default.sail_no_go_angle_rad))
+            ),
             sail_xtrack_max_m=float(params.get("SAIL_XTRACK_MAX", default.sail_xtrack_max_m)),
             wp_radius_m=float(params.get("WP_RADIUS", default.wp_radius_m)),
             turn_radius_m=float(params.get("TURN_RADIUS", default.turn_radius_m)),
             wp_speed_mps=params.get("WP_SPEED", 0.0) or None,
-            wp_accel_mps2=accel, wp_jerk_mps3=params.get("WP_JERK", 0.0) or accel,
+            wp_accel_mps2=accel,
+            wp_jerk_mps3=params.get("WP_JERK", 0.0) or accel,
             fence_action=action if fenced else None,
             fence_circle_m=params.get("FENCE_RADIUS") if is_circled else None,
             fence_polygons=bool(int(params.get("FENCE_TYPE", cls.POLYGON_BIT)) & cls.POLYGON_BIT),
-            rc_channels=tuple(int(params.get(name, channel)) for name, channel in zip(
-                ("RCMAP_ROLL", "RCMAP_THROTTLE", "MODE_CH"), default.rc_channels, strict=True)),
+            rc_channels=tuple(
+                int(params.get(name, channel))
+                for name, channel in zip(("RCMAP_ROLL", "RCMAP_THROTTLE", "MODE_CH"), default.rc_channels, strict=True)
+            ),
         )
 
     def planned_no_go_rad(self) -> float:
@@ -122,7 +137,7 @@ class Margin:
 
 
 def required_margin(
-    limits: AutopilotLimits, *, speed_mps: float, hull: Hull | None = None, legs_can_enter_no_go: bool = True,
+    limits: AutopilotLimits, *, speed_mps: float, hull: Hull | None = None, legs_can_enter_no_go: bool = True
 ) -> Margin:
     """Return the margin that the autopilot's behaviour asks for.
 
@@ -148,9 +163,9 @@ def required_margin(
     widest = max((corridor_m, "corridor"), (corner_m, "corner"), (track_m, "track"))
     why = {
         "corridor": f"a shift puts the leg into SAIL_NO_GO_ANGLE: it beats within SAIL_XTRACK_MAX "
-                    f"{limits.sail_xtrack_max_m:g} m and overshoots by {CORRIDOR_OVERSHOOT_S * speed_mps:.1f} m",
+        f"{limits.sail_xtrack_max_m:g} m and overshoots by {CORRIDOR_OVERSHOOT_S * speed_mps:.1f} m",
         "corner": f"cuts the corner {cut_m:.1f} m inside (WP_RADIUS {limits.wp_radius_m:g} m) or swings "
-                  f"{overshoot_m:.1f} m wide of it",
+        f"{overshoot_m:.1f} m wide of it",
         "track": "wanders about the line",
     }
     parts = [
@@ -168,7 +183,7 @@ def narrowest_corridor_m(speed_mps: float) -> float:
 
 
 def widest_corridor_m(
-    limits: AutopilotLimits, margin_m: float, *, speed_mps: float, hull: Hull | None = None,
+    limits: AutopilotLimits, margin_m: float, *, speed_mps: float, hull: Hull | None = None
 ) -> float | None:
     """Return the greatest whole SAIL_XTRACK_MAX that a margin holds [m]; None when it holds none that makes sense."""
     rest_m = required_margin(replace(limits, sail_xtrack_max_m=0.0), speed_mps=speed_mps, hull=hull)
@@ -198,5 +213,6 @@ def proposed_margin(limits: AutopilotLimits, *, speed_mps: float, hull: Hull | N
     corridor_m = max(limits.sail_xtrack_max_m, narrowest_corridor_m(speed_mps))
     margin = required_margin(replace(limits, sail_xtrack_max_m=corridor_m), speed_mps=speed_mps, hull=hull)
     floor = required_margin(limits, speed_mps=speed_mps, hull=hull, legs_can_enter_no_go=False)
-    return ProposedMargin(margin_m=float(math.ceil(margin.total_m)), floor_m=float(math.ceil(floor.total_m)),
-                          margin=margin)
+    return ProposedMargin(
+        margin_m=float(math.ceil(margin.total_m)), floor_m=float(math.ceil(floor.total_m)), margin=margin
+    )

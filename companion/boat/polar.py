@@ -131,7 +131,7 @@ class Polar:
         i = bisect.bisect_right(nodes, folded) - 1
         if i + 1 >= len(nodes) or nodes[i] == folded:
             return speed[min(i, len(nodes) - 1)]
-        return (speed[i + 1] - speed[i]) / (nodes[i + 1] - nodes[i]) * (folded - nodes[i]) + speed[i]   # as np.interp
+        return (speed[i + 1] - speed[i]) / (nodes[i + 1] - nodes[i]) * (folded - nodes[i]) + speed[i]  # as np.interp
 
     def _curve_of(self, tws_mps: float) -> tuple[list[float], list[float]]:
         """Return ``curve`` as lists."""
@@ -170,10 +170,14 @@ class Polar:
 
     def _best(self, tws_mps: float, low_rad: float, high_rad: float, sign: float) -> SailingAngle:
         count = max(2, 1 + math.ceil((high_rad - low_rad) / _SEARCH_STEP_RAD))
-        angles = np.unique(np.concatenate([
-            np.linspace(low_rad, high_rad, count),
-            self.twa_rad[(self.twa_rad >= low_rad) & (self.twa_rad <= high_rad)],
-        ]))
+        angles = np.unique(
+            np.concatenate(
+                [
+                    np.linspace(low_rad, high_rad, count),
+                    self.twa_rad[(self.twa_rad >= low_rad) & (self.twa_rad <= high_rad)],
+                ]
+            )
+        )
         speeds = self.speeds_mps(angles, tws_mps)
         vmg = sign * speeds * np.cos(angles)
         # Of equal angles take the one nearest a beam reach: faster through the water, and clear of trouble.
@@ -192,8 +196,10 @@ AVALON_TESTED_KNOTS = 25.0  # "tested in conditions ranging from almost 0 to 25 
 def constant(speed_mps: float) -> Polar:
     """Return a boat that sails at one speed at every angle in any wind (Wolsieffer 2020, section 3.2)."""
     return Polar(
-        twa_rad=np.array([0.0, math.pi]), tws_mps=np.array([0.0]),
-        speed_mps_table=np.full((2, 1), float(speed_mps)), name=f"constant {speed_mps:g} m/s",
+        twa_rad=np.array([0.0, math.pi]),
+        tws_mps=np.array([0.0]),
+        speed_mps_table=np.full((2, 1), float(speed_mps)),
+        name=f"constant {speed_mps:g} m/s",
     )
 
 
@@ -232,7 +238,7 @@ def ardurover_sitl() -> Polar:
 
 MAX_TWS_KN = 200.0
 MAX_SPEED_KN = 100.0
-MIN_SPEED_KN = 0.05        # OpenCPN stores "cannot sail" as 0.01
+MIN_SPEED_KN = 0.05  # OpenCPN stores "cannot sail" as 0.01
 MAX_FILE_BYTES = 2_000_000  # a polar is a few kilobytes; anything else is another file
 
 _HEADER = re.compile(r"^(twa\s*[/\\]?\s*tws|twa|tws)$", re.IGNORECASE)
@@ -260,8 +266,9 @@ def read_polar(path: str | Path) -> PolarFile:
     except OSError as error:
         raise unreadable(source, error) from error
     if len(raw) > MAX_FILE_BYTES:
-        raise InputError(source, "", f"more than {MAX_FILE_BYTES} bytes is no polar",
-                         "give a .pol or .csv file of boat speeds")
+        raise InputError(
+            source, "", f"more than {MAX_FILE_BYTES} bytes is no polar", "give a .pol or .csv file of boat speeds"
+        )
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -286,21 +293,26 @@ def parse_polar(text: str, *, source: str = "polar") -> PolarFile:
         return pairs
     numeric = [i for i, (_, line) in enumerate(lines) if len(_cells(line)) >= 2 and _is_numeric_row(line)]
     if not numeric:
-        raise InputError(source, f"line {lines[0][0]}", "no header of wind speeds",
-                         "start with a line like TWA\\TWS;4;6;8;10")
-    return _parse_grid(lines[numeric[0]:], source)
+        raise InputError(
+            source, f"line {lines[0][0]}", "no header of wind speeds", "start with a line like TWA\\TWS;4;6;8;10"
+        )
+    return _parse_grid(lines[numeric[0] :], source)
 
 
 def polar_of_table(
-    twa_deg: ArrayLike, tws_mps: ArrayLike, speed_mps: Sequence[Sequence[float]], *, name: str, source: str,
+    twa_deg: ArrayLike, tws_mps: ArrayLike, speed_mps: Sequence[Sequence[float]], *, name: str, source: str
 ) -> Polar:
     """Return the polar of a boat file's table. Raises InputError where it is none."""
     remedy = "speed_mps has a row for each of twa_deg, with a speed for each of tws_mps"
     if len({len(row) for row in speed_mps}) > 1:
         raise InputError(source, "[polar]", "its rows are not of one length", remedy)
     try:
-        return Polar(twa_rad=np.radians(np.asarray(twa_deg)), tws_mps=np.asarray(tws_mps),
-                     speed_mps_table=np.asarray(speed_mps), name=name)
+        return Polar(
+            twa_rad=np.radians(np.asarray(twa_deg)),
+            tws_mps=np.asarray(tws_mps),
+            speed_mps_table=np.asarray(speed_mps),
+            name=name,
+        )
     except ValueError as error:
         raise InputError(source, "[polar]", str(error), remedy) from None
 
@@ -371,11 +383,19 @@ def _parse_grid(lines: list[tuple[int, str]], source: str) -> PolarFile:
         raise InputError(source, f"line {header_number}", "no wind speeds", "start with a line like TWA\\TWS;4;6;8")
     for i, (low, high) in enumerate(pairwise(tws_kn), start=3):
         if not high > low:
-            raise InputError(source, f"line {header_number}, column {i}",
-                             f"wind speed {high:g} kn after {low:g} kn", "wind speeds must increase")
+            raise InputError(
+                source,
+                f"line {header_number}, column {i}",
+                f"wind speed {high:g} kn after {low:g} kn",
+                "wind speeds must increase",
+            )
     if tws_kn[0] < 0.0 or tws_kn[-1] > MAX_TWS_KN:
-        raise InputError(source, f"line {header_number}", f"wind speeds {tws_kn[0]:g}..{tws_kn[-1]:g} kn",
-                         f"they must be within 0..{MAX_TWS_KN:g} kn")
+        raise InputError(
+            source,
+            f"line {header_number}",
+            f"wind speeds {tws_kn[0]:g}..{tws_kn[-1]:g} kn",
+            f"they must be within 0..{MAX_TWS_KN:g} kn",
+        )
     twa_deg: list[float] = []
     rows: list[list[float]] = []
     for number, line in lines[1:]:
@@ -387,8 +407,12 @@ def _parse_grid(lines: list[tuple[int, str]], source: str) -> PolarFile:
         if not 0.0 <= angle <= 180.0:
             raise InputError(source, f"line {number}", f"wind angle {angle:g} degrees", "angles run from 0 to 180")
         if twa_deg and angle <= twa_deg[-1]:
-            raise InputError(source, f"line {number}", f"wind angle {angle:g} after {twa_deg[-1]:g} degrees",
-                             "angles must increase from row to row")
+            raise InputError(
+                source,
+                f"line {number}",
+                f"wind angle {angle:g} after {twa_deg[-1]:g} degrees",
+                "angles must increase from row to row",
+            )
         values = row[1:]
         while len(values) > len(tws_kn) and not values[-1]:
             values.pop()
@@ -398,10 +422,12 @@ def _parse_grid(lines: list[tuple[int, str]], source: str) -> PolarFile:
         twa_deg.append(angle)
         # Before the first speed, or under no wind, a boat that does not sail; elsewhere a gap in the file.
         is_head = all(value == 0.0 for known in rows for value in known) and all(cell == "0" for cell in values)
-        rows.append([
-            0.0 if cell == "0" and (is_head or wind_kn == 0.0) else _speed(cell, source, number, i, warnings)
-            for i, (cell, wind_kn) in enumerate(zip(values, tws_kn, strict=True), start=2)
-        ])
+        rows.append(
+            [
+                0.0 if cell == "0" and (is_head or wind_kn == 0.0) else _speed(cell, source, number, i, warnings)
+                for i, (cell, wind_kn) in enumerate(zip(values, tws_kn, strict=True), start=2)
+            ]
+        )
     if not rows:
         raise InputError(source, f"line {header_number}", "no rows of boat speeds", "add rows like 45;2.1;3.0;3.6")
     return _finish(np.array(twa_deg), np.array(tws_kn), np.array(rows, dtype=np.float64), source, warnings)
@@ -417,13 +443,20 @@ def _speed(cell: str, source: str, line: int, column: int, warnings: list[str]) 
         return math.nan
     value = _number(text, source, line, column, "boat speed")
     if value < 0.0 or value > MAX_SPEED_KN:
-        raise InputError(source, f"line {line}, column {column}", f"boat speed {value:g} kn",
-                         f"speeds are within 0..{MAX_SPEED_KN:g} kn")
+        raise InputError(
+            source,
+            f"line {line}, column {column}",
+            f"boat speed {value:g} kn",
+            f"speeds are within 0..{MAX_SPEED_KN:g} kn",
+        )
     return value if value >= MIN_SPEED_KN else 0.0
 
 
 def _finish(
-    twa_deg: NDArray[np.float64], tws_kn: NDArray[np.float64], speed_kn: NDArray[np.float64], source: str,
+    twa_deg: NDArray[np.float64],
+    tws_kn: NDArray[np.float64],
+    speed_kn: NDArray[np.float64],
+    source: str,
     warnings: list[str],
 ) -> PolarFile:
     if not bool(np.any(np.isfinite(speed_kn))):
@@ -451,8 +484,10 @@ def _finish(
     if bool(np.any(np.diff(np.max(filled, axis=0)) < 0.0)):
         warnings.append("the boat gets slower as the wind rises")
     polar = Polar(
-        twa_rad=np.minimum(np.radians(twa_deg), math.pi), tws_mps=tws_kn * MPS_PER_KNOT,
-        speed_mps_table=filled * MPS_PER_KNOT, name=Path(source).stem,
+        twa_rad=np.minimum(np.radians(twa_deg), math.pi),
+        tws_mps=tws_kn * MPS_PER_KNOT,
+        speed_mps_table=filled * MPS_PER_KNOT,
+        name=Path(source).stem,
     )
     return PolarFile(polar=polar, warnings=tuple(warnings))
 
@@ -483,13 +518,18 @@ def _parse_pairs(lines: list[tuple[int, str]], source: str) -> PolarFile | None:
         if not 0.0 <= values[0] <= MAX_TWS_KN or (winds and values[0] <= winds[-1]):
             raise InputError(source, f"line {number}", f"wind speed {values[0]:g} kn", "wind speeds must increase")
         angles = np.array(values[angle_at::2])
-        speeds = np.array(values[3 - angle_at::2])
+        speeds = np.array(values[3 - angle_at :: 2])
         if bool(np.any(np.diff(angles) <= 0.0)) or angles[0] < 0.0 or angles[-1] > 180.0:
-            raise InputError(source, f"line {number}", "wind angles do not increase within 0..180 degrees",
-                             "write TWS, then pairs of angle and speed")
+            raise InputError(
+                source,
+                f"line {number}",
+                "wind angles do not increase within 0..180 degrees",
+                "write TWS, then pairs of angle and speed",
+            )
         if bool(np.any(speeds < 0.0)) or bool(np.any(speeds > MAX_SPEED_KN)):
-            raise InputError(source, f"line {number}", "a boat speed is out of range",
-                             f"speeds are within 0..{MAX_SPEED_KN:g} kn")
+            raise InputError(
+                source, f"line {number}", "a boat speed is out of range", f"speeds are within 0..{MAX_SPEED_KN:g} kn"
+            )
         winds.append(values[0])
         columns.append((angles, np.where(speeds >= MIN_SPEED_KN, speeds, 0.0)))
     twa_deg = np.unique(np.concatenate([angles for angles, _ in columns]))

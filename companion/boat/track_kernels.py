@@ -23,6 +23,7 @@ from companion.kernels.jit import kernel
 # Restated from ArduPilot's AP_Math/SCurve.cpp: seven phases of constant jerk. The original rounds the corners of the
 # jerk off (AR_WPNAV_SNAP_MAX 15 m/s^4, a tenth of a second), which is left out.
 
+
 @kernel
 def top_speed_mps(length_m: float, speed_mps: float, accel: float, jerk: float) -> float:
     """Return the highest speed on a leg."""
@@ -67,7 +68,7 @@ def along(t: float, v: float, rise: float, accel: float, jerk: float) -> tuple[f
 
 @kernel
 def on_leg(
-    t: float, length_m: float, v: float, rise: float, whole: float, accel: float, jerk: float,
+    t: float, length_m: float, v: float, rise: float, whole: float, accel: float, jerk: float
 ) -> tuple[float, float, float]:
     """Return place [m], speed and acceleration along a leg, ``t`` after its start; at its end at rest.
 
@@ -84,13 +85,29 @@ def on_leg(
 
 
 STEP_S = 0.05
-WIND_STEPS = 10            # the wind is given every half second
-KEEP_STEPS = 4             # of the track every fifth of a second is kept
+WIND_STEPS = 10  # the wind is given every half second
+KEEP_STEPS = 4  # of the track every fifth of a second is kept
 
 # --- settings
-(H_WP_RADIUS, H_TURN_RADIUS, H_WP_SPEED, H_ACCEL, H_POS_P, H_VEL_P, H_LATERAL, H_NO_GO, H_CORRIDOR, H_PIVOT_RATE,
- H_RATE_MAX, H_RATE_CHANGE, H_GATHER_M, H_ANGLE_P, H_WIND_LAG_S, H_LATENCY_S,
- H_JERK) = range(17)
+(
+    H_WP_RADIUS,
+    H_TURN_RADIUS,
+    H_WP_SPEED,
+    H_ACCEL,
+    H_POS_P,
+    H_VEL_P,
+    H_LATERAL,
+    H_NO_GO,
+    H_CORRIDOR,
+    H_PIVOT_RATE,
+    H_RATE_MAX,
+    H_RATE_CHANGE,
+    H_GATHER_M,
+    H_ANGLE_P,
+    H_WIND_LAG_S,
+    H_LATENCY_S,
+    H_JERK,
+) = range(17)
 H_SIZE = 17
 
 # --- columns of the track
@@ -113,7 +130,7 @@ RUDDER_MAX_RAD = math.radians(35.0)
 def turn_to(angle_rad: float) -> float:
     """Return the angle on -pi to pi."""
     angle = angle_rad + math.pi
-    if 0.0 <= angle < 2.0 * math.pi:     # what a remainder comes to within a turn either way, without its division
+    if 0.0 <= angle < 2.0 * math.pi:  # what a remainder comes to within a turn either way, without its division
         return angle - math.pi
     if -2.0 * math.pi < angle < 0.0:
         return (angle + 2.0 * math.pi) - math.pi
@@ -143,8 +160,12 @@ def remembered(noise: NDArray[np.float64], first: NDArray[np.float64], phi: floa
 
 @kernel
 def sail(
-    points: NDArray[np.float64], state: NDArray[np.float64], wind_rad: NDArray[np.float64],
-    curve: NDArray[np.float64], h: NDArray[np.float64], out: NDArray[np.float64],
+    points: NDArray[np.float64],
+    state: NDArray[np.float64],
+    wind_rad: NDArray[np.float64],
+    curve: NDArray[np.float64],
+    h: NDArray[np.float64],
+    out: NDArray[np.float64],
 ) -> int:
     """Sail the legs between ``points`` (n, 2), and fill ``out`` (m, T_SIZE); return how many rows were filled.
 
@@ -160,7 +181,7 @@ def sail(
     ge, gn, after, v_next, whole_next = 0.0, 0.0, 0.0, 0.0, 0.0
     rise, rise_next = 0.0, 0.0
     accel, jerk, fastest = h[H_ACCEL], h[H_JERK], h[H_WP_SPEED]
-    t_prev, t_this, t_next = 0.0, 0.0, 0.0      # along the curves of the leg before, this one, the next
+    t_prev, t_this, t_next = 0.0, 0.0, 0.0  # along the curves of the leg before, this one, the next
     l_prev, v_prev, rise_prev, whole_prev, pe, pn = 0.0, 1.0, 0.0, 0.0, 0.0, 0.0
     scale, pace = 0.0, 0.0
     he, hn, te, tn = 0.0, 0.0, points[0, 0], points[0, 1]
@@ -217,7 +238,8 @@ def sail(
                 s2, w2, a2 = on_leg(0.5 * left, after, v_next, rise_next, whole_next, accel, jerk)
                 turn_m = math.hypot((s1 - length) * ue + s2 * ge, (s1 - length) * un + s2 * gn)
                 if (
-                    turn_m < h[H_WP_RADIUS] and math.hypot(w1 * ue + w2 * ge, w1 * un + w2 * gn) < min(v_this, v_next)
+                    turn_m < h[H_WP_RADIUS]
+                    and math.hypot(w1 * ue + w2 * ge, w1 * un + w2 * gn) < min(v_this, v_next)
                     and math.hypot(a1 * ue + a2 * ge, a1 * un + a2 * gn) < h[H_LATERAL]
                 ):
                     t_next = 1e-9
@@ -229,7 +251,7 @@ def sail(
                 arrived = arrived or t_next >= whole - t_this
         pace = math.hypot(he, hn)
         # --- reached?
-        xtrack = (bn - on) * ue - (be - oe) * un    # to the left of the leg
+        xtrack = (bn - on) * ue - (be - oe) * un  # to the left of the leg
         past = (be - oe) * ue + (bn - on) * un >= length
         reached = arrived and (leg < last or math.hypot(de - be, dn - bn) <= h[H_WP_RADIUS] or past)
         # --- what is steered

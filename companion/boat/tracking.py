@@ -21,8 +21,8 @@ from companion.boat import track_kernels as k
 from companion.boat.margins import AutopilotLimits
 from companion.boat.polar import Polar
 
-DEFAULT_WP_SPEED_MPS = 2.0   # the firmware's
-CURVE_NODES = 91           # of the polar: every two degrees
+DEFAULT_WP_SPEED_MPS = 2.0  # the firmware's
+CURVE_NODES = 91  # of the polar: every two degrees
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,8 +72,16 @@ class GuidanceModel:
         for name in ("wp_radius_m", "turn_radius_m", "corridor_m", "latency_s", "pivot_rate_radps"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be 0 or more")
-        for name in ("wp_speed_mps", "accel_mps2", "jerk_mps3", "pos_p", "vel_p", "lateral_mps2", "gather_m",
-                     "rate_max_radps"):
+        for name in (
+            "wp_speed_mps",
+            "accel_mps2",
+            "jerk_mps3",
+            "pos_p",
+            "vel_p",
+            "lateral_mps2",
+            "gather_m",
+            "rate_max_radps",
+        ):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be above 0")
 
@@ -82,9 +90,14 @@ class GuidanceModel:
         """Return the helm of an autopilot; what was not read is ArduRover's default."""
         speed = DEFAULT_WP_SPEED_MPS if limits.wp_speed_mps is None else limits.wp_speed_mps
         return cls(
-            wp_radius_m=limits.wp_radius_m, turn_radius_m=limits.turn_radius_m, wp_speed_mps=speed,
-            accel_mps2=limits.wp_accel_mps2, jerk_mps3=limits.wp_jerk_mps3,
-            no_go_half_rad=limits.sail_no_go_angle_rad, corridor_m=limits.sail_xtrack_max_m)
+            wp_radius_m=limits.wp_radius_m,
+            turn_radius_m=limits.turn_radius_m,
+            wp_speed_mps=speed,
+            accel_mps2=limits.wp_accel_mps2,
+            jerk_mps3=limits.wp_jerk_mps3,
+            no_go_half_rad=limits.sail_no_go_angle_rad,
+            corridor_m=limits.sail_xtrack_max_m,
+        )
 
     def settings(self) -> NDArray[np.float64]:
         """Return the kernel's settings."""
@@ -95,16 +108,19 @@ class GuidanceModel:
         h[k.H_NO_GO], h[k.H_CORRIDOR] = self.no_go_half_rad, self.corridor_m
         h[k.H_PIVOT_RATE] = self.pivot_rate_radps
         h[k.H_RATE_MAX], h[k.H_RATE_CHANGE], h[k.H_GATHER_M] = (
-            self.rate_max_radps, self.rate_change_radps2, self.gather_m)
+            self.rate_max_radps,
+            self.rate_change_radps2,
+            self.gather_m,
+        )
         h[k.H_ANGLE_P], h[k.H_WIND_LAG_S], h[k.H_LATENCY_S] = self.angle_p, self.wind_lag_s, self.latency_s
         h[k.H_JERK] = self.jerk_mps3
         return h
 
 
-LONGEST_S = 20_000.0       # a track is not followed for longer
-SLOWEST_MPS = 0.1          # made good: what is slower has no track worth predicting
-DRAWN = 24                 # winds of a spread
-DRAW_SEED = 15             # one set of winds, whoever asks: a prediction is a function of its arguments
+LONGEST_S = 20_000.0  # a track is not followed for longer
+SLOWEST_MPS = 0.1  # made good: what is slower has no track worth predicting
+DRAWN = 24  # winds of a spread
+DRAW_SEED = 15  # one set of winds, whoever asks: a prediction is a function of its arguments
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -136,9 +152,14 @@ def curve_of(polar: Polar, tws_mps: float) -> NDArray[np.float64]:
 
 
 def predict(
-    points_en_m: ArrayLike, helm: GuidanceModel, *, curve_mps: NDArray[np.float64],
-    twd_from_rad: float | NDArray[np.float64], start_en_m: Sequence[float] | None = None,
-    heading_rad: float | None = None, speed_mps: float | None = None,
+    points_en_m: ArrayLike,
+    helm: GuidanceModel,
+    *,
+    curve_mps: NDArray[np.float64],
+    twd_from_rad: float | NDArray[np.float64],
+    start_en_m: Sequence[float] | None = None,
+    heading_rad: float | None = None,
+    speed_mps: float | None = None,
 ) -> PredictedTrack:
     """Return the track along legs.
 
@@ -156,8 +177,12 @@ def predict(
     keep = np.concatenate([[True], np.any(np.abs(np.diff(points, axis=0)) > 1e-6, axis=1)])
     points = points[keep]
     if len(points) < 2:
-        return PredictedTrack(en_m=points, leg=np.zeros(len(points), dtype=np.int64),
-                         beats=np.zeros(len(points), dtype=bool), arrives=True)
+        return PredictedTrack(
+            en_m=points,
+            leg=np.zeros(len(points), dtype=np.int64),
+            beats=np.zeros(len(points), dtype=bool),
+            arrives=True,
+        )
     wind = np.atleast_1d(np.asarray(twd_from_rad, dtype=np.float64))
     course = math.atan2(*(points[1] - points[0]))
     heading = course if heading_rad is None else heading_rad
@@ -172,12 +197,15 @@ def predict(
     out = np.empty((int(limit_s / (k.STEP_S * k.KEEP_STEPS)), k.T_SIZE))
     rows = int(k.sail(points, state, wind, curve_mps, helm.settings(), out))
     return PredictedTrack(
-        en_m=out[:rows, :2].copy(), leg=out[:rows, k.T_LEG].astype(np.int64), beats=out[:rows, k.T_BEATS] > 0.0,
-        arrives=rows < len(out))
+        en_m=out[:rows, :2].copy(),
+        leg=out[:rows, k.T_LEG].astype(np.int64),
+        beats=out[:rows, k.T_BEATS] > 0.0,
+        arrives=rows < len(out),
+    )
 
 
 def drawn_winds(
-    twd_from_rad: float, *, sigma_rad: float, tau_s: float, length_s: float, count: int = DRAWN, seed: int = DRAW_SEED,
+    twd_from_rad: float, *, sigma_rad: float, tau_s: float, length_s: float, count: int = DRAWN, seed: int = DRAW_SEED
 ) -> NDArray[np.float64]:
     """Return (count, n) directions every half second: stationary Gaussian, correlated over ``tau_s``.
 
@@ -200,7 +228,7 @@ def drawn_winds(
 
 BOARDS = 10
 SQUARE_RAD = math.radians(25.0)
-STEP_MPS = 0.25                # the wind is rounded up to these: answers are kept
+STEP_MPS = 0.25  # the wind is rounded up to these: answers are kept
 
 
 def beat_band_m(helm: GuidanceModel, polar: Polar, *, tws_mps: float) -> float:

@@ -27,7 +27,7 @@ A mission names the file: file = "pepper.toml" in its [boat].
 Exit codes: 0 written or told, 2 a file or a number cannot be believed.
 """
 TWA_DEG = (40.0, 45.0, 52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0, 165.0, 180.0)
-MOST_WINDS = 7      # columns of a table
+MOST_WINDS = 7  # columns of a table
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
@@ -35,14 +35,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser = add_command(subparsers, "boat", summary, _EPILOG)
     verbs = parser.add_subparsers(dest="verb", metavar="guess|show|compare", required=True)
     guess = verbs.add_parser("guess", help="a boat file from three sizes, for a boat that nobody has sailed yet")
-    guess.add_argument("--length", type=number("m", above=0.0, at_most=100.0), required=True, metavar="M",
-                       help="over all [m]")
-    guess.add_argument("--displacement", type=number("kg", above=0.0, at_most=1e6), required=True, metavar="KG",
-                       help="as she sails [kg]")
-    guess.add_argument("--sail-area", type=number("m2", above=0.0, at_most=1e4), required=True, metavar="M2",
-                       help="of all but a spinnaker [m2]")
-    guess.add_argument("--beam", type=number("m", above=0.0, at_most=30.0), metavar="M",
-                       help="[m] (default: 0.3 of the length)")
+    guess.add_argument(
+        "--length", type=number("m", above=0.0, at_most=100.0), required=True, metavar="M", help="over all [m]"
+    )
+    guess.add_argument(
+        "--displacement",
+        type=number("kg", above=0.0, at_most=1e6),
+        required=True,
+        metavar="KG",
+        help="as she sails [kg]",
+    )
+    guess.add_argument(
+        "--sail-area",
+        type=number("m2", above=0.0, at_most=1e4),
+        required=True,
+        metavar="M2",
+        help="of all but a spinnaker [m2]",
+    )
+    guess.add_argument(
+        "--beam", type=number("m", above=0.0, at_most=30.0), metavar="M", help="[m] (default: 0.3 of the length)"
+    )
     guess.add_argument("--name", help="what she is called (default: the file's name)")
     guess.add_argument("--out", type=out_file, metavar="FILE.toml", help="write it there (default: print it)")
     guess.add_argument("--force", action="store_true", help="take the place of a file that is there")
@@ -51,8 +63,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     show.add_argument("file", metavar="FILE", help="a boat file, a polar file, ardurover or avalon")
     show.add_argument("--plot", type=picture, metavar="P.png", help="draw the polar, with its band")
     show.add_argument("--pol", type=out_file, metavar="FILE.pol", help="write the polar in knots, as OpenCPN reads it")
-    show.add_argument("--quantile", type=number(above=0.0, at_most=0.5), default=0.5, metavar="P",
-                      help="of the speeds in --pol, below which she is with this chance (default: 0.5; careful: 0.1)")
+    show.add_argument(
+        "--quantile",
+        type=number(above=0.0, at_most=0.5),
+        default=0.5,
+        metavar="P",
+        help="of the speeds in --pol, below which she is with this chance (default: 0.5; careful: 0.1)",
+    )
     show.add_argument("--force", action="store_true", help="take the place of a .pol that is there")
     show.set_defaults(run=_show)
     compare = verbs.add_parser("compare", help="how much faster one is than the other")
@@ -131,27 +148,32 @@ def _words(name: str, boat: BoatFile | None) -> list[str]:
     if boat is None:
         return [f"{name}: speeds alone; `companion boat guess` writes a file that says more"]
     o = boat.boat
-    tacks = (f"turns {o.turn_rate_deg_s:g} degrees/s; a tack costs {o.tack_loss_s:g} s and fails in "
-             f"{100.0 * o.tack_fails:g} %; leeway {o.leeway_deg:g} degrees")
+    tacks = (
+        f"turns {o.turn_rate_deg_s:g} degrees/s; a tack costs {o.tack_loss_s:g} s and fails in "
+        f"{100.0 * o.tack_fails:g} %; leeway {o.leeway_deg:g} degrees"
+    )
     return [
         f"{boat.name}: {boat.made or 'nobody says how it was made'}",
         f"{o.length_m:g} x {o.beam_m:g} m; not nearer to the wind than {o.no_go_half_deg:g} degrees; {tacks}",
-        "her speeds are taken to be as they stand here" if o.speed_error_percent == 0.0 else
-        f"her speeds may all be off by {o.speed_error_percent:g} % (standard deviation): arrivals spread by it",
+        "her speeds are taken to be as they stand here"
+        if o.speed_error_percent == 0.0
+        else f"her speeds may all be off by {o.speed_error_percent:g} % (standard deviation): arrivals spread by it",
     ]
 
 
 def _winds(polar: Polar) -> list[float]:
     winds = [float(w) for w in polar.tws_mps if w > 0.0] or [5.0]
-    return winds[::math.ceil(len(winds) / MOST_WINDS)]
+    return winds[:: math.ceil(len(winds) / MOST_WINDS)]
 
 
 def _angles(polar: Polar) -> list[str]:
     lines = ["", _row("wind [m/s]", [f"{w:.1f}" for w in _winds(polar)])]
     for what, best in (("beat", polar.best_beat), ("run", polar.best_run)):
         found = [best(w) for w in _winds(polar)]
-        lines += [_row(f"best {what} [deg]", [f"{math.degrees(a.twa_rad):.0f}" for a in found]),
-                  _row("  made good [m/s]", [f"{a.vmg_mps:.2f}" for a in found])]
+        lines += [
+            _row(f"best {what} [deg]", [f"{math.degrees(a.twa_rad):.0f}" for a in found]),
+            _row("  made good [m/s]", [f"{a.vmg_mps:.2f}" for a in found]),
+        ]
     return lines
 
 
@@ -161,8 +183,12 @@ def _speeds(polar: Polar, twa_deg: float, tws_mps: float) -> str:
 
 def _table(title: str, polar: Polar, cell: Callable[[Polar, float, float], str]) -> list[str]:
     winds = _winds(polar)
-    return ["", title, _row("TWA, wind [m/s]", [f"{w:.1f}" for w in winds]), *(
-        _row(f"  {twa:.0f}", [cell(polar, twa, w) for w in winds]) for twa in TWA_DEG)]
+    return [
+        "",
+        title,
+        _row("TWA, wind [m/s]", [f"{w:.1f}" for w in winds]),
+        *(_row(f"  {twa:.0f}", [cell(polar, twa, w) for w in winds]) for twa in TWA_DEG),
+    ]
 
 
 def _row(name: str, cells: list[str]) -> str:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from companion.mavlink.signing import SigningStore
     from companion.mavlink.transports import Transport
 
-LISTEN_S = 6.0   # long enough for messages of once a second to show their rate
+LISTEN_S = 6.0  # long enough for messages of once a second to show their rate
 
 _EPILOG = """\
 examples:
@@ -60,23 +60,38 @@ class ParameterFix:
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "doctor", help=summary, epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
+        "doctor",
+        help=summary,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Read the autopilot's parameters, version, streams, fence and mission; say what would spoil a "
         "voyage and what to set.",
     )
-    parser.add_argument("--link", required=True, metavar="LINK",
-                        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
-    parser.add_argument("--system", type=system_id, metavar="N",
-                        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)")
+    parser.add_argument(
+        "--link",
+        required=True,
+        metavar="LINK",
+        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
+    )
+    parser.add_argument(
+        "--system",
+        type=system_id,
+        metavar="N",
+        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)",
+    )
     parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="hold the settings against this voyage")
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (mode 0600)")
-    parser.add_argument("--set-key", action="store_true",
-                        help="first put that key on the autopilot, as 'companion key set' does; it asks")
+    parser.add_argument(
+        "--set-key",
+        action="store_true",
+        help="first put that key on the autopilot, as 'companion key set' does; it asks",
+    )
     parser.add_argument("--yes", action="store_true", help="with --set-key: do not ask")
     parser.add_argument("--apply", action="store_true", help="set what the warnings and errors name, and read it back")
     parser.add_argument("--json", action="store_true", help="print findings and changes as JSON")
-    parser.add_argument("--wait", type=number("s", above=0.0), default=30.0, metavar="S",
-                        help="for the first heartbeat (default: 30)")
+    parser.add_argument(
+        "--wait", type=number("s", above=0.0), default=30.0, metavar="S", help="for the first heartbeat (default: 30)"
+    )
     parser.set_defaults(run=run)
 
 
@@ -96,12 +111,25 @@ def run(args: argparse.Namespace) -> int:
     if args.set_key:
         if signing is None:
             raise InputError("--set-key", "", "there is no key", "name it: --signing-key FILE ('companion key new')")
-        seen = put_on(functools.partial(open_link, args.link), signing, system=system, asks=not args.yes,
-                      name=str(args.signing_key))
+        seen = put_on(
+            functools.partial(open_link, args.link),
+            signing,
+            system=system,
+            asks=not args.yes,
+            name=str(args.signing_key),
+        )
         print(run_loop(seen), file=sys.stderr if args.json else sys.stdout)
-    findings, changes = run_loop(diagnose(
-        open_link(args.link), needs_of(mission), wait_s=args.wait, apply=args.apply, signing=signing, system=system,
-        speed=planner_speed()))
+    findings, changes = run_loop(
+        diagnose(
+            open_link(args.link),
+            needs_of(mission),
+            wait_s=args.wait,
+            apply=args.apply,
+            signing=signing,
+            system=system,
+            speed=planner_speed(),
+        )
+    )
     if args.json:
         print(json.dumps(as_json(findings, changes), indent=1))
     else:
@@ -129,11 +157,18 @@ def needs_of(mission: Mission | None) -> Needs:
     boat, config, frame = boat_of(mission), config_of(mission), mission.frame()
     places = [frame.en_from_geo(place) for place in mission.places]
     return Needs(
-        no_go_half_rad=boat.no_go_half_rad, margin_m=config.margin_m, margin_floor_m=config.margin_floor_m,
-        goal_radius_m=min(goal.radius_m for goal in mission.goals), loiter_radius_m=config.loiter_radius_m,
-        speed_mps=boat.polar.max_speed_mps(mission.wind.preview_speed_mps or 5.0), hull=boat.hull,
-        reach_m=max(math.hypot(*place) for place in places), has_fence=mission.operator.upload_fence,
-        can_tack=boat.can_tack, has_refuge=bool(mission.refuges), sails=mission.autopilot.frame == "sailboat",
+        no_go_half_rad=boat.no_go_half_rad,
+        margin_m=config.margin_m,
+        margin_floor_m=config.margin_floor_m,
+        goal_radius_m=min(goal.radius_m for goal in mission.goals),
+        loiter_radius_m=config.loiter_radius_m,
+        speed_mps=boat.polar.max_speed_mps(mission.wind.preview_speed_mps or 5.0),
+        hull=boat.hull,
+        reach_m=max(math.hypot(*place) for place in places),
+        has_fence=mission.operator.upload_fence,
+        can_tack=boat.can_tack,
+        has_refuge=bool(mission.refuges),
+        sails=mission.autopilot.frame == "sailboat",
     )
 
 
@@ -153,14 +188,21 @@ def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> 
             async with Autopilot(connected) as autopilot:
                 answers = {name: await autopilot.get_parameter(name) for name in AutopilotLimits.PARAMETERS}
         return AutopilotLimits.from_params(
-            {name: answer.value for name, answer in answers.items() if answer.value is not None})
+            {name: answer.value for name, answer in answers.items() if answer.value is not None}
+        )
 
     return run_loop(ask())
 
 
 async def diagnose(
-    transport: Transport, needs: Needs, *, wait_s: float = 30.0, apply: bool = False,
-    signing: SigningStore | None = None, system: int | None = None, speed: float | None = None,
+    transport: Transport,
+    needs: Needs,
+    *,
+    wait_s: float = 30.0,
+    apply: bool = False,
+    signing: SigningStore | None = None,
+    system: int | None = None,
+    speed: float | None = None,
 ) -> tuple[tuple[DoctorFinding, ...], tuple[ParameterFix, ...]]:
     """Read everything, judge it, and set what is to be set if ``apply``.
 
@@ -232,22 +274,35 @@ async def _apply(autopilot: Autopilot, findings: Sequence[DoctorFinding]) -> tup
         written = await autopilot.set_parameter(name, wanted)
         seen = await autopilot.get_parameter(name)
         changes[name] = ParameterFix(
-            name=seen.name or name, before=finding.value, wanted=wanted, after=seen.value if seen.is_ok else None,
-            text=written.text)
+            name=seen.name or name,
+            before=finding.value,
+            wanted=wanted,
+            after=seen.value if seen.is_ok else None,
+            text=written.text,
+        )
     return tuple(changes.values())
 
 
 def _is_cured(finding: DoctorFinding, changes: Sequence[ParameterFix]) -> bool:
-    return any(change.before == finding.value and change.wanted == finding.wanted and change.is_done
-               for change in changes) and finding.wanted is not None
+    return (
+        any(change.before == finding.value and change.wanted == finding.wanted and change.is_done for change in changes)
+        and finding.wanted is not None
+    )
 
 
 def as_json(findings: Sequence[DoctorFinding], changes: Sequence[ParameterFix]) -> dict[str, Any]:
     """Return findings and changes as JSON values."""
     return {
         "findings": [
-            {"level": f.level.name.lower(), "code": f.code, "what": f.what, "why": f.why, "parameter": f.parameter,
-             "value": f.value, "wanted": f.wanted}
+            {
+                "level": f.level.name.lower(),
+                "code": f.code,
+                "what": f.what,
+                "why": f.why,
+                "parameter": f.parameter,
+                "value": f.value,
+                "wanted": f.wanted,
+            }
             for f in findings
         ],
         "changes": [

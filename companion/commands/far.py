@@ -51,24 +51,38 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     begin = verbs.add_parser("begin", help="let the counters of orders count from 1 again")
     begin.set_defaults(run=run_begin)
     for verb in (order, begin):
-        verb.add_argument("--expires", type=duration, required=True, metavar="TIME",
-                          help="it counts for nothing after so long, at most 7d: 90m, 2h, 1d")
+        verb.add_argument(
+            "--expires",
+            type=duration,
+            required=True,
+            metavar="TIME",
+            help="it counts for nothing after so long, at most 7d: 90m, 2h, 1d",
+        )
         verb.add_argument("--out", type=Path, metavar="FILE", help="write the bytes there, too")
         force_option(verb)
-    order.add_argument("--counter", type=whole(at_least=1, at_most=0xFFFF), metavar="N",
-                       help=f"its counter (default: one more than the last, which is kept in KEY{COUNTER}; where that "
-                       "file is lost, the boat's status tells the last that she took)")
+    order.add_argument(
+        "--counter",
+        type=whole(at_least=1, at_most=0xFFFF),
+        metavar="N",
+        help=f"its counter (default: one more than the last, which is kept in KEY{COUNTER}; where that "
+        "file is lost, the boat's status tells the last that she took)",
+    )
     order.set_defaults(run=run_order)
     status = verbs.add_parser("status", help="read a status of 42 bytes")
     status.add_argument("source", metavar="FILE|HEX", help="the bytes: in a file, or as hexadecimal digits")
     status.set_defaults(run=run_status)
     for verb in (order, begin, status):
         verb.add_argument("--key", type=Path, required=True, metavar="FILE", help="the key, as on board")
-        verb.add_argument("--system", type=system_id, default=1, metavar="N",
-                          help="MAVLink system id of the boat's autopilot (default: 1)")
+        verb.add_argument(
+            "--system",
+            type=system_id,
+            default=1,
+            metavar="N",
+            help="MAVLink system id of the boat's autopilot (default: 1)",
+        )
 
 
-COUNTER = ".far-counter"     # beside the key: the last counter that was used with it, and since which beginning
+COUNTER = ".far-counter"  # beside the key: the last counter that was used with it, and since which beginning
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +106,12 @@ def run_order(args: argparse.Namespace) -> int:
     with _alone_with(args.key):
         count = _next_count(args.key, args.counter)
         try:
-            data = pack_order(FarOrder(wanted=wanted, counter=count.last, expires_min=expires_min),
-                              key.since(count.began))
+            data = pack_order(
+                FarOrder(wanted=wanted, counter=count.last, expires_min=expires_min), key.since(count.began)
+            )
         except ValueError as error:
             raise InputError(" ".join(args.words)[:40], "", str(error)) from None
-        _keep_count(args.key, count)    # before anybody can send it: a counter is never used twice
+        _keep_count(args.key, count)  # before anybody can send it: a counter is never used twice
     _hand_out(args, data)
     print(f"order {count.last}: {wanted.words}, counts until {moment(expires_min)}")
     return 0
@@ -118,8 +133,10 @@ def run_begin(args: argparse.Namespace) -> int:
         data = pack_beginning(Beginning(began=began, expires_min=expires_min), key)
         _keep_count(args.key, _Count(0, began))
     _hand_out(args, data)
-    print(f"beginning of {moment(began)}, counts until {moment(expires_min)}: send it again until a status tells "
-          "it; the next order is number 1, and what was given before does not count any more")
+    print(
+        f"beginning of {moment(began)}, counts until {moment(expires_min)}: send it again until a status tells "
+        "it; the next order is number 1, and what was given before does not count any more"
+    )
     return 0
 
 
@@ -169,14 +186,22 @@ def _next_count(key: Path, given: int | None) -> _Count:
 
     count, trouble = _read_count(key)
     if given is None and trouble:
-        raise InputError(str(key.with_name(key.name + COUNTER)), "", f"the last counter cannot be read ({trouble})",
-                         "count from 1 again: companion far begin; or name one with --counter: one more than the "
-                         "last that the boat's status tells")
+        raise InputError(
+            str(key.with_name(key.name + COUNTER)),
+            "",
+            f"the last counter cannot be read ({trouble})",
+            "count from 1 again: companion far begin; or name one with --counter: one more than the "
+            "last that the boat's status tells",
+        )
     if given is None and count.last >= MOST_COUNTER:
         raise JobError(f"{key}: all {MOST_COUNTER} counters are used up; count from 1 again: companion far begin")
     if given is not None and count.last and given > count.last + MOST_JUMP:
-        raise InputError("--counter", str(given), f"is more than {MOST_JUMP} ahead of the last, {count.last}, and the "
-                         "boat takes no such", "where she has another count, begin anew: companion far begin")
+        raise InputError(
+            "--counter",
+            str(given),
+            f"is more than {MOST_JUMP} ahead of the last, {count.last}, and the boat takes no such",
+            "where she has another count, begin anew: companion far begin",
+        )
     return _Count(count.last + 1 if given is None else given, count.began)
 
 
@@ -187,8 +212,9 @@ def _keep_count(key: Path, count: _Count) -> None:
     try:
         Disk().replace(path, f"{count.last}{f' {count.began}' if count.began else ''}\n".encode("ascii"))
     except OSError as error:
-        raise JobError(f"{path}: cannot be written ({reason(error)}), and without it a counter would be used twice") \
-            from error
+        raise JobError(
+            f"{path}: cannot be written ({reason(error)}), and without it a counter would be used twice"
+        ) from error
 
 
 def run_status(args: argparse.Namespace) -> int:
@@ -222,8 +248,12 @@ def _bytes_of(source: str) -> bytes:
     try:
         return bytes.fromhex(text)
     except ValueError:
-        raise InputError(source[:60], "", "is neither a file nor hexadecimal digits",
-                         "name the file with the 42 bytes, or paste its digits") from None
+        raise InputError(
+            source[:60],
+            "",
+            "is neither a file nor hexadecimal digits",
+            "name the file with the 42 bytes, or paste its digits",
+        ) from None
 
 
 def lines_of(status: FarStatus, unix_s: float) -> list[str]:
@@ -252,8 +282,9 @@ def lines_of(status: FarStatus, unix_s: float) -> list[str]:
     ]
     if s.has_trouble:
         lines.append("her disk does not keep what it should")
-    lines.append("no order has come" if s.reply is None else
-                 str(s.reply) if s.order is None else f"order {s.order}: {s.reply}")
+    lines.append(
+        "no order has come" if s.reply is None else str(s.reply) if s.order is None else f"order {s.order}: {s.reply}"
+    )
     return lines
 
 

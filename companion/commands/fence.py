@@ -49,10 +49,19 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     check.add_argument("file", metavar="FILE")
     reading_options(check)
     place_options(check)
-    check.add_argument("--wind-from", type=number("deg", at_least=-360.0, at_most=360.0), metavar="DEG",
-                       help="wind for which gaps must be wide enough")
-    check.add_argument("--no-go", type=number("deg", at_least=0.0, at_most=89.0), default=47.0, metavar="DEG",
-                       help="half angle of the no-go zone (47)")
+    check.add_argument(
+        "--wind-from",
+        type=number("deg", at_least=-360.0, at_most=360.0),
+        metavar="DEG",
+        help="wind for which gaps must be wide enough",
+    )
+    check.add_argument(
+        "--no-go",
+        type=number("deg", at_least=0.0, at_most=89.0),
+        default=47.0,
+        metavar="DEG",
+        help="half angle of the no-go zone (47)",
+    )
     check.add_argument("--plot", type=picture, metavar="P.png", help="draw the area")
     check.set_defaults(run=_check)
 
@@ -61,12 +70,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     convert.add_argument("out", metavar="OUT", help="its extension is the format")
     reading_options(convert)
     place_options(convert)
-    convert.add_argument("--repair", action="store_true",
-                         help="write broken rings repaired: no repair makes the sea larger")
+    convert.add_argument(
+        "--repair", action="store_true", help="write broken rings repaired: no repair makes the sea larger"
+    )
     convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
     force_option(convert)
-    convert.add_argument("--simplify", action="store_true",
-                         help="write the 84 items for the autopilot (needs --margin and --start, or a mission)")
+    convert.add_argument(
+        "--simplify",
+        action="store_true",
+        help="write the 84 items for the autopilot (needs --margin and --start, or a mission)",
+    )
     convert.set_defaults(run=_convert)
 
     upload = verbs.add_parser("upload", help="simplify to what the autopilot holds, write, read back, compare")
@@ -88,32 +101,52 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def link_options(parser: argparse.ArgumentParser) -> None:
     """Add --link, --system and --timeout."""
-    parser.add_argument("--link", required=True, metavar="LINK",
-                        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
-    parser.add_argument("--system", type=system_id, metavar="N",
-                        help="the autopilot's MAVLink system id (default: the only one heard)")
-    parser.add_argument("--timeout", type=number("s", above=0.0), default=10.0, metavar="S",
-                        help="wait this long for a heartbeat (10)")
+    parser.add_argument(
+        "--link",
+        required=True,
+        metavar="LINK",
+        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
+    )
+    parser.add_argument(
+        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
+    )
+    parser.add_argument(
+        "--timeout", type=number("s", above=0.0), default=10.0, metavar="S", help="wait this long for a heartbeat (10)"
+    )
 
 
 def reading_options(parser: argparse.ArgumentParser) -> None:
     """Add how a file is to be understood."""
-    parser.add_argument("--kind", choices=("inclusion", "exclusion"), default="exclusion",
-                        help="what zones are where the file does not say (exclusion)")
-    parser.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto",
-                        help="order of WKT coordinates (longitude first, checked against the place)")
-    parser.add_argument("--near", type=place, metavar="LAT,LON",
-                        help="where the file should lie: farther than 50 km is an error")
-    parser.add_argument("--point-radius", type=number("m", above=0.0, at_most=5000.0), metavar="M",
-                        help="radius of an obstacle that is a point or line (10); a file is converted with it drawn")
+    parser.add_argument(
+        "--kind",
+        choices=("inclusion", "exclusion"),
+        default="exclusion",
+        help="what zones are where the file does not say (exclusion)",
+    )
+    parser.add_argument(
+        "--axis",
+        choices=("auto", "lonlat", "latlon"),
+        default="auto",
+        help="order of WKT coordinates (longitude first, checked against the place)",
+    )
+    parser.add_argument(
+        "--near", type=place, metavar="LAT,LON", help="where the file should lie: farther than 50 km is an error"
+    )
+    parser.add_argument(
+        "--point-radius",
+        type=number("m", above=0.0, at_most=5000.0),
+        metavar="M",
+        help="radius of an obstacle that is a point or line (10); a file is converted with it drawn",
+    )
 
 
 def place_options(parser: argparse.ArgumentParser) -> None:
     """Add start, goals and margin."""
     parser.add_argument("--start", type=place, metavar="LAT,LON")
     parser.add_argument("--goal", type=place, metavar="LAT,LON", action="append", default=[])
-    parser.add_argument("--margin", type=number("m", at_least=0.0, at_most=1000.0), metavar="M",
-                        help="what the planner keeps clear [m]")
+    parser.add_argument(
+        "--margin", type=number("m", at_least=0.0, at_most=1000.0), metavar="M", help="what the planner keeps clear [m]"
+    )
 
 
 def read_input(args: argparse.Namespace) -> Document:
@@ -163,8 +196,11 @@ def grown_marks(document: Document, point_radius_m: float) -> Document:
     from companion.geofence import ZoneKind
     from companion.geofence.mission import zones_only
 
-    return replace(document, zones=zones_only(document, point_radius_m),
-                   marks=tuple(m for m in document.marks if m.kind is not ZoneKind.EXCLUSION))
+    return replace(
+        document,
+        zones=zones_only(document, point_radius_m),
+        marks=tuple(m for m in document.marks if m.kind is not ZoneKind.EXCLUSION),
+    )
 
 
 def _check(args: argparse.Namespace) -> int:
@@ -183,17 +219,36 @@ def _check(args: argparse.Namespace) -> int:
         names = [goal.name for goal in mission.goals] if not args.goal else []
     area = area_of(document, point_radius_m(args))
     bad = print_findings(document.findings, args.file)
-    bad |= print_findings(check_area(area, AreaConditions(
-        start=start, goals=goals, near=args.near or document.home, drawing=Path(args.file).stem, margin_m=margin_m,
-        no_go_half_rad=math.radians(args.no_go), twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
-    )), args.file)
+    bad |= print_findings(
+        check_area(
+            area,
+            AreaConditions(
+                start=start,
+                goals=goals,
+                near=args.near or document.home,
+                drawing=Path(args.file).stem,
+                margin_m=margin_m,
+                no_go_half_rad=math.radians(args.no_go),
+                twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
+            ),
+        ),
+        args.file,
+    )
     if args.plot:
         from companion.plots.mission import save_area
 
         with patience("drawing"):
-            save_area(area, args.plot, start=start, goals=goals, margin_m=margin_m or 0.0,
-                      twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
-                      no_go_half_rad=math.radians(args.no_go), title=Path(args.file).name, names=names)
+            save_area(
+                area,
+                args.plot,
+                start=start,
+                goals=goals,
+                margin_m=margin_m or 0.0,
+                twd_from_rad=math.radians(wind_deg) if wind_deg is not None else None,
+                no_go_half_rad=math.radians(args.no_go),
+                title=Path(args.file).name,
+                names=names,
+            )
     print(f"{args.file}: {document.format}: {summary(document)}: {'NOT in order' if bad else 'in order'}")
     return int(bad)
 
@@ -204,8 +259,12 @@ def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
 
     start, goals, margin_m = places(args)
     if start is None or margin_m is None:
-        raise InputError(args.file, "", "simplifying needs a margin and a start",
-                         "give --margin M and --start LAT,LON, or a mission TOML")
+        raise InputError(
+            args.file,
+            "",
+            "simplifying needs a margin and a start",
+            "give --margin M and --start LAT,LON, or a mission TOML",
+        )
     result = fence_for_autopilot(area_of(document, point_radius_m(args)), margin_m, inside=[start, *goals])
     if result.status is not FenceStatus.OK:
         raise JobError(f"{args.file}: no fence for the autopilot: {result.reason}")
@@ -228,7 +287,7 @@ def _convert(args: argparse.Namespace) -> int:
     if args.simplify:
         document = Document(source=document.source, format="simplified", zones=simplified(args, document).zones)
     write_out(write(document, args.out, part="fence"), args.out, lossy=args.lossy, force=args.force)
-    print(f"{args.out}: written: {summary(read(args.out, areas=True))}")   # what is in it, not what was meant to be
+    print(f"{args.out}: written: {summary(read(args.out, areas=True))}")  # what is in it, not what was meant to be
     return 0
 
 
@@ -262,8 +321,10 @@ def _upload(args: argparse.Namespace) -> int:
             print(f"fence enabled: FENCE_TYPE 4, FENCE_ACTION {session.get_param('FENCE_ACTION'):g}")
         else:
             enabled, kind = session.get_param("FENCE_ENABLE"), session.get_param("FENCE_TYPE")
-            print(f"FENCE_ENABLE is {enabled:g} and FENCE_TYPE {kind:g}: "
-                  + ("in force" if enabled and int(kind) & 4 else "not in force; --enable sets both"))
+            print(
+                f"FENCE_ENABLE is {enabled:g} and FENCE_TYPE {kind:g}: "
+                + ("in force" if enabled and int(kind) & 4 else "not in force; --enable sets both")
+            )
     return 0
 
 
@@ -292,5 +353,6 @@ def _download(args: argparse.Namespace) -> int:
 def _document(zones: Any, return_point: GeoPoint | None, findings: Any) -> Document:
     from companion.geofence import Document
 
-    return Document(source="autopilot", format="autopilot", zones=zones, return_point=return_point,
-                    findings=tuple(findings))
+    return Document(
+        source="autopilot", format="autopilot", zones=zones, return_point=return_point, findings=tuple(findings)
+    )

@@ -32,12 +32,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser = add_command(subparsers, "field", summary, _EPILOG)
     parser.add_argument("file", metavar="FILE", help="a mission TOML")
     parser.add_argument("--goal", type=whole(at_least=1), metavar="N", help="its number (else the first by a field)")
-    parser.add_argument("--wind", type=wind, metavar="SPEED@FROM",
-                        help="[m/s, degrees] (else what the mission's previews assume)")
+    parser.add_argument(
+        "--wind", type=wind, metavar="SPEED@FROM", help="[m/s, degrees] (else what the mission's previews assume)"
+    )
     parser.add_argument("--plot", type=picture, metavar="P.png", help="draw it with the boat's fan, wind and obstacles")
     parser.add_argument("--fans", action="store_true", help="in the picture: Schmitt's fan at every arrow, too")
-    parser.add_argument("--page", type=out_file, metavar="P.html",
-                        help="write one file for a browser: turn the wind, drag the boat; it asks for nothing")
+    parser.add_argument(
+        "--page",
+        type=out_file,
+        metavar="P.html",
+        help="write one file for a browser: turn the wind, drag the boat; it asks for nothing",
+    )
     parser.set_defaults(run=run)
 
 
@@ -51,15 +56,23 @@ def run(args: argparse.Namespace) -> int:
     fan, track = heading_fan(seen), field_track(seen)
     print("\n".join([*_words(mission, seen), *_in_the_wind(seen)]))
     end = math.dist(track[-1, 1:3], seen.place_en)
-    print(f"the boat at {seen.here_en[0]:.0f} m east, {seen.here_en[1]:.0f} m north: the field says "
-          f"{_heading(fan.wanted_rad)}, she is steered {_heading(fan.chosen_rad)}")
+    print(
+        f"the boat at {seen.here_en[0]:.0f} m east, {seen.here_en[1]:.0f} m north: the field says "
+        f"{_heading(fan.wanted_rad)}, she is steered {_heading(fan.chosen_rad)}"
+    )
     print(f"sailed by it in a steady wind: {track[-1, 0]:.0f} s, ends {end:.0f} m from {seen.name}")
     if args.plot:
         from companion.plots.field import save_field
 
         with patience("drawing"):
-            save_field(seen, fan, track, args.plot, has_fans=args.fans,
-                       title=f"{mission.name}, goal {seen.number}: {seen.tree.text}")
+            save_field(
+                seen,
+                fan,
+                track,
+                args.plot,
+                has_fans=args.fans,
+                title=f"{mission.name}, goal {seen.number}: {seen.tree.text}",
+            )
         print(f"{args.plot}: written")
     if args.page:
         _write_page(args.page, mission, seen)
@@ -89,7 +102,8 @@ def _words(mission: Mission, seen: FieldPreview) -> list[str]:
     for name, atom in seen.tree.atoms:
         if isinstance(atom, Round):
             words = f"round a circle of {atom.radius_m:g} m about {place(atom.at_en)}, " + (
-                "clockwise" if atom.is_clockwise else "anticlockwise")
+                "clockwise" if atom.is_clockwise else "anticlockwise"
+            )
         elif isinstance(atom, PointTo | StayAt):
             words = f"{'to and about' if isinstance(atom, StayAt) else 'to'} {place(atom.at_en)}"
         elif isinstance(atom, Along):
@@ -113,13 +127,18 @@ def _in_the_wind(seen: FieldPreview) -> list[str]:
     from companion.mission_check import without_value
 
     twd, out = seen.conditions.twd_from_rad, []
-    out.append("a motorboat: no wind is needed" if twd is None else
-               f"wind {seen.conditions.seen.tws_mps:g} m/s from {_heading(twd)}, no-go zone "
-               f"{math.degrees(seen.conditions.habits.no_go_half_rad):.0f}° to either side")
+    out.append(
+        "a motorboat: no wind is needed"
+        if twd is None
+        else f"wind {seen.conditions.seen.tws_mps:g} m/s from {_heading(twd)}, no-go zone "
+        f"{math.degrees(seen.conditions.habits.no_go_half_rad):.0f}° to either side"
+    )
     share = without_value(seen)
     if share > 0.0:
-        out.append(f"without a value in {100.0 * share:.0f} % of the square of {2.0 * seen.half_m:.0f} m about it: "
-                   "there she would not be steered")
+        out.append(
+            f"without a value in {100.0 * share:.0f} % of the square of {2.0 * seen.half_m:.0f} m about it: "
+            "there she would not be steered"
+        )
     return out
 
 

@@ -39,10 +39,10 @@ every port and refuses what is not signed on all but USB. Mission Planner and QG
 passphrase: give them the one that was asked for by 'key new --passphrase'.
 Exit codes: 0 done and seen, 1 not, 2 a file or option that cannot be believed.
 """
-WAIT_S = 15.0       # for the autopilot
-TRIES = 3           # a link may lose the one message
-TAKES_S = 0.5       # for the key to be taken up
-ANSWERS_S = 6.0     # a signed autopilot answers within this
+WAIT_S = 15.0  # for the autopilot
+TRIES = 3  # a link may lose the one message
+TAKES_S = 0.5  # for the key to be taken up
+ANSWERS_S = 6.0  # a signed autopilot answers within this
 # The autopilot takes a key's time up a minute ahead, and refuses a newcomer more than a minute behind it.
 BEHIND_TICKS = 60 * 100_000
 
@@ -131,7 +131,7 @@ async def take_off(link: Opens, store: SigningStore, *, system: int | None, asks
 
 @asynccontextmanager
 async def _connected(
-    link: Opens, store: SigningStore | None, system: int | None, wait_s: float = WAIT_S,
+    link: Opens, store: SigningStore | None, system: int | None, wait_s: float = WAIT_S
 ) -> AsyncIterator[tuple[Autopilot, str]]:
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
@@ -158,8 +158,9 @@ def _tell(autopilot: Autopilot, key: bytes, timestamp: int) -> None:
     from pymavlink.dialects.v20 import ardupilotmega as wire
 
     party = autopilot.link.party
-    autopilot.link.send(wire.MAVLink_setup_signing_message(
-        party.target_system, party.target_component, list(key), timestamp))
+    autopilot.link.send(
+        wire.MAVLink_setup_signing_message(party.target_system, party.target_component, list(key), timestamp)
+    )
 
 
 async def _require_disarmed(autopilot: Autopilot) -> None:

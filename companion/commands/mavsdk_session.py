@@ -38,8 +38,9 @@ def mavsdk_url(link: str) -> str:
 def home_item(items: Sequence[MissionItem], home: GeoPoint | None) -> MissionItem:
     """Return item 0 of a mission: home, else the first place of the list."""
     point = home or next((i.point for i in items if i.lat_e7 or i.lon_e7), GeoPoint(lat_deg=0.0, lon_deg=0.0))
-    return MissionItem(command=Command.NAV_WAYPOINT, lat_e7=round(point.lat_deg * 1e7),
-                       lon_e7=round(point.lon_deg * 1e7), frame=0)
+    return MissionItem(
+        command=Command.NAV_WAYPOINT, lat_e7=round(point.lat_deg * 1e7), lon_e7=round(point.lon_deg * 1e7), frame=0
+    )
 
 
 def to_mavsdk(number: int, item: MissionItem, kind: MissionType) -> Any:
@@ -47,16 +48,34 @@ def to_mavsdk(number: int, item: MissionItem, kind: MissionType) -> Any:
     from mavsdk.plugins.mission_raw import MissionItem as RawItem
 
     p1, p2, p3, p4 = item.params
-    return RawItem(number, item.frame, int(item.command), int(number == 0), int(item.autocontinue), p1, p2, p3, p4,
-                   item.lat_e7, item.lon_e7, item.alt_m, int(kind))
+    return RawItem(
+        number,
+        item.frame,
+        int(item.command),
+        int(number == 0),
+        int(item.autocontinue),
+        p1,
+        p2,
+        p3,
+        p4,
+        item.lat_e7,
+        item.lon_e7,
+        item.alt_m,
+        int(kind),
+    )
 
 
 def from_mavsdk(item: Any) -> MissionItem:
     """Return an item of MAVSDK's as ours."""
     params = tuple(float(p) if p == p else 0.0 for p in (item.param1, item.param2, item.param3, item.param4))  # noqa: PLR0124
     return MissionItem(
-        command=int(item.command), lat_e7=int(item.x), lon_e7=int(item.y), alt_m=float(item.z), frame=int(item.frame),
-        params=(params[0], params[1], params[2], params[3]), autocontinue=bool(item.autocontinue),
+        command=int(item.command),
+        lat_e7=int(item.x),
+        lon_e7=int(item.y),
+        alt_m=float(item.z),
+        frame=int(item.frame),
+        params=(params[0], params[1], params[2], params[3]),
+        autocontinue=bool(item.autocontinue),
     )
 
 
@@ -70,7 +89,7 @@ def words(result: object) -> str:
 OnProgress = Callable[[float], None]  # 0..1
 
 CONNECT_TIMEOUT_S = 10.0
-SILENCE_S = 8.0        # nothing of a transfer for this long: it is dead (ArduRover itself gives up after 8 s)
+SILENCE_S = 8.0  # nothing of a transfer for this long: it is dead (ArduRover itself gives up after 8 s)
 PARAM_TIMEOUT_S = 10.0
 
 
@@ -137,13 +156,20 @@ class MavsdkSession:
         self._raw = MissionRaw(self._system)
         self._direct = MavlinkDirect(self._system)
         self._heard_s = time.monotonic()
-        for name in ("HEARTBEAT", "STATUSTEXT", "MISSION_COUNT", "MISSION_REQUEST", "MISSION_REQUEST_INT",
-                     "MISSION_ITEM_INT", "MISSION_ACK"):
+        for name in (
+            "HEARTBEAT",
+            "STATUSTEXT",
+            "MISSION_COUNT",
+            "MISSION_REQUEST",
+            "MISSION_REQUEST_INT",
+            "MISSION_ITEM_INT",
+            "MISSION_ACK",
+        ):
             self._handles.append(self._direct.subscribe_message(name, self._on_message))
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._close()
 
@@ -230,7 +256,11 @@ class MavsdkSession:
         return answer[0]
 
     def upload(
-        self, kind: MissionType, items: Sequence[MissionItem], *, home: GeoPoint | None = None,
+        self,
+        kind: MissionType,
+        items: Sequence[MissionItem],
+        *,
+        home: GeoPoint | None = None,
         on_progress: OnProgress | None = None,
     ) -> None:
         """Write a list. A mission gets ``home`` (or its first place) as item 0. Raises TransferError."""
@@ -255,7 +285,8 @@ class MavsdkSession:
         self._begin(0, on_progress)
         what = f"{NAMES[kind]} download"
         calls = {
-            MissionType.MISSION: self._raw.download_mission, MissionType.FENCE: self._raw.download_geofence,
+            MissionType.MISSION: self._raw.download_mission,
+            MissionType.FENCE: self._raw.download_geofence,
             MissionType.RALLY: self._raw.download_rallypoints,
         }
         listed = self._wait(what, calls[kind], self._raw.cancel_mission_download)
@@ -281,8 +312,14 @@ class MavsdkSession:
         from mavsdk.plugins.mavlink_direct import MavlinkMessage
 
         fields = {"target_system": self._system.get_system_id(), "target_component": 1, "mission_type": int(kind)}
-        message = MavlinkMessage(message_name="MISSION_CLEAR_ALL", system_id=0, component_id=0, target_system_id=0,
-                                 target_component_id=0, fields_json=json.dumps(fields))
+        message = MavlinkMessage(
+            message_name="MISSION_CLEAR_ALL",
+            system_id=0,
+            component_id=0,
+            target_system_id=0,
+            target_component_id=0,
+            fields_json=json.dumps(fields),
+        )
         self._wait(f"{NAMES[kind]} clear", lambda: self._direct.send_message(message))
 
     def get_param(self, name: str) -> float:
@@ -348,8 +385,12 @@ def progress_bar(title: str) -> Iterator[OnProgress]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
-    columns = (TextColumn("{task.description:>18}"), BarColumn(), TextColumn("{task.percentage:3.0f} %"),
-               TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description:>18}"),
+        BarColumn(),
+        TextColumn("{task.percentage:3.0f} %"),
+        TimeElapsedColumn(),
+    )
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
         task = progress.add_task(title, total=1.0)
         yield lambda done: progress.update(task, completed=done)
@@ -357,7 +398,7 @@ def progress_bar(title: str) -> Iterator[OnProgress]:
 
 
 def upload_and_compare(
-    session: MavsdkSession, kind: MissionType, items: Sequence[MissionItem], *, home: GeoPoint | None = None,
+    session: MavsdkSession, kind: MissionType, items: Sequence[MissionItem], *, home: GeoPoint | None = None
 ) -> str:
     """Write a list, read it back, compare, and return its hash. Raises TransferError where they differ."""
     from companion.mavlink.wire import first_difference, mission_hash

@@ -81,8 +81,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     convert = verbs.add_parser("convert", help="write a mission in another format and say what it does not carry")
     convert.add_argument("file", metavar="FILE")
     convert.add_argument("out", metavar="OUT", help="its extension is the format")
-    convert.add_argument("--part", choices=("mission", "fence", "rally"),
-                         help="write this alone (a .waypoints file holds no more than one of them)")
+    convert.add_argument(
+        "--part",
+        choices=("mission", "fence", "rally"),
+        help="write this alone (a .waypoints file holds no more than one of them)",
+    )
     convert.add_argument("--lossy", action="store_true", help="write even if zones are left out")
     point_radius_option(convert)
     force_option(convert)
@@ -121,8 +124,10 @@ def _example(args: argparse.Namespace) -> int:
     width = max(len(path.name) for path in missions)
     for path, text in told.items():
         print(f"{path.name:{width}}  {tomllib.loads(text)['description']}")
-    print(f"{counted(len(missions), 'mission')} in {args.folder}; next: companion mission check {args.folder}/"
-          f"{missions[0].name} --plot {missions[0].stem}.png")
+    print(
+        f"{counted(len(missions), 'mission')} in {args.folder}; next: companion mission check {args.folder}/"
+        f"{missions[0].name} --plot {missions[0].stem}.png"
+    )
     return 0
 
 
@@ -148,16 +153,20 @@ def _check(args: argparse.Namespace) -> int:
         from companion.mission_check import passage_words
 
         print(passage_words(mission))
-        print(f"{args.file}: note: a passage needs FENCE_TYPE 4 on the autopilot, its polygons alone: with bit 2 the "
-              "circle round home would end it (companion doctor looks)")
+        print(
+            f"{args.file}: note: a passage needs FENCE_TYPE 4 on the autopilot, its polygons alone: with bit 2 the "
+            "circle round home would end it (companion doctor looks)"
+        )
     limits = wind_limit_words(mission)
     if limits:
         print(f"{args.file}: {limits}")
     for line in current_words_of(mission, time.time()):
         print(f"{args.file}: {line}")
-    print(f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
-          f"{counted(len(mission.area.solids), 'obstacle')}: "
-          f"{'NOT in order' if bad else 'in order'}")
+    print(
+        f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
+        f"{counted(len(mission.area.solids), 'obstacle')}: "
+        f"{'NOT in order' if bad else 'in order'}"
+    )
     if bad:
         print(f"to see it on a chart and mend it: companion mission edit {args.file}")
     return int(bad)
@@ -170,8 +179,9 @@ def _only(document: Document, part: str) -> Document:
     parts: dict[str, Document] = {
         "mission": replace(document, zones=(), marks=(), rally=(), return_point=None, tracks=()),
         "fence": replace(document, items=(), item_names=(), rally=(), home=None, tracks=()),
-        "rally": replace(document, items=(), item_names=(), zones=(), marks=(), return_point=None, home=None,
-                         tracks=()),
+        "rally": replace(
+            document, items=(), item_names=(), zones=(), marks=(), return_point=None, home=None, tracks=()
+        ),
     }
     if summary(parts[part]) == "nothing":
         raise JobError(f"{document.source}: there is no {part} in it; it holds {summary(document)}")
@@ -204,9 +214,14 @@ def _convert(args: argparse.Namespace) -> int:
         return 0
     if args.part is not None:
         document = _only(document, args.part)
-    write_out(write(document, args.out), args.out, lossy=args.lossy, force=args.force,
-              remedy="choose another format, or what to write with --part")
-    print(f"{args.out}: written: {summary(read(args.out))}")   # what is in it, not what was meant to be
+    write_out(
+        write(document, args.out),
+        args.out,
+        lossy=args.lossy,
+        force=args.force,
+        remedy="choose another format, or what to write with --part",
+    )
+    print(f"{args.out}: written: {summary(read(args.out))}")  # what is in it, not what was meant to be
     return 0
 
 
@@ -215,8 +230,12 @@ def _upload(args: argparse.Namespace) -> int:
     from companion.messages import MissionType
 
     if Path(args.file).suffix.lower() == ".toml":
-        raise InputError(args.file, "", "holds goals, not the way to them",
-                         "sail it with 'companion run', or convert it to .waypoints to sail straight lines")
+        raise InputError(
+            args.file,
+            "",
+            "holds goals, not the way to them",
+            "sail it with 'companion run', or convert it to .waypoints to sail straight lines",
+        )
     document = _only(read_mission_file(args.file), args.part)
     kind = MissionType.RALLY if args.part == "rally" else MissionType.MISSION
     items = document.rally if kind is MissionType.RALLY else document.items
@@ -244,8 +263,13 @@ def _download(args: argparse.Namespace) -> int:
     if not items:
         print(f"the autopilot holds no {args.part}; nothing is written", file=sys.stderr)
         return 1
-    document = Document(source="autopilot", format="autopilot", items=items if args.part == "mission" else (),
-                        rally=items if args.part == "rally" else (), home=home)
+    document = Document(
+        source="autopilot",
+        format="autopilot",
+        items=items if args.part == "mission" else (),
+        rally=items if args.part == "rally" else (),
+        home=home,
+    )
     write_out(write(document, args.out, part=args.part), args.out, lossy=False, force=args.force)
     print(f"{args.out}: written: {summary(document)}, hash {mission_hash(items)}")
     return 0
@@ -256,19 +280,26 @@ def add_new(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     new = verbs.add_parser("new", help="make a mission TOML with its area files")
     new.add_argument("out", metavar="OUT.toml")
     new.add_argument("--from", dest="source", metavar="FILE", help="a drawing: .plan, .waypoints, GPX, KML, GeoJSON")
-    new.add_argument("--start", type=place, metavar="LAT,LON",
-                     help="where the boat will start (else the drawing's home)")
+    new.add_argument(
+        "--start", type=place, metavar="LAT,LON", help="where the boat will start (else the drawing's home)"
+    )
     new.add_argument("--goal", type=place, metavar="LAT,LON", action="append", default=[], help="in order; repeat it")
     new.add_argument("--land", metavar="FILE", action="append", default=[], help="obstacles, any format; repeat it")
     new.add_argument("--fence", metavar="FILE", help="water to stay inside of, any format")
     new.add_argument("--axis", choices=("auto", "lonlat", "latlon"), default="auto", help="order of WKT coordinates")
     new.add_argument("--name", help="of the mission (else of the file)")
-    new.add_argument("--margin", type=number("m", at_least=0.0, at_most=1000.0), metavar="M",
-                     help="what plans keep clear of everything (what the autopilot's habits ask for)")
-    new.add_argument("--link", metavar="LINK",
-                     help="ask the autopilot there for its habits (else ArduRover's defaults)")
-    new.add_argument("--system", type=system_id, metavar="N",
-                     help="the autopilot's MAVLink system id (default: the only one heard)")
+    new.add_argument(
+        "--margin",
+        type=number("m", at_least=0.0, at_most=1000.0),
+        metavar="M",
+        help="what plans keep clear of everything (what the autopilot's habits ask for)",
+    )
+    new.add_argument(
+        "--link", metavar="LINK", help="ask the autopilot there for its habits (else ArduRover's defaults)"
+    )
+    new.add_argument(
+        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
+    )
     new.add_argument("--radius", type=number("m", above=0.0, at_most=5000.0), metavar="M", help="of the goals (10)")
     point_radius_option(new)
     force_option(new)
@@ -291,15 +322,20 @@ def _proposed_margin(args: argparse.Namespace) -> ProposedMargin | None:
         limits, source = AutopilotLimits(), "ArduRover's default parameters; --link asks the autopilot"
     boat = Boat(polar=ardurover_sitl())
     proposed = proposed_margin(
-        limits, speed_mps=boat.polar.max_speed_mps(WindOptions().preview_speed_mps), hull=boat.hull)
+        limits, speed_mps=boat.polar.max_speed_mps(WindOptions().preview_speed_mps), hull=boat.hull
+    )
     print(f"{args.out}: note: margin_m = {proposed.margin_m:g}: {proposed.margin.describe()} ({source})")
     return proposed
 
 
 def point_radius_option(parser: argparse.ArgumentParser) -> None:
     """Add --point-radius."""
-    parser.add_argument("--point-radius", type=number("m", above=0.0, at_most=5000.0), metavar="M",
-                        help="radius of an obstacle that is a point or line (a mission takes 10)")
+    parser.add_argument(
+        "--point-radius",
+        type=number("m", above=0.0, at_most=5000.0),
+        metavar="M",
+        help="radius of an obstacle that is a point or line (a mission takes 10)",
+    )
 
 
 def run_new(args: argparse.Namespace) -> int:
@@ -324,9 +360,15 @@ def run_new(args: argparse.Namespace) -> int:
     proposed = _proposed_margin(args)
     try:
         made = mission_files(
-            drawing, args.name or out.stem, start=args.start, goals=tuple(args.goal), land=land, radius_m=args.radius,
+            drawing,
+            args.name or out.stem,
+            start=args.start,
+            goals=tuple(args.goal),
+            land=land,
+            radius_m=args.radius,
             margin_m=args.margin if proposed is None else proposed.margin_m,
-            floor_m=None if proposed is None else proposed.floor_m, point_radius_m=args.point_radius,
+            floor_m=None if proposed is None else proposed.floor_m,
+            point_radius_m=args.point_radius,
         )
     except ValueError as error:
         raise InputError(args.source or "companion mission new", "", str(error)) from None
@@ -356,8 +398,12 @@ def write_mission(made: MissionFiles, out: Path, *, force: bool) -> Mission:
         try:
             mission = load_mission(Path(folder) / out.name)
         except InputError as error:
-            raise InputError(str(out.parent / Path(error.source).name), error.place, error.problem,
-                             error.remedy or "nothing is written") from None
+            raise InputError(
+                str(out.parent / Path(error.source).name),
+                error.place,
+                error.problem,
+                error.remedy or "nothing is written",
+            ) from None
     write_files(files, force=force)
     for name in files:
         print(f"{name}: written")
@@ -379,16 +425,30 @@ drawn stays in the file as it stands, comments included. Ctrl-C ends it.
 def add_edit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add the verb."""
     edit = verbs.add_parser(
-        "edit", help="draw a mission in a browser, checked and planned as you draw",
+        "edit",
+        help="draw a mission in a browser, checked and planned as you draw",
         description="Draw a mission in a browser: goals, gates, boxes, obstacles, fence, refuges, the start. What "
         "`companion mission check` finds and what a plan would be in a wind of your choice are shown as you draw. A "
         "file that is not there begins an empty mission.",
-        epilog=_EDIT_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter)
+        epilog=_EDIT_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     edit.add_argument("file", metavar="FILE.toml")
-    edit.add_argument("--http", type=http_address, default=("127.0.0.1", 0), metavar="[HOST:]PORT",
-                      help="where to serve it (default: a free port of this machine, for this machine only)")
-    edit.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
-                      help="a further name under which this machine's page may be asked for")
+    edit.add_argument(
+        "--http",
+        type=http_address,
+        default=("127.0.0.1", 0),
+        metavar="[HOST:]PORT",
+        help="where to serve it (default: a free port of this machine, for this machine only)",
+    )
+    edit.add_argument(
+        "--http-name",
+        type=host_name,
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a further name under which this machine's page may be asked for",
+    )
     chart_option(edit)
     edit.set_defaults(run=run_edit)
 
@@ -401,8 +461,12 @@ def run_edit(args: argparse.Namespace) -> int:
 
     path = Path(args.file)
     if path.suffix.lower() != ".toml":
-        raise InputError(args.file, "", "a mission file ends in .toml",
-                         "make one of a drawing: companion mission new OUT.toml --from FILE")
+        raise InputError(
+            args.file,
+            "",
+            "a mission file ends in .toml",
+            "make one of a drawing: companion mission new OUT.toml --from FILE",
+        )
     import tomlkit  # noqa: F401 - said now where it is missing, and not when somebody saves
 
     base: SourceFiles = read_base(path)
@@ -423,10 +487,12 @@ def run_edit(args: argparse.Namespace) -> int:
 
 def preview_options(parser: argparse.ArgumentParser) -> None:
     """Add --plot and what it assumes."""
-    parser.add_argument("--plot", type=picture, metavar="P.png",
-                        help="draw obstacles, fence, margins, laylines and a plan")
-    parser.add_argument("--wind", type=wind, metavar="SPEED@FROM",
-                        help="for the picture [m/s, degrees] (else the mission's, 5@0)")
+    parser.add_argument(
+        "--plot", type=picture, metavar="P.png", help="draw obstacles, fence, margins, laylines and a plan"
+    )
+    parser.add_argument(
+        "--wind", type=wind, metavar="SPEED@FROM", help="for the picture [m/s, degrees] (else the mission's, 5@0)"
+    )
     parser.add_argument("--no-plan", action="store_true", help="draw no plan")
 
 
@@ -441,7 +507,10 @@ def preview(mission: Mission, args: argparse.Namespace) -> None:
     twd_from_rad, boat = math.radians(from_deg), boat_of(mission)
     with patience("planning and drawing"):
         lines = save_mission(
-            mission, args.plot, tws_mps=tws_mps, twd_from_rad=twd_from_rad,
+            mission,
+            args.plot,
+            tws_mps=tws_mps,
+            twd_from_rad=twd_from_rad,
             beat_rad=boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad,
             plans=[] if args.no_plan else _plans(mission, tws_mps, twd_from_rad),
         )
@@ -459,8 +528,10 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
     by = planner_of(mission).about(mission.frame().origin)
     return planned_legs(
         legs(mission, AssumedWind(from_deg=math.degrees(twd_from_rad), speed_mps=tws_mps), unix_s=time.time()),
-        lambda problem: plan(problem, budget_s=mission.skipper.planning_budget_s, seed=0, algorithm=by.algorithm,
-                             settings=by.settings))
+        lambda problem: plan(
+            problem, budget_s=mission.skipper.planning_budget_s, seed=0, algorithm=by.algorithm, settings=by.settings
+        ),
+    )
 
 
 def read_mission_file(path: str) -> Document:

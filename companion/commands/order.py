@@ -42,22 +42,32 @@ the same, ask why.
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     lines = "\n".join(
-        f"  {'*' if row.stands else ' '} {f'{row.verb} {row.takes}'.rstrip():<15} {row.means}" for row in TABLE)
+        f"  {'*' if row.stands else ' '} {f'{row.verb} {row.takes}'.rstrip():<15} {row.means}" for row in TABLE
+    )
     parser = subparsers.add_parser(
-        "order", help=summary,
+        "order",
+        help=summary,
         description="Give an order to the companion on board and print its answer. It is sent through the autopilot's "
         "link and repeated until it is acknowledged. Speaks as system 254: never as a ground station whose silence "
         "afterwards would set off the autopilot's failsafe.",
-        epilog=_EPILOG.format(verbs=lines), formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog=_EPILOG.format(verbs=lines),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("words", nargs="*", metavar="VERB [ARGS]", help="the order, see below")
-    parser.add_argument("--link", metavar="LINK",
-                        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument(
+        "--link", metavar="LINK", help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT"
+    )
     parser.add_argument("--socket", type=Path, metavar="PATH", help="on board, in place of a link: as the companion's")
-    parser.add_argument("--system", type=system_id, metavar="N",
-                        help="the autopilot's MAVLink system id (default: the only one heard)")
-    parser.add_argument("--timeout", type=number("s", above=0.0), default=15.0, metavar="S",
-                        help="for the autopilot to be heard, and again for the answer (default: 15)")
+    parser.add_argument(
+        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
+    )
+    parser.add_argument(
+        "--timeout",
+        type=number("s", above=0.0),
+        default=15.0,
+        metavar="S",
+        help="for the autopilot to be heard, and again for the answer (default: 15)",
+    )
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (mode 0600)")
     parser.add_argument("--qgc", type=Path, metavar="FILE", help="write QGroundControl's buttons and end")
     force_option(parser)
@@ -70,9 +80,14 @@ def run(args: argparse.Namespace) -> int:
         return _write_buttons(args)
     wanted = phrase(args.words)
     if (args.link is None) == (args.socket is None):
-        raise InputError("--link", "", "is missing: there is nobody to give the order to" if args.link is None else
-                         "and --socket are two ways for one order",
-                         "name the link of the radio, as --link /dev/ttyUSB0:57600, or on board --socket PATH")
+        raise InputError(
+            "--link",
+            "",
+            "is missing: there is nobody to give the order to"
+            if args.link is None
+            else "and --socket are two ways for one order",
+            "name the link of the radio, as --link /dev/ttyUSB0:57600, or on board --socket PATH",
+        )
     from companion.clock import run as run_loop
     from companion.errors import LinkError
     from companion.orders import Result
@@ -83,8 +98,9 @@ def run(args: argparse.Namespace) -> int:
         sys.stderr.write(f"companion order: {error}\n")
         return EXIT_NO_ANSWER
     if answer.result is Result.NO_ANSWER:
-        sys.stderr.write(f"companion order: {answer.text} from the companion; `companion status` says whether it is "
-                         "heard\n")
+        sys.stderr.write(
+            f"companion order: {answer.text} from the companion; `companion status` says whether it is heard\n"
+        )
         return EXIT_NO_ANSWER
     is_done = answer.result is Result.DONE
     print(f"{wanted.words}: {'' if is_done else f'{answer.result.value}: '}{answer.text}")
@@ -104,7 +120,7 @@ async def _give(args: argparse.Namespace, wanted: Wanted) -> Answer:
 
     signing = None if args.signing_key is None else SigningStore(args.signing_key, time.time())
     async with Link(
-        open_link(args.link), identity=SHORE, target_system=args.system, streams=(), is_quiet=True, signing=signing,
+        open_link(args.link), identity=SHORE, target_system=args.system, streams=(), is_quiet=True, signing=signing
     ) as link:
         await link.wait_autopilot(args.timeout)
         return await give(link, wanted, give_up_s=args.timeout)

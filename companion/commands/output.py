@@ -44,17 +44,17 @@ def summary(document: Document) -> str:
     counts = [
         (sum(z.kind is ZoneKind.INCLUSION for z in document.zones), "keep-in zone"),
         (sum(z.kind is ZoneKind.EXCLUSION for z in document.zones), "keep-out zone"),
-        (len(document.marks), "point or line"), (len(document.items), "mission item"),
-        (len(document.rally), "rally point"), (len(document.tracks), "track"),
+        (len(document.marks), "point or line"),
+        (len(document.items), "mission item"),
+        (len(document.rally), "rally point"),
+        (len(document.tracks), "track"),
     ]
     vertices = sum(1 if isinstance(z.shape, Circle) else len(z.shape.exterior.coords) - 1 for z in document.zones)
     words = ", ".join(counted(n, word) for n, word in counts if n)
     return (words or "nothing") + (f" ({counted(vertices, 'fence item')})" if document.zones else "")
 
 
-def write_out(
-    written: Written, out: str, *, lossy: bool, force: bool, remedy: str = "choose another format",
-) -> None:
+def write_out(written: Written, out: str, *, lossy: bool, force: bool, remedy: str = "choose another format") -> None:
     """Write a file, or refuse: when it would hold nothing, or protect less than its source without ``--lossy``."""
     from companion.geofence import FindingLevel
 
@@ -85,8 +85,11 @@ def refuse_existing(names: Sequence[str], *, force: bool) -> None:
 @contextlib.contextmanager
 def patience(doing: str) -> Iterator[None]:
     """Say on stderr why nothing happens when the work within takes long: the first time on a machine it does."""
-    waiting = threading.Timer(PATIENCE_S, sys.stderr.write, (
-        f"note: {doing}; the first time on a machine kernels are compiled and fonts are listed, which takes long\n",))
+    waiting = threading.Timer(
+        PATIENCE_S,
+        sys.stderr.write,
+        (f"note: {doing}; the first time on a machine kernels are compiled and fonts are listed, which takes long\n",),
+    )
     waiting.daemon = True
     waiting.start()
     try:

@@ -41,19 +41,26 @@ problem cannot be read or planned.
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command's options."""
     parser = add_command(subparsers, "plan", summary, _EPILOG)
-    parser.add_argument("problem", metavar="PROBLEM.json", help="the planning problem, or a mission TOML, planned from "
-                        "goal to goal in a wind held steady")
-    parser.add_argument("--wind", type=wind, metavar="SPEED@FROM",
-                        help="of a mission [m/s, degrees] (else what its previews assume)")
-    parser.add_argument("--budget", type=number("s", above=0.0), metavar="S",
-                        help="computing time [s]; 1 unless --expansions is given")
-    parser.add_argument("--expansions", type=whole(at_least=1), metavar="N",
-                        help="effort in the algorithm's own steps instead")
+    parser.add_argument(
+        "problem",
+        metavar="PROBLEM.json",
+        help="the planning problem, or a mission TOML, planned from goal to goal in a wind held steady",
+    )
+    parser.add_argument(
+        "--wind", type=wind, metavar="SPEED@FROM", help="of a mission [m/s, degrees] (else what its previews assume)"
+    )
+    parser.add_argument(
+        "--budget", type=number("s", above=0.0), metavar="S", help="computing time [s]; 1 unless --expansions is given"
+    )
+    parser.add_argument(
+        "--expansions", type=whole(at_least=1), metavar="N", help="effort in the algorithm's own steps instead"
+    )
     parser.add_argument("--seed", type=whole(), default=0, metavar="N", help="of every random choice (default 0)")
     parser.add_argument("--algorithm", default="auto", choices=tuple(ALGORITHMS))
     parser.add_argument("--explain", action="store_true", help="say what bound each leg and what would change the plan")
-    parser.add_argument("--explain-budget", type=number("s", above=0.0), default=5.0, metavar="S",
-                        help="computing time for that [s]")
+    parser.add_argument(
+        "--explain-budget", type=number("s", above=0.0), default=5.0, metavar="S", help="computing time for that [s]"
+    )
     parser.add_argument("--out", type=out_file, metavar="PLAN.json", help="write the plan")
     parser.add_argument("--plot", type=picture, metavar="P.png", help="draw problem, search, path and bound")
     parser.add_argument("--json", action="store_true", help="print the plan as JSON instead of text")
@@ -81,8 +88,12 @@ def run(args: argparse.Namespace) -> int:
         from companion.plots.plan import save_plan
 
         if len(answers) > 1:
-            raise InputError("--plot", str(args.plot), "one plan is drawn, and this mission wants several",
-                             "companion mission check --plot draws them all")
+            raise InputError(
+                "--plot",
+                str(args.plot),
+                "one plan is drawn, and this mission wants several",
+                "companion mission check --plot draws them all",
+            )
         with patience("drawing"):
             save_plan(*answers[0], args.plot, **ground)
     if args.json:
@@ -104,7 +115,8 @@ def _answer(problem: Problem, args: argparse.Namespace) -> tuple[Problem, Plan]:
     # what is asked for may take long by itself: the time it was given is no surprise
     with patience("planning") if args.budget is None else contextlib.nullcontext():
         answer = plan(
-            problem, budget_s=args.budget, expansions=args.expansions, seed=args.seed, algorithm=args.algorithm)
+            problem, budget_s=args.budget, expansions=args.expansions, seed=args.seed, algorithm=args.algorithm
+        )
     if args.explain:
         from companion.planner.explain import explain
 
@@ -167,12 +179,20 @@ def describe(problem: Problem, answer: Plan, margin_m: float = 0.0) -> str:
         return "\n".join(lines)
     length = sum(leg.length_m for leg in answer.legs)
     judged = evaluate(problem, answer.waypoints_en)
-    gap = f", {100.0 * answer.gap:.1f} % above the bound of {answer.lower_bound_s:.1f} s" if math.isfinite(answer.gap) \
+    gap = (
+        f", {100.0 * answer.gap:.1f} % above the bound of {answer.lower_bound_s:.1f} s"
+        if math.isfinite(answer.gap)
         else ""
+    )
     lines += [
         f"{answer.status.value}: {answer.cost_s:.1f} s{gap}",
-        ", ".join((f"{length:.0f} m in {counted(len(courses(answer.legs)), 'course')}{_of_legs(answer)}",
-                   counted(judged.tacks, "tack"), counted(judged.gybes, "gybe"))),
+        ", ".join(
+            (
+                f"{length:.0f} m in {counted(len(courses(answer.legs)), 'course')}{_of_legs(answer)}",
+                counted(judged.tacks, "tack"),
+                counted(judged.gybes, "gybe"),
+            )
+        ),
         _risk_text(problem, answer),
         *_of_wind(problem, answer),
         *_current_text(problem),
@@ -212,8 +232,12 @@ def _current_text(problem: Problem) -> list[str]:
     if drift_mps == 0.0:
         return []
     set_deg, from_deg = math.degrees(problem.current.set_rad), math.degrees(problem.wind.twd_from_rad) % 360.0
-    return [(f"current: sets {set_deg:03.0f}° {drift_mps:.2f} m/s; headings and angles are through the water, the wind "
-             f"over it is from {from_deg:03.0f}°")]
+    return [
+        (
+            f"current: sets {set_deg:03.0f}° {drift_mps:.2f} m/s; headings and angles are through the water, the wind "
+            f"over it is from {from_deg:03.0f}°"
+        )
+    ]
 
 
 def _of_legs(answer: Plan) -> str:
@@ -229,23 +253,29 @@ def _table(answer: Plan) -> list[str]:
         clearances = [leg.clearance_m for leg in course.legs if leg.clearance_m is not None]
         risks = [leg.risk for leg in course.legs if leg.risk is not None]
         headings = [math.degrees(heading) for heading in course.headings_rad]
-        rows.append((
-            str(place), _range(*headings), _range(*course.span(lambda leg: math.degrees(abs(leg.twa_rad)))),
-            "stbd" if first.twa_rad > 0.0 else "port",  # the side the wind comes over
-            f"{course.length_m:.0f} m", f"{first.start_s:.0f} s", f"{last.end_s:.0f} s",
-            _range(*course.span(lambda leg: math.degrees(leg.no_go_half_rad))),
-            _range(*course.span(lambda leg: math.degrees(leg.margin_rad))),
-            f"{min(clearances):.0f} m" if clearances else "-",
-            # at most: as if the legs' chances excluded one another
-            f"{100.0 * min(1.0, sum(risks)):.2f} %" if risks else "-",
-        ))
+        rows.append(
+            (
+                str(place),
+                _range(*headings),
+                _range(*course.span(lambda leg: math.degrees(abs(leg.twa_rad)))),
+                "stbd" if first.twa_rad > 0.0 else "port",  # the side the wind comes over
+                f"{course.length_m:.0f} m",
+                f"{first.start_s:.0f} s",
+                f"{last.end_s:.0f} s",
+                _range(*course.span(lambda leg: math.degrees(leg.no_go_half_rad))),
+                _range(*course.span(lambda leg: math.degrees(leg.margin_rad))),
+                f"{min(clearances):.0f} m" if clearances else "-",
+                # at most: as if the legs' chances excluded one another
+                f"{100.0 * min(1.0, sum(risks)):.2f} %" if risks else "-",
+            )
+        )
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return ["  " + "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
 
 
 def _range(begin: float, end: float) -> str:
     """Return degrees, or from where to where they go."""
-    low, high = (f"{round(value, 1) + 0.0:.1f}" for value in (begin, end))   # + 0: no minus before a zero
+    low, high = (f"{round(value, 1) + 0.0:.1f}" for value in (begin, end))  # + 0: no minus before a zero
     return f"{low}°" if low == high else f"{low}..{high}°"
 
 
@@ -259,6 +289,8 @@ def _risk_text(problem: Problem, answer: Plan) -> str:
         # the words of the plan have the parts
         return f"off the plan: at most {100.0 * risk.total:.1f} % of such voyages meet the no-go zone or a vessel"
     limit = f" (limit {100.0 * problem.risk.max_path_risk:.1f} %)" if problem.risk is not None else ""
-    return ("off the plan: the wind forces the boat to tack or bear away unplanned on at most "
-            f"{100.0 * risk.total:.1f} % of such voyages{limit}; {100.0 * (1.0 - problem.delta_s):.0f} % is allowed at "
-            "each instant")
+    return (
+        "off the plan: the wind forces the boat to tack or bear away unplanned on at most "
+        f"{100.0 * risk.total:.1f} % of such voyages{limit}; {100.0 * (1.0 - problem.delta_s):.0f} % is allowed at "
+        "each instant"
+    )

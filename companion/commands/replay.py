@@ -13,7 +13,8 @@ SHOWN = 5
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "replay", help=summary,
+        "replay",
+        help=summary,
         description="Feed a recorded voyage's messages, outcomes and ticks through today's code and compare every "
         "action with the one recorded. Exit code 1 when something differs.",
         epilog="Example: companion replay voyages/20260714T101500Z-archipelago",
@@ -29,12 +30,16 @@ def run(args: argparse.Namespace) -> int:
     from companion.words import counted
 
     report = replay(args.voyage, args.mission)
-    print(f"{counted(report.steps, 'step')}, {counted(report.messages, 'message')}, "
-          f"{counted(report.actions, 'action')}, {counted(report.restarts, 'restart')}: "
-          f"{counted(len(report.differences), 'difference')}")
+    print(
+        f"{counted(report.steps, 'step')}, {counted(report.messages, 'message')}, "
+        f"{counted(report.actions, 'action')}, {counted(report.restarts, 'restart')}: "
+        f"{counted(len(report.differences), 'difference')}"
+    )
     if report.lost:
-        print(f"{counted(report.lost, 'message')} that the steps heard were not found in the telemetry log: "
-              "what differs may be for want of them")
+        print(
+            f"{counted(report.lost, 'message')} that the steps heard were not found in the telemetry log: "
+            "what differs may be for want of them"
+        )
     if report.unrecorded:
         print(f"{counted(report.unrecorded, 'more step')} came after a gap in the records, and were not compared")
     for difference in report.differences[:SHOWN]:

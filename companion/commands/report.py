@@ -14,7 +14,7 @@ from companion.program.arguments import out_file, picture
 from companion.program.commands import missing
 from companion.words import counted
 
-TRACKS = (".gpx", ".kml", ".kmz", ".geojson")   # the formats that hold a track
+TRACKS = (".gpx", ".kml", ".kmz", ".geojson")  # the formats that hold a track
 
 if TYPE_CHECKING:
     from companion.geofence import Document
@@ -24,15 +24,28 @@ if TYPE_CHECKING:
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "report", help=summary, description="Tell a recorded voyage in words, draw it, and write its track.",
+        "report",
+        help=summary,
+        description="Tell a recorded voyage in words, draw it, and write its track.",
         epilog="Examples: companion report voyages/*; companion report voyages/20260714T101500Z-archipelago --track "
         "day.gpx",
     )
-    parser.add_argument("voyage", type=Path, nargs="+", metavar="VOYAGE_DIR",
-                        help="a folder that `companion run` left; of several, files among them are passed over")
+    parser.add_argument(
+        "voyage",
+        type=Path,
+        nargs="+",
+        metavar="VOYAGE_DIR",
+        help="a folder that `companion run` left; of several, files among them are passed over",
+    )
     parser.add_argument("--out", type=picture, metavar="FILE", help="the picture (default: voyage.png in the folder)")
-    parser.add_argument("--track", type=out_file, action="append", default=[], metavar="FILE",
-                        help=f"write the track as {', '.join(TRACKS)}; may be given more than once")
+    parser.add_argument(
+        "--track",
+        type=out_file,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help=f"write the track as {', '.join(TRACKS)}; may be given more than once",
+    )
     force_option(parser)
     parser.add_argument("--json", action="store_true", help="print summary.json and draw nothing")
     parser.set_defaults(run=run)
@@ -42,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     """Run the command: tell each voyage that can be read, and return the worst exit code."""
     voyages = args.voyage
     if len(voyages) > 1:
-        voyages = [path for path in voyages if not path.is_file()]   # the state for a restart lies among them
+        voyages = [path for path in voyages if not path.is_file()]  # the state for a restart lies among them
         for option, given in (("--out", args.out), ("--track", args.track), ("--json", args.json)):
             if given:
                 raise InputError(option, "", f"is of one voyage, and {len(args.voyage)} are named", "name one")
@@ -71,8 +84,9 @@ def _tell(folder: Path, args: argparse.Namespace) -> None:
         format_of(path, TRACKS)
     record = read_voyage(folder)
     for path in args.track:
-        write_out(write(track_of(record), path), str(path), lossy=False, force=args.force,
-                  remedy=f"write {', '.join(TRACKS)}")
+        write_out(
+            write(track_of(record), path), str(path), lossy=False, force=args.force, remedy=f"write {', '.join(TRACKS)}"
+        )
     if args.json:
         print(json.dumps(record.figures, indent=1))
         return
@@ -124,12 +138,16 @@ def in_words(record: VoyageRecord) -> list[str]:
         lines.append(f"Nearest to an obstacle or the fence: {s.min_clearance_m:.1f} m{promised}, {touched}.")
     if s.promised_risk is not None:
         whole = "" if s.path_risk is None else f"Off the plan: up to {100.0 * s.path_risk:.0f} % was told. "
-        lines.append(f"{whole}At each instant the wind had up to {100.0 * s.promised_risk:.0f} % to force her into "
-                     f"the no-go zone; entered {_times(s.no_go_entries)}.")
+        lines.append(
+            f"{whole}At each instant the wind had up to {100.0 * s.promised_risk:.0f} % to force her into "
+            f"the no-go zone; entered {_times(s.no_go_entries)}."
+        )
     lines += ranges_in_words(s.figures)
     if s.servos:
-        moved = "; ".join(f"output {number} {_times(servo.movements)}, {servo.travel_us} us in all"
-                          for number, servo in s.servos.items())
+        moved = "; ".join(
+            f"output {number} {_times(servo.movements)}, {servo.travel_us} us in all"
+            for number, servo in s.servos.items()
+        )
         lines.append(f"Servos moved: {moved}. SERVOn_FUNCTION says what they are (26 rudder, 89 sheet).")
     if s.alerts:
         said = ", ".join(f"{code} {_times(number)}" for code, number in sorted(s.alerts.items()))

@@ -37,7 +37,8 @@ if TYPE_CHECKING:
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "run", help=summary,
+        "run",
+        help=summary,
         description="Sail a mission: estimate the wind, plan, upload, and plan again at each waypoint. Nothing is "
         "sent to the boat that the mission's [operator] table does not allow.",
         epilog="Exit codes: 0 arrived, 1 not, 2 an order that gets no better by trying again, 66 a file that is not "
@@ -45,72 +46,167 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "missions/archipelago.toml --link udpin:127.0.0.1:14551; companion run --from-autopilot boat.toml --link "
         "udpin:127.0.0.1:14551",
     )
-    parser.add_argument("mission", type=Path, nargs="?", metavar="MISSION.toml",
-                        help="the mission file; beside a drawing its boat, margins, wind and permissions")
-    parser.add_argument("--from-autopilot", action="store_true",
-                        help="sail what was drawn in a ground station and uploaded: waypoints are goals, the fence is "
-                        "the area, rally points are refuges (in the file: from_autopilot = true)")
-    parser.add_argument("--link", required=True, metavar="LINK",
-                        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
-    parser.add_argument("--system", type=system_id, metavar="N",
-                        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)")
-    parser.add_argument("--out", type=Path, metavar="DIR",
-                        help="the voyage folder (default: voyages/<UTC time>-<mission>)")
+    parser.add_argument(
+        "mission",
+        type=Path,
+        nargs="?",
+        metavar="MISSION.toml",
+        help="the mission file; beside a drawing its boat, margins, wind and permissions",
+    )
+    parser.add_argument(
+        "--from-autopilot",
+        action="store_true",
+        help="sail what was drawn in a ground station and uploaded: waypoints are goals, the fence is "
+        "the area, rally points are refuges (in the file: from_autopilot = true)",
+    )
+    parser.add_argument(
+        "--link",
+        required=True,
+        metavar="LINK",
+        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
+    )
+    parser.add_argument(
+        "--system",
+        type=system_id,
+        metavar="N",
+        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)",
+    )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="the voyage folder (default: voyages/<UTC time>-<mission>)"
+    )
     parser.add_argument("--dry-run", action="store_true", help="look, plan and speak; touch nothing")
-    parser.add_argument("--permit", action="append", choices=("set_auto", "arm"), default=[], metavar="KEY",
-                        help="permit this voyage what [operator] does not: set_auto or arm; may be given twice "
-                        "(sitl run does, for its simulated boat)")
+    parser.add_argument(
+        "--permit",
+        action="append",
+        choices=("set_auto", "arm"),
+        default=[],
+        metavar="KEY",
+        help="permit this voyage what [operator] does not: set_auto or arm; may be given twice "
+        "(sitl run does, for its simulated boat)",
+    )
     parser.add_argument("--seed", type=whole(), default=None, help="of the planner (default: the mission's)")
-    parser.add_argument("--state", type=Path, metavar="FILE",
-                        help="where the state for a restart is kept (default: voyages/<mission>.state.json); its "
-                        "folder is one boat's, and locked")
-    parser.add_argument("--socket", type=Path, metavar="PATH", help="take orders from on board at this Unix socket: "
-                        "companion order VERB --socket PATH, as [operator] local_orders permits")
-    parser.add_argument("--http", type=http_address, metavar="[HOST:]PORT",
-                        help="serve the live page here; without HOST to this machine alone (127.0.0.1). It shows; it "
-                        "takes orders only with --http-token")
-    parser.add_argument("--http-token", type=Path, metavar="FILE",
-                        help="let who has the token in this file (made, mode 0600, where there is none) give orders "
-                        "from the page, as [operator] local_orders permits")
-    parser.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
-                        help="a further name under which this machine's page may be asked for")
+    parser.add_argument(
+        "--state",
+        type=Path,
+        metavar="FILE",
+        help="where the state for a restart is kept (default: voyages/<mission>.state.json); its "
+        "folder is one boat's, and locked",
+    )
+    parser.add_argument(
+        "--socket",
+        type=Path,
+        metavar="PATH",
+        help="take orders from on board at this Unix socket: "
+        "companion order VERB --socket PATH, as [operator] local_orders permits",
+    )
+    parser.add_argument(
+        "--http",
+        type=http_address,
+        metavar="[HOST:]PORT",
+        help="serve the live page here; without HOST to this machine alone (127.0.0.1). It shows; it "
+        "takes orders only with --http-token",
+    )
+    parser.add_argument(
+        "--http-token",
+        type=Path,
+        metavar="FILE",
+        help="let who has the token in this file (made, mode 0600, where there is none) give orders "
+        "from the page, as [operator] local_orders permits",
+    )
+    parser.add_argument(
+        "--http-name",
+        type=host_name,
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a further name under which this machine's page may be asked for",
+    )
     chart_option(parser)
-    parser.add_argument("--far", type=out_folder, metavar="DIR", help="the folder shared with the program of a "
-                        "satellite modem: the newest status in DIR/out, orders in DIR/in, as [operator] far_orders "
-                        "permits; `companion far` is its end ashore")
-    parser.add_argument("--far-key", type=Path, metavar="FILE",
-                        help="the key of that link, made by `companion key new` (default: the signing key)")
-    parser.add_argument("--far-every", type=number("min", at_least=1.0, at_most=1440.0), default=10.0, metavar="MIN",
-                        help="a new status this often (default: 10), and after each order")
-    parser.add_argument("--again", action="store_true",
-                        help="sail the mission again when its state says that it has arrived (asked at a terminal)")
-    parser.add_argument("--keep-gb", type=number("GB", above=0.0), metavar="GB",
-                        help="what all voyages in the folder may take together; the oldest finished ones give way, "
-                        "telemetry logs first, decisions last (default: 5, and without end where --out is given)")
-    parser.add_argument("--wait", type=number("s", above=0.0), default=30.0, metavar="S",
-                        help="give up when no autopilot is heard for this long (default: 30)")
+    parser.add_argument(
+        "--far",
+        type=out_folder,
+        metavar="DIR",
+        help="the folder shared with the program of a "
+        "satellite modem: the newest status in DIR/out, orders in DIR/in, as [operator] far_orders "
+        "permits; `companion far` is its end ashore",
+    )
+    parser.add_argument(
+        "--far-key",
+        type=Path,
+        metavar="FILE",
+        help="the key of that link, made by `companion key new` (default: the signing key)",
+    )
+    parser.add_argument(
+        "--far-every",
+        type=number("min", at_least=1.0, at_most=1440.0),
+        default=10.0,
+        metavar="MIN",
+        help="a new status this often (default: 10), and after each order",
+    )
+    parser.add_argument(
+        "--again",
+        action="store_true",
+        help="sail the mission again when its state says that it has arrived (asked at a terminal)",
+    )
+    parser.add_argument(
+        "--keep-gb",
+        type=number("GB", above=0.0),
+        metavar="GB",
+        help="what all voyages in the folder may take together; the oldest finished ones give way, "
+        "telemetry logs first, decisions last (default: 5, and without end where --out is given)",
+    )
+    parser.add_argument(
+        "--wait",
+        type=number("s", above=0.0),
+        default=30.0,
+        metavar="S",
+        help="give up when no autopilot is heard for this long (default: 30)",
+    )
     parser.add_argument("--limit", type=number("s", above=0.0), metavar="S", help="end after this many seconds")
-    parser.add_argument("--exit-on-arrival", action="store_true",
-                        help="end when the voyage is over; by default the boat is watched in its loiter until SIGINT "
-                        "or SIGTERM")
-    parser.add_argument("--feed", action="append", default=[], metavar="FEED",
-                        help="hear other vessels here too, besides the mission's [traffic] feeds: udpin:HOST:PORT, "
-                        "tcp:HOST:PORT, /dev/NAME:BAUD; may be given more than once")
-    parser.add_argument("--nmea", action="append", default=[], metavar="OUT",
-                        help="tell OpenCPN and its like in NMEA 0183, besides the mission's [output] nmea: "
-                        "udp:HOST:PORT, or tcp:[HOST:]PORT to be a server; may be given more than once")
-    parser.add_argument("--signalk", action="append", default=[], metavar="SERVER",
-                        help="tell a Signal K server, besides the mission's [output] signalk: ws://HOST:3000 or "
-                        "tcp:HOST:8375; may be given more than once")
-    parser.add_argument("--signalk-token", type=Path, metavar="FILE",
-                        help="the token that the Signal K server asks for (mode 0600)")
+    parser.add_argument(
+        "--exit-on-arrival",
+        action="store_true",
+        help="end when the voyage is over; by default the boat is watched in its loiter until SIGINT or SIGTERM",
+    )
+    parser.add_argument(
+        "--feed",
+        action="append",
+        default=[],
+        metavar="FEED",
+        help="hear other vessels here too, besides the mission's [traffic] feeds: udpin:HOST:PORT, "
+        "tcp:HOST:PORT, /dev/NAME:BAUD; may be given more than once",
+    )
+    parser.add_argument(
+        "--nmea",
+        action="append",
+        default=[],
+        metavar="OUT",
+        help="tell OpenCPN and its like in NMEA 0183, besides the mission's [output] nmea: "
+        "udp:HOST:PORT, or tcp:[HOST:]PORT to be a server; may be given more than once",
+    )
+    parser.add_argument(
+        "--signalk",
+        action="append",
+        default=[],
+        metavar="SERVER",
+        help="tell a Signal K server, besides the mission's [output] signalk: ws://HOST:3000 or "
+        "tcp:HOST:8375; may be given more than once",
+    )
+    parser.add_argument(
+        "--signalk-token", type=Path, metavar="FILE", help="the token that the Signal K server asks for (mode 0600)"
+    )
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (32 bytes, mode 0600)")
-    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=1.0, metavar="N",
-                        help="the autopilot is a simulator that runs N times as fast as time (default: 1)")
+    parser.add_argument(
+        "--speedup",
+        type=number(above=0.0, at_most=1000.0),
+        default=1.0,
+        metavar="N",
+        help="the autopilot is a simulator that runs N times as fast as time (default: 1)",
+    )
     parser.set_defaults(run=run)
 
 
-NOT_THERE = 66   # exit code (EX_NOINPUT of sysexits.h): a card mounted a second late is no reason to give up
+NOT_THERE = 66  # exit code (EX_NOINPUT of sysexits.h): a card mounted a second late is no reason to give up
 
 
 def run(args: argparse.Namespace) -> int:
@@ -159,7 +255,7 @@ def _run(args: argparse.Namespace) -> int:
     for name in args.signalk:
         parse_signalk(name)
     parse_link(args.link)
-    far_of(args, Guard())   # here for mistakes of the command line; what cannot be used is told with the voyage
+    far_of(args, Guard())  # here for mistakes of the command line; what cannot be used is told with the voyage
     page_of(args, Guard())
     settings, sailed = settings_of(args.mission, is_drawn=args.from_autopilot, system=args.system), None
     if settings is None:
@@ -181,8 +277,13 @@ def _run(args: argparse.Namespace) -> int:
 
 
 def _start(
-    args: argparse.Namespace, settings: MissionOptions | None, sailed: MissionToSail | None, name: str,
-    fork_server: ForkServer | None, out: Console, err: Console,
+    args: argparse.Namespace,
+    settings: MissionOptions | None,
+    sailed: MissionToSail | None,
+    name: str,
+    fork_server: ForkServer | None,
+    out: Console,
+    err: Console,
 ) -> int:
     """Sail what is named, and what is drawn one after the other; return the exit code."""
     from companion.telemetry.systemd import ServiceManager
@@ -212,8 +313,14 @@ def _new_folder(named: Path | None, name: str, number: int) -> Path:
 
 
 def _voyage(
-    args: argparse.Namespace, sailed: MissionToSail, folder: Path, state_path: Path, manager: ServiceManager,
-    fork_server: ForkServer | None, out: Console, err: Console,
+    args: argparse.Namespace,
+    sailed: MissionToSail,
+    folder: Path,
+    state_path: Path,
+    manager: ServiceManager,
+    fork_server: ForkServer | None,
+    out: Console,
+    err: Console,
 ) -> int | None:
     """Sail; return the exit code, None when the voyage has given way to what was drawn under way."""
     from companion.app.from_autopilot import ADOPTED
@@ -225,15 +332,22 @@ def _voyage(
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, VoyageArchive
 
     signing = signing_of(args.signing_key)
-    archive = None   # a folder that was named is not ours to tidy
+    archive = None  # a folder that was named is not ours to tidy
     if args.out is None or args.keep_gb is not None:
         budget_bytes = int((args.keep_gb or DEFAULT_BUDGET_BYTES / 1e9) * 1e9)
         archive = VoyageArchive(folder=folder.parent, budget_bytes=budget_bytes)
-    mission = sailed.mission.with_feeds(*args.feed).with_system(args.system).with_outputs(
-        args.nmea, args.signalk, args.signalk_token).permitting(*args.permit)
+    mission = (
+        sailed.mission.with_feeds(*args.feed)
+        .with_system(args.system)
+        .with_outputs(args.nmea, args.signalk, args.signalk_token)
+        .permitting(*args.permit)
+    )
     seed = mission.skipper.seed if args.seed is None else args.seed
-    guard = Guard(lambda name, why: err.write(f"companion run: note: sailed without the {name}: {why}\n"), seed=seed,
-                  pace=args.speedup)
+    guard = Guard(
+        lambda name, why: err.write(f"companion run: note: sailed without the {name}: {why}\n"),
+        seed=seed,
+        pace=args.speedup,
+    )
     told = checked_displays(displays_of(mission), guard)
     for finding in mission.findings:
         err.write(f"companion run: {finding.line(str(mission.path))}\n")
@@ -246,17 +360,31 @@ def _voyage(
         from companion.app.options import SailOptions
 
         return SailOptions(
-            seed=seed, dry_run=args.dry_run, epoch_s=time.time() - time.monotonic() * args.speedup,
-            expansions=mission.skipper.expansions, state_path=state_path, limit_s=args.limit,
-            wait_s=args.wait * args.speedup, signing=signing, budget_scale=1.0 / args.speedup,
-            exit_on_arrival=args.exit_on_arrival, archive=archive, is_again=again, known=sailed.known,
-            settings=sailed.settings, socket=args.socket, http=page_of(args, guard),
-            charts=charts_of(args, guard), far=far_of(args, guard), command=" ".join(sys.argv),
+            seed=seed,
+            dry_run=args.dry_run,
+            epoch_s=time.time() - time.monotonic() * args.speedup,
+            expansions=mission.skipper.expansions,
+            state_path=state_path,
+            limit_s=args.limit,
+            wait_s=args.wait * args.speedup,
+            signing=signing,
+            budget_scale=1.0 / args.speedup,
+            exit_on_arrival=args.exit_on_arrival,
+            archive=archive,
+            is_again=again,
+            known=sailed.known,
+            settings=sailed.settings,
+            socket=args.socket,
+            http=page_of(args, guard),
+            charts=charts_of(args, guard),
+            far=far_of(args, guard),
+            command=" ".join(sys.argv),
             token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
     summary = run_loop(
-        _sail(mission, transport, folder, options, manager, fork_server, out, told, guard), speedup=args.speedup)
+        _sail(mission, transport, folder, options, manager, fork_server, out, told, guard), speedup=args.speedup
+    )
     # the next voyage waits for no picture, and where nobody was heard there is nothing to draw
     if summary["time_s"] is not None and not summary["arrived_before"] and summary["end_reason"] != ADOPTED:
         _report(folder, err)
@@ -273,8 +401,10 @@ def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
         # an order that gets no better by trying again
         return 2, f"not sailed: {name} had arrived before this start; --again sails it again"
     if summary["arrived"] and not summary["plans"] and not summary["uploads"]:
-        text = (f"arrived, with nothing sailed anew: at this start she lay at the goal of {name} already, or the "
-                "mission on board led her there; to sail it, begin away from its goal")
+        text = (
+            f"arrived, with nothing sailed anew: at this start she lay at the goal of {name} already, or the "
+            "mission on board led her there; to sail it, begin away from its goal"
+        )
     else:
         end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
         if summary["end_reason"] == ADOPTED:
@@ -290,8 +420,15 @@ def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
 
 
 async def _sail(
-    mission: Any, transport: Any, folder: Path, options: Callable[[], Any], manager: ServiceManager,
-    fork_server: ForkServer | None, out: Console, told: Displays, guard: Guard,
+    mission: Any,
+    transport: Any,
+    folder: Path,
+    options: Callable[[], Any],
+    manager: ServiceManager,
+    fork_server: ForkServer | None,
+    out: Console,
+    told: Displays,
+    guard: Guard,
 ) -> dict[str, Any]:
     """Sail; return the summary. Raises KeyboardInterrupt: it was ended before it began, or a second time."""
     from companion.planner.worker import PlannerWorker
@@ -310,6 +447,7 @@ async def _sail(
 
         with ProgressLine(out, chosen.epoch_s) as progress:
             async with Outputs(told, mission.frame(), progress.note, seed=chosen.seed, guard=guard) as outputs:
+
                 def show(status: Any, step: Any) -> None:
                     manager.alive(f"{step.state.phase.value}: {step.state.why}")
                     guard.call(Auxiliary.CONSOLE, lambda: progress.show(status, step))
@@ -318,8 +456,17 @@ async def _sail(
                     outputs.tell(view, unix_of_boat(step.snapshot, step.snapshot.t_s), step.voyage.frame)
 
                 return await sail(
-                    mission, transport, planner, folder, chosen, on_status=show, stop=ending.asked(),
-                    on_refusal=progress.note, on_view=tell if outputs.are_any else None, guard=guard)
+                    mission,
+                    transport,
+                    planner,
+                    folder,
+                    chosen,
+                    on_status=show,
+                    stop=ending.asked(),
+                    on_refusal=progress.note,
+                    on_view=tell if outputs.are_any else None,
+                    guard=guard,
+                )
 
 
 async def _get_ready(planner: PlannerWorker, out: Console, manager: ServiceManager) -> None:
@@ -328,6 +475,7 @@ async def _get_ready(planner: PlannerWorker, out: Console, manager: ServiceManag
     from companion.telemetry.console import CompileProgress
 
     with CompileProgress(out) as preparing:
+
         def say(text: str) -> None:
             preparing.say(text)
             manager.starting(text)
@@ -392,8 +540,13 @@ def page_of(args: argparse.Namespace, guard: Guard) -> Any:
     Raises InputError: what is named has no page to be used on.
     """
     if args.http is None:
-        named = "--http-token" if args.http_token is not None else "--http-name" if args.http_name else (
-            "--chart" if args.chart else "")
+        named = (
+            "--http-token"
+            if args.http_token is not None
+            else "--http-name"
+            if args.http_name
+            else ("--chart" if args.chart else "")
+        )
         if named:
             raise InputError(named, "", "there is no page to use it on", "say where it is served: --http PORT")
         return None
@@ -432,16 +585,18 @@ def far_of(args: argparse.Namespace, guard: Guard) -> Any:
     """
     if args.far is None:
         if args.far_key is not None:
-            raise InputError("--far-key", str(args.far_key), "there is no link to use it on",
-                             "name its folder: --far DIR")
+            raise InputError(
+                "--far-key", str(args.far_key), "there is no link to use it on", "name its folder: --far DIR"
+            )
         return None
     from companion.app.options import SatelliteLink
     from companion.mavlink.signing import read_key
 
     key_file = args.far_key or args.signing_key
     if key_file is None:
-        raise InputError("--far", str(args.far), "has no key", "make one with `companion key new far.key` and name it "
-                         "with --far-key")
+        raise InputError(
+            "--far", str(args.far), "has no key", "make one with `companion key new far.key` and name it with --far-key"
+        )
     try:
         return SatelliteLink(folder=args.far, key=read_key(key_file), every_s=60.0 * args.far_every)
     except InputError as error:
@@ -469,13 +624,19 @@ def hold_state_folder(state_path: Path, folder: Path, err: Console) -> Iterator[
         is_alone = lock.take()
     except OSError as error:
         if is_mistake(error):
-            raise InputError(str(state_path.parent), "", f"cannot hold the state: {reason(error)}",
-                             "name another place with --state or --out") from error
+            raise InputError(
+                str(state_path.parent),
+                "",
+                f"cannot hold the state: {reason(error)}",
+                "name another place with --state or --out",
+            ) from error
         err.write(f"companion run: {state_path.parent} cannot be locked: {reason(error)}; sailing all the same\n")
         is_alone = True
     if not is_alone:
-        raise JobError(f"{state_path.parent}: another companion is sailing with the state kept here, and two must not "
-                       "command one boat; end that one, or keep another boat's state elsewhere with --state")
+        raise JobError(
+            f"{state_path.parent}: another companion is sailing with the state kept here, and two must not "
+            "command one boat; end that one, or keep another boat's state elsewhere with --state"
+        )
     try:
         yield
     finally:
@@ -493,7 +654,7 @@ def confirm_again(mission: Any, state_path: Path, err: Console) -> bool | None:
     try:
         saved = read_state(state_path)
     except (OSError, ValueError):
-        return False   # the voyage says what is wrong with it
+        return False  # the voyage says what is wrong with it
     if not Skipper(voyage=voyage_of(mission), config=config_of(mission)).has_arrived(saved):
         return False
     day = datetime.fromtimestamp(state_path.stat().st_mtime, UTC)
@@ -509,7 +670,7 @@ NOTHING_PERMITTED = """without a mission file nothing is permitted, nothing will
   set_auto = true    # upload the plan and set AUTO; arm = true: arm her, too
 and start: companion run boat.toml --link LINK"""
 
-BEAT_S = 5.0   # of the words to the service manager, whose watchdog waits for 30 s
+BEAT_S = 5.0  # of the words to the service manager, whose watchdog waits for 30 s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -519,7 +680,7 @@ class MissionToSail:
     mission: Mission
     known: tuple[str, ...] = ()
     is_new: bool = False
-    settings: DrawnSettings | None = None   # where it is drawn
+    settings: DrawnSettings | None = None  # where it is drawn
 
 
 def settings_of(path: Path | None, *, is_drawn: bool, system: int | None) -> MissionOptions | None:
@@ -531,8 +692,12 @@ def settings_of(path: Path | None, *, is_drawn: bool, system: int | None) -> Mis
     settings: MissionOptions | None = None
     if path is None:
         if not is_drawn:
-            raise InputError("companion run", "", "there is no mission",
-                             "name a mission file, or sail what is drawn on the autopilot: --from-autopilot")
+            raise InputError(
+                "companion run",
+                "",
+                "there is no mission",
+                "name a mission file, or sail what is drawn on the autopilot: --from-autopilot",
+            )
         settings = MissionOptions(from_autopilot=True)
     elif is_drawn or read_options(path).from_autopilot:
         settings = load_settings(path)
@@ -542,8 +707,13 @@ def settings_of(path: Path | None, *, is_drawn: bool, system: int | None) -> Mis
 
 
 def read_drawn(
-    args: argparse.Namespace, settings: MissionOptions, folder: Path, state_path: Path, signing: Any,
-    manager: ServiceManager, err: Console,
+    args: argparse.Namespace,
+    settings: MissionOptions,
+    folder: Path,
+    state_path: Path,
+    signing: Any,
+    manager: ServiceManager,
+    err: Console,
 ) -> MissionToSail | None:
     """Return the mission that is drawn on the autopilot, kept on the disk; None when it was refused, line by line.
 
@@ -568,8 +738,16 @@ def read_drawn(
     async def read() -> FoundMission:
         patience = asyncio.create_task(_ask_for_patience(manager, BEAT_S * args.speedup))
         try:
-            return await find_on(open_link(args.link), settings, args.mission, state_path, keep_at, say,
-                                 wait_s=args.wait * args.speedup, signing=signing)
+            return await find_on(
+                open_link(args.link),
+                settings,
+                args.mission,
+                state_path,
+                keep_at,
+                say,
+                wait_s=args.wait * args.speedup,
+                signing=signing,
+            )
         finally:
             patience.cancel()
 
@@ -585,8 +763,12 @@ def read_drawn(
     say(f"sailing {found.text}; it is kept at {found.plan}" if found.is_new else f"sailing {found.text}")
     if args.mission is None and not args.dry_run:
         say(NOTHING_PERMITTED)
-    return MissionToSail(mission=mission, known=(found.board,), is_new=found.is_new,
-                  settings=DrawnSettings(options=settings, path=args.mission, state_path=state_path))
+    return MissionToSail(
+        mission=mission,
+        known=(found.board,),
+        is_new=found.is_new,
+        settings=DrawnSettings(options=settings, path=args.mission, state_path=state_path),
+    )
 
 
 async def _ask_for_patience(manager: ServiceManager, every_s: float) -> None:

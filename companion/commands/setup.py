@@ -46,29 +46,57 @@ def instance(text: str) -> str:
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "setup", help=summary, epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
+        "setup",
+        help=summary,
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Look for the autopilot on the serial ports, ask what is not given as an option, write a mission "
         "and the settings of its instance of the unit (NAME.toml, NAME.env), and run the doctor. Nothing else is "
         "changed, neither here nor on the autopilot.",
     )
-    parser.add_argument("name", type=instance, nargs="?", metavar="NAME",
-                        help="of the mission and its instance, companion@NAME (default: boat)")
+    parser.add_argument(
+        "name",
+        type=instance,
+        nargs="?",
+        metavar="NAME",
+        help="of the mission and its instance, companion@NAME (default: boat)",
+    )
     parser.add_argument("--link", metavar="LINK", help="to the autopilot (default: the serial ports are looked at)")
-    parser.add_argument("--system", type=system_id, metavar="N",
-                        help="the autopilot's MAVLink system id (default: of the one that is heard)")
+    parser.add_argument(
+        "--system",
+        type=system_id,
+        metavar="N",
+        help="the autopilot's MAVLink system id (default: of the one that is heard)",
+    )
     parser.add_argument("--start", type=place, metavar="LAT,LON", help="where the boat will start")
-    parser.add_argument("--goal", type=place, action="append", default=[], metavar="LAT,LON",
-                        help="where it is to sail; repeat it for more, in order")
-    parser.add_argument("--drawn", action="store_true",
-                        help="the goals are drawn in a ground station and uploaded to the autopilot")
+    parser.add_argument(
+        "--goal",
+        type=place,
+        action="append",
+        default=[],
+        metavar="LAT,LON",
+        help="where it is to sail; repeat it for more, in order",
+    )
+    parser.add_argument(
+        "--drawn", action="store_true", help="the goals are drawn in a ground station and uploaded to the autopilot"
+    )
     boat = parser.add_mutually_exclusive_group()
-    boat.add_argument("--boat", type=sizes, metavar="M,KG,M2",
-                      help="the boat's length, displacement and sail area, of which its file is guessed (1.5,20,0.9)")
+    boat.add_argument(
+        "--boat",
+        type=sizes,
+        metavar="M,KG,M2",
+        help="the boat's length, displacement and sail area, of which its file is guessed (1.5,20,0.9)",
+    )
     boat.add_argument("--polar", type=Path, metavar="FILE", help="of the boat (default: the simulator's boat)")
-    parser.add_argument("--no-go", type=NO_GO_DEG, metavar="DEG",
-                        help="what the boat can sail to the wind (default: 47, or what is guessed)")
-    parser.add_argument("--dir", type=Path, default=FOLDER, metavar="DIR",
-                        help=f"where the unit looks (default: {FOLDER})")
+    parser.add_argument(
+        "--no-go",
+        type=NO_GO_DEG,
+        metavar="DEG",
+        help="what the boat can sail to the wind (default: 47, or what is guessed)",
+    )
+    parser.add_argument(
+        "--dir", type=Path, default=FOLDER, metavar="DIR", help=f"where the unit looks (default: {FOLDER})"
+    )
     parser.add_argument("--yes", action="store_true", help="ask nothing: the defaults hold where nothing is given")
     parser.add_argument("--force", action="store_true", help="take the place of files that are there")
     parser.add_argument("--no-doctor", action="store_true", help="do not examine the autopilot")
@@ -90,8 +118,11 @@ def run(args: argparse.Namespace) -> int:
         args.start = args.start or ask("where she starts, LAT,LON", None, place)
         args.goal = args.goal or [ask("where she is to sail, LAT,LON", None, place)]
     if args.polar is None and args.boat is None:
-        args.boat = ask("her length [m], displacement [kg] and sail area [m2], as 1.5,20,0.9", SIMULATOR,
-                        lambda text: None if text == SIMULATOR else sizes(text))
+        args.boat = ask(
+            "her length [m], displacement [kg] and sail area [m2], as 1.5,20,0.9",
+            SIMULATOR,
+            lambda text: None if text == SIMULATOR else sizes(text),
+        )
     if args.boat is None:
         args.no_go = args.no_go or ask("how near to the wind she sails [deg]", 47.0, NO_GO_DEG)
     written = write_instance(args.dir, args.name, mission_of(args, link, system), settings_of(link), boat_of(args))
@@ -100,8 +131,9 @@ def run(args: argparse.Namespace) -> int:
     if args.polar is None and args.boat is None:
         print("her speeds are those of the simulator's boat; --boat 1.5,20,0.9 guesses them of her sizes")
     code = 0 if args.no_doctor else _examine(written[0], link, system)
-    print(f"[operator] of {written[0]} permits nothing yet. To start: "
-          f"sudo systemctl enable --now companion@{args.name}")
+    print(
+        f"[operator] of {written[0]} permits nothing yet. To start: sudo systemctl enable --now companion@{args.name}"
+    )
     return code
 
 
@@ -113,8 +145,10 @@ def _room(folder: Path) -> None:
         raise InputError(str(folder), "", "no such folder", "make it, or name another with --dir")
     room = Disk().room(folder)
     if room.is_short:
-        raise JobError(f"{folder}: the card is full ({room.free_bytes / 1e6:.1f} MB left); make room: sudo apt clean, "
-                       "sudo journalctl --vacuum-size=50M")
+        raise JobError(
+            f"{folder}: the card is full ({room.free_bytes / 1e6:.1f} MB left); make room: sudo apt clean, "
+            "sudo journalctl --vacuum-size=50M"
+        )
 
 
 def _link(args: argparse.Namespace, ask: Questions) -> tuple[str, int | None]:
@@ -178,8 +212,9 @@ class Questions:
         """Return the answer, taken by ``take``; asked again until it can be."""
         if self.is_silent:
             if default is None:
-                raise InputError("companion setup", "", f"not given: {what}",
-                                 "name it: --start, --goal, --drawn, --link")
+                raise InputError(
+                    "companion setup", "", f"not given: {what}", "name it: --start, --goal, --drawn, --link"
+                )
             return take(default) if isinstance(default, str) else default
         while True:
             shown = "" if default is None else f" [{default}]"
@@ -203,7 +238,8 @@ def margin_of(link: str | None, system: int | None) -> dict[str, float]:
         with contextlib.suppress(CompanionError):
             limits = limits_at(link, system=system)
     proposed = proposed_margin(
-        limits, speed_mps=boat.polar.max_speed_mps(WindOptions().preview_speed_mps), hull=boat.hull)
+        limits, speed_mps=boat.polar.max_speed_mps(WindOptions().preview_speed_mps), hull=boat.hull
+    )
     return {"margin_m": proposed.margin_m, "margin_floor_m": proposed.floor_m}
 
 
@@ -248,7 +284,7 @@ def settings_of(link: str) -> str:
 
 
 def write_instance(
-    folder: Path, name: str, mission: dict[str, Any], settings: str, boat: Mapping[str, bytes],
+    folder: Path, name: str, mission: dict[str, Any], settings: str, boat: Mapping[str, bytes]
 ) -> list[Path]:
     """Write them once the mission has been read as the boat will read it; return the paths, the mission's first.
 
@@ -269,8 +305,9 @@ def write_instance(
             else:
                 load_mission(path)
         except InputError as error:
-            raise InputError(str(folder / Path(error.source).name), error.place, error.problem,
-                             error.remedy or "nothing is written") from None
+            raise InputError(
+                str(folder / Path(error.source).name), error.place, error.problem, error.remedy or "nothing is written"
+            ) from None
     for file, data in files.items():
         Disk().replace(folder / file, data)
     return [folder / file for file in files]
@@ -279,9 +316,10 @@ def write_instance(
 # The best name first: those of udev stay when ports are plugged in another order.
 NAMES = ("autopilot", "serial/by-id/*", "serial0", "ttyAMA*", "ttyACM*", "ttyUSB*")
 BAUDS = (921_600, 115_200, 57_600)
-LISTEN_S = 3.0   # a heartbeat a second
-WIRE = ("wire the autopilot to a serial port (docs/guides/on-the-boat.md), or name another link: "
-        "--link udpin:0.0.0.0:14550")
+LISTEN_S = 3.0  # a heartbeat a second
+WIRE = (
+    "wire the autopilot to a serial port (docs/guides/on-the-boat.md), or name another link: --link udpin:0.0.0.0:14550"
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -315,8 +353,10 @@ def permission(path: Path) -> str:
         group = grp.getgrgid(status.st_gid).gr_name
     except KeyError:
         group = str(status.st_gid)
-    return (f"{path}: no permission: it belongs to the group {group}, and you are not in it; "
-            f"sudo adduser $USER {group}, then log in anew")
+    return (
+        f"{path}: no permission: it belongs to the group {group}, and you are not in it; "
+        f"sudo adduser $USER {group}, then log in anew"
+    )
 
 
 def find_autopilot(tried: Iterable[Port], say: Callable[[str], None]) -> tuple[str, int]:
@@ -345,8 +385,10 @@ def find_autopilot(tried: Iterable[Port], say: Callable[[str], None]) -> tuple[s
     if troubles:
         raise LinkError("; ".join(troubles))
     names = ", ".join(str(port.path) for port in candidates)
-    raise LinkError(f"no autopilot is heard on {names}: is it on, are RX and TX crossed, is SERIALn_PROTOCOL 2? "
-                    "Or name the link: --link")
+    raise LinkError(
+        f"no autopilot is heard on {names}: is it on, are RX and TX crossed, is SERIALn_PROTOCOL 2? "
+        "Or name the link: --link"
+    )
 
 
 def heard(link: str) -> tuple[int | None, str]:

@@ -23,25 +23,34 @@ SCHEMA = "companion.status/1"
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "status", help=summary,
+        "status",
+        help=summary,
         description="Show the companion's status from its MAVLink messages alone, on another link of the autopilot: "
         "the shore end of a telemetry radio. Speaks once when it starts, so that the autopilot routes to it, and "
         "then only listens.",
         epilog="Exit codes: 0 all is well, 3 no link or no companion heard, 4 what was heard is old, 5 the companion "
         "raises an alarm. Example: companion status --link /dev/ttyUSB0:57600 --once",
     )
-    parser.add_argument("--link", required=True, metavar="LINK",
-                        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
-    parser.add_argument("--system", type=system_id, metavar="N",
-                        help="the autopilot's MAVLink system id (default: the only one heard)")
+    parser.add_argument(
+        "--link",
+        required=True,
+        metavar="LINK",
+        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
+    )
+    parser.add_argument(
+        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
+    )
     parser.add_argument("--once", action="store_true", help="print one status and end")
     parser.add_argument("--json", action="store_true", help="JSON, one object per status; unknown is null")
-    parser.add_argument("--timeout", type=number("s", above=0.0), default=10.0, metavar="S",
-                        help="for the first status (default: 10)")
-    parser.add_argument("--max-age", type=number("s", above=0.0), default=10.0, metavar="S",
-                        help="older is stale (default: 10)")
-    parser.add_argument("--every", type=number("s", above=0.0), default=2.0, metavar="S",
-                        help="without --once (default: 2)")
+    parser.add_argument(
+        "--timeout", type=number("s", above=0.0), default=10.0, metavar="S", help="for the first status (default: 10)"
+    )
+    parser.add_argument(
+        "--max-age", type=number("s", above=0.0), default=10.0, metavar="S", help="older is stale (default: 10)"
+    )
+    parser.add_argument(
+        "--every", type=number("s", above=0.0), default=2.0, metavar="S", help="without --once (default: 2)"
+    )
     parser.add_argument("--units", choices=("ms", "kn"), default="ms", help="of speeds in the text (default: ms)")
     parser.set_defaults(run=run)
 
@@ -63,10 +72,7 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
 
     reader, vehicle = StatusReader(), VehicleAssembler()
     heard = asyncio.Event()
-    async with Link(
-        transport, identity=SHORE, target_system=args.system, streams=(),
-        is_quiet=True,
-    ) as link:
+    async with Link(transport, identity=SHORE, target_system=args.system, streams=(), is_quiet=True) as link:
 
         def take(t_s: float, message: Any) -> None:
             vehicle.take(t_s, message)
@@ -97,7 +103,8 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
             if reader.report(now_s()) is None:
                 sys.stderr.write(
                     f"companion status: an autopilot, but no companion heard on {transport.name} in "
-                    f"{args.timeout:g} s\n")
+                    f"{args.timeout:g} s\n"
+                )
                 return EXIT_NO_LINK
         write: Callable[[dict[str, Any]], None] = _write_json if args.json else (lambda d: _write_text(d, args.units))
         while True:
@@ -129,59 +136,91 @@ def status_document(report: Any, autopilot: Any, is_alive: bool, bytes_in: float
         "state": s.state,
         "alert": {"code": s.alert_code, "text": s.alert_text, "age_s": _age(report, "status")},
         "waypoint": {
-            "seq": s.waypoint_seq, "count": s.waypoint_count, "distance_m": _round(s.waypoint_distance_m),
-            "cross_track_m": _round(s.cross_track_m), "next_tack_s": s.next_tack_s, "age_s": _age(report, "status"),
+            "seq": s.waypoint_seq,
+            "count": s.waypoint_count,
+            "distance_m": _round(s.waypoint_distance_m),
+            "cross_track_m": _round(s.cross_track_m),
+            "next_tack_s": s.next_tack_s,
+            "age_s": _age(report, "status"),
         },
         "goal": {
-            "index": s.goal_index, "count": s.goal_count, "distance_m": _round(s.goal_distance_m),
+            "index": s.goal_index,
+            "count": s.goal_count,
+            "distance_m": _round(s.goal_distance_m),
             "age_s": _age(report, "status"),
         },
         "wind": {
             "twd_deg": None if s.twd_from_rad is None else round(math.degrees(s.twd_from_rad), 1),
             "sigma_deg": None if s.twd_sigma_rad is None else round(math.degrees(s.twd_sigma_rad), 1),
-            "tws_mps": _round(s.tws_mps), "tws_sigma_mps": _round(s.tws_sigma_mps), "reference": "ground",
+            "tws_mps": _round(s.tws_mps),
+            "tws_sigma_mps": _round(s.tws_sigma_mps),
+            "reference": "ground",
             "age_s": None if wind_age is None else round(wind_age, 2),
         },
-        "current": None if s.current_drift_mps is None else {
+        "current": None
+        if s.current_drift_mps is None
+        else {
             "set_deg": None if s.current_set_rad is None else round(math.degrees(s.current_set_rad), 1),
-            "drift_mps": _round(s.current_drift_mps), "age_s": _age(report, "status"),
-        },
-        "plan": {
-            "id": s.plan_id, "plan_age_s": s.plan_age_s, "replans": s.replans, "tacks": s.tacks,
-            "promised_risk": _round(s.promised_risk, 4), "clearance_m": _round(s.clearance_m),
+            "drift_mps": _round(s.current_drift_mps),
             "age_s": _age(report, "status"),
         },
-        "slow_computer": None if s.plan_answer_s is None else {
-            "plan_answer_s": _round(s.plan_answer_s), "age_s": _age(report, "co_plan"),
+        "plan": {
+            "id": s.plan_id,
+            "plan_age_s": s.plan_age_s,
+            "replans": s.replans,
+            "tacks": s.tacks,
+            "promised_risk": _round(s.promised_risk, 4),
+            "clearance_m": _round(s.clearance_m),
+            "age_s": _age(report, "status"),
         },
-        "order": None if not s.order else {
-            "verb": s.order, "stands_s": s.order_age_s, "age_s": _age(report, "status"),
-        },
+        "slow_computer": None
+        if s.plan_answer_s is None
+        else {"plan_answer_s": _round(s.plan_answer_s), "age_s": _age(report, "co_plan")},
+        "order": None if not s.order else {"verb": s.order, "stands_s": s.order_age_s, "age_s": _age(report, "status")},
         "traffic": None if s.traffic is None else _traffic(s.traffic) | {"age_s": _age(report, "traffic")},
-        "position": None if s.position is None else {
-            "lat_deg": s.position.lat_deg, "lon_deg": s.position.lon_deg, "age_s": _age(report, "status"),
-        },
+        "position": None
+        if s.position is None
+        else {"lat_deg": s.position.lat_deg, "lon_deg": s.position.lon_deg, "age_s": _age(report, "status")},
         "autopilot": {
             "mode": None if autopilot is None or autopilot.mode is None else autopilot.mode.name,
             "armed": None if autopilot is None else autopilot.is_armed,
-            "battery_v": _round(s.battery_v), "heard": is_alive,
+            "battery_v": _round(s.battery_v),
+            "heard": is_alive,
         },
-        "link": {"bytes_per_s_in": round(bytes_in), "loss": round(loss, 4),
-                 "companion_bytes_per_s": None if s.bytes_out_per_s is None else round(s.bytes_out_per_s)},
+        "link": {
+            "bytes_per_s_in": round(bytes_in),
+            "loss": round(loss, 4),
+            "companion_bytes_per_s": None if s.bytes_out_per_s is None else round(s.bytes_out_per_s),
+        },
         "ages_s": {name: round(age, 2) for name, age in report.age_s.items()},
     }
 
 
 def _traffic(seen: Any) -> dict[str, Any]:
-    worst = None if not seen.alarm else {
-        "name": seen.name, "alarm": seen.alarm, "role": seen.role, "rule": seen.rule, "range_m": _round(seen.range_m),
-        "bearing_deg": None if seen.bearing_rad is None else round(math.degrees(seen.bearing_rad), 1),
-        "cpa_m": _round(seen.cpa_m), "tcpa_s": seen.tcpa_s,
-    }
+    worst = (
+        None
+        if not seen.alarm
+        else {
+            "name": seen.name,
+            "alarm": seen.alarm,
+            "role": seen.role,
+            "rule": seen.rule,
+            "range_m": _round(seen.range_m),
+            "bearing_deg": None if seen.bearing_rad is None else round(math.degrees(seen.bearing_rad), 1),
+            "cpa_m": _round(seen.cpa_m),
+            "tcpa_s": seen.tcpa_s,
+        }
+    )
     return {
-        "promised_risk": _round(seen.promised_risk, 4), "path_risk": _round(seen.path_risk, 4),
-        "vessels": seen.vessels, "worst": worst, "silence_s": seen.silence_s, "refused": seen.refused,
-        "feeds": seen.feeds, "silent_feeds": seen.silent_feeds, "shared_mmsi": seen.shared_mmsi,
+        "promised_risk": _round(seen.promised_risk, 4),
+        "path_risk": _round(seen.path_risk, 4),
+        "vessels": seen.vessels,
+        "worst": worst,
+        "silence_s": seen.silence_s,
+        "refused": seen.refused,
+        "feeds": seen.feeds,
+        "silent_feeds": seen.silent_feeds,
+        "shared_mmsi": seen.shared_mmsi,
         "clock_jumps": seen.clock_jumps,
     }
 
@@ -194,7 +233,8 @@ def traffic_line(seen: dict[str, Any]) -> str:
         when = "opening" if worst["tcpa_s"] is None else f"in {worst['tcpa_s']:.0f} s"
         parts.append(
             f"{worst['name']}: {worst['alarm'].upper()}, {worst['range_m']:.0f} m at {worst['bearing_deg']:03.0f}°, "
-            f"CPA {worst['cpa_m']:.0f} m {when}, {worst['role']} (rule {worst['rule']})")
+            f"CPA {worst['cpa_m']:.0f} m {when}, {worst['role']} (rule {worst['rule']})"
+        )
     if seen["promised_risk"]:
         each, whole = 100.0 * seen["promised_risk"], 100.0 * seen["path_risk"]
         parts.append(f"too near one: {each:.1f} % at each instant, {whole:.1f} % on the way")
@@ -231,21 +271,30 @@ def _write_text(d: dict[str, Any], units: str) -> None:
 
     w, wind, plan, goal, pilot = d["waypoint"], d["wind"], d["plan"], d["goal"], d["autopilot"]
     state = d["state"].upper() or "state not heard yet"
-    helm = "autopilot's mode not heard yet" if pilot["mode"] is None else \
-        f"{pilot['mode']} {'ARMED' if pilot['armed'] else 'disarmed'}"
+    helm = (
+        "autopilot's mode not heard yet"
+        if pilot["mode"] is None
+        else f"{pilot['mode']} {'ARMED' if pilot['armed'] else 'disarmed'}"
+    )
     replans = "- replans" if plan["replans"] is None else counted(plan["replans"], "replan")
     safe = None if plan["promised_risk"] is None else 1.0 - plan["promised_risk"]
     print(f"{state}  {helm}  (age {d['age_s']:.1f} s)  {d['alert']['text']}")
-    print(f"  WP {show(w['seq'])}/{show(w['count'])} {show(w['distance_m'])} m  xt {show(w['cross_track_m'], '+.1f')} m"
-          f"  next tack {show(w['next_tack_s'])} s | goal {show(goal['distance_m'])} m"
-          f"  ({(goal['index'] or 0) + 1} of {show(goal['count'])})")
-    print(f"  TWD {show(wind['twd_deg'], '03.0f')}±{show(wind['sigma_deg'])}°"
-          f"  TWS {show(wind['tws_mps'], '.1f', factor)} {unit}  (age {show(wind['age_s'], '.1f')} s)"
-          f" | outside no-go {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
-          f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {replans}")
+    print(
+        f"  WP {show(w['seq'])}/{show(w['count'])} {show(w['distance_m'])} m  xt {show(w['cross_track_m'], '+.1f')} m"
+        f"  next tack {show(w['next_tack_s'])} s | goal {show(goal['distance_m'])} m"
+        f"  ({(goal['index'] or 0) + 1} of {show(goal['count'])})"
+    )
+    print(
+        f"  TWD {show(wind['twd_deg'], '03.0f')}±{show(wind['sigma_deg'])}°"
+        f"  TWS {show(wind['tws_mps'], '.1f', factor)} {unit}  (age {show(wind['age_s'], '.1f')} s)"
+        f" | outside no-go {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
+        f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {replans}"
+    )
     if d["current"] is not None:
-        print(f"  current sets {show(d['current']['set_deg'], '03.0f')}°"
-              f" {show(d['current']['drift_mps'], '.2f', factor)} {unit}")
+        print(
+            f"  current sets {show(d['current']['set_deg'], '03.0f')}°"
+            f" {show(d['current']['drift_mps'], '.2f', factor)} {unit}"
+        )
     if d["slow_computer"] is not None:
         print(f"  slow computer: nine plans of ten within {show(d['slow_computer']['plan_answer_s'])} s")
     if d["order"] is not None:
@@ -253,5 +302,8 @@ def _write_text(d: dict[str, Any], units: str) -> None:
     if d["traffic"] is not None:
         print(f"  {traffic_line(d['traffic'])}")
     link = d["link"]
-    print(f"  battery {show(pilot['battery_v'], '.1f')} V | link {link['bytes_per_s_in']} B/s in,"
-          f" loss {100.0 * link['loss']:.0f} %, companion {show(link['companion_bytes_per_s'])} B/s", flush=True)
+    print(
+        f"  battery {show(pilot['battery_v'], '.1f')} V | link {link['bytes_per_s_in']} B/s in,"
+        f" loss {100.0 * link['loss']:.0f} %, companion {show(link['companion_bytes_per_s'])} B/s",
+        flush=True,
+    )

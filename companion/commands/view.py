@@ -17,30 +17,54 @@ from companion.program import control
 from companion.program.arguments import chart_option, host_name, http_address, out_file, system_id
 
 PORT = 8765
-SAID_EVERY = 500      # recorded steps between two words on how far it is
+SAID_EVERY = 500  # recorded steps between two words on how far it is
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "view", help=summary,
+        "view",
+        help=summary,
         description="Serve the page over a recorded voyage, with a timeline, or ashore over what a radio brings of a "
         "companion; or pack a recorded voyage into one HTML file that needs nothing else.",
         epilog="Examples: companion view voyages/20260714T101500Z-archipelago; companion view --link "
         "/dev/ttyUSB0:57600; companion view voyages/20260714T101500Z-archipelago --export voyage.html",
     )
-    parser.add_argument("voyage", type=Path, nargs="?", metavar="VOYAGE_DIR",
-                        help="the folder that `companion run` left")
-    parser.add_argument("--beside", type=Path, metavar="VOYAGE_DIR",
-                        help="another voyage, shown beside it from the moment on that both set sail")
-    parser.add_argument("--link", metavar="LINK", help="the shore end of a telemetry radio: /dev/ttyUSB0:57600, "
-                        "udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
-    parser.add_argument("--system", type=system_id, metavar="N",
-                        help="with --link: the autopilot's MAVLink system id (default: the only one heard)")
-    parser.add_argument("--http", type=http_address, default=("127.0.0.1", PORT), metavar="[HOST:]PORT",
-                        help=f"where to serve it (default: 127.0.0.1:{PORT})")
-    parser.add_argument("--http-name", type=host_name, action="append", default=[], metavar="NAME",
-                        help="a further name under which this machine's page may be asked for")
+    parser.add_argument(
+        "voyage", type=Path, nargs="?", metavar="VOYAGE_DIR", help="the folder that `companion run` left"
+    )
+    parser.add_argument(
+        "--beside",
+        type=Path,
+        metavar="VOYAGE_DIR",
+        help="another voyage, shown beside it from the moment on that both set sail",
+    )
+    parser.add_argument(
+        "--link",
+        metavar="LINK",
+        help="the shore end of a telemetry radio: /dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
+    )
+    parser.add_argument(
+        "--system",
+        type=system_id,
+        metavar="N",
+        help="with --link: the autopilot's MAVLink system id (default: the only one heard)",
+    )
+    parser.add_argument(
+        "--http",
+        type=http_address,
+        default=("127.0.0.1", PORT),
+        metavar="[HOST:]PORT",
+        help=f"where to serve it (default: 127.0.0.1:{PORT})",
+    )
+    parser.add_argument(
+        "--http-name",
+        type=host_name,
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a further name under which this machine's page may be asked for",
+    )
     chart_option(parser)
     parser.add_argument("--export", type=out_file, metavar="FILE.html", help="write one file and serve nothing")
     force_option(parser)
@@ -53,18 +77,27 @@ def run(args: argparse.Namespace) -> int:
     from companion.page import Address, export, open_charts
 
     if (args.voyage is None) == (args.link is None):
-        raise InputError("companion view", "", "what to view is not said" if args.link is None else
-                         "a folder and a link are two things", "name a voyage's folder, or --link LINK")
+        raise InputError(
+            "companion view",
+            "",
+            "what to view is not said" if args.link is None else "a folder and a link are two things",
+            "name a voyage's folder, or --link LINK",
+        )
     if args.export is not None and args.chart:
         raise InputError("--chart", str(args.chart[0]), "is not packed into a file to send", "leave it out")
     charts = open_charts(args.chart)
     if args.link is not None:
         if args.beside is not None:
-            raise InputError("--beside", str(args.beside), "there is no recorded voyage to show it beside",
-                             "name two folders")
+            raise InputError(
+                "--beside", str(args.beside), "there is no recorded voyage to show it beside", "name two folders"
+            )
         if args.export is not None:
-            raise InputError("--export", str(args.export), "what is heard by radio is no voyage yet",
-                             "export the folder that the companion leaves")
+            raise InputError(
+                "--export",
+                str(args.export),
+                "what is heard by radio is no voyage yet",
+                "export the folder that the companion leaves",
+            )
         return run_loop(ashore(args, charts))
     record = read_record(args.voyage)
     if args.beside is not None:
@@ -143,22 +176,22 @@ async def ashore(args: argparse.Namespace, charts: Any) -> int:
     host, port = args.http
     epoch_s = time.time() - now_s()
     live = LiveSource(name=args.link, kind="radio", unix_s=epoch_s)
-    async with Link(
-        open_link(args.link), identity=SHORE, target_system=args.system, streams=(), is_quiet=True,
-    ) as link:
+    async with Link(open_link(args.link), identity=SHORE, target_system=args.system, streams=(), is_quiet=True) as link:
         link.subscribe(take)
 
         async def show() -> None:
             while True:
                 t_s = now_s()
                 view, events = fold.take(
-                    t_s, reader.report(t_s), vehicle[-1] if vehicle else None, assembler.status, epoch_s + t_s)
+                    t_s, reader.report(t_s), vehicle[-1] if vehicle else None, assembler.status, epoch_s + t_s
+                )
                 live.show(view, events, fold.area)
                 await asyncio.sleep(STEP_S)
 
         showing = asyncio.create_task(show(), name="what the radio brings")
         serving = asyncio.create_task(
-            serve(Address(host=host, port=port, names=tuple(args.http_name)), live, charts), name="page")
+            serve(Address(host=host, port=port, names=tuple(args.http_name)), live, charts), name="page"
+        )
         try:
             await asyncio.wait({showing, serving}, return_when=asyncio.FIRST_COMPLETED)
             if showing.done():

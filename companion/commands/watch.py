@@ -25,13 +25,14 @@ from companion.program.arguments import number, system_id
 from companion.view import Event, HeardFold, View
 
 EXIT_NO_LINK = 3
-DRAW_EVERY_S = 0.5     # over ssh a redraw costs; what changes faster than this nobody reads
+DRAW_EVERY_S = 0.5  # over ssh a redraw costs; what changes faster than this nobody reads
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "watch", help=summary,
+        "watch",
+        help=summary,
         description="Watch a voyage on a terminal: state and why, alarms, wind with its history, course, plan, log. "
         "Ashore over another link of the autopilot, from what the companion says there; on board at the socket of "
         "companion run --socket PATH, with everything that it knows. Keys give the orders that the mission permits; "
@@ -39,18 +40,34 @@ def add_parser(subparsers: Any, summary: str) -> None:
         epilog="Keys: q end, ? help. Exit codes: 0 ended by a key or Ctrl-C, 3 nothing heard (without a terminal). "
         "Examples: companion watch --link /dev/ttyUSB0:57600; companion watch --socket boat.sock",
     )
-    parser.add_argument("--link", metavar="LINK",
-                        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT")
+    parser.add_argument(
+        "--link", metavar="LINK", help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT"
+    )
     parser.add_argument("--socket", type=Path, metavar="PATH", help="on board, in place of a link: as the companion's")
-    parser.add_argument("--system", type=system_id, metavar="N",
-                        help="the autopilot's MAVLink system id (default: the only one heard)")
-    parser.add_argument("--signing-key", type=Path, metavar="FILE",
-                        help="MAVLink signing key (mode 0600), for orders to a boat that has one")
-    parser.add_argument("--timeout", type=number("s", above=0.0), default=10.0, metavar="S",
-                        help="without a terminal: give up when nothing is heard for so long; for orders: until the "
-                        "answer (default: 10)")
-    parser.add_argument("--every", type=number("s", above=0.0), default=10.0, metavar="S",
-                        help="without a terminal: between two lines (default: 10)")
+    parser.add_argument(
+        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
+    )
+    parser.add_argument(
+        "--signing-key",
+        type=Path,
+        metavar="FILE",
+        help="MAVLink signing key (mode 0600), for orders to a boat that has one",
+    )
+    parser.add_argument(
+        "--timeout",
+        type=number("s", above=0.0),
+        default=10.0,
+        metavar="S",
+        help="without a terminal: give up when nothing is heard for so long; for orders: until the "
+        "answer (default: 10)",
+    )
+    parser.add_argument(
+        "--every",
+        type=number("s", above=0.0),
+        default=10.0,
+        metavar="S",
+        help="without a terminal: between two lines (default: 10)",
+    )
     parser.add_argument("--units", choices=("ms", "kn"), default="kn", help="of speeds (default: kn)")
     parser.set_defaults(run=run)
 
@@ -58,9 +75,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     if (args.link is None) == (args.socket is None):
-        raise InputError("--link", "", "is missing: there is nobody to watch" if args.link is None else
-                         "and --socket are two ways to one boat",
-                         "name the link of the radio, as --link /dev/ttyUSB0:57600, or on board --socket PATH")
+        raise InputError(
+            "--link",
+            "",
+            "is missing: there is nobody to watch" if args.link is None else "and --socket are two ways to one boat",
+            "name the link of the radio, as --link /dev/ttyUSB0:57600, or on board --socket PATH",
+        )
     from companion.clock import run as run_loop
 
     return run_loop(_watch(args))
@@ -78,7 +98,7 @@ async def _watch(args: argparse.Namespace) -> int:
             return await _draw(args, source, over)
         with contextlib.suppress(BrokenPipeError):
             return await _tell(args, source, over)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())   # nobody reads any more
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # nobody reads any more
         return 0
 
 
@@ -125,9 +145,22 @@ async def _draw(args: argparse.Namespace, source: ViewSource, over: asyncio.Even
             if view is not None:
                 history.take(view, events)
             columns, rows = terminal.size
-            terminal.show(draw(Shown(
-                link=source.name, view=view, history=history, helm=helm, unix_s=time.time(), orders=source.orders,
-                said=said or source.trouble, waited_s=now_s() - began_s), columns, rows))
+            terminal.show(
+                draw(
+                    Shown(
+                        link=source.name,
+                        view=view,
+                        history=history,
+                        helm=helm,
+                        unix_s=time.time(),
+                        orders=source.orders,
+                        said=said or source.trouble,
+                        waited_s=now_s() - began_s,
+                    ),
+                    columns,
+                    rows,
+                )
+            )
             is_due.clear()
             waits = {ended, asyncio.create_task(is_due.wait())}
             _, pending = await asyncio.wait(waits, timeout=DRAW_EVERY_S, return_when=asyncio.FIRST_COMPLETED)
@@ -169,8 +202,8 @@ async def _tell(args: argparse.Namespace, source: ViewSource, over: asyncio.Even
     return 0
 
 
-MOST_LINE = 1 << 20    # bytes; a view is a few thousand
-AGAIN_S = 2.0          # until a socket that is not there is tried again
+MOST_LINE = 1 << 20  # bytes; a view is a few thousand
+AGAIN_S = 2.0  # until a socket that is not there is tried again
 Look = tuple[View | None, tuple[Event, ...]]
 
 
@@ -185,7 +218,7 @@ class ViewSource(ABC):
     def __init__(self, name: str) -> None:
         self.name = name
         self.trouble = ""
-        self.orders: Collection[str] | None = None   # verbs that are permitted here; None: not known
+        self.orders: Collection[str] | None = None  # verbs that are permitted here; None: not known
         self._task: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Self:
@@ -193,7 +226,7 @@ class ViewSource(ABC):
         return self
 
     async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await ended(self._task)
 
@@ -223,8 +256,9 @@ class RadioSource(ViewSource):
         self._timeout_s = timeout_s
         self._reader, self._assembler, self._fold = StatusReader(), VehicleAssembler(), HeardFold()
         self._vehicle: VehicleState | None = None
-        self._link = Link(open_link(name), identity=SHORE, target_system=system, streams=(), is_quiet=True,
-                          signing=signing)
+        self._link = Link(
+            open_link(name), identity=SHORE, target_system=system, streams=(), is_quiet=True, signing=signing
+        )
         self._stack = contextlib.AsyncExitStack()
 
     async def __aenter__(self) -> Self:
@@ -233,7 +267,7 @@ class RadioSource(ViewSource):
         return await super().__aenter__()
 
     async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await super().__aexit__(kind, error, trace)
         await self._stack.aclose()
@@ -265,7 +299,7 @@ class RadioSource(ViewSource):
                 await self._link.wait_autopilot(self._timeout_s)
             except LinkError as error:
                 self.trouble = str(error).removeprefix(f"{self.name}: ")
-                if now_s() - began_s < 0.5 * self._timeout_s:   # it cannot be told which one is ours
+                if now_s() - began_s < 0.5 * self._timeout_s:  # it cannot be told which one is ours
                     return
             else:
                 self.trouble = ""

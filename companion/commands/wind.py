@@ -37,7 +37,7 @@ boat was turning or the wind was below 1 m/s. CRPS is the circular continuous ra
 error, but of the whole forecast; smaller is better.
 """
 
-_LONG_ROWS = 5000                   # from here on a progress bar is worth its line
+_LONG_ROWS = 5000  # from here on a progress bar is worth its line
 _REFERENCES = ("kalman", "mean90")  # drawn beside whatever was asked for
 
 
@@ -45,16 +45,22 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     """Add the command's options."""
     parser = add_command(subparsers, "wind", summary, _EPILOG)
     parser.add_argument(
-        "record", metavar="RECORD", nargs="+", type=Path, help="CSV, tlog, ArduPilot .bin, or a folder of CSV")
+        "record", metavar="RECORD", nargs="+", type=Path, help="CSV, tlog, ArduPilot .bin, or a folder of CSV"
+    )
     parser.add_argument(
-        "--estimator", default="default", metavar="NAME", help="its name, or all; an unknown one is told the names")
+        "--estimator", default="default", metavar="NAME", help="its name, or all; an unknown one is told the names"
+    )
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument(
-        "--plot", type=picture, metavar="P.png", help="draw the (first) record, its forecasts and their scores")
+        "--plot", type=picture, metavar="P.png", help="draw the (first) record, its forecasts and their scores"
+    )
     instead.add_argument("--cost", action="store_true", help="time update and forecast instead of scoring")
     instead.add_argument(
-        "--filter", type=picture, metavar="P.png",
-        help="score and draw Wolsieffer's filter for a grid of R and N instead (half a minute for an hour at 1 Hz)")
+        "--filter",
+        type=picture,
+        metavar="P.png",
+        help="score and draw Wolsieffer's filter for a grid of R and N instead (half a minute for an hour at 1 Hz)",
+    )
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the figures")
     parser.set_defaults(run=run)
 
@@ -68,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     if args.filter is not None and names != ["default"]:
         raise InputError("--estimator", args.estimator, "--filter scores Wolsieffer's alone", "leave one of them out")
     for name in names:
-        make(name)                      # an unknown name is refused before anything is read
+        make(name)  # an unknown name is refused before anything is read
     records = [read_record(path) for path in _files(args.record)]
     if args.cost:
         _print_cost(records[0], names)
@@ -93,14 +99,16 @@ def run(args: argparse.Namespace) -> int:
             scores.append([_score(record, name, advance) for name in drawn])
             fits.append(fit_ar1(record))
     for record, found, ar1 in zip(records, scores, fits, strict=True):
-        _print_record(record, found[:len(names)], ar1)
+        _print_record(record, found[: len(names)], ar1)
     if len(records) > 1:
         from companion.wind.study import average
 
         print(f"mean of {len(records)} records")
         _print_table([(name, list(average([s[i] for s in scores]))) for i, name in enumerate(names)])
     if args.json is not None:
-        document = {"records": [_document(r, s[:len(names)], f) for r, s, f in zip(records, scores, fits, strict=True)]}
+        document = {
+            "records": [_document(r, s[: len(names)], f) for r, s, f in zip(records, scores, fits, strict=True)]
+        }
         args.json.write_text(json.dumps(document, indent=1) + "\n")
     if args.plot is not None:
         from companion.plots.wind import save_wind
@@ -201,7 +209,7 @@ def _read_log(path: Path) -> Record:
     except (OSError, ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
         raise InputError(str(path), "", f"cannot be read as a log ({error})", "name a tlog or .bin") from error
     finally:
-        for part in ("data_map", "filehandle", "f"):      # DFReader keeps a map and a file, mavlogfile a file
+        for part in ("data_map", "filehandle", "f"):  # DFReader keeps a map and a file, mavlogfile a file
             if (opened := getattr(log, part, None)) is not None:
                 opened.close()
     kept = [r for i, r in enumerate(rows) if i == 0 or r[0] > rows[i - 1][0]]
@@ -212,8 +220,13 @@ def _read_log(path: Path) -> Record:
     t = table[:, 0]
     heading = _at(t, headings)
     return Record(
-        name=path.name, t_s=t - t[0], twd_from_rad=np.radians(table[:, 1]), tws_mps=table[:, 2],
-        turning=_turning(t, headings), heading_rad=heading, awa_rad=_at(t, felt),
+        name=path.name,
+        t_s=t - t[0],
+        twd_from_rad=np.radians(table[:, 1]),
+        tws_mps=table[:, 2],
+        turning=_turning(t, headings),
+        heading_rad=heading,
+        awa_rad=_at(t, felt),
     )
 
 
@@ -232,7 +245,7 @@ def _turning(t: np.ndarray[Any, Any], headings: list[tuple[float, float]]) -> np
         before = np.clip(np.searchsorted(times, times - 10.0), 0, None)
         change = np.abs((values - values[before] + math.pi) % (2.0 * math.pi) - math.pi)
         for moment in times[change > math.radians(25.0)]:
-            marked[np.searchsorted(t, moment - 10.0):np.searchsorted(t, moment + 10.0)] = True
+            marked[np.searchsorted(t, moment - 10.0) : np.searchsorted(t, moment + 10.0)] = True
     return marked
 
 
@@ -264,8 +277,11 @@ def _print_table(rows: Sequence[tuple[str, Sequence[HorizonScore]]]) -> None:
         for s in horizons:
             degrees = [math.degrees(v) for v in (s.crps_rad, s.mae_rad, s.sigma_rad, s.width95_rad)]
             print(
-                f"{name:10}{s.horizon_s:7.0f}  {s.count:7d}  " + "  ".join(f"{v:7.2f}" for v in degrees) + "  "
-                + "  ".join(f"{100 * c:5.1f}" for c in s.coverage) + f"  {s.speed_crps_mps:10.3f}"
+                f"{name:10}{s.horizon_s:7.0f}  {s.count:7d}  "
+                + "  ".join(f"{v:7.2f}" for v in degrees)
+                + "  "
+                + "  ".join(f"{100 * c:5.1f}" for c in s.coverage)
+                + f"  {s.speed_crps_mps:10.3f}"
             )
     sys.stdout.flush()
 
@@ -274,19 +290,29 @@ def _document(record: Record, found: Sequence[Score], ar1: Ar1Fit) -> dict[str, 
     from companion.wind.study import SCORED_LEVELS
 
     return {
-        "record": record.name, "readings": len(record), "duration_s": record.duration_s,
+        "record": record.name,
+        "readings": len(record),
+        "duration_s": record.duration_s,
         "ar1": {
-            "step_s": ar1.step_s, "rho_hz": ar1.rho_hz, "rho_error_hz": ar1.rho_error_hz,
-            "noise_radps": ar1.noise_radps, "noise_error_radps": ar1.noise_error_radps,
+            "step_s": ar1.step_s,
+            "rho_hz": ar1.rho_hz,
+            "rho_error_hz": ar1.rho_error_hz,
+            "noise_radps": ar1.noise_radps,
+            "noise_error_radps": ar1.noise_error_radps,
         },
         "scores": [
             {
-                "estimator": s.estimator, "horizon_s": h.horizon_s, "count": h.count,
-                "crps_deg": math.degrees(h.crps_rad), "mae_deg": math.degrees(h.mae_rad),
-                "width95_deg": math.degrees(h.width95_rad), "speed_crps_mps": h.speed_crps_mps,
+                "estimator": s.estimator,
+                "horizon_s": h.horizon_s,
+                "count": h.count,
+                "crps_deg": math.degrees(h.crps_rad),
+                "mae_deg": math.degrees(h.mae_rad),
+                "width95_deg": math.degrees(h.width95_rad),
+                "speed_crps_mps": h.speed_crps_mps,
                 "coverage": {f"{p:g}": c for p, c in zip(SCORED_LEVELS, h.coverage, strict=True)},
             }
-            for s in found for h in s.horizons
+            for s in found
+            for h in s.horizons
         ],
     }
 
@@ -324,8 +350,12 @@ def characterised(records: Sequence[Record], advance: Callable[[int], None]) -> 
 
     found = characterise(records, advance=advance)
     if not found.horizons_s:
-        raise InputError(", ".join(found.records), "", "too short to score",
-                         "a horizon needs 20 forecasts, one every 30 s after ten minutes")
+        raise InputError(
+            ", ".join(found.records),
+            "",
+            "too short to score",
+            "a horizon needs 20 forecasts, one every 30 s after ten minutes",
+        )
     return found
 
 
@@ -340,8 +370,10 @@ def print_grid(found: Characterisation) -> None:
         for r_deg in sorted({cell.r_deg for cell in found.cells}):
             print(f"{r_deg:8g}" + "".join(f"{_words(cells[r_deg, n].at(h)):>14}" for n in windows))
         best = found.best(h)
-        print(f"best: R = {best.r_deg:g} deg, N = {best.window}: {_words(best.at(h))}; "
-              f"the default forecaster {_words(horizon)}")
+        print(
+            f"best: R = {best.r_deg:g} deg, N = {best.window}: {_words(best.at(h))}; "
+            f"the default forecaster {_words(horizon)}"
+        )
 
 
 def _words(score: HorizonScore | None) -> str:
@@ -361,8 +393,11 @@ def grid_document(found: Characterisation) -> dict[str, Any]:
 
 def _figures(score: HorizonScore) -> dict[str, float]:
     return {
-        "horizon_s": score.horizon_s, "count": score.count, "crps_deg": math.degrees(score.crps_rad),
-        "mae_deg": math.degrees(score.mae_rad), "sigma_deg": math.degrees(score.sigma_rad),
+        "horizon_s": score.horizon_s,
+        "count": score.count,
+        "crps_deg": math.degrees(score.crps_rad),
+        "mae_deg": math.degrees(score.mae_rad),
+        "sigma_deg": math.degrees(score.sigma_rad),
         "coverage95": score.coverage[-1],
     }
 

@@ -6,7 +6,21 @@ from companion.current.prior import STILL, Prior, TableRow, read_table
 from companion.current.water_current import STILL_WATER, WaterCurrent, forecast_over_water, over_ground, over_water
 
 __all__ = [
-    "FITS_S", "STILL", "STILL_WATER", "UNTOLD_MPS", "CurrentEstimator", "MotionCheck", "MotionSample", "Prior",
-    "Sailing", "TableRow", "WaterCurrent", "WindAngleUncertainty", "forecast_over_water", "over_ground",
-    "over_water", "plain", "read_table",
+    "FITS_S",
+    "STILL",
+    "STILL_WATER",
+    "UNTOLD_MPS",
+    "CurrentEstimator",
+    "MotionCheck",
+    "MotionSample",
+    "Prior",
+    "Sailing",
+    "TableRow",
+    "WaterCurrent",
+    "WindAngleUncertainty",
+    "forecast_over_water",
+    "over_ground",
+    "over_water",
+    "plain",
+    "read_table",
 ]

@@ -46,9 +46,9 @@ from companion.messages import WindForecast
 # mean is left where it is measured, for by that wind the autopilot decides what it beats: what is believed of the
 # errors is part of the spread, as what is not known of them is.
 
-UNTOLD_MPS = 0.15    # [m/s] of a current that is not planned for: of a stronger one the boat's own track soon tells
-SLOW_MPS = 0.5       # [m/s] the least speed that a crab angle is reckoned with
-LEAST_MPS = 0.5      # [m/s] likewise the least wind
+UNTOLD_MPS = 0.15  # [m/s] of a current that is not planned for: of a stronger one the boat's own track soon tells
+SLOW_MPS = 0.5  # [m/s] the least speed that a crab angle is reckoned with
+LEAST_MPS = 0.5  # [m/s] likewise the least wind
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +67,7 @@ class WindAngleUncertainty:
     is_planned: bool = False
 
     def widened(
-        self, forecast: WindForecast, *, beat_rad: float, speed_mps: float, leeway_rad: float = 0.0,
+        self, forecast: WindForecast, *, beat_rad: float, speed_mps: float, leeway_rad: float = 0.0
     ) -> WindForecast:
         """Return the forecast with its direction's spread widened by what is not known on a leg.
 
@@ -81,18 +81,19 @@ class WindAngleUncertainty:
         turned = _abeam(from_rad) / wind_mps[:, None]
         more = np.zeros_like(from_rad)
         for side in (1.0, -1.0):
-            g = np.zeros((from_rad.shape[0], 6))                                              # (a)
+            g = np.zeros((from_rad.shape[0], 6))  # (a)
             g[:, :2] = turned + _abeam(from_rad - side * beat_rad) / speed_mps
             g[:, 3] = -side
             g[:, 4] = 1.0 + speed_mps * math.cos(beat_rad) / wind_mps
             g[:, 5] = -g[:, 4]
             more = np.maximum(more, np.einsum("ni,ij,nj->n", g, moment, g))
-        if self.is_planned:     # the wind over the water has its own doubt already (``forecast_over_water``)
+        if self.is_planned:  # the wind over the water has its own doubt already (``forecast_over_water``)
             more = np.maximum(more - np.einsum("ni,ij,nj->n", turned, moment[:2, :2], turned), 0.0)
         sigma = np.minimum(np.sqrt(forecast.sigma_twd_rad**2 + more), math.pi)
         factor = sigma / np.maximum(forecast.sigma_twd_rad, 1e-9)
-        return replace(forecast, sigma_twd_rad=sigma,
-                       half_width_rad=np.minimum(forecast.half_width_rad * factor[:, None], math.pi))
+        return replace(
+            forecast, sigma_twd_rad=sigma, half_width_rad=np.minimum(forecast.half_width_rad * factor[:, None], math.pi)
+        )
 
     def _moment(self, leeway_rad: float) -> NDArray[np.float64]:
         """Return the mean squares and products of what plans do not reckon with."""
@@ -117,27 +118,27 @@ TILT_RAD = math.radians(3.0)  # of the vane to either side, to see what it makes
 Speed = Callable[[float, float], float]
 """Speed through the water [m/s] at a true wind angle [rad] in a wind over the water [m/s]: the boat's polar."""
 
-SCALE_SD = 0.12              # of the polar: what a polar not measured on this very boat is wrong by
-ANGLE_SD_RAD = math.radians(2.5)   # of the compass, and so of leeway
-VANE_SD_RAD = math.radians(4.0)    # of a vane mounted by eye
-TAU_S = 7200.0               # a tide turns within hours
-SLOW_S = 36_000.0            # polar, leeway, compass and vane hardly change in a voyage
-ALONG_MPS, ALONG_SHARE = 0.08, 0.06   # noise of a reading along the heading: gusts that the hull has not answered
+SCALE_SD = 0.12  # of the polar: what a polar not measured on this very boat is wrong by
+ANGLE_SD_RAD = math.radians(2.5)  # of the compass, and so of leeway
+VANE_SD_RAD = math.radians(4.0)  # of a vane mounted by eye
+TAU_S = 7200.0  # a tide turns within hours
+SLOW_S = 36_000.0  # polar, leeway, compass and vane hardly change in a voyage
+ALONG_MPS, ALONG_SHARE = 0.08, 0.06  # noise of a reading along the heading: gusts that the hull has not answered
 ACROSS_MPS, ACROSS_SHARE = 0.06, 0.03
-ALIKE_S = 12.0               # readings this near in time are wrong alike: waves, a gust, the helm
-STEADY_RAD_S = math.radians(6.0)      # faster turns are manoeuvres ...
-SETTLES_S = 6.0              # ... after which, and the means with them, it needs this long to have its speed again
-STEADY_MPS2 = 0.06           # a faster change of speed is none of the polar's
-LEAST_TWA_RAD = math.radians(38.0)    # closer to the wind the polar says little
+ALIKE_S = 12.0  # readings this near in time are wrong alike: waves, a gust, the helm
+STEADY_RAD_S = math.radians(6.0)  # faster turns are manoeuvres ...
+SETTLES_S = 6.0  # ... after which, and the means with them, it needs this long to have its speed again
+STEADY_MPS2 = 0.06  # a faster change of speed is none of the polar's
+LEAST_TWA_RAD = math.radians(38.0)  # closer to the wind the polar says little
 EVERY_S = 1.0
-LATE_S = 1.5                 # an older position is no reading
-GATE = 16.0                  # of the innovation squared over its variance, two degrees of freedom: one in 3000
-MISFIT_SAMPLES, MISFIT = 15.0, 0.5   # the mean of that figure: 0.1 at most in a steady current, noise being twelvefold
-FADE_SHARE = 0.02            # of the prior's variance, for each reading while it does not fit
-GATED_S = 60.0               # what does not fit for so long is the new truth
-BELIEVED_S = 60.0            # the boat is held against the water that was believed so long ago: water changes slowly
-NEW_WATER_S = 60.0           # of readings, on headings apart, tell of water that changed as water seldom does ...
-NEW_WATER_MPS, NEW_WATER_SPREADS = 0.5, 3.0   # ... no stronger than so many of this and of the prior's spread
+LATE_S = 1.5  # an older position is no reading
+GATE = 16.0  # of the innovation squared over its variance, two degrees of freedom: one in 3000
+MISFIT_SAMPLES, MISFIT = 15.0, 0.5  # the mean of that figure: 0.1 at most in a steady current, noise being twelvefold
+FADE_SHARE = 0.02  # of the prior's variance, for each reading while it does not fit
+GATED_S = 60.0  # what does not fit for so long is the new truth
+BELIEVED_S = 60.0  # the boat is held against the water that was believed so long ago: water changes slowly
+NEW_WATER_S = 60.0  # of readings, on headings apart, tell of water that changed as water seldom does ...
+NEW_WATER_MPS, NEW_WATER_SPREADS = 0.5, 3.0  # ... no stronger than so many of this and of the prior's spread
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,7 +162,7 @@ class Sailing:
 
 
 def _through_water(
-    velocity_en_mps: tuple[float, float], current_en_mps: tuple[float, float], heading_rad: float,
+    velocity_en_mps: tuple[float, float], current_en_mps: tuple[float, float], heading_rad: float
 ) -> tuple[float, float]:
     """Return a velocity over ground as one through the water, ahead and to starboard [m/s]."""
     east, north = velocity_en_mps[0] - current_en_mps[0], velocity_en_mps[1] - current_en_mps[1]
@@ -181,21 +182,21 @@ class CurrentEstimator:
     def __init__(self, speed: Speed, prior: Prior = STILL, *, checked: bool = True) -> None:
         self._speed, self._prior = speed, prior
         self._check = MotionCheck() if checked else None
-        self._trial: CurrentEstimator | None = None   # of the water that is there since the doubt began
-        self._believed: deque[tuple[float, tuple[float, float]]] = deque()   # the current, when
-        self._x = np.zeros(6)      # departure east, north [m/s]; share k; leeway, compass, vane [rad]
+        self._trial: CurrentEstimator | None = None  # of the water that is there since the doubt began
+        self._believed: deque[tuple[float, tuple[float, float]]] = deque()  # the current, when
+        self._x = np.zeros(6)  # departure east, north [m/s]; share k; leeway, compass, vane [rad]
         self._expected: ExpectedCurrent | None = None
         self._p = np.zeros((6, 6))
         self._t_s: float | None = None
         self._unsteady_s = -math.inf
         self._last: Sailing | None = None
-        self._means: tuple[complex, complex] | None = None   # heading's unit vector and velocity over the last seconds
+        self._means: tuple[complex, complex] | None = None  # heading's unit vector and velocity over the last seconds
         self._taken_s = -math.inf
         self._samples_s = 0.0
         self._rejected_s = 0.0
         self._misfit = 0.0
-        self._seen: dict[int, float] = {}     # headings by sectors of 20 degrees: when they were sailed last
-        self._is_significant = prior.strongest_mps > 0.0   # what is expected is planned for until in doubt
+        self._seen: dict[int, float] = {}  # headings by sectors of 20 degrees: when they were sailed last
+        self._is_significant = prior.strongest_mps > 0.0  # what is expected is planned for until in doubt
 
     # ------------------------------------------------------------------------------------------- feed
     def update(self, t_s: float, utc_s: float | None, now: Sailing | None) -> None:
@@ -246,9 +247,16 @@ class CurrentEstimator:
         sigma = math.sqrt(max(0.0, float(np.array([sin, cos]) @ self._p[:2, :2] @ np.array([sin, cos]))))
         was = check.doubt
         mean = MotionSample(
-            along_mps=along, across_mps=across,
-            speed_mps=speed * self.scale, twa_rad=twa, twd_from_rad=now.twd_from_rad, tws_mps=now.tws_mps,
-            heading_rad=heading_rad, sigma_mps=sigma, roll_rad=now.roll_rad)
+            along_mps=along,
+            across_mps=across,
+            speed_mps=speed * self.scale,
+            twa_rad=twa,
+            twd_from_rad=now.twd_from_rad,
+            tws_mps=now.tws_mps,
+            heading_rad=heading_rad,
+            sigma_mps=sigma,
+            roll_rad=now.roll_rad,
+        )
         along, across = _through_water(now.velocity_en_mps, current, now.heading_rad)
         check.update(t_s, mean, replace(mean, along_mps=along, across_mps=across, heading_rad=now.heading_rad))
         if not check.doubt:
@@ -310,11 +318,11 @@ class CurrentEstimator:
             limit = _limit(expected)
             self._x *= keep
             self._p = self._p * np.outer(keep, keep) + np.diag(limit * (1.0 - keep**2))
-            if expected.sigma_mps > was.sigma_mps:      # a table that ends: what is doubted more is at once
+            if expected.sigma_mps > was.sigma_mps:  # a table that ends: what is doubted more is at once
                 more = expected.sigma_mps**2 - was.sigma_mps**2
                 self._p[0, 0] += more
                 self._p[1, 1] += more
-            if was.verdict and not expected.verdict:    # a row can be chosen at last: what it says is one more reading
+            if was.verdict and not expected.verdict:  # a row can be chosen at last: what it says is one more reading
                 self._x[:2] += (was.east_mps - expected.east_mps, was.north_mps - expected.north_mps)
                 self._correct(np.eye(2, 6), -self._x[:2], np.eye(2) * expected.sigma_mps**2)
         self._t_s, self._expected = t_s, expected
@@ -324,7 +332,7 @@ class CurrentEstimator:
         gain = self._p @ h.T @ np.linalg.inv(h @ self._p @ h.T + noise)
         self._x = self._x + gain @ residual
         rest = np.eye(6) - gain @ h
-        self._p = rest @ self._p @ rest.T + gain @ noise @ gain.T          # Joseph's form keeps it a covariance
+        self._p = rest @ self._p @ rest.T + gain @ noise @ gain.T  # Joseph's form keeps it a covariance
 
     def _take(self, t_s: float, now: Sailing) -> None:
         assert self._expected is not None
@@ -336,42 +344,47 @@ class CurrentEstimator:
         if abs(twa) < LEAST_TWA_RAD or (sog < STANDS_MPS and v > SHOULD_MPS):
             return
         sin, cos = math.sin(now.heading_rad), math.cos(now.heading_rad)
-        along, across = np.array([sin, cos]), np.array([cos, -sin])     # across: to starboard
-        side = -1.0 if twa > 0.0 else 1.0                               # leeway goes to leeward
-        slope = (self._speed_with(now, current, float(x[5]) + TILT_RAD)[1]
-                 - self._speed_with(now, current, float(x[5]) - TILT_RAD)[1]) / (2.0 * TILT_RAD)
-        h = np.column_stack([np.eye(2), v * along, side * v * across, v * across, slope * along])           # (a)
+        along, across = np.array([sin, cos]), np.array([cos, -sin])  # across: to starboard
+        side = -1.0 if twa > 0.0 else 1.0  # leeway goes to leeward
+        slope = (
+            self._speed_with(now, current, float(x[5]) + TILT_RAD)[1]
+            - self._speed_with(now, current, float(x[5]) - TILT_RAD)[1]
+        ) / (2.0 * TILT_RAD)
+        h = np.column_stack([np.eye(2), v * along, side * v * across, v * across, slope * along])  # (a)
         z = np.asarray(now.velocity_en_mps) - base - (v - slope * x[5]) * along
-        noise = ((ALONG_MPS + ALONG_SHARE * v)**2 * np.outer(along, along)
-                 + (ACROSS_MPS + ACROSS_SHARE * v)**2 * np.outer(across, across)) * ALIKE_S / EVERY_S
+        noise = (
+            (
+                (ALONG_MPS + ALONG_SHARE * v) ** 2 * np.outer(along, along)
+                + (ACROSS_MPS + ACROSS_SHARE * v) ** 2 * np.outer(across, across)
+            )
+            * ALIKE_S
+            / EVERY_S
+        )
         self._taken_s = t_s
         r = z - h @ x
         misfit = float(r @ np.linalg.inv(h @ self._p @ h.T + noise) @ r)
         self._misfit += (min(misfit, GATE) - self._misfit) / MISFIT_SAMPLES
-        if self._misfit > MISFIT:      # the water has changed faster than a tide: believe the past less
+        if self._misfit > MISFIT:  # the water has changed faster than a tide: believe the past less
             self._p[:2, :2] += np.eye(2) * FADE_SHARE * self._expected.sigma_mps**2
         if misfit > GATE:
             self._rejected_s += EVERY_S
             if self._rejected_s < GATED_S:
                 return
-            self._p[:2, :2] += np.eye(2) * self._expected.sigma_mps**2     # it has changed: look again
+            self._p[:2, :2] += np.eye(2) * self._expected.sigma_mps**2  # it has changed: look again
         self._rejected_s = 0.0
         self._correct(h, r, noise)
         self._samples_s += EVERY_S
         self._seen[int(wrap_pi(now.heading_rad) // math.radians(20.0))] = t_s
 
-    def _speed_with(
-        self, now: Sailing, current_en_mps: tuple[float, float], vane_rad: float,
-    ) -> tuple[float, float]:
+    def _speed_with(self, now: Sailing, current_en_mps: tuple[float, float], vane_rad: float) -> tuple[float, float]:
         """Return the wind's angle to the bow and the polar's speed, where the vane is turned clockwise so far."""
         east, north = now.velocity_en_mps
         felt_e = now.tws_mps * math.sin(now.twd_from_rad) + east
         felt_n = now.tws_mps * math.cos(now.twd_from_rad) + north
         sin, cos = math.sin(vane_rad), math.cos(vane_rad)
         ground_e, ground_n = cos * felt_e - sin * felt_n - east, cos * felt_n + sin * felt_e - north
-        from_rad, tws_mps = over_water(
-            math.atan2(ground_e, ground_n), math.hypot(ground_e, ground_n), current_en_mps)
-        twa_rad = difference_rad(from_rad, now.heading_rad)     # positive: wind over starboard
+        from_rad, tws_mps = over_water(math.atan2(ground_e, ground_n), math.hypot(ground_e, ground_n), current_en_mps)
+        twa_rad = difference_rad(from_rad, now.heading_rad)  # positive: wind over starboard
         return twa_rad, self._speed(twa_rad, tws_mps)
 
     # ------------------------------------------------------------------------------------------- read
@@ -381,9 +394,15 @@ class CurrentEstimator:
         if expected is None:
             return WaterCurrent(verdict="nothing is known of the water yet")
         found = WaterCurrent(
-            east_mps=float(expected.east_mps + self._x[0]), north_mps=float(expected.north_mps + self._x[1]),
-            var_ee=float(self._p[0, 0]), var_en=float(self._p[0, 1]), var_nn=float(self._p[1, 1]),
-            headings_rad=self._headings_rad(), samples_s=self._samples_s, verdict=expected.verdict)
+            east_mps=float(expected.east_mps + self._x[0]),
+            north_mps=float(expected.north_mps + self._x[1]),
+            var_ee=float(self._p[0, 0]),
+            var_en=float(self._p[0, 1]),
+            var_nn=float(self._p[1, 1]),
+            headings_rad=self._headings_rad(),
+            samples_s=self._samples_s,
+            verdict=expected.verdict,
+        )
         self._is_significant = found.is_worth_planning(was=self._is_significant)
         return replace(found, is_significant=self._is_significant)
 
@@ -394,8 +413,10 @@ class CurrentEstimator:
             return None
         believed = expected.east_mps + self._x[0], expected.north_mps + self._x[1], *self._x[2:]
         return WindAngleUncertainty(
-            believed=tuple(map(float, believed)), covariance=tuple(tuple(map(float, row)) for row in self._p),
-            is_planned=self._is_significant)
+            believed=tuple(map(float, believed)),
+            covariance=tuple(tuple(map(float, row)) for row in self._p),
+            is_planned=self._is_significant,
+        )
 
     @property
     def scale(self) -> float:
@@ -418,6 +439,9 @@ def _limit(expected: ExpectedCurrent) -> Matrix:
 def plain(current: WaterCurrent) -> dict[str, float | str | bool]:
     """Return the figures of a current for a record: set [deg], drift and sigma [m/s]."""
     return {
-        "set_deg": round(math.degrees(current.set_rad), 1), "drift_mps": round(current.drift_mps, 3),
-        "sigma_mps": round(current.sigma_mps, 3), "planned": current.is_significant, "verdict": current.verdict,
+        "set_deg": round(math.degrees(current.set_rad), 1),
+        "drift_mps": round(current.drift_mps, 3),
+        "sigma_mps": round(current.sigma_mps, 3),
+        "planned": current.is_significant,
+        "verdict": current.verdict,
     }

@@ -26,34 +26,34 @@ from dataclasses import dataclass
 
 from companion.geo.angles import difference_rad
 
-SWINGS_S = 4.0                     # of the means of heading and velocity: waves swing the boat's bow within less
+SWINGS_S = 4.0  # of the means of heading and velocity: waves swing the boat's bow within less
 TURNING_RAD_S = math.radians(6.0)  # faster the boat manoeuvres ...
-SETTLES_S = 4.0                    # ... and has the boat's speed again so long after it, and the means with it
+SETTLES_S = 4.0  # ... and has the boat's speed again so long after it, and the means with it
 LEAST_TWA_RAD = math.radians(38.0)  # closer to the wind a polar says little, and the boat may be in irons
 LEAST_TWS_MPS = 1.5
 STANDS_MPS, SHOULD_MPS = 0.15, 0.6  # a boat that stands where it should sail is aground, moored or in irons
-ODD_MPS, ODD_SHARE = 0.5, 0.35     # of a speed: gusts that the hull has not answered, and a polar that is a quarter off
-SPREADS = 2.0                      # of what is not known of the current, beside it
-LEAPT_MPS, LEAPT_SHARE, LEAPT_SPREADS = 0.4, 0.2, 1.0   # likewise after the direction has leapt
-ACROSS_SHARE = 0.3                 # of what it lacks: a current sets it more across its heading, on most of them ...
-LEAPT_ACROSS_SHARE = 0.6           # ... and a compass that is up to 120 degrees off does, with a direction that leapt
-HEELS_RAD = math.radians(8.0)      # to windward: more than a wave's
+ODD_MPS, ODD_SHARE = 0.5, 0.35  # of a speed: gusts that the hull has not answered, and a polar that is a quarter off
+SPREADS = 2.0  # of what is not known of the current, beside it
+LEAPT_MPS, LEAPT_SHARE, LEAPT_SPREADS = 0.4, 0.2, 1.0  # likewise after the direction has leapt
+ACROSS_SHARE = 0.3  # of what it lacks: a current sets it more across its heading, on most of them ...
+LEAPT_ACROSS_SHARE = 0.6  # ... and a compass that is up to 120 degrees off does, with a direction that leapt
+HEELS_RAD = math.radians(8.0)  # to windward: more than a wave's
 LEAST_HEEL_TWA_RAD, MOST_HEEL_TWA_RAD = math.radians(30.0), math.radians(150.0)
-HEEL_S = 10.0                      # of the mean heel
-SURE_S, JUMPED_S = 20.0, 8.0       # of odd readings, without a jump of the direction and after one
-FORGETS = 0.5                      # a reading that fits takes back so much of one that does not
-FITS_S = 20.0                      # of readings that fit end a doubt
-NEW_WIND_S, NEW_WIND_RATIO = 60.0, 4.0   # likewise of a wind from elsewhere, and so many times those that do not, ...
-FAR_APART_RAD = math.radians(70.0)       # ... on headings far apart, of the last ...
-TALLY_S = 300.0                    # ... so long: odd moments while a front passes are forgotten, too
-GAINS_MPS2 = 0.1                   # a boat that gains on its polar at that rate is on its way to it
-JUMP_RAD = math.radians(40.0)      # of the direction's 5 s mean against what it was half a minute and more ago
-TURNED_RAD, LASTS_S = math.radians(125.0), 5.0   # of the same, for so long: no shift
-STEADY = 0.7                       # the length of the mean of the directions before: less is a wind that swings about
-MOORED_S = 600.0                   # of a boat that does not sail by it: a wind that stays so long is a new one
+HEEL_S = 10.0  # of the mean heel
+SURE_S, JUMPED_S = 20.0, 8.0  # of odd readings, without a jump of the direction and after one
+FORGETS = 0.5  # a reading that fits takes back so much of one that does not
+FITS_S = 20.0  # of readings that fit end a doubt
+NEW_WIND_S, NEW_WIND_RATIO = 60.0, 4.0  # likewise of a wind from elsewhere, and so many times those that do not, ...
+FAR_APART_RAD = math.radians(70.0)  # ... on headings far apart, of the last ...
+TALLY_S = 300.0  # ... so long: odd moments while a front passes are forgotten, too
+GAINS_MPS2 = 0.1  # a boat that gains on its polar at that rate is on its way to it
+JUMP_RAD = math.radians(40.0)  # of the direction's 5 s mean against what it was half a minute and more ago
+TURNED_RAD, LASTS_S = math.radians(125.0), 5.0  # of the same, for so long: no shift
+STEADY = 0.7  # the length of the mean of the directions before: less is a wind that swings about
+MOORED_S = 600.0  # of a boat that does not sail by it: a wind that stays so long is a new one
 BEFORE_S, MEMORY_S = 30.0, 90.0
 KEPT_EVERY_S = 5.0
-LEAST_BEFORE = 4                   # of the directions before: fewer may be of the moment when the vane was put right
+LEAST_BEFORE = 4  # of the directions before: fewer may be of the moment when the vane was put right
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +89,7 @@ class _Tally:
 
     def __init__(self) -> None:
         self._fits_s = self._odd_s = 0.0
-        self._bows = 0j      # the sum of the bow's unit vectors over the time that fits
+        self._bows = 0j  # the sum of the bow's unit vectors over the time that fits
 
     def take(self, dt_s: float, heading_rad: float, *, fits: bool) -> None:
         keep = math.exp(-dt_s / TALLY_S)
@@ -120,13 +120,13 @@ class MotionCheck:
         self._turned_s = -math.inf
         self.fits_s = self._odd_s = 0.0
         self._heel_rad = 0.0
-        self._directions: deque[tuple[float, float]] = deque()   # of the wind, one in 5 s
-        self._before_rad: float | None = None                    # where it came from before it leapt ...
-        self._leapt_s = -math.inf                                # ... and when it was seen to have
-        self._wind_s: float | None = None                        # of the last wind that was followed
-        self._far_s = self._back_s = self._moored_s = 0.0        # it has been turned, back, and not sailed by, for
-        self._is_leap = False                                    # it is doubted for its leap alone
-        self._tally = _Tally()                                   # of the doubt that is
+        self._directions: deque[tuple[float, float]] = deque()  # of the wind, one in 5 s
+        self._before_rad: float | None = None  # where it came from before it leapt ...
+        self._leapt_s = -math.inf  # ... and when it was seen to have
+        self._wind_s: float | None = None  # of the last wind that was followed
+        self._far_s = self._back_s = self._moored_s = 0.0  # it has been turned, back, and not sailed by, for
+        self._is_leap = False  # it is doubted for its leap alone
+        self._tally = _Tally()  # of the doubt that is
 
     @property
     def before_rad(self) -> float | None:
@@ -190,14 +190,17 @@ class MotionCheck:
         return None if abs(now.across_mps) > across * abs(lacks) else False
 
     def _heels_to_windward(self, now: MotionSample) -> bool:
-        return LEAST_HEEL_TWA_RAD < abs(now.twa_rad) < MOST_HEEL_TWA_RAD and abs(self._heel_rad) > HEELS_RAD and (
-            (self._heel_rad > 0.0) == (now.twa_rad > 0.0))
+        return (
+            LEAST_HEEL_TWA_RAD < abs(now.twa_rad) < MOST_HEEL_TWA_RAD
+            and abs(self._heel_rad) > HEELS_RAD
+            and ((self._heel_rad > 0.0) == (now.twa_rad > 0.0))
+        )
 
     # ------------------------------------------------------------------------------------ the direction
     def follow_wind(self, t_s: float, twd_from_rad: float, tws_mps: float, *, is_driven: bool) -> None:
         """Take the wind at ``t_s`` as the vane tells it, whether the boat sails by it or not."""
         if tws_mps < LEAST_TWS_MPS:
-            return   # a light air has no direction
+            return  # a light air has no direction
         dt_s = 0.0 if self._wind_s is None else max(0.0, min(5.0, t_s - self._wind_s))
         self._wind_s = t_s
         kept = self._directions
@@ -223,8 +226,10 @@ class MotionCheck:
             self._is_leap = self.is_winds = True
             self.fits_s, self._tally, self._before_rad = 0.0, _Tally(), was
             self._back_s = self._moored_s = 0.0
-            self.doubt = (f"the wind's direction leapt by {math.degrees(by_rad):+.0f}°, farther than a wind shifts: "
-                          "the vane was turned, or its offset")
+            self.doubt = (
+                f"the wind's direction leapt by {math.degrees(by_rad):+.0f}°, farther than a wind shifts: "
+                "the vane was turned, or its offset"
+            )
 
     def _look_for_its_return(self, twd_from_rad: float, dt_s: float, *, is_driven: bool) -> None:
         """End the doubt of a leap that is over, or that has stayed for so long where nobody sails by it."""
@@ -255,8 +260,11 @@ class MotionCheck:
             self.doubt = f"{moves}: no current comes so suddenly, the wind or the water is another than is measured"
 
     def _look_for_an_end(self, now: MotionSample) -> None:
-        is_back = not self.is_winds or self._before_rad is None or (
-            abs(difference_rad(now.twd_from_rad, self._before_rad)) <= JUMP_RAD)
+        is_back = (
+            not self.is_winds
+            or self._before_rad is None
+            or (abs(difference_rad(now.twd_from_rad, self._before_rad)) <= JUMP_RAD)
+        )
         if is_back and self.fits_s >= FITS_S:
             self.settle()
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from companion.errors import InputError
 from companion.geo.angles import wrap_two_pi
 
-DEFAULT_SIGMA_MPS = 0.5    # of water of which the mission says nothing: most tidal waters are within twice of it
-ENDED_S = 3600.0           # a tide has become another within the hour
-MOST_ROWS = 20_000         # two years of hours
-MOST_MPS = 10.0            # the strongest tidal races reach 8
-SPAN_S = 60.0              # rows nearer together than this are a mistake
+DEFAULT_SIGMA_MPS = 0.5  # of water of which the mission says nothing: most tidal waters are within twice of it
+ENDED_S = 3600.0  # a tide has become another within the hour
+MOST_ROWS = 20_000  # two years of hours
+MOST_MPS = 10.0  # the strongest tidal races reach 8
+SPAN_S = 60.0  # rows nearer together than this are a mistake
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +67,9 @@ class Prior:
             return ExpectedCurrent(east_mps=self.east_mps, north_mps=self.north_mps, sigma_mps=self.sigma_mps)
         widest = max(self.sigma_mps, self.strongest_mps)
         if utc_s is None:
-            return ExpectedCurrent(sigma_mps=widest,
-                                   verdict=f"{self.name}: no row can be chosen before the time is known")
+            return ExpectedCurrent(
+                sigma_mps=widest, verdict=f"{self.name}: no row can be chosen before the time is known"
+            )
         if utc_s < rows[0].utc_s or utc_s > rows[-1].utc_s:
             is_over = utc_s > rows[-1].utc_s
             row = rows[-1] if is_over else rows[0]
@@ -77,14 +78,19 @@ class Prior:
             what = "ended" if is_over else "begins in"
             verdict = f"{self.name} {what} {_span(off_s)}{' ago' if is_over else ''}: its nearest row, widened"
             return ExpectedCurrent(
-                east_mps=row.east_mps, north_mps=row.north_mps, verdict=verdict,
-                sigma_mps=self.sigma_mps + share * (math.hypot(widest, self.sigma_mps) - self.sigma_mps))
+                east_mps=row.east_mps,
+                north_mps=row.north_mps,
+                verdict=verdict,
+                sigma_mps=self.sigma_mps + share * (math.hypot(widest, self.sigma_mps) - self.sigma_mps),
+            )
         after = min(max(1, bisect.bisect_right([r.utc_s for r in rows], utc_s)), len(rows) - 1)
         a, b = rows[after - 1], rows[after]
         share = (utc_s - a.utc_s) / (b.utc_s - a.utc_s)
         return ExpectedCurrent(
             east_mps=a.east_mps + share * (b.east_mps - a.east_mps),
-            north_mps=a.north_mps + share * (b.north_mps - a.north_mps), sigma_mps=self.sigma_mps)
+            north_mps=a.north_mps + share * (b.north_mps - a.north_mps),
+            sigma_mps=self.sigma_mps,
+        )
 
 
 STILL = Prior()
@@ -111,21 +117,31 @@ def read_table(text: str, source: str, times: tuple[float | None, ...]) -> tuple
         place = f"line {number}"
         parts = [part.strip() for part in line.split(",")]
         if utc_s is None:
-            raise InputError(source, place, f"{parts[0][:40]!r} is no time with its zone",
-                             "write 2026-11-21T12:00:00Z, set_deg, drift_mps")
+            raise InputError(
+                source,
+                place,
+                f"{parts[0][:40]!r} is no time with its zone",
+                "write 2026-11-21T12:00:00Z, set_deg, drift_mps",
+            )
         try:
             set_deg, drift_mps = float(parts[1]), float(parts[2])
         except (IndexError, ValueError):
-            raise InputError(source, place, "a set in degrees and a drift in m/s are missing",
-                             "write time, set_deg, drift_mps") from None
+            raise InputError(
+                source, place, "a set in degrees and a drift in m/s are missing", "write time, set_deg, drift_mps"
+            ) from None
         if len(parts) > 3 or not (0.0 <= set_deg <= 360.0 and 0.0 <= drift_mps <= MOST_MPS):
-            raise InputError(source, place, f"set {set_deg:g}, drift {drift_mps:g} cannot be",
-                             f"write 0..360 degrees towards which it sets and 0..{MOST_MPS:g} m/s")
+            raise InputError(
+                source,
+                place,
+                f"set {set_deg:g}, drift {drift_mps:g} cannot be",
+                f"write 0..360 degrees towards which it sets and 0..{MOST_MPS:g} m/s",
+            )
         if rows and utc_s - rows[-1].utc_s < SPAN_S:
             raise InputError(source, place, "is not a minute or more after the line before", "sort the table by time")
         set_rad = wrap_two_pi(math.radians(set_deg))
-        rows.append(TableRow(utc_s=utc_s, east_mps=drift_mps * math.sin(set_rad),
-                             north_mps=drift_mps * math.cos(set_rad)))
+        rows.append(
+            TableRow(utc_s=utc_s, east_mps=drift_mps * math.sin(set_rad), north_mps=drift_mps * math.cos(set_rad))
+        )
         if len(rows) > MOST_ROWS:
             raise InputError(source, place, f"has more than {MOST_ROWS} rows", "leave out what is past")
     if len(rows) < 2:
@@ -135,8 +151,11 @@ def read_table(text: str, source: str, times: tuple[float | None, ...]) -> tuple
 
 def table_lines(text: str) -> tuple[tuple[int, str], ...]:
     """Return the numbered lines of a tide table that are rows: no comments, no headings."""
-    lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), start=1)
-             if line.strip() and not line.strip().startswith("#")]
+    lines = [
+        (n, line.strip())
+        for n, line in enumerate(text.splitlines(), start=1)
+        if line.strip() and not line.strip().startswith("#")
+    ]
     if lines and lines[0][1].lower().startswith("time"):
         lines = lines[1:]
     return tuple(lines)

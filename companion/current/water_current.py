@@ -18,7 +18,7 @@ BEYOND_DOUBT = 9.21
 # ... and what was planned for once stays until it is well within its doubt, or half as strong.
 IN_DOUBT = 4.0
 
-BOTH_RAD = math.radians(40.0)   # headings this far apart tell a current from a polar's error
+BOTH_RAD = math.radians(40.0)  # headings this far apart tell a current from a polar's error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,8 +75,11 @@ class WaterCurrent:
         det = self.var_ee * self.var_nn - self.var_en**2
         if det <= 0.0:
             return math.inf if self.drift_mps > 0.0 else 0.0
-        return (self.var_nn * self.east_mps**2 - 2.0 * self.var_en * self.east_mps * self.north_mps
-                + self.var_ee * self.north_mps**2) / det
+        return (
+            self.var_nn * self.east_mps**2
+            - 2.0 * self.var_en * self.east_mps * self.north_mps
+            + self.var_ee * self.north_mps**2
+        ) / det
 
     def is_worth_planning(self, *, was: bool) -> bool:
         """Return whether plans should reckon with it; ``was``: they did."""
@@ -94,8 +97,10 @@ class WaterCurrent:
         remarks = [self.verdict] if self.verdict else []
         if self.samples_s > 0.0 and self.headings_rad < BOTH_RAD:
             remarks.append("told on one heading, where a polar's error or leeway looks the same")
-        text = (f"current {math.degrees(self.set_rad):03.0f}° {self.drift_mps:.2f} m/s, "
-                f"give or take {self.sigma_mps:.2f} m/s")
+        text = (
+            f"current {math.degrees(self.set_rad):03.0f}° {self.drift_mps:.2f} m/s, "
+            f"give or take {self.sigma_mps:.2f} m/s"
+        )
         return f"{text} ({'; '.join(remarks)})" if remarks else text
 
 
@@ -112,12 +117,10 @@ STILL_WATER = WaterCurrent()
 # Still air over a current of 0.5 m/s to the north is a wind of 0.5 m/s from the north. ArduRover's WIND is G (apparent
 # wind and the filter's velocity over ground), and its no-go angle is about G; a polar is of W.
 
-LEAST_WIND_MPS = 0.05     # [m/s] a wind over the water below this has no direction
+LEAST_WIND_MPS = 0.05  # [m/s] a wind over the water below this has no direction
 
 
-def over_water(
-    twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float],
-) -> tuple[float, float]:
+def over_water(twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float]) -> tuple[float, float]:
     """Return the wind over the water (from [rad], speed [m/s]) of a wind over the ground in a current.
 
     >>> from_rad, speed = over_water(0.0, 5.0, (0.0, 0.5))     # the current sets into the wind: more of it
@@ -126,15 +129,13 @@ def over_water(
     """
     if current_en_mps == (0.0, 0.0):
         return twd_from_rad, tws_mps
-    east = tws_mps * math.sin(twd_from_rad) + current_en_mps[0]                               # (a)
+    east = tws_mps * math.sin(twd_from_rad) + current_en_mps[0]  # (a)
     north = tws_mps * math.cos(twd_from_rad) + current_en_mps[1]
     speed = math.hypot(east, north)
     return (wrap_two_pi(heading_of(east, north)) if speed > 0.0 else twd_from_rad), speed
 
 
-def over_ground(
-    twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float],
-) -> tuple[float, float]:
+def over_ground(twd_from_rad: float, tws_mps: float, current_en_mps: tuple[float, float]) -> tuple[float, float]:
     """Return the wind over the ground of a wind over the water: the inverse of ``over_water``."""
     return over_water(twd_from_rad, tws_mps, (-current_en_mps[0], -current_en_mps[1]))
 
@@ -147,10 +148,11 @@ def forecast_over_water(forecast: WindForecast, current: WaterCurrent) -> WindFo
     """
     from_rad, speed = forecast.mean_twd_from_rad, forecast.mean_tws_mps
     ground = np.column_stack([speed * np.sin(from_rad), speed * np.cos(from_rad)])
-    water = ground + np.asarray(current.en_mps)                                               # (a)
+    water = ground + np.asarray(current.en_mps)  # (a)
     size = np.maximum(np.hypot(water[:, 0], water[:, 1]), LEAST_WIND_MPS)
-    along = np.where(size[:, None] > LEAST_WIND_MPS, water / size[:, None], np.column_stack([
-        np.sin(from_rad), np.cos(from_rad)]))
+    along = np.where(
+        size[:, None] > LEAST_WIND_MPS, water / size[:, None], np.column_stack([np.sin(from_rad), np.cos(from_rad)])
+    )
     across = np.column_stack([along[:, 1], -along[:, 0]])
     unit = np.column_stack([np.sin(from_rad), np.cos(from_rad)])
     side = np.column_stack([unit[:, 1], -unit[:, 0]])
@@ -164,7 +166,10 @@ def forecast_over_water(forecast: WindForecast, current: WaterCurrent) -> WindFo
     sigma = np.minimum(spread(across) / size, math.pi)
     factor = sigma / np.maximum(forecast.sigma_twd_rad, 1e-9)
     return replace(
-        forecast, mean_twd_from_rad=np.arctan2(along[:, 0], along[:, 1]),
+        forecast,
+        mean_twd_from_rad=np.arctan2(along[:, 0], along[:, 1]),
         mean_tws_mps=np.hypot(water[:, 0], water[:, 1]),
-        sigma_twd_rad=sigma, sigma_tws_mps=spread(along),
-        half_width_rad=np.minimum(forecast.half_width_rad * factor[:, None], math.pi))
+        sigma_twd_rad=sigma,
+        sigma_tws_mps=spread(along),
+        half_width_rad=np.minimum(forecast.half_width_rad * factor[:, None], math.pi),
+    )

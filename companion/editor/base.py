@@ -18,9 +18,9 @@ from companion.geofence import Document, ZoneKind
 from companion.geofence.formats import decode, drawings_of, parse, read_bytes
 from companion.geofence.mission import AreaOptions, MissionOptions, WindOptions, parse_options
 
-KINDS = ("wkt", "geojson")     # of files that are edited; those of other programs are shown
+KINDS = ("wkt", "geojson")  # of files that are edited; those of other programs are shown
 _SINGLE = {"Polygon": "polygon", "Point": "point", "LineString": "line"}
-_NO_NAME = re.compile(r"[|()#\s]+")   # what ends a name in a WKT file
+_NO_NAME = re.compile(r"[|()#\s]+")  # what ends a name in a WKT file
 _GEOMETRY = {"polygon": "Polygon", "point": "Point", "circle": "Point", "line": "LineString"}
 
 
@@ -52,10 +52,12 @@ class NotEditable(Exception):  # noqa: N818
 def new_ground(name: str, stands_for: Zone) -> Ground:
     """Return a file that is not there yet."""
     if name.endswith(".wkt"):
-        return Ground(name=name, kind="wkt", text="# name|kind|WKT, longitude before latitude (WGS 84)\n",
-                      stands_for=stands_for)
-    return Ground(name=name, kind="geojson", text='{"type": "FeatureCollection", "features": []}\n',
-                  stands_for=stands_for)
+        return Ground(
+            name=name, kind="wkt", text="# name|kind|WKT, longitude before latitude (WGS 84)\n", stands_for=stands_for
+        )
+    return Ground(
+        name=name, kind="geojson", text='{"type": "FeatureCollection", "features": []}\n', stands_for=stands_for
+    )
 
 
 def ground_of(name: str, text: str, kind: str, stands_for: Zone) -> Ground:
@@ -110,21 +112,36 @@ def _wkt(name: str, text: str, stands_for: Zone) -> Ground:
             if not isinstance(body, list) or not body or not all(body):
                 raise NotEditable(f"line {drawing.line}: holds an empty geometry: correct it in the file")
             rings = tuple(_open(ring) for ring in body) if kind == "POLYGON" else (tuple((y, x) for x, y in body),)
-            shapes.append(_valid(Shape(
-                type="polygon" if kind == "POLYGON" else "point" if kind == "POINT" else "line", zone=zone, rings=rings,
-                name=drawing.name, of=name, key=len(shapes)), f"line {drawing.line}"))
-        pieces.append(Piece(begin=begins[drawing.line - 1], end=min(begins[drawing.last], len(text)),
-                            shapes=tuple(range(first, len(shapes)))))
+            shapes.append(
+                _valid(
+                    Shape(
+                        type="polygon" if kind == "POLYGON" else "point" if kind == "POINT" else "line",
+                        zone=zone,
+                        rings=rings,
+                        name=drawing.name,
+                        of=name,
+                        key=len(shapes),
+                    ),
+                    f"line {drawing.line}",
+                )
+            )
+        pieces.append(
+            Piece(
+                begin=begins[drawing.line - 1],
+                end=min(begins[drawing.last], len(text)),
+                shapes=tuple(range(first, len(shapes))),
+            )
+        )
     return Ground(name=name, kind="wkt", text=text, stands_for=stands_for, pieces=tuple(pieces), shapes=tuple(shapes))
 
 
 def _written_wkt(ground: Ground, kept: dict[int, Shape], new: Sequence[Shape]) -> str:
     out, at = "", 0
     for piece in ground.pieces:
-        out += ground.text[at:piece.begin]
+        out += ground.text[at : piece.begin]
         at = piece.end
         if _is_untouched(ground, piece, kept):
-            out += ground.text[piece.begin:piece.end]
+            out += ground.text[piece.begin : piece.end]
         else:
             out += "".join(wkt_line(kept[n]) for n in piece.shapes if n in kept)
     out += ground.text[at:]
@@ -135,10 +152,19 @@ def _written_wkt(ground: Ground, kept: dict[int, Shape], new: Sequence[Shape]) -
 
 def wkt_line(shape: Shape) -> str:
     """Return a shape as a line of a WKT file."""
-    rings = ["(" + ", ".join(f"{number(lon)} {number(lat)}" for lat, lon in (
-        (*ring, *ring[:1]) if shape.type == "polygon" else ring)) + ")" for ring in shape.rings]
-    body = f"POLYGON ({', '.join(rings)})" if shape.type == "polygon" else (
-        f"{'POINT' if shape.type == 'point' else 'LINESTRING'} {rings[0]}")
+    rings = [
+        "("
+        + ", ".join(
+            f"{number(lon)} {number(lat)}" for lat, lon in ((*ring, *ring[:1]) if shape.type == "polygon" else ring)
+        )
+        + ")"
+        for ring in shape.rings
+    ]
+    body = (
+        f"POLYGON ({', '.join(rings)})"
+        if shape.type == "polygon"
+        else (f"{'POINT' if shape.type == 'point' else 'LINESTRING'} {rings[0]}")
+    )
     name = _NO_NAME.sub(" ", shape.name).strip()
     return f"{name}|{shape.zone}|{body}\n"
 
@@ -162,8 +188,9 @@ def _geojson(name: str, text: str, stands_for: Zone) -> Ground:
         at, first = begin + len(feature), len(shapes)
         shapes += _of_feature(json.loads(feature), name, len(shapes), stands_for)
         pieces.append(Piece(begin=begin, end=at, shapes=tuple(range(first, len(shapes)))))
-    return Ground(name=name, kind="geojson", text=text, stands_for=stands_for, pieces=tuple(pieces),
-                  shapes=tuple(shapes))
+    return Ground(
+        name=name, kind="geojson", text=text, stands_for=stands_for, pieces=tuple(pieces), shapes=tuple(shapes)
+    )
 
 
 def _of_feature(feature: Any, name: str, first: int, stands_for: Zone) -> list[Shape]:
@@ -182,13 +209,29 @@ def _of_feature(feature: Any, name: str, first: int, stands_for: Zone) -> list[S
         radius_m = properties.get("radius_m")
         out = []
         for n, body in enumerate(many):
-            rings = [_open([(p[0], p[1]) for p in ring]) for ring in body] if single == "polygon" else [
-                tuple((p[1], p[0]) for p in ([body] if single == "point" else body))]
-            out.append(_valid(msgspec.convert({
-                "type": "circle" if single == "point" and radius_m is not None else single, "zone": zone,
-                "rings": rings, "name": str(properties.get("name", "")), "margin_m": properties.get("margin_m"),
-                "radius_m": radius_m if single == "point" else None, "of": name, "key": first + n}, Shape),
-                f"feature {first + n + 1}"))
+            rings = (
+                [_open([(p[0], p[1]) for p in ring]) for ring in body]
+                if single == "polygon"
+                else [tuple((p[1], p[0]) for p in ([body] if single == "point" else body))]
+            )
+            out.append(
+                _valid(
+                    msgspec.convert(
+                        {
+                            "type": "circle" if single == "point" and radius_m is not None else single,
+                            "zone": zone,
+                            "rings": rings,
+                            "name": str(properties.get("name", "")),
+                            "margin_m": properties.get("margin_m"),
+                            "radius_m": radius_m if single == "point" else None,
+                            "of": name,
+                            "key": first + n,
+                        },
+                        Shape,
+                    ),
+                    f"feature {first + n + 1}",
+                )
+            )
     except (KeyError, TypeError, IndexError, AttributeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -207,7 +250,7 @@ def _valid(shape: Shape, place: str) -> Shape:
 def _written_geojson(ground: Ground, kept: dict[int, Shape], new: Sequence[Shape]) -> str:
     features, is_same_count = [], not new
     for piece in ground.pieces:
-        text = ground.text[piece.begin:piece.end]
+        text = ground.text[piece.begin : piece.end]
         if _is_untouched(ground, piece, kept):
             features.append(text)
             continue
@@ -218,7 +261,7 @@ def _written_geojson(ground: Ground, kept: dict[int, Shape], new: Sequence[Shape
     if is_same_count:
         out, at = "", 0
         for piece, feature in zip(ground.pieces, features, strict=True):
-            out += ground.text[at:piece.begin] + feature
+            out += ground.text[at : piece.begin] + feature
             at = piece.end
         return out + ground.text[at:]
     root = msgspec.json.decode(ground.text, type=dict[str, msgspec.Raw])
@@ -238,14 +281,22 @@ def _feature(shape: Shape, feature: dict[str, Any]) -> str:
     said = {"kind": shape.zone, "name": shape.name, "radius_m": shape.radius_m, "margin_m": shape.margin_m}
     properties = {**(feature.get("properties") or {}), **said}
     rings = [[[lon, lat] for lat, lon in ring] for ring in shape.rings]
-    coordinates: Any = [[*ring, ring[0]] for ring in rings] if shape.type == "polygon" else (
-        rings[0] if shape.type == "line" else rings[0][0])
-    return json.dumps({
-        **feature, "properties": {k: v for k, v in properties.items() if v is not None and not (k in said and v == "")},
-        "geometry": {"type": _GEOMETRY[shape.type], "coordinates": coordinates}}, ensure_ascii=False)
+    coordinates: Any = (
+        [[*ring, ring[0]] for ring in rings]
+        if shape.type == "polygon"
+        else (rings[0] if shape.type == "line" else rings[0][0])
+    )
+    return json.dumps(
+        {
+            **feature,
+            "properties": {k: v for k, v in properties.items() if v is not None and not (k in said and v == "")},
+            "geometry": {"type": _GEOMETRY[shape.type], "coordinates": coordinates},
+        },
+        ensure_ascii=False,
+    )
 
 
-EMPTY = ""           # the text of a file that is not there yet
+EMPTY = ""  # the text of a file that is not there yet
 _DIGITS = 20
 
 
@@ -254,7 +305,7 @@ class Text:
     """A file's content as text, and how it is written back: what is not changed is the same bytes."""
 
     text: str
-    mark: bytes = b""        # a byte order mark
+    mark: bytes = b""  # a byte order mark
     line_end: str = "\n"
 
     def data(self, text: str) -> bytes:
@@ -307,7 +358,8 @@ def _empty() -> MissionOptions:
 
     boat = Boat(polar=ardurover_sitl())
     proposed = proposed_margin(
-        AutopilotLimits(), speed_mps=boat.polar.max_speed_mps(WindOptions().preview_speed_mps), hull=boat.hull)
+        AutopilotLimits(), speed_mps=boat.polar.max_speed_mps(WindOptions().preview_speed_mps), hull=boat.hull
+    )
     return MissionOptions(area=AreaOptions(margin_m=proposed.margin_m, margin_floor_m=proposed.floor_m))
 
 
@@ -336,8 +388,12 @@ def read_base(path: Path) -> SourceFiles:
     toml = text_of(data[path], str(path))
     options = parse_options(toml.text, str(path))
     if options.from_autopilot:
-        raise InputError(str(path), "from_autopilot", "the goals of this mission are drawn on the autopilot, not here",
-                         "draw them in a ground station and upload them")
+        raise InputError(
+            str(path),
+            "from_autopilot",
+            "the goals of this mission are drawn on the autopilot, not here",
+            "draw them in a ground station and upload them",
+        )
     grounds: dict[str, Ground] = {}
     texts: dict[str, Text] = {}
     locked: list[Locked] = []
@@ -349,14 +405,22 @@ def read_base(path: Path) -> SourceFiles:
             data[where] = read_bytes(where)
         except InputError as error:
             if isinstance(error.__context__, OSError):
-                raise unreadable(str(path), error.__context__, f"[area] {where}",
-                                 "paths are relative to the mission file") from None
+                raise unreadable(
+                    str(path), error.__context__, f"[area] {where}", "paths are relative to the mission file"
+                ) from None
             raise
         texts[name] = text = Text(text="") if data[where].startswith(b"PK") else text_of(data[where], str(where))
-        document = parse(data[where], str(where), kind=ZoneKind(stands_for), axis=options.area.axis, areas=True,
-                         extension=where.suffix.lower())
+        document = parse(
+            data[where],
+            str(where),
+            kind=ZoneKind(stands_for),
+            axis=options.area.axis,
+            areas=True,
+            extension=where.suffix.lower(),
+        )
         why = _locked_because(name, where, path, options) or (
-            "" if text.data(text.text) == data[where] else "is not written in UTF-8 throughout: shown, not edited")
+            "" if text.data(text.text) == data[where] else "is not written in UTF-8 throughout: shown, not edited"
+        )
         try:
             if not why:
                 grounds[name] = ground_of(name, text.text, document.format, stands_for)
@@ -366,8 +430,9 @@ def read_base(path: Path) -> SourceFiles:
             why = str(reason)
         if why:
             locked.append(Locked(name=name, why=why, document=document))
-    return SourceFiles(path=path, data=data, toml=toml, options=options, grounds=grounds, texts=texts,
-                       locked=tuple(locked))
+    return SourceFiles(
+        path=path, data=data, toml=toml, options=options, grounds=grounds, texts=texts, locked=tuple(locked)
+    )
 
 
 def area_files(options: MissionOptions) -> list[tuple[str, Zone]]:

@@ -50,13 +50,13 @@ from companion.planner.worker import PlannerWorker
 from companion.view.area import drawn as area_drawn
 from companion.words import counted, listed
 
-SIMPLER_DEG = 2e-6        # 0.2 m
-DEGREE_M = 111_195.0      # of latitude
+SIMPLER_DEG = 2e-6  # 0.2 m
+DEGREE_M = 111_195.0  # of latitude
 SIDES, FEW_SIDES = 48, 8  # of a circle, and of one of many
 MANY = 500
-MOST_SIBLINGS = 200       # missions in the folder that are asked whether they share a file
+MOST_SIBLINGS = 200  # missions in the folder that are asked whether they share a file
 PARTS = {"waypoints": ("mission", "fence", "rally")}
-_UNKNOWN = GeoPoint(lat_deg=50.817, lon_deg=-1.31)   # where a mission without any place begins: where the examples are
+_UNKNOWN = GeoPoint(lat_deg=50.817, lon_deg=-1.31)  # where a mission without any place begins: where the examples are
 _DRAWN = {"name", "goal", "refuge", "start", "area"}
 
 
@@ -66,18 +66,36 @@ def state_of(base: SourceFiles) -> dict[str, Any]:
     frame = area_drawn("", _origin(base, sketch), [], [], [], None)
     wind = base.options.wind
     return {
-        "version": __version__, "file": base.path.name, "folder": str(base.path.parent), "is_new": base.is_new,
-        "called": base.options.name or base.path.stem, "disk": base.revision, "sketch": sketch,
+        "version": __version__,
+        "file": base.path.name,
+        "folder": str(base.path.parent),
+        "is_new": base.is_new,
+        "called": base.options.name or base.path.stem,
+        "disk": base.revision,
+        "sketch": sketch,
         "frame": {"lat": frame.origin_lat_deg, "lon": frame.origin_lon_deg, "lat_m": frame.lat_m, "lon_m": frame.lon_m},
         "is_placed": _places(base, sketch) != [],
-        "files": [{"name": n, "zone": zone, "why": next((o.why for o in base.locked if o.name == n), ""),
-                   "shared_by": _sharing(base, n)} for n, zone in area_files(base.options)],
+        "files": [
+            {
+                "name": n,
+                "zone": zone,
+                "why": next((o.why for o in base.locked if o.name == n), ""),
+                "shared_by": _sharing(base, n),
+            }
+            for n, zone in area_files(base.options)
+        ],
         "locked": [part for other in base.locked for part in _shown(other.name, other.document, base)],
         "wind": {"from_deg": wind.preview_from_deg, "speed_mps": wind.preview_speed_mps},
-        "formats": [{"ending": row.endings[0][1:], "said": row.said, "part": part}
-                    for row in FORMATS for part in PARTS.get(row.name, ("",))],
-        "kept": [t for t in MissionOptions.__struct_fields__ if t not in _DRAWN
-                 and getattr(base.options, t) != getattr(MissionOptions(), t)],
+        "formats": [
+            {"ending": row.endings[0][1:], "said": row.said, "part": part}
+            for row in FORMATS
+            for part in PARTS.get(row.name, ("",))
+        ],
+        "kept": [
+            t
+            for t in MissionOptions.__struct_fields__
+            if t not in _DRAWN and getattr(base.options, t) != getattr(MissionOptions(), t)
+        ],
         "said": "",
     }
 
@@ -128,8 +146,10 @@ def _rings(zone: Zone, sides: int) -> list[list[list[float]]]:
         ring = [center.lat_deg + high_deg * np.cos(turns), center.lon_deg + wide_deg * np.sin(turns)]
         return [np.round(np.column_stack(ring), 7).tolist()]
     polygon = shapely.simplify(zone.shape, SIMPLER_DEG)
-    return [np.round(shapely.get_coordinates(ring)[:-1, ::-1], 7).tolist()
-            for ring in (polygon.exterior, *polygon.interiors)]
+    return [
+        np.round(shapely.get_coordinates(ring)[:-1, ::-1], 7).tolist()
+        for ring in (polygon.exterior, *polygon.interiors)
+    ]
 
 
 def changed_meanwhile(expected: Mapping[Path, bytes], files: Mapping[Path, bytes]) -> list[Path]:
@@ -162,7 +182,7 @@ def save(files: Mapping[Path, bytes], disk: Disk) -> None:
         raise JobError(f"{error.filename}: cannot be written ({reason(error)}); what was there is there") from None
 
 
-BUDGET_S = 0.5       # for a leg: near the best, and while one looks
+BUDGET_S = 0.5  # for a leg: near the best, and while one looks
 MOST_LEGS = 60
 
 
@@ -204,8 +224,11 @@ class PlanPreviews:
                         raise Superseded
                     budget_s = min(BUDGET_S, mission.skipper.planning_budget_s)
                     # Whoever hangs up must not end the worker's work, which would end the worker.
-                    plan = await asyncio.shield(self._worker.plan(
-                        problem, budget_s=budget_s, seed=0, algorithm=by.algorithm, settings=by.settings))
+                    plan = await asyncio.shield(
+                        self._worker.plan(
+                            problem, budget_s=budget_s, seed=0, algorithm=by.algorithm, settings=by.settings
+                        )
+                    )
                     to = words[len(made)]
                     if not plan.has_path:
                         error = f"no way to {to} was found: {plan.reason}"
@@ -229,13 +252,14 @@ def _together(made: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "time_s": round(sum(leg["time_s"] for leg in made), 1),
         "length_m": round(sum(leg["length_m"] for leg in made), 1),
-        "tacks": sum(leg["tacks"] for leg in made), "gybes": sum(leg["gybes"] for leg in made),
+        "tacks": sum(leg["tacks"] for leg in made),
+        "gybes": sum(leg["gybes"] for leg in made),
         "clearance_m": min(clear) if clear else None,
     }
 
 
-MOST_BODY = 4_000_000     # bytes: 20,000 vertices are 0.6 MB
-MOST_BASES = 40           # that a sketch may be drawn upon: so often saved and undone
+MOST_BODY = 4_000_000  # bytes: 20,000 vertices are 0.6 MB
+MOST_BASES = 40  # that a sketch may be drawn upon: so often saved and undone
 _LOG = logging.getLogger(__name__)
 
 Degrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
@@ -258,14 +282,18 @@ class EditorApi:
     """Serves the editor of one mission file; see ``companion.page.connections.App``."""
 
     def __init__(
-        self, base: SourceFiles, token: str, previews: PlanPreviews, charts: Sequence[TileChart] = (),
+        self,
+        base: SourceFiles,
+        token: str,
+        previews: PlanPreviews,
+        charts: Sequence[TileChart] = (),
         disk: Disk | None = None,
     ) -> None:
         self._path, self._token, self._previews, self._disk = base.path, token, previews, disk or Disk()
         self._files = {**files(), **files("companion.editor")}
         self._charts = {chart.tag: chart for chart in charts}
         self._bases: dict[str, SourceFiles] = {}
-        self._own: dict[Any, bytes] = {}      # files that were made here, as they were written
+        self._own: dict[Any, bytes] = {}  # files that were made here, as they were written
         self._turn, self._newest = asyncio.Lock(), 0
         self._keep(base)
 
@@ -306,8 +334,12 @@ class EditorApi:
             raise HttpRefusal(500, f"the editor failed at this: {type(error).__name__}; nothing is written") from None
 
     def _acts(self) -> dict[str, Callable[[_Asked], Awaitable[dict[str, Any]]]]:
-        return {"/api/check": self._check, "/api/plan": self._plan, "/api/save": self._save,
-                "/api/export": self._export}
+        return {
+            "/api/check": self._check,
+            "/api/plan": self._plan,
+            "/api/save": self._save,
+            "/api/export": self._export,
+        }
 
     def _keep(self, base: SourceFiles) -> str:
         revision = base.revision
@@ -338,7 +370,7 @@ class EditorApi:
     async def _check(self, asked: _Asked) -> dict[str, Any]:
         self._newest += 1
         mine = self._newest
-        async with self._turn:   # one at a time, and of those that wait the newest
+        async with self._turn:  # one at a time, and of those that wait the newest
             if mine != self._newest:
                 raise Superseded
             return await asyncio.to_thread(lambda: looked_at(self._draft(asked.sketch), asked.from_deg)[1])
@@ -351,8 +383,11 @@ class EditorApi:
             return {"error": ": ".join(p for p in (first.place, first.problem) if p), "legs": []}
         wind = judged.mission.wind
         from_deg = wind.preview_from_deg if asked.from_deg is None else asked.from_deg
-        return await self._previews.make(judged.mission, AssumedWind(
-            from_deg=from_deg % 360.0, speed_mps=asked.speed_mps, spread_deg=asked.spread_deg), mine)
+        return await self._previews.make(
+            judged.mission,
+            AssumedWind(from_deg=from_deg % 360.0, speed_mps=asked.speed_mps, spread_deg=asked.spread_deg),
+            mine,
+        )
 
     async def _save(self, asked: _Asked) -> dict[str, Any]:
         on_disk = self._base(asked.disk)
@@ -398,9 +433,12 @@ class EditorApi:
         losses = [*goal_losses(judged.mission), *made.losses]
         if made.is_empty:
             raise InputError(name, "", "would be empty: there is nothing in the mission that this format carries")
-        return {"name": name, "data": base64.b64encode(made.data).decode(),
-                "is_lossy": any(f.severity is FindingLevel.ERROR for f in made.losses),
-                "losses": [{"severity": f.severity.value, "text": f.text} for f in losses]}
+        return {
+            "name": name,
+            "data": base64.b64encode(made.data).decode(),
+            "is_lossy": any(f.severity is FindingLevel.ERROR for f in made.losses),
+            "losses": [{"severity": f.severity.value, "text": f.text} for f in losses],
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -412,8 +450,9 @@ class EditorAddress:
 
 
 @contextlib.asynccontextmanager
-async def editing(base: SourceFiles, address: Address,
-                  charts: Sequence[TileChart] = ()) -> AsyncIterator[EditorAddress]:
+async def editing(
+    base: SourceFiles, address: Address, charts: Sequence[TileChart] = ()
+) -> AsyncIterator[EditorAddress]:
     """Serve the editor of a mission while the body runs. An address without a token gets one.
 
     ``charts`` lie under the drawing, the lowest first.

@@ -44,8 +44,10 @@ def draft_of(base: SourceFiles, sketch: Sketch, own: AbstractSet[Path] = frozens
         InputError: a value is out of its range; JobError: the mission file cannot be changed in place.
     """
     source = str(base.path)
-    for name, count, keys in (("goal", len(base.options.goal), [g.key for g in sketch.goals]),
-                              ("refuge", len(base.options.refuge), [r.key for r in sketch.refuges])):
+    for name, count, keys in (
+        ("goal", len(base.options.goal), [g.key for g in sketch.goals]),
+        ("refuge", len(base.options.refuge), [r.key for r in sketch.refuges]),
+    ):
         known = [key for key in keys if key is not None]
         if len(set(known)) != len(known) or any(key >= count for key in known):
             raise JobError(f"{source}: the sketch names a {name} that is not in the file; load it again")
@@ -59,8 +61,13 @@ def draft_of(base: SourceFiles, sketch: Sketch, own: AbstractSet[Path] = frozens
         named = msgspec.structs.replace(MissionOptions(), name=options.name or base.path.stem)
         options = msgspec.structs.replace(options, name=named.name)
         before, text = named, HEAD.format(name=_toml(named.name or ""))
-    toml = rewritten(text, before, options, {
-        "goal": [g.key for g in sketch.goals], "refuge": [r.key for r in sketch.refuges]}, source)
+    toml = rewritten(
+        text,
+        before,
+        options,
+        {"goal": [g.key for g in sketch.goals], "refuge": [r.key for r in sketch.refuges]},
+        source,
+    )
     files = {base.path: base.toml.data(toml)}
     for name, text in texts.items():
         was = base.texts.get(name)
@@ -75,7 +82,7 @@ def _toml(text: str) -> str:
 
 
 def _area(
-    base: SourceFiles, sketch: Sketch, options: MissionOptions, own: AbstractSet[Path],
+    base: SourceFiles, sketch: Sketch, options: MissionOptions, own: AbstractSet[Path]
 ) -> tuple[dict[str, str], MissionOptions]:
     """Return the texts of the area's files with the sketch's shapes in them, and the options that name them."""
     grounds = dict(base.grounds)
@@ -106,15 +113,19 @@ def _area(
 
 
 def _place_for(
-    shape: Shape, base: SourceFiles, options: MissionOptions, grounds: Mapping[str, Ground], own: AbstractSet[Path],
+    shape: Shape, base: SourceFiles, options: MissionOptions, grounds: Mapping[str, Ground], own: AbstractSet[Path]
 ) -> str:
     """Return the file that a new shape goes into: one of its zone that has words for it, else a new one."""
     for name, ground in grounds.items():
         if ground.stands_for == shape.zone and can_hold(ground.kind, shape):
             return name
     if shape.zone == "inclusion" and options.area.fence is not None:
-        raise InputError(str(base.path), "[area] fence", f"is {options.area.fence}, which cannot be drawn in here",
-                         "convert it: companion fence convert, or take it out of the mission")
+        raise InputError(
+            str(base.path),
+            "[area] fence",
+            f"is {options.area.fence}, which cannot be drawn in here",
+            "convert it: companion fence convert, or take it out of the mission",
+        )
     stem = re.sub(r"[^\w-]+", "-", base.path.stem).strip("-").lower() or "mission"
     ending = "wkt" if can_hold("wkt", shape) else "geojson"
     noun = "fence" if shape.zone == "inclusion" else "obstacles"
@@ -173,8 +184,14 @@ def _row(severity: FindingLevel, place: str, text: str, remedy: str, area: Area)
     match = _PLACE.search(place)
     words = [word for word in (match.groups() if match else ()) if word]
     row: dict[str, Any] = {
-        "severity": severity.value, "place": place, "text": text, "remedy": remedy, "at": None,
-        "of": words[0] if words else None, "number": int(words[1]) - 1 if len(words) > 1 else None}
+        "severity": severity.value,
+        "place": place,
+        "text": text,
+        "remedy": remedy,
+        "at": None,
+        "of": words[0] if words else None,
+        "number": int(words[1]) - 1 if len(words) > 1 else None,
+    }
     exact = _AT.search(place)
     if exact:
         row["at"] = [float(exact[1]), float(exact[2])]
@@ -214,7 +231,10 @@ def _rings(polygons: Sequence[shapely.Polygon], frame: LocalFrame) -> list[list[
     out = []
     for polygon in polygons:
         simple = shapely.simplify(polygon, SIMPLER_M)
-        out.append([
-            np.round(frame.array_lonlat_from_en(shapely.get_coordinates(ring)[:-1])[:, ::-1], 7).tolist()
-            for ring in (simple.exterior, *simple.interiors)])
+        out.append(
+            [
+                np.round(frame.array_lonlat_from_en(shapely.get_coordinates(ring)[:-1])[:, ::-1], 7).tolist()
+                for ring in (simple.exterior, *simple.interiors)
+            ]
+        )
     return out

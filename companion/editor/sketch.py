@@ -28,7 +28,7 @@ from companion.geofence.mission import (
     kind_of,
 )
 
-MOST_VERTICES = 20_000     # of all that is drawn by hand: a coast of more is shown, and edited where it was made
+MOST_VERTICES = 20_000  # of all that is drawn by hand: a coast of more is shown, and edited where it was made
 MOST_GOALS = 1000
 
 Place = tuple[Latitude, Longitude]
@@ -121,33 +121,62 @@ def sketched(options: MissionOptions, shapes: Sequence[Shape], revision: str) ->
     """Return the sketch of a mission's options and of the shapes of its files."""
     start, area, skipper = options.start, options.area, options.skipper
     return Sketch(
-        revision=revision, name=options.name, shapes=tuple(shapes),
+        revision=revision,
+        name=options.name,
+        shapes=tuple(shapes),
         start=None if start is None else SketchedStart(at=(start.lat, start.lon), heading_deg=start.heading_deg),
         goals=tuple(_sketched(goal, n) for n, goal in enumerate(options.goal)),
-        refuges=tuple(SketchedRefuge(at=(r.lat, r.lon), radius_m=r.radius_m, name=r.name, key=n)
-                      for n, r in enumerate(options.refuge)),
-        margin_m=area.margin_m, margin_floor_m=area.margin_floor_m, point_radius_m=area.point_radius_m,
-        end=skipper.end, laps=skipper.laps)
+        refuges=tuple(
+            SketchedRefuge(at=(r.lat, r.lon), radius_m=r.radius_m, name=r.name, key=n)
+            for n, r in enumerate(options.refuge)
+        ),
+        margin_m=area.margin_m,
+        margin_floor_m=area.margin_floor_m,
+        point_radius_m=area.point_radius_m,
+        end=skipper.end,
+        laps=skipper.laps,
+    )
 
 
 def _sketched(goal: GoalOptions, key: int) -> SketchedGoal:
     if isinstance(goal, PointOptions):
-        return SketchedGoal(kind="point", key=key, name=goal.name, at=(goal.lat, goal.lon), radius_m=goal.radius_m,
-                            rounding=goal.rounding)
+        return SketchedGoal(
+            kind="point",
+            key=key,
+            name=goal.name,
+            at=(goal.lat, goal.lon),
+            radius_m=goal.radius_m,
+            rounding=goal.rounding,
+        )
     if isinstance(goal, GateOptions):
         return SketchedGoal(
-            kind="gate", key=key, name=goal.name, port_mark=(goal.port_mark.lat, goal.port_mark.lon),
-            starboard_mark=(goal.starboard_mark.lat, goal.starboard_mark.lon), mark_radius_m=goal.mark_radius_m,
-            after_s=goal.after_s)
+            kind="gate",
+            key=key,
+            name=goal.name,
+            port_mark=(goal.port_mark.lat, goal.port_mark.lon),
+            starboard_mark=(goal.starboard_mark.lat, goal.starboard_mark.lon),
+            mark_radius_m=goal.mark_radius_m,
+            after_s=goal.after_s,
+        )
     if isinstance(goal, FieldOptions):
-        return SketchedGoal(kind="field", key=key, name=goal.name, at=(goal.lat, goal.lon), radius_m=goal.radius_m,
-                            for_s=goal.for_s, polygon=goal.polygon, field=goal.field, until=goal.until)
+        return SketchedGoal(
+            kind="field",
+            key=key,
+            name=goal.name,
+            at=(goal.lat, goal.lon),
+            radius_m=goal.radius_m,
+            for_s=goal.for_s,
+            polygon=goal.polygon,
+            field=goal.field,
+            until=goal.until,
+        )
     ring = _ring_of(goal.polygon)
     own = goal.polygon if ring is None else None
     if isinstance(goal, BoxOptions):
         return SketchedGoal(kind="box", key=key, name=goal.name, ring=ring, polygon=own, for_s=goal.for_s)
-    return SketchedGoal(kind="search", key=key, name=goal.name, ring=ring, polygon=own, swath_m=goal.swath_m,
-                        coverage=goal.coverage)
+    return SketchedGoal(
+        kind="search", key=key, name=goal.name, ring=ring, polygon=own, swath_m=goal.swath_m, coverage=goal.coverage
+    )
 
 
 def _ring_of(polygon: str) -> Ring | None:
@@ -179,14 +208,21 @@ def options_of(sketch: Sketch, before: MissionOptions) -> MissionOptions:
     replace = msgspec.structs.replace
     heading = None if sketch.start is None else sketch.start.heading_deg
     made = replace(
-        before, name=sketch.name,
-        start=None if sketch.start is None else StartOptions(
-            lat=sketch.start.at[0], lon=sketch.start.at[1], heading_deg=heading or 0.0),
+        before,
+        name=sketch.name,
+        start=None
+        if sketch.start is None
+        else StartOptions(lat=sketch.start.at[0], lon=sketch.start.at[1], heading_deg=heading or 0.0),
         goal=tuple(_goal(goal, n, before) for n, goal in enumerate(sketch.goals, start=1)),
         refuge=tuple(RefugeOptions(lat=r.at[0], lon=r.at[1], radius_m=r.radius_m, name=r.name) for r in sketch.refuges),
-        area=replace(before.area, margin_m=sketch.margin_m, margin_floor_m=sketch.margin_floor_m,
-                     point_radius_m=sketch.point_radius_m),
-        skipper=replace(before.skipper, end=sketch.end, laps=sketch.laps))
+        area=replace(
+            before.area,
+            margin_m=sketch.margin_m,
+            margin_floor_m=sketch.margin_floor_m,
+            point_radius_m=sketch.point_radius_m,
+        ),
+        skipper=replace(before.skipper, end=sketch.end, laps=sketch.laps),
+    )
     try:
         return msgspec.convert(msgspec.to_builtins(made), MissionOptions)
     except msgspec.ValidationError as error:
@@ -200,25 +236,43 @@ def _goal(goal: SketchedGoal, number: int, before: MissionOptions) -> GoalOption
     if goal.kind == "point":
         if goal.at is None:
             raise ValueError(f"[[goal]] {number} has no place")
-        made = PointOptions(lat=goal.at[0], lon=goal.at[1], name=goal.name, rounding=goal.rounding,
-                            bandwidth_m=old.bandwidth_m if isinstance(old, PointOptions) else None)
+        made = PointOptions(
+            lat=goal.at[0],
+            lon=goal.at[1],
+            name=goal.name,
+            rounding=goal.rounding,
+            bandwidth_m=old.bandwidth_m if isinstance(old, PointOptions) else None,
+        )
         return _with(made, radius_m=goal.radius_m)
     if goal.kind == "gate":
         if goal.port_mark is None or goal.starboard_mark is None:
             raise ValueError(f"[[goal]] {number} is a gate without two marks")
         marks = [MarkOptions(lat=lat, lon=lon) for lat, lon in (goal.port_mark, goal.starboard_mark)]
         gate = GateOptions(
-            port_mark=marks[0], starboard_mark=marks[1], name=goal.name, after_s=goal.after_s,
-            not_before=old.not_before if isinstance(old, GateOptions) else None)
+            port_mark=marks[0],
+            starboard_mark=marks[1],
+            name=goal.name,
+            after_s=goal.after_s,
+            not_before=old.not_before if isinstance(old, GateOptions) else None,
+        )
         return _with(gate, mark_radius_m=goal.mark_radius_m)
     if goal.kind == "field":
         if goal.at is None or goal.field is None:
             raise ValueError(f"[[goal]] {number} is a field without its place or its expression")
         given = {"radius_m": goal.radius_m, "until": goal.until}
-        return msgspec.convert({
-            "kind": "field", "lat": goal.at[0], "lon": goal.at[1], "field": goal.field, "name": goal.name,
-            "for_s": goal.for_s, "polygon": goal.polygon, **{k: v for k, v in given.items() if v is not None},
-        }, FieldOptions)
+        return msgspec.convert(
+            {
+                "kind": "field",
+                "lat": goal.at[0],
+                "lon": goal.at[1],
+                "field": goal.field,
+                "name": goal.name,
+                "for_s": goal.for_s,
+                "polygon": goal.polygon,
+                **{k: v for k, v in given.items() if v is not None},
+            },
+            FieldOptions,
+        )
     polygon = goal.polygon if goal.ring is None else _wkt_of(goal.ring)
     if isinstance(old, BoxOptions | SearchOptions) and goal.ring is not None and _ring_of(old.polygon) == goal.ring:
         polygon = old.polygon

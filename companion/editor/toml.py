@@ -34,15 +34,17 @@ def blocks_of(text: str) -> list[Block]:
     cuts: list[tuple[int, str, bool]] = [(0, "", False)]
     for at in _headers(text):
         match = _HEADER.match(text, at)
-        assert match is not None, text[at:at + 80]
+        assert match is not None, text[at : at + 80]
         brackets, name, ending = match.groups()
         name = name.strip("\"'")
         if ending == "." and name == cuts[-1][1]:
             continue
         cuts.append((_with_comment(text, at, at_least=cuts[-1][0]), name, brackets == "[[" and ending != "."))
     ends = [cut[0] for cut in cuts[1:]] + [len(text)]
-    return [Block(name=name, text=text[begin:end], is_one_of_many=many)
-            for (begin, name, many), end in zip(cuts, ends, strict=True)]
+    return [
+        Block(name=name, text=text[begin:end], is_one_of_many=many)
+        for (begin, name, many), end in zip(cuts, ends, strict=True)
+    ]
 
 
 def text_of(blocks: list[Block]) -> str:
@@ -117,13 +119,29 @@ def _closed(text: str, mark: str, at: int) -> int:
 
 LISTS = ("goal", "refuge")
 # Where a table is put that was not there: before the first of those behind it.
-ORDER = ("", "start", "goal", "refuge", "area", "wind", "risk", "boat", "autopilot", "operator", "skipper", "planner",
-         "passage", "safety", "traffic", "output")
+ORDER = (
+    "",
+    "start",
+    "goal",
+    "refuge",
+    "area",
+    "wind",
+    "risk",
+    "boat",
+    "autopilot",
+    "operator",
+    "skipper",
+    "planner",
+    "passage",
+    "safety",
+    "traffic",
+    "output",
+)
 Keys = Sequence[int | None]
 
 
 def rewritten(
-    text: str, before: MissionOptions, after: MissionOptions, keys: Mapping[str, Keys], source: str = "",
+    text: str, before: MissionOptions, after: MissionOptions, keys: Mapping[str, Keys], source: str = ""
 ) -> str:
     """Return the mission file ``text``, which says ``before``, so that it says ``after``.
 
@@ -183,12 +201,12 @@ def _edited(text: str, table: str, changes: Mapping[str, Any], *, is_one_of_many
 def _fits(array: Any, wanted: tuple[Any, ...]) -> bool:
     """Make an array what is wanted where entries only go or come at its end: its other lines stay as they are."""
     kept = [entry for entry in array if entry in wanted]
-    if tuple(kept) != wanted[:len(kept)] or len(set(kept)) != len(kept):
+    if tuple(kept) != wanted[: len(kept)] or len(set(kept)) != len(kept):
         return False
     for n in reversed(range(len(array))):
         if array[n] not in wanted:
             array.pop(n)
-    for entry in wanted[len(kept):]:
+    for entry in wanted[len(kept) :]:
         array.append(entry)
     return True
 
@@ -207,9 +225,10 @@ def _in_table(blocks: list[Block], table: str, changes: Mapping[str, Any]) -> li
     if index is not None:
         block = blocks[index]
         text = _edited(block.text, table, changes)
-        return [*blocks[:index], _with_text(block, text), *blocks[index + 1:]]
-    body = "".join(f"{key} = {tomlkit.item(_value(value)).as_string()}\n" for key, value in changes.items()
-                   if value is not None)
+        return [*blocks[:index], _with_text(block, text), *blocks[index + 1 :]]
+    body = "".join(
+        f"{key} = {tomlkit.item(_value(value)).as_string()}\n" for key, value in changes.items() if value is not None
+    )
     return _inserted(blocks, Block(name=table, text=f"[{table}]\n{body}"))
 
 
@@ -254,23 +273,24 @@ def _rank(name: str) -> int:
 
 
 def _listed(
-    blocks: list[Block], name: str, before: Sequence[msgspec.Struct], after: Sequence[msgspec.Struct], keys: Keys,
+    blocks: list[Block], name: str, before: Sequence[msgspec.Struct], after: Sequence[msgspec.Struct], keys: Keys
 ) -> list[Block]:
     """Return the blocks with the entries of a list in their new order, changed, added and taken out."""
     if tuple(before) == tuple(after) and list(keys) == list(range(len(before))):
         return blocks
     places = [n for n, b in enumerate(blocks) if b.name == name]
-    if before and len(places) != len(before):   # an array in one line: written as tables
+    if before and len(places) != len(before):  # an array in one line: written as tables
         blocks = _without(blocks, name)
         return _inserted(blocks, *(made(name, entry, is_one_of_many=True) for entry in after)) if after else blocks
     entries = []
     for entry, key in zip(after, keys, strict=True):
-        if key is None or type(entry) is not type(before[key]):   # a goal of another kind is written anew
+        if key is None or type(entry) is not type(before[key]):  # a goal of another kind is written anew
             entries.append(made(name, entry, is_one_of_many=True))
         else:
             block, changes = blocks[places[key]], _changes(before[key], entry)
-            entries.append(_with_text(
-                block, _edited(block.text, name, changes, is_one_of_many=True)) if changes else block)
+            entries.append(
+                _with_text(block, _edited(block.text, name, changes, is_one_of_many=True)) if changes else block
+            )
     if list(keys) == list(range(len(before))):
         out = list(blocks)
         for n, block in zip(places, entries, strict=True):
@@ -279,7 +299,7 @@ def _listed(
     rest = [b for b in blocks if b.name != name]
     if not entries:
         return rest
-    at = sum(1 for b in blocks[:places[0]] if b.name != name) if places else None
+    at = sum(1 for b in blocks[: places[0]] if b.name != name) if places else None
     return _inserted(rest, *entries, at=at)
 
 

@@ -166,8 +166,13 @@ def _watch_irons(
     patience = habits.tack_s if state.manoeuvre is Manoeuvre.TACK else 4.0
     if t_s - since >= patience:
         return replace(
-            state, manoeuvre=Manoeuvre.IRONS, since_s=t_s, stuck_since_s=None, failed_tacks=state.failed_tacks + 1,
-            irons=state.irons + 1, irons_side=1 if twa > 0.0 else -1,
+            state,
+            manoeuvre=Manoeuvre.IRONS,
+            since_s=t_s,
+            stuck_since_s=None,
+            failed_tacks=state.failed_tacks + 1,
+            irons=state.irons + 1,
+            irons_side=1 if twa > 0.0 else -1,
         )
     return replace(state, stuck_since_s=since)
 
@@ -204,8 +209,9 @@ class LastResort:
 
 def go_to(point_en: tuple[float, float], twd_from_rad: float, half_m: float = ZONE_M) -> Intent:
     """Return the intent to sail to a point: Schmitt's attractive point with its zone along the wind."""
-    return Intent(field=AttractivePoint().shifted(*point_en),
-                  zone=HysteresisZone.of_point(point_en, twd_from_rad, half_m))
+    return Intent(
+        field=AttractivePoint().shifted(*point_en), zone=HysteresisZone.of_point(point_en, twd_from_rad, half_m)
+    )
 
 
 def follow_line(a_en: tuple[float, float], b_en: tuple[float, float], half_m: float = ZONE_M) -> Intent:
@@ -220,7 +226,7 @@ def hold_heading(heading_rad: float) -> Intent:
 
 # Away from what stands still: a repulsive field about the mission's obstacles and its fence, whatever their shape.
 
-STEP_M = 0.5   # of the difference quotient
+STEP_M = 0.5  # of the difference quotient
 FAR_M = 1e5
 
 

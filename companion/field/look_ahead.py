@@ -19,14 +19,18 @@ from companion.field.values import Clearance, GuidanceSettings, GuidanceState, I
 from companion.field.vector_fields import NOMINAL, Field, Vectors
 from companion.geo.angles import wrap_pi
 
-OTHER_SIDE_COST = 2.0     # of changing one's mind about the side on which to pass what stands in the way
+OTHER_SIDE_COST = 2.0  # of changing one's mind about the side on which to pass what stands in the way
 _FAN_TWA = np.radians(np.arange(0.0, 181.0, 6.0))
 _STEP_S = 2.5
 
 
 def choose(
-    wanted_rad: float, twd: float | None, situation: Situation, intent: Intent, habits: GuidanceSettings,
-    state: GuidanceState
+    wanted_rad: float,
+    twd: float | None,
+    situation: Situation,
+    intent: Intent,
+    habits: GuidanceSettings,
+    state: GuidanceState,
 ) -> tuple[float, float | None, int]:
     """Return the heading of the fan with the least cost, its margin [m], and the side to pass what stands still on."""
     if not situation.obstacles and intent.stay_in is None and intent.clearance is None:
@@ -170,11 +174,11 @@ def _wrap(angles: NDArray[np.float64]) -> NDArray[np.float64]:
 
 # Out of some water: the heading by which a boat is soonest outside, clear of who is in the way (WRSC 2013).
 
-AHEAD_S = 25.0        # what crossing ahead of a vessel is held to cost, at its bow
-AGAIN_S = 8.0         # what changing one's mind costs: half a turn twice as much
-CLEAR_M = 10.0        # outside every vessel's disc nothing is added
+AHEAD_S = 25.0  # what crossing ahead of a vessel is held to cost, at its bow
+AGAIN_S = 8.0  # what changing one's mind costs: half a turn twice as much
+CLEAR_M = 10.0  # outside every vessel's disc nothing is added
 LOOK_S, MOST_LOOK_S = 150.0, 1800.0
-BEYOND_M = 5.0        # outside is so far outside
+BEYOND_M = 5.0  # outside is so far outside
 FAN_RAD = np.radians(np.arange(0.0, 360.0, 10.0))
 PINCH_RAD = math.radians(4.0)
 

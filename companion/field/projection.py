@@ -140,7 +140,7 @@ _ALWAYS_M = 30.0
 
 
 def near_and_ahead(
-    own_en: tuple[float, float], heading_rad: float | None, other_en: tuple[float, float], *, near_m: float = 300.0,
+    own_en: tuple[float, float], heading_rad: float | None, other_en: tuple[float, float], *, near_m: float = 300.0
 ) -> bool:
     """Return whether an obstacle matters: within ``near_m`` and in the sector ahead, or within _ALWAYS_M anywhere.
 

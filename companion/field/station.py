@@ -49,7 +49,7 @@ class Station:
 class StationPhase(enum.Enum):
     """What the boat is doing."""
 
-    RETURN = "return"     # by the field
+    RETURN = "return"  # by the field
     BOARD = "board"
     TACK = "tack"
     LOOP = "loop"
@@ -93,7 +93,7 @@ def _board(
     t = situation.t_s
     de, dn = situation.en_m[0] - station.at_en[0], situation.en_m[1] - station.at_en[1]
     up = de * math.sin(twd) + dn * math.cos(twd)
-    across = de * math.cos(twd) - dn * math.sin(twd)      # to starboard of the wind's eye
+    across = de * math.cos(twd) - dn * math.sin(twd)  # to starboard of the wind's eye
     twa = wrap_pi(twd - situation.heading_rad)
     if state.phase is StationPhase.RETURN:
         state = replace(state, phase=StationPhase.BOARD, since_s=t, side=1 if twa > 0.0 else -1)
@@ -133,15 +133,17 @@ def _loop(
     else:
         wanted, what = heading_rad + station.loop_turn_rad, "turning"
         through = abs(wrap_pi(twd - wanted)) < half or (
-            wrap_pi(twd - wanted) * twa < 0.0 and abs(twa) < math.radians(95.0))
+            wrap_pi(twd - wanted) * twa < 0.0 and abs(twa) < math.radians(95.0)
+        )
         if through and speed < station.tack_mps and abs(twa) > math.radians(40.0):
             wanted, thrust, what = twd - same_tack * math.radians(65.0), 1.0, "gathering way"
         elif abs(wrap_pi(twd - wanted)) < half:
-            wanted = twd + half      # the boat turns to the right: out of the zone on the other side
+            wanted = twd + half  # the boat turns to the right: out of the zone on the other side
     way = replace(habits, tack_min_mps=0.8 * station.tack_mps)
     steering, heading, why = helm(state.steering, situation, wanted, way)
     if steering.manoeuvre in {Manoeuvre.IRONS, Manoeuvre.WEAR}:
         what, thrust = why, 1.0
     setpoint = Setpoint(
-        t_s=situation.t_s, heading_rad=wrap_pi(heading), thrust=thrust, reason=f"{StationPhase.LOOP.value}: {what}")
+        t_s=situation.t_s, heading_rad=wrap_pi(heading), thrust=thrust, reason=f"{StationPhase.LOOP.value}: {what}"
+    )
     return replace(state, phase=StationPhase.LOOP, steering=steering), setpoint

@@ -51,7 +51,8 @@ MOST_WEIGHT = 100.0
 MAX, PROJECT = "max", "project"
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*)|(?P<mark>[-+*(),]))", re.ASCII)
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_]\w*)|(?P<mark>[-+*(),]))", re.ASCII
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,8 +197,10 @@ class _Reader:
             return self._word(word)
         if word == "-":
             raise self._wrong("fields are not taken from each other", "add a repulsive one")
-        raise self._wrong("a field is missing" + (f" before {word!r}" if word else " at the end"),
-                          f"write the name of an atom: {self._known()}")
+        raise self._wrong(
+            "a field is missing" + (f" before {word!r}" if word else " at the end"),
+            f"write the name of an atom: {self._known()}",
+        )
 
     def _word(self, word: str) -> Expression:
         begin = self._at
@@ -233,7 +236,7 @@ class _Reader:
         """Return the kind and the text of what comes next, ("", "") at the end."""
         match = _TOKEN.match(self._text, self._at)
         if match is None:
-            rest = self._text[self._at:].strip()
+            rest = self._text[self._at :].strip()
             if rest:
                 raise self._wrong(f"{rest[0]!r} is no part of an expression", "names, numbers, + * ( ) and commas are")
             return "", ""
@@ -248,14 +251,14 @@ class _Reader:
         return ", ".join(self._names) if self._names else "none, add a table [field.NAME]"
 
     def _wrong(self, problem: str, remedy: str) -> InputError:
-        rest = self._text[self._at:]
+        rest = self._text[self._at :]
         where = self._at + len(rest) - len(rest.lstrip()) + 1
         return InputError(self._source, f"{self._place}, character {where}", problem, remedy)
 
 
 PointEn = tuple[float, float]
-LEAST = 0.05 * NOMINAL   # a field weaker than this says nothing of where to go
-RING_SHARE = 0.25        # of a small circle's radius: half the width of its zone
+LEAST = 0.05 * NOMINAL  # a field weaker than this says nothing of where to go
+RING_SHARE = 0.25  # of a small circle's radius: half the width of its zone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -385,6 +388,7 @@ class _Nothing(Field):
 
 def field_of(tree: FieldTree, conditions: FieldConditions, *, without_station: bool = False) -> Field:
     """Return the field of a tree, its last projection left to who steers by it; ``without_station``: less its stays."""
+
     def made(node: Expression) -> Field:
         if isinstance(node, Named):
             atom = tree.atom(node.name)
@@ -424,8 +428,9 @@ class _Sailable(Field):
         twd = self.conditions.twd_from_rad
         if twd is None:
             return self.part.evaluate(p)
-        return Projection(field=self.part, twd_from_rad=twd, zone=self.zone,
-                          no_go_half_rad=self.conditions.habits.no_go_half_rad).evaluate(p)
+        return Projection(
+            field=self.part, twd_from_rad=twd, zone=self.zone, no_go_half_rad=self.conditions.habits.no_go_half_rad
+        ).evaluate(p)
 
 
 def _atom_field(atom: Atom, conditions: FieldConditions) -> Field:
@@ -462,6 +467,10 @@ def _atom_zone(atom: Atom, twd_from_rad: float) -> HysteresisZone | HysteresisRi
     if isinstance(atom, Along):
         return HysteresisZone.of_line(atom.from_en, atom.to_en, atom.zone_m)
     if isinstance(atom, Round):
-        return HysteresisRing(at_en=atom.at_en, radius_m=atom.radius_m, is_clockwise=atom.is_clockwise,
-                        half_m=min(atom.zone_m, RING_SHARE * atom.radius_m))
+        return HysteresisRing(
+            at_en=atom.at_en,
+            radius_m=atom.radius_m,
+            is_clockwise=atom.is_clockwise,
+            half_m=min(atom.zone_m, RING_SHARE * atom.radius_m),
+        )
     return None

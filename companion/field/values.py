@@ -79,7 +79,7 @@ class GuidanceSettings:
     ahead_cost: float = 0.6
     repulsive_sigma_m: float = 100.0
     near_m: float = 300.0
-    keep_m: float = 8.0       # from what stands still
+    keep_m: float = 8.0  # from what stands still
 
     @property
     def shore_s(self) -> float:
@@ -92,8 +92,8 @@ class Manoeuvre(enum.Enum):
 
     SAIL = "sail"
     TACK = "tack"
-    WEAR = "wear"          # round by the stern
-    IRONS = "irons"        # caught head to wind: bear away
+    WEAR = "wear"  # round by the stern
+    IRONS = "irons"  # caught head to wind: bear away
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +108,7 @@ class GuidanceState:
     failed_tacks: int = 0
     irons: int = 0
     irons_side: int = 1
-    round_side: int = 0       # something stands in the way and is passed by turning right (1) or left (-1) of it
+    round_side: int = 0  # something stands in the way and is passed by turning right (1) or left (-1) of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

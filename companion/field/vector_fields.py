@@ -20,9 +20,9 @@ Vectors = NDArray[np.float64]
 
 NOMINAL = 10.0
 REPULSIVE = 20.0
-REPULSIVE_SIGMA_M = 100.0   # listing 4.1 divides by 100²: a Gaussian exp(-(d / 100)²)
+REPULSIVE_SIGMA_M = 100.0  # listing 4.1 divides by 100²: a Gaussian exp(-(d / 100)²)
 CIRCLE_RADIUS_M = 10.0
-ZONE_M = 50.0               # half width of the hysteresis zone
+ZONE_M = 50.0  # half width of the hysteresis zone
 
 
 class Field(abc.ABC):

@@ -19,7 +19,7 @@ from pyproj.enums import TransformDirection
 
 from companion.messages import GeoPoint
 
-_BACK = TransformDirection.INVERSE   # pyproj looks its name up at every call
+_BACK = TransformDirection.INVERSE  # pyproj looks its name up at every call
 
 
 @lru_cache(maxsize=32)

@@ -50,9 +50,10 @@ class PolygonIndex:
         self._grid = np.array([origin[0], origin[1], cell, float(columns), float(rows)])
         self._start, members = _sort_into_cells(edges, self._grid)
         self._packed = np.ascontiguousarray(edges[members])  # each cell's edges side by side
-        middles = np.stack(np.meshgrid(
-            origin[0] + (np.arange(columns) + 0.5) * cell, origin[1] + (np.arange(rows) + 0.5) * cell,
-        ), axis=-1).reshape(-1, 2)
+        middles = np.stack(
+            np.meshgrid(origin[0] + (np.arange(columns) + 0.5) * cell, origin[1] + (np.arange(rows) + 0.5) * cell),
+            axis=-1,
+        ).reshape(-1, 2)
         shapely.prepare(self.union)
         self._middle_inside = np.asarray(shapely.contains_xy(self.union, middles[:, 0], middles[:, 1]), dtype=np.bool_)
 
@@ -145,9 +146,7 @@ def _meet(ax: float, ay: float, bx: float, by: float, edge: Floats, k: int) -> b
 
 
 @kernel
-def _inside(
-    px: float, py: float, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
-) -> bool:
+def _inside(px: float, py: float, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_]) -> bool:
     """Whether a point lies inside: the state of its cell's middle, turned by each edge on the way there."""
     columns, rows = int(grid[3]), int(grid[4])
     c = math.floor((px - grid[0]) / grid[2])
@@ -171,9 +170,7 @@ def _inside(
 
 
 @kernel
-def _contains(
-    points: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
-) -> NDArray[np.bool_]:
+def _contains(points: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_]) -> NDArray[np.bool_]:
     out = np.zeros(points.shape[0], dtype=np.bool_)
     for i in range(points.shape[0]):
         out[i] = _inside(points[i, 0], points[i, 1], edges, start, grid, middle)
@@ -182,7 +179,7 @@ def _contains(
 
 @kernel
 def _intersects(
-    segments: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
+    segments: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
     out = np.zeros(segments.shape[0], dtype=np.bool_)
     columns, rows, cell_m = int(grid[3]), int(grid[4]), grid[2]
@@ -256,9 +253,7 @@ def _distance2(px: float, py: float, edge: Floats, k: int) -> float:
 
 
 @kernel
-def _signed_distance(
-    points: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_],
-) -> Floats:
+def _signed_distance(points: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_]) -> Floats:
     """Search rings of cells round each point until no nearer edge is possible."""
     columns, rows, cell_m = int(grid[3]), int(grid[4]), grid[2]
     out = np.empty(points.shape[0])
@@ -283,8 +278,12 @@ def _signed_distance(
                     else:  # inside the ring: on to its far side
                         c = max(c + 1, high_c)
             # Everything in the rings searched is known; the next ring is at least this far away.
-            reach = min(px - (grid[0] + low_c * cell_m), grid[0] + (high_c + 1) * cell_m - px,
-                        py - (grid[1] + low_r * cell_m), grid[1] + (high_r + 1) * cell_m - py)
+            reach = min(
+                px - (grid[0] + low_c * cell_m),
+                grid[0] + (high_c + 1) * cell_m - px,
+                py - (grid[1] + low_r * cell_m),
+                grid[1] + (high_r + 1) * cell_m - py,
+            )
             if best <= reach * reach:
                 break
             if low_c <= 0 and low_r <= 0 and high_c >= columns - 1 and high_r >= rows - 1:

@@ -21,7 +21,7 @@ from companion.geo.frame import LocalFrame
 # Places that are named by what they are for.
 PLACES = frozenset({"en_m", "sweeps", "searched", "lead_in"})
 _PLACE_ENDS, _VELOCITY_ENDS = ("_en_m", "_en"), ("en_mps",)
-_PROBE_M = 100.0   # north of the new origin: by this the frames' norths are compared
+_PROBE_M = 100.0  # north of the new origin: by this the frames' norths are compared
 
 T = TypeVar("T")
 Point = tuple[float, float]
@@ -71,8 +71,13 @@ def carried(value: T, shift: Shift) -> T:
     changes: dict[str, Any] = {}
     for each in fields(value):
         old = getattr(value, each.name)
-        new = (_rows(old, shift.point) if is_place(each.name) else
-               _rows(old, shift.vector) if is_velocity(each.name) else carried(old, shift))
+        new = (
+            _rows(old, shift.point)
+            if is_place(each.name)
+            else _rows(old, shift.vector)
+            if is_velocity(each.name)
+            else carried(old, shift)
+        )
         if new is not old:
             changes[each.name] = new
     return replace(value, **changes) if changes else value

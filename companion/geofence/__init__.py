@@ -11,6 +11,18 @@ from companion.geofence.mission.mission import Mission, load_mission
 from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
 
 __all__ = [
-    "Area", "Circle", "Code", "Document", "Fence", "Finding", "FindingLevel", "LocalArea", "Mission", "Obstacle",
-    "Zone", "ZoneKind", "load_mission", "read",
+    "Area",
+    "Circle",
+    "Code",
+    "Document",
+    "Fence",
+    "Finding",
+    "FindingLevel",
+    "LocalArea",
+    "Mission",
+    "Obstacle",
+    "Zone",
+    "ZoneKind",
+    "load_mission",
+    "read",
 ]

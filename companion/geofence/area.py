@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 # nearer than the distance; OUTWARDS pays for that.
 QUADRANT_SEGMENTS = 4
 OUTWARDS = 1.0 / math.cos(0.75 * math.pi / (2.0 * QUADRANT_SEGMENTS))
-CIRCLE_SEGMENTS = 16   # of a quarter of a circle: 0.1 % of its radius is given away
+CIRCLE_SEGMENTS = 16  # of a quarter of a circle: 0.1 % of its radius is given away
 MANY_POINTS = 500  # from here on the grid pays for being built and compiled
-SLACK_M = 1.0      # a fence's items are rounded, its circles drawn with sides, its earth another sphere
-AROUND_M = 20_000.0   # of what is known, where nothing limits the water: nobody sails so far in one frame
+SLACK_M = 1.0  # a fence's items are rounded, its circles drawn with sides, its earth another sphere
+AROUND_M = 20_000.0  # of what is known, where nothing limits the water: nobody sails so far in one frame
 
 
 def buffer_out(shape: BaseGeometry, distance_m: float) -> BaseGeometry:
@@ -114,11 +114,19 @@ class Area:
             pieces = polygons_about(zone.shape, frame, reach_m, cover=False)
             polygon = buffer_in(shapely.union_all(pieces), zone.margin_m or 0.0)
             limits = polygon if limits is None else shapely.intersection(limits, polygon)
-        near = [(o, o.name or f"obstacle {i + 1}", p) for i, o in enumerate(self.solids)
-                for p in polygons_about(o.shape, frame, reach_m)]
+        near = [
+            (o, o.name or f"obstacle {i + 1}", p)
+            for i, o in enumerate(self.solids)
+            for p in polygons_about(o.shape, frame, reach_m)
+        ]
         return LocalArea(
-            frame=frame, names=tuple(name for _, name, _ in near), polygons=tuple(p for *_, p in near),
-            own_margins_m=tuple(o.margin_m or 0.0 for o, *_ in near), limits=limits, reach_m=reach_m)
+            frame=frame,
+            names=tuple(name for _, name, _ in near),
+            polygons=tuple(p for *_, p in near),
+            own_margins_m=tuple(o.margin_m or 0.0 for o, *_ in near),
+            limits=limits,
+            reach_m=reach_m,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +157,7 @@ class LocalArea:
         disc = shapely.buffer(shapely.points(centre_en), radius_m, quad_segs=CIRCLE_SEGMENTS)
         limits = disc if self.limits is None else shapely.intersection(self.limits, disc)
         area = replace(self, limits=limits, edge_name=name if self.limits is None else f"{self.edge_name} or {name}")
-        area.__dict__["unfenced"] = self.unfenced   # what was computed of the obstacles serves both
+        area.__dict__["unfenced"] = self.unfenced  # what was computed of the obstacles serves both
         return area
 
     @functools.lru_cache(maxsize=4)  # noqa: B019 - an area lives as long as its voyage
@@ -159,8 +167,9 @@ class LocalArea:
         A fence along the mission's own obstacles and edges, which keeps within their margin, takes nothing.
         """
         here = shapely.points((0.0, 0.0)) if self.limits is None else self.limits
-        shapes = [(zone.kind, polygon_en(zone.shape, self.frame, cover=zone.kind is ZoneKind.EXCLUSION))
-                  for zone in zones]
+        shapes = [
+            (zone.kind, polygon_en(zone.shape, self.frame, cover=zone.kind is ZoneKind.EXCLUSION)) for zone in zones
+        ]
         x0, y0, x1, y1 = shapely.total_bounds([here, *self.polygons, *(shape for _, shape in shapes)])
         world = shapely.box(x0 - AROUND_M, y0 - AROUND_M, x1 + AROUND_M, y1 + AROUND_M)
         water = world if self.limits is None else buffer_in(self.limits, margin_m + SLACK_M)
@@ -172,8 +181,13 @@ class LocalArea:
         free = shapely.difference(water, self.buffered(margin_m + SLACK_M))
         wide = shapely.buffer(shapely.intersection(free, beyond), -SLACK_M)
         # and what of the margin lies beside it
-        taken = shapely.union_all(parts(shapely.intersection(
-            shapely.buffer(wide, margin_m + 3.0 * SLACK_M, quad_segs=QUADRANT_SEGMENTS), beyond)))
+        taken = shapely.union_all(
+            parts(
+                shapely.intersection(
+                    shapely.buffer(wide, margin_m + 3.0 * SLACK_M, quad_segs=QUADRANT_SEGMENTS), beyond
+                )
+            )
+        )
         shapely.prepare(taken)
         return taken
 
@@ -185,9 +199,12 @@ class LocalArea:
             limits = shapely.box(x0 - AROUND_M, y0 - AROUND_M, x1 + AROUND_M, y1 + AROUND_M)
         else:
             limits = self.limits
-        area = replace(self, limits=shapely.difference(limits, taken),
-                       edge_name=name if self.limits is None else f"{self.edge_name} or {name}")
-        area.__dict__["unfenced"] = self.unfenced   # what was computed of the obstacles serves both
+        area = replace(
+            self,
+            limits=shapely.difference(limits, taken),
+            edge_name=name if self.limits is None else f"{self.edge_name} or {name}",
+        )
+        area.__dict__["unfenced"] = self.unfenced  # what was computed of the obstacles serves both
         return area
 
     def roomy_en(self, near_en: tuple[float, float], room_m: float) -> tuple[float, float] | None:
@@ -279,7 +296,7 @@ class LocalArea:
     def clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
         """Return the smaller of the two clearances [m]: positive in free water."""
         if isinstance(points_en, list) and len(points_en) == 1 and isinstance(points_en[0], tuple):
-            return np.array([self._clearance_at_m(points_en[0])])   # the boat's: asked for several times a step
+            return np.array([self._clearance_at_m(points_en[0])])  # the boat's: asked for several times a step
         return np.minimum(self.obstacle_clearance_m(points_en), self.limit_clearance_m(points_en))
 
     @functools.lru_cache(maxsize=16)  # noqa: B019 - an area lives as long as its voyage
@@ -301,7 +318,7 @@ class LocalArea:
     def path_clearance_m(self, path_en: ArrayLike) -> float:
         """Return the exact smallest distance of a polyline (n, 2) to obstacles and limits [m], ≤ 0 on contact."""
         if isinstance(path_en, list) and len(path_en) == 2 and all(isinstance(place, tuple) for place in path_en):
-            return self._way_clearance_m(*path_en)   # the boat's to its waypoint: asked for several times a step
+            return self._way_clearance_m(*path_en)  # the boat's to its waypoint: asked for several times a step
         return self._path_clearance_m(path_en)
 
     @functools.lru_cache(maxsize=16)  # noqa: B019 - an area lives as long as its voyage
@@ -336,7 +353,7 @@ class LocalArea:
     def obstacle_names(self, margin_m: float = 0.0) -> list[str]:
         """Return what each of ``obstacles_wkt`` is called: by the obstacles that have grown into it."""
         out = []
-        tree = shapely.STRtree(self.polygons)   # a chart has islands by the thousand
+        tree = shapely.STRtree(self.polygons)  # a chart has islands by the thousand
         for part in parts(self.buffered(margin_m)) if self.polygons else []:
             names = [self.names[n] for n in sorted(tree.query(part, predicate="intersects").tolist())]
             out.append(listed(names[:3]) if len(names) <= 3 else f"{', '.join(names[:2])} and {len(names) - 2} more")
@@ -367,9 +384,9 @@ class LocalArea:
 
 SAGITTA_M = 0.1
 RADIUS_M = 6_371_000.0
-DEGREE_M = 110_500.0        # the shortest degree of latitude
-LEAST_TAN = 0.1             # of the latitude: pieces at the equator are no longer than for this
-POLE_DEG = 89.0             # from here on a box of longitudes says nothing
+DEGREE_M = 110_500.0  # the shortest degree of latitude
+LEAST_TAN = 0.1  # of the latitude: pieces at the equator are no longer than for this
+POLE_DEG = 89.0  # from here on a box of longitudes says nothing
 
 
 def polygons_about(shape: Shape, frame: LocalFrame, reach_m: float, *, cover: bool = True) -> list[Polygon]:
@@ -389,8 +406,11 @@ def polygons_about(shape: Shape, frame: LocalFrame, reach_m: float, *, cover: bo
             part = shapely.intersection(part, _box(frame, reach_m))
         elif turns != 0:
             continue
-        pieces += [p for p in shapely.get_parts(shapely.segmentize(part, _piece_deg(frame, part)))
-                   if isinstance(p, Polygon) and not p.is_empty]
+        pieces += [
+            p
+            for p in shapely.get_parts(shapely.segmentize(part, _piece_deg(frame, part)))
+            if isinstance(p, Polygon) and not p.is_empty
+        ]
     return [_in_metres(piece, frame) for piece in pieces]
 
 
@@ -414,4 +434,5 @@ def _piece_deg(frame: LocalFrame, part: BaseGeometry) -> float:
 def _in_metres(polygon: Polygon, frame: LocalFrame) -> Polygon:
     return Polygon(
         frame.array_en_from_lonlat(np.asarray(polygon.exterior.coords)[:, :2]),
-        [frame.array_en_from_lonlat(np.asarray(ring.coords)[:, :2]) for ring in polygon.interiors])
+        [frame.array_en_from_lonlat(np.asarray(ring.coords)[:, :2]) for ring in polygon.interiors],
+    )

@@ -38,7 +38,7 @@ from companion.geofence.shapes import Circle, Obstacle, Shape, Zone, ZoneKind, c
 from companion.messages import GeoPoint, MissionItem
 
 Ring = NDArray[np.float64]  # (n, 2), open
-MAX_START_VERTICES = 150    # longer rings are thinned first
+MAX_START_VERTICES = 150  # longer rings are thinned first
 MAX_REDUCED_VERTICES = 600  # what is still longer then is no shape for 84 items
 
 
@@ -64,7 +64,7 @@ def reduce_ring(ring: Ring, may_add: Callable[[Polygon], bool]) -> Ring:
 
 
 def _acceptable(
-    triangle: list[tuple[float, float]], changed: list[tuple[float, float]], may_add: Callable[[Polygon], bool],
+    triangle: list[tuple[float, float]], changed: list[tuple[float, float]], may_add: Callable[[Polygon], bool]
 ) -> bool:
     polygon = Polygon(triangle)
     if polygon.area > 0.0 and not may_add(polygon):
@@ -83,7 +83,7 @@ def _moves(points: list[tuple[float, float]]) -> list[_Move]:
     for i in range(n):
         a, b, c, d = points[i - 1], points[i], points[(i + 1) % n], points[(i + 2) % n]
         if turns[i] <= 0.0:
-            out.append((-turns[i] / 2.0, (a, b, c), [a, b, c], points[:i] + points[i + 1:]))
+            out.append((-turns[i] / 2.0, (a, b, c), [a, b, c], points[:i] + points[i + 1 :]))
         elif turns[(i + 1) % n] > 0.0 and n > 3:
             meet = _meeting(a, b, c, d)
             if meet is not None:
@@ -99,7 +99,7 @@ def _cross(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float
 
 
 def _meeting(
-    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float],
+    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]
 ) -> tuple[float, float] | None:
     """Return where a→b and d→c meet beyond b and c, None if they do not."""
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - d[0], c[1] - d[1]
@@ -206,10 +206,12 @@ class Plane:
 
     def metres(self, polygon: Polygon) -> Polygon:
         """Return a polygon of degrees in metres; longitudes are brought near the plane's."""
+
         def scaled(coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
             lonlat = coordinates[:, :2] - np.array([self.lon_deg, self.lat_deg])
             lonlat[:, 0] -= 360.0 * np.round(np.median(lonlat[:, 0]) / 360.0)
             return np.asarray(lonlat * self.scale)
+
         return shapely.transform(shapely.force_2d(polygon), scaled)
 
     def point(self, point: GeoPoint) -> tuple[float, float]:
@@ -254,9 +256,7 @@ def shape_in(shape: Shape, plane: Plane, *, cover: bool) -> tuple[Polygon, tuple
     return plane.metres(shape), None
 
 
-def limits_in(
-    area: Area, plane: Plane, places: list[tuple[float, float]],
-) -> tuple[BaseGeometry | None, Circle | None]:
+def limits_in(area: Area, plane: Plane, places: list[tuple[float, float]]) -> tuple[BaseGeometry | None, Circle | None]:
     """Return the piece of the keep-in zones' intersection that holds the start, and the circle if it is one."""
     limits: BaseGeometry | None = None
     for zone in area.fence.inclusions:
@@ -274,7 +274,7 @@ def limits_in(
 
 
 def cut_by_rings(
-    area: Area, plane: Plane, places: list[tuple[float, float]], limits: BaseGeometry | None, notes: list[str],
+    area: Area, plane: Plane, places: list[tuple[float, float]], limits: BaseGeometry | None, notes: list[str]
 ) -> BaseGeometry | None:
     """Return the limits cut to the hole of any obstacle that surrounds the start: a lake in its shore."""
     here = shapely.points(places[0])
@@ -291,6 +291,7 @@ def cut_by_rings(
 
 
 # The proof that fence items are a proper fence for an area, from the items' own integers.
+
 
 def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: Sequence[GeoPoint]) -> str:
     """Return why the items are not a proper fence for the area, "" when they are. Independent of how they were made.
@@ -311,9 +312,9 @@ def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: 
         if zone.kind is ZoneKind.INCLUSION:
             outer, _ = shape_in(zone.shape, plane, cover=True)
             keep_in = outer if keep_in is None else shapely.intersection(keep_in, outer)
-    out_small = shapely.union_all([
-        _inner(z.shape, plane) for z in zones if z.kind is ZoneKind.EXCLUSION
-    ] or [Polygon()])
+    out_small = shapely.union_all(
+        [_inner(z.shape, plane) for z in zones if z.kind is ZoneKind.EXCLUSION] or [Polygon()]
+    )
     obstacles = [(o, shape_in(o.shape, plane, cover=True)[0]) for o in area.solids]
     for obstacle, polygon in obstacles:
         reach = polygon if keep_in is None else shapely.intersection(polygon, keep_in)
@@ -327,9 +328,9 @@ def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: 
         reach = shapely.difference(keep_in, out_small) if keep_in is not None else None
         if reach is None or not shapely.covers(shapely.buffer(polygon, slack_m), reach):
             return f"the keep-in zone is not inside {zone.name or 'the limits'}"
-    margin = shapely.union_all([
-        shapely.buffer(p, max(margin_m, o.margin_m or 0.0), quad_segs=16) for o, p in obstacles
-    ] or [Polygon()])
+    margin = shapely.union_all(
+        [shapely.buffer(p, max(margin_m, o.margin_m or 0.0), quad_segs=16) for o, p in obstacles] or [Polygon()]
+    )
     limits, _ = limits_in(area, plane, [plane.point(inside[0])])
     limits = cut_by_rings(area, plane, [plane.point(inside[0])], limits, [])
     useful: BaseGeometry | None = None
@@ -349,8 +350,10 @@ def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: 
             return "the keep-in zone shuts out water that the planner may use"
     for index, place in enumerate(inside):
         point = shapely.points(plane.point(place))
-        shut = any(z.kind is ZoneKind.EXCLUSION and shapely.covers(shape_in(z.shape, plane, cover=True)[0], point)
-                   for z in zones)
+        shut = any(
+            z.kind is ZoneKind.EXCLUSION and shapely.covers(shape_in(z.shape, plane, cover=True)[0], point)
+            for z in zones
+        )
         if shut or (keep_in is not None and not shapely.covers(keep_in, point)):
             return f"the {'start' if index == 0 else f'goal {index}'} would be outside the autopilot's fence"
     return ""
@@ -378,19 +381,19 @@ def _inner(shape: Shape, plane: Plane) -> Polygon:
 
 # How much of the margin a simplification may use: the least that fits leaves the most room between plan and fence.
 STEPS = (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)
-RESERVE_M = 0.03      # rounding to 1e-7 degrees moves a vertex by at most 8 mm; the rest is for edges
+RESERVE_M = 0.03  # rounding to 1e-7 degrees moves a vertex by at most 8 mm; the rest is for edges
 
 
 class FenceStatus(enum.Enum):
     """How the simplification ended."""
 
     OK = "ok"
-    EMPTY = "empty"                      # there is nothing to keep out of or inside of
-    TOO_MANY_ITEMS = "too many items"    # not even at the whole margin
-    NO_MARGIN = "no margin"              # the margin is too small for any zone to hold what it must
-    START_ENCLOSED = "start enclosed"    # a zone would hold the start or a goal
-    NO_WATER = "no water"                # the limits leave no water at the margin
-    TOO_LARGE = "too large"              # the area is too wide to be flat
+    EMPTY = "empty"  # there is nothing to keep out of or inside of
+    TOO_MANY_ITEMS = "too many items"  # not even at the whole margin
+    NO_MARGIN = "no margin"  # the margin is too small for any zone to hold what it must
+    START_ENCLOSED = "start enclosed"  # a zone would hold the start or a goal
+    NO_WATER = "no water"  # the limits leave no water at the margin
+    TOO_LARGE = "too large"  # the area is too wide to be flat
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -413,9 +416,9 @@ class AutopilotFence:
 @dataclass(frozen=True)
 class _Solid:
     name: str
-    polygon: Polygon           # the obstacle itself; a circle's is drawn around it
+    polygon: Polygon  # the obstacle itself; a circle's is drawn around it
     circle: tuple[float, float, float] | None
-    margin_m: float            # what the planner keeps from it
+    margin_m: float  # what the planner keeps from it
 
 
 def fence_for_autopilot(area: Area, margin_m: float, *, inside: Sequence[GeoPoint]) -> AutopilotFence:
@@ -424,6 +427,7 @@ def fence_for_autopilot(area: Area, margin_m: float, *, inside: Sequence[GeoPoin
     ``margin_m`` is what the planner keeps clear of obstacles and limits; ``inside`` are the places (start, goals)
     that the boat must be able to sail to, the first of them in the water that counts. Same input, same output.
     """
+
     def refuse(status: FenceStatus, reason: str) -> AutopilotFence:
         return AutopilotFence(status=status, reason=reason, margin_m=margin_m)
 
@@ -456,7 +460,8 @@ def fence_for_autopilot(area: Area, margin_m: float, *, inside: Sequence[GeoPoin
                 f"{len(items)} items of {stored} bytes are needed where the autopilot holds {MAX_FENCE_ITEMS} items in "
                 f"{STORAGE_BYTES} bytes, even with "
                 f"{step * margin_m:.1f} m of the {margin_m:g} m margin used; most go to "
-                + ", ".join(f"{name} ({n})" for n, name in worst) + "; raise margin_m, merge or drop obstacles"
+                + ", ".join(f"{name} ({n})" for n, name in worst)
+                + "; raise margin_m, merge or drop obstacles"
             )
             continue
         fault = prove(area, items, margin_m, inside=inside)
@@ -464,8 +469,13 @@ def fence_for_autopilot(area: Area, margin_m: float, *, inside: Sequence[GeoPoin
             status, last = FenceStatus.START_ENCLOSED if "would be outside" in fault else FenceStatus.NO_MARGIN, fault
             continue
         return AutopilotFence(
-            status=FenceStatus.OK, reason="", margin_m=margin_m, used_m=step * margin_m,
-            zones=tuple(zones), items=items, notes=tuple(notes),
+            status=FenceStatus.OK,
+            reason="",
+            margin_m=margin_m,
+            used_m=step * margin_m,
+            zones=tuple(zones),
+            items=items,
+            notes=tuple(notes),
         )
     return refuse(status, last)
 
@@ -475,7 +485,7 @@ def _sides(zone: Zone) -> int:
 
 
 def _solids(
-    area: Area, plane: Plane, places: list[tuple[float, float]], limits: BaseGeometry | None, margin_m: float,
+    area: Area, plane: Plane, places: list[tuple[float, float]], limits: BaseGeometry | None, margin_m: float
 ) -> tuple[list[_Solid], list[str]]:
     """Return the obstacles in the plane, holes filled, and those outside the limits left to the limits."""
     solids: list[_Solid] = []
@@ -507,7 +517,11 @@ def _island(ring: BaseGeometry, plane: Plane, index: int) -> Obstacle:
 
 
 def _attempt(
-    plane: Plane, solids: list[_Solid], limits: BaseGeometry | None, rim: Circle | None, tolerance_m: float,
+    plane: Plane,
+    solids: list[_Solid],
+    limits: BaseGeometry | None,
+    rim: Circle | None,
+    tolerance_m: float,
     usable_m: float,
 ) -> tuple[list[Zone] | None, str]:
     """Return zones that stick out by at most ``tolerance_m``, or why there are none."""
@@ -519,10 +533,16 @@ def _attempt(
             return None, f"no keep-in zone fits between the limits and the water {usable_m:.1f} m inside them"
         zones.append(zone)
     share = tolerance_m / usable_m
-    allowed = shapely.union_all([
-        shapely.buffer(s.polygon, max(tolerance_m, share * s.margin_m / (1.0 + plane.error)), quad_segs=16)
-        for s in solids
-    ]) if solids else MultiPolygon()
+    allowed = (
+        shapely.union_all(
+            [
+                shapely.buffer(s.polygon, max(tolerance_m, share * s.margin_m / (1.0 + plane.error)), quad_segs=16)
+                for s in solids
+            ]
+        )
+        if solids
+        else MultiPolygon()
+    )
     if limits is not None:
         beyond = shapely.difference(shapely.box(*limits.buffer(1e4).bounds), shapely.buffer(limits, -tolerance_m))
         allowed = shapely.union(allowed, beyond)
@@ -551,9 +571,7 @@ def _groups(solids: list[_Solid], allowed: BaseGeometry) -> list[list[_Solid]]:
         merged = False
         hulls = [shapely.convex_hull(shapely.union_all([s.polygon for s in g])) for g in groups]
         pairs = shapely.STRtree(hulls).query(hulls, predicate="dwithin", distance=50.0)
-        order = sorted(
-            ((float(shapely.distance(hulls[i], hulls[j])), int(i), int(j)) for i, j in pairs.T if i < j),
-        )
+        order = sorted(((float(shapely.distance(hulls[i], hulls[j])), int(i), int(j)) for i, j in pairs.T if i < j))
         for _, i, j in order:
             if shapely.covers(allowed, shapely.convex_hull(shapely.union_all([hulls[i], hulls[j]]))):
                 groups[i] += groups.pop(j)
@@ -563,7 +581,7 @@ def _groups(solids: list[_Solid], allowed: BaseGeometry) -> list[list[_Solid]]:
 
 
 def _keep_out(
-    plane: Plane, group: list[_Solid], allowed: BaseGeometry, tolerance_m: float, reserve_m: float,
+    plane: Plane, group: list[_Solid], allowed: BaseGeometry, tolerance_m: float, reserve_m: float
 ) -> Zone | None:
     """Return the cheapest zone round a group of obstacles: a circle, else a polygon."""
     name = " + ".join(s.name for s in group)
@@ -579,7 +597,7 @@ def _keep_out(
 
 
 def _keep_in(
-    plane: Plane, limits: BaseGeometry, rim: Circle | None, tolerance_m: float, reserve_m: float,
+    plane: Plane, limits: BaseGeometry, rim: Circle | None, tolerance_m: float, reserve_m: float
 ) -> Zone | None:
     """Return a zone inside the limits that holds all water ``tolerance_m`` inside them."""
     if rim is not None:

@@ -23,11 +23,11 @@ from companion.geofence.shapes import Circle, Zone, ZoneKind, center_of, polygon
 from companion.messages import GeoPoint
 from companion.words import counted
 
-MAX_GAPS = 20       # reported; a coast of skerries has thousands
+MAX_GAPS = 20  # reported; a coast of skerries has thousands
 MAX_OBSTACLES = 2000  # above this gaps are not looked for
 # What people call the edge of the water they sail on, at the end of a name: "shore", "north-lake".
 _SHORE = re.compile(r"(.*[\W_])?(shore|shoreline|coast|lake|pond|bay|limits?|boundary|fence|water)", re.IGNORECASE)
-SEA_ROUND_M = 500.0   # open water round everything, without a fence
+SEA_ROUND_M = 500.0  # open water round everything, without a fence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,20 +84,28 @@ def _inclusions(area: Area, frame: LocalFrame, findings: Findings) -> None:
     pieces = [p for p in parts(both) if p.area > 0.0]
     if not pieces:
         findings.add(
-            FindingLevel.ERROR, Code.DISJOINT_INCLUSIONS, names,
+            FindingLevel.ERROR,
+            Code.DISJOINT_INCLUSIONS,
+            names,
             "the keep-in zones do not all overlap: ArduPilot intersects them and no water is left",
             "draw one zone round all the water",
         )
     elif len(pieces) > 1:
         findings.add(
-            FindingLevel.WARNING, Code.DISJOINT_INCLUSIONS, names,
-            f"the keep-in zones overlap in {len(pieces)} separate pieces", "draw one zone round the water to sail in",
+            FindingLevel.WARNING,
+            Code.DISJOINT_INCLUSIONS,
+            names,
+            f"the keep-in zones overlap in {len(pieces)} separate pieces",
+            "draw one zone round the water to sail in",
         )
     if pieces and any(shapely.difference(p, both).area > 1.0 for p in polygons):
         findings.add(
-            FindingLevel.WARNING, Code.INTERSECTED_INCLUSIONS, names,
+            FindingLevel.WARNING,
+            Code.INTERSECTED_INCLUSIONS,
+            names,
             f"ArduPilot intersects keep-in zones: of {', '.join(_hectares(p) for p in polygons)} only "
-            f"{_hectares(both)} is left to sail in", "draw one zone round all the water",
+            f"{_hectares(both)} is left to sail in",
+            "draw one zone round all the water",
         )
 
 
@@ -128,7 +136,9 @@ def _places(local: LocalArea, conditions: AreaConditions, findings: Findings) ->
         clearance_m = float(local.clearance_m([here])[0])
         if conditions.margin_m is not None and clearance_m < conditions.margin_m:
             findings.add(
-                FindingLevel.WARNING, code, name,
+                FindingLevel.WARNING,
+                code,
+                name,
                 f"has {clearance_m:.1f} m of free water, less than the margin of {conditions.margin_m:g} m",
                 "move it off, or lower the margin",
             )
@@ -153,7 +163,10 @@ def _round_the_water(local: LocalArea, conditions: AreaConditions, findings: Fin
     else:
         return
     findings.add(
-        FindingLevel.NOTE, Code.ROUND_THE_WATER, name, f"is a keep-out zone, and {why}",
+        FindingLevel.NOTE,
+        Code.ROUND_THE_WATER,
+        name,
+        f"is a keep-out zone, and {why}",
         "if the water is inside it, read it with --kind inclusion (mission new: --fence; a mission: [area] fence)",
     )
 
@@ -166,8 +179,11 @@ def _sticking_out(local: LocalArea, findings: Findings) -> None:
             continue
         outside = shapely.disjoint(local.limits, polygon)
         findings.add(
-            FindingLevel.NOTE if outside else FindingLevel.WARNING, Code.OBSTACLE_OUTSIDE_FENCE, name,
-            "lies outside the fence and changes nothing" if outside
+            FindingLevel.NOTE if outside else FindingLevel.WARNING,
+            Code.OBSTACLE_OUTSIDE_FENCE,
+            name,
+            "lies outside the fence and changes nothing"
+            if outside
             else f"sticks out of the fence by {_hectares(shapely.difference(polygon, local.limits))}",
             "" if outside else "is one of the two in the wrong place?",
         )
@@ -179,8 +195,12 @@ def free_water(local: LocalArea, margin_m: float) -> BaseGeometry:
         sea = buffer_in(local.limits, margin_m)
     else:
         west, south, east, north = local.solid.bounds if local.polygons else (0.0, 0.0, 0.0, 0.0)
-        sea = shapely.box(min(west, 0.0) - SEA_ROUND_M, min(south, 0.0) - SEA_ROUND_M,
-                          max(east, 0.0) + SEA_ROUND_M, max(north, 0.0) + SEA_ROUND_M)
+        sea = shapely.box(
+            min(west, 0.0) - SEA_ROUND_M,
+            min(south, 0.0) - SEA_ROUND_M,
+            max(east, 0.0) + SEA_ROUND_M,
+            max(north, 0.0) + SEA_ROUND_M,
+        )
     return shapely.difference(sea, local.buffered(margin_m))
 
 
@@ -188,9 +208,7 @@ def _connected(local: LocalArea, places: Sequence[tuple[float, float]], margin_m
     """Whether all places are within ``margin_m`` of one and the same piece of free water."""
     points = shapely.points(np.array(places))
     reach = max(margin_m, 0.01)
-    return any(
-        bool(np.all(shapely.dwithin(piece, points, reach))) for piece in parts(free_water(local, margin_m))
-    )
+    return any(bool(np.all(shapely.dwithin(piece, points, reach))) for piece in parts(free_water(local, margin_m)))
 
 
 def _way_through(local: LocalArea, conditions: AreaConditions, findings: Findings) -> None:
@@ -204,14 +222,21 @@ def _way_through(local: LocalArea, conditions: AreaConditions, findings: Finding
         return
     low, high = 0.0, conditions.margin_m
     if not _connected(local, places, 0.0):
-        findings.add(FindingLevel.ERROR, Code.UNREACHABLE, "", "there is no water between the start and every goal",
-                     "correct the fence or the obstacles")
+        findings.add(
+            FindingLevel.ERROR,
+            Code.UNREACHABLE,
+            "",
+            "there is no water between the start and every goal",
+            "correct the fence or the obstacles",
+        )
         return
     while high - low > 0.1:
         middle = (low + high) / 2.0
         low, high = (middle, high) if _connected(local, places, middle) else (low, middle)
     findings.add(
-        FindingLevel.ERROR, Code.UNREACHABLE, "",
+        FindingLevel.ERROR,
+        Code.UNREACHABLE,
+        "",
         f"at a margin of {conditions.margin_m:g} m there is no way between the start and every goal",
         f"there is one at {low:.1f} m",
     )
@@ -238,9 +263,7 @@ def _gaps(local: LocalArea, conditions: AreaConditions, findings: Findings) -> N
             continue
         line = shapely.shortest_line(shapes[i], shapes[j])
         width_m = float(line.length)
-        if width_m < 0.01 or any(
-            k not in {i, j} and shapely.intersects(shapes[k], line) for k in tree.query(line)
-        ):
+        if width_m < 0.01 or any(k not in {i, j} and shapely.intersects(shapes[k], line) for k in tree.query(line)):
             continue
         (ax, ay), (bx, by) = line.coords
         middle = local.frame.geo_from_en((ax + bx) / 2.0, (ay + by) / 2.0)
@@ -255,13 +278,13 @@ def _gaps(local: LocalArea, conditions: AreaConditions, findings: Findings) -> N
         findings.add(FindingLevel.NOTE, Code.NARROW_GAP, "", f"{len(found) - MAX_GAPS} more narrow gaps are not listed")
 
 
-def _gap(
-    width_m: float, course_rad: float, place: str, margin_m: float, conditions: AreaConditions,
-) -> Finding | None:
+def _gap(width_m: float, course_rad: float, place: str, margin_m: float, conditions: AreaConditions) -> Finding | None:
     """Return what is wrong with a gap whose way through is ``course_rad`` (or its opposite)."""
     if width_m < 2.0 * margin_m:
         return Finding(
-            severity=FindingLevel.WARNING, code=Code.NARROW_GAP, place=place,
+            severity=FindingLevel.WARNING,
+            code=Code.NARROW_GAP,
+            place=place,
             text=f"the gap of {width_m:.1f} m is closed at a margin of {margin_m:g} m, which needs {2 * margin_m:g} m",
         )
     if conditions.twd_from_rad is None:
@@ -275,7 +298,9 @@ def _gap(
     if width_m >= needed_m:
         return None
     return Finding(
-        severity=FindingLevel.WARNING, code=Code.NARROW_GAP, place=place,
+        severity=FindingLevel.WARNING,
+        code=Code.NARROW_GAP,
+        place=place,
         text=f"the gap of {width_m:.1f} m is too narrow to beat through in this wind: the margin of {margin_m:g} m "
         f"on both sides of a close-hauled course needs {needed_m:.1f} m",
     )
@@ -289,16 +314,24 @@ def _items(area: Area, conditions: AreaConditions, findings: Findings) -> None:
         return
     text = f"the area takes {count} fence items where ArduRover holds {MAX_FENCE_ITEMS}"
     if conditions.margin_m is None or conditions.start is None:
-        findings.add(FindingLevel.WARNING, Code.TOO_MANY_ITEMS, "", text,
-                     "it can be simplified within a margin: give --margin and --start")
+        findings.add(
+            FindingLevel.WARNING,
+            Code.TOO_MANY_ITEMS,
+            "",
+            text,
+            "it can be simplified within a margin: give --margin and --start",
+        )
         return
     result = fence_for_autopilot(area, conditions.margin_m, inside=[conditions.start, *conditions.goals])
     if result.status is FenceStatus.OK:
         findings.add(
-            FindingLevel.NOTE, Code.TOO_MANY_ITEMS, "",
+            FindingLevel.NOTE,
+            Code.TOO_MANY_ITEMS,
+            "",
             f"{text}; simplified it takes {len(result.items)} and uses {result.used_m:.1f} m of the "
             f"{conditions.margin_m:g} m margin",
         )
     else:
-        findings.add(FindingLevel.WARNING, Code.TOO_MANY_ITEMS, "",
-                     f"{text}, and it cannot be simplified: {result.reason}")
+        findings.add(
+            FindingLevel.WARNING, Code.TOO_MANY_ITEMS, "", f"{text}, and it cannot be simplified: {result.reason}"
+        )

@@ -15,12 +15,13 @@ from companion.words import one_line
 
 # Findings: what is wrong, or worth knowing, about a fence, an obstacle file or a mission, and where.
 
+
 class FindingLevel(enum.Enum):
     """How bad a finding is."""
 
-    ERROR = "error"        # the boat must not sail with it
-    WARNING = "warning"    # it works, and someone should look
-    NOTE = "note"          # what was done on the way
+    ERROR = "error"  # the boat must not sail with it
+    WARNING = "warning"  # it works, and someone should look
+    NOTE = "note"  # what was done on the way
 
 
 class Code(enum.Enum):
@@ -127,8 +128,9 @@ class Document:
     @property
     def is_empty(self) -> bool:
         """Nothing at all was read."""
-        return not (self.zones or self.marks or self.items or self.rally or self.tracks
-                    or self.home or self.return_point)
+        return not (
+            self.zones or self.marks or self.items or self.rally or self.tracks or self.home or self.return_point
+        )
 
     def require_clean(self) -> Document:
         """Return the document itself; raise its first error as InputError."""
@@ -143,13 +145,13 @@ class Document:
         """Return everything solid as obstacles: keep-out zones, and marks grown by ``radius_m``."""
         solid = [
             Obstacle(shape=z.shape, name=z.name, margin_m=z.margin_m)
-            for z in self.zones if z.kind is ZoneKind.EXCLUSION
+            for z in self.zones
+            if z.kind is ZoneKind.EXCLUSION
         ]
         for mark in self.marks:
             if mark.kind is ZoneKind.EXCLUSION:
                 solid.extend(
-                    Obstacle(shape=s, name=mark.name, margin_m=mark.margin_m)
-                    for s in grown(mark.geometry, radius_m)
+                    Obstacle(shape=s, name=mark.name, margin_m=mark.margin_m) for s in grown(mark.geometry, radius_m)
                 )
         return tuple(solid)
 

@@ -114,7 +114,7 @@ def unwrapped(lonlat_deg: ArrayLike, *, near_lon_deg: float | None = None) -> ND
         is_ring = bool(np.array_equal(lonlat[0], lonlat[-1]))
         lonlat[:, 0] = np.unwrap(lonlat[:, 0], period=360.0)
         if is_ring and abs(lonlat[0, 0] - lonlat[-1, 0]) < 1e-6:
-            lonlat[-1] = lonlat[0]   # what is rounded would make the ring cross itself where it begins
+            lonlat[-1] = lonlat[0]  # what is rounded would make the ring cross itself where it begins
     if near_lon_deg is not None and lonlat.shape[0]:
         lonlat[:, 0] += 360.0 * round((near_lon_deg - float(lonlat[0, 0])) / 360.0)
     return lonlat

@@ -26,12 +26,12 @@ from companion.kernels.carried import is_carried, misfit
 from companion.kernels.listed import Entry, from_text, read_list
 from companion.kernels.places import looked_in, mark, sweep, written_to
 
-KILLED = 9            # exit code where the compiling processes were killed
-PROCESS_MB = 250      # of memory that each process may take, ...
-KERNELS_A_PROCESS = 12   # which is what so many kernels make of it
+KILLED = 9  # exit code where the compiling processes were killed
+PROCESS_MB = 250  # of memory that each process may take, ...
+KERNELS_A_PROCESS = 12  # which is what so many kernels make of it
 # Of processes that are ended, what multiprocessing clears away after them is none of the user's business.
 _QUIET = ("-W", "ignore::UserWarning:multiprocessing.resource_tracker")
-_TRIES = 3            # of processes that die: short of memory, most likely
+_TRIES = 3  # of processes that die: short of memory, most likely
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class Progress:
     of: int
     done_s: float
     of_s: float
-    why: str = ""   # the package's own were of no use
+    why: str = ""  # the package's own were of no use
 
     def say(self, elapsed_s: float, first: Progress) -> str:
         """Return it in words; ``first`` was the progress ``elapsed_s`` ago."""
@@ -71,8 +71,12 @@ def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
     if is_ready(packages):
         return
     # In a session of its own: Ctrl-C is for this process, which ends its children itself.
-    with subprocess.Popen([sys.executable, *_QUIET, "-m", "companion.kernels.build", *packages],  # noqa: S603 - ours
-                          stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, start_new_session=True) as compiling:
+    with subprocess.Popen(  # noqa: S603 - ours
+        [sys.executable, *_QUIET, "-m", "companion.kernels.build", *packages],
+        stdout=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as compiling:
         try:
             assert compiling.stdout is not None
             began_s, first, why = time.monotonic(), None, misfit()
@@ -83,7 +87,7 @@ def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
                 say(progress.say(time.monotonic() - began_s, first))
             code = compiling.wait()
         finally:
-            compiling.kill()   # its processes see it, and leave
+            compiling.kill()  # its processes see it, and leave
     if code != 0:
         why = "killed, most likely for want of memory" if code in {KILLED, -KILLED} else f"exit code {code}"
         say(f"kernels cannot be compiled ahead ({why}): they are compiled one by one as they are called")
@@ -99,13 +103,13 @@ def compile_listed(packages: Sequence[str]) -> int:
     left = [entry for package in packages for entry in read_list(package)]
     of, of_s, deaths = len(left), sum(entry.seconds for entry in left), 0
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["companion.kernels.cache"])   # so that a process begins with numba loaded
+    context.set_forkserver_preload(["companion.kernels.cache"])  # so that a process begins with numba loaded
     while left:
         at_once = hands()
         try:
             # anew for each batch: what compiles grows
             with ProcessPoolExecutor(at_once, context, initializer=leave_with_parent) as pool:
-                jobs = {pool.submit(_compile, entry): entry for entry in left[:at_once * KERNELS_A_PROCESS]}
+                jobs = {pool.submit(_compile, entry): entry for entry in left[: at_once * KERNELS_A_PROCESS]}
                 for job in as_completed(jobs):
                     job.result()
                     left.remove(jobs[job])
@@ -157,5 +161,5 @@ if __name__ == "__main__":
     _leave_after(_orphaned)
     try:
         sys.exit(compile_listed(sys.argv[1:]))
-    except BrokenPipeError:   # who asked for it has gone; there is nobody to flush for either
+    except BrokenPipeError:  # who asked for it has gone; there is nobody to flush for either
         os._exit(1)

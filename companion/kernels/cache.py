@@ -33,11 +33,20 @@ _LOG = logging.getLogger(__name__)
 # 1 to 5 % less time here.
 numba.config.CPU_NAME = "generic"
 numba.config.CPU_FEATURES = ""
-numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.Locator"   # the setting NUMBA_CACHE_LOCATOR_CLASSES
+numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.Locator"  # the setting NUMBA_CACHE_LOCATOR_CLASSES
 
 # What reading a torn or foreign file of the cache raises.
-_UNREADABLE = (EOFError, pickle.UnpicklingError, ValueError, IndexError, KeyError, TypeError, AttributeError,
-               ImportError, RuntimeError)
+_UNREADABLE = (
+    EOFError,
+    pickle.UnpicklingError,
+    ValueError,
+    IndexError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    ImportError,
+    RuntimeError,
+)
 
 
 class Locator:
@@ -56,7 +65,7 @@ class Locator:
         except OSError as error:
             _LOG.warning("compiled kernels cannot be kept in %s (%s)", places.folder(), error.strerror)
             folder = None
-        for place in places.looked_in():   # a card that has become read-only is still read
+        for place in places.looked_in():  # a card that has become read-only is still read
             if place != folder and any(place.glob(f"*-{digest}.*")):
                 return cls(digest, place)
         return None if folder is None else cls(digest, folder)
@@ -82,8 +91,11 @@ class Compiled(CPUDispatcher):  # type: ignore[misc]
     """Numba's dispatcher: one machine code for each combination of types, compiled by one process at a time."""
 
     def __init__(self, function: Callable[..., Any], locals: Any = None, targetoptions: Any = None) -> None:  # noqa: A002
-        super().__init__(function, locals=locals or {},
-                         targetoptions=targetoptions or {"nopython": True, "nogil": True, "boundscheck": None})
+        super().__init__(
+            function,
+            locals=locals or {},
+            targetoptions=targetoptions or {"nopython": True, "nogil": True, "boundscheck": None},
+        )
         self._is_kept = False
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
@@ -93,11 +105,11 @@ class Compiled(CPUDispatcher):  # type: ignore[misc]
 
     def compile(self, sig: Any) -> Any:
         """Return the machine code for a signature, from the cache or made now."""
-        if not self._is_kept:   # not before: what it is made of is known when the kernels that it calls are
-            with contextlib.suppress(RuntimeError):   # there is no place
+        if not self._is_kept:  # not before: what it is made of is known when the kernels that it calls are
+            with contextlib.suppress(RuntimeError):  # there is no place
                 self.enable_caching()
             self._is_kept = True
-        with global_compiler_lock, self._alone():   # that first: a thread that waits for it would hold this
+        with global_compiler_lock, self._alone():  # that first: a thread that waits for it would hold this
             try:
                 return super().compile(sig)
             except OSError as error:
@@ -116,7 +128,7 @@ class Compiled(CPUDispatcher):  # type: ignore[misc]
         with contextlib.ExitStack() as held:
             if self._cache.cache_path is not None:
                 name = f".{self.py_func.__module__}.{self.py_func.__qualname__}.lock"
-                with contextlib.suppress(OSError):   # nothing can be written: there is nothing to mix up either
+                with contextlib.suppress(OSError):  # nothing can be written: there is nothing to mix up either
                     fd = os.open(Path(self._cache.cache_path, name), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
                     held.callback(os.close, fd)
                     fcntl.flock(fd, fcntl.LOCK_EX)

@@ -22,7 +22,7 @@ from companion.kernels.listed import key, key_of, read_list
 
 _LOG = logging.getLogger(__name__)
 PACKAGES = ("companion", "sitl")
-EXTENSION = "carried_kernels"   # its name as a module
+EXTENSION = "carried_kernels"  # its name as a module
 
 
 def symbol(package: str, number: int) -> str:
@@ -88,14 +88,15 @@ def _functions(package: str) -> dict[tuple[str, str], dict[tuple[Any, ...], Call
     out: dict[tuple[str, str], dict[tuple[Any, ...], Callable[..., Any]]] = {}
     for number, entry in enumerate(read_list(package)):
         out.setdefault((entry.module, entry.name), {})[key(entry.signature)] = getattr(
-            _extension(), symbol(package, number))
+            _extension(), symbol(package, number)
+        )
     return out
 
 
 class Carried:
     """A kernel of the extension where it is called with the types that it is listed with; numba's with any other."""
 
-    waiting: ClassVar[list[Carried] | None] = []   # for numba; None: it has been loaded, and no more are made
+    waiting: ClassVar[list[Carried] | None] = []  # for numba; None: it has been loaded, and no more are made
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.py_func = function
@@ -108,7 +109,7 @@ class Carried:
     def __call__(self, *args: Any, **named: Any) -> Any:
         """Call it."""
         if self.compiled is None and not named:
-            if self._by_types is None:   # now: the classes of its arguments are there
+            if self._by_types is None:  # now: the classes of its arguments are there
                 module, name = self.py_func.__module__, self.py_func.__qualname__
                 self._by_types = _functions(module.partition(".")[0]).get((module, name), {})
             try:

@@ -31,9 +31,9 @@ def carry(folder: Path = places.CARRIED) -> Path:
     """
     folder.mkdir(exist_ok=True, parents=True)
     (folder / places.CARRIED_FOR).unlink(missing_ok=True)
-    Carried.waiting = None   # kernels are compiled here, not called from what was carried before
+    Carried.waiting = None  # kernels are compiled here, not called from what was carried before
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")   # that it is deprecated
+        warnings.simplefilter("ignore")  # that it is deprecated
         from numba.pycc import CC, compiler
     compiler.Flags = _flags(compiler.Flags)
     extension = CC(EXTENSION)
@@ -56,6 +56,7 @@ def carry(folder: Path = places.CARRIED) -> Path:
 
 def _flags(of_numba: Any) -> Any:
     """Return numba's flags with the interpreter's lock released while a kernel runs; ``CC`` has no option for it."""
+
     class Flags(of_numba):  # type: ignore[misc]
         def __init__(self, copy_from: Any = None) -> None:
             super().__init__(copy_from)

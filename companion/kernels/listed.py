@@ -67,14 +67,24 @@ class _Scalar(str):
 
 def key(signature: str) -> tuple[Any, ...]:
     """Return a signature as ``key_of`` has its arguments."""
-    return _read(signature, {**{name: _Scalar(name) for name in SCALARS}, "tuple": lambda *members: (tuple, *members),
-                             "named": lambda place, *members: (_class(place), *members)})
+    return _read(
+        signature,
+        {
+            **{name: _Scalar(name) for name in SCALARS},
+            "tuple": lambda *members: (tuple, *members),
+            "named": lambda place, *members: (_class(place), *members),
+        },
+    )
 
 
 _KINDS: Mapping[type, str] = {
-    float: "float64", int: "int64", bool: "bool", np.bool_: "bool",
-    **{getattr(np, name): name for name in SCALARS if name != "bool"}}
-_CONTIGUOUS, _PLAIN = 0x001, 0x500   # of numpy's flags: in C's order; aligned and writable
+    float: "float64",
+    int: "int64",
+    bool: "bool",
+    np.bool_: "bool",
+    **{getattr(np, name): name for name in SCALARS if name != "bool"},
+}
+_CONTIGUOUS, _PLAIN = 0x001, 0x500  # of numpy's flags: in C's order; aligned and writable
 
 
 def key_of(value: Any) -> Any:
@@ -140,7 +150,7 @@ def _class(place: str) -> Any:
 
 
 def _read(text: str, names: Mapping[str, Any | Callable[..., Any]]) -> tuple[Any, ...]:
-    try:   # our own list, in numba's own notation
+    try:  # our own list, in numba's own notation
         return tuple(eval(f"({text},)" if text else "()", {**names, "__builtins__": {}}))  # noqa: S307
     except (SyntaxError, NameError, TypeError, ValueError, ImportError, AttributeError) as error:
         raise JobError(f"{text!r} is no signature: {error}") from error

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-_HEAD = re.compile(r"([0-9a-f]+)-([0-9a-f]+) r-.p \S+ \S+ \d+ +/.*")   # private, and cannot be written
+_HEAD = re.compile(r"([0-9a-f]+)-([0-9a-f]+) r-.p \S+ \S+ \d+ +/.*")  # private, and cannot be written
 _SMAPS = Path("/proc/self/smaps")
 
 
@@ -34,8 +34,7 @@ def let_go() -> int:
     except (OSError, AttributeError):
         return 0
     advise.argtypes = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int
-    return sum(end - begin for begin, end in clean(text)
-               if advise(begin, end - begin, mmap.MADV_DONTNEED) == 0)
+    return sum(end - begin for begin, end in clean(text) if advise(begin, end - begin, mmap.MADV_DONTNEED) == 0)
 
 
 def clean(smaps: str) -> Iterator[tuple[int, int]]:

@@ -25,22 +25,25 @@ from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
-FILE = "kernels.txt"   # in each package: see ``listed``
+FILE = "kernels.txt"  # in each package: see ``listed``
 PACKAGES = Path(__file__).resolve().parents[2]
 IN_MEMORY = (Path("/dev/shm"), Path("/run"))  # noqa: S108 - see _is_private
-CARRIED = Path(__file__).resolve().parent / "carried"   # filled when a package is built: see ``carry``
-CARRIED_FOR = "carried.json"                            # in it: the sources that it was made from, and the library
-KEPT_BYTES = 200 * 2**20   # beyond this, a dozen versions of everything, the oldest files go
+CARRIED = Path(__file__).resolve().parent / "carried"  # filled when a package is built: see ``carry``
+CARRIED_FOR = "carried.json"  # in it: the sources that it was made from, and the library
+KEPT_BYTES = 200 * 2**20  # beyond this, a dozen versions of everything, the oldest files go
 _LOG = logging.getLogger(__name__)
-ROOT = 0                   # the user who may change everything
+ROOT = 0  # the user who may change everything
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def folder() -> Path:
     """Return the user's folder of machine code; it need not exist."""
-    for name, below in (("COMPANION_KERNELS", ""), ("CACHE_DIRECTORY", "kernels"),
-                        ("XDG_CACHE_HOME", "sailboat-companion/kernels")):
-        place = os.environ.get(name, "").partition(":")[0]   # the service manager separates several by colons
+    for name, below in (
+        ("COMPANION_KERNELS", ""),
+        ("CACHE_DIRECTORY", "kernels"),
+        ("XDG_CACHE_HOME", "sailboat-companion/kernels"),
+    ):
+        place = os.environ.get(name, "").partition(":")[0]  # the service manager separates several by colons
         if place and Path(place).is_absolute():
             return Path(place, below)
     return Path("~/.cache/sailboat-companion/kernels").expanduser()
@@ -84,8 +87,9 @@ def objection(status: os.stat_result, place: Path) -> str:
 @functools.cache
 def refuse(path: Path, why: str) -> None:
     """Say, once, that what lies at a place is not used."""
-    _LOG.warning("%s: %s: compiled kernels are run, so none of it is used; make it yours alone (chown, chmod go-w)",
-                 path, why)
+    _LOG.warning(
+        "%s: %s: compiled kernels are run, so none of it is used; make it yours alone (chown, chmod go-w)", path, why
+    )
 
 
 def _is_ours(place: Path) -> bool:
@@ -117,7 +121,7 @@ def _tried(place: Path) -> Path:
     if not _is_ours(place):
         raise OSError(errno.EPERM, "it is not ours alone", str(place))
     if place.stat().st_mode & 0o077:
-        place.chmod(0o700)   # numba's files are as open as the user's umask has them
+        place.chmod(0o700)  # numba's files are as open as the user's umask has them
     with tempfile.TemporaryFile(dir=place):
         return place
 

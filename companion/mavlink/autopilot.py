@@ -24,23 +24,15 @@ from companion.mavlink.wire import codec
 from companion.mavlink.wire.assembler import Value, VehicleAssembler
 from companion.mavlink.wire.companion_status import high_latency2, status_messages
 from companion.mavlink.wire.frames import Message
-from companion.messages import (
-    AutopilotStatus,
-    CompanionStatus,
-    GeoPoint,
-    MissionItem,
-    MissionType,
-    Mode,
-    VehicleState,
-)
+from companion.messages import AutopilotStatus, CompanionStatus, GeoPoint, MissionItem, MissionType, Mode, VehicleState
 
 OnValue = Callable[[Value], None]
 
 # How long the autopilot has to show what it acknowledged: its heartbeat and MISSION_CURRENT come once a second [s].
 CONFIRM_S = 2.5
 SET_CURRENT_TRIES = 3
-AUX_SAILBOAT_TACK, AUX_SAILBOAT_MOTOR = 63, 74   # RC option numbers of DO_AUX_FUNCTION
-AUX_MIDDLE, AUX_HIGH = 1.0, 2.0                  # positions of its switch
+AUX_SAILBOAT_TACK, AUX_SAILBOAT_MOTOR = 63, 74  # RC option numbers of DO_AUX_FUNCTION
+AUX_MIDDLE, AUX_HIGH = 1.0, 2.0  # positions of its switch
 
 
 class Autopilot:
@@ -121,9 +113,7 @@ class Autopilot:
         await self._wait_status(lambda _: True, -math.inf)
         return self.status
 
-    async def _wait_status(
-        self, holds: Callable[[AutopilotStatus], bool], since_s: float,
-    ) -> bool:
+    async def _wait_status(self, holds: Callable[[AutopilotStatus], bool], since_s: float) -> bool:
         """Wait until a status heard at ``since_s`` or later fulfils ``holds``."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(CONFIRM_S):
@@ -173,8 +163,9 @@ class Autopilot:
         answer = await self.link.command(wire.MAV_CMD_COMPONENT_ARM_DISARM, 1.0 if is_armed else 0.0)
         if answer.is_ok and not await self._wait_status(lambda s: s.is_armed is is_armed, since_s):
             return CommandAnswer(
-                outcome=TransferOutcome.MISMATCH, text="accepted, but the heartbeat does not show it",
-                result=answer.result
+                outcome=TransferOutcome.MISMATCH,
+                text="accepted, but the heartbeat does not show it",
+                result=answer.result,
             )
         return answer
 
@@ -195,8 +186,9 @@ class Autopilot:
                 return answer
         now = self.status.mission_seq if self.status else None
         return CommandAnswer(
-            outcome=TransferOutcome.MISMATCH, text=f"item {seq} was accepted, MISSION_CURRENT shows {now}",
-            result=answer.result
+            outcome=TransferOutcome.MISMATCH,
+            text=f"item {seq} was accepted, MISSION_CURRENT shows {now}",
+            result=answer.result,
         )
 
     async def tack(self) -> CommandAnswer:
@@ -209,7 +201,8 @@ class Autopilot:
         An autopilot without a throttle output acknowledges it, too, and does nothing.
         """
         return await self.link.command(
-            wire.MAV_CMD_DO_AUX_FUNCTION, float(AUX_SAILBOAT_MOTOR), AUX_HIGH if on else AUX_MIDDLE)
+            wire.MAV_CMD_DO_AUX_FUNCTION, float(AUX_SAILBOAT_MOTOR), AUX_HIGH if on else AUX_MIDDLE
+        )
 
     async def enable_fence(self, *, enabled: bool = True) -> CommandAnswer:
         """Switch the fence on or off until the next reboot (the parameter FENCE_ENABLE stays)."""
@@ -275,8 +268,13 @@ class Autopilot:
         return await self._lists.read(MissionType.RALLY, "items")
 
     async def upload_mission(
-        self, items: Sequence[MissionItem], *, method: Method = "auto", keep_first: int = 0,
-        set_current: int | None = None, stopgap: MissionItem | None = None,
+        self,
+        items: Sequence[MissionItem],
+        *,
+        method: Method = "auto",
+        keep_first: int = 0,
+        set_current: int | None = None,
+        stopgap: MissionItem | None = None,
     ) -> TransferResult:
         """Put ``items`` on the autopilot, read them back, compare, and then make ``set_current`` current if given.
 
@@ -303,8 +301,7 @@ class Autopilot:
         if result.is_ok and set_current is not None:
             answer = await self.set_current(set_current, reset=True)
             if not answer.is_ok:
-                result = replace(
-                    result, outcome=answer.outcome, text=f"uploaded, but not made current: {answer.text}")
+                result = replace(result, outcome=answer.outcome, text=f"uploaded, but not made current: {answer.text}")
         return replace(result, duration_s=now_s() - began_s)
 
     async def upload_fence(self, items: Sequence[MissionItem]) -> TransferResult:

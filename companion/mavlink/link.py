@@ -146,9 +146,8 @@ class Link:
         self._sink, self._signing, self._is_quiet = sink, signing, is_quiet
         self._reception = Reception(self._identity, target_system, objection, self.stats)
         self._stamp, self._on_fault = stamp, on_fault
-        self._codec = Codec(
-            self._reception.own_system, self._identity.component, signing.state if signing else None)
-        self._subscribers: tuple[tuple[str, OnMessage], ...] = ()   # each with its name for a fault
+        self._codec = Codec(self._reception.own_system, self._identity.component, signing.state if signing else None)
+        self._subscribers: tuple[tuple[str, OnMessage], ...] = ()  # each with its name for a fault
         self._heartbeat_s: float | None = None
         self._found, self._decided = asyncio.Event(), asyncio.Event()
         self._boot_s: float | None = None
@@ -205,7 +204,8 @@ class Link:
                         await self._decided.wait()
             if not self._decided.is_set():
                 raise LinkError(
-                    f"{self.transport.name}: no autopilot in {timeout_s:g} s: {self._diagnosis()}") from None
+                    f"{self.transport.name}: no autopilot in {timeout_s:g} s: {self._diagnosis()}"
+                ) from None
         if self._reception.refusal:
             raise LinkError(f"{self.transport.name}: {self._reception.refusal}")
         return self.party
@@ -396,7 +396,7 @@ class Link:
             self._doubt_until_s = now + DOUBT_S
         self._throughput.note(now, received=len(data))
         for message in self._codec.feed(data):
-            try:   # as ``guard`` does; fifty messages a second, each to several listeners, are worth the lines
+            try:  # as ``guard`` does; fifty messages a second, each to several listeners, are worth the lines
                 self._take(now, message)
             except Exception as error:
                 self._fault("the link", error)
@@ -405,7 +405,7 @@ class Link:
         if self._reception.is_repeat(message):
             return
         if now < self._doubt_until_s and self._reception.is_out_of_turn(message):
-            self.stats.dropped[Drop.HELD] += 1   # and not recorded: a replay knows nothing of our turns
+            self.stats.dropped[Drop.HELD] += 1  # and not recorded: a replay knows nothing of our turns
             return
         self.stats.frames_in += 1
         if self._sink is not None:
@@ -418,7 +418,7 @@ class Link:
         kind = message.get_type()
         if heard is Heard.OURS and message.get_srcComponent() == codec.AUTOPILOT_COMPONENT:
             if now < self._doubt_until_s and getattr(message, "time_boot_ms", None) is not None:
-                self._doubt_until_s = -math.inf   # the count is known again
+                self._doubt_until_s = -math.inf  # the count is known again
             self.monitor.heard(now, kind)
             self._notice_boot(kind, message)
             if kind == "HEARTBEAT" and codec.is_autopilot_heartbeat(message):

@@ -87,8 +87,7 @@ class MissionLists:
         began_s = now_s()
         async with self._link.lock("lists"):
             cleared = await self._link.perform(ListClear(self._link.party, kind))
-        return TransferResult(
-            outcome=cleared.outcome, text=cleared.text, method="items", duration_s=now_s() - began_s)
+        return TransferResult(outcome=cleared.outcome, text=cleared.text, method="items", duration_s=now_s() - began_s)
 
     async def write_mission(
         self, items: Sequence[MissionItem], method: Method, keep_first: int, stopgap: MissionItem | None
@@ -104,7 +103,7 @@ class MissionLists:
                     and result.method == "guarded"
                     and result.outcome is not TransferOutcome.UNSUPPORTED
                 ):
-                    break   # what failed by a bad link is not tried again without the guard
+                    break  # what failed by a bad link is not tried again without the guard
                 if chosen == "guarded" and stopgap is not None:
                     result = await self._upload_guarded(items, keep_first, stopgap)
                 else:
@@ -132,7 +131,7 @@ class MissionLists:
         return replace(result, duration_s=now_s() - began_s)
 
     def _ways(
-        self, items: Sequence[MissionItem], method: Method, keep_first: int, *, is_guarded: bool,
+        self, items: Sequence[MissionItem], method: Method, keep_first: int, *, is_guarded: bool
     ) -> tuple[Method, ...]:
         """Return the protocols to try, in order: twice the chosen one, at last the plain one."""
         if method != "auto":
@@ -199,14 +198,15 @@ class MissionLists:
         if not difference and len(read.items) < len(sent):
             difference = f"{len(sent)} items written, {len(read.items)} read back"
         if difference:
-            return TransferResult(outcome=TransferOutcome.MISMATCH, text=difference, method=method,
-                                  count=len(read.items))
+            return TransferResult(
+                outcome=TransferOutcome.MISMATCH, text=difference, method=method, count=len(read.items)
+            )
         tail = len(read.items) - len(sent)
         text = f"{tail} old items stand behind the end" if tail > 0 else ""
         return TransferResult(outcome=TransferOutcome.OK, text=text, method=method, count=len(read.items))
 
     async def _upload_guarded(
-        self, items: Sequence[MissionItem], keep_first: int, stopgap: MissionItem,
+        self, items: Sequence[MissionItem], keep_first: int, stopgap: MissionItem
     ) -> TransferResult:
         """Write behind a stopgap: close the mission there, write and check the rest, then open it by a single item."""
         party, kind, seq = self._link.party, MissionType.MISSION, keep_first + 1
@@ -224,7 +224,7 @@ class MissionLists:
             if done.outcome not in {TransferOutcome.OK, TransferOutcome.UNCONFIRMED}:
                 return self._guarded(done.outcome, done.text)
             read = await self._read(kind, "items")
-            difference = first_difference(closed, (read.items or ())[:len(closed)])
+            difference = first_difference(closed, (read.items or ())[: len(closed)])
             if read.items is None or difference:
                 return self._guarded(TransferOutcome.MISMATCH if read.items is not None else read.outcome, difference)
         done = await self._link.perform(ListUpload(party, kind, (items[keep_first],), first=seq, partial=True))
@@ -239,7 +239,7 @@ class MissionLists:
 
     def _guarded(self, outcome: TransferOutcome, text: str) -> TransferResult:
         if outcome is TransferOutcome.UNCONFIRMED:
-            outcome = TransferOutcome.TIMEOUT   # it may not stand there: nothing is written behind it
+            outcome = TransferOutcome.TIMEOUT  # it may not stand there: nothing is written behind it
         if outcome is not TransferOutcome.OK and self._link.is_lost:
             outcome = TransferOutcome.LINK
         return TransferResult(outcome=outcome, text=text, method="guarded")
@@ -278,9 +278,7 @@ class MissionLists:
         return self._ftp_seq
 
 
-def compared(
-    items: Sequence[MissionItem], read: ReadResult, method: Method,
-) -> TransferResult:
+def compared(items: Sequence[MissionItem], read: ReadResult, method: Method) -> TransferResult:
     """Return how a write of ``items`` ended, by what was read back."""
     if read.items is None:
         return TransferResult(outcome=read.outcome, text=read.text, method=method)

@@ -55,7 +55,7 @@ class Throughput:
 
     def __init__(self) -> None:
         self._pieces: deque[tuple[float, int, int]] = deque()
-        self._received = self._sent = 0   # the sums of what is kept
+        self._received = self._sent = 0  # the sums of what is kept
 
     def note(self, t_s: float, *, received: int = 0, sent: int = 0) -> None:
         """Note bytes."""
@@ -124,7 +124,7 @@ class BootClock:
     """The autopilot's boot time against ours, with one rival for it."""
 
     def __init__(self) -> None:
-        self.is_new = False           # the last message that fitted began a new clock
+        self.is_new = False  # the last message that fitted began a new clock
         self._offset_s: float | None = None
         self._last_s = 0.0
         self._rival_s = 0.0
@@ -156,7 +156,8 @@ class BootClock:
     def is_contested(self, t_s: float) -> bool:
         """Return whether another clock goes on beside this one: two autopilots speak as one."""
         return (
-            self._rival_count >= CONTEST_COUNT and self._rival_last_s - self._rival_first_s >= CONTEST_S
+            self._rival_count >= CONTEST_COUNT
+            and self._rival_last_s - self._rival_first_s >= CONTEST_S
             and t_s - self._rival_last_s <= CONTEST_OVER_S
         )
 
@@ -236,7 +237,7 @@ class PlausibilityFilter:
             if self.clock.is_new:
                 self._streams.clear()
         is_guarded = False
-        for s in self._streams:   # asked at every message: a loop, not a generator
+        for s in self._streams:  # asked at every message: a loop, not a generator
             if s.vouchers >= VOUCHERS and t_s - s.last_s <= ALIVE_S:
                 is_guarded = True
                 break
@@ -252,8 +253,9 @@ class PlausibilityFilter:
             streams = sorted(streams, key=lambda s: -min(s.vouchers, VOUCHERS))
             spoke_s = max(s.last_s for s in streams if s.is_vouched) if streams[0].is_vouched else spoke_s
         for stream in streams:
-            if stream.holds(t_s, seq, is_timed=boot_s is not None,
-                            may_skip=stream.last_s == spoke_s or t_s - spoke_s >= SILENCE_S):
+            if stream.holds(
+                t_s, seq, is_timed=boot_s is not None, may_skip=stream.last_s == spoke_s or t_s - spoke_s >= SILENCE_S
+            ):
                 stream.take(t_s, seq, boot_s)
                 return stream
         if len(self._streams) >= MAX_STREAMS:
@@ -271,7 +273,7 @@ class PlausibilityFilter:
 
 Objection = Callable[[float, Message], Drop | None]
 
-OWN_COMPONENT = 191   # MAV_COMP_ID_ONBOARD_COMPUTER
+OWN_COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 TOOL_COMPONENT = 192  # ..._COMPUTER2: a tool that looks in beside a companion that sails
 _DUPLICATE_WINDOW = 32
 _COMMANDS = frozenset({"COMMAND_LONG", "COMMAND_INT"})
@@ -294,9 +296,9 @@ SHORE = LinkIdentity(system=254, component=190)
 class Heard(enum.Enum):
     """What a message is to us."""
 
-    NOTHING = "nothing"    # not ours to hear; counted
-    OURS = "ours"          # of the autopilot's system, and believed
-    ORDER = "order"        # of another system: a command to us by our ids
+    NOTHING = "nothing"  # not ours to hear; counted
+    OURS = "ours"  # of the autopilot's system, and believed
+    ORDER = "order"  # of another system: a command to us by our ids
 
 
 class Reception:
@@ -310,7 +312,7 @@ class Reception:
     """
 
     def __init__(
-        self, identity: LinkIdentity, wanted: int | None, objection: Objection | None, stats: LinkStats,
+        self, identity: LinkIdentity, wanted: int | None, objection: Objection | None, stats: LinkStats
     ) -> None:
         self.census = Census(wanted)
         self.own_system = identity.system or wanted or 1
@@ -318,9 +320,9 @@ class Reception:
         self.refusal = ""
         self._identity, self._stats = identity, stats
         self._objection = objection or _of_the_autopilot(PlausibilityFilter())
-        self.expects_burst = False   # more frames were asked for at once than a stream has: their numbers prove nothing
+        self.expects_burst = False  # more frames were asked for at once than a stream has: their numbers prove nothing
         self._unheard: Counter[int] = Counter()
-        self._recent: dict[tuple[int, int, int, int, int], None] = {}   # the last frames, oldest first
+        self._recent: dict[tuple[int, int, int, int, int], None] = {}  # the last frames, oldest first
 
     @property
     def is_decided(self) -> bool:
@@ -376,7 +378,7 @@ class Reception:
         if component == self._identity.component:
             self._notice_companion(t_s, message, kind)
             if system in {self.target, self.own_system}:
-                self._stats.dropped[Drop.OWN_IDS] += 1   # an echo of what we said, or a second companion's
+                self._stats.dropped[Drop.OWN_IDS] += 1  # an echo of what we said, or a second companion's
                 return Heard.NOTHING
         if system != self.target:
             if self.target is None and component != self._identity.component:
@@ -391,13 +393,14 @@ class Reception:
 
     def is_for_us_alone(self, message: Message) -> bool:
         """Return whether a message with a target means this component by name."""
-        return bool(
-            message.target_system == self.own_system and message.target_component == self._identity.component)
+        return bool(message.target_system == self.own_system and message.target_component == self._identity.component)
 
     def _notice_companion(self, t_s: float, message: Message, kind: str) -> None:
         """Tell a second companion from the echo of our own heartbeat."""
-        if kind == "HEARTBEAT" and message.type == wire.MAV_TYPE_ONBOARD_CONTROLLER and (
-            message.custom_mode != self._identity.token
+        if (
+            kind == "HEARTBEAT"
+            and message.type == wire.MAV_TYPE_ONBOARD_CONTROLLER
+            and (message.custom_mode != self._identity.token)
         ):
             self.census.take_companion(t_s, message)
 
@@ -412,6 +415,7 @@ class Reception:
 
 def _of_the_autopilot(witness: PlausibilityFilter) -> Objection:
     """Return the judgement of one who has no key: the autopilot's own messages must fit together."""
+
     def objection(t_s: float, message: Message) -> Drop | None:
         return witness.objection(t_s, message) if message.get_srcComponent() == codec.AUTOPILOT_COMPONENT else None
 

@@ -27,7 +27,7 @@ TICKS_PER_S = 100_000
 AHEAD_S = 40.0
 # A stored timestamp beyond this is damage: of the 48 bits of a timestamp the last year is left to be signed in.
 _MOST_STORED = MOST_TIMESTAMP - 366 * 86_400 * TICKS_PER_S
-_MOST_BYTES = 64    # of the file: 15 digits are needed
+_MOST_BYTES = 64  # of the file: 15 digits are needed
 _LOG = logging.getLogger(__name__)
 
 
@@ -61,7 +61,8 @@ def make_key(path: Path, passphrase: str = "") -> None:
         Disk().sync_folder(path.parent)
     except FileExistsError:
         raise InputError(
-            str(path), "", "is there already", "a key may be in use and is not written over: choose another") from None
+            str(path), "", "is there already", "a key may be in use and is not written over: choose another"
+        ) from None
     except OSError as error:
         raise InputError(str(path), "", f"cannot be written ({reason(error)})", "choose another place") from error
 
@@ -80,7 +81,10 @@ class SigningStore:
             _LOG.warning(
                 "%s: %s: frames are signed by this computer's clock, and it is written anew; if the autopilot does not "
                 "answer, that clock is behind the last frame that it took: set it right, or take the key off over USB "
-                "and put it on again (companion key remove, set)", self._path, damage)
+                "and put it on again (companion key remove, set)",
+                self._path,
+                damage,
+            )
 
     def save(self) -> None:
         """Store the timestamp if what is stored is about to be reached."""
@@ -98,7 +102,7 @@ def _stored(path: Path) -> tuple[int, str]:
     try:
         text = read_regular(path, _MOST_BYTES, follows_links=False).strip()
     except FileNotFoundError:
-        return 0, ""    # the first start with this key
+        return 0, ""  # the first start with this key
     except OSError as error:
         return 0, f"cannot be read ({reason(error)})"
     if not re.fullmatch(rb"[0-9]{1,20}", text) or int(text) > _MOST_STORED:

@@ -54,7 +54,7 @@ def parse_tlog(data: bytes) -> Iterator[TlogRecord]:
         if size == 0:
             at += 1
             continue
-        yield TlogRecord(unix_us, data[at + 8:at + 8 + size])
+        yield TlogRecord(unix_us, data[at + 8 : at + 8 + size])
         at += 8 + size
 
 

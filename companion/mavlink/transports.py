@@ -114,6 +114,7 @@ def parse_link(text: str) -> LinkName:
     >>> parse_link("/dev/ttyAMA0").baud
     921600
     """
+
     def bad(problem: str) -> InputError:
         return InputError("--link", text or "(empty)", problem, _REMEDY)
 
@@ -354,7 +355,9 @@ class DatagramEndpoint(_Endpoint):
         wire = self._wire
         nobody = self._link.kind == "udpin" and self._peer is None
         if (
-            wire is None or nobody or wire.is_closing()
+            wire is None
+            or nobody
+            or wire.is_closing()
             or wire.get_write_buffer_size() + len(data) > MAX_WRITE_BUFFER_BYTES
         ):
             self._stats.writes_dropped += 1

@@ -72,9 +72,9 @@ class Speaker:
 class CensusState(enum.Enum):
     """What the census says."""
 
-    LISTENING = "listening"   # nobody yet, or not long enough
+    LISTENING = "listening"  # nobody yet, or not long enough
     CHOSEN = "chosen"
-    REFUSED = "refused"       # what is heard cannot be ours; the reason says what to do
+    REFUSED = "refused"  # what is heard cannot be ours; the reason says what to do
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,9 +120,13 @@ class Census:
             return
         before = self._speakers.get(system)
         self._speakers[system] = Speaker(
-            system=system, vehicle_type=int(message.type), autopilot=int(message.autopilot),
-            mode=int(message.custom_mode), is_armed=codec.is_armed(message),
-            first_s=before.first_s if before else t_s, last_s=t_s,
+            system=system,
+            vehicle_type=int(message.type),
+            autopilot=int(message.autopilot),
+            mode=int(message.custom_mode),
+            is_armed=codec.is_armed(message),
+            first_s=before.first_s if before else t_s,
+            last_s=t_s,
         )
 
     def take_companion(self, t_s: float, message: Message) -> None:
@@ -130,8 +134,10 @@ class Census:
         before = self._companions.get(message.get_srcSystem())
         is_same = before is not None and before.token == message.custom_mode and t_s - before.last_s <= GONE_S
         self._companions[message.get_srcSystem()] = OtherCompanion(
-            token=int(message.custom_mode), is_starting=message.system_status == wire.MAV_STATE_BOOT,
-            beats=before.beats + 1 if is_same and before is not None else 1, last_s=t_s,
+            token=int(message.custom_mode),
+            is_starting=message.system_status == wire.MAV_STATE_BOOT,
+            beats=before.beats + 1 if is_same and before is not None else 1,
+            last_s=t_s,
         )
 
     def hears_station(self, t_s: float) -> bool:
@@ -162,13 +168,18 @@ class Census:
             if not heard or t_s - min(s.first_s for s in heard) < LISTEN_S:
                 return AutopilotChoice()
             if len(heard) > 1:
-                return AutopilotChoice(standing=CensusState.REFUSED, reason=(
-                    f"{len(heard)} autopilots are heard: {listed(heard)}: say which is yours, with --system N or "
-                    "[autopilot] system in the mission"))
+                return AutopilotChoice(
+                    standing=CensusState.REFUSED,
+                    reason=(
+                        f"{len(heard)} autopilots are heard: {listed(heard)}: say which is yours, with --system N or "
+                        "[autopilot] system in the mission"
+                    ),
+                )
             ours = list(heard)
         if not ours[0].is_rover:
-            return AutopilotChoice(standing=CensusState.REFUSED,
-                                   reason=f"{ours[0].describe()} is not a rover: no boat of ours")
+            return AutopilotChoice(
+                standing=CensusState.REFUSED, reason=f"{ours[0].describe()} is not a rover: no boat of ours"
+            )
         return AutopilotChoice(standing=CensusState.CHOSEN, system=ours[0].system)
 
 
@@ -214,7 +225,7 @@ class Identity:
     vehicle_type: int | None = None
     frame_class: int | None = None
     sails: bool | None = None
-    other_uid: str | None = None      # a UID that differs, told once
+    other_uid: str | None = None  # a UID that differs, told once
 
     def told(self, system: int, uid: str) -> Identity:
         """Take an AUTOPILOT_VERSION. One that differs is believed when it is told twice running."""
@@ -230,5 +241,7 @@ class Identity:
         """Take parameters; others than the frame's do not matter."""
         frame, sails = values.get("FRAME_CLASS"), values.get("SAIL_ENABLE")
         return replace(
-            self, frame_class=self.frame_class if frame is None else int(frame),
-            sails=self.sails if sails is None else sails != 0.0)
+            self,
+            frame_class=self.frame_class if frame is None else int(frame),
+            sails=self.sails if sails is None else sails != 0.0,
+        )

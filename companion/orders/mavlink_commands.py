@@ -19,12 +19,21 @@ from companion.orders.order import BY_VERB, TABLE, Answer, Place, Result, Verb, 
 
 VERB_COMMAND, PLACE_COMMAND = int(wire.MAV_CMD_USER_1), int(wire.MAV_CMD_USER_2)
 COMMANDS = frozenset({VERB_COMMAND, PLACE_COMMAND})
-GLOBAL_FRAMES = frozenset({
-    wire.MAV_FRAME_GLOBAL, wire.MAV_FRAME_GLOBAL_RELATIVE_ALT, wire.MAV_FRAME_GLOBAL_INT,
-    wire.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, wire.MAV_FRAME_GLOBAL_TERRAIN_ALT, wire.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT})
+GLOBAL_FRAMES = frozenset(
+    {
+        wire.MAV_FRAME_GLOBAL,
+        wire.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+        wire.MAV_FRAME_GLOBAL_INT,
+        wire.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+        wire.MAV_FRAME_GLOBAL_TERRAIN_ALT,
+        wire.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
+    }
+)
 RESULTS = {
-    Result.DONE: int(wire.MAV_RESULT_ACCEPTED), Result.REFUSED: int(wire.MAV_RESULT_DENIED),
-    Result.NOT_NOW: int(wire.MAV_RESULT_TEMPORARILY_REJECTED), Result.UNKNOWN: int(wire.MAV_RESULT_UNSUPPORTED),
+    Result.DONE: int(wire.MAV_RESULT_ACCEPTED),
+    Result.REFUSED: int(wire.MAV_RESULT_DENIED),
+    Result.NOT_NOW: int(wire.MAV_RESULT_TEMPORARILY_REJECTED),
+    Result.UNKNOWN: int(wire.MAV_RESULT_UNSUPPORTED),
 }
 
 
@@ -73,12 +82,25 @@ def message_of(wanted: Wanted, system: int, attempt: int = 0) -> Message:
         raise ValueError(wanted.fault or "nothing is wanted")
     if wanted.verb is not Verb.GOAL:
         return wire.MAVLink_command_long_message(
-            system, OWN_COMPONENT, VERB_COMMAND, min(attempt, 255), *params_of(wanted), 0.0, 0.0, 0.0, 0.0)
+            system, OWN_COMPONENT, VERB_COMMAND, min(attempt, 255), *params_of(wanted), 0.0, 0.0, 0.0, 0.0
+        )
     if wanted.place is None or wanted.place.trouble:
         raise ValueError("a goal needs a position" if wanted.place is None else wanted.place.trouble)
     return wire.MAVLink_command_int_message(
-        system, OWN_COMPONENT, wire.MAV_FRAME_GLOBAL, PLACE_COMMAND, 0, 0, 0.0, 0.0, 0.0, 0.0,
-        round(wanted.place.lat_deg * 1e7), round(wanted.place.lon_deg * 1e7), 0.0)
+        system,
+        OWN_COMPONENT,
+        wire.MAV_FRAME_GLOBAL,
+        PLACE_COMMAND,
+        0,
+        0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        round(wanted.place.lat_deg * 1e7),
+        round(wanted.place.lon_deg * 1e7),
+        0.0,
+    )
 
 
 def params_of(wanted: Wanted) -> tuple[float, float, float]:
@@ -90,9 +112,9 @@ def params_of(wanted: Wanted) -> tuple[float, float, float]:
 
 # Giving an order through a link and hearing its answer: what a ground station, a script or the command line does.
 
-AGAIN_S = 1.5        # the companion answers within a second; a slow radio takes another half
+AGAIN_S = 1.5  # the companion answers within a second; a slow radio takes another half
 GIVE_UP_S = 15.0
-WORDS_S = 3.0        # the sentence follows the acknowledgement; chunk by chunk on a slow radio
+WORDS_S = 3.0  # the sentence follows the acknowledgement; chunk by chunk on a slow radio
 _BY_RESULT = {value: result for result, value in RESULTS.items()}
 
 
@@ -185,17 +207,20 @@ async def give(link: OrderLink, wanted: Wanted, *, give_up_s: float = GIVE_UP_S)
 
 # Buttons for QGroundControl: its ``MavlinkActions`` file, with each verb that needs no typing.
 
-UNUSED = (0.0, 0.0, 0.0, 0.0)   # param4 to param7
+UNUSED = (0.0, 0.0, 0.0, 0.0)  # param4 to param7
 
 
 def qgc_actions() -> str:
     """Return the file. QGroundControl ignores a file that has any other key than those it documents."""
     actions = [
         {
-            "label": row.button, "description": row.means[:1].upper() + row.means[1:], "mavCmd": VERB_COMMAND,
+            "label": row.button,
+            "description": row.means[:1].upper() + row.means[1:],
+            "mavCmd": VERB_COMMAND,
             "compId": OWN_COMPONENT,
             **{f"param{n}": value for n, value in enumerate((*params_of(Wanted(verb=row.verb)), *UNUSED), 1)},
         }
-        for row in TABLE if row.button
+        for row in TABLE
+        if row.button
     ]
     return json.dumps({"version": 1, "fileType": "MavlinkActions", "actions": actions}, indent=4) + "\n"

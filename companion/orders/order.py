@@ -15,7 +15,7 @@ from companion.messages import GeoPoint
 
 # The verbs: what can be asked of the boat, by number on the radio and by word everywhere else.
 
-ALL = "all"   # of the verbs, where a mission says which are permitted
+ALL = "all"  # of the verbs, where a mission says which are permitted
 
 
 class Verb(enum.StrEnum):
@@ -43,44 +43,96 @@ class VerbRow:
     means: str
     refused: str
     takes: str = ""
-    stands: bool = False     # until ``go_on``, or another order that stands
-    button: str = ""         # of a ground station; empty: it has none, for what it takes cannot be typed there
+    stands: bool = False  # until ``go_on``, or another order that stands
+    button: str = ""  # of a ground station; empty: it has none, for what it takes cannot be typed there
 
 
 TABLE: tuple[VerbRow, ...] = (
-    VerbRow(verb=Verb.HOLD, number=1, stands=True, button="Hold here",
+    VerbRow(
+        verb=Verb.HOLD,
+        number=1,
+        stands=True,
+        button="Hold here",
         means="loiter here, where there is room near by, until told to go on",
-        refused="a person has her, the battery or a failsafe comes first, uploading is not permitted"),
-    VerbRow(verb=Verb.GO_ON, number=2, button="Go on",
+        refused="a person has her, the battery or a failsafe comes first, uploading is not permitted",
+    ),
+    VerbRow(
+        verb=Verb.GO_ON,
+        number=2,
+        button="Go on",
         means="the end of whatever order stands: on to the next goal; without one the end of a stay in a box",
-        refused="never"),
-    VerbRow(verb=Verb.SKIP_GOAL, number=3, button="Skip this goal",
+        refused="never",
+    ),
+    VerbRow(
+        verb=Verb.SKIP_GOAL,
+        number=3,
+        button="Skip this goal",
         means="the goal that is next is given up, the one behind it becomes the next",
-        refused="it is the last one: hold, home or a refuge say where to stay instead"),
-    VerbRow(verb=Verb.REFUGE, number=4, takes="[NAME]", stands=True, button="To the nearest refuge",
+        refused="it is the last one: hold, home or a refuge say where to stay instead",
+    ),
+    VerbRow(
+        verb=Verb.REFUGE,
+        number=4,
+        takes="[NAME]",
+        stands=True,
+        button="To the nearest refuge",
         means="sail to the refuge of that name, or the nearest, and stay there until told to go on",
-        refused="the mission has none of that name (they are listed); she is not under way; as `hold`"),
-    VerbRow(verb=Verb.HOME, number=5, stands=True, button="Home",
+        refused="the mission has none of that name (they are listed); she is not under way; as `hold`",
+    ),
+    VerbRow(
+        verb=Verb.HOME,
+        number=5,
+        stands=True,
+        button="Home",
         means="sail to where she was armed and stay there until told to go on; planned like any leg, never RTL",
-        refused="the autopilot has not told where home is, or it is in no free water; she is not under way; as `hold`"),
-    VerbRow(verb=Verb.GOAL, number=6, takes="LAT LON", stands=True,
+        refused="the autopilot has not told where home is, or it is in no free water; she is not under way; as `hold`",
+    ),
+    VerbRow(
+        verb=Verb.GOAL,
+        number=6,
+        takes="LAT LON",
+        stands=True,
         means="sail to that place, then on to the goals that are left",
         refused="it is no position (0, 0; not a number; outside ±90 or ±180), on land, outside the fence, nearer to "
         "something than the margin's floor, farther than 50 km (on a passage than its longest leg), or latitude and "
-        "longitude are swapped; she is not under way; as `hold`"),
-    VerbRow(verb=Verb.REPLAN, number=7, button="Plan again",
-        means="a new plan from where she is", refused="she is not sailing to anywhere"),
-    VerbRow(verb=Verb.STOP, number=8, stands=True, button="Give the boat up",
+        "longitude are swapped; she is not under way; as `hold`",
+    ),
+    VerbRow(
+        verb=Verb.REPLAN,
+        number=7,
+        button="Plan again",
+        means="a new plan from where she is",
+        refused="she is not sailing to anywhere",
+    ),
+    VerbRow(
+        verb=Verb.STOP,
+        number=8,
+        stands=True,
+        button="Give the boat up",
         means="nothing more is asked of the boat until told to go on: what is on board the autopilot sails on",
-        refused="never"),
-    VerbRow(verb=Verb.ADOPT, number=9, button="Sail what was drawn",
+        refused="never",
+    ),
+    VerbRow(
+        verb=Verb.ADOPT,
+        number=9,
+        button="Sail what was drawn",
         means="end this voyage, and sail the mission that somebody has drawn and uploaded",
-        refused="nothing drawn is on offer, it cannot be sailed, or this voyage's goals are in its mission file"),
-    VerbRow(verb=Verb.REPLACE, number=10, button="Replace the mission on board",
-        means="overwrite a mission on the autopilot that is not ours", refused="the mission on board is ours, or "
-        "uploading is not permitted"),
-    VerbRow(verb=Verb.WHY, number=11, button="Why?",
-        means="say what she does and why, and when she tacks next", refused="never: reading is always permitted"),
+        refused="nothing drawn is on offer, it cannot be sailed, or this voyage's goals are in its mission file",
+    ),
+    VerbRow(
+        verb=Verb.REPLACE,
+        number=10,
+        button="Replace the mission on board",
+        means="overwrite a mission on the autopilot that is not ours",
+        refused="the mission on board is ours, or uploading is not permitted",
+    ),
+    VerbRow(
+        verb=Verb.WHY,
+        number=11,
+        button="Why?",
+        means="say what she does and why, and when she tacks next",
+        refused="never: reading is always permitted",
+    ),
 )
 BY_VERB = {row.verb: row for row in TABLE}
 _BY_NUMBER = {row.number: row.verb for row in TABLE}
@@ -113,8 +165,8 @@ def permitted(verb: Verb, orders: Iterable[str]) -> bool:
     return verb is Verb.WHY or ALL in words or verb.value in words
 
 
-MAVLINK, LOCAL, FAR = "mavlink", "local", "far"   # the ways in which orders come
-MARK_BITS = 24   # a float32 holds so many exactly
+MAVLINK, LOCAL, FAR = "mavlink", "local", "far"  # the ways in which orders come
+MARK_BITS = 24  # a float32 holds so many exactly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -221,11 +273,16 @@ class Order:
         """Return plain JSON values; numbers that JSON does not have as words."""
         wanted = self.wanted
         return {
-            "verb": None if wanted.verb is None else wanted.verb.value, "name": wanted.name, "number": wanted.number,
-            "mark": wanted.mark, "fault": wanted.fault,
+            "verb": None if wanted.verb is None else wanted.verb.value,
+            "name": wanted.name,
+            "number": wanted.number,
+            "mark": wanted.mark,
+            "fault": wanted.fault,
             "place": None if wanted.place is None else [repr(wanted.place.lat_deg), repr(wanted.place.lon_deg)],
-            "source": [self.source.kind, self.source.system, self.source.component], "heard_s": self.t_s,
-            "command": self.command, "authority": self.authority,
+            "source": [self.source.kind, self.source.system, self.source.component],
+            "heard_s": self.t_s,
+            "command": self.command,
+            "authority": self.authority,
         }
 
     @classmethod
@@ -234,20 +291,27 @@ class Order:
         place, source = data["place"], data["source"]
         return cls(
             wanted=Wanted(
-                verb=None if data["verb"] is None else Verb(data["verb"]), name=data["name"], number=data["number"],
-                mark=data["mark"], fault=data["fault"],
-                place=None if place is None else Place(lat_deg=float(place[0]), lon_deg=float(place[1]))),
-            source=Source(kind=source[0], system=source[1], component=source[2]), t_s=float(data["heard_s"]),
-            command=data["command"], authority=data["authority"])
+                verb=None if data["verb"] is None else Verb(data["verb"]),
+                name=data["name"],
+                number=data["number"],
+                mark=data["mark"],
+                fault=data["fault"],
+                place=None if place is None else Place(lat_deg=float(place[0]), lon_deg=float(place[1])),
+            ),
+            source=Source(kind=source[0], system=source[1], component=source[2]),
+            t_s=float(data["heard_s"]),
+            command=data["command"],
+            authority=data["authority"],
+        )
 
 
 class Result(enum.Enum):
     """How an order ended."""
 
-    DONE = "done"            # taken: it is being carried out, or stands
-    REFUSED = "refused"      # not permitted, or it cannot be done: the same again will be refused again
-    NOT_NOW = "not now"      # as things are; another time it may be
-    UNKNOWN = "unknown"      # no order of ours
+    DONE = "done"  # taken: it is being carried out, or stands
+    REFUSED = "refused"  # not permitted, or it cannot be done: the same again will be refused again
+    NOT_NOW = "not now"  # as things are; another time it may be
+    UNKNOWN = "unknown"  # no order of ours
     NO_ANSWER = "no answer"  # nobody has answered who asked: it may have been taken all the same
 
 
@@ -273,6 +337,7 @@ def which(wanted: Wanted, names: Sequence[str]) -> int | None:
 
 
 # Orders in words, as a person types them: ``hold``, ``refuge Bay``, ``goal 51.1 -1.3``.
+
 
 def phrase(words: Sequence[str]) -> Wanted:
     """Return what the words want.

@@ -24,11 +24,11 @@ from companion.messages import GeoPoint
 from companion.outputs.outlet import Outlet, Say
 from companion.view.values import GoalView, LegView, PointEn, View
 
-TALKER = "II"          # integrated instrumentation
-MAX_CHARACTERS = 82    # from $ to the line end, both included
-NAME_CHARACTERS = 8    # of a waypoint: more than a few do not fit into the sentences of a route
+TALKER = "II"  # integrated instrumentation
+MAX_CHARACTERS = 82  # from $ to the line end, both included
+NAME_CHARACTERS = 8  # of a waypoint: more than a few do not fit into the sentences of a route
 _FRAME = len("$*00\r\n")
-_MOST_XTE_NM = 9.99    # what the field of a cross-track error holds
+_MOST_XTE_NM = 9.99  # what the field of a cross-track error holds
 
 
 def sentence(kind: str, *fields: str) -> str:
@@ -61,8 +61,9 @@ def name_of(text: str) -> str:
 
 def mwv(angle_rad: float, speed_mps: float, *, is_apparent: bool, is_valid: bool = True) -> str:
     """Return the wind's angle to the bow [rad, starboard positive] and its speed: on the boat, or the true one."""
-    return sentence("MWV", _degrees(angle_rad), "R" if is_apparent else "T", _knots(speed_mps), "N",
-                    "A" if is_valid else "V")
+    return sentence(
+        "MWV", _degrees(angle_rad), "R" if is_apparent else "T", _knots(speed_mps), "N", "A" if is_valid else "V"
+    )
 
 
 def mwd(from_rad: float, speed_mps: float) -> str:
@@ -86,32 +87,71 @@ def rmc(utc_s: float | None, point: GeoPoint | None, speed_mps: float | None, co
     clock, day = ("", "") if when is None else (f"{when:%H%M%S}.{when.microsecond // 10_000:02d}", f"{when:%d%m%y}")
     speed = "" if point is None or speed_mps is None else _knots(speed_mps)
     course = "" if point is None or course_rad is None else _degrees(course_rad)
-    return sentence("RMC", clock, "V" if point is None else "A", *_place(point), speed, course, day, "", "",
-                    "N" if point is None else "A")
+    return sentence(
+        "RMC",
+        clock,
+        "V" if point is None else "A",
+        *_place(point),
+        speed,
+        course,
+        day,
+        "",
+        "",
+        "N" if point is None else "A",
+    )
 
 
-def apb(
-    right_of_leg_m: float, leg_rad: float, bearing_rad: float, name: str, *, is_inside: bool, is_past: bool,
-) -> str:
+def apb(right_of_leg_m: float, leg_rad: float, bearing_rad: float, name: str, *, is_inside: bool, is_past: bool) -> str:
     """Return what an autopilot needs: the distance off the leg, the leg's bearing, the waypoint's, which it steers.
 
     ``is_inside`` the circle of arrival; ``is_past`` the line across the leg at the waypoint.
     """
     off, side = _off_track(right_of_leg_m)
     return sentence(
-        "APB", "A", "A", off, side, "N", _flag(is_inside), _flag(is_past), _degrees(leg_rad), "T", name,
-        _degrees(bearing_rad), "T", _degrees(bearing_rad), "T")
+        "APB",
+        "A",
+        "A",
+        off,
+        side,
+        "N",
+        _flag(is_inside),
+        _flag(is_past),
+        _degrees(leg_rad),
+        "T",
+        name,
+        _degrees(bearing_rad),
+        "T",
+        _degrees(bearing_rad),
+        "T",
+    )
 
 
 def rmb(
-    right_of_leg_m: float, origin: str, name: str, point: GeoPoint, distance_m: float, bearing_rad: float,
-    closing_mps: float | None, *, has_arrived: bool,
+    right_of_leg_m: float,
+    origin: str,
+    name: str,
+    point: GeoPoint,
+    distance_m: float,
+    bearing_rad: float,
+    closing_mps: float | None,
+    *,
+    has_arrived: bool,
 ) -> str:
     """Return the waypoint: where it is, how far, how fast the boat comes nearer to it."""
     off, side = _off_track(right_of_leg_m)
     return sentence(
-        "RMB", "A", off, side, origin, name, *_place(point), _miles(distance_m),
-        _degrees(bearing_rad), "" if closing_mps is None else _knots(closing_mps), _flag(has_arrived))
+        "RMB",
+        "A",
+        off,
+        side,
+        origin,
+        name,
+        *_place(point),
+        _miles(distance_m),
+        _degrees(bearing_rad),
+        "" if closing_mps is None else _knots(closing_mps),
+        _flag(has_arrived),
+    )
 
 
 def wpl(point: GeoPoint, name: str) -> str:
@@ -136,8 +176,12 @@ def rte(route: str, names: Sequence[str]) -> list[str]:
 def _place(point: GeoPoint | None) -> tuple[str, str, str, str]:
     if point is None:
         return "", "", "", ""
-    return (_minutes(point.lat_deg, 2), "S" if point.lat_deg < 0.0 else "N", _minutes(point.lon_deg, 3),
-            "W" if point.lon_deg < 0.0 else "E")
+    return (
+        _minutes(point.lat_deg, 2),
+        "S" if point.lat_deg < 0.0 else "N",
+        _minutes(point.lon_deg, 3),
+        "W" if point.lon_deg < 0.0 else "E",
+    )
 
 
 def _minutes(degrees: float, digits: int) -> str:
@@ -157,7 +201,7 @@ def _knots(speed_mps: float) -> str:
 
 def _miles(distance_m: float) -> str:
     miles = min(999.9, distance_m / M_PER_NM)
-    return f"{miles:.3f}" if miles < 99.0 else f"{miles:.1f}"   # the longest sentence of all has no room for more
+    return f"{miles:.3f}" if miles < 99.0 else f"{miles:.1f}"  # the longest sentence of all has no room for more
 
 
 def _off_track(right_of_leg_m: float) -> tuple[str, str]:
@@ -169,9 +213,9 @@ def _flag(is_so: bool) -> str:
     return "A" if is_so else "V"
 
 
-FRESH_S = 5.0         # what is older is not told as if it were so now
-INSIDE_M = 5.0        # of a waypoint: ArduRover announces it 3 to 5 m early
-SAME_M = 1.0          # a waypoint nearer to a goal than this is the goal's
+FRESH_S = 5.0  # what is older is not told as if it were so now
+INSIDE_M = 5.0  # of a waypoint: ArduRover announces it 3 to 5 m early
+SAME_M = 1.0  # a waypoint nearer to a goal than this is the goal's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,7 +228,7 @@ class ActiveLeg:
     distance_m: float
     bearing_rad: float
     right_m: float
-    along_m: float         # past its end when it is longer than the leg
+    along_m: float  # past its end when it is longer than the leg
     length_m: float
     closing_mps: float | None
 
@@ -212,15 +256,21 @@ def course_of(view: View) -> ActiveLeg | None:
     if boat.sog_mps is not None and boat.cog_deg is not None:
         closing_mps = boat.sog_mps * math.cos(math.radians(boat.cog_deg) - bearing_rad)
     return ActiveLeg(
-        start_en_m=leg.from_en_m, end_en_m=leg.to_en_m, leg_rad=wrap_two_pi(leg_rad), distance_m=math.hypot(*left),
-        bearing_rad=wrap_two_pi(bearing_rad), right_m=off[0] * north - off[1] * east,
-        along_m=off[0] * east + off[1] * north, length_m=length_m, closing_mps=closing_mps)
+        start_en_m=leg.from_en_m,
+        end_en_m=leg.to_en_m,
+        leg_rad=wrap_two_pi(leg_rad),
+        distance_m=math.hypot(*left),
+        bearing_rad=wrap_two_pi(bearing_rad),
+        right_m=off[0] * north - off[1] * east,
+        along_m=off[0] * east + off[1] * north,
+        length_m=length_m,
+        closing_mps=closing_mps,
+    )
 
 
 def legs_ahead(view: View) -> tuple[LegView, ...]:
     """Return the legs that are not sailed yet, but for the loiter at the end."""
-    return () if view.plan is None else tuple(
-        leg for leg in view.plan.legs if not leg.is_done and not leg.is_loiter)
+    return () if view.plan is None else tuple(leg for leg in view.plan.legs if not leg.is_done and not leg.is_loiter)
 
 
 def names_ahead(view: View) -> tuple[str, ...]:
@@ -256,8 +306,8 @@ def _between(start: PointEn, end: PointEn) -> PointEn:
 
 
 ROUTE = "companion"
-ORIGIN = "FROM"        # the name of where the leg begins
-UNTRUSTED = frozenset({"none", "untrusted"})   # of a wind's health: shown as not valid
+ORIGIN = "FROM"  # the name of where the leg begins
+UNTRUSTED = frozenset({"none", "untrusted"})  # of a wind's health: shown as not valid
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,8 +329,10 @@ def lines_of(view: View, frame: LocalFrame, utc_s: float | None) -> Lines:
     has_arrived = view.state.has_arrived is True
     underway = () if course is None else _course(course, names[0], points[0], has_arrived=has_arrived)
     route = tuple(wpl(point, name) for point, name in zip(points, names, strict=True))
-    return Lines(now=(*_motion(view, utc_s), *_wind(view), *_water(view), *underway),
-                 route=(*route, *rte(ROUTE, names)) if names else ())
+    return Lines(
+        now=(*_motion(view, utc_s), *_wind(view), *_water(view), *underway),
+        route=(*route, *rte(ROUTE, names)) if names else (),
+    )
 
 
 def _motion(view: View, utc_s: float | None) -> list[str]:
@@ -297,14 +349,12 @@ def _wind(view: View) -> list[str]:
     if wind is None:
         return []
     is_valid = wind.health not in UNTRUSTED and is_fresh(wind.age_s)
-    moves = is_fresh(view.boat.age_s)   # an angle at the bow is as old as the heading
+    moves = is_fresh(view.boat.age_s)  # an angle at the bow is as old as the heading
     out = []
     if wind.awa_deg is not None and wind.aws_mps is not None:
-        out.append(mwv(math.radians(wind.awa_deg), wind.aws_mps, is_apparent=True,
-                                 is_valid=is_valid and moves))
+        out.append(mwv(math.radians(wind.awa_deg), wind.aws_mps, is_apparent=True, is_valid=is_valid and moves))
     if wind.twa_deg is not None and wind.tws_mps is not None:
-        out.append(mwv(math.radians(wind.twa_deg), wind.tws_mps, is_apparent=False,
-                                 is_valid=is_valid and moves))
+        out.append(mwv(math.radians(wind.twa_deg), wind.tws_mps, is_apparent=False, is_valid=is_valid and moves))
     if is_valid and wind.twd_from_deg is not None and wind.tws_mps is not None:
         out.append(mwd(math.radians(wind.twd_from_deg), wind.tws_mps))
     return out
@@ -313,17 +363,23 @@ def _wind(view: View) -> list[str]:
 def _water(view: View) -> list[str]:
     """Return the current that plans reckon with."""
     water = view.water
-    return [] if water is None or not water.is_planned else [
-        vdr(math.radians(water.set_deg), water.drift_mps)]
+    return [] if water is None or not water.is_planned else [vdr(math.radians(water.set_deg), water.drift_mps)]
 
 
 def _course(course: ActiveLeg, name: str, point: GeoPoint, *, has_arrived: bool) -> list[str]:
     is_inside = course.distance_m <= INSIDE_M
     return [
-        apb(course.right_m, course.leg_rad, course.bearing_rad, name, is_inside=is_inside,
-                      is_past=course.is_past),
-        rmb(course.right_m, ORIGIN, name, point, course.distance_m, course.bearing_rad, course.closing_mps,
-                      has_arrived=has_arrived or is_inside),
+        apb(course.right_m, course.leg_rad, course.bearing_rad, name, is_inside=is_inside, is_past=course.is_past),
+        rmb(
+            course.right_m,
+            ORIGIN,
+            name,
+            point,
+            course.distance_m,
+            course.bearing_rad,
+            course.closing_mps,
+            has_arrived=has_arrived or is_inside,
+        ),
     ]
 
 
@@ -335,10 +391,10 @@ def _rad(angle_deg: float | None) -> float | None:
     return None if angle_deg is None else math.radians(angle_deg)
 
 
-ROUTE_EVERY_S = 60.0           # who comes to a broadcast later has the route after this long
+ROUTE_EVERY_S = 60.0  # who comes to a broadcast later has the route after this long
 MOST_CLIENTS = 16
-BEHIND_BYTES = 16_384          # a client that has not read so much misses what comes
-PATIENCE_S = 10.0              # ... and is hung up on after this long
+BEHIND_BYTES = 16_384  # a client that has not read so much misses what comes
+PATIENCE_S = 10.0  # ... and is hung up on after this long
 
 
 class RouteTeller:
@@ -367,7 +423,8 @@ class UdpOutlet(Outlet[Lines]):
         """Send until the network fails; that nobody listens is no failure."""
         failed: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         wire, _ = await asyncio.get_running_loop().create_datagram_endpoint(
-            lambda: _Refusals(failed), remote_addr=self._address, allow_broadcast=True)
+            lambda: _Refusals(failed), remote_addr=self._address, allow_broadcast=True
+        )
         teller = RouteTeller()
         self.became("sending", is_open=True)
         try:
@@ -398,7 +455,7 @@ class TcpOutlet(Outlet[Lines]):
         super().__init__(f"NMEA 0183 {name.text}", say, seed=seed)
         self._host, self._port = name.host, name.port
         self.clients: set[_Client] = set()
-        self.hung_up = 0     # clients that did not read
+        self.hung_up = 0  # clients that did not read
         self._missed = 0
 
     @property

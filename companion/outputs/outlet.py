@@ -20,11 +20,15 @@ from companion.guard import Guard, kept
 T = TypeVar("T")
 Say = Callable[[str], None]
 
-SAY_AGAIN_S = 600.0      # the same words about a receiver are not said again sooner
+SAY_AGAIN_S = 600.0  # the same words about a receiver are not said again sooner
 _WORDS = {
-    errno.EADDRINUSE: "the port is in use", errno.ECONNREFUSED: "nobody listens there",
-    errno.EACCES: "not permitted", errno.EPERM: "not permitted", errno.EADDRNOTAVAIL: "no address of this computer",
-    errno.ENETUNREACH: "no network leads there", errno.EHOSTUNREACH: "no way leads there",
+    errno.EADDRINUSE: "the port is in use",
+    errno.ECONNREFUSED: "nobody listens there",
+    errno.EACCES: "not permitted",
+    errno.EPERM: "not permitted",
+    errno.EADDRNOTAVAIL: "no address of this computer",
+    errno.ENETUNREACH: "no network leads there",
+    errno.EHOSTUNREACH: "no way leads there",
 }
 
 
@@ -57,7 +61,7 @@ class Outlet(ABC, Generic[T]):
     def __init__(self, name: str, say: Say, *, seed: int = 0) -> None:
         self.name, self.slot = name, Slot[T]()
         self.guard = Guard()
-        self.sent = 0              # values handed over
+        self.sent = 0  # values handed over
         self.is_open = False
         self.state = "not open yet"
         self._say, self._seed = say, seed
@@ -66,11 +70,12 @@ class Outlet(ABC, Generic[T]):
 
     async def __aenter__(self) -> Self:
         self._task = asyncio.create_task(
-            kept(self._live, self._failed, seed=self._seed), name=f"auxiliary: {self.name}")
+            kept(self._live, self._failed, seed=self._seed), name=f"auxiliary: {self.name}"
+        )
         return self
 
     async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await ended(self._task)
 

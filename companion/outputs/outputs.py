@@ -19,7 +19,7 @@ from companion.outputs.outlet import Outlet, Say
 from companion.outputs.signalk import TcpSignalK, Values, WebSocketSignalK, require_websockets, values_of
 from companion.view.values import View
 
-MOST_TOKEN = 8192   # characters
+MOST_TOKEN = 8192  # characters
 
 
 def checked_displays(displays: Displays, guard: Guard) -> Displays:
@@ -54,18 +54,22 @@ class Outputs:
     """The receivers that are wanted, while it is open. ``say`` hears how they stand, in words; ``guard`` knows it."""
 
     def __init__(
-        self, chosen: Displays, frame: LocalFrame, say: Say, *, seed: int = 0, guard: Guard | None = None,
+        self, chosen: Displays, frame: LocalFrame, say: Say, *, seed: int = 0, guard: Guard | None = None
     ) -> None:
         self._frame = frame
-        self._guard = guard or Guard(lambda name, why: say(
-            f"{name}: not told: {why}" if why else f"{name}: told again"))
+        self._guard = guard or Guard(
+            lambda name, why: say(f"{name}: not told: {why}" if why else f"{name}: told again")
+        )
         self.nmea: list[Outlet[Lines]] = [
             (UdpOutlet if name.kind == "udp" else TcpOutlet)(name, say, seed=seed + number)
-            for number, name in enumerate(chosen.nmea)]
+            for number, name in enumerate(chosen.nmea)
+        ]
         self.signalk: list[Outlet[Values]] = [
-            TcpSignalK(name, say, seed=seed + number) if name.kind == "tcp" else
-            WebSocketSignalK(name, say, token=chosen.token, seed=seed + number)
-            for number, name in enumerate(chosen.signalk, len(chosen.nmea))]
+            TcpSignalK(name, say, seed=seed + number)
+            if name.kind == "tcp"
+            else WebSocketSignalK(name, say, token=chosen.token, seed=seed + number)
+            for number, name in enumerate(chosen.signalk, len(chosen.nmea))
+        ]
         self._stack = contextlib.AsyncExitStack()
         if guard is not None:
             for outlet in self._outlets:
@@ -86,7 +90,7 @@ class Outputs:
         return self
 
     async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         await self._stack.aclose()
 

@@ -42,7 +42,12 @@ Values = dict[str, Any]
 def values_of(view: View, frame: LocalFrame) -> Values:
     """Return what is known by its path; places in the view are metres in ``frame``."""
     values: Values = {
-        **_motion(view), **_wind(view), **_water(view), **_course(view, frame), **_performance(view), **_helm(view),
+        **_motion(view),
+        **_wind(view),
+        **_water(view),
+        **_course(view, frame),
+        **_performance(view),
+        **_helm(view),
         # the loudest come first in the view, and are the last to be written
         **{path: value for alarm in reversed(view.alarms) for path, value in _notification(alarm).items()},
     }
@@ -52,7 +57,8 @@ def values_of(view: View, frame: LocalFrame) -> Values:
 def delta(values: Values, told: Mapping[str, Any]) -> dict[str, Any]:
     """Return the update for a server that was ``told`` values before; alarms only where they have changed."""
     news = [
-        {"path": path, "value": value} for path, value in values.items()
+        {"path": path, "value": value}
+        for path, value in values.items()
         if not path.startswith("notifications.") or told.get(path) != value
     ]
     news += [{"path": path, "value": _over(path)} for path in told if path not in values and told[path] is not None]
@@ -79,8 +85,9 @@ def _motion(view: View) -> Values:
         "navigation.speedOverGround": boat.sog_mps,
         "navigation.courseOverGroundTrue": _rad(boat.cog_deg),
         "navigation.headingTrue": _rad(boat.heading_deg),
-        "navigation.attitude": None if boat.roll_deg is None else {
-            "roll": math.radians(boat.roll_deg), "pitch": None, "yaw": None},
+        "navigation.attitude": None
+        if boat.roll_deg is None
+        else {"roll": math.radians(boat.roll_deg), "pitch": None, "yaw": None},
     }
 
 
@@ -88,7 +95,7 @@ def _wind(view: View) -> Values:
     wind = view.wind
     if wind is None or wind.health in UNTRUSTED or not is_fresh(wind.age_s):
         return {}
-    moves = is_fresh(view.boat.age_s)   # an angle at the bow is as old as the heading
+    moves = is_fresh(view.boat.age_s)  # an angle at the bow is as old as the heading
     return {
         "environment.wind.directionTrue": _rad(wind.twd_from_deg),
         "environment.wind.speedOverGround": wind.tws_mps,
@@ -139,8 +146,9 @@ def _performance(view: View) -> Values:
         "performance.polarSpeedRatio": boat.sog_mps / speed if boat.sog_mps is not None and speed else None,
         "performance.beatAngle": None if polar is None else _rad(polar.beat_deg),
         "performance.gybeAngle": None if polar is None else _rad(polar.run_deg),
-        "performance.tackTrue": None if wind.twd_from_deg is None or wind.twa_deg is None else
-        math.radians((wind.twd_from_deg + wind.twa_deg) % 360.0),
+        "performance.tackTrue": None
+        if wind.twd_from_deg is None or wind.twa_deg is None
+        else math.radians((wind.twd_from_deg + wind.twa_deg) % 360.0),
     }
 
 
@@ -149,8 +157,11 @@ def _helm(view: View) -> Values:
     steers = {"AUTO": "route", "GUIDED": "auto"}
     return {
         "navigation.state": "sailing" if state.is_sailing else None,
-        "steering.autopilot.state": None if state.mode is None else
-        steers.get(state.mode, "standby") if state.is_armed else "standby",
+        "steering.autopilot.state": None
+        if state.mode is None
+        else steers.get(state.mode, "standby")
+        if state.is_armed
+        else "standby",
         f"{BATTERY}.voltage": boat.battery_v,
         f"{BATTERY}.capacity.stateOfCharge": boat.battery_share,
     }
@@ -162,9 +173,13 @@ def _notification(alarm: AlarmView) -> Values:
         return {}
     words = re.findall(r"[A-Za-z0-9]+", alarm.code) or ["alarm"]
     name = KNOWN.get(alarm.code, "companion." + words[0].lower() + "".join(word.capitalize() for word in words[1:]))
-    return {f"notifications.{name}": {
-        "state": state, "method": ["visual", "sound"] if state in LOUD else ["visual"],
-        "message": f"{alarm.code}: {alarm.text}" if alarm.text else alarm.code}}
+    return {
+        f"notifications.{name}": {
+            "state": state,
+            "method": ["visual", "sound"] if state in LOUD else ["visual"],
+            "message": f"{alarm.code}: {alarm.text}" if alarm.text else alarm.code,
+        }
+    }
 
 
 def _place(frame: LocalFrame, en_m: PointEn) -> dict[str, float]:
@@ -176,9 +191,9 @@ def _rad(angle_deg: float | None) -> float | None:
     return None if angle_deg is None else round(math.radians(angle_deg), 4)
 
 
-OPEN_S = 10.0            # for a connection to stand
-STUCK_S = 20.0           # a server that takes nothing for so long is given up
-ECHO_S = 15.0            # what we told comes back within this
+OPEN_S = 10.0  # for a connection to stand
+STUCK_S = 20.0  # a server that takes nothing for so long is given up
+ECHO_S = 15.0  # what we told comes back within this
 ECHO_EVERY_MS = 2_000
 ECHO = "navigation.position"
 NOT_TAKEN = "it takes nothing from us: give a token with the right to write (--signalk-token FILE)"
@@ -220,7 +235,7 @@ class WebSocketSignalK(Outlet[Values]):
     def __init__(self, name: OutputName, say: Say, *, token: str = "", seed: int = 0) -> None:
         super().__init__(f"Signal K {name.text}", say, seed=seed)
         self._url, self._token = name.url, token
-        self.is_taken: bool | None = None    # by the server; None: not known yet
+        self.is_taken: bool | None = None  # by the server; None: not known yet
 
     async def serve(self) -> None:
         """Connect and tell until the server goes."""
@@ -232,15 +247,28 @@ class WebSocketSignalK(Outlet[Values]):
         headers = {"Authorization": f"Bearer {self._token}"} if self._token else {}
         try:
             async with connect(
-                self._url, additional_headers=headers, compression=None, open_timeout=OPEN_S, close_timeout=1.0,
-                max_queue=4, max_size=1 << 20, write_limit=65_536, logger=quiet, proxy=None, user_agent_header=None,
+                self._url,
+                additional_headers=headers,
+                compression=None,
+                open_timeout=OPEN_S,
+                close_timeout=1.0,
+                max_queue=4,
+                max_size=1 << 20,
+                write_limit=65_536,
+                logger=quiet,
+                proxy=None,
+                user_agent_header=None,
             ) as socket:
                 await self._tell(socket)
         except InvalidStatus as error:
             status = error.response.status_code
-            raise OSError(f"it refuses our token ({status}): make a new one" if status in REFUSED and self._token else
-                          f"it wants a token ({status}): --signalk-token FILE" if status in REFUSED else
-                          f"no Signal K stream is there (HTTP {status})") from error
+            raise OSError(
+                f"it refuses our token ({status}): make a new one"
+                if status in REFUSED and self._token
+                else f"it wants a token ({status}): --signalk-token FILE"
+                if status in REFUSED
+                else f"no Signal K stream is there (HTTP {status})"
+            ) from error
         except WebSocketException as error:
             raise OSError(str(error) or type(error).__name__) from error
 
@@ -249,8 +277,11 @@ class WebSocketSignalK(Outlet[Values]):
         told: Values = {}
         heard = asyncio.create_task(self._hear(socket))
         self.became("connected", is_open=True)
-        await socket.send(json.dumps({"context": "vessels.self", "subscribe": [
-            {"path": ECHO, "period": ECHO_EVERY_MS, "policy": "fixed"}]}))
+        await socket.send(
+            json.dumps(
+                {"context": "vessels.self", "subscribe": [{"path": ECHO, "period": ECHO_EVERY_MS, "policy": "fixed"}]}
+            )
+        )
         try:
             while not heard.done():
                 values = await _unless(heard, self.slot.take())
@@ -261,7 +292,7 @@ class WebSocketSignalK(Outlet[Values]):
                 told = told_after(values, told)
                 self.sent += 1
                 if asked_s is None and ECHO in told:
-                    asked_s = effort_s()   # of the server's time: beside a hurried simulator it is not ours
+                    asked_s = effort_s()  # of the server's time: beside a hurried simulator it is not ours
                 if self.is_taken is None and asked_s is not None and effort_s() - asked_s > ECHO_S:
                     self.is_taken = False
                     self.became(NOT_TAKEN, is_open=True)
@@ -270,7 +301,7 @@ class WebSocketSignalK(Outlet[Values]):
 
     async def _hear(self, socket: Any) -> None:
         """Read what comes, so that it never waits, and look for ourselves in it."""
-        heard: set[str] = set()   # when what we told was taken: a server keeps the last of an earlier voyage
+        heard: set[str] = set()  # when what we told was taken: a server keeps the last of an earlier voyage
         async for message in socket:
             if self.is_taken:
                 continue
@@ -288,8 +319,12 @@ def require_websockets() -> None:
     try:
         import websockets  # noqa: F401 - looked for, not used
     except ImportError:
-        raise InputError("--signalk", "", "ws:// needs a library that is not installed",
-                         f"{install('signalk')}, or name the server's TCP port") from None
+        raise InputError(
+            "--signalk",
+            "",
+            "ws:// needs a library that is not installed",
+            f"{install('signalk')}, or name the server's TCP port",
+        ) from None
 
 
 async def _drain(reader: asyncio.StreamReader) -> None:

@@ -15,6 +15,21 @@ from companion.page.server import export, files, served, tile_at
 from companion.page.sources import LiveSource, RecordedSource, plan_figures
 
 __all__ = [
-    "Address", "Guests", "HttpRefusal", "HttpReply", "LiveSource", "RecordedSource", "Stream", "TileChart", "export",
-    "files", "listening", "open_charts", "plan_figures", "read_token", "require_token", "served", "tile_at",
+    "Address",
+    "Guests",
+    "HttpRefusal",
+    "HttpReply",
+    "LiveSource",
+    "RecordedSource",
+    "Stream",
+    "TileChart",
+    "export",
+    "files",
+    "listening",
+    "open_charts",
+    "plan_figures",
+    "read_token",
+    "require_token",
+    "served",
+    "tile_at",
 ]

@@ -20,15 +20,16 @@ from companion.disk import open_regular
 from companion.errors import InputError, unreadable
 
 MOST_ZOOM = 24
-MOST_TILE = 2_000_000       # bytes
-MOST_METADATA = 1_000_000   # bytes
-_KEPT = 64                  # directories of a PMTiles file that are kept unpacked
+MOST_TILE = 2_000_000  # bytes
+MOST_METADATA = 1_000_000  # bytes
+_KEPT = 64  # directories of a PMTiles file that are kept unpacked
 _RASTER = "png, jpg, jpeg or webp"
 _CONVERT = "convert it ashore: gdal_translate -of MBTILES CHART OUT.mbtiles, then gdaladdo OUT.mbtiles 2 4 8 16"
 # One clear pixel: a tile that is not in the file is no error in a browser.
 NO_TILE = bytes.fromhex(
     "89504e470d0a1a0a0000000d49484452000000010000000108060000001f15c4890000000b4944415478da6360000200"
-    "00050001e9fadcd80000000049454e44ae426082")
+    "00050001e9fadcd80000000049454e44ae426082"
+)
 
 
 class Tiles(Protocol):
@@ -52,8 +53,14 @@ class TileChart:
 
     def facts(self) -> dict[str, Any]:
         """Return what a page has to know of it."""
-        return {"name": self.name, "credit": self.credit, "bounds_deg": self.bounds_deg,
-                "least_zoom": self.least_zoom, "most_zoom": self.most_zoom, "tag": self.tag}
+        return {
+            "name": self.name,
+            "credit": self.credit,
+            "bounds_deg": self.bounds_deg,
+            "least_zoom": self.least_zoom,
+            "most_zoom": self.most_zoom,
+            "tag": self.tag,
+        }
 
     def tile(self, z: int, x: int, y: int) -> tuple[str, bytes]:
         """Return the kind and the content of a tile; what cannot be read or is no picture is clear."""
@@ -61,7 +68,7 @@ class TileChart:
             return "image/png", NO_TILE
         try:
             data = self.tiles.get(z, x, y) or b""
-        except Exception:   # a card that fails, a file that is cut short: the water is shown without it
+        except Exception:  # a card that fails, a file that is cut short: the water is shown without it
             data = b""
         kind = picture_of(data) if len(data) <= MOST_TILE else ""
         return (kind, data) if kind else ("image/png", NO_TILE)
@@ -101,7 +108,7 @@ def open_chart(path: Path) -> TileChart:
             return _pmtiles(path, tag)
     except InputError:
         raise
-    except Exception as error:   # of sqlite3, of the library, of whatever such a file makes of them
+    except Exception as error:  # of sqlite3, of the library, of whatever such a file makes of them
         raise InputError(str(path), "", f"is a broken chart ({_words(error)})", "copy it again") from error
     raise InputError(str(path), "", "is no chart: neither MBTiles nor PMTiles 3", _CONVERT)
 
@@ -124,8 +131,12 @@ class Mbtiles:
 
     def get(self, z: int, x: int, y: int) -> bytes | None:
         """Return a tile."""
-        rows = self.ask("SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ? LIMIT 1",
-                        z, x, (1 << z) - 1 - y)
+        rows = self.ask(
+            "SELECT tile_data FROM tiles WHERE zoom_level = ? AND tile_column = ? AND tile_row = ? LIMIT 1",
+            z,
+            x,
+            (1 << z) - 1 - y,
+        )
         return bytes(rows[0][0]) if rows and rows[0][0] else None
 
 
@@ -140,8 +151,15 @@ def _mbtiles(path: Path, tag: str) -> TileChart:
         raise InputError(str(path), "", "is a chart without tiles", "make it again")
     _require_raster(path, said.get("format", "png"))
     bounds = said.get("bounds", "").split(",")
-    return _chart(path, tag, tiles, name=said.get("name"), credit=said.get("attribution"),
-                  bounds=[float(b) for b in bounds] if len(bounds) == 4 else None, zooms=(int(least), int(most)))
+    return _chart(
+        path,
+        tag,
+        tiles,
+        name=said.get("name"),
+        credit=said.get("attribution"),
+        bounds=[float(b) for b in bounds] if len(bounds) == 4 else None,
+        zooms=(int(least), int(most)),
+    )
 
 
 class Pmtiles:
@@ -154,11 +172,12 @@ class Pmtiles:
             self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         self.header = deserialize_header(self._bytes(0, 127))
         self._directory = functools.lru_cache(_KEPT)(
-            lambda offset, length: deserialize_directory(self._bytes(offset, length)))
-        self._directory(self.header["root_offset"], self.header["root_length"])   # a broken one is refused at once
+            lambda offset, length: deserialize_directory(self._bytes(offset, length))
+        )
+        self._directory(self.header["root_offset"], self.header["root_length"])  # a broken one is refused at once
 
     def _bytes(self, offset: int, length: int) -> bytes:
-        return self._map[offset:offset + length]
+        return self._map[offset : offset + length]
 
     def get(self, z: int, x: int, y: int) -> bytes | None:
         """Return a tile."""
@@ -166,7 +185,7 @@ class Pmtiles:
 
         number = zxy_to_tileid(z, x, y)
         offset, length = self.header["root_offset"], self.header["root_length"]
-        for _ in range(4):   # directories are nested no deeper
+        for _ in range(4):  # directories are nested no deeper
             entry = find_tile(self._directory(offset, length), number)
             if entry is None:
                 return None
@@ -192,29 +211,50 @@ def _pmtiles(path: Path, tag: str) -> TileChart:
         raise InputError(str(path), "", "holds packed pictures, which no browser unpacks", "make it again without")
     said = tiles.metadata()
     corners = header["min_lon_e7"], header["min_lat_e7"], header["max_lon_e7"], header["max_lat_e7"]
-    return _chart(path, tag, tiles, name=said.get("name"), credit=said.get("attribution"),
-                  bounds=[corner / 1e7 for corner in corners], zooms=(header["min_zoom"], header["max_zoom"]))
+    return _chart(
+        path,
+        tag,
+        tiles,
+        name=said.get("name"),
+        credit=said.get("attribution"),
+        bounds=[corner / 1e7 for corner in corners],
+        zooms=(header["min_zoom"], header["max_zoom"]),
+    )
 
 
 def _require_raster(path: Path, kind: str) -> None:
     if kind.lower() in {"pbf", "mvt", "mlt"}:
-        raise InputError(str(path), "", "holds vector tiles, which are not drawn here",
-                         f"take a raster chart: tiles that are {_RASTER}")
+        raise InputError(
+            str(path),
+            "",
+            "holds vector tiles, which are not drawn here",
+            f"take a raster chart: tiles that are {_RASTER}",
+        )
     if kind.lower() not in {"png", "jpg", "jpeg", "webp", "image/png", "image/jpeg", "image/webp"}:
-        raise InputError(str(path), "", f"holds tiles of a kind that is not known ({kind[:20]!r})",
-                         f"take a chart whose tiles are {_RASTER}")
+        raise InputError(
+            str(path),
+            "",
+            f"holds tiles of a kind that is not known ({kind[:20]!r})",
+            f"take a chart whose tiles are {_RASTER}",
+        )
 
 
 def _chart(
-    path: Path, tag: str, tiles: Tiles, *, name: Any, credit: Any, bounds: list[float] | None, zooms: tuple[int, int],
+    path: Path, tag: str, tiles: Tiles, *, name: Any, credit: Any, bounds: list[float] | None, zooms: tuple[int, int]
 ) -> TileChart:
     """Return a chart; where a file does not say its bounds, or says what cannot be, it is looked for everywhere."""
     west, south, east, north = bounds or (-180.0, -90.0, 180.0, 90.0)
     if not (-180.0 <= west < east <= 180.0 and -90.0 <= south < north <= 90.0):
         west, south, east, north = -180.0, -90.0, 180.0, 90.0
     return TileChart(
-        name=str(name or path.stem)[:80], credit=_plain(str(credit or ""))[:200], tag=tag, tiles=tiles,
-        bounds_deg=(west, south, east, north), least_zoom=max(0, min(zooms)), most_zoom=min(MOST_ZOOM, max(zooms)))
+        name=str(name or path.stem)[:80],
+        credit=_plain(str(credit or ""))[:200],
+        tag=tag,
+        tiles=tiles,
+        bounds_deg=(west, south, east, north),
+        least_zoom=max(0, min(zooms)),
+        most_zoom=min(MOST_ZOOM, max(zooms)),
+    )
 
 
 def _plain(text: str) -> str:

@@ -28,8 +28,8 @@ from companion.clock import now_s
 from companion.disk import Disk, read_regular, read_secret
 from companion.errors import InputError, JobError, unreadable
 
-LEAST_TOKEN = 22      # characters: 128 bits in base64
-MOST_EMPTY = 65_536   # bytes of nothing that are looked through
+LEAST_TOKEN = 22  # characters: 128 bits in base64
+MOST_EMPTY = 65_536  # bytes of nothing that are looked through
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class Address:
     host: str
     port: int
     names: tuple[str, ...] = ()
-    token: str = field(default="", repr=False)   # of who may give orders; empty: nobody
+    token: str = field(default="", repr=False)  # of who may give orders; empty: nobody
 
     @property
     def url(self) -> str:
@@ -86,8 +86,12 @@ def read_token(path: Path) -> str:
         raise unreadable(str(path), error, "the token", remedy) from error
     text = read_secret(path, "the token", remedy)
     if len(text) < LEAST_TOKEN or not text.isascii() or not text.isprintable() or " " in text:
-        raise InputError(str(path), "", f"is no token: it needs {LEAST_TOKEN} characters or more, in one word",
-                         "remove it, and a new one is made")
+        raise InputError(
+            str(path),
+            "",
+            f"is no token: it needs {LEAST_TOKEN} characters or more, in one word",
+            "remove it, and a new one is made",
+        )
     return text
 
 
@@ -108,25 +112,30 @@ def _is_ip(text: str) -> bool:
 
 
 MOST_CONNECTIONS = 64
-MOST_HEAD = 16_384        # bytes of a request's head
-REQUEST_S = 10.0          # for a request to come in whole, from its first byte, or the connection's beginning
-IDLE_S = 30.0             # between two of one connection
-BLOCKED_S = 10.0          # a client that does not read for so long is dropped
-BUFFER = 65_536           # bytes that wait for a client
-LAST_S = 0.3              # at the end
-LINGER_S = 1.0            # for what a refused client still sends: hung up on at once it would not read why
-PACK_BYTES = 2_000        # less than that is not packed
+MOST_HEAD = 16_384  # bytes of a request's head
+REQUEST_S = 10.0  # for a request to come in whole, from its first byte, or the connection's beginning
+IDLE_S = 30.0  # between two of one connection
+BLOCKED_S = 10.0  # a client that does not read for so long is dropped
+BUFFER = 65_536  # bytes that wait for a client
+LAST_S = 0.3  # at the end
+LINGER_S = 1.0  # for what a refused client still sends: hung up on at once it would not read why
+PACK_BYTES = 2_000  # less than that is not packed
 
-POLICY = ("default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'; "
-          "object-src 'none'")
+POLICY = (
+    "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'; "
+    "object-src 'none'"
+)
 HEADERS = (
     ("Content-Security-Policy", POLICY),
-    ("X-Content-Type-Options", "nosniff"), ("Referrer-Policy", "no-referrer"), ("X-Frame-Options", "DENY"),
-    ("Cross-Origin-Resource-Policy", "same-origin"), ("Cross-Origin-Opener-Policy", "same-origin"),
+    ("X-Content-Type-Options", "nosniff"),
+    ("Referrer-Policy", "no-referrer"),
+    ("X-Frame-Options", "DENY"),
+    ("Cross-Origin-Resource-Policy", "same-origin"),
+    ("Cross-Origin-Opener-Policy", "same-origin"),
     ("Permissions-Policy", "geolocation=(), camera=(), microphone=()"),
 )
 JSON = "application/json"
-MARK = b"x-companion"     # no form and no picture can send it
+MARK = b"x-companion"  # no form and no picture can send it
 
 
 class HttpRefusal(Exception):  # noqa: N818
@@ -189,7 +198,7 @@ class Guests:
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._idle: dict[asyncio.StreamWriter, tuple[int, float] | None] = {}   # (rank, since when [s]); None: busy
+        self._idle: dict[asyncio.StreamWriter, tuple[int, float] | None] = {}  # (rank, since when [s]); None: busy
 
     def __iter__(self) -> Iterator[asyncio.StreamWriter]:
         return iter(tuple(self._idle))
@@ -231,13 +240,16 @@ async def listening(address: Address, app: App, *, pace: float = 1.0) -> AsyncIt
     server = HttpServer(address, app, pace)
     try:
         listener = await asyncio.start_server(
-            server.accept, address.host, address.port, limit=MOST_HEAD, backlog=MOST_CONNECTIONS)
+            server.accept, address.host, address.port, limit=MOST_HEAD, backlog=MOST_CONNECTIONS
+        )
     except (OSError, UnicodeError) as error:
         words = getattr(error, "strerror", None) or str(error)
         in_use = getattr(error, "errno", None) in {98, 48, 10048}
-        raise JobError(f"--http {address.host}:{address.port}: " + (
-            "the port is in use; name another one" if in_use else f"cannot listen there ({words})")) from error
-    if address.port == 0:   # any that is free
+        raise JobError(
+            f"--http {address.host}:{address.port}: "
+            + ("the port is in use; name another one" if in_use else f"cannot listen there ({words})")
+        ) from error
+    if address.port == 0:  # any that is free
         server.address = replace(address, port=listener.sockets[0].getsockname()[1])
     try:
         yield server
@@ -278,7 +290,7 @@ class HttpServer:
             if self.guests.take(writer):
                 await _Connection(self, reader, writer).run()
         except (OSError, TimeoutError, h11.ProtocolError):
-            pass   # gone, or speaks something else: nobody to tell
+            pass  # gone, or speaks something else: nobody to tell
         finally:
             self.guests.leave(writer)
             writer.close()
@@ -307,10 +319,10 @@ class HttpServer:
             raise HttpRefusal(405, "there is GET, and POST for orders", closes=True)
         if request.method == b"POST" and not origin:
             raise HttpRefusal(403, "an order names the page that it comes from (Origin)", closes=True)
-        if header(request, b"transfer-encoding"):   # of chunks of a byte each a body costs minutes of the loop
+        if header(request, b"transfer-encoding"):  # of chunks of a byte each a body costs minutes of the loop
             raise HttpRefusal(411, "what is posted says how long it is (Content-Length)", closes=True)
         most = self.app.admit(request, path_of(request))
-        if int(header(request, b"content-length") or 0) > most:   # h11 has seen that it is a number
+        if int(header(request, b"content-length") or 0) > most:  # h11 has seen that it is a number
             raise HttpRefusal(413, f"at most {most} bytes are taken", closes=True)
         return most
 
@@ -378,7 +390,7 @@ class _Connection:
             self._h11.receive_data(await self._reader.read(MOST_HEAD))
 
     async def _body(self) -> bytes:
-        body = bytearray()   # no longer than it said, and that is checked
+        body = bytearray()  # no longer than it said, and that is checked
         while isinstance(event := await self._event(), h11.Data):
             body += event.data
         return bytes(body)
@@ -409,19 +421,25 @@ class _Connection:
                 await self._send(416, kind, b"", headers)
                 return
             headers.append(("Content-Range", f"bytes {span[0]}-{span[1] - 1}/{len(data)}"))
-            await self._send(206, kind, data[span[0]:span[1]], headers, has_body=not is_head)
+            await self._send(206, kind, data[span[0] : span[1]], headers, has_body=not is_head)
             return
         takes_packed = "gzip" in header(request, b"accept-encoding") and not kind.startswith("image/")
         if takes_packed and packed is None and len(data) > PACK_BYTES:
-            packed = await asyncio.to_thread(gzip.compress, data, 1, mtime=0)   # milliseconds: not on the voyage's loop
+            packed = await asyncio.to_thread(gzip.compress, data, 1, mtime=0)  # milliseconds: not on the voyage's loop
         if takes_packed and packed is not None:
             headers += [("Content-Encoding", "gzip"), ("Vary", "Accept-Encoding")]
             data = packed
         await self._send(200, kind, data, headers, has_body=not is_head)
 
     async def _send(
-        self, status: int, kind: str, data: bytes, headers: list[tuple[str, str]] | None = None, *,
-        has_body: bool = True, closes: bool = False,
+        self,
+        status: int,
+        kind: str,
+        data: bytes,
+        headers: list[tuple[str, str]] | None = None,
+        *,
+        has_body: bool = True,
+        closes: bool = False,
     ) -> None:
         fields = [*HEADERS, ("Content-Type", kind), *(headers or [("Cache-Control", "no-store")])]
         if status != 304:
@@ -442,8 +460,12 @@ class _Connection:
             await self._writer.drain()
 
     async def _stream(self, stream: Stream) -> None:
-        fields = [*HEADERS, ("Content-Type", "text/event-stream"), ("Cache-Control", "no-store"),
-                  ("Connection", "close")]
+        fields = [
+            *HEADERS,
+            ("Content-Type", "text/event-stream"),
+            ("Cache-Control", "no-store"),
+            ("Connection", "close"),
+        ]
         await self._write(self._h11.send(h11.Response(status_code=200, headers=fields)) or b"", is_stream=True)
         gone = asyncio.create_task(self._gone(), name="page: is he still there")
         try:
@@ -481,8 +503,9 @@ def path_of(request: h11.Request) -> str:
 
 def header(request: h11.Request, name: bytes) -> str:
     """Return a header's value, empty without it; of several the last."""
-    return next((value.decode("latin-1") for key, value in reversed(request.headers.raw_items())
-                 if key.lower() == name), "")
+    return next(
+        (value.decode("latin-1") for key, value in reversed(request.headers.raw_items()) if key.lower() == name), ""
+    )
 
 
 def single_range(text: str, size: int) -> tuple[int, int] | None:

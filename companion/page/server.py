@@ -32,8 +32,13 @@ from companion.page.connections import (
 )
 from companion.page.sources import LiveSource, RecordedSource, Watcher
 
-TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8",
-         ".js": "text/javascript; charset=utf-8", ".svg": "image/svg+xml", ".json": "application/json"}
+TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".json": "application/json",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,11 +55,15 @@ def files(package: str = "companion.page") -> dict[str, File]:
     """Return the files in a package's ``web`` by their path from /; ``index.html`` is / itself, too."""
     out = {}
     for entry in sorted(resources.files(package).joinpath("web").iterdir(), key=lambda e: e.name):
-        suffix = entry.name[entry.name.rfind("."):]
+        suffix = entry.name[entry.name.rfind(".") :]
         if suffix in TYPES and entry.name != "tsconfig.json" and not entry.name.startswith("package"):
             data = entry.read_bytes()
-            out[f"/{entry.name}"] = File(kind=TYPES[suffix], data=data, packed=gzip.compress(data, 9, mtime=0),
-                                         tag=f'"{hashlib.sha256(data).hexdigest()[:20]}"')
+            out[f"/{entry.name}"] = File(
+                kind=TYPES[suffix],
+                data=data,
+                packed=gzip.compress(data, 9, mtime=0),
+                tag=f'"{hashlib.sha256(data).hexdigest()[:20]}"',
+            )
     return {**out, "/": out["/index.html"]} if "/index.html" in out else out
 
 
@@ -67,11 +76,15 @@ def export(record: RecordedSource) -> bytes:
     page = site["/index.html"].data.decode()
     style = site["/style.css"].data.decode()
     modules = {path: file.data.decode() for path, file in site.items() if path.endswith(".js")}
-    imports = {f"page{path}": "data:text/javascript;base64," + _base64(_renamed(text).encode())
-               for path, text in modules.items()}
+    imports = {
+        f"page{path}": "data:text/javascript;base64," + _base64(_renamed(text).encode())
+        for path, text in modules.items()
+    }
     data = {
-        "hello": {**record.hello(), "takes_orders": False}, "area": msgspec.to_builtins(record.area),
-        "past": msgspec.Raw(record.past()()), "log": msgspec.Raw(record.log()),
+        "hello": {**record.hello(), "takes_orders": False},
+        "area": msgspec.to_builtins(record.area),
+        "past": msgspec.Raw(record.past()()),
+        "log": msgspec.Raw(record.log()),
         "moments": [base64.b64encode(chunk).decode() for chunk in record.chunks],
     }
     beside = record.compared()
@@ -81,9 +94,11 @@ def export(record: RecordedSource) -> bytes:
     page = re.sub(r'<link rel="stylesheet"[^>]*>', lambda _: f"<style>{style}</style>", page)
     page = re.sub(r'<link rel="icon"[^>]*>', '<link rel="icon" href="data:,">', page)
     page = re.sub(r'<script src="/early.js"></script>', lambda _: f"<script>{modules['/early.js']}</script>", page)
-    begin = (f'<script type="importmap">{msgspec.json.encode({"imports": imports}).decode()}</script>\n'
-             f'<script type="application/octet-stream" id="voyage">{packed}</script>\n'
-             '<script type="module">import "page/main.js";</script>')
+    begin = (
+        f'<script type="importmap">{msgspec.json.encode({"imports": imports}).decode()}</script>\n'
+        f'<script type="application/octet-stream" id="voyage">{packed}</script>\n'
+        '<script type="module">import "page/main.js";</script>'
+    )
     page = re.sub(r'<script type="module" src="/main.js"></script>', lambda _: begin, page)
     return page.encode()
 
@@ -99,13 +114,13 @@ def _base64(data: bytes) -> str:
 
 MOST_WATCHERS = 16
 MOST_BODY = 1_000
-STILL_S = 15.0            # a word now and then, where nothing happens
-ANSWER_S = 8.0            # for the answer to an order
+STILL_S = 15.0  # a word now and then, where nothing happens
+ANSWER_S = 8.0  # for the answer to an order
 
 
 @contextlib.asynccontextmanager
 async def served(
-    address: Address, source: LiveSource | RecordedSource, *, pace: float = 1.0, charts: Sequence[TileChart] = (),
+    address: Address, source: LiveSource | RecordedSource, *, pace: float = 1.0, charts: Sequence[TileChart] = ()
 ) -> AsyncIterator[HttpServer]:
     """Serve a page while the body runs. ``pace``: seconds of the loop for each second; ``charts``: the lowest first.
 
@@ -123,8 +138,9 @@ async def served(
 class Page:
     """One page over one source."""
 
-    def __init__(self, address: Address, source: LiveSource | RecordedSource, pace: float,
-                 charts: Sequence[TileChart]) -> None:
+    def __init__(
+        self, address: Address, source: LiveSource | RecordedSource, pace: float, charts: Sequence[TileChart]
+    ) -> None:
         self._address, self._source, self._pace = address, source, pace
         self._charts = {chart.tag: chart for chart in charts}
         self._files = files()
@@ -144,7 +160,7 @@ class Page:
     async def reply(self, request: h11.Request, path: str, body: bytes) -> HttpReply | Stream:
         """Answer a request. Raises Refused."""
         if path == "/api/token" and request.method == b"POST":
-            return HttpReply(data=b'{"error":null}')   # who got here has it
+            return HttpReply(data=b'{"error":null}')  # who got here has it
         if request.method == b"POST":
             return HttpReply(data=await self._order(body, is_preview=path == "/api/preview"))
         if path == "/api/stream" and isinstance(self._source, LiveSource):
@@ -192,9 +208,18 @@ class Page:
         """Return how BlueOS lists the page. In a window of its own: nobody may frame it."""
         from companion import __version__
 
-        return {"name": "Sailboat companion", "description": f"The live page of {self._source.name}.",
-                "icon": "mdi-sail-boat", "company": "sailboat-companion", "version": __version__, "webpage": "",
-                "api": "/api/hello", "new_page": True, "avoid_iframes": True, "works_in_relative_paths": False}
+        return {
+            "name": "Sailboat companion",
+            "description": f"The live page of {self._source.name}.",
+            "icon": "mdi-sail-boat",
+            "company": "sailboat-companion",
+            "version": __version__,
+            "webpage": "",
+            "api": "/api/hello",
+            "new_page": True,
+            "avoid_iframes": True,
+            "works_in_relative_paths": False,
+        }
 
     async def _order(self, body: bytes, *, is_preview: bool) -> bytes:
         """Take an order of one who was let in, or show what it would lead to; return the answer."""

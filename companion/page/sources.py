@@ -22,7 +22,7 @@ from companion.orders import Answer, Wanted
 from companion.planner import Plan
 from companion.view import SCHEMA, AreaView, Event, Past, Trail, View, sample_of
 
-KEPT = 600        # events: at most a few hundred kB
+KEPT = 600  # events: at most a few hundred kB
 
 
 class Hub:
@@ -109,8 +109,8 @@ class Watcher:
         return b"".join(parts)
 
 
-CHUNK = 60            # recorded views in one answer
-MOST_MOMENTS = 7200   # of a recorded voyage: more are thinned out
+CHUNK = 60  # recorded views in one answer
+MOST_MOMENTS = 7200  # of a recorded voyage: more are thinned out
 GZIP_LEVEL = 5
 
 Ask = Callable[[Wanted], Awaitable[Answer]]
@@ -123,7 +123,7 @@ class LiveSource:
 
     name: str
     kind: str = "live"
-    unix_s: float | None = None          # of t_s = 0
+    unix_s: float | None = None  # of t_s = 0
     ask: Ask | None = None
     preview: Preview | None = None
     permitted: tuple[str, ...] = ()
@@ -134,7 +134,7 @@ class LiveSource:
     def show(self, view: View, events: Sequence[Event], area: AreaView | None) -> None:
         """Show the next step."""
         if self.area is not None and area is not None and area.hash != self.area.hash:
-            self.trail.follow(self.area.frame, area.frame)   # a passage: the metres count from elsewhere now
+            self.trail.follow(self.area.frame, area.frame)  # a passage: the metres count from elsewhere now
         self.area = area
         if view.unix_s is not None:
             self.unix_s = view.unix_s - view.t_s
@@ -143,9 +143,16 @@ class LiveSource:
 
     def hello(self) -> dict[str, Any]:
         """Return what a page has to know first."""
-        return {"schema": SCHEMA, "version": __version__, "kind": self.kind, "name": self.name,
-                "orders": list(self.permitted) if self.ask is not None else None, "count": None, "chunk": None,
-                "area": None if self.area is None else self.area.hash}
+        return {
+            "schema": SCHEMA,
+            "version": __version__,
+            "kind": self.kind,
+            "name": self.name,
+            "orders": list(self.permitted) if self.ask is not None else None,
+            "count": None,
+            "chunk": None,
+            "area": None if self.area is None else self.area.hash,
+        }
 
     def past(self) -> Callable[[], bytes]:
         """Return what makes the JSON of the samples so far; a thread may call it while more come."""
@@ -168,7 +175,7 @@ class RecordedSource:
         self.unix_s: float | None = None
         self.sails_s: float | None = None
         self.last: View | None = None
-        self.beside: RecordedSource | None = None   # another voyage, to compare with
+        self.beside: RecordedSource | None = None  # another voyage, to compare with
 
     def take(self, view: View, events: Sequence[Event]) -> None:
         """Take the next moment; of a very long voyage those in which nothing happened are thinned out."""
@@ -198,9 +205,18 @@ class RecordedSource:
 
     def hello(self) -> dict[str, Any]:
         """Return what a page has to know first."""
-        return {"schema": SCHEMA, "version": __version__, "kind": "recorded", "name": self.name, "orders": None,
-                "count": len(self.times), "chunk": CHUNK, "area": self.area.hash, "sails_s": self.sails_s,
-                "beside": None if self.beside is None else self.beside.name}
+        return {
+            "schema": SCHEMA,
+            "version": __version__,
+            "kind": "recorded",
+            "name": self.name,
+            "orders": None,
+            "count": len(self.times),
+            "chunk": CHUNK,
+            "area": self.area.hash,
+            "sails_s": self.sails_s,
+            "beside": None if self.beside is None else self.beside.name,
+        }
 
     def log(self) -> bytes:
         """Return the log, as JSON."""
@@ -213,12 +229,22 @@ class RecordedSource:
     def _compared(self, other: RecordedSource) -> bytes:
         east_m = (other.area.origin_lon_deg - self.area.origin_lon_deg) * self.area.lon_m
         north_m = (other.area.origin_lat_deg - self.area.origin_lat_deg) * self.area.lat_m
-        moved = [replace(
-            s, east_m=None if s.east_m is None else round(s.east_m + east_m, 1),
-            north_m=None if s.north_m is None else round(s.north_m + north_m, 1)) for s in other.trail.samples]
-        return msgspec.json.encode({
-            "name": other.name, "sails_s": other.sails_s, "past": Past.of(moved, other.unix_s),
-            "figures": None if other.last is None else other.last.figures})
+        moved = [
+            replace(
+                s,
+                east_m=None if s.east_m is None else round(s.east_m + east_m, 1),
+                north_m=None if s.north_m is None else round(s.north_m + north_m, 1),
+            )
+            for s in other.trail.samples
+        ]
+        return msgspec.json.encode(
+            {
+                "name": other.name,
+                "sails_s": other.sails_s,
+                "past": Past.of(moved, other.unix_s),
+                "figures": None if other.last is None else other.last.figures,
+            }
+        )
 
     def past(self) -> Callable[[], bytes]:
         """Return what makes the JSON of the whole voyage's samples: a row for each moment."""
@@ -233,7 +259,9 @@ def plan_figures(plan: Plan) -> dict[str, Any]:
     clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
     late_s = None if plan.arrival is None or not math.isfinite(plan.arrival.late_s) else round(plan.arrival.late_s)
     return {
-        "time_s": round(plan.cost_s, 1), "late_s": late_s, "length_m": round(sum(leg.length_m for leg in plan.legs), 1),
+        "time_s": round(plan.cost_s, 1),
+        "late_s": late_s,
+        "length_m": round(sum(leg.length_m for leg in plan.legs), 1),
         "risk": None if plan.risk is None or not math.isfinite(plan.risk) else round(plan.risk, 4),
         "risks": [None if leg.risk is None else round(leg.risk, 4) for leg in plan.legs],
         "tacks": sum(leg.manoeuvre == "tack" for leg in plan.legs),

@@ -41,8 +41,11 @@ class Started:
     @classmethod
     async def begin(cls, command: Sequence[str]) -> Started:
         """Start it, in a session of its own: Ctrl-C is for this process, which ends its child itself."""
-        return cls(await asyncio.create_subprocess_exec(
-            *command, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, start_new_session=True))
+        return cls(
+            await asyncio.create_subprocess_exec(
+                *command, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, start_new_session=True
+            )
+        )
 
     @property
     def pid(self) -> int:

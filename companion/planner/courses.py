@@ -66,6 +66,6 @@ def _goes_on(course: Board, leg: Leg) -> bool:
     if leg.twa_rad * before.twa_rad <= 0.0 or leg.is_beat != before.is_beat:
         return False
     sailed = next((item for item in reversed(course.legs) if item.length_m >= CORNER_M), None)
-    if leg.length_m < CORNER_M or sailed is None:   # a corner belongs to the course that it ends or begins
+    if leg.length_m < CORNER_M or sailed is None:  # a corner belongs to the course that it ends or begins
         return True
     return abs(difference_rad(leg.heading_rad, sailed.heading_rad)) <= BEND_RAD

@@ -15,10 +15,10 @@ from companion.planner.plan import PlanStatus
 from companion.planner.problem.value import Problem
 
 Judge = Callable[[NDArray[np.float64]], float]
-LATE = 1.1     # of the seconds: another path is not judged beyond
+LATE = 1.1  # of the seconds: another path is not judged beyond
 SETTLES = 5.0  # times what the first path takes: so long it soon gets better, and is not judged yet
 SETTLED = 0.25  # ... and no longer than this share of the seconds
-FASTER = 0.8    # of the time of the path that was judged last: another way, which is judged at once
+FASTER = 0.8  # of the time of the path that was judged last: another way, which is judged at once
 
 
 class Effort:
@@ -37,9 +37,9 @@ class Effort:
         self.after_s = self.judging_s = self.needed_s = 0.0
         self.has_answer = self.is_at_risk = False
         self._judge: Judge | None = None
-        self._judge_at_s: float | None = None    # None: nothing has been judged
-        self._judged_s = 0.0                     # the time of the path that was judged last
-        self._first: NDArray[np.float64] | None = None    # the first path, until then
+        self._judge_at_s: float | None = None  # None: nothing has been judged
+        self._judged_s = 0.0  # the time of the path that was judged last
+        self._first: NDArray[np.float64] | None = None  # the first path, until then
         self.used = 0
         self.first_s: float | None = None
         self._began_s = effort_s()
@@ -119,7 +119,7 @@ class Effort:
         if self.elapsed_s < self.hears_at_s and not is_far_faster:
             self._first = path() if self._first is None else self._first
             return False
-        self._judge, self._judged_s = None, time_s    # what the judge itself searches is not judged again
+        self._judge, self._judged_s = None, time_s  # what the judge itself searches is not judged again
         self._judge_at_s = judge(path())
         if self._first is not None and (not self.has_answer or self.is_at_risk) and self.has_time(self.needed_s):
             self._judge_at_s = judge(self._first)
@@ -153,7 +153,8 @@ class _Part(Effort):
     def __init__(self, whole: Effort, share: float) -> None:
         super().__init__(
             None if math.isinf(whole.budget_s) else share * whole.remaining_s,
-            None if whole.limit is None else max(1, int(share * (whole.limit - whole.used))))
+            None if whole.limit is None else max(1, int(share * (whole.limit - whole.used))),
+        )
         self._whole = whole
 
     @property
@@ -171,7 +172,7 @@ class _Part(Effort):
     def improved(self, path: Callable[[], NDArray[np.float64]], time_s: float) -> bool:
         began_s = self.elapsed_s
         is_judged = self._whole.improved(path, time_s)
-        self.budget_s += self.elapsed_s - began_s    # what the judgement took is none of this part's
+        self.budget_s += self.elapsed_s - began_s  # what the judgement took is none of this part's
         return is_judged
 
 

@@ -21,7 +21,7 @@ from companion.planner.risk.tacks import tacks_at_risk
 from companion.planner.what_if import Replanner, decisive_side, other_side, what_would_help
 from companion.words import counted
 
-TOUCH_M = 0.5                      # nearer than this a leg is said to touch
+TOUCH_M = 0.5  # nearer than this a leg is said to touch
 NO_GO_TOUCH_RAD = math.radians(0.5)
 _ING = {"tack": "tacking", "gybe": "gybing"}
 
@@ -42,10 +42,14 @@ def explain(problem: Problem, plan: Plan, budget_s: float = 5.0, *, expansions: 
         text, data = what_would_help(problem, again)
         return replace(plan, why=Why(text=text, data=data | {"replans": again.count}))
     legs = [leg_bounds(problem, leg) for leg in plan.legs]
-    text, data = _courses_in_words(problem, plan, legs), {
-        "legs": legs, "turns": turns(plan),
-        "courses": [[course.first + 1, course.first + len(course.legs)] for course in courses(plan.legs)],
-    }
+    text, data = (
+        _courses_in_words(problem, plan, legs),
+        {
+            "legs": legs,
+            "turns": turns(plan),
+            "courses": [[course.first + 1, course.first + len(course.legs)] for course in courses(plan.legs)],
+        },
+    )
     side = decisive_side(problem, plan)
     if side is not None:
         more, other = other_side(problem, plan, side, again)
@@ -67,13 +71,17 @@ def _clearance_in_words(problem: Problem, plan: Plan) -> tuple[str, dict[str, An
     data: dict[str, Any] = {}
     if plan.expected_clearance_m is not None and plan.expected_at_en is not None and problem.tracking is not None:
         east, north = plan.expected_at_en
-        text = (f"On the track that is expected the hull passes {plan.expected_clearance_m:.1f} m clear or more, least "
-                f"at {east:.0f} E, {north:.0f} N (floor {problem.tracking.floor_m:g} m).")
+        text = (
+            f"On the track that is expected the hull passes {plan.expected_clearance_m:.1f} m clear or more, least "
+            f"at {east:.0f} E, {north:.0f} N (floor {problem.tracking.floor_m:g} m)."
+        )
         data["expected_clearance_m"] = plan.expected_clearance_m
     tacks = tacks_at_risk(problem, plan.legs)
     if tacks:
-        data["tacks"] = [{"leg": tack.leg + 1, "at": list(tack.at_en), "failures": tack.failures, "risk": tack.risk}
-                         for tack in tacks]
+        data["tacks"] = [
+            {"leg": tack.leg + 1, "at": list(tack.at_en), "failures": tack.failures, "risk": tack.risk}
+            for tack in tacks
+        ]
     return " ".join([text, *tacks_in_words(problem, tacks)]).strip(), data
 
 
@@ -112,11 +120,15 @@ def leg_bounds(problem: Problem, leg: Leg) -> dict[str, Any]:
         binds.append({"by": "beat", "corridor_m": round(problem.beat.corridor_m, 1)})
     elif leg.margin_rad <= NO_GO_TOUCH_RAD:
         widened = leg.no_go_half_rad - problem.boat.no_go_half_rad
-        binds.append({
-            "by": "no_go", "half_angle_deg": round(math.degrees(leg.no_go_half_rad), 2),
-            "sigma_deg": round(math.degrees(leg.sigma_rad), 2), "widened_deg": round(math.degrees(widened), 2),
-            "sigmas": round(widened / leg.sigma_rad, 3) if leg.sigma_rad > 1e-9 else 0.0,
-        })
+        binds.append(
+            {
+                "by": "no_go",
+                "half_angle_deg": round(math.degrees(leg.no_go_half_rad), 2),
+                "sigma_deg": round(math.degrees(leg.sigma_rad), 2),
+                "widened_deg": round(math.degrees(widened), 2),
+                "sigmas": round(widened / leg.sigma_rad, 3) if leg.sigma_rad > 1e-9 else 0.0,
+            }
+        )
     if abs(leg.twa_rad) >= problem.boat.max_twa_rad - NO_GO_TOUCH_RAD and problem.boat.max_twa_rad < math.pi - 1e-6:
         binds.append({"by": "deepest_angle", "angle_deg": round(math.degrees(problem.boat.max_twa_rad), 2)})
     reach = TOUCH_M + problem.clearance_floor_m
@@ -126,14 +138,29 @@ def leg_bounds(problem: Problem, leg: Leg) -> dict[str, Any]:
             shape = problem.obstacles[i]
             at_end = shapely.distance(shape, end) <= reach
             at_start = shapely.distance(shape, start) <= reach
-            where = "along it" if at_end and at_start else "turns at it" if at_end else "leaves it" if at_start \
+            where = (
+                "along it"
+                if at_end and at_start
+                else "turns at it"
+                if at_end
+                else "leaves it"
+                if at_start
                 else "brushes it"
-            binds.append({"by": "obstacle", "obstacle": i, "name": problem.obstacle_name(i), "where": where,
-                          "around_en": _around(shape)})
+            )
+            binds.append(
+                {
+                    "by": "obstacle",
+                    "obstacle": i,
+                    "name": problem.obstacle_name(i),
+                    "where": where,
+                    "around_en": _around(shape),
+                }
+            )
     if problem.fence_polygon is not None and shapely.distance(problem.fence_polygon.boundary, line) <= TOUCH_M:
         binds.append({"by": "fence"})
     return {
-        "binds": binds, "margin_deg": round(math.degrees(leg.margin_rad), 2),
+        "binds": binds,
+        "margin_deg": round(math.degrees(leg.margin_rad), 2),
         "clearance_m": None if leg.clearance_m is None else round(leg.clearance_m, 2),
     }
 
@@ -150,15 +177,18 @@ def _courses_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]]) 
     merged = courses(plan.legs)
     for i, course in enumerate(merged, start=1):
         tack = "starboard" if course.legs[0].twa_rad > 0.0 else "port"
-        bound: dict[str, None] = {}   # in order, each once
+        bound: dict[str, None] = {}  # in order, each once
         for bind in (b for k in course.numbers for b in legs[k]["binds"]):
             bound[f"close-hauled on {tack} tack" if bind["by"] == "no_go" else _bind_in_words(bind)] = None
         for text in bound:
             numbers.setdefault(text, []).append(i)
     sentences = [f"{_named('Course', which)} {text}." for text, which in numbers.items()]
     if len(merged) < len(plan.legs):
-        sentences.insert(0, f"{counted(len(plan.legs), 'leg')} make {counted(len(merged), 'course')}: within a course "
-                         "they bend by a few degrees, as the no-go zone grows or a shore does.")
+        sentences.insert(
+            0,
+            f"{counted(len(plan.legs), 'leg')} make {counted(len(merged), 'course')}: within a course "
+            "they bend by a few degrees, as the no-go zone grows or a shore does.",
+        )
     zones = [bind for bound in legs for bind in bound["binds"] if bind["by"] == "no_go"]
     if zones:
         sentences.append(_zone_in_words(zones))
@@ -201,10 +231,15 @@ def turns_in_words(problem: Problem, plan: Plan) -> list[str]:
         if round_:
             other = "tack" if name == "gybe" else "gybe"
             lost = problem.boat.tack_loss_s if other == "tack" else problem.boat.gybe_loss_s
-            why = "the boat cannot tack" if other == "tack" and not problem.boat.can_tack else \
-                f"a {other} would lose {lost:.0f} s"
-            out.append(f"It {name}s round instead of {_ING[other]}, by way of "
-                       f"{_named('course', sorted({course_of[k] for k in round_}))}: {why}.")
+            why = (
+                "the boat cannot tack"
+                if other == "tack" and not problem.boat.can_tack
+                else f"a {other} would lose {lost:.0f} s"
+            )
+            out.append(
+                f"It {name}s round instead of {_ING[other]}, by way of "
+                f"{_named('course', sorted({course_of[k] for k in round_}))}: {why}."
+            )
     return out
 
 
@@ -216,30 +251,40 @@ def _named(word: str, which: list[int]) -> str:
             runs[-1].append(number)
         else:
             runs.append([number])
-    parts = [part for run in runs for part in (
-        [f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(number) for number in run])]
+    parts = [
+        part
+        for run in runs
+        for part in ([f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(number) for number in run])
+    ]
     text = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
     return f"{word}{'s' if len(which) > 1 else ''} {text}"
 
 
 def _zone_in_words(zones: list[dict[str, Any]]) -> str:
     """Say how wide the no-go zone is where it binds, and at what sigma."""
+
     def span(key: str) -> str:
         low, high = round(min(z[key] for z in zones)), round(max(z[key] for z in zones))
         return f"{low}°" if low == high else f"{low} to {high}°"
 
     text = f"Close-hauled is {span('half_angle_deg')} off the wind"
     if max(z["widened_deg"] for z in zones) > 0.0:
-        text += (f", {span('widened_deg')} of it for a wind uncertain by {span('sigma_deg')} "
-                 f"({max(z['sigmas'] for z in zones):.2f} sigma)")
+        text += (
+            f", {span('widened_deg')} of it for a wind uncertain by {span('sigma_deg')} "
+            f"({max(z['sigmas'] for z in zones):.2f} sigma)"
+        )
     return f"{text}."
 
 
 def _bind_in_words(bind: dict[str, Any]) -> str:
     if bind["by"] == "obstacle":
         east, north = bind["around_en"]
-        verb = {"along it": "along", "turns at it": "up to a turn at", "leaves it": "from a turn at",
-                "brushes it": "brushing"}[bind["where"]]
+        verb = {
+            "along it": "along",
+            "turns at it": "up to a turn at",
+            "leaves it": "from a turn at",
+            "brushes it": "brushing",
+        }[bind["where"]]
         return f"{verb} {bind['name']} (around {east:.0f} E, {north:.0f} N)"
     if bind["by"] == "beat":
         return f"beaten by the autopilot, {bind['corridor_m']:.0f} m to either side of its line"

@@ -29,10 +29,10 @@ from companion.kernels.build import is_ready
 from companion.kernels.memory import let_go, trim
 
 _PID = struct.Struct("<q")
-_PATIENCE_S = 1.0   # a fork takes milliseconds, and the voyage's loop waits for it
-_REST_S = 10.0      # until one is begun anew: what kills it at once must not have the processor for itself
+_PATIENCE_S = 1.0  # a fork takes milliseconds, and the voyage's loop waits for it
+_REST_S = 10.0  # until one is begun anew: what kills it at once must not have the processor for itself
 FORK_SERVER_READY = b"r"
-FORK_SERVER = "--fork-server"   # of the worker's program: be a fork server on the socket of this number
+FORK_SERVER = "--fork-server"  # of the worker's program: be a fork server on the socket of this number
 
 
 def call_process(name: str) -> None:
@@ -46,7 +46,7 @@ class ForkServer:
 
     def __init__(self, control: socket.socket, serve: Callable[[Any, Any], None], pid: int = 0) -> None:
         self._control, self._serve, self._pid = control, serve, pid
-        self._program: subprocess.Popen[bytes] | None = None   # where it is one of its own
+        self._program: subprocess.Popen[bytes] | None = None  # where it is one of its own
         self._is_ready, self._begun_s = True, -math.inf
 
     @classmethod
@@ -99,7 +99,10 @@ class ForkServer:
         with theirs:
             self._program = subprocess.Popen(  # noqa: S603 - our own program
                 [sys.executable, "-m", "companion.planner.worker", FORK_SERVER, str(theirs.fileno())],
-                pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, start_new_session=True)
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+            )
         self._control.settimeout(_PATIENCE_S)
         self._pid, self._is_ready, self._begun_s = self._program.pid, False, time.monotonic()
         return True
@@ -124,7 +127,7 @@ class ForkServer:
                 (pid,) = _PID.unpack(self._control.recv(_PID.size))
         except (OSError, struct.error) as error:
             ours.close()
-            if self.is_alive:   # it hangs, and would keep the loop waiting again
+            if self.is_alive:  # it hangs, and would keep the loop waiting again
                 os.kill(self._pid, signal.SIGKILL)
             raise JobError(f"no planner could be forked: {error}") from error
         return pid, ours
@@ -142,11 +145,11 @@ class ForkServer:
     def tend(self) -> None:
         """Fork a planner for each socket that comes, until the companion has gone."""
         with contextlib.suppress(OSError):
-            os.setsid()   # Ctrl-C is for the companion, which ends the planner itself
+            os.setsid()  # Ctrl-C is for the companion, which ends the planner itself
         call_process("fork-server")
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)
-        signal.signal(signal.SIGCHLD, signal.SIG_IGN)   # nobody waits for a planner: none is left as a zombie
+        signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for a planner: none is left as a zombie
         while True:
             said, (*fds,), _, _ = socket.recv_fds(self._control, 1, 1)
             if not said:
@@ -170,9 +173,9 @@ class ForkServer:
 def settle() -> None:
     """Make the memory of a process that has loaded all what its forks will share, and give back the rest."""
     gc.collect()
-    gc.freeze()   # what is there now is never looked at again, so its pages stay shared
+    gc.freeze()  # what is there now is never looked at again, so its pages stay shared
     trim()
-    let_go()   # of the libraries that were read to be loaded, half is never called: what is comes back by itself
+    let_go()  # of the libraries that were read to be loaded, half is never called: what is comes back by itself
 
 
 def _until_the_end(work: Callable[[], None]) -> NoReturn:

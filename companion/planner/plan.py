@@ -17,13 +17,13 @@ from companion.words import counted
 class PlanStatus(enum.Enum):
     """How planning ended; ``Plan.reason`` says more."""
 
-    OPTIMAL = "optimal"          # found, and within 0.1 % of a proved lower bound
-    FOUND = "found"              # found; the search ended before the bound was met
-    INFEASIBLE = "infeasible"    # proved: no path exists
-    NOT_FOUND = "not found"      # searched to its end, or what was found may not be sailed: no proof that there is none
-    TIMEOUT = "timeout"          # the effort ended first, without a path and without a proof
-    INVALID = "invalid"          # the problem cannot be planned at all
-    UNANSWERED = "unanswered"    # the planner died, hung or failed: nothing is known of the problem
+    OPTIMAL = "optimal"  # found, and within 0.1 % of a proved lower bound
+    FOUND = "found"  # found; the search ended before the bound was met
+    INFEASIBLE = "infeasible"  # proved: no path exists
+    NOT_FOUND = "not found"  # searched to its end, or what was found may not be sailed: no proof that there is none
+    TIMEOUT = "timeout"  # the effort ended first, without a path and without a proof
+    INVALID = "invalid"  # the problem cannot be planned at all
+    UNANSWERED = "unanswered"  # the planner died, hung or failed: nothing is known of the problem
 
     @property
     def has_path(self) -> bool:
@@ -98,15 +98,27 @@ class Arrival:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form; None for what is never."""
-        return {"p10_s": _finite(self.early_s), "p50_s": _finite(self.median_s), "p90_s": _finite(self.late_s),
-                "over_max": self.over_max, "under_min": self.under_min, "doubts": list(self.doubts)}
+        return {
+            "p10_s": _finite(self.early_s),
+            "p50_s": _finite(self.median_s),
+            "p90_s": _finite(self.late_s),
+            "over_max": self.over_max,
+            "under_min": self.under_min,
+            "doubts": list(self.doubts),
+        }
 
     @classmethod
     def from_dict(cls, raw: Mapping[str, Any]) -> Arrival:
         """Return the value of ``to_dict``'s form."""
         early, median, late = (math.inf if raw[key] is None else float(raw[key]) for key in ("p10_s", "p50_s", "p90_s"))
-        return cls(early_s=early, median_s=median, late_s=late, over_max=raw["over_max"], under_min=raw["under_min"],
-                   doubts=tuple(raw["doubts"]))
+        return cls(
+            early_s=early,
+            median_s=median,
+            late_s=late,
+            over_max=raw["over_max"],
+            under_min=raw["under_min"],
+            doubts=tuple(raw["doubts"]),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -165,8 +177,10 @@ class Plan:
             return f"{self.status.value}: {self.reason}"
         length_m = sum(leg.length_m for leg in self.legs)
         risk = "" if self.risk is None else f", {100.0 * self.risk:.1f} % off the plan"
-        return (f"{self.status.value}: {counted(len(self.legs), 'leg')}, {length_m:.0f} m, {self.cost_s:.0f} s "
-                f"(at least {self.lower_bound_s:.0f} s){risk}")
+        return (
+            f"{self.status.value}: {counted(len(self.legs), 'leg')}, {length_m:.0f} m, {self.cost_s:.0f} s "
+            f"(at least {self.lower_bound_s:.0f} s){risk}"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON form: degrees, metres, seconds; None for what is not finite."""
@@ -188,9 +202,14 @@ class Plan:
             **({} if self.arrival is None else {"arrival": self.arrival.to_dict()}),
             **({"unproven": list(self.unproven)} if self.unproven else {}),
             **({} if self.speed is None else {"speed": self.speed}),
-            **({} if self.expected_clearance_m is None else {
-                "expected_clearance_m": self.expected_clearance_m,
-                "expected_at": None if self.expected_at_en is None else list(self.expected_at_en)}),
+            **(
+                {}
+                if self.expected_clearance_m is None
+                else {
+                    "expected_clearance_m": self.expected_clearance_m,
+                    "expected_at": None if self.expected_at_en is None else list(self.expected_at_en),
+                }
+            ),
             "legs": [_leg_dict(leg) for leg in self.legs],
             "why": {"text": self.why.text, "data": dict(self.why.data)},
         }
@@ -217,7 +236,8 @@ class Plan:
             vessel_risk=float(raw.get("vessel_risk", 0.0)),
             tack_risk=float(raw.get("tack_risk", 0.0)),
             arrival=None if raw.get("arrival") is None else Arrival.from_dict(raw["arrival"]),
-            unproven=tuple(raw.get("unproven", ())), speed=raw.get("speed"),
+            unproven=tuple(raw.get("unproven", ())),
+            speed=raw.get("speed"),
             expected_clearance_m=raw.get("expected_clearance_m"),
             expected_at_en=None if raw.get("expected_at") is None else (raw["expected_at"][0], raw["expected_at"][1]),
             why=Why(text=raw["why"]["text"], data=raw["why"]["data"]),

@@ -30,11 +30,11 @@ from companion.planner.risk.tacks import TackAtRisk, of_risky, tacks_at_risk
 from companion.planner.warm import warm_problems
 from companion.planners import ALGORITHMS, Settings
 
-DEARER = 1.10          # of the first path's time: what another may take
-CONTACT_S = 1800.0     # what a contact counts as
-AGAIN_SHARE = 0.15     # of the search's expansions, for each of the others
-AGAIN_TIME_SHARE = 0.04   # of its seconds: together they stay within a fifth of the budget
-NARROWER = (1.0, 2.0, 3.0, 0.5)   # of the room that is missing: more of it lets more failures in a row pass
+DEARER = 1.10  # of the first path's time: what another may take
+CONTACT_S = 1800.0  # what a contact counts as
+AGAIN_SHARE = 0.15  # of the search's expansions, for each of the others
+AGAIN_TIME_SHARE = 0.04  # of its seconds: together they stay within a fifth of the budget
+NARROWER = (1.0, 2.0, 3.0, 0.5)  # of the room that is missing: more of it lets more failures in a row pass
 SPARE_M = 0.5
 
 
@@ -96,8 +96,8 @@ def _others(problem: Problem, tacks: tuple[TackAtRisk, ...]) -> Iterator[Problem
     yield replace(problem, beat=None, boat=replace(problem.boat, can_tack=False))
 
 
-BOUND_TESTS = 40_000   # of visibility, for the bound of both kinds of path, when there is effort left
-BEAT_SHARE = 0.3       # of the effort, for the path with beats: an easier search, and often the end of it
+BOUND_TESTS = 40_000  # of visibility, for the bound of both kinds of path, when there is effort left
+BEAT_SHARE = 0.3  # of the effort, for the path with beats: an easier search, and often the end of it
 
 
 def with_beats(search: Search, beat: Beat) -> Search:
@@ -146,11 +146,11 @@ def with_beats(search: Search, beat: Beat) -> Search:
 
 DEFAULT_BUDGET_S = 1.0
 OPTIMAL_GAP = 1e-3
-TRIED = 0.1            # of a budget in seconds: for changes to a path so that its track keeps the floor
-MENDED = 0.25          # ... more where the first path's track does not, or a tack of it may fail onto something
-AGAIN = 0.6            # of what judging the first path takes: that of another, for which water and winds are at hand
-LATER = 2.0            # another path is judged after as many times as long, while somebody hears of it
-SEARCHED = 0.94        # of a budget in seconds: the last step of a search ends late, and its path is checked exactly
+TRIED = 0.1  # of a budget in seconds: for changes to a path so that its track keeps the floor
+MENDED = 0.25  # ... more where the first path's track does not, or a tack of it may fail onto something
+AGAIN = 0.6  # of what judging the first path takes: that of another, for which water and winds are at hand
+LATER = 2.0  # another path is judged after as many times as long, while somebody hears of it
+SEARCHED = 0.94  # of a budget in seconds: the last step of a search ends late, and its path is checked exactly
 
 _loaded: set[str] = set()
 
@@ -187,8 +187,12 @@ def plan(
     if algorithm not in ALGORITHMS:
         raise InputError("plan", "algorithm", f"{algorithm!r} is unknown", "choose " + ", ".join(ALGORITHMS))
     if settings is not None and type(settings) is not ALGORITHMS[algorithm].settings:
-        raise InputError("plan", "settings", f"{type(settings).__name__} is not for {algorithm!r}",
-                         "give those of the algorithm, or none")
+        raise InputError(
+            "plan",
+            "settings",
+            f"{type(settings).__name__} is not for {algorithm!r}",
+            "give those of the algorithm, or none",
+        )
     if budget_s is not None and not budget_s > 0.0:
         raise InputError("plan", "budget_s", f"{budget_s} is not positive", "give seconds")
     if expansions is not None and not expansions > 0:
@@ -198,8 +202,14 @@ def plan(
     warm(algorithm)
     effort = Effort(SEARCHED * budget_s if budget_s is not None and expansions is None else budget_s, expansions)
     defect = defect_of(problem)
-    empty = Plan(status=PlanStatus.INVALID, reason=defect or "", waypoints_en=np.empty((0, 2)),
-                 algorithm=algorithm, seed=seed, elapsed_s=effort.elapsed_s)
+    empty = Plan(
+        status=PlanStatus.INVALID,
+        reason=defect or "",
+        waypoints_en=np.empty((0, 2)),
+        algorithm=algorithm,
+        seed=seed,
+        elapsed_s=effort.elapsed_s,
+    )
     if defect is not None:
         return replace(empty, why=Why(text=f"Cannot be planned: {defect}."))
     try:
@@ -220,8 +230,7 @@ def warm(algorithm: str = "auto") -> None:
 
 
 def _solved(
-    problem: Problem, effort: Effort, empty: Plan, settings: Settings | None,
-    on_better: Callable[[Plan], None] | None,
+    problem: Problem, effort: Effort, empty: Plan, settings: Settings | None, on_better: Callable[[Plan], None] | None
 ) -> Plan:
     algorithm = ALGORITHMS[empty.algorithm]
     found = importlib.import_module(algorithm.module).search
@@ -240,7 +249,6 @@ def _solved(
             return keep_limit(problem, keep_share(problem, _judged(free, outcome, effort, empty)))
 
     if problem.beat is not None and problem.boat.can_tack and empty.algorithm == "auto":
-
         search = with_beats(search, problem.beat)
 
     whole = _whole(search, problem)
@@ -260,7 +268,7 @@ class _Answers:
     """The best answer so far of a search in seconds, and what judging it takes."""
 
     def __init__(
-        self, problem: Problem, effort: Effort, empty: Plan, on_better: Callable[[Plan], None] | None, search: Search,
+        self, problem: Problem, effort: Effort, empty: Plan, on_better: Callable[[Plan], None] | None, search: Search
     ) -> None:
         self._problem, self._effort, self._empty, self._on_better = problem, effort, empty, on_better
         self._search, self._has_looked = search, False
@@ -291,8 +299,7 @@ class _Answers:
         found = None
         if judged.is_feasible and is_kept:
             then_s = effort.elapsed_s
-            found = keep_limit(problem, _judged(
-                problem, Outcome(waypoints_en=np.asarray(path)), effort, self._empty))
+            found = keep_limit(problem, _judged(problem, Outcome(waypoints_en=np.asarray(path)), effort, self._empty))
             needed_s += effort.elapsed_s - then_s
         effort.needed_s = max(effort.needed_s, AGAIN * needed_s)
         if not is_kept or (found is not None and found.tack_risk > 0.0):
@@ -304,7 +311,7 @@ class _Answers:
             if self._on_better is not None:
                 self._on_better(self.best)
         if self.best is not None and self._on_better is None:
-            return math.inf     # it was judged to know what that takes
+            return math.inf  # it was judged to know what that takes
         return effort.elapsed_s + LATER * (effort.elapsed_s if found is not None else effort.elapsed_s - began_s)
 
     def last(self, outcome: Outcome, plan: Plan) -> Plan:
@@ -313,16 +320,21 @@ class _Answers:
         The last may take longer than one from before where fewer of its tacks are at risk.
         """
         best = self.best
-        if best is None or (plan.has_path and (
-                _counted_s(plan) <= _counted_s(best) or plan.tack_risk < best.tack_risk)):
+        if best is None or (
+            plan.has_path and (_counted_s(plan) <= _counted_s(best) or plan.tack_risk < best.tack_risk)
+        ):
             return plan
         bound = min(outcome.lower_bound_s, best.cost_s)
         is_bound = bound > 0.0 and math.isfinite(outcome.lower_bound_s)
         return replace(
-            best, lower_bound_s=bound if is_bound else best.lower_bound_s, trace=outcome.trace,
-            expansions=self._effort.used, elapsed_s=self._effort.elapsed_s,
+            best,
+            lower_bound_s=bound if is_bound else best.lower_bound_s,
+            trace=outcome.trace,
+            expansions=self._effort.used,
+            elapsed_s=self._effort.elapsed_s,
             reason=f"{100.0 * (best.cost_s / bound - 1.0):.1f} % above the bound" if is_bound else best.reason,
-            unproven=() if is_bound else ("bound",))
+            unproven=() if is_bound else ("bound",),
+        )
 
 
 def _counted_s(plan: Plan) -> float:
@@ -331,10 +343,11 @@ def _counted_s(plan: Plan) -> float:
 
 
 def _whole(
-    search: Search, problem: Problem, judge: Callable[[list[tuple[float, float]]], Evaluation] | None = None,
+    search: Search, problem: Problem, judge: Callable[[list[tuple[float, float]]], Evaluation] | None = None
 ) -> Search:
     """Return the search in terms of discs, laid as the autopilot can follow it and with room for tacks that fail,
     where the problem says how."""  # noqa: D205, D209
+
     def search_resolved(problem: Problem, effort: Effort, seed: int) -> Outcome:
         return search(resolved(problem), effort, seed)
 
@@ -344,15 +357,19 @@ def _whole(
 
         whole = with_track(search_resolved, judge)
     if problem.boat.tack_fails > 0.0 and problem.boat.can_tack:
-
         whole = with_contingency(whole)
     return whole
 
 
 def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> Plan:
     """Return the outcome as a plan whose numbers come from the exact scorer."""
-    spent = replace(empty, expansions=effort.used, elapsed_s=effort.elapsed_s, trace=outcome.trace,
-                    lower_bound_s=outcome.lower_bound_s)
+    spent = replace(
+        empty,
+        expansions=effort.used,
+        elapsed_s=effort.elapsed_s,
+        trace=outcome.trace,
+        lower_bound_s=outcome.lower_bound_s,
+    )
     if outcome.waypoints_en is None:
         status = outcome.status or PlanStatus.TIMEOUT
         reason = outcome.reason or "the effort ended before a path was found; none was proved impossible"
@@ -367,8 +384,14 @@ def _judged(problem: Problem, outcome: Outcome, effort: Effort, empty: Plan) -> 
     status = PlanStatus.OPTIMAL if gap <= OPTIMAL_GAP else PlanStatus.FOUND
     reason = f"{100.0 * gap:.1f} % above the bound" if math.isfinite(gap) else "no useful bound"
     return replace(
-        spent, status=status, reason=reason, waypoints_en=np.array(outcome.waypoints_en, dtype=np.float64),
-        legs=clearances(problem, judged.legs), cost_s=judged.time_s, lower_bound_s=bound, first_s=effort.first_s,
+        spent,
+        status=status,
+        reason=reason,
+        waypoints_en=np.array(outcome.waypoints_en, dtype=np.float64),
+        legs=clearances(problem, judged.legs),
+        cost_s=judged.time_s,
+        lower_bound_s=bound,
+        first_s=effort.first_s,
         elapsed_s=effort.elapsed_s,
         **_expected(problem, outcome.waypoints_en, judged),
     )

@@ -21,7 +21,7 @@ from companion.planner.problem.value import Problem
 
 MAX_SHIFT_RAD = math.radians(60.0)  # larger shifts are another day's wind
 SHIFT_RESOLUTION_RAD = math.radians(1.0)
-_SHARE = 1.0 / 30.0                # of the budget for one replan: both sides of the bisection fit
+_SHARE = 1.0 / 30.0  # of the budget for one replan: both sides of the bisection fit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,8 +55,13 @@ class Replanner:
 
         self.count += 1
         budget_s = self._each_s if self._expansions is None else None
-        return plan(problem, budget_s=budget_s, expansions=self._expansions, seed=self._plan.seed,
-                    algorithm=self._plan.algorithm)
+        return plan(
+            problem,
+            budget_s=budget_s,
+            expansions=self._expansions,
+            seed=self._plan.seed,
+            algorithm=self._plan.algorithm,
+        )
 
 
 def decisive_side(problem: Problem, plan: Plan) -> ObstacleSide | None:
@@ -83,12 +88,17 @@ def decisive_side(problem: Problem, plan: Plan) -> ObstacleSide | None:
         on_path = _nearest_on_path(way, inside)
         outward = on_path - inside
         if float(np.hypot(*outward)) > 1e-9:
-            return ObstacleSide(anchor_en=_pair(inside), outward_en=_pair(outward / np.hypot(*outward)),
-                         obstacle=nearest, words=f"{_compass(outward)} of {problem.obstacle_name(nearest)}")
+            return ObstacleSide(
+                anchor_en=_pair(inside),
+                outward_en=_pair(outward / np.hypot(*outward)),
+                obstacle=nearest,
+                words=f"{_compass(outward)} of {problem.obstacle_name(nearest)}",
+            )
     foot = start + line * float(np.clip(np.dot(corner - start, line) / length**2, 0.02, 0.98))
     across = np.array([line[1], -line[0]]) / length * math.copysign(1.0, float(off[i]))
-    return ObstacleSide(anchor_en=_pair(foot), outward_en=_pair(across), obstacle=None,
-                 words=f"{_compass(across)} of the straight line")
+    return ObstacleSide(
+        anchor_en=_pair(foot), outward_en=_pair(across), obstacle=None, words=f"{_compass(across)} of the straight line"
+    )
 
 
 def _nearest_on_path(way: NDArray[np.float64], place: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -116,10 +126,14 @@ def walled(problem: Problem, side: ObstacleSide, *, sign: float) -> Problem:
     (ax, ay), (ux, uy) = side.anchor_en, side.outward_en
     ux, uy = sign * ux, sign * uy
     half = 5e-4 * size + 0.01
-    wall = shapely.Polygon([
-        (ax - uy * half, ay + ux * half), (ax + uy * half, ay - ux * half),
-        (ax + far * ux + uy * half, ay + far * uy - ux * half), (ax + far * ux - uy * half, ay + far * uy + ux * half),
-    ])
+    wall = shapely.Polygon(
+        [
+            (ax - uy * half, ay + ux * half),
+            (ax + uy * half, ay - ux * half),
+            (ax + far * ux + uy * half, ay + far * uy - ux * half),
+            (ax + far * ux - uy * half, ay + far * uy + ux * half),
+        ]
+    )
     return replace(problem, obstacles=(*problem.obstacles, wall))
 
 
@@ -150,6 +164,7 @@ def shifted(problem: Problem, shift_rad: float) -> Problem:
 
 def _deciding_shift(problem: Problem, side: ObstacleSide, again: Replanner) -> float | None:
     """Return the smaller shift (veer or back) at which the other side becomes the faster; None when none is found."""
+
     def prefers_other(shift_rad: float) -> bool:
         turned = shifted(problem, shift_rad)
         chosen, other = again(walled(turned, side, sign=-1.0)), again(walled(turned, side, sign=1.0))
@@ -187,6 +202,7 @@ def what_would_help(problem: Problem, again: Replanner) -> tuple[str, dict[str, 
             said.append(f"with delta_s {best:.3f} instead of {problem.delta_s:g} there is a path")
     size = math.dist(problem.start_en, problem.goal_en)
     if problem.obstacles:
+
         def shrunk(m: float) -> Problem:
             return replace(problem, obstacles=tuple(s.buffer(-m) for s in problem.obstacles))
 
@@ -214,7 +230,7 @@ def what_would_help(problem: Problem, again: Replanner) -> tuple[str, dict[str, 
 
 
 def _bisect(
-    make: Callable[[float], Problem], easy: float, hard: float, tolerance: float, again: Replanner,
+    make: Callable[[float], Problem], easy: float, hard: float, tolerance: float, again: Replanner
 ) -> float | None:
     """Return the value nearest to ``hard`` at which a path is found, within ``tolerance``; None when not even easy."""
     if again.is_over or not again(make(easy)).has_path:

@@ -48,13 +48,13 @@ the computer that is slow."""
 REFERENCE_PER_S = 400_000.0
 """Expansions of ``auto`` in a second of the reference core: one of an AMD EPYC server's, on which the figures of the
 docs were measured. ``speed`` is held against it."""
-STARTS = 3            # of a child that dies while it gets ready, at the beginning of a voyage
+STARTS = 3  # of a child that dies while it gets ready, at the beginning of a voyage
 SPEED_EXPANSIONS = 5_000
 SPEED_TRIES = 3
-LEAST_RUN_S = 0.05    # a shorter run does not tell how much of the processor there was
+LEAST_RUN_S = 0.05  # a shorter run does not tell how much of the processor there was
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PULSE_S = 0.5
-_LOOK_S = 0.2         # between two looks whether child and fork server live
+_LOOK_S = 0.2  # between two looks whether child and fork server live
 _SILENCE_S = 60.0
 """A child that gets ready may take as long as it takes, and says once in ``_BEAT_S`` that it lives; this long without a
 word [s] and it is taken for hung."""
@@ -82,8 +82,15 @@ def speed() -> float:
 
 def failed(reason: str, *, seed: int, algorithm: str, elapsed_s: float = 0.0) -> Plan:
     """Return the plan that says the worker did not answer."""
-    return Plan(status=PlanStatus.UNANSWERED, reason=reason, waypoints_en=np.empty((0, 2)), algorithm=algorithm,
-                seed=seed, elapsed_s=elapsed_s, why=Why(text=reason))
+    return Plan(
+        status=PlanStatus.UNANSWERED,
+        reason=reason,
+        waypoints_en=np.empty((0, 2)),
+        algorithm=algorithm,
+        seed=seed,
+        elapsed_s=elapsed_s,
+        why=Why(text=reason),
+    )
 
 
 def _without(reason: str, best: Plan | None, *, seed: int, algorithm: str, elapsed_s: float) -> Plan:
@@ -115,13 +122,20 @@ class InlinePlanner:
         """Nothing to end."""
 
     async def plan(
-        self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
-        algorithm: str = "auto", settings: Settings | None = None,
+        self,
+        problem: Problem,
+        *,
+        budget_s: float | None = None,
+        expansions: int | None = None,
+        seed: int = 0,
+        algorithm: str = "auto",
+        settings: Settings | None = None,
     ) -> Plan:
         """Return the plan of ``expansions`` (or the default number) after ``virtual_s``."""
         del budget_s
-        answer = plan(problem, expansions=expansions or self.expansions, seed=seed, algorithm=algorithm,
-                      settings=settings)
+        answer = plan(
+            problem, expansions=expansions or self.expansions, seed=seed, algorithm=algorithm, settings=settings
+        )
         await asyncio.sleep(self.virtual_s)
         return answer
 
@@ -137,7 +151,11 @@ class PlannerWorker:
     """
 
     def __init__(
-        self, *, grace_s: float = DEFAULT_GRACE_S, command: list[str] | None = None, algorithm: str = "auto",
+        self,
+        *,
+        grace_s: float = DEFAULT_GRACE_S,
+        command: list[str] | None = None,
+        algorithm: str = "auto",
         fork_server: ForkServer | None = None,
     ) -> None:
         self._grace_s, self._fork_server = grace_s, fork_server if algorithm == "auto" else None
@@ -187,7 +205,7 @@ class PlannerWorker:
                 try:
                     await self._warm(say)
                 except TimeoutError:
-                    raise   # which is an OSError, too
+                    raise  # which is an OSError, too
                 except (EOFError, OSError) as error:
                     if left == 0:
                         raise
@@ -197,8 +215,14 @@ class PlannerWorker:
                     return
 
     async def plan(
-        self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
-        algorithm: str = "auto", settings: Settings | None = None,
+        self,
+        problem: Problem,
+        *,
+        budget_s: float | None = None,
+        expansions: int | None = None,
+        seed: int = 0,
+        algorithm: str = "auto",
+        settings: Settings | None = None,
     ) -> Plan:
         """Return the child's plan; when it hangs or dies the best it had found, or ``PlanStatus.UNANSWERED``.
 
@@ -209,8 +233,14 @@ class PlannerWorker:
         if budget_s is None and expansions is None:
             budget_s = DEFAULT_BUDGET_S
         request = pickle.dumps(
-            {"problem": problem, "budget_s": budget_s, "expansions": expansions, "seed": seed, "algorithm": algorithm,
-             "settings": settings}
+            {
+                "problem": problem,
+                "budget_s": budget_s,
+                "expansions": expansions,
+                "seed": seed,
+                "algorithm": algorithm,
+                "settings": settings,
+            }
         )
         async with self._lock:
             began_s = effort_s()
@@ -239,8 +269,13 @@ class PlannerWorker:
                 raise
         if isinstance(value, Plan):
             return value
-        return _without(f"the planner's worker failed: {value}", best, seed=seed, algorithm=algorithm,
-                        elapsed_s=effort_s() - began_s)
+        return _without(
+            f"the planner's worker failed: {value}",
+            best,
+            seed=seed,
+            algorithm=algorithm,
+            elapsed_s=effort_s() - began_s,
+        )
 
     # ------------------------------------------------------------------------------------ the child
     async def _keep(self) -> None:
@@ -249,13 +284,13 @@ class PlannerWorker:
             await asyncio.sleep(_LOOK_S)
             if self._fork_server is not None and self._fork_server.revive():
                 _LOG.warning("the planners' fork server died; it is begun anew")
-            if not self._was_warm or self._lock.locked():   # whoever gets it ready or has it sees it by himself
+            if not self._was_warm or self._lock.locked():  # whoever gets it ready or has it sees it by himself
                 continue
             async with self._lock:
                 if not self.is_alive:
                     _LOG.warning("the planner's worker died; it is replaced")
                     await self._replace()
-                with contextlib.suppress(OSError, EOFError):   # the next request is told of it
+                with contextlib.suppress(OSError, EOFError):  # the next request is told of it
                     await self._warm()
 
     async def _start(self) -> None:
@@ -277,7 +312,7 @@ class PlannerWorker:
             self._is_warm = word.startswith(_READY)
             self._was_warm = self._was_warm or self._is_warm
             if self._is_warm:
-                self.share = float(word[len(_READY):])
+                self.share = float(word[len(_READY) :])
             else:
                 say(word.decode())
 
@@ -341,7 +376,7 @@ class PlannerWorker:
         task = awaited or asyncio.ensure_future(self._receive())
         deadline_s = effort_s() + limit_s
         try:
-            while True:   # looked for before the clock: this process may have been kept waiting, too
+            while True:  # looked for before the clock: this process may have been kept waiting, too
                 await asyncio.wait({task}, timeout=_PULSE_S)
                 if task.done():
                     return task.result()
@@ -390,13 +425,14 @@ def answer_requests(source: Any, sink: Any) -> None:
         answer: Plan | str
         try:
             found = plan(
-                request.pop("problem"), **request, on_better=lambda found: _write(sink, pickle.dumps((False, found))))
+                request.pop("problem"), **request, on_better=lambda found: _write(sink, pickle.dumps((False, found)))
+            )
             answer = replace(found, speed=own_speed * _share_since(began_s, cpu_s))
         except Exception as error:
             answer = f"{type(error).__name__}: {error}"
         _write(sink, pickle.dumps((True, answer)))
         del request, answer
-        trim()   # the next plan may be an hour away
+        trim()  # the next plan may be an hour away
 
 
 def _share_since(began_s: float, cpu_s: float) -> float:
@@ -431,7 +467,7 @@ class _Pulse:
             try:
                 _write(self._sink, self._doing.encode())
             except OSError:
-                os._exit(1)   # nobody waits for the kernels any more
+                os._exit(1)  # nobody waits for the kernels any more
             if self._is_over.wait(_BEAT_S):
                 return
 
@@ -449,7 +485,7 @@ def be_fork_server(fd: int) -> None:
     control = socket.socket(fileno=fd)
     warm()
     settle()
-    with contextlib.suppress(OSError):   # who began it has gone: the fork server sees it, and ends
+    with contextlib.suppress(OSError):  # who began it has gone: the fork server sees it, and ends
         control.sendall(FORK_SERVER_READY)
     ForkServer(control, answer_requests).tend()
 

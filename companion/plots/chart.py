@@ -66,23 +66,37 @@ def scale_bar(axes: Axes) -> None:
     power = 10.0 ** math.floor(math.log10(wanted_m))
     length_m = max(step * power for step in (1.0, 2.0, 5.0) if step * power <= wanted_m)
     left, low, tick = x0 + 0.03 * (x1 - x0), y0 + 0.03 * (y1 - y0), 0.008 * (y1 - y0)
-    axes.plot([left, left, left + length_m, left + length_m], [low + tick, low, low, low + tick], color="black", lw=1.4,
-              zorder=10, scalex=False, scaley=False)
+    axes.plot(
+        [left, left, left + length_m, left + length_m],
+        [low + tick, low, low, low + tick],
+        color="black",
+        lw=1.4,
+        zorder=10,
+        scalex=False,
+        scaley=False,
+    )
     text = f"{length_m:g} m" if length_m < 1000.0 else f"{length_m / 1000.0:g} km"
-    axes.annotate(text, (left + length_m / 2.0, low), xytext=(0, 3), textcoords="offset points", ha="center",
-                  fontsize=8, zorder=10)
+    axes.annotate(
+        text,
+        (left + length_m / 2.0, low),
+        xytext=(0, 3),
+        textcoords="offset points",
+        ha="center",
+        fontsize=8,
+        zorder=10,
+    )
 
 
 def legend_above(axes: Any) -> None:
     """Put the legend over the axes, where no curve runs."""
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8, frameon=False,
-                    borderaxespad=0.1)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, fontsize=8, frameon=False, borderaxespad=0.1)
 
 
 def legend_below(axes: Any, *, columns: int = 4, more: Sequence[Artist] = ()) -> None:
     """Put the legend of a chart under it: what is labelled in it, behind ``more``."""
     handles = [*more, *axes.get_legend_handles_labels()[0]]
     if handles:
-        axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.07), ncols=columns, fontsize=8,
-                    frameon=False)
+        axes.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.07), ncols=columns, fontsize=8, frameon=False
+        )

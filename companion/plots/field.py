@@ -39,11 +39,26 @@ def draw_wind(ax: Axes, twd_from_rad: float, tws_mps: float | None = None) -> No
     at = np.array([0.91, 0.89])
     to = -np.array([math.sin(twd_from_rad), math.cos(twd_from_rad)])
     a, b = at - 0.055 * to, at + 0.055 * to
-    ax.annotate("", xy=(b[0], b[1]), xytext=(a[0], a[1]), xycoords="axes fraction",
-                arrowprops={"arrowstyle": "-|>", "lw": 2.2, "color": "black"}, zorder=6)
+    ax.annotate(
+        "",
+        xy=(b[0], b[1]),
+        xytext=(a[0], a[1]),
+        xycoords="axes fraction",
+        arrowprops={"arrowstyle": "-|>", "lw": 2.2, "color": "black"},
+        zorder=6,
+    )
     speed = "" if tws_mps is None else f" {tws_mps:.0f} m/s"
-    ax.text(0.91, 0.795, f"wind{speed}", transform=ax.transAxes, ha="center", va="top", fontsize=8,
-            bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8}, zorder=6)
+    ax.text(
+        0.91,
+        0.795,
+        f"wind{speed}",
+        transform=ax.transAxes,
+        ha="center",
+        va="top",
+        fontsize=8,
+        bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.8},
+        zorder=6,
+    )
 
 
 def draw_boat(ax: Axes, en_m: tuple[float, float], heading_rad: float, size_m: float, colour: str) -> None:
@@ -66,13 +81,18 @@ def draw_zone(ax: Axes, zone: HysteresisZone, reach_m: float, *, with_line: bool
         ax.plot(*np.vstack([edge - along, edge + along]).T, color=GREY, lw=1.0, ls="--", zorder=4)
 
 
-TURNED = "#d97a1f"     # an arrow that the no-go zone has turned
+TURNED = "#d97a1f"  # an arrow that the no-go zone has turned
 TRACK = "#7a3fa0"
 COUNT = 23
 
 
 def save_field(
-    seen: FieldPreview, fan: HeadingFan, track: NDArray[np.float64], path: str | Path, *, title: str,
+    seen: FieldPreview,
+    fan: HeadingFan,
+    track: NDArray[np.float64],
+    path: str | Path,
+    *,
+    title: str,
     has_fans: bool = False,
 ) -> None:
     """Draw a goal's field; ``has_fans``: with Schmitt's fan of possible directions at every arrow."""
@@ -80,12 +100,14 @@ def save_field(
 
 
 def field_figure(
-    seen: FieldPreview, fan: HeadingFan, track: NDArray[np.float64], *, title: str, has_fans: bool = False,
+    seen: FieldPreview, fan: HeadingFan, track: NDArray[np.float64], *, title: str, has_fans: bool = False
 ) -> Figure:
     """Return the picture."""
     figure = plt.figure(figsize=(12.4, 9.2))
-    axes, rose, words = (figure.add_axes(part) for part in (
-        (0.055, 0.06, 0.662, 0.892), (0.745, 0.6, 0.235, 0.317), (0.738, 0.06, 0.25, 0.5)))
+    axes, rose, words = (
+        figure.add_axes(part)
+        for part in ((0.055, 0.06, 0.662, 0.892), (0.745, 0.6, 0.235, 0.317), (0.738, 0.06, 0.25, 0.5))
+    )
     handles = draw_area(axes, seen.area, 0.0)
     _draw_arrows(axes, seen, has_fans=has_fans)
     _draw_trajectory(axes, seen)
@@ -95,11 +117,21 @@ def field_figure(
         handles.append(Line2D([], [], color=TRACK, lw=2.0, label=f"sailed by it, {_time(track[-1, 0])}"))
     axes.add_patch(Disc(seen.place_en, seen.radius_m, fc="none", ec=GREEN, lw=1.4, zorder=7))
     axes.plot(*seen.place_en, "o", color=GREEN, ms=6, mec="black", mew=0.5, zorder=8)
-    axes.annotate(seen.name, seen.place_en, xytext=(7, 7), textcoords="offset points", fontsize=9, zorder=9,
-                  bbox={"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.75})
+    axes.annotate(
+        seen.name,
+        seen.place_en,
+        xytext=(7, 7),
+        textcoords="offset points",
+        fontsize=9,
+        zorder=9,
+        bbox={"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.75},
+    )
     draw_boat(axes, seen.here_en, fan.chosen_rad, 0.055 * seen.half_m, RED)
-    axes.set(xlim=(seen.centre_en[0] - seen.half_m, seen.centre_en[0] + seen.half_m), aspect="equal",
-             ylim=(seen.centre_en[1] - seen.half_m, seen.centre_en[1] + seen.half_m))
+    axes.set(
+        xlim=(seen.centre_en[0] - seen.half_m, seen.centre_en[0] + seen.half_m),
+        aspect="equal",
+        ylim=(seen.centre_en[1] - seen.half_m, seen.centre_en[1] + seen.half_m),
+    )
     axes.set_xlabel("east [m]", fontsize=8)
     axes.set_ylabel("north [m]", fontsize=8)
     axes.tick_params(labelsize=8)
@@ -108,8 +140,13 @@ def field_figure(
     if seen.conditions.twd_from_rad is not None:
         draw_wind(axes, seen.conditions.twd_from_rad, seen.conditions.seen.tws_mps)
     words.axis("off")
-    words.legend(handles=[*handles, *_handles(seen, has_fans=has_fans)], loc="upper left", fontsize=9, frameon=False,
-                 borderaxespad=0.0)
+    words.legend(
+        handles=[*handles, *_handles(seen, has_fans=has_fans)],
+        loc="upper left",
+        fontsize=9,
+        frameon=False,
+        borderaxespad=0.0,
+    )
     figure.suptitle(title, fontsize=11, x=0.02, ha="left")
     return figure
 
@@ -133,12 +170,27 @@ def _draw_arrows(axes: Axes, seen: FieldPreview, *, has_fans: bool) -> None:
     turned = np.hypot(*(wanted - v).T) > 1e-6 * np.maximum(length, 1e-9)
     if has_fans and seen.projection is not None:
         low, high = seen.projection.fan(points)
-        wedges = [Wedge((float(p[0]), float(p[1])), 0.6 * step, 90.0 - math.degrees(b), 90.0 - math.degrees(a))
-                  for p, a, b in zip(points, low, high, strict=True) if b > a]
+        wedges = [
+            Wedge((float(p[0]), float(p[1])), 0.6 * step, 90.0 - math.degrees(b), 90.0 - math.degrees(a))
+            for p, a, b in zip(points, low, high, strict=True)
+            if b > a
+        ]
         axes.add_collection(PatchCollection(wedges, facecolor=SAND, alpha=0.35, edgecolor="none", zorder=2.5))
     for which, colour in ((~turned, BLUE), (turned, TURNED)):
-        axes.quiver(points[which, 0], points[which, 1], drawn[which, 0], drawn[which, 1], angles="xy", scale_units="xy",
-                    scale=1.0, color=colour, width=0.0028, headwidth=4.2, headlength=5.0, zorder=3.5)
+        axes.quiver(
+            points[which, 0],
+            points[which, 1],
+            drawn[which, 0],
+            drawn[which, 1],
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            color=colour,
+            width=0.0028,
+            headwidth=4.2,
+            headlength=5.0,
+            zorder=3.5,
+        )
 
 
 def _draw_trajectory(axes: Axes, seen: FieldPreview) -> None:
@@ -169,9 +221,17 @@ def _draw_trajectory(axes: Axes, seen: FieldPreview) -> None:
             axes.add_patch(PathPatch(outline(atom.water_en), fc="none", ec="black", lw=1.5, ls="--", zorder=4.5))
             at = atom.water_en.bounds[0], atom.water_en.bounds[3]
         if at is not None:
-            axes.annotate(name, at, xytext=(5, -12), textcoords="offset points", fontsize=8, style="italic", zorder=9,
-                          annotation_clip=True,
-                          bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7})
+            axes.annotate(
+                name,
+                at,
+                xytext=(5, -12),
+                textcoords="offset points",
+                fontsize=8,
+                style="italic",
+                zorder=9,
+                annotation_clip=True,
+                bbox={"boxstyle": "round,pad=0.1", "fc": "white", "ec": "none", "alpha": 0.7},
+            )
 
 
 def _draw_zone(axes: Axes, seen: FieldPreview) -> None:
@@ -192,8 +252,12 @@ def _draw_rose(rose: Axes, seen: FieldPreview, fan: HeadingFan) -> None:
         shut = math.degrees(half)
         rose.add_patch(Wedge((0.0, 0.0), 1.0, middle - shut, middle + shut, fc=RED, alpha=0.15))
         east, north = math.sin(twd), math.cos(twd)
-        rose.annotate("", xy=(1.0 * east, 1.0 * north), xytext=(1.3 * east, 1.3 * north),
-                      arrowprops={"arrowstyle": "-|>", "lw": 2.2, "color": "black"})
+        rose.annotate(
+            "",
+            xy=(1.0 * east, 1.0 * north),
+            xytext=(1.3 * east, 1.3 * north),
+            arrowprops={"arrowstyle": "-|>", "lw": 2.2, "color": "black"},
+        )
     fastest = max(float(fan.speeds_mps.max()), 1e-9)
     best = max(float(fan.worth_mps.max()), 1e-9)
     width = math.radians(5.0) * 0.42
@@ -205,14 +269,23 @@ def _draw_rose(rose: Axes, seen: FieldPreview, fan: HeadingFan) -> None:
             share = max(0.0, worth / best)
             rose.add_patch(Polygon(corners, fc=mpl.colormaps["YlGn"](0.15 + 0.75 * share), ec="none"))
     for heading, colour, style in ((fan.wanted_rad, BLUE, "--"), (fan.chosen_rad, RED, "-")):
-        rose.annotate("", xy=(1.08 * math.sin(heading), 1.08 * math.cos(heading)), xytext=(0.0, 0.0),
-                      arrowprops={"arrowstyle": "-|>", "lw": 1.8, "color": colour, "ls": style})
-    wind = "no wind needed" if twd is None else (
-        f"wind {seen.conditions.seen.tws_mps:g} m/s from {math.degrees(twd) % 360.0:03.0f}°")
+        rose.annotate(
+            "",
+            xy=(1.08 * math.sin(heading), 1.08 * math.cos(heading)),
+            xytext=(0.0, 0.0),
+            arrowprops={"arrowstyle": "-|>", "lw": 1.8, "color": colour, "ls": style},
+        )
+    wind = (
+        "no wind needed"
+        if twd is None
+        else (f"wind {seen.conditions.seen.tws_mps:g} m/s from {math.degrees(twd) % 360.0:03.0f}°")
+    )
     for knot in (0.5, 1.0):
         rose.add_patch(Disc((0.0, 0.0), knot, fc="none", ec=GREY, lw=0.6, ls=":"))
-    told = ", ".join(f"{word} {math.degrees(angle) % 360.0:03.0f}°" for word, angle in (
-        ("wanted", fan.wanted_rad), ("steered", fan.chosen_rad)))
+    told = ", ".join(
+        f"{word} {math.degrees(angle) % 360.0:03.0f}°"
+        for word, angle in (("wanted", fan.wanted_rad), ("steered", fan.chosen_rad))
+    )
     rose.set_title(f"the boat's fan, {wind}\nouter ring {fastest:.1f} m/s; {told}", fontsize=9)
 
 
@@ -229,6 +302,9 @@ def _handles(seen: FieldPreview, *, has_fans: bool) -> list[Patch | Line2D]:
         out.append(line(RED, "repels: 37 % of its strength here", ls=(0, (4, 3)), lw=1.0))
     if has_fans and seen.projection is not None:
         out.append(Patch(fc=SAND, alpha=0.5, label="fan of possible directions (Schmitt 4.4)"))
-    out += [line(BLUE, "in the fan: wanted", ls="--", lw=1.8), line(RED, "in the fan: steered", lw=1.8),
-            Patch(fc="#4aa85f", label="candidates: as long as fast, as green as good")]
+    out += [
+        line(BLUE, "in the fan: wanted", ls="--", lw=1.8),
+        line(RED, "in the fan: steered", lw=1.8),
+        Patch(fc="#4aa85f", label="candidates: as long as fast, as green as good"),
+    ]
     return out

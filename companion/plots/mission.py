@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 PORT, STARBOARD, LINE = "#c0392b", "#1e8449", "#5b2c83"
 TASK_WATER = "box to stay in, area to search"
-ARROW_SHARE = 0.35   # of the line's length
+ARROW_SHARE = 0.35  # of the line's length
 
 En = tuple[float, float]
 
@@ -58,8 +58,13 @@ def draw_gate(axes: Axes, port: En, starboard: En, name: str) -> None:
     way = heading_of(starboard[0] - port[0], starboard[1] - port[1]) - math.pi / 2.0
     east, north = unit_en(way)
     length_m = ARROW_SHARE * math.dist(port, starboard)
-    axes.annotate("", (middle[0] + length_m * east, middle[1] + length_m * north), middle,
-                  arrowprops={"arrowstyle": "-|>", "lw": 1.4, "color": LINE}, zorder=8)
+    axes.annotate(
+        "",
+        (middle[0] + length_m * east, middle[1] + length_m * north),
+        middle,
+        arrowprops={"arrowstyle": "-|>", "lw": 1.4, "color": LINE},
+        zorder=8,
+    )
     axes.annotate(name, starboard, xytext=(8, 6), textcoords="offset points", fontsize=8, zorder=9)
 
 
@@ -102,7 +107,7 @@ def corners_of(mission: Mission) -> list[En]:
 
 
 def sweeps_of(
-    mission: Mission, local: LocalArea, start: En | None, twd_from_rad: float,
+    mission: Mission, local: LocalArea, start: En | None, twd_from_rad: float
 ) -> list[tuple[str, tuple[Sweep, ...]]]:
     """Return the sweeps of each search as they would be laid for this wind; under way they are for the wind then."""
     out = []
@@ -136,7 +141,12 @@ Points = NDArray[np.float64]
 
 
 def save_mission(
-    mission: Mission, path: str | Path, *, tws_mps: float, twd_from_rad: float, beat_rad: float,
+    mission: Mission,
+    path: str | Path,
+    *,
+    tws_mps: float,
+    twd_from_rad: float,
+    beat_rad: float,
     plans: Sequence[Plan] = (),
 ) -> list[str]:
     """Draw a mission and save it; return what the picture has to say in words.
@@ -171,7 +181,8 @@ def save_mission(
     _finish(axes, extent, twd_from_rad, tws_mps, handles)
     words = _words(mission, plans) + [
         f"{name}: {counted(len(laid), 'sweep')}, {length_m(laid):.0f} m, beside the time of the way there"
-        for name, laid in sweeps]
+        for name, laid in sweeps
+    ]
     subtitle = words[0] if words else mission.options.description
     where = place_words(mission.origin.lat_deg, mission.origin.lon_deg)
     figure.suptitle(f"{mission.name}   ·   {where}\n{subtitle}", fontsize=10, x=0.1, ha="left")
@@ -180,9 +191,16 @@ def save_mission(
 
 
 def save_area(
-    area: Area, path: str | Path, *, start: GeoPoint | None = None, goals: tuple[GeoPoint, ...] = (),
-    margin_m: float = 0.0, twd_from_rad: float | None = None, no_go_half_rad: float = math.radians(47.0),
-    title: str = "", names: Sequence[str] = (),
+    area: Area,
+    path: str | Path,
+    *,
+    start: GeoPoint | None = None,
+    goals: tuple[GeoPoint, ...] = (),
+    margin_m: float = 0.0,
+    twd_from_rad: float | None = None,
+    no_go_half_rad: float = math.radians(47.0),
+    title: str = "",
+    names: Sequence[str] = (),
 ) -> None:
     """Draw an area alone and save it; ``names`` are the goals'. Raises InputError when the file cannot be written."""
     shapes = [z.shape for z in area.fence.inclusions] + [o.shape for o in area.solids]
@@ -199,10 +217,11 @@ def save_area(
     for index, place in enumerate(places):
         is_start = start is not None and index == 0
         axes.plot(*place, "o", color=START if is_start else GOAL, ms=8, mec="black", mew=0.6, zorder=8)
-        number = index + (start is None)   # of a goal, from 1
+        number = index + (start is None)  # of a goal, from 1
         name = "start" if is_start else (names[number - 1] if number <= len(names) else "") or f"goal {number}"
-        axes.annotate(name, place, xytext=(7, -10) if is_start else (8, 6), textcoords="offset points", fontsize=8,
-                      zorder=9)
+        axes.annotate(
+            name, place, xytext=(7, -10) if is_start else (8, 6), textcoords="offset points", fontsize=8, zorder=9
+        )
     handles += [_dot(START, "start")] if start is not None else []
     handles += [_dot(GOAL, "goal")] if goals else []
     _finish(axes, extent, twd_from_rad, None, handles)
@@ -235,8 +254,16 @@ def draw_area(axes: Axes, local: LocalArea, margin_m: float) -> list[Handle]:
         if len(local.polygons) <= 30:
             for name, polygon in zip(local.names, local.polygons, strict=True):
                 at = polygon.representative_point()
-                axes.annotate(name, (at.x, at.y), fontsize=6.5, ha="center", va="center", color="#5b5135", zorder=5,
-                              annotation_clip=True)
+                axes.annotate(
+                    name,
+                    (at.x, at.y),
+                    fontsize=6.5,
+                    ha="center",
+                    va="center",
+                    color="#5b5135",
+                    zorder=5,
+                    annotation_clip=True,
+                )
     return handles
 
 
@@ -249,12 +276,15 @@ def _draw_autopilot(axes: Axes, mission: Mission, frame: LocalFrame) -> list[Han
     for zone in result.zones:
         ring = polygon_en(zone.shape, frame, cover=zone.kind is ZoneKind.EXCLUSION)
         axes.add_patch(PathPatch(outline(ring), fc="none", ec=AUTOPILOT, lw=0.9, ls=(0, (3, 2)), zorder=4))
-    return [Line2D([], [], color=AUTOPILOT, lw=0.9, ls=(0, (3, 2)),
-                   label=f"fence on the autopilot ({len(result.items)} items)")]
+    return [
+        Line2D(
+            [], [], color=AUTOPILOT, lw=0.9, ls=(0, (3, 2)), label=f"fence on the autopilot ({len(result.items)} items)"
+        )
+    ]
 
 
 def _draw_laylines(
-    axes: Axes, places: list[En], twd_from_rad: float, beat_rad: float, extent: tuple[float, float, float, float],
+    axes: Axes, places: list[En], twd_from_rad: float, beat_rad: float, extent: tuple[float, float, float, float]
 ) -> list[Handle]:
     """Draw the two laylines of each mark that lies to windward of the place before it."""
     reach_m = math.hypot(extent[2] - extent[0], extent[3] - extent[1])
@@ -267,8 +297,14 @@ def _draw_laylines(
         length_m = min(reach_m, 1.1 * math.hypot(mark[0] - before[0], mark[1] - before[1]))
         for side, colour in ((-1.0, STARBOARD), (1.0, PORT)):  # wind over starboard: heading = from - angle
             east, north = unit_en(twd_from_rad + side * beat_rad)
-            axes.plot([mark[0], mark[0] - length_m * east], [mark[1], mark[1] - length_m * north], color=colour, lw=1.0,
-                      ls=(0, (7, 3)), zorder=4)
+            axes.plot(
+                [mark[0], mark[0] - length_m * east],
+                [mark[1], mark[1] - length_m * north],
+                color=colour,
+                lw=1.0,
+                ls=(0, (7, 3)),
+                zorder=4,
+            )
     if not drawn:
         return []
     angle = math.degrees(beat_rad)
@@ -288,8 +324,12 @@ def draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En]) 
     for index, (place, goal) in enumerate(zip(goals, mission.goals, strict=True)):
         name = goal.name or (f"goal {index + 1}" if len(goals) > 1 else "goal")
         if goal.gate is not None:
-            draw_gate(axes, mission.frame().en_from_geo(goal.gate.port), mission.frame().en_from_geo(
-                goal.gate.starboard), name)
+            draw_gate(
+                axes,
+                mission.frame().en_from_geo(goal.gate.port),
+                mission.frame().en_from_geo(goal.gate.starboard),
+                name,
+            )
             continue
         water = goal.box or goal.search
         if water is not None:
@@ -315,7 +355,10 @@ def _dot(colour: str, label: str) -> Line2D:
 
 
 def _finish(
-    axes: Axes, extent: tuple[float, float, float, float], twd_from_rad: float | None, tws_mps: float | None,
+    axes: Axes,
+    extent: tuple[float, float, float, float],
+    twd_from_rad: float | None,
+    tws_mps: float | None,
     handles: list[Handle],
 ) -> None:
     axes.set(xlim=(extent[0], extent[2]), ylim=(extent[1], extent[3]), aspect="equal")
@@ -328,21 +371,33 @@ def _finish(
         east, north = unit_en(twd_from_rad)
         cx, cy, size = 0.91, 0.91, 0.05
         axes.annotate(
-            "", (cx - size * east, cy - size * north), (cx + size * east, cy + size * north),
-            xycoords="axes fraction", textcoords="axes fraction",
-            arrowprops={"arrowstyle": "-|>", "lw": 2.0, "color": WIND}, zorder=10)
+            "",
+            (cx - size * east, cy - size * north),
+            (cx + size * east, cy + size * north),
+            xycoords="axes fraction",
+            textcoords="axes fraction",
+            arrowprops={"arrowstyle": "-|>", "lw": 2.0, "color": WIND},
+            zorder=10,
+        )
         speed = f", {tws_mps:g} m/s" if tws_mps is not None else ""
-        axes.text(cx, cy - 0.075, f"from {math.degrees(twd_from_rad) % 360.0:03.0f}°{speed}", transform=axes.transAxes,
-                  ha="center", va="top", fontsize=8, color=WIND, zorder=10,
-                  bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 1.5})
+        axes.text(
+            cx,
+            cy - 0.075,
+            f"from {math.degrees(twd_from_rad) % 360.0:03.0f}°{speed}",
+            transform=axes.transAxes,
+            ha="center",
+            va="top",
+            fontsize=8,
+            color=WIND,
+            zorder=10,
+            bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 1.5},
+        )
     figure = axes.get_figure(root=True)
     if handles and figure is not None:
         figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=8, frameon=False)
 
 
-def extent_of(
-    local: LocalArea, places: list[En], paths: list[Points],
-) -> tuple[float, float, float, float]:
+def extent_of(local: LocalArea, places: list[En], paths: list[Points]) -> tuple[float, float, float, float]:
     """Return a square that holds the places, the paths, and what land lies about them."""
     xy = [np.array(places).reshape(-1, 2), *paths]
     points = np.vstack(xy)
@@ -378,8 +433,11 @@ def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
         else:
             out.append(f"{name}: no path ({answer.status.value}): {answer.reason}")
     if len(out) > 1 and all(p.has_path for p in plans):
-        out.insert(0, f"{sum(p.cost_s for p in plans):.0f} s to all {min(len(plans), len(mission.goals))} goals"
-                   + (" and home" if len(plans) > len(mission.goals) else ""))
+        out.insert(
+            0,
+            f"{sum(p.cost_s for p in plans):.0f} s to all {min(len(plans), len(mission.goals))} goals"
+            + (" and home" if len(plans) > len(mission.goals) else ""),
+        )
     if plans and any(g.rounding or g.gate for g in mission.goals):
         out.append("the preview sails to the marks; on which side they are left is the skipper's part")
     return out

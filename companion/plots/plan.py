@@ -40,7 +40,7 @@ FANS_MOST = 14
 
 
 def save_plan(
-    problem: Problem, plan: Plan, path: str | Path, *, area: LocalArea | None = None, margin_m: float = 0.0,
+    problem: Problem, plan: Plan, path: str | Path, *, area: LocalArea | None = None, margin_m: float = 0.0
 ) -> None:
     """Draw a plan and save it.
 
@@ -63,7 +63,7 @@ def save_plan(
 
 
 def draw_plan(
-    axes: Axes, problem: Problem, plan: Plan, *, title: str | None = None, fans: bool = True, solids: bool = True,
+    axes: Axes, problem: Problem, plan: Plan, *, title: str | None = None, fans: bool = True, solids: bool = True
 ) -> None:
     """Draw problem, search, path, fans and a wind arrow into axes in local metres."""
     x0, y0, x1, y1 = _frame(problem, plan)
@@ -77,27 +77,40 @@ def draw_plan(
         axes.plot([], [], color=TREE, lw=0.6, label="search tree")
     for k, other in enumerate(plan.trace.get("paths", ()) if plan.trace else ()):  # the candidates that auto weighed
         way = np.asarray(other)
-        axes.plot(way[:, 0], way[:, 1], "-", color=TREE, lw=1.0, zorder=2,
-                  label=None if k else "ways that were weighed")
-    axes.plot([problem.start_en[0], problem.goal_en[0]], [problem.start_en[1], problem.goal_en[1]], ls=":", lw=0.8,
-              color="#777777", zorder=2, label="straight line")
+        axes.plot(
+            way[:, 0], way[:, 1], "-", color=TREE, lw=1.0, zorder=2, label=None if k else "ways that were weighed"
+        )
+    axes.plot(
+        [problem.start_en[0], problem.goal_en[0]],
+        [problem.start_en[1], problem.goal_en[1]],
+        ls=":",
+        lw=0.8,
+        color="#777777",
+        zorder=2,
+        label="straight line",
+    )
     if plan.has_path:
         way = np.asarray(plan.waypoints_en)
         if fans:
             _fans(axes, problem, plan, 0.055 * max(x1 - x0, y1 - y0))
-        axes.plot(way[:, 0], way[:, 1], "-", color=PATH, lw=1.9, zorder=5, solid_joinstyle="round",
-                  label="plan")
+        axes.plot(way[:, 0], way[:, 1], "-", color=PATH, lw=1.9, zorder=5, solid_joinstyle="round", label="plan")
         axes.plot(way[1:-1, 0], way[1:-1, 1], "o", color=PATH, ms=3.2, zorder=6)
     axes.plot(*problem.start_en, "o", color=START, ms=8, mec="black", mew=0.6, zorder=7, ls="", label="start")
     axes.add_patch(Circle(problem.goal_en, max(problem.goal_radius_m, 1e-6), fc="none", ec=GOAL, lw=1.2, zorder=7))
-    axes.plot(*problem.goal_en, "o", color=GOAL, ms=8, mec="black", mew=0.6, zorder=7, ls="",
-              label="goal and its radius")
+    axes.plot(
+        *problem.goal_en, "o", color=GOAL, ms=8, mec="black", mew=0.6, zorder=7, ls="", label="goal and its radius"
+    )
     draw_wind(axes, problem)
     for k, target in enumerate(resolved(problem).targets):
         axes.plot([], [], color="#7a3fa0", ls="--", label=None if k else "vessel, and where it is in a minute")
         axes.add_patch(Circle((target.x_m, target.y_m), target.radius_m, fc="none", ec="#7a3fa0", ls="--", zorder=4))
-        axes.annotate("", (target.x_m + 60.0 * target.vx_mps, target.y_m + 60.0 * target.vy_mps),
-                      (target.x_m, target.y_m), arrowprops={"arrowstyle": "->", "color": "#7a3fa0"}, zorder=4)
+        axes.annotate(
+            "",
+            (target.x_m + 60.0 * target.vx_mps, target.y_m + 60.0 * target.vy_mps),
+            (target.x_m, target.y_m),
+            arrowprops={"arrowstyle": "->", "color": "#7a3fa0"},
+            zorder=4,
+        )
     axes.set(xlim=(x0, x1), ylim=(y0, y1), aspect="equal")
     axes.tick_params(labelsize=7)
     axes.set_xlabel("east [m]", fontsize=8)
@@ -127,10 +140,17 @@ def draw_wind(axes: Axes, problem: Problem) -> None:
     east, north = math.sin(problem.wind.twd_from_rad), math.cos(problem.wind.twd_from_rad)
     cx, cy, size = 0.09, 0.91, 0.055
     axes.annotate(
-        "", (cx - size * east, cy - size * north), (cx + size * east, cy + size * north), xycoords="axes fraction",
-        textcoords="axes fraction", arrowprops={"arrowstyle": "-|>", "lw": 1.8, "color": "#1f4e79"}, zorder=9)
-    axes.text(cx, cy - 0.075, "wind", transform=axes.transAxes, ha="center", va="top", fontsize=7, color="#1f4e79",
-              zorder=9)
+        "",
+        (cx - size * east, cy - size * north),
+        (cx + size * east, cy + size * north),
+        xycoords="axes fraction",
+        textcoords="axes fraction",
+        arrowprops={"arrowstyle": "-|>", "lw": 1.8, "color": "#1f4e79"},
+        zorder=9,
+    )
+    axes.text(
+        cx, cy - 0.075, "wind", transform=axes.transAxes, ha="center", va="top", fontsize=7, color="#1f4e79", zorder=9
+    )
 
 
 def _outline(shape: shapely.Geometry) -> DrawnPath:
@@ -159,12 +179,15 @@ def _fans(axes: Axes, problem: Problem, plan: Plan, radius_m: float) -> None:
         leg = next((item for item in plan.legs if t <= item.end_s), plan.legs[-1])
         span = leg.end_s - leg.start_s
         share = 0.0 if span <= 0.0 else min(1.0, max(0.0, (t - leg.start_s) / span))
-        at = (leg.from_en[0] + share * (leg.to_en[0] - leg.from_en[0]),
-              leg.from_en[1] + share * (leg.to_en[1] - leg.from_en[1]))
+        at = (
+            leg.from_en[0] + share * (leg.to_en[0] - leg.from_en[0]),
+            leg.from_en[1] + share * (leg.to_en[1] - leg.from_en[1]),
+        )
         wide = min(180.0, math.degrees(problem.no_go_half_rad(float(t))))
         for half, colour, zorder in ((wide, WIDER, 0.6), (own, FAN, 0.7)):
-            axes.add_patch(Wedge(at, radius_m, windward_deg - half, windward_deg + half, fc=colour, lw=0,
-                                 zorder=zorder))
+            axes.add_patch(
+                Wedge(at, radius_m, windward_deg - half, windward_deg + half, fc=colour, lw=0, zorder=zorder)
+            )
 
 
 def _frame(problem: Problem, plan: Plan) -> tuple[float, float, float, float]:

@@ -17,7 +17,7 @@ from matplotlib.projections.polar import PolarAxes
 from companion.boat import Polar
 from companion.plots.chart import save
 
-NINETY = 1.645      # standard deviations to either side that nine in ten lie in
+NINETY = 1.645  # standard deviations to either side that nine in ten lie in
 MOST_CURVES = 4
 
 
@@ -36,7 +36,7 @@ def polar_figure(polar: Polar, speed_error: float, *, title: str) -> Figure:
     axes.set_thetamax(180.0)
     winds = [float(w) for w in polar.tws_mps if w > 0.0] or [5.0]
     angles = np.radians(np.arange(0.0, 181.0, 1.0))
-    for n, tws_mps in enumerate(winds[::-1][::math.ceil(len(winds) / MOST_CURVES)]):
+    for n, tws_mps in enumerate(winds[::-1][:: math.ceil(len(winds) / MOST_CURVES)]):
         speeds, colour = polar.speeds_mps(angles, tws_mps), plt.get_cmap("viridis")(0.2 + 0.22 * n)
         axes.plot(angles, speeds, color=colour, label=f"{tws_mps:.1f} m/s of wind")
         if speed_error > 0.0 and n == 0:

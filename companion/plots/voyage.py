@@ -91,8 +91,15 @@ def _chart(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
         way = np.asarray(decision.plan.waypoints if decision.plan else (), dtype=np.float64)
         first = i == 0
         axes.plot(
-            way[:, 0], way[:, 1], color=PLAN_GREY, linewidth=1.6 if first else 0.8, alpha=0.95 if first else 0.4,
-            linestyle="--" if first else "-", marker="o" if first else None, markersize=3.5, zorder=3,
+            way[:, 0],
+            way[:, 1],
+            color=PLAN_GREY,
+            linewidth=1.6 if first else 0.8,
+            alpha=0.95 if first else 0.4,
+            linestyle="--" if first else "-",
+            marker="o" if first else None,
+            markersize=3.5,
+            zorder=3,
             label="first plan" if first else ("later plan" if i == 1 else None),
         )
     _fans(axes, chart, plans)
@@ -107,8 +114,16 @@ def _chart(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
             label = None
     _goals(axes, chart)
     if len(known):
-        axes.plot(east[known[0]], north[known[0]], "o", color="white", markeredgecolor="black", markersize=8, zorder=7,
-                  label="first position")
+        axes.plot(
+            east[known[0]],
+            north[known[0]],
+            "o",
+            color="white",
+            markeredgecolor="black",
+            markersize=8,
+            zorder=7,
+            label="first position",
+        )
         axes.plot(east[known[-1]], north[known[-1]], "s", color="black", markersize=5, zorder=7, label="last position")
     _wind_arrow(axes, c)
     axes.set_aspect("equal", adjustable="datalim")
@@ -139,7 +154,7 @@ def _goals(axes: Any, chart: RecordedChart) -> None:
         axes.annotate(name + side, (goal.x, goal.y), xytext=(9, 7), textcoords="offset points", zorder=8)
     if any(goal.line is not None for goal in chart.goals):
         for handle in gate_handles():
-            axes.add_line(handle)   # nothing of it is drawn: it stands in the legend
+            axes.add_line(handle)  # nothing of it is drawn: it stands in the legend
     if any(goal.water is not None for goal in chart.goals):
         axes.add_line(water_handle(TASK_WATER))
     if any(goal.line is None and goal.water is None for goal in chart.goals):
@@ -156,10 +171,23 @@ def _fans(axes: Any, chart: RecordedChart, plans: list[RecordedPlan]) -> None:
     scale = 0.055 * max((math.dist(leg.start_en, legs[-1].end_en) for leg in legs), default=100.0)
     middle = 90.0 - plans[0].twd_deg
     for k, leg in enumerate(legs):
-        for angle, shade, layer, name in ((leg.no_go_half_deg, "#f3c1bd", 2.4, "no-go zone as widened"),
-                                          (chart.no_go_half_deg, "#d9867f", 2.5, "no-go zone")):
-            axes.add_patch(Wedge(leg.start_en, scale, middle - angle, middle + angle, facecolor=shade, alpha=0.55,
-                                 edgecolor="none", zorder=layer, label=None if k else name))
+        for angle, shade, layer, name in (
+            (leg.no_go_half_deg, "#f3c1bd", 2.4, "no-go zone as widened"),
+            (chart.no_go_half_deg, "#d9867f", 2.5, "no-go zone"),
+        ):
+            axes.add_patch(
+                Wedge(
+                    leg.start_en,
+                    scale,
+                    middle - angle,
+                    middle + angle,
+                    facecolor=shade,
+                    alpha=0.55,
+                    edgecolor="none",
+                    zorder=layer,
+                    label=None if k else name,
+                )
+            )
 
 
 def _sailed(axes: Any, record: VoyageRecord) -> None:
@@ -195,13 +223,23 @@ def _wind_arrow(axes: Any, c: dict[str, NDArray[np.float64]]) -> None:
     mean = math.atan2(float(np.sin(np.radians(twd)).mean()), float(np.cos(np.radians(twd)).mean()))
     x, y, length = 0.07, 0.90, 0.07
     axes.annotate(
-        "", xy=(x - length / 2 * math.sin(mean), y - length / 2 * math.cos(mean)),
+        "",
+        xy=(x - length / 2 * math.sin(mean), y - length / 2 * math.cos(mean)),
         xytext=(x + length / 2 * math.sin(mean), y + length / 2 * math.cos(mean)),
-        xycoords="axes fraction", textcoords="axes fraction",
+        xycoords="axes fraction",
+        textcoords="axes fraction",
         arrowprops={"arrowstyle": "-|>", "color": WIND_BLUE, "linewidth": 2.4},
     )
-    axes.text(x, y - 0.075, f"mean wind\n{math.degrees(mean) % 360.0:03.0f}°", transform=axes.transAxes,
-              color=WIND_BLUE, ha="center", va="top", fontsize=9)
+    axes.text(
+        x,
+        y - 0.075,
+        f"mean wind\n{math.degrees(mean) % 360.0:03.0f}°",
+        transform=axes.transAxes,
+        color=WIND_BLUE,
+        ha="center",
+        va="top",
+        fontsize=9,
+    )
 
 
 def _wrap_deg(angle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -217,8 +255,15 @@ def _direction(axes: Any, record: VoyageRecord) -> None:
     if known.any() and np.nanmean(unwrapped) > 180.0:
         unwrapped -= 360.0
     sigma = c["twd_sigma_deg"]
-    axes.fill_between(t, unwrapped - 1.96 * sigma, unwrapped + 1.96 * sigma, color=WIND_BLUE, alpha=0.15, linewidth=0,
-                      label="95 % a minute ahead")
+    axes.fill_between(
+        t,
+        unwrapped - 1.96 * sigma,
+        unwrapped + 1.96 * sigma,
+        color=WIND_BLUE,
+        alpha=0.15,
+        linewidth=0,
+        label="95 % a minute ahead",
+    )
     axes.plot(t, unwrapped, color=WIND_BLUE, linewidth=1.2, label="wind from (5 s mean)")
     axes.set_ylabel("TWD, °")
     legend_above(axes)
@@ -257,8 +302,15 @@ def _no_go(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
             xs.append(times[k + 1])
             ys.append(ys[-1])
         if xs:
-            axes.fill_between(xs, bare, ys, color="#f3c1bd", alpha=0.6, linewidth=0,
-                              label="as the plan widened it" if k == 0 else None)
+            axes.fill_between(
+                xs,
+                bare,
+                ys,
+                color="#f3c1bd",
+                alpha=0.6,
+                linewidth=0,
+                label="as the plan widened it" if k == 0 else None,
+            )
     twa = np.abs(_wrap_deg(c["heading_deg"] - c["twd_deg"]))
     axes.plot(c["t_s"] - t0, twa, color="black", linewidth=0.9, label="|TWA| as sailed")
     axes.set_ylim(0.0, 180.0)

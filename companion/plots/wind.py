@@ -38,11 +38,21 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-TRUE, BAND, MEDIAN = "#1f5fa8", "#e08a1e", "#b3541e"      # true wind is blue, as on other displays
+TRUE, BAND, MEDIAN = "#1f5fa8", "#e08a1e", "#b3541e"  # true wind is blue, as on other displays
 PORT, STARBOARD, PLAIN = "#c1272d", "#2e8b3d", "#1f5fa8"
 # Of the estimators' curves, in the order of their table; one more gets the next.
-_STYLES = (("#b3541e", "o"), ("#777777", "s"), ("#2e8b3d", "D"), ("#8e44ad", "P"), ("#c2185b", "X"), ("#1f5fa8", "^"),
-           ("#6fa8dc", "v"), ("#8c6d1f", "<"), ("#17a2a2", ">"), ("#222222", "*"))
+_STYLES = (
+    ("#b3541e", "o"),
+    ("#777777", "s"),
+    ("#2e8b3d", "D"),
+    ("#8e44ad", "P"),
+    ("#c2185b", "X"),
+    ("#1f5fa8", "^"),
+    ("#6fa8dc", "v"),
+    ("#8c6d1f", "<"),
+    ("#17a2a2", ">"),
+    ("#222222", "*"),
+)
 _STRIP_MIN = 60.0
 _LAG_S = 600.0
 
@@ -80,7 +90,8 @@ def wind_figure(record: Record, scores: Sequence[Score]) -> Figure:
     figure.suptitle(
         f"{record.name}: true wind, mean {np.mean(record.tws_mps):.1f} m/s from "
         f"{math.degrees(centre) % 360.0:.0f}°, {record.duration_s / 60.0:.0f} min; forecasts by "
-        f"“{scores[0].estimator}”", fontsize=12,
+        f"“{scores[0].estimator}”",
+        fontsize=12,
     )
     return figure
 
@@ -110,8 +121,9 @@ def draw_direction(axes: Axes, record: Record, score: Score, centre_rad: float) 
         middle = _about(trace[:, 1], centre_rad)
         for column, alpha, name in ((3, 0.22, "95 %"), (2, 0.38, "50 %")):
             half = np.degrees(trace[:, column])
-            axes.fill_between(t, middle - half, middle + half, color=BAND, alpha=alpha, lw=0.0,
-                              label=f"forecast 2 min before, {name}")
+            axes.fill_between(
+                t, middle - half, middle + half, color=BAND, alpha=alpha, lw=0.0, label=f"forecast 2 min before, {name}"
+            )
         # A mean that crosses the edge of the picture is not a line across it.
         axes.plot(t, np.where(np.abs(np.diff(middle, prepend=middle[0])) > 180.0, np.nan, middle), color=MEDIAN, lw=0.9)
     low, high = np.percentile(_about(record.twd_from_rad, centre_rad), [0.5, 99.5])
@@ -159,8 +171,8 @@ def draw_strips(direction: Axes, speed: Axes, record: Record, centre_rad: float)
         colours = [STARBOARD if s > 0 else PORT for s in side]
     points = np.stack([mean, ago], axis=1)
     gap = np.abs(np.diff(mean)) > 120.0
-    lines = [points[i:i + 2] for i in range(len(points) - 1) if not gap[i] and np.all(np.isfinite(points[i:i + 2]))]
-    shown = [c for i, c in enumerate(colours[:-1]) if not gap[i] and np.all(np.isfinite(points[i:i + 2]))]
+    lines = [points[i : i + 2] for i in range(len(points) - 1) if not gap[i] and np.all(np.isfinite(points[i : i + 2]))]
+    shown = [c for i, c in enumerate(colours[:-1]) if not gap[i] and np.all(np.isfinite(points[i : i + 2]))]
     direction.add_collection(LineCollection(lines, colors=shown, linewidths=1.6))
     good = mean[np.isfinite(mean)]
     low, middle, high = np.percentile(good, [5, 50, 95])
@@ -200,9 +212,13 @@ def draw_reliability(axes: Axes, scores: Sequence[Score]) -> None:
     for score in scores:
         if score.pit.size:
             inside = 2.0 * np.abs(score.pit - 0.5)
-            axes.plot(100.0 * level, [100.0 * float(np.mean(inside <= p)) for p in level],
-                      color=_style(score)[0], lw=2.0 if score is scores[0] else 1.1,
-                      label=score.estimator)
+            axes.plot(
+                100.0 * level,
+                [100.0 * float(np.mean(inside <= p)) for p in level],
+                color=_style(score)[0],
+                lw=2.0 if score is scores[0] else 1.1,
+                label=score.estimator,
+            )
     axes.set_xlabel("promised: within interval [%]")
     axes.set_ylabel("observed [%]")
     axes.set_title("reliability at 2 min", fontsize=9)
@@ -229,9 +245,15 @@ def draw_crps(axes: Axes, scores: Sequence[Score]) -> None:
     for score in scores:
         if score.horizons:
             colour, mark = _style(score)
-            axes.plot([h.horizon_s for h in score.horizons], [math.degrees(h.crps_rad) for h in score.horizons],
-                      color=colour, marker=mark, ms=4,
-                      lw=2.0 if score is scores[0] else 1.1, label=score.estimator)
+            axes.plot(
+                [h.horizon_s for h in score.horizons],
+                [math.degrees(h.crps_rad) for h in score.horizons],
+                color=colour,
+                marker=mark,
+                ms=4,
+                lw=2.0 if score is scores[0] else 1.1,
+                label=score.estimator,
+            )
     axes.set_xscale("log")
     axes.set_xlim(8, 750)
     ticks = [10, 30, 60, 120, 300, 600]
@@ -252,9 +274,14 @@ def draw_histogram(axes: Axes, record: Record, centre_rad: float) -> None:
     reach = min(180.0, max(15.0, 3.5 * spread))
     axes.hist(off, bins=60, range=(-reach, reach), density=True, color=TRUE, alpha=0.6)
     x = np.linspace(-reach, reach, 200)
-    axes.plot(x, np.exp(-0.5 * (x / spread) ** 2) / (spread * math.sqrt(2.0 * math.pi)), color=MEDIAN, lw=1.4,
-              label=f"normal, sd {spread:.1f}°")
-    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])   # room for the legend over the curve
+    axes.plot(
+        x,
+        np.exp(-0.5 * (x / spread) ** 2) / (spread * math.sqrt(2.0 * math.pi)),
+        color=MEDIAN,
+        lw=1.4,
+        label=f"normal, sd {spread:.1f}°",
+    )
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend over the curve
     axes.set_xlabel("direction about its mean [°]")
     axes.set_yticks([])
     axes.set_title("distribution of direction", fontsize=9)
@@ -268,9 +295,14 @@ def draw_strength(axes: Axes, record: Record) -> None:
     top = float(np.max(speed)) + 0.5
     axes.hist(speed, bins=40, range=(0.0, top), density=True, color=TRUE, alpha=0.6)
     x = np.linspace(0.0, top, 200)
-    axes.plot(x, np.exp(-0.5 * ((x - mean) / spread) ** 2) / (spread * math.sqrt(2.0 * math.pi)), color=MEDIAN, lw=1.4,
-              label=f"normal, sd {spread:.1f} m/s")
-    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])   # room for the legend over the curve
+    axes.plot(
+        x,
+        np.exp(-0.5 * ((x - mean) / spread) ** 2) / (spread * math.sqrt(2.0 * math.pi)),
+        color=MEDIAN,
+        lw=1.4,
+        label=f"normal, sd {spread:.1f} m/s",
+    )
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])  # room for the legend over the curve
     axes.set_xlabel("wind speed [m/s]")
     axes.set_yticks([])
     axes.set_title("distribution of strength", fontsize=9)
@@ -303,11 +335,11 @@ def autocorrelation(record: Record, centre_rad: float) -> tuple[Array, Array]:
     x -= np.mean(x)
     most = min(int(_LAG_S / step), x.size // 2)
     variance = max(1e-12, float(np.mean(x * x)))
-    values = [float(np.mean(x[:x.size - k] * x[k:])) / variance for k in range(most + 1)]
+    values = [float(np.mean(x[: x.size - k] * x[k:])) / variance for k in range(most + 1)]
     return np.arange(most + 1, dtype=np.float64) * step, np.array(values, dtype=np.float64)
 
 
-_FIRST, _LAST = 0.05, 0.85      # of the colour map: its last yellow is not seen on white
+_FIRST, _LAST = 0.05, 0.85  # of the colour map: its last yellow is not seen on white
 _REFERENCE = "#b3541e"
 
 
@@ -320,7 +352,7 @@ def filter_figure(found: Characterisation, *, title: str = "") -> Figure:
     """Return the picture of a characterisation with at least one horizon."""
     horizons = found.horizons_s
     figure, axes = plt.subplots(
-        2, len(horizons), figsize=(1.2 + 3.9 * len(horizons), 7.4), layout="constrained", squeeze=False, sharex=True,
+        2, len(horizons), figsize=(1.2 + 3.9 * len(horizons), 7.4), layout="constrained", squeeze=False, sharex=True
     )
     for column, horizon_s in enumerate(horizons):
         above, below = axes[0, column], axes[1, column]
@@ -351,12 +383,27 @@ def _draw(axes: Axes, found: Characterisation, horizon_s: float, value: Callable
     for i, n in enumerate(windows):
         of = [(cell.r_deg, value(s)) for cell in found.cells if cell.window == n and (s := cell.at(horizon_s))]
         share = i / max(1, len(windows) - 1)
-        axes.plot(*zip(*of, strict=True), marker="o", ms=3, lw=1.4, label=f"N = {n}",
-                  color=colours(_FIRST + (_LAST - _FIRST) * share))
+        axes.plot(
+            *zip(*of, strict=True),
+            marker="o",
+            ms=3,
+            lw=1.4,
+            label=f"N = {n}",
+            color=colours(_FIRST + (_LAST - _FIRST) * share),
+        )
     chosen = found.chosen
     if chosen is not None and (there := chosen.at(horizon_s)) is not None:
-        axes.plot([chosen.r_deg], [value(there)], marker="*", ms=15, mfc="#f2c14e", mec="black", ls="none", zorder=5,
-                  label=f"the mission's default: R = {chosen.r_deg:g}°, N = {chosen.window}")
+        axes.plot(
+            [chosen.r_deg],
+            [value(there)],
+            marker="*",
+            ms=15,
+            mfc="#f2c14e",
+            mec="black",
+            ls="none",
+            zorder=5,
+            label=f"the mission's default: R = {chosen.r_deg:g}°, N = {chosen.window}",
+        )
     reference = next(s for s in found.default if s.horizon_s == horizon_s)
     axes.axhline(value(reference), color=_REFERENCE, ls="--", lw=1.6, label="default forecaster")
     axes.set_xscale("log")

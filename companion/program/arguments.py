@@ -24,16 +24,20 @@ PICTURES = (".png", ".svg", ".pdf", ".jpg")
 
 
 def add_command(
-    subparsers: argparse._SubParsersAction[argparse.ArgumentParser], name: str, summary: str, epilog: str,
+    subparsers: argparse._SubParsersAction[argparse.ArgumentParser], name: str, summary: str, epilog: str
 ) -> argparse.ArgumentParser:
     """Add a command that its summary describes; the lines of ``epilog`` stay as they are."""
     return subparsers.add_parser(
-        name, help=summary, description=summary[0].upper() + summary[1:] + ".", epilog=epilog,
-        formatter_class=argparse.RawDescriptionHelpFormatter)
+        name,
+        help=summary,
+        description=summary[0].upper() + summary[1:] + ".",
+        epilog=epilog,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
 
 
 def number(
-    unit: str = "", *, above: float | None = None, at_least: float | None = None, at_most: float | None = None,
+    unit: str = "", *, above: float | None = None, at_least: float | None = None, at_most: float | None = None
 ) -> Callable[[str], float]:
     """Return the reader of a finite number in a range; ``unit`` is what the refusal calls it."""
     allowed = _range(above, at_least, at_most, unit)
@@ -140,9 +144,15 @@ def http_address(text: str) -> tuple[str, int]:
 
 def chart_option(parser: ArgumentParser) -> None:
     """Add the option of what a page shows under its own water."""
-    parser.add_argument("--chart", type=Path, action="append", default=[], metavar="FILE",
-                        help="a chart under the page's own water: raster tiles in MBTiles or PMTiles; may be given "
-                        "more than once, the lowest first")
+    parser.add_argument(
+        "--chart",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a chart under the page's own water: raster tiles in MBTiles or PMTiles; may be given "
+        "more than once, the lowest first",
+    )
 
 
 def host_name(text: str) -> str:
@@ -153,8 +163,11 @@ def host_name(text: str) -> str:
 
 
 def _is_within(value: float, above: float | None, at_least: float | None, at_most: float | None) -> bool:
-    return (above is None or value > above) and (at_least is None or value >= at_least) and (
-        at_most is None or value <= at_most)
+    return (
+        (above is None or value > above)
+        and (at_least is None or value >= at_least)
+        and (at_most is None or value <= at_most)
+    )
 
 
 def _range(above: float | None, at_least: float | None, at_most: float | None, unit: str = "") -> str:

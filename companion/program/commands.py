@@ -83,7 +83,8 @@ def safe_streams() -> Iterator[None]:
     before = sys.stdout, sys.stderr
     sys.stdout, sys.stderr = (
         stream if stream is None or isinstance(stream, SafeStream) else cast("TextIO", SafeStream(stream))
-        for stream in before)
+        for stream in before
+    )
     try:
         yield
     finally:
@@ -140,7 +141,7 @@ class Parser(argparse.ArgumentParser):
         self.commands = subparsers.choices
         return subparsers
 
-    def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:   # type: ignore[override]
+    def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Take every argument; raise InputError in the name of the command that has no use for one."""
         values, rest = super().parse_known_args(args, namespace)
         if rest:
@@ -173,7 +174,7 @@ class Annex:
         """Whether the package is there."""
         try:
             return importlib.util.find_spec(self.package) is not None
-        except ModuleNotFoundError:   # the package that it is in
+        except ModuleNotFoundError:  # the package that it is in
             return False
 
 
@@ -208,8 +209,11 @@ class Program:
 
     def _known(self) -> Mapping[str, str]:
         """Return the summaries of the commands that are no guests'."""
-        return self.commands if self.annex is None or not self.annex.is_installed else {
-            **self.commands, **self.annex.commands}
+        return (
+            self.commands
+            if self.annex is None or not self.annex.is_installed
+            else {**self.commands, **self.annex.commands}
+        )
 
     def _points(self) -> EntryPoints | tuple[()]:
         if not self.guests:
@@ -226,7 +230,8 @@ class Program:
     def parser(self, command: str | None = None) -> Parser:
         """Return the parser; only ``command``'s own options are loaded, or all of them when it is None."""
         parser = Parser(
-            prog=self.name, description=self.description,
+            prog=self.name,
+            description=self.description,
             epilog="Exit codes: 0 success, 1 failed job, 2 bad usage or input. "
             f"'{self.name} COMMAND --help' says more.",
         )
@@ -248,16 +253,22 @@ class Program:
 
     def _run(self, argv: Sequence[str] | None) -> int:
         if sys.maxsize < 2**32:
-            sys.stderr.write(f"{self.name}: this is a 32-bit system, for which there are no libraries; install "
-                             "a 64-bit one (Raspberry Pi OS 64-bit)\n")
+            sys.stderr.write(
+                f"{self.name}: this is a 32-bit system, for which there are no libraries; install "
+                "a 64-bit one (Raspberry Pi OS 64-bit)\n"
+            )
             return CompanionError.exit_code
         arguments = with_negative_values(sys.argv[1:] if argv is None else argv)
         command = next((a for a in arguments if not a.startswith("-")), None)
         try:
             strange = next((a for a in arguments if re.search("[\ud800-\udfff]", a)), None)
-            if strange is not None:   # records and states are UTF-8 and could not name it
-                raise InputError(self.name, one_line(strange), f"is not in this system's encoding "
-                                 f"({sys.getfilesystemencoding()})", "rename it, or set LANG=C.UTF-8")
+            if strange is not None:  # records and states are UTF-8 and could not name it
+                raise InputError(
+                    self.name,
+                    one_line(strange),
+                    f"is not in this system's encoding ({sys.getfilesystemencoding()})",
+                    "rename it, or set LANG=C.UTF-8",
+                )
             if command is not None and command not in self._known() and command not in self.names:
                 raise self._unknown(command)
             args = self.parser(command or "").parse_args(arguments)
@@ -295,8 +306,9 @@ class Program:
     def _unknown(self, word: str) -> CompanionError:
         """Return what to raise for a command that there is not: it may be a verb of one, or a slip of the pen."""
         if self.annex is not None and word in self.annex.commands:
-            return JobError(f"{self.name} {word}: {self.annex.name} is not installed, which this needs; "
-                            f"{self.annex.remedy}")
+            return JobError(
+                f"{self.name} {word}: {self.annex.name} is not installed, which this needs; {self.annex.remedy}"
+            )
         whole = [f"{name} {word}" for name, parser in self.parser().commands.items() if word in parser.commands]
         meant = whole or difflib.get_close_matches(word, self.names, n=1)
         remedy = f"there are {', '.join(self.names)}; '{self.name} --help' says more"

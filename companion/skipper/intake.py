@@ -33,9 +33,9 @@ from companion.skipper.way.gates import bearing_on
 from companion.skipper.way.geometry import distance_m, waypoint_done
 
 HISTORY_STEP_S = 10.0
-HISTORY_KEPT = 19            # 180 s and the present
+HISTORY_KEPT = 19  # 180 s and the present
 BOOT_SLACK_S = 1.0
-FOREIGN_TEXTS = ("Flight plan received",)   # somebody finished an upload
+FOREIGN_TEXTS = ("Flight plan received",)  # somebody finished an upload
 
 
 def take_outcomes(ctx: StepContext) -> None:
@@ -56,9 +56,14 @@ def take_outcomes(ctx: StepContext) -> None:
         ctx.act(CancelPlan(request_id=number))
         take_plan(ctx, PlanOutcome(request_id=number, text=f"no answer within {patience_s:.0f} s"))
     if state.pending.upload is not None and ctx.t_s - state.pending.upload.t_s > config.upload_timeout_s:
-        take_upload(ctx, UploadOutcome(
-            upload_id=state.pending.upload.upload_id, result=UploadResult.TIMEOUT,
-            text=f"no outcome within {config.upload_timeout_s:.0f} s"))
+        take_upload(
+            ctx,
+            UploadOutcome(
+                upload_id=state.pending.upload.upload_id,
+                result=UploadResult.TIMEOUT,
+                text=f"no outcome within {config.upload_timeout_s:.0f} s",
+            ),
+        )
     if state.pending.read is not None and ctx.t_s - state.pending.read[1] > config.read_timeout_s:
         ctx.set(pending=changed(ctx.state.pending, read=None, read_retry=ctx.failed(state.pending.read_retry)))
     if state.pending.command is not None and ctx.t_s - state.pending.command[1] > config.command_timeout_s:
@@ -74,7 +79,8 @@ def _take_read(ctx: StepContext, outcome: ReadOutcome) -> None:
         return
     ctx.set(
         pending=changed(ctx.state.pending, read=None, read_retry=PATIENT),
-        mission=changed(ctx.state.mission, read_items=outcome.items, read_t_s=ctx.t_s))
+        mission=changed(ctx.state.mission, read_items=outcome.items, read_t_s=ctx.t_s),
+    )
 
 
 def _take_command(ctx: StepContext, outcome: CommandOutcome) -> None:
@@ -82,14 +88,17 @@ def _take_command(ctx: StepContext, outcome: CommandOutcome) -> None:
     if pending is None or pending[0] != outcome.command_id:
         return
     if outcome.result is CommandResult.ACCEPTED:
-        ctx.set(
-            pending=changed(ctx.state.pending, command=None, command_retry=PATIENT, accepted=(pending[2], ctx.t_s)))
+        ctx.set(pending=changed(ctx.state.pending, command=None, command_retry=PATIENT, accepted=(pending[2], ctx.t_s)))
         if pending[2] in {MOTOR_ON, MOTOR_OFF}:
             ctx.set(adrift=replace(ctx.state.adrift, motor=pending[2] == MOTOR_ON))
         return
     _command_failed(ctx, pending[2])
-    ctx.say(Severity.WARNING, f"refused {pending[2]}",
-             f"{pending[2]} {outcome.result.value}: {outcome.text or 'no reason given'}", every_s=0.0)
+    ctx.say(
+        Severity.WARNING,
+        f"refused {pending[2]}",
+        f"{pending[2]} {outcome.result.value}: {outcome.text or 'no reason given'}",
+        every_s=0.0,
+    )
 
 
 def _command_failed(ctx: StepContext, what: str) -> None:
@@ -117,7 +126,8 @@ def take_events(ctx: StepContext) -> None:
                 # A read that is under way, or came in this very step, may tell of the mission before.
                 ctx.set(
                     mission=changed(ctx.state.mission, checked=False, read_since_s=ctx.t_s),
-                    pending=changed(ctx.state.pending, read=None))
+                    pending=changed(ctx.state.pending, read=None),
+                )
             note(ctx, event)
         elif isinstance(event, Disbelieved):
             ctx.say(Severity.WARNING, event.what, event.text, every_s=0.0)
@@ -130,8 +140,9 @@ def count_time(ctx: StepContext) -> None:
     state, status = ctx.state, ctx.autopilot
     sails = state.voyage.sailing and not state.voyage.over and status is not None and status.is_armed
     passed_s = ctx.t_s - state.voyage.last_step_s if sails and math.isfinite(state.voyage.last_step_s) else 0.0
-    ctx.set(voyage=changed(
-        ctx.state.voyage, under_way_s=state.voyage.under_way_s + max(0.0, passed_s), last_step_s=ctx.t_s))
+    ctx.set(
+        voyage=changed(ctx.state.voyage, under_way_s=state.voyage.under_way_s + max(0.0, passed_s), last_step_s=ctx.t_s)
+    )
     now_s = utc_s(ctx)
     if sails and state.voyage.set_sail_utc_s is None and now_s is not None:
         ctx.set(voyage=changed(ctx.state.voyage, set_sail_utc_s=round(now_s - ctx.state.voyage.under_way_s, 1)))
@@ -142,8 +153,11 @@ def locate(ctx: StepContext) -> None:
     state, status = ctx.state, ctx.autopilot
     route = state.mission.route
     if ctx.gate is not None and ctx.boat_en is not None:
-        ctx.set(progress=changed(
-            ctx.state.progress, bearing_rad=bearing_on(ctx.gate, ctx.boat_en, state.progress.bearing_rad)))
+        ctx.set(
+            progress=changed(
+                ctx.state.progress, bearing_rad=bearing_on(ctx.gate, ctx.boat_en, state.progress.bearing_rad)
+            )
+        )
     guided = ctx.steers and state.voyage.sailing and status is not None and status.mode is Mode.GUIDED
     if route is not None and status is not None and status.mission_seq is not None and _counts(ctx) and not guided:
         index = min(max(status.mission_seq - 1, 0), len(route.items) - 1)
@@ -155,9 +169,11 @@ def locate(ctx: StepContext) -> None:
     if route is not None and boat is not None and state.voyage.sailing:
         _own_count(ctx)
         if guided:
-            ctx.set(mission=changed(
-                ctx.state.mission, index=min(ctx.state.mission.own_index, len(route.items) - 1),
-                passed_since_s=None))
+            ctx.set(
+                mission=changed(
+                    ctx.state.mission, index=min(ctx.state.mission.own_index, len(route.items) - 1), passed_since_s=None
+                )
+            )
         pass_gates(ctx)
         if guided and ctx.guidance is Guidance.FIELD and ctx.state.mission.route is not None:
             # Steered to the gates themselves: the waypoints before a gate that is passed need not be.
@@ -174,16 +190,22 @@ def remember_fix(ctx: StepContext) -> None:
     """Keep the position for the next step's look at jumps."""
     here, vehicle, age = ctx.snapshot.position_en_m, ctx.snapshot.vehicle, ctx.snapshot.vehicle_age_s
     if here is not None and vehicle is not None and age is not None and age <= FRESH_S:
-        ctx.set(position=changed(ctx.state.position, last_seen=Fix(
-            t_s=ctx.t_s - age, en_m=here, velocity_en_mps=vehicle.velocity_en_mps)))
+        ctx.set(
+            position=changed(
+                ctx.state.position, last_seen=Fix(t_s=ctx.t_s - age, en_m=here, velocity_en_mps=vehicle.velocity_en_mps)
+            )
+        )
 
 
 def notice_truncation(ctx: StepContext) -> None:
     """Look at the mission again when the autopilot counts fewer items than we put there."""
     status, state = ctx.autopilot, ctx.state
     if (
-        status is not None and status.mission_total is not None and state.mission.route is not None
-        and state.mission.checked and state.pending.upload is None
+        status is not None
+        and status.mission_total is not None
+        and state.mission.route is not None
+        and state.mission.checked
+        and state.pending.upload is None
         and status.mission_total < len(state.mission.route.items)
         and ctx.t_s - state.mission.read_since_s > ctx.config.settle_s
         and ctx.t_s - state.mission.uploaded_s > ctx.config.settle_s
@@ -203,8 +225,12 @@ def _own_count(ctx: StepContext) -> None:
         return
     own = max(ctx.state.mission.own_index, ctx.state.mission.index)
     while own < len(route.items) - 1 and waypoint_done(
-        boat, route.leg_from_en_m[own], route.points_en_m[own], route.points_en_m[own + 1],
-        grid_m=ctx.config.grid_size_m, manoeuvre_m=ctx.config.manoeuvre_m,
+        boat,
+        route.leg_from_en_m[own],
+        route.points_en_m[own],
+        route.points_en_m[own + 1],
+        grid_m=ctx.config.grid_size_m,
+        manoeuvre_m=ctx.config.manoeuvre_m,
     ):
         own += 1
         if own > ctx.state.mission.index + 1:
@@ -233,6 +259,10 @@ def _remember(ctx: StepContext) -> None:
         # A new plan may be longer or shorter: what it changed is no way made good, nor lost.
         longer = left - history[-1][3]
         history = tuple((t_s, east, north, togo + longer) for t_s, east, north, togo in history)
-    ctx.set(progress=changed(
-        ctx.state.progress, history=(*history, (ctx.t_s, boat[0], boat[1], left))[-HISTORY_KEPT:],
-        history_plan=plan_id))
+    ctx.set(
+        progress=changed(
+            ctx.state.progress,
+            history=(*history, (ctx.t_s, boat[0], boat[1], left))[-HISTORY_KEPT:],
+            history_plan=plan_id,
+        )
+    )

@@ -20,8 +20,8 @@ from companion.skipper.way.line import BEFORE_M, BEYOND_M, ahead_m, crossing, is
 from companion.skipper.way.sweeps import coverage, grown, is_off, left_over, sweeps_over
 from companion.skipper.way.voyage import PointEn, Search
 
-GAP_S = 2.0 + FRESH_S   # between two fixes that belong together
-AT_MOST = 4          # rounds: the sweeps, and what they left; the wind's own anew are not counted
+GAP_S = 2.0 + FRESH_S  # between two fixes that belong together
+AT_MOST = 4  # rounds: the sweeps, and what they left; the wind's own anew are not counted
 HAIR_M = 0.5
 
 
@@ -55,8 +55,12 @@ def pass_gates(ctx: StepContext) -> None:
         left = distance_m(boat, gate.en_m)
         counted = number in ctx.state.mission.route.gate_of[: ctx.state.mission.index]
         near = max(gate.radius_m, ctx.config.grid_size_m)
-        if not (ctx.state.progress.closest_m <= gate.radius_m or (counted and left <= near and not _is_last(ctx))
-                or _is_near_enough(ctx, gate, counted) or _is_before(gate, boat)):
+        if not (
+            ctx.state.progress.closest_m <= gate.radius_m
+            or (counted and left <= near and not _is_last(ctx))
+            or _is_near_enough(ctx, gate, counted)
+            or _is_before(gate, boat)
+        ):
             if counted and left > near and not _is_last(ctx):
                 # The autopilot has left it behind and we were never near.
                 ctx.void_route()
@@ -93,19 +97,33 @@ def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
     is_told = ctx.state.progress.released == gate.goal
     if stay_left_s(ctx, gate) > 0.0 and not is_told:
         return False
-    ctx.set(progress=changed(
-        ctx.state.progress, gate=ctx.state.progress.gate + 1, reached=(*ctx.state.progress.reached, gate.goal),
-        closest_m=math.inf, inside=None))
+    ctx.set(
+        progress=changed(
+            ctx.state.progress,
+            gate=ctx.state.progress.gate + 1,
+            reached=(*ctx.state.progress.reached, gate.goal),
+            closest_m=math.inf,
+            inside=None,
+        )
+    )
     why = "told to go on" if is_told else "her time is over"
-    ctx.say(Severity.NOTICE, "goal", f"{gate.name}: {why} after {inside.age_s(ctx.t_s, utc_s(ctx)):.0f} s in it",
-             every_s=0.0)
+    ctx.say(
+        Severity.NOTICE,
+        "goal",
+        f"{gate.name}: {why} after {inside.age_s(ctx.t_s, utc_s(ctx)):.0f} s in it",
+        every_s=0.0,
+    )
     return True
 
 
 def _is_before(gate: Gate, boat: PointEn) -> bool:
     """Return whether the boat is where the way across the gate's line may begin, though not at the place for it."""
-    return gate.is_before_line and gate.line is not None and is_between(gate.line, boat) and (
-        ahead_m(gate.line, boat) <= -0.5 * BEFORE_M)
+    return (
+        gate.is_before_line
+        and gate.line is not None
+        and is_between(gate.line, boat)
+        and (ahead_m(gate.line, boat) <= -0.5 * BEFORE_M)
+    )
 
 
 def _cross(ctx: StepContext) -> None:
@@ -119,8 +137,12 @@ def _cross(ctx: StepContext) -> None:
         return
     found = crossing(gate.line, last.en_m, boat) if last is not None and not is_blind else None
     # Sailed on by the autopilot while nobody looked, the boat is straight behind the line: its leg led across it.
-    unseen = is_blind and gate.is_crossed and is_between(gate.line, boat) and (
-        0.0 < ahead_m(gate.line, boat) <= BEYOND_M + ctx.config.grid_size_m)
+    unseen = (
+        is_blind
+        and gate.is_crossed
+        and is_between(gate.line, boat)
+        and (0.0 < ahead_m(gate.line, boat) <= BEYOND_M + ctx.config.grid_size_m)
+    )
     if not unseen and (found is None or (not found.is_forward and not gate.is_crossed)):
         return
     if found is not None and not found.is_forward:
@@ -137,11 +159,21 @@ def _cross(ctx: StepContext) -> None:
     if not gate.is_crossed:
         # The boat's route leads to the place before the line, which is behind it.
         ctx.set(plans=changed(ctx.state.plans, asked=f"{gate.name} is crossed"))
-    ctx.set(progress=changed(
-        ctx.state.progress, gate=following, reached=(*ctx.state.progress.reached, gate.goal), closest_m=math.inf,
-        bearing_rad=0.0, missed_s=None))
-    how = "while nobody looked" if found is None else (
-        f"{min(found.from_port_m, width_m(gate.line) - found.from_port_m):.1f} m inside of the nearer mark")
+    ctx.set(
+        progress=changed(
+            ctx.state.progress,
+            gate=following,
+            reached=(*ctx.state.progress.reached, gate.goal),
+            closest_m=math.inf,
+            bearing_rad=0.0,
+            missed_s=None,
+        )
+    )
+    how = (
+        "while nobody looked"
+        if found is None
+        else (f"{min(found.from_port_m, width_m(gate.line) - found.from_port_m):.1f} m inside of the nearer mark")
+    )
     after = f", {-left_s:.0f} s after the gun" if gate.line.is_start and left_s is not None else ""
     ctx.say(Severity.NOTICE, "goal", f"{gate.name} crossed {how}{after}", every_s=0.0)
 
@@ -186,7 +218,8 @@ def missed(ctx: StepContext) -> None:
         ctx.act(CancelPlan(request_id=ctx.state.pending.plan.request_id))
     ctx.set(
         progress=changed(ctx.state.progress, missed=ctx.state.progress.missed + 1, missed_s=ctx.t_s),
-        pending=changed(ctx.state.pending, plan=None))
+        pending=changed(ctx.state.pending, plan=None),
+    )
 
 
 # -------- Searching an area: its sweeps laid and laid anew, what the track has covered, when it is done.
@@ -203,13 +236,15 @@ def follow_search(ctx: StepContext) -> None:
         return
     search = gate.search
     if float(shapely.distance(search.area_en, shapely.points(boat))) <= search.swath_m:
-        ctx.set(progress=changed(
-            ctx.state.progress, searched=grown(ctx.state.progress.searched, boat, search.swath_m)))
+        ctx.set(progress=changed(ctx.state.progress, searched=grown(ctx.state.progress.searched, boat, search.swath_m)))
     share = coverage(search.area_en, ctx.state.progress.searched, search.swath_m)
     number, count = gate.sweep
-    ctx.set(progress=changed(
-        ctx.state.progress,
-        task=f"sweep {number} of {count}, {100.0 * share:.0f} % covered" if count else "sweeps not laid yet"))
+    ctx.set(
+        progress=changed(
+            ctx.state.progress,
+            task=f"sweep {number} of {count}, {100.0 * share:.0f} % covered" if count else "sweeps not laid yet",
+        )
+    )
     if count and ctx.wind_mean is not None and _begins(ctx, gate) and is_off(ctx.wind_mean[0], _laid(ctx, gate)[1]):
         lay_sweeps(ctx, gate, is_shift=True)
 
@@ -246,9 +281,14 @@ def lay_sweeps(ctx: StepContext, gate: Gate, *, is_shift: bool = False) -> bool:
     why = "the wind has turned: " if is_shift else f"{100.0 * share:.0f} % covered: " if rounds else ""
     ctx.set(
         pending=changed(ctx.state.pending, plan=None),
-        plans=changed(ctx.state.plans, asked=f"{why}{len(sweeps)} sweeps of {gate.name}"))
-    ctx.say(Severity.NOTICE, "sweeps", f"{gate.name}: {why}{len(sweeps)} sweeps across a wind from "
-             f"{math.degrees(wind[0]) % 360.0:.0f} deg", every_s=0.0)
+        plans=changed(ctx.state.plans, asked=f"{why}{len(sweeps)} sweeps of {gate.name}"),
+    )
+    ctx.say(
+        Severity.NOTICE,
+        "sweeps",
+        f"{gate.name}: {why}{len(sweeps)} sweeps across a wind from {math.degrees(wind[0]) % 360.0:.0f} deg",
+        every_s=0.0,
+    )
     return True
 
 
@@ -270,9 +310,17 @@ def end_search(ctx: StepContext, gate: Gate) -> None:
     assert search is not None
     share = coverage(search.area_en, ctx.state.progress.searched, search.swath_m)
     following = next((n for n, g in enumerate(ctx.gates) if g.goal > gate.goal), len(ctx.gates))
-    ctx.set(progress=changed(
-        ctx.state.progress, gate=following, reached=(*ctx.state.progress.reached, gate.goal), closest_m=math.inf,
-        searched=(), task="", covered=(*ctx.state.progress.covered, (gate.goal, round(share, 4)))))
+    ctx.set(
+        progress=changed(
+            ctx.state.progress,
+            gate=following,
+            reached=(*ctx.state.progress.reached, gate.goal),
+            closest_m=math.inf,
+            searched=(),
+            task="",
+            covered=(*ctx.state.progress.covered, (gate.goal, round(share, 4))),
+        )
+    )
     less = "" if share >= search.coverage else f", less than the {100.0 * search.coverage:.0f} % that were asked for"
     severity = Severity.WARNING if less else Severity.NOTICE
     ctx.say(severity, "goal", f"{gate.name} searched: {100.0 * share:.0f} % covered{less}", every_s=0.0)

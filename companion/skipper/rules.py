@@ -18,13 +18,7 @@ from companion.skipper.behaviors.field_guidance import follow_field
 from companion.skipper.behaviors.operator_orders import preview, take_orders
 from companion.skipper.behaviors.position_doubt import follow
 from companion.skipper.board.vehicle_identity import judge
-from companion.skipper.intake import (
-    count_time,
-    locate,
-    remember_fix,
-    take_events,
-    take_outcomes,
-)
+from companion.skipper.intake import count_time, locate, remember_fix, take_events, take_outcomes
 from companion.skipper.planning.diversions import speak_of_fence
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.track import TRACKS_M
@@ -65,16 +59,19 @@ class Skipper:
             return SkipperState(mission=LoadedMission(known=known))
         if not self.fits(persisted):
             return SkipperState(
-                why="the saved state is of another voyage", mission=LoadedMission(known=(*known, *persisted.names)))
+                why="the saved state is of another voyage", mission=LoadedMission(known=(*known, *persisted.names))
+            )
         return SkipperState(
             vehicle=VehicleIdentity(uid=persisted.uid, system=persisted.system),
             mission=LoadedMission(adoptable=persisted, known=known),
             voyage=VoyageState(
-                under_way_s=persisted.under_way_s, arrived=persisted.arrived, set_sail_utc_s=persisted.set_sail_utc_s),
+                under_way_s=persisted.under_way_s, arrived=persisted.arrived, set_sail_utc_s=persisted.set_sail_utc_s
+            ),
             orders=Orders(standing=persisted.standing, skipped=persisted.skipped),
             position=PositionState(place=persisted.place, restored=persisted.place),
             tacking=Tacking(tried=persisted.tacks[0], failed=persisted.tacks[1]),
-            plans=Planning(latency=persisted.latency))
+            plans=Planning(latency=persisted.latency),
+        )
 
     def fits(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage."""
@@ -104,7 +101,7 @@ class Skipper:
 
         It changes nothing but the time of the first plans.
         """
-        ladders = [rungs(self.config, track_m=track_m) for track_m in TRACKS_M[:2]]   # of winds up to 5 m/s, mostly
+        ladders = [rungs(self.config, track_m=track_m) for track_m in TRACKS_M[:2]]  # of winds up to 5 m/s, mostly
         for margin_m in sorted({0.0, *(step.margin_m for ladder in ladders for step in ladder)}):
             self.voyage.area.obstacles_wkt(margin_m)
         self.voyage.area.clearance_m([(0.0, 0.0)])
@@ -114,7 +111,8 @@ class Skipper:
         water = self.voyage.frame.origin if self.voyage.is_passage else None
         if state.mission.adoptable is not None and (state.mission.foreign or not state.mission.checked):
             return replace(
-                state.mission.adoptable, standing=standing_saved(state), skipped=state.orders.skipped, water=water)
+                state.mission.adoptable, standing=standing_saved(state), skipped=state.orders.skipped, water=water
+            )
         return replace(saved_of(state, self.voyage.name), water=water)
 
     def leaves_water(self, state: SkipperState, here: GeoPoint) -> bool:

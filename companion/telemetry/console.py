@@ -32,9 +32,9 @@ from companion.skipper.step import Announce, Phase
 from companion.telemetry.folder.records import sigma_ahead_rad
 from companion.words import one_line, printable
 
-MOST_WAITING = 64     # lines; a reader that is this far behind misses the next
+MOST_WAITING = 64  # lines; a reader that is this far behind misses the next
 _GONE = frozenset({errno.EPIPE, errno.EIO, errno.EBADF, errno.ENXIO})
-LAST_WORDS_S = 1.0    # what is still waiting at the end gets so long
+LAST_WORDS_S = 1.0  # what is still waiting at the end gets so long
 
 
 class Console:
@@ -84,10 +84,10 @@ class Console:
         while (data := self._lines.get()) is not None:
             try:
                 while data and self._fd is not None:
-                    data = data[os.write(self._fd, data):]
+                    data = data[os.write(self._fd, data) :]
             except OSError as error:
                 if error.errno in _GONE:
-                    self._fd = None   # for good: the number may be another file's by and by
+                    self._fd = None  # for good: the number may be another file's by and by
 
 
 class TextStream(Protocol):
@@ -154,7 +154,7 @@ class StatusLine:
         self._stream.flush()
 
 
-PREPARING_PATIENCE_S = 4.0      # loading what was compiled before takes about two seconds, and nothing is said of it
+PREPARING_PATIENCE_S = 4.0  # loading what was compiled before takes about two seconds, and nothing is said of it
 PREPARING_EVERY_S = 10.0  # between two lines where there is no terminal
 
 
@@ -181,11 +181,11 @@ class CompileProgress:
 
 # Without a terminal a line is written this often [s of the voyage], and whenever the phase changes.
 PLAIN_EVERY_S = 15.0
-SILENT_S = 5.0           # without a heartbeat
-LOUD = Severity.NOTICE   # what is said more quietly than this is in the records only
-COLUMNS_MOST = 120       # longer lines are hard to read
-DISK = "disk"   # the alert of trouble with the disk, which no state of the voyage tells
-GONE = "gone"   # ... and of what is gone beside it: a page, a socket, an output
+SILENT_S = 5.0  # without a heartbeat
+LOUD = Severity.NOTICE  # what is said more quietly than this is in the records only
+COLUMNS_MOST = 120  # longer lines are hard to read
+DISK = "disk"  # the alert of trouble with the disk, which no state of the voyage tells
+GONE = "gone"  # ... and of what is gone beside it: a page, a socket, an output
 
 
 class ProgressLine:
@@ -198,8 +198,8 @@ class ProgressLine:
         self._stream, self._epoch_s = stream, epoch_s
         self._is_terminal = stream.isatty()
         self._last: tuple[float, str] = (-math.inf, "")
-        self._standing = 0   # lines that are rewritten
-        self._notes: list[str] = []   # to be said with the next step
+        self._standing = 0  # lines that are rewritten
+        self._notes: list[str] = []  # to be said with the next step
 
     def __enter__(self) -> Self:
         return self
@@ -223,8 +223,9 @@ class ProgressLine:
         if status.alert_code in {DISK, GONE}:
             text += f" | {status.alert_text}"
         said, self._notes = self._notes, []
-        said += [self._said(step.snapshot.t_s, a) for a in step.actions
-                if isinstance(a, Announce) and a.severity <= LOUD]
+        said += [
+            self._said(step.snapshot.t_s, a) for a in step.actions if isinstance(a, Announce) and a.severity <= LOUD
+        ]
         t_s, phase = step.snapshot.t_s, step.state.phase.value
         if self._is_terminal:
             columns = min(COLUMNS_MOST, shutil.get_terminal_size((COLUMNS_MOST, 24)).columns) - 1

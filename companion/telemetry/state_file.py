@@ -20,10 +20,10 @@ from companion.skipper.step import Persisted
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
 
 ASIDE = ".damaged"
-MAX_BYTES = 4 << 20     # 655 items in each of three lists take a tenth of it
-PATIENCE_S = 5.0        # a card that answers later than this is not waited for
-TRY_EVERY_S = 5.0       # a state that did not change is tried again so often
-MOST_OTHERS = 50        # states of other missions in the folder that are looked into, the newest first
+MAX_BYTES = 4 << 20  # 655 items in each of three lists take a tenth of it
+PATIENCE_S = 5.0  # a card that answers later than this is not waited for
+TRY_EVERY_S = 5.0  # a state that did not change is tried again so often
+MOST_OTHERS = 50  # states of other missions in the folder that are looked into, the newest first
 
 
 class StateFile:
@@ -41,9 +41,7 @@ class StateFile:
         refusal: why the saved state was not believed; empty: it was, or there was none.
     """
 
-    def __init__(
-        self, path: Path, *, disk: Disk, offload: Offload, is_durable: bool = True, pace: float = 1.0,
-    ) -> None:
+    def __init__(self, path: Path, *, disk: Disk, offload: Offload, is_durable: bool = True, pace: float = 1.0) -> None:
         self.path = path
         self.trouble = ""
         self.refusal = ""
@@ -87,11 +85,11 @@ class StateFile:
         if self._is_there or now_s() - self._tried_s < TRY_EVERY_S * self._pace:
             return
         if self._writing is not None and not self._writing.done():
-            return   # the card still has the last one
+            return  # the card still has the last one
         self._tried_s = now_s()
         data = json.dumps(persisted.to_dict()).encode()
         writing = self._writing = asyncio.ensure_future(self._write(data))
-        writing.add_done_callback(lambda done: done.cancelled() or done.exception())   # heard below, or too late
+        writing.add_done_callback(lambda done: done.cancelled() or done.exception())  # heard below, or too late
         if not (await asyncio.wait({writing}, timeout=PATIENCE_S * self._pace))[0]:
             self.trouble = "the disk does not answer"
             return

@@ -26,8 +26,13 @@ from companion.traffic.feeds import AisFeed, Feeds
 
 
 def companion_status(
-    step: Step, voyage: Voyage, figures: VoyageFigures, clearance_m: float | None, bytes_out_per_s: float | None,
-    feeds: Sequence[AisFeed] = (), ais_dropped: int = 0,
+    step: Step,
+    voyage: Voyage,
+    figures: VoyageFigures,
+    clearance_m: float | None,
+    bytes_out_per_s: float | None,
+    feeds: Sequence[AisFeed] = (),
+    ais_dropped: int = 0,
 ) -> CompanionStatus:
     """Return the status at ``step``. The wind's spread is that of a minute ahead, which the plan lives on."""
     snapshot, state = step.snapshot, step.state
@@ -84,8 +89,11 @@ def traffic_status(step: Step, feeds: Sequence[AisFeed], dropped: int) -> Traffi
     seen = TrafficStatus(
         vessels=0 if picture is None else len(picture.vessels),
         refused=counts.stale + counts.far + dropped + sum(feed.counts.refused for feed in feeds),
-        feeds=len(feeds), silent_feeds=sum(feed.is_silent for feed in feeds), shared_mmsi=counts.shared_mmsi,
-        clock_jumps=counts.clock_jumps, silence_s=None if picture is None else picture.silence_s,
+        feeds=len(feeds),
+        silent_feeds=sum(feed.is_silent for feed in feeds),
+        shared_mmsi=counts.shared_mmsi,
+        clock_jumps=counts.clock_jumps,
+        silence_s=None if picture is None else picture.silence_s,
         promised_risk=None if route is None else route.vessels_part,
         path_risk=None if route is None else route.vessel_risk,
     )
@@ -94,9 +102,16 @@ def traffic_status(step: Step, feeds: Sequence[AisFeed], dropped: int) -> Traffi
     worst = step.state.traffic.watch[0]
     approach = worst.approach
     return replace(
-        seen, name=worst.vessel.label, alarm=worst.alarm.name.lower(), role=worst.encounter.role.value,
-        rule=worst.encounter.rule.value, range_m=approach.now_m, bearing_rad=approach.bearing_rad,
-        cpa_m=approach.distance_m, tcpa_s=approach.time_s if approach.is_closing else None)
+        seen,
+        name=worst.vessel.label,
+        alarm=worst.alarm.name.lower(),
+        role=worst.encounter.role.value,
+        rule=worst.encounter.rule.value,
+        range_m=approach.now_m,
+        bearing_rad=approach.bearing_rad,
+        cpa_m=approach.distance_m,
+        tcpa_s=approach.time_s if approach.is_closing else None,
+    )
 
 
 def risk_of(route: Route) -> float:
@@ -117,7 +132,7 @@ def _alert(step: Step) -> tuple[str, str]:
     return "", step.state.why
 
 
-CLOCK_OFF_S = 10.0     # of this computer's clock against the autopilot's: from here on it is said
+CLOCK_OFF_S = 10.0  # of this computer's clock against the autopilot's: from here on it is said
 
 
 def unix_of_boat(snapshot: Snapshot, t_s: float) -> float | None:
@@ -138,7 +153,13 @@ def worst_watchdog(step: Step) -> str:
 
 
 def far_status(
-    status: CompanionStatus, step: Step, *, sequence: int, order: int | None, reply: Reply | None, has_trouble: bool,
+    status: CompanionStatus,
+    step: Step,
+    *,
+    sequence: int,
+    order: int | None,
+    reply: Reply | None,
+    has_trouble: bool,
     is_heard: bool,
 ) -> FarStatus:
     """Return what is told far away; ``order`` and ``reply`` are those of the order that came last."""
@@ -146,27 +167,42 @@ def far_status(
     unix_s, autopilot, standing = unix_of_boat(snapshot, status.t_s), snapshot.autopilot, step.state.orders.standing
     goal = None if status.goal_index is None else status.goal_index + 1
     return FarStatus(
-        phase=status.state, sequence=sequence, minute=None if unix_s is None else minutes_of(unix_s),
-        is_heard=is_heard, is_armed=autopilot is not None and autopilot.is_armed,
+        phase=status.state,
+        sequence=sequence,
+        minute=None if unix_s is None else minutes_of(unix_s),
+        is_heard=is_heard,
+        is_armed=autopilot is not None and autopilot.is_armed,
         is_under_way=step.state.voyage.sailing,
-        has_trouble=has_trouble, standing=None if standing is None else standing.verb, position=status.position,
-        goal_m=status.goal_distance_m, waypoint_m=status.waypoint_distance_m,
+        has_trouble=has_trouble,
+        standing=None if standing is None else standing.verb,
+        position=status.position,
+        goal_m=status.goal_distance_m,
+        waypoint_m=status.waypoint_distance_m,
         speed_mps=None if snapshot.vehicle is None else snapshot.vehicle.speed_mps,
-        twd_from_rad=status.twd_from_rad, tws_mps=status.tws_mps, twd_sigma_rad=status.twd_sigma_rad,
-        goal=goal, goals=status.goal_count, plan_age_s=status.plan_age_s, promised_risk=status.promised_risk,
-        clearance_m=status.clearance_m, cpa_m=None if traffic is None else traffic.cpa_m,
-        alarm="" if traffic is None else traffic.alarm or "none", watchdog=worst_watchdog(step),
-        battery_v=status.battery_v, order=order, reply=reply,
+        twd_from_rad=status.twd_from_rad,
+        tws_mps=status.tws_mps,
+        twd_sigma_rad=status.twd_sigma_rad,
+        goal=goal,
+        goals=status.goal_count,
+        plan_age_s=status.plan_age_s,
+        promised_risk=status.promised_risk,
+        clearance_m=status.clearance_m,
+        cpa_m=None if traffic is None else traffic.cpa_m,
+        alarm="" if traffic is None else traffic.alarm or "none",
+        watchdog=worst_watchdog(step),
+        battery_v=status.battery_v,
+        order=order,
+        reply=reply,
     )
 
 
 # Status to the radio: a frame of it every so often [s]; see companion.mavlink.wire.companion_status for its bytes.
 STATUS_EVERY_S = 2.0
-TROUBLE_EVERY_S = 600.0   # trouble with the disk that lasts is said again
+TROUBLE_EVERY_S = 600.0  # trouble with the disk that lasts is said again
 
 
 async def speak_high_latency(
-    autopilot: Autopilot, seen: Callable[[], tuple[CompanionStatus, Step] | None], is_wanted: Callable[[], bool],
+    autopilot: Autopilot, seen: Callable[[], tuple[CompanionStatus, Step] | None], is_wanted: Callable[[], bool]
 ) -> None:
     """Send HIGH_LATENCY2 while it is asked for, until cancelled."""
     while True:
@@ -181,7 +217,12 @@ class TelemetrySender:
     """Speaks through ``autopilot``; ``status`` and ``trouble`` are asked for what there is to say."""
 
     def __init__(
-        self, autopilot: Autopilot, feeds: Feeds, log: Logbook, *, status: Callable[[], CompanionStatus | None],
+        self,
+        autopilot: Autopilot,
+        feeds: Feeds,
+        log: Logbook,
+        *,
+        status: Callable[[], CompanionStatus | None],
         trouble: Callable[[], str],
     ) -> None:
         self._autopilot, self._feeds, self._log = autopilot, feeds, log

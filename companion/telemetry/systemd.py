@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Self
 
 STATUS_CHARACTERS = 200
-PATIENCE_S = 120     # after each word that it is still being started
+PATIENCE_S = 120  # after each word that it is still being started
 
 
 class ServiceManager:
@@ -34,7 +34,7 @@ class ServiceManager:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._send("STOPPING=1")
         if self._socket is not None:

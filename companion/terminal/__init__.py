@@ -5,6 +5,15 @@ from companion.terminal.keys import KeyCommands, words_of
 from companion.terminal.screen import Frame, Terminal, can_draw, changes
 
 __all__ = [
-    "Frame", "History", "KeyCommands", "Shown", "Terminal", "can_draw", "changes", "draw", "event_words", "line_of",
+    "Frame",
+    "History",
+    "KeyCommands",
+    "Shown",
+    "Terminal",
+    "can_draw",
+    "changes",
+    "draw",
+    "event_words",
+    "line_of",
     "words_of",
 ]

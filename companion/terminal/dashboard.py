@@ -17,7 +17,7 @@ from companion.terminal.screen import Frame, Style
 from companion.view import Event, FigureView, View
 from companion.words import counted, one_line
 
-OLD_S = 10.0      # what was heard longer ago looks old
+OLD_S = 10.0  # what was heard longer ago looks old
 
 
 def number_text(value: float | None, form: str = ".0f", unit: str = "", scale: float = 1.0) -> str:
@@ -149,12 +149,17 @@ class History:
 def _bin(ago_s: float, winds: list[_Wind]) -> WindBin:
     mean = math.atan2(sum(math.sin(w.twd_rad) for w in winds), sum(math.cos(w.twd_rad) for w in winds))
     off = [math.degrees(wrap_pi(w.twd_rad - mean)) for w in winds]
-    return WindBin(ago_s, math.degrees(wrap_two_pi(mean)), sum(w.tws_mps for w in winds) / len(winds),
-               0.5 * (max(off) - min(off)), winds[0].tack)
+    return WindBin(
+        ago_s,
+        math.degrees(wrap_two_pi(mean)),
+        sum(w.tws_mps for w in winds) / len(winds),
+        0.5 * (max(off) - min(off)),
+        winds[0].tack,
+    )
 
 
 BIN_S = 60.0
-SCALE_DEG = 10.0     # the strip's half width is a multiple of this
+SCALE_DEG = 10.0  # the strip's half width is a multiple of this
 
 
 def tape(frame: Frame, row: int, view: View) -> None:
@@ -184,16 +189,16 @@ def tape(frame: Frame, row: int, view: View) -> None:
         frame.put(row + 1, at(line.course_deg), "|", tacks[line.tack])
     heading = tacks.get(boat.tack or "", Style.BOLD)
     for angle, mark, style in (
-        (bearing, "W", Style.BOLD), (boat.cog_deg, "C", Style.PLAIN), (boat.heading_deg, "H", heading),
+        (bearing, "W", Style.BOLD),
+        (boat.cog_deg, "C", Style.PLAIN),
+        (boat.heading_deg, "H", heading),
         (None if wind is None else wind.twd_from_deg, "T", Style.BOLD),
     ):
         if angle is not None:
             frame.put(row + 1, at(angle), mark, style)
 
 
-def wind_strip(
-    frame: Frame, row: int, column: int, rows: int, bins: Sequence[WindBin | None], *, knots: bool,
-) -> None:
+def wind_strip(frame: Frame, row: int, column: int, rows: int, bins: Sequence[WindBin | None], *, knots: bool) -> None:
     """Draw the wind's history, the newest on top, a shift to the left to the left; S and P are the tack then."""
     width = frame.columns - column
     strip = width - len(" 59' 359° ") - len(" 99.9")
@@ -203,21 +208,28 @@ def wind_strip(
     if not known:
         frame.put(row, column, " no wind heard yet", Style.DIM)
         return
-    centre = math.degrees(math.atan2(
-        sum(math.sin(math.radians(b.twd_from_deg)) for b in known),
-        sum(math.cos(math.radians(b.twd_from_deg)) for b in known))) % 360.0
+    centre = (
+        math.degrees(
+            math.atan2(
+                sum(math.sin(math.radians(b.twd_from_deg)) for b in known),
+                sum(math.cos(math.radians(b.twd_from_deg)) for b in known),
+            )
+        )
+        % 360.0
+    )
     centre = round(centre / 5.0) * 5.0
     off = {id(b): (b.twd_from_deg - centre + 180.0) % 360.0 - 180.0 for b in known}
     half = SCALE_DEG * max(1, math.ceil(max(abs(off[id(b)]) + b.spread_deg for b in known) / SCALE_DEG))
     half = min(180.0, half)
     frame.put(row, column, f" min  from  ±{half:.0f}°".ljust(width - 4) + unit_text(knots=knots).rjust(4), Style.DIM)
-    for number, each in enumerate(bins[:rows - 1]):
+    for number, each in enumerate(bins[: rows - 1]):
         if each is None:
             continue
         line = row + 1 + number
         name = "now" if number == 0 else f"{each.ago_s / 60.0:2.0f}'"
-        begin = frame.put(line, column, f" {name:>3} {direction_text(each.twd_from_deg)} ", Style.DIM if number else
-                          Style.PLAIN)
+        begin = frame.put(
+            line, column, f" {name:>3} {direction_text(each.twd_from_deg)} ", Style.DIM if number else Style.PLAIN
+        )
 
         def at(angle_deg: float, begin: int = begin) -> int:
             return begin + round((angle_deg / half + 1.0) * 0.5 * (strip - 1))
@@ -238,24 +250,41 @@ def body_of(view: View, *, knots: bool, columns: int) -> list[Row]:
     """Return label, text and style of each line; ``columns`` wide ones say more."""
     is_wide = columns >= 40
     return [
-        _wind(view, knots=knots), *_water(view, knots=knots), _bow(view, knots=knots), _boat(view, knots=knots),
-        _leg(view), _goal(view),
-        _tack(view), _plan(view, is_wide=is_wide), _clear(view), _parts(view), _power(view), _speeds(view, knots=knots),
+        _wind(view, knots=knots),
+        *_water(view, knots=knots),
+        _bow(view, knots=knots),
+        _boat(view, knots=knots),
+        _leg(view),
+        _goal(view),
+        _tack(view),
+        _plan(view, is_wide=is_wide),
+        _clear(view),
+        _parts(view),
+        _power(view),
+        _speeds(view, knots=knots),
         *_figures(view, knots=knots),
     ]
 
 
 def _figures(view: View, *, knots: bool) -> list[Row]:
     """Return the figures of the table that are shown here."""
-    return [(figure.label, _text_of(figure, knots=knots), Style.PLAIN) for figure in view.shown
-            if figure.name not in BY_NAME or "watch" in BY_NAME[figure.name].shown]
+    return [
+        (figure.label, _text_of(figure, knots=knots), Style.PLAIN)
+        for figure in view.shown
+        if figure.name not in BY_NAME or "watch" in BY_NAME[figure.name].shown
+    ]
 
 
 def _text_of(figure: FigureView, *, knots: bool) -> str:
     if figure.kind == "speed":
         return f"{speed_text(figure.value, knots=knots)} {unit_text(knots=knots)}"
-    return {"distance": length_text, "time": span_text, "bearing": direction_text, "angle": side_text,
-            "share": share_text}.get(figure.kind, number_text)(figure.value)
+    return {
+        "distance": length_text,
+        "time": span_text,
+        "bearing": direction_text,
+        "angle": side_text,
+        "share": share_text,
+    }.get(figure.kind, number_text)(figure.value)
 
 
 def _wind(view: View, *, knots: bool) -> Row:
@@ -266,8 +295,14 @@ def _wind(view: View, *, knots: bool) -> Row:
     gusts = "" if wind.tws_sigma_mps is None else f"±{speed_text(wind.tws_sigma_mps, knots=knots)}"
     style = Style.PLAIN if wind.health == "good" else Style.WARN
     health = "" if wind.health == "good" else f" {wind.health}"
-    return "Wind", (f"{direction_text(wind.twd_from_deg)}{spread} {speed_text(wind.tws_mps, knots=knots)}{gusts} "
-                    f"{unit_text(knots=knots)}{health}"), style
+    return (
+        "Wind",
+        (
+            f"{direction_text(wind.twd_from_deg)}{spread} {speed_text(wind.tws_mps, knots=knots)}{gusts} "
+            f"{unit_text(knots=knots)}{health}"
+        ),
+        style,
+    )
 
 
 def _water(view: View, *, knots: bool) -> list[Row]:
@@ -293,8 +328,10 @@ def _bow(view: View, *, knots: bool) -> Row:
 
 def _boat(view: View, *, knots: bool) -> Row:
     boat = view.boat
-    text = (f"HDG {direction_text(boat.heading_deg)} COG {direction_text(boat.cog_deg)} "
-            f"{speed_text(boat.sog_mps, knots=knots)} {unit_text(knots=knots)}")
+    text = (
+        f"HDG {direction_text(boat.heading_deg)} COG {direction_text(boat.cog_deg)} "
+        f"{speed_text(boat.sog_mps, knots=knots)} {unit_text(knots=knots)}"
+    )
     is_old = boat.age_s is None or boat.age_s > OLD_S
     return "Boat", f"{text}, {span_text(boat.age_s)} ago" if is_old else text, Style.WARN if is_old else Style.PLAIN
 
@@ -315,8 +352,11 @@ def _leg(view: View) -> Row:
 def _goal(view: View) -> Row:
     goal = next((g for g in view.goals if g.is_next), None)
     figures = view.figures
-    number = "" if figures.goals is None or figures.goals_reached is None else \
-        f"{min(figures.goals_reached + 1, figures.goals)}/{figures.goals} "
+    number = (
+        ""
+        if figures.goals is None or figures.goals_reached is None
+        else f"{min(figures.goals_reached + 1, figures.goals)}/{figures.goals} "
+    )
     if goal is None:
         return "Goal", f"{number}{length_text(view.boat.goal_m)}", Style.PLAIN
     text = f"{number}{length_text(goal.distance_m)} at {direction_text(goal.bearing_deg)} {goal.name}"
@@ -330,8 +370,14 @@ def _tack(view: View) -> Row:
     next_s = None if view.plan is None else view.plan.next_tack_s
     about = "about " if view.plan is not None and view.plan.next_tack_is_planned is False else ""
     tacks = view.figures.tacks
-    return "Tack", (f"{'none planned' if next_s is None else f'in {about}{span_text(next_s)}'}{layline}"
-                    f"{'' if tacks is None else f', {tacks} done'}"), Style.PLAIN
+    return (
+        "Tack",
+        (
+            f"{'none planned' if next_s is None else f'in {about}{span_text(next_s)}'}{layline}"
+            f"{'' if tacks is None else f', {tacks} done'}"
+        ),
+        Style.PLAIN,
+    )
 
 
 def _plan(view: View, *, is_wide: bool) -> Row:
@@ -341,15 +387,21 @@ def _plan(view: View, *, is_wide: bool) -> Row:
     there = "" if plan.there_s is None else f"there in {span_text(plan.there_s)}"
     late = "" if plan.there_late_s is None or not is_wide else f" (90 %: {span_text(plan.there_late_s)})"
     risk = "" if plan.path_risk is None else f"off plan {share_text(plan.path_risk)}"
-    text = ", ".join(part for part in (
-        there + late, risk, f"#{number_text(plan.number)} {span_text(plan.age_s)} old") if part)
+    text = ", ".join(
+        part for part in (there + late, risk, f"#{number_text(plan.number)} {span_text(plan.age_s)} old") if part
+    )
     return "Plan", f"{text}, {plan.bound_for}" if plan.bound_for else text, Style.PLAIN
 
 
 def _clear(view: View) -> Row:
     near = min((v for v in view.vessels if v.cpa_s is not None), key=lambda v: v.cpa_m or 0.0, default=None)
-    ships = "" if not view.vessels else f", {len(view.vessels)} vessels" if near is None else \
-        f", {near.name or near.mmsi} {length_text(near.cpa_m)} in {span_text(near.cpa_s)}"
+    ships = (
+        ""
+        if not view.vessels
+        else f", {len(view.vessels)} vessels"
+        if near is None
+        else f", {near.name or near.mmsi} {length_text(near.cpa_m)} in {span_text(near.cpa_s)}"
+    )
     is_alarm = any(v.alarm in {"act", "touch"} for v in view.vessels)
     return "Clear", f"{length_text(view.boat.clearance_m)} of land{ships}", Style.BAD if is_alarm else Style.PLAIN
 
@@ -359,8 +411,17 @@ def _parts(view: View) -> Row:
     if not ill:
         return "Parts", "all well", Style.PLAIN
     worst = any(part.grade == "bad" for part in ill)
-    words = ", ".join(part.name + (f" {span_text(part.age_s)} ago" if (part.age_s or 0.0) > 5.0 else
-                                   f" {part.text}" if part.text else f" {part.grade}") for part in ill)
+    words = ", ".join(
+        part.name
+        + (
+            f" {span_text(part.age_s)} ago"
+            if (part.age_s or 0.0) > 5.0
+            else f" {part.text}"
+            if part.text
+            else f" {part.grade}"
+        )
+        for part in ill
+    )
     return "Parts", words, Style.BAD if worst else Style.WARN
 
 
@@ -375,12 +436,18 @@ def _speeds(view: View, *, knots: bool) -> Row:
     boat, polar = view.boat, view.polar
     ratio = None if polar is None else polar.live_share()
     heel = "" if boat.roll_deg is None else f", heel {abs(boat.roll_deg):.0f}°{'S' if boat.roll_deg > 0.0 else 'P'}"
-    return "VMG", (f"{speed_text(boat.vmg_mps, knots=knots)} {unit_text(knots=knots)}"
-                   f"{'' if ratio is None else f', polar {share_text(ratio)}'}{heel}"), Style.PLAIN
+    return (
+        "VMG",
+        (
+            f"{speed_text(boat.vmg_mps, knots=knots)} {unit_text(knots=knots)}"
+            f"{'' if ratio is None else f', polar {share_text(ratio)}'}{heel}"
+        ),
+        Style.PLAIN,
+    )
 
 
 LEAST_COLUMNS, LEAST_ROWS = 40, 12
-STRIP_COLUMNS = (24, 36)      # of the wind's history: at least, at most
+STRIP_COLUMNS = (24, 36)  # of the wind's history: at least, at most
 LEVELS = {"critical": Style.ALARM, "error": Style.BAD, "warning": Style.WARN, "notice": Style.BOLD}
 
 
@@ -428,11 +495,12 @@ def draw(what: Shown, columns: int, rows: int) -> Frame:
     bottom = rows - 2 - log_rows
     strip = min(STRIP_COLUMNS[1], max(STRIP_COLUMNS[0], columns - 44))
     left = columns - strip - 2
-    for offset, (label, text, style) in enumerate(body_of(view, knots=what.helm.knots, columns=left)[:bottom - row]):
+    for offset, (label, text, style) in enumerate(body_of(view, knots=what.helm.knots, columns=left)[: bottom - row]):
         frame.put(row + offset, 1, label, Style.DIM)
         frame.put(row + offset, 8, text, style, width=left - 7)
-    wind_strip(frame, row, left + 2, bottom - row, what.history.bins(view.t_s, BIN_S, bottom - row - 1),
-               knots=what.helm.knots)
+    wind_strip(
+        frame, row, left + 2, bottom - row, what.history.bins(view.t_s, BIN_S, bottom - row - 1), knots=what.helm.knots
+    )
     if what.helm.has_help:
         _help(frame, bottom, log_rows, what)
     else:
@@ -488,8 +556,13 @@ def _alarms(frame: Frame, view: View, row: int, rows: int) -> int:
 
 def _log(frame: Frame, row: int, rows: int, history: History) -> None:
     for offset, event in enumerate(list(reversed(history.events))[:rows]):
-        frame.put(row + offset, 1, event_words(event), LEVELS.get(event.level, Style.PLAIN)
-                  if event.level in {"critical", "error", "warning"} else Style.PLAIN, width=frame.columns - 2)
+        frame.put(
+            row + offset,
+            1,
+            event_words(event),
+            LEVELS.get(event.level, Style.PLAIN) if event.level in {"critical", "error", "warning"} else Style.PLAIN,
+            width=frame.columns - 2,
+        )
 
 
 def event_words(event: Event) -> str:
@@ -503,8 +576,12 @@ def _help(frame: Frame, row: int, rows: int, what: Shown) -> None:
     keys = [f"{key.key} {key.label}" for key in shown(orders)]
     hidden = [key.label for key in KEYS if key not in shown(orders)]
     lines = [
-        f"Orders: {', '.join(keys)}.", f"Not permitted here: {', '.join(hidden)}." if hidden else
-        "Which of them she takes is in her mission." if orders is None else "",
+        f"Orders: {', '.join(keys)}.",
+        f"Not permitted here: {', '.join(hidden)}."
+        if hidden
+        else "Which of them she takes is in her mission."
+        if orders is None
+        else "",
         "u knots or m/s, ? this help, q or Ctrl-C the end. T true wind, H heading, C course, W waypoint, : no-go zone.",
         "S and P: starboard and port tack, or the side that the wind comes over.",
     ]
@@ -516,8 +593,13 @@ def _help(frame: Frame, row: int, rows: int, what: Shown) -> None:
 def _bottom(frame: Frame, what: Shown) -> None:
     helm = what.helm
     asked = helm.prompt
-    frame.put(frame.rows - 2, 1, asked or helm.said or what.said, Style.WARN if asked else Style.PLAIN,
-              width=frame.columns - 2)
+    frame.put(
+        frame.rows - 2,
+        1,
+        asked or helm.said or what.said,
+        Style.WARN if asked else Style.PLAIN,
+        width=frame.columns - 2,
+    )
     keys = "  ".join(f"{key.key} {key.label}" for key in shown(what.orders))
     frame.put(frame.rows - 1, 1, f"q quit  ? help  {keys}", Style.DIM, width=frame.columns - 2)
 
@@ -533,8 +615,10 @@ def line_of(view: View, unix_s: float, *, knots: bool) -> str:
         "age unknown" if age_s is None else f"{'age' if age_s <= OLD_S else 'OLD'} {span_text(age_s)}",
     ]
     if wind is not None:
-        parts.append(f"wind {direction_text(wind.twd_from_deg)}±{number_text(wind.sigma_deg)}° "
-                     f"{speed_text(wind.tws_mps, knots=knots)} {unit}")
+        parts.append(
+            f"wind {direction_text(wind.twd_from_deg)}±{number_text(wind.sigma_deg)}° "
+            f"{speed_text(wind.tws_mps, knots=knots)} {unit}"
+        )
     parts.append(f"{direction_text(boat.cog_deg)} {speed_text(boat.sog_mps, knots=knots)} {unit}")
     if plan is not None and plan.leg is not None:
         parts.append(f"leg {plan.leg}/{number_text(plan.count)} {length_text(boat.waypoint_m)}")

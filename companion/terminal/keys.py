@@ -10,7 +10,7 @@ from companion.orders import Verb, Wanted, permitted, phrase
 
 YES = frozenset("yY")
 BACKSPACE, ENTER, ESCAPE, CTRL_U = frozenset("\x08\x7f"), frozenset("\r\n"), "\x1b", "\x15"
-MOST = 60   # characters of a place or a name
+MOST = 60  # characters of a place or a name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

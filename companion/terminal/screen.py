@@ -19,7 +19,7 @@ from itertools import groupby
 from types import TracebackType
 from typing import Self, TextIO
 
-NEAR = 6   # unchanged cells between two changed ones that are cheaper to write again than to jump over
+NEAR = 6  # unchanged cells between two changed ones that are cheaper to write again than to jump over
 
 
 class Style(enum.Enum):
@@ -30,15 +30,14 @@ class Style(enum.Enum):
     DIM = "2"
     TITLE = "7"
     GOOD = "32"
-    PORT = "31"          # the tack on which the wind is over the port side, and what is bad
+    PORT = "31"  # the tack on which the wind is over the port side, and what is bad
     STARBOARD = "32;1"
     BAD = "31;1"
     WARN = "33;1"
     ALARM = "7;31"
 
 
-COLOURLESS = {
-    Style.GOOD: "", Style.PORT: "", Style.STARBOARD: "1", Style.BAD: "1", Style.WARN: "1", Style.ALARM: "7;1"}
+COLOURLESS = {Style.GOOD: "", Style.PORT: "", Style.STARBOARD: "1", Style.BAD: "1", Style.WARN: "1", Style.ALARM: "7;1"}
 
 Cell = tuple[str, Style]
 BLANK: Cell = (" ", Style.PLAIN)
@@ -60,7 +59,7 @@ class Frame:
         room = self.columns - column if width is None else min(width, self.columns - column)
         shown = clean(text)
         if len(shown) > room:
-            shown = shown[:max(0, room - 1)] + "…" if room > 0 else ""
+            shown = shown[: max(0, room - 1)] + "…" if room > 0 else ""
         if 0 <= row < self.rows:
             for offset, character in enumerate(shown):
                 if 0 <= column + offset < self.columns:
@@ -84,8 +83,10 @@ def clean(text: str) -> str:
     >>> clean(chr(27) + "[2J" + chr(0x202E))
     '�[2J�'
     """
-    return "".join(c if c.isprintable() and not unicodedata.combining(c)
-                   and unicodedata.east_asian_width(c) not in "WF" else "�" for c in text)
+    return "".join(
+        c if c.isprintable() and not unicodedata.combining(c) and unicodedata.east_asian_width(c) not in "WF" else "�"
+        for c in text
+    )
 
 
 def changes(before: Frame | None, after: Frame, *, has_colour: bool = True) -> str:
@@ -144,7 +145,7 @@ class Terminal:
         self._waiting = b""
         self._keys = codecs.getincrementaldecoder("utf-8")("replace")
         self.bytes_out = 0
-        self.is_gone = False      # hung up: nobody looks any more
+        self.is_gone = False  # hung up: nobody looks any more
 
     def __enter__(self) -> Self:
         self._before = termios.tcgetattr(self._in)
@@ -158,7 +159,7 @@ class Terminal:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         loop = asyncio.get_running_loop()
         loop.remove_reader(self._in)
@@ -221,7 +222,7 @@ class Terminal:
         loop = asyncio.get_running_loop()
         try:
             while self._waiting:
-                self._waiting = self._waiting[os.write(self._out, self._waiting):]
+                self._waiting = self._waiting[os.write(self._out, self._waiting) :]
             loop.remove_writer(self._out)
         except BlockingIOError:
             loop.add_writer(self._out, self._flush)

@@ -42,9 +42,9 @@ class Alarm(enum.IntEnum):
     """How much a target matters; a larger value is worse."""
 
     NONE = 0
-    WARN = 1     # closest approach and the time to it are both under the warning limits
-    ACT = 2      # both are under the limits for acting
-    TOUCH = 3    # hulls overlap now, by what is reported
+    WARN = 1  # closest approach and the time to it are both under the warning limits
+    ACT = 2  # both are under the limits for acting
+    TOUCH = 3  # hulls overlap now, by what is reported
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,14 +103,17 @@ def cpa(own: OwnShip, vessel: Vessel, t_s: float) -> ClosestApproach:
     now = _gap(a, b, half_a, half_b)
     later = predict(vessel, t_s + time_s)
     return ClosestApproach(
-        distance_m=max(0.0, gap - radius), time_s=time_s, now_m=max(0.0, now - radius),
-        bearing_rad=wrap_two_pi(math.atan2(-ex, -ey)), is_closing=time_s > 0.0,
+        distance_m=max(0.0, gap - radius),
+        time_s=time_s,
+        now_m=max(0.0, now - radius),
+        bearing_rad=wrap_two_pi(math.atan2(-ex, -ey)),
+        is_closing=time_s > 0.0,
         sigma_m=max(later.sigma_along_m, later.sigma_across_m),
     )
 
 
 def peril_m(
-    own_en_m: tuple[float, float], own_velocity_en_mps: tuple[float, float], vessel: Vessel, t_s: float,
+    own_en_m: tuple[float, float], own_velocity_en_mps: tuple[float, float], vessel: Vessel, t_s: float
 ) -> float:
     """Return how much a vessel matters where not all can be kept [m]: less is more.
 

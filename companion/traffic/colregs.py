@@ -37,7 +37,7 @@ HEAD_ON_RAD = math.radians(6.0)
 class Rule(enum.Enum):
     """Which rule governs."""
 
-    NONE = "none"               # not under way, or not known enough
+    NONE = "none"  # not under way, or not known enough
     SAILING = "12"
     OVERTAKING = "13"
     HEAD_ON = "14"
@@ -51,14 +51,14 @@ class Role(enum.Enum):
     GIVE_WAY = "give way"
     STAND_ON = "stand on"
     BOTH_ALTER = "both alter to starboard"
-    KEEP_CLEAR = "keep clear"   # of what does not move, and of what is not known
+    KEEP_CLEAR = "keep clear"  # of what does not move, and of what is not known
 
 
 class Policy(enum.Enum):
     """How we act on it."""
 
-    KEEP_CLEAR = "keep clear"   # of everyone, whatever the rules give us
-    RULES = "rules"             # stand on where they say so, until the alarm says ACT (rule 17)
+    KEEP_CLEAR = "keep clear"  # of everyone, whatever the rules give us
+    RULES = "rules"  # stand on where they say so, until the alarm says ACT (rule 17)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,7 +112,7 @@ def classify(own: OwnShip, vessel: Vessel, approach: ClosestApproach, twd_from_r
 
 
 def _overtaking(
-    own: OwnShip, vessel: Vessel, approach: ClosestApproach, ours: float, theirs: float,
+    own: OwnShip, vessel: Vessel, approach: ClosestApproach, ours: float, theirs: float
 ) -> Encounter | None:
     """Return the verdict of rule 13, or None where nobody overtakes."""
     if not approach.is_closing:
@@ -178,6 +178,7 @@ def _under_power(vessel: Vessel, approach: ClosestApproach, ours: float, theirs:
 
 # The picture judged: each vessel's approach, alarm and rule, the worst first.
 
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assessment:
     """One vessel seen from our boat."""
@@ -211,10 +212,12 @@ def assess(
         encounter = classify(own, vessel, approach, twd_from_rad)
         # An old report's spread counts against us: a stale track must not look safe. One sigma is taken off.
         alarm = alarm_of(approach, limits, growth_m=approach.sigma_m if picture.age_s(vessel) > 30.0 else 0.0)
-        out.append(Assessment(vessel=vessel, approach=approach, alarm=alarm, encounter=encounter,
-                              age_s=picture.age_s(vessel)))
-    return tuple(sorted(out, key=lambda x: (
-        -x.alarm, x.approach.distance_m, x.approach.time_s, x.vessel.mmsi, x.vessel.branch)))
+        out.append(
+            Assessment(vessel=vessel, approach=approach, alarm=alarm, encounter=encounter, age_s=picture.age_s(vessel))
+        )
+    return tuple(
+        sorted(out, key=lambda x: (-x.alarm, x.approach.distance_m, x.approach.time_s, x.vessel.mmsi, x.vessel.branch))
+    )
 
 
 # Encounters under the rules of the road: what the rules ask of us, held from the beginning to past and clear.
@@ -227,17 +230,17 @@ def assess(
 # Where we stand on we keep course and speed (rule 17 a i) until the other has evidently not acted, that is until no
 # more time is left than we need to get clear by ourselves (rule 17 a ii and b).
 
-SOON_S = 300.0               # an approach later than this is no risk of collision yet
-OVER_S = 5.0                 # for so long they have drawn apart, and would on their first courses: past and clear
-LEFT_S = 120.0               # for so long the other has drawn away on its own course: it does not come back
+SOON_S = 300.0  # an approach later than this is no risk of collision yet
+OVER_S = 5.0  # for so long they have drawn apart, and would on their first courses: past and clear
+LEFT_S = 120.0  # for so long the other has drawn away on its own course: it does not come back
 # Getting clear by ourselves: seeing it, a plan, its upload and the turn; then a way that is not straight across.
 REACTION_S, DETOUR = 15.0, 1.5
 SLOW_MPS = 1.0
 # A change of course that is readily apparent (rule 8 b). The rule has no number: 30 degrees is the usual reading; once
 # the lesser of these shows, the change is made.
 APPARENT_RAD, SHOWN_RAD = math.radians(30.0), math.radians(24.0)
-ACTS_RAD, OTHER_ACTS_CPA = math.radians(15.0), 0.4   # turned by this much; then this share of the distance does
-TACK_RAD = math.radians(10.0)   # nearer to the wind's line than this a tack is not told from a heading
+ACTS_RAD, OTHER_ACTS_CPA = math.radians(15.0), 0.4  # turned by this much; then this share of the distance does
+TACK_RAD = math.radians(10.0)  # nearer to the wind's line than this a tack is not told from a heading
 
 # Who stands on is bound to keep course and speed (rule 17), and who should give way and does not has shown that it
 # keeps them: in an encounter no vessel is expected to wander. Reports that say otherwise make another plan.
@@ -306,8 +309,7 @@ class OngoingEncounter:
     def sentence(self, approach: ClosestApproach) -> str:
         """Return one line: who, where from, what the rules give and what we do."""
         rule = f"rule {self.encounter.rule.value}: {self.encounter.reason}"
-        where = {"ahead": "comes from ahead", "astern": "comes from astern"}.get(
-            self.side, f"crosses from {self.side}")
+        where = {"ahead": "comes from ahead", "astern": "comes from astern"}.get(self.side, f"crosses from {self.side}")
         if self.encounter.rule is Rule.OVERTAKING and self.encounter.role is Role.GIVE_WAY:
             where = "is being overtaken"
         if self.evident:
@@ -316,7 +318,7 @@ class OngoingEncounter:
             does = "standing on"
         else:
             does = self.encounter.role.value
-        return (f"{self.label} {where}: {does} ({rule}); CPA {approach.distance_m:.0f} m in {approach.time_s:.0f} s")
+        return f"{self.label} {where}: {does} ({rule}); CPA {approach.distance_m:.0f} m in {approach.time_s:.0f} s"
 
 
 def act_limits(own: OwnShip, vessel: Vessel, clearance_m: float, *, other_acts: bool = False) -> AlarmLimits:
@@ -326,12 +328,20 @@ def act_limits(own: OwnShip, vessel: Vessel, clearance_m: float, *, other_acts: 
     """
     way_m = DETOUR * (clearance_m + own.radius_m + vessel.reach_m)
     return AlarmLimits(
-        warn_cpa_m=clearance_m, warn_tcpa_s=SOON_S, act_cpa_m=clearance_m * (OTHER_ACTS_CPA if other_acts else 1.0),
-        act_tcpa_s=REACTION_S + way_m / max(own.speed_mps, SLOW_MPS))
+        warn_cpa_m=clearance_m,
+        warn_tcpa_s=SOON_S,
+        act_cpa_m=clearance_m * (OTHER_ACTS_CPA if other_acts else 1.0),
+        act_tcpa_s=REACTION_S + way_m / max(own.speed_mps, SLOW_MPS),
+    )
 
 
 def follow(
-    held: Sequence[OngoingEncounter], own: OwnShip, seen: Sequence[Assessment], *, t_s: float, clearance_m: float,
+    held: Sequence[OngoingEncounter],
+    own: OwnShip,
+    seen: Sequence[Assessment],
+    *,
+    t_s: float,
+    clearance_m: float,
     twd_from_rad: float | None,
 ) -> tuple[OngoingEncounter, ...]:
     """Return the encounters after a look round.
@@ -349,15 +359,18 @@ def follow(
     out = []
     for one in seen:
         before = known.get((one.vessel.mmsi, one.vessel.branch))
-        after = _begun(own, one, clearance_m, t_s, twd_from_rad) if before is None else (
-            _gone_on(before, own, one, t_s, twd_from_rad))
+        after = (
+            _begun(own, one, clearance_m, t_s, twd_from_rad)
+            if before is None
+            else (_gone_on(before, own, one, t_s, twd_from_rad))
+        )
         if after is not None:
             out.append(_judged(after, own, one, clearance_m))
     return tuple(sorted(out, key=lambda h: (h.mmsi, h.branch)))
 
 
 def _begun(
-    own: OwnShip, one: Assessment, clearance_m: float, t_s: float, twd_from_rad: float | None,
+    own: OwnShip, one: Assessment, clearance_m: float, t_s: float, twd_from_rad: float | None
 ) -> OngoingEncounter | None:
     a = one.approach
     doubt_m = min(a.sigma_m, clearance_m)
@@ -365,9 +378,16 @@ def _begun(
         return None
     course = math.atan2(*own.velocity_en_mps)
     return OngoingEncounter(
-        mmsi=one.vessel.mmsi, branch=one.vessel.branch, label=one.vessel.label, encounter=one.encounter, since_s=t_s,
-        course_rad=course, side=_side(difference_rad(a.bearing_rad, course)),
-        other_course_rad=one.vessel.course_rad, tacks=_tacks(own, one.vessel, twd_from_rad))
+        mmsi=one.vessel.mmsi,
+        branch=one.vessel.branch,
+        label=one.vessel.label,
+        encounter=one.encounter,
+        since_s=t_s,
+        course_rad=course,
+        side=_side(difference_rad(a.bearing_rad, course)),
+        other_course_rad=one.vessel.course_rad,
+        tacks=_tacks(own, one.vessel, twd_from_rad),
+    )
 
 
 def _gone_on(
@@ -380,8 +400,10 @@ def _gone_on(
         held = replace(held, apart_s=t_s)
     elif t_s - held.apart_s >= (LEFT_S if _meets_again(held, own, one.vessel, t_s) else OVER_S):
         return None
-    if own.speed_mps >= 0.5 * SLOW_MPS and abs(
-            difference_rad(math.atan2(*own.velocity_en_mps), held.course_rad)) >= SHOWN_RAD:
+    if (
+        own.speed_mps >= 0.5 * SLOW_MPS
+        and abs(difference_rad(math.atan2(*own.velocity_en_mps), held.course_rad)) >= SHOWN_RAD
+    ):
         held = replace(held, altered=True)
     tacks = _tacks(own, one.vessel, twd_from_rad)
     # The other's may change because it gives way: that relieves it of nothing.
@@ -396,20 +418,23 @@ def _meets_again(held: OngoingEncounter, own: OwnShip, vessel: Vessel, t_s: floa
     """Would they close again, were both back on the courses that the encounter began on?"""
     if held.other_course_rad is None:
         return False
-    back = replace(own, velocity_en_mps=(
-        own.speed_mps * math.sin(held.course_rad), own.speed_mps * math.cos(held.course_rad)))
+    back = replace(
+        own, velocity_en_mps=(own.speed_mps * math.sin(held.course_rad), own.speed_mps * math.cos(held.course_rad))
+    )
     return cpa(back, replace(vessel, course_rad=held.other_course_rad, heading_rad=None), t_s).is_closing
 
 
-def _judged(
-    held: OngoingEncounter, own: OwnShip, one: Assessment, clearance_m: float,
-) -> OngoingEncounter:
+def _judged(held: OngoingEncounter, own: OwnShip, one: Assessment, clearance_m: float) -> OngoingEncounter:
     then, now = held.other_course_rad, one.vessel.course_rad
     other_acts = then is not None and now is not None and abs(difference_rad(now, then)) >= ACTS_RAD
     alarm = alarm_of(one.approach, act_limits(own, one.vessel, clearance_m, other_acts=other_acts))
     must_act = held.evident or held.encounter.role is not Role.STAND_ON or alarm >= Alarm.ACT
-    return replace(held, must_act=must_act, evident=must_act and held.encounter.role is Role.STAND_ON,
-                   cpa_m=one.approach.distance_m)
+    return replace(
+        held,
+        must_act=must_act,
+        evident=must_act and held.encounter.role is Role.STAND_ON,
+        cpa_m=one.approach.distance_m,
+    )
 
 
 def _tacks(own: OwnShip, vessel: Vessel, twd_from_rad: float | None) -> tuple[str, str]:

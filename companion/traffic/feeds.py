@@ -26,9 +26,9 @@ from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json
 
 OnReport = Callable[[AisReport], None]
 
-DEFAULT_BAUD = 38400          # ITU-R M.1371 receivers: NMEA 0183-HS
-MAX_PARTIAL = 1024            # bytes without a line end: noise, dropped
-SILENT_S = 60.0               # a feed unheard for this long is stale: say so, AIS traffic or not
+DEFAULT_BAUD = 38400  # ITU-R M.1371 receivers: NMEA 0183-HS
+MAX_PARTIAL = 1024  # bytes without a line end: noise, dropped
+SILENT_S = 60.0  # a feed unheard for this long is stale: say so, AIS traffic or not
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,6 +127,7 @@ class AisFeed:
     # ------------------------------------------------------------------------------------------- life
     async def run_stream(self) -> None:
         """Connect, read to the end, connect again; for ever."""
+
         def failed(why: str) -> None:
             self.last_error = why
 
@@ -209,7 +210,7 @@ class Feeds:
         self.open_feeds: list[AisFeed] = []
         self.dropped = 0
         self._heard: list[AisReport] = []
-        self._silent: set[str] = set()   # feeds of which it was said
+        self._silent: set[str] = set()  # feeds of which it was said
 
     async def open(self, stack: contextlib.AsyncExitStack, names: Sequence[str], seed: int) -> list[str]:
         """Listen to the feeds for as long as ``stack`` lives; return why any of them could not be opened."""

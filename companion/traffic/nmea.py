@@ -16,10 +16,10 @@ from typing import Any
 from companion.geo import MPS_PER_KNOT
 from companion.messages import AisReport, GeoPoint
 
-MAX_LINE = 120           # NMEA 0183 says 82; tag blocks and careless multiplexers make more
+MAX_LINE = 120  # NMEA 0183 says 82; tag blocks and careless multiplexers make more
 MAX_DATAGRAM = 8192
-FRAGMENT_S = 10.0        # fragments of one message come within this
-MAX_PENDING = 32         # messages waiting for fragments
+FRAGMENT_S = 10.0  # fragments of one message come within this
+MAX_PENDING = 32  # messages waiting for fragments
 _SPEED_LIMIT_MPS = 102.3 * MPS_PER_KNOT
 _POSITION_TYPES = frozenset({1, 2, 3, 18, 19, 27})
 _STATIC_TYPES = frozenset({5, 24})
@@ -31,11 +31,11 @@ class DecodeCounts:
 
     lines: int = 0
     reports: int = 0
-    other: int = 0               # sentences and messages that say nothing about another vessel's movement
-    bad_form: int = 0            # not a sentence, not JSON, too long
+    other: int = 0  # sentences and messages that say nothing about another vessel's movement
+    bad_form: int = 0  # not a sentence, not JSON, too long
     bad_checksum: int = 0
-    bad_payload: int = 0         # a right checksum around nonsense
-    bad_fragment: int = 0        # out of order, incomplete, too late
+    bad_payload: int = 0  # a right checksum around nonsense
+    bad_fragment: int = 0  # out of order, incomplete, too late
 
     @property
     def refused(self) -> int:
@@ -69,7 +69,7 @@ class NmeaDecoder:
         counts.lines += 1
         text = line.decode("ascii", "replace") if isinstance(line, bytes) else line
         text = text.strip("\r\n \0")
-        if text.startswith("\\"):                     # IEC 61162-450 tag block
+        if text.startswith("\\"):  # IEC 61162-450 tag block
             text = text.rpartition("\\")[2]
         if not text or len(text) > MAX_LINE or text[0] not in "!$":
             counts.bad_form += 1
@@ -78,7 +78,7 @@ class NmeaDecoder:
             counts.bad_checksum += 1
             return None
         fields = text[1:].partition("*")[0].split(",")
-        if len(fields[0]) != 5 or fields[0][2:] != "VDM":   # VDO is our own transponder
+        if len(fields[0]) != 5 or fields[0][2:] != "VDM":  # VDO is our own transponder
             counts.other += 1
             return None
         parts = self._collect(fields, text, t_s)
@@ -149,9 +149,14 @@ def report_from_pyais(message: Any, t_s: float) -> AisReport | None:
     mmsi = int(message.mmsi)
     if kind in _POSITION_TYPES:
         report = AisReport(
-            t_s=t_s, mmsi=mmsi, position=_position(message.lat, message.lon), course_rad=_course(message.course, kind),
-            speed_mps=_speed(message.speed, kind), heading_rad=_heading(getattr(message, "heading", None)),
-            turn_rate_radps=_turn(getattr(message, "turn", None)), nav_status=_status(getattr(message, "status", None)),
+            t_s=t_s,
+            mmsi=mmsi,
+            position=_position(message.lat, message.lon),
+            course_rad=_course(message.course, kind),
+            speed_mps=_speed(message.speed, kind),
+            heading_rad=_heading(getattr(message, "heading", None)),
+            turn_rate_radps=_turn(getattr(message, "turn", None)),
+            nav_status=_status(getattr(message, "status", None)),
             is_class_b=kind in {18, 19},
         )
         return _with_static(report, message) if kind == 19 else report
@@ -210,8 +215,13 @@ def _with_static(report: AisReport, message: Any) -> AisReport:
     size = [float(getattr(message, side, 0) or 0.0) for side in ("to_bow", "to_stern", "to_port", "to_starboard")]
     bow, stern, port, starboard = size if any(size) else (None, None, None, None)
     return replace(
-        report, name=_text(getattr(message, "shipname", None)), ship_type=_kind(getattr(message, "ship_type", None)),
-        bow_m=bow, stern_m=stern, port_m=port, starboard_m=starboard,
+        report,
+        name=_text(getattr(message, "shipname", None)),
+        ship_type=_kind(getattr(message, "ship_type", None)),
+        bow_m=bow,
+        stern_m=stern,
+        port_m=port,
+        starboard_m=starboard,
     )
 
 
@@ -243,13 +253,22 @@ def decode_json(datagram: bytes, t_s: float) -> AisReport | None:
         knots = _number(raw.get("speed_kn"), 0.0, 102.2)
         speed = None if knots is None else knots * MPS_PER_KNOT
     length, beam = _number(raw.get("length_m"), 0.1, 500.0), _number(raw.get("beam_m"), 0.05, 100.0)
-    length = 5.0 if length is None else length          # an event's boat, not a ship
+    length = 5.0 if length is None else length  # an event's boat, not a ship
     beam = length / 3.0 if beam is None else beam
     name = raw.get("name")
     return AisReport(
-        t_s=t_s, mmsi=mmsi, position=position, course_rad=course if course is not None else heading,
-        speed_mps=speed, heading_rad=heading, name=_text(name[:40]) if isinstance(name, str) else None,
-        bow_m=length / 2, stern_m=length / 2, port_m=beam / 2, starboard_m=beam / 2, is_class_b=True,
+        t_s=t_s,
+        mmsi=mmsi,
+        position=position,
+        course_rad=course if course is not None else heading,
+        speed_mps=speed,
+        heading_rad=heading,
+        name=_text(name[:40]) if isinstance(name, str) else None,
+        bow_m=length / 2,
+        stern_m=length / 2,
+        port_m=beam / 2,
+        starboard_m=beam / 2,
+        is_class_b=True,
         age_s=_number(raw.get("age_s"), 0.0, 3600.0) or 0.0,
     )
 

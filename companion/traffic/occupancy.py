@@ -14,14 +14,7 @@ from dataclasses import dataclass, replace
 
 from companion.messages import Spread, Target
 from companion.traffic.approach import OwnShip
-from companion.traffic.predict import (
-    TURN_HOLD_S,
-    MotionUncertainty,
-    Prediction,
-    motion_of,
-    predict,
-    turn_rate,
-)
+from companion.traffic.predict import TURN_HOLD_S, MotionUncertainty, Prediction, motion_of, predict, turn_rate
 from companion.traffic.vessel import Vessel
 
 # Predictions beyond this are not worth avoiding: the plan is made again long before.
@@ -126,17 +119,35 @@ def _disc(
     along, across = line(a.sigma_along_m, b.sigma_along_m), line(a.sigma_across_m, b.sigma_across_m)
     sigma = line(_sigma_m(a, begin, keep), _sigma_m(b, late, keep))
     spread = Spread(
-        vessel=10 * vessel.mmsi + vessel.branch, x_m=x - vx * begin, y_m=y - vy * begin, course_rad=b.course_rad,
-        keep_m=a.reach_m + keep.own_radius_m + keep.clearance_m + sagitta, along_m=along[0], along_mps=along[1],
-        across_m=across[0], across_mps=across[1], own_mps=keep.own_timing_mps, sigma_m=sigma[0], sigma_mps=sigma[1],
+        vessel=10 * vessel.mmsi + vessel.branch,
+        x_m=x - vx * begin,
+        y_m=y - vy * begin,
+        course_rad=b.course_rad,
+        keep_m=a.reach_m + keep.own_radius_m + keep.clearance_m + sagitta,
+        along_m=along[0],
+        along_mps=along[1],
+        across_m=across[0],
+        across_mps=across[1],
+        own_mps=keep.own_timing_mps,
+        sigma_m=sigma[0],
+        sigma_mps=sigma[1],
     )
     if keep.ahead_m > 0.0 and math.hypot(vx, vy) > 0.3:
         ahead = 0.5 * keep.ahead_m
         x, y = x + ahead * vx / math.hypot(vx, vy), y + ahead * vy / math.hypot(vx, vy)
         ra += ahead
     return Target(
-        x_m=x - vx * begin, y_m=y - vy * begin, vx_mps=vx, vy_mps=vy, radius_m=ra - growth * begin, growth_mps=growth,
-        from_s=begin, until_s=end, name=vessel.label, mmsi=vessel.mmsi, spread=spread,
+        x_m=x - vx * begin,
+        y_m=y - vy * begin,
+        vx_mps=vx,
+        vy_mps=vy,
+        radius_m=ra - growth * begin,
+        growth_mps=growth,
+        from_s=begin,
+        until_s=end,
+        name=vessel.label,
+        mmsi=vessel.mmsi,
+        spread=spread,
     )
 
 

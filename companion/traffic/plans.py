@@ -66,9 +66,7 @@ class Conflict:
     depth_m: float
 
 
-def check_legs(
-    legs: Sequence[TimedLeg], discs: Sequence[Target],
-) -> tuple[Conflict, ...]:
+def check_legs(legs: Sequence[TimedLeg], discs: Sequence[Target]) -> tuple[Conflict, ...]:
     """Return where the plan meets the discs, the earliest meeting of each vessel, in order of time.
 
     Args:
@@ -94,9 +92,7 @@ def check_legs(
     return tuple(sorted(found.values(), key=lambda c: (c.time_s, c.mmsi)))
 
 
-def _enters(
-    leg: TimedLeg, begin: float, end: float, lo: float, hi: float, disc: Target
-) -> tuple[float, float] | None:
+def _enters(leg: TimedLeg, begin: float, end: float, lo: float, hi: float, disc: Target) -> tuple[float, float] | None:
     """Return (first time inside, greatest depth) or None: |r + w s|² < (R + g s)², a quadratic in s."""
     span = end - begin
     ux, uy = (0.0, 0.0)
@@ -139,9 +135,7 @@ def _first_negative(a: float, b: float, c: float, last: float) -> float | None:
     return s if 0.0 <= s < last else None
 
 
-def _max_depth(
-    rx: float, ry: float, wx: float, wy: float, radius: float, g: float, lo: float, hi: float
-) -> float:
+def _max_depth(rx: float, ry: float, wx: float, wy: float, radius: float, g: float, lo: float, hi: float) -> float:
     def depth(s: float) -> float:
         return radius + g * s - math.hypot(rx + wx * s, ry + wy * s)
 
@@ -164,15 +158,20 @@ class Decision(enum.Enum):
     """What to do with the active plan, seen from the traffic."""
 
     KEEP = "keep"
-    REPLAN = "replan"                # it has become unsafe: look for another
-    WAIT = "wait"                    # unsafe, but the last plan for traffic is too young and the meeting not near
+    REPLAN = "replan"  # it has become unsafe: look for another
+    WAIT = "wait"  # unsafe, but the last plan for traffic is too young and the meeting not near
     REPLACE_UNSAFE = "replace: the active plan meets a target"
     REPLACE_BETTER = "replace: clearly better"
 
 
 def decide(
-    conflicts: Sequence[Conflict], *, since_replan_s: float, urgent_s: float = 60.0,
-    active_cost_s: float | None = None, new_cost_s: float | None = None, apart_m: float | None = None,
+    conflicts: Sequence[Conflict],
+    *,
+    since_replan_s: float,
+    urgent_s: float = 60.0,
+    active_cost_s: float | None = None,
+    new_cost_s: float | None = None,
+    apart_m: float | None = None,
 ) -> Decision:
     """Return whether to replan (no new plan yet) or to replace (``new_cost_s`` given).
 
@@ -211,7 +210,7 @@ def path_distance_m(a_en: ArrayLike, b_en: ArrayLike, *, step_m: float = 5.0) ->
     a, b = _resample(np.asarray(a_en, dtype=np.float64), step_m), _resample(np.asarray(b_en, dtype=np.float64), step_m)
     if len(a) == 0 or len(b) == 0:
         return math.inf
-    a = a[int(np.argmin(np.hypot(*(a - b[0]).T))):]
+    a = a[int(np.argmin(np.hypot(*(a - b[0]).T))) :]
     distance = np.hypot(a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1])
     reach = np.empty_like(distance)
     reach[0] = np.maximum.accumulate(distance[0])

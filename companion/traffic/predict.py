@@ -45,14 +45,28 @@ class MotionUncertainty:
 
 # Own assumptions, not from a standard: a ship holds its course, small craft, sailing and fishing boats do not.
 SHIP = MotionUncertainty()
-SMALL = MotionUncertainty(position_m=5.0, speed_mps=0.5, course_rad=math.radians(5.0), accel_mps2=0.02,
-               turn_radps=math.radians(0.5), unknown_mps=3.0)
-WANDERING = MotionUncertainty(position_m=5.0, speed_mps=0.7, course_rad=math.radians(8.0), accel_mps2=0.03,
-                   turn_radps=math.radians(1.0), unknown_mps=3.0)
-STOPPED = MotionUncertainty(position_m=5.0, speed_mps=0.05, course_rad=0.0, accel_mps2=0.0, turn_radps=0.0,
-                            unknown_mps=0.05)
-STEADY = MotionUncertainty(position_m=1.0, speed_mps=0.05, course_rad=math.radians(0.5), accel_mps2=0.0, turn_radps=0.0,
-                unknown_mps=1.0)
+SMALL = MotionUncertainty(
+    position_m=5.0,
+    speed_mps=0.5,
+    course_rad=math.radians(5.0),
+    accel_mps2=0.02,
+    turn_radps=math.radians(0.5),
+    unknown_mps=3.0,
+)
+WANDERING = MotionUncertainty(
+    position_m=5.0,
+    speed_mps=0.7,
+    course_rad=math.radians(8.0),
+    accel_mps2=0.03,
+    turn_radps=math.radians(1.0),
+    unknown_mps=3.0,
+)
+STOPPED = MotionUncertainty(
+    position_m=5.0, speed_mps=0.05, course_rad=0.0, accel_mps2=0.0, turn_radps=0.0, unknown_mps=0.05
+)
+STEADY = MotionUncertainty(
+    position_m=1.0, speed_mps=0.05, course_rad=math.radians(0.5), accel_mps2=0.0, turn_radps=0.0, unknown_mps=1.0
+)
 """An intruder that promises constant speed and heading (WRSC 2013)."""
 
 
@@ -70,7 +84,7 @@ def motion_of(vessel: Vessel) -> MotionUncertainty:
     if vessel.derived:
         base = replace(base, speed_mps=2.0 * base.speed_mps, course_rad=2.0 * base.course_rad)
     if turning == 0.0:
-        return base      # most vessels, each step: a copy costs more than all the arithmetic of a prediction
+        return base  # most vessels, each step: a copy costs more than all the arithmetic of a prediction
     return replace(base, turn_radps=math.hypot(base.turn_radps, 0.5 * turning))
 
 
@@ -138,8 +152,13 @@ def predict(vessel: Vessel, t_s: float, motion: MotionUncertainty | None = None)
     (east, north), course = run(vessel.centre_en_m, course, speed, turn_rate(vessel), tau)
     along, across = spread(m, speed, tau, is_known=vessel.is_moving_known)
     return Prediction(
-        t_s=t_s, mean_en_m=(east, north), velocity_en_mps=(speed * math.sin(course), speed * math.cos(course)),
-        course_rad=course, sigma_along_m=along, sigma_across_m=across, reach_m=vessel.reach_m,
+        t_s=t_s,
+        mean_en_m=(east, north),
+        velocity_en_mps=(speed * math.sin(course), speed * math.cos(course)),
+        course_rad=course,
+        sigma_along_m=along,
+        sigma_across_m=across,
+        reach_m=vessel.reach_m,
     )
 
 

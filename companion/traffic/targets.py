@@ -26,13 +26,13 @@ class TrafficCounts:
 
     heard: int = 0
     own: int = 0
-    late: int = 0             # older than what is known of the vessel
-    stale: int = 0            # too old when it came
-    far: int = 0              # not near enough to matter, or not on the globe's useful part
-    static_unknown: int = 0   # name and size of a vessel whose position was never heard
-    shared_mmsi: int = 0      # two vessels with one MMSI
+    late: int = 0  # older than what is known of the vessel
+    stale: int = 0  # too old when it came
+    far: int = 0  # not near enough to matter, or not on the globe's useful part
+    static_unknown: int = 0  # name and size of a vessel whose position was never heard
+    shared_mmsi: int = 0  # two vessels with one MMSI
     clock_jumps: int = 0
-    forgotten: int = 0        # expired, or pushed out by the bound
+    forgotten: int = 0  # expired, or pushed out by the bound
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +64,7 @@ CLOCK_BACK_S = 60.0
 # must not have all of them judged for each.
 SPARE_SHARE, SPARE_S = 8, 5.0
 
-Key = tuple[int, int]   # MMSI and branch
+Key = tuple[int, int]  # MMSI and branch
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,8 +96,8 @@ class Targets:
     vessels: Mapping[Key, Vessel] = field(default_factory=dict)
     counts: TrafficCounts = field(default_factory=TrafficCounts)
     last_heard_s: float | None = None
-    spare: tuple[tuple[float, Key], ...] = ()   # who goes next: peril [m] and whose, the least perilous first
-    spare_s: float = -math.inf                  # when that was judged
+    spare: tuple[tuple[float, Key], ...] = ()  # who goes next: peril [m] and whose, the least perilous first
+    spare_s: float = -math.inf  # when that was judged
 
     @classmethod
     def empty(cls, frame: LocalFrame, limits: TargetLimits | None = None) -> Targets:
@@ -110,7 +110,9 @@ class Targets:
         return TrafficPicture(t_s=t_s, vessels=tuple(alive), counts=self.counts, last_heard_s=self.last_heard_s)
 
     def heard(
-        self, report: AisReport, own_en_m: tuple[float, float] = (0.0, 0.0),
+        self,
+        report: AisReport,
+        own_en_m: tuple[float, float] = (0.0, 0.0),
         own_velocity_en_mps: tuple[float, float] = (0.0, 0.0),
     ) -> Targets:
         """Return the fold after ``report``; ``report.t_s`` is when it arrived on our clock.
@@ -152,8 +154,9 @@ class Targets:
             return self
         jump = t_s - self.last_heard_s
         moved = {k: replace(v, t_s=v.t_s + jump, heard_s=v.heard_s + jump) for k, v in self.vessels.items()}
-        return replace(self, vessels=moved, last_heard_s=t_s,
-                       counts=replace(self.counts, clock_jumps=self.counts.clock_jumps + 1))
+        return replace(
+            self, vessels=moved, last_heard_s=t_s, counts=replace(self.counts, clock_jumps=self.counts.clock_jumps + 1)
+        )
 
     def _branches(self, mmsi: int) -> list[Vessel]:
         keys = ((mmsi, branch) for branch in range(self.limits.max_branches))
@@ -170,7 +173,7 @@ class Targets:
         return replace(self, vessels=vessels, counts=counts, last_heard_s=now_s)
 
     def _placed(
-        self, report: AisReport, en: tuple[float, float], own: _Own, counts: TrafficCounts, now_s: float,
+        self, report: AisReport, en: tuple[float, float], own: _Own, counts: TrafficCounts, now_s: float
     ) -> Targets:
         t_s = report.t_s - max(0.0, report.age_s)
         known = self._branches(report.mmsi)
@@ -187,8 +190,15 @@ class Targets:
         return replace(self, vessels=vessels, counts=counts, last_heard_s=now_s)
 
     def _new(
-        self, report: AisReport, en: tuple[float, float], own: _Own, t_s: float,
-        vessels: dict[Key, Vessel], known: list[Vessel], counts: TrafficCounts, now_s: float,
+        self,
+        report: AisReport,
+        en: tuple[float, float],
+        own: _Own,
+        t_s: float,
+        vessels: dict[Key, Vessel],
+        known: list[Vessel],
+        counts: TrafficCounts,
+        now_s: float,
     ) -> Targets:
         expired = [k for k, v in vessels.items() if now_s - v.heard_s > self.limits.expire_s]
         for key in expired:
@@ -215,7 +225,7 @@ class Targets:
         return replace(self, vessels=vessels, counts=counts, last_heard_s=now_s, spare=spare, spare_s=spare_s)
 
 
-_Own = tuple[tuple[float, float], tuple[float, float]]   # place [m] and velocity [m/s] of our boat
+_Own = tuple[tuple[float, float], tuple[float, float]]  # place [m] and velocity [m/s] of our boat
 
 
 def _least_perilous(vessels: Mapping[Key, Vessel], own: _Own, t_s: float, count: int) -> tuple[tuple[float, Key], ...]:
@@ -225,8 +235,18 @@ def _least_perilous(vessels: Mapping[Key, Vessel], own: _Own, t_s: float, count:
 
 def _is_sound(report: AisReport) -> bool:
     """Are all numbers finite and possible? A decoder's sentinels never arrive here."""
-    numbers = (report.t_s, report.age_s, report.course_rad, report.speed_mps, report.heading_rad,
-               report.turn_rate_radps, report.bow_m, report.stern_m, report.port_m, report.starboard_m)
+    numbers = (
+        report.t_s,
+        report.age_s,
+        report.course_rad,
+        report.speed_mps,
+        report.heading_rad,
+        report.turn_rate_radps,
+        report.bow_m,
+        report.stern_m,
+        report.port_m,
+        report.starboard_m,
+    )
     if any(x is not None and not math.isfinite(x) for x in numbers):
         return False
     return (report.speed_mps or 0.0) >= 0.0 and report.age_s >= -1.0
@@ -252,7 +272,9 @@ def _reach_m(vessel: Vessel, t_s: float) -> float:
 def _described(vessel: Vessel, report: AisReport, now_s: float) -> Vessel:
     size = (report.bow_m, report.stern_m, report.port_m, report.starboard_m)
     return replace(
-        vessel, heard_s=now_s, name=report.name or vessel.name,
+        vessel,
+        heard_s=now_s,
+        name=report.name or vessel.name,
         ship_type=report.ship_type if report.ship_type is not None else vessel.ship_type,
         hull=hull_of(*size, is_class_b=vessel.is_class_b) if any(size) else vessel.hull,
     )
@@ -262,10 +284,20 @@ def _first(
     report: AisReport, branch: int, en: tuple[float, float], t_s: float, now_s: float, *, is_shared: bool
 ) -> Vessel:
     return Vessel(
-        mmsi=report.mmsi, branch=branch, t_s=t_s, heard_s=now_s, antenna_en_m=en,
-        course_rad=report.course_rad, speed_mps=report.speed_mps, heading_rad=report.heading_rad,
-        turn_rate_radps=report.turn_rate_radps, nav_status=report.nav_status, ship_type=report.ship_type,
-        name=report.name, is_class_b=report.is_class_b, is_shared_mmsi=is_shared,
+        mmsi=report.mmsi,
+        branch=branch,
+        t_s=t_s,
+        heard_s=now_s,
+        antenna_en_m=en,
+        course_rad=report.course_rad,
+        speed_mps=report.speed_mps,
+        heading_rad=report.heading_rad,
+        turn_rate_radps=report.turn_rate_radps,
+        nav_status=report.nav_status,
+        ship_type=report.ship_type,
+        name=report.name,
+        is_class_b=report.is_class_b,
+        is_shared_mmsi=is_shared,
         hull=hull_of(report.bow_m, report.stern_m, report.port_m, report.starboard_m, is_class_b=report.is_class_b),
     )
 
@@ -281,8 +313,15 @@ def _moved(vessel: Vessel, report: AisReport, en: tuple[float, float], t_s: floa
         course = wrap_two_pi(math.atan2(de, dn)) if course is None else course
         derived = True
     return replace(
-        described, t_s=t_s, antenna_en_m=en, course_rad=course, speed_mps=speed, heading_rad=report.heading_rad,
+        described,
+        t_s=t_s,
+        antenna_en_m=en,
+        course_rad=course,
+        speed_mps=speed,
+        heading_rad=report.heading_rad,
         turn_rate_radps=report.turn_rate_radps,
         nav_status=report.nav_status if report.nav_status is not None else vessel.nav_status,
-        is_class_b=report.is_class_b or vessel.is_class_b, reports=vessel.reports + 1, derived=derived,
+        is_class_b=report.is_class_b or vessel.is_class_b,
+        reports=vessel.reports + 1,
+        derived=derived,
     )

@@ -74,7 +74,7 @@ class Vessel:
     is_class_b: bool = False
     reports: int = 1
     is_shared_mmsi: bool = False
-    derived: bool = False      # speed and course come from positions, not from the report
+    derived: bool = False  # speed and course come from positions, not from the report
 
     @property
     def label(self) -> str:
@@ -135,8 +135,9 @@ def hull_of(
     length, beam = (bow_m or 0.0) + (stern_m or 0.0), (port_m or 0.0) + (starboard_m or 0.0)
     if length <= 0.0:
         length, beam = (CLASS_B_LENGTH_M, CLASS_B_BEAM_M) if is_class_b else (CLASS_A_LENGTH_M, CLASS_A_BEAM_M)
-        return VesselDimensions(bow_m=length / 2, stern_m=length / 2, port_m=beam / 2, starboard_m=beam / 2,
-                                is_known=False)
+        return VesselDimensions(
+            bow_m=length / 2, stern_m=length / 2, port_m=beam / 2, starboard_m=beam / 2, is_known=False
+        )
     if not bow_m:
         bow_m = stern_m = length / 2
     if beam <= 0.0:

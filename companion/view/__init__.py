@@ -12,6 +12,15 @@ from companion.view.recorded import recorded_views
 from companion.view.values import SCHEMA, FigureView, Past, Trail, View, sample_of
 
 __all__ = [
-    "SCHEMA", "AreaView", "Event", "FigureView", "HeardFold", "Past", "Trail", "View", "ViewFold", "recorded_views",
+    "SCHEMA",
+    "AreaView",
+    "Event",
+    "FigureView",
+    "HeardFold",
+    "Past",
+    "Trail",
+    "View",
+    "ViewFold",
+    "recorded_views",
     "sample_of",
 ]

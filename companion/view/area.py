@@ -18,7 +18,7 @@ from companion.view.values import PointEn, metres
 if TYPE_CHECKING:
     from companion.geo.frame import LocalFrame
 
-SIMPLER_M = 0.25     # a coast is drawn to this; nothing is decided by the picture
+SIMPLER_M = 0.25  # a coast is drawn to this; nothing is decided by the picture
 HASH_DIGITS = 16
 
 Ring = tuple[PointEn, ...]
@@ -57,13 +57,24 @@ def area_of(voyage: Voyage, margin_m: float) -> AreaView:
     """Return the area of a voyage."""
     fence = voyage.area.fence_wkt(0.0)
     return drawn(
-        voyage.name, voyage.frame.origin, voyage.area.obstacles_wkt(0.0), voyage.area.obstacles_wkt(margin_m),
-        [] if fence is None else [fence], margin_m, voyage.area.obstacle_names(0.0))
+        voyage.name,
+        voyage.frame.origin,
+        voyage.area.obstacles_wkt(0.0),
+        voyage.area.obstacles_wkt(margin_m),
+        [] if fence is None else [fence],
+        margin_m,
+        voyage.area.obstacle_names(0.0),
+    )
 
 
 def drawn(
-    name: str, origin: GeoPoint, obstacles: Iterable[str], grown: Iterable[str], limits: Iterable[str],
-    margin_m: float | None, names: Iterable[str] = (),
+    name: str,
+    origin: GeoPoint,
+    obstacles: Iterable[str],
+    grown: Iterable[str],
+    limits: Iterable[str],
+    margin_m: float | None,
+    names: Iterable[str] = (),
 ) -> AreaView:
     """Return the area of WKT polygons in local metres; ``names`` are the obstacles', or there are none."""
     from companion.geo.frame import LocalFrame
@@ -75,9 +86,17 @@ def drawn(
     aside_deg = origin.lon_deg - 0.01 if origin.lon_deg > 0.0 else origin.lon_deg + 0.01
     east_m = frame.en_from_geo(GeoPoint(lat_deg=origin.lat_deg, lon_deg=aside_deg))[0]
     area = AreaView(
-        name=name, origin_lat_deg=origin.lat_deg, origin_lon_deg=origin.lon_deg, lat_m=round(north_m / step, 3),
-        lon_m=round(abs(east_m) / 0.01, 3), obstacles=_shapes(obstacles), grown=_shapes(grown), limits=_shapes(limits),
-        margin_m=margin_m, names=tuple(names))
+        name=name,
+        origin_lat_deg=origin.lat_deg,
+        origin_lon_deg=origin.lon_deg,
+        lat_m=round(north_m / step, 3),
+        lon_m=round(abs(east_m) / 0.01, 3),
+        obstacles=_shapes(obstacles),
+        grown=_shapes(grown),
+        limits=_shapes(limits),
+        margin_m=margin_m,
+        names=tuple(names),
+    )
     return replace(area, hash=hashlib.sha256(msgspec.json.encode(area)).hexdigest()[:HASH_DIGITS])
 
 
@@ -85,7 +104,9 @@ def _shapes(texts: Iterable[str]) -> tuple[tuple[Ring, ...], ...]:
     shapes = [shapely.simplify(part, SIMPLER_M) for text in texts for part in shapely.get_parts(shapely.from_wkt(text))]
     return tuple(
         tuple(_ring(ring) for ring in (shape.exterior, *shape.interiors))
-        for shape in shapes if isinstance(shape, Polygon) and not shape.is_empty)
+        for shape in shapes
+        if isinstance(shape, Polygon) and not shape.is_empty
+    )
 
 
 def _ring(ring: shapely.LinearRing) -> Ring:

@@ -27,7 +27,7 @@ from companion.view.values import Level, compass
 from companion.words import counted
 
 LOUD = Severity.INFO
-LEAST_RISK = 0.001      # a smaller chance is not worth a line
+LEAST_RISK = 0.001  # a smaller chance is not worth a line
 Facts = tuple[tuple[str, str], ...]
 
 
@@ -64,8 +64,13 @@ def happenings(step: Step, phase: str, why: dict[int, str]) -> Iterable[Happenin
     snapshot = step.snapshot
     for event in snapshot.events:
         if isinstance(event, Order):
-            yield Happening(kind="order", title=f"order: {event.wanted.words}", level="notice",
-                            text=f"of {event.source.words}", facts=(("authority", event.authority),))
+            yield Happening(
+                kind="order",
+                title=f"order: {event.wanted.words}",
+                level="notice",
+                text=f"of {event.source.words}",
+                facts=(("authority", event.authority),),
+            )
         elif isinstance(event, ModeChanged):
             before, after = (("unknown" if m is None else m.name) for m in (event.before, event.after))
             yield Happening(kind="mode", title=f"mode {after}", text=f"before it {before}")
@@ -74,21 +79,28 @@ def happenings(step: Step, phase: str, why: dict[int, str]) -> Iterable[Happenin
             yield _plan(outcome, why.get(outcome.request_id, ""))
         elif isinstance(outcome, UploadOutcome):
             is_ok = outcome.result is UploadResult.OK
-            yield Happening(kind="upload", level="info" if is_ok else "warning",
-                            title=f"upload {outcome.result.value}", text=outcome.text)
+            yield Happening(
+                kind="upload",
+                level="info" if is_ok else "warning",
+                title=f"upload {outcome.result.value}",
+                text=outcome.text,
+            )
         elif isinstance(outcome, CommandOutcome) and outcome.result is not CommandResult.ACCEPTED:
             yield Happening(kind="command", title=f"command {outcome.result.value}", text=outcome.text, level="warning")
     if step.state.phase.value != phase:
         yield Happening(kind="phase", title=step.state.phase.value, text=step.state.why, level="notice")
     for action in step.actions:
         if isinstance(action, RequestPlan):
-            yield Happening(kind="ask", title=f"plan asked for: {action.reason.words}",
-                            text=action.text, facts=_facts(action))
+            yield Happening(
+                kind="ask", title=f"plan asked for: {action.reason.words}", text=action.text, facts=_facts(action)
+            )
         elif isinstance(action, UploadMission):
             facts = [("items", str(len(action.items)))]
             if action.change.apart_m is not None:
-                facts += [("apart from the old way", f"{action.change.apart_m:.0f} m"),
-                          ("the old way", action.change.unsafe or "was safe")]
+                facts += [
+                    ("apart from the old way", f"{action.change.apart_m:.0f} m"),
+                    ("the old way", action.change.unsafe or "was safe"),
+                ]
             yield Happening(kind="upload", title="new way uploaded", text=action.text, facts=tuple(facts))
         elif isinstance(action, Acknowledge):
             yield Happening(kind="answer", title=f"answer: {action.result.value}", text=action.text, level="notice")
@@ -104,7 +116,8 @@ def _facts(action: RequestPlan) -> Facts:
         ("no-go half angle now", f"{math.degrees(problem.no_go_half_rad(0.0)):.0f}°"),
         ("in 1 min", f"{math.degrees(problem.no_go_half_rad(60.0)):.0f}°"),
         ("in 5 min", f"{math.degrees(problem.no_go_half_rad(300.0)):.0f}°"),
-        ("probability", f"{problem.delta_s:.2f}"), ("budget", f"{action.budget_s:.1f} s"),
+        ("probability", f"{problem.delta_s:.2f}"),
+        ("budget", f"{action.budget_s:.1f} s"),
     ]
     if action.rung:
         facts.append(("step of the ladder", action.rung))
@@ -119,11 +132,15 @@ def _plan(outcome: PlanOutcome, why: str) -> Happening:
     facts = [("time", f"{plan.cost_s:.0f} s")]
     if plan.arrival is not None and math.isfinite(plan.arrival.late_s):
         facts.append(
-            ("in the wind's spread", f"{plan.arrival.median_s:.0f} s, nine of ten {plan.arrival.late_s:.0f} s"))
+            ("in the wind's spread", f"{plan.arrival.median_s:.0f} s, nine of ten {plan.arrival.late_s:.0f} s")
+        )
     if math.isfinite(plan.lower_bound_s) and plan.lower_bound_s > 0.0:
         facts.append(("no faster than", f"{plan.lower_bound_s:.0f} s"))
-    facts += [("legs", str(len(plan.legs))), ("looked at", counted(plan.expansions, "expansion")),
-              ("computed in", f"{plan.elapsed_s:.2f} s")]
+    facts += [
+        ("legs", str(len(plan.legs))),
+        ("looked at", counted(plan.expansions, "expansion")),
+        ("computed in", f"{plan.elapsed_s:.2f} s"),
+    ]
     tacks = sum(leg.manoeuvre == "tack" for leg in plan.legs)
     if tacks:
         facts.append(("tacks", str(tacks)))
@@ -136,5 +153,9 @@ def _plan(outcome: PlanOutcome, why: str) -> Happening:
     clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
     if clear:
         facts.append(("nearest beyond the margin", f"{min(clear):.1f} m"))
-    return Happening(kind="plan", title=f"plan {outcome.request_id}: {plan.status.value}",
-                     text=why or outcome.text, facts=tuple(facts))
+    return Happening(
+        kind="plan",
+        title=f"plan {outcome.request_id}: {plan.status.value}",
+        text=why or outcome.text,
+        facts=tuple(facts),
+    )

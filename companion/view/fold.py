@@ -32,9 +32,9 @@ from companion.view.parts import (
 )
 from companion.view.values import place, rounded, tack_of
 
-TRACK_S = 60.0        # of the track that each view brings: what a page missed while its link was lost
+TRACK_S = 60.0  # of the track that each view brings: what a page missed while its link was lost
 TRACK_STEP_S = 3.0
-PLANS_KEPT = 4        # a route may be spliced from as many
+PLANS_KEPT = 4  # a route may be spliced from as many
 
 
 class ViewFold:
@@ -44,7 +44,7 @@ class ViewFold:
     """
 
     def __init__(
-        self, voyage: Voyage, config: SkipperConfig, *, source: values.Source = "live", epoch_s: float | None = None,
+        self, voyage: Voyage, config: SkipperConfig, *, source: values.Source = "live", epoch_s: float | None = None
     ) -> None:
         self.area = area_of(voyage, config.margin_m)
         self._voyage, self._config, self._source, self._epoch_s = voyage, config, source, epoch_s
@@ -61,7 +61,7 @@ class ViewFold:
         return None if self._epoch_s is None else round(self._epoch_s + t_s, 3)
 
     def take(
-        self, step: Step, status: CompanionStatus, figures: VoyageFigures,
+        self, step: Step, status: CompanionStatus, figures: VoyageFigures
     ) -> tuple[values.View, tuple[Event, ...]]:
         """Return the view at a step, and what happened in it."""
         t_s = step.snapshot.t_s
@@ -73,9 +73,18 @@ class ViewFold:
         events = []
         for found in happenings(step, self._phase, self._whys):
             self._number += 1
-            events.append(Event(
-                number=self._number, t_s=round(t_s, 2), unix_s=self.unix_s(t_s), kind=found.kind, level=found.level,
-                title=found.title, text=found.text, facts=found.facts))
+            events.append(
+                Event(
+                    number=self._number,
+                    t_s=round(t_s, 2),
+                    unix_s=self.unix_s(t_s),
+                    kind=found.kind,
+                    level=found.level,
+                    title=found.title,
+                    text=found.text,
+                    facts=found.facts,
+                )
+            )
         if step.state.phase.value != self._phase:
             self._phase, self._phase_s = step.state.phase.value, t_s
         return self._view(step, status, figures), tuple(events)
@@ -87,8 +96,9 @@ class ViewFold:
             return
         self.area = area_of(voyage, self._config.margin_m)
         self._track = deque((t_s, place(shift.point(at)), tack) for t_s, at, tack in self._track)
-        self._plans = {number: replace(chosen, plan=carried(chosen.plan, shift))
-                       for number, chosen in self._plans.items()}
+        self._plans = {
+            number: replace(chosen, plan=carried(chosen.plan, shift)) for number, chosen in self._plans.items()
+        }
 
     def _note(self, step: Step) -> None:
         """Keep what later views need: plans, what was said, the track."""
@@ -103,7 +113,8 @@ class ViewFold:
                 t_s, request = asked
                 why = bounds_in_words(request.problem, outcome.plan) if outcome.plan.has_path else outcome.plan.reason
                 self._plans[outcome.request_id] = Chosen(
-                    t_s=t_s, reason=request.reason.value, plan=outcome.plan, why=why)
+                    t_s=t_s, reason=request.reason.value, plan=outcome.plan, why=why
+                )
                 self._plans = dict(list(self._plans.items())[-PLANS_KEPT:])
                 self._whys = {number: chosen.why for number, chosen in self._plans.items()}
         here, t_s = step.snapshot.position_en_m, step.snapshot.t_s
@@ -132,22 +143,37 @@ class ViewFold:
         eta = step.eta()
         ages = [a for a in (snapshot.heartbeat_age_s, snapshot.vehicle_age_s) if a is not None]
         return values.View(
-            source=self._source, name=voyage.name, t_s=round(t_s, 3), unix_s=self.unix_s(t_s), area=self.area.hash,
+            source=self._source,
+            name=voyage.name,
+            t_s=round(t_s, 3),
+            unix_s=self.unix_s(t_s),
+            area=self.area.hash,
             age_s=rounded(min(ages), 1) if ages else None,
-            state=parts.state_of(step, self._phase_s), alarms=parts.alarms(step, status, self._said),
-            boat=parts.boat_of(step, status, voyage), wind=wind_of(step), water=water_of(step),
+            state=parts.state_of(step, self._phase_s),
+            alarms=parts.alarms(step, status, self._said),
+            boat=parts.boat_of(step, status, voyage),
+            wind=wind_of(step),
+            water=water_of(step),
             no_go=no_go_of(step, voyage, config),
-            laylines=None if following is None or state.voyage.over else laylines_of(
-                step, voyage, config, following.name, following.at_en_m),
+            laylines=None
+            if following is None or state.voyage.over
+            else laylines_of(step, voyage, config, following.name, following.at_en_m),
             polar=polar_of(step, voyage, config),
             plan=plan_of(step, voyage, eta, chosen, legs),
             predicted=predicted_of(eta),
-            track=tuple(values.TrackPoint(ago_s=round(t_s - at_s, 1), at_en_m=at, tack=tack)
-                        for at_s, at, tack in self._track),
-            vessels=vessels_of(step), goals=goals, refuges=parts.refuges_of(voyage), home=parts.home_of(step, voyage),
-            safe_end=safe_end_of(route), orders=parts.orders_of(step),
-            figures=parts.figures_of(step, figures, voyage), shown=parts.shown(figures_now(step, "page")),
-            health=parts.health_of(step, status))
+            track=tuple(
+                values.TrackPoint(ago_s=round(t_s - at_s, 1), at_en_m=at, tack=tack) for at_s, at, tack in self._track
+            ),
+            vessels=vessels_of(step),
+            goals=goals,
+            refuges=parts.refuges_of(voyage),
+            home=parts.home_of(step, voyage),
+            safe_end=safe_end_of(route),
+            orders=parts.orders_of(step),
+            figures=parts.figures_of(step, figures, voyage),
+            shown=parts.shown(figures_now(step, "page")),
+            health=parts.health_of(step, status),
+        )
 
 
 def aged(view: values.View, passed_s: float) -> values.View:

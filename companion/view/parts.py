@@ -27,7 +27,7 @@ from companion.traffic import Alarm, Assessment
 from companion.view import values
 from companion.view.values import compass, degrees, metres, place, rounded, signed, tack_of
 
-MOST = 40   # vessels in a view, the worst first
+MOST = 40  # vessels in a view, the worst first
 
 
 def vessels_of(step: Step) -> tuple[values.VesselView, ...]:
@@ -38,10 +38,19 @@ def vessels_of(step: Step) -> tuple[values.VesselView, ...]:
     if picture is None:
         return ()
     newest = sorted(picture.vessels, key=picture.age_s)[:MOST]
-    return tuple(values.VesselView(
-        name=v.label, mmsi=v.mmsi, age_s=rounded(picture.age_s(v), 1), at_en_m=place(v.centre_en_m),
-        course_deg=None if v.course_rad is None else compass(v.course_rad), speed_mps=rounded(v.speed_mps),
-        length_m=metres(v.hull.length_m), beam_m=metres(v.hull.beam_m)) for v in newest)
+    return tuple(
+        values.VesselView(
+            name=v.label,
+            mmsi=v.mmsi,
+            age_s=rounded(picture.age_s(v), 1),
+            at_en_m=place(v.centre_en_m),
+            course_deg=None if v.course_rad is None else compass(v.course_rad),
+            speed_mps=rounded(v.speed_mps),
+            length_m=metres(v.hull.length_m),
+            beam_m=metres(v.hull.beam_m),
+        )
+        for v in newest
+    )
 
 
 def _seen(step: Step, seen: Assessment) -> values.VesselView:
@@ -55,14 +64,25 @@ def _seen(step: Step, seen: Assessment) -> values.VesselView:
     if then_s is not None and here is not None and own is not None:
         own_then = place((here[0] + own.velocity_en_mps[0] * then_s, here[1] + own.velocity_en_mps[1] * then_s))
     return values.VesselView(
-        name=vessel.label, mmsi=vessel.mmsi, age_s=rounded(seen.age_s, 1), at_en_m=place(at),
+        name=vessel.label,
+        mmsi=vessel.mmsi,
+        age_s=rounded(seen.age_s, 1),
+        at_en_m=place(at),
         course_deg=None if vessel.course_rad is None else compass(vessel.course_rad),
-        speed_mps=rounded(vessel.speed_mps), heading_deg=None if vessel.bow_rad is None else compass(vessel.bow_rad),
-        length_m=metres(vessel.hull.length_m), beam_m=metres(vessel.hull.beam_m),
-        alarm=seen.alarm.name.lower(), role=seen.encounter.role.value, rule=seen.encounter.rule.value,
-        range_m=metres(approach.now_m), bearing_deg=compass(approach.bearing_rad), cpa_m=metres(approach.distance_m),
-        cpa_s=rounded(then_s, 0), own_cpa_en_m=own_then,
-        cpa_en_m=None if then_s is None else place((at[0] + ve * then_s, at[1] + vn * then_s)))
+        speed_mps=rounded(vessel.speed_mps),
+        heading_deg=None if vessel.bow_rad is None else compass(vessel.bow_rad),
+        length_m=metres(vessel.hull.length_m),
+        beam_m=metres(vessel.hull.beam_m),
+        alarm=seen.alarm.name.lower(),
+        role=seen.encounter.role.value,
+        rule=seen.encounter.rule.value,
+        range_m=metres(approach.now_m),
+        bearing_deg=compass(approach.bearing_rad),
+        cpa_m=metres(approach.distance_m),
+        cpa_s=rounded(then_s, 0),
+        own_cpa_en_m=own_then,
+        cpa_en_m=None if then_s is None else place((at[0] + ve * then_s, at[1] + vn * then_s)),
+    )
 
 
 def alarms_of(step: Step) -> tuple[values.AlarmView, ...]:
@@ -70,22 +90,34 @@ def alarms_of(step: Step) -> tuple[values.AlarmView, ...]:
     levels: dict[Alarm, values.Level] = {Alarm.WARN: "warning", Alarm.ACT: "error", Alarm.TOUCH: "critical"}
     return tuple(
         values.AlarmView(code="vessel", level=levels[seen.alarm], text=seen.sentence())
-        for seen in step.state.traffic.watch if seen.alarm in levels)
+        for seen in step.state.traffic.watch
+        if seen.alarm in levels
+    )
 
 
 def heard_vessel(traffic: TrafficStatus | None, age_s: float | None) -> tuple[values.VesselView, ...]:
     """Return the one vessel that a radio's status tells of, the worst."""
     if traffic is None or not traffic.alarm:
         return ()
-    return (values.VesselView(
-        name=traffic.name, age_s=rounded(age_s, 1), alarm=traffic.alarm, role=traffic.role, rule=traffic.rule,
-        range_m=rounded(traffic.range_m, 1), cpa_m=rounded(traffic.cpa_m, 1), cpa_s=rounded(traffic.tcpa_s, 0),
-        bearing_deg=None if traffic.bearing_rad is None or not math.isfinite(traffic.bearing_rad)
-        else compass(traffic.bearing_rad)),)
+    return (
+        values.VesselView(
+            name=traffic.name,
+            age_s=rounded(age_s, 1),
+            alarm=traffic.alarm,
+            role=traffic.role,
+            rule=traffic.rule,
+            range_m=rounded(traffic.range_m, 1),
+            cpa_m=rounded(traffic.cpa_m, 1),
+            cpa_s=rounded(traffic.tcpa_s, 0),
+            bearing_deg=None
+            if traffic.bearing_rad is None or not math.isfinite(traffic.bearing_rad)
+            else compass(traffic.bearing_rad),
+        ),
+    )
 
 
-SILENT_S = 5.0        # what should come every second and has not for so long is bad ...
-LATE_S = 2.5          # ... and poor
+SILENT_S = 5.0  # what should come every second and has not for so long is bad ...
+LATE_S = 2.5  # ... and poor
 FEED_SILENT_S = 60.0
 SHORE_LATE_S = 30.0
 LEVELS: dict[int, values.Level] = {2: "critical", 3: "error", 4: "warning", 5: "notice"}
@@ -100,20 +132,32 @@ def state_of(step: Step, since_s: float) -> values.StateView:
     """Return what the boat does and why."""
     state, autopilot = step.state, step.snapshot.autopilot
     return values.StateView(
-        phase=state.phase.value, why=state.why, task=state.progress.task, age_s=rounded(step.snapshot.t_s - since_s, 1),
+        phase=state.phase.value,
+        why=state.why,
+        task=state.progress.task,
+        age_s=rounded(step.snapshot.t_s - since_s, 1),
         mode=None if autopilot is None or autopilot.mode is None else autopilot.mode.name,
-        is_armed=None if autopilot is None else autopilot.is_armed, is_sailing=state.voyage.sailing,
-        is_over=bool(state.voyage.over), has_arrived=state.voyage.arrived, is_planning=state.pending.plan is not None,
-        wants=state.wants)
+        is_armed=None if autopilot is None else autopilot.is_armed,
+        is_sailing=state.voyage.sailing,
+        is_over=bool(state.voyage.over),
+        has_arrived=state.voyage.arrived,
+        is_planning=state.pending.plan is not None,
+        wants=state.wants,
+    )
 
 
 def alarms(step: Step, status: CompanionStatus, said: Mapping[str, str]) -> tuple[values.AlarmView, ...]:
     """Return what somebody should look at: watchdogs, vessels too near, trouble with the disk."""
     t_s = step.snapshot.t_s
-    out = [values.AlarmView(
-        code=raised.name, level=level_of(BY_NAME[raised.name].severity),
-        text=said.get(raised.name, BY_NAME[raised.name].watches), age_s=rounded(t_s - raised.since_s, 1),
-    ) for raised in step.state.alarms.raised]
+    out = [
+        values.AlarmView(
+            code=raised.name,
+            level=level_of(BY_NAME[raised.name].severity),
+            text=said.get(raised.name, BY_NAME[raised.name].watches),
+            age_s=rounded(t_s - raised.since_s, 1),
+        )
+        for raised in step.state.alarms.raised
+    ]
     out += alarms_of(step)
     if status.alert_code in {DISK, GONE}:
         out.append(values.AlarmView(code=status.alert_code, level="warning", text=status.alert_text))
@@ -131,8 +175,10 @@ def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatV
     snapshot, autopilot = step.snapshot, step.snapshot.autopilot
     vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
     at_rest = values.BoatView(
-        length_m=voyage.boat.hull.length_m, battery_v=None if autopilot is None else rounded(autopilot.battery_v),
-        battery_share=None if autopilot is None else rounded(autopilot.battery_remaining))
+        length_m=voyage.boat.hull.length_m,
+        battery_v=None if autopilot is None else rounded(autopilot.battery_v),
+        battery_share=None if autopilot is None else rounded(autopilot.battery_remaining),
+    )
     if vehicle is None or here is None:
         return at_rest
     goal = voyage.legs[min(next_goal(step, voyage), len(voyage.legs) - 1)].en_m
@@ -140,9 +186,14 @@ def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatV
     to_goal_rad = heading_of(goal[0] - here[0], goal[1] - here[1])
     twa_rad = None if twd_rad is None else difference_rad(twd_rad, vehicle.heading_rad)
     return replace(
-        at_rest, age_s=rounded(snapshot.vehicle_age_s, 1), lat_deg=rounded(vehicle.position.lat_deg, 7),
-        lon_deg=rounded(vehicle.position.lon_deg, 7), at_en_m=place(here), heading_deg=compass(vehicle.heading_rad),
-        cog_deg=compass(cog_rad), sog_mps=rounded(vehicle.speed_mps),
+        at_rest,
+        age_s=rounded(snapshot.vehicle_age_s, 1),
+        lat_deg=rounded(vehicle.position.lat_deg, 7),
+        lon_deg=rounded(vehicle.position.lon_deg, 7),
+        at_en_m=place(here),
+        heading_deg=compass(vehicle.heading_rad),
+        cog_deg=compass(cog_rad),
+        sog_mps=rounded(vehicle.speed_mps),
         roll_deg=None if vehicle.roll_rad is None else signed(vehicle.roll_rad),
         tack=None if twa_rad is None else tack_of(twa_rad),
         vmg_mps=rounded(vmg_mps(step)),
@@ -150,7 +201,8 @@ def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatV
         clearance_m=rounded(status.clearance_m, 1),
         cross_track_m=None if autopilot is None else rounded(autopilot.cross_track_m, 1),
         waypoint_m=None if autopilot is None else rounded(autopilot.waypoint_distance_m, 1),
-        goal_m=rounded(math.dist(here, goal), 1))
+        goal_m=rounded(math.dist(here, goal), 1),
+    )
 
 
 def kind_of(goal: Goal) -> str:
@@ -170,14 +222,22 @@ def goals_of(step: Step, voyage: Voyage) -> tuple[values.GoalView, ...]:
     begin = min(following, len(voyage.legs) - 1) // lap * lap
     out = []
     for number, goal in enumerate(voyage.goals):
-        out.append(values.GoalView(
-            name=goal.name or f"goal {number + 1}", kind=kind_of(goal), at_en_m=place(goal.en_m),
-            radius_m=metres(goal.radius_m), side="" if goal.side is Side.NONE else goal.side.value,
-            line_en_m=None if goal.line is None else (
-                place(goal.line.port_en_m), place(goal.line.starboard_en_m)),
-            is_next=begin + number == following, is_reached=begin + number in step.state.progress.reached,
-            distance_m=None if here is None else metres(math.dist(here, goal.en_m)),
-            bearing_deg=None if here is None else compass(heading_of(goal.en_m[0] - here[0], goal.en_m[1] - here[1]))))
+        out.append(
+            values.GoalView(
+                name=goal.name or f"goal {number + 1}",
+                kind=kind_of(goal),
+                at_en_m=place(goal.en_m),
+                radius_m=metres(goal.radius_m),
+                side="" if goal.side is Side.NONE else goal.side.value,
+                line_en_m=None if goal.line is None else (place(goal.line.port_en_m), place(goal.line.starboard_en_m)),
+                is_next=begin + number == following,
+                is_reached=begin + number in step.state.progress.reached,
+                distance_m=None if here is None else metres(math.dist(here, goal.en_m)),
+                bearing_deg=None
+                if here is None
+                else compass(heading_of(goal.en_m[0] - here[0], goal.en_m[1] - here[1])),
+            )
+        )
     return tuple(out)
 
 
@@ -193,7 +253,8 @@ def home_of(step: Step, voyage: Voyage) -> values.PlaceView | None:
 def refuges_of(voyage: Voyage) -> tuple[values.PlaceView, ...]:
     """Return the refuges."""
     return tuple(
-        values.PlaceView(name=r.name, at_en_m=place(r.en_m), radius_m=rounded(r.radius_m, 1)) for r in voyage.refuges)
+        values.PlaceView(name=r.name, at_en_m=place(r.en_m), radius_m=rounded(r.radius_m, 1)) for r in voyage.refuges
+    )
 
 
 def orders_of(step: Step) -> values.OrdersView:
@@ -201,31 +262,46 @@ def orders_of(step: Step) -> values.OrdersView:
     state, t_s = step.state, step.snapshot.t_s
     standing, last = state.orders.standing, max(state.orders.answered, key=lambda a: a.t_s, default=None)
     return values.OrdersView(
-        standing=None if standing is None else values.StandingView(
-            verb=standing.verb.value, words=standing.words, by=standing.by, age_s=rounded(standing.age_s(t_s), 0),
-            at_en_m=None if standing.en_m is None else place(standing.en_m)),
+        standing=None
+        if standing is None
+        else values.StandingView(
+            verb=standing.verb.value,
+            words=standing.words,
+            by=standing.by,
+            age_s=rounded(standing.age_s(t_s), 0),
+            at_en_m=None if standing.en_m is None else place(standing.en_m),
+        ),
         permitted=tuple(verb.value for verb in Verb if permitted(verb, step.snapshot.permissions.local_orders)),
         answer="" if last is None else f"{last.order.wanted.words}: {last.answer.text}",
-        answer_age_s=None if last is None else rounded(t_s - last.t_s, 0))
+        answer_age_s=None if last is None else rounded(t_s - last.t_s, 0),
+    )
 
 
 def figures_of(step: Step, figures: VoyageFigures, voyage: Voyage) -> values.Figures:
     """Return the voyage so far."""
     return values.Figures(
         time_s=None if figures.first_s is None else rounded(figures.last_s - figures.first_s, 0),
-        distance_m=rounded(figures.distance_m, 1), tacks=figures.tacks, gybes=figures.gybes, plans=figures.plans,
-        replans=figures.replans, contacts=figures.contacts, no_go_entries=figures.no_go_entries,
+        distance_m=rounded(figures.distance_m, 1),
+        tacks=figures.tacks,
+        gybes=figures.gybes,
+        plans=figures.plans,
+        replans=figures.replans,
+        contacts=figures.contacts,
+        no_go_entries=figures.no_go_entries,
         min_clearance_m=rounded(figures.min_clearance_m, 1),
         promised_clearance_m=rounded(figures.promised_clearance_m, 1),
-        goals_reached=min(len(step.state.progress.reached), len(voyage.legs)), goals=len(voyage.legs))
+        goals_reached=min(len(step.state.progress.reached), len(voyage.legs)),
+        goals=len(voyage.legs),
+    )
 
 
 def shown(told: Mapping[str, float]) -> tuple[values.FigureView, ...]:
     """Return figures of the table by their names as the page shows them; those of another release are left out."""
     return tuple(
-        values.FigureView(
-            name=name, label=figure.label, kind=figure.kind, hint=figure.hint, value=rounded(value, 4))
-        for name, value in told.items() if (figure := FIGURES_BY_NAME.get(name)) is not None)
+        values.FigureView(name=name, label=figure.label, kind=figure.kind, hint=figure.hint, value=rounded(value, 4))
+        for name, value in told.items()
+        if (figure := FIGURES_BY_NAME.get(name)) is not None
+    )
 
 
 def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
@@ -233,43 +309,79 @@ def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
     snapshot, state, wind = step.snapshot, step.state, step.snapshot.wind
     autopilot, mission = snapshot.autopilot, snapshot.mission
     wind_age = None if wind.forecast is None else max(0.0, snapshot.t_s - wind.forecast.t_s)
-    wind_grade: values.Grade = "unknown" if wind.health is WindHealth.NONE else \
-        "good" if wind.health is WindHealth.GOOD else "bad" if wind.health is WindHealth.UNTRUSTED else "poor"
+    wind_grade: values.Grade = (
+        "unknown"
+        if wind.health is WindHealth.NONE
+        else "good"
+        if wind.health is WindHealth.GOOD
+        else "bad"
+        if wind.health is WindHealth.UNTRUSTED
+        else "poor"
+    )
     ekf = autopilot is not None and autopilot.ekf_ok
     parts = [
-        values.Part(name="autopilot", grade=by_age(snapshot.heartbeat_age_s),
-                    age_s=rounded(snapshot.heartbeat_age_s, 1), text="not heard yet" if autopilot is None else
-                    f"{'armed' if autopilot.is_armed else 'disarmed'}"
-                    f"{'' if autopilot.mode is None else f', {autopilot.mode.name}'}"),
-        values.Part(name="position", age_s=rounded(snapshot.vehicle_age_s, 1),
-                    grade=by_age(snapshot.vehicle_age_s) if ekf or autopilot is None else "bad",
-                    text="" if autopilot is None or ekf else "the autopilot does not believe its position"),
+        values.Part(
+            name="autopilot",
+            grade=by_age(snapshot.heartbeat_age_s),
+            age_s=rounded(snapshot.heartbeat_age_s, 1),
+            text="not heard yet"
+            if autopilot is None
+            else f"{'armed' if autopilot.is_armed else 'disarmed'}"
+            f"{'' if autopilot.mode is None else f', {autopilot.mode.name}'}",
+        ),
+        values.Part(
+            name="position",
+            age_s=rounded(snapshot.vehicle_age_s, 1),
+            grade=by_age(snapshot.vehicle_age_s) if ekf or autopilot is None else "bad",
+            text="" if autopilot is None or ekf else "the autopilot does not believe its position",
+        ),
         values.Part(name="wind", grade=wind_grade, age_s=rounded(wind_age, 1), text=wind.verdict or wind.health.value),
         _planner(step),
-        values.Part(name="mission on board", grade="unknown" if mission.items is None else
-                    "bad" if state.mission.foreign else "good",
-                    age_s=None if mission.read_t_s is None else rounded(snapshot.t_s - mission.read_t_s, 0),
-                    text=state.mission.foreign or ("not read yet" if mission.items is None else "ours, as read back")),
-        values.Part(name="records", grade="bad" if status.alert_code == DISK else "good",
-                    text=status.alert_text if status.alert_code == DISK else "written"),
+        values.Part(
+            name="mission on board",
+            grade="unknown" if mission.items is None else "bad" if state.mission.foreign else "good",
+            age_s=None if mission.read_t_s is None else rounded(snapshot.t_s - mission.read_t_s, 0),
+            text=state.mission.foreign or ("not read yet" if mission.items is None else "ours, as read back"),
+        ),
+        values.Part(
+            name="records",
+            grade="bad" if status.alert_code == DISK else "good",
+            text=status.alert_text if status.alert_code == DISK else "written",
+        ),
     ]
     if status.alert_code == GONE:
         parts.append(values.Part(name="beside the voyage", grade="poor", text=status.alert_text))
     if status.traffic is not None:
         seen = status.traffic
         is_poor = seen.silent_feeds > 0 or seen.silence_s is None or seen.silence_s > FEED_SILENT_S
-        parts.append(values.Part(
-            name="AIS", grade="poor" if is_poor else "good", age_s=rounded(seen.silence_s, 0),
-            text=f"{seen.feeds - seen.silent_feeds} of {seen.feeds} feeds heard" if seen.feeds else "by the autopilot"))
+        parts.append(
+            values.Part(
+                name="AIS",
+                grade="poor" if is_poor else "good",
+                age_s=rounded(seen.silence_s, 0),
+                text=f"{seen.feeds - seen.silent_feeds} of {seen.feeds} feeds heard"
+                if seen.feeds
+                else "by the autopilot",
+            )
+        )
     if snapshot.shore_age_s is not None:
-        parts.append(values.Part(
-            name="ground station", age_s=rounded(snapshot.shore_age_s, 0),
-            grade="good" if snapshot.shore_age_s < SHORE_LATE_S else "poor"))
+        parts.append(
+            values.Part(
+                name="ground station",
+                age_s=rounded(snapshot.shore_age_s, 0),
+                grade="good" if snapshot.shore_age_s < SHORE_LATE_S else "poor",
+            )
+        )
     if autopilot is not None and autopilot.battery_v is not None:
         share = "" if autopilot.battery_remaining is None else f", {100.0 * autopilot.battery_remaining:.0f} %"
-        parts.append(values.Part(
-            name="battery", grade="bad" if state.alarms.battery_critical or autopilot.battery_failed else "good",
-            age_s=rounded(snapshot.autopilot_age_s, 1), text=f"{autopilot.battery_v:.1f} V{share}"))
+        parts.append(
+            values.Part(
+                name="battery",
+                grade="bad" if state.alarms.battery_critical or autopilot.battery_failed else "good",
+                age_s=rounded(snapshot.autopilot_age_s, 1),
+                text=f"{autopilot.battery_v:.1f} V{share}",
+            )
+        )
     return tuple(parts)
 
 
@@ -279,8 +391,10 @@ def _planner(step: Step) -> values.Part:
     doing = "at work" if state.pending.plan is not None else "ready" if is_alive else "its process has died"
     is_slow = state.plans.latency.is_slow
     return values.Part(
-        name="planner", grade="bad" if not is_alive else "poor" if is_slow else "good",
-        text=", ".join(part for part in (doing, "slow" if is_slow else "", state.plans.latency.words) if part))
+        name="planner",
+        grade="bad" if not is_alive else "poor" if is_slow else "good",
+        text=", ".join(part for part in (doing, "slow" if is_slow else "", state.plans.latency.words) if part),
+    )
 
 
 def by_age(age_s: float | None) -> values.Grade:
@@ -291,8 +405,8 @@ def by_age(age_s: float | None) -> values.Grade:
 HORIZONS_S = (0.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 WEDGES_S = (0.0, 60.0, 300.0)
 INTERVAL_LEVELS = (0.5, 0.8, 0.95)
-SWING_LEVEL = 0.8          # of the fan that a layline is drawn with
-SIGMA_AT_S = 60.0          # the spread in figures is that of a minute ahead, as in the status
+SWING_LEVEL = 0.8  # of the fan that a layline is drawn with
+SIGMA_AT_S = 60.0  # the spread in figures is that of a minute ahead, as in the status
 HAS_WAY_MPS = 0.2
 
 
@@ -302,7 +416,7 @@ def planned_no_go_rad(config: SkipperConfig, voyage: Voyage, limits: AutopilotLi
     return max(of_autopilot + config.no_go_pad_rad, voyage.boat.no_go_half_rad)
 
 
-@lru_cache(maxsize=64)   # asked for twice in every step, and the search takes longer than all else in a view
+@lru_cache(maxsize=64)  # asked for twice in every step, and the search takes longer than all else in a view
 def best_angles(boat: Boat, tws_mps: float, no_go_rad: float) -> tuple[float, float]:
     """Return the best angles to windward and to leeward [rad]."""
     beat = boat.polar.best_beat(tws_mps, no_go_half_rad=no_go_rad)
@@ -318,18 +432,23 @@ def wind_of(step: Step) -> values.WindView | None:
     twd_rad, tws_mps = wind.present_twd_from_rad, wind.present_tws_mps
     awa_rad, aws_mps = apparent(twd_rad, tws_mps, vehicle)
     return values.WindView(
-        health=wind.health.value, verdict=wind.verdict,
-        twd_from_deg=None if twd_rad is None else compass(twd_rad), tws_mps=rounded(tws_mps),
+        health=wind.health.value,
+        verdict=wind.verdict,
+        twd_from_deg=None if twd_rad is None else compass(twd_rad),
+        tws_mps=rounded(tws_mps),
         mean_twd_from_deg=None if wind.mean_twd_from_rad is None else compass(wind.mean_twd_from_rad),
         mean_tws_mps=rounded(wind.mean_tws_mps),
         sigma_deg=None if forecast is None else degrees(_at(forecast, SIGMA_AT_S, "sigma_twd_rad")),
         tws_sigma_mps=None if forecast is None else rounded(_at(forecast, SIGMA_AT_S, "sigma_tws_mps")),
         twa_deg=None if twd_rad is None or vehicle is None else signed(difference_rad(twd_rad, vehicle.heading_rad)),
-        awa_deg=None if awa_rad is None else signed(awa_rad), aws_mps=rounded(aws_mps),
+        awa_deg=None if awa_rad is None else signed(awa_rad),
+        aws_mps=rounded(aws_mps),
         record_s=rounded(wind.record_s, 0),
         correlation_s=None if forecast is None else rounded(forecast.correlation_time_s, 1),
         age_s=None if forecast is None else rounded(max(0.0, step.snapshot.t_s - forecast.t_s), 1),
-        levels=() if forecast is None else INTERVAL_LEVELS, bands=() if forecast is None else bands_of(forecast))
+        levels=() if forecast is None else INTERVAL_LEVELS,
+        bands=() if forecast is None else bands_of(forecast),
+    )
 
 
 def water_of(step: Step) -> values.WaterView | None:
@@ -337,27 +456,41 @@ def water_of(step: Step) -> values.WaterView | None:
     current, wind = step.snapshot.current, step.snapshot.wind
     if current.sigma_mps == 0.0:
         return None
-    over = None if wind.present_twd_from_rad is None or wind.present_tws_mps is None else over_water(
-        wind.present_twd_from_rad, wind.present_tws_mps, current.planned_en_mps)
+    over = (
+        None
+        if wind.present_twd_from_rad is None or wind.present_tws_mps is None
+        else over_water(wind.present_twd_from_rad, wind.present_tws_mps, current.planned_en_mps)
+    )
     return values.WaterView(
-        set_deg=compass(current.set_rad), drift_mps=rounded(current.drift_mps), sigma_mps=rounded(current.sigma_mps),
-        is_planned=current.is_significant, verdict=current.verdict,
-        twd_from_deg=None if over is None else compass(over[0]), tws_mps=None if over is None else rounded(over[1]))
+        set_deg=compass(current.set_rad),
+        drift_mps=rounded(current.drift_mps),
+        sigma_mps=rounded(current.sigma_mps),
+        is_planned=current.is_significant,
+        verdict=current.verdict,
+        twd_from_deg=None if over is None else compass(over[0]),
+        tws_mps=None if over is None else rounded(over[1]),
+    )
 
 
 def bands_of(forecast: WindForecast) -> tuple[values.Band, ...]:
     """Return the forecast at the view's horizons, as far as it reaches."""
     last_s = float(forecast.horizon_s[-1])
-    return tuple(values.Band(
-        horizon_s=at_s, twd_from_deg=compass(mean_twd_rad(forecast, at_s)),
-        sigma_deg=degrees(_at(forecast, at_s, "sigma_twd_rad")), tws_mps=rounded(_at(forecast, at_s, "mean_tws_mps")),
-        tws_sigma_mps=rounded(_at(forecast, at_s, "sigma_tws_mps")),
-        half_deg=tuple(degrees(half_width_rad(forecast, at_s, level)) for level in INTERVAL_LEVELS),
-    ) for at_s in HORIZONS_S if at_s <= last_s)
+    return tuple(
+        values.Band(
+            horizon_s=at_s,
+            twd_from_deg=compass(mean_twd_rad(forecast, at_s)),
+            sigma_deg=degrees(_at(forecast, at_s, "sigma_twd_rad")),
+            tws_mps=rounded(_at(forecast, at_s, "mean_tws_mps")),
+            tws_sigma_mps=rounded(_at(forecast, at_s, "sigma_tws_mps")),
+            half_deg=tuple(degrees(half_width_rad(forecast, at_s, level)) for level in INTERVAL_LEVELS),
+        )
+        for at_s in HORIZONS_S
+        if at_s <= last_s
+    )
 
 
 def apparent(
-    twd_from_rad: float | None, tws_mps: float | None, vehicle: VehicleState | None,
+    twd_from_rad: float | None, tws_mps: float | None, vehicle: VehicleState | None
 ) -> tuple[float | None, float | None]:
     """Return the apparent wind, angle at the bow [rad] and speed [m/s], that a true wind makes on a moving boat."""
     if twd_from_rad is None or tws_mps is None or vehicle is None:
@@ -378,14 +511,19 @@ def no_go_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.NoGo |
     for at_s in WEDGES_S:
         if at_s <= float(forecast.horizon_s[-1]):
             widening_rad = half_width_rad(forecast, at_s, max(0.0, 2.0 * delta_s - 1.0))
-            wedges.append(values.Wedge(
-                horizon_s=at_s, from_deg=compass(mean_twd_rad(forecast, at_s)),
-                half_deg=degrees(min(math.pi, half_rad + widening_rad)), widening_deg=degrees(widening_rad)))
+            wedges.append(
+                values.Wedge(
+                    horizon_s=at_s,
+                    from_deg=compass(mean_twd_rad(forecast, at_s)),
+                    half_deg=degrees(min(math.pi, half_rad + widening_rad)),
+                    widening_deg=degrees(widening_rad),
+                )
+            )
     return values.NoGo(half_deg=degrees(half_rad), probability=round(delta_s, 4), wedges=tuple(wedges))
 
 
 def laylines_of(
-    step: Step, voyage: Voyage, config: SkipperConfig, name: str, mark_en: PointEn,
+    step: Step, voyage: Voyage, config: SkipperConfig, name: str, mark_en: PointEn
 ) -> values.Laylines | None:
     """Return the laylines of a mark; None where it is fetched on one course, or the wind is not known."""
     snapshot, boat = step.snapshot, voyage.boat
@@ -408,15 +546,25 @@ def laylines_of(
     swing = 0.0 if wind.forecast is None else half_width_rad(wind.forecast, there_s, SWING_LEVEL)
     lines = []
     for tack, side in (("starboard", 1.0), ("port", -1.0)):
-        course_rad = twd_rad - side * angle_rad   # on starboard tack the wind is to the right of the bow
+        course_rad = twd_rad - side * angle_rad  # on starboard tack the wind is to the right of the bow
         if current != (0.0, 0.0):
             course_rad = heading_of(*(v * speed_mps + c for v, c in zip(unit_en(course_rad), current, strict=True)))
-        lines.append(values.Layline(
-            tack=tack, course_deg=compass(course_rad), swing_deg=degrees(swing),  # type: ignore[arg-type]
-            reach_s=rounded(_meets_s(here, vehicle, mark_en, course_rad), 0)))
+        lines.append(
+            values.Layline(
+                tack=tack,  # type: ignore[arg-type]
+                course_deg=compass(course_rad),
+                swing_deg=degrees(swing),
+                reach_s=rounded(_meets_s(here, vehicle, mark_en, course_rad), 0),
+            )
+        )
     return values.Laylines(
-        name=name, mark_en_m=place(mark_en), is_beat=is_beat, angle_deg=degrees(angle_rad), level=SWING_LEVEL,
-        lines=tuple(lines))
+        name=name,
+        mark_en_m=place(mark_en),
+        is_beat=is_beat,
+        angle_deg=degrees(angle_rad),
+        level=SWING_LEVEL,
+        lines=tuple(lines),
+    )
 
 
 def _meets_s(here: PointEn, vehicle: VehicleState, mark_en: PointEn, course_rad: float) -> float | None:
@@ -429,8 +577,10 @@ def _meets_s(here: PointEn, vehicle: VehicleState, mark_en: PointEn, course_rad:
     if abs(across_mps) < 0.05:
         return None
     time_s = -across_m / across_mps
-    along_m = sum(u * (p + v * time_s - m) for u, p, v, m in zip(
-        (east, north), here, vehicle.velocity_en_mps, mark_en, strict=True))
+    along_m = sum(
+        u * (p + v * time_s - m)
+        for u, p, v, m in zip((east, north), here, vehicle.velocity_en_mps, mark_en, strict=True)
+    )
     return time_s if time_s > 0.0 and along_m < 0.0 else None
 
 
@@ -450,13 +600,19 @@ def polar_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.PolarV
     beat, run = best_angles(voyage.boat, round(tws_mps, 1), no_go_rad)
     has_way = vehicle is not None and twd_rad is not None
     return values.PolarView(
-        name=polar.name, tws_mps=rounded(tws_mps), twa_deg=tuple(degrees(float(a)) for a in angles),
+        name=polar.name,
+        tws_mps=rounded(tws_mps),
+        twa_deg=tuple(degrees(float(a)) for a in angles),
         speed_mps=tuple(rounded(float(v), 3) for v in speeds),
-        beat_deg=degrees(beat), run_deg=degrees(run),
+        beat_deg=degrees(beat),
+        run_deg=degrees(run),
         live_twa_deg=signed(difference_rad(twd_rad, vehicle.heading_rad))
-        if has_way and vehicle is not None and twd_rad is not None else None,
-        live_mps=None if vehicle is None else rounded(math.hypot(
-            *(v - c for v, c in zip(vehicle.velocity_en_mps, current, strict=True)))))
+        if has_way and vehicle is not None and twd_rad is not None
+        else None,
+        live_mps=None
+        if vehicle is None
+        else rounded(math.hypot(*(v - c for v, c in zip(vehicle.velocity_en_mps, current, strict=True)))),
+    )
 
 
 def _at(forecast: WindForecast, at_s: float, name: str) -> float:
@@ -465,9 +621,9 @@ def _at(forecast: WindForecast, at_s: float, name: str) -> float:
     return float(np.interp(at_s, forecast.horizon_s, getattr(forecast, name)))
 
 
-SAME_M = 2.0          # a leg of the plan that ends so near a waypoint is the one that leads to it
-AHEAD_STEP_S = 5.0    # between the places that the boat is expected at
-MOST_AHEAD = 90       # of them
+SAME_M = 2.0  # a leg of the plan that ends so near a waypoint is the one that leads to it
+AHEAD_STEP_S = 5.0  # between the places that the boat is expected at
+MOST_AHEAD = 90  # of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -481,7 +637,7 @@ class Chosen:
 
 
 def plan_of(
-    step: Step, voyage: Voyage, eta: Eta, chosen: Chosen | None, legs: tuple[Leg, ...],
+    step: Step, voyage: Voyage, eta: Eta, chosen: Chosen | None, legs: tuple[Leg, ...]
 ) -> values.PlanView | None:
     """Return the plan that is sailed; ``legs`` are those of the plans that it was spliced from, the newest first."""
     route, state = step.state.mission.route, step.state
@@ -491,21 +647,33 @@ def plan_of(
     left = tuple(_leg(route, n, legs) for n in range(begin, count))
     tack = next_tack(step, voyage.boat.polar)
     return values.PlanView(
-        number=route.plan_id, age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),
+        number=route.plan_id,
+        age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),
         reason="" if chosen is None else chosen.reason,
-        why=(chosen.why if chosen is not None and chosen.why else route.why), rung=route.rung,
-        bound_for=route.bound_for, twd_from_deg=compass(route.plan_twd_from_rad), tws_mps=rounded(route.plan_tws_mps),
-        delta_s=rounded(route.delta_s, 4), promised_risk=rounded(1.0 - route.delta_s, 4),
-        path_risk=rounded(_risk_left(route, left), 4), vessel_risk=rounded(route.vessel_risk, 4),
-        margin_m=rounded(route.margin_m, 1), cost_s=rounded(route.cost_s, 1),
-        median_s=rounded(route.median_s, 0), late_s=rounded(route.late_s, 0),
-        there_s=rounded(eta.there_s, 0), there_late_s=rounded(eta.there_late_s, 0),
+        why=(chosen.why if chosen is not None and chosen.why else route.why),
+        rung=route.rung,
+        bound_for=route.bound_for,
+        twd_from_deg=compass(route.plan_twd_from_rad),
+        tws_mps=rounded(route.plan_tws_mps),
+        delta_s=rounded(route.delta_s, 4),
+        promised_risk=rounded(1.0 - route.delta_s, 4),
+        path_risk=rounded(_risk_left(route, left), 4),
+        vessel_risk=rounded(route.vessel_risk, 4),
+        margin_m=rounded(route.margin_m, 1),
+        cost_s=rounded(route.cost_s, 1),
+        median_s=rounded(route.median_s, 0),
+        late_s=rounded(route.late_s, 0),
+        there_s=rounded(eta.there_s, 0),
+        there_late_s=rounded(eta.there_late_s, 0),
         expected_clearance_m=rounded(route.expected_clearance_m, 1),
-        bound_s=_bound_s(route, chosen), replans=state.plans.replans,
+        bound_s=_bound_s(route, chosen),
+        replans=state.plans.replans,
         next_tack_s=None if tack is None else rounded(tack.in_s, 0),
         next_tack_is_planned=None if tack is None else tack.is_planned,
-        leg=min(begin + 1, count) if count else None, count=count,
-        legs=left)
+        leg=min(begin + 1, count) if count else None,
+        count=count,
+        legs=left,
+    )
 
 
 def _bound_s(route: Route, chosen: Chosen | None) -> float | None:
@@ -528,15 +696,29 @@ def _leg(route: Route, number: int, legs: tuple[Leg, ...]) -> values.LegView:
     known = None if is_loiter else next((leg for leg in legs if math.dist(leg.to_en, end) < SAME_M), None)
     if known is None:
         return values.LegView(
-            from_en_m=place(start), to_en_m=place(end), is_loiter=is_loiter,
-            course_deg=None if start == end else compass(course_rad), length_m=rounded(math.dist(start, end), 1),
-            twa_deg=None if start == end else signed(difference_rad(route.plan_twd_from_rad, course_rad)))
+            from_en_m=place(start),
+            to_en_m=place(end),
+            is_loiter=is_loiter,
+            course_deg=None if start == end else compass(course_rad),
+            length_m=rounded(math.dist(start, end), 1),
+            twa_deg=None if start == end else signed(difference_rad(route.plan_twd_from_rad, course_rad)),
+        )
     return values.LegView(
-        from_en_m=place(start), to_en_m=place(end), is_beat=known.is_beat, course_deg=compass(course_rad),
-        twa_deg=signed(known.twa_rad), length_m=rounded(math.dist(start, end), 1), speed_mps=rounded(known.speed_mps),
-        starts_s=rounded(known.start_s, 1), ends_s=rounded(known.end_s, 1), sigma_deg=degrees(known.sigma_rad),
-        no_go_half_deg=degrees(known.no_go_half_rad), clearance_m=rounded(known.clearance_m, 1),
-        risk=rounded(known.risk, 4), manoeuvre=known.manoeuvre)
+        from_en_m=place(start),
+        to_en_m=place(end),
+        is_beat=known.is_beat,
+        course_deg=compass(course_rad),
+        twa_deg=signed(known.twa_rad),
+        length_m=rounded(math.dist(start, end), 1),
+        speed_mps=rounded(known.speed_mps),
+        starts_s=rounded(known.start_s, 1),
+        ends_s=rounded(known.end_s, 1),
+        sigma_deg=degrees(known.sigma_rad),
+        no_go_half_deg=degrees(known.no_go_half_rad),
+        clearance_m=rounded(known.clearance_m, 1),
+        risk=rounded(known.risk, 4),
+        manoeuvre=known.manoeuvre,
+    )
 
 
 def safe_end_of(route: Route | None) -> values.PlaceView | None:
@@ -554,7 +736,9 @@ def predicted_of(eta: Eta) -> tuple[values.AheadView, ...]:
         is_last = n == len(eta.points) - 1
         is_new = not points or way.in_s - points[-1].in_s >= AHEAD_STEP_S or points[-1].tack != tack
         if len(points) < MOST_AHEAD and (is_new or is_last):
-            points.append(values.AheadView(
-                in_s=way.in_s, at_en_m=place(way.at_en_m), tack=tack, within_m=rounded(way.within_m, 1)))
+            points.append(
+                values.AheadView(
+                    in_s=way.in_s, at_en_m=place(way.at_en_m), tack=tack, within_m=rounded(way.within_m, 1)
+                )
+            )
     return tuple(points)
-

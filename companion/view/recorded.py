@@ -32,18 +32,31 @@ def area_of_chart(record: VoyageRecord) -> AreaView:
     """Return the area of a recorded voyage."""
     chart = record.chart
     return drawn(
-        chart.name, GeoPoint(lat_deg=chart.origin.lat_deg, lon_deg=chart.origin.lon_deg), chart.obstacles, chart.grown,
-        [chart.fence] if chart.fence else [], chart.margin_m, chart.names)
+        chart.name,
+        GeoPoint(lat_deg=chart.origin.lat_deg, lon_deg=chart.origin.lon_deg),
+        chart.obstacles,
+        chart.grown,
+        [chart.fence] if chart.fence else [],
+        chart.margin_m,
+        chart.names,
+    )
 
 
 def views_of_rows(record: VoyageRecord, area: AreaView) -> Iterator[values.View]:
     """Yield a view for each row of the track."""
     chart, columns = record.chart, record.columns
     plans = [p for p in record.plans if p.plan is not None and p.plan.waypoints]
-    goals = tuple(values.GoalView(
-        name=g.name or f"goal {n}", kind="buoy" if g.side != "none" else "line" if g.line else "point",
-        at_en_m=place((g.x, g.y)), radius_m=rounded(g.radius_m, 1), side="" if g.side == "none" else g.side,
-        line_en_m=g.line) for n, g in enumerate(chart.goals, start=1))
+    goals = tuple(
+        values.GoalView(
+            name=g.name or f"goal {n}",
+            kind="buoy" if g.side != "none" else "line" if g.line else "point",
+            at_en_m=place((g.x, g.y)),
+            radius_m=rounded(g.radius_m, 1),
+            side="" if g.side == "none" else g.side,
+            line_en_m=g.line,
+        )
+        for n, g in enumerate(chart.goals, start=1)
+    )
     number = -1
     for row in range(len(columns["t_s"])):
         cell = {name: _known(float(column[row])) for name, column in columns.items()}
@@ -52,11 +65,18 @@ def views_of_rows(record: VoyageRecord, area: AreaView) -> Iterator[values.View]
             number += 1
         here = None if cell["east_m"] is None or cell["north_m"] is None else (cell["east_m"], cell["north_m"])
         yield values.View(
-            source="recorded", name=chart.name, t_s=round(t_s, 3), area=area.hash, age_s=0.0,
+            source="recorded",
+            name=chart.name,
+            t_s=round(t_s, 3),
+            area=area.hash,
+            age_s=0.0,
             unix_s=None if record.epoch_s is None else round(record.epoch_s + t_s, 3),
             state=values.StateView(phase=record.texts["phase"][row], mode=record.texts["mode"][row] or None),
-            boat=_boat(cell, here), wind=_wind(cell),
-            plan=None if number < 0 else _plan(plans[number], t_s), goals=goals)
+            boat=_boat(cell, here),
+            wind=_wind(cell),
+            plan=None if number < 0 else _plan(plans[number], t_s),
+            goals=goals,
+        )
 
 
 def events_of_record(record: VoyageRecord) -> Iterator[tuple[Event, ...]]:
@@ -91,26 +111,45 @@ def _twa_deg(cell: dict[str, float | None]) -> float | None:
 def _boat(cell: dict[str, float | None], here: values.PointEn | None) -> values.BoatView:
     twa_deg = _twa_deg(cell)
     return values.BoatView(
-        age_s=None if here is None else 0.0, lat_deg=cell["lat_deg"], lon_deg=cell["lon_deg"],
-        at_en_m=None if here is None else place(here), heading_deg=cell["heading_deg"], cog_deg=cell["cog_deg"],
-        sog_mps=cell["sog_mps"], clearance_m=cell["clearance_m"], cross_track_m=cell["cross_track_m"],
-        tack=None if twa_deg is None else tack_of(twa_deg))
+        age_s=None if here is None else 0.0,
+        lat_deg=cell["lat_deg"],
+        lon_deg=cell["lon_deg"],
+        at_en_m=None if here is None else place(here),
+        heading_deg=cell["heading_deg"],
+        cog_deg=cell["cog_deg"],
+        sog_mps=cell["sog_mps"],
+        clearance_m=cell["clearance_m"],
+        cross_track_m=cell["cross_track_m"],
+        tack=None if twa_deg is None else tack_of(twa_deg),
+    )
 
 
 def _wind(cell: dict[str, float | None]) -> values.WindView | None:
     if cell["twd_deg"] is None:
         return None
     return values.WindView(
-        health="recorded", twd_from_deg=cell["twd_deg"], tws_mps=cell["tws_mps"], mean_twd_from_deg=cell["twd_deg"],
-        mean_tws_mps=cell["tws_mps"], sigma_deg=cell["twd_sigma_deg"], twa_deg=_twa_deg(cell))
+        health="recorded",
+        twd_from_deg=cell["twd_deg"],
+        tws_mps=cell["tws_mps"],
+        mean_twd_from_deg=cell["twd_deg"],
+        mean_tws_mps=cell["tws_mps"],
+        sigma_deg=cell["twd_sigma_deg"],
+        twa_deg=_twa_deg(cell),
+    )
 
 
 def _plan(recorded: RecordedPlan, t_s: float) -> values.PlanView:
     assert recorded.plan is not None
     way = recorded.plan.waypoints
     legs = tuple(values.LegView(from_en_m=place(a), to_en_m=place(b)) for a, b in pairwise(way))
-    return values.PlanView(number=recorded.request_id, age_s=round(t_s - recorded.t_s, 1), reason=recorded.reason or "",
-                       twd_from_deg=rounded(recorded.twd_deg, 1), legs=legs, count=len(legs))
+    return values.PlanView(
+        number=recorded.request_id,
+        age_s=round(t_s - recorded.t_s, 1),
+        reason=recorded.reason or "",
+        twd_from_deg=rounded(recorded.twd_deg, 1),
+        legs=legs,
+        count=len(legs),
+    )
 
 
 Moment = tuple[View, tuple[Event, ...]]
@@ -140,12 +179,22 @@ def recorded_views(folder: Path) -> RecordedViews:
     if heard and is_from_the_start(folder / TLOG):
         recorded = RecordedInput(folder)
         fold = ViewFold(recorded.voyage, recorded.config, source="recorded", epoch_s=recorded.epoch_s)
-        return RecordedViews(name=recorded.mission.name, area=fold.area, count=len(recorded.rows), is_whole=True,
-                             moments=_folded(recorded, fold, fold.area))
+        return RecordedViews(
+            name=recorded.mission.name,
+            area=fold.area,
+            count=len(recorded.rows),
+            is_whole=True,
+            moments=_folded(recorded, fold, fold.area),
+        )
     record = read_voyage(folder)
     area = area_of_chart(record)
-    return RecordedViews(name=record.chart.name, area=area, count=len(record.columns["t_s"]), is_whole=False,
-                         moments=zip(views_of_rows(record, area), events_of_record(record), strict=True))
+    return RecordedViews(
+        name=record.chart.name,
+        area=area,
+        count=len(record.columns["t_s"]),
+        is_whole=False,
+        moments=zip(views_of_rows(record, area), events_of_record(record), strict=True),
+    )
 
 
 def _folded(recorded: RecordedInput, fold: ViewFold, area: AreaView) -> Iterator[Moment]:

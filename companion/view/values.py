@@ -17,7 +17,7 @@ from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift
 
-PointEn = tuple[float, float]   # metres east and north of the area's origin
+PointEn = tuple[float, float]  # metres east and north of the area's origin
 Tack = Literal["port", "starboard"]
 
 
@@ -47,7 +47,7 @@ class WindView:
     tws_mps: float | None = None
     mean_twd_from_deg: float | None = None
     mean_tws_mps: float | None = None
-    sigma_deg: float | None = None       # of the direction a minute ahead
+    sigma_deg: float | None = None  # of the direction a minute ahead
     tws_sigma_mps: float | None = None
     twa_deg: float | None = None
     awa_deg: float | None = None
@@ -102,7 +102,7 @@ class Layline:
     tack: Tack
     course_deg: float
     swing_deg: float
-    reach_s: float | None = None         # until the boat meets it on its present course; None: it does not
+    reach_s: float | None = None  # until the boat meets it on its present course; None: it does not
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,11 +113,11 @@ class Laylines:
     mark_en_m: PointEn
     is_beat: bool
     angle_deg: float
-    level: float                         # probability of the swing's interval
+    level: float  # probability of the swing's interval
     lines: tuple[Layline, ...] = ()
 
 
-CARRIES_DEG = 8.0     # so much closer to the wind than her best angle a boat sails by the way that she has
+CARRIES_DEG = 8.0  # so much closer to the wind than her best angle a boat sails by the way that she has
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -243,9 +243,9 @@ class BoatView:
     sog_mps: float | None = None
     roll_deg: float | None = None
     tack: Tack | None = None
-    vmg_mps: float | None = None         # to windward, negative to leeward
-    vmc_mps: float | None = None         # towards the goal
-    clearance_m: float | None = None     # of the hull to the nearest obstacle or limit
+    vmg_mps: float | None = None  # to windward, negative to leeward
+    vmc_mps: float | None = None  # towards the goal
+    clearance_m: float | None = None  # of the hull to the nearest obstacle or limit
     cross_track_m: float | None = None
     waypoint_m: float | None = None
     goal_m: float | None = None
@@ -262,7 +262,7 @@ class LegView:
     to_en_m: PointEn
     is_done: bool = False
     is_loiter: bool = False
-    is_beat: bool | None = None          # the autopilot beats it by itself
+    is_beat: bool | None = None  # the autopilot beats it by itself
     course_deg: float | None = None
     twa_deg: float | None = None
     length_m: float | None = None
@@ -271,9 +271,9 @@ class LegView:
     ends_s: float | None = None
     sigma_deg: float | None = None
     no_go_half_deg: float | None = None
-    clearance_m: float | None = None     # beyond the margin, to the nearest obstacle or limit
-    risk: float | None = None            # of being forced into the no-go zone, or too near to a vessel, on this leg
-    manoeuvre: str = ""                  # the turn into it: tack, gybe or empty
+    clearance_m: float | None = None  # beyond the margin, to the nearest obstacle or limit
+    risk: float | None = None  # of being forced into the no-go zone, or too near to a vessel, on this leg
+    manoeuvre: str = ""  # the turn into it: tack, gybe or empty
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -285,29 +285,29 @@ class PlanView:
 
     number: int | None = None
     age_s: float | None = None
-    reason: str = ""                     # why it was asked for
+    reason: str = ""  # why it was asked for
     why: str = ""
-    rung: str = ""                       # the step of the ladder on which it was found; empty: as configured
+    rung: str = ""  # the step of the ladder on which it was found; empty: as configured
     bound_for: str = ""
-    twd_from_deg: float | None = None    # the wind that it was judged in
+    twd_from_deg: float | None = None  # the wind that it was judged in
     tws_mps: float | None = None
     delta_s: float | None = None
-    promised_risk: float | None = None   # at each instant
-    path_risk: float | None = None       # off the plan before the next goal: the sum over the legs that are left
+    promised_risk: float | None = None  # at each instant
+    path_risk: float | None = None  # off the plan before the next goal: the sum over the legs that are left
     vessel_risk: float | None = None
     margin_m: float | None = None
     cost_s: float | None = None
-    median_s: float | None = None        # from there to the plan's end, in half the winds of the spread ...
-    late_s: float | None = None          # ... and in nine of ten
-    there_s: float | None = None         # from now until the next goal is reached, at the pace that the boat keeps ...
-    there_late_s: float | None = None    # ... and in nine cases of ten
-    expected_clearance_m: float | None = None   # of the hull on the track that is expected
-    bound_s: float | None = None         # no plan is faster than that; None of a plan that was kept
+    median_s: float | None = None  # from there to the plan's end, in half the winds of the spread ...
+    late_s: float | None = None  # ... and in nine of ten
+    there_s: float | None = None  # from now until the next goal is reached, at the pace that the boat keeps ...
+    there_late_s: float | None = None  # ... and in nine cases of ten
+    expected_clearance_m: float | None = None  # of the hull on the track that is expected
+    bound_s: float | None = None  # no plan is faster than that; None of a plan that was kept
     replans: int | None = None
     next_tack_s: float | None = None
-    next_tack_is_planned: bool | None = None    # at the end of this leg; False: the autopilot's own, or farther on
-    leg: int | None = None               # the leg that is sailed, from 1 ...
-    count: int | None = None             # ... of so many
+    next_tack_is_planned: bool | None = None  # at the end of this leg; False: the autopilot's own, or farther on
+    leg: int | None = None  # the leg that is sailed, from 1 ...
+    count: int | None = None  # ... of so many
     legs: tuple[LegView, ...] = ()
 
 
@@ -350,7 +350,7 @@ class VesselView:
     bearing_deg: float | None = None
     cpa_m: float | None = None
     cpa_s: float | None = None
-    cpa_en_m: PointEn | None = None      # where it will be then ...
+    cpa_en_m: PointEn | None = None  # where it will be then ...
     own_cpa_en_m: PointEn | None = None  # ... and where we shall be
 
 
@@ -413,7 +413,7 @@ class Figures:
     contacts: int | None = None
     no_go_entries: int | None = None
     min_clearance_m: float | None = None
-    promised_clearance_m: float | None = None   # the least that a plan expected which was sailed
+    promised_clearance_m: float | None = None  # the least that a plan expected which was sailed
     goals_reached: int | None = None
     goals: int | None = None
 
@@ -478,7 +478,7 @@ class View:
     health: tuple[Part, ...] = ()
 
 
-MOST = 3600        # samples kept: an hour at one a second, a day at one in 24 s
+MOST = 3600  # samples kept: an hour at one a second, a day at one in 24 s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -493,11 +493,11 @@ class Sample:
     twd_from_deg: float | None = None
     tws_mps: float | None = None
     clearance_m: float | None = None
-    starboard: bool | None = None          # tack
-    polar_twa_deg: float | None = None     # of the wind over the water, as the polar is ...
-    polar_mps: float | None = None         # ... and the speed through it
-    ahead_twd_deg: float | None = None     # the forecast's mean for a minute ahead ...
-    ahead_half_deg: float | None = None    # ... and the half width that holds 80 %
+    starboard: bool | None = None  # tack
+    polar_twa_deg: float | None = None  # of the wind over the water, as the polar is ...
+    polar_mps: float | None = None  # ... and the speed through it
+    ahead_twd_deg: float | None = None  # the forecast's mean for a minute ahead ...
+    ahead_half_deg: float | None = None  # ... and the half width that holds 80 %
     ahead_tws_mps: float | None = None
     ahead_tws_sigma_mps: float | None = None
 
@@ -506,7 +506,7 @@ class Sample:
 class Past:
     """Samples by column, each as long as ``t_s``; names as in ``Sample``."""
 
-    unix_s: float | None = None            # of t_s = 0
+    unix_s: float | None = None  # of t_s = 0
     t_s: tuple[float, ...] = ()
     east_m: tuple[float | None, ...] = ()
     north_m: tuple[float | None, ...] = ()
@@ -563,12 +563,19 @@ def sample_of(view: View) -> Sample:
     minute = None if wind is None else next((b for b in wind.bands if b.horizon_s == 60.0), None)
     east, north = boat.at_en_m or (None, None)
     return Sample(
-        t_s=view.t_s, east_m=east, north_m=north, heading_deg=boat.heading_deg, sog_mps=boat.sog_mps,
-        clearance_m=boat.clearance_m, starboard=None if boat.tack is None else boat.tack == "starboard",
-        twd_from_deg=None if wind is None else wind.twd_from_deg, tws_mps=None if wind is None else wind.tws_mps,
+        t_s=view.t_s,
+        east_m=east,
+        north_m=north,
+        heading_deg=boat.heading_deg,
+        sog_mps=boat.sog_mps,
+        clearance_m=boat.clearance_m,
+        starboard=None if boat.tack is None else boat.tack == "starboard",
+        twd_from_deg=None if wind is None else wind.twd_from_deg,
+        tws_mps=None if wind is None else wind.tws_mps,
         polar_twa_deg=None if polar is None else polar.live_twa_deg,
         polar_mps=None if polar is None else polar.live_mps,
         ahead_twd_deg=None if minute is None else minute.twd_from_deg,
         ahead_half_deg=None if minute is None or len(minute.half_deg) < 2 else minute.half_deg[1],
         ahead_tws_mps=None if minute is None else minute.tws_mps,
-        ahead_tws_sigma_mps=None if minute is None else minute.tws_sigma_mps)
+        ahead_tws_sigma_mps=None if minute is None else minute.tws_sigma_mps,
+    )

@@ -14,6 +14,15 @@ from companion.wind.tracker import WindTracker
 from companion.wind.true_wind import apparent_wind, true_wind
 
 __all__ = [
-    "HORIZONS_S", "NAMES", "Estimator", "Forecaster", "VaneParameters", "WindStatus", "WindTracker", "WindVerdict",
-    "apparent_wind", "make", "true_wind",
+    "HORIZONS_S",
+    "NAMES",
+    "Estimator",
+    "Forecaster",
+    "VaneParameters",
+    "WindStatus",
+    "WindTracker",
+    "WindVerdict",
+    "apparent_wind",
+    "make",
+    "true_wind",
 ]

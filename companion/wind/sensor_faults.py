@@ -23,12 +23,12 @@ from companion.wind.true_wind import LIGHT_MPS, apparent_wind, true_wind
 #
 # Thresholds are set so that the 41 h of recorded good wind raise next to no alarm (counts: docs/reference/wind.md).
 
-_STILL_RAD = math.radians(0.4)        # a vane within this has not moved (instruments report whole degrees)
-_SWEPT_RAD = math.radians(20.0)       # boat turned this much under a vane that has not moved: frozen
+_STILL_RAD = math.radians(0.4)  # a vane within this has not moved (instruments report whole degrees)
+_SWEPT_RAD = math.radians(20.0)  # boat turned this much under a vane that has not moved: frozen
 _STILL_LEAST_S = 3.0
-_SUSPECT_RAD = math.radians(6.0)      # turned this much: not believed, no verdict yet
-_IDENTICAL_RAD = 1e-7                 # the very same number again
-_IDENTICAL_S = 20.0                   # for this long while the boat swung a little: a silent sensor
+_SUSPECT_RAD = math.radians(6.0)  # turned this much: not believed, no verdict yet
+_IDENTICAL_RAD = 1e-7  # the very same number again
+_IDENTICAL_S = 20.0  # for this long while the boat swung a little: a silent sensor
 _SWUNG_RAD = math.radians(5.0)
 
 
@@ -66,18 +66,17 @@ class FrozenVane:
         still_s = t_s - (self._since_s if self._since_s is not None else t_s)
         # A boat that spins carries a frozen vane's wind with it at once: stop believing before being sure.
         self.is_suspect = not moved and self._high - self._low >= _SUSPECT_RAD
-        self.is_frozen = (
-            (still_s >= _STILL_LEAST_S and self._high - self._low >= _SWEPT_RAD)
-            or (t_s - self._same_s >= _IDENTICAL_S and self._same_high - self._same_low >= _SWUNG_RAD)
+        self.is_frozen = (still_s >= _STILL_LEAST_S and self._high - self._low >= _SWEPT_RAD) or (
+            t_s - self._same_s >= _IDENTICAL_S and self._same_high - self._same_low >= _SWUNG_RAD
         )
         return self.is_frozen
 
 
-_SPIKE_RAD = math.radians(45.0)       # a lone reading this far from the last seconds is none of the wind's doing
-_SPIKE_ROUGH = 6.0                    # ... or this many times the usual departure, whichever is more
-_SHIFT_S = 4.0                        # readings that stay away this long are a shift, not a spike
+_SPIKE_RAD = math.radians(45.0)  # a lone reading this far from the last seconds is none of the wind's doing
+_SPIKE_ROUGH = 6.0  # ... or this many times the usual departure, whichever is more
+_SHIFT_S = 4.0  # readings that stay away this long are a shift, not a spike
 _SHARE_S = 60.0
-_MANY, _FEW = 0.04, 0.02              # share of spikes that raises, clears the verdict
+_MANY, _FEW = 0.04, 0.02  # share of spikes that raises, clears the verdict
 
 
 class Spikes:
@@ -107,7 +106,7 @@ class Spikes:
         self._away_s = self._away_s + dt_s if is_far else 0.0
         is_spike = is_far and self._away_s < max(_SHIFT_S, 1.5 * dt_s)
         self.share += gain(dt_s, _SHARE_S) * ((1.0 if is_spike else 0.0) - self.share)
-        if is_far and not is_spike:    # it stayed: the wind is there now, and those were no spikes
+        if is_far and not is_spike:  # it stayed: the wind is there now, and those were no spikes
             self.share = self._share_before
         # A verdict waits until it is clear that the present departure is no shift.
         if self._away_s == 0.0 or self.is_spiking:
@@ -124,12 +123,12 @@ class Spikes:
         return False
 
 
-_SETTLE_S = 10.0                      # after a manoeuvre, before the wind is believed again
-_LEG_S = 40.0                         # averaged on each side of a tack
+_SETTLE_S = 10.0  # after a manoeuvre, before the wind is believed again
+_LEG_S = 40.0  # averaged on each side of a tack
 _LEG_LEAST_S = 15.0
-_FORGET = 0.93                        # per tack: about fifteen tacks count
-_PRIOR_RAD = math.radians(9.0)        # expected mounting error, before any tack
-_SURE = 3.0                           # standard errors
+_FORGET = 0.93  # per tack: about fifteen tacks count
+_PRIOR_RAD = math.radians(9.0)  # expected mounting error, before any tack
+_SURE = 3.0  # standard errors
 _OFFSET_LEAST_RAD = math.radians(4.0)
 
 
@@ -150,7 +149,7 @@ class TackOffset:
         self._side_since_s = 0.0
         self._busy_s = -math.inf
         self._t_s: float | None = None
-        self._leg = np.zeros(7)            # weight, M (2), J A (2), side J A (2)
+        self._leg = np.zeros(7)  # weight, M (2), J A (2), side J A (2)
         self._before: np.ndarray[tuple[int], np.dtype[np.float64]] | None = None
         self._before_s = 0.0
         self._normal = np.zeros((2, 2))
@@ -159,7 +158,12 @@ class TackOffset:
         self._solution = (0.0, 0.0, _PRIOR_RAD, _PRIOR_RAD)
 
     def update(
-        self, t_s: float, wind_en_mps: tuple[float, float], velocity_en_mps: tuple[float, float], awa_rad: float, *,
+        self,
+        t_s: float,
+        wind_en_mps: tuple[float, float],
+        velocity_en_mps: tuple[float, float],
+        awa_rad: float,
+        *,
         is_turning: bool,
     ) -> None:
         """Take the from-vector of the computed true wind, the boat's velocity and the apparent angle."""
@@ -190,8 +194,8 @@ class TackOffset:
 
     def _learn(self, step: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
         now = self._leg / self._leg[0]
-        unrest = 0.12 * math.hypot(now[1], now[2])        # [m/s] of a mean of half a minute against the next
-        matrix = np.array([[step[3], step[5]], [step[4], step[6]]])                                    # (a)
+        unrest = 0.12 * math.hypot(now[1], now[2])  # [m/s] of a mean of half a minute against the next
+        matrix = np.array([[step[3], step[5]], [step[4], step[6]]])  # (a)
         self._normal = _FORGET * self._normal + matrix.T @ matrix / unrest**2
         self._right = _FORGET * self._right + matrix.T @ step[1:3] / unrest**2
         self.tacks += 1
@@ -231,16 +235,16 @@ class WindVerdict(enum.Enum):
     """What may be wrong with the wind; GOOD alone, the others in any combination."""
 
     GOOD = "good"
-    CALM = "calm"                        # too little wind for a direction
-    TURNING = "turning"                  # in a manoeuvre: compass and vane lag
-    FROZEN = "frozen"                    # the vane does not move although the boat turns under it
-    SPIKING = "spiking"                  # single readings far from their neighbours
-    MISALIGNED = "misaligned"            # port and starboard tack disagree: the vane is mounted wrong
-    TURNED = "turned"                    # the direction leapt, and the boat does not sail by it
-    RETURNED = "returned"                # readings are back after a gap
-    SILENT = "silent"                    # no reading for some time
-    HELD = "held"                        # the autopilot repeats an old true wind
-    SYNTHESISED = "synthesised"          # the autopilot invents the direction (no vane configured)
+    CALM = "calm"  # too little wind for a direction
+    TURNING = "turning"  # in a manoeuvre: compass and vane lag
+    FROZEN = "frozen"  # the vane does not move although the boat turns under it
+    SPIKING = "spiking"  # single readings far from their neighbours
+    MISALIGNED = "misaligned"  # port and starboard tack disagree: the vane is mounted wrong
+    TURNED = "turned"  # the direction leapt, and the boat does not sail by it
+    RETURNED = "returned"  # readings are back after a gap
+    SILENT = "silent"  # no reading for some time
+    HELD = "held"  # the autopilot repeats an old true wind
+    SYNTHESISED = "synthesised"  # the autopilot invents the direction (no vane configured)
     NO_SPEED_SENSOR = "no_speed_sensor"  # "true" wind without a speed is heading plus vane
 
 
@@ -274,19 +278,19 @@ class WindStatus:
 
 
 # How far each verdict widens sigma (a factor), unless its proportion is computed.
-_GAP_S = 10.0             # [s] without a sample is a gap
-_RETURN_S = 30.0          # [s] after it during which the estimate settles
-_HELD_S = 10.0            # [s] of the very same true wind on a boat that moves
-_AGREES_RAD, _AGREES_MPS = math.radians(10.0), 0.5   # vane and anemometer make the same true wind
-_HELD_BLIND_S = 20.0      # [s] likewise when the boat's motion is not known
-_ZERO_S = 10.0            # [s] of a speed of exactly nothing
-_NEAR_S = 1.5             # [s] vehicle and wind of one instant
-_TURNED_S = 10.0          # [s] within which a change of heading is a turn
-_LAG_S = 2.0              # [s] after it
-_DEAD_MPS = 0.3           # [m/s] less wind than this has no direction at all
-TURNED_RAD = math.radians(25.0)   # of heading within those seconds: the definition of the records' ``turning``
+_GAP_S = 10.0  # [s] without a sample is a gap
+_RETURN_S = 30.0  # [s] after it during which the estimate settles
+_HELD_S = 10.0  # [s] of the very same true wind on a boat that moves
+_AGREES_RAD, _AGREES_MPS = math.radians(10.0), 0.5  # vane and anemometer make the same true wind
+_HELD_BLIND_S = 20.0  # [s] likewise when the boat's motion is not known
+_ZERO_S = 10.0  # [s] of a speed of exactly nothing
+_NEAR_S = 1.5  # [s] vehicle and wind of one instant
+_TURNED_S = 10.0  # [s] within which a change of heading is a turn
+_LAG_S = 2.0  # [s] after it
+_DEAD_MPS = 0.3  # [m/s] less wind than this has no direction at all
+TURNED_RAD = math.radians(25.0)  # of heading within those seconds: the definition of the records' ``turning``
 _INVENTED_RAD = math.radians(45.0)
-_ASSUMED_MPS = 3.0        # [m/s] wind assumed where there is no speed, to bound what the boat's own motion hides
+_ASSUMED_MPS = 3.0  # [m/s] wind assumed where there is no speed, to bound what the boat's own motion hides
 
 
 class WindWatch:
@@ -294,7 +298,7 @@ class WindWatch:
 
     def __init__(self, parameters: VaneParameters | None = None) -> None:
         self.parameters = parameters or VaneParameters()
-        self.contradicted = ""    # why the boat's motion speaks against the sensor (``companion.current.motion``)
+        self.contradicted = ""  # why the boat's motion speaks against the sensor (``companion.current.motion``)
         self.tacks = TackOffset()
         self._frozen, self._spikes = FrozenVane(), Spikes()
         self._vehicle: VehicleState | None = None
@@ -305,7 +309,7 @@ class WindWatch:
         self._turn_s = -math.inf
         self._headings: deque[tuple[float, float]] = deque(maxlen=11)
         self._frozen_s: float | None = None
-        self._same_s = self._zero_s = 0.0       # since when the same true wind, a speed of nothing
+        self._same_s = self._zero_s = 0.0  # since when the same true wind, a speed of nothing
         self._same_heading_rad = 0.0
         self._has_moved = False
 
@@ -327,7 +331,7 @@ class WindWatch:
         """Take what the boat feels."""
         self._apparent = wind
         if wind.aws_mps < LIGHT_MPS:
-            self._frozen.rest()      # so little wind turns no vane: that it stands still says nothing of it
+            self._frozen.rest()  # so little wind turns no vane: that it stands still says nothing of it
         elif self._vehicle is not None and abs(wind.t_s - self._vehicle.t_s) <= _NEAR_S:
             self._frozen.update(wind.t_s, wind.awa_rad, self._vehicle.heading_rad)
 
@@ -357,8 +361,9 @@ class WindWatch:
             widening *= 1.0 + 2.0 * lack
             calm_weight = 1.0 - 0.8 * lack if sample.tws_mps >= _DEAD_MPS else 0.0
         if self.parameters.is_direction_invented:
-            found.append((WindVerdict.SYNTHESISED,
-                          f"WNDVN_TYPE {self.parameters.vane_type}: the direction is invented"))
+            found.append(
+                (WindVerdict.SYNTHESISED, f"WNDVN_TYPE {self.parameters.vane_type}: the direction is invented")
+            )
             extra = math.hypot(extra, _INVENTED_RAD)
         if is_held:
             found.append((WindVerdict.HELD, "the autopilot repeats an old true wind"))
@@ -390,10 +395,15 @@ class WindWatch:
         self._compare_tacks(sample, is_turning=is_turning or frozen_s > 0.0)
         if self.tacks.is_misaligned:
             offset, side = self.tacks.offset_rad or 0.0, self.tacks.side_rad or 0.0
-            found.append((WindVerdict.MISALIGNED, (
-                f"the tacks disagree: vane off by {math.degrees(offset):+.0f} deg, "
-                f"{math.degrees(side):+.0f} deg to the side of the wind"
-            )))
+            found.append(
+                (
+                    WindVerdict.MISALIGNED,
+                    (
+                        f"the tacks disagree: vane off by {math.degrees(offset):+.0f} deg, "
+                        f"{math.degrees(side):+.0f} deg to the side of the wind"
+                    ),
+                )
+            )
             extra = math.hypot(extra, self.tacks.sure_rad)
         if dt_s > _GAP_S:
             self._back_s, self._gap_s = t, dt_s
@@ -401,9 +411,16 @@ class WindWatch:
             found.append((WindVerdict.RETURNED, f"back after {self._gap_s:.0f} s of silence"))
             widening *= 1.0 + min(1.0, self._gap_s / 300.0) * (1.0 - (t - self._back_s) / _RETURN_S)
         return WindStatus(
-            t_s=t, verdicts=tuple(v for v, _ in found) or (WindVerdict.GOOD,), widening=widening, extra_sigma_rad=extra,
-            weight=min(weight, calm_weight), speed_weight=weight, offset_rad=self.tacks.offset_rad,
-            side_rad=self.tacks.side_rad, sample=sample, age_s=0.0,
+            t_s=t,
+            verdicts=tuple(v for v, _ in found) or (WindVerdict.GOOD,),
+            widening=widening,
+            extra_sigma_rad=extra,
+            weight=min(weight, calm_weight),
+            speed_weight=weight,
+            offset_rad=self.tacks.offset_rad,
+            side_rad=self.tacks.side_rad,
+            sample=sample,
+            age_s=0.0,
             reason="; ".join(text for _, text in found) or "good",
         )
 
@@ -447,7 +464,8 @@ class WindWatch:
         measured = self._measured(sample)
         return measured is None or not (
             abs(difference_rad(measured.twd_from_rad, sample.twd_from_rad)) <= _AGREES_RAD
-            and abs(measured.tws_mps - sample.tws_mps) <= _AGREES_MPS)
+            and abs(measured.tws_mps - sample.tws_mps) <= _AGREES_MPS
+        )
 
     def _frozen_for(self, t_s: float) -> float:
         """Return for how long the vane has been seen frozen [s], 0 when it is not."""

@@ -20,15 +20,19 @@ from companion.wind.parameters import VaneParameters
 from companion.wind.sensor_faults import WindStatus, WindVerdict, WindWatch
 from companion.wind.true_wind import LIGHT_MPS, true_wind
 
-SILENT_S = 5.0            # [s] without a sample before the wind counts as silent
-WIND_PREFERRED_S = 10.0   # [s] after a WIND message during which apparent wind is only listened to
+SILENT_S = 5.0  # [s] without a sample before the wind counts as silent
+WIND_PREFERRED_S = 10.0  # [s] after a WIND message during which apparent wind is only listened to
 
 
 _QUALITY = {
-    WindVerdict.TURNING: WindQuality.TURNING, WindVerdict.CALM: WindQuality.LIGHT, WindVerdict.HELD: WindQuality.HELD,
-    WindVerdict.FROZEN: WindQuality.SUSPECT, WindVerdict.SPIKING: WindQuality.SUSPECT,
+    WindVerdict.TURNING: WindQuality.TURNING,
+    WindVerdict.CALM: WindQuality.LIGHT,
+    WindVerdict.HELD: WindQuality.HELD,
+    WindVerdict.FROZEN: WindQuality.SUSPECT,
+    WindVerdict.SPIKING: WindQuality.SUSPECT,
     WindVerdict.MISALIGNED: WindQuality.SUSPECT,
-    WindVerdict.TURNED: WindQuality.SUSPECT, WindVerdict.SYNTHESISED: WindQuality.INVALID,
+    WindVerdict.TURNED: WindQuality.SUSPECT,
+    WindVerdict.SYNTHESISED: WindQuality.INVALID,
 }
 
 
@@ -99,7 +103,7 @@ class WindTracker:
 
     def _take(self, sample: WindSample) -> None:
         if self._status is not None and sample.t_s <= self._status.t_s:
-            return      # a duplicate: AppWnd* are broadcast on every link each time any link sends WIND
+            return  # a duplicate: AppWnd* are broadcast on every link each time any link sends WIND
         status = self._watch.judge(sample)
         if sample.source is WindSource.AUTOPILOT_TRUE:
             extra = self._lost_to_filter(sample)
@@ -109,7 +113,8 @@ class WindTracker:
         # A reading that is not believed is not fed at all: the forecast then ages, and widens, by itself.
         if max(status.weight, status.speed_weight) > 0.0:
             self._estimator.update(
-                judged.t_s, judged.twd_from_rad, judged.tws_mps, weight=status.weight, speed_weight=status.speed_weight)
+                judged.t_s, judged.twd_from_rad, judged.tws_mps, weight=status.weight, speed_weight=status.speed_weight
+            )
 
     def _lost_to_filter(self, sample: WindSample) -> float:
         """Return the sigma [rad] that the autopilot's low pass took out of the wind.
@@ -141,7 +146,7 @@ class WindTracker:
         return changed(status, age_s=age_s, verdicts=verdicts, reason=f"no wind for {age_s:.0f} s")
 
     def forecast_table(
-        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None,
+        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None
     ) -> WindForecast | None:
         """Return the forecast at ``t_s``, widened by what the watch found; None before the first wind."""
         if self._status is None or not self._estimator.is_ready:
@@ -151,6 +156,7 @@ class WindTracker:
         sigma = np.hypot(status.widening * table.sigma_twd_rad, status.extra_sigma_rad)
         factor = sigma / table.sigma_twd_rad
         return changed(
-            table, sigma_twd_rad=np.minimum(sigma, SIGMA_MAX_RAD),
+            table,
+            sigma_twd_rad=np.minimum(sigma, SIGMA_MAX_RAD),
             half_width_rad=np.minimum(table.half_width_rad * factor[:, None], math.pi),
         )

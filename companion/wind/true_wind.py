@@ -17,9 +17,9 @@ import math
 from companion.geo.angles import heading_of, wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
 
-LIGHT_MPS = 1.0                          # [m/s] below this the direction is nearly without meaning (recorded wind)
-TURNING_RADPS = math.radians(10.0)       # [rad/s] no wave, a manoeuvre: compass and vane lag
-STALE_S = 1.0                            # [s] apparent wind and vehicle further apart than this are not one instant
+LIGHT_MPS = 1.0  # [m/s] below this the direction is nearly without meaning (recorded wind)
+TURNING_RADPS = math.radians(10.0)  # [rad/s] no wave, a manoeuvre: compass and vane lag
+STALE_S = 1.0  # [s] apparent wind and vehicle further apart than this are not one instant
 
 
 def true_wind(apparent: ApparentWind, vehicle: VehicleState) -> WindSample:
@@ -36,7 +36,7 @@ def true_wind(apparent: ApparentWind, vehicle: VehicleState) -> WindSample:
     """
     angle = vehicle.heading_rad + apparent.awa_rad
     ve, vn = vehicle.velocity_en_mps
-    east, north = apparent.aws_mps * math.sin(angle) - ve, apparent.aws_mps * math.cos(angle) - vn   # (a)
+    east, north = apparent.aws_mps * math.sin(angle) - ve, apparent.aws_mps * math.cos(angle) - vn  # (a)
     speed = math.hypot(east, north)
     if abs(apparent.t_s - vehicle.t_s) > STALE_S:
         quality = WindQuality.SUSPECT
@@ -58,9 +58,10 @@ def true_wind(apparent: ApparentWind, vehicle: VehicleState) -> WindSample:
 def apparent_wind(sample: WindSample, vehicle: VehicleState) -> ApparentWind:
     """Return the wind that the boat would feel in this true wind over ground (the inverse of ``true_wind``)."""
     ve, vn = vehicle.velocity_en_mps
-    east = sample.tws_mps * math.sin(sample.twd_from_rad) + ve                                # (a)
+    east = sample.tws_mps * math.sin(sample.twd_from_rad) + ve  # (a)
     north = sample.tws_mps * math.cos(sample.twd_from_rad) + vn
     return ApparentWind(
-        t_s=sample.t_s, awa_rad=wrap_pi(heading_of(east, north) - vehicle.heading_rad),
+        t_s=sample.t_s,
+        awa_rad=wrap_pi(heading_of(east, north) - vehicle.heading_rad),
         aws_mps=min(100.0, math.hypot(east, north)),
     )

@@ -21,7 +21,8 @@ from sitl.run.variation import Variation
 from sitl.runner import SCENARIO_FOLDER, CampaignResults, Experiment, ExperimentSummary, Job
 
 SCENARIOS = tuple(
-    SCENARIO_FOLDER / f"{name}.toml" for name in ("two-channels", "figures/two-channels-rough", "narrow-channel"))
+    SCENARIO_FOLDER / f"{name}.toml" for name in ("two-channels", "figures/two-channels-rough", "narrow-channel")
+)
 AS_IT_IS = "as it is"
 PLANNED = {"skipper": {"autopilot_beats": False}}
 
@@ -38,8 +39,11 @@ VARIATIONS: Mapping[str, Variation] = {
     "planned, delta_s 0.6": Variation(tables={**PLANNED, "risk": {"delta_s": 0.6}}),
     "planned, delta_s 0.8": Variation(tables={**PLANNED, "risk": {"delta_s": 0.8}}),
     "planned, delta_s 0.98": Variation(tables={**PLANNED, "risk": {"delta_s": 0.98}}),
-    **{name: Variation(tables={"skipper": {"autopilot_beats": False, "planner": name}})
-       for name in ALGORITHMS if name != AUTO.algorithm},
+    **{
+        name: Variation(tables={"skipper": {"autopilot_beats": False, "planner": name}})
+        for name in ALGORITHMS
+        if name != AUTO.algorithm
+    },
 }
 BOOTSTRAPS = 2000
 
@@ -54,13 +58,18 @@ def sail(job: Job[str]) -> dict[str, Any]:
     said = {"scenario": scenario.name, "variation": job.case, "seed": job.seed}
     with job.folder() as folder:
         try:
-            verdict = run_virtual(run_embedded(
-                scenario, job.scenario, job.seed, folder, variation=VARIATIONS[job.case]))
+            verdict = run_virtual(
+                run_embedded(scenario, job.scenario, job.seed, folder, variation=VARIATIONS[job.case])
+            )
         except Exception as error:
             return {**said, "error": repr(error)}
     names = ("arrived", "contacts", "time_s", "tacks", "min_clearance_m", "no_go_entries", "replans", "promised_risk")
-    return {**said, "error": "", **{name: verdict.figures[name] for name in names},
-            "floor_m": _mission(job.scenario).margin_floor_m}
+    return {
+        **said,
+        "error": "",
+        **{name: verdict.figures[name] for name in names},
+        "floor_m": _mission(job.scenario).margin_floor_m,
+    }
 
 
 def _mission(path: Path) -> Mission:
@@ -70,9 +79,7 @@ def _mission(path: Path) -> Mission:
     return mission_of(load_scenario(path), path)
 
 
-def ablation(
-    scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int,
-) -> Experiment[str]:
+def ablation(scenarios: Sequence[Path], *, names: Sequence[str], runs: int, first_seed: int) -> Experiment[str]:
     """Return the voyages of each scenario by the variations that are named and as it is; tables of each.
 
     Raises:
@@ -89,17 +96,30 @@ def ablation(
         records = sailed.records
         lines = []
         for scenario in dict.fromkeys(record["scenario"] for record in sorted(records, key=_order)):
-            lines += [f"{scenario}, {runs} seeds from {first_seed}",
-                      table([record for record in records if record["scenario"] == scenario], wanted)]
-        errors = [f"ERROR {r['scenario']}, {r['variation']}, seed {r['seed']}: {r['error'][:300]}"
-                  for r in records if r["error"]]
+            lines += [
+                f"{scenario}, {runs} seeds from {first_seed}",
+                table([record for record in records if record["scenario"] == scenario], wanted),
+            ]
+        errors = [
+            f"ERROR {r['scenario']}, {r['variation']}, seed {r['seed']}: {r['error'][:300]}"
+            for r in records
+            if r["error"]
+        ]
         return ExperimentSummary(lines=lines + errors, is_good=not errors)
 
     return Experiment(
-        name="ablate", sail=sail, key=lambda job: job.key(variation=job.case), sum_up=sum_up,
-        jobs=[Job(scenario=path, case=name, seed=first_seed + n)
-              for n in range(runs) for path in scenarios for name in wanted],
-        is_failed=lambda record: bool(record["error"]))
+        name="ablate",
+        sail=sail,
+        key=lambda job: job.key(variation=job.case),
+        sum_up=sum_up,
+        jobs=[
+            Job(scenario=path, case=name, seed=first_seed + n)
+            for n in range(runs)
+            for path in scenarios
+            for name in wanted
+        ],
+        is_failed=lambda record: bool(record["error"]),
+    )
 
 
 def _order(record: Mapping[str, Any]) -> tuple[str, int, int]:
@@ -109,23 +129,43 @@ def _order(record: Mapping[str, Any]) -> tuple[str, int, int]:
 def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
     """Return one scenario's table, a line for each variation; times are paired with those of ``AS_IT_IS``."""
     reference = {r["seed"]: r for r in records if r["variation"] == AS_IT_IS and not r["error"]}
-    rows = [("", "arrived", "touched", "below floor", "in no-go, per voyage", "least clearance m", "median m", "tacks",
-             "time, share of as it is")]
+    rows = [
+        (
+            "",
+            "arrived",
+            "touched",
+            "below floor",
+            "in no-go, per voyage",
+            "least clearance m",
+            "median m",
+            "tacks",
+            "time, share of as it is",
+        )
+    ]
     for name in names:
         mine = [r for r in records if r["variation"] == name and not r["error"]]
         if not mine:
             continue
         clear = [r["min_clearance_m"] for r in mine if r["min_clearance_m"] is not None]
-        shares = [r["time_s"] / reference[r["seed"]]["time_s"] for r in mine
-                  if r["arrived"] and r["seed"] in reference and reference[r["seed"]]["arrived"]]
+        shares = [
+            r["time_s"] / reference[r["seed"]]["time_s"]
+            for r in mine
+            if r["arrived"] and r["seed"] in reference and reference[r["seed"]]["arrived"]
+        ]
         middle, low, high = interval(shares)
-        rows.append((
-            name, f"{sum(bool(r['arrived']) for r in mine)}/{len(mine)}", str(sum(r["contacts"] > 0 for r in mine)),
-            str(sum(r["min_clearance_m"] is not None and r["min_clearance_m"] < r["floor_m"] for r in mine)),
-            f"{np.mean([r['no_go_entries'] or 0 for r in mine]):.2f}",
-            f"{min(clear):.1f}" if clear else "-", f"{np.median(clear):.1f}" if clear else "-",
-            f"{np.median([r['tacks'] for r in mine]):.0f}",
-            "1" if name == AS_IT_IS else f"{middle:.3f} ({low:.3f} to {high:.3f})" if shares else "-"))
+        rows.append(
+            (
+                name,
+                f"{sum(bool(r['arrived']) for r in mine)}/{len(mine)}",
+                str(sum(r["contacts"] > 0 for r in mine)),
+                str(sum(r["min_clearance_m"] is not None and r["min_clearance_m"] < r["floor_m"] for r in mine)),
+                f"{np.mean([r['no_go_entries'] or 0 for r in mine]):.2f}",
+                f"{min(clear):.1f}" if clear else "-",
+                f"{np.median(clear):.1f}" if clear else "-",
+                f"{np.median([r['tacks'] for r in mine]):.0f}",
+                "1" if name == AS_IT_IS else f"{middle:.3f} ({low:.3f} to {high:.3f})" if shares else "-",
+            )
+        )
     return "\n".join(columns(rows, left=1)) + "\n"
 
 

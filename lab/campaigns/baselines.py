@@ -68,8 +68,14 @@ from sitl.world import WindModel
 
 # Measured to be its best (ArduPilot 4.7): margins that a tacking boat needs, the fence itself without action.
 DIJKSTRA = {
-    "OA_TYPE": 2.0, "OA_MARGIN_MAX": 15.0, "AVOID_ENABLE": 0.0, "FENCE_MARGIN": 2.0, "FENCE_TYPE": 4.0,
-    "FENCE_ACTION": 0.0, "FENCE_ENABLE": 1.0, "SAIL_XTRACK_MAX": 8.0,
+    "OA_TYPE": 2.0,
+    "OA_MARGIN_MAX": 15.0,
+    "AVOID_ENABLE": 0.0,
+    "FENCE_MARGIN": 2.0,
+    "FENCE_TYPE": 4.0,
+    "FENCE_ACTION": 0.0,
+    "FENCE_ENABLE": 1.0,
+    "SAIL_XTRACK_MAX": 8.0,
 }
 # Its fence holds 84 points: the obstacles' outlines are made simpler by at most the first of these that fits [m].
 FENCE_PLAYS_M = (4.0, 6.0, 8.0)
@@ -123,7 +129,7 @@ class BaselineTrack:
             self._note(t_s, noted.en_m[n], noted.heading_rad[n], noted.speed_mps[n], wind)
 
     def _note(
-        self, t_s: float, en: tuple[float, float], heading_rad: float, speed_mps: float, wind: tuple[float, float],
+        self, t_s: float, en: tuple[float, float], heading_rad: float, speed_mps: float, wind: tuple[float, float]
     ) -> None:
         self.truth.add(t_s, en, heading_rad, speed_mps, wind)
         goal = self.mission.goals[len(self.goals_s)]
@@ -143,13 +149,21 @@ class BaselineTrack:
 
     def record(self, who: str, scenario: str, seed: int) -> dict[str, Any]:
         """Return how it went."""
-        hulls, solid = self.truth.hull(boat_of(self.mission).hull), solid_of(
-            self.mission.area.local(self.mission.frame()))
+        hulls, solid = (
+            self.truth.hull(boat_of(self.mission).hull),
+            solid_of(self.mission.area.local(self.mission.frame())),
+        )
         contacts, clearance_m = len(hulls.entries(solid)), hulls.least_m(solid)[0]
         tacks, gybes = count_tacks(self.truth)
         return {
-            "who": who, "scenario": scenario, "seed": seed, "arrived": self.is_done, "contacts": contacts,
-            "time_s": self.time_s, "tacks": tacks, "gybes": gybes,
+            "who": who,
+            "scenario": scenario,
+            "seed": seed,
+            "arrived": self.is_done,
+            "contacts": contacts,
+            "time_s": self.time_s,
+            "tacks": tacks,
+            "gybes": gybes,
             "clearance_m": clearance_m if math.isfinite(clearance_m) else None,
         }
 
@@ -184,8 +198,9 @@ def sail_companion(scenario: Scenario, path: Path, seed: int, *, shifts: bool | 
     variation = None if shifts is None else Variation(tables={"skipper": {"shifts": shifts}})
     track = BaselineTrack(load_mission(scenario.mission_path(path)))
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
-        verdict = run_virtual(run_embedded(
-            scenario, path, seed, Path(folder) / "voyage", observer=track.observe(), variation=variation))
+        verdict = run_virtual(
+            run_embedded(scenario, path, seed, Path(folder) / "voyage", observer=track.observe(), variation=variation)
+        )
     return BaselineVoyage(track=track, record={**track.record(told, scenario.name, seed), **_promises(verdict)})
 
 
@@ -194,9 +209,15 @@ def sail_fixed(scenario: Scenario, path: Path, seed: int) -> BaselineVoyage:
     dies = EventSpec(at_s=DIES_S, kind="kill_companion")
     track = BaselineTrack(load_mission(scenario.mission_path(path)))
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
-        run_virtual(run_embedded(
-            msgspec.structs.replace(scenario, events=(*scenario.events, dies)), path, seed, Path(folder) / "voyage",
-            observer=track.observe()))
+        run_virtual(
+            run_embedded(
+                msgspec.structs.replace(scenario, events=(*scenario.events, dies)),
+                path,
+                seed,
+                Path(folder) / "voyage",
+                observer=track.observe(),
+            )
+        )
     return BaselineVoyage(track=track, record=track.record("fixed plan", scenario.name, seed))
 
 
@@ -205,8 +226,15 @@ def sail_companion_ardurover(scenario: Scenario, path: Path, seed: int, speedup:
     track, noted = BaselineTrack(load_mission(scenario.mission_path(path))), TrueTrack()
     with tempfile.TemporaryDirectory(prefix="figures-") as folder:
         verdict = run_live(
-            scenario, path, seed, Path(folder) / "voyage", autopilot="ardurover", program=None, speedup=speedup,
-            truth=noted)
+            scenario,
+            path,
+            seed,
+            Path(folder) / "voyage",
+            autopilot="ardurover",
+            program=None,
+            speedup=speedup,
+            truth=noted,
+        )
     track.follow(noted)
     if not noted.t_s:
         raise JobError("it never sailed in AUTO")
@@ -227,8 +255,17 @@ def sail_alone(scenario: Scenario, path: Path, seed: int) -> BaselineVoyage:
     async def voyage() -> None:
         mission, wind = track.mission, HeldWind(scenario_wind(scenario, path, seed))
         autopilot = SimulatedAutopilot(
-            AutopilotConfig(home=mission.start or mission.origin, heading_rad=_heading_rad(mission), is_warm=True,
-                            is_moored=True, parameters=scenario.parameters, polar=own_polar(mission)), wind, seed=seed)
+            AutopilotConfig(
+                home=mission.start or mission.origin,
+                heading_rad=_heading_rad(mission),
+                is_warm=True,
+                is_moored=True,
+                parameters=scenario.parameters,
+                polar=own_polar(mission),
+            ),
+            wind,
+            seed=seed,
+        )
         wires = MemoryLink("shore", seed=seed)
         async with (
             serve(autopilot, [wires.far]),
@@ -243,7 +280,11 @@ def sail_alone(scenario: Scenario, path: Path, seed: int) -> BaselineVoyage:
 
 
 def sail_ardurover(
-    scenario: Scenario, path: Path, seed: int, who: str, speedup: float,
+    scenario: Scenario,
+    path: Path,
+    seed: int,
+    who: str,
+    speedup: float,
     set_sail: tuple[float, float, float] | None = None,
 ) -> BaselineVoyage:
     """Sail with the real ArduRover, "alone" or with its own "dijkstra".
@@ -262,8 +303,7 @@ def sail_ardurover(
             heading_rad = math.radians(set_sail[2])
         wind = HeldWind(scenario_wind(scenario, path, seed))
         async with (
-            ArduRover(require(), start, wind, heading_rad=heading_rad, speedup=speedup,
-                      parameters=parameters) as rover,
+            ArduRover(require(), start, wind, heading_rad=heading_rad, speedup=speedup, parameters=parameters) as rover,
             Link(open_link(rover.link), identity=LinkIdentity(system=255, component=190), streams=()) as link,
             Autopilot(link, timeout_s=30.0 * speedup) as pilot,
         ):
@@ -302,8 +342,9 @@ async def _sail(pilot: Autopilot, track: BaselineTrack, now: Callable[[], Now | 
     The last waypoint is there twice: the mission then ends beyond the goal's radius for nobody.
     """
     points: list[MissionItem] = [waypoint(g.point) for g in track.mission.goals]
-    done = await pilot.upload_mission([*points, waypoint(track.mission.goals[-1].point,
-                                                         command=Command.NAV_LOITER_UNLIM)])
+    done = await pilot.upload_mission(
+        [*points, waypoint(track.mission.goals[-1].point, command=Command.NAV_LOITER_UNLIM)]
+    )
     if done.outcome is not TransferOutcome.OK:
         raise JobError(f"the mission was not taken: {done.text}")
     for _ in range(30):
@@ -323,8 +364,18 @@ async def _sail(pilot: Autopilot, track: BaselineTrack, now: Callable[[], Now | 
         raise JobError("it never sailed in AUTO")
 
 
-HEADS = ("scenario", "sailor", "pairs", "median s", "against s", "median %", "mean % (95 %)", "worst pair %", "tacks",
-         "of the possible %")
+HEADS = (
+    "scenario",
+    "sailor",
+    "pairs",
+    "median s",
+    "against s",
+    "median %",
+    "mean % (95 %)",
+    "worst pair %",
+    "tacks",
+    "of the possible %",
+)
 
 
 def pairs(records: Sequence[dict[str, Any]], against: str) -> str:
@@ -338,8 +389,11 @@ def pairs(records: Sequence[dict[str, Any]], against: str) -> str:
     base = {(r["scenario"], r["seed"]): r for r in records if r["who"] == against}
     for scenario in dict.fromkeys(scenario for scenario, _ in base):
         for who in dict.fromkeys(r["who"] for r in records if r["scenario"] == scenario and r["who"] != against):
-            both = [(r, base[key]) for r in records
-                    if (key := (scenario, r["seed"])) in base and (r["scenario"], r["who"]) == (scenario, who)]
+            both = [
+                (r, base[key])
+                for r in records
+                if (key := (scenario, r["seed"])) in base and (r["scenario"], r["who"]) == (scenario, who)
+            ]
             rows.append((scenario, who, *_cells(both)))
     return markdown(HEADS, rows)
 
@@ -355,19 +409,32 @@ def _cells(both: Sequence[tuple[dict[str, Any], dict[str, Any]]]) -> list[str]:
     known = [(a["time_s"], b["time_s"], b["best_s"]) for a, b in clean if "best_s" in b]
     possible_s = sum(other_s - best_s for _, other_s, best_s in known)
     gained_s = sum(other_s - mine_s for mine_s, other_s, _ in known)
-    return [count, f"{mine:.0f}", f"{other:.0f}", f"{100.0 * (mine / other - 1.0):+.1f}",
-            f"{middle:+.1f} ({low:+.1f} to {high:+.1f})", f"{100.0 * (max(shares) - 1.0):+.1f}",
-            f"{statistics.median(a['tacks'] for a, _ in clean):g}",
-            f"{100.0 * gained_s / possible_s:.0f}" if possible_s > 0.0 else "-"]
+    return [
+        count,
+        f"{mine:.0f}",
+        f"{other:.0f}",
+        f"{100.0 * (mine / other - 1.0):+.1f}",
+        f"{middle:+.1f} ({low:+.1f} to {high:+.1f})",
+        f"{100.0 * (max(shares) - 1.0):+.1f}",
+        f"{statistics.median(a['tacks'] for a, _ in clean):g}",
+        f"{100.0 * gained_s / possible_s:.0f}" if possible_s > 0.0 else "-",
+    ]
 
 
-SCENARIOS = tuple(SCENARIO_FOLDER / f"{name}.toml" for name in (
-    "figures/block", "two-channels", "demo", "lee-shore", "figures/slalom", "upwind"))
+SCENARIOS = tuple(
+    SCENARIO_FOLDER / f"{name}.toml"
+    for name in ("figures/block", "two-channels", "demo", "lee-shore", "figures/slalom", "upwind")
+)
 # The sailors, and as they are told in tables, in their order there.
 NAMES = {
-    "companion": "companion", "shifts": "companion, by shifts", "no-shifts": "companion, no shifts",
-    "fixed": "fixed plan", "companion-ardurover": "companion, ArduRover", "alone-embedded": "alone, embedded",
-    "alone": "alone, ArduRover", "dijkstra": "dijkstra, ArduRover",
+    "companion": "companion",
+    "shifts": "companion, by shifts",
+    "no-shifts": "companion, no shifts",
+    "fixed": "fixed plan",
+    "companion-ardurover": "companion, ArduRover",
+    "alone-embedded": "alone, embedded",
+    "alone": "alone, ArduRover",
+    "dijkstra": "dijkstra, ArduRover",
 }
 TOLD = tuple(NAMES.values())
 # Sailors with the companion on the embedded autopilot: by the shifts, or not; None: as the mission says.
@@ -424,8 +491,7 @@ def voyage_of(job: Job[Sailor]) -> BaselineVoyage:
 def key_of(job: Job[Sailor]) -> Key:
     """Return what a voyage is known by: of those on the real ArduRover the pace and where they set sail, too."""
     sailor = job.case
-    key: Key = {"who": sailor.who, "scenario": scenario_of(job).name, "hash": file_hash(job.scenario),
-                "seed": job.seed}
+    key: Key = {"who": sailor.who, "scenario": scenario_of(job).name, "hash": file_hash(job.scenario), "seed": job.seed}
     if sailor.who in {"companion-ardurover", "alone", "dijkstra"}:
         key = {**key, "speedup": sailor.speedup}
     if sailor.set_sail is not None and sailor.who in {"alone", "dijkstra"}:
@@ -437,23 +503,38 @@ def baselines(jobs: Sequence[Job[Sailor]], *, results: Path | None, against: str
     """Return the voyages, begun where the companion set sail in ``results``; a table of all that the file holds."""
     began: dict[tuple[str, int], tuple[float, float, float]] = {}
     if results is not None and results.is_file() and results.stat().st_size:
-        began = {(key["scenario"], key["seed"]): tuple(result["start"])
-                 for key, result in read_results(results).pairs() if "start" in result}
+        began = {
+            (key["scenario"], key["seed"]): tuple(result["start"])
+            for key, result in read_results(results).pairs()
+            if "start" in result
+        }
 
     def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = latest([result for _, result in sailed.held.pairs()])
         return ExperimentSummary(lines=[table(records), *([] if against is None else [pairs(records, NAMES[against])])])
 
-    return Experiment(name="baselines", sail=sail, key=key_of, sum_up=sum_up, jobs=[
-        replace(job, case=replace(job.case, set_sail=began.get((scenario_of(job).name, job.seed)))) for job in jobs])
+    return Experiment(
+        name="baselines",
+        sail=sail,
+        key=key_of,
+        sum_up=sum_up,
+        jobs=[
+            replace(job, case=replace(job.case, set_sail=began.get((scenario_of(job).name, job.seed)))) for job in jobs
+        ],
+    )
 
 
 def jobs_of(
-    who: Sequence[str], scenarios: Sequence[Path], seeds: int, speedup: float, winds: Sequence[WindOf] | None,
+    who: Sequence[str], scenarios: Sequence[Path], seeds: int, speedup: float, winds: Sequence[WindOf] | None
 ) -> list[Job[Sailor]]:
     """Return the voyages of a campaign; ``winds`` None: those of the scenarios."""
-    return [Job(scenario=p, seed=s, case=Sailor(who=w, speedup=speedup, wind=wind))
-            for s in range(seeds) for w in who for p in scenarios for wind in winds or (None,)]
+    return [
+        Job(scenario=p, seed=s, case=Sailor(who=w, speedup=speedup, wind=wind))
+        for s in range(seeds)
+        for w in who
+        for p in scenarios
+        for wind in winds or (None,)
+    ]
 
 
 def latest(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -467,8 +548,20 @@ def table(records: Sequence[dict[str, Any]]) -> str:
     Times are of voyages that arrived without contact; "forced" is how many of the companion's voyages met a wind shift
     into the no-go zone on a leg, to be held against the risk that the plan promised.
     """
-    heads = ("scenario", "sailor", "runs", "arrived", "touched", "clean", "median s", "90 %", "tacks", "least m",
-             "risk", "forced")
+    heads = (
+        "scenario",
+        "sailor",
+        "runs",
+        "arrived",
+        "touched",
+        "clean",
+        "median s",
+        "90 %",
+        "tacks",
+        "least m",
+        "risk",
+        "forced",
+    )
     lines = []
     names = list(dict.fromkeys(load_scenario(p).name for p in SCENARIOS))
     for name in [*names, *sorted({r["scenario"] for r in records} - set(names))]:
@@ -485,10 +578,16 @@ def _row(name: str, who: str, rows: Sequence[dict[str, Any]]) -> list[str]:
     risks = [r["promised_risk"] for r in rows if r.get("promised_risk") is not None]
     entered = [r["no_go_entries"] for r in rows if r.get("no_go_entries") is not None]
     return [
-        name, who, str(len(rows)), str(sum(r["arrived"] for r in rows)), str(sum(r["contacts"] > 0 for r in rows)),
-        str(len(clean)), f"{statistics.median(clean):.0f}" if clean else "-",
+        name,
+        who,
+        str(len(rows)),
+        str(sum(r["arrived"] for r in rows)),
+        str(sum(r["contacts"] > 0 for r in rows)),
+        str(len(clean)),
+        f"{statistics.median(clean):.0f}" if clean else "-",
         f"{clean[math.ceil(0.9 * len(clean)) - 1]:.0f}" if clean else "-",
-        f"{statistics.median(r['tacks'] for r in rows):g}", f"{min(clearances):.1f}" if clearances else "-",
+        f"{statistics.median(r['tacks'] for r in rows):g}",
+        f"{min(clearances):.1f}" if clearances else "-",
         f"{statistics.median(risks):.2f}" if risks else "-",
         f"{sum(n > 0 for n in entered)} of {len(entered)}" if entered else "-",
     ]

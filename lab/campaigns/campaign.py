@@ -37,16 +37,20 @@ def sail(job: Job[Method]) -> dict[str, Any]:
     with replace(job, keep=place).folder() as folder:
         try:
             variation = job.case.variation(mission_of(scenario, job.scenario))
-            verdict = run_virtual(
-                run_embedded(scenario, job.scenario, job.seed, folder, variation=variation)).to_dict()
+            verdict = run_virtual(run_embedded(scenario, job.scenario, job.seed, folder, variation=variation)).to_dict()
         except Exception as error:
-            verdict = {"scenario": scenario.name, "seed": job.seed, "passed": False, "checks": [
-                {"name": "no unhandled error", "passed": False, "figure": repr(error), "required": []}], "figures": {}}
+            verdict = {
+                "scenario": scenario.name,
+                "seed": job.seed,
+                "passed": False,
+                "checks": [{"name": "no unhandled error", "passed": False, "figure": repr(error), "required": []}],
+                "figures": {},
+            }
         if not verdict["passed"] and place is None:
             kept = FAILURES / name
             shutil.rmtree(kept, ignore_errors=True)
             if folder.is_dir():
-                with contextlib.suppress(OSError):   # a seed repeats: its result is worth more than its folder
+                with contextlib.suppress(OSError):  # a seed repeats: its result is worth more than its folder
                     kept.parent.mkdir(exist_ok=True)
                     shutil.copytree(folder, kept)
     return {**verdict, "scenario": told}
@@ -64,7 +68,11 @@ def key_of(job: Job[Method]) -> Key:
 
 
 def campaign(
-    scenarios: Sequence[Path], *, runs: int, first_seed: int = 0, keep: Path | None = None,
+    scenarios: Sequence[Path],
+    *,
+    runs: int,
+    first_seed: int = 0,
+    keep: Path | None = None,
     methods: Sequence[Method] = (AS_IT_SAYS,),
 ) -> Experiment[Method]:
     """Return the voyages of each scenario by each method that its mission allows; a table, and what failed.
@@ -79,9 +87,12 @@ def campaign(
 
     loaded = [load_scenario(path) for path in scenarios]
     missions = [mission_of(scenario, path) for scenario, path in zip(loaded, scenarios, strict=True)]
-    ways = [(_name(scenario.name, path, method), path, method)
-            for scenario, path, mission in zip(loaded, scenarios, missions, strict=True)
-            for method in methods if method.guidance is None or can_be_sailed(mission, method.guidance)]
+    ways = [
+        (_name(scenario.name, path, method), path, method)
+        for scenario, path, mission in zip(loaded, scenarios, missions, strict=True)
+        for method in methods
+        if method.guidance is None or can_be_sailed(mission, method.guidance)
+    ]
     names = [name for name, _, _ in ways]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -94,21 +105,40 @@ def campaign(
         rate = sum(t["sailed_s"] for t in table) / sailed.cpu_s if sailed.now == len(records) and sailed.cpu_s else None
         lines = [*told(table), sailed.took + (f"; {rate:.0f} times real time per core" if rate else "")]
         if len(names) == 2:
-            first, second = (Table(campaign="campaign", by=sailed.held.by, keys=("seed",), rows=tuple(
-                {**r["figures"], "passed": r["passed"], "seed": r["seed"]} for r in by_name[name])) for name in names)
+            first, second = (
+                Table(
+                    campaign="campaign",
+                    by=sailed.held.by,
+                    keys=("seed",),
+                    rows=tuple({**r["figures"], "passed": r["passed"], "seed": r["seed"]} for r in by_name[name]),
+                )
+                for name in names
+            )
             if {row["seed"] for row in first.rows} & {row["seed"] for row in second.rows}:
-                lines += ["", f"{names[0]} (first) and {names[1]} (second), seed by seed:",
-                          *told_pairs(compare(first, second)).splitlines()]
+                lines += [
+                    "",
+                    f"{names[0]} (first) and {names[1]} (second), seed by seed:",
+                    *told_pairs(compare(first, second)).splitlines(),
+                ]
         for record in sorted((r for r in records if not r["passed"]), key=lambda r: (r["scenario"], r["seed"])):
             bad = "; ".join(f"{c['name']}: {c['figure']}" for c in record["checks"] if not c["passed"])
             lines.append(f"FAILED {record['scenario']} seed {record['seed']}: {bad[:300]}")
-        return ExperimentSummary(lines=lines, figures={"table": table, "wall_s": sailed.wall_s},
-                                 is_good=all(r["passed"] for r in records))
+        return ExperimentSummary(
+            lines=lines, figures={"table": table, "wall_s": sailed.wall_s}, is_good=all(r["passed"] for r in records)
+        )
 
     return Experiment(
-        name="campaign", sail=sail, key=key_of, sum_up=sum_up, line=verdict_line,
-        jobs=[Job(scenario=path, seed=first_seed + k, keep=keep, case=method)
-              for _, path, method in ways for k in range(runs)])
+        name="campaign",
+        sail=sail,
+        key=key_of,
+        sum_up=sum_up,
+        line=verdict_line,
+        jobs=[
+            Job(scenario=path, seed=first_seed + k, keep=keep, case=method)
+            for _, path, method in ways
+            for k in range(runs)
+        ],
+    )
 
 
 def figures(name: str, records: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -148,10 +178,19 @@ def _median(values: Iterable[float]) -> float | None:
 def told(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Return the rows under each other."""
     heads = {
-        "scenario": "scenario", "runs": "runs", "passed": "passed", "arrived": "arrived", "touched": "touched",
-        "time_median_s": "time s", "time_p90_s": "p90 s", "tacks_median": "tacks", "replans_median": "replans",
-        "below_floor": "below floor", "clearance_min_m": "least clearance m",
-        "clearance_median_m": "median m", "promised_risk": "promised risk",
+        "scenario": "scenario",
+        "runs": "runs",
+        "passed": "passed",
+        "arrived": "arrived",
+        "touched": "touched",
+        "time_median_s": "time s",
+        "time_p90_s": "p90 s",
+        "tacks_median": "tacks",
+        "replans_median": "replans",
+        "below_floor": "below floor",
+        "clearance_min_m": "least clearance m",
+        "clearance_median_m": "median m",
+        "promised_risk": "promised risk",
         "observed_no_go": "forced into no-go",
     }
     return columns([list(heads.values()), *([_cell(row[key]) for key in heads] for row in rows)], left=1)

@@ -21,17 +21,17 @@ _MODE_WEIGHTS = (6, 1, 1, 1)
 NEAR_M, FAR_M = 20.0, 5000.0
 SHORT_S, LONG_S = 5.0, 300.0
 CREEPS_MPS = (0.2, 2.0)
-ONTO = 0.5            # the share of the jumps that are aimed at something solid
-SAILS_MPS = 1.8       # roughly, by which the boat is aimed from
-ANSWER_S = 15.0       # an order is waited for so long
-AFTER_S = 120.0       # of the voyage, when the position is right again
-MODERATE_MPS = 4.0      # in less wind than this the same way takes longer
-UNATTENDED = 0.06       # the share of voyages on which the companion may not set modes
-LATEST_S = 170.0        # for a fault to begin
-TURNS_S = 45.0, 90.0    # when a vane is turned: under way, on a voyage of two minutes
-BESIDE = ("jump", "vane", "outlets", "card")   # what may be drawn beside the rest
-BESIDE_SHARE = 0.5      # of the voyages, for each of them
-BROKEN_SHARE = 0.5      # of the outlets
+ONTO = 0.5  # the share of the jumps that are aimed at something solid
+SAILS_MPS = 1.8  # roughly, by which the boat is aimed from
+ANSWER_S = 15.0  # an order is waited for so long
+AFTER_S = 120.0  # of the voyage, when the position is right again
+MODERATE_MPS = 4.0  # in less wind than this the same way takes longer
+UNATTENDED = 0.06  # the share of voyages on which the companion may not set modes
+LATEST_S = 170.0  # for a fault to begin
+TURNS_S = 45.0, 90.0  # when a vane is turned: under way, on a voyage of two minutes
+BESIDE = ("jump", "vane", "outlets", "card")  # what may be drawn beside the rest
+BESIDE_SHARE = 0.5  # of the voyages, for each of them
+BROKEN_SHARE = 0.5  # of the outlets
 
 
 def turned_vane(rng: random.Random, at_s: float) -> SampledFault:
@@ -48,8 +48,12 @@ def turned_vane(rng: random.Random, at_s: float) -> SampledFault:
 
 def full_card(rng: random.Random, at_s: float) -> SampledFault:
     """Fill the card, or make it read-only: from the start or under way, for good or until it is well again."""
-    return one(at_s=rng.choice((FIRST_S, at_s)), kind="disk", state=rng.choice(("full", "read_only")),
-               for_s=rng.choice((None, length(rng, 5.0, 120.0))))
+    return one(
+        at_s=rng.choice((FIRST_S, at_s)),
+        kind="disk",
+        state=rng.choice(("full", "read_only")),
+        for_s=rng.choice((None, length(rng, 5.0, 120.0))),
+    )
 
 
 def unattended(rng: random.Random) -> SampledFault:
@@ -77,15 +81,23 @@ class Jump:
 
 
 def draw_jump(
-    seed: int, base: Scenario, *, start_en: tuple[float, float], goal_en: tuple[float, float],
+    seed: int,
+    base: Scenario,
+    *,
+    start_en: tuple[float, float],
+    goal_en: tuple[float, float],
     solids_en: Sequence[tuple[float, float]],
 ) -> Jump:
     """Return the voyage of ``seed``: ``base`` in moderate wind, from start to goal among solids, by their middles."""
     rng = random.Random(f"jumps {seed}")
     kind = KINDS[seed % len(KINDS)]
     mode = rng.choices(MODES, weights=_MODE_WEIGHTS)[0]
-    wind = WindSpec(model="ou", from_deg=round(rng.uniform(0.0, 360.0), 1), tws_mps=round(rng.uniform(3.5, 7.0), 2),
-                    sd_deg=round(rng.uniform(3.0, 10.0), 1))
+    wind = WindSpec(
+        model="ou",
+        from_deg=round(rng.uniform(0.0, 360.0), 1),
+        tws_mps=round(rng.uniform(3.5, 7.0), 2),
+        sd_deg=round(rng.uniform(3.0, 10.0), 1),
+    )
     at_s = round(rng.uniform(250.0, 300.0) if mode == "at rest" else rng.uniform(45.0, 100.0), 1)
     for_s = length(rng, SHORT_S, LONG_S)
     size_m, way_rad = length(rng, NEAR_M, FAR_M), rng.uniform(0.0, 2.0 * math.pi)
@@ -99,27 +111,48 @@ def draw_jump(
         away = (onto[0] - here[0], onto[1] - here[1])
         size_m = round(max(NEAR_M, math.hypot(*away)), 1)
     jump = EventSpec(
-        at_s=at_s, kind="gps_jump", for_s=for_s, east_m=round(away[0], 1), north_m=round(away[1], 1),
-        is_resisted=kind == "resisted", is_of_one=kind == "one of two",
-        over_s=for_s if kind == "creeping" else 0.0)
+        at_s=at_s,
+        kind="gps_jump",
+        for_s=for_s,
+        east_m=round(away[0], 1),
+        north_m=round(away[1], 1),
+        is_resisted=kind == "resisted",
+        is_of_one=kind == "one of two",
+        over_s=for_s if kind == "creeping" else 0.0,
+    )
     events = [jump]
     if kind == "one of two":
         events.insert(0, EventSpec(at_s=FIRST_S, kind="gps_jump", is_of_one=True))
     if kind == "on restart":
         dead_s = length(rng, 2.0, 40.0)
-        events.insert(0, EventSpec(at_s=round(at_s - rng.uniform(0.1, 0.9) * dead_s, 1), kind="kill_companion",
-                                   restart_after_s=dead_s))
+        events.insert(
+            0,
+            EventSpec(
+                at_s=round(at_s - rng.uniform(0.1, 0.9) * dead_s, 1), kind="kill_companion", restart_after_s=dead_s
+            ),
+        )
     if mode == "held by order":
-        first_s = at_s if kind != "on restart" else events[0].at_s - ANSWER_S   # the companion lives to answer it
+        first_s = at_s if kind != "on restart" else events[0].at_s - ANSWER_S  # the companion lives to answer it
         events.append(EventSpec(at_s=round(first_s - rng.uniform(5.0, 20.0), 1), kind="order", order="hold"))
     headings: dict[str, dict[str, Any]] = {"skipper": {"guidance": "heading"}, "operator": {"guided": True}}
     tables = {"by headings": headings, "held by order": {"operator": {"orders": "all"}}}
     scenario = msgspec.structs.replace(
-        base, wind=wind, is_service=True, limit_s=round(at_s + for_s + AFTER_S, 1), exit_on_arrival=mode != "at rest",
+        base,
+        wind=wind,
+        is_service=True,
+        limit_s=round(at_s + for_s + AFTER_S, 1),
+        exit_on_arrival=mode != "at rest",
         events=tuple(sorted(events, key=lambda e: e.at_s)),
-        expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None))
-    return Jump(scenario=scenario, kind=kind, mode=mode, size_m=size_m, for_s=for_s,
-                variation=Variation(tables=tables[mode]) if mode in tables else None)
+        expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None),
+    )
+    return Jump(
+        scenario=scenario,
+        kind=kind,
+        mode=mode,
+        size_m=size_m,
+        for_s=for_s,
+        variation=Variation(tables=tables[mode]) if mode in tables else None,
+    )
 
 
 def draw(seed: int, base: Scenario) -> Scenario:
@@ -147,8 +180,13 @@ def draw_beside(seed: int, drawn: Scenario, what: Sequence[str], jump: Jump) -> 
         if name == "jump":
             events = tuple(e for e in jump.scenario.events if e.kind != "order")
             longer_s = max(0.0, jump.scenario.limit_s - drawn.limit_s)
-            lots.append(SampledFault(events=events, longer_s=longer_s,
-                            changes={"exit_on_arrival": drawn.exit_on_arrival and jump.scenario.exit_on_arrival}))
+            lots.append(
+                SampledFault(
+                    events=events,
+                    longer_s=longer_s,
+                    changes={"exit_on_arrival": drawn.exit_on_arrival and jump.scenario.exit_on_arrival},
+                )
+            )
         elif name == "vane":
             lots.append(turned_vane(rng, round(rng.uniform(*TURNS_S), 1)))
         elif name == "outlets":
@@ -164,15 +202,27 @@ def drawn_by(rng: random.Random, base: Scenario) -> Scenario:
     # moderate winds as often as all others together: in them the boat is where the faults are
     tws_mps = rng.choice((rng.uniform(3.5, 7.0), rng.uniform(2.0, 12.0)))
     wind = WindSpec(
-        model="ou", from_deg=round(rng.uniform(0.0, 360.0), 1), tws_mps=round(tws_mps, 2),
-        sd_deg=round(rng.uniform(3.0, 10.0), 1), tau_s=28.0, tws_sd_mps=round(rng.uniform(0.1, 0.6), 2),
+        model="ou",
+        from_deg=round(rng.uniform(0.0, 360.0), 1),
+        tws_mps=round(tws_mps, 2),
+        sd_deg=round(rng.uniform(3.0, 10.0), 1),
+        tau_s=28.0,
+        tws_sd_mps=round(rng.uniform(0.1, 0.6), 2),
     )
     lots: list[SampledFault] = [unattended(rng)] if rng.random() < UNATTENDED else []
     lots += sampled_faults(rng, LATEST_S)
     limit_s = base.limit_s * max(1.0, MODERATE_MPS / tws_mps)
     return with_faults(
-        msgspec.structs.replace(base, wind=wind, is_service=True, has_ftp=rng.random() < 0.5, limit_s=limit_s,
-                                expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None)), lots)
+        msgspec.structs.replace(
+            base,
+            wind=wind,
+            is_service=True,
+            has_ftp=rng.random() < 0.5,
+            limit_s=limit_s,
+            expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None),
+        ),
+        lots,
+    )
 
 
 def draw_planner(seed: int, base: Scenario) -> Scenario:
@@ -180,8 +230,15 @@ def draw_planner(seed: int, base: Scenario) -> Scenario:
     rng = random.Random(f"planner {seed}")
     wind = WindSpec(model="ou", from_deg=round(rng.uniform(0.0, 360.0), 1), tws_mps=round(rng.uniform(3.5, 7.0), 2))
     makers, weights = zip(*PLANNER, strict=True)
-    events = [e for _ in range(rng.randint(2, 4))
-              for e in rng.choices(makers, weights=weights)[0](rng, round(rng.uniform(3.0, 120.0), 1)).events]
+    events = [
+        e
+        for _ in range(rng.randint(2, 4))
+        for e in rng.choices(makers, weights=weights)[0](rng, round(rng.uniform(3.0, 120.0), 1)).events
+    ]
     return msgspec.structs.replace(
-        base, wind=wind, events=tuple(sorted(events, key=lambda e: e.at_s)), is_service=True,
-        expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None))
+        base,
+        wind=wind,
+        events=tuple(sorted(events, key=lambda e: e.at_s)),
+        is_service=True,
+        expect=ExpectSpec(arrived=None, contacts=None, max_silence_s=None),
+    )

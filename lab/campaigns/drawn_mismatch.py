@@ -16,13 +16,39 @@ from sitl.rehearse.mismatch_sampling import departing
 from sitl.runner import SCENARIO_FOLDER
 from sitl.scenario import ExpectSpec, Scenario, load_scenario
 
-WATERS = tuple(SCENARIO_FOLDER / f"{name}.toml" for name in (
-    "demo", "two-channels", "narrow-channel", "figures/block", "figures/slalom", "lee-shore", "faults/rocks", "gates",
-    "gybing", "home", "upwind", "figures/two-channels-rough"))
+WATERS = tuple(
+    SCENARIO_FOLDER / f"{name}.toml"
+    for name in (
+        "demo",
+        "two-channels",
+        "narrow-channel",
+        "figures/block",
+        "figures/slalom",
+        "lee-shore",
+        "faults/rocks",
+        "gates",
+        "gybing",
+        "home",
+        "upwind",
+        "figures/two-channels-rough",
+    )
+)
 LIMIT_S = 1500.0
 MAX_SILENCE_S = 10.0
-KINDS = ("gusts", "wind over the water", "current", "waves", "polar", "leeway", "tacks fail", "vane", "compass",
-         "position")
+KINDS = (
+    "gusts",
+    "wind over the water",
+    "current",
+    "waves",
+    "polar",
+    "leeway",
+    "tacks fail",
+    "vane",
+    "compass",
+    "position",
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledMismatch:
     """What a seed is.
@@ -63,7 +89,11 @@ def drawn_by(rng: random.Random, source: Path, *, only: tuple[str, ...] | None =
 
     scenario = load_scenario(source)
     wind = msgspec.structs.replace(scenario.wind, tws_mps=round(rng.uniform(3.5, 8.0), 3))
-    drawn, kinds = departing(rng, msgspec.structs.replace(scenario, wind=wind), mission_of(scenario, source),
-                             only=only)
-    return SampledMismatch(source=source, kinds=kinds, scenario=msgspec.structs.replace(
-        drawn, limit_s=LIMIT_S, expect=ExpectSpec(arrived=None, max_silence_s=MAX_SILENCE_S)))
+    drawn, kinds = departing(rng, msgspec.structs.replace(scenario, wind=wind), mission_of(scenario, source), only=only)
+    return SampledMismatch(
+        source=source,
+        kinds=kinds,
+        scenario=msgspec.structs.replace(
+            drawn, limit_s=LIMIT_S, expect=ExpectSpec(arrived=None, max_silence_s=MAX_SILENCE_S)
+        ),
+    )

@@ -85,7 +85,7 @@ BY_PARAMETERS = frozenset({"failsafe", "crash", "autopilot refuses"})
 ALERT_S = 2.0
 # An ideal skipper has done enough when he has gained this much time: he can plan and upload in half of it.
 GAINED_S = 15.0
-MOMENTS = 4          # the last before the contact are tried
+MOMENTS = 4  # the last before the contact are tried
 
 HANDS: tuple[tuple[str, Mode | None], ...] = (("lets be", None), ("loiters", Mode.LOITER), ("holds", Mode.HOLD))
 
@@ -97,8 +97,8 @@ class Reach:
     lives: Sequence[tuple[float, float]]
     link_up: Sequence[tuple[float, bool]]
     operator_s: Sequence[tuple[float, float]]
-    stopped_s: Sequence[float] = ()          # when a failsafe stopped the boat: a sign as well
-    false_s: Sequence[float] = ()            # when the autopilot came to believe a place where the boat is not
+    stopped_s: Sequence[float] = ()  # when a failsafe stopped the boat: a sign as well
+    false_s: Sequence[float] = ()  # when the autopilot came to believe a place where the boat is not
 
     def first_s(self, t_s: float, before_s: float) -> float | None:
         """Return the first moment from ``t_s`` on at which he could, None before ``before_s``."""
@@ -142,7 +142,8 @@ def by_hand(scenario: Scenario, t_s: float, mode: Mode | None, until_s: float) -
     if mode is not None:
         kept.append(EventSpec(at_s=t_s, kind="mode", mode=mode.name))
     return msgspec.structs.replace(
-        scenario, events=tuple(sorted(kept, key=lambda e: e.at_s)), limit_s=min(scenario.limit_s, until_s + 1.0))
+        scenario, events=tuple(sorted(kept, key=lambda e: e.at_s)), limit_s=min(scenario.limit_s, until_s + 1.0)
+    )
 
 
 def _may_order(scenario: Scenario, excuse: str, t_s: float) -> bool:
@@ -151,7 +152,7 @@ def _may_order(scenario: Scenario, excuse: str, t_s: float) -> bool:
 
 
 def avoidable(
-    scenario: Scenario, excuse: str, contact_s: float, reach: Reach, touches: Callable[[Scenario], float | None],
+    scenario: Scenario, excuse: str, contact_s: float, reach: Reach, touches: Callable[[Scenario], float | None]
 ) -> str:
     """Return by what the contact at ``contact_s`` was to be avoided; empty when by nothing that was tried.
 
@@ -211,9 +212,9 @@ MissionKey = tuple[tuple[int, int, int], ...]
 class WhoSteers(enum.Enum):
     """Who steers."""
 
-    SAILED = "sailed"          # armed, and in AUTO or GUIDED
-    REFUSED = "refused"        # stopped by a failsafe that lasts, or disarmed and not to be armed yet
-    ADRIFT = "adrift"          # stopped or disarmed, and free to be sailed
+    SAILED = "sailed"  # armed, and in AUTO or GUIDED
+    REFUSED = "refused"  # stopped by a failsafe that lasts, or disarmed and not to be armed yet
+    ADRIFT = "adrift"  # stopped or disarmed, and free to be sailed
 
 
 @dataclass(slots=True)
@@ -275,8 +276,10 @@ class Watch:
         self.link_up.append(link.is_up)
         self.stopped.append("" if helm is WhoSteers.SAILED else autopilot.pilot.failsafe.stopped_by)
         current = autopilot.core.vehicle.current_en_mps
-        air = (truth.tws_mps * math.sin(truth.twd_from_rad) + current[0],
-               truth.tws_mps * math.cos(truth.twd_from_rad) + current[1])
+        air = (
+            truth.tws_mps * math.sin(truth.twd_from_rad) + current[0],
+            truth.tws_mps * math.cos(truth.twd_from_rad) + current[1],
+        )
         drift_mps = math.hypot(*current)
         self.carried.append(drift_mps > 0.0 and math.hypot(*air) < max(STEERAGE_MPS, STEMS * drift_mps))
 
@@ -293,14 +296,14 @@ class Watch:
         wrong = np.asarray(self._is_false())
         if wrong[i] and not shapely.intersects(self.solid, shapely.points(self.believed_en_m[i])):
             return "false position"
-        if not wrong[i] and wrong[self._since(i, REACTION_S):i].any():
+        if not wrong[i] and wrong[self._since(i, REACTION_S) : i].any():
             return "false position"
         t_s = self.t_s[i]
         if any(a <= t_s <= b + REACTION_S for a, b in self.operator_s):
             return "operator"
-        if WhoSteers.REFUSED in self.helm[self._since(i, RESUME_S):i + 1]:
+        if WhoSteers.REFUSED in self.helm[self._since(i, RESUME_S) : i + 1]:
             return "autopilot refuses"
-        stops = self.stopped[self._since(i, REACTION_S):i + 1]
+        stops = self.stopped[self._since(i, REACTION_S) : i + 1]
         if any(stops):
             return "crash" if "crash" in stops else "failsafe"
         if self.carried[i] and self._was_called(i):
@@ -323,10 +326,18 @@ class Watch:
 
     def reach(self) -> Reach:
         """Return when a skipper could see and order."""
-        changes = [(t_s, up) for n, (t_s, up) in enumerate(zip(self.t_s, self.link_up, strict=True))
-                   if n == 0 or up != self.link_up[n - 1]]
-        return Reach(lives=tuple(self.lives), link_up=tuple(changes), operator_s=tuple(self.operator_s),
-                     stopped_s=self._begins([bool(by) for by in self.stopped]), false_s=self._begins(self._is_false()))
+        changes = [
+            (t_s, up)
+            for n, (t_s, up) in enumerate(zip(self.t_s, self.link_up, strict=True))
+            if n == 0 or up != self.link_up[n - 1]
+        ]
+        return Reach(
+            lives=tuple(self.lives),
+            link_up=tuple(changes),
+            operator_s=tuple(self.operator_s),
+            stopped_s=self._begins([bool(by) for by in self.stopped]),
+            false_s=self._begins(self._is_false()),
+        )
 
     def _begins(self, holds: Sequence[bool]) -> tuple[float, ...]:
         """Return when something began to hold [s]."""
@@ -349,8 +360,9 @@ class Watch:
         return least_m, self.t_s[i]
 
     def _track(self) -> HullTrack:
-        return HullTrack(en_m=np.asarray(self.en_m).reshape(-1, 2), heading_rad=np.asarray(self.heading_rad),
-                         hull=self.hull)
+        return HullTrack(
+            en_m=np.asarray(self.en_m).reshape(-1, 2), heading_rad=np.asarray(self.heading_rad), hull=self.hull
+        )
 
     # ------------------------------------------------------------------------------------------ missions
     def mixture_s(self) -> float:
@@ -365,11 +377,11 @@ class Watch:
         """Return what the mission on board is: "whole", "closed", "begun", "mixture"."""
         if not key or key in self.ours or key in self.foreign:
             return "whole"
-        begun = [mission for mission in self.ours if mission[:len(key) - 1] == key[:-1]]
+        begun = [mission for mission in self.ours if mission[: len(key) - 1] == key[:-1]]
         ends_in = {item[1:] for mission in begun for item in mission}
         if key[-1][0] == Command.NAV_LOITER_UNLIM and key[-1][1:] in ends_in:
             return "closed"
-        if not was_armed and any(mission[:len(key)] == key for mission in self.ours):
+        if not was_armed and any(mission[: len(key)] == key for mission in self.ours):
             return "begun"
         return "mixture"
 
@@ -419,10 +431,13 @@ def mission_key(items: Iterable[tuple[int, int, int]]) -> MissionKey:
 
 def false_wind_spans(events: Iterable[EventSpec], end_s: float) -> list[tuple[float, float]]:
     """Return when the vane was turned by ``TURNED_DEG`` or more, or its offset was set so, from and to [s]."""
-    spans = [(e.at_s, end_s if e.for_s is None else e.at_s + e.for_s) for e in events
-             if e.kind == "vane" and e.state == "offset" and abs(e.value_deg) >= TURNED_DEG]
+    spans = [
+        (e.at_s, end_s if e.for_s is None else e.at_s + e.for_s)
+        for e in events
+        if e.kind == "vane" and e.state == "offset" and abs(e.value_deg) >= TURNED_DEG
+    ]
     offsets = sorted((e for e in events if e.parameter == "WNDVN_DIR_OFS"), key=lambda e: e.at_s)
-    for event, until_s in zip(offsets, (*(e.at_s for e in offsets[1:]), end_s), strict=False):   # there may be none
+    for event, until_s in zip(offsets, (*(e.at_s for e in offsets[1:]), end_s), strict=False):  # there may be none
         if abs(event.value) >= TURNED_DEG:
             spans.append((event.at_s, until_s))
     return spans

@@ -80,7 +80,7 @@ KNOWN: Mapping[int, str] = {
     198: "a calm in 15 s, 0.8 m/s of current and a rock 9 m off: only a skipper who knew of the calm would keep clear",
     525: "the same, 0.5 m/s of current: the calm's last breath comes from ahead, and stops her 9 m from the rock",
 }
-WORKER_PACE = 2.0    # faster, two seconds of a busy machine would count as silence
+WORKER_PACE = 2.0  # faster, two seconds of a busy machine would count as silence
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,8 +136,13 @@ def _jump_of(seed: int, base: Scenario, source: Path) -> Jump:
     frame = mission.frame()
     places = [frame.en_from_geo(p) for p in (mission.start or mission.origin, mission.goals[-1].point)]
     solid = solid_of(mission.area.local(frame))
-    return draw_jump(seed, base, start_en=places[0], goal_en=places[1],
-                     solids_en=[(p.centroid.x, p.centroid.y) for p in shapely.get_parts(solid)])
+    return draw_jump(
+        seed,
+        base,
+        start_en=places[0],
+        goal_en=places[1],
+        solids_en=[(p.centroid.x, p.centroid.y) for p in shapely.get_parts(solid)],
+    )
 
 
 def sail_jump(drawn: Jump, job: Job[FaultCase]) -> dict[str, Any]:
@@ -152,9 +157,16 @@ def sail_jump(drawn: Jump, job: Job[FaultCase]) -> dict[str, Any]:
     jump = next(e for e in drawn.scenario.events if e.kind == "gps_jump" and e.for_s is not None)
     first_s = next((t for t in reach.false_s if t >= jump.at_s), jump.at_s)
     seen_s = reach.first_s(first_s + ALERT_S, drawn.scenario.limit_s)
-    held = None if seen_s is None else _sail(
-        by_hand(drawn.scenario, seen_s, Mode.LOITER, drawn.scenario.limit_s), replace(job, keep=None), method,
-        drawn.variation)
+    held = (
+        None
+        if seen_s is None
+        else _sail(
+            by_hand(drawn.scenario, seen_s, Mode.LOITER, drawn.scenario.limit_s),
+            replace(job, keep=None),
+            method,
+            drawn.variation,
+        )
+    )
     touched = [t_s for t_s, _ in ours.watch.contacts() if t_s >= jump.at_s]
     held_touched = [] if held is None else [t_s for t_s, _ in held.watch.contacts() if t_s >= jump.at_s]
     faults = [f"contact at {touched[0]:.0f} s, none when held in LOITER"] if touched and not held_touched else []
@@ -164,11 +176,21 @@ def sail_jump(drawn: Jump, job: Job[FaultCase]) -> dict[str, Any]:
     if ours.errors:
         faults.append(f"unhandled: {ours.errors[0].strip().splitlines()[-1]}")
     return {
-        "seed": job.seed, "passed": not faults, "faults": faults, "kind": drawn.kind, "mode": drawn.mode,
-        "size": drawn.size_class, "size_m": drawn.size_m, "for_s": drawn.for_s,
-        "events": [told(e) for e in drawn.scenario.events], "parameters": {},
-        "touched_s": touched[:1], "held_touched_s": held_touched[:1], "arrived": bool(ours.figures.get("arrived")),
-        "time_s": ours.figures.get("time_s"), "errors": ours.errors,
+        "seed": job.seed,
+        "passed": not faults,
+        "faults": faults,
+        "kind": drawn.kind,
+        "mode": drawn.mode,
+        "size": drawn.size_class,
+        "size_m": drawn.size_m,
+        "for_s": drawn.for_s,
+        "events": [told(e) for e in drawn.scenario.events],
+        "parameters": {},
+        "touched_s": touched[:1],
+        "held_touched_s": held_touched[:1],
+        "arrived": bool(ours.figures.get("arrived")),
+        "time_s": ours.figures.get("time_s"),
+        "errors": ours.errors,
         "simulated_s": ours.watch.t_s[-1] if ours.watch.t_s else 0.0,
     }
 
@@ -186,12 +208,16 @@ def sail_faults(scenario: Scenario, job: Job[FaultCase]) -> dict[str, Any]:
     contacts = []
     for t_s, excuse in watch.contacts():
         helped = "" if excuse == UNEXCUSED else avoidable(scenario, excuse, t_s, watch.reach(), touches)
-        contacts.append({
-            "t_s": t_s, "excuse": UNEXCUSED if helped else excuse, "looked_like": excuse, "helped": helped})
+        contacts.append(
+            {"t_s": t_s, "excuse": UNEXCUSED if helped else excuse, "looked_like": excuse, "helped": helped}
+        )
     least = watch.clearance_m()
     mixture_s, silence_s = watch.mixture_s(), watch.silence_s(voyage.status_s)
-    faults = [f"contact at {c['t_s']:.0f} s{': ' if c['helped'] else ''}{c['helped']}"
-              for c in contacts if c["excuse"] == UNEXCUSED]
+    faults = [
+        f"contact at {c['t_s']:.0f} s{': ' if c['helped'] else ''}{c['helped']}"
+        for c in contacts
+        if c["excuse"] == UNEXCUSED
+    ]
     is_low = least is not None and least[0] < voyage.floor_m
     before = [e for e in scenario.events if least is not None and e.at_s <= least[1]]
     is_weather = is_all_ordinary(before)
@@ -206,17 +232,30 @@ def sail_faults(scenario: Scenario, job: Job[FaultCase]) -> dict[str, Any]:
     if errors:
         faults.append(f"unhandled: {errors[0].strip().splitlines()[-1]}")
     return {
-        "seed": job.seed, "passed": not faults, "faults": faults,
-        "events": [told(e) for e in scenario.events], "parameters": dict(scenario.parameters),
-        "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}", "limit_s": scenario.limit_s,
-        "set_auto": scenario.set_auto, "system": scenario.system, "method": method.told,
+        "seed": job.seed,
+        "passed": not faults,
+        "faults": faults,
+        "events": [told(e) for e in scenario.events],
+        "parameters": dict(scenario.parameters),
+        "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}",
+        "limit_s": scenario.limit_s,
+        "set_auto": scenario.set_auto,
+        "system": scenario.system,
+        "method": method.told,
         "broken": list(scenario.broken),
         "kinds": sorted({e.kind for e in scenario.events}),
-        "arrived": bool(figures.get("arrived")), "time_s": figures.get("time_s"),
-        "contacts": contacts, "clearance_m": least and least[0], "clearance_t_s": least and least[1],
-        "below_floor": is_low, "weather_only": is_weather,
-        "mixture_s": mixture_s, "held_back_s": watch.held_back_s(),
-        "silence_s": silence_s, "sailed": watch.has_sailed, "errors": errors,
+        "arrived": bool(figures.get("arrived")),
+        "time_s": figures.get("time_s"),
+        "contacts": contacts,
+        "clearance_m": least and least[0],
+        "clearance_t_s": least and least[1],
+        "below_floor": is_low,
+        "weather_only": is_weather,
+        "mixture_s": mixture_s,
+        "held_back_s": watch.held_back_s(),
+        "silence_s": silence_s,
+        "sailed": watch.has_sailed,
+        "errors": errors,
         "simulated_s": watch.t_s[-1] if watch.t_s else 0.0,
     }
 
@@ -230,12 +269,10 @@ class _Voyage:
     errors: list[str]
     status_s: list[float]
     floor_m: float
-    ordered: list[int]     # neighbours
+    ordered: list[int]  # neighbours
 
 
-def _sail(
-    scenario: Scenario, job: Job[FaultCase], method: Method, variation: Variation | None = None,
-) -> _Voyage:
+def _sail(scenario: Scenario, job: Job[FaultCase], method: Method, variation: Variation | None = None) -> _Voyage:
     """Sail a scenario on the embedded autopilot under the eyes of a watch."""
     from companion.clock import run_virtual
     from companion.compose import boat_of
@@ -246,9 +283,13 @@ def _sail(
     pace = WORKER_PACE if job.case.trouble == "worker" else None
     mission = load_mission(scenario.mission_path(job.scenario))
     frame = mission.frame()
-    watch = Watch(solid=solid_of(mission.area.local(frame)), frame=frame, hull=boat_of(mission).hull,
-                  operator_s=operator_spans(scenario.events, scenario.limit_s),
-                  false_wind_s=false_wind_spans(scenario.events, scenario.limit_s))
+    watch = Watch(
+        solid=solid_of(mission.area.local(frame)),
+        frame=frame,
+        hull=boat_of(mission).hull,
+        operator_s=operator_spans(scenario.events, scenario.limit_s),
+        false_wind_s=false_wind_spans(scenario.events, scenario.limit_s),
+    )
     for event in scenario.events:
         if event.kind == "foreign_mission":
             item = waypoint(frame.geo_from_en(event.east_m, event.north_m))
@@ -265,24 +306,36 @@ def _sail(
     ordered: list[int] = []
     with job.folder() as folder:
         try:
-            voyage = run_embedded(scenario, job.scenario, job.seed, folder, on_status=on_status, expansions=EXPANSIONS,
-                                  observer=watch, worker_pace=pace,
-                                  variation=method.variation(mission, variation))
+            voyage = run_embedded(
+                scenario,
+                job.scenario,
+                job.seed,
+                folder,
+                on_status=on_status,
+                expansions=EXPANSIONS,
+                observer=watch,
+                worker_pace=pace,
+                variation=method.variation(mission, variation),
+            )
             verdict = run_virtual(voyage) if pace is None else run_from_zero(voyage, pace)
             figures = verdict.figures
             seen = {check.name: check.figure for check in verdict.checks}
             errors, ordered = [str(e) for e in seen["no unhandled error"]], seen.get("neighbours given orders", [])
         except Exception as error:
             errors = [repr(error)]
-    return _Voyage(watch=watch, figures=figures, errors=errors, status_s=status_s, floor_m=mission.margin_floor_m,
-                                      ordered=ordered)
+    return _Voyage(
+        watch=watch, figures=figures, errors=errors, status_s=status_s, floor_m=mission.margin_floor_m, ordered=ordered
+    )
 
 
 def told(event: EventSpec) -> str:
     """Return an event in short, with what was drawn for it."""
     plain = msgspec.to_builtins(EventSpec(at_s=0.0, kind=event.kind))
-    drawn = [f"{key} {value}" for key, value in msgspec.to_builtins(event).items()
-             if key not in {"at_s", "kind"} and value != plain[key]]
+    drawn = [
+        f"{key} {value}"
+        for key, value in msgspec.to_builtins(event).items()
+        if key not in {"at_s", "kind"} and value != plain[key]
+    ]
     return f"{event.kind} at {event.at_s:.0f} s" + (f" ({', '.join(drawn)})" if drawn else "")
 
 
@@ -312,12 +365,20 @@ def faults(case: FaultCase, *, runs: int, first_seed: int = 0) -> Experiment[Fau
                 lines.append(f"again: sitl faults{option} --first-seed {record['seed']} --keep DIR")
             elif record["seed"] in known:
                 lines.append(f"seed {record['seed']} passes, which was known to fail: {known[record['seed']]}")
-        return ExperimentSummary(lines=lines, is_good=all(r["passed"] or r["seed"] in known for r in records), figures={
-            "figures": {**table, "wall_s": sailed.wall_s, "cpu_s": sailed.cpu_s}, "voyages": records})
+        return ExperimentSummary(
+            lines=lines,
+            is_good=all(r["passed"] or r["seed"] in known for r in records),
+            figures={"figures": {**table, "wall_s": sailed.wall_s, "cpu_s": sailed.cpu_s}, "voyages": records},
+        )
 
-    return Experiment(name="faults", sail=sail, line=line, sum_up=sum_up,
-                      key=lambda job: job.key(trouble=trouble, **drawing),
-                      jobs=[job_of(seed, case) for seed in range(first_seed, first_seed + runs)])
+    return Experiment(
+        name="faults",
+        sail=sail,
+        line=line,
+        sum_up=sum_up,
+        key=lambda job: job.key(trouble=trouble, **drawing),
+        jobs=[job_of(seed, case) for seed in range(first_seed, first_seed + runs)],
+    )
 
 
 def figures_of(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -330,15 +391,18 @@ def figures_of(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
         kinds.update(record["kinds"])
     times = [r["time_s"] for r in records if r["arrived"]]
     return {
-        "voyages": len(records), "passed": sum(r["passed"] for r in records),
+        "voyages": len(records),
+        "passed": sum(r["passed"] for r in records),
         "failed_seeds": [r["seed"] for r in records if not r["passed"]],
         "arrived": sum(r["arrived"] for r in records),
-        "touched": touched.pop(UNEXCUSED, 0), "touched_excused": dict(sorted(touched.items())),
+        "touched": touched.pop(UNEXCUSED, 0),
+        "touched_excused": dict(sorted(touched.items())),
         "excused_seeds": {
             excuse: [r["seed"] for r in records if any(c["excuse"] == excuse for c in r["contacts"])]
             for excuse in sorted(touched)
         },
-        "below_floor": len(low), "below_floor_in_weather": [r["seed"] for r in low if r["weather_only"]],
+        "below_floor": len(low),
+        "below_floor_in_weather": [r["seed"] for r in low if r["weather_only"]],
         "clearance_min_m": min((r["clearance_m"] for r in records if r["clearance_m"] is not None), default=None),
         "mixture_max_s": max((r["mixture_s"] for r in records), default=0.0),
         "held_back_max_s": max((r["held_back_s"] for r in records), default=0.0),
@@ -354,35 +418,57 @@ def figures_told(table: dict[str, Any]) -> list[str]:
     """Return what was counted, in lines."""
     return [
         f"{table['voyages']} voyages, {table['passed']} passed, {table['arrived']} arrived in time",
-        (f"touched something: {table['touched']} voyages; longest mixture {table['mixture_max_s']:.1f} s; "
-         f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}"),
-        *(f"  excused: {voyages} voyages touched, {EXCUSES[excuse]}; nothing that was tried would have helped"
-          for excuse, voyages in table["touched_excused"].items()),
-        (f"below the margin's floor: {table['below_floor']} voyages, {len(table['below_floor_in_weather'])} of them "
-         "in ordinary weather"),
+        (
+            f"touched something: {table['touched']} voyages; longest mixture {table['mixture_max_s']:.1f} s; "
+            f"longest silence {table['silence_max_s']:.1f} s; unhandled errors {table['unhandled']}"
+        ),
+        *(
+            f"  excused: {voyages} voyages touched, {EXCUSES[excuse]}; nothing that was tried would have helped"
+            for excuse, voyages in table["touched_excused"].items()
+        ),
+        (
+            f"below the margin's floor: {table['below_floor']} voyages, {len(table['below_floor_in_weather'])} of them "
+            "in ordinary weather"
+        ),
         f"  a mission held back by a slow upload, ended by a loiter: {table['held_back_max_s']:.1f} s at most",
-        "voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items())]
+        "voyages with: " + ", ".join(f"{k} {v}" for k, v in table["faults"].items()),
+    ]
 
 
 def jump_figures(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return, by class of the false position and by mode, how many touched, and how many of them held in LOITER."""
+
     def row(name: str, of: Sequence[dict[str, Any]]) -> dict[str, Any]:
-        return {"class": name, "voyages": len(of), "touched": sum(bool(r["touched_s"]) for r in of),
-                "held_touched": sum(bool(r["held_touched_s"]) for r in of), "arrived": sum(r["arrived"] for r in of)}
+        return {
+            "class": name,
+            "voyages": len(of),
+            "touched": sum(bool(r["touched_s"]) for r in of),
+            "held_touched": sum(bool(r["held_touched_s"]) for r in of),
+            "arrived": sum(r["arrived"] for r in of),
+        }
 
     classes = [(kind, [r for r in records if r["kind"] == kind]) for kind in KINDS]
-    classes += [(f"{kind}, {size}", [r for r in records if (r["kind"], r["size"]) == (kind, size)])
-                for kind in KINDS for size in ("to 100 m", "to 500 m", "farther")]
+    classes += [
+        (f"{kind}, {size}", [r for r in records if (r["kind"], r["size"]) == (kind, size)])
+        for kind in KINDS
+        for size in ("to 100 m", "to 500 m", "farther")
+    ]
     classes += [(mode, [r for r in records if r["mode"] == mode]) for mode in MODES]
     return {
-        "voyages": len(records), "passed": sum(r["passed"] for r in records),
+        "voyages": len(records),
+        "passed": sum(r["passed"] for r in records),
         "failed_seeds": [r["seed"] for r in records if not r["passed"]],
         "classes": [row(name, of) for name, of in [*classes, ("all", list(records))] if of],
-        "simulated_s": sum(r["simulated_s"] for r in records)}
+        "simulated_s": sum(r["simulated_s"] for r in records),
+    }
 
 
 def jumps_told(table: dict[str, Any]) -> list[str]:
     """Return the classes of false positions under each other."""
-    return [f"{'false position':<24} voyages  touched  held in LOITER  arrived", *(
-        f"{row['class']:<24} {row['voyages']:7}  {row['touched']:7}  {row['held_touched']:14}  {row['arrived']:7}"
-        for row in table["classes"])]
+    return [
+        f"{'false position':<24} voyages  touched  held in LOITER  arrived",
+        *(
+            f"{row['class']:<24} {row['voyages']:7}  {row['touched']:7}  {row['held_touched']:14}  {row['arrived']:7}"
+            for row in table["classes"]
+        ),
+    ]

@@ -34,9 +34,9 @@ from sitl.world import AR1
 
 BEGIN, END = "<!-- made by `sitl hostile --document docs/reference/mavlink.md` -->", "<!-- end of the table -->"
 BURST_S = 2.0
-QUIET_S = 4.0            # after the last frame, for what comes of it
-CLEAR_S = 15.0           # at most, until what was raised is over
-SETTLED_S = 15.0         # under way before the first
+QUIET_S = 4.0  # after the last frame, for what comes of it
+CLEAR_S = 15.0  # at most, until what was raised is over
+SETTLED_S = 15.0  # under way before the first
 LIMIT_S = 3000.0
 TWD_RAD, TWS_MPS = 0.0, 6.0
 
@@ -116,9 +116,14 @@ def _ordered(action: act.Action) -> str:
         return "" if action.code.endswith(" over") or action.code == "ours" else f'says "{action.code}"'
     if isinstance(action, act.SetMode):
         return f"orders {action.mode.name}"
-    return {act.RequestPlan: "plans anew", act.UploadMission: "uploads", act.Arm: "orders arming",
-            act.SetCurrent: "sets the item", act.SteerHeading: "steers", act.ReadMission: "reads the mission",
-            }.get(type(action), "")
+    return {
+        act.RequestPlan: "plans anew",
+        act.UploadMission: "uploads",
+        act.Arm: "orders arming",
+        act.SetCurrent: "sets the item",
+        act.SteerHeading: "steers",
+        act.ReadMission: "reads the mission",
+    }.get(type(action), "")
 
 
 def _false(step: Step, autopilot: SimulatedAutopilot) -> list[str]:
@@ -129,8 +134,7 @@ def _false(step: Step, autopilot: SimulatedAutopilot) -> list[str]:
         out += ["false position"] * (_apart_m(vehicle.position, truth.position) > FALSE_PLACE_M)
         out += ["false heading"] * (abs(difference_rad(vehicle.heading_rad, truth.heading_rad)) > FALSE_ANGLE_RAD)
     if snapshot.wind.present_twd_from_rad is not None:
-        out += ["false wind"] * (
-            abs(difference_rad(snapshot.wind.present_twd_from_rad, TWD_RAD)) > FALSE_ANGLE_RAD)
+        out += ["false wind"] * (abs(difference_rad(snapshot.wind.present_twd_from_rad, TWD_RAD)) > FALSE_ANGLE_RAD)
     if status is not None:
         out += ["false mode"] * (status.mode is not truth.mode)
         out += ["false arming"] * (status.is_armed is not truth.is_armed)
@@ -158,7 +162,7 @@ def _apart_m(a: GeoPoint, b: GeoPoint) -> float:
 
 
 async def _measure(
-    who: Hostility, folder: Path, bursts: Sequence[Sequence[Forgery]], seed: int = 0,
+    who: Hostility, folder: Path, bursts: Sequence[Sequence[Forgery]], seed: int = 0
 ) -> list[tuple[str, ...]]:
     """Sail, send one burst of forgeries after another, and return what each did."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -168,19 +172,28 @@ async def _measure(
     assert mission.start is not None
     autopilot = SimulatedAutopilot(
         AutopilotConfig(home=mission.start, heading_rad=math.pi / 2.0, is_warm=True, is_moored=True),
-        AR1(TWD_RAD, TWS_MPS, seed=1, sd_rad=math.radians(3.0)), seed=1)
+        AR1(TWD_RAD, TWS_MPS, seed=1, sd_rad=math.radians(3.0)),
+        seed=1,
+    )
     line = MemoryLink("hostile", seed=1)
     signing = _store(folder) if who.is_signed else None
-    end = line.near if signing is None else SignedEnd(
-        line.near, Signer(signing.state.key, signing.state.timestamp))
+    end = line.near if signing is None else SignedEnd(line.near, Signer(signing.state.key, signing.state.timestamp))
     forger = Forger(listens=who.listens, seed=seed)
     air = RadioChannel(end, on_heard=lambda data: forger.hear(now_s(), data))
     trial = _Trial(autopilot=autopilot, air=air, forger=forger, rate_hz=who.rate_hz)
-    options = SailOptions(epoch_s=EPOCH_S, expansions=mission.skipper.expansions, offload=at_once, is_durable=False,
-                          signing=signing, limit_s=LIMIT_S, command="sitl hostile")
+    options = SailOptions(
+        epoch_s=EPOCH_S,
+        expansions=mission.skipper.expansions,
+        offload=at_once,
+        is_durable=False,
+        signing=signing,
+        limit_s=LIMIT_S,
+        command="sitl hostile",
+    )
     async with serve(autopilot, [line.far]):
         voyage = asyncio.create_task(
-            sail(mission, air, FaultyPlanner(), folder / "voyage", options, on_status=lambda _, s: trial.look(s)))
+            sail(mission, air, FaultyPlanner(), folder / "voyage", options, on_status=lambda _, s: trial.look(s))
+        )
         try:
             return await _forge_all(trial, bursts)
         finally:
@@ -223,8 +236,14 @@ async def _window(trial: _Trial, burst: Sequence[Forgery], *, in_a_read: bool) -
 def _is_quiet(step: Step, autopilot: SimulatedAutopilot) -> bool:
     state = step.state
     return not (
-        _false(step, autopilot) or state.vehicle.doubt or state.alarms.raised or state.mission.foreign
-        or state.pending.plan or state.pending.upload or state.pending.read)
+        _false(step, autopilot)
+        or state.vehicle.doubt
+        or state.alarms.raised
+        or state.mission.foreign
+        or state.pending.plan
+        or state.pending.upload
+        or state.pending.read
+    )
 
 
 def _store(folder: Path) -> SigningStore:
@@ -234,9 +253,7 @@ def _store(folder: Path) -> SigningStore:
     return SigningStore(key, EPOCH_S)
 
 
-def measure(
-    who: Hostility, folder: Path, forgeries: Sequence[Forgery] = FORGERIES,
-) -> dict[Forgery, tuple[str, ...]]:
+def measure(who: Hostility, folder: Path, forgeries: Sequence[Forgery] = FORGERIES) -> dict[Forgery, tuple[str, ...]]:
     """Return what each forgery does to a companion in the hands of ``who``; files go to ``folder``."""
     bursts = [(forgery,) for forgery in forgeries]
     runs = [run_virtual(_measure(who, folder / str(n), bursts, n)) for n in range(who.runs)]

@@ -37,8 +37,8 @@ from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key
 _SAME_M = 0.5
 # What a plan says of its arrival, and the probability of being there by then.
 QUANTILES = {"p10_s": 0.1, "p50_s": 0.5, "p90_s": 0.9}
-_SHORT_M = 10.0       # a leg that is shorter is the middle of a turn
-_SLOW_MPS = 0.3       # slower than this the boat goes nowhere that could be kept to
+_SHORT_M = 10.0  # a leg that is shorter is the middle of a turn
+_SLOW_MPS = 0.3  # slower than this the boat goes nowhere that could be kept to
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,17 +78,22 @@ class Legs:
         current = autopilot.core.vehicle.current_en_mps
         through = truth.velocity_en_mps[0] - current[0], truth.velocity_en_mps[1] - current[1]
         course_rad = heading_of(end[0] - begin[0], end[1] - begin[1])
-        self.sailed.append(SailedSpan(
-            t_s=t_s, end_en_m=self.frame.en_from_geo(autopilot.core.chart.point(end)), course_rad=course_rad,
-            bow_rad=bow_rad(course_rad, current, through, truth.heading_rad),
-            twd_from_rad=over_water(truth.twd_from_rad, truth.tws_mps, current)[0]))
+        self.sailed.append(
+            SailedSpan(
+                t_s=t_s,
+                end_en_m=self.frame.en_from_geo(autopilot.core.chart.point(end)),
+                course_rad=course_rad,
+                bow_rad=bow_rad(course_rad, current, through, truth.heading_rad),
+                twd_from_rad=over_water(truth.twd_from_rad, truth.tws_mps, current)[0],
+            )
+        )
 
     def life(self, start_s: float, end_s: float) -> None:
         """Take one life of the companion: nothing is made of it."""
 
 
 def bow_rad(
-    course_rad: float, current_en_mps: tuple[float, float], through_en_mps: tuple[float, float], heading_rad: float,
+    course_rad: float, current_en_mps: tuple[float, float], through_en_mps: tuple[float, float], heading_rad: float
 ) -> float:
     """Return the heading that makes a course over the ground good.
 
@@ -125,18 +130,31 @@ def legs_promised(folder: Path, sailed: list[SailedSpan], half_rad: float) -> li
     plans = [(d["t_s"], d["plan"]["legs"]) for d in decisions(folder) if d["kind"] == "plan" and d.get("plan")]
     found = []
     for leg in sailed:
-        planned = next((p for t_s, legs in reversed(plans) if t_s <= leg.t_s for p in legs
-                        if math.dist(p["to"], leg.end_en_m) <= _SAME_M), None)
+        planned = next(
+            (
+                p
+                for t_s, legs in reversed(plans)
+                if t_s <= leg.t_s
+                for p in legs
+                if math.dist(p["to"], leg.end_en_m) <= _SAME_M
+            ),
+            None,
+        )
         if planned is None:
             continue
         twa_rad, sigma_rad = math.radians(planned["twa_deg"]), math.radians(planned["sigma_deg"])
         came_rad = wrap_pi(leg.twd_from_rad - leg.bow_rad)
         planned_rad = heading_of(planned["to"][0] - planned["from"][0], planned["to"][1] - planned["from"][1])
-        found.append({
-            "promised": round(chance_of_no_go(twa_rad, sigma_rad, half_rad), 5), "came": abs(came_rad) < half_rad,
-            "sigma_deg": round(planned["sigma_deg"], 2), "off_deg": round(math.degrees(wrap_pi(came_rad - twa_rad)), 2),
-            "course_off_deg": round(math.degrees(wrap_pi(leg.course_rad - planned_rad)), 2),
-            "is_beat": bool(planned.get("is_beat"))})
+        found.append(
+            {
+                "promised": round(chance_of_no_go(twa_rad, sigma_rad, half_rad), 5),
+                "came": abs(came_rad) < half_rad,
+                "sigma_deg": round(planned["sigma_deg"], 2),
+                "off_deg": round(math.degrees(wrap_pi(came_rad - twa_rad)), 2),
+                "course_off_deg": round(math.degrees(wrap_pi(leg.course_rad - planned_rad)), 2),
+                "is_beat": bool(planned.get("is_beat")),
+            }
+        )
     return found
 
 
@@ -154,8 +172,14 @@ def arrival_promised(folder: Path) -> dict[str, float | None] | None:
 
 
 def _first_plan(folder: Path) -> dict[str, Any] | None:
-    return next((d["plan"] for d in decisions(folder) if d["kind"] == "plan" and d.get("plan")
-                 and d["plan"].get("cost_s") is not None), None)
+    return next(
+        (
+            d["plan"]
+            for d in decisions(folder)
+            if d["kind"] == "plan" and d.get("plan") and d["plan"].get("cost_s") is not None
+        ),
+        None,
+    )
 
 
 def decisions(folder: Path) -> list[dict[str, Any]]:
@@ -167,7 +191,7 @@ def decisions(folder: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in lines if line.endswith("\n")]
 
 
-Z95 = 1.959964    # of a normal's 95 % interval
+Z95 = 1.959964  # of a normal's 95 % interval
 
 
 def share_interval(hits: int, of: int) -> tuple[float, float]:
@@ -196,9 +220,11 @@ def figures_of(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "failed_seeds": [r["seed"] for r in records if not r["passed"]],
         "below_floor_seeds": [r["seed"] for r in sailed if r["below_floor"]],
         "silence_max_s": max((r["silence_s"] or 0.0 for r in sailed), default=0.0),
-        "time_share": [float(q) for q in _quantiles(ratios)], "timed": len(ratios),
+        "time_share": [float(q) for q in _quantiles(ratios)],
+        "timed": len(ratios),
         "later_than_promised": sum(ratio > 1.0 for ratio in ratios),
-        "legs": len(legs), "legs_in_no_go": sum(leg["came"] for leg in legs),
+        "legs": len(legs),
+        "legs_in_no_go": sum(leg["came"] for leg in legs),
         "legs_in_no_go_promised": sum(leg["promised"] for leg in legs),
         "kinds": {kind: _row([r for r in records if kind in r["kinds"]]) for kind in kinds},
         "waters": {water: _row([r for r in records if r["scenario"] == water]) for water in waters},
@@ -217,9 +243,12 @@ def _row(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     sailed = [r for r in records if "arrived" in r]
     clear = [r["min_clearance_m"] for r in sailed if r["min_clearance_m"] is not None]
     return {
-        "voyages": len(records), "passed": sum(r["passed"] for r in records),
-        "arrived": sum(r["arrived"] for r in sailed), "touched": sum(r["contacts"] > 0 for r in sailed),
-        "below_floor": sum(r["below_floor"] for r in sailed), "with_solids": len(clear),
+        "voyages": len(records),
+        "passed": sum(r["passed"] for r in records),
+        "arrived": sum(r["arrived"] for r in sailed),
+        "touched": sum(r["contacts"] > 0 for r in sailed),
+        "below_floor": sum(r["below_floor"] for r in sailed),
+        "with_solids": len(clear),
         "clearance_min_m": min(clear, default=None),
         "clearance_median_m": statistics.median(clear) if clear else None,
     }
@@ -229,25 +258,34 @@ def told(table: dict[str, Any]) -> str:
     """Return what was counted, for a terminal."""
     low, high = share_interval(table["below_floor"], table["with_solids"])
     lines = [
-        (f"{table['voyages']} voyages: {table['passed']} passed, {table['arrived']} arrived in time, "
-         f"{table['touched']} touched"),
-        (f"below the margin's floor: {table['below_floor']} of {table['with_solids']} with something to be clear of "
-         f"({_percent(low)} to {_percent(high)}); longest silence {table['silence_max_s']:.1f} s")]
+        (
+            f"{table['voyages']} voyages: {table['passed']} passed, {table['arrived']} arrived in time, "
+            f"{table['touched']} touched"
+        ),
+        (
+            f"below the margin's floor: {table['below_floor']} of {table['with_solids']} with something to be clear of "
+            f"({_percent(low)} to {_percent(high)}); longest silence {table['silence_max_s']:.1f} s"
+        ),
+    ]
     if table["time_share"]:
         lines.append(
             f"time, share of what the first plan promised: {' / '.join(f'{q:.2f}' for q in table['time_share'])} "
-            f"(10, 50, 90 % of {table['timed']}); later than promised {table['later_than_promised']}")
+            f"(10, 50, 90 % of {table['timed']}); later than promised {table['later_than_promised']}"
+        )
     if table["legs"]:
         lines.append(
             f"legs in the no-go zone half way, of {table['legs']} that the plan sails itself: "
-            f"{table['legs_in_no_go']}, promised {table['legs_in_no_go_promised']:.1f}")
+            f"{table['legs_in_no_go']}, promised {table['legs_in_no_go_promised']:.1f}"
+        )
     for name in ("kinds", "waters"):
         rows = table[name]
         width = max((len(row) for row in rows), default=0)
         lines.append(f"{name[:-1].ljust(width)}  voyages  arrived  touched  below floor  least m  median m")
         lines += [
             f"{row.ljust(width)}  {r['voyages']:7}  {r['arrived']:7}  {r['touched']:7}  {r['below_floor']:11}  "
-            f"{_metres(r['clearance_min_m'])}  {_metres(r['clearance_median_m']):>8}" for row, r in rows.items()]
+            f"{_metres(r['clearance_min_m'])}  {_metres(r['clearance_median_m']):>8}"
+            for row, r in rows.items()
+        ]
     return "\n".join(lines)
 
 
@@ -262,7 +300,7 @@ def _metres(value: float | None) -> str:
 CAMPAIGN = "mismatch"
 EXPANSIONS = 8_000
 PLANNED = Variation(tables={"skipper": {"autopilot_beats": False}})
-NO_GO_RAD = math.radians(45.0)     # SAIL_NO_GO_ANGLE of the simulated autopilot
+NO_GO_RAD = math.radians(45.0)  # SAIL_NO_GO_ANGLE of the simulated autopilot
 # Of an arrival's promise: the first plan is for the first goal.
 ONE_GOAL = 1
 
@@ -296,14 +334,28 @@ def sail_drawn(drawn: SampledMismatch, job: Job[MismatchCase]) -> dict[str, Any]
     method = drawn_method(random.Random(f"method {job.seed}"), case.draws, mission)
     legs = Legs(mission.frame())
     record: dict[str, Any] = {
-        "seed": job.seed, "scenario": drawn.scenario.name, "planned": case.planned,
-        "as_planned": case.only == (), "kinds": list(drawn.kinds),
-        "drawn": drawn.told(), "method": method.told, "floor_m": mission.margin_floor_m}
+        "seed": job.seed,
+        "scenario": drawn.scenario.name,
+        "planned": case.planned,
+        "as_planned": case.only == (),
+        "kinds": list(drawn.kinds),
+        "drawn": drawn.told(),
+        "method": method.told,
+        "floor_m": mission.margin_floor_m,
+    }
     with job.folder() as folder:
         try:
-            verdict = run_virtual(run_embedded(
-                drawn.scenario, drawn.source, job.seed, folder, expansions=EXPANSIONS, observer=legs,
-                variation=method.variation(mission, PLANNED if case.planned else None)))
+            verdict = run_virtual(
+                run_embedded(
+                    drawn.scenario,
+                    drawn.source,
+                    job.seed,
+                    folder,
+                    expansions=EXPANSIONS,
+                    observer=legs,
+                    variation=method.variation(mission, PLANNED if case.planned else None),
+                )
+            )
         except Exception as error:
             return record | {"passed": False, "faults": [f"unhandled: {error!r}"]}
         summary = json.loads((folder / "summary.json").read_bytes())
@@ -315,12 +367,29 @@ def sail_drawn(drawn: SampledMismatch, job: Job[MismatchCase]) -> dict[str, Any]
     is_low = clear_m is not None and clear_m < mission.margin_floor_m
     # the floor is counted by itself, beside what must never be
     faults = [f"{c.name}: {c.figure}" for c in verdict.checks if not c.passed and c.name != "clearance, m"]
-    names = ("arrived", "contacts", "time_s", "tacks", "min_clearance_m", "silence_s", "replans", "promised_risk",
-             "no_go_entries", "end_reason")
+    names = (
+        "arrived",
+        "contacts",
+        "time_s",
+        "tacks",
+        "min_clearance_m",
+        "silence_s",
+        "replans",
+        "promised_risk",
+        "no_go_entries",
+        "end_reason",
+    )
     return record | {
-        "passed": not faults, "faults": faults, "below_floor": is_low, **{name: figures[name] for name in names},
-        "path_risk": summary.get("path_risk"), "alerts": summary.get("alerts", {}), "promised_s": time_s,
-        "arrival": arrival, "legs": promised}
+        "passed": not faults,
+        "faults": faults,
+        "below_floor": is_low,
+        **{name: figures[name] for name in names},
+        "path_risk": summary.get("path_risk"),
+        "alerts": summary.get("alerts", {}),
+        "promised_s": time_s,
+        "arrival": arrival,
+        "legs": promised,
+    }
 
 
 def key_of(job: Job[MismatchCase]) -> Key:
@@ -332,22 +401,39 @@ def key_of(job: Job[MismatchCase]) -> Key:
 
 def mismatch(case: MismatchCase, *, runs: int, first_seed: int) -> Experiment[MismatchCase]:
     """Return ``runs`` seeds of a case; what failed, and what was counted."""
+
     def line(record: dict[str, Any]) -> str | None:
         method = f" {record['method']}" if record.get("method") else ""
-        return None if record["passed"] else (
-            f"FAILED seed {record['seed']}, {record['scenario']}{method}: {'; '.join(record['faults'])} "
-            f"({', '.join(record['kinds']) or 'as planned'})")
+        return (
+            None
+            if record["passed"]
+            else (
+                f"FAILED seed {record['seed']}, {record['scenario']}{method}: {'; '.join(record['faults'])} "
+                f"({', '.join(record['kinds']) or 'as planned'})"
+            )
+        )
 
     def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = sorted(sailed.records, key=lambda r: int(r["seed"]))
         table = figures_of(records)
         how = (" --planned" if case.planned else "") + (f" --draw {','.join(case.draws)}" if case.draws else "")
         how += " --as-planned" if case.only == () else "".join(f' --only "{kind}"' for kind in case.only or ())
-        again = [f"again: sitl mismatch --first-seed {r['seed']}{how} --keep DIR"
-                 for r in records if not r["passed"] or r.get("below_floor")]
-        return ExperimentSummary(lines=[told(table), sailed.took, *again],
-                                 figures={"figures": table, "voyages": records},
-                                 is_good=all(r["passed"] for r in records))
+        again = [
+            f"again: sitl mismatch --first-seed {r['seed']}{how} --keep DIR"
+            for r in records
+            if not r["passed"] or r.get("below_floor")
+        ]
+        return ExperimentSummary(
+            lines=[told(table), sailed.took, *again],
+            figures={"figures": table, "voyages": records},
+            is_good=all(r["passed"] for r in records),
+        )
 
-    return Experiment(name=CAMPAIGN, sail=sail, key=key_of, line=line, sum_up=sum_up,
-                      jobs=[job_of(seed, case) for seed in range(first_seed, first_seed + runs)])
+    return Experiment(
+        name=CAMPAIGN,
+        sail=sail,
+        key=key_of,
+        line=line,
+        sum_up=sum_up,
+        jobs=[job_of(seed, case) for seed in range(first_seed, first_seed + runs)],
+    )

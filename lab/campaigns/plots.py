@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 GROUPS = (("as planned", "#1f5fa8", "o"), ("another boat and water", "#b3541e", "s"))
-_LEAST = 1e-3       # what is less is drawn at this: the axes are of tenths and hundredths
+_LEAST = 1e-3  # what is less is drawn at this: the axes are of tenths and hundredths
 LEAST_VOYAGES = 10  # of a group, or its interval would be all that is seen
 
 
@@ -50,26 +50,53 @@ def reliability_figure(records: Sequence[Mapping[str, Any]]) -> Figure:
         _bars(left, [max(b.promised or 0.0, _LEAST) for b in bins], bins, colour, mark, label)
         late = late_curve(mine)
         if late:
-            left.plot([b.promised or _LEAST for b in late], [max(b.share, _LEAST) for b in late], color=colour,
-                      marker="^", ls="none", mfc="none", label=f"{name}: later than a quantile")
+            left.plot(
+                [b.promised or _LEAST for b in late],
+                [max(b.share, _LEAST) for b in late],
+                color=colour,
+                marker="^",
+                ls="none",
+                mfc="none",
+                label=f"{name}: later than a quantile",
+            )
         shares = time_shares(mine)
         if shares:
-            right.step(shares, [(n + 1) / len(shares) for n in range(len(shares))], where="post", color=colour,
-                       label=f"{name}: {len(shares)} arrivals")
+            right.step(
+                shares,
+                [(n + 1) / len(shares) for n in range(len(shares))],
+                where="post",
+                color=colour,
+                label=f"{name}: {len(shares)} arrivals",
+            )
     left.plot([_LEAST, 1.0], [_LEAST, 1.0], color="black", lw=0.8, ls=":", label="as promised")
-    left.set(xscale="log", yscale="log", xlim=(0.7 * _LEAST, 1.3), ylim=(0.7 * _LEAST, 1.3), xlabel="promised",
-             ylabel="came", title="In the no-go zone, half way along a leg; late")
+    left.set(
+        xscale="log",
+        yscale="log",
+        xlim=(0.7 * _LEAST, 1.3),
+        ylim=(0.7 * _LEAST, 1.3),
+        xlabel="promised",
+        ylabel="came",
+        title="In the no-go zone, half way along a leg; late",
+    )
     floors = floor_curve(records)
     floors = [b for b in floors if b.of >= LEAST_VOYAGES] or floors
     _bars(middle, list(range(len(floors))), floors, GROUPS[1][1], GROUPS[1][2], "")
     middle.axhline(0.01, color="black", lw=0.8, ls=":")
-    middle.set(ylim=(0.0, None), xlabel="how many things are not the plan's", ylabel="share of voyages",
-               title="Below the margin's floor (dotted: 1 %)")
+    middle.set(
+        ylim=(0.0, None),
+        xlabel="how many things are not the plan's",
+        ylabel="share of voyages",
+        title="Below the margin's floor (dotted: 1 %)",
+    )
     middle.set_xticks(range(len(floors)), [f"{b.name}\n({b.of})" for b in floors])
     right.axvline(1.0, color="black", lw=0.8, ls=":")
-    right.set(xlabel="time, share of the first plan's", ylabel="share of arrivals", ylim=(0.0, 1.0),
-              title="Time against the expected time")
-    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), fontsize=8)   # below: no corner is free of points
+    right.set(
+        xlabel="time, share of the first plan's",
+        ylabel="share of arrivals",
+        ylim=(0.0, 1.0),
+        title="Time against the expected time",
+    )
+    left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), fontsize=8)  # below: no corner is free of points
     right.legend(loc="lower right", fontsize=8)
     return figure
 
@@ -87,8 +114,13 @@ COLOURS = {True: PORT_RED, False: STARBOARD_GREEN}
 def save_regret(voyages: Sequence[tuple[BaselineVoyage, Best | None]], path: Path) -> None:
     """Draw a column for each voyage. Raises InputError when the file cannot be written or its kind is unknown."""
     figure, axes = plt.subplots(
-        2, len(voyages), figsize=(1.0 + 4.8 * len(voyages), 9.0), layout="constrained", squeeze=False,
-        height_ratios=(3.0, 1.0))
+        2,
+        len(voyages),
+        figsize=(1.0 + 4.8 * len(voyages), 9.0),
+        layout="constrained",
+        squeeze=False,
+        height_ratios=(3.0, 1.0),
+    )
     for column, (voyage, ideal) in enumerate(voyages):
         _chart(axes[0, column], voyage, ideal)
         _shifts(axes[1, column], voyage.track, ideal)
@@ -118,8 +150,10 @@ def _chart(axes: Axes, voyage: BaselineVoyage, ideal: Best | None) -> None:
     if ideal is not None:
         _line(axes, ideal.track[:, 1:3], ideal.track[1:, 3] > 0.0, lw=1.6, ls=(0, (3.0, 1.2)))
         time_s = voyage.record["time_s"]
-        words = (f"{time_s:.0f} s, {voyage.record['tacks']} tacks; clairvoyant {ideal.time_s:.0f} s, {ideal.tacks}: "
-                 f"{100.0 * (time_s / ideal.time_s - 1.0):+.1f} %")
+        words = (
+            f"{time_s:.0f} s, {voyage.record['tacks']} tacks; clairvoyant {ideal.time_s:.0f} s, {ideal.tacks}: "
+            f"{100.0 * (time_s / ideal.time_s - 1.0):+.1f} %"
+        )
     axes.set_title(f"{voyage.record['who']}, seed {voyage.record['seed']}\n{words}", fontsize=10)
     axes.plot([], [], color=PORT_RED, lw=3.0, alpha=0.55, label="sailed on port tack")
     axes.plot([], [], color=STARBOARD_GREEN, lw=3.0, alpha=0.55, label="on starboard tack")
@@ -137,8 +171,9 @@ def _chart(axes: Axes, voyage: BaselineVoyage, ideal: Best | None) -> None:
 def _line(axes: Axes, places: NDArray[np.float64], is_port: Any, **style: Any) -> None:
     """Draw a track, each board in one piece; ``is_port`` is of the pieces between places."""
     for first, last in _boards(is_port[: len(places) - 1]):
-        axes.plot(*places[first:last + 1].T, color=COLOURS[bool(is_port[first])], solid_capstyle="butt", zorder=5,
-                  **style)
+        axes.plot(
+            *places[first : last + 1].T, color=COLOURS[bool(is_port[first])], solid_capstyle="butt", zorder=5, **style
+        )
 
 
 def _boards(is_port: Any) -> list[tuple[int, int]]:
@@ -166,9 +201,18 @@ def _shifts(axes: Axes, track: BaselineTrack, ideal: Best | None) -> None:
     for n, (name, times, is_port) in enumerate(rows):
         at = low - (1.5 + 1.8 * n) * band
         for first, last in _boards(is_port[: len(times) - 1]):
-            axes.barh(at, times[last] - times[first], left=times[first], height=band,
-                      color=COLOURS[bool(is_port[first])])
-        axes.annotate(name, (1.0, at), xycoords=("axes fraction", "data"), xytext=(3, 0), textcoords="offset points",
-                      fontsize=7, va="center", annotation_clip=False)
+            axes.barh(
+                at, times[last] - times[first], left=times[first], height=band, color=COLOURS[bool(is_port[first])]
+            )
+        axes.annotate(
+            name,
+            (1.0, at),
+            xycoords=("axes fraction", "data"),
+            xytext=(3, 0),
+            textcoords="offset points",
+            fontsize=7,
+            va="center",
+            annotation_clip=False,
+        )
     axes.set(xlabel="time since setting sail, s", ylabel="wind from, °", ylim=(low - 5.0 * band, high + band))
     axes.grid(visible=True, alpha=0.3)

@@ -13,17 +13,7 @@ import numpy as np
 from companion.compose import boat_of
 from companion.errors import InputError
 from companion.geofence import Mission, load_mission
-from lab.campaigns.baselines import (
-    NAMES,
-    TOLD,
-    BaselineTrack,
-    Sailor,
-    key_of,
-    latest,
-    pairs,
-    scenario_of,
-    voyage_of,
-)
+from lab.campaigns.baselines import NAMES, TOLD, BaselineTrack, Sailor, key_of, latest, pairs, scenario_of, voyage_of
 from lab.perfect_information import Best, Race, RaceBoat, RaceMark, Weather, best
 from sitl.autopilot import TACK_RETRY_S, no_go_half_rad, settled_polar, tack_loss_s
 from sitl.results import markdown
@@ -31,8 +21,21 @@ from sitl.run.embedded import solid_of
 from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job
 from sitl.scenario import Scenario, load_scenario, own_polar, scenario_departures, scenario_waters, scenario_wind
 
-HEADS = ("scenario", "sailor", "runs", "clean", "median s", "tacks", "best s", "its tacks", "over best %", "10 %",
-         "90 %", "gap to bound %", "refined %")
+HEADS = (
+    "scenario",
+    "sailor",
+    "runs",
+    "clean",
+    "median s",
+    "tacks",
+    "best s",
+    "its tacks",
+    "over best %",
+    "10 %",
+    "90 %",
+    "gap to bound %",
+    "refined %",
+)
 
 
 def figures_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -42,8 +45,12 @@ def figures_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     what the search's finest grid gained: both say how well the best itself is known.
     """
     names = list(dict.fromkeys(r["scenario"] for r in records))
-    return [_figures(name, who, rows) for name in names for who in TOLD
-            if (rows := [r for r in records if r["scenario"] == name and r["who"] == who])]
+    return [
+        _figures(name, who, rows)
+        for name in names
+        for who in TOLD
+        if (rows := [r for r in records if r["scenario"] == name and r["who"] == who])
+    ]
 
 
 def _figures(name: str, who: str, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
@@ -54,10 +61,16 @@ def _figures(name: str, who: str, rows: Sequence[dict[str, Any]]) -> dict[str, A
         return statistics.median(values) if values else None
 
     return {
-        "scenario": name, "sailor": who, "runs": len(rows), "clean": len(clean),
-        "time_s": median([r["time_s"] for r in clean]), "tacks": median([r["tacks"] for r in clean]),
-        "best_s": median([r["best_s"] for r in clean]), "best_tacks": median([r["best_tacks"] for r in clean]),
-        "regret": median(regrets), "regret_10": regrets[math.floor(0.1 * (len(regrets) - 1))] if regrets else None,
+        "scenario": name,
+        "sailor": who,
+        "runs": len(rows),
+        "clean": len(clean),
+        "time_s": median([r["time_s"] for r in clean]),
+        "tacks": median([r["tacks"] for r in clean]),
+        "best_s": median([r["best_s"] for r in clean]),
+        "best_tacks": median([r["best_tacks"] for r in clean]),
+        "regret": median(regrets),
+        "regret_10": regrets[math.floor(0.1 * (len(regrets) - 1))] if regrets else None,
         "regret_90": regrets[math.ceil(0.9 * (len(regrets) - 1))] if regrets else None,
         "gap": median([r["best_s"] / r["bound_s"] - 1.0 for r in clean]),
         "refined": median([r["coarser_s"] / r["best_s"] - 1.0 for r in clean]),
@@ -66,10 +79,25 @@ def _figures(name: str, who: str, rows: Sequence[dict[str, Any]]) -> dict[str, A
 
 def told(records: Sequence[dict[str, Any]]) -> str:
     """Return the figures as a Markdown table."""
-    return markdown(HEADS, [[
-        f["scenario"], f["sailor"], str(f["runs"]), str(f["clean"]), _number(f["time_s"]), _number(f["tacks"], "g"),
-        _number(f["best_s"]), _number(f["best_tacks"], "g"), *(_percent(f[k], 1) for k in ("regret", "regret_10",
-        "regret_90")), _percent(f["gap"], 1), _percent(f["refined"], 2)] for f in figures_of(records)])
+    return markdown(
+        HEADS,
+        [
+            [
+                f["scenario"],
+                f["sailor"],
+                str(f["runs"]),
+                str(f["clean"]),
+                _number(f["time_s"]),
+                _number(f["tacks"], "g"),
+                _number(f["best_s"]),
+                _number(f["best_tacks"], "g"),
+                *(_percent(f[k], 1) for k in ("regret", "regret_10", "regret_90")),
+                _percent(f["gap"], 1),
+                _percent(f["refined"], 2),
+            ]
+            for f in figures_of(records)
+        ],
+    )
 
 
 def _number(value: float | None, kind: str = ".0f") -> str:
@@ -89,16 +117,28 @@ def require_judged(path: Path) -> None:
     scenario = load_scenario(path)
     mission = load_mission(scenario.mission_path(path))
     start = mission.frame().en_from_geo(mission.start or mission.origin)
-    plain = all(goal.gate is None and goal.box is None and goal.search is None and goal.field is None
-                and goal.rounding is None for goal in mission.goals)
+    plain = all(
+        goal.gate is None and goal.box is None and goal.search is None and goal.field is None and goal.rounding is None
+        for goal in mission.goals
+    )
     if mission.is_passage or mission.skipper.laps > 1 or not plain:
-        raise InputError(str(path), "mission", "has goals that are no plain marks, or laps, or is a passage",
-                         "the best time is known for marks to be reached in their order")
-    if (scenario_waters(scenario, scenario_wind(scenario, path, 0), start) is not None
-            or scenario_departures(scenario) is not None
-            or any(event.kind not in {"wind_shift", "wind_speed"} for event in scenario.events)):
-        raise InputError(str(path), "", "has a stream, lees, another boat than the plan's, or events",
-                         "the best time is known for one wind everywhere and the boat as planned")
+        raise InputError(
+            str(path),
+            "mission",
+            "has goals that are no plain marks, or laps, or is a passage",
+            "the best time is known for marks to be reached in their order",
+        )
+    if (
+        scenario_waters(scenario, scenario_wind(scenario, path, 0), start) is not None
+        or scenario_departures(scenario) is not None
+        or any(event.kind not in {"wind_shift", "wind_speed"} for event in scenario.events)
+    ):
+        raise InputError(
+            str(path),
+            "",
+            "has a stream, lees, another boat than the plan's, or events",
+            "the best time is known for one wind everywhere and the boat as planned",
+        )
 
 
 def race_of(scenario: Scenario, track: BaselineTrack) -> Race:
@@ -109,12 +149,18 @@ def race_of(scenario: Scenario, track: BaselineTrack) -> Race:
     polar, parameters = own_polar(mission), scenario.parameters
     return Race(
         craft=RaceBoat(
-            polar=settled_polar(parameters) if polar is None else polar, no_go_half_rad=no_go_half_rad(parameters),
-            max_twa_rad=boat.max_twa_rad, tack_s=tack_loss_s(parameters, polar, float(tws.mean())),
-            board_s=TACK_RETRY_S),
+            polar=settled_polar(parameters) if polar is None else polar,
+            no_go_half_rad=no_go_half_rad(parameters),
+            max_twa_rad=boat.max_twa_rad,
+            tack_s=tack_loss_s(parameters, polar, float(tws.mean())),
+            board_s=TACK_RETRY_S,
+        ),
         weather=Weather(t_s=t_s - t_s[0], twd_from_rad=np.array(truth.twd_from_rad), tws_mps=tws),
-        start_en_m=truth.en_m[0], goals=_goals(mission), clear_m=boat.hull.reach_m,
-        solid=solid_of(mission.area.local(frame)))
+        start_en_m=truth.en_m[0],
+        goals=_goals(mission),
+        clear_m=boat.hull.reach_m,
+        solid=solid_of(mission.area.local(frame)),
+    )
 
 
 def _goals(mission: Mission) -> tuple[RaceMark, ...]:
@@ -133,16 +179,24 @@ def sail(job: Job[Sailor]) -> dict[str, Any]:
     ideal = best_of(scenario_of(job), voyage.track)
     if ideal is None:
         return voyage.record
-    return {**voyage.record, "best_s": ideal.time_s, "bound_s": ideal.bound_s, "coarser_s": ideal.coarser_s,
-            "best_tacks": ideal.tacks}
+    return {
+        **voyage.record,
+        "best_s": ideal.time_s,
+        "bound_s": ideal.bound_s,
+        "coarser_s": ideal.coarser_s,
+        "best_tacks": ideal.tacks,
+    }
 
 
 def regret(jobs: Sequence[Job[Sailor]], *, against: str | None) -> Experiment[Sailor]:
     """Return the voyages; a table of all that there is, and one sailor against the others."""
+
     def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = latest([result for _, result in sailed.held.pairs()])
-        return ExperimentSummary(lines=[told(records), *([] if against is None else [pairs(records, NAMES[against])])],
-                                 figures=figures_of(records))
+        return ExperimentSummary(
+            lines=[told(records), *([] if against is None else [pairs(records, NAMES[against])])],
+            figures=figures_of(records),
+        )
 
     return Experiment(name="regret", sail=sail, key=key_of, sum_up=sum_up, jobs=jobs)
 

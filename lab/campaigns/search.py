@@ -30,12 +30,12 @@ from sitl.options import CampaignOptions
 from sitl.runner import Experiment, Job, file_hash
 from sitl.scenario import Scenario, load_scenario, scenario_text
 
-LENGTH = 160        # numbers of a stream; what a voyage draws beyond them is the same for all its descendants
-KEPT = 0.25         # of a generation
-TOUCHED = 0.2       # of the numbers of a stream are moved at a time ...
-STEP = 0.15         # ... by this much, round the ends
-ANEW = 0.03         # ... and these are drawn anew
-OTHER_WEATHER = 0.2   # how often a move is into another weather, too
+LENGTH = 160  # numbers of a stream; what a voyage draws beyond them is the same for all its descendants
+KEPT = 0.25  # of a generation
+TOUCHED = 0.2  # of the numbers of a stream are moved at a time ...
+STEP = 0.15  # ... by this much, round the ends
+ANEW = 0.03  # ... and these are drawn anew
+OTHER_WEATHER = 0.2  # how often a move is into another weather, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +93,7 @@ class Splitting:
     each: int
     is_blind: bool = False
     threshold_m: float = math.inf
-    chance: float = 1.0      # of coming as near as the threshold
+    chance: float = 1.0  # of coming as near as the threshold
     level: int = 0
     _here: list[tuple[float, Point]] = field(default_factory=list)
     _asked: list[Point] = field(default_factory=list)
@@ -106,7 +106,7 @@ class Splitting:
             return self._asked
         kept = max(1, round(KEPT * self.each))
         ranked = sorted(self._here, key=lambda entry: entry[0])
-        if ranked[kept - 1][0] < self.threshold_m:   # all alike: the level is not left yet
+        if ranked[kept - 1][0] < self.threshold_m:  # all alike: the level is not left yet
             self.threshold_m = ranked[kept - 1][0]
             self.chance *= sum(score <= self.threshold_m for score, _ in ranked) / len(ranked)
             self.level += 1
@@ -118,8 +118,13 @@ class Splitting:
     def tell(self, scores_m: Sequence[float]) -> None:
         """Take how near each of the generation came."""
         came = list(zip(scores_m, self._asked, strict=True))
-        self._here = came if not self._parents else [
-            now if now[0] <= self.threshold_m else before for now, before in zip(came, self._parents, strict=True)]
+        self._here = (
+            came
+            if not self._parents
+            else [
+                now if now[0] <= self.threshold_m else before for now, before in zip(came, self._parents, strict=True)
+            ]
+        )
 
 
 # The water of `sitl mismatch` in which the floor was broken.
@@ -146,8 +151,7 @@ def drawn_of(job: Job[SearchCase]) -> Scenario:
 def sail(job: Job[SearchCase]) -> dict[str, Any]:
     """Sail a job; return how it went and how near it came."""
     if job.case.what == "faults":
-        record = faults.sail_faults(
-            drawn_of(job), Job(scenario=job.scenario, seed=job.seed, case=faults.FaultCase()))
+        record = faults.sail_faults(drawn_of(job), Job(scenario=job.scenario, seed=job.seed, case=faults.FaultCase()))
         touched = [contact["excuse"] == UNEXCUSED for contact in record["contacts"]]
         near_m, drawn = record["clearance_m"], record["events"]
     else:
@@ -158,20 +162,42 @@ def sail(job: Job[SearchCase]) -> dict[str, Any]:
     score_m = near_m if near_m is not None and math.isfinite(near_m) else None
     if touched:
         score_m = 0.0 if any(touched) else None
-    return {"number": job.case.number, "seed": job.seed, "score_m": score_m, "violates": any(touched),
-            "passed": record["passed"], "faults": record["faults"], "drawn": drawn}
+    return {
+        "number": job.case.number,
+        "seed": job.seed,
+        "score_m": score_m,
+        "violates": any(touched),
+        "passed": record["passed"],
+        "faults": record["faults"],
+        "drawn": drawn,
+    }
 
 
 def generation(name: str, jobs: Sequence[Job[SearchCase]]) -> Experiment[SearchCase]:
     """Return a generation of the search that is called so: it and a voyage's number say what was drawn."""
     return Experiment(
-        name="search", jobs=jobs, sail=sail, is_failed=lambda record: record["violates"],
-        key=lambda job: {"search": name, "scenario": load_scenario(job.scenario).name,
-                         "hash": file_hash(job.scenario), "number": job.case.number})
+        name="search",
+        jobs=jobs,
+        sail=sail,
+        is_failed=lambda record: record["violates"],
+        key=lambda job: {
+            "search": name,
+            "scenario": load_scenario(job.scenario).name,
+            "hash": file_hash(job.scenario),
+            "number": job.case.number,
+        },
+    )
 
 
 def run_search(
-    *, what: What, scenario: Path, runs: int, each: int, first_seed: int, is_blind: bool, found: Path,
+    *,
+    what: What,
+    scenario: Path,
+    runs: int,
+    each: int,
+    first_seed: int,
+    is_blind: bool,
+    found: Path,
     options: CampaignOptions,
 ) -> int:
     """Search until a voyage touches or ``runs`` are sailed; say how, and leave the scenario. Return the exit code."""
@@ -179,21 +205,29 @@ def run_search(
     search = Splitting(random.Random(f"search {name}"), each=each, is_blind=is_blind)
     sailed = 0
     while sailed < runs:
-        jobs = [Job(scenario=scenario, seed=point.seed, case=SearchCase(what=what, point=point, number=sailed + n))
-                for n, point in enumerate(search.ask())]
+        jobs = [
+            Job(scenario=scenario, seed=point.seed, case=SearchCase(what=what, point=point, number=sailed + n))
+            for n, point in enumerate(search.ask())
+        ]
         there = generation(name, jobs).results(options)
         if there.lost:
             return there.exit_code(is_good=False)
         sailed += len(jobs)
         search.tell([math.inf if r["score_m"] is None else r["score_m"] for r in there.records])
         nearest = min((r["score_m"] for r in there.records if r["score_m"] is not None), default=math.inf)
-        print(f"{sailed} sailed, level {search.level}: nearer than {search.threshold_m:.1f} m (chance "
-              f"{search.chance:.2g}), nearest of this generation {nearest:.1f} m", flush=True)
+        print(
+            f"{sailed} sailed, level {search.level}: nearer than {search.threshold_m:.1f} m (chance "
+            f"{search.chance:.2g}), nearest of this generation {nearest:.1f} m",
+            flush=True,
+        )
         bad = [record for record in there.records if record["violates"] or record["faults"]]
         for record in bad:
             path = _left(jobs[record["number"] - jobs[0].case.number], found)
-            print(f"FOUND after {record['number'] + 1} voyages: {'; '.join(record['faults'])} "
-                  f"({', '.join(record['drawn'])}); again: sitl run {path} --seed {record['seed']}", flush=True)
+            print(
+                f"FOUND after {record['number'] + 1} voyages: {'; '.join(record['faults'])} "
+                f"({', '.join(record['drawn'])}); again: sitl run {path} --seed {record['seed']}",
+                flush=True,
+            )
         if any(record["violates"] for record in bad):
             return 1
     print(f"no contact in {counted(sailed, 'voyage')}")

@@ -17,21 +17,31 @@ from typing import Any
 from sitl.runner import SCENARIO_FOLDER, CampaignResults, Experiment, ExperimentSummary, Job, Key, file_hash
 
 EVERY_S = 2.0
-AHEAD_S = (10, 30, 60, 120)          # the places that are scored
-LEFT_S = (0.0, 30.0, 60.0, 120.0, 300.0, math.inf)   # classes of what is left until the goal
-TACK_WITHIN_S = 60.0                 # a tack that is told for later is no promise yet
-TACK_OFF_S = 5.0                     # a tack that comes so near to its time holds
-TACK_HOLDS_S = 4.0                   # a tack that is kept for less was the sea
+AHEAD_S = (10, 30, 60, 120)  # the places that are scored
+LEFT_S = (0.0, 30.0, 60.0, 120.0, 300.0, math.inf)  # classes of what is left until the goal
+TACK_WITHIN_S = 60.0  # a tack that is told for later is no promise yet
+TACK_OFF_S = 5.0  # a tack that comes so near to its time holds
+TACK_HOLDS_S = 4.0  # a tack that is kept for less was the sea
 WIND_S = (60.0, 120.0, 300.0)
-WIND_MEAN_S = 10.0                   # the wind that came is the mean of so long: a vane trembles
-LEVEL = 0.8                          # of the wind's bands that are scored
-FORCED = frozenset({"plan asked for: no go", "plan asked for: off leg"})   # the log's words: she is forced off the plan
-POLAR_OFF = 0.1                      # a boat that is the polar's sails within so much of it
-CHORD_S = 5.0                        # the way that is held against the log is measured in such chords: fixes tremble
-WAY_OFF = 0.05                       # a way that is so near to it holds
-SCENARIOS = tuple(SCENARIO_FOLDER / f"{name}.toml" for name in (
-    "demo", "two-channels", "upwind", "downwind", "narrow-channel", "current-across", "figures/slalom",
-    "figures/beat-500"))
+WIND_MEAN_S = 10.0  # the wind that came is the mean of so long: a vane trembles
+LEVEL = 0.8  # of the wind's bands that are scored
+FORCED = frozenset({"plan asked for: no go", "plan asked for: off leg"})  # the log's words: she is forced off the plan
+POLAR_OFF = 0.1  # a boat that is the polar's sails within so much of it
+CHORD_S = 5.0  # the way that is held against the log is measured in such chords: fixes tremble
+WAY_OFF = 0.05  # a way that is so near to it holds
+SCENARIOS = tuple(
+    SCENARIO_FOLDER / f"{name}.toml"
+    for name in (
+        "demo",
+        "two-channels",
+        "upwind",
+        "downwind",
+        "narrow-channel",
+        "current-across",
+        "figures/slalom",
+        "figures/beat-500",
+    )
+)
 
 
 def sail(job: Job[bool]) -> dict[str, Any]:
@@ -74,7 +84,7 @@ def scored(folder: Path) -> dict[str, Any]:
         last_s, goal = view.t_s, view.figures.goals_reached or 0
         if plan.there_s is not None and plan.there_late_s is not None and goal < len(reached_s):
             out["there"].append([round(reached_s[goal] - view.t_s, 1), plan.there_s, plan.there_late_s])
-        following = tacks_s[bisect_right(tacks_s, view.t_s):]
+        following = tacks_s[bisect_right(tacks_s, view.t_s) :]
         if plan.next_tack_s is not None and plan.next_tack_s <= TACK_WITHIN_S:
             came_s = round(following[0] - view.t_s, 1) if following else None
             out["tack"].append([plan.next_tack_s, came_s, bool(plan.next_tack_is_planned)])
@@ -93,9 +103,14 @@ def scored(folder: Path) -> dict[str, Any]:
         if (share := None if view.polar is None else view.polar.live_share()) is not None:
             out["polar"].append(round(share, 3))
     end = views[-1].figures
-    return {**out, "clear": _least(out["clear"]), "legs": _leg_risks(views, forced_s),
-            "whole": _plan_risks(views, reached_s, forced_s), "way": [[end.distance_m, _way_m(times, places)]],
-            "turns": [_turns(views, tacks_s)]}
+    return {
+        **out,
+        "clear": _least(out["clear"]),
+        "legs": _leg_risks(views, forced_s),
+        "whole": _plan_risks(views, reached_s, forced_s),
+        "way": [[end.distance_m, _way_m(times, places)]],
+        "turns": [_turns(views, tacks_s)],
+    }
 
 
 def _turns(views: Sequence[Any], tacks_s: Sequence[float]) -> list[int]:
@@ -122,8 +137,11 @@ def _leg_risks(views: Sequence[Any], forced_s: Sequence[float]) -> list[list[Any
             leg = at
         last_s = view.t_s
     ends = [t_s for t_s, _ in begun[1:]] + [last_s]
-    return [[risk, any(t_s < t <= end for t in forced_s)]
-            for (t_s, risk), end in zip(begun, ends, strict=True) if risk is not None]
+    return [
+        [risk, any(t_s < t <= end for t in forced_s)]
+        for (t_s, risk), end in zip(begun, ends, strict=True)
+        if risk is not None
+    ]
 
 
 def _plan_risks(views: Sequence[Any], reached_s: Sequence[float], forced_s: Sequence[float]) -> list[list[Any]]:
@@ -131,8 +149,13 @@ def _plan_risks(views: Sequence[Any], reached_s: Sequence[float], forced_s: Sequ
     out: dict[int, list[Any]] = {}
     for view in views:
         plan, goal = view.plan, view.figures.goals_reached or 0
-        if plan is not None and plan.number not in out and plan.path_risk is not None and view.state.is_sailing and (
-                goal < len(reached_s)):
+        if (
+            plan is not None
+            and plan.number not in out
+            and plan.path_risk is not None
+            and view.state.is_sailing
+            and (goal < len(reached_s))
+        ):
             out[plan.number] = [plan.path_risk, any(view.t_s < t <= reached_s[goal] for t in forced_s)]
     return list(out.values())
 
@@ -174,7 +197,7 @@ def _wind_deg(times: Sequence[float], views: Sequence[Any], t_s: float) -> float
     """Return the mean direction that the wind was seen from about a time [deg]; None: not in all of ``WIND_MEAN_S``."""
     if t_s + WIND_MEAN_S / 2.0 > times[-1]:
         return None
-    seen = views[bisect_right(times, t_s - WIND_MEAN_S / 2.0):bisect_right(times, t_s + WIND_MEAN_S / 2.0)]
+    seen = views[bisect_right(times, t_s - WIND_MEAN_S / 2.0) : bisect_right(times, t_s + WIND_MEAN_S / 2.0)]
     winds = [math.radians(v.wind.twd_from_deg) for v in seen if v.wind is not None and v.wind.twd_from_deg is not None]
     return math.degrees(math.atan2(sum(map(math.sin, winds)), sum(map(math.cos, winds)))) if winds else None
 
@@ -202,16 +225,29 @@ def table_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     # By what was left, and by what was told: of the voyages that take long most were told too little, whoever tells.
     for by, column in (("of", 0), ("told", 1)):
         for low, high in pairwise(LEFT_S):
-            mine = [(told - left, left, left <= late) for left, told, late in
-                    (row for row in there if low < row[column] <= high)]
+            mine = [
+                (told - left, left, left <= late)
+                for left, told, late in (row for row in there if low < row[column] <= high)
+            ]
             until = " or more" if math.isinf(high) else f" to {high:.0f}"
-            rows.append(_row(f"there in, {by} {low:.0f}{until} s", [e for e, _, _ in mine], [h for _, _, h in mine],
-                             share=[e / s for e, s, _ in mine]))
+            rows.append(
+                _row(
+                    f"there in, {by} {low:.0f}{until} s",
+                    [e for e, _, _ in mine],
+                    [h for _, _, h in mine],
+                    share=[e / s for e, s, _ in mine],
+                )
+            )
     tacks = [row for record in records for row in record["tack"]]
     for name, planned in (("next tack, of the plan", True), ("next tack, about", False)):
         own = [(told, came) for told, came, is_planned in tacks if is_planned == planned]
-        rows.append(_row(name, [told - came for told, came in own if came is not None],
-                         [came is not None and abs(told - came) <= TACK_OFF_S for told, came in own]))
+        rows.append(
+            _row(
+                name,
+                [told - came for told, came in own if came is not None],
+                [came is not None and abs(told - came) <= TACK_OFF_S for told, came in own],
+            )
+        )
     places = [row for record in records for row in record["place"]]
     for ahead_s in AHEAD_S:
         off = [(off, off <= within) for at_s, off, within in places if at_s == ahead_s]
@@ -220,30 +256,44 @@ def table_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     for at_s in WIND_S:
         rows.append(_row(f"wind in {at_s:.0f} s, {LEVEL:.0%} band", [], [held for s, held in winds if s == at_s]))
     clears = [row for record in records for row in record["clear"]]
-    rows.append(_row("clearance expected of a plan, m", [met - told for told, met in clears],
-                     [met >= told for told, met in clears]))
+    rows.append(
+        _row(
+            "clearance expected of a plan, m",
+            [met - told for told, met in clears],
+            [met >= told for told, met in clears],
+        )
+    )
     for name, kind in (("off the plan, on a leg", "legs"), ("off the plan, until the goal", "whole")):
         chances = [row for record in records for row in record[kind]]
-        rows.append({**_row(name, [], [not came for _, came in chances]),
-                     "median_share": statistics.mean(told - came for told, came in chances) if chances else None})
+        rows.append(
+            {
+                **_row(name, [], [not came for _, came in chances]),
+                "median_share": statistics.mean(told - came for told, came in chances) if chances else None,
+            }
+        )
     polar = [share - 1.0 for record in records for share in record["polar"]]
     rows.append(_row("share of the polar", [], [abs(off) <= POLAR_OFF for off in polar], share=polar))
     ways = [row for record in records for row in record["way"]]
-    rows.append(_row("distance sailed, m", [told - way for told, way in ways],
-                     [abs(told - way) <= WAY_OFF * way for told, way in ways],
-                     share=[(told - way) / way for told, way in ways if way]))
+    rows.append(
+        _row(
+            "distance sailed, m",
+            [told - way for told, way in ways],
+            [abs(told - way) <= WAY_OFF * way for told, way in ways],
+            share=[(told - way) / way for told, way in ways if way],
+        )
+    )
     turns = [row for record in records for row in record["turns"]]
-    rows.append(_row("tacks and gybes counted", [told - came for told, came in turns],
-                     [told == came for told, came in turns]))
+    rows.append(
+        _row("tacks and gybes counted", [told - came for told, came in turns], [told == came for told, came in turns])
+    )
     return [row for row in rows if row["shown"]]
 
 
-def _row(
-    name: str, errors: Sequence[float], held: Sequence[bool], share: Sequence[float] = (),
-) -> dict[str, Any]:
+def _row(name: str, errors: Sequence[float], held: Sequence[bool], share: Sequence[float] = ()) -> dict[str, Any]:
     sizes = sorted(abs(e) for e in errors)
     return {
-        "figure": name, "shown": len(held),
+        "figure": name,
+        "shown": len(held),
         "median_error": statistics.median(errors) if errors else None,
         "median_share": statistics.median(share) if share else None,
         "p90_error": sizes[min(len(sizes) - 1, math.ceil(0.9 * len(sizes)) - 1)] if sizes else None,
@@ -253,13 +303,17 @@ def _row(
 
 def told(rows: Sequence[dict[str, Any]]) -> str:
     """Return the table as text."""
+
     def cell(value: float | None, form: str) -> str:
         return "-" if value is None else format(value, form)
 
     lines = [f"{'figure':34s} {'shown':>7s} {'error':>7s} {'of it':>7s} {'90 %':>7s} {'held':>7s}"]
-    lines += [f"{row['figure']:34s} {row['shown']:7d} {cell(row['median_error'], '+.1f'):>7s} "
-              f"{cell(row['median_share'], '+.1%'):>7s} {cell(row['p90_error'], '.1f'):>7s} "
-              f"{cell(row['held'], '.1%'):>7s}" for row in rows]
+    lines += [
+        f"{row['figure']:34s} {row['shown']:7d} {cell(row['median_error'], '+.1f'):>7s} "
+        f"{cell(row['median_share'], '+.1%'):>7s} {cell(row['p90_error'], '.1f'):>7s} "
+        f"{cell(row['held'], '.1%'):>7s}"
+        for row in rows
+    ]
     return "\n".join(lines)
 
 
@@ -275,8 +329,9 @@ def shown(scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: b
         tables = {name: table_of([r for r in sailed.records if r["scenario"] == name]) for name in names}
         if len(names) > 1:
             tables["all"] = table_of(sailed.records)
-        return ExperimentSummary(lines=[*(f"{name}\n{told(rows)}\n" for name, rows in tables.items()), sailed.took],
-                                 figures=tables)
+        return ExperimentSummary(
+            lines=[*(f"{name}\n{told(rows)}\n" for name, rows in tables.items()), sailed.took], figures=tables
+        )
 
     def key(job: Job[bool]) -> Key:
         water = {} if job.case else {"hash": file_hash(job.scenario)}
@@ -284,6 +339,10 @@ def shown(scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: b
 
     paths = scenarios or SCENARIOS
     every = range(first_seed, first_seed + seeds * (1 if mismatch else len(paths)))
-    jobs = [Job(scenario=draw(seed).source, case=True, seed=seed) if mismatch else
-            Job(scenario=paths[n // seeds], case=False, seed=seed) for n, seed in enumerate(every)]
+    jobs = [
+        Job(scenario=draw(seed).source, case=True, seed=seed)
+        if mismatch
+        else Job(scenario=paths[n // seeds], case=False, seed=seed)
+        for n, seed in enumerate(every)
+    ]
     return Experiment(name="shown", sail=sail, key=key, sum_up=sum_up, jobs=jobs)

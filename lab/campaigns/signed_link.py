@@ -31,7 +31,7 @@ class Signer:
         """Return an unsigned frame with a signature; anything else as it is."""
         if not _is_v2(frame) or frame[2] & _SIGNED:
             return frame
-        plain = _with_flag(frame[:10 + frame[1]], _SIGNED)
+        plain = _with_flag(frame[: 10 + frame[1]], _SIGNED)
         self._timestamp += 1
         stamped = plain + bytes([LINK_ID]) + self._timestamp.to_bytes(6, "little")
         return stamped + hashlib.sha256(self._key + stamped).digest()[:6]
@@ -41,7 +41,7 @@ class Signer:
         """Return a signed frame without its signature; anything else as it is."""
         if not _is_v2(frame) or not frame[2] & _SIGNED:
             return frame
-        return _with_flag(frame[:-_SIGNATURE_BYTES - 2], 0)
+        return _with_flag(frame[: -_SIGNATURE_BYTES - 2], 0)
 
 
 def _is_v2(frame: bytes) -> bool:
@@ -115,8 +115,12 @@ class ManInTheMiddle:
         if plan.boat_key is not None:
             end = SignedEnd(end, Signer(read_key(plan.boat_key), timestamp))
         self._boat, self._companion = end, open_link(companion)
-        self._forger = Forger(system=plan.system, listens=plan.listens, timestamp=timestamp,
-                              key=None if plan.key is None else read_key(plan.key))
+        self._forger = Forger(
+            system=plan.system,
+            listens=plan.listens,
+            timestamp=timestamp,
+            key=None if plan.key is None else read_key(plan.key),
+        )
 
     async def run(self) -> None:
         """Forge, and pass on until the time is over."""

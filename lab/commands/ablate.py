@@ -14,17 +14,28 @@ from sitl.options import add_options, options_of
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "ablate", help=summary,
+        "ablate",
+        help=summary,
         description="Sail the same weather, seed for seed, with one thing taken away or another in its place: the "
         "wind's spread, the forecaster, the probability of staying out of the no-go zone, beats left to the autopilot, "
         "the planner. Prints for each scenario arrivals, contacts, voyages below the floor, times in the no-go "
         "zone, clearance, and the time as a share of the same seed's with everything, with its 95 % interval.",
         epilog='Example: sitl ablate two-channels --runs 20 --only "no spread" --only kalman',
     )
-    parser.add_argument("scenarios", type=scenario_file, nargs="*", metavar="SCENARIO",
-                        help="(default: Wolsieffer's two channels in two winds, and a narrow one)")
-    parser.add_argument("--only", action="append", default=[], metavar="NAME",
-                        help="only these variations (default: all; a wrong name lists them)")
+    parser.add_argument(
+        "scenarios",
+        type=scenario_file,
+        nargs="*",
+        metavar="SCENARIO",
+        help="(default: Wolsieffer's two channels in two winds, and a narrow one)",
+    )
+    parser.add_argument(
+        "--only",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="only these variations (default: all; a wrong name lists them)",
+    )
     parser.add_argument("--runs", type=whole(at_least=1), default=20, metavar="N", help="seeds (default: 20)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S")
     add_options(parser)
@@ -36,8 +47,9 @@ def run(args: argparse.Namespace) -> int:
     from lab.campaigns.ablation import SCENARIOS, VARIATIONS, ablation
     from sitl.run.compiled import compile_ahead
 
-    experiment = ablation(args.scenarios or SCENARIOS, names=args.only or tuple(VARIATIONS), runs=args.runs,
-                          first_seed=args.first_seed)
+    experiment = ablation(
+        args.scenarios or SCENARIOS, names=args.only or tuple(VARIATIONS), runs=args.runs, first_seed=args.first_seed
+    )
     drawn = {job.case for job in experiment.jobs}
     for planner in (name for name in ALGORITHMS if name == AUTO.algorithm or name in drawn):
         compile_ahead(planner)

@@ -27,16 +27,23 @@ def wind_of(text: str) -> tuple[float, float]:
 
 def add_winds(parser: argparse.ArgumentParser) -> None:
     """Add the options that ``sitl regret`` has, too."""
-    parser.add_argument("--winds", nargs="+", type=wind_of, metavar="DEG,S",
-                        help="winds in place of the scenarios': spread and correlation time each, or steady")
-    parser.add_argument("--against", choices=SAILORS, metavar="SAILOR",
-                        help="hold the others against this one, seed by seed")
+    parser.add_argument(
+        "--winds",
+        nargs="+",
+        type=wind_of,
+        metavar="DEG,S",
+        help="winds in place of the scenarios': spread and correlation time each, or steady",
+    )
+    parser.add_argument(
+        "--against", choices=SAILORS, metavar="SAILOR", help="hold the others against this one, seed by seed"
+    )
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "baselines", help=summary,
+        "baselines",
+        help=summary,
         description="Sail six scenarios with the companion and with ArduRover alone, in the same weather, and print "
         "the table of arrivals, contacts, times, tacks and clearances. 'companion', 'fixed' (its first plan, never "
         "another) and 'alone-embedded' use the embedded autopilot; 'companion-ardurover', 'alone' (a waypoint per "
@@ -45,13 +52,24 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "Voyages are appended to FILE, and the table is of everything in it.",
         epilog="Example: sitl baselines --who alone dijkstra --seeds 5 --out figures.jsonl",
     )
-    parser.add_argument("--who", nargs="+", choices=SAILORS, default=list(USUAL),
-                        help="sailors (default: all but the last two)")
-    parser.add_argument("--scenarios", type=scenario_file, nargs="+", metavar="SCENARIO",
-                        help="scenario files, or names of ours (default: the six)")
+    parser.add_argument(
+        "--who", nargs="+", choices=SAILORS, default=list(USUAL), help="sailors (default: all but the last two)"
+    )
+    parser.add_argument(
+        "--scenarios",
+        type=scenario_file,
+        nargs="+",
+        metavar="SCENARIO",
+        help="scenario files, or names of ours (default: the six)",
+    )
     parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
-    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=20.0, metavar="X",
-                        help="of the real ArduRover (default: 20)")
+    parser.add_argument(
+        "--speedup",
+        type=number(above=0.0, at_most=1000.0),
+        default=20.0,
+        metavar="X",
+        help="of the real ArduRover (default: 20)",
+    )
     add_winds(parser)
     add_options(parser, workers=1, out=Path("baselines.jsonl"))
     parser.set_defaults(run=run)

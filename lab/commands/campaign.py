@@ -14,20 +14,29 @@ from sitl.options import add_options, options_of
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "campaign", help=summary,
+        "campaign",
+        help=summary,
         description="Sail a scenario over many seeds on the embedded autopilot: a line per voyage, then a table of "
         "success, time, tacks, replans, clearance and risk. A failing seed is named and repeats exactly. Of two "
         "scenarios, or one by two methods, the voyages are compared seed by seed.",
         epilog="Example: sitl campaign demo --runs 50",
     )
-    parser.add_argument("scenarios", type=scenario_file, nargs="+", metavar="SCENARIO",
-                        help="a scenario or a mission file, or the name of one of ours (sitl run --help)")
+    parser.add_argument(
+        "scenarios",
+        type=scenario_file,
+        nargs="+",
+        metavar="SCENARIO",
+        help="a scenario or a mission file, or the name of one of ours (sitl run --help)",
+    )
     parser.add_argument("--runs", type=whole(at_least=1), default=50, metavar="N", help="seeds 0..N-1 (default: 50)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the table's figures")
-    parser.add_argument("--keep", type=out_folder, metavar="DIR",
-                        help="keep the voyage folders (default: failed ones only, "
-                        "in campaign-failures/)")
+    parser.add_argument(
+        "--keep",
+        type=out_folder,
+        metavar="DIR",
+        help="keep the voyage folders (default: failed ones only, in campaign-failures/)",
+    )
     add_methods(parser)
     add_options(parser)
     parser.set_defaults(run=run)

@@ -22,7 +22,8 @@ BESIDE = {
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "faults", help=summary,
+        "faults",
+        help=summary,
         description="Sail a short voyage many times, each with faults drawn from its seed: bad and cut links, broken "
         "vanes and compasses, false positions, wind shifts, calms, currents, a planner that dies or hangs, a companion "
         "that is killed with its state and clock spoilt, full disks, an autopilot that reboots and its failsafes, an "
@@ -31,19 +32,37 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "unhandled error. A failing seed is printed and repeats exactly.",
         epilog="Example: sitl faults --runs 1000, then sitl faults --first-seed 17 --keep v",
     )
-    parser.add_argument("--runs", type=whole(at_least=1), default=1000, metavar="N",
-                        help="seeds to sail (default: 1000)")
+    parser.add_argument(
+        "--runs", type=whole(at_least=1), default=1000, metavar="N", help="seeds to sail (default: 1000)"
+    )
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
-    parser.add_argument("--keep", type=out_folder, metavar="DIR",
-                        help="sail only the first seed and keep its voyage folder")
+    parser.add_argument(
+        "--keep", type=out_folder, metavar="DIR", help="sail only the first seed and keep its voyage folder"
+    )
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--jumps", dest="trouble", action="store_const", const="jumps", default="all",
-                      help="false positions alone, each sailed again by who only holds her in LOITER")
-    what.add_argument("--turned-vane", dest="trouble", action="store_const", const="turned-vane",
-                      help="beside what is drawn: the vane turned by 60 degrees or more under way, or its offset set")
-    what.add_argument("--worker", dest="trouble", action="store_const", const="worker",
-                      help="the planner's real process, killed, stopped, out of memory: in real time (a minute each)")
+    what.add_argument(
+        "--jumps",
+        dest="trouble",
+        action="store_const",
+        const="jumps",
+        default="all",
+        help="false positions alone, each sailed again by who only holds her in LOITER",
+    )
+    what.add_argument(
+        "--turned-vane",
+        dest="trouble",
+        action="store_const",
+        const="turned-vane",
+        help="beside what is drawn: the vane turned by 60 degrees or more under way, or its offset set",
+    )
+    what.add_argument(
+        "--worker",
+        dest="trouble",
+        action="store_const",
+        const="worker",
+        help="the planner's real process, killed, stopped, out of memory: in real time (a minute each)",
+    )
     add_draw(parser, BESIDE)
     add_options(parser)
     parser.set_defaults(run=run)

@@ -36,18 +36,30 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument("--boat", metavar="LINK", help="the boat's port: udpout:127.0.0.1:14555, tcp:127.0.0.1:5760")
     parser.add_argument("--companion", metavar="LINK", help="where the companion listens: udpout:127.0.0.1:14551")
     parser.add_argument("--system", type=system_id, default=1, metavar="N", help="the boat's system id (1)")
-    parser.add_argument("--message", action="append", default=[], metavar="NAME",
-                        help="forge this message; may be given more than once (default: every one in turn)")
+    parser.add_argument(
+        "--message",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="forge this message; may be given more than once (default: every one in turn)",
+    )
     parser.add_argument("--listen", action="store_true", help="use the boat's own boot time and frame numbers")
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="sign the forgeries: the forger has the key")
-    parser.add_argument("--sign-boat", type=Path, metavar="FILE",
-                        help="sign what the boat says, which has no key of its own, for a companion with --signing-key")
-    parser.add_argument("--rate", type=number("Hz", above=0.0, at_most=500.0), default=5.0, metavar="HZ",
-                        help="frames a second (5)")
-    parser.add_argument("--count", type=whole(at_least=1, at_most=100_000), default=100, metavar="N",
-                        help="forge so many frames (100)")
-    parser.add_argument("--for", dest="for_s", type=number("s", above=0.0), default=600.0, metavar="S",
-                        help="end after S seconds (600)")
+    parser.add_argument(
+        "--sign-boat",
+        type=Path,
+        metavar="FILE",
+        help="sign what the boat says, which has no key of its own, for a companion with --signing-key",
+    )
+    parser.add_argument(
+        "--rate", type=number("Hz", above=0.0, at_most=500.0), default=5.0, metavar="HZ", help="frames a second (5)"
+    )
+    parser.add_argument(
+        "--count", type=whole(at_least=1, at_most=100_000), default=100, metavar="N", help="forge so many frames (100)"
+    )
+    parser.add_argument(
+        "--for", dest="for_s", type=number("s", above=0.0), default=600.0, metavar="S", help="end after S seconds (600)"
+    )
     parser.set_defaults(run=run)
 
 
@@ -77,7 +89,7 @@ def _measure(document: Path | None) -> int:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError("--document", str(document), f"cannot be read ({error})") from error
     if text is not None:
-        written(text, ())   # before minutes are spent on it
+        written(text, ())  # before minutes are spent on it
     effects = {}
     with tempfile.TemporaryDirectory() as folder:
         for who in HOSTILITIES:
@@ -100,8 +112,11 @@ def _stand_between(args: argparse.Namespace) -> int:
     from lab.campaigns.signed_link import ManInTheMiddle, SpoofingPlan
     from sitl.faults import FORGERIES
 
-    for option, value, low, high in (("--rate", args.rate, 0.0, MAX_RATE_HZ), ("--count", args.count, 0, MAX_COUNT),
-                                     ("--for", args.for_s, 0.0, MAX_S)):
+    for option, value, low, high in (
+        ("--rate", args.rate, 0.0, MAX_RATE_HZ),
+        ("--count", args.count, 0, MAX_COUNT),
+        ("--for", args.for_s, 0.0, MAX_S),
+    ):
         if not low < value <= high:
             raise InputError(option, f"{value:g}", f"is not above {low:g} and at most {high:g}")
     for option, text in (("--boat", args.boat), ("--companion", args.companion)):
@@ -113,8 +128,16 @@ def _stand_between(args: argparse.Namespace) -> int:
     forgeries = tuple(f for f in FORGERIES if not args.message or f.message in args.message)
     if not forgeries:
         raise InputError("--message", ", ".join(args.message), "is read ashore only", "see sitl hostile --list")
-    plan = SpoofingPlan(forgeries=forgeries, rate_hz=args.rate, count=args.count, for_s=args.for_s, system=args.system,
-                listens=args.listen, key=args.signing_key, boat_key=args.sign_boat)
+    plan = SpoofingPlan(
+        forgeries=forgeries,
+        rate_hz=args.rate,
+        count=args.count,
+        for_s=args.for_s,
+        system=args.system,
+        listens=args.listen,
+        key=args.signing_key,
+        boat_key=args.sign_boat,
+    )
     middle = ManInTheMiddle(args.boat, args.companion, plan)
     try:
         run_loop(middle.run())

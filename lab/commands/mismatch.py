@@ -14,7 +14,8 @@ from sitl.options import add_options, options_of
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "mismatch", help=summary,
+        "mismatch",
+        help=summary,
         description="Sail the waters of the repository, each voyage with what the plan does not know of, drawn from "
         "its seed: current and tide, gusts, lees and gradients of the wind, waves, a polar that errs by up to 20 %, "
         "leeway, tacks that fail, a turned vane, a compass and a position that err. Judged by the truth: contact, "
@@ -24,16 +25,27 @@ def add_parser(subparsers: Any, summary: str) -> None:
     )
     parser.add_argument("--runs", type=whole(at_least=1), default=100, metavar="N", help="seeds (default: 100)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
-    parser.add_argument("--planned", action="store_true",
-                        help="no beat is left to the autopilot: every board is planned, and its risk promised")
+    parser.add_argument(
+        "--planned",
+        action="store_true",
+        help="no beat is left to the autopilot: every board is planned, and its risk promised",
+    )
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--as-planned", action="store_true",
-                       help="the control: the same waters and winds, and nothing that the plan does not know of")
-    which.add_argument("--only", action="append", metavar="KIND",
-                       help="every voyage has this, and nothing else; may be repeated (a wrong name lists them)")
+    which.add_argument(
+        "--as-planned",
+        action="store_true",
+        help="the control: the same waters and winds, and nothing that the plan does not know of",
+    )
+    which.add_argument(
+        "--only",
+        action="append",
+        metavar="KIND",
+        help="every voyage has this, and nothing else; may be repeated (a wrong name lists them)",
+    )
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
-    parser.add_argument("--keep", type=out_folder, metavar="DIR",
-                        help="sail only the first seed and keep its voyage folder")
+    parser.add_argument(
+        "--keep", type=out_folder, metavar="DIR", help="sail only the first seed and keep its voyage folder"
+    )
     add_draw(parser)
     add_options(parser)
     parser.set_defaults(run=run)

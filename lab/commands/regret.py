@@ -14,7 +14,8 @@ from sitl.options import add_options, options_of
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "regret", help=summary,
+        "regret",
+        help=summary,
         description="Sail scenarios with each sailor of 'sitl baselines', and solve for the best time in the wind that "
         "she met, known in advance: by the simulated hull's own speeds and what a tack costs her, clear of everything "
         "solid by half her length and no more. Printed: time over that best, the median and 10 and 90 %; how far the "
@@ -22,16 +23,35 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "fine. The default is those on the embedded autopilot.",
         epilog="Example: sitl regret --seeds 20 --out regret.jsonl --plot regret.png",
     )
-    parser.add_argument("--who", nargs="+", choices=SAILORS, default=["companion", "fixed", "alone-embedded"],
-                        help="sailors (default: companion fixed alone-embedded)")
-    parser.add_argument("--scenarios", type=scenario_file, nargs="+", metavar="SCENARIO",
-                        help="scenario files, or names of ours (default: the six of sitl baselines)")
+    parser.add_argument(
+        "--who",
+        nargs="+",
+        choices=SAILORS,
+        default=["companion", "fixed", "alone-embedded"],
+        help="sailors (default: companion fixed alone-embedded)",
+    )
+    parser.add_argument(
+        "--scenarios",
+        type=scenario_file,
+        nargs="+",
+        metavar="SCENARIO",
+        help="scenario files, or names of ours (default: the six of sitl baselines)",
+    )
     parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
-    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=20.0, metavar="X",
-                        help="of the real ArduRover (default: 20)")
+    parser.add_argument(
+        "--speedup",
+        type=number(above=0.0, at_most=1000.0),
+        default=20.0,
+        metavar="X",
+        help="of the real ArduRover (default: 20)",
+    )
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the table's figures")
-    parser.add_argument("--plot", type=out_file, metavar="FILE",
-                        help="draw seed 0 of the first scenario: what each sailor sailed over the clairvoyant's track")
+    parser.add_argument(
+        "--plot",
+        type=out_file,
+        metavar="FILE",
+        help="draw seed 0 of the first scenario: what each sailor sailed over the clairvoyant's track",
+    )
     add_winds(parser)
     add_options(parser, workers=1)
     parser.set_defaults(run=run)

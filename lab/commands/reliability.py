@@ -14,7 +14,8 @@ from companion.program.arguments import out_file
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "reliability", help=summary,
+        "reliability",
+        help=summary,
         description="Hold what plans promised against what came, over voyages that were sailed: how often the true "
         "wind was in the no-go zone on a leg, by the chance that the plan gave it; how often the margin's floor was "
         "broken, by how much was not the plan's; the time against the expected time. With 95 % intervals (Wilson).",
@@ -37,8 +38,9 @@ def run(args: argparse.Namespace) -> int:
     alien = next((path for path, h in zip(args.files, held, strict=True) if h.campaign != CAMPAIGN), None)
     records = [result for h in held for _, result in h.pairs()]
     if alien is not None or not records:
-        raise InputError(str(alien or args.files[0]), "", "holds no voyages of sitl mismatch",
-                         "name what its --out wrote")
+        raise InputError(
+            str(alien or args.files[0]), "", "holds no voyages of sitl mismatch", "name what its --out wrote"
+        )
     for name, is_control in (("as planned", True), ("another boat and water", False)):
         mine = [r for r in records if bool(r.get("as_planned")) == is_control]
         if mine:

@@ -16,7 +16,8 @@ from companion.program.arguments import out_file, whole
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "results", help=summary,
+        "results",
+        help=summary,
         description="Files of results (FILE.jsonl of a campaign's --out) and tables of them (FILE.parquet of its "
         "--table; needs the extra [results]).",
         epilog="Example: sitl results compare before.parquet after.jsonl",
@@ -25,14 +26,19 @@ def add_parser(subparsers: Any, summary: str) -> None:
     show = verbs.add_parser("show", help="what a file holds: by which program, and the figures of each group")
     show.add_argument("file", type=Path, metavar="FILE")
     held = verbs.add_parser(
-        "compare", help="two files of one campaign, paired by seed: changes, how sure, the worst seeds first",
+        "compare",
+        help="two files of one campaign, paired by seed: changes, how sure, the worst seeds first",
         description="Pair two files by seed and say what changed: shares of voyages, the ratio of times of those that "
         "arrived in both, clearance, silence, tacks, replans. Each with its 95 % interval and how likely as much for "
-        "the worse would be by luck.")
+        "the worse would be by luck.",
+    )
     held.add_argument("first", type=Path, metavar="A")
     held.add_argument("second", type=Path, metavar="B")
-    held.add_argument("--fail-on-worse", action="store_true",
-                      help="exit 1 where B is worse, and by more than luck explains (at 5 %% for all figures together)")
+    held.add_argument(
+        "--fail-on-worse",
+        action="store_true",
+        help="exit 1 where B is worse, and by more than luck explains (at 5 %% for all figures together)",
+    )
     held.add_argument("--most", type=whole(), default=10, metavar="N", help="seeds to name (default: 10)")
     held.add_argument("--json", type=out_file, metavar="FILE", help="write the changes")
     join = verbs.add_parser("join", help="one file of several, as --array leaves them")

@@ -13,7 +13,8 @@ from sitl.options import add_options, options_of
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "shown", help=summary,
+        "shown",
+        help=summary,
         description="Sail scenarios on the embedded autopilot, fold their records into the views that a page shows, "
         "and hold every figure against what came: the time until the goal is reached and by when in nine cases of "
         "ten, by what was left and by what was told; the next tack; the places in 10 to 120 s with their nine-in-ten "
@@ -24,12 +25,20 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "often it did not come.",
         epilog="Example: sitl shown demo --seeds 10",
     )
-    parser.add_argument("scenarios", type=scenario_file, nargs="*", metavar="SCENARIO",
-                        help="(default: the demo, five waters and two winds)")
+    parser.add_argument(
+        "scenarios",
+        type=scenario_file,
+        nargs="*",
+        metavar="SCENARIO",
+        help="(default: the demo, five waters and two winds)",
+    )
     parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="of each (default: 5)")
     parser.add_argument("--first-seed", type=whole(), default=0, metavar="S")
-    parser.add_argument("--mismatch", action="store_true",
-                        help="boats and waters that are not the plan's, as sitl mismatch draws them, in their place")
+    parser.add_argument(
+        "--mismatch",
+        action="store_true",
+        help="boats and waters that are not the plan's, as sitl mismatch draws them, in their place",
+    )
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the tables")
     add_options(parser)
     parser.set_defaults(run=run)

@@ -31,9 +31,16 @@ class LineCommand:
 
 
 def line_following(
-    at_en: tuple[float, float], heading_rad: float, twd_from_rad: float,
-    a_en: tuple[float, float], b_en: tuple[float, float], q: int, *,
-    r_m: float = 50.0, gamma_rad: float = math.pi / 4.0, close_hauled_rad: float = math.pi / 4.0,
+    at_en: tuple[float, float],
+    heading_rad: float,
+    twd_from_rad: float,
+    a_en: tuple[float, float],
+    b_en: tuple[float, float],
+    q: int,
+    *,
+    r_m: float = 50.0,
+    gamma_rad: float = math.pi / 4.0,
+    close_hauled_rad: float = math.pi / 4.0,
     sail_abeam_rad: float = math.pi / 4.0,
 ) -> LineCommand:
     """Return rudder and sheet that bring the boat to the line from a to b and along it [1].
@@ -47,16 +54,19 @@ def line_following(
     course = math.atan2(de, dn)
     # Line 1: e > 0 when the boat is left of the line.
     offset = (de * (at_en[1] - a_en[1]) - dn * (at_en[0] - a_en[0])) / length if length > 0.0 else 0.0
-    if abs(offset) > 0.5 * r_m:                                                   # line 2
+    if abs(offset) > 0.5 * r_m:  # line 2
         q = 1 if offset > 0.0 else -1
-    nominal = course + (2.0 * gamma_rad / math.pi) * math.atan(offset / r_m)      # lines 3, 4
+    nominal = course + (2.0 * gamma_rad / math.pi) * math.atan(offset / r_m)  # lines 3, 4
     limit = math.cos(close_hauled_rad)
-    unsailable = math.cos(nominal - twd_from_rad) > limit                         # line 5
+    unsailable = math.cos(nominal - twd_from_rad) > limit  # line 5
     beating = abs(offset) < r_m and math.cos(course - twd_from_rad) > limit
-    wanted = twd_from_rad + q * close_hauled_rad if unsailable or beating else nominal   # lines 6, 7
+    wanted = twd_from_rad + q * close_hauled_rad if unsailable or beating else nominal  # lines 6, 7
     return LineCommand(
-        heading_rad=wrap_pi(wanted), rudder_rad=rudder_for(heading_rad, wanted),
-        sail_max_rad=sail_for(wanted, twd_from_rad, sail_abeam_rad), q=q, offset_m=offset,
+        heading_rad=wrap_pi(wanted),
+        rudder_rad=rudder_for(heading_rad, wanted),
+        sail_max_rad=sail_for(wanted, twd_from_rad, sail_abeam_rad),
+        q=q,
+        offset_m=offset,
     )
 
 

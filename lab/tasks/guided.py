@@ -42,14 +42,17 @@ from sitl.world import AR1
 Decide = Callable[[Situation], tuple[float, float]]
 # The intruder of a run over MAVLink comes early: nobody learns more from 40 minutes of waiting.
 ENTRY_LIMIT_S = 300.0
-AUTO_HALF_M, AUTO_LOOPS = 5.0, 100   # a station's plan: to and fro across the wind
+AUTO_HALF_M, AUTO_LOOPS = 5.0, 100  # a station's plan: to and fro across the wind
 
 
 def ardurover_habits(tws_mps: float, **changes: float | bool) -> GuidanceSettings:
     """Return what ArduRover's simulated sailboat can do: a measured polar, tacks of 2 s, no irons."""
     twa, speed = ardurover_sitl().curve(max(1.0, tws_mps))
     base: dict[str, float | bool] = {
-        "turn_rate_radps": math.radians(40.0), "tack_s": 1.5, "tack_min_mps": 0.3, "lag_s": 2.5,
+        "turn_rate_radps": math.radians(40.0),
+        "tack_s": 1.5,
+        "tack_min_mps": 0.3,
+        "lag_s": 2.5,
         "no_go_half_rad": math.radians(45.0),
     }
     base.update(changes)
@@ -78,9 +81,12 @@ class Steering:
             return None
         wind = self._wind
         return Situation(
-            t_s=t_s, en_m=self._frame.en_from_geo(self._vehicle.position),
-            velocity_en_mps=self._vehicle.velocity_en_mps, heading_rad=self._vehicle.heading_rad,
-            twd_from_rad=None if wind is None else wind.twd_from_rad, tws_mps=0.0 if wind is None else wind.tws_mps,
+            t_s=t_s,
+            en_m=self._frame.en_from_geo(self._vehicle.position),
+            velocity_en_mps=self._vehicle.velocity_en_mps,
+            heading_rad=self._vehicle.heading_rad,
+            twd_from_rad=None if wind is None else wind.twd_from_rad,
+            tws_mps=0.0 if wind is None else wind.tws_mps,
         )
 
     async def take_over(self) -> None:
@@ -114,8 +120,14 @@ class Steering:
 
 
 async def sail_guided(
-    facade: Autopilot, truth: Callable[[], Truth], frame: LocalFrame, decide: Decide, until: Callable[[float], bool],
-    limit_s: float, *, needs_wind: bool = True,
+    facade: Autopilot,
+    truth: Callable[[], Truth],
+    frame: LocalFrame,
+    decide: Decide,
+    until: Callable[[float], bool],
+    limit_s: float,
+    *,
+    needs_wind: bool = True,
 ) -> list[tuple[float, float, float, float, float]]:
     """Steer by ``decide`` while the truth is sampled each half second; return its rows."""
     rows: list[tuple[float, float, float, float, float]] = []
@@ -137,10 +149,16 @@ async def sail_guided(
 
 
 def with_boat(
-    wind: AR1, seed: int, heading_rad: float, job: Callable[[Autopilot, Callable[[], Truth]], Any], autopilot: str,
-    speedup: float, model: str = "sailboat",
+    wind: AR1,
+    seed: int,
+    heading_rad: float,
+    job: Callable[[Autopilot, Callable[[], Truth]], Any],
+    autopilot: str,
+    speedup: float,
+    model: str = "sailboat",
 ) -> Any:
     """Run ``job`` with a boat: the simulated autopilot in virtual time, or the real ArduRover in a hurry."""
+
     async def simulated() -> Any:
         config = AutopilotConfig(home=ORIGIN, heading_rad=heading_rad, is_warm=True, is_moored=True)
         memory = MemoryLink(seed=seed)
@@ -169,7 +187,10 @@ def with_boat(
 
 
 async def _sail_mission(
-    facade: Autopilot, truth: Callable[[], Truth], items: list[MissionItem], until: Callable[[float], bool],
+    facade: Autopilot,
+    truth: Callable[[], Truth],
+    items: list[MissionItem],
+    until: Callable[[float], bool],
     limit_s: float,
 ) -> list[tuple[float, float, float, float, float]]:
     """Sail a mission in AUTO while the truth is sampled each half second; return its rows."""
@@ -206,8 +227,14 @@ def run_wrsc(seed: int, autopilot: str = "embedded", speedup: float = 8.0) -> Wr
         # The real boat drifts while it boots: it sails to the middle first, before the clock of the task starts.
         start = truth()
         if math.hypot(start.east_m, start.north_m) > 30.0:
-            await sail_guided(facade, truth, frame, lambda s: skipper.by_field(s, ()),
-                        lambda _: math.hypot(truth().east_m, truth().north_m) < 25.0, 240.0)
+            await sail_guided(
+                facade,
+                truth,
+                frame,
+                lambda s: skipper.by_field(s, ()),
+                lambda _: math.hypot(truth().east_m, truth().north_m) < 25.0,
+                240.0,
+            )
 
         def over(t_s: float) -> bool:
             now = truth()
@@ -222,7 +249,7 @@ def run_wrsc(seed: int, autopilot: str = "embedded", speedup: float = 8.0) -> Wr
 
 
 def run_station(
-    seed: int, autopilot: str = "embedded", speedup: float = 8.0, radius_m: float = 20.0, method: str = "field",
+    seed: int, autopilot: str = "embedded", speedup: float = 8.0, radius_m: float = 20.0, method: str = "field"
 ) -> dict[str, float]:
     """Keep station over MAVLink for five minutes after the first point inside, and score it.
 
@@ -267,8 +294,11 @@ def run_station(
 
 def main(argv: list[str] | None = None) -> int:
     """Run the seeds and print one line each."""
-    parser = argparse.ArgumentParser(prog="python -m lab.tasks.guided", description="Field guidance over MAVLink.",
-                                     epilog="example: python -m lab.tasks.guided --seeds 10 --autopilot ardurover")
+    parser = argparse.ArgumentParser(
+        prog="python -m lab.tasks.guided",
+        description="Field guidance over MAVLink.",
+        epilog="example: python -m lab.tasks.guided --seeds 10 --autopilot ardurover",
+    )
     parser.add_argument("--task", choices=["wrsc", "station"], default="wrsc")
     parser.add_argument("--method", choices=["field", "plan", "loiter"], default="field", help="of station keeping")
     parser.add_argument("--seeds", type=int, default=5)

@@ -37,23 +37,29 @@ from sitl.world import AR1
 STEP_S = 0.05
 MARKS = ((0.0, 80.0), (110.0, 80.0), (110.0, 0.0), (0.0, 0.0))
 REACHED_M = 5.0
-NEAR_M = 40.0             # from here on to the mark itself: a line has no end
+NEAR_M = 40.0  # from here on to the mark itself: a line has no end
 ROCK = box(45.0, 70.0, 60.0, 95.0)
 KEEP_M = 8.0
 INTRUDER_KEEP_M = 15.0
 INTRUDER_GAP_M = 90.0
 LIMIT_S = 900.0
-SLOW = 0.3                # of full thrust, at least
+SLOW = 0.3  # of full thrust, at least
 HABITS = GuidanceSettings(
-    is_sailing=False, polar_mps=(2.0, 2.0), turn_rate_radps=math.radians(20.0), tack_s=0.0, lag_s=2.0, horizon_s=60.0,
-    repulsive_sigma_m=30.0, keep_m=KEEP_M,
+    is_sailing=False,
+    polar_mps=(2.0, 2.0),
+    turn_rate_radps=math.radians(20.0),
+    tack_s=0.0,
+    lag_s=2.0,
+    horizon_s=60.0,
+    repulsive_sigma_m=30.0,
+    keep_m=KEEP_M,
 )
 
 MASS_KG = 40.0
 INERTIA_KGM2 = 12.0
-MOTOR_N = 32.0            # each at u = 1
-ARM_M = 0.35              # of a motor from the keel
-DRAG_KGPM = 8.0           # 2 m/s at 32 N
+MOTOR_N = 32.0  # each at u = 1
+ARM_M = 0.35  # of a motor from the keel
+DRAG_KGPM = 8.0  # 2 m/s at 32 N
 TURN_DRAG_NMS = 14.0
 
 
@@ -116,7 +122,8 @@ class MotorPilot:
         self._state = GuidanceState()
         self._habits = replace(HABITS, polar_mps=(speed_mps, speed_mps))
         self._area = LocalArea(
-            frame=LocalFrame(ORIGIN), names=("rock",), polygons=(ROCK,), own_margins_m=(0.0,), limits=None)
+            frame=LocalFrame(ORIGIN), names=("rock",), polygons=(ROCK,), own_margins_m=(0.0,), limits=None
+        )
         self._intruder: tuple[float, tuple[float, float], tuple[float, float]] | None = None
         self._speed_mps = speed_mps
         self.mark = 0
@@ -131,8 +138,12 @@ class MotorPilot:
         if self._intruder is not None:
             noise = self._rng.normal(0.0, 1.0, 2)
             x, y = self.intruder_at(seen.t_s)
-            other = MovingObstacle(en_m=(x + noise[0], y + noise[1]), velocity_en_mps=self._intruder[2],
-                             keep_m=INTRUDER_KEEP_M, growth_mps=0.1)
+            other = MovingObstacle(
+                en_m=(x + noise[0], y + noise[1]),
+                velocity_en_mps=self._intruder[2],
+                keep_m=INTRUDER_KEEP_M,
+                growth_mps=0.1,
+            )
             seen = replace(seen, obstacles=(other,))
         # Without the wind there is no no-go zone: the boat goes where the field points.
         seen = replace(seen, twd_from_rad=None)
@@ -164,9 +175,11 @@ def _score(seed: int, pilot: MotorPilot, rows: Any) -> MotorScore:
     """Score rows of (t, east, north, ...) [s, m]."""
     track = np.asarray(rows, dtype=np.float64)
     first = np.flatnonzero(np.hypot(track[:, 1] - MARKS[0][0], track[:, 2] - MARKS[0][1]) < REACHED_M + 1.0)
-    upwind = track[:first[0] + 1] if first.size else track
+    upwind = track[: first[0] + 1] if first.size else track
     return MotorScore(
-        seed=seed, marks=pilot.mark, time_s=float(track[-1, 0] - track[0, 0]),
+        seed=seed,
+        marks=pilot.mark,
+        time_s=float(track[-1, 0] - track[0, 0]),
         rock_m=min(ROCK.distance(Point(e, n)) for e, n in track[:, 1:3]),
         intruder_m=min(math.dist((e, n), pilot.intruder_at(t)) for t, e, n in track[:, :3]),
         sailed_upwind=bool(first.size) and float(np.abs(upwind[:, 1] - upwind[0, 1]).max()) < 15.0,
@@ -179,9 +192,15 @@ def run(seed: int) -> MotorScore:
     boat, pilot, rows, t = MotorBoat(), MotorPilot(seed, 2.0), [(0.0, 0.0, 0.0)], 0.0
     while pilot.mark < len(MARKS) and t < LIMIT_S:
         noise = rng.normal(0.0, 0.7, 2)
-        heading, _ = pilot.decide(Situation(
-            t_s=t, en_m=(boat.en_m[0] + noise[0], boat.en_m[1] + noise[1]), velocity_en_mps=boat.velocity_en_mps,
-            heading_rad=boat.heading_rad, twd_from_rad=None))
+        heading, _ = pilot.decide(
+            Situation(
+                t_s=t,
+                en_m=(boat.en_m[0] + noise[0], boat.en_m[1] + noise[1]),
+                velocity_en_mps=boat.velocity_en_mps,
+                heading_rad=boat.heading_rad,
+                twd_from_rad=None,
+            )
+        )
         boat = boat.steer(heading)
         t += 1.0
         rows.append((t, *boat.en_m))
@@ -193,8 +212,15 @@ def run_ardurover(seed: int, speedup: float = 8.0) -> MotorScore:
     pilot = MotorPilot(seed, 3.0)
 
     async def job(facade: Autopilot, truth: Callable[[], Truth]) -> Any:
-        return await sail_guided(facade, truth, LocalFrame(ORIGIN), pilot.decide,
-                                 lambda _: pilot.mark >= len(MARKS), LIMIT_S, needs_wind=False)
+        return await sail_guided(
+            facade,
+            truth,
+            LocalFrame(ORIGIN),
+            pilot.decide,
+            lambda _: pilot.mark >= len(MARKS),
+            LIMIT_S,
+            needs_wind=False,
+        )
 
     wind = AR1(0.0, 4.0, seed=seed)
     return _score(seed, pilot, with_boat(wind, seed, 0.0, job, "ardurover", speedup, "motorboat"))
@@ -202,8 +228,11 @@ def run_ardurover(seed: int, speedup: float = 8.0) -> MotorScore:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the seeds and print one line each."""
-    parser = argparse.ArgumentParser(prog="python -m lab.tasks.motor", description="A motorboat by field guidance.",
-                                     epilog="example: python -m lab.tasks.motor --seeds 10")
+    parser = argparse.ArgumentParser(
+        prog="python -m lab.tasks.motor",
+        description="A motorboat by field guidance.",
+        epilog="example: python -m lab.tasks.motor --seeds 10",
+    )
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--autopilot", choices=["model", "ardurover"], default="model")
     parser.add_argument("--speedup", type=float, default=8.0, help="of the real ArduRover (default 8)")

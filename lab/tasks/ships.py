@@ -24,15 +24,7 @@ from companion.geo.frame import LocalFrame
 from companion.messages import AisReport, GeoPoint, Target
 from companion.planner import Plan, Problem, plan
 from companion.planner.problem import VESSELS_SHARE, BoatLimits, ProblemWind, Sigma, evaluate
-from companion.skipper.planning import (
-    ALIKE_S,
-    GIVE_UP_RISK,
-    HORIZON_S,
-    OWN_TIMING_MPS,
-    PART_BY_RUNG,
-    SETTLED_M,
-    soon,
-)
+from companion.skipper.planning import ALIKE_S, GIVE_UP_RISK, HORIZON_S, OWN_TIMING_MPS, PART_BY_RUNG, SETTLED_M, soon
 from companion.traffic import (
     Decision,
     Targets,
@@ -95,7 +87,12 @@ class Scene:
 
 
 def meeting(
-    goal: tuple[float, float], share: float, course_deg: float, speed: float, own_mps: float, miss_m: float = 0.0,
+    goal: tuple[float, float],
+    share: float,
+    course_deg: float,
+    speed: float,
+    own_mps: float,
+    miss_m: float = 0.0,
     **more: float,
 ) -> TaskShip:
     """Return a ship that would meet a boat going straight to ``goal`` after ``share`` of the way."""
@@ -112,16 +109,21 @@ def scenes() -> tuple[Scene, ...]:
     goal, own = (3000.0, 0.0), 2.2
     fast = 10.0 * own
     four = (
-        meeting(goal, 0.25, 180.0, 6.0, own), meeting(goal, 0.45, 0.0, 4.0, own, length_m=90.0),
-        meeting(goal, 0.6, 225.0, 8.0, own), meeting(goal, 0.8, 320.0, 5.0, own, length_m=60.0),
+        meeting(goal, 0.25, 180.0, 6.0, own),
+        meeting(goal, 0.45, 0.0, 4.0, own, length_m=90.0),
+        meeting(goal, 0.6, 225.0, 8.0, own),
+        meeting(goal, 0.8, 320.0, 5.0, own, length_m=60.0),
     )
     return (
         Scene(name="four ships (AVALON)", goal_en=goal, ships=four),
         Scene(name="crossing, ten times faster", goal_en=goal, ships=(meeting(goal, 0.5, 180.0, fast, own),)),
         Scene(name="overtaking, ten times faster", goal_en=goal, ships=(meeting(goal, 0.5, 90.0, fast, own),)),
         Scene(name="head-on, ten times faster", goal_en=goal, ships=(meeting(goal, 0.5, 270.0, fast, own),)),
-        Scene(name="four ships, one turns", goal_en=goal, ships=(
-            *four[1:], meeting(goal, 0.5, 180.0, 6.0, own, miss_m=900.0, turn_at_s=400.0, turn_deg=40.0))),
+        Scene(
+            name="four ships, one turns",
+            goal_en=goal,
+            ships=(*four[1:], meeting(goal, 0.5, 180.0, 6.0, own, miss_m=900.0, turn_at_s=400.0, turn_deg=40.0)),
+        ),
     )
 
 
@@ -174,36 +176,73 @@ class ShipsVoyage:
             arrived = math.dist(self._en, scene.goal_en) < 40.0
         gaps = np.diff(self._planned)
         return ShipsOutcome(
-            scene=scene.name, seed=self._seed, arrived=arrived, time_s=t, least_m=least, plans=len(self._planned),
+            scene=scene.name,
+            seed=self._seed,
+            arrived=arrived,
+            time_s=t,
+            least_m=least,
+            plans=len(self._planned),
             shortest_interval_s=float(gaps.min()) if len(gaps) else math.inf,
-            path_distances_m=tuple(round(d) for d in self._distances), checks_unsafe=self._unsafe, no_plan=self._none,
+            path_distances_m=tuple(round(d) for d in self._distances),
+            checks_unsafe=self._unsafe,
+            no_plan=self._none,
         )
 
     def _hear(self, t_s: float) -> None:
         for number, ship in enumerate(self._scene.ships):
             x, y = (float(p + self._rng.normal(0.0, 4.0)) for p in ship.at(t_s))
             half = 0.5 * ship.length_m
-            self._targets = self._targets.heard(AisReport(
-                t_s=t_s, mmsi=211000001 + number, position=self._frame.geo_from_en(x, y), nav_status=0, ship_type=70,
-                course_rad=ship.course_at(t_s) + float(self._rng.normal(0.0, 0.01)),
-                speed_mps=max(0.0, ship.speed_mps + float(self._rng.normal(0.0, 0.05))),
-                heading_rad=ship.course_at(t_s), bow_m=half, stern_m=half, port_m=0.1 * half, starboard_m=0.1 * half,
-            ))
+            self._targets = self._targets.heard(
+                AisReport(
+                    t_s=t_s,
+                    mmsi=211000001 + number,
+                    position=self._frame.geo_from_en(x, y),
+                    nav_status=0,
+                    ship_type=70,
+                    course_rad=ship.course_at(t_s) + float(self._rng.normal(0.0, 0.01)),
+                    speed_mps=max(0.0, ship.speed_mps + float(self._rng.normal(0.0, 0.05))),
+                    heading_rad=ship.course_at(t_s),
+                    bow_m=half,
+                    stern_m=half,
+                    port_m=0.1 * half,
+                    starboard_m=0.1 * half,
+                )
+            )
 
     def _problem(self, discs: Sequence[Target], part: float | None = None) -> Problem:
         twa, speed = polar_at(self._scene.tws_mps)
         return Problem(
-            start_en=self._en, start_heading_rad=self._heading, goal_en=self._scene.goal_en, goal_radius_m=30.0,
-            wind=ProblemWind(twd_from_rad=math.radians(self._scene.twd_deg), tws_mps=self._scene.tws_mps,
-                      sigma=Sigma(model="ar1", sigma0_rad=0.05, sigma_inf_rad=0.15, rho_hz=0.036)),
-            boat=BoatLimits(no_go_half_rad=math.radians(47.0), turn_rate_radps=0.2, polar_twa_rad=twa, polar_mps=speed,
-                            tack_loss_s=7.0),
-            delta_s=DELTA_S, targets=tuple(discs), vessels_part=part,
+            start_en=self._en,
+            start_heading_rad=self._heading,
+            goal_en=self._scene.goal_en,
+            goal_radius_m=30.0,
+            wind=ProblemWind(
+                twd_from_rad=math.radians(self._scene.twd_deg),
+                tws_mps=self._scene.tws_mps,
+                sigma=Sigma(model="ar1", sigma0_rad=0.05, sigma_inf_rad=0.15, rho_hz=0.036),
+            ),
+            boat=BoatLimits(
+                no_go_half_rad=math.radians(47.0),
+                turn_rate_radps=0.2,
+                polar_twa_rad=twa,
+                polar_mps=speed,
+                tack_loss_s=7.0,
+            ),
+            delta_s=DELTA_S,
+            targets=tuple(discs),
+            vessels_part=part,
         )
 
     def _discs(self, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Target, ...]:
-        keep = Keep(sigmas=sigmas, clearance_m=CLEARANCE_M, own_radius_m=1.8, own_timing_mps=OWN_TIMING_MPS,
-                    ahead_m=CLEARANCE_M, horizon_s=HORIZON_S, settled_m=SETTLED_M)
+        keep = Keep(
+            sigmas=sigmas,
+            clearance_m=CLEARANCE_M,
+            own_radius_m=1.8,
+            own_timing_mps=OWN_TIMING_MPS,
+            ahead_m=CLEARANCE_M,
+            horizon_s=HORIZON_S,
+            settled_m=SETTLED_M,
+        )
         return planning_discs(vessels, t_s, keep)
 
     def _check(self, t_s: float, picture: TrafficPicture) -> None:
@@ -267,8 +306,11 @@ class ShipsVoyage:
 
 def main(argv: list[str] | None = None) -> int:
     """Sail each scene with each seed; a line each."""
-    parser = argparse.ArgumentParser(prog="python -m lab.tasks.ships", description="By plan among ships.",
-                                     epilog="example: python -m lab.tasks.ships --seeds 5")
+    parser = argparse.ArgumentParser(
+        prog="python -m lab.tasks.ships",
+        description="By plan among ships.",
+        epilog="example: python -m lab.tasks.ships --seeds 5",
+    )
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--json", action="store_true", help="one JSON object a line")
     args = parser.parse_args(argv)
@@ -283,7 +325,8 @@ def main(argv: list[str] | None = None) -> int:
                 sys.stdout.write(
                     f"{o.scene:28s} seed {o.seed}  {'arrived' if o.arrived else 'LOST'} after {o.time_s:.0f} s  "
                     f"nearest hulls {o.least_m:.0f} m  plans {o.plans}, {o.shortest_interval_s:.0f} s apart at least, "
-                    f"successive paths {list(o.path_distances_m)} m apart  without a plan {o.no_plan}\n")
+                    f"successive paths {list(o.path_distances_m)} m apart  without a plan {o.no_plan}\n"
+                )
             sys.stdout.flush()
     return 0 if good else 1
 

@@ -24,9 +24,9 @@ from lab.tasks.controllers import line_following
 from sitl.scenario import TASK_S, StationScore, station_score
 from sitl.world import LENGTH_M, SimulatedVaimos, habits_for, wind_for
 
-PLAN_HALF_M = 2.0     # the plan: to and fro between two waypoints this far from the station, across the wind
+PLAN_HALF_M = 2.0  # the plan: to and fro between two waypoints this far from the station, across the wind
 PLAN_REACHED_M = 3.0
-PLAN_R_M = 10.0        # of the line controller
+PLAN_R_M = 10.0  # of the line controller
 
 
 class ByPlan:
@@ -55,8 +55,16 @@ class ByPlan:
         past = (here[0] - mark[0]) * (mark[0] - self._from[0]) + (here[1] - mark[1]) * (mark[1] - self._from[1]) > 0.0
         if past or math.dist(here, mark) < PLAN_REACHED_M:
             self._from, self._loop = mark, self._loop[::-1]
-        command = line_following(here, seen.heading_rad, twd, self._from, self._loop[0], self._q, r_m=PLAN_R_M,
-                                 close_hauled_rad=habits.no_go_half_rad)
+        command = line_following(
+            here,
+            seen.heading_rad,
+            twd,
+            self._from,
+            self._loop[0],
+            self._q,
+            r_m=PLAN_R_M,
+            close_hauled_rad=habits.no_go_half_rad,
+        )
         self._q = command.q
         self._state, heading, _ = helm(self._state, seen, command.heading_rad, habits)
         return heading
@@ -87,21 +95,28 @@ def run(seed: int, method: str = "field") -> tuple[NDArray[np.float64], StationS
 
 def main(argv: list[str] | None = None) -> int:
     """Run the seeds and print a line each and the medians."""
-    parser = argparse.ArgumentParser(prog="python -m lab.tasks.station", description="Station keeping on VAIMOS.",
-                                     epilog="example: python -m lab.tasks.station --runs 20")
+    parser = argparse.ArgumentParser(
+        prog="python -m lab.tasks.station",
+        description="Station keeping on VAIMOS.",
+        epilog="example: python -m lab.tasks.station --runs 20",
+    )
     parser.add_argument("--runs", type=int, default=20)
     parser.add_argument("--first", type=int, default=0, help="the first seed")
     parser.add_argument("--method", choices=["field", "plan"], default="field")
     args = parser.parse_args(argv)
     scores = [run(seed, args.method)[1] for seed in range(args.first, args.first + args.runs)]
     for seed, s in enumerate(scores, start=args.first):
-        sys.stdout.write(f"{seed:3d}  95 % within {s.radius95_m:5.1f} m ({s.lengths:.1f} lengths)  mean distance "
-                         f"{s.mean_m:5.1f} m  SailBot {s.sailbot:4.1f}  {'kept' if s.kept else 'lost'}\n")
+        sys.stdout.write(
+            f"{seed:3d}  95 % within {s.radius95_m:5.1f} m ({s.lengths:.1f} lengths)  mean distance "
+            f"{s.mean_m:5.1f} m  SailBot {s.sailbot:4.1f}  {'kept' if s.kept else 'lost'}\n"
+        )
     r = np.asarray([s.radius95_m for s in scores])
     mean, points = np.median([s.mean_m for s in scores]), np.median([s.sailbot for s in scores])
-    sys.stdout.write(f"median 95 % radius {np.median(r):.1f} m ({np.median(r) / LENGTH_M:.2f} lengths), "
-                     f"mean distance {mean:.1f} m, SailBot {points:.1f}, "
-                     f"kept {sum(s.kept for s in scores)}/{len(scores)}\n")
+    sys.stdout.write(
+        f"median 95 % radius {np.median(r):.1f} m ({np.median(r) / LENGTH_M:.2f} lengths), "
+        f"mean distance {mean:.1f} m, SailBot {points:.1f}, "
+        f"kept {sum(s.kept for s in scores)}/{len(scores)}\n"
+    )
     return 0
 
 

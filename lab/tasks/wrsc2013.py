@@ -31,7 +31,7 @@ from sitl.world import LENGTH_M, SimulatedVaimos, habits_for, summary, wind_for
 APPROACH_M = 5.0
 ENTRY_LIMIT_S = 2700.0
 LEAVE_WITHIN_S = 900.0
-ORIGIN = GeoPoint(lat_deg=48.360, lon_deg=-4.540)   # the roads of Brest
+ORIGIN = GeoPoint(lat_deg=48.360, lon_deg=-4.540)  # the roads of Brest
 INTRUDER_LENGTH_M = 4.0
 METHODS = ("field", "plan", "schmitt")
 
@@ -46,7 +46,7 @@ class Wrsc2013Course:
     entry_s: float
     heading_rad: float
     speed_mps: float
-    through_en: tuple[float, float]   # a point of its track inside the square
+    through_en: tuple[float, float]  # a point of its track inside the square
     entry_en: tuple[float, float]
 
     def at(self, t_s: float | NDArray[np.float64]) -> tuple[Any, Any]:
@@ -58,9 +58,7 @@ class Wrsc2013Course:
     def crossing_s(self) -> float:
         """How long it is inside the square [s]."""
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        ends = [
-            (math.copysign(HALF_M, v) - p) / v for p, v in zip(self.entry_en, (s, c), strict=True) if abs(v) > 1e-9
-        ]
+        ends = [(math.copysign(HALF_M, v) - p) / v for p, v in zip(self.entry_en, (s, c), strict=True) if abs(v) > 1e-9]
         return min(ends) / self.speed_mps
 
 
@@ -75,8 +73,16 @@ def draw(seed: int) -> Wrsc2013Course:
     x, y = (float(v) for v in rng.uniform(-0.5 * HALF_M, 0.5 * HALF_M, 2))
     s, c = math.sin(heading), math.cos(heading)
     back = min((p + math.copysign(HALF_M, v)) / v for p, v in ((x, s), (y, c)) if abs(v) > 1e-9)
-    return Wrsc2013Course(seed=seed, twd_from_rad=twd, tws_mps=tws, entry_s=float(rng.uniform(60.0, ENTRY_LIMIT_S)),
-                  heading_rad=heading, speed_mps=speed, through_en=(x, y), entry_en=(x - back * s, y - back * c))
+    return Wrsc2013Course(
+        seed=seed,
+        twd_from_rad=twd,
+        tws_mps=tws,
+        entry_s=float(rng.uniform(60.0, ENTRY_LIMIT_S)),
+        heading_rad=heading,
+        speed_mps=speed,
+        through_en=(x, y),
+        entry_en=(x - back * s, y - back * c),
+    )
 
 
 # ------------------------------------------------------------------------------------------- scorer
@@ -85,10 +91,10 @@ class Wrsc2013Score:
     """The task's four booleans and its figures; distances are between hulls' discs [m]."""
 
     seed: int
-    stayed: bool          # in the square until the intruder entered
-    left_in_time: bool    # out within 15 minutes of its entry
-    kept_clear: bool      # never under 5 m
-    crossed: bool         # the intruder did enter within 45 minutes
+    stayed: bool  # in the square until the intruder entered
+    left_in_time: bool  # out within 15 minutes of its entry
+    kept_clear: bool  # never under 5 m
+    crossed: bool  # the intruder did enter within 45 minutes
     least_m: float
     left_after_s: float | None
 
@@ -116,9 +122,13 @@ def score(track: NDArray[np.float64], intruder: NDArray[np.float64], *, seed: in
     left_after = float(t[entered + left[0]] - t[entered]) if left.size else None
     least = least_distance_m(p, intruder) - 0.5 * (LENGTH_M + INTRUDER_LENGTH_M)
     return Wrsc2013Score(
-        seed=seed, stayed=stayed, left_in_time=left_after is not None and left_after <= LEAVE_WITHIN_S,
-        kept_clear=least >= APPROACH_M, crossed=entered < len(t) and float(t[entered]) <= ENTRY_LIMIT_S,
-        least_m=least, left_after_s=left_after,
+        seed=seed,
+        stayed=stayed,
+        left_in_time=left_after is not None and left_after <= LEAVE_WITHIN_S,
+        kept_clear=least >= APPROACH_M,
+        crossed=entered < len(t) and float(t[entered]) <= ENTRY_LIMIT_S,
+        least_m=least,
+        left_after_s=left_after,
     )
 
 
@@ -141,11 +151,17 @@ def broadcast(course: Wrsc2013Course, t_s: float, rng: np.random.Generator, fram
     x, y = course.at(t_s)
     noise = rng.normal(0.0, 0.7, 2)
     point = frame.geo_from_en(float(x) + float(noise[0]), float(y) + float(noise[1]))
-    return json.dumps({
-        "id": 1, "lat": round(point.lat_deg, 7), "lon": round(point.lon_deg, 7),
-        "heading_deg": round(math.degrees(course.heading_rad), 1), "speed_mps": round(course.speed_mps, 2),
-        "length_m": INTRUDER_LENGTH_M, "name": "INTRUDER",
-    }).encode()
+    return json.dumps(
+        {
+            "id": 1,
+            "lat": round(point.lat_deg, 7),
+            "lon": round(point.lon_deg, 7),
+            "heading_deg": round(math.degrees(course.heading_rad), 1),
+            "speed_mps": round(course.speed_mps, 2),
+            "length_m": INTRUDER_LENGTH_M,
+            "name": "INTRUDER",
+        }
+    ).encode()
 
 
 @dataclass(slots=True)
@@ -166,10 +182,12 @@ def run(seed: int, method: str = "field") -> Run:
     course = draw(seed)
     rng = np.random.default_rng((2013, seed, 7))
     frame = LocalFrame(ORIGIN)
-    boat = SimulatedVaimos.launch(wind_for(course.twd_from_rad, course.tws_mps, seed), rng, (0.0, 0.0),
-                         course.twd_from_rad + math.pi / 2.0)
+    boat = SimulatedVaimos.launch(
+        wind_for(course.twd_from_rad, course.tws_mps, seed), rng, (0.0, 0.0), course.twd_from_rad + math.pi / 2.0
+    )
     skipper = (
-        PlanSkipper(habits_for, frame, seed) if method == "plan"
+        PlanSkipper(habits_for, frame, seed)
+        if method == "plan"
         else FieldSkipper(habits_for, frame, look_ahead=method != "schmitt")
     )
     end = course.entry_s + LEAVE_WITHIN_S + 30.0
@@ -183,55 +201,79 @@ def run(seed: int, method: str = "field") -> Run:
         ix, iy = course.at(boat.t_s)
         is_out = max(abs(x), abs(y)) > HALF_M and boat.t_s > course.entry_s
         if is_out and done_s is None and math.hypot(x - ix, y - iy) > 30.0:
-            done_s = boat.t_s + 60.0     # a minute more, or until the intruder has left: it must stay clear outside
+            done_s = boat.t_s + 60.0  # a minute more, or until the intruder has left: it must stay clear outside
         gone = boat.t_s > course.entry_s + course.crossing_s
         if done_s is not None and boat.t_s > done_s and (gone or math.hypot(x - ix, y - iy) > 80.0):
             break
     track = boat.positions()
     intruder = np.column_stack(course.at(track[:, 0]))
-    return Run(course=course, track=track, intruder=intruder, score=score(track, intruder, seed=seed),
-               irons=skipper.irons, plans=skipper.plans, last_resort_s=skipper.last_resort_s)
+    return Run(
+        course=course,
+        track=track,
+        intruder=intruder,
+        score=score(track, intruder, seed=seed),
+        irons=skipper.irons,
+        plans=skipper.plans,
+        last_resort_s=skipper.last_resort_s,
+    )
 
 
 def sail(job: Job[str]) -> dict[str, Any]:
     """Sail a seed by the method of the case; return its score."""
     result = run(job.seed, job.case)
-    out = {**asdict(result.score), "method": job.case, "complete": result.score.complete, "irons": result.irons,
-           "plans": result.plans, "last_resort_s": result.last_resort_s,
-           "tws_mps": round(result.course.tws_mps, 2), "intruder_mps": round(result.course.speed_mps, 2)}
+    out = {
+        **asdict(result.score),
+        "method": job.case,
+        "complete": result.score.complete,
+        "irons": result.irons,
+        "plans": result.plans,
+        "last_resort_s": result.last_resort_s,
+        "tws_mps": round(result.course.tws_mps, 2),
+        "intruder_mps": round(result.course.speed_mps, 2),
+    }
     return {k: (round(v, 2) if isinstance(v, float) else v) for k, v in out.items()}
 
 
 def wrsc2013(seeds: Iterable[int], methods: Iterable[str]) -> Experiment[str]:
     """Return each seed by each method."""
     return Experiment(
-        name="wrsc2013", sail=sail, jobs=[Job(seed=seed, case=method) for method in methods for seed in seeds],
+        name="wrsc2013",
+        sail=sail,
+        jobs=[Job(seed=seed, case=method) for method in methods for seed in seeds],
         key=lambda job: {"scenario": "wrsc2013", "method": job.case, "seed": job.seed},
-        is_failed=lambda row: not row["complete"])
+        is_failed=lambda row: not row["complete"],
+    )
 
 
 def table(rows: list[dict[str, Any]], method: str) -> dict[str, Any]:
     """Return the figures of a campaign."""
     n = len(rows)
     return {
-        "method": method, "runs": n, "complete": sum(r["complete"] for r in rows),
+        "method": method,
+        "runs": n,
+        "complete": sum(r["complete"] for r in rows),
         "share_complete": sum(r["complete"] for r in rows) / max(1, n),
-        "stayed": sum(r["stayed"] for r in rows), "left_in_time": sum(r["left_in_time"] for r in rows),
+        "stayed": sum(r["stayed"] for r in rows),
+        "left_in_time": sum(r["left_in_time"] for r in rows),
         "kept_clear": sum(r["kept_clear"] for r in rows),
         "least_m": min((r["least_m"] for r in rows), default=math.inf),
         "failed_seeds": [r["seed"] for r in rows if not r["complete"]],
-        "irons": sum(r["irons"] for r in rows), "plans": sum(r["plans"] for r in rows),
+        "irons": sum(r["irons"] for r in rows),
+        "plans": sum(r["plans"] for r in rows),
         "last_resort_s": sum(r["last_resort_s"] for r in rows),
-        "quantiles": summary({
-            "least_m": [r["least_m"] for r in rows], "left_after_s": [r["left_after_s"] or math.nan for r in rows],
-        }),
+        "quantiles": summary(
+            {"least_m": [r["least_m"] for r in rows], "left_after_s": [r["left_after_s"] or math.nan for r in rows]}
+        ),
     }
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run the campaign and print its table."""
-    parser = argparse.ArgumentParser(prog="python -m lab.tasks.wrsc2013", description=__doc__.split("\n", 1)[0],
-                                     epilog="example: python -m lab.tasks.wrsc2013 --runs 500 --method field")
+    parser = argparse.ArgumentParser(
+        prog="python -m lab.tasks.wrsc2013",
+        description=__doc__.split("\n", 1)[0],
+        epilog="example: python -m lab.tasks.wrsc2013 --runs 500 --method field",
+    )
     parser.add_argument("--runs", type=int, default=50, help="seeds 0..N-1 (default 50)")
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--method", choices=[*METHODS, "all"], default="all", help="who steers (default: all)")

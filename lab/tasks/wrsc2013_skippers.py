@@ -29,20 +29,30 @@ from lab.tasks.controllers import line_following
 from sitl.world import LENGTH_M
 
 HALF_M = 100.0
-SHUTTLE_M = 30.0      # while waiting: to and fro across the wind, this far each side of the centre
+SHUTTLE_M = 30.0  # while waiting: to and fro across the wind, this far each side of the centre
 WAIT_BOX_M = 85.0
-FAR_M = 600.0         # beyond what both can run in a minute and a half
-CLEARANCE_M = 12.0    # between hulls; the task asks for 5
-KEEP = Keep(sigmas=risk_factor(1e-4), clearance_m=CLEARANCE_M, own_radius_m=0.5 * LENGTH_M, own_timing_mps=0.05,
-            ahead_m=25.0, horizon_s=180.0)
+FAR_M = 600.0  # beyond what both can run in a minute and a half
+CLEARANCE_M = 12.0  # between hulls; the task asks for 5
+KEEP = Keep(
+    sigmas=risk_factor(1e-4),
+    clearance_m=CLEARANCE_M,
+    own_radius_m=0.5 * LENGTH_M,
+    own_timing_mps=0.05,
+    ahead_m=25.0,
+    horizon_s=180.0,
+)
 
 
 class FieldSkipper:
     """Waits by shuttling through the centre, leaves by the side that is soonest reached clear of the intruder."""
 
     def __init__(
-        self, habits_for: Callable[..., GuidanceSettings], frame: LocalFrame, *, look_ahead: bool,
-        half_m: float = HALF_M
+        self,
+        habits_for: Callable[..., GuidanceSettings],
+        frame: LocalFrame,
+        *,
+        look_ahead: bool,
+        half_m: float = HALF_M,
     ) -> None:
         self.irons = self.plans = 0
         self.last_resort_s = 0.0
@@ -123,8 +133,14 @@ def obstacles_of(vessels: tuple[Vessel, ...], seen: Situation) -> tuple[MovingOb
         sigma_now = max(now.sigma_along_m, now.sigma_across_m)
         sigma_later = max(later.sigma_along_m, later.sigma_across_m)
         keep = now.reach_m + KEEP.own_radius_m + KEEP.clearance_m + k * sigma_now
-        out.append(MovingObstacle(en_m=now.mean_en_m, velocity_en_mps=now.velocity_en_mps, keep_m=keep,
-                            growth_mps=k * (sigma_later - sigma_now) / 90.0))
+        out.append(
+            MovingObstacle(
+                en_m=now.mean_en_m,
+                velocity_en_mps=now.velocity_en_mps,
+                keep_m=keep,
+                growth_mps=k * (sigma_later - sigma_now) / 90.0,
+            )
+        )
     return tuple(out)
 
 
@@ -133,27 +149,36 @@ CHECK_S = 2.0
 RETRY_S = 10.0
 # Where to leave: two places on each side of the square, 30 m outside it.
 _OUT_M = HALF_M + 30.0
-_GOALS = tuple(
-    goal for side in (-_OUT_M, _OUT_M) for off in (-45.0, 45.0) for goal in ((side, off), (off, side))
-)
+_GOALS = tuple(goal for side in (-_OUT_M, _OUT_M) for off in (-45.0, 45.0) for goal in ((side, off), (off, side)))
 GOAL_RADIUS_M = 22.0
 WIND_SIGMA = Sigma(model="ar1", sigma0_rad=math.radians(3.0), sigma_inf_rad=math.radians(9.0), rho_hz=0.036)
 
 
 def problem_for(
-    seen: Situation, habits: GuidanceSettings, goal_en: tuple[float, float], discs: tuple[Target, ...], *,
+    seen: Situation,
+    habits: GuidanceSettings,
+    goal_en: tuple[float, float],
+    discs: tuple[Target, ...],
+    *,
     goal_radius_m: float = GOAL_RADIUS_M,
 ) -> Problem:
     """Return the planning problem of the moment; its clock starts now, as the discs' does."""
     assert seen.twd_from_rad is not None
     return Problem(
-        start_en=seen.en_m, start_heading_rad=seen.heading_rad, goal_en=goal_en, goal_radius_m=goal_radius_m,
+        start_en=seen.en_m,
+        start_heading_rad=seen.heading_rad,
+        goal_en=goal_en,
+        goal_radius_m=goal_radius_m,
         wind=ProblemWind(twd_from_rad=seen.twd_from_rad, tws_mps=seen.tws_mps, sigma=WIND_SIGMA),
         boat=BoatLimits(
-            no_go_half_rad=habits.no_go_half_rad, turn_rate_radps=habits.turn_rate_radps,
-            polar_twa_rad=habits.polar_twa_rad, polar_mps=habits.polar_mps, tack_loss_s=habits.tack_s,
+            no_go_half_rad=habits.no_go_half_rad,
+            turn_rate_radps=habits.turn_rate_radps,
+            polar_twa_rad=habits.polar_twa_rad,
+            polar_mps=habits.polar_mps,
+            tack_loss_s=habits.tack_s,
         ),
-        delta_s=0.7, targets=tuple(replace(disc, spread=None) for disc in discs),
+        delta_s=0.7,
+        targets=tuple(replace(disc, spread=None) for disc in discs),
     )
 
 
@@ -200,8 +225,16 @@ class PlanSkipper(FieldSkipper):
     def _follow(self, seen: Situation, a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
         assert seen.twd_from_rad is not None
         habits = self._habits_for(seen.tws_mps)
-        command = line_following(seen.en_m, seen.heading_rad, seen.twd_from_rad, a, b, self._q, r_m=12.0,
-                                 close_hauled_rad=habits.no_go_half_rad)
+        command = line_following(
+            seen.en_m,
+            seen.heading_rad,
+            seen.twd_from_rad,
+            a,
+            b,
+            self._q,
+            r_m=12.0,
+            close_hauled_rad=habits.no_go_half_rad,
+        )
         self._q = command.q
         self._helm, heading, _ = helm(self._helm, seen, command.heading_rad, habits)
         self.irons = self._helm.irons + self._state.irons
@@ -225,9 +258,7 @@ class PlanSkipper(FieldSkipper):
         """Check the active plan against the targets; plan again where that says so."""
         discs = planning_discs(vessels, seen.t_s, KEEP, motion=STEADY)
         own_discs = tuple(d for d in discs if d.from_s == 0.0)
-        near = any(
-            math.hypot(seen.en_m[0] - d.x_m, seen.en_m[1] - d.y_m) < d.radius_m for d in own_discs
-        )
+        near = any(math.hypot(seen.en_m[0] - d.x_m, seen.en_m[1] - d.y_m) < d.radius_m for d in own_discs)
         conflicts: tuple[Conflict, ...] = ()
         verdict = Decision.REPLAN
         if self._way is not None and self._goal is not None:
@@ -236,7 +267,7 @@ class PlanSkipper(FieldSkipper):
             conflicts = check_legs(legs, discs)
             verdict = decide(conflicts, since_replan_s=seen.t_s - self._planned_s)
         if self._way is None and seen.t_s - self._planned_s < RETRY_S:
-            verdict = Decision.WAIT          # nothing was found a moment ago: the field has the helm meanwhile
+            verdict = Decision.WAIT  # nothing was found a moment ago: the field has the helm meanwhile
         is_out = max(abs(seen.en_m[0]), abs(seen.en_m[1])) > HALF_M + 10.0
         if verdict is Decision.REPLAN and not near and not (is_out and not conflicts):
             self._plan(seen, habits, discs)

@@ -140,7 +140,7 @@ def check(path: Path) -> str:
 
 
 DEFAULTS = Path(__file__).with_name("sailboat.parm")
-MOTOR = "-motor"      # of a model: the hull with an auxiliary motor
+MOTOR = "-motor"  # of a model: the hull with an auxiliary motor
 THROTTLE = ("SERVO3_FUNCTION 70", "SERVO3_MIN 1000", "SERVO3_MAX 2000", "SERVO3_TRIM 1500")
 _WIND_HZ = 5.0
 _WIND = ("SIM_WIND_DIR", "SIM_WIND_SPD")
@@ -172,9 +172,18 @@ class ArduRover:
     """
 
     def __init__(
-        self, program: Path, home: GeoPoint, wind: WindModel, *, heading_rad: float = 0.0, speedup: float = 1.0,
-        instance: int | None = None, parameters: Mapping[str, float] | None = None, folder: Path | None = None,
-        model: str = "sailboat", waters: Waters | None = None,
+        self,
+        program: Path,
+        home: GeoPoint,
+        wind: WindModel,
+        *,
+        heading_rad: float = 0.0,
+        speedup: float = 1.0,
+        instance: int | None = None,
+        parameters: Mapping[str, float] | None = None,
+        folder: Path | None = None,
+        model: str = "sailboat",
+        waters: Waters | None = None,
     ) -> None:
         self._program, self._home, self._wind = program.resolve(), home, wind
         self._heading_rad, self._speedup = heading_rad, speedup
@@ -232,10 +241,28 @@ class ArduRover:
         heading_deg = math.degrees(wrap_two_pi(self._heading_rad))
         log = self._stack.enter_context((folder / "ardurover.log").open("wb"))
         self._process = await asyncio.create_subprocess_exec(
-            str(self._program), "--model", self._model, "--speedup", f"{self._speedup:g}", "-I", str(self.instance),
-            "--home", f"{self._home.lat_deg:.7f},{self._home.lon_deg:.7f},0,{heading_deg:.3f}",
-            "--defaults", str(defaults), "-w", "--serial0", "tcp:0", "--serial1", "tcp:2", "--serial2", "tcp:3",
-            cwd=folder, stdout=log, stderr=asyncio.subprocess.STDOUT, stdin=asyncio.subprocess.DEVNULL,
+            str(self._program),
+            "--model",
+            self._model,
+            "--speedup",
+            f"{self._speedup:g}",
+            "-I",
+            str(self.instance),
+            "--home",
+            f"{self._home.lat_deg:.7f},{self._home.lon_deg:.7f},0,{heading_deg:.3f}",
+            "--defaults",
+            str(defaults),
+            "-w",
+            "--serial0",
+            "tcp:0",
+            "--serial1",
+            "tcp:2",
+            "--serial2",
+            "tcp:3",
+            cwd=folder,
+            stdout=log,
+            stderr=asyncio.subprocess.STDOUT,
+            stdin=asyncio.subprocess.DEVNULL,
         )
         self._stack.push_async_callback(self._stop)
         await self._wait_for_port(folder)
@@ -349,12 +376,20 @@ class ArduRover:
         beat, mission = (self._seen.get(n) for n in ("HEARTBEAT", "MISSION_CURRENT"))
         twd, tws = self._wind_here()
         return Truth(
-            t_s=self.t_s, boot_s=self._boot_s, east_m=east, north_m=north, position=position,
-            heading_rad=wrap_two_pi(sim.yaw), speed_mps=math.hypot(ve, vn), velocity_en_mps=(ve, vn),
-            twd_from_rad=twd, tws_mps=tws,
+            t_s=self.t_s,
+            boot_s=self._boot_s,
+            east_m=east,
+            north_m=north,
+            position=position,
+            heading_rad=wrap_two_pi(sim.yaw),
+            speed_mps=math.hypot(ve, vn),
+            velocity_en_mps=(ve, vn),
+            twd_from_rad=twd,
+            tws_mps=tws,
             mode=_KNOWN_MODES.get(beat.custom_mode, Mode.HOLD) if beat else Mode.INITIALISING,
             is_armed=bool(beat and beat.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED),
-            mission_seq=mission.seq if mission else 0, tacks=self._tacks,
+            mission_seq=mission.seq if mission else 0,
+            tacks=self._tacks,
         )
 
     def _send(self, message: Any) -> None:
@@ -378,8 +413,12 @@ class ArduRover:
                     self.texts.append((self._boot_s, m.severity, m.text))
             elif name == "HEARTBEAT" and not self._is_heard:
                 self._is_heard = True
-                for msgid, hertz in ((mav.MAVLINK_MSG_ID_SIMSTATE, 5), (mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5),
-                                     (mav.MAVLINK_MSG_ID_ATTITUDE, 5), (mav.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, 2)):
+                for msgid, hertz in (
+                    (mav.MAVLINK_MSG_ID_SIMSTATE, 5),
+                    (mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5),
+                    (mav.MAVLINK_MSG_ID_ATTITUDE, 5),
+                    (mav.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, 2),
+                ):
                     self.command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, float(msgid), 1e6 / hertz)
 
     async def _live(self) -> None:

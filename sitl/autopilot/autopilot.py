@@ -115,12 +115,20 @@ class SimulatedAutopilot:
         s = self.core.vehicle.state
         east, north = self.core.vehicle.true_position
         return Truth(
-            t_s=self.t_s, boot_s=self.core.boot_s, east_m=east, north_m=north,
-            position=self.core.chart.point((east, north)), heading_rad=wrap_two_pi(float(s[k.S_YAW])),
+            t_s=self.t_s,
+            boot_s=self.core.boot_s,
+            east_m=east,
+            north_m=north,
+            position=self.core.chart.point((east, north)),
+            heading_rad=wrap_two_pi(float(s[k.S_YAW])),
             speed_mps=math.hypot(float(s[k.S_VE]), float(s[k.S_VN])),
-            velocity_en_mps=(float(s[k.S_VE]), float(s[k.S_VN])), twd_from_rad=wrap_two_pi(float(s[k.S_WDIR])),
-            tws_mps=float(s[k.S_WSPD]), mode=self.pilot.helm.mode, is_armed=self.core.is_armed,
-            mission_seq=self.pilot.helm.mission.current_seq, tacks=int(s[k.S_TACKS]),
+            velocity_en_mps=(float(s[k.S_VE]), float(s[k.S_VN])),
+            twd_from_rad=wrap_two_pi(float(s[k.S_WDIR])),
+            tws_mps=float(s[k.S_WSPD]),
+            mode=self.pilot.helm.mode,
+            is_armed=self.core.is_armed,
+            mission_seq=self.pilot.helm.mission.current_seq,
+            tacks=int(s[k.S_TACKS]),
         )
 
     def reboot(self) -> None:

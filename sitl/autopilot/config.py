@@ -91,7 +91,7 @@ class Departures:
 
 HOME = GeoPoint(lat_deg=51.1, lon_deg=-1.3)
 
-FRAME_M = 50_000.0   # metres about one place are good to here
+FRAME_M = 50_000.0  # metres about one place are good to here
 
 # 2026-06-09, 10:13 UTC. Unix time of every simulated voyage's start: stamps must not depend on when it was run.
 EPOCH_S = 1_781_000_000.0
@@ -171,9 +171,9 @@ class VaneState(enum.Enum):
     """How the wind vane is broken."""
 
     OK = "ok"
-    FROZEN = "frozen"      # its angle to the bow stays as it is
-    OFFSET = "offset"      # mounted wrong by ``value_rad``
-    SPIKES = "spikes"      # one reading in fifty is anywhere within ``value_rad``
+    FROZEN = "frozen"  # its angle to the bow stays as it is
+    OFFSET = "offset"  # mounted wrong by ``value_rad``
+    SPIKES = "spikes"  # one reading in fifty is anywhere within ``value_rad``
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

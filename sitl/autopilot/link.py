@@ -13,39 +13,64 @@ from companion.mavlink.wire import Dialect
 LOOP_S = 0.02
 # What a port sends at 1 Hz without being asked, in the order seen on the real one.
 DEFAULT_STREAMS: tuple[int, ...] = (
-    mav.MAVLINK_MSG_ID_HEARTBEAT, mav.MAVLINK_MSG_ID_AHRS, mav.MAVLINK_MSG_ID_AHRS2, mav.MAVLINK_MSG_ID_ATTITUDE,
-    mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mav.MAVLINK_MSG_ID_VFR_HUD, mav.MAVLINK_MSG_ID_SYS_STATUS,
-    mav.MAVLINK_MSG_ID_POWER_STATUS, mav.MAVLINK_MSG_ID_MEMINFO, mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
-    mav.MAVLINK_MSG_ID_MISSION_CURRENT, mav.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW, mav.MAVLINK_MSG_ID_RC_CHANNELS,
-    mav.MAVLINK_MSG_ID_RAW_IMU, mav.MAVLINK_MSG_ID_SCALED_IMU2, mav.MAVLINK_MSG_ID_SCALED_IMU3,
-    mav.MAVLINK_MSG_ID_SCALED_PRESSURE, mav.MAVLINK_MSG_ID_SCALED_PRESSURE2, mav.MAVLINK_MSG_ID_GPS_RAW_INT,
-    mav.MAVLINK_MSG_ID_SYSTEM_TIME, mav.MAVLINK_MSG_ID_RC_CHANNELS_SCALED, mav.MAVLINK_MSG_ID_SIMSTATE,
-    mav.MAVLINK_MSG_ID_WIND, mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT, mav.MAVLINK_MSG_ID_VIBRATION,
-    mav.MAVLINK_MSG_ID_RPM, mav.MAVLINK_MSG_ID_BATTERY_STATUS, mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
-    mav.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, mav.MAVLINK_MSG_ID_FENCE_STATUS,
-    mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, mav.MAVLINK_MSG_ID_HOME_POSITION,
+    mav.MAVLINK_MSG_ID_HEARTBEAT,
+    mav.MAVLINK_MSG_ID_AHRS,
+    mav.MAVLINK_MSG_ID_AHRS2,
+    mav.MAVLINK_MSG_ID_ATTITUDE,
+    mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+    mav.MAVLINK_MSG_ID_VFR_HUD,
+    mav.MAVLINK_MSG_ID_SYS_STATUS,
+    mav.MAVLINK_MSG_ID_POWER_STATUS,
+    mav.MAVLINK_MSG_ID_MEMINFO,
+    mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
+    mav.MAVLINK_MSG_ID_MISSION_CURRENT,
+    mav.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
+    mav.MAVLINK_MSG_ID_RC_CHANNELS,
+    mav.MAVLINK_MSG_ID_RAW_IMU,
+    mav.MAVLINK_MSG_ID_SCALED_IMU2,
+    mav.MAVLINK_MSG_ID_SCALED_IMU3,
+    mav.MAVLINK_MSG_ID_SCALED_PRESSURE,
+    mav.MAVLINK_MSG_ID_SCALED_PRESSURE2,
+    mav.MAVLINK_MSG_ID_GPS_RAW_INT,
+    mav.MAVLINK_MSG_ID_SYSTEM_TIME,
+    mav.MAVLINK_MSG_ID_RC_CHANNELS_SCALED,
+    mav.MAVLINK_MSG_ID_SIMSTATE,
+    mav.MAVLINK_MSG_ID_WIND,
+    mav.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+    mav.MAVLINK_MSG_ID_VIBRATION,
+    mav.MAVLINK_MSG_ID_RPM,
+    mav.MAVLINK_MSG_ID_BATTERY_STATUS,
+    mav.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+    mav.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT,
+    mav.MAVLINK_MSG_ID_FENCE_STATUS,
+    mav.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
+    mav.MAVLINK_MSG_ID_HOME_POSITION,
 )
 # Can be asked for, off by default.
 OPTIONAL_STREAMS: tuple[int, ...] = (
-    mav.MAVLINK_MSG_ID_AIS_VESSEL, mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION, mav.MAVLINK_MSG_ID_HIGH_LATENCY2,
-    mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION, mav.MAVLINK_MSG_ID_GPS2_RAW,
+    mav.MAVLINK_MSG_ID_AIS_VESSEL,
+    mav.MAVLINK_MSG_ID_ATTITUDE_QUATERNION,
+    mav.MAVLINK_MSG_ID_HIGH_LATENCY2,
+    mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    mav.MAVLINK_MSG_ID_GPS2_RAW,
 )
 STREAMABLE = frozenset((*DEFAULT_STREAMS, *OPTIONAL_STREAMS))
 # MAV_DATA_STREAM -> its messages
 GROUPS: dict[int, tuple[int, ...]] = {
-    1: (27, 116, 129, 29, 137),            # raw sensors
+    1: (27, 116, 129, 29, 137),  # raw sensors
     2: (1, 125, 152, 42, 24, 62, 162, 87),  # extended status
-    3: (36, 65),                           # radio control
-    4: (34,),                              # raw controller
-    6: (33, 32),                           # position
-    10: (30, 163, 178, 164),               # extra 1
-    11: (74,),                             # extra 2
-    12: (168, 193, 241, 226, 147, 2),      # extra 3
+    3: (36, 65),  # radio control
+    4: (34,),  # raw controller
+    6: (33, 32),  # position
+    10: (30, 163, 178, 164),  # extra 1
+    11: (74,),  # extra 2
+    12: (168, 193, 241, 226, 147, 2),  # extra 3
 }
 MAX_BUFFER_BYTES = 65536
 MAX_UNREAD_BYTES = 1 << 20
 FIRST_STREAMS_S = 2.96
-SIGNING_AHEAD = 60 * 100_000   # of a key's timestamp when it is taken up [10 µs]
+SIGNING_AHEAD = 60 * 100_000  # of a key's timestamp when it is taken up [10 µs]
 
 
 class MavlinkPort:
@@ -54,7 +79,7 @@ class MavlinkPort:
     def __init__(self, number: int, sysid: int) -> None:
         self.number = number
         self.is_heard = False
-        self.is_plugged = True    # else what is said on it goes nowhere, and its bytes are not made
+        self.is_plugged = True  # else what is said on it goes nowhere, and its bytes are not made
         self.last_heard_s = -math.inf
         self._codec = Dialect(None, srcSystem=sysid, srcComponent=1)
         self._codec.robust_parsing = True
@@ -64,7 +89,7 @@ class MavlinkPort:
         self._interval_s: dict[int, float] = {}
         # messages of one rate are sent together: (interval, next due time, messages)
         self._buckets: list[tuple[float, float, tuple[int, ...]]] = []
-        self.due_s = math.inf     # when the next stream is
+        self.due_s = math.inf  # when the next stream is
         self.restart(0.0)
 
     def sign(self, key: bytes, timestamp: int) -> None:
@@ -75,7 +100,8 @@ class MavlinkPort:
         signing.link_id, signing.timestamp = self.number, timestamp + SIGNING_AHEAD
         signing.stream_timestamps.clear()
         signing.allow_unsigned_callback = lambda _, msgid: (
-            self.number == 0 or msgid in {mav.MAVLINK_MSG_ID_RADIO_STATUS, mav.MAVLINK_MSG_ID_RADIO})
+            self.number == 0 or msgid in {mav.MAVLINK_MSG_ID_RADIO_STATUS, mav.MAVLINK_MSG_ID_RADIO}
+        )
 
     # --------------------------------------------------------------------------------------------- bytes
     def hear(self, data: bytes) -> None:
@@ -209,7 +235,7 @@ class Voice:
         self.links: dict[int, MavlinkPort] = {}
         self._text_id = 0
         self._late_texts: list[tuple[int, str]] = []
-        self._key: tuple[bytes, int] | None = None   # and its timestamp; kept over reboots
+        self._key: tuple[bytes, int] | None = None  # and its timestamp; kept over reboots
 
     @property
     def has_work(self) -> bool:
@@ -254,7 +280,7 @@ class Voice:
 
     def announce(self, severity: int, text: str) -> None:
         """STATUSTEXT on every port, in chunks of 50 characters."""
-        pieces = [text[i:i + 50] for i in range(0, len(text), 50)] or [""]
+        pieces = [text[i : i + 50] for i in range(0, len(text), 50)] or [""]
         ident = 0
         if len(pieces) > 1:
             self._text_id = self._text_id % 65535 + 1

@@ -84,7 +84,7 @@ class MemoryEnd:
 
     def __init__(self, name: str, link: MemoryLink, rng: random.Random) -> None:
         self.other: MemoryEnd = self
-        self.is_mute = False             # what it says is heard by nobody
+        self.is_mute = False  # what it says is heard by nobody
         self._name = name
         self._link = link
         self._rng = rng
@@ -144,7 +144,7 @@ class MemoryEnd:
             sent = frame
             if rng.random() < faults.corrupt:
                 place = rng.randrange(len(frame))
-                sent = frame[:place] + bytes([frame[place] ^ rng.randrange(1, 256)]) + frame[place + 1:]
+                sent = frame[:place] + bytes([frame[place] ^ rng.randrange(1, 256)]) + frame[place + 1 :]
             arrival_s = now_s() + faults.delay_s + faults.jitter_s * rng.random()
             loop = asyncio.get_running_loop()
             if rng.random() < faults.reorder:

@@ -26,36 +26,59 @@ SET_UP = {"FS_THR_ENABLE": 2.0, "AVOID_ENABLE": 0.0}
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "boat", help=summary, description=summary, epilog=_EXAMPLE,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "boat", help=summary, description=summary, epilog=_EXAMPLE, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--port", type=_port, default=5760, help="TCP port on 127.0.0.1, 0 for none (default 5760)")
     parser.add_argument("--udp", type=_port, default=14555, help="UDP port to listen on, 0 for none (default 14555)")
     parser.add_argument("--udp-out", metavar="HOST:PORT", action="append", default=[], help="also send there first")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
-    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), default=1.0, metavar="N",
-                        help="simulated seconds per second")
     parser.add_argument(
-        "--wind", default="5@0", metavar="WIND",
+        "--speedup",
+        type=number(above=0.0, at_most=1000.0),
+        default=1.0,
+        metavar="N",
+        help="simulated seconds per second",
+    )
+    parser.add_argument(
+        "--wind",
+        default="5@0",
+        metavar="WIND",
         help="SPEED@FROM in m/s and degrees, ar1:SPEED@FROM[,sd=DEG][,rho=HZ][,gust=MPS], or FILE.csv (default 5@0)",
     )
-    parser.add_argument("--home", type=place, default="51.1,-1.3", metavar="LAT,LON",
-                        help="place of the boat (default 51.1,-1.3)")
-    parser.add_argument("--heading", type=number("deg", at_least=-360.0, at_most=360.0), default=0.0, metavar="DEG",
-                        help="of the bow at power-up")
+    parser.add_argument(
+        "--home", type=place, default="51.1,-1.3", metavar="LAT,LON", help="place of the boat (default 51.1,-1.3)"
+    )
+    parser.add_argument(
+        "--heading",
+        type=number("deg", at_least=-360.0, at_most=360.0),
+        default=0.0,
+        metavar="DEG",
+        help="of the bow at power-up",
+    )
     parser.add_argument("--seed", type=whole(), default=0, help="of the wind and of faults (default 0)")
     parser.add_argument("--warm", action="store_true", help="powered up long ago: no EKF wait of 42 s")
-    parser.add_argument("--moored", action=argparse.BooleanOptionalAction, default=True,
-                        help="lies still until it is armed (default); --no-moored: drifts")
-    parser.add_argument("--at", type=moment, metavar="TIME",
-                        help="the time that its GPS tells, as 2026-11-24T08:00Z (default: now)")
+    parser.add_argument(
+        "--moored",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="lies still until it is armed (default); --no-moored: drifts",
+    )
+    parser.add_argument(
+        "--at", type=moment, metavar="TIME", help="the time that its GPS tells, as 2026-11-24T08:00Z (default: now)"
+    )
     parser.add_argument("--sysid", type=whole(at_least=1, at_most=255), default=1, help="MAVLink system id (default 1)")
-    parser.add_argument("--param", metavar="NAME=VALUE", action="append", default=[],
-                        help="set a parameter; it has been set up as 'companion doctor' asks: "
-                             + ", ".join(f"{name}={value:g}" for name, value in SET_UP.items()))
+    parser.add_argument(
+        "--param",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="set a parameter; it has been set up as 'companion doctor' asks: "
+        + ", ".join(f"{name}={value:g}" for name, value in SET_UP.items()),
+    )
     parser.add_argument("--polar", type=Path, metavar="FILE", help="a boat that sails by this polar")
-    parser.add_argument("--for", dest="for_s", type=number("s", above=0.0), metavar="S",
-                        help="end after S simulated seconds")
+    parser.add_argument(
+        "--for", dest="for_s", type=number("s", above=0.0), metavar="S", help="end after S simulated seconds"
+    )
     parser.set_defaults(run=run)
 
 
@@ -89,9 +112,14 @@ def run(args: argparse.Namespace) -> int:
     parameters = SET_UP | parameters
     begins = args.at or dt.datetime.now(dt.UTC).replace(microsecond=0)
     config = AutopilotConfig(
-        home=args.home, heading_rad=math.radians(args.heading), is_warm=args.warm,
-        is_moored=args.moored, sysid=args.sysid, parameters=parameters,
-        polar=None if args.polar is None else read_polar(args.polar).polar, epoch_s=begins.timestamp(),
+        home=args.home,
+        heading_rad=math.radians(args.heading),
+        is_warm=args.warm,
+        is_moored=args.moored,
+        sysid=args.sysid,
+        parameters=parameters,
+        polar=None if args.polar is None else read_polar(args.polar).polar,
+        epoch_s=begins.timestamp(),
     )
     autopilot = SimulatedAutopilot(config, parse_wind(args.wind, seed=args.seed), args.seed)
     endpoints = [f"tcpin:{args.host}:{args.port}"] if args.port else []
@@ -108,8 +136,10 @@ def run(args: argparse.Namespace) -> int:
     async def sail() -> None:
         try:
             async with serve(autopilot, endpoints) as server:
-                sys.stdout.write(f"sitl boat: {', '.join(endpoints)}, {args.speedup:g}x, it is "
-                                 f"{begins:%Y-%m-%d %H:%M} UTC there; Ctrl-C ends\n")
+                sys.stdout.write(
+                    f"sitl boat: {', '.join(endpoints)}, {args.speedup:g}x, it is "
+                    f"{begins:%Y-%m-%d %H:%M} UTC there; Ctrl-C ends\n"
+                )
                 sys.stdout.flush()
                 await server.wait(args.for_s)
         except LinkError as error:

@@ -10,7 +10,8 @@ from sitl.commands.run import OURS, add_options
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "demo", help=summary,
+        "demo",
+        help=summary,
         description="Sail round an archipelago in a shifting wind: autopilot, weather and companion are processes of "
         "their own over UDP, eight times as fast as real time. A picture and the record are left in the voyage's "
         "folder.",

@@ -62,7 +62,8 @@ max_time_s = 600.0
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "example", help=summary,
+        "example",
+        help=summary,
         description="Write a scenario with a comment at every key, and the mission that it sails beside it.",
         epilog="Example: sitl example squall && sitl run squall/squall.toml",
     )
@@ -82,8 +83,12 @@ def run(args: argparse.Namespace) -> int:
     files |= {file: (examples.folder() / file).read_bytes() for file in ("rocks.toml", "rocks.wkt")}
     there = [file for file in files if (args.folder / file).exists()]
     if there or name == "rocks":
-        raise InputError(str(args.folder), (there or ["rocks.toml"])[0], "is there already, or would be the mission's",
-                         "name another folder: nothing is written over")
+        raise InputError(
+            str(args.folder),
+            (there or ["rocks.toml"])[0],
+            "is there already, or would be the mission's",
+            "name another folder: nothing is written over",
+        )
     try:
         args.folder.mkdir(parents=True, exist_ok=True)
         for file, data in files.items():

@@ -15,13 +15,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     from sitl.ardurover import URL, fetched_path
 
     parser = subparsers.add_parser(
-        "fetch", help=summary, description=f"{summary}, for Linux on x86-64, from {URL}",
+        "fetch",
+        help=summary,
+        description=f"{summary}, for Linux on x86-64, from {URL}",
         epilog="example: sitl fetch && sitl run demo --autopilot ardurover",
     )
     parser.add_argument("--to", type=Path, metavar="FILE", help=f"where to put it (default {fetched_path()})")
     parser.add_argument("--url", default=URL, help="another place to get it from")
-    parser.add_argument("--timeout", type=number("s", above=0.0), default=120.0, metavar="S",
-                        help="for the download (default 120)")
+    parser.add_argument(
+        "--timeout", type=number("s", above=0.0), default=120.0, metavar="S", help="for the download (default 120)"
+    )
     parser.set_defaults(run=run)
 
 

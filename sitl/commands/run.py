@@ -25,41 +25,68 @@ def scenario_file(text: str) -> Path:
     if text not in OURS:
         close = difflib.get_close_matches(text, OURS, n=1)
         raise argparse.ArgumentTypeError(
-            f"there is neither a file nor a scenario {text}; {f'did you mean {close[0]}?' if close else 'see --help'}")
+            f"there is neither a file nor a scenario {text}; {f'did you mean {close[0]}?' if close else 'see --help'}"
+        )
     return OURS[text]
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "run", help=summary,
+        "run",
+        help=summary,
         description="Run a scenario: autopilot, weather, companion, and a verdict on what the boat really did. The "
         "embedded autopilot runs under the virtual clock in this process; with --live it is a process of its own "
         "over UDP, as is the companion; with --autopilot ardurover it is the real program.",
         epilog="Examples: sitl run demo --seed 3, sitl run my-mission.toml --live",
     )
-    parser.add_argument("scenario", type=scenario_file, metavar="SCENARIO",
-                        help=f"a scenario or a mission file, or one of ours: {', '.join(sorted(OURS))}")
+    parser.add_argument(
+        "scenario",
+        type=scenario_file,
+        metavar="SCENARIO",
+        help=f"a scenario or a mission file, or one of ours: {', '.join(sorted(OURS))}",
+    )
     add_options(parser)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add all but the scenario."""
     parser.add_argument("--autopilot", choices=("embedded", "ardurover"), default="embedded")
-    parser.add_argument("--ardurover", type=Path, metavar="PATH", help="the ArduRover program (default: $ARDUROVER, "
-                        "the PATH, what `sitl fetch` brought)")
+    parser.add_argument(
+        "--ardurover",
+        type=Path,
+        metavar="PATH",
+        help="the ArduRover program (default: $ARDUROVER, the PATH, what `sitl fetch` brought)",
+    )
     parser.add_argument("--live", action="store_true", help="separate processes over UDP, in (sped-up) real time")
-    parser.add_argument("--speedup", type=number(above=0.0, at_most=1000.0), metavar="N",
-                        help="with --live or ardurover (default: the scenario's)")
-    parser.add_argument("--cpu", type=number(above=0.0, at_most=1.0), metavar="SHARE",
-                        help="companion and planner get this share of one core, in real time: a slow computer")
-    parser.add_argument("--http", type=http_address, metavar="[HOST:]PORT",
-                        help="with --live or ardurover: the companion serves its live page here")
+    parser.add_argument(
+        "--speedup",
+        type=number(above=0.0, at_most=1000.0),
+        metavar="N",
+        help="with --live or ardurover (default: the scenario's)",
+    )
+    parser.add_argument(
+        "--cpu",
+        type=number(above=0.0, at_most=1.0),
+        metavar="SHARE",
+        help="companion and planner get this share of one core, in real time: a slow computer",
+    )
+    parser.add_argument(
+        "--http",
+        type=http_address,
+        metavar="[HOST:]PORT",
+        help="with --live or ardurover: the companion serves its live page here",
+    )
     parser.add_argument("--http-token", type=Path, metavar="FILE", help="orders from the page, as of companion run")
     chart_option(parser)
     parser.add_argument("--seed", type=whole(), default=0)
-    parser.add_argument("--at", type=moment, metavar="TIME", help="when it begins, as 2026-11-24T08:00Z: what is dark, "
-                        "and the tide (default: a scenario's own time, of a mission file now)")
+    parser.add_argument(
+        "--at",
+        type=moment,
+        metavar="TIME",
+        help="when it begins, as 2026-11-24T08:00Z: what is dark, "
+        "and the tide (default: a scenario's own time, of a mission file now)",
+    )
     parser.add_argument("--out", type=out_folder, metavar="DIR", help="the voyage folder")
     parser.set_defaults(run=run)
 
@@ -81,20 +108,28 @@ def run(args: argparse.Namespace) -> int:
     scenario = msgspec.structs.replace(scenario, begins=beginning(scenario, args.scenario, args.at))
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{file_name(scenario.name)}"
     if (folder / DECISIONS).exists():
-        raise InputError("--out", str(folder), "holds a voyage already, which this one would resume",
-                         "name another folder, or remove that one")
+        raise InputError(
+            "--out",
+            str(folder),
+            "holds a voyage already, which this one would resume",
+            "name another folder, or remove that one",
+        )
     # What cannot be sailed is told before anything is compiled for a minute.
     mission = mission_of(scenario, args.scenario)
     scenario_wind(scenario, args.scenario, args.seed)
     if own_polar(mission) is not None and args.autopilot == "ardurover":
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
     page = page_words(args)
-    print(f"{scenario.name} begins {scenario.begins:%Y-%m-%d %H:%M} UTC"
-          f"{'' if args.at else '; --at names another time'}", flush=True)
+    print(
+        f"{scenario.name} begins {scenario.begins:%Y-%m-%d %H:%M} UTC{'' if args.at else '; --at names another time'}",
+        flush=True,
+    )
     own = load_mission(scenario.mission_path(args.scenario)).options.operator
     if not (own.arm and own.set_auto) and scenario.set_auto:
-        print("the simulated boat may be armed and set to AUTO; on the water [operator] of the mission forbids it",
-              flush=True)
+        print(
+            "the simulated boat may be armed and set to AUTO; on the water [operator] of the mission forbids it",
+            flush=True,
+        )
     if args.http is not None:
         host, port = args.http
         print(f"the page: http://{f'[{host}]' if ':' in host else host}:{port}/ once the companion is up", flush=True)
@@ -103,13 +138,19 @@ def run(args: argparse.Namespace) -> int:
         from sitl.run.live import run_live
 
         verdict = run_live(
-            scenario, args.scenario, args.seed, folder, autopilot=args.autopilot, program=args.ardurover,
-            speedup=args.speedup or (1.0 if args.cpu is not None else None), page=page, cpu=args.cpu,
+            scenario,
+            args.scenario,
+            args.seed,
+            folder,
+            autopilot=args.autopilot,
+            program=args.ardurover,
+            speedup=args.speedup or (1.0 if args.cpu is not None else None),
+            page=page,
+            cpu=args.cpu,
         )
     else:
         with ProgressLine(sys.stdout) as progress:
-            verdict = run_virtual(run_embedded(
-                scenario, args.scenario, args.seed, folder, on_status=progress.show))
+            verdict = run_virtual(run_embedded(scenario, args.scenario, args.seed, folder, on_status=progress.show))
         draw(folder)
     print_verdict(verdict)
     print(folder)
@@ -133,9 +174,12 @@ def page_words(args: argparse.Namespace) -> list[str]:
     if not is_live(args):
         raise InputError("--http", "", "no browser can be waited for under the virtual clock", "say --live, too")
     host, port = args.http
-    return ["--http", f"{f'[{host}]' if ':' in host else host}:{port}",
-            *([] if args.http_token is None else ["--http-token", str(args.http_token)]),
-            *(word for path in args.chart for word in ("--chart", str(path)))]
+    return [
+        "--http",
+        f"{f'[{host}]' if ':' in host else host}:{port}",
+        *([] if args.http_token is None else ["--http-token", str(args.http_token)]),
+        *(word for path in args.chart for word in ("--chart", str(path))),
+    ]
 
 
 def draw(folder: Path) -> None:
@@ -174,6 +218,8 @@ def print_verdict(verdict: Any) -> None:
     from sitl.scenario import verdict_line
 
     for check in verdict.checks:
-        print(f"{'pass' if check.passed else 'FAIL'}  {check.name}: {words(check.figure)} "
-              f"(wanted: {words(check.required)})")
+        print(
+            f"{'pass' if check.passed else 'FAIL'}  {check.name}: {words(check.figure)} "
+            f"(wanted: {words(check.required)})"
+        )
     print(verdict_line(verdict.to_dict()))

@@ -8,7 +8,23 @@ from sitl.faults.satellite_link import KEY, Satellite
 from sitl.faults.spoofing import FORGERIES, Forger, Forgery
 
 __all__ = [
-    "FORGERIES", "KEY", "LINK_EVENTS", "REDRAWN", "FaultyPlanner", "Forger", "Forgery", "KillablePlanner", "Observer",
-    "Relay", "Satellite", "SimulatedWorld", "break_vane", "channel", "give_order", "impair", "inject", "redraw",
+    "FORGERIES",
+    "KEY",
+    "LINK_EVENTS",
+    "REDRAWN",
+    "FaultyPlanner",
+    "Forger",
+    "Forgery",
+    "KillablePlanner",
+    "Observer",
+    "Relay",
+    "Satellite",
+    "SimulatedWorld",
+    "break_vane",
+    "channel",
+    "give_order",
+    "impair",
+    "inject",
+    "redraw",
     "set_parameter",
 ]

@@ -19,7 +19,7 @@ from companion.planner.worker import DEFAULT_GRACE_S, InlinePlanner, PlannerWork
 from companion.planners import Settings
 from companion.telemetry.folder import STATE
 
-START_S = 1.5   # what it takes to start another worker
+START_S = 1.5  # what it takes to start another worker
 
 
 class FaultyPlanner(InlinePlanner):
@@ -45,8 +45,14 @@ class FaultyPlanner(InlinePlanner):
         self._is_starved = True
 
     async def plan(
-        self, problem: Problem, *, budget_s: float | None = None, expansions: int | None = None, seed: int = 0,
-        algorithm: str = "auto", settings: Settings | None = None,
+        self,
+        problem: Problem,
+        *,
+        budget_s: float | None = None,
+        expansions: int | None = None,
+        seed: int = 0,
+        algorithm: str = "auto",
+        settings: Settings | None = None,
     ) -> Plan:
         """Plan as the worker would: a dead one is replaced first, a hung one when its time is over."""
         if not self.is_alive:
@@ -61,7 +67,8 @@ class FaultyPlanner(InlinePlanner):
             return failed("the planner's worker failed: MemoryError()", seed=seed, algorithm=algorithm)
         deaths = self._deaths
         answer = await super().plan(
-            problem, budget_s=budget_s, expansions=expansions, seed=seed, algorithm=algorithm, settings=settings)
+            problem, budget_s=budget_s, expansions=expansions, seed=seed, algorithm=algorithm, settings=settings
+        )
         if deaths != self._deaths:
             return failed("the planner's worker died", seed=seed, algorithm=algorithm)
         return answer
@@ -72,7 +79,7 @@ class KillablePlanner(PlannerWorker):
 
     def __init__(self) -> None:
         super().__init__()
-        self.fates: list[str] = []    # that befell a living process, for who counts them
+        self.fates: list[str] = []  # that befell a living process, for who counts them
 
     def die(self) -> None:
         """SIGKILL, as the kernel's out-of-memory killer sends it too."""
@@ -98,7 +105,7 @@ class KillablePlanner(PlannerWorker):
 
 
 STATES: Final = {"full": errno.ENOSPC, "sick": errno.EIO, "read_only": errno.EROFS, "ok": 0}
-KEPT = 600   # earlier contents of the saved state, which changes once a second at most
+KEPT = 600  # earlier contents of the saved state, which changes once a second at most
 
 
 class FaultyDisk(Disk):

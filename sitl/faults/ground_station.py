@@ -17,8 +17,8 @@ from companion.messages import Command, GeoPoint, waypoint
 from companion.orders import Place, Verb, Wanted, give, phrase
 from sitl.scenario import EventSpec
 
-REDRAWN = frozenset({"home", "fence", "rally", "edit_item"})   # by the ground station
-HEARD_S = 30.0   # for the boat's autopilot to be heard
+REDRAWN = frozenset({"home", "fence", "rally", "edit_item"})  # by the ground station
+HEARD_S = 30.0  # for the boat's autopilot to be heard
 
 
 def wanted_by(event: EventSpec, frame: LocalFrame) -> Wanted:
@@ -67,7 +67,8 @@ async def redraw(transport: Transport, event: EventSpec, frame: LocalFrame) -> s
             read = await pilot.read_mission()
             items = list(read.items or ())
             items[event.seq - 1] = replace(
-                items[event.seq - 1], lat_e7=round(there.lat_deg * 1e7), lon_e7=round(there.lon_deg * 1e7))
+                items[event.seq - 1], lat_e7=round(there.lat_deg * 1e7), lon_e7=round(there.lon_deg * 1e7)
+            )
             done = await pilot.upload_mission(items, method="items")
         else:
             answer = await pilot.enable_fence(enabled=False)
@@ -81,5 +82,17 @@ async def redraw(transport: Transport, event: EventSpec, frame: LocalFrame) -> s
 
 def _home_at(pilot: Autopilot, there: GeoPoint) -> mav.MAVLink_message:
     return mav.MAVLink_command_int_message(
-        pilot.link.party.target_system, 1, 0, mav.MAV_CMD_DO_SET_HOME, 0, 0, 0.0, 0.0, 0.0, 0.0,
-        round(there.lat_deg * 1e7), round(there.lon_deg * 1e7), 0.0)
+        pilot.link.party.target_system,
+        1,
+        0,
+        mav.MAV_CMD_DO_SET_HOME,
+        0,
+        0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        round(there.lat_deg * 1e7),
+        round(there.lon_deg * 1e7),
+        0.0,
+    )

@@ -89,7 +89,7 @@ async def play(event: EventSpec, autopilot: SimulatedAutopilot, station: MemoryE
 async def _station(shore: MemoryEnd, until_s: float) -> None:
     """Be a ground station: nothing but a heartbeat a second."""
     codec = mav.MAVLink(None, srcSystem=255, srcComponent=mav.MAV_COMP_ID_MISSIONPLANNER)
-    await shore.open(lambda _: None)   # nobody looks at its screen
+    await shore.open(lambda _: None)  # nobody looks at its screen
     try:
         while now_s() < until_s:
             shore.write(mav.MAVLink_heartbeat_message(mav.MAV_TYPE_GCS, 8, 0, 0, mav.MAV_STATE_ACTIVE, 3).pack(codec))
@@ -116,15 +116,15 @@ class SimulatedWorld:
     autopilot: SimulatedAutopilot
     link: MemoryLink
     shore: MemoryLink
-    station: MemoryLink      # a ground station that beats, where a scenario has one
+    station: MemoryLink  # a ground station that beats, where a scenario has one
     others: Others
     frame: LocalFrame
     wind: WindModel
     seed: int
-    neighbours: dict[int, MemoryLink] = field(default_factory=dict)   # lines of those that are ever heard, by system
+    neighbours: dict[int, MemoryLink] = field(default_factory=dict)  # lines of those that are ever heard, by system
     forgers: list[Forger] = field(default_factory=list)
-    air: RadioChannel | None = None   # where there is more than one who speaks on the companion's channel
-    ordered: list[int] = field(default_factory=list)   # systems of neighbours that were given orders
+    air: RadioChannel | None = None  # where there is more than one who speaks on the companion's channel
+    ordered: list[int] = field(default_factory=list)  # systems of neighbours that were given orders
     truth: TrueTrack = field(default_factory=TrueTrack)
     status_s: list[float] = field(default_factory=list)
     alerts: dict[str, int] = field(default_factory=dict)
@@ -135,10 +135,9 @@ class SimulatedWorld:
     disk: FaultyDisk = field(default_factory=FaultyDisk)
     observer: Observer | None = None
     satellite: Satellite | None = None
-    stranger: asyncio.Lock = field(default_factory=asyncio.Lock)   # one ground station, one upload at a time
-    called: asyncio.Event = field(default_factory=asyncio.Event)   # the companion calls its crew to the anchor
+    stranger: asyncio.Lock = field(default_factory=asyncio.Lock)  # one ground station, one upload at a time
+    called: asyncio.Event = field(default_factory=asyncio.Event)  # the companion calls its crew to the anchor
     called_at_s: list[float] = field(default_factory=list)
-
 
     def heard_by(self) -> Transport:
         """Return the companion's end of its channel."""
@@ -152,6 +151,7 @@ def channel(world: SimulatedWorld, events: tuple[EventSpec, ...]) -> None:
             world.neighbours[event.system] = MemoryLink(f"neighbour {event.system}", seed=world.seed + event.system)
     is_forged = any(e.kind in {"spoof", "company"} for e in events)
     if world.neighbours or is_forged:
+
         def overheard(data: bytes) -> None:
             for forger in world.forgers:
                 forger.hear(now_s(), data)
@@ -173,12 +173,14 @@ async def _begins(event: EventSpec) -> None:
 
 def _switched(do: Callable[[SimulatedWorld, EventSpec], None], undo: Callable[[SimulatedWorld], None]) -> _Inject:
     """Return an event that is there from its time on, for ``for_s``."""
+
     async def happens(world: SimulatedWorld, event: EventSpec) -> None:
         await _begins(event)
         do(world, event)
         if event.for_s is not None:
             await asyncio.sleep(event.for_s)
             undo(world)
+
     return happens
 
 
@@ -188,6 +190,7 @@ def _at(do: Callable[[SimulatedWorld, EventSpec], None]) -> _Inject:
 
 def _ashore(ask: Callable[[SimulatedWorld, EventSpec], Awaitable[str]]) -> _Inject:
     """Have a ground station of a person's do something, one at a time; what went wrong is an error of the voyage."""
+
     async def inject(world: SimulatedWorld, event: EventSpec) -> None:
         await _begins(event)
         async with world.stranger:
@@ -240,7 +243,8 @@ async def _company(world: SimulatedWorld, event: EventSpec) -> None:
     await _begins(event)
     other, until_s = Codec(1, OWN_COMPONENT), math.inf if event.for_s is None else event.at_s + event.for_s
     beat = mav.MAVLink_heartbeat_message(
-        mav.MAV_TYPE_ONBOARD_CONTROLLER, mav.MAV_AUTOPILOT_INVALID, 0, 0x0BAD, mav.MAV_STATE_ACTIVE, 3)
+        mav.MAV_TYPE_ONBOARD_CONTROLLER, mav.MAV_AUTOPILOT_INVALID, 0, 0x0BAD, mav.MAV_STATE_ACTIVE, 3
+    )
     while now_s() < until_s and world.air is not None:
         world.air.say(other.pack(beat))
         await asyncio.sleep(1.0)
@@ -255,9 +259,17 @@ async def _neighbour(world: SimulatedWorld, event: EventSpec) -> None:
     await _begins(event)
     here = world.autopilot.truth.position
     other = SimulatedAutopilot(
-        AutopilotConfig(home=GeoPoint(lat_deg=here.lat_deg + 0.01, lon_deg=here.lon_deg), sysid=event.system,
-                        uid=b"neighbour", vehicle_type=event.vehicle_type, is_warm=True, is_moored=True),
-        world.wind, seed=world.seed + event.system)
+        AutopilotConfig(
+            home=GeoPoint(lat_deg=here.lat_deg + 0.01, lon_deg=here.lon_deg),
+            sysid=event.system,
+            uid=b"neighbour",
+            vehicle_type=event.vehicle_type,
+            is_warm=True,
+            is_moored=True,
+        ),
+        world.wind,
+        seed=world.seed + event.system,
+    )
     async with serve(other, [world.neighbours[event.system].far]):
         try:
             await asyncio.sleep(math.inf if event.for_s is None else event.for_s)
@@ -314,23 +326,27 @@ _BY_KIND: dict[str, _Inject] = {
     "reboot": _at(lambda world, _: world.autopilot.reboot()),
     "gps_jump": _switched(
         lambda world, e: world.autopilot.set_gps(
-            GpsFault(east_m=e.east_m, north_m=e.north_m, is_resisted=e.is_resisted, over_s=e.over_s,
-                     is_of_one=e.is_of_one)),
-        lambda world: world.autopilot.set_gps(GpsFault())),
+            GpsFault(
+                east_m=e.east_m, north_m=e.north_m, is_resisted=e.is_resisted, over_s=e.over_s, is_of_one=e.is_of_one
+            )
+        ),
+        lambda world: world.autopilot.set_gps(GpsFault()),
+    ),
     "gps_lost": _switched(
         lambda world, _: world.autopilot.set_gps(GpsFault(is_lost=True)),
-        lambda world: world.autopilot.set_gps(GpsFault())),
+        lambda world: world.autopilot.set_gps(GpsFault()),
+    ),
     "compass": _switched(
         lambda world, e: world.autopilot.set_compass(math.radians(e.value_deg)),
-        lambda world: world.autopilot.set_compass(0.0)),
+        lambda world: world.autopilot.set_compass(0.0),
+    ),
     "current": _switched(
         lambda world, e: world.autopilot.set_current(math.radians(e.set_deg), e.drift_mps),
-        lambda world: world.autopilot.set_current(0.0, 0.0)),
-    "disk": _switched(
-        lambda world, e: world.disk.become(e.its_state), lambda world: world.disk.become("ok")),
+        lambda world: world.autopilot.set_current(0.0, 0.0),
+    ),
+    "disk": _switched(lambda world, e: world.disk.become(e.its_state), lambda world: world.disk.become("ok")),
     "kill_planner": _at(lambda world, _: world.planner.die()),
-    "planner_hang": _at(
-        lambda world, e: world.planner.hang(math.inf if e.for_s is None else now_s() + e.for_s)),
+    "planner_hang": _at(lambda world, e: world.planner.hang(math.inf if e.for_s is None else now_s() + e.for_s)),
     "planner_starved": _at(lambda world, _: world.planner.starve()),
     "vane": _vane,
     "crew": _crew,

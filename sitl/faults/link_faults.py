@@ -24,9 +24,15 @@ from sitl.autopilot import FrameStream, Impairment, MemoryLink, VaneFault, VaneS
 from sitl.scenario import EventSpec, free_port
 
 _V2 = 0xFD
-_READ = frozenset({mav.MAVLINK_MSG_ID_ATTITUDE, mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, mav.MAVLINK_MSG_ID_WIND,
-                   mav.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT})
-SPIKES = 0.02   # one reading in fifty is anywhere, as the simulated autopilot's
+_READ = frozenset(
+    {
+        mav.MAVLINK_MSG_ID_ATTITUDE,
+        mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        mav.MAVLINK_MSG_ID_WIND,
+        mav.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
+    }
+)
+SPIKES = 0.02  # one reading in fifty is anywhere, as the simulated autopilot's
 
 
 class FaultyVane:
@@ -38,7 +44,7 @@ class FaultyVane:
         self._decoder.robust_parsing = True
         self._heading_rad = 0.0
         self._velocity_en_mps = (0.0, 0.0)
-        self._awa_rad: float | None = None    # of the vane as it is
+        self._awa_rad: float | None = None  # of the vane as it is
         self._frozen_rad: float | None = None
         self._fault = VaneFault()
 
@@ -73,8 +79,12 @@ class FaultyVane:
             return frame
         aws_mps, angle = math.hypot(east, north), self._heading_rad + self._said(self._awa_rad)
         east, north = aws_mps * math.sin(angle) - ve, aws_mps * math.cos(angle) - vn
-        return self._packed(frame, mav.MAVLink_wind_message(
-            math.degrees(wrap_two_pi(heading_of(east, north))), math.hypot(east, north), message.speed_z))
+        return self._packed(
+            frame,
+            mav.MAVLink_wind_message(
+                math.degrees(wrap_two_pi(heading_of(east, north))), math.hypot(east, north), message.speed_z
+            ),
+        )
 
     def _said(self, awa_rad: float) -> float:
         """Return what the vane says where the wind is at ``awa_rad`` of the bow."""
@@ -98,14 +108,20 @@ LINK_EVENTS = frozenset({"link_cut", "link_half", "link_quality"})
 
 async def impair(line: MemoryLink, event: EventSpec) -> None:
     """Cut or impair ``line`` as ``event`` says, and mend it after ``for_s``."""
-    end = line.near if event.kind == "link_half" and event.its_state == "unheard" else line.far   # whose words are lost
+    end = line.near if event.kind == "link_half" and event.its_state == "unheard" else line.far  # whose words are lost
     if event.kind == "link_cut":
         line.cut()
     elif event.kind == "link_half":
         end.is_mute = True
     else:
-        line.impairment = Impairment(loss=event.loss, duplicate=event.duplicate, reorder=event.reorder,
-                                     corrupt=event.corrupt, noise=event.noise, delay_s=event.delay_s)
+        line.impairment = Impairment(
+            loss=event.loss,
+            duplicate=event.duplicate,
+            reorder=event.reorder,
+            corrupt=event.corrupt,
+            noise=event.noise,
+            delay_s=event.delay_s,
+        )
     if event.for_s is None:
         return
     await asyncio.sleep(event.for_s)

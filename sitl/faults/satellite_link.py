@@ -20,8 +20,8 @@ from companion.orders import Wanted
 from companion.orders.far import FarKey, FarOrder, FarStatus, minutes_of, pack_order, unpack_status
 from sitl.scenario import EventSpec, SatelliteSpec
 
-SESSION_S = 20.0      # a modem's session: so often it looks for something to send
-PATIENCE_S = 900.0    # without an answer for so long the shore sends the same bytes again
+SESSION_S = 20.0  # a modem's session: so often it looks for something to send
+PATIENCE_S = 900.0  # without an answer for so long the shore sends the same bytes again
 KEY = bytes(range(32))
 
 
@@ -94,11 +94,15 @@ def _after(delay_s: float, do: Callable[[], None]) -> Coroutine[Any, Any, None]:
     async def wait() -> None:
         await asyncio.sleep(delay_s)
         do()
+
     return wait()
 
 
 async def order_far(
-    satellite: Satellite, event: EventSpec, frame: LocalFrame, wanted_by: Callable[[EventSpec, LocalFrame], Wanted],
+    satellite: Satellite,
+    event: EventSpec,
+    frame: LocalFrame,
+    wanted_by: Callable[[EventSpec, LocalFrame], Wanted],
     errors: list[str],
 ) -> None:
     """Give an event's order as a shore does that hears nothing for minutes; what was wrong goes to ``errors``.

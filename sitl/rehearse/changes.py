@@ -44,10 +44,14 @@ class MissionChange:
         if self.name != LATER:
             return scenario
         current = scenario.current and msgspec.structs.replace(
-            scenario.current, tide_high_s=scenario.current.tide_high_s - self.value)
+            scenario.current, tide_high_s=scenario.current.tide_high_s - self.value
+        )
         return msgspec.structs.replace(
-            scenario, begins=scenario.begins + dt.timedelta(seconds=self.value), current=current,
-            wind=msgspec.structs.replace(scenario.wind, from_s=scenario.wind.from_s + self.value))
+            scenario,
+            begins=scenario.begins + dt.timedelta(seconds=self.value),
+            current=current,
+            wind=msgspec.structs.replace(scenario.wind, from_s=scenario.wind.from_s + self.value),
+        )
 
     @property
     def variation(self) -> Variation | None:
@@ -84,16 +88,20 @@ def usual(mission: Mission, *, tells_the_hour: bool) -> list[MissionChange]:
     """Return what a crew would think of first; ``tells_the_hour`` is whether the hour makes a difference at all."""
     margin_m, delta_s, corridor_m = mission.margin_m, mission.risk.delta_s, AutopilotLimits().sail_xtrack_max_m
     less_m = max(mission.margin_floor_m, round(margin_m / 1.5, 1))
-    wanted = [f"margin_m={round(1.5 * margin_m, 1):g}", *([f"margin_m={less_m:g}"] if less_m < margin_m else []),
-              f"delta_s={round(0.5 * (1.0 + delta_s), 3):g}", *([f"delta_s={round(delta_s - 0.1, 3):g}"]
-                                                               if delta_s >= 0.6 else []),
-              f"{CORRIDOR}={0.5 * corridor_m:g}", f"{CORRIDOR}={2.0 * corridor_m:g}",
-              *([f"{LATER}=1h"] if tells_the_hour else [])]
+    wanted = [
+        f"margin_m={round(1.5 * margin_m, 1):g}",
+        *([f"margin_m={less_m:g}"] if less_m < margin_m else []),
+        f"delta_s={round(0.5 * (1.0 + delta_s), 3):g}",
+        *([f"delta_s={round(delta_s - 0.1, 3):g}"] if delta_s >= 0.6 else []),
+        f"{CORRIDOR}={0.5 * corridor_m:g}",
+        f"{CORRIDOR}={2.0 * corridor_m:g}",
+        *([f"{LATER}=1h"] if tells_the_hour else []),
+    ]
     found = []
     for text in wanted:
         try:
             found.append(change_of(text, mission))
-        except InputError:   # a margin that closes the water, say: nothing to try
+        except InputError:  # a margin that closes the water, say: nothing to try
             continue
     return found
 
@@ -131,16 +139,23 @@ class Tried:
 
     def told(self) -> str:
         """Return it in a line."""
-        words = [f"{change.measure.name} {told_of(change)}{'' if is_sure(change) else ', unsure'}"
-                 for change in self.comparison.changes
-                 if change.measure.name in TOLD and change.change != (change.measure.kind == "ratio")]
+        words = [
+            f"{change.measure.name} {told_of(change)}{'' if is_sure(change) else ', unsure'}"
+            for change in self.comparison.changes
+            if change.measure.name in TOLD and change.change != (change.measure.kind == "ratio")
+        ]
         return f"{self.change.told}, {counted(len(self.comparison.pairs), 'pair')}: " + (
-            "; ".join(words) or "no difference")
+            "; ".join(words) or "no difference"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
-        return {"change": self.change.told, "name": self.change.name, "value": self.change.value,
-                **self.comparison.to_dict()}
+        return {
+            "change": self.change.told,
+            "name": self.change.name,
+            "value": self.change.value,
+            **self.comparison.to_dict(),
+        }
 
 
 def tried(change: MissionChange, before: Sequence[Record], after: Sequence[Record]) -> Tried:

@@ -36,40 +36,91 @@ goes on where it was; what was sailed is not sailed again. What is drawn and how
 def add_parser(subparsers: Any, summary: str) -> None:
     """Add the command."""
     parser = subparsers.add_parser(
-        "rehearse", help=summary, formatter_class=argparse.RawDescriptionHelpFormatter, epilog=_EPILOG,
+        "rehearse",
+        help=summary,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog=_EPILOG,
         description="Sail a mission in simulation, each voyage with a wind, a boat, a sea and sensors of its own, "
         "until the chances\nof arriving and of coming below the margin's floor are known well enough. Then tell times, "
-        "watchdogs, the worst\nvoyages, where the trouble is, and what a change is worth by pairs of voyages.")
+        "watchdogs, the worst\nvoyages, where the trouble is, and what a change is worth by pairs of voyages.",
+    )
     parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="a mission with a [start], or a scenario")
     weather = parser.add_argument_group("what is sailed")
-    weather.add_argument("--wind", metavar="WIND", help="SPEED@FROM [m/s, degrees], a measured record or the table "
-                         "of a climate as CSV (default: the mission's preview wind)")
-    weather.add_argument("--wind-error", type=_error, metavar="DEG,MPS", help="how far the mean wind that is given may "
-                         "be off, standard deviations (default: 10,0.5; of a climate 0,0)")
-    weather.add_argument("--depart", type=moment, metavar="TIME", help="when she sets sail, as 2026-11-24T08:00Z: for "
-                         "a tide table and the dark (default: when the table begins, else now; of a scenario its own)")
-    weather.add_argument("--doubt", type=number(at_least=0.0, at_most=3.0), default=1.0, metavar="X",
-                         help="how far boat, sea and sensors may differ from the plan's: 0 not at all, 1 as a small "
-                         "boat meets them (default: 1)")
-    weather.add_argument("--faults", action="store_true", help="trouble befalls each voyage: links, sensors, calms, a "
-                         "companion that is killed, an operator")
-    weather.add_argument("--limit", type=duration, metavar="TIME", help="call a voyage off after 90m, 2h (default: "
-                         "three times the plan, at least 15m)")
+    weather.add_argument(
+        "--wind",
+        metavar="WIND",
+        help="SPEED@FROM [m/s, degrees], a measured record or the table "
+        "of a climate as CSV (default: the mission's preview wind)",
+    )
+    weather.add_argument(
+        "--wind-error",
+        type=_error,
+        metavar="DEG,MPS",
+        help="how far the mean wind that is given may be off, standard deviations (default: 10,0.5; of a climate 0,0)",
+    )
+    weather.add_argument(
+        "--depart",
+        type=moment,
+        metavar="TIME",
+        help="when she sets sail, as 2026-11-24T08:00Z: for "
+        "a tide table and the dark (default: when the table begins, else now; of a scenario its own)",
+    )
+    weather.add_argument(
+        "--doubt",
+        type=number(at_least=0.0, at_most=3.0),
+        default=1.0,
+        metavar="X",
+        help="how far boat, sea and sensors may differ from the plan's: 0 not at all, 1 as a small "
+        "boat meets them (default: 1)",
+    )
+    weather.add_argument(
+        "--faults",
+        action="store_true",
+        help="trouble befalls each voyage: links, sensors, calms, a companion that is killed, an operator",
+    )
+    weather.add_argument(
+        "--limit",
+        type=duration,
+        metavar="TIME",
+        help="call a voyage off after 90m, 2h (default: three times the plan, at least 15m)",
+    )
     ends = parser.add_argument_group("when it ends, what is tried")
-    ends.add_argument("--sure", type=number("percent", above=0.0, at_most=100.0), default=10.0, metavar="PERCENT",
-                      help="end when the intervals of arriving and of the floor are no wider (default: 10)")
-    ends.add_argument("--runs", type=whole(at_least=1), default=1000, metavar="N",
-                      help="voyages at most (default: 1000)")
-    ends.add_argument("--minutes", type=number("minutes", above=0.0, at_most=100_000.0), metavar="M",
-                      help="have the whole answer in so many minutes: the chances first, then what "
-                      "changes are worth, then the worst voyages again")
-    ends.add_argument("--try", action="append", dest="tries", default=[], metavar="NAME=VALUE",
-                      help="what a change is worth: margin_m, delta_s, SAIL_XTRACK_MAX, or later=1h; may be given more "
-                      "than once (default: a usual set)")
-    ends.add_argument("--pairs", type=whole(), default=20, metavar="N",
-                      help="voyages with each change, of the first seeds; 0: none (default: 20)")
-    parser.add_argument("--out", type=out_folder, metavar="DIR",
-                        help=f"the folder of results (default: {FOLDER}/NAME of the mission)")
+    ends.add_argument(
+        "--sure",
+        type=number("percent", above=0.0, at_most=100.0),
+        default=10.0,
+        metavar="PERCENT",
+        help="end when the intervals of arriving and of the floor are no wider (default: 10)",
+    )
+    ends.add_argument(
+        "--runs", type=whole(at_least=1), default=1000, metavar="N", help="voyages at most (default: 1000)"
+    )
+    ends.add_argument(
+        "--minutes",
+        type=number("minutes", above=0.0, at_most=100_000.0),
+        metavar="M",
+        help="have the whole answer in so many minutes: the chances first, then what "
+        "changes are worth, then the worst voyages again",
+    )
+    ends.add_argument(
+        "--try",
+        action="append",
+        dest="tries",
+        default=[],
+        metavar="NAME=VALUE",
+        help="what a change is worth: margin_m, delta_s, SAIL_XTRACK_MAX, or later=1h; may be given more "
+        "than once (default: a usual set)",
+    )
+    ends.add_argument(
+        "--pairs",
+        type=whole(),
+        default=20,
+        metavar="N",
+        help="voyages with each change, of the first seeds; 0: none (default: 20)",
+    )
+    parser.add_argument(
+        "--out", type=out_folder, metavar="DIR", help=f"the folder of results (default: {FOLDER}/NAME of the mission)"
+    )
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the figures there, too")
     add_options(parser, has_out=False)
     parser.set_defaults(run=run)
@@ -86,18 +137,29 @@ def run(args: argparse.Namespace) -> int:
 
     folder = args.out or FOLDER / file_name(load_scenario(args.mission).name)
     compile_ahead()
-    limits = Limits(width=args.sure / 100.0, runs=args.runs, minutes=args.minutes)   # whose minutes begin here
-    made = prepared(args.mission, folder, wind=args.wind, wind_error=args.wind_error, doubt=args.doubt,
-                    faults=args.faults, depart=args.depart, limit_s=args.limit)
+    limits = Limits(width=args.sure / 100.0, runs=args.runs, minutes=args.minutes)  # whose minutes begin here
+    made = prepared(
+        args.mission,
+        folder,
+        wind=args.wind,
+        wind_error=args.wind_error,
+        doubt=args.doubt,
+        faults=args.faults,
+        depart=args.depart,
+        limit_s=args.limit,
+    )
     changes = [change_of(text, made.mission) for text in args.tries] or usual(
-        made.mission, tells_the_hour=made.tells_the_hour)
+        made.mission, tells_the_hour=made.tells_the_hour
+    )
     planned_s = sum(plan.cost_s for plan in made.plans)
-    print(f"{made.mission.name}: {made.doubts.wind.told}; doubt {args.doubt:g}{', with trouble' if args.faults else ''}"
-          f"; sets sail {made.scenario.begins:%Y-%m-%d %H:%M} UTC"
-          f"{f'; planned {planned_s:.0f} s' if planned_s else ''}, called off after {made.scenario.limit_s:.0f} s; "
-          f"the page, from the first voyage on: {folder / PAGE}", flush=True)
-    return rehearse(made, folder, limits, changes, args.pairs,
-                    options_of(args, out=folder / RESULTS), args.json)
+    print(
+        f"{made.mission.name}: {made.doubts.wind.told}; doubt {args.doubt:g}{', with trouble' if args.faults else ''}"
+        f"; sets sail {made.scenario.begins:%Y-%m-%d %H:%M} UTC"
+        f"{f'; planned {planned_s:.0f} s' if planned_s else ''}, called off after {made.scenario.limit_s:.0f} s; "
+        f"the page, from the first voyage on: {folder / PAGE}",
+        flush=True,
+    )
+    return rehearse(made, folder, limits, changes, args.pairs, options_of(args, out=folder / RESULTS), args.json)
 
 
 def _error(text: str) -> tuple[float, float]:

@@ -23,7 +23,7 @@ from companion.safety import TABLE
 from companion.words import counted
 
 LEVEL = 0.95
-_STEPS = 50     # halvings of a share
+_STEPS = 50  # halvings of a share
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +56,7 @@ def _evidence(came: int, of: int, p: float) -> float:
     missed = of - came
     if (p <= 0.0 and came) or (p >= 1.0 and missed):
         return math.inf
-    mean = (math.lgamma(came + 0.5) + math.lgamma(missed + 0.5) - math.lgamma(of + 1.0) - math.log(math.pi))
+    mean = math.lgamma(came + 0.5) + math.lgamma(missed + 0.5) - math.lgamma(of + 1.0) - math.log(math.pi)
     return mean - (came * math.log(p) if came else 0.0) - (missed * math.log1p(-p) if missed else 0.0)
 
 
@@ -130,8 +130,10 @@ class Estimates:
     def line(self) -> str:
         """Return it for a line on a terminal."""
         middle = next(time for time in self.times if time.of_all == 0.5)
-        return (f"of {len(self.records)}: arrives {percent(self.arrives)}, below the floor {percent(self.low)}, "
-                f"half by {clock(middle.value)}")
+        return (
+            f"of {len(self.records)}: arrives {percent(self.arrives)}, below the floor {percent(self.low)}, "
+            f"half by {clock(middle.value)}"
+        )
 
     def worst(self, most: int) -> list[Record]:
         """Return the worst voyages: errors, contacts, the floor, then those that do not arrive, then the longest."""
@@ -140,11 +142,16 @@ class Estimates:
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON; a time that is not reached is None."""
         return {
-            "voyages": len(self.records), "arrives": _share(self.arrives), "below_floor": _share(self.low),
+            "voyages": len(self.records),
+            "arrives": _share(self.arrives),
+            "below_floor": _share(self.low),
             "touches": _share(self.touches),
-            "time_s": [{"quantile": q.of_all, "value": _finite(q.value), "low": _finite(q.low), "high": _finite(q.high)}
-                       for q in self.times],
-            "watchdogs": {name: _share(share) for name, share in self.watchdogs.items()}}
+            "time_s": [
+                {"quantile": q.of_all, "value": _finite(q.value), "low": _finite(q.low), "high": _finite(q.high)}
+                for q in self.times
+            ],
+            "watchdogs": {name: _share(share) for name, share in self.watchdogs.items()},
+        }
 
 
 def estimates_of(there: Sequence[Record | None]) -> Estimates:
@@ -159,16 +166,26 @@ def estimates_of(there: Sequence[Record | None]) -> Estimates:
     raised = Counter(name for record in records for name in WATCHDOGS if name in record.get("alerts", {}))
     times = sorted(record["time_s"] if record.get("arrived") else math.inf for record in records)
     return Estimates(
-        records=records, arrives=share("arrived"), low=share("below_floor"), touches=share("contacts"),
+        records=records,
+        arrives=share("arrived"),
+        low=share("below_floor"),
+        touches=share("contacts"),
         times=tuple(quantile_of(times, of_all) for of_all in QUANTILES),
-        watchdogs={name: share_of(came, count) for name, came in raised.most_common()})
+        watchdogs={name: share_of(came, count) for name, came in raised.most_common()},
+    )
 
 
 def _badness(record: Record) -> tuple[float, ...]:
     clear_m = record.get("min_clearance_m")
-    return (bool(record.get("error")), bool(record.get("contacts")), bool(record.get("below_floor")),
-            not record.get("arrived"), -(clear_m if clear_m is not None else math.inf) if record.get("below_floor")
-            else 0.0, record.get("time_s") or 0.0, -record["seed"])
+    return (
+        bool(record.get("error")),
+        bool(record.get("contacts")),
+        bool(record.get("below_floor")),
+        not record.get("arrived"),
+        -(clear_m if clear_m is not None else math.inf) if record.get("below_floor") else 0.0,
+        record.get("time_s") or 0.0,
+        -record["seed"],
+    )
 
 
 def why_bad(record: Record) -> str:
@@ -179,8 +196,11 @@ def why_bad(record: Record) -> str:
         return f"an error of the program: {record['error']}"
     if record.get("contacts"):
         return "touched something" + ("" if record.get("arrived") else ", did not arrive")
-    how = f"arrived after {clock(record['time_s'])}" if record.get("arrived") else (
-        f"did not arrive ({record.get('end_reason') or 'time is up'})")
+    how = (
+        f"arrived after {clock(record['time_s'])}"
+        if record.get("arrived")
+        else (f"did not arrive ({record.get('end_reason') or 'time is up'})")
+    )
     return how + clear
 
 
@@ -210,15 +230,19 @@ def clock(seconds: float) -> str:
 def reached(time: Quantile) -> str:
     """Return in words when a share of the voyages is there."""
     share = f"{100.0 * time.of_all:.0f} %"
-    return f"{share} are there within {clock(time.value)}" if math.isfinite(time.value) else (
-        f"fewer than {share} arrive")
+    return (
+        f"{share} are there within {clock(time.value)}" if math.isfinite(time.value) else (f"fewer than {share} arrive")
+    )
 
 
 def told(known: Estimates) -> list[str]:
     """Return what is known, a line for each thing."""
     lines = [f"{counted(len(known.records), 'voyage')}; in brackets what is 95 % sure, at whichever voyage one stops"]
-    for words, share in (("arrives", known.arrives), ("below the margin's floor", known.low),
-                         ("touches something", known.touches)):
+    for words, share in (
+        ("arrives", known.arrives),
+        ("below the margin's floor", known.low),
+        ("touches something", known.touches),
+    ):
         lines.append(f"  {words}: {share.came} of {share.of} ({percent(share)})")
     for time in known.times:
         lines.append(f"  {reached(time)} ({clock(time.low)} to {clock(time.high)})")

@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-CELLS = 90              # along the longer side of the map
+CELLS = 90  # along the longer side of the map
 MOST_BARS = 8
-MOST_KINDS = 6          # of trouble, each with a colour of its own
+MOST_KINDS = 6  # of trouble, each with a colour of its own
 BLUE, AMBER = "#1f5fa8", "#b3541e"
 WORST = ("#7b1fa2", "#ad1457", "#4e342e")
 KINDS = ("#d62728", "#ff7f0e", "#9467bd", "#8c564b", "#e377c2", "#111111")
@@ -50,7 +50,11 @@ def save_rehearsal(made: PreparedRehearsal, outcome: RehearsalOutcome, path: Pat
         _changes(figure.add_subplot(grid[2, 1]), outcome.changes)
     figure.suptitle(
         f"{made.mission.name}, rehearsed: {counted(len(outcome.known.records), 'voyage')}, {outcome.ends}   ·   "
-        f"arrives {percent(outcome.known.arrives)} (95 %)\n{made.doubts.wind.told}", fontsize=11, ha="left", x=0.01)
+        f"arrives {percent(outcome.known.arrives)} (95 %)\n{made.doubts.wind.told}",
+        fontsize=11,
+        ha="left",
+        x=0.01,
+    )
     save(figure, path)
 
 
@@ -64,8 +68,17 @@ def _map(axes: Axes, made: PreparedRehearsal, outcome: RehearsalOutcome) -> None
     extent = extent_of(local, [*([start] if start else []), *goals], tracks)
     handles = [*draw_area(axes, local, mission.margin_m), *draw_marks(axes, mission, start, goals)]
     density = shares_of(tracks, extent)
-    image = axes.imshow(np.ma.masked_less_equal(density, 0.0), origin="lower", cmap="viridis", alpha=0.75, vmin=0.0,
-                        vmax=1.0, extent=(extent[0], extent[2], extent[1], extent[3]), zorder=3.5, aspect="equal")
+    image = axes.imshow(
+        np.ma.masked_less_equal(density, 0.0),
+        origin="lower",
+        cmap="viridis",
+        alpha=0.75,
+        vmin=0.0,
+        vmax=1.0,
+        extent=(extent[0], extent[2], extent[1], extent[3]),
+        zorder=3.5,
+        aspect="equal",
+    )
     figure = axes.get_figure(root=True)
     if figure is not None:
         figure.colorbar(image, ax=axes, shrink=0.5, label="share of the voyages that pass here")
@@ -81,17 +94,29 @@ def _map(axes: Axes, made: PreparedRehearsal, outcome: RehearsalOutcome) -> None
     low = np.array([record["nearest"] for record in records if record.get("nearest")])
     if len(low):
         axes.plot(low[:, 0], low[:, 1], "*", color="#ffd400", mec="black", mew=0.7, ms=12, zorder=9)
-        handles.append(Line2D([], [], ls="", marker="*", color="#ffd400", mec="black", ms=10,
-                              label=f"nearest, below the floor: {len(low)}"))
-    axes.set(xlim=(extent[0], extent[2]), ylim=(extent[1], extent[3]), xlabel="east of the start, m",
-             ylabel="north of the start, m")
+        handles.append(
+            Line2D(
+                [],
+                [],
+                ls="",
+                marker="*",
+                color="#ffd400",
+                mec="black",
+                ms=10,
+                label=f"nearest, below the floor: {len(low)}",
+            )
+        )
+    axes.set(
+        xlim=(extent[0], extent[2]),
+        ylim=(extent[1], extent[3]),
+        xlabel="east of the start, m",
+        ylabel="north of the start, m",
+    )
     scale_bar(axes)
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.08), ncols=3, fontsize=8, frameon=False)
 
 
-def shares_of(
-    tracks: Sequence[NDArray[np.float64]], extent: tuple[float, float, float, float],
-) -> NDArray[np.float64]:
+def shares_of(tracks: Sequence[NDArray[np.float64]], extent: tuple[float, float, float, float]) -> NDArray[np.float64]:
     """Return the share of tracks that pass each cell of a map, (rows from the south, columns from the west)."""
     west, south, east, north = extent
     size_m = max(east - west, north - south) / CELLS
@@ -109,12 +134,22 @@ def shares_of(
 
 
 def _chances(axes: Axes, known: Estimates) -> None:
-    bars = [("arrives", known.arrives), ("below the floor", known.low), ("touches", known.touches),
-            *list(known.watchdogs.items())[:MOST_BARS]]
+    bars = [
+        ("arrives", known.arrives),
+        ("below the floor", known.low),
+        ("touches", known.touches),
+        *list(known.watchdogs.items())[:MOST_BARS],
+    ]
     for row, (_, share) in enumerate(bars):
         middle = share.came / share.of if share.of else 0.0
-        axes.errorbar(middle, row, xerr=[[max(0.0, middle - share.low)], [max(0.0, share.high - middle)]], fmt="o",
-                      color=BLUE if row < 3 else AMBER, capsize=3)
+        axes.errorbar(
+            middle,
+            row,
+            xerr=[[max(0.0, middle - share.low)], [max(0.0, share.high - middle)]],
+            fmt="o",
+            color=BLUE if row < 3 else AMBER,
+            capsize=3,
+        )
     axes.set_yticks(range(len(bars)), [name for name, _ in bars], fontsize=9)
     axes.invert_yaxis()
     axes.set(xlim=(-0.02, 1.02), xlabel="share of the voyages, with what is 95 % sure", title="Chances")
@@ -130,14 +165,20 @@ def _times(axes: Axes, known: Estimates, planned_s: float) -> None:
             high = time.high if math.isfinite(time.high) else (times[-1] if times else time.value)
             axes.plot([time.low, high], [time.of_all, time.of_all], color=AMBER, lw=1.6)
             axes.plot(time.value, time.of_all, "o", color=AMBER)
-            axes.annotate(clock(time.value), (time.value, time.of_all), xytext=(5, -11), textcoords="offset points",
-                          fontsize=8)
+            axes.annotate(
+                clock(time.value), (time.value, time.of_all), xytext=(5, -11), textcoords="offset points", fontsize=8
+            )
     if planned_s > 0.0:
         axes.axvline(planned_s, color="black", lw=0.9, ls=":", label=f"first plan: {clock(planned_s)}")
         axes.legend(loc="lower right", fontsize=8, frameon=False)
     low_s = min([*times, *([planned_s] if planned_s else [])], default=0.0)
-    axes.set(ylim=(0.0, 1.02), xlim=(0.9 * low_s, None), xlabel="time since setting sail, s",
-             ylabel="share that is there", title="Times, with three quantiles and what is 95 % sure of them")
+    axes.set(
+        ylim=(0.0, 1.02),
+        xlim=(0.9 * low_s, None),
+        xlabel="time since setting sail, s",
+        ylabel="share that is there",
+        title="Times, with three quantiles and what is 95 % sure of them",
+    )
     axes.grid(visible=True, alpha=0.3)
 
 
@@ -151,8 +192,13 @@ def _changes(axes: Axes, changes: Sequence[Tried]) -> None:
                 low, middle, high = scaled(change)
                 around = [[max(0.0, middle - low)], [max(0.0, high - middle)]]
                 (axes if is_time else right).errorbar(
-                    middle, row + (-0.12 if is_time else 0.12), xerr=around, fmt="o" if is_time else "s",
-                    color=BLUE if is_time else AMBER, capsize=3)
+                    middle,
+                    row + (-0.12 if is_time else 0.12),
+                    xerr=around,
+                    fmt="o" if is_time else "s",
+                    color=BLUE if is_time else AMBER,
+                    capsize=3,
+                )
     axes.axvline(0.0, color="black", lw=0.8, ls=":")
     for each in (axes, right):
         reach = max(map(abs, each.get_xlim()))
@@ -162,4 +208,3 @@ def _changes(axes: Axes, changes: Sequence[Tried]) -> None:
     axes.set_xlabel("time, % (95 %)", color=BLUE)
     right.set_xlabel("least clearance, m", color=AMBER, fontsize=9)
     axes.grid(visible=True, axis="x", alpha=0.3)
-

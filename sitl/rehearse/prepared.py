@@ -21,9 +21,9 @@ from sitl.run.embedded import EXPANSIONS, mission_of
 from sitl.scenario import Scenario, WindSpec, beginning, load_scenario, scenario_text
 
 SCENARIO = "rehearsal.toml"
-SLOWER = 3.0        # a voyage may take this much longer than planned ...
+SLOWER = 3.0  # a voyage may take this much longer than planned ...
 AT_LEAST_S = 900.0  # ... and no less than this before it is called off
-BESIDE_S = 3600.0   # for what the preview of a plan does not count: a search, a box, a field
+BESIDE_S = 3600.0  # for what the preview of a plan does not count: a search, a box, a field
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,8 +48,15 @@ class PreparedRehearsal:
 
 
 def prepared(
-    path: Path, folder: Path, *, wind: str | None, wind_error: tuple[float, float] | None, doubt: float, faults: bool,
-    depart: dt.datetime | None, limit_s: float | None,
+    path: Path,
+    folder: Path,
+    *,
+    wind: str | None,
+    wind_error: tuple[float, float] | None,
+    doubt: float,
+    faults: bool,
+    depart: dt.datetime | None,
+    limit_s: float | None,
 ) -> PreparedRehearsal:
     """Read and plan a mission (or a scenario), and write the scenario that is sailed into ``folder``.
 
@@ -60,24 +67,37 @@ def prepared(
     base = load_scenario(path)
     mission = mission_of(base, path)
     if mission.start is None:
-        raise InputError(str(mission.path), "[start]", "is missing, and a rehearsal begins somewhere",
-                         "add lat and lon of where she will set sail")
+        raise InputError(
+            str(mission.path),
+            "[start]",
+            "is missing, and a rehearsal begins somewhere",
+            "add lat and lon of where she will set sail",
+        )
     given = given_wind(wind, _mean(base, mission), wind_error)
     middle = given.middle
     plans = _planned(mission, AssumedWind(from_deg=middle[0], speed_mps=middle[1]))
     voyage_s = mission.skipper.laps * sum(p.cost_s for p in plans) + mission.skipper.station_s
     needs_more = any(goal.field or goal.search or goal.box for goal in mission.goals)
     scenario = msgspec.structs.replace(
-        base, mission=os.path.relpath(mission.path, folder), wind=given.beside(folder).spec,
+        base,
+        mission=os.path.relpath(mission.path, folder),
+        wind=given.beside(folder).spec,
         begins=depart or _hour(base, mission, path, folder / SCENARIO),
-        limit_s=limit_s or round(max(SLOWER * voyage_s, AT_LEAST_S) + needs_more * BESIDE_S))
+        limit_s=limit_s or round(max(SLOWER * voyage_s, AT_LEAST_S) + needs_more * BESIDE_S),
+    )
     folder.mkdir(parents=True, exist_ok=True)
     source = folder / SCENARIO
     Disk().replace(source, scenario_text(scenario).encode())
     return PreparedRehearsal(
-        source=source, scenario=scenario, mission=mission, plans=tuple(plans), doubts=Doubts(
-            wind=replace(given, spec=scenario.wind), boat=doubt, faults=faults, voyage_s=round(max(voyage_s, 60.0), 1)),
-        tells_the_hour=given.record_s > 0.0 or mission.tide_path is not None or mission.safety.end(DARK) is not End.SAY)
+        source=source,
+        scenario=scenario,
+        mission=mission,
+        plans=tuple(plans),
+        doubts=Doubts(
+            wind=replace(given, spec=scenario.wind), boat=doubt, faults=faults, voyage_s=round(max(voyage_s, 60.0), 1)
+        ),
+        tells_the_hour=given.record_s > 0.0 or mission.tide_path is not None or mission.safety.end(DARK) is not End.SAY,
+    )
 
 
 def _mean(base: Scenario, mission: Mission) -> WindSpec:
@@ -115,7 +135,10 @@ def _planned(mission: Mission, wind: AssumedWind) -> list[Plan]:
     except ValueError as error:
         raise InputError(str(mission.path), "", str(error), "'companion mission check --plot' draws it") from None
     if not plans[-1].has_path:
-        raise InputError(str(mission.path), leg_names(mission)[len(plans) - 1],
-                         f"no way leads there in {wind.speed_mps:g} m/s from {wind.from_deg:g}° ({plans[-1].reason})",
-                         "'companion mission check --plot' draws it")
+        raise InputError(
+            str(mission.path),
+            leg_names(mission)[len(plans) - 1],
+            f"no way leads there in {wind.speed_mps:g} m/s from {wind.from_deg:g}° ({plans[-1].reason})",
+            "'companion mission check --plot' draws it",
+        )
     return plans

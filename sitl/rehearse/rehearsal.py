@@ -28,8 +28,8 @@ from sitl.rehearse.voyage import RehearsalCase, rehearsal, sail
 from sitl.runner import CampaignResults, Job
 
 MOST_WORST = 3
-CHANCES_SHARE = 0.6   # of the minutes, where changes are tried in the rest
-PAGE_EVERY_S = 10.0   # the page fills
+CHANCES_SHARE = 0.6  # of the minutes, where changes are tried in the rest
+PAGE_EVERY_S = 10.0  # the page fills
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +57,7 @@ class Follower:
     """
 
     limits: Limits
-    share: float = 1.0     # of the minutes
+    share: float = 1.0  # of the minutes
     on_known: Callable[[Estimates], None] = lambda _: None
     count: int = 0
     ends: str = ""
@@ -78,7 +78,7 @@ class Follower:
                 self.ends = "sure enough"
         if not self.ends and self.limits.left_s(self.share) <= 0.0:
             self.ends = "the time is over"
-        self.known = estimates_of(there[:self.count])
+        self.known = estimates_of(there[: self.count])
         if self.known.records:
             self.on_known(self.known)
         return self.known.line() if self.count else "nothing known yet", bool(self.ends)
@@ -100,14 +100,22 @@ class _GrowingPage:
 
 
 def rehearse(
-    made: PreparedRehearsal, folder: Path, limits: Limits, changes: Sequence[MissionChange], pairs: int,
-    options: CampaignOptions, json_path: Path | None,
+    made: PreparedRehearsal,
+    folder: Path,
+    limits: Limits,
+    changes: Sequence[MissionChange],
+    pairs: int,
+    options: CampaignOptions,
+    json_path: Path | None,
 ) -> int:
     """Sail, tell and write; return the exit code."""
     jobs = [Job(scenario=made.source, seed=seed, case=RehearsalCase(doubts=made.doubts)) for seed in range(limits.runs)]
     page = _GrowingPage(made, folder)
-    follower = Follower(limits, share=CHANCES_SHARE if changes and pairs else 1.0,
-                        on_known=lambda known: page.fill(RehearsalOutcome(known=known, ends="more to come")))
+    follower = Follower(
+        limits,
+        share=CHANCES_SHARE if changes and pairs else 1.0,
+        on_known=lambda known: page.fill(RehearsalOutcome(known=known, ends="more to come")),
+    )
     if options.array[1] > 1:
         return _part(jobs, changes, pairs, options)
     try:
@@ -120,53 +128,60 @@ def rehearse(
     found: list[Tried] = []
     voyage_s = sailed.wall_s / sailed.now * (options.workers or os.cpu_count() or 1) if sailed.now else 0.0
     if changes and count:
-        sys.stdout.write("\n".join(told(follower.known)) + "\n")   # the chances are known: nobody waits for the rest
+        sys.stdout.write("\n".join(told(follower.known)) + "\n")  # the chances are known: nobody waits for the rest
         sys.stderr.write(f"{counted(len(changes), 'change')}, each for the first {counted(count, 'seed')}\n")
 
         def so_far(records: Sequence[dict[str, Any]]) -> list[Tried]:
-            return [tried(change, follower.known.records[:count], mine) for change in changes
-                    if (mine := [r for r in records if r.get("change") == change.told])]
+            return [
+                tried(change, follower.known.records[:count], mine)
+                for change in changes
+                if (mine := [r for r in records if r.get("change") == change.told])
+            ]
 
         def is_time(there: Sequence[dict[str, Any] | None]) -> tuple[str, bool]:
             records = [record for record in there if record]
             page.fill(RehearsalOutcome(known=follower.known, ends="more to come", changes=tuple(so_far(records))))
-            return "", limits.left_s() <= voyage_s   # of the worst, once again
+            return "", limits.left_s() <= voyage_s  # of the worst, once again
 
         # seed by seed: when the time is over, all changes have been tried alike
         again = rehearsal(changed(jobs[:count], changes)).results(options, watch=is_time)
         code |= again.exit_code(is_good=True)
         found = so_far(again.records)
-    outcome = RehearsalOutcome(known=follower.known, ends=follower.ends or "not as sure as was asked for",
-                      changes=tuple(found), folders=_worst(follower.known, jobs, folder, limits, voyage_s))
+    outcome = RehearsalOutcome(
+        known=follower.known,
+        ends=follower.ends or "not as sure as was asked for",
+        changes=tuple(found),
+        folders=_worst(follower.known, jobs, folder, limits, voyage_s),
+    )
     sys.stdout.write("\n".join(_words(outcome, sailed, is_told=bool(changes and count))) + "\n")
     return code | _written(outcome, made, folder, json_path)
 
 
-def changed(
-    jobs: Sequence[Job[RehearsalCase]], changes: Sequence[MissionChange],
-) -> list[Job[RehearsalCase]]:
+def changed(jobs: Sequence[Job[RehearsalCase]], changes: Sequence[MissionChange]) -> list[Job[RehearsalCase]]:
     """Return each job with each change, seed by seed."""
     return [replace(job, case=replace(job.case, change=change)) for job in jobs for change in changes]
 
 
 def _part(
-    jobs: Sequence[Job[RehearsalCase]], changes: Sequence[MissionChange], pairs: int, options: CampaignOptions,
+    jobs: Sequence[Job[RehearsalCase]], changes: Sequence[MissionChange], pairs: int, options: CampaignOptions
 ) -> int:
     """Sail a part of all voyages; what is known is told when the parts are together."""
     sailed = rehearsal([*jobs, *changed(jobs[:pairs], changes)]).results(options)
     number, of = options.array
-    sys.stdout.write(f"{sailed.took}\npart {number} of {of}, in {options.file}; when all are sailed: sitl results join "
-                     f"{options.out.with_name(f'results.*-of-{of}.jsonl') if options.out else ''} --out {options.out}, "
-                     "and this command without --array tells what is known\n")
+    sys.stdout.write(
+        f"{sailed.took}\npart {number} of {of}, in {options.file}; when all are sailed: sitl results join "
+        f"{options.out.with_name(f'results.*-of-{of}.jsonl') if options.out else ''} --out {options.out}, "
+        "and this command without --array tells what is known\n"
+    )
     return sailed.exit_code(is_good=True)
 
 
 def _worst(
-    known: Estimates, jobs: Sequence[Job[RehearsalCase]], folder: Path, limits: Limits, voyage_s: float,
+    known: Estimates, jobs: Sequence[Job[RehearsalCase]], folder: Path, limits: Limits, voyage_s: float
 ) -> tuple[tuple[dict[str, Any], Path | None], ...]:
     """Sail the worst voyages again, while there is time, and keep their folders; a seed repeats to the last bit."""
     found: list[tuple[dict[str, Any], Path | None]] = []
-    for before in (folder / WORST).glob("*-seed-*"):   # ours, and nothing else that may be there
+    for before in (folder / WORST).glob("*-seed-*"):  # ours, and nothing else that may be there
         shutil.rmtree(before) if before.is_dir() else before.unlink()
     for number, record in enumerate(known.worst(MOST_WORST), start=1):
         if limits.left_s() < voyage_s:
@@ -180,8 +195,9 @@ def _worst(
             place.parent.mkdir(parents=True, exist_ok=True)
             again = json.loads(json.dumps(sail(replace(jobs[record["seed"]], keep=place))))
             if again != record:
-                sys.stderr.write(f"\nseed {record['seed']} is another voyage here: was it sailed by another kind of "
-                                 "processor?\n")
+                sys.stderr.write(
+                    f"\nseed {record['seed']} is another voyage here: was it sailed by another kind of processor?\n"
+                )
         except OSError as error:
             sys.stderr.write(f"\n{place}: {reason(error)}: the folder is not kept, the result is\n")
             shutil.rmtree(place, ignore_errors=True)
@@ -201,13 +217,17 @@ def _words(outcome: RehearsalOutcome, sailed: CampaignResults, *, is_told: bool)
     if is_told and not outcome.changes:
         lines.append("what changes are worth: there was no time for it; more --minutes, and the same command goes on")
     if outcome.changes:
-        lines.append("what to change, by pairs of voyages with the same seed (the difference and its 95 % interval; of "
-                     "twenty such intervals one is wrong):")
+        lines.append(
+            "what to change, by pairs of voyages with the same seed (the difference and its 95 % interval; of "
+            "twenty such intervals one is wrong):"
+        )
         lines += [f"  {change.told()}" for change in outcome.changes]
     if outcome.folders:
         lines.append("the worst:")
-        lines += [f"  seed {record['seed']}: {why_bad(record)}{f'; companion view {folder}' if folder else ''}"
-                  for record, folder in outcome.folders]
+        lines += [
+            f"  seed {record['seed']}: {why_bad(record)}{f'; companion view {folder}' if folder else ''}"
+            for record, folder in outcome.folders
+        ]
     return lines
 
 
@@ -221,8 +241,9 @@ def _written(outcome: RehearsalOutcome, made: PreparedRehearsal, folder: Path, j
         Disk().replace(folder / PAGE, page_of(made, outcome, folder))
     except (OSError, CompanionError) as error:
         why = f"{error.filename}: {reason(error)}" if isinstance(error, OSError) else str(error)
-        sys.stdout.write(f"not written: {why}; the voyages are safe in {folder / RESULTS}: make room, and the same "
-                         "command goes on\n")
+        sys.stdout.write(
+            f"not written: {why}; the voyages are safe in {folder / RESULTS}: make room, and the same command goes on\n"
+        )
         return 1
     sys.stdout.write(f"page: {folder / PAGE}\n")
     return 0

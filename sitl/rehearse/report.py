@@ -38,14 +38,30 @@ class RehearsalOutcome:
     def to_dict(self, made: PreparedRehearsal) -> dict[str, Any]:
         """Return it for JSON."""
         return {
-            "mission": made.mission.name, "wind": made.doubts.wind.told, "doubt": made.doubts.boat,
-            "faults": made.doubts.faults, "departs": made.scenario.begins.isoformat(),
-            "limit_s": made.scenario.limit_s, "planned_s": sum(p.cost_s for p in made.plans) or None,
-            "ended": self.ends, **self.known.to_dict(), "changes": [change.to_dict() for change in self.changes],
-            "worst": [{"seed": record["seed"], "why": why_bad(record), "folder": folder and str(folder)}
-                      for record, folder in self.folders],
-            "tracks": [{"seed": record["seed"], "en_m": record.get("track", []), "nearest": record.get("nearest"),
-                        "troubles": record.get("troubles", [])} for record in self.known.records]}
+            "mission": made.mission.name,
+            "wind": made.doubts.wind.told,
+            "doubt": made.doubts.boat,
+            "faults": made.doubts.faults,
+            "departs": made.scenario.begins.isoformat(),
+            "limit_s": made.scenario.limit_s,
+            "planned_s": sum(p.cost_s for p in made.plans) or None,
+            "ended": self.ends,
+            **self.known.to_dict(),
+            "changes": [change.to_dict() for change in self.changes],
+            "worst": [
+                {"seed": record["seed"], "why": why_bad(record), "folder": folder and str(folder)}
+                for record, folder in self.folders
+            ],
+            "tracks": [
+                {
+                    "seed": record["seed"],
+                    "en_m": record.get("track", []),
+                    "nearest": record.get("nearest"),
+                    "troubles": record.get("troubles", []),
+                }
+                for record in self.known.records
+            ],
+        }
 
 
 STYLE = """
@@ -73,23 +89,42 @@ def page_of(made: PreparedRehearsal, outcome: RehearsalOutcome, folder: Path, *,
     if is_whole and (folder / PICTURE).is_file():
         data = base64.b64encode((folder / PICTURE).read_bytes()).decode()
         picture = f"<img alt='Map of the voyages, chances, times, changes' src='data:image/png;base64,{data}'>"
-    head = ("<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content='width=device-width'>"
-            f"<title>{name}, rehearsed</title><link rel=icon href='data:,'><style>{STYLE}</style>"
-            f"{'' if is_whole else '<meta http-equiv=refresh content=10>'}")
-    asked = (f"<h1>{name}, rehearsed</h1><p>{len(known.records)} voyages, {html.escape(outcome.ends)}. Wind: "
-             f"{html.escape(made.doubts.wind.told)}. Doubt in boat, sea and sensors: {made.doubts.boat:g}; "
-             f"{'with' if made.doubts.faults else 'without'} trouble. In brackets what is 95 % sure.</p>")
-    parts = [head, asked, _chances(known), picture, _changes(outcome.changes), "<h2>The worst</h2><table>",
-             *_worst(outcome, folder), "</table>"]
+    head = (
+        "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content='width=device-width'>"
+        f"<title>{name}, rehearsed</title><link rel=icon href='data:,'><style>{STYLE}</style>"
+        f"{'' if is_whole else '<meta http-equiv=refresh content=10>'}"
+    )
+    asked = (
+        f"<h1>{name}, rehearsed</h1><p>{len(known.records)} voyages, {html.escape(outcome.ends)}. Wind: "
+        f"{html.escape(made.doubts.wind.told)}. Doubt in boat, sea and sensors: {made.doubts.boat:g}; "
+        f"{'with' if made.doubts.faults else 'without'} trouble. In brackets what is 95 % sure.</p>"
+    )
+    parts = [
+        head,
+        asked,
+        _chances(known),
+        picture,
+        _changes(outcome.changes),
+        "<h2>The worst</h2><table>",
+        *_worst(outcome, folder),
+        "</table>",
+    ]
     return "\n".join(parts).encode()
 
 
 def _chances(known: Estimates) -> str:
-    rows = [_row(words, _cell(share)) for words, share in (
-        ("arrives", known.arrives), ("comes below the margin's floor", known.low),
-        ("touches something", known.touches))]
-    rows += [_row(reached(time), f"<span class=quiet>({clock(time.low)} to {clock(time.high)})</span>")
-             for time in known.times]
+    rows = [
+        _row(words, _cell(share))
+        for words, share in (
+            ("arrives", known.arrives),
+            ("comes below the margin's floor", known.low),
+            ("touches something", known.touches),
+        )
+    ]
+    rows += [
+        _row(reached(time), f"<span class=quiet>({clock(time.low)} to {clock(time.high)})</span>")
+        for time in known.times
+    ]
     rows += [_row(html.escape(watchdog), _cell(share)) for watchdog, share in known.watchdogs.items()]
     return f"<h2>What will happen</h2><table>{''.join(rows)}</table>"
 
@@ -109,10 +144,17 @@ def _changes(changes: Sequence[Tried]) -> str:
     rows = []
     for pair in changes:
         found = {change.measure.name: change for change in pair.comparison.changes}
-        rows.append(_row(html.escape(pair.change.told), str(len(pair.comparison.pairs)),
-                         *(_difference(found[name]) if name in found else "" for name in TOLD)))
-    return ("<h2>What to change</h2><p>The same seeds with it and without. Green and red are differences that the "
-            f"pairs leave no doubt of.</p><table><tr>{head}{''.join(rows)}</table>")
+        rows.append(
+            _row(
+                html.escape(pair.change.told),
+                str(len(pair.comparison.pairs)),
+                *(_difference(found[name]) if name in found else "" for name in TOLD),
+            )
+        )
+    return (
+        "<h2>What to change</h2><p>The same seeds with it and without. Green and red are differences that the "
+        f"pairs leave no doubt of.</p><table><tr>{head}{''.join(rows)}</table>"
+    )
 
 
 def _difference(change: Difference) -> str:

@@ -63,15 +63,18 @@ class Given:
     def drawn(self, rng: random.Random, voyage_s: float) -> WindSpec:
         """Return the weather of a seed, whose voyage takes about so long."""
         if self.spec.model == "recorded":
-            return msgspec.structs.replace(self.spec, from_s=round(rng.uniform(
-                0.0, max(0.0, self.record_s - voyage_s)), 1))
+            return msgspec.structs.replace(
+                self.spec, from_s=round(rng.uniform(0.0, max(0.0, self.record_s - voyage_s)), 1)
+            )
         mean = (self.spec.from_deg, self.spec.tws_mps)
         if self.cells:
             cell = rng.choices(self.cells, weights=[c.share for c in self.cells])[0]
             mean = (cell.from_deg, cell.tws_mps)
         return msgspec.structs.replace(
-            self.spec, from_deg=round((mean[0] + rng.gauss(0.0, self.error[0])) % 360.0, 2),
-            tws_mps=round(min(max(mean[1] + rng.gauss(0.0, self.error[1]), LEAST_MPS), MOST_MPS), 3))
+            self.spec,
+            from_deg=round((mean[0] + rng.gauss(0.0, self.error[0])) % 360.0, 2),
+            tws_mps=round(min(max(mean[1] + rng.gauss(0.0, self.error[1]), LEAST_MPS), MOST_MPS), 3),
+        )
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -113,8 +116,10 @@ def given_wind(text: str | None, spec: WindSpec, error: tuple[float, float] | No
 
 
 def _told(spec: WindSpec, off: tuple[float, float]) -> str:
-    return (f"{spec.tws_mps:g} m/s from {spec.from_deg:g}°, the mean of each voyage off by {off[1]:g} m/s and "
-            f"{off[0]:g}° (standard deviations), wandering by {spec.sd_deg:g}°")
+    return (
+        f"{spec.tws_mps:g} m/s from {spec.from_deg:g}°, the mean of each voyage off by {off[1]:g} m/s and "
+        f"{off[0]:g}° (standard deviations), wandering by {spec.sd_deg:g}°"
+    )
 
 
 def _of_file(path: Path, spec: WindSpec, error: tuple[float, float] | None) -> Given:
@@ -131,9 +136,12 @@ def _of_file(path: Path, spec: WindSpec, error: tuple[float, float] | None) -> G
     from_deg, tws_mps = (math.degrees(record.at(0.0)[0]), record.at(0.0)[1])
     return Given(
         told=f"measured, {record.duration_s / 3600.0:.1f} h of {path.name}, each voyage from a time of its own on",
-        spec=msgspec.structs.replace(spec, model="recorded", file=str(path.resolve()), from_deg=round(from_deg, 2),
-                                     tws_mps=round(tws_mps, 3)),
-        error=(0.0, 0.0), record_s=record.duration_s)
+        spec=msgspec.structs.replace(
+            spec, model="recorded", file=str(path.resolve()), from_deg=round(from_deg, 2), tws_mps=round(tws_mps, 3)
+        ),
+        error=(0.0, 0.0),
+        record_s=record.duration_s,
+    )
 
 
 def _climate(path: Path, spec: WindSpec, off: tuple[float, float]) -> Given:
@@ -144,11 +152,16 @@ def _climate(path: Path, spec: WindSpec, off: tuple[float, float]) -> Given:
             try:
                 from_deg, tws_mps, share = (float(row[name]) for name in CLIMATE)
             except (TypeError, ValueError):
-                raise InputError(str(path), f"line {reader.line_num}", "is not three numbers",
-                                 f"write {','.join(CLIMATE)}") from None
+                raise InputError(
+                    str(path), f"line {reader.line_num}", "is not three numbers", f"write {','.join(CLIMATE)}"
+                ) from None
             if not (0.0 < tws_mps <= MOST_MPS and -360.0 <= from_deg <= 360.0 and 0.0 <= share <= 1e9):
-                raise InputError(str(path), f"line {reader.line_num}", "is out of range",
-                                 f"speeds up to {MOST_MPS:g} m/s, degrees, shares from 0")
+                raise InputError(
+                    str(path),
+                    f"line {reader.line_num}",
+                    "is out of range",
+                    f"speeds up to {MOST_MPS:g} m/s, degrees, shares from 0",
+                )
             cells.append(ClimateCell(tws_mps=tws_mps, from_deg=from_deg % 360.0, share=share))
     if not cells or sum(cell.share for cell in cells) <= 0.0:
         raise InputError(str(path), "", "holds no wind", f"write lines of {','.join(CLIMATE)}")
@@ -156,9 +169,9 @@ def _climate(path: Path, spec: WindSpec, off: tuple[float, float]) -> Given:
     return Given(told=f"a climate of {len(cells)} winds, {path.name}{about}", spec=spec, error=off, cells=tuple(cells))
 
 
-DRAWN_PERCENT = 8.7    # the deviation of what a drawn polar errs by as a whole
-OF_ONES_OWN = 0.5      # the error of a polar that was made for this boat, as a share of another's
-LEEWAY_SPREAD = 0.3    # of a leeway that the mission gives, as a share of it
+DRAWN_PERCENT = 8.7  # the deviation of what a drawn polar errs by as a whole
+OF_ONES_OWN = 0.5  # the error of a polar that was made for this boat, as a share of another's
+LEEWAY_SPREAD = 0.3  # of a leeway that the mission gives, as a share of it
 # Where a stranger sends the boat is clear water only where `sitl faults` sails.
 ELSEWHERE = frozenset({"foreign_mission"})
 
@@ -183,15 +196,17 @@ class Doubts:
 def drawn(seed: int, base: Scenario, mission: Mission, doubts: Doubts) -> tuple[Scenario, tuple[str, ...]]:
     """Return the scenario of a seed, and what in it is not the plan's, by name."""
     scenario = msgspec.structs.replace(
-        base, wind=doubts.wind.drawn(random.Random(f"rehearsed wind {seed}"), doubts.voyage_s))
+        base, wind=doubts.wind.drawn(random.Random(f"rehearsed wind {seed}"), doubts.voyage_s)
+    )
     rng = random.Random(f"rehearsed boat {seed}")
     other, kinds = departing(rng, scenario, mission)
     scenario = _nearer(other, mission, doubts.boat) if doubts.boat > 0.0 else scenario
     scenario = _as_given(random.Random(f"rehearsed givens {seed}"), scenario, mission, doubts.boat)
     if doubts.faults:
         rng = random.Random(f"rehearsed faults {seed}")
-        lots = [lot for lot in sampled_faults(rng, doubts.voyage_s)
-                if not ELSEWHERE & {event.kind for event in lot.events}]
+        lots = [
+            lot for lot in sampled_faults(rng, doubts.voyage_s) if not ELSEWHERE & {event.kind for event in lot.events}
+        ]
         scenario = with_faults(scenario, lots)
         scenario = msgspec.structs.replace(scenario, is_service=True)
     return scenario, kinds if doubts.boat > 0.0 else ()
@@ -204,14 +219,20 @@ def _nearer(scenario: Scenario, mission: Mission, share: float) -> Scenario:
         polar = share * mission.boat.speed_error_percent / DRAWN_PERCENT
     wind = scenario.wind
     wind = msgspec.structs.replace(
-        wind, gust_spread=min(1.0, share * wind.gust_spread), stronger_per_km=share * wind.stronger_per_km,
-        bends_deg_per_km=share * wind.bends_deg_per_km, lees=tuple(_lee(lee, share) for lee in wind.lees))
+        wind,
+        gust_spread=min(1.0, share * wind.gust_spread),
+        stronger_per_km=share * wind.stronger_per_km,
+        bends_deg_per_km=share * wind.bends_deg_per_km,
+        lees=tuple(_lee(lee, share) for lee in wind.lees),
+    )
     return msgspec.structs.replace(
-        scenario, wind=wind,
+        scenario,
+        wind=wind,
         current=None if scenario.current is None else _stream(scenario.current, share),
         waves=None if scenario.waves is None else _sea(scenario.waves, share),
         boat=None if scenario.boat is None else _hull(scenario.boat, share, polar),
-        sensors=None if scenario.sensors is None else _sensors(scenario.sensors, share))
+        sensors=None if scenario.sensors is None else _sensors(scenario.sensors, share),
+    )
 
 
 def _lee(lee: LeeSpec, share: float) -> LeeSpec:
@@ -231,28 +252,43 @@ def _hull(spec: HullSpec, share: float, polar: float) -> HullSpec:
         return min(max(1.0 + polar * (value - 1.0), 0.2), 2.0)
 
     return msgspec.structs.replace(
-        spec, beat=factor(spec.beat), reach=factor(spec.reach), run=factor(spec.run),
-        leeway_deg=share * spec.leeway_deg, tack_fails=min(1.0, share * spec.tack_fails))
+        spec,
+        beat=factor(spec.beat),
+        reach=factor(spec.reach),
+        run=factor(spec.run),
+        leeway_deg=share * spec.leeway_deg,
+        tack_fails=min(1.0, share * spec.tack_fails),
+    )
 
 
 def _sensors(spec: SensorsSpec, share: float) -> SensorsSpec:
     return msgspec.structs.replace(
-        spec, vane_deg=share * spec.vane_deg, compass_deg=share * spec.compass_deg,
-        deviation_deg=share * spec.deviation_deg, gps_noise_m=share * spec.gps_noise_m,
-        gps_lag_s=share * spec.gps_lag_s)
+        spec,
+        vane_deg=share * spec.vane_deg,
+        compass_deg=share * spec.compass_deg,
+        deviation_deg=share * spec.deviation_deg,
+        gps_noise_m=share * spec.gps_noise_m,
+        gps_lag_s=share * spec.gps_lag_s,
+    )
 
 
 def _as_given(rng: random.Random, scenario: Scenario, mission: Mission, share: float) -> Scenario:
     """Return a scenario with the leeway and the current that the mission gives, each off by its own doubt."""
     if mission.boat.leeway_deg > 0.0:
         leeway_deg = mission.boat.leeway_deg * max(0.0, 1.0 + share * rng.gauss(0.0, LEEWAY_SPREAD))
-        scenario = msgspec.structs.replace(scenario, boat=msgspec.structs.replace(
-            scenario.boat or HullSpec(), leeway_deg=round(min(leeway_deg, 30.0), 3)))
+        scenario = msgspec.structs.replace(
+            scenario,
+            boat=msgspec.structs.replace(scenario.boat or HullSpec(), leeway_deg=round(min(leeway_deg, 30.0), 3)),
+        )
     if mission.current is not None:
         expected = water_of(mission).at(scenario.epoch_s)
         east = expected.east_mps + share * rng.gauss(0.0, expected.sigma_mps)
         north = expected.north_mps + share * rng.gauss(0.0, expected.sigma_mps)
-        scenario = msgspec.structs.replace(scenario, current=CurrentSpec(
-            set_deg=round(math.degrees(math.atan2(east, north)) % 360.0, 2),
-            drift_mps=round(math.hypot(east, north), 3)))
+        scenario = msgspec.structs.replace(
+            scenario,
+            current=CurrentSpec(
+                set_deg=round(math.degrees(math.atan2(east, north)) % 360.0, 2),
+                drift_mps=round(math.hypot(east, north), 3),
+            ),
+        )
     return scenario

@@ -25,10 +25,22 @@ from sitl.rehearse.sampling import Doubts, drawn
 from sitl.runner import Experiment, Job, Key, file_hash
 from sitl.scenario import HullTrack
 
-TRACK_M = 1.0      # by how much a kept track may be off the true one
+TRACK_M = 1.0  # by how much a kept track may be off the true one
 UNDER_WAY_S = 2.0  # what is said when the boat sets sail is of the mission and of no place
-FIGURES = ("arrived", "contacts", "time_s", "distance_m", "tacks", "gybes", "min_clearance_m", "silence_s", "replans",
-           "promised_risk", "no_go_entries", "end_reason")
+FIGURES = (
+    "arrived",
+    "contacts",
+    "time_s",
+    "distance_m",
+    "tacks",
+    "gybes",
+    "min_clearance_m",
+    "silence_s",
+    "replans",
+    "promised_risk",
+    "no_go_entries",
+    "end_reason",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,8 +93,9 @@ class Trace:
         """Return where the hull came nearest to what is solid, or touched it first."""
         if not self.en_m:
             return None
-        _, index = HullTrack(en_m=np.asarray(self.en_m), heading_rad=np.asarray(self.heading_rad),
-                             hull=hull).least_m(solid)
+        _, index = HullTrack(en_m=np.asarray(self.en_m), heading_rad=np.asarray(self.heading_rad), hull=hull).least_m(
+            solid
+        )
         return [round(x, 1) for x in self.en_m[index]]
 
 
@@ -104,18 +117,27 @@ def sail(job: Job[RehearsalCase]) -> dict[str, Any]:
     announced: list[tuple[float, str, Severity]] = []
 
     def listen(_: CompanionStatus, step: Step) -> None:
-        announced.extend((step.snapshot.t_s, action.code, action.severity) for action in step.actions
-                         if isinstance(action, Announce))
+        announced.extend(
+            (step.snapshot.t_s, action.code, action.severity) for action in step.actions if isinstance(action, Announce)
+        )
 
     record: dict[str, Any] = {
-        "seed": job.seed, "change": job.case.told, "kinds": list(kinds),
-        "wind_from_deg": scenario.wind.from_deg, "tws_mps": scenario.wind.tws_mps, "wind_from_s": scenario.wind.from_s,
-        "faults": sorted({event.kind for event in scenario.events})}
+        "seed": job.seed,
+        "change": job.case.told,
+        "kinds": list(kinds),
+        "wind_from_deg": scenario.wind.from_deg,
+        "tws_mps": scenario.wind.tws_mps,
+        "wind_from_s": scenario.wind.from_s,
+        "faults": sorted({event.kind for event in scenario.events}),
+    }
     with tempfile.TemporaryDirectory(prefix="rehearse-") as scratch:
         folder = Path(scratch) / "voyage"
         try:
-            verdict = run_virtual(run_embedded(scenario, job.scenario, job.seed, folder, observer=trace,
-                                               on_status=listen, variation=variation))
+            verdict = run_virtual(
+                run_embedded(
+                    scenario, job.scenario, job.seed, folder, observer=trace, on_status=listen, variation=variation
+                )
+            )
         except Exception as error:
             return record | {"passed": False, "error": repr(error)}
         if job.keep is not None:
@@ -125,12 +147,19 @@ def sail(job: Job[RehearsalCase]) -> dict[str, Any]:
     is_low = clear_m is not None and clear_m < mission.margin_floor_m
     errors = next(check.figure for check in verdict.checks if check.name == "no unhandled error")
     return record | {
-        "passed": bool(figures["arrived"]) and not (figures["contacts"] or is_low or errors), "below_floor": is_low,
-        **({"error": errors[0].strip().splitlines()[-1]} if errors else {}), **{n: figures[n] for n in FIGURES},
-        "alerts": dict(Counter(code for _, code, _ in announced)), "track": trace.track(),
+        "passed": bool(figures["arrived"]) and not (figures["contacts"] or is_low or errors),
+        "below_floor": is_low,
+        **({"error": errors[0].strip().splitlines()[-1]} if errors else {}),
+        **{n: figures[n] for n in FIGURES},
+        "alerts": dict(Counter(code for _, code, _ in announced)),
+        "track": trace.track(),
         "nearest": trace.nearest(solid_of(mission.water()), boat_of(mission).hull) if is_low else None,
-        "troubles": [[code, *(round(x, 1) for x in place)] for t_s, code, severity in announced
-                     if severity <= Severity.WARNING and (place := trace.at(t_s - UNDER_WAY_S)) is not None]}
+        "troubles": [
+            [code, *(round(x, 1) for x in place)]
+            for t_s, code, severity in announced
+            if severity <= Severity.WARNING and (place := trace.at(t_s - UNDER_WAY_S)) is not None
+        ],
+    }
 
 
 def rehearsal(jobs: Sequence[Job[RehearsalCase]]) -> Experiment[RehearsalCase]:
@@ -143,5 +172,12 @@ def key_of(job: Job[RehearsalCase]) -> Key:
     from sitl.scenario import load_scenario
 
     doubts = job.case.doubts
-    return {"mission": load_scenario(job.scenario).name, "hash": file_hash(job.scenario), "wind": doubts.wind.told,
-            "doubt": doubts.boat, "faults": doubts.faults, "change": job.case.told, "seed": job.seed}
+    return {
+        "mission": load_scenario(job.scenario).name,
+        "hash": file_hash(job.scenario),
+        "wind": doubts.wind.told,
+        "doubt": doubts.boat,
+        "faults": doubts.faults,
+        "change": job.case.told,
+        "seed": job.seed,
+    }

@@ -39,10 +39,7 @@ START_S = 90.0
 # Of the real one's simulated receiver, which its filter knows of (SIM_GPS1_LAG_MS) [ms].
 REAL_LAG_MS = 100.0
 # What the judge asks for: the position and the bow, five times a second.
-JUDGE_STREAMS = (
-    Stream("GLOBAL_POSITION_INT", 5.0, 3.0),
-    Stream("ATTITUDE", 5.0, 3.0),
-)
+JUDGE_STREAMS = (Stream("GLOBAL_POSITION_INT", 5.0, 3.0), Stream("ATTITUDE", 5.0, 3.0))
 # What an operator and a ground station do, over any autopilot's link.
 OPERATORS = frozenset({"mode", "reboot", "foreign_mission", "order", "parameter"}) | REDRAWN
 
@@ -120,20 +117,34 @@ class SimulatedBoat:
     @classmethod
     @contextlib.asynccontextmanager
     async def start(
-        cls, source: Path, wind: WindModel, seed: int, pace: float, epoch_s: float,
+        cls, source: Path, wind: WindModel, seed: int, pace: float, epoch_s: float
     ) -> AsyncIterator[SimulatedBoat]:
         """Run it while the block runs."""
         port, judge_port = free_port(), free_port()
         process = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "sitl.run.live_boat", str(source), "--seed", str(seed), "--speedup", f"{pace:g}",
-            "--epoch", f"{epoch_s:.0f}", "--endpoint", f"udpout:127.0.0.1:{port}",
-            "--endpoint", f"udpin:127.0.0.1:{judge_port}", "--parent", str(os.getpid()),
+            sys.executable,
+            "-m",
+            "sitl.run.live_boat",
+            str(source),
+            "--seed",
+            str(seed),
+            "--speedup",
+            f"{pace:g}",
+            "--epoch",
+            f"{epoch_s:.0f}",
+            "--endpoint",
+            f"udpout:127.0.0.1:{port}",
+            "--endpoint",
+            f"udpin:127.0.0.1:{judge_port}",
+            "--parent",
+            str(os.getpid()),
         )
         judge_url = f"udpout:127.0.0.1:{judge_port}"
         try:
             async with (
-                Link(open_link(judge_url), identity=LinkIdentity(system=255, component=191),
-                     streams=JUDGE_STREAMS) as link,
+                Link(
+                    open_link(judge_url), identity=LinkIdentity(system=255, component=191), streams=JUDGE_STREAMS
+                ) as link,
                 Autopilot(link, timeout_s=START_S * pace) as pilot,
             ):
                 yield cls(pilot, wind, port, judge_url)
@@ -154,7 +165,9 @@ class SimulatedBoat:
             return None
         # The autopilot is warm: its boot time is a minute ahead of the simulation.
         return LiveFix(
-            position=state.position, heading_rad=state.heading_rad, speed_mps=state.speed_mps,
+            position=state.position,
+            heading_rad=state.heading_rad,
+            speed_mps=state.speed_mps,
             wind=self._wind.at(max(0.0, state.boot_s - WARM_BOOT_S)),
             sails=status.is_armed and status.mode in {Mode.AUTO, Mode.GUIDED},
         )
@@ -181,7 +194,7 @@ class RealBoat:
     @classmethod
     @contextlib.asynccontextmanager
     async def start(
-        cls, scenario: Scenario, mission: Mission, wind: WindModel, program: Path | None, pace: float, folder: Path,
+        cls, scenario: Scenario, mission: Mission, wind: WindModel, program: Path | None, pace: float, folder: Path
     ) -> AsyncIterator[RealBoat]:
         """Run it while the block runs."""
         waters = scenario_waters(scenario, wind, mission.frame().en_from_geo(mission.start or mission.origin))
@@ -189,10 +202,15 @@ class RealBoat:
         if scenario.sensors is not None and scenario.sensors.gps_lag_s:
             parameters |= {"SIM_GPS1_LAG_MS": REAL_LAG_MS + 1e3 * scenario.sensors.gps_lag_s}
         async with ArduRover(
-            require(program), mission.start or mission.origin, wind, speedup=pace, parameters=parameters,
+            require(program),
+            mission.start or mission.origin,
+            wind,
+            speedup=pace,
+            parameters=parameters,
             heading_rad=math.radians(heading_deg_of(scenario, mission)),
-            model="motorboat" if mission.autopilot.frame == "motor" else (
-                "sailboat" + (MOTOR if mission.boat.motor else "")),
+            model="motorboat"
+            if mission.autopilot.frame == "motor"
+            else ("sailboat" + (MOTOR if mission.boat.motor else "")),
             waters=waters,
         ) as rover:
             yield cls(rover)
@@ -213,8 +231,11 @@ class RealBoat:
         except LinkError:
             return None
         return LiveFix(
-            position=t.position, heading_rad=t.heading_rad, speed_mps=t.speed_mps,
-            wind=(t.twd_from_rad, t.tws_mps), sails=t.is_armed and t.mode in {Mode.AUTO, Mode.GUIDED},
+            position=t.position,
+            heading_rad=t.heading_rad,
+            speed_mps=t.speed_mps,
+            wind=(t.twd_from_rad, t.tws_mps),
+            sails=t.is_armed and t.mode in {Mode.AUTO, Mode.GUIDED},
         )
 
     async def play(self, event: EventSpec, frame: LocalFrame) -> None:

@@ -70,11 +70,11 @@ MAX_TRUTH_SAMPLES = 20_000
 # Effort of one plan under the virtual clock, where time cannot stop it.
 EXPANSIONS = 15_000
 
-FAR = "far"   # the folder of the satellite link, in the voyage's
+FAR = "far"  # the folder of the satellite link, in the voyage's
 # A companion that ended for want of an autopilot is started again after this long, as its service does [s].
 SERVICE_RESTART_S = 5.0
 # Where outlets cannot be: what is said of them is the same on every machine.
-NOWHERE = "192.0.2.1"          # an address for documentation (RFC 5737)
+NOWHERE = "192.0.2.1"  # an address for documentation (RFC 5737)
 NO_FOLDER = Path("/dev/null")
 
 
@@ -143,8 +143,15 @@ def with_radio(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
 
 
 async def run_embedded(
-    scenario: Scenario, source: Path, seed: int, folder: Path, *, on_status: OnStatus | None = None,
-    expansions: int | None = EXPANSIONS, observer: Observer | None = None, worker_pace: float | None = None,
+    scenario: Scenario,
+    source: Path,
+    seed: int,
+    folder: Path,
+    *,
+    on_status: OnStatus | None = None,
+    expansions: int | None = EXPANSIONS,
+    observer: Observer | None = None,
+    worker_pace: float | None = None,
     variation: Variation | None = None,
 ) -> ScenarioVerdict:
     """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json.
@@ -163,20 +170,37 @@ async def run_embedded(
     if heading_deg is None:
         heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     autopilot = SimulatedAutopilot(
-        AutopilotConfig(home=start, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
-                        parameters=scenario.parameters, has_ftp=scenario.has_ftp, has_motor=mission.boat.motor,
-                        is_motorboat=mission.autopilot.frame == "motor",
-                        polar=own_polar(mission), epoch_s=scenario.epoch_s, departures=scenario_departures(scenario),
-                        waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(start)),
-                        recentre_m=recentre_m(mission)),
-        wind, seed=seed,
+        AutopilotConfig(
+            home=start,
+            heading_rad=math.radians(heading_deg),
+            is_warm=True,
+            is_moored=True,
+            parameters=scenario.parameters,
+            has_ftp=scenario.has_ftp,
+            has_motor=mission.boat.motor,
+            is_motorboat=mission.autopilot.frame == "motor",
+            polar=own_polar(mission),
+            epoch_s=scenario.epoch_s,
+            departures=scenario_departures(scenario),
+            waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(start)),
+            recentre_m=recentre_m(mission),
+        ),
+        wind,
+        seed=seed,
     )
     link = MemoryLink("companion", seed=seed)
     frame = mission.frame()
     world = SimulatedWorld(
-        autopilot=autopilot, link=link, frame=frame, wind=wind, seed=seed, shore=MemoryLink("shore", seed=seed + 1),
-        station=MemoryLink("station", seed=seed + 2), observer=observer,
-        others=Others(frame, wind, seed, port=radio_port, hear=autopilot.hear_vessel))
+        autopilot=autopilot,
+        link=link,
+        frame=frame,
+        wind=wind,
+        seed=seed,
+        shore=MemoryLink("shore", seed=seed + 1),
+        station=MemoryLink("station", seed=seed + 2),
+        observer=observer,
+        others=Others(frame, wind, seed, port=radio_port, hear=autopilot.hear_vessel),
+    )
     channel(world, scenario.events)
     if scenario.satellite is not None:
         world.satellite = Satellite(scenario.satellite, folder / FAR, seed=seed, epoch_s=scenario.epoch_s)
@@ -197,31 +221,58 @@ async def run_embedded(
                 await task
     area = mission.water()
     verdict = judge(
-        scenario=scenario.name, seed=seed, expect=scenario.expect, truth=world.truth, solid=solid_of(area),
-        hull=boat_of(mission).hull, floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
-        called_at_s=world.called_at_s, ordered=world.ordered if world.neighbours else None,
-        goal_en_m=frame.en_from_geo(mission.goals[-1].point), summary=world.summary,
-        status_times_s=world.status_s, alerts=world.alerts, errors=world.errors, marks=marks_of(mission),
-        tasks=tasks_of(mission, scenario.epoch_s), keep_m=mission.traffic.safe_distance_m, **ends_of(mission),
+        scenario=scenario.name,
+        seed=seed,
+        expect=scenario.expect,
+        truth=world.truth,
+        solid=solid_of(area),
+        hull=boat_of(mission).hull,
+        floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
+        called_at_s=world.called_at_s,
+        ordered=world.ordered if world.neighbours else None,
+        goal_en_m=frame.en_from_geo(mission.goals[-1].point),
+        summary=world.summary,
+        status_times_s=world.status_s,
+        alerts=world.alerts,
+        errors=world.errors,
+        marks=marks_of(mission),
+        tasks=tasks_of(mission, scenario.epoch_s),
+        keep_m=mission.traffic.safe_distance_m,
+        **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict
 
 
 async def _sail_and_restart(
-    world: SimulatedWorld, scenario: Scenario, mission: Mission, seed: int, folder: Path, on_status: OnStatus | None,
-    expansions: int | None, worker_pace: float | None, room: Callable[[Estimator], WindTracker] | None,
+    world: SimulatedWorld,
+    scenario: Scenario,
+    mission: Mission,
+    seed: int,
+    folder: Path,
+    on_status: OnStatus | None,
+    expansions: int | None,
+    worker_pace: float | None,
+    room: Callable[[Estimator], WindTracker] | None,
 ) -> None:
     """Run the companion; kill it where the scenario says, and start it again."""
     kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
     deadline_s = now_s() + scenario.limit_s
     options = SailOptions(
-        seed=seed, epoch_s=scenario.epoch_s, expansions=expansions if worker_pace is None else None,
-        budget_scale=1.0 / (worker_pace or 1.0), offload=at_once, is_durable=False,
-        state_path=folder / STATE, disk=world.disk, command=f"sitl run {scenario.name}",
-        exit_on_arrival=scenario.exit_on_arrival, dry_run=scenario.dry_run,
-        far=None if scenario.satellite is None else SatelliteLink(
-            folder=folder / FAR, key=KEY, every_s=scenario.satellite.status_every_s),
+        seed=seed,
+        epoch_s=scenario.epoch_s,
+        expansions=expansions if worker_pace is None else None,
+        budget_scale=1.0 / (worker_pace or 1.0),
+        offload=at_once,
+        is_durable=False,
+        state_path=folder / STATE,
+        disk=world.disk,
+        command=f"sitl run {scenario.name}",
+        exit_on_arrival=scenario.exit_on_arrival,
+        dry_run=scenario.dry_run,
+        far=None
+        if scenario.satellite is None
+        else SatelliteLink(folder=folder / FAR, key=KEY, every_s=scenario.satellite.status_every_s),
     )
     if room is not None:
         options = replace(options, room=room)
@@ -243,8 +294,18 @@ async def _sail_and_restart(
         # the planner's process lives and dies with the companion's
         planner = world.planner = FaultyPlanner() if worker_pace is None else KillablePlanner()
         task = asyncio.create_task(
-            _one_life(planner, sail(mission, world.heard_by(), planner, folder, replace(options, limit_s=left_s),
-                                    on_status=look, guard=_guard_of(scenario.broken, seed))),
+            _one_life(
+                planner,
+                sail(
+                    mission,
+                    world.heard_by(),
+                    planner,
+                    folder,
+                    replace(options, limit_s=left_s),
+                    on_status=look,
+                    guard=_guard_of(scenario.broken, seed),
+                ),
+            ),
             name="companion",
         )
         kill = kills.pop(0) if kills else None

@@ -50,7 +50,7 @@ from sitl.scenario import (
 
 PERIOD_S = 0.1
 CGROUPS = Path("/sys/fs/cgroup")
-AHEAD = 32   # times the weight of another control group, or of a session
+AHEAD = 32  # times the weight of another control group, or of a session
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,9 +110,11 @@ async def cpu_share(share: float) -> AsyncIterator[CpuShare]:
     """
     period_us = int(PERIOD_S * 1e6)
     quota_us = max(1000, int(share * period_us))
-    folder = _group("share", {"cpu.shares": f"{1024 * AHEAD}", "cpu.cfs_period_us": f"{period_us}",
-                              "cpu.cfs_quota_us": f"{quota_us}"},
-                    {"cpu.weight": f"{100 * AHEAD}", "cpu.max": f"{quota_us} {period_us}"})
+    folder = _group(
+        "share",
+        {"cpu.shares": f"{1024 * AHEAD}", "cpu.cfs_period_us": f"{period_us}", "cpu.cfs_quota_us": f"{quota_us}"},
+        {"cpu.weight": f"{100 * AHEAD}", "cpu.max": f"{quota_us} {period_us}"},
+    )
     ahead = _group("ahead", {"cpu.shares": f"{1024 * AHEAD}"}, {"cpu.weight": f"{100 * AHEAD}"})
     own = None if ahead is None else _own_group(ahead.parent)
     try:
@@ -185,7 +187,8 @@ class _Companion:
         self._expects_death = False
         share = self._share
         self._process = await asyncio.create_subprocess_exec(
-            *self._command, process_group=0, preexec_fn=None if share is None else share.enter)
+            *self._command, process_group=0, preexec_fn=None if share is None else share.enter
+        )
         if share is not None:
             self._holder = asyncio.create_task(share.hold(self._process.pid), name="share of a core")
         self._watcher = asyncio.create_task(self._watch(self._process), name="companion process")
@@ -227,8 +230,17 @@ class _Companion:
 
 
 def run_live(
-    scenario: Scenario, source: Path, seed: int, folder: Path, *, autopilot: str, program: Path | None,
-    speedup: float | None, truth: TrueTrack | None = None, page: Sequence[str] = (), cpu: float | None = None,
+    scenario: Scenario,
+    source: Path,
+    seed: int,
+    folder: Path,
+    *,
+    autopilot: str,
+    program: Path | None,
+    speedup: float | None,
+    truth: TrueTrack | None = None,
+    page: Sequence[str] = (),
+    cpu: float | None = None,
 ) -> ScenarioVerdict:
     """Run ``scenario``; leaves a voyage folder with verdict.json. The judge's track is noted in ``truth``.
 
@@ -244,27 +256,37 @@ def run_live(
     if cannot:
         raise JobError(
             f"{scenario.name}: {', '.join(cannot)} can be played by the embedded autopilot only; leave out "
-            f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}")
+            f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}"
+        )
     unlike = kind.cannot_be(scenario)
     if unlike:
         raise JobError(
             f"{scenario.name}: {', '.join(unlike)} can be had of the embedded autopilot only; leave out "
-            f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}")
+            f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}"
+        )
     pace = speedup or scenario.speedup
     track = TrueTrack() if truth is None else truth
     try:
         return run(_run(scenario, source, seed, folder, autopilot, program, pace, track, page, cpu), speedup=pace)
-    except asyncio.CancelledError:   # SIGTERM
+    except asyncio.CancelledError:  # SIGTERM
         raise KeyboardInterrupt from None
 
 
 async def _run(
-    scenario: Scenario, source: Path, seed: int, folder: Path, kind: str, program: Path | None, pace: float,
-    truth: TrueTrack, page: Sequence[str], cpu: float | None,
+    scenario: Scenario,
+    source: Path,
+    seed: int,
+    folder: Path,
+    kind: str,
+    program: Path | None,
+    pace: float,
+    truth: TrueTrack,
+    page: Sequence[str],
+    cpu: float | None,
 ) -> ScenarioVerdict:
     here = asyncio.current_task()
     assert here is not None
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, here.cancel)   # it must leave nobody behind
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, here.cancel)  # it must leave nobody behind
     mission_path = scenario.mission_path(source)
     mission = load_mission(mission_path)
     wind = scenario_wind(scenario, source, seed)
@@ -284,13 +306,35 @@ async def _run(
             relay = await stack.enter_async_context(Relay(boat.link, seed=seed))
             link = relay.link
         feeds = ["--feed", f"udpin:127.0.0.1:{port}"] if any(e.kind in TRAFFIC for e in scenario.events) else []
-        companion = _Companion([
-            sys.executable, "-m", "companion.cli", "run", str(mission_path), "--link", link, "--out", str(folder),
-            "--state", str(folder / "state.json"), "--seed", str(seed), "--speedup", f"{pace:g}",
-            "--limit", f"{scenario.limit_s:g}", *feeds, *(["--exit-on-arrival"] if scenario.exit_on_arrival else []),
-            *(["--dry-run"] if scenario.dry_run else []), *page,
-            "--permit", "arm", *(["--permit", "set_auto"] if scenario.set_auto else []),
-        ], share)
+        companion = _Companion(
+            [
+                sys.executable,
+                "-m",
+                "companion.cli",
+                "run",
+                str(mission_path),
+                "--link",
+                link,
+                "--out",
+                str(folder),
+                "--state",
+                str(folder / "state.json"),
+                "--seed",
+                str(seed),
+                "--speedup",
+                f"{pace:g}",
+                "--limit",
+                f"{scenario.limit_s:g}",
+                *feeds,
+                *(["--exit-on-arrival"] if scenario.exit_on_arrival else []),
+                *(["--dry-run"] if scenario.dry_run else []),
+                *page,
+                "--permit",
+                "arm",
+                *(["--permit", "set_auto"] if scenario.set_auto else []),
+            ],
+            share,
+        )
         stack.push_async_callback(companion.stop)
         await companion.start()
         # The scenario's clock starts when the companion does its first work, as it does on the embedded autopilot.
@@ -298,8 +342,10 @@ async def _run(
         began_s, summary_path = now_s(), folder / SUMMARY
         side = [
             asyncio.create_task(follow(boat, frame, truth, others, began_s, summary_path), name="judge"),
-            *(asyncio.create_task(_event(e, began_s, boat, frame, companion, others, relay), name=f"event {e.kind}")
-              for e in scenario.events),
+            *(
+                asyncio.create_task(_event(e, began_s, boat, frame, companion, others, relay), name=f"event {e.kind}")
+                for e in scenario.events
+            ),
         ]
         try:
             await companion.ended(began_s + scenario.limit_s + COMPANION_STOP_S * pace)
@@ -312,20 +358,30 @@ async def _run(
         raise JobError(f"the companion left no summary in {folder}; its exit code was {companion.exit_code}")
     summary: dict[str, Any] = json.loads(summary_path.read_bytes())
     verdict = judge(
-        scenario=scenario.name, seed=seed, expect=scenario.expect, truth=truth,
-        solid=solid_of(mission.water()), hull=boat_of(mission).hull,
+        scenario=scenario.name,
+        seed=seed,
+        expect=scenario.expect,
+        truth=truth,
+        solid=solid_of(mission.water()),
+        hull=boat_of(mission).hull,
         floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
         goal_en_m=frame.en_from_geo(mission.goals[-1].point),
-        summary=summary, status_times_s=None, alerts=summary.get("alerts", {}), errors=errors,
-        marks=marks_of(mission), began_s=began_s, keep_m=mission.traffic.safe_distance_m,
-        tasks=tasks_of(mission, scenario.epoch_s - began_s), **ends_of(mission),
+        summary=summary,
+        status_times_s=None,
+        alerts=summary.get("alerts", {}),
+        errors=errors,
+        marks=marks_of(mission),
+        began_s=began_s,
+        keep_m=mission.traffic.safe_distance_m,
+        tasks=tasks_of(mission, scenario.epoch_s - began_s),
+        **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict
 
 
 async def follow(
-    boat: LiveBoat, frame: LocalFrame, truth: TrueTrack, others: Others, began_s: float, summary: Path,
+    boat: LiveBoat, frame: LocalFrame, truth: TrueTrack, others: Others, began_s: float, summary: Path
 ) -> None:
     """Note where the boat is from the moment it sails, and how near the others come, until the voyage is summed up.
 
@@ -344,7 +400,12 @@ async def follow(
 
 
 async def _event(
-    event: EventSpec, began_s: float, boat: LiveBoat, frame: LocalFrame, companion: _Companion, others: Others,
+    event: EventSpec,
+    began_s: float,
+    boat: LiveBoat,
+    frame: LocalFrame,
+    companion: _Companion,
+    others: Others,
     relay: Relay | None,
 ) -> None:
     """Play one event; wind events are in the wind."""

@@ -34,17 +34,26 @@ def main() -> int:
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     home, wind = mission.start or mission.origin, scenario_wind(scenario, args.scenario, args.seed)
     autopilot = SimulatedAutopilot(
-        AutopilotConfig(home=home, heading_rad=math.radians(heading_deg), is_warm=True, is_moored=True,
-                        parameters=scenario.parameters, polar=own_polar(mission), epoch_s=args.epoch,
-                         is_motorboat=mission.autopilot.frame == "motor", departures=scenario_departures(scenario),
-                         waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(home)),
-                         recentre_m=recentre_m(mission)),
-        wind, args.seed,
+        AutopilotConfig(
+            home=home,
+            heading_rad=math.radians(heading_deg),
+            is_warm=True,
+            is_moored=True,
+            parameters=scenario.parameters,
+            polar=own_polar(mission),
+            epoch_s=args.epoch,
+            is_motorboat=mission.autopilot.frame == "motor",
+            departures=scenario_departures(scenario),
+            waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(home)),
+            recentre_m=recentre_m(mission),
+        ),
+        wind,
+        args.seed,
     )
 
     async def sail() -> None:
         async with serve(autopilot, args.endpoint) as server:
-            while await server.wait(args.speedup) and os.getppid() == args.parent:   # each second of the wall
+            while await server.wait(args.speedup) and os.getppid() == args.parent:  # each second of the wall
                 pass
 
     try:

@@ -22,6 +22,7 @@ class Variation:
 
     def mission(self, mission: Mission) -> Mission:
         """Return the mission so changed."""
-        changes = {name: msgspec.structs.replace(getattr(mission.options, name), **keys)
-                   for name, keys in self.tables.items()}
+        changes = {
+            name: msgspec.structs.replace(getattr(mission.options, name), **keys) for name, keys in self.tables.items()
+        }
         return replace(mission, options=msgspec.structs.replace(mission.options, **changes))

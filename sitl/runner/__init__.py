@@ -17,7 +17,25 @@ from sitl.runner.result_store import (
 )
 
 __all__ = [
-    "SCENARIO_FOLDER", "CampaignResults", "Experiment", "ExperimentSummary", "Job", "Key", "MadeBy", "ResultStore",
-    "ScenarioBundle", "Table", "WorkerDiedError", "file_hash", "in_processes", "joined", "made_by", "read_results",
-    "read_table", "sail_kept", "settled", "table_of", "write_table",
+    "SCENARIO_FOLDER",
+    "CampaignResults",
+    "Experiment",
+    "ExperimentSummary",
+    "Job",
+    "Key",
+    "MadeBy",
+    "ResultStore",
+    "ScenarioBundle",
+    "Table",
+    "WorkerDiedError",
+    "file_hash",
+    "in_processes",
+    "joined",
+    "made_by",
+    "read_results",
+    "read_table",
+    "sail_kept",
+    "settled",
+    "table_of",
+    "write_table",
 ]

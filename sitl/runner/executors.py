@@ -33,8 +33,8 @@ JobT = TypeVar("JobT")
 ResultT = TypeVar("ResultT")
 # Processes that die one after the other before any has done a job will not do one.
 MOST_DEAD = 4
-ENDED_S = 5.0   # within which a process ends that was told to
-AHEAD = 2   # jobs in flight for each process: none waits for this one
+ENDED_S = 5.0  # within which a process ends that was told to
+AHEAD = 2  # jobs in flight for each process: none waits for this one
 
 
 class WorkerDiedError(JobError):
@@ -58,7 +58,7 @@ def in_processes(work: Callable[[JobT], ResultT], jobs: Iterable[JobT], workers:
 
 
 def settled(
-    work: Callable[[JobT], ResultT], jobs: Iterable[JobT], workers: int | None,
+    work: Callable[[JobT], ResultT], jobs: Iterable[JobT], workers: int | None
 ) -> Generator[tuple[int, ResultT | Exception], None, None]:
     """Yield the number of each job, from 0, with its result or what it raised, as they are done.
 
@@ -108,7 +108,7 @@ def _tried(work: Callable[[JobT], ResultT], job: JobT) -> ResultT | Exception:
 
 
 def _flight(
-    work: Callable[[JobT], ResultT], queue: deque[tuple[int, JobT]], count: int, *, is_alone: bool,
+    work: Callable[[JobT], ResultT], queue: deque[tuple[int, JobT]], count: int, *, is_alone: bool
 ) -> Generator[tuple[int, ResultT | Exception], None, list[tuple[int, JobT]]]:
     """Yield what comes of a queue until it is empty or a process dies; return what was in flight then."""
     before = set(active_children())
@@ -142,7 +142,7 @@ def _flight(
         is_over = True
     finally:
         pool.shutdown(wait=is_over, cancel_futures=True)
-        if not is_over:   # broken off: nobody waits for voyages under way
+        if not is_over:  # broken off: nobody waits for voyages under way
             ended = set(active_children()) - before
             for process in ended:
                 process.terminate()
@@ -160,10 +160,10 @@ def _begin(scratch: str) -> None:
 
 
 LOCAL = "local"
-ANSWER_S = 10.0      # within which a scheduler answers that is there
-PATIENCE_S = 120.0   # until which one that went is waited for
-LONELY_S = 20.0      # without a result, after which it is asked whether any worker is left
-RETRIES = 1          # of a job that raised: a card or a link may be better elsewhere
+ANSWER_S = 10.0  # within which a scheduler answers that is there
+PATIENCE_S = 120.0  # until which one that went is waited for
+LONELY_S = 20.0  # without a result, after which it is asked whether any worker is left
+RETRIES = 1  # of a job that raised: a card or a link may be better elsewhere
 
 
 class _GoneError(Exception):
@@ -171,8 +171,13 @@ class _GoneError(Exception):
 
 
 def settled_on(
-    address: str, work: Callable[[JobT], ResultT], jobs: Mapping[int, JobT], workers: int | None, *,
-    say: Callable[[str], None], patience_s: float = PATIENCE_S,
+    address: str,
+    work: Callable[[JobT], ResultT],
+    jobs: Mapping[int, JobT],
+    workers: int | None,
+    *,
+    say: Callable[[str], None],
+    patience_s: float = PATIENCE_S,
 ) -> Iterator[tuple[int, ResultT | Exception]]:
     """Yield the number of each job with its result or what it raised, as they are done.
 
@@ -211,10 +216,12 @@ def require_same(client: Any, address: str) -> None:
         told: dict[str, Any] = {"the scheduler": client.run_on_scheduler(_told), **client.run(_told)}
         infos = client.scheduler_info()["workers"]
     except (OSError, TimeoutError):
-        return   # a worker that goes now is no worker; the scheduler's going is seen next
+        return  # a worker that goes now is no worker; the scheduler's going is seen next
     except Exception as error:
-        raise JobError(f"{address}: the scheduler or a worker cannot load this program ({type(error).__name__}: "
-                       f"{str(error)[:120]}); install the same version there") from error
+        raise JobError(
+            f"{address}: the scheduler or a worker cannot load this program ({type(error).__name__}: "
+            f"{str(error)[:120]}); install the same version there"
+        ) from error
     for who, plain in told.items():
         try:
             unlike = made_by().unlike(MadeBy.from_dict(plain))
@@ -224,8 +231,10 @@ def require_same(client: Any, address: str) -> None:
             raise JobError(f"{address}: {who} runs another version ({unlike}); install the same there")
     many = next((name for name, info in infos.items() if info["nthreads"] > 1), None)
     if many is not None:
-        raise JobError(f"{address}: {many} has {infos[many]['nthreads']} threads, and a voyage wants a process of its "
-                       "own; start workers with --nthreads 1")
+        raise JobError(
+            f"{address}: {many} has {infos[many]['nthreads']} threads, and a voyage wants a process of its "
+            "own; start workers with --nthreads 1"
+        )
 
 
 def _told() -> dict[str, Any]:
@@ -243,9 +252,16 @@ def _local(workers: int) -> Iterator[Any]:
     from dask import config
 
     # A voyage may have processes of its own, which a daemon may not.
-    with config.set({"distributed.worker.daemon": False}), distributed.LocalCluster(
-            n_workers=workers, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0",
-            silence_logs=logging.CRITICAL) as cluster:
+    with (
+        config.set({"distributed.worker.daemon": False}),
+        distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+    ):
         yield cluster
 
 
@@ -259,7 +275,7 @@ def _connected(place: Any, address: str, patience_s: float = 0.0) -> Any:
     while True:
         try:
             if is_file:
-                Path(place).read_bytes()   # dask would wait for it, and say nothing
+                Path(place).read_bytes()  # dask would wait for it, and say nothing
             return Client(**where, timeout=f"{ANSWER_S}s", set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             if time.monotonic() < until_s and isinstance(error, OSError):
@@ -271,12 +287,12 @@ def _connected(place: Any, address: str, patience_s: float = 0.0) -> Any:
 
 
 def _close(client: Any) -> None:
-    with contextlib.suppress(Exception):   # one that lost its scheduler has nothing to say goodbye to
+    with contextlib.suppress(Exception):  # one that lost its scheduler has nothing to say goodbye to
         client.close(timeout=5)
 
 
 def _round(
-    client: Any, work: Callable[[JobT], ResultT], jobs: Mapping[int, JobT], tell: Callable[[str], None],
+    client: Any, work: Callable[[JobT], ResultT], jobs: Mapping[int, JobT], tell: Callable[[str], None]
 ) -> Iterator[tuple[int, ResultT | Exception]]:
     """Yield what comes of the jobs until all are done; raise _GoneError when the scheduler goes.
 
@@ -325,4 +341,4 @@ def _round(
             raise
         raise _GoneError from error
     finally:
-        flying.clear()   # gives back what is not done: the scheduler forgets it
+        flying.clear()  # gives back what is not done: the scheduler forgets it

@@ -25,8 +25,8 @@ from sitl.runner.result_store import Key, ResultStore, StoredResults, made_by, p
 # Sees what there is of each job, in their order (None: nothing yet, {}: lost), when a run begins and after each result.
 # Returns what is known so far, in words, and whether that is enough.
 Watch = Callable[[Sequence[dict[str, Any] | None]], tuple[str, bool]]
-TOLD = 10             # of the jobs that were lost
-LOG_EVERY_S = 30.0    # a line of how far it is, where that is no terminal
+TOLD = 10  # of the jobs that were lost
+LOG_EVERY_S = 30.0  # a line of how far it is, where that is no terminal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,8 +45,9 @@ class CampaignResults:
         """What it took, in words; nothing was sailed now: "", of which the rest was held."""
         if not self.now:
             return f"{counted(len(self.records), 'voyage')}, all of them in the file before"
-        return (f"{counted(self.now, 'voyage')} in {self.wall_s:.0f} s, {self.cpu_s / self.now:.2f} CPU s each"
-                + (f"; {len(self.records) - self.now} in the file before" if len(self.records) > self.now else ""))
+        return f"{counted(self.now, 'voyage')} in {self.wall_s:.0f} s, {self.cpu_s / self.now:.2f} CPU s each" + (
+            f"; {len(self.records) - self.now} in the file before" if len(self.records) > self.now else ""
+        )
 
     def exit_code(self, *, is_good: bool) -> int:
         """Say what was lost; return 0 where nothing was and all else is good."""
@@ -112,7 +113,7 @@ class Experiment(Generic[CaseT]):
                 is in the file.
         """
         if options.table is not None:
-            import_module("pyarrow")   # missed now, and not when all is sailed
+            import_module("pyarrow")  # missed now, and not when all is sailed
         mine = options.part(self.jobs)
         names = [text_of(self.key(job)) for job in mine]
         began_s, cpu_s, now, lost = time.monotonic(), 0.0, 0, []
@@ -153,8 +154,13 @@ class Experiment(Generic[CaseT]):
         if options.table is not None:
             write_table(table_of(held), options.table)
         return CampaignResults(
-            records=[held.results[name] for name in names if name in held.results], held=held, lost=lost,
-            now=now, wall_s=time.monotonic() - began_s, cpu_s=cpu_s)
+            records=[held.results[name] for name in names if name in held.results],
+            held=held,
+            lost=lost,
+            now=now,
+            wall_s=time.monotonic() - began_s,
+            cpu_s=cpu_s,
+        )
 
 
 def sail_kept(sail: Callable[[Job[CaseT]], dict[str, Any]], job: Job[CaseT]) -> int:
@@ -168,7 +174,7 @@ def sail_kept(sail: Callable[[Job[CaseT]], dict[str, Any]], job: Job[CaseT]) -> 
 @contextlib.contextmanager
 def _ends_when_told() -> Iterator[None]:
     """Take SIGTERM, by which a queue ends what it began, for Ctrl-C: workers are ended, and nothing is left behind."""
-    if threading.current_thread() is not threading.main_thread():   # where no signal comes
+    if threading.current_thread() is not threading.main_thread():  # where no signal comes
         yield
         return
 
@@ -183,7 +189,9 @@ def _ends_when_told() -> Iterator[None]:
 
 
 def _settled(
-    work: Callable[[Job[CaseT]], Any], jobs: Mapping[int, Job[CaseT]], options: CampaignOptions,
+    work: Callable[[Job[CaseT]], Any],
+    jobs: Mapping[int, Job[CaseT]],
+    options: CampaignOptions,
     say: Callable[[str], None],
 ) -> Generator[tuple[int, Done | Exception], None, None]:
     """Yield jobs' numbers and what came of them, by the options' executor."""

@@ -42,7 +42,7 @@ class Job(Generic[CaseT]):
 
     seed: int
     case: CaseT
-    scenario: Path = Path()     # none where the case is all
+    scenario: Path = Path()  # none where the case is all
     keep: Path | None = None
 
     @contextlib.contextmanager
@@ -57,16 +57,21 @@ class Job(Generic[CaseT]):
                 yield Path(scratch) / "voyage"
             return
         if self.keep.is_dir() and any(self.keep.iterdir()):
-            raise InputError("--keep", str(self.keep), "is not empty",
-                             "a voyage's folder is taken up where it was left")
+            raise InputError(
+                "--keep", str(self.keep), "is not empty", "a voyage's folder is taken up where it was left"
+            )
         yield self.keep
 
     def key(self, **case: KeyValue) -> Key:
         """Return what a job is known by among results, with what it has of its own in ``case``."""
         from sitl.scenario import load_scenario
 
-        return {"scenario": load_scenario(self.scenario).name, "hash": file_hash(self.scenario), **case,
-                "seed": self.seed}
+        return {
+            "scenario": load_scenario(self.scenario).name,
+            "hash": file_hash(self.scenario),
+            **case,
+            "seed": self.seed,
+        }
 
 
 def files_of(path: Path) -> dict[str, Path]:
@@ -77,8 +82,10 @@ def files_of(path: Path) -> dict[str, Path]:
     scenario = load_scenario(path)
     mission_path = scenario.mission_path(path)
     found = {"": path, "mission": mission_path}
-    for base, plain in ((path, msgspec.to_builtins(scenario)), (mission_path, msgspec.to_builtins(
-            load_mission(mission_path).options))):
+    for base, plain in (
+        (path, msgspec.to_builtins(scenario)),
+        (mission_path, msgspec.to_builtins(load_mission(mission_path).options)),
+    ):
         for word in _words(plain):
             file = base.parent / word
             if len(word) < 256 and "\n" not in word and "\0" not in word and file.is_file():
@@ -102,7 +109,7 @@ def file_hash(path: Path) -> str:
 
     It is taken once in a process.
     """
-    return _file_hash(path.resolve())   # a relative name is another file in another folder
+    return _file_hash(path.resolve())  # a relative name is another file in another folder
 
 
 @cache
@@ -133,19 +140,30 @@ class ScenarioBundle:
             return cls(main=where.relative_to(SCENARIO_FOLDER).as_posix(), hash=file_hash(path))
         files = {file.resolve() for file in files_of(path).values()}
         root = Path(os.path.commonpath([file.parent for file in files]))
-        bundle = cls(main=where.relative_to(root).as_posix(), hash=file_hash(path), packed=tuple(
-            sorted((file.relative_to(root).as_posix(), zlib.compress(file.read_bytes())) for file in files)))
+        bundle = cls(
+            main=where.relative_to(root).as_posix(),
+            hash=file_hash(path),
+            packed=tuple(
+                sorted((file.relative_to(root).as_posix(), zlib.compress(file.read_bytes())) for file in files)
+            ),
+        )
         with tempfile.TemporaryDirectory(prefix="scenario-") as trial:
             try:
                 is_whole = _file_hash.__wrapped__(bundle.unpack(Path(trial))) == bundle.hash
-                is_own = all(file.resolve().is_relative_to(Path(trial).resolve()) or any(
-                    file.resolve().is_relative_to(ours.parent) for ours in ROOTS)
-                    for file in files_of(Path(trial) / bundle.main).values())
+                is_own = all(
+                    file.resolve().is_relative_to(Path(trial).resolve())
+                    or any(file.resolve().is_relative_to(ours.parent) for ours in ROOTS)
+                    for file in files_of(Path(trial) / bundle.main).values()
+                )
             except InputError:
                 is_whole = is_own = False
         if not (is_whole and is_own):
-            raise InputError(str(path), "", "names a file that another machine will not find",
-                             "name files relative to the file that names them")
+            raise InputError(
+                str(path),
+                "",
+                "names a file that another machine will not find",
+                "name files relative to the file that names them",
+            )
         return bundle
 
     def unpack(self, folder: Path) -> Path:
@@ -221,10 +239,18 @@ def perform(task: Task) -> Done:
         _require_room()
         raise RaisedError(f"{type(error).__name__}: {error}") from None
     spent = {"wall_s": time.perf_counter() - began_s, "cpu_s": time.process_time() - worked_s}
-    _require_room()   # the voyage may have met the end of the disk
-    return Done(result=json.loads(json.dumps(result)), facts={
-        "host": platform.node(), "pid": os.getpid(), "processor": processor(), **spent, "at": time.time(),
-        "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0})
+    _require_room()  # the voyage may have met the end of the disk
+    return Done(
+        result=json.loads(json.dumps(result)),
+        facts={
+            "host": platform.node(),
+            "pid": os.getpid(),
+            "processor": processor(),
+            **spent,
+            "at": time.time(),
+            "peak_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
+        },
+    )
 
 
 def require_fit(by: MadeBy) -> None:
@@ -238,5 +264,7 @@ def _require_room() -> None:
     scratch = Path(tempfile.gettempdir())
     room = Disk().room(scratch)
     if room.is_short:
-        raise NoRoomError(f"{platform.node()}: {scratch}: {room.free_bytes >> 20} MB are left, too few for a voyage; "
-                          "make room, and the same command goes on")
+        raise NoRoomError(
+            f"{platform.node()}: {scratch}: {room.free_bytes >> 20} MB are left, too few for a voyage; "
+            "make room, and the same command goes on"
+        )

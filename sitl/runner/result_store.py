@@ -38,8 +38,14 @@ from companion.words import counted
 
 LIBRARIES = ("numpy", "numba", "shapely", "pyproj", "pymavlink")
 # The laboratory's lies beside them, or is not installed.
-ROOTS = tuple(folder for folder in (*(Path(package.__path__[0]).resolve() for package in (companion, sitl)),
-                                    Path(sitl.__path__[0]).resolve().with_name("lab")) if folder.is_dir())
+ROOTS = tuple(
+    folder
+    for folder in (
+        *(Path(package.__path__[0]).resolve() for package in (companion, sitl)),
+        Path(sitl.__path__[0]).resolve().with_name("lab"),
+    )
+    if folder.is_dir()
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,8 +70,12 @@ class MadeBy:
 
     def unlike(self, other: MadeBy) -> str:
         """Return in words how ``other`` differs in what decides a result, "" where it does not."""
-        pairs = [("the project", self.version, other.version), ("its source", self.source, other.source),
-                 ("Python", self.python, other.python), ("the machine", self.machine, other.machine)]
+        pairs = [
+            ("the project", self.version, other.version),
+            ("its source", self.source, other.source),
+            ("Python", self.python, other.python),
+            ("the machine", self.machine, other.machine),
+        ]
         theirs = dict(other.libraries)
         pairs += [(name, number, theirs.get(name, "none")) for name, number in self.libraries]
         return ", ".join(f"{name} is {there} there and {here} here" for name, here, there in pairs if here != there)
@@ -75,9 +85,13 @@ class MadeBy:
 def made_by() -> MadeBy:
     """Return what this process is."""
     return MadeBy(
-        version=companion.__version__, commit=_commit(), source=_source(), machine=platform.machine(),
+        version=companion.__version__,
+        commit=_commit(),
+        source=_source(),
+        machine=platform.machine(),
         python=".".join(platform.python_version_tuple()[:2]),
-        libraries=tuple((name, version(name)) for name in LIBRARIES))
+        libraries=tuple((name, version(name)) for name in LIBRARIES),
+    )
 
 
 @cache
@@ -99,14 +113,20 @@ def _source() -> str:
 
 def _commit() -> str:
     """Return the commit of the checkout that the packages lie in, "" where there is none or no git."""
+
     def git(*words: str) -> str:
-        done = subprocess.run(["git", "-C", str(ROOTS[0].parent), *words],  # noqa: S603, S607 - the user's own git
-                              capture_output=True, text=True, check=True, timeout=10.0)
+        done = subprocess.run(  # noqa: S603 - the user's own git
+            ["git", "-C", str(ROOTS[0].parent), *words],  # noqa: S607
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=10.0,
+        )
         return done.stdout.strip()
 
     try:
         if not git("ls-files", *(str(root / "__init__.py") for root in ROOTS)):
-            return ""   # installed somewhere below another project's checkout
+            return ""  # installed somewhere below another project's checkout
         changed = git("status", "--porcelain", "--untracked-files=all", "--", *map(str, ROOTS))
         return git("rev-parse", "--short=12", "HEAD") + ("+" if changed else "")
     except (OSError, subprocess.SubprocessError):
@@ -139,8 +159,10 @@ class StoredResults:
 
     def to_bytes(self) -> bytes:
         """Return the file."""
-        lines = [_head(self.campaign, self.by), *(_line(text, self.results[text])
-                                                  for text in sorted(self.results, key=_order))]
+        lines = [
+            _head(self.campaign, self.by),
+            *(_line(text, self.results[text]) for text in sorted(self.results, key=_order)),
+        ]
         return "".join(lines).encode()
 
 
@@ -154,8 +176,9 @@ def _line(key: str, result: dict[str, Any]) -> str:
 
 def _order(text: str) -> list[tuple[bool, float, str]]:
     """Return what to sort a key by: numbers as numbers."""
-    return [(isinstance(v, str), float(v) if isinstance(v, int | float) else 0.0, str(v))
-            for v in json.loads(text).values()]
+    return [
+        (isinstance(v, str), float(v) if isinstance(v, int | float) else 0.0, str(v)) for v in json.loads(text).values()
+    ]
 
 
 def read_results(path: Path) -> StoredResults:
@@ -216,9 +239,9 @@ class ResultStore:
         except OSError as error:
             raise JobError(f"{self.path}: another run writes it; wait for it, or name another file") from error
         data = self.path.read_bytes()
-        whole = data[:data.rfind(b"\n") + 1]
+        whole = data[: data.rfind(b"\n") + 1]
         if not whole:
-            if data and not data.startswith(b'{"results":'[:len(data)]):   # somebody's file, and no head cut short
+            if data and not data.startswith(b'{"results":'[: len(data)]):  # somebody's file, and no head cut short
                 raise InputError(str(self.path), "line 1", "is no line of a file of results", "name another file")
             os.ftruncate(self._fd, 0)
             self._append(_head(campaign, made_by()))
@@ -228,8 +251,12 @@ class ResultStore:
             raise InputError(str(self.path), "", f"holds results of sitl {held.campaign}", "name another file")
         unlike = made_by().unlike(held.by)
         if unlike:
-            raise InputError(str(self.path), "", f"was begun by another program ({unlike})",
-                             "results are not mixed: name another file")
+            raise InputError(
+                str(self.path),
+                "",
+                f"was begun by another program ({unlike})",
+                "results are not mixed: name another file",
+            )
         os.ftruncate(self._fd, len(whole))
         return held
 
@@ -237,7 +264,7 @@ class ResultStore:
         """Append a result; JobError, which says what is safe, where the disk does not take it."""
         self._append(_line(key, result))
         self.held.results[key] = result
-        with contextlib.suppress(OSError):   # they are about the run and not of it
+        with contextlib.suppress(OSError):  # they are about the run and not of it
             fd = self._disk.open_to_append(facts_beside(self.path))
             try:
                 self._disk.append(fd, (f'{{"key":{key},' + text_of(facts)[1:] + "\n").encode())
@@ -249,17 +276,20 @@ class ResultStore:
             self._disk.append(self._fd, line.encode())
         except OSError as error:
             held = self.held.results if hasattr(self, "held") else ()
-            raise JobError(f"{self.path}: {reason(error)}; it holds {counted(len(held), 'result')}: make room, and "
-                           "the same command goes on") from error
+            raise JobError(
+                f"{self.path}: {reason(error)}; it holds {counted(len(held), 'result')}: make room, and "
+                "the same command goes on"
+            ) from error
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
         """Put the lines in order, unless the run was broken off, and close."""
         if kind is None and self.path.is_file():
-            with contextlib.suppress(OSError):   # unordered they say the same
+            with contextlib.suppress(OSError):  # unordered they say the same
                 self._disk.replace(self.path, self.held.to_bytes())
         os.close(self._fd)
 
@@ -289,8 +319,12 @@ def table_of(held: StoredResults) -> Table:
     """Return a ledger's results as a table."""
     pairs = list(held.pairs())
     rows = tuple({**_flat(result), **key} for key, result in pairs)
-    return Table(campaign=held.campaign, by=held.by, rows=rows, keys=tuple(dict.fromkeys(
-        name for key, _ in pairs for name in key)))
+    return Table(
+        campaign=held.campaign,
+        by=held.by,
+        rows=rows,
+        keys=tuple(dict.fromkeys(name for key, _ in pairs for name in key)),
+    )
 
 
 def _flat(result: Mapping[str, Any]) -> dict[str, Any]:
@@ -356,8 +390,12 @@ def write_table(table: Table, path: Path) -> None:
     columns |= {name: pa.array([value] * len(table.rows)) for name, value in made.items()}
     meta = {"results": FORMAT, "campaign": table.campaign, "made_by": table.by.to_dict(), "keys": table.keys}
     sink = pa.BufferOutputStream()
-    parquet.write_table(pa.table(columns).replace_schema_metadata({META: text_of(meta).encode()}), sink,
-                        compression="zstd", write_statistics=False)
+    parquet.write_table(
+        pa.table(columns).replace_schema_metadata({META: text_of(meta).encode()}),
+        sink,
+        compression="zstd",
+        write_statistics=False,
+    )
     try:
         Disk().replace(path, sink.getvalue().to_pybytes())
     except OSError as error:
@@ -387,13 +425,22 @@ def joined(paths: Iterable[Path]) -> StoredResults:
             whole = StoredResults(campaign=part.campaign, by=part.by)
         unlike = whole.by.unlike(part.by)
         if part.campaign != whole.campaign or unlike:
-            raise InputError(str(path), "", f"is of sitl {part.campaign}, the first of sitl {whole.campaign}"
-                             if part.campaign != whole.campaign else f"was made by another program ({unlike})",
-                             "join what belongs together")
+            raise InputError(
+                str(path),
+                "",
+                f"is of sitl {part.campaign}, the first of sitl {whole.campaign}"
+                if part.campaign != whole.campaign
+                else f"was made by another program ({unlike})",
+                "join what belongs together",
+            )
         for key, result in part.results.items():
             if whole.results.setdefault(key, result) != result:
-                raise InputError(str(path), key, "has another result than in the files before",
-                                 "the same program must give the same: is the processor of another kind?")
+                raise InputError(
+                    str(path),
+                    key,
+                    "has another result than in the files before",
+                    "the same program must give the same: is the processor of another kind?",
+                )
     if whole is None:
         raise InputError("sitl results join", "", "no file", "name the parts")
     return whole

@@ -36,14 +36,18 @@ Craft = Literal["power", "sail", "fishing", "restricted", "not under command", "
 Duty = Literal["first", "second", "both"]
 
 # ITU-R M.1371: what a vessel of each kind says of itself.
-STATUS: dict[Craft, int] = {
-    "power": 0, "sail": 8, "fishing": 7, "restricted": 3, "not under command": 2, "draught": 4}
+STATUS: dict[Craft, int] = {"power": 0, "sail": 8, "fishing": 7, "restricted": 3, "not under command": 2, "draught": 4}
 SHIP_TYPE: dict[Craft, int] = {
-    "power": 70, "sail": 36, "fishing": 30, "restricted": 33, "not under command": 70, "draught": 80}
+    "power": 70,
+    "sail": 36,
+    "fishing": 30,
+    "restricted": 33,
+    "not under command": 70,
+    "draught": 80,
+}
 # Rule 18: who is before whom; a vessel constrained by its draught is not to be impeded by sail either.
-_RANK: dict[Craft, int] = {
-    "power": 0, "sail": 1, "draught": 2, "fishing": 3, "restricted": 4, "not under command": 4}
-STERN_SECTOR_DEG = 112.5     # 22.5 degrees abaft the beam
+_RANK: dict[Craft, int] = {"power": 0, "sail": 1, "draught": 2, "fishing": 3, "restricted": 4, "not under command": 4}
+STERN_SECTOR_DEG = 112.5  # 22.5 degrees abaft the beam
 END_ON_DEG = 6.0
 
 
@@ -106,7 +110,7 @@ def _sails(a: Mover, b: Mover, twd_deg: float) -> Duty:
     """Rule 12 a: the tack, and on the same tack the place."""
     first, second = (_half_turn(twd_deg - math.degrees(m.heading_rad)) > 0.0 for m in (a, b))
     if first != second:
-        return "second" if first else "first"      # with the wind on the starboard side it is on starboard tack
+        return "second" if first else "first"  # with the wind on the starboard side it is on starboard tack
     upwind = complex(math.sin(math.radians(twd_deg)), math.cos(math.radians(twd_deg)))
     higher = ((complex(*a.en_m) - complex(*b.en_m)) * upwind.conjugate()).real
     return "first" if higher >= 0.0 else "second"
@@ -118,7 +122,7 @@ def _half_turn(degrees: float) -> float:
 
 STEADY_DEG = 15.0
 APPARENT_DEG = 30.0
-SHOWS_DEG = 15.0             # a change of course has begun
+SHOWS_DEG = 15.0  # a change of course has begun
 EVIDENT_S = 90.0
 EARLY_S, PROMPT_S = 60.0, 45.0
 AHEAD_S = 40.0
@@ -147,15 +151,15 @@ class Judgement:
     """What came of it; ``faults`` are the rules that our boat broke, in words."""
 
     rule: str
-    duty: str                # "we stand on", "we give way", "both"
+    duty: str  # "we stand on", "we give way", "both"
     manner: str
     craft: str
     cpa_unaltered_m: float
-    meet_s: float            # from its first report to the meeting, both going on
-    nearest_m: float         # between the hulls
-    altered_deg: float       # our largest change of course before the closest approach
-    altered_left_s: float | None   # to the meeting when our change had begun
-    crossed: str             # "ahead", "astern", ""
+    meet_s: float  # from its first report to the meeting, both going on
+    nearest_m: float  # between the hulls
+    altered_deg: float  # our largest change of course before the closest approach
+    altered_left_s: float | None  # to the meeting when our change had begun
+    crossed: str  # "ahead", "astern", ""
     faults: tuple[str, ...]
     keep_m: float
 
@@ -171,16 +175,38 @@ class Judgement:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as plain values."""
-        names = ("rule", "duty", "manner", "craft", "cpa_unaltered_m", "meet_s", "nearest_m", "altered_deg",
-                 "altered_left_s", "crossed", "keep_m")
+        names = (
+            "rule",
+            "duty",
+            "manner",
+            "craft",
+            "cpa_unaltered_m",
+            "meet_s",
+            "nearest_m",
+            "altered_deg",
+            "altered_left_s",
+            "crossed",
+            "keep_m",
+        )
         plain = {n: round(v, 1) if isinstance(v := getattr(self, n), float) else v for n in names}
-        return {**plain, "faults": list(self.faults), "kept_rules": self.kept_rules,
-                "kept_distance": self.kept_distance}
+        return {
+            **plain,
+            "faults": list(self.faults),
+            "kept_rules": self.kept_rules,
+            "kept_distance": self.kept_distance,
+        }
 
 
 def judge_encounter(
-    met: Met, t_s: Sequence[float], en_m: Sequence[tuple[float, float]], heading_rad: Sequence[float],
-    twd_from_rad: Sequence[float], *, keep_m: float, our_length_m: float, craft: Craft = "sail",
+    met: Met,
+    t_s: Sequence[float],
+    en_m: Sequence[tuple[float, float]],
+    heading_rad: Sequence[float],
+    twd_from_rad: Sequence[float],
+    *,
+    keep_m: float,
+    our_length_m: float,
+    craft: Craft = "sail",
 ) -> Judgement | None:
     """Return what the tracks show; None where the other was not heard, or nothing was sailed after that.
 
@@ -209,11 +235,24 @@ def judge_encounter(
     bows = np.interp(times, t_s, np.unwrap(heading_rad))
     gaps = _gaps(ours, hers, hers_deg, met, our_length_m)
     movers = [
-        (Mover(en_m=(float(ours[i, 0]), float(ours[i, 1])), course_rad=math.radians(ours_deg[i]),
-               heading_rad=float(bows[i]), speed_mps=float(speeds[0][i]), craft=craft),
-         Mover(en_m=(float(hers[i, 0]), float(hers[i, 1])), course_rad=math.radians(hers_deg[i]),
-               heading_rad=math.radians(hers_deg[i]), speed_mps=float(speeds[1][i]), craft=met.craft))
-        for i in range(len(times))]
+        (
+            Mover(
+                en_m=(float(ours[i, 0]), float(ours[i, 1])),
+                course_rad=math.radians(ours_deg[i]),
+                heading_rad=float(bows[i]),
+                speed_mps=float(speeds[0][i]),
+                craft=craft,
+            ),
+            Mover(
+                en_m=(float(hers[i, 0]), float(hers[i, 1])),
+                course_rad=math.radians(hers_deg[i]),
+                heading_rad=math.radians(hers_deg[i]),
+                speed_mps=float(speeds[1][i]),
+                craft=met.craft,
+            ),
+        )
+        for i in range(len(times))
+    ]
     rule, who = duty(*movers[0], float(np.median(wind[:10])))
     cpa_m, meet_s = closest(*movers[0])
     nearest = int(np.argmin(gaps))
@@ -224,17 +263,29 @@ def judge_encounter(
     left_s = float(meet_s - (times[begun[0]] - times[0])) if len(begun) else None
     crossed = _crossed(ours, hers, hers_deg, speeds[1], float(hers_deg[0] - ours_deg[0]))
     giving_way = _give_way_faults(turned[before], left_s, meet_s, times, begun, crossed, rule)
-    faults = giving_way if who != "second" else _stand_on_faults(
-        movers, turned, her_turn, nearest, keep_m + 0.5 * met.length_m)
+    faults = (
+        giving_way
+        if who != "second"
+        else _stand_on_faults(movers, turned, her_turn, nearest, keep_m + 0.5 * met.length_m)
+    )
     if who == "second" and faults and rule == "12" and not giving_way and _in_doubt(*movers[0], float(wind[0])):
         who, faults = "first", []
     if who == "both" and len(begun) and ours_deg[begun[0]] < ours_deg[0]:
         faults.append("altered to port")
     return Judgement(
-        rule=rule, duty={"first": "we give way", "second": "we stand on", "both": "both"}[who], manner=met.manner,
-        craft=met.craft, cpa_unaltered_m=cpa_m, meet_s=meet_s, nearest_m=float(gaps[nearest]),
-        altered_deg=float(turned[before].max()), altered_left_s=left_s, crossed=crossed[0], faults=tuple(faults),
-        keep_m=keep_m)
+        rule=rule,
+        duty={"first": "we give way", "second": "we stand on", "both": "both"}[who],
+        manner=met.manner,
+        craft=met.craft,
+        cpa_unaltered_m=cpa_m,
+        meet_s=meet_s,
+        nearest_m=float(gaps[nearest]),
+        altered_deg=float(turned[before].max()),
+        altered_left_s=left_s,
+        crossed=crossed[0],
+        faults=tuple(faults),
+        keep_m=keep_m,
+    )
 
 
 def _in_doubt(ours: Mover, hers: Mover, twd_from_rad: float) -> bool:
@@ -244,7 +295,10 @@ def _in_doubt(ours: Mover, hers: Mover, twd_from_rad: float) -> bool:
 
 
 def _stand_on_faults(
-    movers: Sequence[tuple[Mover, Mover]], turned: NDArray[np.float64], her_turn: NDArray[np.float64], nearest: int,
+    movers: Sequence[tuple[Mover, Mover]],
+    turned: NDArray[np.float64],
+    her_turn: NDArray[np.float64],
+    nearest: int,
     clear_m: float,
 ) -> list[str]:
     began = movers[0][0]
@@ -262,8 +316,13 @@ def _stand_on_faults(
 
 
 def _give_way_faults(
-    turned: NDArray[np.float64], left_s: float | None, meet_s: float, times: NDArray[np.float64],
-    begun: NDArray[np.intp], crossed: tuple[str, float], rule: str,
+    turned: NDArray[np.float64],
+    left_s: float | None,
+    meet_s: float,
+    times: NDArray[np.float64],
+    begun: NDArray[np.intp],
+    crossed: tuple[str, float],
+    rule: str,
 ) -> list[str]:
     faults = []
     if left_s is None or turned.max() < APPARENT_DEG:
@@ -276,7 +335,10 @@ def _give_way_faults(
 
 
 def _crossed(
-    ours: NDArray[np.float64], hers: NDArray[np.float64], hers_deg: NDArray[np.float64], speed: NDArray[np.float64],
+    ours: NDArray[np.float64],
+    hers: NDArray[np.float64],
+    hers_deg: NDArray[np.float64],
+    speed: NDArray[np.float64],
     between_deg: float,
 ) -> tuple[str, float]:
     """Return on which side of the other we crossed its course's line first, and how many seconds of its way off."""
@@ -304,20 +366,20 @@ def _ways(times: NDArray[np.float64], t_s: Sequence[float], en_m: Sequence[tuple
 
 
 def _courses_deg(
-    times: NDArray[np.float64], t_s: Sequence[float], en_m: Sequence[tuple[float, float]],
+    times: NDArray[np.float64], t_s: Sequence[float], en_m: Sequence[tuple[float, float]]
 ) -> NDArray[np.float64]:
     way = _ways(times, t_s, en_m)
     return np.asarray(np.degrees(np.unwrap(np.arctan2(way[:, 0], way[:, 1]))))
 
 
 def _speeds(
-    times: NDArray[np.float64], t_s: Sequence[float], en_m: Sequence[tuple[float, float]],
+    times: NDArray[np.float64], t_s: Sequence[float], en_m: Sequence[tuple[float, float]]
 ) -> NDArray[np.float64]:
     return np.asarray(np.hypot(*_ways(times, t_s, en_m).T))
 
 
 def _gaps(
-    ours: NDArray[np.float64], hers: NDArray[np.float64], hers_deg: NDArray[np.float64], met: Met, our_length_m: float,
+    ours: NDArray[np.float64], hers: NDArray[np.float64], hers_deg: NDArray[np.float64], met: Met, our_length_m: float
 ) -> NDArray[np.float64]:
     """Return the distances between the other's rectangle and our disc [m]."""
     off = ours - hers
@@ -331,9 +393,9 @@ Manner = Literal["rules", "keeps"]
 TURN_DEG, MORE_DEG, MOST_DEG = 50.0, 20.0, 110.0
 MORE_AFTER_S = 15.0
 CLOSE_HAULED_DEG = 50.0
-NIMBLE_M = 40.0              # shorter than this it turns fast
+NIMBLE_M = 40.0  # shorter than this it turns fast
 RATES_DEG_S = (6.0, 2.5)
-ROOM_M = 90.0                # between the middles, beyond half its length: what it wants between us
+ROOM_M = 90.0  # between the middles, beyond half its length: what it wants between us
 
 
 @dataclass(slots=True)
@@ -345,15 +407,15 @@ class Mariner:
     craft: Craft
     manner: Manner
     react_s: float
-    base_rad: float          # the course that it is on its way by
+    base_rad: float  # the course that it is on its way by
     speed_mps: float
     en_m: tuple[float, float]
     t_s: float
     name: str = ""
     course_rad: float = 0.0
-    turn_deg: float = 0.0    # how far off its course it has decided to go
+    turn_deg: float = 0.0  # how far off its course it has decided to go
     turned_s: float = -math.inf
-    gives_way: bool | None = None   # by what the rules gave when it began
+    gives_way: bool | None = None  # by what the rules gave when it began
 
     def __post_init__(self) -> None:
         self.course_rad = self.base_rad
@@ -396,11 +458,17 @@ class Mariner:
         size = min(abs(self.turn_deg) + (MORE_DEG if self.turn_deg else TURN_DEG), MOST_DEG)
         sides = (1.0, -1.0) if not self.turn_deg else (math.copysign(1.0, self.turn_deg),)
         able = [s * size for s in sides if self._can(s * size, twd_deg)] or [
-            s * size for s in (1.0, -1.0) if self._can(s * size, twd_deg)]
+            s * size for s in (1.0, -1.0) if self._can(s * size, twd_deg)
+        ]
         if able:
             # The better side by what is gained; to starboard where both do.
-            self.turn_deg = max(able, key=lambda d: (round(min(room_m, closest(
-                ours, self.mover(self.base_rad + math.radians(d)))[0]), -1), d))
+            self.turn_deg = max(
+                able,
+                key=lambda d: (
+                    round(min(room_m, closest(ours, self.mover(self.base_rad + math.radians(d)))[0]), -1),
+                    d,
+                ),
+            )
             self.turned_s = self.t_s
 
     def _can(self, turn_deg: float, twd_deg: float) -> bool:
@@ -415,7 +483,7 @@ class Receiver:
 
     rng: np.random.Generator
     fix_sd_m: float = 3.0
-    drift: complex = 0j      # of the fix: it wanders, it does not jump
+    drift: complex = 0j  # of the fix: it wanders, it does not jump
 
     def fix_error_m(self) -> complex:
         """Return the error of the next fix, east and north [m]."""
@@ -433,8 +501,13 @@ class Receiver:
         return math.radians(float(self.rng.normal(0.0, 1.0 + 2.0 / max(speed_mps, 0.5))))
 
 
-def met_by(ours: tuple[tuple[float, float], tuple[float, float]], course_deg: float, sog_mps: float, meet_s: float,
-           miss_m: float) -> tuple[tuple[float, float], float]:
+def met_by(
+    ours: tuple[tuple[float, float], tuple[float, float]],
+    course_deg: float,
+    sog_mps: float,
+    meet_s: float,
+    miss_m: float,
+) -> tuple[tuple[float, float], float]:
     """Return where a vessel is, and its course [rad], that will meet ours after ``meet_s``.
 
     Args:
@@ -451,8 +524,11 @@ def met_by(ours: tuple[tuple[float, float], tuple[float, float]], course_deg: fl
     relative = hers - complex(ve, vn)
     bow = complex(ve, vn) / max(1e-9, math.hypot(ve, vn))
     beside = relative / max(1e-9, abs(relative)) * 1j
-    towards = (beside * bow.conjugate()).real if abs(math.sin(math.radians(course_deg))) > 0.2 else (
-        beside * (bow * -1j).conjugate()).real
+    towards = (
+        (beside * bow.conjugate()).real
+        if abs(math.sin(math.radians(course_deg))) > 0.2
+        else (beside * (bow * -1j).conjugate()).real
+    )
     there = complex(east, north) + complex(ve, vn) * meet_s + beside * math.copysign(miss_m, towards * miss_m)
     start = there - hers * meet_s
     return (start.real, start.imag), course

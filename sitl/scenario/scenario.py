@@ -48,66 +48,73 @@ Seconds = Annotated[float, msgspec.Meta(ge=0.0, le=600.0)]
 class LeeSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """An island that takes the wind from the water behind it."""
 
-    east_m: Metres               # its middle, from the mission's origin
-    north_m: Metres   # the same
-    radius_m: Positive   # of the island
-    loss: Share = 0.5            # of the wind's strength, close behind it
-    reach_m: Positive = 150.0    # downwind of which a third of that is left
+    east_m: Metres  # its middle, from the mission's origin
+    north_m: Metres  # the same
+    radius_m: Positive  # of the island
+    loss: Share = 0.5  # of the wind's strength, close behind it
+    reach_m: Positive = 150.0  # downwind of which a third of that is left
 
 
 class CurrentSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The water's motion: a constant part and a tide, both stronger on one side of the water."""
 
-    set_deg: Degrees = 0.0       # where it runs to
-    drift_mps: Speed = 0.0   # of its constant part
+    set_deg: Degrees = 0.0  # where it runs to
+    drift_mps: Speed = 0.0  # of its constant part
     tide_set_deg: Degrees = 0.0  # where the tide runs to at its greatest
-    tide_mps: Speed = 0.0   # the tide's greatest speed
+    tide_mps: Speed = 0.0  # the tide's greatest speed
     tide_s: Positive = 44_712.0  # from one such time to the next: 12.42 hours, the moon's
-    tide_high_s: Metres = 0.0    # the first of them, after the start
-    tide_turns: Turns = 0.0      # 0: to and fro; 1: turns with the clock; -1: against it; between: an ellipse
-    shear_per_km: Slope = 0.0    # stronger by this share of itself for each km from the mission's origin ...
+    tide_high_s: Metres = 0.0  # the first of them, after the start
+    tide_turns: Turns = 0.0  # 0: to and fro; 1: turns with the clock; -1: against it; between: an ellipse
+    shear_per_km: Slope = 0.0  # stronger by this share of itself for each km from the mission's origin ...
     shear_to_deg: Degrees = 0.0  # ... in this direction; it never turns round
 
 
 class WavesSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A seaway."""
 
-    from_deg: Degrees | None = None   # none: from where the wind is on the average
-    loss: Share = 0.0            # of the boat's speed, head to sea; half of it abeam, none with it
-    yaw_deg: Swing = 0.0         # how far the bow swings to each side
-    period_s: Positive = 4.0     # of that
+    from_deg: Degrees | None = None  # none: from where the wind is on the average
+    loss: Share = 0.0  # of the boat's speed, head to sea; half of it abeam, none with it
+    yaw_deg: Swing = 0.0  # how far the bow swings to each side
+    period_s: Positive = 4.0  # of that
 
 
 class HullSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A boat that is not the polar's."""
 
-    speed: Factor = 1.0          # of the polar's, at every angle, times ...
-    beat: Factor = 1.0           # ... this at 45 degrees to the true wind
-    reach: Factor = 1.0          # at 90
-    run: Factor = 1.0            # at 150, straight between
-    leeway_deg: Leeway = 0.0     # on a beat: the apparent wind 30 degrees off the bow, three times as fast as the boat
-    tack_fails: Share = 0.0      # the chance that a tack does ...
-    irons_s: Seconds = 10.0      # ... and how long the boat lies near head to wind then
+    speed: Factor = 1.0  # of the polar's, at every angle, times ...
+    beat: Factor = 1.0  # ... this at 45 degrees to the true wind
+    reach: Factor = 1.0  # at 90
+    run: Factor = 1.0  # at 150, straight between
+    leeway_deg: Leeway = 0.0  # on a beat: the apparent wind 30 degrees off the bow, three times as fast as the boat
+    tack_fails: Share = 0.0  # the chance that a tack does ...
+    irons_s: Seconds = 10.0  # ... and how long the boat lies near head to wind then
 
 
 class SensorsSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Sensors that err from the start to the end."""
 
-    vane_deg: Degrees = 0.0      # the vane points so far to starboard of the wind
-    compass_deg: Degrees = 0.0   # the heading is told so far to starboard
-    deviation_deg: Swing = 0.0   # beside it, on the worst heading ...
-    deviation_at_deg: Degrees = 0.0   # ... which is 90 degrees from this one, on which it is none
-    gps_noise_m: Annotated[float, msgspec.Meta(ge=0.0, le=100.0)] = 0.0   # spread, east and north each, wandering ...
-    gps_noise_s: Positive = 30.0      # ... with this correlation time
-    gps_lag_s: Seconds = 0.0     # the position is so old
+    vane_deg: Degrees = 0.0  # the vane points so far to starboard of the wind
+    compass_deg: Degrees = 0.0  # the heading is told so far to starboard
+    deviation_deg: Swing = 0.0  # beside it, on the worst heading ...
+    deviation_at_deg: Degrees = 0.0  # ... which is 90 degrees from this one, on which it is none
+    gps_noise_m: Annotated[float, msgspec.Meta(ge=0.0, le=100.0)] = 0.0  # spread, east and north each, wandering ...
+    gps_noise_s: Positive = 30.0  # ... with this correlation time
+    gps_lag_s: Seconds = 0.0  # the position is so old
 
 
 def stream_of(spec: CurrentSpec) -> CurrentModel:
     """Return the stream of a scenario's table."""
     return CurrentModel(
-        set_to_rad=math.radians(spec.set_deg), drift_mps=spec.drift_mps, tide_to_rad=math.radians(spec.tide_set_deg),
-        tide_mps=spec.tide_mps, tide_s=spec.tide_s, tide_high_s=spec.tide_high_s, tide_turns=spec.tide_turns,
-        shear_per_km=spec.shear_per_km, shear_to_rad=math.radians(spec.shear_to_deg))
+        set_to_rad=math.radians(spec.set_deg),
+        drift_mps=spec.drift_mps,
+        tide_to_rad=math.radians(spec.tide_set_deg),
+        tide_mps=spec.tide_mps,
+        tide_s=spec.tide_s,
+        tide_high_s=spec.tide_high_s,
+        tide_turns=spec.tide_turns,
+        shear_per_km=spec.shear_per_km,
+        shear_to_rad=math.radians(spec.shear_to_deg),
+    )
 
 
 def lee_of(spec: LeeSpec) -> Lee:
@@ -116,67 +123,81 @@ def lee_of(spec: LeeSpec) -> Lee:
 
 
 def departures_of(
-    boat: HullSpec | None, waves: WavesSpec | None, sensors: SensorsSpec | None, wind_from_deg: float,
+    boat: HullSpec | None, waves: WavesSpec | None, sensors: SensorsSpec | None, wind_from_deg: float
 ) -> Departures | None:
     """Return what a boat is that is not the plan's; None where no table says so."""
     if boat is None and waves is None and sensors is None:
         return None
     hull, sea, told = boat or HullSpec(), waves or WavesSpec(), sensors or SensorsSpec()
     return Departures(
-        beat=hull.speed * hull.beat, reach=hull.speed * hull.reach, run=hull.speed * hull.run,
-        leeway_rad=math.radians(hull.leeway_deg), tack_fails=hull.tack_fails, irons_s=hull.irons_s,
-        waves=Waves(from_rad=math.radians(wind_from_deg if sea.from_deg is None else sea.from_deg), loss=sea.loss,
-                    yaw_rad=math.radians(sea.yaw_deg), period_s=sea.period_s),
+        beat=hull.speed * hull.beat,
+        reach=hull.speed * hull.reach,
+        run=hull.speed * hull.run,
+        leeway_rad=math.radians(hull.leeway_deg),
+        tack_fails=hull.tack_fails,
+        irons_s=hull.irons_s,
+        waves=Waves(
+            from_rad=math.radians(wind_from_deg if sea.from_deg is None else sea.from_deg),
+            loss=sea.loss,
+            yaw_rad=math.radians(sea.yaw_deg),
+            period_s=sea.period_s,
+        ),
         sensors=Sensors(
-            vane_rad=math.radians(told.vane_deg), compass_rad=math.radians(told.compass_deg),
-            deviation_rad=math.radians(told.deviation_deg), deviation_at_rad=math.radians(told.deviation_at_deg),
-            gps_noise_m=told.gps_noise_m, gps_noise_s=told.gps_noise_s, gps_lag_s=told.gps_lag_s))
+            vane_rad=math.radians(told.vane_deg),
+            compass_rad=math.radians(told.compass_deg),
+            deviation_rad=math.radians(told.deviation_deg),
+            deviation_at_rad=math.radians(told.deviation_at_deg),
+            gps_noise_m=told.gps_noise_m,
+            gps_noise_s=told.gps_noise_s,
+            gps_lag_s=told.gps_lag_s,
+        ),
+    )
 
 
 EventKind = Literal[
-    "wind_shift",        # veer_deg, over_s
-    "wind_speed",        # tws_mps, over_s
-    "mode",              # mode: a person's choice, by name; by: radio (the mode switch), else the ground station
-    "arm", "disarm",     # by the ground station
-    "set_current",       # seq, for_s: the ground station makes an item of the mission current, and insists
-    "parameter",         # parameter, value: set by the ground station, for good
-    "home",              # east_m, north_m: the ground station moves home there
-    "fence",             # radius_m about east_m, north_m: it draws another fence and switches it on; state
-    "rally",             # east_m, north_m: it draws the list of rally points anew, this one alone
-    "edit_item",         # seq, east_m, north_m: it moves one item of the mission and uploads the list again
-    "refused",           # state, for_s: the autopilot refuses it
-    "company",           # another companion speaks on the link with our ids; for_s
-    "reboot",            # the autopilot restarts
-    "link_cut",          # for_s (none: for good)
-    "link_half",         # state: the companion hears and is not heard, or hears nothing; for_s
-    "link_quality",      # loss, duplicate, reorder, delay_s, corrupt, noise
-    "neighbour",         # another boat's autopilot, system, is on the link; for_s; vehicle_type
-    "spoof",             # forgery ("MESSAGE: what it says", of sitl.faults.spoofing), rate_hz, listens, for_s
-    "gps_jump",          # east_m, north_m, for_s, is_resisted (noticed by the EKF, as on the real one)
-    "gps_lost",          # for_s
-    "compass",           # value_deg to starboard, for_s: what the autopilot believes
-    "vane",              # state, value_deg
-    "kill_companion",    # restart_after_s: SIGKILL in the middle of whatever it does; saved, aged_s, clock_step_s
-    "kill_planner",      # its process dies; the next request starts another
-    "planner_hang",      # for_s: requests are not answered in time
-    "planner_starved",   # its process gets no more memory; a replaced one does
-    "disk",              # state, for_s: the companion's
-    "foreign_mission",   # somebody uploads another mission
-    "battery",           # volts
-    "leak",              # for_s: the bilge's switch is wet
-    "sensor",            # sensor, value, for_s: a script of the boat's tells it (NAMED_VALUE_FLOAT)
-    "radio_lost",        # for_s: the transmitter is out of range
-    "station",           # for_s: a ground station is heard, from then on no more
-    "knockdown",         # roll_deg, for_s
-    "current",           # set_deg, drift_mps, for_s
-    "order",             # order: to the companion, in words (a goal at east_m, north_m); answer: what it must be
-    "far_order",         # order, expires_s, late_s: over the satellite link, sent again until it is answered; answer
-    "crew",              # anchors react_s after the companion first calls for it, weighs after for_s
-    "vessel",            # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
-    "intruder",          # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
-    "meeting",           # course_deg off ours, sog_mps, meet_s, miss_m, craft, manner, react_s, length_m, receiver: a
-                         # vessel with somebody on watch, who would meet us
-    "second_boat",       # east_m, north_m, goal_east_m, goal_north_m: VAIMOS's model, steered by field, told by radio
+    "wind_shift",  # veer_deg, over_s
+    "wind_speed",  # tws_mps, over_s
+    "mode",  # mode: a person's choice, by name; by: radio (the mode switch), else the ground station
+    "arm",  # by the ground station
+    "disarm",  # by the ground station
+    "set_current",  # seq, for_s: the ground station makes an item of the mission current, and insists
+    "parameter",  # parameter, value: set by the ground station, for good
+    "home",  # east_m, north_m: the ground station moves home there
+    "fence",  # radius_m about east_m, north_m: it draws another fence and switches it on; state
+    "rally",  # east_m, north_m: it draws the list of rally points anew, this one alone
+    "edit_item",  # seq, east_m, north_m: it moves one item of the mission and uploads the list again
+    "refused",  # state, for_s: the autopilot refuses it
+    "company",  # another companion speaks on the link with our ids; for_s
+    "reboot",  # the autopilot restarts
+    "link_cut",  # for_s (none: for good)
+    "link_half",  # state: the companion hears and is not heard, or hears nothing; for_s
+    "link_quality",  # loss, duplicate, reorder, delay_s, corrupt, noise
+    "neighbour",  # another boat's autopilot, system, is on the link; for_s; vehicle_type
+    "spoof",  # forgery ("MESSAGE: what it says", of sitl.faults.spoofing), rate_hz, listens, for_s
+    "gps_jump",  # east_m, north_m, for_s, is_resisted (noticed by the EKF, as on the real one)
+    "gps_lost",  # for_s
+    "compass",  # value_deg to starboard, for_s: what the autopilot believes
+    "vane",  # state, value_deg
+    "kill_companion",  # restart_after_s: SIGKILL in the middle of whatever it does; saved, aged_s, clock_step_s
+    "kill_planner",  # its process dies; the next request starts another
+    "planner_hang",  # for_s: requests are not answered in time
+    "planner_starved",  # its process gets no more memory; a replaced one does
+    "disk",  # state, for_s: the companion's
+    "foreign_mission",  # somebody uploads another mission
+    "battery",  # volts
+    "leak",  # for_s: the bilge's switch is wet
+    "sensor",  # sensor, value, for_s: a script of the boat's tells it (NAMED_VALUE_FLOAT)
+    "radio_lost",  # for_s: the transmitter is out of range
+    "station",  # for_s: a ground station is heard, from then on no more
+    "knockdown",  # roll_deg, for_s
+    "current",  # set_deg, drift_mps, for_s
+    "order",  # order: to the companion, in words (a goal at east_m, north_m); answer: what it must be
+    "far_order",  # order, expires_s, late_s: over the satellite link, sent again until it is answered; answer
+    "crew",  # anchors react_s after the companion first calls for it, weighs after for_s
+    "vessel",  # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
+    "intruder",  # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
+    "meeting",  # course_deg off ours, sog_mps, meet_s, miss_m, craft, manner, react_s, length_m, receiver: keeps watch
+    "second_boat",  # east_m, north_m, goal_east_m, goal_north_m: VAIMOS's model, steered by field, told by radio
 ]
 
 
@@ -195,27 +216,27 @@ STATES: dict[str, tuple[str, ...]] = {
 class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The weather; from ``gust_spread`` on also what varies in time beside it and over the water."""
 
-    model: Literal["constant", "ou", "recorded"] = "ou"   # ou wanders about its mean
-    from_deg: float = 0.0   # where it comes from, on the average
-    tws_mps: float = 5.0   # true wind speed, on the average
-    sd_deg: float = 9.0   # standard deviation of the direction
-    tau_s: float = 28.0          # 1 / rho: Wolsieffer's 0.036 Hz
-    tws_sd_mps: float = 0.3   # standard deviation of the speed
-    file: str | None = None   # of a recorded wind: CSV, relative to this one
-    from_s: float = 0.0                # of the weather's own time: what has blown by then is over
-    gust_spread: Share = 0.0           # of the strength's logarithm, about the strength that is there without gusts
-    gust_s: Positive = 15.0            # their correlation time
-    stronger_per_km: Slope = 0.0       # the wind is stronger by this share for each km from the mission's origin ...
-    stronger_to_deg: Degrees = 0.0     # ... in this direction ...
-    bends_deg_per_km: Degrees = 0.0    # ... and veers by so much there
-    lees: tuple[LeeSpec, ...] = ()   # behind islands
+    model: Literal["constant", "ou", "recorded"] = "ou"  # ou wanders about its mean
+    from_deg: float = 0.0  # where it comes from, on the average
+    tws_mps: float = 5.0  # true wind speed, on the average
+    sd_deg: float = 9.0  # standard deviation of the direction
+    tau_s: float = 28.0  # 1 / rho: Wolsieffer's 0.036 Hz
+    tws_sd_mps: float = 0.3  # standard deviation of the speed
+    file: str | None = None  # of a recorded wind: CSV, relative to this one
+    from_s: float = 0.0  # of the weather's own time: what has blown by then is over
+    gust_spread: Share = 0.0  # of the strength's logarithm, about the strength that is there without gusts
+    gust_s: Positive = 15.0  # their correlation time
+    stronger_per_km: Slope = 0.0  # the wind is stronger by this share for each km from the mission's origin ...
+    stronger_to_deg: Degrees = 0.0  # ... in this direction ...
+    bends_deg_per_km: Degrees = 0.0  # ... and veers by so much there
+    lees: tuple[LeeSpec, ...] = ()  # behind islands
 
 
 class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Something that happens at ``at_s`` [s] after the simulation's start."""
 
-    at_s: float              # after the simulation's start
-    kind: EventKind          # see below
+    at_s: float  # after the simulation's start
+    kind: EventKind  # see below
     veer_deg: float = 0.0
     over_s: float = 0.0
     tws_mps: float | None = None
@@ -226,49 +247,49 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     duplicate: float = 0.0
     reorder: float = 0.0
     corrupt: float = 0.0
-    noise: float = 0.0           # of the bytes: lost, changed or inserted
+    noise: float = 0.0  # of the bytes: lost, changed or inserted
     delay_s: float = 0.0
     east_m: float = 0.0
     north_m: float = 0.0
     is_resisted: bool = False
-    is_of_one: bool = False      # of two receivers: from now on there is a second, which tells the truth
+    is_of_one: bool = False  # of two receivers: from now on there is a second, which tells the truth
     order: str = ""
     answer: Literal["done", "refused", "not now", "unknown", "no answer", "expired"] = "done"
-    expires_s: float = 3600.0    # of an order from far away
-    late_s: float = 0.0          # it lies somewhere on its way for so long
+    expires_s: float = 3600.0  # of an order from far away
+    late_s: float = 0.0  # it lies somewhere on its way for so long
     state: str | None = None
     value_deg: float = 0.0
     parameter: str = ""
     sensor: Annotated[str, msgspec.Meta(max_length=10, pattern="^[ -~]*$")] = ""
     value: float = 0.0
     restart_after_s: float | None = None
-    saved: Literal["kept", "lost", "torn", "old"] = "kept"   # what becomes of the companion's saved state
-    aged_s: float = 0.0          # of an old one: as it was so long before
-    clock_step_s: float = 0.0    # of the companion's wall clock, when it lives again
+    saved: Literal["kept", "lost", "torn", "old"] = "kept"  # what becomes of the companion's saved state
+    aged_s: float = 0.0  # of an old one: as it was so long before
+    clock_step_s: float = 0.0  # of the companion's wall clock, when it lives again
     volts: float | None = None
     roll_deg: float = 0.0
     seq: int = 1
-    radius_m: float = 100.0      # of a fence
-    system: int = 7              # of a neighbour
+    radius_m: float = 100.0  # of a fence
+    system: int = 7  # of a neighbour
     vehicle_type: int = 11
     forgery: str = ""
     rate_hz: float = 5.0
-    listens: bool = False        # the forger hears the boat
+    listens: bool = False  # the forger hears the boat
     set_deg: float = 0.0
     drift_mps: float = 0.0
-    react_s: float = 0.0         # a crew's, from being called to the anchor on the ground
+    react_s: float = 0.0  # a crew's, from being called to the anchor on the ground
     course_deg: float = 0.0
     sog_mps: float = 0.0
-    every_s: float = 10.0        # between its AIS reports
+    every_s: float = 10.0  # between its AIS reports
     is_on_ais: bool = True
-    length_m: float | None = None   # of a vessel; none: a ship of 100 m, a boat of 3.65 m
+    length_m: float | None = None  # of a vessel; none: a ship of 100 m, a boat of 3.65 m
     gap_m: float = 0.0
-    bearing_deg: float = 0.0     # clockwise
+    bearing_deg: float = 0.0  # clockwise
     craft: Craft = "power"
-    manner: Manner = "rules"     # of whoever is met: gives way by the rules, or keeps its course whatever
-    meet_s: float = 120.0        # until the closest approach, both going on ...
-    miss_m: float = 0.0          # ... and how far apart the middles are then
-    receiver: Literal["autopilot", "feed"] = "autopilot"   # who hears that vessel's AIS
+    manner: Manner = "rules"  # of whoever is met: gives way by the rules, or keeps its course whatever
+    meet_s: float = 120.0  # until the closest approach, both going on ...
+    miss_m: float = 0.0  # ... and how far apart the middles are then
+    receiver: Literal["autopilot", "feed"] = "autopilot"  # who hears that vessel's AIS
     goal_east_m: float = 0.0
     goal_north_m: float = 0.0
 
@@ -279,13 +300,29 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 # What a boat must bear without coming nearer to anything than its mission allows.
-ORDINARY = frozenset({
-    "wind_speed", "wind_shift", "link_cut", "link_half", "link_quality", "kill_planner", "battery", "leak", "sensor",
-    "vessel", "neighbour", "disk", "order", "far_order", "meeting"})
-ORDINARY_VEER_DEG = 45.0     # a greater shift is a front
-ORDINARY_CUT_S = 5.0         # a longer silence of the link is a fault of its own
-ORDINARY_LOSS = 0.3          # a link that loses more is none
-ORDINARY_NOISE = 0.005       # of bytes: one frame in five
+ORDINARY = frozenset(
+    {
+        "wind_speed",
+        "wind_shift",
+        "link_cut",
+        "link_half",
+        "link_quality",
+        "kill_planner",
+        "battery",
+        "leak",
+        "sensor",
+        "vessel",
+        "neighbour",
+        "disk",
+        "order",
+        "far_order",
+        "meeting",
+    }
+)
+ORDINARY_VEER_DEG = 45.0  # a greater shift is a front
+ORDINARY_CUT_S = 5.0  # a longer silence of the link is a fault of its own
+ORDINARY_LOSS = 0.3  # a link that loses more is none
+ORDINARY_NOISE = 0.005  # of bytes: one frame in five
 
 
 def is_ordinary(event: EventSpec) -> bool:
@@ -307,79 +344,79 @@ def is_all_ordinary(events: Iterable[EventSpec]) -> bool:
 class SatelliteSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A satellite link to the boat: each message takes from ``delay_s`` to ``delay_most_s``, by a lot of its own."""
 
-    delay_s: float = 30.0   # a message takes at least ...
-    delay_most_s: float = 300.0   # ... and at most
-    loss: float = 0.0   # share of messages that never come
-    duplicate: float = 0.0   # share that comes twice
-    status_every_s: float = 600.0   # between two statuses of the boat
+    delay_s: float = 30.0  # a message takes at least ...
+    delay_most_s: float = 300.0  # ... and at most
+    loss: float = 0.0  # share of messages that never come
+    duplicate: float = 0.0  # share that comes twice
+    status_every_s: float = 600.0  # between two statuses of the boat
 
 
 class HeldSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The boat must stay where it is: from and to these times [s after the simulation's start], within ``within_m``."""
 
-    from_s: float   # after the start
-    to_s: float   # after the start
-    within_m: float          # of the boat's mean place meanwhile
+    from_s: float  # after the start
+    to_s: float  # after the start
+    within_m: float  # of the boat's mean place meanwhile
 
 
 class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What must hold when it is over; a check that is not asked for is not made."""
 
-    arrived: bool | None = True   # at the last goal
-    contacts: int | None = 0   # of the hull with what is solid, by the true track
-    within_m: float | None = None             # last position to the last goal, or to what ``ends_at`` names
-    ends_at: Literal["goal", "home", "refuge"] = "goal"   # home: where the boat was armed; the nearest refuge
-    refuge_within_m: float | None = None      # of a refuge, at some moment
-    max_time_s: float | None = None   # from setting sail to the end
-    min_clearance_m: float | None = None   # from what is solid and the fence, by the true track
+    arrived: bool | None = True  # at the last goal
+    contacts: int | None = 0  # of the hull with what is solid, by the true track
+    within_m: float | None = None  # last position to the last goal, or to what ``ends_at`` names
+    ends_at: Literal["goal", "home", "refuge"] = "goal"  # home: where the boat was armed; the nearest refuge
+    refuge_within_m: float | None = None  # of a refuge, at some moment
+    max_time_s: float | None = None  # from setting sail to the end
+    min_clearance_m: float | None = None  # from what is solid and the fence, by the true track
     min_vessel_distance_m: float | None = None  # from the boat to each vessel's hull
-    second_boat_within_m: float | None = None   # of its goal, at some moment
-    rules_kept: bool | None = None            # of the road, by the tracks, in every meeting
-    station_radius_m: float | None = None       # about their mean, of 95 % of 5 minutes' points at the last goal
-    max_silence_s: float | None = 10.0        # without a status from the companion that says why
-    max_replans_per_hour: float | None = None   # plans made under way
-    max_tacks: int | None = None              # before the boat first comes within ``within_m`` of the last goal
-    held: HeldSpec | None = None   # the boat stays where it is
-    end_phase: str | None = None   # the skipper's phase in the end
-    alerts: tuple[str, ...] = ()              # announced at least once, by code
-    marks_rounded: int | None = None           # in order, each on its side
-    gates_crossed: int | None = None           # in order, each in its direction, laps counted
-    marks_clear_m: float = 1.0                 # of the gates: what the boat's position keeps clear of them
-    start_within_s: float | None = None        # after the gun, and not before it
-    inside_s: float | None = None              # each box is not left for so long after the boat came in ...
-    inside_share: float = 0.98                 # ... but for the rest of this share of the time
-    seen: float | None = None                  # share of the water of each search, within half a swath of the track
-    called_s: float | None = None              # the crew is called to the anchor this long before a contact
+    second_boat_within_m: float | None = None  # of its goal, at some moment
+    rules_kept: bool | None = None  # of the road, by the tracks, in every meeting
+    station_radius_m: float | None = None  # about their mean, of 95 % of 5 minutes' points at the last goal
+    max_silence_s: float | None = 10.0  # without a status from the companion that says why
+    max_replans_per_hour: float | None = None  # plans made under way
+    max_tacks: int | None = None  # before the boat first comes within ``within_m`` of the last goal
+    held: HeldSpec | None = None  # the boat stays where it is
+    end_phase: str | None = None  # the skipper's phase in the end
+    alerts: tuple[str, ...] = ()  # announced at least once, by code
+    marks_rounded: int | None = None  # in order, each on its side
+    gates_crossed: int | None = None  # in order, each in its direction, laps counted
+    marks_clear_m: float = 1.0  # of the gates: what the boat's position keeps clear of them
+    start_within_s: float | None = None  # after the gun, and not before it
+    inside_s: float | None = None  # each box is not left for so long after the boat came in ...
+    inside_share: float = 0.98  # ... but for the rest of this share of the time
+    seen: float | None = None  # share of the water of each search, within half a swath of the track
+    called_s: float | None = None  # the crew is called to the anchor this long before a contact
 
 
 class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One scenario file."""
 
-    name: str   # of the voyage folder and in tables
-    title: str = ""   # what it is about, in a sentence
-    mission: str   # the mission file, relative to this one
-    limit_s: float = 3600.0   # called off then
-    speedup: float = 8.0                      # when it runs in real time, separate processes
-    begins: dt.datetime = dt.datetime.fromtimestamp(EPOCH_S, dt.UTC)   # UTC: what is dark, and the tide
-    start_heading_deg: float | None = None   # None: as the mission says
-    has_ftp: bool = True                      # the embedded autopilot offers MAVFTP; else items go one by one
-    is_service: bool = False                  # a companion that heard no autopilot is started again
-    exit_on_arrival: bool = True              # else the boat is watched in its loiter until the limit
-    dry_run: bool = False                     # the companion may only look
-    set_auto: bool = True                     # it may set modes
-    policy: Literal["keep clear", "rules"] | None = None   # for vessels, in place of what the mission says
-    system: int | None = None                 # of our autopilot, named in place of what the mission says
-    satellite: SatelliteSpec | None = None    # ``far_order`` needs one
-    broken: tuple[Outlet, ...] = ()           # what is wanted beside the voyage, and cannot be used
-    wind: WindSpec = msgspec.field(default_factory=WindSpec)   # the weather
-    current: CurrentSpec | None = None        # of these four: what the plan does not know of, None: it is as planned
-    waves: WavesSpec | None = None   # a seaway
-    boat: HullSpec | None = None   # a boat that is not the polar's
-    sensors: SensorsSpec | None = None   # sensors that err
-    parameters: dict[str, float] = {}   # of the autopilot, by name, from its start
-    without_shifts: dict[str, float] = {}     # beside those, of who does not tack on the shifts (sitl baselines)
-    events: tuple[EventSpec, ...] = ()   # what befalls the boat, in any number
-    expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)   # what must hold in the end
+    name: str  # of the voyage folder and in tables
+    title: str = ""  # what it is about, in a sentence
+    mission: str  # the mission file, relative to this one
+    limit_s: float = 3600.0  # called off then
+    speedup: float = 8.0  # when it runs in real time, separate processes
+    begins: dt.datetime = dt.datetime.fromtimestamp(EPOCH_S, dt.UTC)  # UTC: what is dark, and the tide
+    start_heading_deg: float | None = None  # None: as the mission says
+    has_ftp: bool = True  # the embedded autopilot offers MAVFTP; else items go one by one
+    is_service: bool = False  # a companion that heard no autopilot is started again
+    exit_on_arrival: bool = True  # else the boat is watched in its loiter until the limit
+    dry_run: bool = False  # the companion may only look
+    set_auto: bool = True  # it may set modes
+    policy: Literal["keep clear", "rules"] | None = None  # for vessels, in place of what the mission says
+    system: int | None = None  # of our autopilot, named in place of what the mission says
+    satellite: SatelliteSpec | None = None  # ``far_order`` needs one
+    broken: tuple[Outlet, ...] = ()  # what is wanted beside the voyage, and cannot be used
+    wind: WindSpec = msgspec.field(default_factory=WindSpec)  # the weather
+    current: CurrentSpec | None = None  # of these four: what the plan does not know of, None: it is as planned
+    waves: WavesSpec | None = None  # a seaway
+    boat: HullSpec | None = None  # a boat that is not the polar's
+    sensors: SensorsSpec | None = None  # sensors that err
+    parameters: dict[str, float] = {}  # of the autopilot, by name, from its start
+    without_shifts: dict[str, float] = {}  # beside those, of who does not tack on the shifts (sitl baselines)
+    events: tuple[EventSpec, ...] = ()  # what befalls the boat, in any number
+    expect: ExpectSpec = msgspec.field(default_factory=ExpectSpec)  # what must hold in the end
 
     @property
     def epoch_s(self) -> float:
@@ -458,9 +495,17 @@ def _suggestion(error: msgspec.ValidationError) -> str:
     if "unknown field" not in str(error):
         return ""
     word = str(error).partition("`")[2].partition("`")[0]
-    tables = {"wind": WindSpec, "satellite": SatelliteSpec, "events": EventSpec, "expect": ExpectSpec,
-              "wind.lees": LeeSpec, "current": CurrentSpec, "waves": WavesSpec, "boat": HullSpec,
-              "sensors": SensorsSpec}
+    tables = {
+        "wind": WindSpec,
+        "satellite": SatelliteSpec,
+        "events": EventSpec,
+        "expect": ExpectSpec,
+        "wind.lees": LeeSpec,
+        "current": CurrentSpec,
+        "waves": WavesSpec,
+        "boat": HullSpec,
+        "sensors": SensorsSpec,
+    }
     table = tables.get(_place(error).split("[")[0], Scenario)
     close = difflib.get_close_matches(word, table.__struct_fields__, n=1)
     return f"did you mean `{close[0]}`?" if close else f"known: {', '.join(table.__struct_fields__)}"
@@ -481,8 +526,12 @@ def scenario_wind(scenario: Scenario, source: Path, seed: int) -> WindModel:
         base = Constant(math.radians(spec.from_deg), spec.tws_mps)
     else:
         base = AR1(
-            math.radians(spec.from_deg), spec.tws_mps, seed=seed, sd_rad=math.radians(spec.sd_deg),
-            rho_hz=1.0 / spec.tau_s, tws_sd_mps=spec.tws_sd_mps,
+            math.radians(spec.from_deg),
+            spec.tws_mps,
+            seed=seed,
+            sd_rad=math.radians(spec.sd_deg),
+            rho_hz=1.0 / spec.tau_s,
+            tws_sd_mps=spec.tws_sd_mps,
         )
     if spec.gust_spread > 0.0:
         base = Gusty(base, spread=spec.gust_spread, tau_s=spec.gust_s, seed=seed)
@@ -490,7 +539,10 @@ def scenario_wind(scenario: Scenario, source: Path, seed: int) -> WindModel:
         base = Later(base, spec.from_s)
     events = tuple(
         WindEvent(
-            at_s=e.at_s, veer_rad=math.radians(e.veer_deg), tws_mps=e.tws_mps, over_s=e.over_s,
+            at_s=e.at_s,
+            veer_rad=math.radians(e.veer_deg),
+            tws_mps=e.tws_mps,
+            over_s=e.over_s,
             for_s=math.inf if e.for_s is None else e.for_s,
         )
         for e in scenario.events
@@ -505,9 +557,14 @@ def scenario_waters(scenario: Scenario, wind: WindModel, home_en_m: tuple[float,
     if scenario.current is None and not spec.lees and spec.stronger_per_km == 0.0 and spec.bends_deg_per_km == 0.0:
         return None
     return Waters(
-        wind=wind, lees=tuple(lee_of(lee) for lee in spec.lees), stronger_per_km=spec.stronger_per_km,
-        stronger_to_rad=math.radians(spec.stronger_to_deg), bends_rad_per_km=math.radians(spec.bends_deg_per_km),
-        stream=stream_of(scenario.current or CurrentSpec()), home_en_m=home_en_m)
+        wind=wind,
+        lees=tuple(lee_of(lee) for lee in spec.lees),
+        stronger_per_km=spec.stronger_per_km,
+        stronger_to_rad=math.radians(spec.stronger_to_deg),
+        bends_rad_per_km=math.radians(spec.bends_deg_per_km),
+        stream=stream_of(scenario.current or CurrentSpec()),
+        home_en_m=home_en_m,
+    )
 
 
 def scenario_departures(scenario: Scenario) -> Departures | None:
@@ -515,7 +572,7 @@ def scenario_departures(scenario: Scenario) -> Departures | None:
     return departures_of(scenario.boat, scenario.waves, scenario.sensors, scenario.wind.from_deg)
 
 
-OWN = "ardurover"   # [boat] polar: the simulator's own hull, by its equations
+OWN = "ardurover"  # [boat] polar: the simulator's own hull, by its equations
 
 
 def own_polar(mission: Mission) -> Polar | None:

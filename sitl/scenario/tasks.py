@@ -20,9 +20,9 @@ from companion.geofence.shapes import polygon_en
 from sitl.scenario.scenario import ExpectSpec
 
 Points = NDArray[np.float64]
-Finding = tuple[str, bool, Any, Any]   # what had to hold, whether it did, its figure, what was wanted
-GRID = 10         # points of a grid to a swath
-EARLY = "early start"                  # said by the companion
+Finding = tuple[str, bool, Any, Any]  # what had to hold, whether it did, its figure, what was wanted
+GRID = 10  # points of a grid to a swath
+EARLY = "early start"  # said by the companion
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,15 +58,27 @@ def tasks_of(mission: Mission, epoch_s: float) -> Tasks:
     """Return the tasks of a mission; ``epoch_s`` is the Unix time of the track's time 0."""
     frame = mission.frame()
     lap = tuple(
-        GateLine(port_en_m=frame.en_from_geo(g.gate.port), starboard_en_m=frame.en_from_geo(g.gate.starboard),
-             not_before_s=g.gate.not_before_s, after_s=g.gate.after_s)
-        for g in mission.goals if g.gate is not None)
+        GateLine(
+            port_en_m=frame.en_from_geo(g.gate.port),
+            starboard_en_m=frame.en_from_geo(g.gate.starboard),
+            not_before_s=g.gate.not_before_s,
+            after_s=g.gate.after_s,
+        )
+        for g in mission.goals
+        if g.gate is not None
+    )
     solid = list(mission.water().polygons)
     boxes = tuple(polygon_en(g.box.shape, frame, cover=False) for g in mission.goals if g.box is not None)
     searches = tuple(
-        (shapely.difference(polygon_en(g.search.shape, frame, cover=False), shapely.union_all(solid) if solid else
-                            shapely.Polygon()), g.search.swath_m)
-        for g in mission.goals if g.search is not None)
+        (
+            shapely.difference(
+                polygon_en(g.search.shape, frame, cover=False), shapely.union_all(solid) if solid else shapely.Polygon()
+            ),
+            g.search.swath_m,
+        )
+        for g in mission.goals
+        if g.search is not None
+    )
     return Tasks(gates=lap * mission.skipper.laps, boxes=boxes, searches=searches, epoch_s=epoch_s)
 
 
@@ -74,8 +86,7 @@ def share_seen(track: Points, water: BaseGeometry, swath_m: float) -> float:
     """Return the share of some water that lay within half a swath of a track: of the points of a grid in it."""
     west, south, east, north = water.bounds
     fine_m = max(1.0, swath_m / GRID)
-    x, y = np.meshgrid(np.arange(west + 0.5 * fine_m, east, fine_m),
-                       np.arange(south + 0.5 * fine_m, north, fine_m))
+    x, y = np.meshgrid(np.arange(west + 0.5 * fine_m, east, fine_m), np.arange(south + 0.5 * fine_m, north, fine_m))
     spots = shapely.points(x.ravel(), y.ravel())
     spots = spots[shapely.covers(water, spots)]
     if not len(spots) or len(track) < 2:
@@ -135,7 +146,7 @@ def count_gates(track: Points, gates: Sequence[GateLine], since: int = 0) -> int
 
 
 def findings(
-    expect: ExpectSpec, tasks: Tasks, t_s: Sequence[float], track: Points, said: frozenset[str] | set[str],
+    expect: ExpectSpec, tasks: Tasks, t_s: Sequence[float], track: Points, said: frozenset[str] | set[str]
 ) -> Iterator[Finding]:
     """Yield what a scenario expects of tasks, and what became of it."""
     since = 0
@@ -145,26 +156,40 @@ def findings(
         ways = [] if start is None else crossings(track, start)
         after_s = [t_s[n + 1] - gun_s for n, is_forward in ways if is_forward]
         late_s = min((s for s in after_s if s >= 0.0), default=None)
-        yield ("start, s after the gun", late_s is not None and late_s <= expect.start_within_s, late_s,
-               f"at most {expect.start_within_s}")
+        yield (
+            "start, s after the gun",
+            late_s is not None and late_s <= expect.start_within_s,
+            late_s,
+            f"at most {expect.start_within_s}",
+        )
         early = sum(s < 0.0 for s in after_s)
-        yield "starts before the gun", early == 0 or (EARLY in said and EARLY in expect.alerts), early, (
-            "any, told and sailed again" if EARLY in expect.alerts else 0)
+        yield (
+            "starts before the gun",
+            early == 0 or (EARLY in said and EARLY in expect.alerts),
+            early,
+            ("any, told and sailed again" if EARLY in expect.alerts else 0),
+        )
         since = int(np.searchsorted(np.asarray(t_s), gun_s)) - 1 if math.isfinite(gun_s) else 0
     if expect.gates_crossed is not None:
         done = count_gates(track, tasks.gates, max(0, since))
         yield "gates crossed", done == expect.gates_crossed, done, expect.gates_crossed
         marks = [np.asarray(m) for pair in tasks.gates for m in (pair.port_en_m, pair.starboard_en_m)]
         near_m = min((float(np.min(np.hypot(*(track - m).T))) for m in marks), default=math.inf) if len(track) else None
-        yield "nearest to a gate's mark, m", near_m is not None and near_m > expect.marks_clear_m, near_m, (
-            f"more than {expect.marks_clear_m}")
-
+        yield (
+            "nearest to a gate's mark, m",
+            near_m is not None and near_m > expect.marks_clear_m,
+            near_m,
+            (f"more than {expect.marks_clear_m}"),
+        )
 
     if expect.inside_s is not None:
         shares = shares_inside(t_s, track, tasks.boxes, expect.inside_s)
-        yield (f"in the box for {expect.inside_s:g} s after entry", bool(shares) and min(shares) >= expect.inside_share,
-               shares, f"a share of at least {expect.inside_share}")
-
+        yield (
+            f"in the box for {expect.inside_s:g} s after entry",
+            bool(shares) and min(shares) >= expect.inside_share,
+            shares,
+            f"a share of at least {expect.inside_share}",
+        )
 
     if expect.seen is not None:
         seen = [share_seen(track, water, swath_m) for water, swath_m in tasks.searches]

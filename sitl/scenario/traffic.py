@@ -35,11 +35,11 @@ from sitl.world import SimulatedVaimos, WindModel, habits_for
 SHIP_M = 100.0
 BEAM_SHARE = 0.16
 BOAT_BEAM_SHARE = 0.35
-BOAT_M = 12.0              # up to here the beam is a boat's
+BOAT_M = 12.0  # up to here the beam is a boat's
 FIRST_MMSI = 211_000_001
 PORTS = range(20_000, 32_000)
-KEEP_M = 15.0              # what the second boat's field keeps between hulls
-REPULSIVE_M = 30.0         # its Gaussian beyond that: Schmitt's 100 m would send the boat round by 200 m
+KEEP_M = 15.0  # what the second boat's field keeps between hulls
+REPULSIVE_M = 30.0  # its Gaussian beyond that: Schmitt's 100 m would send the boat round by 200 m
 
 Motion = tuple[tuple[float, float], tuple[float, float]]
 """Position and velocity, east and north [m, m/s]."""
@@ -118,8 +118,11 @@ class SecondBoat:
         keep_m = KEEP_M + 0.5 * (our_length_m + self.length_m)
         seen = self._boat.sense((MovingObstacle(en_m=ours[0], velocity_en_mps=ours[1], keep_m=keep_m, growth_mps=0.3),))
         self._state, setpoint = step(
-            self._state, seen, go_to(self.goal_en, seen.twd_from_rad or 0.0),
-            habits_for(seen.tws_mps, repulsive_sigma_m=REPULSIVE_M))
+            self._state,
+            seen,
+            go_to(self.goal_en, seen.twd_from_rad or 0.0),
+            habits_for(seen.tws_mps, repulsive_sigma_m=REPULSIVE_M),
+        )
         self._boat.sail(setpoint.heading_rad, setpoint.thrust)
         self.nearest_goal_m = min(self.nearest_goal_m, math.dist(self._boat.en_m, self.goal_en))
 
@@ -143,16 +146,26 @@ def ais_report(vessel: Moving, frame: LocalFrame, t_s: float) -> AisVessel:
     """Return a vessel's AIS position report."""
     course, heading, speed = vessel.way(t_s)
     return AisVessel(
-        mmsi=vessel.mmsi, position=frame.geo_from_en(*vessel.at(t_s)), cog_deg=math.degrees(course) % 360.0,
-        sog_mps=speed, heading_deg=math.degrees(heading) % 360.0, nav_status=0)
+        mmsi=vessel.mmsi,
+        position=frame.geo_from_en(*vessel.at(t_s)),
+        cog_deg=math.degrees(course) % 360.0,
+        sog_mps=speed,
+        heading_deg=math.degrees(heading) % 360.0,
+        nav_status=0,
+    )
 
 
 def radio_report(vessel: Moving, frame: LocalFrame, t_s: float) -> bytes:
     """Return what an event's radio says of a vessel (WRSC 2013), in the form of ``companion.traffic.decode_json``."""
     place, (course, heading, speed) = frame.geo_from_en(*vessel.at(t_s)), vessel.way(t_s)
     said: dict[str, Any] = {
-        "id": vessel.mmsi, "lat": place.lat_deg, "lon": place.lon_deg, "course_deg": math.degrees(course) % 360.0,
-        "heading_deg": math.degrees(heading) % 360.0, "speed_mps": speed, "length_m": vessel.length_m,
+        "id": vessel.mmsi,
+        "lat": place.lat_deg,
+        "lon": place.lon_deg,
+        "course_deg": math.degrees(course) % 360.0,
+        "heading_deg": math.degrees(heading) % 360.0,
+        "speed_mps": speed,
+        "length_m": vessel.length_m,
         "beam_m": beam_m(vessel),
     }
     return json.dumps(said).encode()
@@ -172,8 +185,11 @@ def free_port() -> int:
     """
     while True:
         port = PORTS[secrets.randbelow(len(PORTS))]
-        with (contextlib.suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
-              socket.socket() as tcp):
+        with (
+            contextlib.suppress(OSError),
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp,
+            socket.socket() as tcp,
+        ):
             udp.bind(("127.0.0.1", port))
             tcp.bind(("127.0.0.1", port))
             return port
@@ -181,9 +197,14 @@ def free_port() -> int:
 
 def ship_of(event: EventSpec, number: int) -> ScriptedShip:
     """Return the ship of a "vessel" event; ``number`` tells several apart."""
-    return ScriptedShip(mmsi=FIRST_MMSI + number, from_s=event.at_s, en_m=(event.east_m, event.north_m),
-                course_rad=math.radians(event.course_deg), speed_mps=event.sog_mps,
-                length_m=event.length_m or SHIP_M)
+    return ScriptedShip(
+        mmsi=FIRST_MMSI + number,
+        from_s=event.at_s,
+        en_m=(event.east_m, event.north_m),
+        course_rad=math.radians(event.course_deg),
+        speed_mps=event.sog_mps,
+        length_m=event.length_m or SHIP_M,
+    )
 
 
 def intruder_of(event: EventSpec, number: int, t_s: float, ours: Motion, heading_rad: float) -> ScriptedShip:
@@ -194,15 +215,21 @@ def intruder_of(event: EventSpec, number: int, t_s: float, ours: Motion, heading
     here, velocity = ours
     place = here[0] + gap * math.sin(bearing), here[1] + gap * math.cos(bearing)
     meet_s, aim = 0.0, here
-    for _ in range(50):   # the time of meeting: a contraction while it is the faster of the two
+    for _ in range(50):  # the time of meeting: a contraction while it is the faster of the two
         meet_s = math.dist(place, aim) / event.sog_mps
         aim = here[0] + velocity[0] * meet_s, here[1] + velocity[1] * meet_s
-    return ScriptedShip(mmsi=FIRST_MMSI + number, from_s=t_s, en_m=place, speed_mps=event.sog_mps, length_m=length,
-                course_rad=math.atan2(aim[0] - place[0], aim[1] - place[1]))
+    return ScriptedShip(
+        mmsi=FIRST_MMSI + number,
+        from_s=t_s,
+        en_m=place,
+        speed_mps=event.sog_mps,
+        length_m=length,
+        course_rad=math.atan2(aim[0] - place[0], aim[1] - place[1]),
+    )
 
 
 TRAFFIC = frozenset({"vessel", "intruder", "second_boat", "meeting"})
-OUR_LENGTH_M = 2.0    # what the second boat takes ours for
+OUR_LENGTH_M = 2.0  # what the second boat takes ours for
 
 
 def sentences(vessel: AisVessel) -> bytes:
@@ -211,7 +238,10 @@ def sentences(vessel: AisVessel) -> bytes:
     Speed is rounded to 0.1 kn, course to 0.1 deg, position to 1e-4 minutes (0.2 m), as there.
     """
     said: dict[str, Any] = {
-        "msg_type": 1, "mmsi": vessel.mmsi, "lat": vessel.position.lat_deg, "lon": vessel.position.lon_deg,
+        "msg_type": 1,
+        "mmsi": vessel.mmsi,
+        "lat": vessel.position.lat_deg,
+        "lon": vessel.position.lon_deg,
         "status": vessel.nav_status,
     }
     if vessel.cog_deg is not None:
@@ -227,8 +257,14 @@ def described(mariner: Mariner) -> bytes:
     """Return a class A static report as NMEA lines (message 5): name, kind and size."""
     half, side = round(0.5 * mariner.length_m), max(1, round(0.5 * beam_m(mariner)))
     said: dict[str, Any] = {
-        "msg_type": 5, "mmsi": mariner.mmsi, "shipname": mariner.name, "ship_type": SHIP_TYPE[mariner.craft],
-        "to_bow": half, "to_stern": half, "to_port": side, "to_starboard": side,
+        "msg_type": 5,
+        "mmsi": mariner.mmsi,
+        "shipname": mariner.name,
+        "ship_type": SHIP_TYPE[mariner.craft],
+        "to_bow": half,
+        "to_stern": half,
+        "to_port": side,
+        "to_starboard": side,
     }
     return "".join(f"{line}\r\n" for line in encode_dict(said, talker_id="AI", sentence_type="VDM")).encode()
 
@@ -237,7 +273,12 @@ class Others:
     """The vessels of one run."""
 
     def __init__(
-        self, frame: LocalFrame, wind: WindModel, seed: int, *, port: int,
+        self,
+        frame: LocalFrame,
+        wind: WindModel,
+        seed: int,
+        *,
+        port: int,
         hear: Callable[[AisVessel], None] | None = None,
     ) -> None:
         """Tell of them at the UDP ``port`` of this machine (0: by nothing), AIS to ``hear`` if that is given."""
@@ -253,9 +294,16 @@ class Others:
             nearest = min(truth.vessels_m.get(name, math.inf), distance_m(vessel, here_en_m, t_s))
             truth.vessels_m[name] = round(nearest, 2)
             if isinstance(vessel, Mariner):
-                met = truth.met.setdefault(name, Met(
-                    craft=vessel.craft, manner=vessel.manner, length_m=vessel.length_m, beam_m=beam_m(vessel),
-                    heard_s=truth.t_s[-1]))
+                met = truth.met.setdefault(
+                    name,
+                    Met(
+                        craft=vessel.craft,
+                        manner=vessel.manner,
+                        length_m=vessel.length_m,
+                        beam_m=beam_m(vessel),
+                        heard_s=truth.t_s[-1],
+                    ),
+                )
                 course, _, speed = vessel.way(t_s)
                 met.t_s.append(truth.t_s[-1])
                 met.en_m.append(vessel.at(t_s))
@@ -289,8 +337,13 @@ class Others:
             await self._meet(event, number, began_s, ours)
         else:
             second = SecondBoat(
-                FIRST_MMSI + number, self._wind, self._seed, now_s() - began_s, (event.east_m, event.north_m),
-                (event.goal_east_m, event.goal_north_m))
+                FIRST_MMSI + number,
+                self._wind,
+                self._seed,
+                now_s() - began_s,
+                (event.east_m, event.north_m),
+                (event.goal_east_m, event.goal_north_m),
+            )
             self._vessels.append(second)
             self._second = second
             await self._sail(second, event.every_s, began_s, ours)
@@ -304,20 +357,28 @@ class Others:
             if self._port and now_s() - told_s >= every_s:
                 told_s = now_s()
                 self._tell(second, told_s - began_s)
-            next_s += 1.0   # the model sails a second a call: a late timer is caught up with
+            next_s += 1.0  # the model sails a second a call: a late timer is caught up with
             await asyncio.sleep(max(0.0, next_s - now_s()))
             second.sail(ours()[0], OUR_LENGTH_M)
 
     async def _meet(
-        self, event: EventSpec, number: int, began_s: float, ours: Callable[[], tuple[Motion, float]],
+        self, event: EventSpec, number: int, began_s: float, ours: Callable[[], tuple[Motion, float]]
     ) -> None:
         """Let a vessel come whose watch sees us, and tell of it by AIS with the errors of its instruments."""
         motion, _ = ours()
         place, course = met_by(motion, event.course_deg, event.sog_mps, event.meet_s, event.miss_m)
         mariner = Mariner(
-            mmsi=FIRST_MMSI + number, length_m=event.length_m or SHIP_M, craft=event.craft, manner=event.manner,
-            react_s=event.react_s or event.meet_s, base_rad=course, speed_mps=event.sog_mps, en_m=place,
-            t_s=now_s() - began_s, name=f"M{number}")
+            mmsi=FIRST_MMSI + number,
+            length_m=event.length_m or SHIP_M,
+            craft=event.craft,
+            manner=event.manner,
+            react_s=event.react_s or event.meet_s,
+            base_rad=course,
+            speed_mps=event.sog_mps,
+            en_m=place,
+            t_s=now_s() - began_s,
+            name=f"M{number}",
+        )
         self._vessels.append(mariner)
         errors = Receiver(rng=np.random.default_rng((11, self._seed, mariner.mmsi)))
         told_s, next_s = -math.inf, now_s()
@@ -329,8 +390,13 @@ class Others:
             next_s += 1.0
             await asyncio.sleep(max(0.0, next_s - now_s()))
             motion, heading = ours()
-            us = Mover(en_m=motion[0], course_rad=math.atan2(*motion[1]), heading_rad=heading,
-                       speed_mps=math.hypot(*motion[1]), craft="sail")
+            us = Mover(
+                en_m=motion[0],
+                course_rad=math.atan2(*motion[1]),
+                heading_rad=heading,
+                speed_mps=math.hypot(*motion[1]),
+                craft="sail",
+            )
             t_s = now_s() - began_s
             mariner.watch(us, self._wind.at(max(0.0, t_s))[0], t_s)
 
@@ -340,9 +406,12 @@ class Others:
         east, north = mariner.at(t_s)
         course = mariner.course_rad + errors.course_error_rad(mariner.speed_mps)
         heard = replace(
-            true, position=self._frame.geo_from_en(east + fix.real, north + fix.imag),
-            cog_deg=math.degrees(course) % 360.0, sog_mps=max(0.0, mariner.speed_mps + errors.speed_error_mps()),
-            nav_status=STATUS[mariner.craft])
+            true,
+            position=self._frame.geo_from_en(east + fix.real, north + fix.imag),
+            cog_deg=math.degrees(course) % 360.0,
+            sog_mps=max(0.0, mariner.speed_mps + errors.speed_error_mps()),
+            nav_status=STATUS[mariner.craft],
+        )
         if event.receiver == "autopilot":
             self._hear(heard)
         elif self._port:

@@ -79,8 +79,9 @@ class HullTrack:
     def _swept(self, which: NDArray[np.intp]) -> NDArray[np.object_]:
         """Return what the hull covered from the sample before each of ``which`` to it."""
         before = np.maximum(which - 1, 0)
-        corners = np.concatenate([
-            outline_en_m(self.hull, self.en_m[i], self.heading_rad[i])[:, :4] for i in (before, which)], axis=1)
+        corners = np.concatenate(
+            [outline_en_m(self.hull, self.en_m[i], self.heading_rad[i])[:, :4] for i in (before, which)], axis=1
+        )
         return np.asarray(shapely.convex_hull(shapely.multipoints(corners)))
 
 
@@ -93,11 +94,11 @@ SAILBOT_MINUTES_FREE = 5.5
 class StationScore:
     """The scores of one track; distances in metres."""
 
-    kept: bool             # WRSC 2018: five minutes were sailed and their mean position is within the radius
-    radius95_m: float      # WRSC 2018: about the mean position
-    lengths: float         # WRSC 2018: that per boat length
-    mean_m: float          # WRSC 2019: mean distance to the point
-    sailbot: float         # SailBot: points, 10 at best, left out of the box in time
+    kept: bool  # WRSC 2018: five minutes were sailed and their mean position is within the radius
+    radius95_m: float  # WRSC 2018: about the mean position
+    lengths: float  # WRSC 2018: that per boat length
+    mean_m: float  # WRSC 2019: mean distance to the point
+    sailbot: float  # SailBot: points, 10 at best, left out of the box in time
     farthest_m: float
 
 
@@ -116,8 +117,14 @@ def station_score(
     d = np.hypot(track[:, 1] - point_en[0], track[:, 2] - point_en[1])
     inside = np.flatnonzero(d <= radius_m)
     if not inside.size:
-        return StationScore(kept=False, radius95_m=math.inf, lengths=math.inf, mean_m=math.inf, sailbot=0.0,
-                            farthest_m=float(d.max(initial=math.inf)))
+        return StationScore(
+            kept=False,
+            radius95_m=math.inf,
+            lengths=math.inf,
+            mean_m=math.inf,
+            sailbot=0.0,
+            farthest_m=float(d.max(initial=math.inf)),
+        )
     begin = float(track[inside[0], 0])
     during = (track[:, 0] >= begin) & (track[:, 0] <= begin + TASK_S)
     p = track[during, 1:3]
@@ -127,8 +134,11 @@ def station_score(
     radius95 = float(apart[max(0, round(0.95 * len(apart)) - 1)])
     long_enough = float(track[during, 0][-1]) - begin >= TASK_S - 1.5
     return StationScore(
-        kept=long_enough and math.dist((float(mean[0]), float(mean[1])), point_en) < radius_m, radius95_m=radius95,
-        lengths=radius95 / length_m, mean_m=float(d[during].mean()), sailbot=sailbot_points(track, point_en),
+        kept=long_enough and math.dist((float(mean[0]), float(mean[1])), point_en) < radius_m,
+        radius95_m=radius95,
+        lengths=radius95 / length_m,
+        mean_m=float(d[during].mean()),
+        sailbot=sailbot_points(track, point_en),
         farthest_m=float(d[during].max()),
     )
 
@@ -165,9 +175,9 @@ class TrueTrack:
     speed_mps: list[float] = field(default_factory=list)
     twd_from_rad: list[float] = field(default_factory=list)
     tws_mps: list[float] = field(default_factory=list)
-    vessels_m: dict[str, float] = field(default_factory=dict)   # the least distance to each vessel's hull
-    met: dict[str, Met] = field(default_factory=dict)     # the tracks of those who met us
-    second_boat_m: float | None = None   # the second boat's least distance to its goal
+    vessels_m: dict[str, float] = field(default_factory=dict)  # the least distance to each vessel's hull
+    met: dict[str, Met] = field(default_factory=dict)  # the tracks of those who met us
+    second_boat_m: float | None = None  # the second boat's least distance to its goal
 
     def add(
         self, t_s: float, en_m: tuple[float, float], heading_rad: float, speed_mps: float, wind: tuple[float, float]
@@ -186,8 +196,7 @@ class TrueTrack:
 
     def hull(self, hull: Hull) -> HullTrack:
         """Return the track of a hull that was there."""
-        return HullTrack(
-            en_m=self.positions_m(), heading_rad=np.asarray(self.heading_rad, dtype=np.float64), hull=hull)
+        return HullTrack(en_m=self.positions_m(), heading_rad=np.asarray(self.heading_rad, dtype=np.float64), hull=hull)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -350,11 +359,19 @@ def judge(
         check("arrived", arrived == expect.arrived, arrived, expect.arrived)
     if expect.contacts is not None:
         # a boat that never sailed touched nothing and does not pass
-        check("contacts", bool(truth.t_s) and contacts <= expect.contacts, contacts if truth.t_s else None,
-              f"at most {expect.contacts}")
+        check(
+            "contacts",
+            bool(truth.t_s) and contacts <= expect.contacts,
+            contacts if truth.t_s else None,
+            f"at most {expect.contacts}",
+        )
     if expect.within_m is not None:
-        check(f"distance to the {expect.ends_at}, m", end_distance <= expect.within_m, end_distance,
-              f"at most {expect.within_m}")
+        check(
+            f"distance to the {expect.ends_at}, m",
+            end_distance <= expect.within_m,
+            end_distance,
+            f"at most {expect.within_m}",
+        )
     if expect.refuge_within_m is not None:
         nearest = min((float(np.min(np.hypot(*(positions - p).T))) for p in refuges_en_m), default=math.inf)
         check("nearest to a refuge, m", nearest <= expect.refuge_within_m, nearest, f"at most {expect.refuge_within_m}")
@@ -364,24 +381,49 @@ def judge(
     if least_m is not None:
         check("clearance, m", clearance >= least_m, clearance, f"at least {least_m}")
     if expect.min_vessel_distance_m is not None:
-        nearest = min(truth.vessels_m.values(), default=-math.inf)   # nothing measured does not pass
-        check("distance to vessels, m", nearest >= expect.min_vessel_distance_m, truth.vessels_m,
-              f"at least {expect.min_vessel_distance_m}")
-    met = {name: found for name, track in truth.met.items() if (found := judge_encounter(
-        track, truth.t_s, truth.en_m, truth.heading_rad, truth.twd_from_rad, keep_m=keep_m,
-        our_length_m=hull.length_m)) is not None}
+        nearest = min(truth.vessels_m.values(), default=-math.inf)  # nothing measured does not pass
+        check(
+            "distance to vessels, m",
+            nearest >= expect.min_vessel_distance_m,
+            truth.vessels_m,
+            f"at least {expect.min_vessel_distance_m}",
+        )
+    met = {
+        name: found
+        for name, track in truth.met.items()
+        if (
+            found := judge_encounter(
+                track,
+                truth.t_s,
+                truth.en_m,
+                truth.heading_rad,
+                truth.twd_from_rad,
+                keep_m=keep_m,
+                our_length_m=hull.length_m,
+            )
+        )
+        is not None
+    }
     if expect.rules_kept is not None:
         faults = [f"{name}: {fault}" for name, found in met.items() for fault in found.faults]
         check("rules of the road", bool(met) and (not faults) == expect.rules_kept, faults, "kept")
     if expect.second_boat_within_m is not None:
         nearest_m = truth.second_boat_m
-        check("the second boat's distance to its goal, m", nearest_m is not None and
-              nearest_m <= expect.second_boat_within_m, nearest_m, f"at most {expect.second_boat_within_m}")
+        check(
+            "the second boat's distance to its goal, m",
+            nearest_m is not None and nearest_m <= expect.second_boat_within_m,
+            nearest_m,
+            f"at most {expect.second_boat_within_m}",
+        )
     if expect.station_radius_m is not None:
         track = np.column_stack([truth.t_s, positions]) if truth.t_s else np.zeros((0, 3))
         score = station_score(track, goal_en_m)
-        check("station keeping: radius of 95 %, m", score.kept and score.radius95_m <= expect.station_radius_m,
-              score.radius95_m, f"at most {expect.station_radius_m}")
+        check(
+            "station keeping: radius of 95 %, m",
+            score.kept and score.radius95_m <= expect.station_radius_m,
+            score.radius95_m,
+            f"at most {expect.station_radius_m}",
+        )
     if expect.max_silence_s is not None and silence_s is not None:
         check("silence, s", silence_s <= expect.max_silence_s, silence_s, f"at most {expect.max_silence_s}")
     if expect.max_replans_per_hour is not None and duration_s > 0.0:
@@ -395,8 +437,12 @@ def judge(
     if expect.held is not None:
         stay = positions[[expect.held.from_s <= t - began_s <= expect.held.to_s for t in truth.t_s]]
         radius_m = float(np.max(np.hypot(*(stay - stay.mean(axis=0)).T))) if len(stay) else None
-        check("held within, m", radius_m is not None and radius_m <= expect.held.within_m, radius_m,
-              f"at most {expect.held.within_m}")
+        check(
+            "held within, m",
+            radius_m is not None and radius_m <= expect.held.within_m,
+            radius_m,
+            f"at most {expect.held.within_m}",
+        )
     if expect.end_phase is not None:
         check("end phase", summary.get("end_phase") == expect.end_phase, summary.get("end_phase"), expect.end_phase)
     if expect.marks_rounded is not None:
@@ -405,10 +451,16 @@ def judge(
     for finding in task_findings(expect, tasks or Tasks(), truth.t_s, positions, seen):
         check(*finding)
     if expect.called_s is not None and called_at_s is not None:
-        ahead_s = [max((truth.t_s[i] - t for t in called_at_s if 0.0 <= truth.t_s[i] - t <= CALL_HOLDS_S), default=0.0)
-                   for i in touches]
-        check("called before a contact, s", all(s >= expect.called_s for s in ahead_s), ahead_s,
-              f"at least {expect.called_s}")
+        ahead_s = [
+            max((truth.t_s[i] - t for t in called_at_s if 0.0 <= truth.t_s[i] - t <= CALL_HOLDS_S), default=0.0)
+            for i in touches
+        ]
+        check(
+            "called before a contact, s",
+            all(s >= expect.called_s for s in ahead_s),
+            ahead_s,
+            f"at least {expect.called_s}",
+        )
     if ordered is not None:
         check("neighbours given orders", not ordered, list(ordered), [])
     for code in expect.alerts:
@@ -443,10 +495,11 @@ def verdict_line(record: Mapping[str, Any]) -> str:
     """Return a verdict's record in one line: what voyage it was, and its figures or why there are none."""
     f = record["figures"]
     if f:
-        words = (f"{f['time_s']:.0f} s and {counted(f['tacks'], 'tack')} in all, {f['distance_m']:.0f} m, "
-                 f"{counted(f['replans'], 'replan')}, ")
-        words += ("nothing to be clear of" if f["min_clearance_m"] is None else
-                  f"clearance {f['min_clearance_m']:.1f} m")
+        words = (
+            f"{f['time_s']:.0f} s and {counted(f['tacks'], 'tack')} in all, {f['distance_m']:.0f} m, "
+            f"{counted(f['replans'], 'replan')}, "
+        )
+        words += "nothing to be clear of" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"
         if f["min_clearance_m"] is not None and f.get("promised_clearance_m") is not None:
             words += f" (promised {f['promised_clearance_m']:.1f} m)"
     else:

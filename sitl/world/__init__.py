@@ -18,7 +18,23 @@ from sitl.world.environment import (
 )
 
 __all__ = [
-    "AR1", "LENGTH_M", "Constant", "CurrentModel", "Gusty", "Later", "Lee", "Process", "Recorded", "Scripted",
-    "SimulatedVaimos", "Waters", "WindEvent", "WindModel", "habits_for", "parse_wind", "polar_at", "summary",
+    "AR1",
+    "LENGTH_M",
+    "Constant",
+    "CurrentModel",
+    "Gusty",
+    "Later",
+    "Lee",
+    "Process",
+    "Recorded",
+    "Scripted",
+    "SimulatedVaimos",
+    "Waters",
+    "WindEvent",
+    "WindModel",
+    "habits_for",
+    "parse_wind",
+    "polar_at",
+    "summary",
     "wind_for",
 ]

@@ -49,31 +49,43 @@ STEP_S = 0.05
 class VaimosParameters:
     """The eleven parameters, and ours. Units as in the module's equations; ``share`` 1 is the published set."""
 
-    p1: float = 0.03       # drift, share of the wind speed
-    p2: float = 40.0       # tangential friction [kg/m]
-    p3: float = 6000.0     # angular friction [kg m]
-    p4: float = 200.0      # sail lift [kg/s]
-    p5: float = 1500.0     # rudder lift [kg/s]
-    p6: float = 0.5        # distance to the sail's centre of effort [m]
-    p7: float = 0.5        # distance to the mast [m]
-    p8: float = 2.0        # distance to the rudder [m]
-    p9: float = 300.0      # mass [kg]
-    p10: float = 400.0     # moment of inertia [kg m²]
-    p11: float = 0.2       # rudder break coefficient
-    share: float = 0.2     # of p2 to p5 and of the damping
-    windage: float = 0.1   # hull and rig along the keel, per apparent wind squared [kg/m]: 0.16 m², flagging sail
+    p1: float = 0.03  # drift, share of the wind speed
+    p2: float = 40.0  # tangential friction [kg/m]
+    p3: float = 6000.0  # angular friction [kg m]
+    p4: float = 200.0  # sail lift [kg/s]
+    p5: float = 1500.0  # rudder lift [kg/s]
+    p6: float = 0.5  # distance to the sail's centre of effort [m]
+    p7: float = 0.5  # distance to the mast [m]
+    p8: float = 2.0  # distance to the rudder [m]
+    p9: float = 300.0  # mass [kg]
+    p10: float = 400.0  # moment of inertia [kg m²]
+    p11: float = 0.2  # rudder break coefficient
+    share: float = 0.2  # of p2 to p5 and of the damping
+    windage: float = 0.1  # hull and rig along the keel, per apparent wind squared [kg/m]: 0.16 m², flagging sail
     damping: float = 400.0  # turn damping at rest [kg m²/s]
-    sail_rate: float = 0.8    # [rad/s]
+    sail_rate: float = 0.8  # [rad/s]
     rudder_rate: float = 0.8  # [rad/s]
-    hull_mps: float = 2.4     # hull speed [m/s]; math.inf for the printed equations
+    hull_mps: float = 2.4  # hull speed [m/s]; math.inf for the printed equations
 
     def array(self) -> NDArray[np.float64]:
         """Return the kernel's parameter vector."""
-        return np.array([
-            self.p1, *(self.share * p for p in (self.p2, self.p3, self.p4, self.p5)),
-            self.p6, self.p7, self.p8, self.p9, self.p10, self.p11, self.windage,
-            self.share * self.damping, self.sail_rate, self.rudder_rate, self.hull_mps,
-        ])
+        return np.array(
+            [
+                self.p1,
+                *(self.share * p for p in (self.p2, self.p3, self.p4, self.p5)),
+                self.p6,
+                self.p7,
+                self.p8,
+                self.p9,
+                self.p10,
+                self.p11,
+                self.windage,
+                self.share * self.damping,
+                self.sail_rate,
+                self.rudder_rate,
+                self.hull_mps,
+            ]
+        )
 
 
 def state_at(east_m: float, north_m: float, heading_rad: float, speed_mps: float = 0.0) -> NDArray[np.float64]:
@@ -83,8 +95,14 @@ def state_at(east_m: float, north_m: float, heading_rad: float, speed_mps: float
 
 @kernel
 def sail_heading(
-    state: NDArray[np.float64], p: NDArray[np.float64], wanted_rad: float, twd_from_rad: float, tws_mps: float,
-    seconds: float, step_s: float, thrust: float = 1.0,
+    state: NDArray[np.float64],
+    p: NDArray[np.float64],
+    wanted_rad: float,
+    twd_from_rad: float,
+    tws_mps: float,
+    seconds: float,
+    step_s: float,
+    thrust: float = 1.0,
 ) -> NDArray[np.float64]:
     """Return the state after ``seconds`` of steering ``wanted_rad`` by rudder, the sail trimmed for the true heading.
 
@@ -108,8 +126,13 @@ def sail_heading(
 
 @kernel
 def step(
-    state: NDArray[np.float64], p: NDArray[np.float64], rudder_rad: float, sheet_rad: float, twd_from_rad: float,
-    tws_mps: float, step_s: float,
+    state: NDArray[np.float64],
+    p: NDArray[np.float64],
+    rudder_rad: float,
+    sheet_rad: float,
+    twd_from_rad: float,
+    tws_mps: float,
+    step_s: float,
 ) -> NDArray[np.float64]:
     """Return the state after one step under a rudder and a sheet command."""
     s = state.copy()
@@ -197,7 +220,11 @@ def habits_for(tws_mps: float, **changes: float | bool) -> GuidanceSettings:
     """Return what VAIMOS can do in this wind: the boat's polar, slow tacks, leeway of 3 % of the wind."""
     twa, speed = polar_at(tws_mps)
     base: dict[str, float | bool] = {
-        "turn_rate_radps": math.radians(11.0), "tack_s": 7.0, "tack_min_mps": 0.5, "lag_s": 6.0, "leeway_share": 0.03,
+        "turn_rate_radps": math.radians(11.0),
+        "tack_s": 7.0,
+        "tack_min_mps": 0.5,
+        "lag_s": 6.0,
+        "leeway_share": 0.03,
         "no_go_half_rad": math.radians(47.0),
     }
     base.update(changes)
@@ -250,9 +277,13 @@ class SimulatedVaimos:
         assert mean is not None
         noise = self.rng.normal(0.0, GPS_SD_M, 2)
         return Situation(
-            t_s=self.t_s, en_m=(float(self.state[0] + noise[0]), float(self.state[1] + noise[1])),
-            velocity_en_mps=self._velocity, heading_rad=wrap_pi(float(self.state[2])),
-            twd_from_rad=wrap_two_pi(math.atan2(mean[0], mean[1])), tws_mps=mean[2], obstacles=obstacles,
+            t_s=self.t_s,
+            en_m=(float(self.state[0] + noise[0]), float(self.state[1] + noise[1])),
+            velocity_en_mps=self._velocity,
+            heading_rad=wrap_pi(float(self.state[2])),
+            twd_from_rad=wrap_two_pi(math.atan2(mean[0], mean[1])),
+            tws_mps=mean[2],
+            obstacles=obstacles,
         )
 
     def sail(self, heading_rad: float, thrust: float = 1.0) -> None:

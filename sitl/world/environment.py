@@ -114,8 +114,16 @@ class AR1:
     """
 
     def __init__(
-        self, twd_from_rad: float, tws_mps: float, *, seed: int, sd_rad: float = SPREAD_RAD, rho_hz: float = RHO_HZ,
-        tws_sd_mps: float = 0.0, step_s: float = 0.1, from_mean: bool = False,
+        self,
+        twd_from_rad: float,
+        tws_mps: float,
+        *,
+        seed: int,
+        sd_rad: float = SPREAD_RAD,
+        rho_hz: float = RHO_HZ,
+        tws_sd_mps: float = 0.0,
+        step_s: float = 0.1,
+        from_mean: bool = False,
     ) -> None:
         self.twd_from_rad, self.tws_mps = twd_from_rad, tws_mps
         self.sd_rad, self.rho_hz, self.tws_sd_mps = sd_rad, rho_hz, tws_sd_mps
@@ -274,8 +282,12 @@ def parse_wind(text: str, *, seed: int = 0) -> WindModel:
     if model == "constant":
         return Constant(math.radians(direction), speed)
     return AR1(
-        math.radians(direction), speed, seed=seed, sd_rad=math.radians(options.get("sd", math.degrees(SPREAD_RAD))),
-        rho_hz=options.get("rho", RHO_HZ), tws_sd_mps=options.get("gust", 0.0),
+        math.radians(direction),
+        speed,
+        seed=seed,
+        sd_rad=math.radians(options.get("sd", math.degrees(SPREAD_RAD))),
+        rho_hz=options.get("rho", RHO_HZ),
+        tws_sd_mps=options.get("gust", 0.0),
     )
 
 

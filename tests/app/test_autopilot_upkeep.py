@@ -45,7 +45,7 @@ def test_what_is_drawn_on_the_autopilot_is_read_while_a_fence_is_in_force_and_no
     async def read_fence():
         read_s.append(now_s())
         try:
-            await asyncio.sleep(0.0 if answers else 1e6)   # a link that answers nothing
+            await asyncio.sleep(0.0 if answers else 1e6)  # a link that answers nothing
         except asyncio.CancelledError:
             ended.append(now_s())
             raise
@@ -56,23 +56,23 @@ def test_what_is_drawn_on_the_autopilot_is_read_while_a_fence_is_in_force_and_no
     async def lived():
         task = asyncio.create_task(keep_fence(fold, autopilot, None, None, taken.append))
         await asyncio.sleep(30.0)
-        assert read_s == []                                  # there is none in force
+        assert read_s == []  # there is none in force
         shown.fence_breached = False
         await asyncio.sleep(FENCE_READ_S + 2.0)
         assert len(read_s) == 1
         answers.append(one)
         await asyncio.sleep(3.0 * FENCE_EVERY_S)
-        assert (len(taken), taken[-1]) == (1, one)           # told once
+        assert (len(taken), taken[-1]) == (1, one)  # told once
         answers.append(other)
         shown.fence_breached, before = True, len(read_s)
         await asyncio.sleep(2.0)
-        assert len(read_s) == before + 1                     # at once, when anything new is said of it
+        assert len(read_s) == before + 1  # at once, when anything new is said of it
         assert taken == [one, other]
         answers.clear()
         shown.fence_breaches = 1
-        await asyncio.sleep(1.5)                             # it is being read, to no end ...
+        await asyncio.sleep(1.5)  # it is being read, to no end ...
         assert len(ended) == 1
-        state.pending.upload = object()                      # ... and gives way
+        state.pending.upload = object()  # ... and gives way
         await asyncio.sleep(0.2)
         assert len(ended) == 2
         before = len(read_s)

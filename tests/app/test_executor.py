@@ -103,8 +103,18 @@ def test_the_first_plan_gets_longer_on_a_slow_computer_and_no_other(share, longe
         executor = Executor(None, planner, lambda _: None)
         running = asyncio.create_task(executor.run())
         for number, reason in enumerate((ReplanReason.START, ReplanReason.WAYPOINT)):
-            executor.submit([RequestPlan(request_id=number, problem=Problem.from_json(simple()), reason=reason,
-                                         budget_s=2.0, seed=number, from_seq=None)])
+            executor.submit(
+                [
+                    RequestPlan(
+                        request_id=number,
+                        problem=Problem.from_json(simple()),
+                        reason=reason,
+                        budget_s=2.0,
+                        seed=number,
+                        from_seq=None,
+                    )
+                ]
+            )
             await asyncio.sleep(5.0)
         running.cancel()
 

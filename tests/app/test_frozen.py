@@ -10,11 +10,14 @@ from companion.skipper import SkipperState
 from companion.skipper.step.state import LoadedMission, Phase
 
 
-@pytest.mark.parametrize(("value", "changes"), [
-    (AutopilotStatus(t_s=1.0), {"mode": Mode.AUTO, "t_s": 2.0}),
-    (SkipperState(), {"phase": Phase.STANDARD, "why": "away", "wants": ("wind",)}),
-    (GeoPoint(lat_deg=1.0, lon_deg=2.0), {"lat_deg": 3.0}),
-])
+@pytest.mark.parametrize(
+    ("value", "changes"),
+    [
+        (AutopilotStatus(t_s=1.0), {"mode": Mode.AUTO, "t_s": 2.0}),
+        (SkipperState(), {"phase": Phase.STANDARD, "why": "away", "wants": ("wind",)}),
+        (GeoPoint(lat_deg=1.0, lon_deg=2.0), {"lat_deg": 3.0}),
+    ],
+)
 def test_it_is_what_replace_makes(value, changes):
     new = changed(value, **changes)
     assert new == replace(value, **changes)

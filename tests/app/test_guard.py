@@ -40,16 +40,24 @@ from tests.one_mark import one_mark
 
 # When everything beside the voyage is broken [s]: from before its start, and again under way.
 WINDOWS = ((0.0, 12.0), (80.0, 95.0))
-OTHERS = {Auxiliary.VIEW: ((0.0, 12.0), (115.0, 130.0)),     # without a view nothing of it fails to be shown
-          Auxiliary.OUTPUTS: ((0.0, 24.0), (80.0, 95.0)),
-          Auxiliary.FENCE: ((0.0, 50.0),)}                   # once the boat is ours
-MISSION = one_mark("reach", (50.8170000, -1.3071600), 90.0, rock=False, tables="""local_orders = ["hold"]
+OTHERS = {
+    Auxiliary.VIEW: ((0.0, 12.0), (115.0, 130.0)),  # without a view nothing of it fails to be shown
+    Auxiliary.OUTPUTS: ((0.0, 24.0), (80.0, 95.0)),
+    Auxiliary.FENCE: ((0.0, 50.0),),
+}  # once the boat is ours
+MISSION = one_mark(
+    "reach",
+    (50.8170000, -1.3071600),
+    90.0,
+    rock=False,
+    tables="""local_orders = ["hold"]
 upload_fence = true
 [traffic]
 feeds = ["udpin:127.0.0.1:{feed}"]
 [output]
 nmea = ["udp:127.0.0.1:{nmea}"]
-""")
+""",
+)
 
 # What is called of each of them, at its start and under way. What is added to ``Auxiliary`` is added here.
 FAULTS = {
@@ -71,11 +79,21 @@ FAULTS = {
     Auxiliary.FENCE: ((autopilot_upkeep, "fence_for_autopilot"),),
     Auxiliary.FEEDS: ((Feeds, "open"),),
 }
-ONCE = {Auxiliary.FENCE, Auxiliary.FEEDS}   # at the start, and then no more
+ONCE = {Auxiliary.FENCE, Auxiliary.FEEDS}  # at the start, and then no more
 # Of the command, before there is a voyage; and what it shows, below.
 NAMED = {Auxiliary.ORDERS_BY_PAGE, Auxiliary.CHARTS, Auxiliary.SIGNALK_TOKEN}
-NEEDED = {"executor", "orders", "plans", "whose boat", "stopped before", "link heartbeat", "link rates", "link turns",
-          "order", "fence upload"}
+NEEDED = {
+    "executor",
+    "orders",
+    "plans",
+    "whose boat",
+    "stopped before",
+    "link heartbeat",
+    "link rates",
+    "link turns",
+    "order",
+    "fence upload",
+}
 
 
 def break_it(monkeypatch, owner, name, windows):
@@ -124,7 +142,8 @@ def test_with_all_that_is_beside_her_broken_at_the_start_and_under_way_she_arriv
     begin, say = Adoption.__init__, Autopilot.say
     monkeypatch.setattr(Adoption, "__init__", lambda self, *args: (adoptions.append(self), begin(self, *args))[1])
     monkeypatch.setattr(
-        Autopilot, "say", lambda self, severity, text: (said.append(text), say(self, severity, text))[1])
+        Autopilot, "say", lambda self, severity, text: (said.append(text), say(self, severity, text))[1]
+    )
     monkeypatch.setattr(app, "OperatorCommands", Wanting)
     (tmp_path / "m.toml").write_text(MISSION.format(feed=free_port(), nmea=free_port()))
     mission = load_mission(tmp_path / "m.toml")
@@ -140,13 +159,27 @@ def test_with_all_that_is_beside_her_broken_at_the_start_and_under_way_she_arriv
         wires = MemoryLink("boat", seed=1)
         async with serve(autopilot, [wires.far]):
             tasks.update({f"not {task.get_name()}" for task in asyncio.all_tasks()})
-            async with Outputs(checked_displays(displays_of(mission), guard), mission.frame(), lambda _: None,
-                               guard=guard) as displays:
-                return await app.sail(mission, wires.near, InlinePlanner(), tmp_path / "v", SailOptions(
-                    limit_s=190.0, offload=at_once, is_durable=False, expansions=2000,
-                    http=Address(host="127.0.0.1", port=0), socket=tmp_path / "s",
-                    far=SatelliteLink(folder=tmp_path / "far", key=bytes(32)),
-                ), guard=guard, on_status=look, on_view=lambda view, _, step: displays.tell(view, None))
+            async with Outputs(
+                checked_displays(displays_of(mission), guard), mission.frame(), lambda _: None, guard=guard
+            ) as displays:
+                return await app.sail(
+                    mission,
+                    wires.near,
+                    InlinePlanner(),
+                    tmp_path / "v",
+                    SailOptions(
+                        limit_s=190.0,
+                        offload=at_once,
+                        is_durable=False,
+                        expansions=2000,
+                        http=Address(host="127.0.0.1", port=0),
+                        socket=tmp_path / "s",
+                        far=SatelliteLink(folder=tmp_path / "far", key=bytes(32)),
+                    ),
+                    guard=guard,
+                    on_status=look,
+                    on_view=lambda view, _, step: displays.tell(view, None),
+                )
 
     summary = run_virtual(sailed())
     assert summary["arrived"] is True
@@ -176,18 +209,44 @@ def test_a_console_that_fails_is_no_end(from_s, tmp_path, monkeypatch):
     monkeypatch.setattr(console.ProgressLine, "show", broken)
     mission = MISSION.format(feed=free_port(), nmea=free_port()).replace("upload_fence = true", "")
     (tmp_path / "m.toml").write_text(mission)
-    assert cli.main(["run", str(tmp_path / "m.toml"), "--link", f"udpin:127.0.0.1:{free_port()}", "--wait", "1.5",
-                     "--speedup", "20", "--out", str(tmp_path / "v"), "--state", str(tmp_path / "s.json")]) == 1
+    assert (
+        cli.main(
+            [
+                "run",
+                str(tmp_path / "m.toml"),
+                "--link",
+                f"udpin:127.0.0.1:{free_port()}",
+                "--wait",
+                "1.5",
+                "--speedup",
+                "20",
+                "--out",
+                str(tmp_path / "v"),
+                "--state",
+                str(tmp_path / "s.json"),
+            ]
+        )
+        == 1
+    )
     assert len(shown) > 15
     records = read_jsonl(tmp_path / "v/decisions.jsonl")
     assert [(r["what"], r["text"]) for r in records if r["kind"] == "auxiliary"] == [
-        ("console", "sailing on without the console: RuntimeError: broken")]
+        ("console", "sailing on without the console: RuntimeError: broken")
+    ]
 
 
 def test_what_is_named_and_cannot_be_used_is_left_out(tmp_path):
     guard, nowhere = Guard(), tmp_path / "nowhere" / "file"
-    args = argparse.Namespace(http=("", 80), http_name=(), http_token=nowhere, chart=[nowhere], far=tmp_path,
-                              far_key=nowhere, signing_key=None, far_every=10.0)
+    args = argparse.Namespace(
+        http=("", 80),
+        http_name=(),
+        http_token=nowhere,
+        chart=[nowhere],
+        far=tmp_path,
+        far_key=nowhere,
+        signing_key=None,
+        far_every=10.0,
+    )
     assert page_of(args, guard).token == ""
     assert charts_of(args, guard) == ()
     assert far_of(args, guard) is None
@@ -197,14 +256,16 @@ def test_what_is_named_and_cannot_be_used_is_left_out(tmp_path):
     assert {*guard.gone} == {*NAMED, Auxiliary.FAR}
     assert all("no such file" in why for why in guard.gone.values())
     guard.look()
-    assert len(guard.gone) == 4   # for good
+    assert len(guard.gone) == 4  # for good
 
 
 @pytest.mark.parametrize("name", ["rocks.wkt", "boat.pol", "tide.csv", "m.toml"])
 def test_a_fifo_in_place_of_a_file_is_one_line_and_nothing_waits_for_it(name, tmp_path, capfd):
     """The start hung for ever."""
-    (tmp_path / "m.toml").write_text(MISSION.format(feed=1, nmea=2).replace(
-        "[area]", '[area]\nobstacles = ["rocks.wkt"]') + '[boat]\npolar = "boat.pol"\n[current]\ntable = "tide.csv"\n')
+    (tmp_path / "m.toml").write_text(
+        MISSION.format(feed=1, nmea=2).replace("[area]", '[area]\nobstacles = ["rocks.wkt"]')
+        + '[boat]\npolar = "boat.pol"\n[current]\ntable = "tide.csv"\n'
+    )
     (tmp_path / "rocks.wkt").write_text("POLYGON ((-1.3 50.81, -1.299 50.81, -1.299 50.811, -1.3 50.81))")
     (tmp_path / "boat.pol").write_text("TWA\\TWS;4;8\n0;0;0\n90;3;5\n180;2;4\n")
     (tmp_path / "tide.csv").write_text("time,set_deg,drift_mps\n")
@@ -285,8 +346,19 @@ def test_who_is_told_may_fail_and_may_be_what_is_gone():
     assert reason(TimeoutError()) == "no answer"
 
 
-FLYING = ("app", "commands/run.py", "compose.py", "fold.py", "geofence", "mavlink", "outputs", "page",
-          "skipper", "telemetry", "traffic")
+FLYING = (
+    "app",
+    "commands/run.py",
+    "compose.py",
+    "fold.py",
+    "geofence",
+    "mavlink",
+    "outputs",
+    "page",
+    "skipper",
+    "telemetry",
+    "traffic",
+)
 # A key that is asked for by hand, exclusively; the log of a link, which is appended to.
 NOT_WHOLE = {"mavlink/signing.py", "mavlink/tlog.py"}
 

@@ -31,6 +31,7 @@ def views(guard=None):
 
 def with_socket(path, talk, shown=None):
     """Run ``talk(crew)`` with the socket served; what nobody takes is answered by nobody."""
+
     async def whole():
         operator = OperatorCommands(Link(MemoryLink().near), has_key=False)
         operator.begin()
@@ -46,7 +47,7 @@ async def said(path, *lines):
     try:
         return [await asyncio.wait_for(reader.readline(), 5.0) for _ in lines]
     except ConnectionError:
-        return [b""]   # hung up
+        return [b""]  # hung up
     finally:
         writer.close()
         with contextlib.suppress(ConnectionError):
@@ -64,8 +65,16 @@ def test_an_order_waits_for_its_answer_and_only_for_its_own(tmp_path):
         assert {o.wanted.verb for o in orders} == {Verb.HOLD, Verb.GOAL}
         assert {(o.source.kind, o.authority) for o in orders} == {("local", "local")}
         for order in reversed(orders):
-            operator.answered(Acknowledge(way="local", system=0, component=order.source.component, command=0,
-                                      result=Result.DONE, text=order.wanted.verb))
+            operator.answered(
+                Acknowledge(
+                    way="local",
+                    system=0,
+                    component=order.source.component,
+                    command=0,
+                    result=Result.DONE,
+                    text=order.wanted.verb,
+                )
+            )
         return [json.loads(line) for [line] in (await first, await second)]
 
     assert with_socket(tmp_path / "s", talk) == [{"result": "done", "text": "hold"}, {"result": "done", "text": "goal"}]
@@ -94,12 +103,20 @@ def test_a_line_without_end_is_hung_up_on_and_a_crowd_is_not_let_in(tmp_path):
         assert await said(tmp_path / "s", b"x" * 3 * MAX_LINE) == [b""]
         crowd = [await asyncio.open_unix_connection(tmp_path / "s") for _ in range(MOST)]
         for _, writer in crowd:
-            writer.write(b"hold\n")   # each waits for its answer
+            writer.write(b"hold\n")  # each waits for its answer
         await asyncio.sleep(0.05)
         late = await said(tmp_path / "s", b"jump\n")
         for order in operator.take():
-            operator.answered(Acknowledge(way="local", system=0, component=order.source.component, command=0,
-                                      result=Result.DONE, text="so be it"))
+            operator.answered(
+                Acknowledge(
+                    way="local",
+                    system=0,
+                    component=order.source.component,
+                    command=0,
+                    result=Result.DONE,
+                    text="so be it",
+                )
+            )
         for _, writer in crowd:
             writer.close()
             await writer.wait_closed()
@@ -176,7 +193,7 @@ def test_who_watches_is_told_of_each_step_and_orders_go_on(tmp_path):
         tell(shown, 1)
         first = msgspec.json.decode(await reader.readline())
         tell(shown, 2)
-        tell(shown, 3)                       # before the one before it was fetched: the newest, and all that happened
+        tell(shown, 3)  # before the one before it was fetched: the newest, and all that happened
         second = msgspec.json.decode(await reader.readline())
         assert (await said(tmp_path / "s", b"dance\n"))[0].startswith(b'{"result": "unknown"')
         writer.close()
@@ -191,7 +208,7 @@ def test_who_watches_is_told_of_each_step_and_orders_go_on(tmp_path):
     assert msgspec.convert(first["view"], View) == replace(VIEW, t_s=1.0)
     assert second["view"]["t_s"] == 3.0
     assert [event["number"] for event in second["events"]] == [2, 3]
-    assert left == 0                         # who is gone is told no more
+    assert left == 0  # who is gone is told no more
 
 
 def test_who_watches_and_never_reads_is_hung_up_on(tmp_path, monkeypatch):
@@ -217,7 +234,7 @@ def test_who_watches_and_never_reads_is_hung_up_on(tmp_path, monkeypatch):
 def test_a_view_that_cannot_be_made_is_said_once_and_costs_nothing():
     faults, seen = [], []
     shown = views(Guard(lambda name, why: faults.append((name, why))))
-    shown.take(None, None, None)             # nobody watches: nothing is made
+    shown.take(None, None, None)  # nobody watches: nothing is made
     assert faults == []
     shown.watchers.append(lambda *told: seen.append(told))
     shown.take(None, None, None)

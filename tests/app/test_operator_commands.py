@@ -54,7 +54,7 @@ def test_with_a_key_what_is_not_signed_with_it_is_counted_and_said_once(tmp_path
         for signing in (None, SigningState(key=bytes(32), timestamp=good.timestamp)):
             stranger = Codec(255, 190, signing)
             peer.end.write(stranger.pack(command(8)))
-            peer.end.write(stranger.pack(command(8, component=1)))   # the autopilot's to judge
+            peer.end.write(stranger.pack(command(8, component=1)))  # the autopilot's to judge
         await asyncio.sleep(0.1)
         assert operator.take() == []
         assert (operator.unsigned, peer.of("COMMAND_ACK")) == (2, [])

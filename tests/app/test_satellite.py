@@ -49,8 +49,10 @@ def beginning(ago_s=0.0):
 def seen(t_s=0.0, utc_s=UTC_S):
     """Return a status and as much of its step as is told far away."""
     autopilot = AutopilotStatus(t_s=t_s, boot_s=100.0, utc_at_boot_s=None if utc_s is None else utc_s - 100.0)
-    step = SimpleNamespace(snapshot=SimpleNamespace(autopilot=autopilot, vehicle=None, t_s=t_s),
-                           state=SkipperState(voyage=VoyageState(sailing=True)))
+    step = SimpleNamespace(
+        snapshot=SimpleNamespace(autopilot=autopilot, vehicle=None, t_s=t_s),
+        state=SkipperState(voyage=VoyageState(sailing=True)),
+    )
     return CompanionStatus(t_s=t_s, state="standard", battery_v=12.2), step
 
 
@@ -65,12 +67,21 @@ class Voyage:
 
     def sail(self, *looks):
         """Run the mailbox for a moment after each of ``looks`` was done; return the last status."""
+
         async def whole():
             box = SatelliteMailbox(
-                SatelliteLink(folder=self.folder, key=KEY.key, every_s=600.0), 1, self.operator, disk=self.disk,
-                offload=at_once, is_durable=False, seen=lambda: seen(utc_s=self.utc_s), is_heard=lambda: True,
-                has_trouble=lambda: False, say=lambda severity, text: self.said.append(text),
-                record=self.records.append)
+                SatelliteLink(folder=self.folder, key=KEY.key, every_s=600.0),
+                1,
+                self.operator,
+                disk=self.disk,
+                offload=at_once,
+                is_durable=False,
+                seen=lambda: seen(utc_s=self.utc_s),
+                is_heard=lambda: True,
+                has_trouble=lambda: False,
+                say=lambda severity, text: self.said.append(text),
+                record=self.records.append,
+            )
             async with asyncio.TaskGroup() as group:
                 tasks = [group.create_task(box.run()), group.create_task(self.answer())]
                 await asyncio.sleep(LOOK_S / 2.0)
@@ -88,13 +99,22 @@ class Voyage:
         while True:
             for order in self.operator.take() if self.has_answers else ():
                 self.orders.append(order)
-                self.operator.answered(Acknowledge(way="far", system=0, component=order.source.component, command=0,
-                                               result=Result.DONE, text="so be it"))
+                self.operator.answered(
+                    Acknowledge(
+                        way="far",
+                        system=0,
+                        component=order.source.component,
+                        command=0,
+                        result=Result.DONE,
+                        text="so be it",
+                    )
+                )
             await asyncio.sleep(0.2)
 
     def put(self, data, name="000001.sbd"):
         def do():
             (self.folder / IN / name).write_bytes(data)
+
         return do
 
     @property
@@ -133,8 +153,10 @@ def test_killed_between_taking_and_doing_an_order_is_lost_and_the_status_says_so
     assert (status.order, status.reply, second.orders, second.waiting) == (1, Reply.TAKEN, [], [])
 
 
-@pytest.mark.parametrize(("left_s", "utc_s", "reply"), [
-    (-7200.0, UTC_S, Reply.EXPIRED), (3600.0, None, Reply.NO_CLOCK), (9e6, UTC_S, Reply.TOO_LONG)])
+@pytest.mark.parametrize(
+    ("left_s", "utc_s", "reply"),
+    [(-7200.0, UTC_S, Reply.EXPIRED), (3600.0, None, Reply.NO_CLOCK), (9e6, UTC_S, Reply.TOO_LONG)],
+)
 def test_what_does_not_count_is_said_and_told(tmp_path, left_s, utc_s, reply):
     voyage = Voyage(tmp_path, utc_s=utc_s)
     status = voyage.sail(voyage.put(sealed(left_s=left_s)))
@@ -207,6 +229,7 @@ def unreadable(kind, path):
 @pytest.mark.parametrize("kind", ["loop", "pipe", "sick"])
 def test_a_message_that_cannot_be_read_is_put_aside_and_keeps_no_other_out(tmp_path, monkeypatch, kind):
     """One unreadable file stood in the way of every order behind it (issue 43, point 7)."""
+
     def sick(path, most_bytes, read=satellite.read_regular, **how):
         if path.name == "000000\x1b[2J.sbd" and kind == "sick":
             raise OSError(errno.EIO, "Input/output error", str(path))
@@ -214,11 +237,12 @@ def test_a_message_that_cannot_be_read_is_put_aside_and_keeps_no_other_out(tmp_p
 
     monkeypatch.setattr(satellite, "read_regular", sick)
     voyage = Voyage(tmp_path)
-    status = voyage.sail(lambda: unreadable(kind, tmp_path / IN / "000000\x1b[2J.sbd"), voyage.put(sealed()),
-                         *[lambda: None] * TRIES)
+    status = voyage.sail(
+        lambda: unreadable(kind, tmp_path / IN / "000000\x1b[2J.sbd"), voyage.put(sealed()), *[lambda: None] * TRIES
+    )
     assert (status.order, status.reply, voyage.waiting) == (1, Reply.DONE, [])
     assert put_aside(tmp_path) == ["000000\x1b[2J.sbd"]
-    said, = (text for text in voyage.said if ASIDE in text)
+    (said,) = (text for text in voyage.said if ASIDE in text)
     assert r"'000000\x1b[2J.sbd', cannot be read (" in said
 
 
@@ -268,8 +292,9 @@ def test_the_shore_begins_anew_and_nothing_of_before_counts_again(tmp_path):
     second = Voyage(tmp_path)
     assert second.sail().reply is Reply.BEGUN, "it outlives a restart"
     new = sealed(key=KEY.since(began))
-    status = second.sail(second.put(sealed(1, Verb.HOME)), second.put(old, "2"), second.put(data, "3"),
-                         second.put(new, "4"))
+    status = second.sail(
+        second.put(sealed(1, Verb.HOME)), second.put(old, "2"), second.put(data, "3"), second.put(new, "4")
+    )
     assert (status.order, status.reply, [o.wanted.verb for o in second.orders]) == (1, Reply.DONE, [Verb.HOLD])
     assert second.sail(second.put(data), second.put(new, "n")).reply is Reply.DONE, "played back, it begins nothing"
     assert len(second.orders) == 1

@@ -25,8 +25,15 @@ def sailed(tws_mps, irons_s):
     """Return her speed before the corner, and her places from there until the third try, in pieces by try."""
     departs = replace(Departures(), tack_fails=1.0, irons_s=irons_s)
     wind = Constant(0.0, tws_mps)
-    vehicle = Vehicle(wind, Parameters({}), heading_rad=HALF, is_moored=False, seed=0, polar=None,
-                      surroundings=Surroundings(wind, departs, None, 0))
+    vehicle = Vehicle(
+        wind,
+        Parameters({}),
+        heading_rad=HALF,
+        is_moored=False,
+        seed=0,
+        polar=None,
+        surroundings=Surroundings(wind, departs, None, 0),
+    )
     vehicle.settle()
     vehicle.set_armed(armed=True)
     vehicle.steer_heading(HALF, 1.0)
@@ -61,17 +68,23 @@ def test_the_simulated_hull_stays_near_the_reckoned_tracks(tws_mps, irons_s):
         place, pace = tuple(tracks[1][-1]), AGAIN_SHARE * speed
 
 
-@given(course=st.floats(-math.pi, math.pi), twd=st.floats(-math.pi, math.pi), speed=st.floats(0.1, 5.0),
-       tws=st.floats(0.0, 15.0), turn=st.floats(-math.pi, math.pi))
+@given(
+    course=st.floats(-math.pi, math.pi),
+    twd=st.floats(-math.pi, math.pi),
+    speed=st.floats(0.1, 5.0),
+    tws=st.floats(0.0, 15.0),
+    turn=st.floats(-math.pi, math.pi),
+)
 def test_the_tracks_turn_with_the_world_and_grow_with_her_speed(course, twd, speed, tws, turn):
-    assume(math.cos(twd - course) > -1.0 + 1e-9)   # dead before the wind there is no side to shoot up on
+    assume(math.cos(twd - course) > -1.0 + 1e-9)  # dead before the wind there is no side to shoot up on
     here = failed_tack((0.0, 0.0), course_rad=course, speed_mps=speed, twd_from_rad=twd, tws_mps=tws)
     there = failed_tack((0.0, 0.0), course_rad=course + turn, speed_mps=speed, twd_from_rad=twd + turn, tws_mps=tws)
     faster = failed_tack((0.0, 0.0), course_rad=course, speed_mps=2.0 * speed, twd_from_rad=twd, tws_mps=0.0)
     still = failed_tack((0.0, 0.0), course_rad=course, speed_mps=speed, twd_from_rad=twd, tws_mps=0.0)
     for a, b in zip(here, there, strict=True):
-        rotated = np.column_stack([a[:, 0] * math.cos(turn) + a[:, 1] * math.sin(turn),
-                                   a[:, 1] * math.cos(turn) - a[:, 0] * math.sin(turn)])
+        rotated = np.column_stack(
+            [a[:, 0] * math.cos(turn) + a[:, 1] * math.sin(turn), a[:, 1] * math.cos(turn) - a[:, 0] * math.sin(turn)]
+        )
         assert rotated == pytest.approx(b, abs=1e-6)
     for a, b in zip(still, faster, strict=True):
         assert 2.0 * a == pytest.approx(b, abs=1e-9)
@@ -79,8 +92,9 @@ def test_the_tracks_turn_with_the_world_and_grow_with_her_speed(course, twd, spe
 
 def test_a_current_carries_her_while_she_lies():
     still = failed_tack((0.0, 0.0), course_rad=0.8, speed_mps=2.0, twd_from_rad=0.0, tws_mps=5.0)
-    moved = failed_tack((0.0, 0.0), course_rad=0.8, speed_mps=2.0, twd_from_rad=0.0, tws_mps=5.0,
-                        current_en_mps=(0.5, 0.0))
+    moved = failed_tack(
+        (0.0, 0.0), course_rad=0.8, speed_mps=2.0, twd_from_rad=0.0, tws_mps=5.0, current_en_mps=(0.5, 0.0)
+    )
     assert moved[0][-1] - still[0][-1] == pytest.approx([5.0, 0.0])
 
 
@@ -90,7 +104,7 @@ def test_she_is_set_abeam_to_the_lee_of_her_old_tack(course, twd, tws):
     east, north = lee_set(course_rad=course, twd_from_rad=twd, lee_mps=SET_SHARE * tws)
     assert math.hypot(east, north) == pytest.approx(SET_SHARE * tws)
     assert east * math.sin(twd) + north * math.cos(twd) == pytest.approx(0.0, abs=1e-9)
-    assert east * math.sin(course) + north * math.cos(course) >= -1e-9      # farther on, never back
+    assert east * math.sin(course) + north * math.cos(course) >= -1e-9  # farther on, never back
 
 
 def test_the_set_is_what_the_simulators_hull_makes_with_five_degrees_of_leeway():

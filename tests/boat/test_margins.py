@@ -31,10 +31,16 @@ def test_without_a_corridor_the_beat_has_no_bound():
 
 
 def test_parameters_by_their_ardupilot_names():
-    limits = AutopilotLimits.from_params({
-        "SAIL_NO_GO_ANGLE": 35.0, "SAIL_XTRACK_MAX": 12.0, "WP_RADIUS": 7.0, "TURN_RADIUS": 1.0,
-        "FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0,
-    })
+    limits = AutopilotLimits.from_params(
+        {
+            "SAIL_NO_GO_ANGLE": 35.0,
+            "SAIL_XTRACK_MAX": 12.0,
+            "WP_RADIUS": 7.0,
+            "TURN_RADIUS": 1.0,
+            "FENCE_ENABLE": 1.0,
+            "FENCE_ACTION": 2.0,
+        }
+    )
     assert math.degrees(limits.planned_no_go_rad()) == pytest.approx(37.0)
     assert limits.fence_action == 2
     assert AutopilotLimits.from_params({"FENCE_ACTION": 2.0}).fence_action is None

@@ -33,7 +33,7 @@ def test_the_voyages_clearance_is_the_hulls():
     assert made.hull_clearance_m((0.0, 5.0), 0.0) == pytest.approx(1.0)
     assert made.hull_clearance_m((0.0, 5.0), math.pi / 2.0) == pytest.approx(4.0)
     assert made.hull_clearance_m((0.0, 7.0), 0.0) <= 0.0
-    assert made.hull_clearance_m((27.0, 0.0), math.pi / 2.0) <= 0.0          # the bow is over the fence
+    assert made.hull_clearance_m((27.0, 0.0), math.pi / 2.0) <= 0.0  # the bow is over the fence
     assert replace(made, area=area()).hull_clearance_m((0.0, 0.0), 0.0) == math.inf
 
 

@@ -40,8 +40,11 @@ def test_no_angle_makes_better_vmg_than_the_best_angles(polar, tws):
 
 
 def test_speed_falls_linearly_to_nothing_below_the_first_wind_and_the_first_angle():
-    polar = Polar(twa_rad=np.radians([40.0, 90.0]), tws_mps=np.array([4.0, 8.0]),
-                  speed_mps_table=np.array([[2.0, 3.0], [4.0, 5.0]]))
+    polar = Polar(
+        twa_rad=np.radians([40.0, 90.0]),
+        tws_mps=np.array([4.0, 8.0]),
+        speed_mps_table=np.array([[2.0, 3.0], [4.0, 5.0]]),
+    )
     assert polar.speed_mps(math.radians(90.0), 2.0) == pytest.approx(2.0)
     assert polar.speed_mps(math.radians(90.0), 6.0) == pytest.approx(4.5)
     assert polar.speed_mps(math.radians(20.0), 4.0) == pytest.approx(1.0)
@@ -49,16 +52,19 @@ def test_speed_falls_linearly_to_nothing_below_the_first_wind_and_the_first_angl
     assert polar.speed_mps(1.0, 0.0) == 0.0
 
 
-@pytest.mark.parametrize(("twa", "tws", "table"), [
-    ([0.0, 1.0], [1.0], [[0.0], [-1.0]]),
-    ([0.0, 0.0], [1.0], [[0.0], [1.0]]),
-    ([0.0, 4.0], [1.0], [[0.0], [1.0]]),
-    ([0.0, 1.0], [2.0, 1.0], [[0.0, 1.0], [1.0, 2.0]]),
-    ([0.0, 1.0], [1.0], [[0.0], [math.nan]]),
-    ([0.0, 1.0], [math.inf], [[0.0], [1.0]]),
-    ([0.0, 1.0], [1.0, 2.0], [[0.0], [1.0]]),
-    ([], [], [[]]),
-])
+@pytest.mark.parametrize(
+    ("twa", "tws", "table"),
+    [
+        ([0.0, 1.0], [1.0], [[0.0], [-1.0]]),
+        ([0.0, 0.0], [1.0], [[0.0], [1.0]]),
+        ([0.0, 4.0], [1.0], [[0.0], [1.0]]),
+        ([0.0, 1.0], [2.0, 1.0], [[0.0, 1.0], [1.0, 2.0]]),
+        ([0.0, 1.0], [1.0], [[0.0], [math.nan]]),
+        ([0.0, 1.0], [math.inf], [[0.0], [1.0]]),
+        ([0.0, 1.0], [1.0, 2.0], [[0.0], [1.0]]),
+        ([], [], [[]]),
+    ],
+)
 def test_a_table_that_breaks_a_rule_is_refused(twa, tws, table):
     with pytest.raises(ValueError):
         Polar(twa_rad=np.array(twa), tws_mps=np.array(tws), speed_mps_table=np.array(table))
@@ -102,14 +108,23 @@ def test_the_boat_as_a_problem_says_the_same_speeds():
     assert "gybe_loss_s" not in d
     for degrees in np.linspace(0.0, 180.0, 37):
         assert np.interp(degrees, d["speed"]["twa_deg"], d["speed"]["v_mps"]) == pytest.approx(
-            boat.polar.speed_mps(math.radians(degrees), 5.0), abs=1e-9)
+            boat.polar.speed_mps(math.radians(degrees), 5.0), abs=1e-9
+        )
     assert Boat(polar=constant(1.2)).problem_boat(9.0)["speed"] == {"model": "constant", "v_mps": 1.2}
 
 
-@pytest.mark.parametrize("change", [
-    {"no_go_half_rad": -0.1}, {"no_go_half_rad": 4.0}, {"max_twa_rad": 0.2}, {"turn_rate_radps": 0.0},
-    {"turn_rate_radps": math.nan}, {"tack_loss_s": -1.0}, {"gybe_loss_s": math.inf},
-])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"no_go_half_rad": -0.1},
+        {"no_go_half_rad": 4.0},
+        {"max_twa_rad": 0.2},
+        {"turn_rate_radps": 0.0},
+        {"turn_rate_radps": math.nan},
+        {"tack_loss_s": -1.0},
+        {"gybe_loss_s": math.inf},
+    ],
+)
 def test_a_boat_that_cannot_be_is_refused(change):
     with pytest.raises(ValueError):
         Boat(polar=constant(1.0), **change)

@@ -21,23 +21,27 @@ def knots(polar, twa_deg, tws_kn):
     return polar.speed_mps(math.radians(twa_deg), tws_kn * MPS_PER_KNOT) / MPS_PER_KNOT
 
 
-@pytest.mark.parametrize("change", [
-    lambda s: s,
-    lambda s: s.replace(";", ","),
-    lambda s: s.replace(";", "\t"),
-    lambda s: s.replace(";", " "),
-    lambda s: s.replace("\n", "\r\n"),
-    lambda s: "\ufeff" + s,
-    lambda s: "A description of the boat\n" + s,
-    lambda s: "# comment\n! another\n" + s,
-    lambda s: s.replace("TWA\\TWS", "twa/tws"),
-    lambda s: s.replace("TWA\\TWS", "Twa"),
-    lambda s: s.replace("TWA\\TWS", "0"),
-    lambda s: s.replace(".", ","),  # decimal commas, ; between
-    lambda s: s.replace("2.1", "2.1:3"),  # a sail named after the speed
-    lambda s: s.replace("\n", ";\n"),  # trailing separators
-    lambda s: s + "\n\n",
-], ids=range(15))
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda s: s,
+        lambda s: s.replace(";", ","),
+        lambda s: s.replace(";", "\t"),
+        lambda s: s.replace(";", " "),
+        lambda s: s.replace("\n", "\r\n"),
+        lambda s: "\ufeff" + s,
+        lambda s: "A description of the boat\n" + s,
+        lambda s: "# comment\n! another\n" + s,
+        lambda s: s.replace("TWA\\TWS", "twa/tws"),
+        lambda s: s.replace("TWA\\TWS", "Twa"),
+        lambda s: s.replace("TWA\\TWS", "0"),
+        lambda s: s.replace(".", ","),  # decimal commas, ; between
+        lambda s: s.replace("2.1", "2.1:3"),  # a sail named after the speed
+        lambda s: s.replace("\n", ";\n"),  # trailing separators
+        lambda s: s + "\n\n",
+    ],
+    ids=range(15),
+)
 def test_one_grid_in_many_dresses_is_one_polar(change):
     polar = parse_polar(change(GRID)).polar
     assert np.degrees(polar.twa_rad) == pytest.approx([0, 45, 90, 150])
@@ -63,7 +67,7 @@ def test_a_bare_zero_is_unknown_and_warned_but_zero_point_zero_cannot_sail():
     assert knots(read.polar, 30, 4) == 0.0
     assert knots(read.polar, 30, 8) == 0.0  # OpenCPN saves "cannot sail" as 0.01
     assert knots(read.polar, 45, 4) == pytest.approx(0.5)
-    assert sum("bare 0" in w for w in read.warnings) == 1   # head to wind a boat does not sail: no gap
+    assert sum("bare 0" in w for w in read.warnings) == 1  # head to wind a boat does not sail: no gap
     assert "line 4, column 2" in read.warnings[0]
 
 
@@ -84,28 +88,32 @@ def test_beat_and_gybe_rows_are_left_out_and_said_so():
 def test_expedition_pairs_in_either_order(swapped):
     rows = [(4, [(30, 1.0), (60, 3.0), (110, 3.5), (180, 2.0)]), (10, [(32, 2.0), (60, 5.0), (120, 6.0), (180, 4.0)])]
     text = "!Expedition\n" + "\n".join(
-        "\t".join([str(w)] + [f"{b}\t{a}" if swapped else f"{a}\t{b}" for a, b in pairs]) for w, pairs in rows)
+        "\t".join([str(w)] + [f"{b}\t{a}" if swapped else f"{a}\t{b}" for a, b in pairs]) for w, pairs in rows
+    )
     polar = parse_polar(text).polar
     assert knots(polar, 60, 4) == pytest.approx(3.0)
     assert knots(polar, 180, 10) == pytest.approx(4.0)
     assert knots(polar, 120, 10) == pytest.approx(6.0)
 
 
-@pytest.mark.parametrize(("text", "where", "what"), [
-    ("", "", "no polar"),
-    ("hello\nworld\n", "line 1", "no header"),
-    ("TWA/TWS;4;6\n45;2;x\n", "line 2, column 3", "'x'"),
-    ("TWA/TWS;6;4\n45;2;3\n", "line 1", "increase"),
-    ("TWA/TWS;4;6\n90;2;3\n45;2;3\n", "line 3", "increase"),
-    ("TWA/TWS;4;6\n190;2;3\n", "line 2", "0 to 180"),
-    ("TWA/TWS;4;6\n45;2;-3\n", "line 2, column 3", "-3"),
-    ("TWA/TWS;4;6\n45;2;nan\n", "line 2, column 3", "'nan'"),
-    ("TWA/TWS;4;6\n45;2;1e9\n", "line 2, column 3", "speeds are"),
-    ("TWA/TWS;4;600\n45;2;3\n", "line 1", "200"),
-    ("TWA/TWS;4;6\n", "line 1", "no rows"),
-    ("TWA/TWS;4;6\n45;;\n90;;\n", "", "no boat speed"),
-    ("TWA/TWS\n45;2\n", "line", "wind speed"),
-])
+@pytest.mark.parametrize(
+    ("text", "where", "what"),
+    [
+        ("", "", "no polar"),
+        ("hello\nworld\n", "line 1", "no header"),
+        ("TWA/TWS;4;6\n45;2;x\n", "line 2, column 3", "'x'"),
+        ("TWA/TWS;6;4\n45;2;3\n", "line 1", "increase"),
+        ("TWA/TWS;4;6\n90;2;3\n45;2;3\n", "line 3", "increase"),
+        ("TWA/TWS;4;6\n190;2;3\n", "line 2", "0 to 180"),
+        ("TWA/TWS;4;6\n45;2;-3\n", "line 2, column 3", "-3"),
+        ("TWA/TWS;4;6\n45;2;nan\n", "line 2, column 3", "'nan'"),
+        ("TWA/TWS;4;6\n45;2;1e9\n", "line 2, column 3", "speeds are"),
+        ("TWA/TWS;4;600\n45;2;3\n", "line 1", "200"),
+        ("TWA/TWS;4;6\n", "line 1", "no rows"),
+        ("TWA/TWS;4;6\n45;;\n90;;\n", "", "no boat speed"),
+        ("TWA/TWS\n45;2\n", "line", "wind speed"),
+    ],
+)
 def test_what_cannot_be_read_is_one_line_with_its_place(text, where, what, tmp_path):
     path = tmp_path / "boat.pol"
     path.write_text(text, encoding="utf-8")

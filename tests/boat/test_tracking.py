@@ -98,8 +98,10 @@ def test_a_board_goes_beyond_the_corridor_by_what_is_predicted_and_no_more_than_
 
 
 # --------------------------------------------------------------------------------------------- always so
-@given(st.floats(0.0, 2.0 * math.pi), st.lists(st.tuples(st.floats(25.0, 90.0), st.floats(-1.5, 1.5)),
-                                               min_size=1, max_size=5))
+@given(
+    st.floats(0.0, 2.0 * math.pi),
+    st.lists(st.tuples(st.floats(25.0, 90.0), st.floats(-1.5, 1.5)), min_size=1, max_size=5),
+)
 @settings(max_examples=40)
 def test_turned_with_the_wind_it_is_the_same_track(turn, legs):
     here, course, path = (0.0, 0.0), math.radians(110.0), [(0.0, 0.0)]
@@ -112,11 +114,10 @@ def test_turned_with_the_wind_it_is_the_same_track(turn, legs):
     plain, turned = track(path), track(np.asarray(path) @ rotation, twd=turn)
     assert plain.arrives
     assert turned.arrives
-    away = shapely.hausdorff_distance(
-        shapely.LineString(plain.en_m @ rotation), shapely.LineString(turned.en_m))
+    away = shapely.hausdorff_distance(shapely.LineString(plain.en_m @ rotation), shapely.LineString(turned.en_m))
     assert away < 0.5
     assert np.all(np.diff(plain.leg) >= 0)
-    assert plain.beats.mean() < 0.1   # beside its end the bearing may point to windward for a moment
+    assert plain.beats.mean() < 0.1  # beside its end the bearing may point to windward for a moment
 
 
 @pytest.mark.parametrize("radius", [1.5, 3.0, 5.0])
@@ -179,7 +180,7 @@ def test_drawn_winds_have_the_spread_and_the_memory_that_are_asked_for():
     winds = drawn_winds(1.0, sigma_rad=0.2, tau_s=20.0, length_s=400.0, count=400)
     assert float(np.mean(winds)) == pytest.approx(1.0, abs=0.02)
     assert float(np.std(winds)) == pytest.approx(0.2, rel=0.05)
-    late = np.corrcoef(winds[:, 100], winds[:, 140])[0, 1]     # 20 s on
+    late = np.corrcoef(winds[:, 100], winds[:, 140])[0, 1]  # 20 s on
     assert late == pytest.approx(math.exp(-1.0), abs=0.12)
     steady = drawn_winds(0.0, sigma_rad=0.2, tau_s=0.0, length_s=60.0)
     assert np.ptp(steady, axis=1).max() == 0.0
@@ -209,8 +210,9 @@ def test_the_point_runs_a_leg_from_rest_to_rest_without_a_leap(length, fastest, 
 
 
 def test_the_helm_is_that_of_the_parameters():
-    limits = AutopilotLimits.from_params({
-        "WP_RADIUS": 4.0, "WP_SPEED": 5.0, "ATC_ACCEL_MAX": 1.5, "SAIL_XTRACK_MAX": 20.0, "SAIL_NO_GO_ANGLE": 40.0})
+    limits = AutopilotLimits.from_params(
+        {"WP_RADIUS": 4.0, "WP_SPEED": 5.0, "ATC_ACCEL_MAX": 1.5, "SAIL_XTRACK_MAX": 20.0, "SAIL_NO_GO_ANGLE": 40.0}
+    )
     helm = GuidanceModel.of(limits)
     assert (helm.wp_radius_m, helm.wp_speed_mps, helm.accel_mps2, helm.jerk_mps3) == (4.0, 5.0, 1.5, 1.5)
     assert helm.corridor_m == 20.0

@@ -31,11 +31,15 @@ OPTIONS = [
     (name, words, action)
     for name, program in PROGRAMS.items()
     for words, parser in _leaves(program.parser())
-    for action in parser._actions if action.option_strings
+    for action in parser._actions
+    if action.option_strings
 ]
 PLACES = [(n, w, a.option_strings[0]) for n, w, a in OPTIONS if a.metavar and "LAT,LON" in a.metavar]
-NUMBERS = [(n, w, a.option_strings[0]) for n, w, a in OPTIONS
-           if a.type is not None and getattr(a.type, "__qualname__", "").split(".")[0] in {"number", "whole"}]
+NUMBERS = [
+    (n, w, a.option_strings[0])
+    for n, w, a in OPTIONS
+    if a.type is not None and getattr(a.type, "__qualname__", "").split(".")[0] in {"number", "whole"}
+]
 
 
 def _error(capsys, program, arguments):
@@ -72,18 +76,30 @@ def test_every_number_has_a_range(capsys, program, words, option, value):
 
 
 # A time, an effort or a size may be as large as one likes.
-BOUNDLESS = {"--timeout", "--wait", "--limit", "--for", "--budget", "--explain-budget", "--max-age", "--every",
-             "--keep-gb"}
+BOUNDLESS = {
+    "--timeout",
+    "--wait",
+    "--limit",
+    "--for",
+    "--budget",
+    "--explain-budget",
+    "--max-age",
+    "--every",
+    "--keep-gb",
+}
 
 
-@pytest.mark.parametrize(("given", "taken"), [
-    (["--start", "-33.85,151.26"], ["--start=-33.85,151.26"]),
-    (["--start", "-.5,1"], ["--start=-.5,1"]),
-    (["--start=-33,1", "-34,1"], ["--start=-33,1", "-34,1"]),
-    (["--", "-33,1"], ["--", "-33,1"]),
-    (["--force", "--goal", "1,-2"], ["--force", "--goal", "1,-2"]),
-    (["-33,1"], ["-33,1"]),
-])
+@pytest.mark.parametrize(
+    ("given", "taken"),
+    [
+        (["--start", "-33.85,151.26"], ["--start=-33.85,151.26"]),
+        (["--start", "-.5,1"], ["--start=-.5,1"]),
+        (["--start=-33,1", "-34,1"], ["--start=-33,1", "-34,1"]),
+        (["--", "-33,1"], ["--", "-33,1"]),
+        (["--force", "--goal", "1,-2"], ["--force", "--goal", "1,-2"]),
+        (["-33,1"], ["-33,1"]),
+    ],
+)
 def test_only_a_value_is_tied_to_its_option(given, taken):
     assert with_negative_values(given) == taken
 

@@ -37,17 +37,21 @@ DAMAGES = {
 def short(tmp_path_factory):
     """A mission with everything that one may name, and a voyage of it."""
     folder = tmp_path_factory.mktemp("short")
-    (folder / "rock.wkt").write_text("POLYGON ((-1.3102 50.8175, -1.3098 50.8175, -1.3098 50.8177, -1.3102 50.8177, "
-                                     "-1.3102 50.8175))")
+    (folder / "rock.wkt").write_text(
+        "POLYGON ((-1.3102 50.8175, -1.3098 50.8175, -1.3098 50.8177, -1.3102 50.8177, -1.3102 50.8175))"
+    )
     (folder / "fence.wkt").write_text("POLYGON ((-1.32 50.81, -1.30 50.81, -1.30 50.83, -1.32 50.83, -1.32 50.81))")
     (folder / "boat.pol").write_text("TWA;4;6;8\n45;2.1;3.0;3.6\n90;2.8;3.4;3.9\n150;2.0;2.9;3.6\n")
     (folder / "mission.toml").write_text(
         'name = "short"\n[start]\nlat = 50.8170\nlon = -1.3100\n[[goal]]\nlat = 50.8181\nlon = -1.3100\n'
-        '[area]\nobstacles = ["rock.wkt"]\nfence = "fence.wkt"\nmargin_m = 10.0\n[boat]\npolar = "boat.pol"\n')
+        '[area]\nobstacles = ["rock.wkt"]\nfence = "fence.wkt"\nmargin_m = 10.0\n[boat]\npolar = "boat.pol"\n'
+    )
     (folder / "wind.csv").write_text(
-        "t_s,wind_from_deg,wind_speed_ms\n" + "".join(f"{t},{350 + t % 7},5.0\n" for t in range(0, 1500, 2)))
+        "t_s,wind_from_deg,wind_speed_ms\n" + "".join(f"{t},{350 + t % 7},5.0\n" for t in range(0, 1500, 2))
+    )
     (folder / "scenario.toml").write_text(
-        'name = "short"\nmission = "mission.toml"\nlimit_s = 60.0\n[wind]\nmodel = "recorded"\nfile = "wind.csv"\n')
+        'name = "short"\nmission = "mission.toml"\nlimit_s = 60.0\n[wind]\nmodel = "recorded"\nfile = "wind.csv"\n'
+    )
     shutil.copy(next(PROBLEM.glob("*.json")), folder / "problem.json")
     return folder
 
@@ -56,8 +60,9 @@ def short(tmp_path_factory):
 def voyage(short, tmp_path_factory):
     out = tmp_path_factory.mktemp("voyage") / "v"
     # long enough for a plan, its upload and getting under way, which 38 s take
-    scenario = Scenario(name="short", mission="mission.toml", limit_s=50.0, wind=WindSpec(tws_mps=5.0),
-                        expect=ExpectSpec())
+    scenario = Scenario(
+        name="short", mission="mission.toml", limit_s=50.0, wind=WindSpec(tws_mps=5.0), expect=ExpectSpec()
+    )
     run_virtual(run_embedded(scenario, short / "scenario.toml", 1, out, expansions=2000))
     return out
 
@@ -91,16 +96,34 @@ def broken(folder, name, damage):
 
 READS = [
     (cli, ("mission", "check", "mission.toml"), ("mission.toml", "rock.wkt", "fence.wkt", "boat.pol")),
-    (cli, ("run", "mission.toml", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--state", "state.json"),
-     ("mission.toml", "rock.wkt", "boat.pol")),
+    (
+        cli,
+        ("run", "mission.toml", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--state", "state.json"),
+        ("mission.toml", "rock.wkt", "boat.pol"),
+    ),
     (cli, ("run", "mission.toml", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--signing-key", "key"), ("key",)),
     (cli, ("doctor", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--mission", "mission.toml"), ("mission.toml",)),
     (cli, ("doctor", "--link", "tcp:127.0.0.1:1", "--wait", "0.2", "--signing-key", "key"), ("key",)),
     (cli, ("fence", "check", "rock.wkt"), ("rock.wkt",)),
     (cli, ("fence", "convert", "rock.wkt", "out.kml"), ("rock.wkt",)),
     (cli, ("mission", "convert", "mission.toml", "out.plan"), ("mission.toml", "rock.wkt")),
-    (cli, ("mission", "new", "new.toml", "--start", "50.817,-1.31", "--goal", "50.8181,-1.31", "--land", "rock.wkt",
-           "--fence", "fence.wkt"), ("rock.wkt", "fence.wkt")),
+    (
+        cli,
+        (
+            "mission",
+            "new",
+            "new.toml",
+            "--start",
+            "50.817,-1.31",
+            "--goal",
+            "50.8181,-1.31",
+            "--land",
+            "rock.wkt",
+            "--fence",
+            "fence.wkt",
+        ),
+        ("rock.wkt", "fence.wkt"),
+    ),
     (cli, ("mission", "new", "new.toml", "--from", "drawing.kml"), ("drawing.kml",)),
     (cli, ("mission", "upload", "drawing.kml", "--link", "tcp:127.0.0.1:1"), ("drawing.kml",)),
     (cli, ("plan", "problem.json", "--expansions", "50"), ("problem.json",)),
@@ -115,18 +138,28 @@ READS = [
 
 
 @pytest.mark.parametrize("damage", [*DAMAGES, "folder"])
-@pytest.mark.parametrize(("program", "argv", "name"), [(p, a, n) for p, a, names in READS for n in names],
-                         ids=lambda v: "-".join(v[:2]) if isinstance(v, tuple) else v if isinstance(v, str) else "")
+@pytest.mark.parametrize(
+    ("program", "argv", "name"),
+    [(p, a, n) for p, a, names in READS for n in names],
+    ids=lambda v: "-".join(v[:2]) if isinstance(v, tuple) else v if isinstance(v, str) else "",
+)
 def test_what_is_read(short, tmp_path, monkeypatch, capsys, program, argv, name, damage):
     shutil.copytree(short, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
     broken(tmp_path, name, damage)
-    missing_on_the_boat = argv[0] == "run" and program is cli and damage == "missing"   # the unit tries again
+    missing_on_the_boat = argv[0] == "run" and program is cli and damage == "missing"  # the unit tries again
     assert ends_in_one_line(capsys, program, argv, name) in ({NOT_THERE} if missing_on_the_boat else {1, 2})
 
 
-VOYAGE_FILES = ("voyage.toml", "decisions.jsonl", "track.csv", "area.json", "summary.json", "telemetry.tlog",
-                "mission/mission.toml")
+VOYAGE_FILES = (
+    "voyage.toml",
+    "decisions.jsonl",
+    "track.csv",
+    "area.json",
+    "summary.json",
+    "telemetry.tlog",
+    "mission/mission.toml",
+)
 UNREPORTED = {"telemetry.tlog", "mission/mission.toml"}
 
 
@@ -193,7 +226,7 @@ def test_what_is_written(short, voyage, tmp_path, monkeypatch, capsys, program, 
     target = Path(name)
     if place == "is-a-folder":
         if name == "voyage":
-            return   # a folder is what it wants
+            return  # a folder is what it wants
         target.mkdir()
     else:
         Path("a-file").write_text("")

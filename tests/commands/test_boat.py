@@ -16,7 +16,7 @@ def test_what_is_guessed_is_shown_drawn_and_written_for_opencpn(tmp_path, capsys
     assert main(["boat", "guess", *SIZES, "--out", str(file)]) == 0
     assert read_boat_file(file).made.endswith("1.5 m, 20 kg, 0.9 m2")
     assert read_boat_file(file).name == "pepper"
-    assert main(["boat", "guess", *SIZES, "--out", str(file)]) == 2   # it is there
+    assert main(["boat", "guess", *SIZES, "--out", str(file)]) == 2  # it is there
     assert main(["boat", "show", str(file), "--plot", str(tmp_path / "p.png"), "--pol", str(tmp_path / "p.pol")]) == 0
     assert (tmp_path / "p.png").stat().st_size > 10_000
     said = capsys.readouterr().out
@@ -42,9 +42,14 @@ def test_two_boats_are_compared_in_the_winds_of_the_first(tmp_path, capsys):
     assert rows == {"60": ["+50", "+0"]}
 
 
-@pytest.mark.parametrize("words", [
-    ["guess", "--length", "1.5", "--displacement", "2000", "--sail-area", "0.9"], ["show", "nowhere.toml"],
-    ["compare", "ardurover", "nowhere.pol"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["guess", "--length", "1.5", "--displacement", "2000", "--sail-area", "0.9"],
+        ["show", "nowhere.toml"],
+        ["compare", "ardurover", "nowhere.pol"],
+    ],
+)
 def test_what_cannot_be_is_one_line(words, capsys):
     assert main(["boat", *words]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1

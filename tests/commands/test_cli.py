@@ -37,14 +37,17 @@ def test_every_sitl_command_has_help(command, capsys):
     assert f"sitl {command}" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("words", "meant"), [
-    (["convert", "a.wkt", "b.plan"], "did you mean `companion fence convert` or `companion mission convert`?"),
-    (["new", "a.toml"], "did you mean `companion mission new`"),
-    (["replai", "v"], "did you mean `companion replay`?"),
-    (["sail"], "there are run, plan, wind"),
-    (["doctor", "--link", "udpin:127.0.0.1:1", "syd.toml"], "a mission is given as --mission syd.toml"),
-    (["doctor", "--link", "udpin:127.0.0.1:1", "--aply"], "did you mean --apply?"),
-])
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["convert", "a.wkt", "b.plan"], "did you mean `companion fence convert` or `companion mission convert`?"),
+        (["new", "a.toml"], "did you mean `companion mission new`"),
+        (["replai", "v"], "did you mean `companion replay`?"),
+        (["sail"], "there are run, plan, wind"),
+        (["doctor", "--link", "udpin:127.0.0.1:1", "syd.toml"], "a mission is given as --mission syd.toml"),
+        (["doctor", "--link", "udpin:127.0.0.1:1", "--aply"], "did you mean --apply?"),
+    ],
+)
 def test_who_slips_is_told_in_one_line_what_was_meant(words, meant, capsys):
     assert cli.main(words) == 2
     error = capsys.readouterr().err
@@ -69,14 +72,26 @@ def mission(folder, text=GOOD, obstacles=None):
 RING = "-1.3105 50.8180, -1.3095 50.8180, -1.3095 50.8190, -1.3105 50.8190"
 BAD = [
     ("unknown key", GOOD.replace("margin_m", "marginn_m"), None, "marginn_m"),
-    ("goal inside an obstacle", GOOD,
-     "POLYGON ((-1.311 50.82, -1.309 50.82, -1.309 50.821, -1.311 50.821, -1.311 50.82))", "goal"),
+    (
+        "goal inside an obstacle",
+        GOOD,
+        "POLYGON ((-1.311 50.82, -1.309 50.82, -1.309 50.821, -1.311 50.821, -1.311 50.82))",
+        "goal",
+    ),
     ("empty", GOOD, "POLYGON EMPTY", "archipelago.wkt"),
-    ("self-crossing", GOOD,
-     "POLYGON ((-1.3105 50.818, -1.3095 50.819, -1.3095 50.818, -1.3105 50.819, -1.3105 50.818))", "archipelago.wkt"),
+    (
+        "self-crossing",
+        GOOD,
+        "POLYGON ((-1.3105 50.818, -1.3095 50.819, -1.3095 50.818, -1.3105 50.819, -1.3105 50.818))",
+        "archipelago.wkt",
+    ),
     ("unclosed", GOOD, f"POLYGON (({RING}))", "archipelago.wkt"),
-    ("swapped axes", GOOD, "POLYGON ((50.818 -1.3105, 50.818 -1.3095, 50.819 -1.3095, 50.818 -1.3105))",
-     "archipelago.wkt"),
+    (
+        "swapped axes",
+        GOOD,
+        "POLYGON ((50.818 -1.3105, 50.818 -1.3095, 50.819 -1.3095, 50.818 -1.3105))",
+        "archipelago.wkt",
+    ),
     ("a polar with holes", GOOD + "\n[boat]\npolar = 'holes.pol'\n", None, "holes.pol"),
     ("no such polar", GOOD + "\n[boat]\npolar = 'fast'\n", None, "polar"),
     ("not TOML", "goal = [", None, "m.toml"),
@@ -107,8 +122,12 @@ def test_a_bad_mission_is_one_line_and_nothing_is_sent(tmp_path, capsys, what, t
 def test_what_is_found_in_a_mission_is_told_in_the_words_of_its_check(tmp_path, capfd):
     """`run` printed "note: Finding(severity=<Severity.NOTE ...": what Python calls it."""
     path = mission(tmp_path, re.sub("(?m)^name = .*", 'name = "a/b"', GOOD, count=1))
-    assert cli.main(["run", str(path), "--link", f"udpin:127.0.0.1:{free_port()}", "--out", str(tmp_path / "v"),
-                     "--wait", "1"]) == 1
+    assert (
+        cli.main(
+            ["run", str(path), "--link", f"udpin:127.0.0.1:{free_port()}", "--out", str(tmp_path / "v"), "--wait", "1"]
+        )
+        == 1
+    )
     said = capfd.readouterr().err.splitlines()[0]
     assert said.startswith(f"companion run: {path}: name: warning: 'a/b' cannot be part of a file's name")
     cli.main(["mission", "check", str(path)])
@@ -117,8 +136,9 @@ def test_what_is_found_in_a_mission_is_told_in_the_words_of_its_check(tmp_path, 
 
 def test_a_link_that_never_answers_is_one_line(tmp_path, capsys):
     path = mission(tmp_path)
-    code = cli.main(["run", str(path), "--link", f"udpin:127.0.0.1:{free_port()}", "--out", str(tmp_path / "v"),
-                     "--wait", "1"])
+    code = cli.main(
+        ["run", str(path), "--link", f"udpin:127.0.0.1:{free_port()}", "--out", str(tmp_path / "v"), "--wait", "1"]
+    )
     error = capsys.readouterr().err
     assert code == 1
     assert "no autopilot" in error
@@ -133,8 +153,21 @@ def test_a_bad_link_is_bad_usage(tmp_path, capsys, link):
 
 def test_a_bad_feed_is_bad_usage(tmp_path, capsys):
     path = str(mission(tmp_path))
-    assert cli.main(["run", path, "--link", f"udpin:127.0.0.1:{free_port()}", "--feed", "udpin:127.0.0.1:10110",
-                     "--feed", "radio"]) == 2
+    assert (
+        cli.main(
+            [
+                "run",
+                path,
+                "--link",
+                f"udpin:127.0.0.1:{free_port()}",
+                "--feed",
+                "udpin:127.0.0.1:10110",
+                "--feed",
+                "radio",
+            ]
+        )
+        == 2
+    )
     assert "radio: is not a feed" in capsys.readouterr().err
 
 
@@ -148,9 +181,9 @@ def test_a_scenario_is_not_sailed_into_the_folder_of_another_voyage(tmp_path, ca
     assert sorted(tmp_path.iterdir()) == before
 
 
-@pytest.mark.parametrize(("autopilot", "event"), [
-    (["--live"], "gps_jump"), (["--autopilot", "ardurover"], "kill_planner"),
-])
+@pytest.mark.parametrize(
+    ("autopilot", "event"), [(["--live"], "gps_jump"), (["--autopilot", "ardurover"], "kill_planner")]
+)
 def test_a_scenario_that_cannot_be_played_live_says_so_first(tmp_path, capsys, autopilot, event):
     mission = Path("missions/archipelago.toml").resolve()
     path, out = tmp_path / "odd.toml", tmp_path / "voyage"
@@ -174,15 +207,52 @@ def test_status_without_a_companion_exits_3(capsys):
 def test_the_shore_hears_the_companion_through_the_autopilot(tmp_path):
     """Three processes: simulated autopilot, companion, and the shore on another link of the autopilot."""
     port, shore = free_port(), free_port()
-    boat = subprocess.Popen([sys.executable, "-m", "sitl.run.live_boat", "sitl/scenarios/demo.toml", "--speedup", "8",
-                             "--endpoint", f"udpout:127.0.0.1:{port}", "--endpoint", f"udpin:127.0.0.1:{shore}"])
+    boat = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "sitl.run.live_boat",
+            "sitl/scenarios/demo.toml",
+            "--speedup",
+            "8",
+            "--endpoint",
+            f"udpout:127.0.0.1:{port}",
+            "--endpoint",
+            f"udpin:127.0.0.1:{shore}",
+        ]
+    )
     companion = subprocess.Popen(
-        [sys.executable, "-m", "companion.cli", "run", "missions/archipelago.toml", "--link", f"udpin:127.0.0.1:{port}",
-         "--out", str(tmp_path / "v"), "--state", str(tmp_path / "state.json"), "--speedup", "8", "--dry-run"],
-        stdout=subprocess.DEVNULL)
+        [
+            sys.executable,
+            "-m",
+            "companion.cli",
+            "run",
+            "missions/archipelago.toml",
+            "--link",
+            f"udpin:127.0.0.1:{port}",
+            "--out",
+            str(tmp_path / "v"),
+            "--state",
+            str(tmp_path / "state.json"),
+            "--speedup",
+            "8",
+            "--dry-run",
+        ],
+        stdout=subprocess.DEVNULL,
+    )
     try:
-        status = [sys.executable, "-m", "companion.cli", "status", "--link", f"udpout:127.0.0.1:{shore}", "--once",
-                  "--json", "--timeout", "20"]
+        status = [
+            sys.executable,
+            "-m",
+            "companion.cli",
+            "status",
+            "--link",
+            f"udpout:127.0.0.1:{shore}",
+            "--once",
+            "--json",
+            "--timeout",
+            "20",
+        ]
         deadline = time.monotonic() + 100.0
         while True:
             done = subprocess.run(status, capture_output=True, text=True, timeout=60, check=False)
@@ -206,9 +276,13 @@ def test_the_shore_hears_the_companion_through_the_autopilot(tmp_path):
         boat.wait(30)
 
 
-@pytest.mark.parametrize(("wrong", "choices"), [
-    ('[wind]\nmodel = "gusty"\n', "write one of constant, ou, recorded"),
-    ('[[events]]\nat_s = 1.0\nkind = "gale"\n', "wind_shift")])
+@pytest.mark.parametrize(
+    ("wrong", "choices"),
+    [
+        ('[wind]\nmodel = "gusty"\n', "write one of constant, ou, recorded"),
+        ('[[events]]\nat_s = 1.0\nkind = "gale"\n', "wind_shift"),
+    ],
+)
 def test_a_wrong_word_in_a_scenario_is_told_its_choices(wrong, choices, tmp_path, capsys):
     (tmp_path / "s.toml").write_text(f'name = "x"\nmission = "m.toml"\n{wrong}')
     assert sitl_cli.main(["run", str(tmp_path / "s.toml")]) == 2
@@ -221,13 +295,19 @@ NASTY = "Nab\x1b]0;owned\x07\x1b[2J\x9b2J\u202egnp\r\nerror: all is well"
 
 def test_no_name_of_a_chart_reaches_the_terminal_as_more_than_a_name(tmp_path, capsys):
     """An island's name cleared the screen of who checked the file (issue 43, point 9)."""
-    lat, lon = 50.8203440, -1.3101419   # of the mission's goal
+    lat, lon = 50.8203440, -1.3101419  # of the mission's goal
     ring = [[lon + e * 1e-4, lat + n * 1e-4] for e, n in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
-    island = {"type": "FeatureCollection", "features": [
-        {"type": "Feature", "properties": {"name": NASTY}, "geometry": {"type": "Polygon", "coordinates": [ring]}}]}
+    island = {
+        "type": "FeatureCollection",
+        "features": [
+            {"type": "Feature", "properties": {"name": NASTY}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+        ],
+    }
     (tmp_path / "bay.geojson").write_text(json.dumps(island))
-    (tmp_path / "bay.toml").write_text(f'name = "b"\n[[goal]]\nname = {json.dumps(NASTY)}\nlat = {lat}\nlon = {lon}\n'
-                                       '[area]\nobstacles = ["bay.geojson"]\n')
+    (tmp_path / "bay.toml").write_text(
+        f'name = "b"\n[[goal]]\nname = {json.dumps(NASTY)}\nlat = {lat}\nlon = {lon}\n'
+        '[area]\nobstacles = ["bay.geojson"]\n'
+    )
     assert cli.main(["mission", "check", str(tmp_path / "bay.toml")]) != 0
     told = capsys.readouterr()
     assert "Nab" in told.out + told.err
@@ -235,9 +315,26 @@ def test_no_name_of_a_chart_reaches_the_terminal_as_more_than_a_name(tmp_path, c
     assert not [line for line in told.out.splitlines() if line.startswith("error: all is well")]
 
 
-@pytest.mark.parametrize("words", [["fence", "check"], ["mission", "check"], ["plan"], ["wind"], ["replay"], ["report"],
-                                   ["run", "--link", "udpin:127.0.0.1:1"], ["doctor", "--link"], ["order"], ["far"],
-                                   ["status", "--link"], ["watch", "--link"], ["view"], ["key", "new", "--x"], []])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["fence", "check"],
+        ["mission", "check"],
+        ["plan"],
+        ["wind"],
+        ["replay"],
+        ["report"],
+        ["run", "--link", "udpin:127.0.0.1:1"],
+        ["doctor", "--link"],
+        ["order"],
+        ["far"],
+        ["status", "--link"],
+        ["watch", "--link"],
+        ["view"],
+        ["key", "new", "--x"],
+        [],
+    ],
+)
 def test_no_file_name_and_no_option_does(words, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert cli.main([*words, f"none\udcff{NASTY}.toml"]) != 0
@@ -258,8 +355,10 @@ def test_whatever_a_command_prints_is_safe_and_the_streams_are_as_they_were(caps
         return 0
 
     monkeypatch.setattr("companion.commands.replay.run", loud)
-    monkeypatch.setattr("companion.commands.replay.add_parser", lambda sub, summary: sub.add_parser(
-        "replay", help=summary).set_defaults(run=loud))
+    monkeypatch.setattr(
+        "companion.commands.replay.add_parser",
+        lambda sub, summary: sub.add_parser("replay", help=summary).set_defaults(run=loud),
+    )
     monkeypatch.setattr(logging.getLogger("companion.test"), "propagate", False)
     assert cli.main(["replay"]) == 0
     assert (sys.stdout, sys.stderr) == before
@@ -273,7 +372,12 @@ def test_whatever_a_command_prints_is_safe_and_the_streams_are_as_they_were(caps
 def test_nothing_writes_to_a_terminal_but_through_the_safe_streams():
     """What goes round them: the console's thread and the dashboard, each with its own text made safe; see there."""
     around = re.compile(
-        r"(stdout|stderr)\.buffer|os\.write\((1|2|self\._fd|self\._out)\b|__stdout__|__stderr__|/dev/tty['\"]")
-    found = {str(path) for folder in ("companion", "sitl", "lab") for path in Path(folder).rglob("*.py")
-             if around.search(path.read_text())}
+        r"(stdout|stderr)\.buffer|os\.write\((1|2|self\._fd|self\._out)\b|__stdout__|__stderr__|/dev/tty['\"]"
+    )
+    found = {
+        str(path)
+        for folder in ("companion", "sitl", "lab")
+        for path in Path(folder).rglob("*.py")
+        if around.search(path.read_text())
+    }
     assert found == {"companion/telemetry/console.py", "companion/terminal/screen.py"}

@@ -32,8 +32,14 @@ def test_a_voyage_that_hears_nobody_is_stopped_when_it_is_asked(tmp_path):
         stop = asyncio.Event()
         asyncio.get_running_loop().call_later(3.3, stop.set)
         options = SailOptions(epoch_s=1.78e9, offload=at_once, is_durable=False, wait_s=30.0)
-        told = await sail(load_mission(tmp_path / "a.toml"), MemoryLink("nobody", seed=1).near, FaultyPlanner(),
-                          tmp_path / "v", options, stop=stop)
+        told = await sail(
+            load_mission(tmp_path / "a.toml"),
+            MemoryLink("nobody", seed=1).near,
+            FaultyPlanner(),
+            tmp_path / "v",
+            options,
+            stop=stop,
+        )
         return told, now_s()
 
     summary, ended_s = run_virtual(voyage())
@@ -65,9 +71,29 @@ def test_run_on_a_link_where_nobody_answers_ends_when_it_is_told_to(tmp_path):
     """It went on for 25 s; the shell of a script has what it puts into its background ignore SIGINT."""
     (tmp_path / "a.toml").write_text(MISSION)
     run = subprocess.Popen(
-        ["/bin/sh", "-c", "trap '' INT; exec \"$@\"", "sh", sys.executable, "-m", "companion", "run", "a.toml",
-         "--link", f"tcp:127.0.0.1:{free_port()}", "--wait", "1000",
-         "--out", "v"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=HERE)
+        [
+            "/bin/sh",
+            "-c",
+            "trap '' INT; exec \"$@\"",
+            "sh",
+            sys.executable,
+            "-m",
+            "companion",
+            "run",
+            "a.toml",
+            "--link",
+            f"tcp:127.0.0.1:{free_port()}",
+            "--wait",
+            "1000",
+            "--out",
+            "v",
+        ],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=HERE,
+    )
     try:
         assert any("nothing yet" in line for line in run.stdout)
         run.send_signal(signal.SIGINT)
@@ -90,8 +116,9 @@ class Slow:
 sys.meta_path.insert(0, Slow())
 runpy.run_module("companion", run_name="__main__")
 """
-    run = subprocess.Popen([sys.executable, "-c", begin], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                           env=HERE)
+    run = subprocess.Popen(
+        [sys.executable, "-c", begin], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=HERE
+    )
     try:
         assert run.stdout.readline() == "loading\n"
         run.send_signal(signal.SIGINT)
@@ -125,15 +152,24 @@ def test_a_port_that_is_not_there_is_told_first(tmp_path, capsys):
     assert absent_device("COM3").startswith("COM3: no such device")
 
 
-@pytest.mark.parametrize(("words", "code", "said"), [
-    (["mission", "check", "a.toml"], 0, "N?rdliche B?je"),
-    (["mission", "check", "ü.toml"], 2, "rename it, or set LANG"),
-])
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["mission", "check", "a.toml"], 0, "N?rdliche B?je"),
+        (["mission", "check", "ü.toml"], 2, "rename it, or set LANG"),
+    ],
+)
 def test_a_terminal_without_umlauts_is_told_in_question_marks(tmp_path, words, code, said):
     for name in ("a", "ü"):
         (tmp_path / f"{name}.toml").write_text(MISSION.replace('"a"', '"Nördliche Böje"'), encoding="utf-8")
-    run = subprocess.run([sys.executable, "-m", "companion", *words], cwd=tmp_path, capture_output=True, text=True,
-                         check=False, env={**HERE, "PYTHONUTF8": "0", "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"})
+    run = subprocess.run(
+        [sys.executable, "-m", "companion", *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**HERE, "PYTHONUTF8": "0", "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"},
+    )
     assert run.returncode == code, run.stderr
     assert said in run.stdout + run.stderr
     assert (run.stdout + run.stderr).count("\n") == 1

@@ -45,14 +45,17 @@ def test_orders_are_made_as_the_page_says_and_counted(key, tmp_path, capsys):
     assert (tmp_path / "far.key.far-counter").read_text() == "40\n"
 
 
-@pytest.mark.parametrize(("words", "why"), [
-    (["jump", "--expires", "2h"], "there is no order 'jump'"),
-    (["hold", "--expires", "30s"], "is not a time; write 90m, 2h or 1d"),
-    (["hold", "--expires", "8d"], "is out of range; from 1m to 7d"),
-    (["hold"], "--expires"),
-    (["goal", "0", "0", "--expires", "2h"], "no position that anybody means"),
-    (["refuge", "300", "--expires", "2h"], "too large"),
-])
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (["jump", "--expires", "2h"], "there is no order 'jump'"),
+        (["hold", "--expires", "30s"], "is not a time; write 90m, 2h or 1d"),
+        (["hold", "--expires", "8d"], "is out of range; from 1m to 7d"),
+        (["hold"], "--expires"),
+        (["goal", "0", "0", "--expires", "2h"], "no position that anybody means"),
+        (["refuge", "300", "--expires", "2h"], "too large"),
+    ],
+)
 def test_what_cannot_be_ordered_is_one_line_and_uses_no_counter(key, tmp_path, capsys, words, why):
     code, _, err = run(capsys, "order", *words, "--key", key)
     assert code == 2
@@ -100,9 +103,22 @@ def test_a_file_that_is_there_is_not_written_over(key, tmp_path, capsys):
 
 def test_a_status_is_read_in_words_from_a_file_or_digits(key, tmp_path, capsys):
     status = FarStatus(
-        phase="holding", minute=minutes_of(time.time() - 840.0), is_heard=True, is_armed=True, is_under_way=True,
-        standing=Verb.HOLD, position=GeoPoint(lat_deg=50.8195, lon_deg=-1.308), speed_mps=1.4, battery_v=12.4,
-        watchdog="becalmed", order=17, reply=Reply.DONE, goal=1, goals=3, has_trouble=True)
+        phase="holding",
+        minute=minutes_of(time.time() - 840.0),
+        is_heard=True,
+        is_armed=True,
+        is_under_way=True,
+        standing=Verb.HOLD,
+        position=GeoPoint(lat_deg=50.8195, lon_deg=-1.308),
+        speed_mps=1.4,
+        battery_v=12.4,
+        watchdog="becalmed",
+        order=17,
+        reply=Reply.DONE,
+        goal=1,
+        goals=3,
+        has_trouble=True,
+    )
     data = pack_status(status, FarKey(bytes(range(32)), 1))
     begun = pack_status(FarStatus(phase="holding", reply=Reply.BEGUN), FarKey(bytes(range(32)), 1))
     assert run(capsys, "status", begun.hex(), "--key", key)[1].endswith("\nbegun anew: counters count from 1\n")
@@ -110,17 +126,28 @@ def test_a_status_is_read_in_words_from_a_file_or_digits(key, tmp_path, capsys):
     (tmp_path / "hex").write_text(data.hex() + "\n")
     sources = (tmp_path / "raw", tmp_path / "hex", data.hex())
     told = {run(capsys, "status", source, "--key", key)[1] for source in sources}
-    text, = told
-    for words in ("14 min ago", "HOLDING, under way, armed; under the order hold", "at 50.81950 -1.30800, 1.4 m/s",
-                  "goal 1 of 3, - m to it", "wind from - ± - deg", "12.4 V; BECALMED", "her disk does not keep",
-                  "order 17: done"):
+    (text,) = told
+    for words in (
+        "14 min ago",
+        "HOLDING, under way, armed; under the order hold",
+        "at 50.81950 -1.30800, 1.4 m/s",
+        "goal 1 of 3, - m to it",
+        "wind from - ± - deg",
+        "12.4 V; BECALMED",
+        "her disk does not keep",
+        "order 17: done",
+    ):
         assert words in text
 
 
-@pytest.mark.parametrize(("source", "why"), [
-    ("00" * 42, "its code is wrong"), ("00", "it has 1 bytes, and not 42"),
-    ("nothing", "neither a file nor hexadecimal"),
-])
+@pytest.mark.parametrize(
+    ("source", "why"),
+    [
+        ("00" * 42, "its code is wrong"),
+        ("00", "it has 1 bytes, and not 42"),
+        ("nothing", "neither a file nor hexadecimal"),
+    ],
+)
 def test_what_is_no_status_is_one_line(key, capsys, source, why):
     code, _, err = run(capsys, "status", source, "--key", key)
     assert code == 2

@@ -31,11 +31,14 @@ def test_a_field_as_a_picture(tmp_path, capsys):
     assert "out of 4.0 ha of water" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("arguments", "says"), [
-    (["sitl/missions/block.toml"], '[[goal]]: no goal is sailed by a field; write kind = "field" in one'),
-    (["sitl/missions/field-lane.toml", "--goal", "2"], "[[goal]] 2: is not sailed by a field; name one that is: 1"),
-    (["missions/none.toml"], "no such file"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["sitl/missions/block.toml"], '[[goal]]: no goal is sailed by a field; write kind = "field" in one'),
+        (["sitl/missions/field-lane.toml", "--goal", "2"], "[[goal]] 2: is not sailed by a field; name one that is: 1"),
+        (["missions/none.toml"], "no such file"),
+    ],
+)
 def test_what_is_refused_is_one_line(arguments, says, capsys):
     assert main(["field", *arguments]) == 2
     told = capsys.readouterr().err
@@ -68,4 +71,4 @@ def test_a_mission_by_field_throughout_is_sailed_to_its_marks():
     assert seen.tree.text == "mark"
     assert without_value(seen) < 0.01
     out = field_preview(mission("field-square"), number=2)
-    assert 0.5 < without_value(out) < 0.9      # outside of the square there is nowhere to go
+    assert 0.5 < without_value(out) < 0.9  # outside of the square there is nowhere to go

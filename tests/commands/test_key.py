@@ -89,7 +89,8 @@ def test_with_the_key_on_board_strangers_are_not_answered_and_without_it_they_ar
             boat.reboot()
             assert not await is_answered(radio)
             assert "does not sign any more" in await take_off(
-                lambda: usb.near, **told(SigningStore(key, NOW_S + 400.0)))
+                lambda: usb.near, **told(SigningStore(key, NOW_S + 400.0))
+            )
             assert await is_answered(radio)
             with pytest.raises(LinkError, match=r"not signed; .companion key set"):
                 await take_off(lambda: usb.near, **told(SigningStore(key, NOW_S + 500.0)))
@@ -107,7 +108,7 @@ def test_nothing_is_done_to_an_armed_boat_or_without_consent(key, monkeypatch):
             boat.core.set_armed(armed=True)
             with pytest.raises(JobError, match="armed"):
                 await put_on(lambda: usb.near, **told(SigningStore(key, NOW_S)))
-            async with Link(usb.near, streams=()) as link, Autopilot(link):   # and the autopilot refuses it itself
+            async with Link(usb.near, streams=()) as link, Autopilot(link):  # and the autopilot refuses it itself
                 link.send(wire.MAVLink_setup_signing_message(1, 1, [1] * 32, 5))
             assert await is_answered(radio)
 

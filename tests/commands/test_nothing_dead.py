@@ -67,73 +67,171 @@ POINT = "POINT (-1.3060 50.8175)"
 
 # Of the kinds of goal that are no point: each in a goal of its own, behind the mission's.
 TASKS = {
-    "gate": {"kind": "gate", "port_mark": {"lat": 50.8200, "lon": -1.3090},
-             "starboard_mark": {"lat": 50.8200, "lon": -1.3080}, "mark_radius_m": 6.0, "after_s": 300.0},
+    "gate": {
+        "kind": "gate",
+        "port_mark": {"lat": 50.8200, "lon": -1.3090},
+        "starboard_mark": {"lat": 50.8200, "lon": -1.3080},
+        "mark_radius_m": 6.0,
+        "after_s": 300.0,
+    },
     "box": {"kind": "box", "polygon": "POLYGON ((-1.309 50.820, -1.308 50.820, -1.308 50.821, -1.309 50.820))"},
-    "search": {"kind": "search", "swath_m": 20.0,
-               "polygon": "POLYGON ((-1.309 50.820, -1.308 50.820, -1.308 50.821, -1.309 50.820))"},
+    "search": {
+        "kind": "search",
+        "swath_m": 20.0,
+        "polygon": "POLYGON ((-1.309 50.820, -1.308 50.820, -1.308 50.821, -1.309 50.820))",
+    },
     "field": {"kind": "field", "lat": 50.8196, "lon": -1.3082, "field": "a", "for_s": 100.0},
 }
 # The atoms of fields: one of each kind that has a key of its own.
 HERE, THERE = {"lat": 50.8196, "lon": -1.3082}, {"lat": 50.8199, "lon": -1.3070}
 ATOM = {
-    "circle": {"kind": "circle", **HERE, "radius_m": 40.0}, "line": {"kind": "line", "start": HERE, "end": THERE},
-    "repulsive_point": {"kind": "repulsive_point", **HERE}, "heading": {"kind": "heading", "heading_deg": 10.0},
+    "circle": {"kind": "circle", **HERE, "radius_m": 40.0},
+    "line": {"kind": "line", "start": HERE, "end": THERE},
+    "repulsive_point": {"kind": "repulsive_point", **HERE},
+    "heading": {"kind": "heading", "heading_deg": 10.0},
     "leave": {"kind": "leave", "polygon": TASKS["box"]["polygon"]},
 }
 TASK_KEYS = {
-    "kind": "gate", "port_mark": {"lat": 50.8200, "lon": -1.3092}, "starboard_mark": {"lat": 50.8200, "lon": -1.3078},
-    "polygon": "POLYGON ((-1.309 50.820, -1.3081 50.820, -1.3081 50.821, -1.309 50.820))", "for_s": 60.0,
-    "swath_m": 30.0, "coverage": 0.5,
-    "field": "2 * a", "until": "time",
-    "mark_radius_m": 8.0, "after_s": 400.0, "not_before": dt.datetime(2026, 11, 21, 12, tzinfo=dt.UTC),
+    "kind": "gate",
+    "port_mark": {"lat": 50.8200, "lon": -1.3092},
+    "starboard_mark": {"lat": 50.8200, "lon": -1.3078},
+    "polygon": "POLYGON ((-1.309 50.820, -1.3081 50.820, -1.3081 50.821, -1.309 50.820))",
+    "for_s": 60.0,
+    "swath_m": 30.0,
+    "coverage": 0.5,
+    "field": "2 * a",
+    "until": "time",
+    "mark_radius_m": 8.0,
+    "after_s": 400.0,
+    "not_before": dt.datetime(2026, 11, 21, 12, tzinfo=dt.UTC),
 }
 
 # The numbers of one planner or estimator: in a mission that asks for it.
-ASTAR = {"expansions": 5000, "grid_m": 5.0, "turn_s_per_rad": 4.0, "tack_s": 9.0, "gybe_s": 9.0, "tunnel": "abrupt",
-         "tunnel_width_m": 80.0, "heuristic_kn": 0.0, "min_twa_deg": 50.0, "max_twa_deg": 150.0, "max_turn_deg": 120.0,
-         "ship_match_s": 30.0, "projection": "flat"}
+ASTAR = {
+    "expansions": 5000,
+    "grid_m": 5.0,
+    "turn_s_per_rad": 4.0,
+    "tack_s": 9.0,
+    "gybe_s": 9.0,
+    "tunnel": "abrupt",
+    "tunnel_width_m": 80.0,
+    "heuristic_kn": 0.0,
+    "min_twa_deg": 50.0,
+    "max_twa_deg": 150.0,
+    "max_turn_deg": 120.0,
+    "ship_match_s": 30.0,
+    "projection": "flat",
+}
 RRTSTAR = {"goal_bias": 0.1, "range_m": 70.0, "rewiring": False, "risk_weight_s": 20.0, "state_risk_weight_s": 30.0}
 KALMAN = {"kalman_window": 50, "kalman_r_deg": 5.0, "kalman_r_mps": 1.0}
 
 # Every key with another value than the mission's or its default.
 OTHER = {
-    "goal": {"lat": 50.8189, "lon": -1.3099, "radius_m": 30.0, "rounding": "starboard", "name": "other",
-             "bandwidth_m": 200.0,
-             **TASK_KEYS},
-    "field": {"kind": "station", "lat": 50.8197, "lon": -1.3083, "start": {"lat": 50.8191, "lon": -1.3083},
-              "end": {"lat": 50.8190, "lon": -1.3070}, "radius_m": 50.0, "turn": "anticlockwise",
-              "zone_m": 9.0, "range_m": 30.0, "heading_deg": 20.0,
-              "polygon": TASK_KEYS["polygon"]},
+    "goal": {
+        "lat": 50.8189,
+        "lon": -1.3099,
+        "radius_m": 30.0,
+        "rounding": "starboard",
+        "name": "other",
+        "bandwidth_m": 200.0,
+        **TASK_KEYS,
+    },
+    "field": {
+        "kind": "station",
+        "lat": 50.8197,
+        "lon": -1.3083,
+        "start": {"lat": 50.8191, "lon": -1.3083},
+        "end": {"lat": 50.8190, "lon": -1.3070},
+        "radius_m": 50.0,
+        "turn": "anticlockwise",
+        "zone_m": 9.0,
+        "range_m": 30.0,
+        "heading_deg": 20.0,
+        "polygon": TASK_KEYS["polygon"],
+    },
     "refuge": {"lat": 50.8173, "lon": -1.3091, "radius_m": 25.0, "name": "cove"},
     "start": {"lat": 50.8171, "lon": -1.3101, "heading_deg": 200.0},
-    "area": {"obstacles": ["point.wkt"], "fence": "fence.wkt", "axis": "latlon", "margin_m": 14.0,
-             "margin_floor_m": 7.0, "point_radius_m": 15.0},
+    "area": {
+        "obstacles": ["point.wkt"],
+        "fence": "fence.wkt",
+        "axis": "latlon",
+        "margin_m": 14.0,
+        "margin_floor_m": 7.0,
+        "point_radius_m": 15.0,
+    },
     "risk": {"delta_s": 0.8, "max_path_risk": 0.3},
-    "boat": {"file": "boat.toml", "speed_error_percent": 20.0, "polar": 2.0,
-             "no_go_half_deg": 50.0, "max_twa_deg": 170.0, "turn_rate_deg_s": 20.0, "tack_loss_s": 6.0,
-             "gybe_loss_s": 3.0, "can_tack": False, "gybe_room_m": 40.0, "length_m": 3.0, "beam_m": 1.5, "motor": True,
-             "leeway_deg": 4.0, "max_tws_mps": 11.0, "min_tws_mps": 1.5, "tack_fails": 0.2},
+    "boat": {
+        "file": "boat.toml",
+        "speed_error_percent": 20.0,
+        "polar": 2.0,
+        "no_go_half_deg": 50.0,
+        "max_twa_deg": 170.0,
+        "turn_rate_deg_s": 20.0,
+        "tack_loss_s": 6.0,
+        "gybe_loss_s": 3.0,
+        "can_tack": False,
+        "gybe_room_m": 40.0,
+        "length_m": 3.0,
+        "beam_m": 1.5,
+        "motor": True,
+        "leeway_deg": 4.0,
+        "max_tws_mps": 11.0,
+        "min_tws_mps": 1.5,
+        "tack_fails": 0.2,
+    },
     "autopilot": {"system": 7, "frame": "motor"},
     "current": {"set_deg": 40.0, "drift_mps": 0.5, "sigma_mps": 0.3, "table": "tide.csv"},
     "wind": {"estimator": "mean90", "preview_from_deg": 40.0, "preview_speed_mps": 8.0, **KALMAN},
-    "operator": {"arm": False, "set_auto": True, "guided": True, "upload_fence": True, "replace_foreign": True,
-                 "orders": ["hold"], "local_orders": ["stop"], "far_orders": ["home"]},
-    "skipper": {"replan": "forecast", "end": "home", "autopilot_beats": False, "shifts": True,
-                "tacks_per_minute": 2.0, "guidance": "field",
-                "station_s": 60.0, "laps": 2, "bandwidth_m": 90.0, "horizon_m": 3000.0, "planning_budget_s": 1.0,
-                "expansions": 123, "seed": 7, "min_replan_s": 25.0, "max_replan_s": 700.0, "wind_shift_deg": 30.0,
-                "off_track_m": 45.0, "voyage_timeout_s": 900.0, "planner": "astar"},
+    "operator": {
+        "arm": False,
+        "set_auto": True,
+        "guided": True,
+        "upload_fence": True,
+        "replace_foreign": True,
+        "orders": ["hold"],
+        "local_orders": ["stop"],
+        "far_orders": ["home"],
+    },
+    "skipper": {
+        "replan": "forecast",
+        "end": "home",
+        "autopilot_beats": False,
+        "shifts": True,
+        "tacks_per_minute": 2.0,
+        "guidance": "field",
+        "station_s": 60.0,
+        "laps": 2,
+        "bandwidth_m": 90.0,
+        "horizon_m": 3000.0,
+        "planning_budget_s": 1.0,
+        "expansions": 123,
+        "seed": 7,
+        "min_replan_s": 25.0,
+        "max_replan_s": 700.0,
+        "wind_shift_deg": 30.0,
+        "off_track_m": 45.0,
+        "voyage_timeout_s": 900.0,
+        "planner": "astar",
+    },
     "planner": {**ASTAR, **RRTSTAR},
     "passage": {"leg_m": 70_000.0, "recentre_m": 2000.0},
     "safety": {
         **{ending.key: next(str(end) for end in End if end is not ending.default) for ending in ENDINGS.values()},
         **{key: 10.0 if setting.default is None else setting.default * 0.5 for key, setting in SETTINGS.items()},
-        **{cause.key: next(word for word in CHOICES if word != WORD_OF[cause.answer])
-           for cause in FAILSAFES if cause.key},
+        **{
+            cause.key: next(word for word in CHOICES if word != WORD_OF[cause.answer])
+            for cause in FAILSAFES
+            if cause.key
+        },
     },
-    "traffic": {"feeds": ["udpin:127.0.0.1:10110"], "safe_distance_m": 60.0, "safe_time_s": 80.0, "own_mmsi": 211234560,
-                "drop_after_s": 300.0, "policy": "rules"},
+    "traffic": {
+        "feeds": ["udpin:127.0.0.1:10110"],
+        "safe_distance_m": 60.0,
+        "safe_time_s": 80.0,
+        "own_mmsi": 211234560,
+        "drop_after_s": 300.0,
+        "policy": "rules",
+    },
     "output": {"nmea": ["udp:127.0.0.1:10110"], "signalk": ["tcp:127.0.0.1:8375"], "signalk_token": "token"},
 }
 BOAT = """name = "b"
@@ -146,7 +244,7 @@ speed_mps = [[1.0], [1.5]]
 """
 # What does not sail: pictures and previews, and what `companion run` itself takes. Tried below.
 DRAWN = {("start", "heading_deg"), ("wind", "preview_from_deg")}
-RUN = {("skipper", "expansions"), ("skipper", "seed"), ("autopilot", "system")}   # the last: test_whose
+RUN = {("skipper", "expansions"), ("skipper", "seed"), ("autopilot", "system")}  # the last: test_whose
 
 
 def folder_with(path):
@@ -188,8 +286,11 @@ def mission(path, table="", key="", value=None):
     elif table == "goal-kind":
         raw["goal"].append(dict(TASKS[key]))
     elif table:
-        for others, keys in ((RRTSTAR, {"skipper": {"planner": "rrtstar"}}), (ASTAR, {"skipper": {"planner": "astar"}}),
-                             (KALMAN, {"wind": {"estimator": "kalman"}})):
+        for others, keys in (
+            (RRTSTAR, {"skipper": {"planner": "rrtstar"}}),
+            (ASTAR, {"skipper": {"planner": "astar"}}),
+            (KALMAN, {"wind": {"estimator": "kalman"}}),
+        ):
             if table in {"planner", "wind"} and key in others:
                 raw |= keys
         if key == "recentre_m":
@@ -247,13 +348,32 @@ def sailed(m):
     for n in range(80):
         estimator.update(float(n), 0.3 * math.sin(n), 5.0 + math.cos(n))
     wind = estimator.forecast(60.0)
-    return repr((
-        m.name, voyage.recentre_m, voyage.far_m, voyage.frame.origin, voyage.goals, voyage.laps, voyage.refuges,
-        gates_of(voyage),
-        voyage.area.obstacles_wkt(0.0), voyage.area.fence_wkt(0.0), speeds, rest, config_of(m), permissions_of(m),
-        target_limits_of(m), feeds_of(m), displays_of(m), type(estimator).__name__, wind, needs_of(m),
-        water_of(m).at(None), water_of(m).at(1795262400.0),
-    ))
+    return repr(
+        (
+            m.name,
+            voyage.recentre_m,
+            voyage.far_m,
+            voyage.frame.origin,
+            voyage.goals,
+            voyage.laps,
+            voyage.refuges,
+            gates_of(voyage),
+            voyage.area.obstacles_wkt(0.0),
+            voyage.area.fence_wkt(0.0),
+            speeds,
+            rest,
+            config_of(m),
+            permissions_of(m),
+            target_limits_of(m),
+            feeds_of(m),
+            displays_of(m),
+            type(estimator).__name__,
+            wind,
+            needs_of(m),
+            water_of(m).at(None),
+            water_of(m).at(1795262400.0),
+        )
+    )
 
 
 def test_every_key_has_another_value_here():
@@ -261,8 +381,9 @@ def test_every_key_has_another_value_here():
     assert {(table, key) for table, keys in OTHER.items() for key in keys} == known
 
 
-@pytest.mark.parametrize(("table", "key"), sorted(
-    {(table, key) for table, keys in OTHER.items() for key in keys} - DRAWN - RUN))
+@pytest.mark.parametrize(
+    ("table", "key"), sorted({(table, key) for table, keys in OTHER.items() for key in keys} - DRAWN - RUN)
+)
 def test_every_key_changes_what_is_sailed(table, key, tmp_path):
     folder_with(tmp_path)
     before = sailed(base_for(tmp_path, table, key))
@@ -301,10 +422,25 @@ def test_effort_and_seed_reach_the_voyage(tmp_path, capsys):
     """Nobody answers, and what it would have sailed with is in the folder."""
     folder_with(tmp_path)
     m = mission(tmp_path, "skipper", "expansions", 123)
-    m.path.write_text(m.path.read_text() + "seed = 7\n" if m.path.read_text().rstrip().endswith("123") else
-                      m.path.read_text().replace("expansions = 123", "expansions = 123\nseed = 7"))
-    code = cli.main(["run", str(m.path), "--link", f"udpin:127.0.0.1:{free_port()}", "--out", str(tmp_path / "v"),
-                     "--wait", "0.1", "--state", str(tmp_path / "s.json")])
+    m.path.write_text(
+        m.path.read_text() + "seed = 7\n"
+        if m.path.read_text().rstrip().endswith("123")
+        else m.path.read_text().replace("expansions = 123", "expansions = 123\nseed = 7")
+    )
+    code = cli.main(
+        [
+            "run",
+            str(m.path),
+            "--link",
+            f"udpin:127.0.0.1:{free_port()}",
+            "--out",
+            str(tmp_path / "v"),
+            "--wait",
+            "0.1",
+            "--state",
+            str(tmp_path / "s.json"),
+        ]
+    )
     capsys.readouterr()
     assert code == 1
     run = tomllib.loads((tmp_path / "v" / "voyage.toml").read_text())["run"]
@@ -348,12 +484,16 @@ def read_names(package):
     return names
 
 
-@pytest.mark.parametrize(("program", "of"), [
-    (cli.PROGRAM, cli.PROGRAM), (sitl_cli.PROGRAM, sitl_cli.PROGRAM), (sitl_cli.PROGRAM, sitl_cli.LABORATORY)])
+@pytest.mark.parametrize(
+    ("program", "of"),
+    [(cli.PROGRAM, cli.PROGRAM), (sitl_cli.PROGRAM, sitl_cli.PROGRAM), (sitl_cli.PROGRAM, sitl_cli.LABORATORY)],
+)
 def test_every_option_is_read(program, of):
     read = read_names(import_module(of.package))
     unread = {
-        (name, dest) for name in of.commands for dest in options_of(program.parser(name))
+        (name, dest)
+        for name in of.commands
+        for dest in options_of(program.parser(name))
         if dest not in read and dest != "command"
     }
     assert unread == set()
@@ -377,5 +517,3 @@ def test_every_failsafe_that_is_answered_is_in_a_scenario():
     told = {code for path in Path("sitl/scenarios").glob("*.toml") for code in load_scenario(path).expect.alerts}
     answered = {f"{cause.name} failsafe" for cause in FAILSAFES if cause.answer is not Recovery.LEAVE}
     assert answered - told == set()
-
-

@@ -15,8 +15,13 @@ from companion.mavlink.wire.frames import Codec
 from sitl.scenario.traffic import free_port
 
 BEAT = wire.MAVLink_heartbeat_message(
-    wire.MAV_TYPE_SURFACE_BOAT, wire.MAV_AUTOPILOT_ARDUPILOTMEGA, wire.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, 0,
-    wire.MAV_STATE_STANDBY, 3)
+    wire.MAV_TYPE_SURFACE_BOAT,
+    wire.MAV_AUTOPILOT_ARDUPILOTMEGA,
+    wire.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+    0,
+    wire.MAV_STATE_STANDBY,
+    3,
+)
 
 
 class Boat:
@@ -58,7 +63,8 @@ class Boat:
             return
         verb = "goal" if message.command == 31011 else {1: "hold", 4: "refuge", 11: "why"}[int(message.param1)]
         ack = wire.MAVLink_command_ack_message(
-            message.command, self.result, 0, 0, message.get_srcSystem(), message.get_srcComponent())
+            message.command, self.result, 0, 0, message.get_srcSystem(), message.get_srcComponent()
+        )
         for reply in (ack, *status_texts(5, f"order {verb}: {self.text}", 7)):
             self._socket.sendto(companion.pack(reply), self._to)
 
@@ -109,9 +115,16 @@ def test_nobody_answers(boat, capsys):
     assert "nothing was heard at all" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("words", "says"), [
-    (["hodl", "--link", "x"], "did you mean hold?"), (["hold"], "--link: is missing"), ([], "VERB: is missing"),
-    (["goal", "0", "0", "--link", "x"], "no position"), (["hold", "--qgc", "o.json"], "leave out the verb")])
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["hodl", "--link", "x"], "did you mean hold?"),
+        (["hold"], "--link: is missing"),
+        ([], "VERB: is missing"),
+        (["goal", "0", "0", "--link", "x"], "no position"),
+        (["hold", "--qgc", "o.json"], "leave out the verb"),
+    ],
+)
 def test_bad_usage(words, says, capsys):
     assert cli.main(["order", *words]) == 2
     assert says in capsys.readouterr().err

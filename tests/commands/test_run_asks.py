@@ -69,10 +69,12 @@ def test_a_service_is_notasked(mission, tmp_path, monkeypatch):
 
 def test_one_boat_has_one_companion_whatever_it_sails(tmp_path):
     with Console(None) as console, hold_state_folder(tmp_path / "x/a.state.json", tmp_path / "v", console):
-        with pytest.raises(JobError, match="two must not command one boat"), \
-                hold_state_folder(tmp_path / "x/b.json", tmp_path / "w", console):
+        with (
+            pytest.raises(JobError, match="two must not command one boat"),
+            hold_state_folder(tmp_path / "x/b.json", tmp_path / "w", console),
+        ):
             pass
-        with hold_state_folder(tmp_path / "y/a.state.json", tmp_path / "v", console):      # another boat
+        with hold_state_folder(tmp_path / "y/a.state.json", tmp_path / "v", console):  # another boat
             pass
     with Console(None) as console, hold_state_folder(tmp_path / "x/a.state.json", tmp_path / "v", console):
         pass
@@ -81,8 +83,10 @@ def test_one_boat_has_one_companion_whatever_it_sails(tmp_path):
 def test_a_place_that_cannot_hold_the_state_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with Console(None) as console:
-        with pytest.raises(InputError, match="cannot hold the state"), \
-                hold_state_folder(tmp_path / "file/s.json", tmp_path / "v", console):
+        with (
+            pytest.raises(InputError, match="cannot hold the state"),
+            hold_state_folder(tmp_path / "file/s.json", tmp_path / "v", console),
+        ):
             pass
         with pytest.raises(InputError, match="is a folder"), hold_state_folder(tmp_path, tmp_path / "v", console):
             pass

@@ -59,7 +59,7 @@ _DRAW = textwrap.dedent("""
 
 
 def draw(url, what):
-    command = [sys.executable, "-c", _DRAW, url, what]   # a process of its own: MAVSDK keeps threads
+    command = [sys.executable, "-c", _DRAW, url, what]  # a process of its own: MAVSDK keeps threads
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -147,7 +147,8 @@ def test_a_drawing_of_mavsdk_is_sailed_on_the_real_ardurover(tmp_path):
 
     async def call(*command):
         process = await asyncio.create_subprocess_exec(
-            *command, cwd=tmp_path, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE)
+            *command, cwd=tmp_path, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+        )
         out, err = await process.communicate()
         return process.returncode, out.decode(), err.decode()
 

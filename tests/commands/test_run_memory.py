@@ -16,8 +16,8 @@ from companion.telemetry.folder.recorder import read_jsonl
 from sitl.scenario.traffic import free_port
 
 PACE = 20
-MOST_MB = 130.0   # 113 to 122: a plan that is being made counts
-ASHORE = ("/scipy/", "/matplotlib/", "mavsdk", "/ompl/", "/numba/", "llvmlite")   # in the names of their libraries
+MOST_MB = 130.0  # 113 to 122: a plan that is being made counts
+ASHORE = ("/scipy/", "/matplotlib/", "mavsdk", "/ompl/", "/numba/", "llvmlite")  # in the names of their libraries
 PACKAGED = """
 import sys
 from pathlib import Path
@@ -55,8 +55,24 @@ def memory_mb(pid):
 @pytest.fixture
 def boat():
     port = free_port()
-    command = [sys.executable, "-m", "sitl.cli", "boat", "--port", str(port), "--udp", "0", "--speedup", str(PACE),
-               "--warm", "--moored", "--home", "50.817,-1.31", "--heading", "90"]
+    command = [
+        sys.executable,
+        "-m",
+        "sitl.cli",
+        "boat",
+        "--port",
+        str(port),
+        "--udp",
+        "0",
+        "--speedup",
+        str(PACE),
+        "--warm",
+        "--moored",
+        "--home",
+        "50.817,-1.31",
+        "--heading",
+        "90",
+    ]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert "sitl boat" in process.stdout.readline()
         yield f"tcp:127.0.0.1:{port}"
@@ -65,21 +81,34 @@ def boat():
 
 def test_it_is_small_with_its_planner_and_leaves_no_process_behind(boat, carried, tmp_path):
     (tmp_path / "there.toml").write_text(MISSION)
-    command = [sys.executable, "-c", PACKAGED, str(carried), "run", "there.toml", "--link", boat, "--out", "voyage",
-               "--speedup", str(PACE)]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL,
-                          env={**os.environ, "PYTHONPATH": str(Path.cwd())}) as companion:
+    command = [
+        sys.executable,
+        "-c",
+        PACKAGED,
+        str(carried),
+        "run",
+        "there.toml",
+        "--link",
+        boat,
+        "--out",
+        "voyage",
+        "--speedup",
+        str(PACE),
+    ]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": str(Path.cwd())}
+    ) as companion:
         try:
             wait_for_plans(tmp_path / "voyage/decisions.jsonl", 1)
             pids = family(companion.pid)
-            assert len(pids) == 3   # the companion, the fork server, the planner
+            assert len(pids) == 3  # the companion, the fork server, the planner
             maps = "".join(Path(f"/proc/{pid}/maps").read_text() for pid in pids)
             assert [name for name in ASHORE if name in maps] == []
             assert sum(map(memory_mb, pids)) < MOST_MB
         finally:
             companion.send_signal(signal.SIGINT)
         companion.wait(60)
-    end = time.monotonic() + 10.0   # the planner ends when it sees that its socket is closed
+    end = time.monotonic() + 10.0  # the planner ends when it sees that its socket is closed
     while any(Path(f"/proc/{pid}").exists() for pid in pids):
         assert time.monotonic() < end
         time.sleep(0.05)

@@ -37,8 +37,24 @@ COMPANION = [sys.executable, "-m", "companion.cli"]
 def link():
     """A simulated boat in a process of its own; its LINK."""
     port = free_port()
-    command = [sys.executable, "-m", "sitl.cli", "boat", "--port", str(port), "--udp", "0", "--speedup", str(PACE),
-               "--warm", "--moored", "--home", "50.817,-1.31", "--heading", "90"]
+    command = [
+        sys.executable,
+        "-m",
+        "sitl.cli",
+        "boat",
+        "--port",
+        str(port),
+        "--udp",
+        "0",
+        "--speedup",
+        str(PACE),
+        "--warm",
+        "--moored",
+        "--home",
+        "50.817,-1.31",
+        "--heading",
+        "90",
+    ]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as boat:
         assert "sitl boat" in boat.stdout.readline()
         yield f"tcp:127.0.0.1:{port}"
@@ -72,25 +88,37 @@ def records(path):
     return [json.loads(line) for line in path.read_text().splitlines() if line] if path.exists() else []
 
 
-ORDERS = ("why", "home", "jump", "hold")   # held, she does not arrive while nothing can be recorded
-told = {}   # what orders on board were answered: the exit code, what was printed
+ORDERS = ("why", "home", "jump", "hold")  # held, she does not arrive while nothing can be recorded
+told = {}  # what orders on board were answered: the exit code, what was printed
 
 
 def order(folder, *words):
-    done = subprocess.run([*COMPANION, "order", *words, "--socket", "s"], cwd=folder, text=True, capture_output=True,
-                          check=False)
+    done = subprocess.run(
+        [*COMPANION, "order", *words, "--socket", "s"], cwd=folder, text=True, capture_output=True, check=False
+    )
     return done.returncode, done.stdout + done.stderr
 
 
 @pytest.fixture(scope="module")
 def first(link, folder):
     """The first mission, sailed through everything: its exit code, its folder, what a second companion said."""
-    run = subprocess.Popen(command("first.toml", link, "--out", "first/v", "--socket", "s"), cwd=folder, text=True,
-                           stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    run = subprocess.Popen(
+        command("first.toml", link, "--out", "first/v", "--socket", "s"),
+        cwd=folder,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
     assert run.stdout.readline()
-    run.stdout.close()                                    # | head -1
-    second = subprocess.run(command("second.toml", link, "--out", "first/w"), cwd=folder, text=True,
-                            capture_output=True, check=False, timeout=PATIENCE_S)
+    run.stdout.close()  # | head -1
+    second = subprocess.run(
+        command("second.toml", link, "--out", "first/w"),
+        cwd=folder,
+        text=True,
+        capture_output=True,
+        check=False,
+        timeout=PATIENCE_S,
+    )
     decisions = folder / "first/v/decisions.jsonl"
     wait_for(lambda: any(d.get("code") == "under way" for d in records(decisions)))
     told.update((words, order(folder, *words.split())) for words in ORDERS)
@@ -102,7 +130,7 @@ def first(link, folder):
                     os.write(file.fileno(), bytes(4096))
             except OSError:
                 pass
-    run.send_signal(signal.SIGHUP)                        # the ssh has dropped
+    run.send_signal(signal.SIGHUP)  # the ssh has dropped
     if is_small:
         size = decisions.stat().st_size
         time.sleep(12.0 / PACE)
@@ -113,7 +141,7 @@ def first(link, folder):
     try:
         wait_for(lambda: any(d.get("code") == "done" for d in records(decisions)))
         time.sleep(20.0 / PACE)
-        assert run.poll() is None                         # the loiter is watched until somebody ends it
+        assert run.poll() is None  # the loiter is watched until somebody ends it
         run.terminate()
         return run.wait(PATIENCE_S), folder / "first/v", second, is_small
     finally:
@@ -122,10 +150,15 @@ def first(link, folder):
 
 def test_orders_are_taken_from_on_board_as_the_mission_permits(first, folder):
     assert (told["why"][0], told["hold"], told["go_on"][0]) == (
-        0, (0, "hold: loitering here, where there is room, until go_on\n"), 0)
+        0,
+        (0, "hold: loitering here, where there is room, until go_on\n"),
+        0,
+    )
     assert told["go_on"][1].startswith("go_on: the end of hold: ")
     assert told["home"] == (
-        1, "home: refused: not permitted: the mission's [operator] local_orders does not name home\n")
+        1,
+        "home: refused: not permitted: the mission's [operator] local_orders does not name home\n",
+    )
     assert told["jump"][0] == 2
     by = [d["order"] for d in records(first[1] / "decisions.jsonl") if d["kind"] == "order"]
     assert {d["source"][0] for d in by} == {"local"}
@@ -147,7 +180,8 @@ def test_a_second_companion_is_refused_in_one_line(first):
     _, _, second, _ = first
     assert second.returncode == 1
     assert re.fullmatch(
-        r"companion run: first: another companion is sailing with the state kept here.*\n", second.stderr)
+        r"companion run: first: another companion is sailing with the state kept here.*\n", second.stderr
+    )
 
 
 def test_a_real_full_disk_under_way_costs_records_only(first):
@@ -165,8 +199,15 @@ def test_the_second_mission_sails_from_wherever_it_is_started(first, link, folde
     """It met the first one's list as foreign, and waited for ever (issue 13, point 1)."""
     assert first[0] == 0
     (tmp_path / "second.toml").write_text((folder / "second.toml").read_text())
-    run = subprocess.run(command("second.toml", link, "--exit-on-arrival"), cwd=tmp_path, capture_output=True,
-                         text=True, check=False, stdin=subprocess.DEVNULL, timeout=PATIENCE_S)
+    run = subprocess.run(
+        command("second.toml", link, "--exit-on-arrival"),
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        stdin=subprocess.DEVNULL,
+        timeout=PATIENCE_S,
+    )
     assert run.returncode == 0, run.stdout + run.stderr
     *_, end, where = run.stdout.splitlines()
     assert re.match(r"arrived; [1-9]\d* s under way, ", end)

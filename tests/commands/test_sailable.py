@@ -17,23 +17,38 @@ MISSIONS = Path(__file__).parents[2] / "missions"
 SCENARIOS = sorted((Path(sitl_run.__file__).parents[1] / "scenarios").glob("*.toml"))
 GOOD = (MISSIONS / "archipelago.toml").read_text()
 BAD = [
-    ("estimator", '[wind]\nestimator = "kalmann"\n',
-     "[wind] estimator: 'kalmann' is no wind estimator; did you mean 'kalman'?"),
-    ("choice", '[skipper]\nguidance = "fields"\n',
-     """[skipper] guidance: 'fields' is none of the choices; write "plan" or "heading" or "field\""""),
+    (
+        "estimator",
+        '[wind]\nestimator = "kalmann"\n',
+        "[wind] estimator: 'kalmann' is no wind estimator; did you mean 'kalman'?",
+    ),
+    (
+        "choice",
+        '[skipper]\nguidance = "fields"\n',
+        """[skipper] guidance: 'fields' is none of the choices; write "plan" or "heading" or "field\"""",
+    ),
     ("feed", '[traffic]\nfeeds = ["upd:1234"]\n', "[traffic] feeds: 'upd:1234' is not a feed; write udpin:HOST:PORT"),
     ("floor", "margin_floor_m = 20.0", "[area] margin_floor_m: 20 m is more than margin_m"),
     ("field", '[skipper]\nguidance = "field"\n', '[skipper] guidance: "field" steers in GUIDED, which nobody allows'),
     ("heading", '[skipper]\nguidance = "heading"\n', "write guided = true in [operator]"),
     ("replan", "[skipper]\nmin_replan_s = 60.0\nmax_replan_s = 30.0\n", "[skipper] max_replan_s: 30 s is less than"),
-    ("numbers", '[skipper]\nplanner = "astar"\n[planner]\nrewiring = false\n',
-     "[planner] rewiring: is a number of 'rrtstar', and this mission plans by 'astar'"),
+    (
+        "numbers",
+        '[skipper]\nplanner = "astar"\n[planner]\nrewiring = false\n',
+        "[planner] rewiring: is a number of 'rrtstar', and this mission plans by 'astar'",
+    ),
     ("numbers of none", "[planner]\ngrid_m = 5.0\n", "[planner] grid_m: is a number of 'astar'"),
     ("effort", "[planner]\nexpansions = 5\n", "[planner] expansions: is for"),
-    ("tunnel", '[skipper]\nplanner = "astar"\n[planner]\ntunnel = "abrupt"\n',
-     "[planner] tunnel: a tunnel has a width"),
-    ("projection", '[planner]\nprojection = "flat"\n',
-     "[planner] projection: is a number of 'astar', and this mission plans by 'auto'"),
+    (
+        "tunnel",
+        '[skipper]\nplanner = "astar"\n[planner]\ntunnel = "abrupt"\n',
+        "[planner] tunnel: a tunnel has a width",
+    ),
+    (
+        "projection",
+        '[planner]\nprojection = "flat"\n',
+        "[planner] projection: is a number of 'astar', and this mission plans by 'auto'",
+    ),
     ("filter", "[wind]\nkalman_window = 50\n", "[wind] kalman_window: is for the estimator"),
     ("polar", '[boat]\npolar = "ardurovr"\n', "[boat] polar: there is no polar 'ardurovr'"),
 ]
@@ -59,9 +74,12 @@ def test_check_and_run_refuse_the_same_in_the_same_words(tmp_path, capsys, what,
     said = []
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
-        link = f"udpin:127.0.0.1:{free.getsockname()[1]}"   # nothing is opened before the mission is believed
-        for argv in (["mission", "check", str(path)], ["run", str(path), "--link", link, "--wait", "0.1"],
-                     ["doctor", "--mission", str(path), "--link", link]):
+        link = f"udpin:127.0.0.1:{free.getsockname()[1]}"  # nothing is opened before the mission is believed
+        for argv in (
+            ["mission", "check", str(path)],
+            ["run", str(path), "--link", link, "--wait", "0.1"],
+            ["doctor", "--mission", str(path), "--link", link],
+        ):
             assert cli.main(argv) == 2, argv
             error = capsys.readouterr().err
             assert error.count("\n") == 1

@@ -26,8 +26,25 @@ HERE = ["--start", "50.817,-1.31", "--goal", "50.8188,-1.3085"]
 def boat():
     port = free_port()
     with subprocess.Popen(
-            [sys.executable, "-m", "sitl.cli", "boat", "--port", str(port), "--udp", "0", "--warm", "--moored",
-             "--sysid", "7", "--home", "50.817,-1.31"], stdout=subprocess.PIPE, text=True) as process:
+        [
+            sys.executable,
+            "-m",
+            "sitl.cli",
+            "boat",
+            "--port",
+            str(port),
+            "--udp",
+            "0",
+            "--warm",
+            "--moored",
+            "--sysid",
+            "7",
+            "--home",
+            "50.817,-1.31",
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
         assert "sitl boat" in process.stdout.readline()
         yield port
         process.terminate()
@@ -62,16 +79,17 @@ def serial(boat):
 
 
 def test_it_finds_the_autopilot_writes_a_mission_that_can_be_sailed_and_runs_the_doctor(
-        serial, tmp_path, monkeypatch, capfd):
+    serial, tmp_path, monkeypatch, capfd
+):
     monkeypatch.setattr(setup, "serial_ports", lambda: [setup.Port(path=serial)])
     code = cli.main(["setup", "lake", "--yes", "--dir", str(tmp_path), *HERE])
     out, err = capfd.readouterr()
-    assert code == 0, out + err   # the doctor's: the simulated boat is set up as it asks
+    assert code == 0, out + err  # the doctor's: the simulated boat is set up as it asks
     assert f"the autopilot of system 7 is on {serial}:921600" in out
     assert "0 errors, 0 warnings; nothing was changed" in out
-    assert "margin" not in out   # the doctor praises what it writes
+    assert "margin" not in out  # the doctor praises what it writes
     assert sorted(p.name for p in tmp_path.iterdir()) == ["lake.env", "lake.toml"]
-    assert "\n[[goal]]\nlat = " in (tmp_path / "lake.toml").read_text()   # and so is the next one, written by hand
+    assert "\n[[goal]]\nlat = " in (tmp_path / "lake.toml").read_text()  # and so is the next one, written by hand
     assert f"LINK={serial}:921600\n" in (tmp_path / "lake.env").read_text()
     mission = load_mission(tmp_path / "lake.toml")
     assert (mission.autopilot.system, mission.operator.arm, mission.operator.set_auto) == (7, False, False)
@@ -80,18 +98,37 @@ def test_it_finds_the_autopilot_writes_a_mission_that_can_be_sailed_and_runs_the
 
 
 def test_a_drawn_mission_is_run_as_one(tmp_path, capfd):
-    assert cli.main(["setup", "pond", "--yes", "--drawn", "--no-go", "50", "--link", "udpin:127.0.0.1:14598",
-                     "--no-doctor", "--dir", str(tmp_path)]) == 0
+    assert (
+        cli.main(
+            [
+                "setup",
+                "pond",
+                "--yes",
+                "--drawn",
+                "--no-go",
+                "50",
+                "--link",
+                "udpin:127.0.0.1:14598",
+                "--no-doctor",
+                "--dir",
+                str(tmp_path),
+            ]
+        )
+        == 0
+    )
     written = tomllib.loads((tmp_path / "pond.toml").read_text())
     assert (written["from_autopilot"], written["boat"]["no_go_half_deg"]) == (True, 50)
     assert "systemctl enable --now companion@pond" in capfd.readouterr().out
 
 
-@pytest.mark.parametrize(("words", "said"), [
-    (["Lake", "--yes"], "is no name of an instance"),
-    (["lake", "--yes", "--dir", "/nowhere/at/all"], "/nowhere/at/all: no such folder; make it, or name another"),
-    (["lake", "--yes", "--link", "udpin:1", "--no-doctor", *HERE], "udpin:1"),
-])
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["Lake", "--yes"], "is no name of an instance"),
+        (["lake", "--yes", "--dir", "/nowhere/at/all"], "/nowhere/at/all: no such folder; make it, or name another"),
+        (["lake", "--yes", "--link", "udpin:1", "--no-doctor", *HERE], "udpin:1"),
+    ],
+)
 def test_bad_words_are_one_line_and_write_nothing(words, said, tmp_path, capfd):
     where = [] if "--dir" in words else ["--dir", str(tmp_path)]
     assert cli.main(["setup", *words, *where]) == 2
@@ -104,8 +141,12 @@ def test_bad_words_are_one_line_and_write_nothing(words, said, tmp_path, capfd):
 def test_a_full_card_is_one_line_with_what_makes_room(tmp_path, monkeypatch, capfd):
     here = os.statvfs(tmp_path)
     monkeypatch.setattr(os, "statvfs", lambda _: os.statvfs_result((*here[:3], 0, 0, *here[5:10])))
-    assert cli.main(["setup", "lake", "--yes", "--dir", str(tmp_path), "--link", "udpin:127.0.0.1:1", "--no-doctor",
-                     *HERE]) == 1
+    assert (
+        cli.main(
+            ["setup", "lake", "--yes", "--dir", str(tmp_path), "--link", "udpin:127.0.0.1:1", "--no-doctor", *HERE]
+        )
+        == 1
+    )
     err = capfd.readouterr().err
     assert "the card is full (0.0 MB left); make room: sudo apt clean" in err
     assert err.count("\n") == 1
@@ -133,11 +174,12 @@ def test_no_port_a_busy_one_and_one_without_permission(tmp_path, monkeypatch, se
     assert "there is no serial port here; wire the autopilot" in refusal(setup.serial_ports(tmp_path))
     (tmp_path / "ttyACM0").symlink_to(serial)
     (tmp_path / "autopilot").symlink_to("ttyACM0")
-    assert [p.path.name for p in setup.serial_ports(tmp_path)] == ["autopilot"]   # one port, its best name
-    monkeypatch.setattr(os, "access", lambda *_: False)   # root may everything
+    assert [p.path.name for p in setup.serial_ports(tmp_path)] == ["autopilot"]  # one port, its best name
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may everything
     group = grp.getgrgid(serial.stat().st_gid).gr_name
     assert f"belongs to the group {group}, and you are not in it; sudo adduser $USER {group}" in refusal(
-        setup.serial_ports(tmp_path))
+        setup.serial_ports(tmp_path)
+    )
 
 
 def test_a_busy_port_says_who_to_end(serial):

@@ -22,8 +22,9 @@ STATUS = CompanionStatus(t_s=1.0, state="standard", tws_mps=5.0, twd_from_rad=0.
 @pytest.fixture
 def air(monkeypatch):
     """Return a port on which an autopilot's heartbeats and a companion's status are heard."""
-    monkeypatch.setattr(vehicle_identity, "LISTEN_S",
-                        0.3)   # the autopilot's heartbeat before that counts it, and no more
+    monkeypatch.setattr(
+        vehicle_identity, "LISTEN_S", 0.3
+    )  # the autopilot's heartbeat before that counts it, and no more
     port, stop = free_port(), threading.Event()
     threads = []
 
@@ -36,9 +37,10 @@ def air(monkeypatch):
                     if sent < len(beats) and time.monotonic() - began >= beats[sent]:
                         sent += 1
                         beat = wire.MAVLink_heartbeat_message(
-                            wire.MAV_TYPE_SURFACE_BOAT, wire.MAV_AUTOPILOT_ARDUPILOTMEGA, DISARMED, MANUAL, STANDBY, 3)
+                            wire.MAV_TYPE_SURFACE_BOAT, wire.MAV_AUTOPILOT_ARDUPILOTMEGA, DISARMED, MANUAL, STANDBY, 3
+                        )
                         udp.sendto(autopilot.pack(beat), ("127.0.0.1", port))
-                    for message in status_messages(STATUS, 1.0, 3):   # the packed one, and the wind
+                    for message in status_messages(STATUS, 1.0, 3):  # the packed one, and the wind
                         if kinds is None or message.get_type() in kinds:
                             udp.sendto(companion.pack(message), ("127.0.0.1", port))
 

@@ -19,14 +19,22 @@ BEAT_RAD = math.radians(50.0)
 
 def forecast(from_rad, tws, sigma_rad=0.1):
     return WindForecast(
-        t_s=0.0, horizon_s=np.array([0.0, 60.0]), mean_twd_from_rad=np.full(2, from_rad),
-        sigma_twd_rad=np.full(2, sigma_rad), mean_tws_mps=np.full(2, tws), sigma_tws_mps=np.full(2, 0.3),
-        level=np.array([0.8]), half_width_rad=np.full((2, 1), 1.28 * sigma_rad), correlation_time_s=30.0)
+        t_s=0.0,
+        horizon_s=np.array([0.0, 60.0]),
+        mean_twd_from_rad=np.full(2, from_rad),
+        sigma_twd_rad=np.full(2, sigma_rad),
+        mean_tws_mps=np.full(2, tws),
+        sigma_tws_mps=np.full(2, 0.3),
+        level=np.array([0.8]),
+        half_width_rad=np.full((2, 1), 1.28 * sigma_rad),
+        correlation_time_s=30.0,
+    )
 
 
 def doubt(sigmas, believed=(0.0,) * 6, *, is_planned=False):
-    return WindAngleUncertainty(believed=believed, covariance=tuple(map(tuple, np.diag(np.square(sigmas)).tolist())),
-                 is_planned=is_planned)
+    return WindAngleUncertainty(
+        believed=believed, covariance=tuple(map(tuple, np.diag(np.square(sigmas)).tolist())), is_planned=is_planned
+    )
 
 
 def angle_rad(from_rad, tws, speed, side, x):
@@ -34,9 +42,13 @@ def angle_rad(from_rad, tws, speed, side, x):
     course = from_rad - side * BEAT_RAD
     unit = np.array([math.sin(course), math.cos(course)])
     felt = tws * np.array([math.sin(from_rad), math.cos(from_rad)]) + speed * unit
-    turned = -(x[5] - x[4])      # clockwise
-    felt = np.array([math.cos(turned) * felt[0] + math.sin(turned) * felt[1],
-                     math.cos(turned) * felt[1] - math.sin(turned) * felt[0]])
+    turned = -(x[5] - x[4])  # clockwise
+    felt = np.array(
+        [
+            math.cos(turned) * felt[0] + math.sin(turned) * felt[1],
+            math.cos(turned) * felt[1] - math.sin(turned) * felt[0],
+        ]
+    )
     over_water = felt - speed * unit + x[:2]
     abeam = x[0] * math.cos(course) - x[1] * math.sin(course)
     bow = course - math.asin(abeam / speed) + side * x[3]
@@ -69,10 +81,13 @@ def test_what_is_believed_and_not_planned_for_is_spread_too():
 
     def widened(believed, **also):
         leeway_rad = also.pop("leeway_rad", 0.0)
-        return float(doubt(exact, believed, **also).widened(
-            forecast(0.0, 5.0, 1e-6), beat_rad=BEAT_RAD, speed_mps=2.0, leeway_rad=leeway_rad).sigma_twd_rad[0])
+        return float(
+            doubt(exact, believed, **also)
+            .widened(forecast(0.0, 5.0, 1e-6), beat_rad=BEAT_RAD, speed_mps=2.0, leeway_rad=leeway_rad)
+            .sigma_twd_rad[0]
+        )
 
-    assert widened((0.0, 0.0, 0.0, 0.0, 0.0, 0.1)) > 0.1                     # longer by her own speed
+    assert widened((0.0, 0.0, 0.0, 0.0, 0.0, 0.1)) > 0.1  # longer by her own speed
     assert widened((0.0, 0.0, 0.0, 0.0, 0.1, 0.1)) == pytest.approx(0.0, abs=1e-5), "vane and compass cancel"
     assert widened((0.0, 0.0, 0.3, 0.0, 0.0, 0.0)) == pytest.approx(0.0, abs=1e-5), "her speed turns nothing"
     assert widened((0.0, 0.0, 0.0, 0.08, 0.0, 0.0), leeway_rad=0.08) == pytest.approx(0.0, abs=1e-5)

@@ -25,9 +25,7 @@ def turned_vane(now, by_rad):
     return replace(now, twd_from_rad=math.atan2(from_e, from_n), tws_mps=math.hypot(from_e, from_n))
 
 
-def reading(
-    t_s, heading_deg, current, *, scale=1.0, leeway_deg=0.0, vane_deg=0.0, noise=0.0, rng=None, is_driven=True,
-):
+def reading(t_s, heading_deg, current, *, scale=1.0, leeway_deg=0.0, vane_deg=0.0, noise=0.0, rng=None, is_driven=True):
     """Return what a boat of this polar tells on a heading."""
     heading = math.radians(heading_deg)
     from_rad, tws = over_water(TWD, TWS, current)
@@ -36,9 +34,13 @@ def reading(
     course = heading - math.copysign(math.radians(leeway_deg), twa)
     jolt = (rng.gauss(0.0, noise), rng.gauss(0.0, noise)) if rng else (0.0, 0.0)
     now = Sailing(
-        t_s=t_s, velocity_en_mps=(v * math.sin(course) + current[0] + jolt[0],
-                                  v * math.cos(course) + current[1] + jolt[1]),
-        heading_rad=heading, twd_from_rad=TWD, tws_mps=TWS, is_driven=is_driven)
+        t_s=t_s,
+        velocity_en_mps=(v * math.sin(course) + current[0] + jolt[0], v * math.cos(course) + current[1] + jolt[1]),
+        heading_rad=heading,
+        twd_from_rad=TWD,
+        tws_mps=TWS,
+        is_driven=is_driven,
+    )
     return turned_vane(now, math.radians(vane_deg)) if vane_deg else now
 
 
@@ -83,8 +85,9 @@ def test_the_stated_spread_holds_what_it_should(scale, leeway_deg, set_rad, seed
     for heading_deg in (48.0, -48.0, 48.0):
         for _ in range(80):
             t_s += 1.0
-            estimator.update(t_s, None, reading(
-                t_s, heading_deg, current, scale=scale, leeway_deg=leeway_deg, noise=0.08, rng=rng))
+            estimator.update(
+                t_s, None, reading(t_s, heading_deg, current, scale=scale, leeway_deg=leeway_deg, noise=0.08, rng=rng)
+            )
     found = estimator.view()
     assert math.dist(found.en_mps, current) < 3.0 * found.sigma_mps
 
@@ -106,9 +109,18 @@ def test_turns_stops_and_sails_that_are_eased_teach_nothing():
     assert estimator.view().samples_s == 0.0
     aground = reading(0.0, 60.0, (0.0, 0.0))
     for t in range(240, 400):
-        estimator.update(float(t), None, Sailing(
-            t_s=float(t), velocity_en_mps=(0.01, 0.0), heading_rad=aground.heading_rad,
-            twd_from_rad=TWD, tws_mps=TWS, is_driven=True))
+        estimator.update(
+            float(t),
+            None,
+            Sailing(
+                t_s=float(t),
+                velocity_en_mps=(0.01, 0.0),
+                heading_rad=aground.heading_rad,
+                twd_from_rad=TWD,
+                tws_mps=TWS,
+                is_driven=True,
+            ),
+        )
     assert estimator.view().samples_s == 0.0, "a boat that stands is not carried by its own speed backwards"
 
 

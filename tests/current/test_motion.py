@@ -12,7 +12,7 @@ from companion.current import CurrentEstimator, MotionCheck, MotionSample, Saili
 from tests.current.test_estimator import reading, turned_vane
 
 POLAR = ardurover_sitl()
-FIRST_S = 60.0      # she has sailed so long before anything happens
+FIRST_S = 60.0  # she has sailed so long before anything happens
 
 
 def sails(moments, estimator=None):
@@ -26,16 +26,23 @@ def boat(t_s, heading_deg, along_mps, *, twd_deg=0.0, tws_mps=5.0, vane_deg=0.0,
     """Return a moment of a boat that makes ``along_mps`` through the water, whatever her polar says."""
     heading = math.radians(heading_deg)
     now = Sailing(
-        t_s=t_s, velocity_en_mps=(
-            along_mps * math.sin(heading) + current[0], along_mps * math.cos(heading) + current[1]),
-        heading_rad=heading, twd_from_rad=math.radians(twd_deg), tws_mps=tws_mps, is_driven=True, roll_rad=roll_rad)
+        t_s=t_s,
+        velocity_en_mps=(along_mps * math.sin(heading) + current[0], along_mps * math.cos(heading) + current[1]),
+        heading_rad=heading,
+        twd_from_rad=math.radians(twd_deg),
+        tws_mps=tws_mps,
+        is_driven=True,
+        roll_rad=roll_rad,
+    )
     return turned_vane(now, math.radians(vane_deg)) if vane_deg else now
 
 
 def beats(for_s, first_s=0.0, current=(0.0, 0.0), leg_s=60, noise=0.05, headings=(50.0, -50.0)):
     rng = random.Random(3)
-    return [reading(first_s + t, headings[(t // leg_s) % len(headings)], current, noise=noise, rng=rng)
-            for t in range(1, int(for_s) + 1)]
+    return [
+        reading(first_s + t, headings[(t // leg_s) % len(headings)], current, noise=noise, rng=rng)
+        for t in range(1, int(for_s) + 1)
+    ]
 
 
 def astern(for_s, vane_deg, *, first_s=FIRST_S, heading_deg=20.0):
@@ -87,8 +94,9 @@ def test_a_wind_that_seems_to_fit_on_one_heading_is_not_believed_for_that():
 
 def test_a_front_by_which_she_sails_is_no_turned_vane():
     after = [replace(now, t_s=FIRST_S + now.t_s) for now in beats(200.0, headings=(160.0, 60.0))]
-    turned = [boat(now.t_s, math.degrees(now.heading_rad), math.hypot(*now.velocity_en_mps), twd_deg=110.0)
-              for now in after]
+    turned = [
+        boat(now.t_s, math.degrees(now.heading_rad), math.hypot(*now.velocity_en_mps), twd_deg=110.0) for now in after
+    ]
     estimator, when = sails([*beats(FIRST_S), *turned])
     assert not when
     assert not estimator.motion_doubt
@@ -121,8 +129,12 @@ def test_a_loiter_that_is_not_sailed_as_the_wind_says_ends_no_doubt():
 
 
 def test_a_loiter_of_which_a_third_is_not_sailed_as_the_wind_says_ends_no_doubt():
-    moments = [replace(now, velocity_en_mps=(0.2 * now.velocity_en_mps[0], 0.2 * now.velocity_en_mps[1]))
-               if n // 6 % 3 == 0 else now for n, now in enumerate(loiters(900.0, 150.0))]
+    moments = [
+        replace(now, velocity_en_mps=(0.2 * now.velocity_en_mps[0], 0.2 * now.velocity_en_mps[1]))
+        if n // 6 % 3 == 0
+        else now
+        for n, now in enumerate(loiters(900.0, 150.0))
+    ]
     estimator, when = sails([*beats(FIRST_S), *moments])
     assert len(when) == 1
     assert estimator.doubts_wind
@@ -147,8 +159,10 @@ def test_a_current_that_only_lies_along_her_heading_is_doubted_until_other_headi
         heading = math.radians(heading_deg)
         from_rad, tws_mps = over_water(0.0, 5.0, current)
         twa = math.remainder(from_rad - heading, 2.0 * math.pi)
-        moments += [boat(foul[-1].t_s + 40.0 * n + t, heading_deg, POLAR.speed_mps(twa, tws_mps), current=current)
-                    for t in range(1, 41)]
+        moments += [
+            boat(foul[-1].t_s + 40.0 * n + t, heading_deg, POLAR.speed_mps(twa, tws_mps), current=current)
+            for t in range(1, 41)
+        ]
     sails(moments, estimator)
     assert not estimator.motion_doubt
     assert math.dist(estimator.view().en_mps, current) < 0.3
@@ -168,8 +182,10 @@ def test_new_water_is_believed_from_headings_that_alone_do_not_last():
 def test_a_compass_that_errs_is_no_turned_vane(off_deg):
     """It turns the wind's direction, and her track off her bow: she makes her speed, elsewhere."""
     good = beats(200.0, first_s=FIRST_S)
-    wrong = [replace(now, heading_rad=now.heading_rad + math.radians(off_deg), twd_from_rad=math.radians(off_deg))
-             for now in good]
+    wrong = [
+        replace(now, heading_rad=now.heading_rad + math.radians(off_deg), twd_from_rad=math.radians(off_deg))
+        for now in good
+    ]
     estimator, when = sails([*beats(FIRST_S), *wrong])
     assert not when
     assert not estimator.doubts_wind
@@ -187,17 +203,41 @@ def test_heel_to_windward_tells_of_a_vane_whose_speed_does_not():
     assert heeled.doubts_wind
 
 
-@pytest.mark.parametrize("now", [
-    MotionSample(along_mps=0.05, across_mps=0.0, speed_mps=2.2, twa_rad=1.2, twd_from_rad=0.0, tws_mps=5.0,
-                 heading_rad=-1.2,
-           sigma_mps=0.2),                                                    # aground, moored
-    MotionSample(along_mps=-0.4, across_mps=0.0, speed_mps=1.2, twa_rad=0.5, twd_from_rad=0.0, tws_mps=5.0,
-                 heading_rad=-0.5,
-           sigma_mps=0.2),                                                    # in irons
-    MotionSample(along_mps=-0.4, across_mps=0.0, speed_mps=2.2, twa_rad=1.2, twd_from_rad=0.0, tws_mps=1.0,
-                 heading_rad=-1.2,
-           sigma_mps=0.2),                                                    # hardly any wind
-])
+@pytest.mark.parametrize(
+    "now",
+    [
+        MotionSample(
+            along_mps=0.05,
+            across_mps=0.0,
+            speed_mps=2.2,
+            twa_rad=1.2,
+            twd_from_rad=0.0,
+            tws_mps=5.0,
+            heading_rad=-1.2,
+            sigma_mps=0.2,
+        ),  # aground, moored
+        MotionSample(
+            along_mps=-0.4,
+            across_mps=0.0,
+            speed_mps=1.2,
+            twa_rad=0.5,
+            twd_from_rad=0.0,
+            tws_mps=5.0,
+            heading_rad=-0.5,
+            sigma_mps=0.2,
+        ),  # in irons
+        MotionSample(
+            along_mps=-0.4,
+            across_mps=0.0,
+            speed_mps=2.2,
+            twa_rad=1.2,
+            twd_from_rad=0.0,
+            tws_mps=1.0,
+            heading_rad=-1.2,
+            sigma_mps=0.2,
+        ),  # hardly any wind
+    ],
+)
 def test_who_stands_still_or_lies_in_irons_tells_nothing(now):
     check = MotionCheck()
     for t in range(200):

@@ -34,15 +34,27 @@ def test_without_a_current_it_is_the_same_number():
 def forecast(from_rad, tws, sigma_rad, sigma_mps):
     n = 3
     return WindForecast(
-        t_s=0.0, horizon_s=np.array([0.0, 60.0, 600.0]), mean_twd_from_rad=np.full(n, from_rad),
-        sigma_twd_rad=np.full(n, sigma_rad), mean_tws_mps=np.full(n, tws), sigma_tws_mps=np.full(n, sigma_mps),
-        level=np.array([0.8]), half_width_rad=np.full((n, 1), 1.28 * sigma_rad), correlation_time_s=30.0)
+        t_s=0.0,
+        horizon_s=np.array([0.0, 60.0, 600.0]),
+        mean_twd_from_rad=np.full(n, from_rad),
+        sigma_twd_rad=np.full(n, sigma_rad),
+        mean_tws_mps=np.full(n, tws),
+        sigma_tws_mps=np.full(n, sigma_mps),
+        level=np.array([0.8]),
+        half_width_rad=np.full((n, 1), 1.28 * sigma_rad),
+        correlation_time_s=30.0,
+    )
 
 
 @given(ANGLES, st.floats(3.0, 12.0), ANGLES, st.floats(0.0, 0.8), st.floats(0.0, 0.2))
 def test_the_spread_over_water_is_that_of_drawn_winds(from_rad, tws, set_rad, drift, doubt):
-    current = WaterCurrent(east_mps=drift * math.sin(set_rad), north_mps=drift * math.cos(set_rad), var_ee=doubt**2,
-                           var_nn=doubt**2, is_significant=True)
+    current = WaterCurrent(
+        east_mps=drift * math.sin(set_rad),
+        north_mps=drift * math.cos(set_rad),
+        var_ee=doubt**2,
+        var_nn=doubt**2,
+        is_significant=True,
+    )
     made = forecast_over_water(forecast(from_rad, tws, 0.1, 0.4), current)
     rng = np.random.default_rng(3)
     drawn, blown = from_rad + 0.1 * rng.standard_normal(4000), tws + 0.4 * rng.standard_normal(4000)

@@ -48,17 +48,20 @@ def test_behind_its_end_and_before_its_begin_a_table_is_widened_and_never_silent
     assert prior.at(None).sigma_mps == pytest.approx(0.6)
 
 
-@pytest.mark.parametrize(("current", "tide", "words"), [
-    ('table = "tide.csv"', "2026-11-21T12:00:00, 90, 0.6\n2026-11-21T13:00:00Z, 90, 0.2\n", "line 1"),
-    ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90\n2026-11-21T13:00:00Z, 90, 0.2\n", "line 1"),
-    ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90, 0.6\n2026-11-21T11:00:00Z, 90, 0.2\n", "line 2"),
-    ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90, 60\n2026-11-21T13:00:00Z, 90, 0.2\n", "cannot be"),
-    ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90, nan\n2026-11-21T13:00:00Z, 90, 0.2\n", "cannot be"),
-    ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90, 0.6\n", "fewer than two rows"),
-    ('table = "tide.csv"\nset_deg = 90.0\ndrift_mps = 0.3', TIDE, "exclude one another"),
-    ("set_deg = 90.0", TIDE, "not both there"),
-    ("drift_mps = 0.3", TIDE, "not both there"),
-])
+@pytest.mark.parametrize(
+    ("current", "tide", "words"),
+    [
+        ('table = "tide.csv"', "2026-11-21T12:00:00, 90, 0.6\n2026-11-21T13:00:00Z, 90, 0.2\n", "line 1"),
+        ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90\n2026-11-21T13:00:00Z, 90, 0.2\n", "line 1"),
+        ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90, 0.6\n2026-11-21T11:00:00Z, 90, 0.2\n", "line 2"),
+        ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90, 60\n2026-11-21T13:00:00Z, 90, 0.2\n", "cannot be"),
+        ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90, nan\n2026-11-21T13:00:00Z, 90, 0.2\n", "cannot be"),
+        ('table = "tide.csv"', "2026-11-21T12:00:00Z, 90, 0.6\n", "fewer than two rows"),
+        ('table = "tide.csv"\nset_deg = 90.0\ndrift_mps = 0.3', TIDE, "exclude one another"),
+        ("set_deg = 90.0", TIDE, "not both there"),
+        ("drift_mps = 0.3", TIDE, "not both there"),
+    ],
+)
 def test_what_is_wrong_is_one_line_with_its_place(tmp_path, current, tide, words):
     with pytest.raises(InputError, match=words):
         water_of(mission(tmp_path, current, tide))

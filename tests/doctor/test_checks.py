@@ -24,12 +24,36 @@ from tests.sitl.boats import boat_process
 
 # ArduRover's sailboat as `sim_vehicle.py -f sailboat` starts it.
 DEFAULTS = {
-    "FRAME_CLASS": 2.0, "SAIL_ENABLE": 1.0, "SAIL_NO_GO_ANGLE": 45.0, "SAIL_XTRACK_MAX": 10.0, "SAIL_LOIT_RADIUS": 5.0,
-    "LOIT_TYPE": 1.0, "WNDVN_TYPE": 4.0, "WNDVN_SPEED_TYPE": 4.0, "WNDVN_SPEED_MIN": 0.0, "WNDVN_TRUE_FILT": 0.05,
-    "WP_RADIUS": 3.0, "TURN_RADIUS": 0.9, "AVOID_ENABLE": 3.0, "OA_TYPE": 0.0, "MIS_RESTART": 0.0,
-    "MIS_DONE_BEHAVE": 1.0, "FENCE_ENABLE": 0.0, "FENCE_TYPE": 6.0, "FENCE_RADIUS": 300.0, "FENCE_ACTION": 1.0,
-    "FS_THR_ENABLE": 1.0, "FS_GCS_ENABLE": 0.0, "FS_ACTION": 2.0, "FS_EKF_ACTION": 1.0, "FS_CRASH_CHECK": 0.0,
-    "CRASH_ANGLE": 0.0, "BATT_MONITOR": 4.0, "BATT_FS_LOW_ACT": 0.0, "SYSID_THISMAV": 1.0, "SYSID_MYGCS": 255.0,
+    "FRAME_CLASS": 2.0,
+    "SAIL_ENABLE": 1.0,
+    "SAIL_NO_GO_ANGLE": 45.0,
+    "SAIL_XTRACK_MAX": 10.0,
+    "SAIL_LOIT_RADIUS": 5.0,
+    "LOIT_TYPE": 1.0,
+    "WNDVN_TYPE": 4.0,
+    "WNDVN_SPEED_TYPE": 4.0,
+    "WNDVN_SPEED_MIN": 0.0,
+    "WNDVN_TRUE_FILT": 0.05,
+    "WP_RADIUS": 3.0,
+    "TURN_RADIUS": 0.9,
+    "AVOID_ENABLE": 3.0,
+    "OA_TYPE": 0.0,
+    "MIS_RESTART": 0.0,
+    "MIS_DONE_BEHAVE": 1.0,
+    "FENCE_ENABLE": 0.0,
+    "FENCE_TYPE": 6.0,
+    "FENCE_RADIUS": 300.0,
+    "FENCE_ACTION": 1.0,
+    "FS_THR_ENABLE": 1.0,
+    "FS_GCS_ENABLE": 0.0,
+    "FS_ACTION": 2.0,
+    "FS_EKF_ACTION": 1.0,
+    "FS_CRASH_CHECK": 0.0,
+    "CRASH_ANGLE": 0.0,
+    "BATT_MONITOR": 4.0,
+    "BATT_FS_LOW_ACT": 0.0,
+    "SYSID_THISMAV": 1.0,
+    "SYSID_MYGCS": 255.0,
 }
 RATES = {"WIND": 2.0, "GLOBAL_POSITION_INT": 5.0, "ATTITUDE": 5.0, "MISSION_CURRENT": 1.0, "EKF_STATUS_REPORT": 1.0}
 GOOD = {**DEFAULTS, "AVOID_ENABLE": 0.0, "FS_THR_ENABLE": 2.0}
@@ -38,8 +62,17 @@ GOOD = {**DEFAULTS, "AVOID_ENABLE": 0.0, "FS_THR_ENABLE": 2.0}
 def seen(**changes):
     parameters = {**GOOD, **{k: v for k, v in changes.items() if k.isupper()}}
     rest = {k: v for k, v in changes.items() if not k.isupper()}
-    return Examined(**{"parameters": parameters, "version": (4, 6, 0), "mission": (), "fence": (), "rates_hz": RATES,
-                       "system_id": 1, **rest})
+    return Examined(
+        **{
+            "parameters": parameters,
+            "version": (4, 6, 0),
+            "mission": (),
+            "fence": (),
+            "rates_hz": RATES,
+            "system_id": 1,
+            **rest,
+        }
+    )
 
 
 def codes(findings, level):
@@ -52,65 +85,108 @@ def test_a_boat_that_is_set_up_has_nothing_in_its_way():
     assert codes(findings, Level.WARNING) == set()
 
 
-@pytest.mark.parametrize(("changes", "needs", "code", "level", "name", "wanted"), [
-    ({"SAIL_ENABLE": 0.0}, {}, "sail_enable", Level.ERROR, "SAIL_ENABLE", 1.0),
-    ({"FRAME_CLASS": 1.0}, {}, "frame_class", Level.ERROR, "FRAME_CLASS", 2.0),
-    ({"SAIL_ENABLE": 1.0}, {"sails": False}, "sail_enable", Level.ERROR, "SAIL_ENABLE", 0.0),
-    ({"FRAME_CLASS": 1.0, "SAIL_ENABLE": 0.0}, {"sails": False}, "frame_class", Level.ERROR, "FRAME_CLASS", 2.0),
-    ({"SAIL_NO_GO_ANGLE": 90.0}, {}, "impossible", Level.ERROR, "SAIL_NO_GO_ANGLE", None),
-    ({"WP_RADIUS": -1.0}, {}, "impossible", Level.ERROR, "WP_RADIUS", None),
-    ({"uid": ""}, {}, "board", Level.INFO, None, None),
-    ({"WNDVN_TYPE": 0.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", None),
-    ({"WNDVN_TYPE": 1.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", None),
-    ({"WNDVN_TYPE": 11.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", 10.0),
-    ({"WNDVN_SPEED_TYPE": 0.0}, {}, "wind speed", Level.WARNING, "WNDVN_SPEED_TYPE", None),
-    ({"WNDVN_TRUE_FILT": 0.01}, {}, "wind filter", Level.WARNING, "WNDVN_TRUE_FILT", 0.05),
-    ({"SAIL_XTRACK_MAX": 30.0}, {}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
-    ({"SAIL_XTRACK_MAX": 0.0}, {}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
-    ({"SAIL_XTRACK_MAX": 2.0}, {}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
-    ({}, {"margin_m": 12.0}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", 7.0),
-    ({}, {"margin_m": 10.0}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", None),
-    ({}, {"can_tack": False}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 0.0),
-    ({"SAIL_NO_GO_ANGLE": 35.0}, {}, "no-go", Level.WARNING, "SAIL_NO_GO_ANGLE", 45.0),
-    ({"SAIL_LOIT_RADIUS": 20.0}, {}, "loiter", Level.WARNING, "SAIL_LOIT_RADIUS", 6.0),
-    ({"WP_RADIUS": 15.0}, {"margin_m": 30.0}, "waypoint radius", Level.WARNING, "WP_RADIUS", 3.0),
-    ({"AVOID_ENABLE": 7.0}, {}, "avoidance", Level.WARNING, "AVOID_ENABLE", 0.0),
-    ({"OA_TYPE": 2.0}, {}, "two planners", Level.WARNING, "OA_TYPE", 0.0),
-    ({"MIS_RESTART": 1.0}, {}, "mis_restart", Level.WARNING, "MIS_RESTART", 0.0),
-    ({"FENCE_ENABLE": 1.0}, {"reach_m": 400.0, "margin_m": 40.0}, "home circle", Level.ERROR, "FENCE_TYPE", 4.0),
-    ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0}, {"margin_m": 40.0}, "empty fence", Level.WARNING, "FENCE_ENABLE", 0.0),
-    ({}, {"has_fence": True, "reach_m": 10.0}, "fence off", Level.WARNING, "FENCE_ENABLE", 1.0),
-    ({"FENCE_ENABLE": 1.0, "FENCE_ACTION": 0.0}, {"margin_m": 40.0}, "fence action", Level.WARNING, "FENCE_ACTION",
-     1.0),
-    ({"FS_THR_ENABLE": 1.0, "FS_ACTION": 1.0}, {}, "radio failsafe", Level.WARNING, "FS_THR_ENABLE", 2.0),
-    ({"FS_GCS_ENABLE": 1.0, "FS_ACTION": 6.0}, {}, "station failsafe", Level.WARNING, "FS_GCS_ENABLE", 2.0),
-    ({"FS_GCS_ENABLE": 2.0, "FS_THR_ENABLE": 1.0, "FS_ACTION": 1.0}, {}, "station failsafe", Level.WARNING,
-     "FS_THR_ENABLE", 2.0),
-    # HOLD is no failsafe for a sailboat, for a motor boat it is
-    ({"FS_THR_ENABLE": 1.0}, {}, "radio failsafe", Level.ERROR, "FS_THR_ENABLE", 2.0),
-    ({"FS_THR_ENABLE": 1.0}, {"sails": False}, "radio failsafe", Level.WARNING, "FS_THR_ENABLE", 2.0),
-    ({"FS_GCS_ENABLE": 1.0}, {}, "station failsafe", Level.ERROR, "FS_GCS_ENABLE", 2.0),
-    ({"FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0}, {"margin_m": 40.0}, "fence action", Level.ERROR, "FENCE_ACTION", 1.0),
-    ({"FENCE_ENABLE": 1.0, "FENCE_ACTION": 4.0}, {"margin_m": 40.0}, "fence action", Level.ERROR, "FENCE_ACTION", 1.0),
-    ({"FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0}, {"margin_m": 40.0, "sails": False}, "fence action", Level.INFO,
-     "FENCE_ACTION", None),
-    ({"BATT_FS_LOW_ACT": 2.0}, {}, "battery failsafe", Level.ERROR, "BATT_FS_LOW_ACT", 1.0),
-    ({"BATT_FS_CRT_ACT": 5.0}, {}, "battery failsafe", Level.ERROR, "BATT_FS_CRT_ACT", 1.0),
-    ({"FS_EKF_ACTION": 0.0}, {}, "EKF failsafe", Level.WARNING, "FS_EKF_ACTION", 1.0),
-    ({"FS_EKF_ACTION": 2.0}, {}, "EKF failsafe", Level.WARNING, "FS_EKF_ACTION", 1.0),
-    ({"CRASH_ANGLE": 30.0}, {}, "crash check", Level.WARNING, "CRASH_ANGLE", 0.0),
-    ({"SYSID_MYGCS": 1.0}, {}, "system id", Level.ERROR, "SYSID_MYGCS", 255.0),
-    ({"system_id": 2}, {}, "system id", Level.WARNING, "SYSID_THISMAV", None),
-    ({"version": (4, 0, 0)}, {}, "version", Level.WARNING, None, None),
-    ({"mission": None}, {}, "mission", Level.WARNING, None, None),
-    ({"mission": (MissionItem(command=16, lat_e7=1, lon_e7=1),)}, {}, "mission end", Level.WARNING, None, None),
-    ({"fence": (MissionItem(command=5001),) * 90}, {}, "fence size", Level.ERROR, None, None),
-    ({"rates_hz": {**RATES, "WIND": 0.0}}, {}, "streams", Level.ERROR, None, None),
-    ({"rates_hz": {**RATES, "ATTITUDE": 0.3}}, {}, "streams", Level.WARNING, None, None),
-])
+@pytest.mark.parametrize(
+    ("changes", "needs", "code", "level", "name", "wanted"),
+    [
+        ({"SAIL_ENABLE": 0.0}, {}, "sail_enable", Level.ERROR, "SAIL_ENABLE", 1.0),
+        ({"FRAME_CLASS": 1.0}, {}, "frame_class", Level.ERROR, "FRAME_CLASS", 2.0),
+        ({"SAIL_ENABLE": 1.0}, {"sails": False}, "sail_enable", Level.ERROR, "SAIL_ENABLE", 0.0),
+        ({"FRAME_CLASS": 1.0, "SAIL_ENABLE": 0.0}, {"sails": False}, "frame_class", Level.ERROR, "FRAME_CLASS", 2.0),
+        ({"SAIL_NO_GO_ANGLE": 90.0}, {}, "impossible", Level.ERROR, "SAIL_NO_GO_ANGLE", None),
+        ({"WP_RADIUS": -1.0}, {}, "impossible", Level.ERROR, "WP_RADIUS", None),
+        ({"uid": ""}, {}, "board", Level.INFO, None, None),
+        ({"WNDVN_TYPE": 0.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", None),
+        ({"WNDVN_TYPE": 1.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", None),
+        ({"WNDVN_TYPE": 11.0}, {}, "vane", Level.ERROR, "WNDVN_TYPE", 10.0),
+        ({"WNDVN_SPEED_TYPE": 0.0}, {}, "wind speed", Level.WARNING, "WNDVN_SPEED_TYPE", None),
+        ({"WNDVN_TRUE_FILT": 0.01}, {}, "wind filter", Level.WARNING, "WNDVN_TRUE_FILT", 0.05),
+        ({"SAIL_XTRACK_MAX": 30.0}, {}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
+        ({"SAIL_XTRACK_MAX": 0.0}, {}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
+        ({"SAIL_XTRACK_MAX": 2.0}, {}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 10.0),
+        ({}, {"margin_m": 12.0}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", 7.0),
+        ({}, {"margin_m": 10.0}, "margin", Level.WARNING, "SAIL_XTRACK_MAX", None),
+        ({}, {"can_tack": False}, "corridor", Level.WARNING, "SAIL_XTRACK_MAX", 0.0),
+        ({"SAIL_NO_GO_ANGLE": 35.0}, {}, "no-go", Level.WARNING, "SAIL_NO_GO_ANGLE", 45.0),
+        ({"SAIL_LOIT_RADIUS": 20.0}, {}, "loiter", Level.WARNING, "SAIL_LOIT_RADIUS", 6.0),
+        ({"WP_RADIUS": 15.0}, {"margin_m": 30.0}, "waypoint radius", Level.WARNING, "WP_RADIUS", 3.0),
+        ({"AVOID_ENABLE": 7.0}, {}, "avoidance", Level.WARNING, "AVOID_ENABLE", 0.0),
+        ({"OA_TYPE": 2.0}, {}, "two planners", Level.WARNING, "OA_TYPE", 0.0),
+        ({"MIS_RESTART": 1.0}, {}, "mis_restart", Level.WARNING, "MIS_RESTART", 0.0),
+        ({"FENCE_ENABLE": 1.0}, {"reach_m": 400.0, "margin_m": 40.0}, "home circle", Level.ERROR, "FENCE_TYPE", 4.0),
+        (
+            {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0},
+            {"margin_m": 40.0},
+            "empty fence",
+            Level.WARNING,
+            "FENCE_ENABLE",
+            0.0,
+        ),
+        ({}, {"has_fence": True, "reach_m": 10.0}, "fence off", Level.WARNING, "FENCE_ENABLE", 1.0),
+        (
+            {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 0.0},
+            {"margin_m": 40.0},
+            "fence action",
+            Level.WARNING,
+            "FENCE_ACTION",
+            1.0,
+        ),
+        ({"FS_THR_ENABLE": 1.0, "FS_ACTION": 1.0}, {}, "radio failsafe", Level.WARNING, "FS_THR_ENABLE", 2.0),
+        ({"FS_GCS_ENABLE": 1.0, "FS_ACTION": 6.0}, {}, "station failsafe", Level.WARNING, "FS_GCS_ENABLE", 2.0),
+        (
+            {"FS_GCS_ENABLE": 2.0, "FS_THR_ENABLE": 1.0, "FS_ACTION": 1.0},
+            {},
+            "station failsafe",
+            Level.WARNING,
+            "FS_THR_ENABLE",
+            2.0,
+        ),
+        # HOLD is no failsafe for a sailboat, for a motor boat it is
+        ({"FS_THR_ENABLE": 1.0}, {}, "radio failsafe", Level.ERROR, "FS_THR_ENABLE", 2.0),
+        ({"FS_THR_ENABLE": 1.0}, {"sails": False}, "radio failsafe", Level.WARNING, "FS_THR_ENABLE", 2.0),
+        ({"FS_GCS_ENABLE": 1.0}, {}, "station failsafe", Level.ERROR, "FS_GCS_ENABLE", 2.0),
+        (
+            {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0},
+            {"margin_m": 40.0},
+            "fence action",
+            Level.ERROR,
+            "FENCE_ACTION",
+            1.0,
+        ),
+        (
+            {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 4.0},
+            {"margin_m": 40.0},
+            "fence action",
+            Level.ERROR,
+            "FENCE_ACTION",
+            1.0,
+        ),
+        (
+            {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0},
+            {"margin_m": 40.0, "sails": False},
+            "fence action",
+            Level.INFO,
+            "FENCE_ACTION",
+            None,
+        ),
+        ({"BATT_FS_LOW_ACT": 2.0}, {}, "battery failsafe", Level.ERROR, "BATT_FS_LOW_ACT", 1.0),
+        ({"BATT_FS_CRT_ACT": 5.0}, {}, "battery failsafe", Level.ERROR, "BATT_FS_CRT_ACT", 1.0),
+        ({"FS_EKF_ACTION": 0.0}, {}, "EKF failsafe", Level.WARNING, "FS_EKF_ACTION", 1.0),
+        ({"FS_EKF_ACTION": 2.0}, {}, "EKF failsafe", Level.WARNING, "FS_EKF_ACTION", 1.0),
+        ({"CRASH_ANGLE": 30.0}, {}, "crash check", Level.WARNING, "CRASH_ANGLE", 0.0),
+        ({"SYSID_MYGCS": 1.0}, {}, "system id", Level.ERROR, "SYSID_MYGCS", 255.0),
+        ({"system_id": 2}, {}, "system id", Level.WARNING, "SYSID_THISMAV", None),
+        ({"version": (4, 0, 0)}, {}, "version", Level.WARNING, None, None),
+        ({"mission": None}, {}, "mission", Level.WARNING, None, None),
+        ({"mission": (MissionItem(command=16, lat_e7=1, lon_e7=1),)}, {}, "mission end", Level.WARNING, None, None),
+        ({"fence": (MissionItem(command=5001),) * 90}, {}, "fence size", Level.ERROR, None, None),
+        ({"rates_hz": {**RATES, "WIND": 0.0}}, {}, "streams", Level.ERROR, None, None),
+        ({"rates_hz": {**RATES, "ATTITUDE": 0.3}}, {}, "streams", Level.WARNING, None, None),
+    ],
+)
 def test_what_would_spoil_a_voyage_is_found(changes, needs, code, level, name, wanted):
-    findings = [f for f in examine(seen(**changes), Needs(**{"speed_mps": 2.5, **needs}))
-                if f.code == code and f.level is level]
+    findings = [
+        f for f in examine(seen(**changes), Needs(**{"speed_mps": 2.5, **needs})) if f.code == code and f.level is level
+    ]
     assert len(findings) == 1, [f.code for f in examine(seen(**changes), Needs(**needs))]
     assert findings[0].parameter == name
     assert findings[0].wanted == wanted
@@ -134,8 +210,16 @@ def test_silence_points_at_signing_only_where_signatures_are_heard():
 
 def test_what_is_wanted_cures():
     """Setting what the findings want leaves no finding that wants something else (no two that fight)."""
-    parameters = {**DEFAULTS, "SAIL_XTRACK_MAX": 30.0, "WP_RADIUS": 15.0, "OA_TYPE": 2.0, "FENCE_ENABLE": 1.0,
-                  "FS_GCS_ENABLE": 1.0, "SAIL_LOIT_RADIUS": 20.0, "CRASH_ANGLE": 10.0}
+    parameters = {
+        **DEFAULTS,
+        "SAIL_XTRACK_MAX": 30.0,
+        "WP_RADIUS": 15.0,
+        "OA_TYPE": 2.0,
+        "FENCE_ENABLE": 1.0,
+        "FS_GCS_ENABLE": 1.0,
+        "SAIL_LOIT_RADIUS": 20.0,
+        "CRASH_ANGLE": 10.0,
+    }
     needs = Needs(reach_m=500.0, margin_m=25.0, speed_mps=2.5)
     for _ in range(3):
         for finding in examine(seen(parameters=parameters, fence=(MissionItem(command=5001),)), needs):
@@ -158,11 +242,12 @@ def test_corridor_and_margin_do_not_fight(fence, corridor_m, speed_mps, margin_m
     needs = Needs(speed_mps=speed_mps, margin_m=margin_m)
     first = advice(needs, SAIL_XTRACK_MAX=corridor_m, **fence)
     assert [(f.code, f.wanted) for f in first] == [
-        (f.code, f.wanted) for f in advice(needs, SAIL_XTRACK_MAX=corridor_m)]
+        (f.code, f.wanted) for f in advice(needs, SAIL_XTRACK_MAX=corridor_m)
+    ]
     wanted = {f.wanted for f in first if f.wanted is not None}
     assert len(wanted) <= 1
     set_to = next(iter(wanted), corridor_m)
-    assert set_to * 2.0 * math.sqrt(2.0) / speed_mps >= 5.0 or not first   # a board outlasts the time between tacks
+    assert set_to * 2.0 * math.sqrt(2.0) / speed_mps >= 5.0 or not first  # a board outlasts the time between tacks
     again = advice(needs, SAIL_XTRACK_MAX=set_to, **fence)
     assert not [f for f in again if f.wanted is not None]
     if again:
@@ -189,10 +274,19 @@ def test_a_new_mission_has_the_margin_that_the_doctor_finds_enough(tmp_path, cap
 
 def doctor(parameters, *, apply=False, prepare=None, signing=None):
     """Run the doctor against the simulated autopilot over a link in memory."""
+
     async def consult():
         autopilot = SimulatedAutopilot(
-            AutopilotConfig(home=GeoPoint(lat_deg=50.8, lon_deg=-1.3), heading_rad=0.0, is_warm=True, is_moored=True,
-                            parameters=parameters), parse_wind("5@0"), seed=1)
+            AutopilotConfig(
+                home=GeoPoint(lat_deg=50.8, lon_deg=-1.3),
+                heading_rad=0.0,
+                is_warm=True,
+                is_moored=True,
+                parameters=parameters,
+            ),
+            parse_wind("5@0"),
+            seed=1,
+        )
         link = MemoryLink("doctor", seed=1)
         if prepare is not None:
             prepare(link)
@@ -226,6 +320,7 @@ def test_apply_sets_and_reads_back(consulted):
     assert {c["parameter"] for c in data["changes"]} == set(done)
     assert all(math.isfinite(c["wanted"]) for c in data["changes"])
 
+
 KEY = bytes(range(32))
 STAMP = 10**13
 
@@ -237,9 +332,10 @@ def sign(link, *, is_strict=True):
     link.near.write = lambda data: ask(b"".join(f for f in frames(data) if f[2] & 1 or not is_strict))
 
 
-@pytest.mark.parametrize(("is_strict", "level", "words"), [
-    (True, Level.ERROR, "refuses what is not signed"), (False, Level.WARNING, "as on USB"),
-])
+@pytest.mark.parametrize(
+    ("is_strict", "level", "words"),
+    [(True, Level.ERROR, "refuses what is not signed"), (False, Level.WARNING, "as on USB")],
+)
 def test_an_autopilot_that_signs_is_recognised(is_strict, level, words):
     findings, _ = doctor({}, prepare=partial(sign, is_strict=is_strict))
     signing = next(f for f in findings if f.code == "signing")
@@ -261,10 +357,15 @@ def test_with_the_key_a_signed_autopilot_answers_and_with_another_it_is_said(tmp
         doctor({}, prepare=sign, signing=store("wrong", KEY[::-1]))
 
 
-@pytest.mark.parametrize(("speed", "level", "words"), [
-    (0.87, Level.INFO, "87 % of the reference core"), (0.25, Level.INFO, "25 %"), (0.02, Level.WARNING, "2 %")])
+@pytest.mark.parametrize(
+    ("speed", "level", "words"),
+    [(0.87, Level.INFO, "87 % of the reference core"), (0.25, Level.INFO, "25 %"), (0.02, Level.WARNING, "2 %")],
+)
 def test_how_fast_this_computer_plans_is_said(speed, level, words):
-    found = [f for f in examine(Examined(parameters={"FRAME_CLASS": 2.0}, planner_speed=speed), Needs())
-             if f.code == "computer"]
+    found = [
+        f
+        for f in examine(Examined(parameters={"FRAME_CLASS": 2.0}, planner_speed=speed), Needs())
+        if f.code == "computer"
+    ]
     assert [f.level for f in found] == [level]
     assert words in found[0].what

@@ -23,14 +23,24 @@ class Asker(Browser):
     async def post(self, path, value=None, token=TOKEN, body=None, **headers):
         """Return status and answer."""
         data = json.dumps(value or {}).encode() if body is None else body
-        status, _, answer = await self.get(path, "POST", data, **{
-            "Origin": f"http://127.0.0.1:{self.port}", "Content_Type": "application/json", "X_Companion": "1",
-            "Authorization": f"Bearer {token}", **headers})
+        status, _, answer = await self.get(
+            path,
+            "POST",
+            data,
+            **{
+                "Origin": f"http://127.0.0.1:{self.port}",
+                "Content_Type": "application/json",
+                "X_Companion": "1",
+                "Authorization": f"Bearer {token}",
+                **headers,
+            },
+        )
         return status, json.loads(answer) if answer else None
 
 
 def with_editor(path, talk):
     """Return what ``talk(asker)`` returns while the editor of a file is served."""
+
     async def whole():
         async with editing(read_base(path), Address(host="127.0.0.1", port=0, token=TOKEN)) as place:
             return await talk(Asker(int(place.url.split(":")[2].split("/")[0])))

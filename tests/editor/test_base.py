@@ -27,10 +27,10 @@ def written(folder, name, text=SQUARE, more=""):
 def why_locked(path):
     base = read_base(path)
     assert not base.grounds
-    assert state_of(base)["locked"]          # it is shown
+    assert state_of(base)["locked"]  # it is shown
     assert state_of(base)["files"][0]["why"] == base.locked[0].why
     draft = draft_of(base, base.sketch())
-    assert list(draft.files.values()) == [path.read_bytes()]   # and never written
+    assert list(draft.files.values()) == [path.read_bytes()]  # and never written
     return base.locked[0].why
 
 
@@ -54,8 +54,12 @@ def test_every_example_is_drawn_and_its_draft_is_itself(path, tmp_path):
 
 
 def test_files_that_are_shown_and_not_edited(tmp_path):
-    path = written(tmp_path, "a.wkt", more='axis = "latlon"\n', text=(
-        "POLYGON ((50.818 -1.312, 50.818 -1.311, 50.819 -1.311, 50.819 -1.312, 50.818 -1.312))\n"))
+    path = written(
+        tmp_path,
+        "a.wkt",
+        more='axis = "latlon"\n',
+        text=("POLYGON ((50.818 -1.312, 50.818 -1.311, 50.819 -1.311, 50.819 -1.312, 50.818 -1.312))\n"),
+    )
     assert "latitude first" in why_locked(path)
     path = written(tmp_path, "a.wkt")
     assert main(["fence", "convert", str(tmp_path / "a.wkt"), str(tmp_path / "a.kml")]) == 0
@@ -85,7 +89,7 @@ def test_line_ends_and_marks_of_windows_stay(tmp_path):
 
 def test_a_ring_that_crosses_itself_is_told_before_it_is_drawn(tmp_path):
     path = written(tmp_path, "a.wkt", "POLYGON ((-1.312 50.818, -1.311 50.819, -1.311 50.818, -1.312 50.819))\n")
-    assert len(read_base(path).sketch().shapes[0].rings[0]) == 4   # it is there, to be mended
+    assert len(read_base(path).sketch().shapes[0].rings[0]) == 4  # it is there, to be mended
     with pytest.raises(InputError, match="ring"):
         load_mission(path)
 

@@ -21,12 +21,16 @@ from tests.page.test_browser import is_own, keep
 
 pytestmark = needs_browser
 
+
 class Board(Window):
     """A window with the editor, and a hand that draws in it."""
 
     def spot(self, place):
-        x, y = self.js("const s = editing.screen(arguments[0]), b = document.getElementById('map')"
-                       ".getBoundingClientRect(); return [b.left + s[0], b.top + s[1]]", list(place))
+        x, y = self.js(
+            "const s = editing.screen(arguments[0]), b = document.getElementById('map')"
+            ".getBoundingClientRect(); return [b.left + s[0], b.top + s[1]]",
+            list(place),
+        )
         return round(x), round(y)
 
     def act(self, *moves):
@@ -48,8 +52,12 @@ class Board(Window):
             self.act(place)
 
     def type_in(self, name, text):
-        self.js("const f = document.getElementById(arguments[0]); f.value = arguments[1]; "
-                "f.dispatchEvent(new Event('input')); f.dispatchEvent(new Event('change'))", name, text)
+        self.js(
+            "const f = document.getElementById(arguments[0]); f.value = arguments[1]; "
+            "f.dispatchEvent(new Event('input')); f.dispatchEvent(new Event('change'))",
+            name,
+            text,
+        )
 
     def settled(self):
         self.until("return editing.found() !== null && !editing.isAsking()")
@@ -71,12 +79,18 @@ def test_a_mission_drawn_from_nothing_is_saved_checked_and_sailed(tmp_path, caps
         board.until("return !document.getElementById('dialog').open")
         board.draw("start", (50.8172, -1.3100))
         board.draw("goal", (50.8180, -1.3082), (50.8186, -1.3098))
-        board.draw("obstacle", (50.8177, -1.3098), (50.8177, -1.3092), (50.81795, -1.3092), (50.81795, -1.3098),
-                   (50.8177, -1.3098))
+        board.draw(
+            "obstacle",
+            (50.8177, -1.3098),
+            (50.8177, -1.3092),
+            (50.81795, -1.3092),
+            (50.81795, -1.3098),
+            (50.8177, -1.3098),
+        )
         board.draw("rock", (50.8182, -1.3076))
         board.draw("refuge", (50.817, -1.3072))
         board.draw("fence", (50.8167, -1.3108), (50.8167, -1.3064), (50.8191, -1.3064), (50.8191, -1.3108))
-        board.keys("\ue007")   # Enter closes it
+        board.keys("\ue007")  # Enter closes it
         board.until("return editing.now().shapes.length === 3")
         board.click("#pick-goal-0")
         board.type_in("name-goal-0", "East mark")
@@ -100,8 +114,10 @@ def test_a_mission_drawn_from_nothing_is_saved_checked_and_sailed(tmp_path, caps
     assert len(mission.refuges) == 1
     path.write_text(path.read_text().replace("auto = false", "auto = true").replace("arm = false", "arm = true"))
     scenario = tmp_path / "scenario.toml"
-    scenario.write_text(f'name = "drawn"\ntitle = "Drawn"\nmission = "{path}"\nlimit_s = 1800.0\n[wind]\nmodel = "ou"\n'
-                        'from_deg = 0.0\ntws_mps = 5.0\nsd_deg = 9.0\ntau_s = 28.0\n[expect]\ncontacts = 0\n')
+    scenario.write_text(
+        f'name = "drawn"\ntitle = "Drawn"\nmission = "{path}"\nlimit_s = 1800.0\n[wind]\nmodel = "ou"\n'
+        "from_deg = 0.0\ntws_mps = 5.0\nsd_deg = 9.0\ntau_s = 28.0\n[expect]\ncontacts = 0\n"
+    )
     assert sitl(["run", str(scenario), "--out", str(tmp_path / "v")]) == 0, capsys.readouterr()
     assert read_record(tmp_path / "v").last.state.has_arrived
 
@@ -121,7 +137,7 @@ def test_what_is_dragged_typed_and_put_in_order_is_saved_and_undone(archipelago)
         first = board.js("return editing.now()")
         board.act((50.8203440, -1.3101419), (50.8202, -1.3105), (50.8201, -1.3108))
         board.until("return Math.abs(editing.now().goals[0].at[1] + 1.3108) < 2e-5")
-        board.act((50.8185, -1.3103))                      # Great Heron
+        board.act((50.8185, -1.3103))  # Great Heron
         board.until("return editing.selected() && editing.selected().of === 'shape'")
         heron = board.js("return editing.now().shapes[editing.selected().n].name")
         assert heron == "Great Heron"
@@ -130,9 +146,10 @@ def test_what_is_dragged_typed_and_put_in_order_is_saved_and_undone(archipelago)
         board.act(corner, (corner[0] + 1e-4, corner[1] + 1e-4))
         board.settled()
         keep(board, "editor-corner")
-        board.keys("\ue017")                               # Delete: the corner that is chosen
-        board.until("return editing.now().shapes[editing.selected().n].rings[0].length === arguments[0]", 5.0,
-                    corners - 1)
+        board.keys("\ue017")  # Delete: the corner that is chosen
+        board.until(
+            "return editing.now().shapes[editing.selected().n].rings[0].length === arguments[0]", 5.0, corners - 1
+        )
         board.draw("goal", (50.8170, -1.3110))
         board.keys("\ue00c")
         board.type_in("rounding-goal-1", "port")
@@ -147,7 +164,9 @@ def test_what_is_dragged_typed_and_put_in_order_is_saved_and_undone(archipelago)
         keep(board, "editor-changed")
         board.click("#help")
         assert board.js("return [document.activeElement.id, document.getElementById('dialog').scrollTop]") == [
-            "dialogtitle", 0]
+            "dialogtitle",
+            0,
+        ]
         board.keys("\ue00c")
         board.saved()
         goals = [(goal.rounding, goal.point.lat_deg) for goal in load_mission(archipelago).goals]
@@ -175,10 +194,10 @@ def test_a_file_changed_meanwhile_is_told_and_a_lost_editor_too(archipelago):
         assert board.barriers() == []
         keep(board, "editor-changed-meanwhile")
         assert archipelago.read_text().endswith("# somebody\n")
-        board.js("document.querySelector('#dialog .buttons button').click()")   # write over it
+        board.js("document.querySelector('#dialog .buttons button').click()")  # write over it
         board.until("return document.getElementById('kept').textContent === 'saved'")
         assert "somebody" not in archipelago.read_text()
-        board.complaints()   # of the 409
+        board.complaints()  # of the 409
     with Board() as board:
         with edited(archipelago) as url:
             board.open(url)
@@ -188,7 +207,7 @@ def test_a_file_changed_meanwhile_is_told_and_a_lost_editor_too(archipelago):
         assert "What is drawn is still here" in board.text("trouble")
         assert board.text("kept") == "not saved"
         drawn = board.js("return editing.now().goals[0].at")
-        with edited(archipelago, port=int(url.split(":")[2].split("/")[0])):   # begun again at its port
+        with edited(archipelago, port=int(url.split(":")[2].split("/")[0])):  # begun again at its port
             board.click("#save")
             board.until("return document.getElementById('kept').textContent === 'saved'")
         assert load_mission(archipelago).goals[0].point.lat_deg == drawn[0]
@@ -199,9 +218,9 @@ def test_by_keys_alone_a_mark_is_put_and_a_finding_leads_to_its_place(archipelag
         board.open(url)
         board.settled()
         board.js("document.getElementById('map').focus()")
-        board.keys("g", "\ue012", "\ue015", " ")           # left, down, a point under the cross
+        board.keys("g", "\ue012", "\ue015", " ")  # left, down, a point under the cross
         board.until("return editing.now().goals.length === 2")
-        board.keys("\ue00c", "\ue012")                     # the tool is put away; what is chosen goes a metre west
+        board.keys("\ue00c", "\ue012")  # the tool is put away; what is chosen goes a metre west
         first = board.js("return editing.now().goals[1].at")
         board.keys("\ue012")
         west = board.js("return editing.now().goals[1].at")
@@ -209,9 +228,11 @@ def test_by_keys_alone_a_mark_is_put_and_a_finding_leads_to_its_place(archipelag
         assert 0.9 < (first[1] - west[1]) * 70_400 < 1.1
         board.settled()
         board.js("document.querySelector('#findings button').click()")
-        middle = board.js("const b = document.getElementById('map').getBoundingClientRect(), "
-                          "s = editing.screen(editing.found().findings[0].at || editing.now().goals[1].at); "
-                          "return [s[0] - b.width / 2, s[1] - b.height / 2]")
+        middle = board.js(
+            "const b = document.getElementById('map').getBoundingClientRect(), "
+            "s = editing.screen(editing.found().findings[0].at || editing.now().goals[1].at); "
+            "return [s[0] - b.width / 2, s[1] - b.height / 2]"
+        )
         assert max(map(abs, middle)) < 3
         keep(board, "editor-keys")
         assert board.complaints() == []
@@ -222,13 +243,18 @@ def test_by_day_and_by_night_on_a_phone_and_exported(archipelago, tmp_path):
         board.open(url)
         board.settled()
         for palette in ("day", "dusk", "night"):
-            board.js("const p = document.getElementById('palette'); p.value = arguments[0]; "
-                     "p.dispatchEvent(new Event('change'))", palette)
+            board.js(
+                "const p = document.getElementById('palette'); p.value = arguments[0]; "
+                "p.dispatchEvent(new Event('change'))",
+                palette,
+            )
             assert board.barriers() == [], palette
             keep(board, f"editor-{palette}")
         board.click("#export")
-        board.js("const f = document.getElementById('format'); f.value = [...f.options].find((o) => "
-                 "o.textContent.includes('.plan')).value")
+        board.js(
+            "const f = document.getElementById('format'); f.value = [...f.options].find((o) => "
+            "o.textContent.includes('.plan')).value"
+        )
         board.click("#make")
         board.until("return document.getElementById('download') !== null")
         assert board.js("return document.getElementById('download').download") == "archipelago.plan"
@@ -253,9 +279,11 @@ def test_where_a_course_ends_where_it_begins_each_word_can_be_read(window):
     with edited(Path("missions") / "lake.toml") as url, Board(**window) as board:
         board.open(url)
         board.settled()
-        words = board.js("return [...document.querySelectorAll('#map text.word')].map((word) => { "
-                         "const r = word.getBoundingClientRect();"
-                         "return [word.textContent, r.left, r.top + 3, r.right, r.bottom - 3]; })")
+        words = board.js(
+            "return [...document.querySelectorAll('#map text.word')].map((word) => { "
+            "const r = word.getBoundingClientRect();"
+            "return [word.textContent, r.left, r.top + 3, r.right, r.bottom - 3]; })"
+        )
     assert {"start", "safe end"} <= {word for word, *_ in words}
     for (one, *a), (other, *b) in itertools.combinations(words, 2):
         assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1], (one, other)

@@ -43,7 +43,9 @@ def test_what_the_page_begins_with(bay):
     assert state["file"] == "bay.toml"
     assert not state["is_new"]
     assert {f["name"]: f["shared_by"] for f in state["files"]} == {
-        "bay.wkt": ["bay-with-care.toml"], "bay-shore.wkt": ["bay-with-care.toml"]}
+        "bay.wkt": ["bay-with-care.toml"],
+        "bay-shore.wkt": ["bay-with-care.toml"],
+    }
     assert {"plan", "wkt", "gpx", "kml", "geojson", "waypoints"} <= {f["ending"] for f in state["formats"]}
     assert "operator" in state["kept"]
     assert len(state["sketch"]["shapes"]) == len(load_mission(bay).area.obstacles) + 1
@@ -66,7 +68,7 @@ def test_a_draft_is_judged_as_the_check_does_and_nothing_is_written(bay):
     hatched = shapely.union_all([shapely.Polygon(shape[0], shape[1:]) for shape in good[1]["grown"]])
     for solid in (load_mission(bay).area.obstacles[0].shape, load_mission(bay).area.fence.inclusions[0].shape):
         edge = shapely.transform(solid.exterior, lambda lonlat: lonlat[:, ::-1])
-        assert shapely.covers(shapely.buffer(hatched, 1e-7), edge)   # the obstacle's margin, and the fence's
+        assert shapely.covers(shapely.buffer(hatched, 1e-7), edge)  # the obstacle's margin, and the fence's
     errors = [f for f in bad[1]["findings"] if f["severity"] == "error"]
     assert (errors[0]["of"], errors[0]["number"]) == ("goal", 0)
     assert "is inside the obstacle" in errors[0]["text"]
@@ -77,20 +79,21 @@ def test_a_draft_is_judged_as_the_check_does_and_nothing_is_written(bay):
 def test_a_plan_is_made_in_the_wind_that_is_asked_and_a_newer_request_replaces_it(bay):
     async def talk(asker):
         sketch = (await begun(asker))["sketch"]
-        await asker.post("/api/plan", {"sketch": sketch, "from_deg": 0.0, "speed_mps": 5.0})   # the worker is warm
+        await asker.post("/api/plan", {"sketch": sketch, "from_deg": 0.0, "speed_mps": 5.0})  # the worker is warm
         steady = await asker.post("/api/plan", {"sketch": sketch, "from_deg": 0.0, "speed_mps": 5.0})
         spread = await asker.post("/api/plan", {"sketch": sketch, "from_deg": 0.0, "speed_mps": 5.0, "spread_deg": 12})
         many = []
         for n in range(6):
-            many.append(asyncio.create_task(
-                asker.post("/api/plan", {"sketch": sketch, "from_deg": float(n), "speed_mps": 5.0})))
+            many.append(
+                asyncio.create_task(asker.post("/api/plan", {"sketch": sketch, "from_deg": float(n), "speed_mps": 5.0}))
+            )
             await asyncio.sleep(0.05)
         return steady[1], spread[1], [await each for each in many]
 
     steady, spread, many = with_editor(bay, talk)
     assert steady["error"] == ""
     assert [leg["to"] for leg in steady["legs"]] == ["goal 1, East mark", "goal 2, North mark", "home"]
-    assert spread["time_s"] > steady["time_s"]   # a wider no-go zone
+    assert spread["time_s"] > steady["time_s"]  # a wider no-go zone
     assert many[-1][0] == 200
     assert {status for status, _ in many} == {200, 409}
 
@@ -112,7 +115,11 @@ def test_saving_changes_what_was_changed_and_says_whether_it_is_in_order(bay):
     assert [b for _, b in changed] == ["lat = 50.8182", "lon = -1.3076"]
     assert (bay.parent / "bay.wkt").read_text() == water
     assert sorted(p.name for p in bay.parent.iterdir()) == [
-        "bay-shore.wkt", "bay-with-care.toml", "bay.toml", "bay.wkt"]
+        "bay-shore.wkt",
+        "bay-with-care.toml",
+        "bay.toml",
+        "bay.wkt",
+    ]
 
 
 def test_an_island_moved_is_one_line_of_its_file_and_undone_after_saving_the_file_is_as_it_was(bay):
@@ -162,19 +169,28 @@ def test_a_mission_from_nothing_has_its_files_beside_it_and_writes_over_none(tmp
 
     async def talk(asker):
         state = await begun(asker)
-        sketch = {**state["sketch"], "start": {"at": [50.818, -1.308]},
-                  "goals": [{"kind": "point", "at": [50.82, -1.305]}],
-                  "shapes": [{"type": "polygon", "zone": "inclusion", "rings": [square]},
-                             {"type": "point", "rings": [[[50.819, -1.3065]]], "name": "Rock"},
-                             {"type": "circle", "rings": [[[50.819, -1.3035]]], "radius_m": 25.0}]}
+        sketch = {
+            **state["sketch"],
+            "start": {"at": [50.818, -1.308]},
+            "goals": [{"kind": "point", "at": [50.82, -1.305]}],
+            "shapes": [
+                {"type": "polygon", "zone": "inclusion", "rings": [square]},
+                {"type": "point", "rings": [[[50.819, -1.3065]]], "name": "Rock"},
+                {"type": "circle", "rings": [[[50.819, -1.3035]]], "radius_m": 25.0},
+            ],
+        }
         return state, await asker.post("/api/save", {"sketch": sketch, "disk": state["disk"]})
 
     state, (status, saved) = with_editor(path, talk)
     assert state["is_new"]
     assert status == 200, saved
     assert sorted(p.name for p in tmp_path.iterdir()) == [
-        "New Bay.toml", "new-bay-fence.wkt", "new-bay-obstacles-2.wkt", "new-bay-obstacles.geojson",
-        "new-bay-obstacles.wkt"]
+        "New Bay.toml",
+        "new-bay-fence.wkt",
+        "new-bay-obstacles-2.wkt",
+        "new-bay-obstacles.geojson",
+        "new-bay-obstacles.wkt",
+    ]
     assert (tmp_path / "new-bay-obstacles.wkt").read_text() == "POINT (1 1)\n"
     mission = load_mission(path)
     assert mission.name == "New Bay"
@@ -201,7 +217,8 @@ def test_every_format_is_made_of_what_is_drawn(bay, tmp_path):
         out = {}
         for form in state["formats"]:
             out[form["ending"], form["part"]] = await asker.post(
-                "/api/export", {"sketch": state["sketch"], "format": form["ending"], "part": form["part"]})
+                "/api/export", {"sketch": state["sketch"], "format": form["ending"], "part": form["part"]}
+            )
         return out
 
     made = with_editor(bay, talk)
@@ -216,17 +233,26 @@ def test_every_format_is_made_of_what_is_drawn(bay, tmp_path):
 
 
 # ------------------------------------------------------------------------------------------------------ who may not
-@pytest.mark.parametrize(("headers", "status"), [
-    ({"token": "a-wrong-token-of-24-letters"}, 401), ({"token": ""}, 401), ({"Origin": None}, 403),
-    ({"Origin": "http://evil.example"}, 403), ({"Host": "evil.example"}, 421), ({"X_Companion": None}, 403),
-    ({"Content_Type": "text/plain"}, 403),
-])
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"token": "a-wrong-token-of-24-letters"}, 401),
+        ({"token": ""}, 401),
+        ({"Origin": None}, 403),
+        ({"Origin": "http://evil.example"}, 403),
+        ({"Host": "evil.example"}, 421),
+        ({"X_Companion": None}, 403),
+        ({"Content_Type": "text/plain"}, 403),
+    ],
+)
 def test_who_may_not(bay, headers, status):
     before = bay.read_bytes()
 
     async def talk(asker):
-        return [(await asker.post(path, {}, **headers))[0]
-                for path in ("/api/mission", "/api/check", "/api/plan", "/api/save", "/api/export")]
+        return [
+            (await asker.post(path, {}, **headers))[0]
+            for path in ("/api/mission", "/api/check", "/api/plan", "/api/save", "/api/export")
+        ]
 
     assert with_editor(bay, talk) == [status] * 5
     assert bay.read_bytes() == before
@@ -234,20 +260,27 @@ def test_who_may_not(bay, headers, status):
 
 def test_who_may_not_is_told_so_before_the_four_megabytes_that_he_sends(bay):
     async def talk(asker):
-        head = (f"POST /api/save HTTP/1.1\r\nHost: 127.0.0.1:{asker.port}\r\nContent-Length: 4000000\r\n"
-                f"Origin: http://127.0.0.1:{asker.port}\r\nContent-Type: application/json\r\nX-Companion: 1\r\n")
-        return [await asker.raw(f"{head}{more}\r\n".encode(), at_most_s=1.5) for more in (
-            "", f"Authorization: Bearer {TOKEN[:-1]}\r\n")]
+        head = (
+            f"POST /api/save HTTP/1.1\r\nHost: 127.0.0.1:{asker.port}\r\nContent-Length: 4000000\r\n"
+            f"Origin: http://127.0.0.1:{asker.port}\r\nContent-Type: application/json\r\nX-Companion: 1\r\n"
+        )
+        return [
+            await asker.raw(f"{head}{more}\r\n".encode(), at_most_s=1.5)
+            for more in ("", f"Authorization: Bearer {TOKEN[:-1]}\r\n")
+        ]
 
     assert [answer[:12] for answer in with_editor(bay, talk)] == [b"HTTP/1.1 401"] * 2
 
 
 def test_a_body_in_chunks_of_a_byte_does_not_hold_the_loop(bay):
     """Each was put behind all before it: 20 ms of the sender's were seconds of the loop's (issue 43, point 9)."""
+
     async def talk(asker):
-        head = (f"POST /api/check HTTP/1.1\r\nHost: 127.0.0.1:{asker.port}\r\nTransfer-Encoding: chunked\r\n"
-                f"Origin: http://127.0.0.1:{asker.port}\r\nContent-Type: application/json\r\nX-Companion: 1\r\n"
-                f"Authorization: Bearer {TOKEN}\r\n\r\n")
+        head = (
+            f"POST /api/check HTTP/1.1\r\nHost: 127.0.0.1:{asker.port}\r\nTransfer-Encoding: chunked\r\n"
+            f"Origin: http://127.0.0.1:{asker.port}\r\nContent-Type: application/json\r\nX-Companion: 1\r\n"
+            f"Authorization: Bearer {TOKEN}\r\n\r\n"
+        )
         begun_s = time.thread_time()
         answer = await asker.raw(head.encode() + b"1\r\n \r\n" * 30_000 + b"0\r\n\r\n", at_most_s=20.0)
         return answer[:12], time.thread_time() - begun_s
@@ -259,8 +292,18 @@ def test_a_body_in_chunks_of_a_byte_does_not_hold_the_loop(bay):
 
 def test_nothing_but_the_page_is_read_without_the_token(bay):
     async def talk(asker):
-        paths = ("/", "/editor.js", "/map.js", "/style.css", "/api/mission", "/api/hello", "/bay.toml", "/../bay.toml",
-                 "/tsconfig.json", "/tiles/000000000000/1/1/1")
+        paths = (
+            "/",
+            "/editor.js",
+            "/map.js",
+            "/style.css",
+            "/api/mission",
+            "/api/hello",
+            "/bay.toml",
+            "/../bay.toml",
+            "/tsconfig.json",
+            "/tiles/000000000000/1/1/1",
+        )
         return {path: (await asker.get(path))[0] for path in paths}, (await asker.get("/"))[1]
 
     status, headers = with_editor(bay, talk)
@@ -269,7 +312,14 @@ def test_nothing_but_the_page_is_read_without_the_token(bay):
 
 
 RUBBISH = [
-    b"", b"{", b"[]", b"null", b"\xff\xfe", b"[" * 50_000, b'{"sketch": {}}', b'{"sketch": {"revision": "none"}}',
+    b"",
+    b"{",
+    b"[]",
+    b"null",
+    b"\xff\xfe",
+    b"[" * 50_000,
+    b'{"sketch": {}}',
+    b'{"sketch": {"revision": "none"}}',
     b'{"sketch": {"revision": "x", "goals": [{"kind": "point", "at": [1e400, 0]}]}}',
 ]
 
@@ -282,11 +332,15 @@ def test_rubbish_is_answered_in_one_line_and_the_editor_lives(bay):
         out = []
         sketch = state["sketch"]
         odd = [
-            {**sketch, "goals": [{"kind": "point"}]}, {**sketch, "goals": [{"kind": "gate"}]},
+            {**sketch, "goals": [{"kind": "point"}]},
+            {**sketch, "goals": [{"kind": "gate"}]},
             {**sketch, "goals": [{"kind": "search", "ring": [[1, 1], [2, 2], [3, 1]]}]},
             {**sketch, "goals": [*sketch["goals"], *sketch["goals"]]},
             {**sketch, "goals": [{**sketch["goals"][0], "key": 99}]},
-            {**sketch, "margin_m": -5}, {**sketch, "laps": 0}, {**sketch, "name": "x" * 1000}, {**sketch, "more": 1},
+            {**sketch, "margin_m": -5},
+            {**sketch, "laps": 0},
+            {**sketch, "name": "x" * 1000},
+            {**sketch, "more": 1},
             {**sketch, "goals": [{**sketch["goals"][0], "at": [91, 0]}]},
             {**sketch, "shapes": [{**sketch["shapes"][0], "key": 4000}]},
             {**sketch, "shapes": [sketch["shapes"][0], sketch["shapes"][0]]},
@@ -310,7 +364,7 @@ def test_rubbish_is_answered_in_one_line_and_the_editor_lives(bay):
     out, big, state = with_editor(bay, talk)
     for path, what, status, answer in out:
         assert status in {200, 400, 410, 422}, (path, what, status, answer)
-        if status == 200:   # judged: what is wrong with it is a finding, or why there is no plan
+        if status == 200:  # judged: what is wrong with it is a finding, or why there is no plan
             assert path in {"/api/check", "/api/plan", "/api/export"}
             assert path == "/api/export" or answer.get("error") or not answer["is_in_order"], (what, answer)
         else:
@@ -322,9 +376,14 @@ def test_rubbish_is_answered_in_one_line_and_the_editor_lives(bay):
 
 json_values = st.recursive(
     st.none() | st.booleans() | st.floats(allow_nan=False) | st.integers() | st.text(max_size=5),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(
-        st.sampled_from(["sketch", "revision", "goals", "shapes", "kind", "at", "rings", "type"]), inner, max_size=4),
-    max_leaves=12)
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["sketch", "revision", "goals", "shapes", "kind", "at", "rings", "type"]), inner, max_size=4
+        )
+    ),
+    max_leaves=12,
+)
 
 
 @settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -13,11 +13,16 @@ import pytest
 from companion import cli
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("[[goal]\nlat = 1\n", "is not TOML"), ("[[goal]]\nlat = 1.0\nlon = 2.0\nradius = 3\n", "did you mean 'radius_m'?"),
-    ('[area]\nobstacles = ["gone.wkt"]\n', "no such file"), ("from_autopilot = true\n", "drawn on the autopilot"),
-    ("\x00", "holds binary data"),
-])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[[goal]\nlat = 1\n", "is not TOML"),
+        ("[[goal]]\nlat = 1.0\nlon = 2.0\nradius = 3\n", "did you mean 'radius_m'?"),
+        ('[area]\nobstacles = ["gone.wkt"]\n', "no such file"),
+        ("from_autopilot = true\n", "drawn on the autopilot"),
+        ("\x00", "holds binary data"),
+    ],
+)
 def test_a_file_that_cannot_be_believed_is_one_line_and_stays(capsys, tmp_path, text, words):
     path = tmp_path / "m.toml"
     path.write_text(text)
@@ -47,9 +52,13 @@ def test_a_port_in_use_is_one_line(capsys, tmp_path):
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
 def test_it_says_where_it_is_and_ends_when_it_is_told_to(tmp_path, end):
-    done = subprocess.Popen([sys.executable, "-m", "companion.cli", "mission", "edit", str(tmp_path / "m.toml")],
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                            env={**os.environ, "PYTHONPATH": str(Path.cwd())})
+    done = subprocess.Popen(
+        [sys.executable, "-m", "companion.cli", "mission", "edit", str(tmp_path / "m.toml")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path.cwd())},
+    )
     try:
         line = done.stdout.readline()
         assert re.fullmatch(r"http://127\.0\.0\.1:\d+/#[\w-]{32}  \(Ctrl-C ends it\)\n", line), line
@@ -64,10 +73,13 @@ def test_it_says_where_it_is_and_ends_when_it_is_told_to(tmp_path, end):
 
 def test_the_check_names_the_editor_where_something_is_wrong(capsys, tmp_path):
     path = tmp_path / "m.toml"
-    path.write_text('[start]\nlat = 50.0\nlon = 1.0\n[[goal]]\nlat = 50.004\nlon = 1.0\n'
-                    '[area]\nobstacles = ["wall.wkt"]\nfence = "pond.wkt"\n')
+    path.write_text(
+        "[start]\nlat = 50.0\nlon = 1.0\n[[goal]]\nlat = 50.004\nlon = 1.0\n"
+        '[area]\nobstacles = ["wall.wkt"]\nfence = "pond.wkt"\n'
+    )
     (tmp_path / "wall.wkt").write_text("POLYGON ((0.99 50.002, 1.01 50.002, 1.01 50.003, 0.99 50.003, 0.99 50.002))\n")
     (tmp_path / "pond.wkt").write_text(
-        "POLYGON ((0.995 49.999, 1.005 49.999, 1.005 50.005, 0.995 50.005, 0.995 49.999))\n")
+        "POLYGON ((0.995 49.999, 1.005 49.999, 1.005 50.005, 0.995 50.005, 0.995 49.999))\n"
+    )
     assert cli.main(["mission", "check", str(path)]) == 1
     assert f"companion mission edit {path}" in capsys.readouterr().out

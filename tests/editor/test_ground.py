@@ -18,20 +18,45 @@ Calf|exclusion|POLYGON ((1.0 50.0, 1.10 50.0, 1.1 50.1, 1.0 50.0))   # its tower
 Two rocks|exclusion|MULTIPOINT (3 50, 3.1 50)
 LINESTRING (4 50, 4.1 50)
 # the end"""
-GEOJSON = json.dumps({"type": "FeatureCollection", "name": "[] features", "features": [
-    {"type": "Feature", "id": 7, "properties": {"name": "Rock", "radius_m": 5, "colour": "red"},
-     "geometry": {"type": "Point", "coordinates": [1.5, 50.0]}},
-    {"type": "Feature", "properties": {"role": "waypoint"}, "geometry": {"type": "Point", "coordinates": [9, 9]}},
-    {"type": "Feature", "properties": {"kind": "inclusion", "margin_m": 3.0}, "geometry": {
-        "type": "Polygon", "coordinates": [[[1, 50], [2, 50], [2, 51], [1, 50]]]}},
-    {"type": "Feature", "properties": None, "geometry": {
-        "type": "MultiPolygon", "coordinates": [
-            [[[3, 50], [4, 50], [4, 51], [3, 50]]], [[[5, 50], [6, 50], [6, 51], [5, 50]]]]}},
-]}, indent=2)
+GEOJSON = json.dumps(
+    {
+        "type": "FeatureCollection",
+        "name": "[] features",
+        "features": [
+            {
+                "type": "Feature",
+                "id": 7,
+                "properties": {"name": "Rock", "radius_m": 5, "colour": "red"},
+                "geometry": {"type": "Point", "coordinates": [1.5, 50.0]},
+            },
+            {
+                "type": "Feature",
+                "properties": {"role": "waypoint"},
+                "geometry": {"type": "Point", "coordinates": [9, 9]},
+            },
+            {
+                "type": "Feature",
+                "properties": {"kind": "inclusion", "margin_m": 3.0},
+                "geometry": {"type": "Polygon", "coordinates": [[[1, 50], [2, 50], [2, 51], [1, 50]]]},
+            },
+            {
+                "type": "Feature",
+                "properties": None,
+                "geometry": {
+                    "type": "MultiPolygon",
+                    "coordinates": [[[[3, 50], [4, 50], [4, 51], [3, 50]]], [[[5, 50], [6, 50], [6, 51], [5, 50]]]],
+                },
+            },
+        ],
+    },
+    indent=2,
+)
 TEXTS = {"wkt": WKT, "geojson": GEOJSON}
 
-places = st.tuples(st.integers(-900_000_000, 900_000_000).map(lambda n: n / 1e7),
-                   st.integers(-1_800_000_000, 1_800_000_000).map(lambda n: n / 1e7))
+places = st.tuples(
+    st.integers(-900_000_000, 900_000_000).map(lambda n: n / 1e7),
+    st.integers(-1_800_000_000, 1_800_000_000).map(lambda n: n / 1e7),
+)
 rings = st.lists(places, min_size=3, max_size=6, unique=True).map(tuple)
 words = st.text("abc é'-\"", max_size=8).map(lambda s: " ".join(s.split()))
 
@@ -40,11 +65,15 @@ words = st.text("abc é'-\"", max_size=8).map(lambda s: " ".join(s.split()))
 def shapes(draw):
     kind = draw(st.sampled_from(["polygon", "circle", "point", "line"]))
     return Shape(
-        type=kind, zone=draw(st.sampled_from(["inclusion", "exclusion"])), name=draw(words),
-        rings=tuple(draw(st.lists(rings, min_size=1, max_size=2))) if kind == "polygon" else (
-            draw(rings) if kind == "line" else (draw(places),),),
+        type=kind,
+        zone=draw(st.sampled_from(["inclusion", "exclusion"])),
+        name=draw(words),
+        rings=tuple(draw(st.lists(rings, min_size=1, max_size=2)))
+        if kind == "polygon"
+        else (draw(rings) if kind == "line" else (draw(places),),),
         radius_m=draw(st.sampled_from([5.0, 12.5])) if kind == "circle" else None,
-        margin_m=draw(st.sampled_from([None, 4.0])))
+        margin_m=draw(st.sampled_from([None, 4.0])),
+    )
 
 
 def contents(found):
@@ -55,13 +84,24 @@ def contents(found):
 def test_what_is_in_a_file(kind):
     ground = ground_of("f", TEXTS[kind], kind, "exclusion")
     found = [(s.type, s.zone, s.name, len(s.rings), s.key) for s in ground.shapes]
-    assert found == {
-        "wkt": [("polygon", "exclusion", "Calf", 1, 0), ("polygon", "exclusion", "", 2, 1),
-                ("point", "exclusion", "Two rocks", 1, 2), ("point", "exclusion", "Two rocks", 1, 3),
-                ("line", "exclusion", "", 1, 4)],
-        "geojson": [("circle", "exclusion", "Rock", 1, 0), ("polygon", "inclusion", "", 1, 1),
-                    ("polygon", "exclusion", "", 1, 2), ("polygon", "exclusion", "", 1, 3)],
-    }[kind]
+    assert (
+        found
+        == {
+            "wkt": [
+                ("polygon", "exclusion", "Calf", 1, 0),
+                ("polygon", "exclusion", "", 2, 1),
+                ("point", "exclusion", "Two rocks", 1, 2),
+                ("point", "exclusion", "Two rocks", 1, 3),
+                ("line", "exclusion", "", 1, 4),
+            ],
+            "geojson": [
+                ("circle", "exclusion", "Rock", 1, 0),
+                ("polygon", "inclusion", "", 1, 1),
+                ("polygon", "exclusion", "", 1, 2),
+                ("polygon", "exclusion", "", 1, 3),
+            ],
+        }[kind]
+    )
     assert written(ground, ground.shapes) == TEXTS[kind]
 
 
@@ -83,7 +123,7 @@ def test_what_was_drawn_is_read_again_and_the_rest_stands(kind, data):
         assert contents(ground_of("f", text, kind, "exclusion").shapes) == contents([*drawn, *new])
     for piece in ground.pieces:
         if all(ground.shapes[n] in drawn for n in piece.shapes):
-            assert ground.text[piece.begin:piece.end] in text
+            assert ground.text[piece.begin : piece.end] in text
     if kind == "wkt":
         assert "# a chart; no geometry\n" in text
         assert "# the end" in text
@@ -110,12 +150,25 @@ def test_foreign_words_of_a_feature_stay_when_it_is_moved():
     assert len(root["features"]) == 4
 
 
-@pytest.mark.parametrize(("text", "kind"), [
-    ("POLYGON EMPTY", "wkt"), ("POLYGON ((1 2, 3 4), EMPTY)", "wkt"), ("POINT (190 50)", "wkt"),
-    ('{"type": "Feature", "geometry": null}', "geojson"), ("[1]", "geojson"),
-    ('{"type": "FeatureCollection", "features": [{"type": "Feature", "geometry": {"type": "GeometryCollection"}}]}',
-     "geojson"), ('{"type": "FeatureCollection", "features": [3]}', "geojson"), ("<kml/>", "kml"),
-])
+@pytest.mark.parametrize(
+    ("text", "kind"),
+    [
+        ("POLYGON EMPTY", "wkt"),
+        ("POLYGON ((1 2, 3 4), EMPTY)", "wkt"),
+        ("POINT (190 50)", "wkt"),
+        ('{"type": "Feature", "geometry": null}', "geojson"),
+        ("[1]", "geojson"),
+        (
+            (
+                '{"type": "FeatureCollection", "features":'
+                ' [{"type": "Feature", "geometry": {"type": "GeometryCollection"}}]}'
+            ),
+            "geojson",
+        ),
+        ('{"type": "FeatureCollection", "features": [3]}', "geojson"),
+        ("<kml/>", "kml"),
+    ],
+)
 def test_what_is_not_drawn_here_is_said(text, kind):
     with pytest.raises(NotEditable):
         ground_of("f", text, kind, "exclusion")

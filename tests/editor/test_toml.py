@@ -28,21 +28,38 @@ latitudes = st.integers(-900_000_000, 900_000_000).map(lambda n: n / 1e7)
 longitudes = st.integers(-1_800_000_000, 1_800_000_000).map(lambda n: n / 1e7)
 names = st.text("abc 'é\"\\#[]=", max_size=8)
 points = st.builds(
-    PointOptions, lat=latitudes, lon=longitudes, name=names, radius_m=st.sampled_from([10.0, 12.0, 8.5]),
-    rounding=st.sampled_from([None, "port", "starboard"]))
+    PointOptions,
+    lat=latitudes,
+    lon=longitudes,
+    name=names,
+    radius_m=st.sampled_from([10.0, 12.0, 8.5]),
+    rounding=st.sampled_from([None, "port", "starboard"]),
+)
 marks = st.builds(MarkOptions, lat=latitudes, lon=longitudes)
-gates = st.builds(GateOptions, port_mark=marks, starboard_mark=marks, name=names,
-                  after_s=st.sampled_from([None, 60.0]))
-boxes = st.builds(BoxOptions, polygon=st.sampled_from(["box.wkt", "POLYGON ((1 1, 2 1, 2 2, 1 1))"]),
-                  for_s=st.sampled_from([None, 300.0]), name=names)
+gates = st.builds(GateOptions, port_mark=marks, starboard_mark=marks, name=names, after_s=st.sampled_from([None, 60.0]))
+boxes = st.builds(
+    BoxOptions,
+    polygon=st.sampled_from(["box.wkt", "POLYGON ((1 1, 2 1, 2 2, 1 1))"]),
+    for_s=st.sampled_from([None, 300.0]),
+    name=names,
+)
 goals = points | gates | boxes
 refuges = st.builds(RefugeOptions, lat=latitudes, lon=longitudes, name=names)
-areas = st.builds(AreaOptions, obstacles=st.lists(st.sampled_from(["a.wkt", "b.wkt"]), max_size=2).map(tuple),
-                  fence=st.sampled_from([None, "f.wkt"]), margin_m=st.sampled_from([12.0, 15.0]))
+areas = st.builds(
+    AreaOptions,
+    obstacles=st.lists(st.sampled_from(["a.wkt", "b.wkt"]), max_size=2).map(tuple),
+    fence=st.sampled_from([None, "f.wkt"]),
+    margin_m=st.sampled_from([12.0, 15.0]),
+)
 missions = st.builds(
-    MissionOptions, goal=st.lists(goals, max_size=4).map(tuple), refuge=st.lists(refuges, max_size=2).map(tuple),
-    name=st.none() | names, start=st.none() | st.builds(StartOptions, lat=latitudes, lon=longitudes), area=areas,
-    skipper=st.builds(SkipperOptions, laps=st.sampled_from([1, 3]), end=st.sampled_from(["loiter", "home"])))
+    MissionOptions,
+    goal=st.lists(goals, max_size=4).map(tuple),
+    refuge=st.lists(refuges, max_size=2).map(tuple),
+    name=st.none() | names,
+    start=st.none() | st.builds(StartOptions, lat=latitudes, lon=longitudes),
+    area=areas,
+    skipper=st.builds(SkipperOptions, laps=st.sampled_from([1, 3]), end=st.sampled_from(["loiter", "home"])),
+)
 
 
 @st.composite
@@ -51,8 +68,9 @@ def texts(draw):
     options = draw(missions)
     head, *tables = blocks_of(dump_options(msgspec.structs.replace(options, goal=(), refuge=())))
     tables = [b.text for b in tables]
-    lists = [made(name, entry, is_one_of_many=True).text for name in ("goal", "refuge")
-             for entry in getattr(options, name)]
+    lists = [
+        made(name, entry, is_one_of_many=True).text for name in ("goal", "refuge") for entry in getattr(options, name)
+    ]
     order = draw(st.permutations([*range(len(tables)), *[-1] * len(lists)]))
     mixed, next_list = [head.text], iter(lists)
     mixed += [tables[n] if n >= 0 else next(next_list) for n in order]
@@ -71,7 +89,7 @@ def texts(draw):
 @st.composite
 def changed(draw, entries, new):
     """The entries in any order, some gone, some changed, some new; and their keys."""
-    keys = list(draw(st.permutations(range(len(entries)))))[:draw(st.integers(0, len(entries)))]
+    keys = list(draw(st.permutations(range(len(entries)))))[: draw(st.integers(0, len(entries)))]
     if draw(st.booleans()):
         keys.sort()
     keys = [*keys, *[None] * draw(st.integers(0, 2))]
@@ -101,10 +119,14 @@ def test_what_is_meant_is_read_again_and_comments_stay(data, drawn):
     gone = len(before.goal) + len(before.refuge) - sum(k is not None for k in (*goal_keys, *refuge_keys))
     kinds = any(k is not None and type(g) is not type(before.goal[k]) for g, k in zip(goal, goal_keys, strict=True))
     same = ("name", "refuge")
-    is_all_kept = not gone and not kinds and after.start is not None and all(
-        getattr(after, f) == getattr(before, f) for f in same) and all(
-        getattr(after.area, f) == getattr(before.area, f) for f in ("fence", "obstacles")) and all(
-        g == before.goal[k] for g, k in zip(goal, goal_keys, strict=True) if k is not None)
+    is_all_kept = (
+        not gone
+        and not kinds
+        and after.start is not None
+        and all(getattr(after, f) == getattr(before, f) for f in same)
+        and all(getattr(after.area, f) == getattr(before.area, f) for f in ("fence", "obstacles"))
+        and all(g == before.goal[k] for g, k in zip(goal, goal_keys, strict=True) if k is not None)
+    )
     if is_all_kept:
         assert sorted(re.findall(r"# comment \d+", out)) == sorted(re.findall(r"# comment \d+", text))
 
@@ -150,24 +172,37 @@ def test_one_goal_moved_is_two_numbers_in_the_file(path):
     first = before.goal[0]
     if not isinstance(first, PointOptions):
         return
-    after = msgspec.structs.replace(before, goal=(
-        msgspec.structs.replace(first, lat=50.8200001, lon=-1.3100001), *before.goal[1:]))
+    after = msgspec.structs.replace(
+        before, goal=(msgspec.structs.replace(first, lat=50.8200001, lon=-1.3100001), *before.goal[1:])
+    )
     out = rewritten(text, before, after, {"goal": range(len(before.goal)), "refuge": range(len(before.refuge))})
     differing = [(a, b) for a, b in zip(text.split("\n"), out.split("\n"), strict=True) if a != b]
     assert [b.split("#")[0].strip() for _, b in differing] == ["lat = 50.8200001", "lon = -1.3100001"]
 
 
-@pytest.mark.parametrize("text", [
-    'goal = [{lat = 1.0, lon = 2.0, name = "a"}, {lat = 3.0, lon = 4.0}]\nname = "m"\n',
-    ('name = "m"\nstart.lat = 1.0\nstart.lon = 2.0 # c\n[[goal]]\nlat = 1.0\nlon = 2.0\n[area]\nmargin_m = 2\n'
-     '[[goal]]\nlat=3.0\nlon=4.0'),
-    ('[[goal]]\nkind = "gate"\n[goal.port_mark]\nlat = 1.0 # here\nlon = 1.0\n[goal.starboard_mark]\nlat = 2.0\n'
-     'lon = 1.0\n[[goal]]\nlat = 1.0\nlon = 2.0\n'),
-], ids=["inline", "dotted and apart", "tables in tables"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        'goal = [{lat = 1.0, lon = 2.0, name = "a"}, {lat = 3.0, lon = 4.0}]\nname = "m"\n',
+        (
+            'name = "m"\nstart.lat = 1.0\nstart.lon = 2.0 # c\n[[goal]]\nlat = 1.0\nlon = 2.0\n[area]\nmargin_m = 2\n'
+            "[[goal]]\nlat=3.0\nlon=4.0"
+        ),
+        (
+            '[[goal]]\nkind = "gate"\n[goal.port_mark]\nlat = 1.0 # here\nlon = 1.0\n[goal.starboard_mark]\nlat = 2.0\n'
+            "lon = 1.0\n[[goal]]\nlat = 1.0\nlon = 2.0\n"
+        ),
+    ],
+    ids=["inline", "dotted and apart", "tables in tables"],
+)
 def test_other_ways_to_write_a_mission(text):
     before = parse_options(text, "m")
     keys = {"goal": (1, 0), "refuge": ()}
-    after = msgspec.structs.replace(before, goal=(before.goal[1], before.goal[0]),
-                                    area=AreaOptions(margin_m=7.0, margin_floor_m=3.0),
-                                    start=StartOptions(lat=5.0, lon=6.0), skipper=SkipperOptions(end="home"))
+    after = msgspec.structs.replace(
+        before,
+        goal=(before.goal[1], before.goal[0]),
+        area=AreaOptions(margin_m=7.0, margin_floor_m=3.0),
+        start=StartOptions(lat=5.0, lon=6.0),
+        skipper=SkipperOptions(end="home"),
+    )
     assert parse_options(rewritten(text, before, after, keys), "m") == after

@@ -22,8 +22,14 @@ from companion.field.vector_fields import (
     repulsive_line_between,
 )
 
-ATOMS: tuple[Field, ...] = (AttractiveLine(), AttractiveCircle(), AttractivePoint(), RepulsivePoint(), RepulsiveLine(),
-                            Uniform(1.0))
+ATOMS: tuple[Field, ...] = (
+    AttractiveLine(),
+    AttractiveCircle(),
+    AttractivePoint(),
+    RepulsivePoint(),
+    RepulsiveLine(),
+    Uniform(1.0),
+)
 metre = st.floats(-500.0, 500.0)
 angle = st.floats(-math.pi, math.pi)
 atom = st.sampled_from(ATOMS)
@@ -74,7 +80,7 @@ def test_repulsive_atoms_are_gaussians_of_a_hundred_metres() -> None:
 @property_test
 @given(atom, metre, metre, metre, metre)
 def test_shift(field: Field, x: float, y: float, dx: float, dy: float) -> None:
-    assume(math.hypot(x, y) > 1e-3 and abs(y) > 1e-3)       # at a centre the direction jumps
+    assume(math.hypot(x, y) > 1e-3 and abs(y) > 1e-3)  # at a centre the direction jumps
     assert field.shifted(dx, dy)((x + dx, y + dy)) == pytest.approx(field((x, y)), abs=1e-6)
 
 
@@ -85,7 +91,7 @@ def test_rotation_turns_pattern_and_vectors_clockwise(field: Field, x: float, y:
     s, c = math.sin(a), math.cos(a)
     turned = field.rotated(a)((c * x + s * y, -s * x + c * y))[0]
     v = field((x, y))[0]
-    if abs(y) > 1e-6:       # on its line a repulsive line has two sides
+    if abs(y) > 1e-6:  # on its line a repulsive line has two sides
         assert turned == pytest.approx((c * v[0] + s * v[1], -s * v[0] + c * v[1]), abs=1e-6)
 
 
@@ -141,15 +147,19 @@ WIND = math.radians(0.0)
 def vectorfield1() -> Projection:
     """Figure 4.2: line following, the other boat, projection."""
     other = RepulsivePoint().shifted(30.0, 40.0)
-    return Projection(field=AttractiveLine() + other, twd_from_rad=WIND,
-                      zone=HysteresisZone(at_en=(0.0, 0.0), course_rad=math.pi / 2.0))
+    return Projection(
+        field=AttractiveLine() + other,
+        twd_from_rad=WIND,
+        zone=HysteresisZone(at_en=(0.0, 0.0), course_rad=math.pi / 2.0),
+    )
 
 
 def vectorfield2() -> Projection:
     """Figure 4.3: attractive point, the other boat, projection."""
     other = RepulsivePoint().shifted(30.0, 40.0)
-    return Projection(field=AttractivePoint() + other, twd_from_rad=WIND,
-                      zone=HysteresisZone.of_point((0.0, 0.0), WIND))
+    return Projection(
+        field=AttractivePoint() + other, twd_from_rad=WIND, zone=HysteresisZone.of_point((0.0, 0.0), WIND)
+    )
 
 
 @pytest.mark.parametrize("tree", [vectorfield1(), vectorfield2()])
@@ -167,7 +177,7 @@ def test_tree_1_follows_the_line_far_from_the_boat_and_leaves_it_near() -> None:
     tree = vectorfield1()
     assert math.degrees(tree.steer((-500.0, 0.0), 1)[0]) == pytest.approx(90.0, abs=0.01)
     near = tree.steer((30.0, 30.0), 1)[0]
-    assert abs(math.degrees(near)) > 110.0          # south of the boat at (30, 40): away, southwards
+    assert abs(math.degrees(near)) > 110.0  # south of the boat at (30, 40): away, southwards
 
 
 def test_tree_2_beats_up_to_the_point_in_boards() -> None:
@@ -175,15 +185,16 @@ def test_tree_2_beats_up_to_the_point_in_boards() -> None:
     tree = vectorfield2()
     assert math.degrees(tree.steer((0.0, -300.0), 1)[0]) == pytest.approx(45.0)
     assert math.degrees(tree.steer((0.0, -300.0), -1)[0]) == pytest.approx(-45.0)
-    assert tree.steer((-60.0, -300.0), -1)[2] == 1        # left of the zone: go right, and keep going right ...
+    assert tree.steer((-60.0, -300.0), -1)[2] == 1  # left of the zone: go right, and keep going right ...
     assert tree.steer((0.0, -250.0), 1)[2] == 1
-    assert tree.steer((60.0, -200.0), 1)[2] == -1         # ... until the right edge
+    assert tree.steer((60.0, -200.0), 1)[2] == -1  # ... until the right edge
 
 
 @property_test
 @given(atom, metre, metre, angle, st.floats(0.3, 1.3), st.sampled_from([-1, 1]))
-def test_projection_is_outside_the_zone_and_changes_nothing_else(field: Field, x: float, y: float, twd: float,
-                                                                 half: float, q: int) -> None:
+def test_projection_is_outside_the_zone_and_changes_nothing_else(
+    field: Field, x: float, y: float, twd: float, half: float, q: int
+) -> None:
     p = Projection(field=field, twd_from_rad=twd, no_go_half_rad=half)
     v, raw = p.evaluate((x, y), q)[0], field((x, y))[0]
     if np.hypot(*raw) < 1e-6:
@@ -199,7 +210,7 @@ def test_fan_is_one_sided_outside_the_zone() -> None:
     width = np.degrees(high - low)
     assert width == pytest.approx((90.0, 45.0, 45.0))
     heading = math.radians(90.0) + 0.5 * math.atan(80.0 / 50.0)
-    assert high[1] == pytest.approx(heading + math.pi / 4.0, abs=0.05)     # left of the line: to the right
+    assert high[1] == pytest.approx(heading + math.pi / 4.0, abs=0.05)  # left of the line: to the right
     assert low[2] == pytest.approx(math.pi - heading - math.pi / 4.0, abs=0.05)
 
 

@@ -24,22 +24,39 @@ HABITS = GuidanceSettings()
 def seen(heading_deg: float = 90.0, twd_deg: float = 0.0, speed: float = 2.0, **more: object) -> Situation:
     h = math.radians(heading_deg)
     velocity = (speed * math.sin(h), speed * math.cos(h))
-    values: dict[str, object] = {"t_s": 0.0, "en_m": (0.0, 0.0), "heading_rad": h, "velocity_en_mps": velocity,
-                                 "twd_from_rad": math.radians(twd_deg)}
+    values: dict[str, object] = {
+        "t_s": 0.0,
+        "en_m": (0.0, 0.0),
+        "heading_rad": h,
+        "velocity_en_mps": velocity,
+        "twd_from_rad": math.radians(twd_deg),
+    }
     return Situation(**(values | more))  # type: ignore[arg-type]
 
 
 @settings(max_examples=300)
-@given(angle, angle, angle, st.floats(-1.0, 3.0), st.sampled_from(list(Manoeuvre)), st.floats(0.0, 100.0),
-       st.sampled_from([-1, 1]), st.integers(0, 2), st.booleans())
-def test_no_setpoint_is_ever_inside_the_no_go_zone(wanted: float, heading: float, twd: float, speed: float,
-                                                   doing: Manoeuvre, t: float, q: int, failed: int,
-                                                   look: bool) -> None:
-    situation = seen(math.degrees(heading), math.degrees(twd), speed, t_s=t,
-                     obstacles=(MovingObstacle(en_m=(30.0, 40.0)),))
+@given(
+    angle,
+    angle,
+    angle,
+    st.floats(-1.0, 3.0),
+    st.sampled_from(list(Manoeuvre)),
+    st.floats(0.0, 100.0),
+    st.sampled_from([-1, 1]),
+    st.integers(0, 2),
+    st.booleans(),
+)
+def test_no_setpoint_is_ever_inside_the_no_go_zone(
+    wanted: float, heading: float, twd: float, speed: float, doing: Manoeuvre, t: float, q: int, failed: int, look: bool
+) -> None:
+    situation = seen(
+        math.degrees(heading), math.degrees(twd), speed, t_s=t, obstacles=(MovingObstacle(en_m=(30.0, 40.0)),)
+    )
     state = GuidanceState(q=q, manoeuvre=doing, failed_tacks=failed, irons_side=q)
-    for out in (helm(state, situation, wanted, HABITS)[1],
-                step(state, situation, hold_heading(wanted), replace(HABITS, look_ahead=look))[1].heading_rad):
+    for out in (
+        helm(state, situation, wanted, HABITS)[1],
+        step(state, situation, hold_heading(wanted), replace(HABITS, look_ahead=look))[1].heading_rad,
+    ):
         assert math.cos(out - twd) <= math.cos(HABITS.no_go_half_rad) + 1e-9
 
 
@@ -49,7 +66,7 @@ def test_tack_with_way_on_and_wear_without() -> None:
     assert math.degrees(heading) == pytest.approx(-50.0)
     state, heading, why = helm(GuidanceState(), seen(50.0, speed=0.4), math.radians(-50.0), HABITS)
     assert state.manoeuvre is Manoeuvre.WEAR
-    assert 100.0 < math.degrees(heading) < 180.0          # away from the wind
+    assert 100.0 < math.degrees(heading) < 180.0  # away from the wind
 
 
 def test_wearing_goes_round_by_the_stern_to_the_other_board() -> None:
@@ -127,8 +144,19 @@ def sail(
     boat = SimulatedVaimos.launch(wind_for(0.0, 6.0, 3), np.random.default_rng(3), (0.0, -150.0), math.radians(60.0))
     state, least = GuidanceState(), math.inf
     for k in range(seconds):
-        moved = () if obstacle is None else (replace(obstacle, en_m=(
-            obstacle.en_m[0] + k * obstacle.velocity_en_mps[0], obstacle.en_m[1] + k * obstacle.velocity_en_mps[1])),)
+        moved = (
+            ()
+            if obstacle is None
+            else (
+                replace(
+                    obstacle,
+                    en_m=(
+                        obstacle.en_m[0] + k * obstacle.velocity_en_mps[0],
+                        obstacle.en_m[1] + k * obstacle.velocity_en_mps[1],
+                    ),
+                ),
+            )
+        )
         if moved:
             least = min(least, math.dist(boat.en_m, moved[0].en_m))
         state, setpoint = step(state, boat.sense(moved), intent, habits)

@@ -24,17 +24,28 @@ HABITS = GuidanceSettings(lag_s=2.0, tack_s=2.0, turn_rate_radps=math.radians(40
 
 
 def area(*rocks: Polygon, limits: Polygon | None = None) -> LocalArea:
-    return LocalArea(frame=FRAME, names=tuple(map(str, range(len(rocks)))), polygons=rocks,
-                     own_margins_m=(0.0,) * len(rocks), limits=limits)
+    return LocalArea(
+        frame=FRAME,
+        names=tuple(map(str, range(len(rocks)))),
+        polygons=rocks,
+        own_margins_m=(0.0,) * len(rocks),
+        limits=limits,
+    )
 
 
-def sail(water: LocalArea, goal: tuple[float, float], at: tuple[float, float] = (0.0, 0.0),
-         seconds: int = 300) -> list[tuple[float, float]]:
+def sail(
+    water: LocalArea, goal: tuple[float, float], at: tuple[float, float] = (0.0, 0.0), seconds: int = 300
+) -> list[tuple[float, float]]:
     """Sail a point at 2 m/s that turns 40 degrees a second by the guidance; return its track up to the goal."""
     state, heading, track = GuidanceState(), math.pi / 2.0, [at]
     for t in range(seconds):
-        seen = Situation(t_s=float(t), en_m=track[-1], heading_rad=heading, twd_from_rad=0.0,
-                         velocity_en_mps=(2.0 * math.sin(heading), 2.0 * math.cos(heading)))
+        seen = Situation(
+            t_s=float(t),
+            en_m=track[-1],
+            heading_rad=heading,
+            twd_from_rad=0.0,
+            velocity_en_mps=(2.0 * math.sin(heading), 2.0 * math.cos(heading)),
+        )
         state, setpoint = step(state, seen, replace(go_to(goal, 0.0), clearance=water.clearance_m), HABITS)
         turn = wrap_pi(setpoint.heading_rad - heading)
         heading = wrap_pi(heading + max(-0.7, min(0.7, turn)))

@@ -16,8 +16,9 @@ BOARDS, LOOPS = Station(at_en=(0.0, 0.0), tacks=True), Station(at_en=(0.0, 0.0))
 
 def seen(en: tuple[float, float], heading_deg: float, speed: float = 2.0, t: float = 0.0) -> Situation:
     h = math.radians(heading_deg)
-    return Situation(t_s=t, en_m=en, heading_rad=h, twd_from_rad=0.0,
-                     velocity_en_mps=(speed * math.sin(h), speed * math.cos(h)))
+    return Situation(
+        t_s=t, en_m=en, heading_rad=h, twd_from_rad=0.0, velocity_en_mps=(speed * math.sin(h), speed * math.cos(h))
+    )
 
 
 def test_a_board_begins_after_the_tack_also_when_she_bears_off_to_lose_height() -> None:
@@ -47,8 +48,15 @@ def test_a_loop_gathers_way_before_it_goes_through_the_wind_and_eases_where_she_
 
 
 @settings(max_examples=300)
-@given(st.floats(-40.0, 40.0), st.floats(-40.0, 40.0), st.floats(-180.0, 180.0), st.floats(0.0, 3.0),
-       st.sampled_from(list(StationPhase)), st.sampled_from([-1, 1]), st.sampled_from([BOARDS, LOOPS]))
+@given(
+    st.floats(-40.0, 40.0),
+    st.floats(-40.0, 40.0),
+    st.floats(-180.0, 180.0),
+    st.floats(0.0, 3.0),
+    st.sampled_from(list(StationPhase)),
+    st.sampled_from([-1, 1]),
+    st.sampled_from([BOARDS, LOOPS]),
+)
 def test_no_setpoint_is_inside_the_no_go_zone(
     east: float, north: float, heading: float, speed: float, phase: StationPhase, side: int, station: Station
 ) -> None:

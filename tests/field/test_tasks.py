@@ -105,7 +105,7 @@ def test_guided_over_mavlink_in_virtual_time() -> None:
 def test_station_keeping_over_mavlink() -> None:
     result = run_station(0)
     assert result["kept"]
-    assert result["radius95_m"] < 9.4      # 2018's best by a real boat; this one tacks in 2 s and has no leeway
+    assert result["radius95_m"] < 9.4  # 2018's best by a real boat; this one tacks in 2 s and has no leeway
 
 
 @pytest.mark.parametrize(("method", "within_m"), [("plan", 9.4), ("loiter", 9.4)])
@@ -147,7 +147,7 @@ def test_station_lost_and_cut_short() -> None:
 
 def test_sailbot_points_by_hand() -> None:
     assert sailbot_points(circle(5.0, 330.0), (0.0, 0.0)) == pytest.approx(10.0)
-    assert sailbot_points(circle(5.0, 390.0), (0.0, 0.0)) == pytest.approx(8.0, abs=0.05)      # a minute too long
+    assert sailbot_points(circle(5.0, 390.0), (0.0, 0.0)) == pytest.approx(8.0, abs=0.05)  # a minute too long
     assert sailbot_points(circle(5.0, 120.0), (0.0, 0.0)) == pytest.approx(4.0, abs=0.05)
     assert sailbot_points(circle(5.0), (500.0, 0.0)) == 0.0
 
@@ -165,13 +165,20 @@ def test_the_95_percent_radius_is_the_organisers() -> None:
 
 # WRSC 2018's published radii [m]; the tracks have no licence and are not ours to ship. None: not counted by the jury.
 PUBLISHED = {
-    "Aberystwyth_Micro_sailboat_attempt1": None, "Aberystwyth_Micro_sailboat_attempt2": None,
-    "Aberystwyth_Micro_sailboat_attempt3": 12.5902291279047, "ENSTA_Sailboat_attempt1": 14.3082980898413,
-    "ENSTA_Sailboat_attempt2": 9.38229774571029, "Plymouth_short_Micro_sailboat_attempt1": 17.5473253279203,
-    "Plymouth_short_Micro_sailboat_attempt2": 13.2630265729155, "Plymouth_short_Micro_sailboat_attempt3": None,
-    "Shanghai_Sailboat_attempt1": None, "Shanghai_Sailboat_attempt2": 20.9179144878088,
-    "Shanghai_Sailboat_attempt3": 14.906022330996, "Southampton_Micro_sailboat_attempt1": 11.100143492592549,
-    "Southampton_Micro_sailboat_attempt2": 12.2116654508522, "ZMART_Micro_sailboat_attempt1": 14.2711403324557,
+    "Aberystwyth_Micro_sailboat_attempt1": None,
+    "Aberystwyth_Micro_sailboat_attempt2": None,
+    "Aberystwyth_Micro_sailboat_attempt3": 12.5902291279047,
+    "ENSTA_Sailboat_attempt1": 14.3082980898413,
+    "ENSTA_Sailboat_attempt2": 9.38229774571029,
+    "Plymouth_short_Micro_sailboat_attempt1": 17.5473253279203,
+    "Plymouth_short_Micro_sailboat_attempt2": 13.2630265729155,
+    "Plymouth_short_Micro_sailboat_attempt3": None,
+    "Shanghai_Sailboat_attempt1": None,
+    "Shanghai_Sailboat_attempt2": 20.9179144878088,
+    "Shanghai_Sailboat_attempt3": 14.906022330996,
+    "Southampton_Micro_sailboat_attempt1": 11.100143492592549,
+    "Southampton_Micro_sailboat_attempt2": 12.2116654508522,
+    "ZMART_Micro_sailboat_attempt1": 14.2711403324557,
     "ZMART_Micro_sailboat_attempt2": None,
 }
 
@@ -184,9 +191,15 @@ def test_the_scorer_gives_the_published_radii_of_2018(name: str) -> None:
     frame = LocalFrame(GeoPoint(lat_deg=lat, lon_deg=lon))
     with (Path(os.environ["COMPANION_WRSC_TRACKS"]) / f"{name}.csv").open() as stream:
         rows = list(csv.reader(stream))[1:]
-    track = np.array([
-        (dt.datetime.fromisoformat(r[0]).timestamp(),
-         *frame.en_from_geo(GeoPoint(lat_deg=float(r[1]), lon_deg=float(r[2])))) for r in rows])
+    track = np.array(
+        [
+            (
+                dt.datetime.fromisoformat(r[0]).timestamp(),
+                *frame.en_from_geo(GeoPoint(lat_deg=float(r[1]), lon_deg=float(r[2]))),
+            )
+            for r in rows
+        ]
+    )
     score = station_score(track, (0.0, 0.0))
     published = PUBLISHED[name]
     assert score.kept is (published is not None)

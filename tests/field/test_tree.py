@@ -40,11 +40,15 @@ metres = st.floats(-3e4, 3e4)
 places = st.tuples(metres, metres)
 sizes = st.floats(5.0, 5000.0)
 atoms = st.one_of(
-    st.builds(PointTo, at_en=places), st.builds(StayAt, at_en=places), st.builds(Along, from_en=places, to_en=places),
+    st.builds(PointTo, at_en=places),
+    st.builds(StayAt, at_en=places),
+    st.builds(Along, from_en=places, to_en=places),
     st.builds(Round, at_en=places, radius_m=sizes, is_clockwise=st.booleans()),
     st.builds(AwayFrom, at_en=places, range_m=st.floats(1.0, 5000.0)),
     st.builds(AwayFromLine, from_en=places, to_en=places, range_m=st.floats(1.0, 5000.0)),
-    st.builds(Heading, heading_rad=st.floats(0.0, 6.3)), st.just(OutOf(water_en=SQUARE)))
+    st.builds(Heading, heading_rad=st.floats(0.0, 6.3)),
+    st.just(OutOf(water_en=SQUARE)),
+)
 
 
 def tree(text, **named):
@@ -56,8 +60,13 @@ def at(made, *points, conditions=NORTH):
 
 
 @settings(max_examples=60)
-@given(expressions, st.tuples(atoms, atoms, atoms, atoms), st.lists(places, min_size=1, max_size=4),
-       st.floats(-7.0, 7.0), st.booleans())
+@given(
+    expressions,
+    st.tuples(atoms, atoms, atoms, atoms),
+    st.lists(places, min_size=1, max_size=4),
+    st.floats(-7.0, 7.0),
+    st.booleans(),
+)
 def test_any_field_is_finite_and_bounded_anywhere(expression, four, points, twd, sails):
     names = ("ring", "islet", "lane_2", "Ship")
     made = FieldTree(expression=expression, atoms=tuple(zip(names, four, strict=True)))
@@ -109,13 +118,16 @@ def test_a_part_is_projected_before_it_is_added():
 
 
 def test_the_zone_is_that_of_the_first_trajectory():
-    named = {"rock": AwayFrom(at_en=(0.0, 0.0), range_m=9.0), "ring": Round(at_en=(1.0, 2.0), radius_m=60.0),
-             "lane": Along(from_en=(0.0, 0.0), to_en=(0.0, 100.0), zone_m=30.0)}
+    named = {
+        "rock": AwayFrom(at_en=(0.0, 0.0), range_m=9.0),
+        "ring": Round(at_en=(1.0, 2.0), radius_m=60.0),
+        "lane": Along(from_en=(0.0, 0.0), to_en=(0.0, 100.0), zone_m=30.0),
+    }
     assert isinstance(zone_of(tree("rock + 2 * ring + lane", **named), NORTH), HysteresisRing)
     found = zone_of(tree("rock + max(lane, ring)", **named), NORTH)
     assert found == HysteresisZone(at_en=(0.0, 0.0), course_rad=0.0, half_m=30.0)
     assert zone_of(tree("rock", **named), NORTH) is None
-    assert zone_of(tree("ring", **named), NORTH).half_m == 15.0     # a quarter of a small circle
+    assert zone_of(tree("ring", **named), NORTH).half_m == 15.0  # a quarter of a small circle
     assert zone_of(tree("ring", **named), FieldConditions(seen=SEEN, habits=GuidanceSettings(is_sailing=False))) is None
 
 
@@ -126,8 +138,13 @@ def test_a_boat_beats_round_the_windward_side_of_a_circle_and_stays_near_it(is_c
     habits = GuidanceSettings(turn_rate_radps=1.0, tack_s=1.0)
     state, here, heading, turned, far, bearing = GuidanceState(), (80.0, 0.0), math.pi, 0.0, 0.0, math.pi / 2.0
     for t in range(900):
-        seen = Situation(t_s=float(t), en_m=here, heading_rad=heading, twd_from_rad=0.0,
-                         velocity_en_mps=(2.0 * math.sin(heading), 2.0 * math.cos(heading)))
+        seen = Situation(
+            t_s=float(t),
+            en_m=here,
+            heading_rad=heading,
+            twd_from_rad=0.0,
+            velocity_en_mps=(2.0 * math.sin(heading), 2.0 * math.cos(heading)),
+        )
         now = FieldConditions(seen=seen, habits=habits)
         state, setpoint = step(state, seen, Intent(field=field_of(made, now), zone=zone_of(made, now)), habits)
         heading = setpoint.heading_rad

@@ -35,6 +35,7 @@ def test_inertia_she_takes_time_to_gather_and_to_lose_way() -> None:
 
 def test_she_gathers_way_like_300_kg_under_a_small_sail_and_the_published_set_does_not() -> None:
     """At 6 m/s of wind a sail of 6 m² pushes with at most half rho v² A = 132 N."""
+
     def after_2_s(parameters: VaimosParameters) -> float:
         s = state_at(0.0, 0.0, math.radians(90.0), 0.0)
         return float(sail_heading(s, parameters.array(), math.radians(90.0), 0.0, 6.0, 2.0, STEP_S)[5])
@@ -78,17 +79,25 @@ def test_polar_has_a_no_go_zone_and_hull_speed() -> None:
 
 
 @settings(max_examples=60)
-@given(st.floats(-math.pi, math.pi), st.floats(0.0, 3.0), st.floats(-math.pi, math.pi), st.floats(0.0, 20.0),
-       st.floats(-math.pi, math.pi))
-def test_any_wind_and_any_command_stays_finite_and_symmetric(heading: float, speed: float, twd: float, tws: float,
-                                                             wanted: float) -> None:
+@given(
+    st.floats(-math.pi, math.pi),
+    st.floats(0.0, 3.0),
+    st.floats(-math.pi, math.pi),
+    st.floats(0.0, 20.0),
+    st.floats(-math.pi, math.pi),
+)
+def test_any_wind_and_any_command_stays_finite_and_symmetric(
+    heading: float, speed: float, twd: float, tws: float, wanted: float
+) -> None:
     s = sail_heading(state_at(0.0, 0.0, heading, speed), P, wanted, twd, tws, 20.0, STEP_S)
     assert np.isfinite(s).all()
     assert abs(float(s[5])) < 6.0
     mirror = sail_heading(state_at(0.0, 0.0, -heading, speed), P, -wanted, -twd, tws, 20.0, STEP_S)
     # The mirrored scene is the mirrored voyage, but for the knife edges where the sail changes sides.
-    if abs(math.remainder(heading - twd, math.pi)) > 0.8 and abs(math.remainder(wanted - twd, math.pi)) > 0.8 and (
-        math.remainder(heading - twd, 2 * math.pi) * math.remainder(wanted - twd, 2 * math.pi) > 0.0
+    if (
+        abs(math.remainder(heading - twd, math.pi)) > 0.8
+        and abs(math.remainder(wanted - twd, math.pi)) > 0.8
+        and (math.remainder(heading - twd, 2 * math.pi) * math.remainder(wanted - twd, 2 * math.pi) > 0.0)
     ):
         assert float(mirror[0]) == pytest.approx(-float(s[0]), abs=1e-6)
         assert float(mirror[5]) == pytest.approx(float(s[5]), abs=1e-6)

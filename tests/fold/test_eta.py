@@ -23,8 +23,15 @@ DEMO = Path("sitl/scenarios/demo.toml")
 def demo(tmp_path_factory):
     """The demonstration's steps, and when its goal was reached."""
     steps = []
-    run_virtual(run_embedded(load_scenario(DEMO), DEMO, 0, tmp_path_factory.mktemp("demo") / "voyage",
-                             on_status=lambda _, step: steps.append(step)))
+    run_virtual(
+        run_embedded(
+            load_scenario(DEMO),
+            DEMO,
+            0,
+            tmp_path_factory.mktemp("demo") / "voyage",
+            on_status=lambda _, step: steps.append(step),
+        )
+    )
     return steps, next(step.snapshot.t_s for step in steps if step.state.progress.reached)
 
 
@@ -59,7 +66,8 @@ def test_a_plan_that_is_kept_has_its_own_time_and_the_new_clock(demo):
                 kept += 1
                 assert f"({step.state.mission.route.cost_s:.0f} s;" in said.text
                 assert step.state.mission.route.median_s is None or (
-                    0.5 < step.state.mission.route.median_s / step.state.mission.route.cost_s < 2.0)
+                    0.5 < step.state.mission.route.median_s / step.state.mission.route.cost_s < 2.0
+                )
     assert kept > 0
 
 
@@ -98,7 +106,7 @@ def test_within_two_minutes_a_boat_that_is_slower_is_told_so_and_doubted():
     slow, fit = paced(0.8, seconds=120.0), paced(1.0, seconds=120.0)
     assert slow.share == pytest.approx(0.8, abs=0.05)
     assert slow.doubt > 1.4 * fit.doubt
-    assert slow.late_s(100.0 * slow.share, 0.0) > fit.late_s(100.0, 0.0) + 5.0   # the same time, and less sure
+    assert slow.late_s(100.0 * slow.share, 0.0) > fit.late_s(100.0, 0.0) + 5.0  # the same time, and less sure
 
 
 def test_a_boat_that_has_shown_nothing_is_doubted_and_one_that_keeps_her_pace_is_not():
@@ -107,8 +115,8 @@ def test_a_boat_that_has_shown_nothing_is_doubted_and_one_that_keeps_her_pace_is
     kept = paced(1.0)
     assert kept.late_s(200.0, 0.0) < 225.0
     uneven = replace(PRIOR_PACE, tries=8.0, prior=0.0, took_s=160.0, made_s=160.0, scatter=8.0 * 0.3**2)
-    assert uneven.late_s(40.0, 0.0) < 47.5                            # what one try loses the next one gains
-    assert kept.late_s(200.0, 0.1) < 200.0 * (1.0 + 1.28 * 0.1)      # she sees how the wind of the plan began
+    assert uneven.late_s(40.0, 0.0) < 47.5  # what one try loses the next one gains
+    assert kept.late_s(200.0, 0.1) < 200.0 * (1.0 + 1.28 * 0.1)  # she sees how the wind of the plan began
 
 
 def test_what_tries_scatter_widens_what_is_told():
@@ -132,8 +140,8 @@ def test_a_boat_that_turns_keeps_her_way():
         end = (100.0 * math.sin(math.radians(to_deg)), 100.0 * math.cos(math.radians(to_deg)))
         return walker.steer(0.0, (0.0, 0.0), (0.0, 0.0), end)[1]
 
-    assert lost(-50.0, -120.0) == 0.0                            # a turn alone
-    assert lost(-50.0, 50.0) == pytest.approx(2.78, abs=0.05)    # the arc is 1.2 s shorter than the corner
+    assert lost(-50.0, -120.0) == 0.0  # a turn alone
+    assert lost(-50.0, 50.0) == pytest.approx(2.78, abs=0.05)  # the arc is 1.2 s shorter than the corner
     assert lost(-155.0, 155.0) == pytest.approx(1.88, abs=0.05)
 
 

@@ -52,14 +52,16 @@ def test_vmg_is_the_speed_against_the_wind(step):
     assert told(step, "page")["co_vmg"] == pytest.approx(east * math.sin(wind) + north * math.cos(wind))
 
 
-@pytest.mark.parametrize(("kind", "of_deg", "line", "page", "watch"), [
-    ("bearing", 41.26, "41.3°", 41.3, "041°"),
-    ("bearing", 359.96, "0°", 0.0, "000°"),
-    ("angle", -41.26, "41.3° P", -41.3, "41°P"),
-    ("angle", 318.74 - 180.0, "138.7° S", 138.7, "139°S"),
-])
-def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(
-        step, monkeypatch, kind, of_deg, line, page, watch):
+@pytest.mark.parametrize(
+    ("kind", "of_deg", "line", "page", "watch"),
+    [
+        ("bearing", 41.26, "41.3°", 41.3, "041°"),
+        ("bearing", 359.96, "0°", 0.0, "000°"),
+        ("angle", -41.26, "41.3° P", -41.3, "41°P"),
+        ("angle", 318.74 - 180.0, "138.7° S", 138.7, "139°S"),
+    ],
+)
+def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(step, monkeypatch, kind, of_deg, line, page, watch):
     row = Figure(name="co_test", label="test way", kind=kind, of=lambda step: math.radians(of_deg), hint="why")
     monkeypatch.setattr(figures, "FIGURES", (*FIGURES, row))
     monkeypatch.setitem(BY_NAME, row.name, row)
@@ -74,9 +76,10 @@ def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(
                 assert reader.take(1.0, message)
     view, _ = HeardFold().take(2.0, reader.report(2.0), None, None)
     assert [(f.label, f.kind, f.value, f.hint) for f in view.shown if f.name == "co_test"] == [
-        ("test way", kind, page, "why")]
+        ("test way", kind, page, "why")
+    ]
     assert ("test way", watch) in [row[:2] for row in body_of(view, knots=True, columns=80)]
-    assert HeardFold().take(60.0, reader.report(60.0), None, None)[0].shown == ()   # long not heard
+    assert HeardFold().take(60.0, reader.report(60.0), None, None)[0].shown == ()  # long not heard
 
 
 def test_a_row_is_in_the_report_from_its_least_to_its_most(step, monkeypatch):

@@ -37,8 +37,10 @@ DEMO = "missions/archipelago.toml"
 def fresh():
     mission = load_mission(DEMO)
     return VoyageFold(
-        Skipper(voyage=voyage_of(mission), config=config_of(mission)), WindTracker(estimator=estimator_of(mission)),
-        Permissions())
+        Skipper(voyage=voyage_of(mission), config=config_of(mission)),
+        WindTracker(estimator=estimator_of(mission)),
+        Permissions(),
+    )
 
 
 def told(fold, name, value, *, component=1, t_s=1.0, index=65535):
@@ -105,10 +107,18 @@ def heard(fold, first_s, last_s, *, twd_rad=0.3):
     """Let the fold hear a wind and a boat that lies still, once a second; return the last snapshot."""
     here = GeoPoint(lat_deg=50.817, lon_deg=-1.31)
     for t in range(first_s, last_s):
-        fold.take(VehicleState(
-            t_s=float(t), boot_s=float(t), position=here, velocity_en_mps=(0.0, 0.0), heading_rad=1.0))
-        fold.take(WindSample(t_s=float(t), twd_from_rad=twd_rad, tws_mps=5.0 + 0.01 * (t % 7),
-                             source=WindSource.AUTOPILOT_TRUE, quality=WindQuality.GOOD))
+        fold.take(
+            VehicleState(t_s=float(t), boot_s=float(t), position=here, velocity_en_mps=(0.0, 0.0), heading_rad=1.0)
+        )
+        fold.take(
+            WindSample(
+                t_s=float(t),
+                twd_from_rad=twd_rad,
+                tws_mps=5.0 + 0.01 * (t % 7),
+                source=WindSource.AUTOPILOT_TRUE,
+                quality=WindQuality.GOOD,
+            )
+        )
         snapshot = fold.tick(float(t)).snapshot
     return snapshot
 
@@ -126,7 +136,8 @@ def test_a_parameter_that_changes_what_a_sensor_says_is_said_and_the_wind_is_lea
     told(fold, name, 4.0)
     [event] = changed(fold, 61.0)
     assert event.text == (
-        f"{name} was set from 0 to 4 ({effect_of(name).value}): wind, current and polar are learned anew")
+        f"{name} was set from 0 to 4 ({effect_of(name).value}): wind, current and polar are learned anew"
+    )
     after = heard(fold, 62, 70, twd_rad=1.9)
     assert name in after.unsure
     assert after.wind.record_s < 10.0
@@ -154,7 +165,8 @@ def test_an_offset_that_was_set_leaves_the_wind_before_it_and_says_how_far_it_ha
 
 
 @pytest.mark.parametrize(
-    ("name", "anew"), [("SERVO1_REVERSED", True), ("SAIL_ANGLE_IDEAL", True), ("SAIL_HEEL_MAX", False)])
+    ("name", "anew"), [("SERVO1_REVERSED", True), ("SAIL_ANGLE_IDEAL", True), ("SAIL_HEEL_MAX", False)]
+)
 def test_one_that_changes_how_she_answers_leaves_the_wind(name, anew):
     fold = fresh()
     told(fold, name, 0.0)
@@ -232,7 +244,8 @@ def test_over_tcp_an_impossible_parameter_costs_no_connection():
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
         boat = SimulatedAutopilot(
-            AutopilotConfig(is_warm=True, parameters={"SAIL_NO_GO_ANGLE": 90.0}), Constant(0.0, 5.0), 1)
+            AutopilotConfig(is_warm=True, parameters={"SAIL_NO_GO_ANGLE": 90.0}), Constant(0.0, 5.0), 1
+        )
         async with (
             serve(boat, [f"tcpin:127.0.0.1:{port}"]),
             Link(open_link(f"tcp:127.0.0.1:{port}"), objection=fold.objection) as link,

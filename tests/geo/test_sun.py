@@ -15,13 +15,16 @@ def height_deg(lat_deg, lon_deg, *when):
     return math.degrees(sun_height_rad(math.radians(lat_deg), math.radians(lon_deg), unix_s))
 
 
-@pytest.mark.parametrize(("place", "when", "expected_deg"), [
-    ((51.478, 0.0), (2026, 6, 21, 12, 2), 90.0 - 51.478 + 23.44),       # noon of the longest day at Greenwich
-    ((51.478, 0.0), (2026, 12, 21, 11, 58), 90.0 - 51.478 - 23.44),
-    ((51.507, -0.128), (2026, 3, 20, 18, 14), -0.83),                    # London's sunset: half a disc and refraction
-    ((-33.868, 151.209), (2026, 12, 22, 1, 53), 90.0 - 33.868 + 23.44),  # noon at Sydney
-    ((0.0, 0.0), (2026, 3, 20, 14, 46), 90.0 - 39.6),                    # the equinox, 0.2 h + 2.44 h past noon
-])
+@pytest.mark.parametrize(
+    ("place", "when", "expected_deg"),
+    [
+        ((51.478, 0.0), (2026, 6, 21, 12, 2), 90.0 - 51.478 + 23.44),  # noon of the longest day at Greenwich
+        ((51.478, 0.0), (2026, 12, 21, 11, 58), 90.0 - 51.478 - 23.44),
+        ((51.507, -0.128), (2026, 3, 20, 18, 14), -0.83),  # London's sunset: half a disc and refraction
+        ((-33.868, 151.209), (2026, 12, 22, 1, 53), 90.0 - 33.868 + 23.44),  # noon at Sydney
+        ((0.0, 0.0), (2026, 3, 20, 14, 46), 90.0 - 39.6),  # the equinox, 0.2 h + 2.44 h past noon
+    ],
+)
 def test_it_stands_where_an_almanac_has_it(place, when, expected_deg):
     assert height_deg(*place, *when) == pytest.approx(expected_deg, abs=0.3)
 

@@ -64,21 +64,39 @@ def items(draw, lat, lon, commands=True):
     if commands and draw(st.integers(0, 6)) == 0:
         return MissionItem(command=Command.DO_CHANGE_SPEED, params=params)
     return MissionItem(
-        command=command, lat_e7=round((lat + draw(st.floats(-0.02, 0.02))) * 1e7),
-        lon_e7=round((lon + draw(st.floats(-0.02, 0.02))) * 1e7), params=params,
-        alt_m=float(draw(st.integers(-10, 40))), frame=draw(st.sampled_from([0, 3])) if commands else 3,
+        command=command,
+        lat_e7=round((lat + draw(st.floats(-0.02, 0.02))) * 1e7),
+        lon_e7=round((lon + draw(st.floats(-0.02, 0.02))) * 1e7),
+        params=params,
+        alt_m=float(draw(st.integers(-10, 40))),
+        frame=draw(st.sampled_from([0, 3])) if commands else 3,
         autocontinue=draw(st.booleans()) if commands else True,
     )
 
 
 @st.composite
-def documents(draw, *, zone_count=(0, 4), item_count=(0, 6), circles=True, holes=True, commands=True, marks=True,
-              rally=True, tracks=True, names=True, margins=True, kinds=None, extras=True):
+def documents(
+    draw,
+    *,
+    zone_count=(0, 4),
+    item_count=(0, 6),
+    circles=True,
+    holes=True,
+    commands=True,
+    marks=True,
+    rally=True,
+    tracks=True,
+    names=True,
+    margins=True,
+    kinds=None,
+    extras=True,
+):
     """A whole document; the arguments say what a format can carry."""
     lat, lon = draw(places())
     point = GeoPoint(lat_deg=lattice(lat), lon_deg=lattice(lon))
-    zs = draw(st.lists(zones(lat, lon, circles, holes, True, names, margins), min_size=zone_count[0],
-                       max_size=zone_count[1]))
+    zs = draw(
+        st.lists(zones(lat, lon, circles, holes, True, names, margins), min_size=zone_count[0], max_size=zone_count[1])
+    )
     if kinds is not None:
         zs = [Zone(kind=kinds, shape=z.shape, name=z.name, margin_m=z.margin_m) for z in zs]
     ms = draw(st.lists(items(lat, lon, commands), min_size=item_count[0], max_size=item_count[1]))
@@ -88,15 +106,25 @@ def documents(draw, *, zone_count=(0, 4), item_count=(0, 6), circles=True, holes
         mk.append(Mark(geometry=LineString(draw(rings(lat, lon))), kind=ZoneKind.EXCLUSION, name=draw(NAMES)))
     ra = []
     if rally and draw(st.booleans()):
-        ra.append(MissionItem(command=Command.NAV_RALLY_POINT, lat_e7=round(lat * 1e7), lon_e7=round(lon * 1e7),
-                              alt_m=float(draw(st.integers(0, 9)))))
+        ra.append(
+            MissionItem(
+                command=Command.NAV_RALLY_POINT,
+                lat_e7=round(lat * 1e7),
+                lon_e7=round(lon * 1e7),
+                alt_m=float(draw(st.integers(0, 9))),
+            )
+        )
     tr = []
     if tracks and draw(st.booleans()):
         pts = tuple(GeoPoint(lat_deg=y, lon_deg=x) for x, y in draw(rings(lat, lon)))
         times = tuple(1.7e9 + i for i in range(len(pts))) if draw(st.booleans()) else None
         tr.append(Track(points=pts, times_s=times, name=draw(NAMES)))
     return Document(
-        zones=tuple(zs), items=tuple(ms), marks=tuple(mk), rally=tuple(ra), tracks=tuple(tr),
+        zones=tuple(zs),
+        items=tuple(ms),
+        marks=tuple(mk),
+        rally=tuple(ra),
+        tracks=tuple(tr),
         home=point if extras and draw(st.booleans()) else None,
         return_point=point if extras and draw(st.booleans()) else None,
     )

@@ -29,10 +29,17 @@ def apart_m(a, b):
     return EARTH.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2]
 
 
-@pytest.mark.parametrize(("shape", "lat_deg", "lon_deg", "edge_deg"), [
-    (LONG, 52.5, 178.0, 52.6), (LONG, 52.5, 179.99, 52.6), (LONG, 52.4, -179.9, 52.6), (LONG, 51.4, -177.2, 51.3),
-    (NORTHERN, 75.2, 12.0, 75.3), (NORTHERN, 75.2, 20.0, 75.3),
-])
+@pytest.mark.parametrize(
+    ("shape", "lat_deg", "lon_deg", "edge_deg"),
+    [
+        (LONG, 52.5, 178.0, 52.6),
+        (LONG, 52.5, 179.99, 52.6),
+        (LONG, 52.4, -179.9, 52.6),
+        (LONG, 51.4, -177.2, 51.3),
+        (NORTHERN, 75.2, 12.0, 75.3),
+        (NORTHERN, 75.2, 20.0, 75.3),
+    ],
+)
 def test_a_long_edge_is_where_its_parallel_is(shape, lat_deg, lon_deg, edge_deg):
     """A chord of it in one frame would be kilometres off."""
     frame = frame_at(lat_deg, lon_deg)
@@ -46,8 +53,10 @@ def test_a_long_edge_is_where_its_parallel_is(shape, lat_deg, lon_deg, edge_deg)
 
 def test_two_frames_agree_on_the_clearance():
     first, second = frame_at(52.55, 179.9), frame_at(52.56, -179.97)
-    area = Area(fence=Fence(zones=(Zone(kind=ZoneKind.INCLUSION, shape=LONG),)),
-                obstacles=(Obstacle(shape=Polygon([(179.99, 52.55), (180.01, 52.55), (180.0, 52.57)]), name="rock"),))
+    area = Area(
+        fence=Fence(zones=(Zone(kind=ZoneKind.INCLUSION, shape=LONG),)),
+        obstacles=(Obstacle(shape=Polygon([(179.99, 52.55), (180.01, 52.55), (180.0, 52.57)]), name="rock"),),
+    )
     for lon_deg, lat_deg in [(179.95, 52.58), (-179.99, 52.56), (-179.9, 52.59)]:
         here = GeoPoint(lat_deg=lat_deg, lon_deg=lon_deg)
         a, b = (float(area.about(f, REACH_M).clearance_m([f.en_from_geo(here)])[0]) for f in (first, second))
@@ -57,13 +66,15 @@ def test_two_frames_agree_on_the_clearance():
 
 def test_what_is_far_is_left_out_and_the_edge_of_what_is_known_is_farther_than_the_reach():
     near, far = (Polygon([(lon, 52.0), (lon + 0.01, 52.0), (lon, 52.01)]) for lon in (180.1, 182.0))
-    area = Area(obstacles=(Obstacle(shape=near, name="near"), Obstacle(shape=far, name="far")),
-                fence=Fence(zones=(Zone(kind=ZoneKind.INCLUSION, shape=LONG),)))
+    area = Area(
+        obstacles=(Obstacle(shape=near, name="near"), Obstacle(shape=far, name="far")),
+        fence=Fence(zones=(Zone(kind=ZoneKind.INCLUSION, shape=LONG),)),
+    )
     local = area.about(frame_at(52.0, -179.9), REACH_M)
     assert local.names == ("near",)
     assert local.reach_m == REACH_M
     around = np.array([[REACH_M * math.sin(t), REACH_M * math.cos(t)] for t in np.linspace(0.0, 6.28, 40)])
-    assert float(np.min(local.limit_clearance_m(around))) > -1.0   # nothing nearer than the reach was cut off
+    assert float(np.min(local.limit_clearance_m(around))) > -1.0  # nothing nearer than the reach was cut off
     whole = area.about(frame_at(52.0, -179.9), math.inf)
     assert whole.names == ("near", "far")
 
@@ -84,7 +95,7 @@ def test_a_circle_is_itself_when_it_is_near_and_drawn_when_it_is_not():
 @pytest.mark.parametrize("lat_deg", [89.5, -89.5])
 def test_near_a_pole_nothing_near_is_lost(lat_deg):
     frame = frame_at(lat_deg, 0.0)
-    across = frame.geo_from_en(0.0, math.copysign(80_000.0, lat_deg))   # beyond the pole
+    across = frame.geo_from_en(0.0, math.copysign(80_000.0, lat_deg))  # beyond the pole
     lon, lat = across.lon_deg, across.lat_deg
     rock = Polygon([(lon, lat), (lon + 0.5, lat), (lon, lat - math.copysign(0.01, lat_deg))])
     assert len(polygons_about(rock, frame, 100_000.0)) == 1
@@ -96,7 +107,8 @@ def test_a_circle_and_a_fence_over_the_date_line_are_rings_that_do_not_cross_the
     assert drawn(zone).is_valid
     water = Polygon([(179.94, 51.47), (180.06, 51.47), (180.06, 51.515), (179.94, 51.515)])
     rock = Polygon([(179.9985, 51.5005), (180.0015, 51.5005), (180.0015, 51.5022), (179.9985, 51.5022)])
-    area = Area(obstacles=(Obstacle(shape=rock, name="rock"),),
-                fence=Fence(zones=(Zone(kind=ZoneKind.INCLUSION, shape=water),)))
+    area = Area(
+        obstacles=(Obstacle(shape=rock, name="rock"),), fence=Fence(zones=(Zone(kind=ZoneKind.INCLUSION, shape=water),))
+    )
     made = fence_for_autopilot(area, 15.0, inside=[GeoPoint(lat_deg=51.5, lon_deg=179.96)])
     assert (made.status, made.reason) == (FenceStatus.OK, "")

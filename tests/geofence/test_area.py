@@ -48,8 +48,10 @@ def test_a_margin_is_never_less_than_it_says(seed, margin_m):
 def test_few_points_and_many_points_agree():
     area = local(islands(3))
     points = np.random.default_rng(0).uniform(-400.0, 400.0, (900, 2))
-    assert np.allclose(area.obstacle_clearance_m(points), np.concatenate(
-        [area.obstacle_clearance_m(points[i:i + 300]) for i in (0, 300, 600)]))
+    assert np.allclose(
+        area.obstacle_clearance_m(points),
+        np.concatenate([area.obstacle_clearance_m(points[i : i + 300]) for i in (0, 300, 600)]),
+    )
 
 
 def test_clearances_and_containment():

@@ -112,8 +112,14 @@ def test_simplified_zones_hold_the_true_ones_within_the_margin(case):
     area, margin_m, origin = case
     result = fence_for_autopilot(area, margin_m, inside=[origin])
     if result.status is FenceStatus.OK:
-        check(result, area, margin_m if not any(o.margin_m for o in area.solids) else max(
-            margin_m, *(o.margin_m or 0.0 for o in area.solids)), origin)
+        check(
+            result,
+            area,
+            margin_m
+            if not any(o.margin_m for o in area.solids)
+            else max(margin_m, *(o.margin_m or 0.0 for o in area.solids)),
+            origin,
+        )
         assert 0.0 < result.used_m <= margin_m
         assert result == fence_for_autopilot(area, margin_m, inside=[origin])
     else:
@@ -163,8 +169,9 @@ def test_thousands_of_vertices_fit():
 
 
 def test_refusals_say_why():
-    stars = [island(300.0 * (i % 6) - 700.0, 300.0 * (i // 6) + 200.0, [80.0, 20.0] * 5, f"star {i}")
-             for i in range(30)]
+    stars = [
+        island(300.0 * (i % 6) - 700.0, 300.0 * (i // 6) + 200.0, [80.0, 20.0] * 5, f"star {i}") for i in range(30)
+    ]
     many = fence_for_autopilot(Area(obstacles=tuple(stars)), 5.0, inside=[ORIGIN])
     assert many.status is FenceStatus.TOO_MANY_ITEMS
     assert "autopilot holds 84" in many.reason
@@ -199,8 +206,10 @@ def test_the_proof_finds_what_is_wrong():
         (tuple(Zone(kind=z.kind, shape=_scaled(z.shape, 0.9)) for z in result.zones), "do not hold"),
         (tuple(Zone(kind=z.kind, shape=_scaled(z.shape, 1.6)) for z in result.zones), "beyond the planner's margin"),
         (result.zones[:1], "do not hold"),
-        ((*result.zones, Zone(kind=ZoneKind.INCLUSION, shape=Circle(frame.geo_from_en(0.0, 300.0), 200.0))),
-         "start would be outside"),
+        (
+            (*result.zones, Zone(kind=ZoneKind.INCLUSION, shape=Circle(frame.geo_from_en(0.0, 300.0), 200.0))),
+            "start would be outside",
+        ),
     ):
         items, _ = zones_to_items(zones)
         assert words in prove(area, items, 10.0, inside=[ORIGIN])

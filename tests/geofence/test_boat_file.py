@@ -26,14 +26,15 @@ def mission(tmp_path, boat, *, head=GOAL, file=PEPPER):
 
 
 def test_a_mission_takes_from_the_file_what_it_does_not_say_itself(tmp_path):
-    loaded = load_mission(mission(tmp_path, 'file = "pepper.toml"\ntack_loss_s = 4.0'))   # the default, said
+    loaded = load_mission(mission(tmp_path, 'file = "pepper.toml"\ntack_loss_s = 4.0'))  # the default, said
     boat = boat_of(loaded)
     assert (boat.hull.length_m, boat.hull.beam_m, boat.tack_fails) == (1.5, 0.45, 0.05)
     assert boat.tack_loss_s == 4.0
     assert math.degrees(boat.turn_rate_radps) == pytest.approx(24.5)
     assert boat.speed_error == 0.35
     assert boat.polar.speed_mps(math.radians(90.0), 4.0) == pytest.approx(
-        guessed(SIZES).polar.speed_mps(math.radians(90.0), 4.0), abs=0.01)
+        guessed(SIZES).polar.speed_mps(math.radians(90.0), 4.0), abs=0.01
+    )
 
 
 def test_a_polar_of_the_mission_counts_before_the_file_s(tmp_path):
@@ -60,13 +61,16 @@ def test_the_copy_of_a_voyage_sails_the_same_boat(tmp_path):
     assert boat_of(load_mission(path)).polar == boat_of(loaded).polar
 
 
-@pytest.mark.parametrize(("file", "says"), [
-    ("name = ", "is not TOML"),
-    (PEPPER.replace("length_m", "lenght_m"), "lenght_m"),
-    (PEPPER.replace("[boat] ", "[boat]\nfile = 'a.toml' "), r"\[boat\] file"),
-    (PEPPER.replace("tack_fails = 0.05", "tack_fails = 5"), "tack_fails"),
-    (PEPPER.replace('name = "pepper"', ""), "name"),
-])
+@pytest.mark.parametrize(
+    ("file", "says"),
+    [
+        ("name = ", "is not TOML"),
+        (PEPPER.replace("length_m", "lenght_m"), "lenght_m"),
+        (PEPPER.replace("[boat] ", "[boat]\nfile = 'a.toml' "), r"\[boat\] file"),
+        (PEPPER.replace("tack_fails = 0.05", "tack_fails = 5"), "tack_fails"),
+        (PEPPER.replace('name = "pepper"', ""), "name"),
+    ],
+)
 def test_a_boat_file_that_cannot_be_believed_is_refused_by_name_and_place(tmp_path, file, says):
     with pytest.raises(InputError, match=says) as caught:
         parse_boat_file(file, "pepper.toml")
@@ -75,10 +79,14 @@ def test_a_boat_file_that_cannot_be_believed_is_refused_by_name_and_place(tmp_pa
         load_mission(mission(tmp_path, 'file = "pepper.toml"', file=file))
 
 
-@pytest.mark.parametrize(("file", "says"), [
-    (PEPPER.replace("[0.43, ", "["), "rows are not of one length"),
-    (PEPPER.replace("twa_deg = [40, ", "twa_deg = ["), "matching table"),
-    (PEPPER.replace("0.43, 0.50", "-0.43, 0.50"), "negative")])
+@pytest.mark.parametrize(
+    ("file", "says"),
+    [
+        (PEPPER.replace("[0.43, ", "["), "rows are not of one length"),
+        (PEPPER.replace("twa_deg = [40, ", "twa_deg = ["), "matching table"),
+        (PEPPER.replace("0.43, 0.50", "-0.43, 0.50"), "negative"),
+    ],
+)
 def test_a_table_that_is_no_polar_is_refused_where_it_is_sailed_by(tmp_path, file, says):
     with pytest.raises(InputError, match=rf"pepper.toml: \[polar\]: .*{says}"):
         boat_of(load_mission(mission(tmp_path, 'file = "pepper.toml"', file=file)))

@@ -36,17 +36,25 @@ def found(area, **conditions):
     return {(f.code, f.severity): f for f in check_area(area, AreaConditions(**conditions))}
 
 
-@pytest.mark.parametrize(("area", "conditions", "why"), [
-    (Area((rock(-99, -99, 99, 99, ""),)), {"drawing": "shore"}, "called like the edge of the water"),
-    (Area((rock(-99, -99, 99, 99, "north-lake"),)), {}, "called like the edge of the water"),
-    (Area((rock(-99, -99, 99, 99, ""),)), {"near": goal(5, 5)}, "a place that should lie on the water lies in it"),
-    (Area((rock(-99, -99, 99, 99, ""), rock(5, 5, 9, 9, "a"), rock(500, 5, 509, 9, "b"), rock(15, 5, 19, 9, "c"))), {},
-     "2 of 3 other obstacles lie in it"),
-    (Area((rock(-99, -99, 99, 99, "island"), rock(200, 5, 209, 9, "a"))), {"near": goal(150, 5)}, None),
-    (Area((rock(-99, -99, 99, 99, ""), rock(200, 5, 209, 9, "a"))), {"drawing": "shore"}, None),   # rocks of a shore
-    (Area((rock(-99, -99, 99, 99, "shore"),)), {"near": goal(150, 5)}, None),   # a lee shore, and the boat off it
-    (Area((rock(5, 5, 9, 9, "shore"),), Fence((keep_in(box(-99, -99, 99, 99)),))), {}, None),
-])
+@pytest.mark.parametrize(
+    ("area", "conditions", "why"),
+    [
+        (Area((rock(-99, -99, 99, 99, ""),)), {"drawing": "shore"}, "called like the edge of the water"),
+        (Area((rock(-99, -99, 99, 99, "north-lake"),)), {}, "called like the edge of the water"),
+        (Area((rock(-99, -99, 99, 99, ""),)), {"near": goal(5, 5)}, "a place that should lie on the water lies in it"),
+        (
+            Area(
+                (rock(-99, -99, 99, 99, ""), rock(5, 5, 9, 9, "a"), rock(500, 5, 509, 9, "b"), rock(15, 5, 19, 9, "c"))
+            ),
+            {},
+            "2 of 3 other obstacles lie in it",
+        ),
+        (Area((rock(-99, -99, 99, 99, "island"), rock(200, 5, 209, 9, "a"))), {"near": goal(150, 5)}, None),
+        (Area((rock(-99, -99, 99, 99, ""), rock(200, 5, 209, 9, "a"))), {"drawing": "shore"}, None),  # rocks of a shore
+        (Area((rock(-99, -99, 99, 99, "shore"),)), {"near": goal(150, 5)}, None),  # a lee shore, and the boat off it
+        (Area((rock(5, 5, 9, 9, "shore"),), Fence((keep_in(box(-99, -99, 99, 99)),))), {}, None),
+    ],
+)
 def test_a_shore_that_is_drawn_round_the_water_is_mentioned(area, conditions, why):
     """It was "1 keep-out zone: in order" (issue 13, what still made him stop)."""
     finding = found(area, **conditions).get((Code.ROUND_THE_WATER, FindingLevel.NOTE))
@@ -58,8 +66,9 @@ def test_a_shore_that_is_drawn_round_the_water_is_mentioned(area, conditions, wh
 
 def test_a_good_area_has_no_findings():
     area = Area(obstacles=(rock(50, 50, 80, 80, "a"),), fence=Fence((keep_in(box(-200, -200, 200, 200)),)))
-    assert check_area(area,
-                      AreaConditions(start=ORIGIN, goals=(goal(0.0, 150.0),), margin_m=10.0, twd_from_rad=0.0)) == ()
+    assert (
+        check_area(area, AreaConditions(start=ORIGIN, goals=(goal(0.0, 150.0),), margin_m=10.0, twd_from_rad=0.0)) == ()
+    )
     assert check_area(Area(), AreaConditions(start=ORIGIN)) == ()
 
 
@@ -135,6 +144,10 @@ def test_more_vertices_than_the_autopilot_holds():
 
 @pytest.mark.parametrize("radius_m", [30.0])
 def test_circles_count_too(radius_m):
-    area = Area(obstacles=(Obstacle(shape=Circle(goal(-20 - radius_m, 100), radius_m), name="c"),
-                           Obstacle(shape=Circle(goal(20 + radius_m, 100), radius_m), name="d")))
+    area = Area(
+        obstacles=(
+            Obstacle(shape=Circle(goal(-20 - radius_m, 100), radius_m), name="c"),
+            Obstacle(shape=Circle(goal(20 + radius_m, 100), radius_m), name="d"),
+        )
+    )
     assert "the gap of 39" in found(area, margin_m=25.0)[Code.NARROW_GAP, FindingLevel.WARNING].text

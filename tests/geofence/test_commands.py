@@ -13,27 +13,74 @@ from companion.geofence.mission.options import OperatorOptions
 MISSIONS = pathlib.Path(__file__).parents[2] / "missions"
 DEMO = str(MISSIONS / "archipelago.toml")
 PLAN = {
-    "fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+    "fileType": "Plan",
+    "version": 1,
+    "groundStation": "QGroundControl",
     "mission": {
-        "version": 2, "firmwareType": 3, "vehicleType": 11, "cruiseSpeed": 2, "hoverSpeed": 2,
-        "globalPlanAltitudeMode": 1, "plannedHomePosition": [50.817, -1.31, 0],
+        "version": 2,
+        "firmwareType": 3,
+        "vehicleType": 11,
+        "cruiseSpeed": 2,
+        "hoverSpeed": 2,
+        "globalPlanAltitudeMode": 1,
+        "plannedHomePosition": [50.817, -1.31, 0],
         "items": [
-            {"type": "SimpleItem", "doJumpId": 1, "command": 16, "frame": 3, "autoContinue": True,
-             "AMSLAltAboveTerrain": None, "Altitude": 0, "AltitudeMode": 1,
-             "params": [0, 0, 0, None, 50.82, -1.31, 0]},
-            {"type": "ComplexItem", "complexItemType": "survey", "TransectStyleComplexItem": {"Items": [
-                {"type": "SimpleItem", "doJumpId": 2, "command": 16, "frame": 3, "autoContinue": True,
-                 "params": [0, 0, 0, None, 50.821, -1.311, 0]},
-                {"type": "SimpleItem", "doJumpId": 3, "command": 16, "frame": 3, "autoContinue": True,
-                 "params": [0, 0, 0, None, 50.821, -1.309, 0]}]}},
-            {"type": "SimpleItem", "doJumpId": 7, "command": 177, "frame": 2, "autoContinue": True,
-             "params": [1, -1, 0, 0, 0, 0, 0]},
+            {
+                "type": "SimpleItem",
+                "doJumpId": 1,
+                "command": 16,
+                "frame": 3,
+                "autoContinue": True,
+                "AMSLAltAboveTerrain": None,
+                "Altitude": 0,
+                "AltitudeMode": 1,
+                "params": [0, 0, 0, None, 50.82, -1.31, 0],
+            },
+            {
+                "type": "ComplexItem",
+                "complexItemType": "survey",
+                "TransectStyleComplexItem": {
+                    "Items": [
+                        {
+                            "type": "SimpleItem",
+                            "doJumpId": 2,
+                            "command": 16,
+                            "frame": 3,
+                            "autoContinue": True,
+                            "params": [0, 0, 0, None, 50.821, -1.311, 0],
+                        },
+                        {
+                            "type": "SimpleItem",
+                            "doJumpId": 3,
+                            "command": 16,
+                            "frame": 3,
+                            "autoContinue": True,
+                            "params": [0, 0, 0, None, 50.821, -1.309, 0],
+                        },
+                    ]
+                },
+            },
+            {
+                "type": "SimpleItem",
+                "doJumpId": 7,
+                "command": 177,
+                "frame": 2,
+                "autoContinue": True,
+                "params": [1, -1, 0, 0, 0, 0, 0],
+            },
         ],
     },
-    "geoFence": {"version": 2, "circles": [
-        {"version": 1, "inclusion": False, "circle": {"center": [50.8185, -1.312], "radius": 30}}], "polygons": [
-        {"version": 1, "inclusion": True, "polygon": [
-            [50.815, -1.32], [50.825, -1.32], [50.825, -1.30], [50.815, -1.30]]}]},
+    "geoFence": {
+        "version": 2,
+        "circles": [{"version": 1, "inclusion": False, "circle": {"center": [50.8185, -1.312], "radius": 30}}],
+        "polygons": [
+            {
+                "version": 1,
+                "inclusion": True,
+                "polygon": [[50.815, -1.32], [50.825, -1.32], [50.825, -1.30], [50.815, -1.30]],
+            }
+        ],
+    },
     "rallyPoints": {"version": 2, "points": [[50.8172, -1.3102, 0]]},
 }
 
@@ -136,8 +183,20 @@ def test_rally_points_go_from_format_to_format(capsys, tmp_path):
 def test_mission_new_from_a_start_goals_and_land(capsys, tmp_path):
     out_file = tmp_path / "bay.toml"
     code, out, _ = run(
-        capsys, "mission", "new", out_file, "--start", "50.8170,-1.3100", "--goal", "50.8203,-1.3101",
-        "--land", MISSIONS / "archipelago.wkt", "--fence", MISSIONS / "lake.wkt", "--margin", "10",
+        capsys,
+        "mission",
+        "new",
+        out_file,
+        "--start",
+        "50.8170,-1.3100",
+        "--goal",
+        "50.8203,-1.3101",
+        "--land",
+        MISSIONS / "archipelago.wkt",
+        "--fence",
+        MISSIONS / "lake.wkt",
+        "--margin",
+        "10",
     )
     assert code == 0, out
     mission = load_mission(out_file)
@@ -145,7 +204,7 @@ def test_mission_new_from_a_start_goals_and_land(capsys, tmp_path):
     assert len(mission.area.fence.inclusions) == 1
     assert mission.margin_m == 10.0
     assert mission.operator.arm is False
-    assert "set_auto = false" in out_file.read_text()       # what could be permitted is there to be changed
+    assert "set_auto = false" in out_file.read_text()  # what could be permitted is there to be changed
     assert "[operator] permits nothing yet" in out
     assert load_mission(out_file).operator == OperatorOptions()
     assert run(capsys, "mission", "new", out_file, "--start", "50.8170,-1.3100", "--goal", "50.8203,-1.3101")[0] == 2
@@ -202,12 +261,19 @@ def test_pictures(capsys, tmp_path):
     assert run(capsys, "mission", "check", DEMO, "--plot", tmp_path / "no" / "demo.png", "--no-plan")[0] == 2
 
 
-@pytest.mark.parametrize("argv", [
-    ("fence", "check", "missing.wkt"), ("fence", "convert", DEMO, "x.dwg"), ("fence", "check", DEMO, "--near", "91,0"),
-    ("mission", "check", "missing.toml"), ("mission", "new", "x.txt", "--goal", "0,0"),
-    ("mission", "upload", DEMO, "--link", "udpin:0.0.0.0:14550"), ("fence", "upload", DEMO, "--link", "nowhere"),
-    ("mission", "check", DEMO, "--wind", "strong", "--plot", "x.png"),
-])
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ("fence", "check", "missing.wkt"),
+        ("fence", "convert", DEMO, "x.dwg"),
+        ("fence", "check", DEMO, "--near", "91,0"),
+        ("mission", "check", "missing.toml"),
+        ("mission", "new", "x.txt", "--goal", "0,0"),
+        ("mission", "upload", DEMO, "--link", "udpin:0.0.0.0:14550"),
+        ("fence", "upload", DEMO, "--link", "nowhere"),
+        ("mission", "check", DEMO, "--wind", "strong", "--plot", "x.png"),
+    ],
+)
 def test_bad_use_is_one_line_and_exit_code_2(capsys, argv):
     code, _, err = run(capsys, *argv)
     assert code == 2

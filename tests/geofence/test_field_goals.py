@@ -89,11 +89,18 @@ def test_a_field_is_a_tree_of_atoms_in_the_local_frame(tmp_path):
 
 def test_every_kind_of_atom(tmp_path):
     text = RING.replace("ring + 0.5 * islet", "mark + stay + lane + shoal + max(east, out)").replace(
-        "[operator]", MORE + "[operator]")
+        "[operator]", MORE + "[operator]"
+    )
     atoms = dict(voyage_of(load(tmp_path, text)).goals[0].field.tree.atoms)
     assert [type(atoms[n]) for n in ("mark", "stay", "lane", "shoal", "east", "out")] == [
-        PointTo, StayAt, Along, AwayFromLine, Heading, OutOf]
-    assert AwayFrom not in map(type, atoms.values())     # islet is not named
+        PointTo,
+        StayAt,
+        Along,
+        AwayFromLine,
+        Heading,
+        OutOf,
+    ]
+    assert AwayFrom not in map(type, atoms.values())  # islet is not named
 
 
 def test_what_is_written_is_read_again():
@@ -102,26 +109,37 @@ def test_what_is_written_is_read_again():
     assert options.field["mark"] != options.field["stay"]
 
 
-@pytest.mark.parametrize(("old", "new", "says"), [
-    ('kind = "circle"', 'kind = "cicle"', "[field.ring] kind: 'cicle' is no kind of atom; did you mean \"circle\"?"),
-    ('kind = "circle"\n', "", "[field.ring] kind: is missing"),
-    ("radius_m = 60.0", "radius_m = 1.0", "[field.ring] radius_m: expected a number of at least 5.0"),
-    ("radius_m = 60.0", "", "[field.ring] radius_m: is missing; add it"),
-    ("range_m", "rang_m", "[field.islet] rang_m: unknown key; did you mean 'range_m'?"),
-    ("[field.ring]", "[field.max]", "[field.max]: is no name that an expression can have"),
-    ("[field.ring]\n", '[field."north ring"]\n', "[field.north ring]: is no name that an expression can have"),
-    ("0.5 * islet", "0.5 * isle", "[[goal]] 1 field, character 14: there is no atom 'isle'; did you mean 'islet'?"),
-    ('until = "vessel"', 'until = "vesel"', "[[goal]] 1 until"),
-    ('until = "vessel"', 'until = "told"', '[[goal]] 1 polygon: until = "told" does not ask for any water'),
-    (f'polygon = "{SQUARE}"', "", '[[goal]] 1 until: "vessel" names no water; add polygon'),
-    ("for_s = 600.0", "for_s = 0.0", "[[goal]] 1 for_s"),
-    (SQUARE, "water.wkt", "[[goal]] 1 polygon water.wkt: there is no such file"),
-    (SQUARE, SQUARE.replace("-1.3114", "-1.4114"), "is 7.2 km across; 3 km are the most"),
-    ("lon = -1.3100\nradius_m", "lon = 50.8\nradius_m", "km from [[goal]] 1, which is sailed by it; are lat and"),
-    ("guided = true", "guided = false", "a field is steered in GUIDED, which nobody allows; write guided = true in ["),
-    ("[field.ring]\n", "[field]\nring = 3\n[field.other]\n", "[field.ring]: 3 is no table"),
-    ("lat = 50.8178", "lat = nan", "[[goal]] 1 lat"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (
+            'kind = "circle"',
+            'kind = "cicle"',
+            "[field.ring] kind: 'cicle' is no kind of atom; did you mean \"circle\"?",
+        ),
+        ('kind = "circle"\n', "", "[field.ring] kind: is missing"),
+        ("radius_m = 60.0", "radius_m = 1.0", "[field.ring] radius_m: expected a number of at least 5.0"),
+        ("radius_m = 60.0", "", "[field.ring] radius_m: is missing; add it"),
+        ("range_m", "rang_m", "[field.islet] rang_m: unknown key; did you mean 'range_m'?"),
+        ("[field.ring]", "[field.max]", "[field.max]: is no name that an expression can have"),
+        ("[field.ring]\n", '[field."north ring"]\n', "[field.north ring]: is no name that an expression can have"),
+        ("0.5 * islet", "0.5 * isle", "[[goal]] 1 field, character 14: there is no atom 'isle'; did you mean 'islet'?"),
+        ('until = "vessel"', 'until = "vesel"', "[[goal]] 1 until"),
+        ('until = "vessel"', 'until = "told"', '[[goal]] 1 polygon: until = "told" does not ask for any water'),
+        (f'polygon = "{SQUARE}"', "", '[[goal]] 1 until: "vessel" names no water; add polygon'),
+        ("for_s = 600.0", "for_s = 0.0", "[[goal]] 1 for_s"),
+        (SQUARE, "water.wkt", "[[goal]] 1 polygon water.wkt: there is no such file"),
+        (SQUARE, SQUARE.replace("-1.3114", "-1.4114"), "is 7.2 km across; 3 km are the most"),
+        ("lon = -1.3100\nradius_m", "lon = 50.8\nradius_m", "km from [[goal]] 1, which is sailed by it; are lat and"),
+        (
+            "guided = true",
+            "guided = false",
+            "a field is steered in GUIDED, which nobody allows; write guided = true in [",
+        ),
+        ("[field.ring]\n", "[field]\nring = 3\n[field.other]\n", "[field.ring]: 3 is no table"),
+        ("lat = 50.8178", "lat = nan", "[[goal]] 1 lat"),
+    ],
+)
 def test_what_is_wrong_is_one_line(tmp_path, old, new, says):
     assert old in RING
     with pytest.raises(InputError) as refused:
@@ -148,11 +166,19 @@ def test_a_line_has_two_places_and_a_motor_boat_no_no_go_zone(tmp_path):
 
 
 @settings(max_examples=60)
-@given(st.recursive(
-    st.one_of(st.integers(), st.floats(), st.booleans(), st.text(max_size=8)),
-    lambda inner: st.one_of(st.lists(inner, max_size=2), st.dictionaries(
-        st.sampled_from(["lat", "lon", "radius_m", "start", "polygon", "heading_deg", "x"]), inner, max_size=4)),
-    max_leaves=6), st.sampled_from(["circle", "line", "leave", "heading", "point", "odd"]))
+@given(
+    st.recursive(
+        st.one_of(st.integers(), st.floats(), st.booleans(), st.text(max_size=8)),
+        lambda inner: st.one_of(
+            st.lists(inner, max_size=2),
+            st.dictionaries(
+                st.sampled_from(["lat", "lon", "radius_m", "start", "polygon", "heading_deg", "x"]), inner, max_size=4
+            ),
+        ),
+        max_leaves=6,
+    ),
+    st.sampled_from(["circle", "line", "leave", "heading", "point", "odd"]),
+)
 def test_whatever_stands_for_an_atom_raises_input_error_alone(value, kind):
     import tomli_w
 
@@ -172,8 +198,13 @@ def test_whatever_stands_for_an_atom_raises_input_error_alone(value, kind):
 
 def test_a_field_is_made_in_any_frame_of_a_passage(tmp_path):
     """A goal 300 km off has its atoms beside it: the frame comes along, and nothing is refused for being far."""
-    far = RING.replace("lat = 50.8178", "lat = 48.1178").replace("lat = 50.8185", "lat = 48.1185").replace(
-        'until = "vessel"', 'until = "told"').replace(f'polygon = "{SQUARE}"', "") + "[passage]\nleg_m = 400000.0\n"
+    far = (
+        RING.replace("lat = 50.8178", "lat = 48.1178")
+        .replace("lat = 50.8185", "lat = 48.1185")
+        .replace('until = "vessel"', 'until = "told"')
+        .replace(f'polygon = "{SQUARE}"', "")
+        + "[passage]\nleg_m = 400000.0\n"
+    )
     mission = load(tmp_path, far)
     there = waters_of(mission)(mission.goals[0].point).goals[0]
     assert there.field.tree.atom("ring").at_en == pytest.approx((0.0, 77.8), abs=0.5)

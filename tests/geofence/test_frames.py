@@ -15,8 +15,18 @@ from companion.planner.reference.astar import flat_en_from_lonlat, flat_lonlat_f
 from tests.geofence.strategies import QUIET
 
 GEOD = Geod(ellps="WGS84")
-PLACES = [(50.8, -1.3), (0.0, 0.0), (0.01, 179.999), (-0.01, -179.999), (78.2, 15.6), (-77.8, 166.7), (-33.9, 151.2),
-          (89.0, 0.0), (65.0, 180.0), (-54.8, -68.3)]
+PLACES = [
+    (50.8, -1.3),
+    (0.0, 0.0),
+    (0.01, 179.999),
+    (-0.01, -179.999),
+    (78.2, 15.6),
+    (-77.8, 166.7),
+    (-33.9, 151.2),
+    (89.0, 0.0),
+    (65.0, 180.0),
+    (-54.8, -68.3),
+]
 
 
 @functools.cache
@@ -29,8 +39,13 @@ def geodesic_m(a: GeoPoint, b: GeoPoint) -> float:
 
 
 @settings(**QUIET, max_examples=100)
-@given(st.sampled_from(PLACES), st.floats(0.0, 360.0), st.floats(0.0, 50_000.0), st.floats(0.0, 360.0),
-       st.floats(0.0, 50_000.0))
+@given(
+    st.sampled_from(PLACES),
+    st.floats(0.0, 360.0),
+    st.floats(0.0, 50_000.0),
+    st.floats(0.0, 360.0),
+    st.floats(0.0, 50_000.0),
+)
 def test_below_a_metre_within_50_km(place, bearing_a, far_a_m, bearing_b, far_b_m):
     """Distances in the frame are the geodesic's to below 1 m, wherever the two points lie within 50 km."""
     origin = GeoPoint(lat_deg=place[0], lon_deg=place[1])
@@ -60,7 +75,7 @@ def test_a_hair_beyond_the_antimeridian_is_a_place():
     frame = frame_at(65.0, 180.0)
     point = frame.geo_from_en(2e-07, 1.0)
     assert math.dist(frame.en_from_geo(point), (0.0, 1.0)) < 1e-3
-    (lon_deg, _lat_deg), = frame.array_lonlat_from_en([[2e-07, 1.0]])
+    ((lon_deg, _lat_deg),) = frame.array_lonlat_from_en([[2e-07, 1.0]])
     assert abs(lon_deg) <= 180.0
 
 
@@ -91,9 +106,15 @@ def flat_error_m(lat_deg: float, reach_m: float) -> float:
 
 # docs/lab/frames.md prints this table; a change of either shows here.
 FLAT_TABLE = {
-    (0.0, 1_000.0): 11.23, (0.0, 10_000.0): 112.3, (0.0, 50_000.0): 561.3,
-    (50.8, 1_000.0): 6.26, (50.8, 10_000.0): 70.75, (50.8, 50_000.0): 696.1,
-    (70.0, 1_000.0): 8.16, (70.0, 10_000.0): 107.6, (70.0, 50_000.0): 1346.0,
+    (0.0, 1_000.0): 11.23,
+    (0.0, 10_000.0): 112.3,
+    (0.0, 50_000.0): 561.3,
+    (50.8, 1_000.0): 6.26,
+    (50.8, 10_000.0): 70.75,
+    (50.8, 50_000.0): 696.1,
+    (70.0, 1_000.0): 8.16,
+    (70.0, 10_000.0): 107.6,
+    (70.0, 50_000.0): 1346.0,
 }
 
 

@@ -41,17 +41,20 @@ def test_what_is_written_is_read_again():
     assert parse_options(dump_options(options), "m.toml") == options
 
 
-@pytest.mark.parametrize(("old", "new", "says"), [
-    ('"gate"', '"gat"', "[[goal]] 1 kind: 'gat' is no kind of goal; did you mean \"gate\"?"),
-    ('"gate"', '"regatta"', "is no kind of goal"),
-    ("not_before", "not_befor", "unknown key; did you mean 'not_before'?"),
-    ("12:00:00Z", "12:00:00", "not_before"),
-    ("-1.3096", "-1.3101", "14.1 m apart: 10 m are needed between what is kept clear of them, 20 m in all"),
-    ("-1.3096", "-1.2096", "its marks are 7.1 km apart"),
-    ("not_before", "after_s = 20.0\nnot_before", "not_before names the gun already"),
-    ("starboard_mark", "# starboard_mark", "starboard_mark: is missing"),
-    ("lat = 50.8170, lon = -1.3103", "lat = 150.0, lon = -1.3103", "port_mark.lat"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('"gate"', '"gat"', "[[goal]] 1 kind: 'gat' is no kind of goal; did you mean \"gate\"?"),
+        ('"gate"', '"regatta"', "is no kind of goal"),
+        ("not_before", "not_befor", "unknown key; did you mean 'not_before'?"),
+        ("12:00:00Z", "12:00:00", "not_before"),
+        ("-1.3096", "-1.3101", "14.1 m apart: 10 m are needed between what is kept clear of them, 20 m in all"),
+        ("-1.3096", "-1.2096", "its marks are 7.1 km apart"),
+        ("not_before", "after_s = 20.0\nnot_before", "not_before names the gun already"),
+        ("starboard_mark", "# starboard_mark", "starboard_mark: is missing"),
+        ("lat = 50.8170, lon = -1.3103", "lat = 150.0, lon = -1.3103", "port_mark.lat"),
+    ],
+)
 def test_what_is_wrong_with_a_gate_is_one_line(tmp_path, old, new, says):
     with pytest.raises(InputError) as refused:
         load(tmp_path, GATE.replace(old, new, 1))
@@ -105,19 +108,22 @@ def test_a_box_has_its_place_where_there_is_most_room(tmp_path):
 
 
 def test_a_boxs_water_may_be_a_file_and_is_copied_with_the_voyage(tmp_path):
-    text = BOX.replace(BOX[BOX.index("POLYGON"):BOX.index('"\nfor_s')], "box.wkt")
+    text = BOX.replace(BOX[BOX.index("POLYGON") : BOX.index('"\nfor_s')], "box.wkt")
     goal = load(tmp_path, text, rock=FAR, box=HALF).goals[0]
     assert goal.radius_m == pytest.approx(21.1, abs=0.6)
 
 
-@pytest.mark.parametrize(("old", "new", "says"), [
-    ("-1.3093", "-1.3100", "[[goal]] 1: the roomiest place in it has 11 m about it: a loiter needs 16 m"),
-    ("POLYGON", "POLYGN", "[[goal]] 1 polygon"),
-    ("50.8177, -1.3103 50.8170))", "50.8177))", "the ring is not closed"),
-    ("for_s = 60.0", "for_s = -1.0", "for_s"),
-    ("for_s", "fors", "did you mean 'for_s'?"),
-    ('"box"', '"bocks"', 'did you mean "box"?'),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("-1.3093", "-1.3100", "[[goal]] 1: the roomiest place in it has 11 m about it: a loiter needs 16 m"),
+        ("POLYGON", "POLYGN", "[[goal]] 1 polygon"),
+        ("50.8177, -1.3103 50.8170))", "50.8177))", "the ring is not closed"),
+        ("for_s = 60.0", "for_s = -1.0", "for_s"),
+        ("for_s", "fors", "did you mean 'for_s'?"),
+        ('"box"', '"bocks"', 'did you mean "box"?'),
+    ],
+)
 def test_what_is_wrong_with_a_box_is_one_line(tmp_path, old, new, says):
     with pytest.raises(InputError) as refused:
         load(tmp_path, BOX.replace(old, new), rock=FAR)
@@ -126,7 +132,7 @@ def test_what_is_wrong_with_a_box_is_one_line(tmp_path, old, new, says):
 
 
 def test_a_box_whose_file_is_not_there_is_refused(tmp_path):
-    text = BOX.replace(BOX[BOX.index("POLYGON"):BOX.index('"\nfor_s')], "nowhere.wkt")
+    text = BOX.replace(BOX[BOX.index("POLYGON") : BOX.index('"\nfor_s')], "nowhere.wkt")
     with pytest.raises(InputError, match="there is no such file"):
         load(tmp_path, text, rock=FAR)
 
@@ -151,13 +157,16 @@ def test_a_search_has_an_area_and_a_swath(tmp_path):
     assert (search.swath_m, search.coverage) == (20.0, 0.95)
 
 
-@pytest.mark.parametrize(("old", "new", "says"), [
-    ("swath_m = 20.0", "", "swath_m: is missing"),
-    ("swath_m = 20.0", "swath_m = 1.0", "swath_m"),
-    ("swath_m = 20.0", "swath_m = 300.0", "[[goal]] 1 swath_m: 300 m is wider than the area itself"),
-    ("swath_m", "swath", "did you mean 'swath_m'?"),
-    ('"search"', '"serch"', 'did you mean "search"?'),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("swath_m = 20.0", "", "swath_m: is missing"),
+        ("swath_m = 20.0", "swath_m = 1.0", "swath_m"),
+        ("swath_m = 20.0", "swath_m = 300.0", "[[goal]] 1 swath_m: 300 m is wider than the area itself"),
+        ("swath_m", "swath", "did you mean 'swath_m'?"),
+        ('"search"', '"serch"', 'did you mean "search"?'),
+    ],
+)
 def test_what_is_wrong_with_a_search_is_one_line(tmp_path, old, new, says):
     with pytest.raises(InputError) as refused:
         load(tmp_path, SEARCH.replace(old, new), rock=FAR)

@@ -8,7 +8,7 @@ from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.mission_check import require_sailable
 
-START, FAR = (52.0, 179.5), (52.1, -178.9)   # 110 km over the date line
+START, FAR = (52.0, 179.5), (52.1, -178.9)  # 110 km over the date line
 WATER = "POLYGON ((179.0 51.8, 181.5 51.8, 181.5 52.3, 179.0 52.3, 179.0 51.8))"
 
 
@@ -18,7 +18,8 @@ def written(path, *, goal=FAR, passage="leg_m = 120000.0", more="", skipper="", 
     table = f"[passage]\n{passage}\n" if passage is not None else ""
     file.write_text(
         f'name = "m"\n[start]\nlat = {START[0]}\nlon = {START[1]}\n[[goal]]\nlat = {goal[0]}\nlon = {goal[1]}\n'
-        f'bandwidth_m = 3000.0\n[area]\nfence = "water.wkt"\n{table}[skipper]\nbandwidth_m = 500.0\n{skipper}\n{more}')
+        f'bandwidth_m = 3000.0\n[area]\nfence = "water.wkt"\n{table}[skipper]\nbandwidth_m = 500.0\n{skipper}\n{more}'
+    )
     return file
 
 
@@ -52,21 +53,35 @@ def test_without_a_word_of_it_it_is_refused_as_before_and_told_the_word(tmp_path
     assert waters_of(load_mission(written(tmp_path, passage=None, goal=(52.05, 179.6)))) is None
 
 
-@pytest.mark.parametrize(("file", "place", "problem"), [
-    ({"passage": "leg_m = 100000.0"}, "[[goal]] 1", "is 110 km from [start]"),
-    ({"goal": (52.35, -178.9)}, "[[goal]] 1", "52.350000, -178.900000 is outside the fence"),
-    ({"more": "[[refuge]]\nlat = 52.0\nlon = 176.0\n"}, "[[refuge]] 1", "is 240 km from every goal"),
-    ({"passage": "recentre_m = 5000.0", "goal": (52.05, 179.6)}, "[passage] recentre_m",
-     "is of a passage, and nothing says how long its legs are"),
-])
+@pytest.mark.parametrize(
+    ("file", "place", "problem"),
+    [
+        ({"passage": "leg_m = 100000.0"}, "[[goal]] 1", "is 110 km from [start]"),
+        ({"goal": (52.35, -178.9)}, "[[goal]] 1", "52.350000, -178.900000 is outside the fence"),
+        ({"more": "[[refuge]]\nlat = 52.0\nlon = 176.0\n"}, "[[refuge]] 1", "is 240 km from every goal"),
+        (
+            {"passage": "recentre_m = 5000.0", "goal": (52.05, 179.6)},
+            "[passage] recentre_m",
+            "is of a passage, and nothing says how long its legs are",
+        ),
+    ],
+)
 def test_what_cannot_be_is_refused_by_place_and_reason(tmp_path, file, place, problem):
     error = refusal(written(tmp_path, **file))
     assert (error.place, error.problem) == (place, problem)
     assert error.remedy
 
 
-@pytest.mark.parametrize("passage", ["leg_m = 0.0", "leg_m = 2e7", "leg_m = 1e5\nrecentre_m = 100.0", "leg = 100000.0",
-                                     "leg_m = 1e5\nrecentre_m = 60000.0"])
+@pytest.mark.parametrize(
+    "passage",
+    [
+        "leg_m = 0.0",
+        "leg_m = 2e7",
+        "leg_m = 1e5\nrecentre_m = 100.0",
+        "leg = 100000.0",
+        "leg_m = 1e5\nrecentre_m = 60000.0",
+    ],
+)
 def test_numbers_out_of_range_and_unknown_keys_are_refused(tmp_path, passage):
     with pytest.raises(InputError):
         load_mission(written(tmp_path, passage=passage))

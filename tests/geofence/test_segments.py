@@ -35,8 +35,11 @@ def test_the_same_answers_as_shapely(seed, extent, holes):
     index = PolygonIndex(polygons)
     union = shapely.union_all(polygons)
     points = rng.uniform(-1.5 * extent, 1.5 * extent, (400, 2))
-    ends = np.where(rng.uniform(size=(400, 1)) < 0.5, rng.uniform(-1.5 * extent, 1.5 * extent, (400, 2)),
-                    points + rng.normal(0.0, 0.05 * extent, (400, 2)))
+    ends = np.where(
+        rng.uniform(size=(400, 1)) < 0.5,
+        rng.uniform(-1.5 * extent, 1.5 * extent, (400, 2)),
+        points + rng.normal(0.0, 0.05 * extent, (400, 2)),
+    )
     segments = np.hstack([points, ends])
     drawn = shapely.linestrings(segments.reshape(-1, 2, 2))
     assert (index.intersects(segments) == shapely.intersects(union, drawn)).all()
@@ -48,8 +51,19 @@ def test_the_same_answers_as_shapely(seed, extent, holes):
 
 def test_touching_counts_and_axis_parallel_edges():
     index = PolygonIndex([shapely.box(0.0, 0.0, 10.0, 10.0)])
-    segments = [[-5, 0, 15, 0], [-5, 10, 15, 10], [10, -5, 10, 15], [-5, -5, 0, 0], [5, 5, 6, 6], [-5, 5, 15, 5],
-                [5, 5, 5, 5], [-5, -1, 15, -1], [11, -5, 11, 15], [11, 11, 12, 12], [10.5, 5, 10.5, 5]]
+    segments = [
+        [-5, 0, 15, 0],
+        [-5, 10, 15, 10],
+        [10, -5, 10, 15],
+        [-5, -5, 0, 0],
+        [5, 5, 6, 6],
+        [-5, 5, 15, 5],
+        [5, 5, 5, 5],
+        [-5, -1, 15, -1],
+        [11, -5, 11, 15],
+        [11, 11, 12, 12],
+        [10.5, 5, 10.5, 5],
+    ]
     assert index.intersects(segments).tolist() == [True] * 7 + [False] * 4
     assert index.distance_m([[5.0, 4.0], [13.0, 14.0]]) == pytest.approx([-4.0, 5.0])
 

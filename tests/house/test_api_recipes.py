@@ -14,9 +14,14 @@ def test_a_recipe_runs(number, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     exec(compile(RECIPES[number].replace("runs=20", "runs=1"), f"recipe {number}", "exec"), {})
     said = capsys.readouterr().out
-    assert re.search((
-        r"optimal: \d legs, \d+ m, \d+ s \(at least \d+ s\), [\d.]+ % off the plan", r"in 5 min from \d+ \+- \d+ deg",
-                      r"1\d\d\.\d* \d+")[number], said), said
+    assert re.search(
+        (
+            r"optimal: \d legs, \d+ m, \d+ s \(at least \d+ s\), [\d.]+ % off the plan",
+            r"in 5 min from \d+ \+- \d+ deg",
+            r"1\d\d\.\d* \d+",
+        )[number],
+        said,
+    ), said
 
 
 def test_there_are_three():

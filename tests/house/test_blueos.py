@@ -40,7 +40,7 @@ def labels():
 def test_the_labels_are_what_blueos_reads():
     said = labels()
     assert set(said) >= {"version", "permissions", "authors", "company", "readme", "type", "tags", "links"}
-    assert said["version"] == "${VERSION}"   # which has one place
+    assert said["version"] == "${VERSION}"  # which has one place
     assert said["type"] in KINDS
     assert all(set(author) == {"name", "email"} for author in json.loads(said["authors"]))
     assert {"name", "about", "email"} <= set(json.loads(said["company"]))
@@ -55,7 +55,7 @@ def test_the_permissions_are_of_a_container_and_no_more_than_needed():
     asked = json.loads(labels()["permissions"])
     assert set(asked) == {"HostConfig", "Env"}
     host = asked["HostConfig"]
-    assert host["NetworkMode"] == "host"   # BlueOS's router listens to this machine alone
+    assert host["NetworkMode"] == "host"  # BlueOS's router listens to this machine alone
     assert "Privileged" not in host
     assert [bind.split(":")[1:] for bind in host["Binds"]] == [["/data", "rw"]]
     named = {entry.partition("=")[0] for entry in asked["Env"]}
@@ -70,12 +70,19 @@ def test_what_the_dockerfile_copies_and_starts_is_there():
     entry = json.loads(next(rest for word, rest in done if word == "ENTRYPOINT"))
     script = next(source for source, target in ours if target == entry[0])
     assert os.access(script, os.X_OK)
-    built = subprocess.run([sys.executable, "-c", "import deb; print(deb.NAME, deb.version())"], cwd=ROOT / "packaging",
-                           capture_output=True, text=True, check=True).stdout.split()
+    built = subprocess.run(
+        [sys.executable, "-c", "import deb; print(deb.NAME, deb.version())"],
+        cwd=ROOT / "packaging",
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
     assert copied[0][0] == f"dist/{built[0]}_*~deb13_${{TARGETARCH}}.deb"
     known = companion.cli.PROGRAM.parser("run").commands["run"]._option_string_actions
-    assert all(option in known for option in re.findall(r"(?<= )--(?:link|http|http-name|keep-gb|from-autopilot)\b",
-                                                        script.read_text()))
+    assert all(
+        option in known
+        for option in re.findall(r"(?<= )--(?:link|http|http-name|keep-gb|from-autopilot)\b", script.read_text())
+    )
     assert set(json.loads((FOLDER / "metadata.json").read_text())) == {"name", "website", "docker", "description"}
 
 
@@ -85,11 +92,33 @@ def test_the_start_script_sails_and_blueos_finds_the_page(tmp_path):
     link, page = free_port(), free_port()
     for path in (ROOT / "missions").glob("lake.*"):
         (tmp_path / path.name.replace("lake.toml", "mission.toml")).write_bytes(path.read_bytes())
-    env = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "DATA": str(tmp_path),
-           "LINK": f"udpin:127.0.0.1:{link}", "PORT": str(page), "OPTIONS": "--seed 3 --wait 60"}
-    boat = subprocess.Popen([sys.executable, "-m", "sitl.cli", "boat", "--port", "0", "--udp", "0", "--udp-out",
-                             f"127.0.0.1:{link}", "--warm", "--moored", "--home", "50.817,-1.31"],
-                            stdout=subprocess.DEVNULL)
+    env = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+        "DATA": str(tmp_path),
+        "LINK": f"udpin:127.0.0.1:{link}",
+        "PORT": str(page),
+        "OPTIONS": "--seed 3 --wait 60",
+    }
+    boat = subprocess.Popen(
+        [
+            sys.executable,
+            "-m",
+            "sitl.cli",
+            "boat",
+            "--port",
+            "0",
+            "--udp",
+            "0",
+            "--udp-out",
+            f"127.0.0.1:{link}",
+            "--warm",
+            "--moored",
+            "--home",
+            "50.817,-1.31",
+        ],
+        stdout=subprocess.DEVNULL,
+    )
     started = subprocess.Popen([FOLDER / "start-companion"], env=env, stdout=subprocess.DEVNULL)
     try:
         answer = None
@@ -108,4 +137,4 @@ def test_the_start_script_sails_and_blueos_finds_the_page(tmp_path):
         code = started.wait(60)
         boat.terminate()
         boat.wait(30)
-    assert code == 1   # stopped before it arrived
+    assert code == 1  # stopped before it arrived

@@ -8,8 +8,10 @@ import pytest
 
 MODULES = sorted(
     ".".join(path.with_suffix("").parts).removesuffix(".__init__")
-    for top in ("companion", "sitl", "lab") for path in Path(top).rglob("*.py")
-    if ">>> " in path.read_text(encoding="utf-8"))
+    for top in ("companion", "sitl", "lab")
+    for path in Path(top).rglob("*.py")
+    if ">>> " in path.read_text(encoding="utf-8")
+)
 
 
 @pytest.mark.parametrize("name", MODULES)

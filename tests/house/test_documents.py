@@ -51,14 +51,19 @@ def test_rooms_in_a_circle_are_told():
 def test_every_name_in_the_glossary_is_in_the_code():
     source = "\n".join(file.read_text() for root in rooms.PICTURES for file in (ROOT / root).rglob("*.py"))
     words = set(re.findall(r"\w+", source))
-    rows = [line.split("|")[-2] for line in (ROOT / "docs" / "reference" / "glossary.md").read_text().splitlines()
-            if line.startswith("| ") and not line.startswith("|---")]
+    rows = [
+        line.split("|")[-2]
+        for line in (ROOT / "docs" / "reference" / "glossary.md").read_text().splitlines()
+        if line.startswith("| ") and not line.startswith("|---")
+    ]
     names = {name for row in rows for name in re.findall(r"`([^`]+)`", row) if not name.startswith("_en")}
     assert len(names) > 40
-    modules = {name for name in names if "." in name}   # below companion, or of the others
+    modules = {name for name in names if "." in name}  # below companion, or of the others
     assert names - modules <= words
-    paths = {m: (ROOT if m.partition(".")[0] in rooms.PICTURES else ROOT / "companion") / m.replace(".", "/")
-             for m in modules}
+    paths = {
+        m: (ROOT if m.partition(".")[0] in rooms.PICTURES else ROOT / "companion") / m.replace(".", "/")
+        for m in modules
+    }
     there = [m for m, p in paths.items() if p.with_suffix(".py").is_file() or (p / "__init__.py").is_file()]
     assert sorted(there) == sorted(modules)
 
@@ -69,11 +74,16 @@ def test_every_page_is_in_the_navigation(conf):
     assert listed == pages | {"README", "CONTRIBUTING", "CHANGELOG"}
 
 
-@pytest.mark.parametrize("text", [
-    '<script src="https://cdn.example/x.js">', "<link rel='stylesheet' href='//fonts.example/a.css'>",
-    '<img alt="" src="http://badge.example/b.svg">', "body{background:url(https://example/c.png)}",
-    '@import "//example/d.css";',
-])
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<script src="https://cdn.example/x.js">',
+        "<link rel='stylesheet' href='//fonts.example/a.css'>",
+        '<img alt="" src="http://badge.example/b.svg">',
+        "body{background:url(https://example/c.png)}",
+        '@import "//example/d.css";',
+    ],
+)
 def test_a_site_that_would_ask_another_host_is_refused(conf, tmp_path, text):
     (tmp_path / "page.html").write_text(text)
     assert len(conf.foreign_requests(tmp_path)) == 1
@@ -95,8 +105,11 @@ def invariants():
     """Return the rows of the skipper's table of invariants: (invariant, held in, tests, campaign)."""
     text = (ROOT / "docs" / "reference" / "skipper.md").read_text()
     table = text.partition("\n## Invariants\n")[2].partition("\n## ")[0]
-    return [tuple(cell.strip() for cell in line.strip("| ").split(" | ")) for line in table.splitlines()
-            if line.startswith("| ") and not line.startswith("| invariant")]
+    return [
+        tuple(cell.strip() for cell in line.strip("| ").split(" | "))
+        for line in table.splitlines()
+        if line.startswith("| ") and not line.startswith("| invariant")
+    ]
 
 
 def test_the_table_of_invariants_is_there():

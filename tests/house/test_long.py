@@ -24,10 +24,20 @@ def test_each_stands_once_and_in_order():
 def test_what_failed_last_is_run_alone(tmp_path):
     tests = tmp_path / "test_two.py"
     tests.write_text("def test_good():\n    pass\n\n\ndef test_bad():\n    raise AssertionError\n")
-    words = [sys.executable, "-m", "pytest", "-c", str(Path("pyproject.toml").absolute()), "--rootdir", str(tmp_path),
-             str(tests)]
-    first, second = (subprocess.run([*words, *more], capture_output=True, text=True, check=False, cwd=tmp_path).stdout
-                     for more in ([], ["--lf"]))
+    words = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-c",
+        str(Path("pyproject.toml").absolute()),
+        "--rootdir",
+        str(tmp_path),
+        str(tests),
+    ]
+    first, second = (
+        subprocess.run([*words, *more], capture_output=True, text=True, check=False, cwd=tmp_path).stdout
+        for more in ([], ["--lf"])
+    )
     assert "1 failed, 1 passed" in first
     assert "1 failed" in second
     assert "passed" not in second

@@ -15,7 +15,8 @@ def make(*words, **environment):
     """Run make without what a make around the tests hands down."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFLAGS", "PYTHON", "EXTRAS", "VENV"))}
     return subprocess.run(
-        ["make", *words], cwd=ROOT, env=kept | environment, capture_output=True, text=True, check=False)
+        ["make", *words], cwd=ROOT, env=kept | environment, capture_output=True, text=True, check=False
+    )
 
 
 def python(tmp_path, module, text):
@@ -24,11 +25,14 @@ def python(tmp_path, module, text):
     return {"PYTHONPATH": str(tmp_path)}
 
 
-@pytest.mark.parametrize(("words", "told"), [
-    (["env", "EXTRAS=foo"], "EXTRAS=foo: there is no foo. Known: bench"),
-    (["test", "EXTRAS=bench foo"], "EXTRAS=bench foo: there is no foo."),
-    (["env", "PYTHON=nope"], "there is no nope here. Name a Python of 3.11 or newer: make PYTHON=python3.11"),
-])
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["env", "EXTRAS=foo"], "EXTRAS=foo: there is no foo. Known: bench"),
+        (["test", "EXTRAS=bench foo"], "EXTRAS=bench foo: there is no foo."),
+        (["env", "PYTHON=nope"], "there is no nope here. Name a Python of 3.11 or newer: make PYTHON=python3.11"),
+    ],
+)
 def test_what_cannot_be_is_refused_in_one_line(tmp_path, words, told):
     answer = make(*words, f"VENV={tmp_path / 'venv'}")
     assert answer.returncode == 2
@@ -37,10 +41,13 @@ def test_what_cannot_be_is_refused_in_one_line(tmp_path, words, told):
     assert not (tmp_path / "venv").exists()
 
 
-@pytest.mark.parametrize(("module", "text", "told"), [
-    ("sitecustomize", TOO_OLD, "Python 3.11 or newer is needed; "),
-    ("ensurepip", "raise ImportError", "sudo apt install python3."),
-])
+@pytest.mark.parametrize(
+    ("module", "text", "told"),
+    [
+        ("sitecustomize", TOO_OLD, "Python 3.11 or newer is needed; "),
+        ("ensurepip", "raise ImportError", "sudo apt install python3."),
+    ],
+)
 def test_a_python_that_will_not_do_is_refused_in_one_line(tmp_path, module, text, told):
     changed = python(tmp_path, module, text)
     answer = make("env", f"VENV={tmp_path / 'venv'}", f"PYTHON={sys.executable}", **changed)

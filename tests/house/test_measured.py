@@ -37,9 +37,12 @@ MARKS = [(page, command) for page in PAGES for command in re.findall("<!-- measu
 
 def test_a_block_becomes_what_its_command_prints_and_the_rest_stays():
     text = again(PAGE, lambda command: (f"new of {command.split()[0]}\n", 2.4), "2026-11-25, commit abc")
-    assert text.replace("$ sitl faults --runs 3 | tail -n 1\nnew of sitl", "old").replace(
-        "$ python -m bench.traffic\nnew of python", "old, too").replace(
-        "2026-11-25, commit abc, 2 s", "2026-01-01, commit 1234567, 9 s") == PAGE
+    assert (
+        text.replace("$ sitl faults --runs 3 | tail -n 1\nnew of sitl", "old")
+        .replace("$ python -m bench.traffic\nnew of python", "old, too")
+        .replace("2026-11-25, commit abc, 2 s", "2026-01-01, commit 1234567, 9 s")
+        == PAGE
+    )
     assert text.count("new of") == text.count("commit abc, 2 s") == 2
 
 
@@ -53,8 +56,10 @@ def test_a_command_that_fails_or_is_not_asked_for_leaves_its_block():
 def test_what_is_measured_by_hand_is_listed_with_its_age_the_oldest_first():
     pages = {"a.md": "<!-- by hand: 2026-11-20: sitl x --runs 9 -->", "../b.md": "<!-- by hand: 2026-11-18: y -->"}
     table = ages(pages, dt.date(2026, 11, 25))
-    assert table.splitlines()[3:-1] == ["| `y` | [b](../b.md) | 2026-11-18 | 7 |",
-                                        "| `sitl x --runs 9` | [a](a.md) | 2026-11-20 | 5 |"]
+    assert table.splitlines()[3:-1] == [
+        "| `y` | [b](../b.md) | 2026-11-18 | 7 |",
+        "| `sitl x --runs 9` | [a](a.md) | 2026-11-20 | 5 |",
+    ]
 
 
 def test_every_mark_has_a_block_behind_it():

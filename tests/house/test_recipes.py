@@ -20,7 +20,12 @@ import pytest
 ROOT = Path(__file__).parents[2]
 # How many files a recipe changes, the line in CHANGELOG.md among them: no more than these.
 FILES = {
-    "A wind estimator": 4, "A planner": 5, "A safety trigger": 6, "A figure": 4, "A fence format": 6, "A scenario": 2,
+    "A wind estimator": 4,
+    "A planner": 5,
+    "A safety trigger": 6,
+    "A figure": 4,
+    "A fence format": 6,
+    "A scenario": 2,
 }
 BLOCK = re.compile(r"^ {3}```(\w+)\n(.*?)^ {3}```\n", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"^ {7}(\.venv/bin/.*)$", re.MULTILINE)
@@ -46,36 +51,45 @@ def applied(tree, words, body):
         (tree / m[1]).write_text(body, encoding="utf-8")
         return m[1]
     how, name, path = re.search(
-        rf"(at the end of|before|after the row|to the imports of) (?:{NAME} in )?{PATH}:?$", words).groups()
+        rf"(at the end of|before|after the row|to the imports of) (?:{NAME} in )?{PATH}:?$", words
+    ).groups()
     text = (tree / path).read_text(encoding="utf-8")
     lines = text.splitlines(keepends=True)
     if how == "at the end of":
         text = at_the_end(text, name, body)
     elif how == "after the row":
         at = next(n for n, line in enumerate(lines) if re.match(rf"\| `?{re.escape(name)}\b", line))
-        text = "".join([*lines[:at + 1], body, *lines[at + 1:]])
+        text = "".join([*lines[: at + 1], body, *lines[at + 1 :]])
     elif how == "to the imports of":
         imports = [node for node in ast.parse(text).body if isinstance(node, ast.Import | ast.ImportFrom)]
-        later = [n.lineno - 1 for n in imports if lines[n.lineno - 1].startswith("from companion.")
-                 and lines[n.lineno - 1] > body]
+        later = [
+            n.lineno - 1
+            for n in imports
+            if lines[n.lineno - 1].startswith("from companion.") and lines[n.lineno - 1] > body
+        ]
         at = min(later, default=imports[-1].end_lineno)
         text = "".join([*lines[:at], body, *lines[at:]])
     else:
         begins = re.compile(rf"(def |class )?{re.escape(name)}\b| .*\bname=\"{re.escape(name)}\"")
         at = next(n for n, line in enumerate(lines) if begins.match(line))
-        text = "".join([*lines[:at], textwrap.indent(body, "    ") if lines[at].startswith(" ") else f"{body}\n\n",
-                        *lines[at:]])
+        text = "".join(
+            [*lines[:at], textwrap.indent(body, "    ") if lines[at].startswith(" ") else f"{body}\n\n", *lines[at:]]
+        )
     (tree / path).write_text(text, encoding="utf-8")
     return path
 
 
 def at_the_end(text, name, body):
     """Return a module's text with lines put before the closing bracket of the table that is bound to a name."""
-    node = next(n for n in ast.parse(text).body if name in {
-        t.id for t in getattr(n, "targets", [getattr(n, "target", None)]) if isinstance(t, ast.Name)})
+    node = next(
+        n
+        for n in ast.parse(text).body
+        if name in {t.id for t in getattr(n, "targets", [getattr(n, "target", None)]) if isinstance(t, ast.Name)}
+    )
     lines = text.splitlines(keepends=True)
-    end = sum(len(line) for line in lines[:node.end_lineno - 1]) + len(
-        lines[node.end_lineno - 1].encode()[:node.end_col_offset].decode())
+    end = sum(len(line) for line in lines[: node.end_lineno - 1]) + len(
+        lines[node.end_lineno - 1].encode()[: node.end_col_offset].decode()
+    )
     within = re.search(r"\s*[)\]}]+$", text[:end]).start()
     comma = "" if text[within - 1] in ",([{" else ","
     return f"{text[:within]}{comma}\n{textwrap.indent(body, '    ')}{text[within:end].strip()}{text[end:]}"
@@ -84,10 +98,18 @@ def at_the_end(text, name, body):
 @pytest.fixture
 def tree(tmp_path):
     """Return a copy of the tree as it stands: what is in version control, or would be."""
-    told = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard"], cwd=ROOT, check=False,
-                          capture_output=True, text=True)
-    names = told.stdout.splitlines() if told.returncode == 0 else [
-        str(p.relative_to(ROOT)) for p in ROOT.rglob("*") if p.is_file() and ".venv" not in p.parts]
+    told = subprocess.run(
+        ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    names = (
+        told.stdout.splitlines()
+        if told.returncode == 0
+        else [str(p.relative_to(ROOT)) for p in ROOT.rglob("*") if p.is_file() and ".venv" not in p.parts]
+    )
     for name in names:
         if (ROOT / name).is_file():
             (tmp_path / "tree" / name).parent.mkdir(parents=True, exist_ok=True)
@@ -100,8 +122,14 @@ def run(tree, command):
     program, *rest = shlex.split(command)
     start = [] if program.endswith("/python") else ["-m", Path(program).name]
     rest += ["-p", "no:cacheprovider", "-n0"] if "pytest" in rest else []
-    done = subprocess.run([sys.executable, *start, *rest], cwd=tree, capture_output=True, text=True, check=False,
-                          env={**os.environ, "PYTHONPATH": str(tree), "PYTHONSAFEPATH": "1"})
+    done = subprocess.run(
+        [sys.executable, *start, *rest],
+        cwd=tree,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(tree), "PYTHONSAFEPATH": "1"},
+    )
     assert done.returncode == 0, f"{command}\n{done.stdout[-6000:]}\n{done.stderr[-2000:]}"
 
 
@@ -116,8 +144,11 @@ def test_a_recipe_is_followed_to_the_letter(title, tree):
         else:
             changed.add(applied(tree, words, body))
     assert commands
-    changed |= {str(page.relative_to(tree)) for page in (tree / "docs").rglob("*.md")
-                if page.read_bytes() != (ROOT / page.relative_to(tree)).read_bytes()}
+    changed |= {
+        str(page.relative_to(tree))
+        for page in (tree / "docs").rglob("*.md")
+        if page.read_bytes() != (ROOT / page.relative_to(tree)).read_bytes()
+    }
     modules = [name for name in changed if name.endswith(".py")]
     if modules:
         run(tree, shlex.join([".venv/bin/python", "-m", "ruff", "check", *modules]))

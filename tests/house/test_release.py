@@ -63,5 +63,9 @@ def test_scripts_can_be_read_by_their_shell(script):
 
 
 def test_the_package_of_python_is_built_by_any_python():
-    assert subprocess.run([sys.executable, str(PACKAGING / "deb.py"), "--help"], capture_output=True,
-                          check=False).returncode == 0
+    assert (
+        subprocess.run(
+            [sys.executable, str(PACKAGING / "deb.py"), "--help"], capture_output=True, check=False
+        ).returncode
+        == 0
+    )

@@ -15,8 +15,11 @@ def name_of(path):
 
 
 def imported(path):
-    return [n.module for n in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-            if isinstance(n, ast.ImportFrom) and n.module is not None]
+    return [
+        n.module
+        for n in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(n, ast.ImportFrom) and n.module is not None
+    ]
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=name_of)
@@ -28,13 +31,18 @@ def test_a_room_says_what_it_owns(room):
 
 def test_a_sub_room_is_entered_by_its_face():
     """From another room; a room's own sub-rooms are neighbours, and know each other's modules."""
-    sub_rooms = [room for room in ROOMS
-                 if len(room.relative_to(ROOT).parts) == 3 or room.parent in {ROOT / "sitl", ROOT / "lab"}]
+    sub_rooms = [
+        room for room in ROOMS if len(room.relative_to(ROOT).parts) == 3 or room.parent in {ROOT / "sitl", ROOT / "lab"}
+    ]
     faced = [name_of(room) for room in sub_rooms if "__all__" in (room / "__init__.py").read_text(encoding="utf-8")]
     around = {name: name.rpartition(".")[0] if name.count(".") == 2 else name for name in faced}
     wrong = [
-        (name_of(path), module) for path in CODE for module in imported(path) for name in faced
-        if module.startswith(f"{name}.") and not name_of(path).startswith((f"{around[name]}.", f"{name}."))
+        (name_of(path), module)
+        for path in CODE
+        for module in imported(path)
+        for name in faced
+        if module.startswith(f"{name}.")
+        and not name_of(path).startswith((f"{around[name]}.", f"{name}."))
         and name_of(path) != around[name]
     ]
     assert wrong == []
@@ -48,6 +56,9 @@ def test_no_name_of_a_face_is_hidden_by_a_module_that_is_loaded_later():
         face = ast.parse((room / "__init__.py").read_text(encoding="utf-8"))
         loaded = {n.module for n in ast.walk(face) if isinstance(n, ast.ImportFrom)}
         for node in (n for n in ast.walk(face) if isinstance(n, ast.ImportFrom) and n.module is not None):
-            hidden += [f"{name_of(room)}.{a.name}" for a in node.names
-                       if (room / f"{a.name}.py").exists() and f"{name_of(room)}.{a.name}" not in loaded]
+            hidden += [
+                f"{name_of(room)}.{a.name}"
+                for a in node.names
+                if (room / f"{a.name}.py").exists() and f"{name_of(room)}.{a.name}" not in loaded
+            ]
     assert hidden == []

@@ -31,17 +31,32 @@ PROGRAMS = {"companion": cli.PROGRAM, "sitl": sitl_cli.PROGRAM}
 STANDS_FOR = {"LINK": "tcp:127.0.0.1:5760", "LAT,LON": "50.817,-1.31", "VERB": "hold", "ADDRESS": "local", "[ARGS]": ""}
 WORDS = {"N": "3", "S": "3", "NAME": "demo", "SCENARIO": "demo", "PICTURE": "p.png"}
 # Of README, what a test is no place for.
-NOT_RUN = {"make demo": "CI runs it", "make test": "this is it", "python3 -m venv": "CI makes one",
-           "pip install": "CI installs it"}
+NOT_RUN = {
+    "make demo": "CI runs it",
+    "make test": "this is it",
+    "python3 -m venv": "CI makes one",
+    "pip install": "CI installs it",
+}
 # What a page says that is run as it stands, in one folder, and what lies there for the reader's own files.
-CHEAP = re.compile(r"(companion (--version|mission (example|check|convert) |fence (check|convert) |plan |field "
-                   r"|key new |far (order|begin) |order --qgc |report |view .* --export |wind RECORD)|sitl example )")
-OWN = {"MISSION.toml": "missions/field-ring.toml", "FILE": "missions/bay.toml", "P.png": "p.png", "OUT": "out.plan",
-       "PROBLEM.json": "island.json", "bench/problems/channels-noisy.json": "island.json",
-       "MISSION": "missions/bay.toml",
-       "RECORD.csv": "record.csv", "RECORD": "record.csv", "RECORDS": "record.csv", "missions": "more",
-       "voyages/20260714T101500Z-archipelago": "voyages/one"}
-NAMES_A_COMMAND = re.compile("are required|expected one argument")   # and not a line to type
+CHEAP = re.compile(
+    r"(companion (--version|mission (example|check|convert) |fence (check|convert) |plan |field "
+    r"|key new |far (order|begin) |order --qgc |report |view .* --export |wind RECORD)|sitl example )"
+)
+OWN = {
+    "MISSION.toml": "missions/field-ring.toml",
+    "FILE": "missions/bay.toml",
+    "P.png": "p.png",
+    "OUT": "out.plan",
+    "PROBLEM.json": "island.json",
+    "bench/problems/channels-noisy.json": "island.json",
+    "MISSION": "missions/bay.toml",
+    "RECORD.csv": "record.csv",
+    "RECORD": "record.csv",
+    "RECORDS": "record.csv",
+    "missions": "more",
+    "voyages/20260714T101500Z-archipelago": "voyages/one",
+}
+NAMES_A_COMMAND = re.compile("are required|expected one argument")  # and not a line to type
 UNDER_WAY, ENDS_S = "under way", 60.0
 
 
@@ -54,8 +69,11 @@ def blocks(page):
 
 def quoted(page):
     """Return the command lines between backticks that are whole: more than the name of a command."""
-    return [line for line in re.findall(r"`((?:companion|sitl) [a-z][^`]* [^`]+)`", page.read_text().replace("\n", " "))
-            if "..." not in line]
+    return [
+        line
+        for line in re.findall(r"`((?:companion|sitl) [a-z][^`]* [^`]+)`", page.read_text().replace("\n", " "))
+        if "..." not in line
+    ]
 
 
 def words_of(line):
@@ -80,8 +98,9 @@ def test_every_command_line_of_a_page_is_understood(page, monkeypatch, tmp_path)
                 pytest.fail(f"{line}: {wrong}")
 
 
-@pytest.mark.parametrize("name", [(program, command) for program, it in PROGRAMS.items() for command in it.names],
-                         ids=" ".join)
+@pytest.mark.parametrize(
+    "name", [(program, command) for program, it in PROGRAMS.items() for command in it.names], ids=" ".join
+)
 def test_the_examples_of_a_help_are_understood_and_name_what_an_installed_program_has(name, monkeypatch, tmp_path):
     program, command = name
     monkeypatch.chdir(tmp_path)
@@ -100,24 +119,40 @@ def test_the_examples_of_a_help_are_understood_and_name_what_an_installed_progra
 
 def helps(parser):
     """Return the help of a parser and of all below it."""
-    below = [p for action in parser._actions if isinstance(action, argparse._SubParsersAction)
-             for p in action.choices.values()]
+    below = [
+        p
+        for action in parser._actions
+        if isinstance(action, argparse._SubParsersAction)
+        for p in action.choices.values()
+    ]
     return "\n".join([parser.format_help(), *(helps(p) for p in below)])
 
 
 @contextlib.contextmanager
 def typed(line, folder):
     """Type a line into a shell in the folder; it is stopped with Ctrl-C in the end, where it has not ended."""
-    env = {**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT),
-           "LANG": "C"}
-    shell = subprocess.Popen(["bash", "-c", f"exec {line}"], cwd=folder, env=env, stdin=subprocess.DEVNULL, text=True,
-                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+    env = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+        "PYTHONPATH": str(ROOT),
+        "LANG": "C",
+    }
+    shell = subprocess.Popen(
+        ["bash", "-c", f"exec {line}"],
+        cwd=folder,
+        env=env,
+        stdin=subprocess.DEVNULL,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
     said = ""
     try:
         yield shell
     finally:
         if shell.poll() is None:
-            os.killpg(shell.pid, signal.SIGINT)   # as a terminal does: to all of the group
+            os.killpg(shell.pid, signal.SIGINT)  # as a terminal does: to all of the group
             with contextlib.suppress(subprocess.TimeoutExpired):
                 said = shell.communicate(timeout=ENDS_S)[0]
         shell.kill()
@@ -159,8 +194,16 @@ def page_is_served(line, folder, said):
 
 
 def test_each_line_of_the_front_page_is_run_here_or_it_is_said_why_not():
-    doors = {line for heading in ("I want to see it sail", "I want to draw a mission", "I want it on my boat",
-                                  "I want to do research") for line in door(heading)}
+    doors = {
+        line
+        for heading in (
+            "I want to see it sail",
+            "I want to draw a mission",
+            "I want it on my boat",
+            "I want to do research",
+        )
+        for line in door(heading)
+    }
     others = set(blocks(PAGES[0])) - doors
     assert [line for line in others if not line.startswith(tuple(NOT_RUN))] == []
     assert len(doors) == 12
@@ -205,8 +248,11 @@ def test_who_wants_it_on_his_boat(tmp_path):
 
 def test_the_bench_of_an_evening_from_an_empty_folder(tmp_path):
     """A boat in one terminal, the companion in another: moored until it sails, however long that takes."""
-    boat_line, example, run = [line for line in blocks(ROOT / "docs" / "guides" / "boat-in-an-evening.md")
-                               if line.startswith(("sitl boat", "companion mission example", "companion run"))]
+    boat_line, example, run = [
+        line
+        for line in blocks(ROOT / "docs" / "guides" / "boat-in-an-evening.md")
+        if line.startswith(("sitl boat", "companion mission example", "companion run"))
+    ]
     port = free_port()
     with typed(f"{boat_line} --port {port} --udp 0", tmp_path) as boat:
         until(boat, "Ctrl-C ends")
@@ -231,8 +277,10 @@ def test_what_pages_say_that_is_cheap_is_run(tmp_path):
     done("companion mission example missions", tmp_path)
     done("sitl run rocks", tmp_path)
     next((tmp_path / "voyages").iterdir()).rename(tmp_path / "voyages" / "one")
-    (tmp_path / "record.csv").write_text("t_s,wind_from_deg,wind_speed_ms\n" + "".join(
-        f"{t},{200 + 10 * math.sin(t / 90):.1f},{6 + math.sin(t / 37):.2f}\n" for t in range(0, 2400, 2)))
+    (tmp_path / "record.csv").write_text(
+        "t_s,wind_from_deg,wind_speed_ms\n"
+        + "".join(f"{t},{200 + 10 * math.sin(t / 90):.1f},{6 + math.sin(t / 37):.2f}\n" for t in range(0, 2400, 2))
+    )
     shutil.copy(ROOT / "bench" / "problems" / "channels-noisy.json", tmp_path / "island.json")
     lines = [" ".join(word if "*" in word else shlex.quote(word) for word in words) for words in cheap_lines()]
     assert len(lines) > 15

@@ -13,9 +13,10 @@ import pytest
 def installed(tmp_path_factory):
     """The wheel's content, and the libraries that it is installed beside; not the checkout."""
     folder = tmp_path_factory.mktemp("wheel")
-    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)], check=True,
-                   capture_output=True)
-    wheel, = folder.glob("*.whl")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)], check=True, capture_output=True
+    )
+    (wheel,) = folder.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "site")
     return folder / "site"
@@ -23,26 +24,36 @@ def installed(tmp_path_factory):
 
 def run(installed, folder, *words):
     return subprocess.run(
-        [sys.executable, "-m", *words], cwd=folder, capture_output=True, text=True, check=False,
-        env={**os.environ, "PYTHONPATH": str(installed)})
+        [sys.executable, "-m", *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(installed)},
+    )
 
 
 def test_the_boat_carries_no_laboratory_and_the_laboratory_nothing_else(installed, tmp_path):
     assert {p.name for p in installed.iterdir() if not p.name.endswith(".dist-info")} == {"companion", "sitl"}
-    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)], check=True,
-                   capture_output=True, cwd="lab")
-    wheel, = tmp_path.glob("*.whl")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
+        check=True,
+        capture_output=True,
+        cwd="lab",
+    )
+    (wheel,) = tmp_path.glob("*.whl")
     inside = [name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name]
     assert sorted(inside) == sorted(path.as_posix() for path in Path("lab").rglob("*.py"))
 
 
 def test_it_holds_what_it_needs(installed):
     for there, here in (("companion/missions", "missions"), ("sitl/missions", "sitl/missions")):
-        inside, beside = (sorted(p.relative_to(folder) for p in folder.rglob("*.*"))
-                          for folder in (installed / there, Path(here)))
+        inside, beside = (
+            sorted(p.relative_to(folder) for p in folder.rglob("*.*")) for folder in (installed / there, Path(here))
+        )
         assert inside == beside
     assert (installed / "companion" / "kernels.txt").is_file()
-    points, = installed.glob("*.dist-info/entry_points.txt")
+    (points,) = installed.glob("*.dist-info/entry_points.txt")
     assert "[companion.commands]\nrehearse = sitl.rehearse.command" in points.read_text()
 
 
@@ -54,8 +65,14 @@ from sitl.scenario.scenario import load_scenario
 paths = sorted(Path(sitl.__file__).parent.glob("scenarios/**/*.toml"))
 print(len(paths), [path.stem for path in paths if not load_scenario(path).mission_path(path).is_file()])
 """
-    done = subprocess.run([sys.executable, "-c", asked], cwd=tmp_path, capture_output=True, text=True, check=True,
-                          env={**os.environ, "PYTHONPATH": str(installed)})
+    done = subprocess.run(
+        [sys.executable, "-c", asked],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONPATH": str(installed)},
+    )
     assert done.stdout == f"{len(list(Path('sitl/scenarios').rglob('*.toml')))} []\n"
 
 

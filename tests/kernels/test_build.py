@@ -77,7 +77,7 @@ def test_the_list_names_what_is_there(package):
 def test_it_goes_on_where_it_was(whole, empty):
     """Interrupted, or one kernel edited: what is there is not compiled again."""
     edited = ("xorshift.uniform-", "gauge._chain-")
-    for path in whole.iterdir():   # of earlier versions too
+    for path in whole.iterdir():  # of earlier versions too
         if not path.name.startswith(("all-", ".", *edited)):
             shutil.copy2(path, empty)
     before = {path: path.stat().st_mtime_ns for path in empty.iterdir()}
@@ -90,7 +90,7 @@ def test_it_goes_on_where_it_was(whole, empty):
         assert [path for path in empty.glob(f"{kernel}*") if (whole / path.name).exists()]
     first, last = ([int(n) for n in re.findall(r"(\d+) of (\d+)", text)[0]] for text in (said[0], said[-1]))
     assert first[0] < last[0] == last[1]
-    prepare(ALL, say=pytest.fail)   # nothing is left to do
+    prepare(ALL, say=pytest.fail)  # nothing is left to do
 
 
 def test_a_process_that_is_killed_is_followed_by_another_and_the_third_one_ends_it(empty, monkeypatch, capsys):
@@ -139,8 +139,13 @@ def test_the_first_start_says_what_it_does_and_ctrl_c_ends_it_without_a_word(emp
     manager.settimeout(60.0)
     run = subprocess.Popen(
         [sys.executable, "-m", "companion.cli", "run", "a.toml", "--link", f"udpin:127.0.0.1:{free_port()}"],
-        cwd=tmp_path, env={**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify")}, start_new_session=True, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        cwd=tmp_path,
+        env={**os.environ, "NOTIFY_SOCKET": str(tmp_path / "notify")},
+        start_new_session=True,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
     with manager:
         told = manager.recv(4096).decode()
     # a busy machine is slow to see what there is, and says that first
@@ -164,7 +169,7 @@ def test_whoever_compiles_ahead_ends_with_the_program_that_asked(number, empty):
     asker = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
     asker.stdout.readline()
     asker.send_signal(number)
-    asker.communicate(timeout=10.0)   # the end of its output: nobody else has it
+    asker.communicate(timeout=10.0)  # the end of its output: nobody else has it
     deadline_s = time.monotonic() + 5.0
     while compiling(empty):
         assert time.monotonic() < deadline_s, compiling(empty)
@@ -177,9 +182,20 @@ def test_the_first_start_on_a_busy_machine(empty, tmp_path):
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(8)]
     try:
         done = subprocess.run(
-            [sys.executable, "-m", "sitl.cli", "run", "sitl/scenarios/demo.toml", "--live",
-             "--out", str(tmp_path / "v")], capture_output=True, text=True,
-            check=False)
+            [
+                sys.executable,
+                "-m",
+                "sitl.cli",
+                "run",
+                "sitl/scenarios/demo.toml",
+                "--live",
+                "--out",
+                str(tmp_path / "v"),
+            ],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
     finally:
         for process in busy:
             process.kill()

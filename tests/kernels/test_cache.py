@@ -68,19 +68,25 @@ def test_the_same_content_is_not_compiled_again(load):
     first = load()
     assert first(3.0) == 7.0
     assert is_compiled_anew(first)
-    for changed in ({}, {"boat": f"# a comment\n\n\n{BOAT}"},
-                    {"knots": KNOTS.replace("(x):", '(x):\n    """Say what it does."""')}):
+    for changed in (
+        {},
+        {"boat": f"# a comment\n\n\n{BOAT}"},
+        {"knots": KNOTS.replace("(x):", '(x):\n    """Say what it does."""')},
+    ):
         again = load(**changed)
         assert again(3.0) == 7.0
         assert not is_compiled_anew(again), changed
 
 
-@pytest.mark.parametrize(("changed", "answer"), [
-    ({"knots": KNOTS.replace("2.0", "3.0")}, 10.0),
-    ({"knots": KNOTS.replace("* x", "- x")}, 0.0),
-    ({"boat": BOAT.replace("+ 1.0", "- 1.0")}, 5.0),
-    ({"boat": BOAT.replace("knots(x)", "knots(x) + knots(x)")}, 13.0),
-])
+@pytest.mark.parametrize(
+    ("changed", "answer"),
+    [
+        ({"knots": KNOTS.replace("2.0", "3.0")}, 10.0),
+        ({"knots": KNOTS.replace("* x", "- x")}, 0.0),
+        ({"boat": BOAT.replace("+ 1.0", "- 1.0")}, 5.0),
+        ({"boat": BOAT.replace("knots(x)", "knots(x) + knots(x)")}, 13.0),
+    ],
+)
 def test_an_edit_is_seen_in_the_callee_too(load, changed, answer):
     """Numba's own cache does not see an edit of a callee in another file: stale code sailed (issue 14, point 4)."""
     assert load()(3.0) == 7.0
@@ -100,7 +106,7 @@ def test_what_could_change_unseen_is_refused(load, unseen):
         load(KNOTS.replace("FACTOR = 2.0", unseen))(3.0)
 
 
-@pytest.mark.parametrize("damage", [lambda b: b[:-7], lambda b: b[:50], lambda b: b"", lambda b: b[:len(b) // 2]])
+@pytest.mark.parametrize("damage", [lambda b: b[:-7], lambda b: b[:50], lambda b: b"", lambda b: b[: len(b) // 2]])
 @pytest.mark.parametrize("which", [".nbi", ".nbc"])
 def test_a_torn_file_is_compiled_again(load, kept, damage, which):
     load()(3.0)
@@ -141,13 +147,14 @@ def test_what_others_can_write_is_not_run(load, monkeypatch, tmp_path, caplog):
 
 @pytest.mark.parametrize(("mode", "uid"), [(0o770, None), (0o702, None), (0o700, 54321)])
 def test_kernels_that_others_may_have_written_are_not_run_and_that_is_said_once(
-        load, kept, monkeypatch, caplog, mode, uid):
+    load, kept, monkeypatch, caplog, mode, uid
+):
     """They were unpickled and run from any folder that was named (issue 43, point 9)."""
     places.refuse.cache_clear()
     load()(3.0)
     kept.chmod(mode)
     if uid is not None:
-        monkeypatch.setattr(places.os, "geteuid", lambda: uid)   # what was ours is another's
+        monkeypatch.setattr(places.os, "geteuid", lambda: uid)  # what was ours is another's
         monkeypatch.setattr(places, "ROOT", uid)
     before = {path: path.read_bytes() for path in kept.iterdir()}
     caplog.clear()
@@ -207,11 +214,13 @@ def test_processes_that_compile_one_kernel_for_other_types_do_not_mix_up_its_fil
     """Numba's index of a kernel is read, changed and written without a lock: the last one wins."""
     (tmp_path / "test_knots.py").write_text(KNOTS)
     (tmp_path / "test_boat.py").write_text(BOAT)
-    running = [subprocess.Popen([sys.executable, "-c", TYPES, str(tmp_path), str(n)], stdout=subprocess.PIPE, text=True)
-               for n in range(4)]
+    running = [
+        subprocess.Popen([sys.executable, "-c", TYPES, str(tmp_path), str(n)], stdout=subprocess.PIPE, text=True)
+        for n in range(4)
+    ]
     assert {process.communicate()[0].strip() for process in running} == {str([3.0] * 6)}
     for name in ("test_boat.speed", "test_knots.knots"):
-        index, = kept.glob(f"{name}-*.nbi")
+        (index,) = kept.glob(f"{name}-*.nbi")
         assert len(list(kept.glob(f"{index.name.removesuffix('.nbi')}.*.nbc"))) == 6
 
 
@@ -226,12 +235,15 @@ def test_beyond_the_limit_the_oldest_go(kept, monkeypatch):
     assert sorted(p.name for p in kept.iterdir()) == ["kernel0", "kernel1", "kernel2"]
 
 
-@pytest.mark.parametrize(("environment", "there"), [
-    ({"COMPANION_KERNELS": "/a", "CACHE_DIRECTORY": "/b", "XDG_CACHE_HOME": "/c"}, "/a"),
-    ({"CACHE_DIRECTORY": "/b:/d", "XDG_CACHE_HOME": "/c"}, "/b/kernels"),
-    ({"COMPANION_KERNELS": "relative", "XDG_CACHE_HOME": "/c"}, "/c/sailboat-companion/kernels"),
-    ({"HOME": "/h"}, "/h/.cache/sailboat-companion/kernels"),
-])
+@pytest.mark.parametrize(
+    ("environment", "there"),
+    [
+        ({"COMPANION_KERNELS": "/a", "CACHE_DIRECTORY": "/b", "XDG_CACHE_HOME": "/c"}, "/a"),
+        ({"CACHE_DIRECTORY": "/b:/d", "XDG_CACHE_HOME": "/c"}, "/b/kernels"),
+        ({"COMPANION_KERNELS": "relative", "XDG_CACHE_HOME": "/c"}, "/c/sailboat-companion/kernels"),
+        ({"HOME": "/h"}, "/h/.cache/sailboat-companion/kernels"),
+    ],
+)
 def test_one_place_says_where(monkeypatch, environment, there):
     for name in ("COMPANION_KERNELS", "CACHE_DIRECTORY", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)

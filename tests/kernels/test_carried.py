@@ -15,7 +15,9 @@ from pathlib import Path
 from companion.kernels import places
 places.CARRIED = Path(sys.argv[1])
 """
-PLAN = SETTLED + """
+PLAN = (
+    SETTLED
+    + """
 from companion.planner.solve import plan, warm
 from companion.planner.warm import warm_problems
 from companion.wind.estimators.forecaster import compile_kernels
@@ -25,7 +27,10 @@ answers = [plan(problem, expansions=5000, seed=3) for problem in warm_problems()
 print([a.waypoints_en.tobytes().hex() for a in answers], [a.cost_s for a in answers])
 print([name for name in ("numba", "llvmlite") if name in sys.modules])
 """
-OTHER = SETTLED + """
+)
+OTHER = (
+    SETTLED
+    + """
 import numpy as np
 from companion.kernels import xorshift
 from companion.planner.search import moves
@@ -41,6 +46,7 @@ again = np.array([7], np.uint64)
 print(listed == other == kept(0.3) == moves.kind_of(0.3), first == xorshift.uniform(again), kept is moves.kind_of)
 print(kept(**{kept.py_func.__code__.co_varnames[0]: 0.3}) == listed)
 """
+)
 
 
 def said(program, folder):
@@ -58,7 +64,9 @@ def test_another_type_loads_numba_and_all_kernels_go_on(carried):
     assert said(OTHER, carried).stdout.split() == ["True", "True", "True", "True"]
 
 
-THREADS = SETTLED + """
+THREADS = (
+    SETTLED
+    + """
 import threading, time
 import numpy as np
 from companion.geo.segments import PolygonIndex
@@ -78,6 +86,7 @@ while not ended:
 inside = [t for t in ticks if begun + 0.2 * (ended[0] - begun) < t < begun + 0.8 * (ended[0] - begun)]
 print(len(inside) > 3, [name for name in ("numba", "llvmlite") if name in sys.modules])
 """
+)
 
 
 def test_other_threads_run_while_a_kernel_does(carried):
@@ -112,14 +121,17 @@ def test_it_is_readable_by_all_and_writable_by_its_owner_alone(carried):
         assert path.stat().st_mode & 0o022 == 0
 
 
-MISFIT = SETTLED + """
+MISFIT = (
+    SETTLED
+    + """
 from companion.kernels.carried import misfit
 print(misfit())
 """
+)
 
 
 def test_what_the_package_carries_and_does_not_fit_is_said(carried, tmp_path):
-    assert said(MISFIT, tmp_path).stdout == "\n"   # it carries none
+    assert said(MISFIT, tmp_path).stdout == "\n"  # it carries none
     assert said(MISFIT, carried).stdout == "\n"
     (tmp_path / places.CARRIED_FOR).write_text('{"companion": "another"}')
     assert said(MISFIT, tmp_path).stdout == "those of the package are of another source\n"

@@ -32,4 +32,4 @@ def test_libraries_that_were_loaded_are_let_go_and_can_be_called():
     """Half of them lay in each process of a boat that never called it."""
     done = subprocess.run([sys.executable, "-c", LETS_GO], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert int(done.stdout) > 8_000   # kB, of 30,000
+    assert int(done.stdout) > 8_000  # kB, of 30,000

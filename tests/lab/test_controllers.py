@@ -17,10 +17,18 @@ PARAMETERS = VaimosParameters().array()
 
 
 @settings(max_examples=200)
-@given(st.floats(-300, 300), st.floats(-300, 300), angle, angle, st.floats(-300, 300), st.floats(-300, 300),
-       st.sampled_from([-1, 1]))
-def test_heading_is_sailable_and_commands_are_in_range(x: float, y: float, h: float, twd: float, bx: float, by: float,
-                                                       q: int) -> None:
+@given(
+    st.floats(-300, 300),
+    st.floats(-300, 300),
+    angle,
+    angle,
+    st.floats(-300, 300),
+    st.floats(-300, 300),
+    st.sampled_from([-1, 1]),
+)
+def test_heading_is_sailable_and_commands_are_in_range(
+    x: float, y: float, h: float, twd: float, bx: float, by: float, q: int
+) -> None:
     c = line_following((x, y), h, twd, (0.0, 0.0), (bx, by), q)
     assert math.cos(c.heading_rad - twd) <= math.cos(math.pi / 4.0) + 1e-9
     assert abs(c.rudder_rad) <= math.pi / 4.0
@@ -45,8 +53,9 @@ def test_the_boat_follows_the_line_on_every_point_of_sailing(twd_deg: float) -> 
     s = state_at(40.0, 0.0, twd + math.copysign(math.radians(60.0), math.remainder(-twd, 2.0 * math.pi)), 1.0)
     band = []
     for k in range(int(600 / STEP_S)):
-        c = line_following((s[0], s[1]), s[2], twd, (0.0, 0.0), (0.0, 1000.0), q, r_m=25.0,
-                           close_hauled_rad=math.radians(50.0))
+        c = line_following(
+            (s[0], s[1]), s[2], twd, (0.0, 0.0), (0.0, 1000.0), q, r_m=25.0, close_hauled_rad=math.radians(50.0)
+        )
         q = c.q
         s = step(s, PARAMETERS, c.rudder_rad, c.sail_max_rad, twd, 5.0, STEP_S)
         if k * STEP_S > 200.0:

@@ -20,13 +20,26 @@ def steady(twd_rad=0.0, tws_mps=5.0):
 
 
 def craft(tack_s, polar=None, no_go_deg=45.0):
-    return RaceBoat(polar=polar or ardurover_sitl(), no_go_half_rad=math.radians(no_go_deg), max_twa_rad=math.pi,
-                 tack_s=tack_s, board_s=5.0)
+    return RaceBoat(
+        polar=polar or ardurover_sitl(),
+        no_go_half_rad=math.radians(no_go_deg),
+        max_twa_rad=math.pi,
+        tack_s=tack_s,
+        board_s=5.0,
+    )
 
 
 def race(weather, tack_s, length_m=150.0, **changes):
-    return replace(Race(craft=craft(tack_s), weather=weather, start_en_m=(0.0, 0.0), solid=shapely.Polygon(),
-                        goals=(RaceMark(en_m=(0.0, length_m), radius_m=5.0),)), **changes)
+    return replace(
+        Race(
+            craft=craft(tack_s),
+            weather=weather,
+            start_en_m=(0.0, 0.0),
+            solid=shapely.Polygon(),
+            goals=(RaceMark(en_m=(0.0, length_m), radius_m=5.0),),
+        ),
+        **changes,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -42,14 +55,17 @@ def test_a_beat_in_a_steady_wind_takes_its_length_over_the_speed_made_good_and_o
     found = best(race(steady(), tack_s), 300.0)
     beat_s = 145.0 / ardurover_sitl().best_beat(5.0, no_go_half_rad=math.radians(45.0)).vmg_mps
     assert found.time_s == pytest.approx(beat_s + tack_s, rel=1e-3)
-    assert found.bound_s == pytest.approx(beat_s, rel=1e-3)   # along the wind alone no tack is needed
+    assert found.bound_s == pytest.approx(beat_s, rel=1e-3)  # along the wind alone no tack is needed
     assert found.tacks == 1
 
 
 def test_before_a_known_veer_she_sails_to_where_the_wind_will_come_from():
     """Free tacks: the goal must lie in the sum of what is reached before and after, so T = max over n of a quotient."""
-    weather = Weather(t_s=np.array([0.0, VEERS_S, VEERS_S + 0.01]), twd_from_rad=np.array([0.0, 0.0, VEER_RAD]),
-                      tws_mps=np.full(3, 5.0))
+    weather = Weather(
+        t_s=np.array([0.0, VEERS_S, VEERS_S + 0.01]),
+        twd_from_rad=np.array([0.0, 0.0, VEER_RAD]),
+        tws_mps=np.full(3, 5.0),
+    )
     n = np.linspace(-math.pi / 2.0, math.pi / 2.0, 2001)
     angles = np.radians(np.concatenate([np.linspace(-180.0, -45.0, 541), np.linspace(45.0, 180.0, 541)]))
     speeds = ardurover_sitl().speeds_mps(angles, 5.0)
@@ -62,7 +78,7 @@ def test_before_a_known_veer_she_sails_to_where_the_wind_will_come_from():
     assert found.bound_s == pytest.approx(by_hand_s, rel=2e-3)
     assert found.time_s == pytest.approx(by_hand_s, rel=1e-2)
     there = np.searchsorted(found.track[:, 0], VEERS_S)
-    assert found.track[there, 1] > 40.0   # far to the right by then: of its 57 m on port tack alone
+    assert found.track[there, 1] > 40.0  # far to the right by then: of its 57 m on port tack alone
 
 
 def test_round_a_wall_it_is_the_shortest_way():
@@ -72,7 +88,7 @@ def test_round_a_wall_it_is_the_shortest_way():
     shortest_m = math.hypot(40.0, 60.0) + 10.0 + math.hypot(40.0, 80.0) - 5.0
     assert found.time_s == pytest.approx(shortest_m / 2.0, rel=0.01)
     assert not shapely.LineString(found.track[:, 1:3]).intersects(wall)
-    assert found.bound_s == pytest.approx(145.0 / 2.0, rel=2e-3)   # it knows of no wall
+    assert found.bound_s == pytest.approx(145.0 / 2.0, rel=2e-3)  # it knows of no wall
 
 
 def test_a_track_can_be_sailed_and_is_between_bound_and_grid(unsteady):

@@ -4,7 +4,7 @@ import pytest
 
 from lab.tasks.ships import ShipsVoyage, scenes
 
-APART_M = 300.0     # of the next five minutes of a path and of the unsafe one before it; a straight way is 3 km
+APART_M = 300.0  # of the next five minutes of a path and of the unsafe one before it; a straight way is 3 km
 
 
 @pytest.mark.parametrize("seed", [1])
@@ -15,7 +15,7 @@ def test_four_ships_at_once(seed):
     assert o.shortest_interval_s >= 20.0
     assert o.plans <= 5
     assert all(d <= APART_M for d in o.path_distances_m)
-    assert o.checks_unsafe == o.plans - 1        # each plan after the first: the one before had become unsafe
+    assert o.checks_unsafe == o.plans - 1  # each plan after the first: the one before had become unsafe
 
 
 @pytest.mark.campaign

@@ -75,7 +75,8 @@ async def orders(near, shore_near):
 
     line = Lossy(near, random.Random(1))
     async with (
-        Link(line) as link, Link(shore_near, identity=SHORE, streams=(), is_quiet=True) as shore,
+        Link(line) as link,
+        Link(shore_near, identity=SHORE, streams=(), is_quiet=True) as shore,
         Autopilot(link, timeout_s=60.0) as autopilot,
     ):
         reader, texts = StatusReader(), []

@@ -31,13 +31,13 @@ def mission(count, *, east=0.001, north=0.0):
 
 def sail(main, *, impairment=None, seed=1, has_ftp=True, **link_options):
     """Run ``main(boat, link, autopilot, memory)`` with a warm boat at the other end of a memory link."""
+
     async def whole():
         boat = SimulatedAutopilot(
-            AutopilotConfig(is_warm=True, home=HOME, has_ftp=has_ftp), Constant(0.0, 5.0), seed=seed)
+            AutopilotConfig(is_warm=True, home=HOME, has_ftp=has_ftp), Constant(0.0, 5.0), seed=seed
+        )
         memory = MemoryLink(seed=seed, impairment=impairment or Impairment())
-        async with (
-            serve(boat, [memory.far]), Link(memory.near, **link_options) as link, Autopilot(link) as autopilot,
-        ):
+        async with serve(boat, [memory.far]), Link(memory.near, **link_options) as link, Autopilot(link) as autopilot:
             return await main(boat, link, autopilot, memory)
 
     return run_virtual(whole())
@@ -98,6 +98,7 @@ def test_a_partial_write_keeps_the_leg_that_is_sailed():
 
     sail(main)
 
+
 GUARD_OLD, GUARD_NEW = mission(5), [*mission(5)[:2], *mission(7, north=0.0005)[2:]]
 GUARD_GAP = waypoint(GeoPoint(lat_deg=51.1, lon_deg=-1.298), command=Command.NAV_LOITER_UNLIM)
 
@@ -123,8 +124,9 @@ def test_behind_a_stopgap_no_mixture_is_ever_on_board(old):
             write(data)
 
         memory.near.write = until_cut
-        task = asyncio.create_task(autopilot.upload_mission(
-            new, method="guarded", keep_first=2, set_current=None, stopgap=GUARD_GAP))
+        task = asyncio.create_task(
+            autopilot.upload_mission(new, method="guarded", keep_first=2, set_current=None, stopgap=GUARD_GAP)
+        )
         judged = None
         while not task.done():
             await asyncio.sleep(0.02)
@@ -132,9 +134,14 @@ def test_behind_a_stopgap_no_mixture_is_ever_on_board(old):
             if stored == judged:
                 continue
             judged = stored
-            on_board = tuple(canonical(MissionItem(
-                command=i.command, lat_e7=i.x, lon_e7=i.y, frame=i.frame, params=(i.p1, i.p2, i.p3, i.p4)))
-                for i in stored)
+            on_board = tuple(
+                canonical(
+                    MissionItem(
+                        command=i.command, lat_e7=i.x, lon_e7=i.y, frame=i.frame, params=(i.p1, i.p2, i.p3, i.p4)
+                    )
+                )
+                for i in stored
+            )
             assert sailed(on_board) in whole, (frames, on_board)
             seen.add(whole.index(sailed(on_board)))
         result = await task
@@ -195,8 +202,9 @@ def test_fences_rally_points_and_parameters():
 
 def test_a_list_that_was_asked_for_is_no_forgery_however_fast_it_comes():
     """It took a doctor a minute: the burst was out of step with the streams before it, and was dropped as forged."""
+
     async def main(boat, link, autopilot, memory):
-        await asyncio.sleep(7.0)   # the streams' numbers are known by now
+        await asyncio.sleep(7.0)  # the streams' numbers are known by now
         began_s = now_s()
         table = await autopilot.read_parameters()
         assert len(table.values) > 200
@@ -279,9 +287,18 @@ def test_own_traffic_of_normal_sailing_is_small():
     async def main(boat, link, autopilot, memory):
         await set_sail(autopilot, mission(8))
         status = CompanionStatus(
-            t_s=now_s(), state="destination approach", twd_from_rad=1.0, twd_sigma_rad=0.1, tws_mps=5.0,
-            tws_sigma_mps=0.5, promised_risk=0.02, next_tack_s=40.0, cross_track_m=-3.0, alert_code="wind shift",
-            alert_text="the wind turned 25 deg against the plan's: planning again from waypoint 4", plan_id=3,
+            t_s=now_s(),
+            state="destination approach",
+            twd_from_rad=1.0,
+            twd_sigma_rad=0.1,
+            tws_mps=5.0,
+            tws_sigma_mps=0.5,
+            promised_risk=0.02,
+            next_tack_s=40.0,
+            cross_track_m=-3.0,
+            alert_code="wind shift",
+            alert_text="the wind turned 25 deg against the plan's: planning again from waypoint 4",
+            plan_id=3,
         )
         for _ in range(30):
             autopilot.send_status(status)
@@ -377,6 +394,7 @@ def test_a_listener_speaks_once_and_then_listens():
 
 def test_the_status_crosses_to_another_link():
     """As through a telemetry radio: the shore hears the companion on its own link of the autopilot."""
+
     async def whole():
         boat = SimulatedAutopilot(AutopilotConfig(is_warm=True), Constant(0.0, 5.0), seed=1)
         wire, radio = MemoryLink("wire", seed=1), MemoryLink("radio", seed=2)

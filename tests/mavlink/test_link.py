@@ -60,6 +60,7 @@ def with_peer(main, *, peer_signing=None, **link_options):
 def test_what_waited_while_the_loop_was_held_up_proves_no_silence(held_s):
     """A computer that was busy for a moment read at once what had come, and took its own absence for a silence of the
     autopilot: the first forged mode in the queue was believed."""
+
     async def main(peer, link):
         heard, forger, boot = [], Codec(1, 1), now_s()
         link.subscribe(lambda _, message: heard.append((message.get_type(), getattr(message, "custom_mode", None))))
@@ -69,20 +70,23 @@ def test_what_waited_while_the_loop_was_held_up_proves_no_silence(held_s):
             nonlocal boot
             for number in range(round(seconds * 50.0)):
                 boot += 0.02
-                peer.say(wire.MAVLink_wind_message(90.0, 5.0, 0.0) if number % 5 else
-                         wire.MAVLink_attitude_message(round(1e3 * boot), 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+                peer.say(
+                    wire.MAVLink_wind_message(90.0, 5.0, 0.0)
+                    if number % 5
+                    else wire.MAVLink_attitude_message(round(1e3 * boot), 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+                )
 
         for _ in range(100):
             speak(0.1)
             await asyncio.sleep(0.1)
         forged = wire.MAVLink_heartbeat_message(11, 3, 128, 5, 4, 3)
-        for ahead in (15, 27):   # it knows no count, and comes before the autopilot's own in the queue
+        for ahead in (15, 27):  # it knows no count, and comes before the autopilot's own in the queue
             forger._mav.seq = (peer.codec._mav.seq + ahead) % 256
             peer.end.write(forger.pack(forged))
         before = len(heard)
         speak(held_s)
         peer.say(BEAT)
-        asyncio.get_running_loop().jump(held_s)   # nothing of ours runs
+        asyncio.get_running_loop().jump(held_s)  # nothing of ours runs
         await asyncio.sleep(0.3)
         late = heard[before:]
         assert ("HEARTBEAT", 5) not in late
@@ -230,7 +234,9 @@ async def sail_over(far_link, near_link):
     items = [waypoint(GeoPoint(lat_deg=51.1, lon_deg=-1.3 + 0.001 * i)) for i in range(1, 8)]
     items.append(waypoint(items[-1].point, command=Command.NAV_LOITER_UNLIM))
     async with (
-        serve(boat, [far_link]), Link(open_link(near_link)) as link, Autopilot(link, timeout_s=60.0) as autopilot,
+        serve(boat, [far_link]),
+        Link(open_link(near_link)) as link,
+        Autopilot(link, timeout_s=60.0) as autopilot,
     ):
         assert (await autopilot.upload_mission(items)).is_ok
         assert (await autopilot.set_mode(Mode.AUTO)).is_ok
@@ -254,6 +260,7 @@ def test_a_mission_over_real_sockets(kind):
 
 def test_a_mission_over_a_serial_line():
     """The boat's end is the raw side of a pty, pumped to a memory link."""
+
     async def main():
         ours, theirs = os.openpty()
         tty.setraw(ours)

@@ -11,7 +11,7 @@ from companion.mavlink.wire.frames import Codec, Drop
 from companion.messages import Mode, VehicleState
 
 STEP_S = 0.05
-ZERO_S = 1000.0   # our clock when the autopilot booted
+ZERO_S = 1000.0  # our clock when the autopilot booted
 
 
 def attitude(boot_s):
@@ -76,7 +76,7 @@ def test_a_bad_link_costs_hardly_more(loss):
 def test_a_gap_is_bridged_at_once(gap_s):
     air = Air()
     air.run(20.0)
-    for _ in range(round(gap_s / STEP_S)):   # the autopilot goes on talking to nobody
+    for _ in range(round(gap_s / STEP_S)):  # the autopilot goes on talking to nobody
         air.true.pack(wind())
     air.t_s += gap_s
     assert air.run(20.0) == []
@@ -111,7 +111,7 @@ def test_a_route_that_fell_silent_vouches_for_nobody_while_the_other_speaks(sile
     air = Air()
     air.run(10.0)
     second = Codec(1, 1)
-    for _ in range(20):   # the same autopilot over another route, with a count of its own
+    for _ in range(20):  # the same autopilot over another route, with a count of its own
         air.run(0.2)
         air.hear(second, attitude(air.t_s - ZERO_S))
         air.hear(second, wind())
@@ -232,7 +232,13 @@ def test_two_of_three_count_where_a_forger_says_the_old_mode():
 def test_a_change_that_was_acknowledged_is_a_fact_at_once_and_only_one():
     ack = wire.MAVLink_command_ack_message(wire.MAV_CMD_DO_SET_MODE, 0, 0, 0, 1, 191)
     assert modes((0, beat(4)), (1, beat(4)), (1.1, ack), (1.5, beat()), (1.6, beat(4)), (2.5, beat())) == [
-        HOLD, HOLD, HOLD, AUTO, AUTO, AUTO]
+        HOLD,
+        HOLD,
+        HOLD,
+        AUTO,
+        AUTO,
+        AUTO,
+    ]
     refused = wire.MAVLink_command_ack_message(wire.MAV_CMD_DO_SET_MODE, 4, 0, 0, 1, 191)
     assert modes((0, beat(4)), (1, beat(4)), (1.1, refused), (1.5, beat()))[-1] == HOLD
 
@@ -251,12 +257,24 @@ def places(*fixes):
 
 def test_a_place_that_nothing_agrees_with_is_not_used():
     assert places((1.0, 0), (1.2, 0.5), (1.3, 300.0), (1.4, 1.0), (1.5, 300.0), (1.6, 1.5)) == [
-        True, True, False, True, False, True]
+        True,
+        True,
+        False,
+        True,
+        False,
+        True,
+    ]
 
 
 def test_a_jump_that_stays_is_believed_at_the_third_fix():
     assert places((1.0, 0), (1.2, 0), (1.4, 40.0), (1.6, 40.2), (1.8, 40.4), (2.0, 40.6)) == [
-        True, True, False, False, True, True]
+        True,
+        True,
+        False,
+        False,
+        True,
+        True,
+    ]
     assert places((1.0, 0), (2.0, 0), (3.0, 40.0), (5.0, 40.2)) == [True, True, False, True]
 
 

@@ -38,8 +38,7 @@ def test_mavutil_reads_what_we_write(tmp_path):
 @settings(max_examples=60)
 @given(st.integers(0, len(RAW)))
 def test_a_torn_tail_costs_one_record_at_most(size):
-    whole = [r for i, r in enumerate(RECORDS)
-             if sum(8 + len(x.frame) for x in RECORDS[:i + 1]) <= size]
+    whole = [r for i, r in enumerate(RECORDS) if sum(8 + len(x.frame) for x in RECORDS[: i + 1]) <= size]
     assert list(parse_tlog(RAW[:size])) == whole
 
 

@@ -21,30 +21,53 @@ from companion.mavlink.transports import (
 )
 
 
-@pytest.mark.parametrize(("text", "kind", "where"), [
-    ("/dev/serial0:921600", "serial", ("/dev/serial0", 921600)),
-    ("/dev/ttyAMA0", "serial", ("/dev/ttyAMA0", 921600)),
-    ("serial:/dev/ttyUSB0:57600", "serial", ("/dev/ttyUSB0", 57600)),
-    ("/dev/serial/by-id/usb-1209_Pixhawk-if00:115200", "serial", ("/dev/serial/by-id/usb-1209_Pixhawk-if00", 115200)),
-    ("udpin:0.0.0.0:14551", "udpin", ("0.0.0.0", 14551)),
-    ("udp:127.0.0.1:14550", "udpin", ("127.0.0.1", 14550)),
-    ("udpout:boat.local:14550", "udpout", ("boat.local", 14550)),
-    ("tcp:127.0.0.1:5760", "tcp", ("127.0.0.1", 5760)),
-    ("tcpin:0.0.0.0:5760", "tcpin", ("0.0.0.0", 5760)),
-    ("/dev/serial/by-path/platform-fd50-usb-0:1.2:1.0-port0:57600", "serial",
-     ("/dev/serial/by-path/platform-fd50-usb-0:1.2:1.0-port0", 57600)),
-    ("tcp:[::1]:5760", "tcp", ("::1", 5760)),
-])
+@pytest.mark.parametrize(
+    ("text", "kind", "where"),
+    [
+        ("/dev/serial0:921600", "serial", ("/dev/serial0", 921600)),
+        ("/dev/ttyAMA0", "serial", ("/dev/ttyAMA0", 921600)),
+        ("serial:/dev/ttyUSB0:57600", "serial", ("/dev/ttyUSB0", 57600)),
+        (
+            "/dev/serial/by-id/usb-1209_Pixhawk-if00:115200",
+            "serial",
+            ("/dev/serial/by-id/usb-1209_Pixhawk-if00", 115200),
+        ),
+        ("udpin:0.0.0.0:14551", "udpin", ("0.0.0.0", 14551)),
+        ("udp:127.0.0.1:14550", "udpin", ("127.0.0.1", 14550)),
+        ("udpout:boat.local:14550", "udpout", ("boat.local", 14550)),
+        ("tcp:127.0.0.1:5760", "tcp", ("127.0.0.1", 5760)),
+        ("tcpin:0.0.0.0:5760", "tcpin", ("0.0.0.0", 5760)),
+        (
+            "/dev/serial/by-path/platform-fd50-usb-0:1.2:1.0-port0:57600",
+            "serial",
+            ("/dev/serial/by-path/platform-fd50-usb-0:1.2:1.0-port0", 57600),
+        ),
+        ("tcp:[::1]:5760", "tcp", ("::1", 5760)),
+    ],
+)
 def test_link_names(text, kind, where):
     link = parse_link(text)
     assert link.kind == kind
     assert (link.device or link.host, link.baud if kind == "serial" else link.port) == where
 
 
-@pytest.mark.parametrize("text", [
-    "", "udpin", "udpin:14550", "udpin:host:", "udpin:host:0", "udpin:host:70000", "udpin:host:1e3", "bluetooth:x:1",
-    "/dev/ttyS0:fast", "/dev/ttyS0:12", "tcp::5760", "udpin:h:²",
-])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "udpin",
+        "udpin:14550",
+        "udpin:host:",
+        "udpin:host:0",
+        "udpin:host:70000",
+        "udpin:host:1e3",
+        "bluetooth:x:1",
+        "/dev/ttyS0:fast",
+        "/dev/ttyS0:12",
+        "tcp::5760",
+        "udpin:h:²",
+    ],
+)
 def test_bad_link_names_say_what_to_write(text):
     with pytest.raises(InputError, match="write /dev/serial0:921600"):
         parse_link(text)

@@ -7,8 +7,15 @@ from companion.mavlink.vehicle_identity import LISTEN_S, Census, CensusState, Ot
 from companion.mavlink.wire.frames import Codec
 
 
-def beat(system=1, kind=wire.MAV_TYPE_SURFACE_BOAT, autopilot=wire.MAV_AUTOPILOT_ARDUPILOTMEGA, mode=4, component=1,
-         armed=False, status=wire.MAV_STATE_ACTIVE):
+def beat(
+    system=1,
+    kind=wire.MAV_TYPE_SURFACE_BOAT,
+    autopilot=wire.MAV_AUTOPILOT_ARDUPILOTMEGA,
+    mode=4,
+    component=1,
+    armed=False,
+    status=wire.MAV_STATE_ACTIVE,
+):
     message = wire.MAVLink_heartbeat_message(kind, autopilot, 128 if armed else 0, mode, status, 3)
     [heard] = Codec(9, 9).feed(Codec(system, component).pack(message))
     return heard
@@ -34,7 +41,8 @@ def test_several_are_listed_and_none_is_taken():
     assert choice.reason == (
         "3 autopilots are heard: system 1 (surface boat, ArduPilot, HOLD, disarmed); system 3 (quadrotor, ArduPilot, "
         "mode 4, disarmed); system 7 (surface boat, ArduPilot, AUTO, armed): say which is yours, with --system N or "
-        "[autopilot] system in the mission")
+        "[autopilot] system in the mission"
+    )
 
 
 def test_the_one_that_is_named_is_taken_at_once_whoever_else_speaks():
@@ -44,20 +52,29 @@ def test_the_one_that_is_named_is_taken_at_once_whoever_else_speaks():
 
 
 @pytest.mark.parametrize("wanted", [None, 1])
-@pytest.mark.parametrize("other", [
-    {"kind": wire.MAV_TYPE_FIXED_WING}, {"kind": wire.MAV_TYPE_ANTENNA_TRACKER},
-    {"autopilot": wire.MAV_AUTOPILOT_PX4},
-])
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"kind": wire.MAV_TYPE_FIXED_WING},
+        {"kind": wire.MAV_TYPE_ANTENNA_TRACKER},
+        {"autopilot": wire.MAV_AUTOPILOT_PX4},
+    ],
+)
 def test_what_is_no_rover_is_no_boat_of_ours(wanted, other):
     choice = listened(beat(**other), wanted=wanted)
     assert choice.standing is CensusState.REFUSED
     assert "not a rover" in choice.reason
 
 
-@pytest.mark.parametrize("other", [
-    {"kind": wire.MAV_TYPE_GCS, "autopilot": wire.MAV_AUTOPILOT_INVALID}, {"component": 191}, {"system": 0},
-    {"kind": wire.MAV_TYPE_ONBOARD_CONTROLLER, "autopilot": wire.MAV_AUTOPILOT_INVALID},
-])
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"kind": wire.MAV_TYPE_GCS, "autopilot": wire.MAV_AUTOPILOT_INVALID},
+        {"component": 191},
+        {"system": 0},
+        {"kind": wire.MAV_TYPE_ONBOARD_CONTROLLER, "autopilot": wire.MAV_AUTOPILOT_INVALID},
+    ],
+)
 def test_stations_and_companions_are_no_autopilots(other):
     assert listened(beat(**other)).standing is CensusState.LISTENING
 
@@ -87,9 +104,10 @@ def test_a_second_companion_counts_from_its_second_word_and_while_it_speaks():
     assert census.companion(20.0, 1) is None
 
 
-@pytest.mark.parametrize(("token", "other", "is_starting", "yields"), [
-    (5, 9, False, True), (9, 5, False, True), (5, 9, True, False), (9, 5, True, True),
-])
+@pytest.mark.parametrize(
+    ("token", "other", "is_starting", "yields"),
+    [(5, 9, False, True), (9, 5, False, True), (5, 9, True, False), (9, 5, True, True)],
+)
 def test_who_starts_gives_way_to_who_sails_and_of_two_that_start_one_goes_on(token, other, is_starting, yields):
     assert yields_to(token, OtherCompanion(token=other, is_starting=is_starting, beats=2, last_s=0.0)) is yields
 

@@ -23,7 +23,7 @@ from companion.orders import (
 from companion.orders.mavlink_commands import GLOBAL_FRAMES, PLACE_COMMAND, VERB_COMMAND
 
 FLOAT32 = st.floats(width=32, allow_nan=True, allow_infinity=True)
-INT32 = st.integers(-2**31, 2**31 - 1)
+INT32 = st.integers(-(2**31), 2**31 - 1)
 
 
 def on_the_wire(message):
@@ -39,9 +39,14 @@ def test_each_verb_has_a_number_of_its_own_and_a_row():
     assert {Result.NO_ANSWER} == set(Result) - set(RESULTS)
 
 
-@pytest.mark.parametrize("wanted", [
-    *(Wanted(verb=v) for v in Verb if v is not Verb.GOAL), Wanted(verb=Verb.REFUGE, number=2),
-    Wanted(verb=Verb.GOAL, place=Place(lat_deg=-33.8567844, lon_deg=151.2152967))])
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        *(Wanted(verb=v) for v in Verb if v is not Verb.GOAL),
+        Wanted(verb=Verb.REFUGE, number=2),
+        Wanted(verb=Verb.GOAL, place=Place(lat_deg=-33.8567844, lon_deg=151.2152967)),
+    ],
+)
 def test_what_is_sent_is_what_is_read(wanted):
     message = on_the_wire(message_of(wanted, 7))
     assert (message.target_system, message.target_component) == (7, 191)
@@ -77,13 +82,18 @@ def test_any_command_long_is_read_or_says_why_not(command, params):
 
 
 @settings(max_examples=300)
-@given(st.sampled_from(sorted(COMMANDS)), st.integers(0, 255), st.lists(FLOAT32, min_size=4, max_size=4), INT32, INT32,
-       FLOAT32)
+@given(
+    st.sampled_from(sorted(COMMANDS)),
+    st.integers(0, 255),
+    st.lists(FLOAT32, min_size=4, max_size=4),
+    INT32,
+    INT32,
+    FLOAT32,
+)
 @example(PLACE_COMMAND, 0, [0.0] * 4, 0, 0, 0.0)
 @example(PLACE_COMMAND, 6, [0.0] * 4, 2**31 - 1, 2**31 - 1, math.nan)
 def test_any_command_int_is_read_or_says_why_not(command, frame, params, x, y, z):
-    wanted = wanted_of(on_the_wire(
-        wire.MAVLink_command_int_message(1, 191, frame, command, 0, 0, *params, x, y, z)))
+    wanted = wanted_of(on_the_wire(wire.MAVLink_command_int_message(1, 191, frame, command, 0, 0, *params, x, y, z)))
     assert wanted.verb is not None or wanted.fault
     if command == PLACE_COMMAND:
         assert bool(wanted.fault) is (frame not in GLOBAL_FRAMES)
@@ -91,9 +101,17 @@ def test_any_command_int_is_read_or_says_why_not(command, frame, params, x, y, z
         assert wanted.place.point.lat_deg == x / 1e7
 
 
-@pytest.mark.parametrize(("lat_deg", "lon_deg", "says"), [
-    (0.0, 0.0, "no position that anybody means"), (math.nan, 1.0, "not a number"), (math.inf, 1.0, "not a number"),
-    (151.2, -33.8, "not a latitude"), (51.0, 181.0, "not a longitude"), (51.0, -1.3, "")])
+@pytest.mark.parametrize(
+    ("lat_deg", "lon_deg", "says"),
+    [
+        (0.0, 0.0, "no position that anybody means"),
+        (math.nan, 1.0, "not a number"),
+        (math.inf, 1.0, "not a number"),
+        (151.2, -33.8, "not a latitude"),
+        (51.0, 181.0, "not a longitude"),
+        (51.0, -1.3, ""),
+    ],
+)
 def test_a_place_says_what_is_wrong_with_it(lat_deg, lon_deg, says):
     place = Place(lat_deg=lat_deg, lon_deg=lon_deg)
     assert says in place.trouble
@@ -101,7 +119,10 @@ def test_a_place_says_what_is_wrong_with_it(lat_deg, lon_deg, says):
 
 
 def test_nothing_is_sent_that_cannot_be():
-    for wanted in (Wanted(verb=None, fault="no"), Wanted(verb=Verb.GOAL),
-                   Wanted(verb=Verb.GOAL, place=Place(lat_deg=0.0, lon_deg=0.0))):
+    for wanted in (
+        Wanted(verb=None, fault="no"),
+        Wanted(verb=Verb.GOAL),
+        Wanted(verb=Verb.GOAL, place=Place(lat_deg=0.0, lon_deg=0.0)),
+    ):
         with pytest.raises(ValueError, match=r"no|position"):
             message_of(wanted, 1)

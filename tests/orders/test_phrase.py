@@ -8,41 +8,65 @@ from companion.errors import InputError
 from companion.orders import TABLE, Order, Place, Source, Verb, Wanted, permitted, phrase, qgc_actions
 
 
-@pytest.mark.parametrize(("words", "wanted"), [
-    ("hold", Wanted(verb=Verb.HOLD)), ("go-on", Wanted(verb=Verb.GO_ON)), ("GO_ON", Wanted(verb=Verb.GO_ON)),
-    ("refuge", Wanted(verb=Verb.REFUGE)), ("refuge 2", Wanted(verb=Verb.REFUGE, number=2)),
-    ("refuge Mill Bay", Wanted(verb=Verb.REFUGE, name="Mill Bay")),
-    ("goal 51.1 -1.3", Wanted(verb=Verb.GOAL, place=Place(lat_deg=51.1, lon_deg=-1.3))),
-    ("goal 51.1,-1.3", Wanted(verb=Verb.GOAL, place=Place(lat_deg=51.1, lon_deg=-1.3))),
-])
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        ("hold", Wanted(verb=Verb.HOLD)),
+        ("go-on", Wanted(verb=Verb.GO_ON)),
+        ("GO_ON", Wanted(verb=Verb.GO_ON)),
+        ("refuge", Wanted(verb=Verb.REFUGE)),
+        ("refuge 2", Wanted(verb=Verb.REFUGE, number=2)),
+        ("refuge Mill Bay", Wanted(verb=Verb.REFUGE, name="Mill Bay")),
+        ("goal 51.1 -1.3", Wanted(verb=Verb.GOAL, place=Place(lat_deg=51.1, lon_deg=-1.3))),
+        ("goal 51.1,-1.3", Wanted(verb=Verb.GOAL, place=Place(lat_deg=51.1, lon_deg=-1.3))),
+    ],
+)
 def test_words(words, wanted):
     assert phrase(words.split()) == wanted
 
 
-@pytest.mark.parametrize(("words", "says"), [
-    ("", "VERB: is missing; there are hold, go_on"), ("hodl", "there is no order 'hodl'; did you mean hold?"),
-    ("xyzzy", "there is no order 'xyzzy'; there are hold"), ("hold here", "hold: takes nothing"),
-    ("goal", "is not a position; write goal LAT LON"), ("goal 51", "is not a position"),
-    ("goal 51 north", "is not a position"), ("goal 1 2 3", "is not a position"),
-    ("goal 0 0", "no position that anybody means"), ("goal nan 1", "not a number"), ("goal 151.2 -33.8", "latitude"),
-])
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("", "VERB: is missing; there are hold, go_on"),
+        ("hodl", "there is no order 'hodl'; did you mean hold?"),
+        ("xyzzy", "there is no order 'xyzzy'; there are hold"),
+        ("hold here", "hold: takes nothing"),
+        ("goal", "is not a position; write goal LAT LON"),
+        ("goal 51", "is not a position"),
+        ("goal 51 north", "is not a position"),
+        ("goal 1 2 3", "is not a position"),
+        ("goal 0 0", "no position that anybody means"),
+        ("goal nan 1", "not a number"),
+        ("goal 151.2 -33.8", "latitude"),
+    ],
+)
 def test_words_that_are_no_order(words, says):
     with pytest.raises(InputError) as error:
         phrase(words.split())
     assert says in str(error.value)
 
 
-@pytest.mark.parametrize("wanted", [
-    Wanted(verb=Verb.HOLD), Wanted(verb=None, fault="no order 17"), Wanted(verb=Verb.REFUGE, name="Bay", mark=7),
-    Wanted(verb=Verb.GOAL, place=Place(lat_deg=51.1234567, lon_deg=-1.1))])
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        Wanted(verb=Verb.HOLD),
+        Wanted(verb=None, fault="no order 17"),
+        Wanted(verb=Verb.REFUGE, name="Bay", mark=7),
+        Wanted(verb=Verb.GOAL, place=Place(lat_deg=51.1234567, lon_deg=-1.1)),
+    ],
+)
 def test_an_order_survives_its_record(wanted):
     order = Order(wanted=wanted, source=Source(kind="mavlink", system=255, component=190), t_s=12.25, command=31010)
     assert Order.from_dict(json.loads(json.dumps(order.to_dict()))) == order
 
 
 def test_a_record_keeps_what_is_not_a_number():
-    order = Order(wanted=Wanted(verb=Verb.GOAL, place=Place(lat_deg=float("nan"), lon_deg=1.0)),
-                  source=Source(kind="mavlink"), t_s=0.0)
+    order = Order(
+        wanted=Wanted(verb=Verb.GOAL, place=Place(lat_deg=float("nan"), lon_deg=1.0)),
+        source=Source(kind="mavlink"),
+        t_s=0.0,
+    )
     back = Order.from_dict(json.loads(json.dumps(order.to_dict())))
     assert back.wanted.place.trouble == "the position is not a number"
 

@@ -13,9 +13,11 @@ import urllib.request
 from sitl.scenario.traffic import free_port
 
 PROGRAM = os.environ.get("SIGNALK_SERVER") or shutil.which("signalk-server")
-MISSING = ("no Signal K server: `npm install --prefix DIR signalk-server`, and set $SIGNALK_SERVER to "
-           "DIR/node_modules/.bin/signalk-server")
-SECRET = "a secret of the tests"   # of its tokens
+MISSING = (
+    "no Signal K server: `npm install --prefix DIR signalk-server`, and set $SIGNALK_SERVER to "
+    "DIR/node_modules/.bin/signalk-server"
+)
+SECRET = "a secret of the tests"  # of its tokens
 START_S = 60.0
 
 
@@ -28,17 +30,42 @@ class Server:
         folder.mkdir(parents=True, exist_ok=True)
         settings = {"interfaces": {}, "mdns": False, "vessel": {"mmsi": "366982320"}}
         if nmea_port is not None:
-            settings["pipedProviders"] = [{"id": "nmea", "enabled": True, "pipeElements": [
-                {"type": "providers/simple", "options": {"type": "NMEA0183", "subOptions": {
-                    "type": "udp", "port": str(nmea_port)}, "logging": False}}]}]
+            settings["pipedProviders"] = [
+                {
+                    "id": "nmea",
+                    "enabled": True,
+                    "pipeElements": [
+                        {
+                            "type": "providers/simple",
+                            "options": {
+                                "type": "NMEA0183",
+                                "subOptions": {"type": "udp", "port": str(nmea_port)},
+                                "logging": False,
+                            },
+                        }
+                    ],
+                }
+            ]
         if is_secure:
             settings["security"] = {"strategy": "./tokensecurity"}
-            (folder / "security.json").write_text(json.dumps({
-                "allow_readonly": True, "expiration": "NEVER", "secretKey": SECRET, "users": [
-                    {"username": "boat", "type": "readwrite", "password": "x"},
-                    {"username": "guest", "type": "readonly", "password": "x"}],
-                "devices": [], "immutableConfig": False, "acls": [], "allowDeviceAccessRequests": False,
-                "allowNewUserRegistration": False}))
+            (folder / "security.json").write_text(
+                json.dumps(
+                    {
+                        "allow_readonly": True,
+                        "expiration": "NEVER",
+                        "secretKey": SECRET,
+                        "users": [
+                            {"username": "boat", "type": "readwrite", "password": "x"},
+                            {"username": "guest", "type": "readonly", "password": "x"},
+                        ],
+                        "devices": [],
+                        "immutableConfig": False,
+                        "acls": [],
+                        "allowDeviceAccessRequests": False,
+                        "allowNewUserRegistration": False,
+                    }
+                )
+            )
             (folder / "security.json").chmod(0o600)
         (folder / "settings.json").write_text(json.dumps(settings))
 
@@ -53,9 +80,18 @@ class Server:
     def start(self):
         with (self._folder / "log").open("ab") as log:
             self._process = subprocess.Popen(
-                [PROGRAM], stdout=log, stderr=subprocess.STDOUT, cwd=self._folder, env={
-                    **os.environ, "PORT": str(self.port), "TCPSTREAMPORT": str(self._tcp_port),
-                    "SIGNALK_NODE_CONFIG_DIR": str(self._folder), "EXTERNALHOST": "127.0.0.1"})
+                [PROGRAM],
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                cwd=self._folder,
+                env={
+                    **os.environ,
+                    "PORT": str(self.port),
+                    "TCPSTREAMPORT": str(self._tcp_port),
+                    "SIGNALK_NODE_CONFIG_DIR": str(self._folder),
+                    "EXTERNALHOST": "127.0.0.1",
+                },
+            )
         until_s = time.monotonic() + START_S
         while time.monotonic() < until_s and self._process.poll() is None:
             with contextlib.suppress(OSError):
@@ -88,8 +124,10 @@ class Server:
         def part(data):
             return base64.urlsafe_b64encode(data).rstrip(b"=")
 
-        body = b".".join(part(json.dumps(d).encode()) for d in (
-            {"alg": "HS256", "typ": "JWT"}, {"id": user, "exp": int(time.time()) + 3600}))
+        body = b".".join(
+            part(json.dumps(d).encode())
+            for d in ({"alg": "HS256", "typ": "JWT"}, {"id": user, "exp": int(time.time()) + 3600})
+        )
         return (body + b"." + part(hmac.digest(SECRET.encode(), body, hashlib.sha256))).decode()
 
     def get(self, path, version=1):

@@ -88,7 +88,7 @@ def test_the_waypoint_is_read_back(right, leg, bearing, point, distance, closing
     message = read(nmea.rmb(right, "FROM", "WWWWWW-8", point, distance, bearing, closing, has_arrived=False))
     assert message.status == "A"
     assert float(message.cross_track_error) == pytest.approx(min(9.99, abs(right) / 1852.0), abs=1e-4)
-    assert message.cte_correction_dir == ("L" if right > 0.0 else "R")   # to steer: back to the leg
+    assert message.cte_correction_dir == ("L" if right > 0.0 else "R")  # to steer: back to the leg
     assert (message.dest_waypoint_id, message.origin_waypoint_id) == ("WWWWWW-8", "FROM")
     assert degrees_of(message.dest_lat, message.dest_lat_dir) == pytest.approx(point.lat_deg, abs=1e-6)
     assert degrees_of(message.dest_lon, message.dest_lon_dir) == pytest.approx(point.lon_deg, abs=1e-6)
@@ -132,7 +132,7 @@ def test_a_boat_on_her_leg_is_told(view):
     assert (true.reference, float(true.wind_angle), float(true.wind_speed)) == ("T", 45.0, 9.7)
     rmc, rmb, apb = told_["RMC"][0], told_["RMB"][0], told_["APB"][0]
     assert rmc.datetime.isoformat() == "2026-11-22T20:15:03.250000+00:00"
-    assert (rmb.dest_waypoint_id, rmb.cte_correction_dir) == ("W2", "L")     # she is right of the leg
+    assert (rmb.dest_waypoint_id, rmb.cte_correction_dir) == ("W2", "L")  # she is right of the leg
     assert float(rmb.cross_track_error) * 1852.0 == pytest.approx(5.0, abs=0.2)
     assert float(rmb.dest_range) * 1852.0 == pytest.approx(math.hypot(32.0, 51.0), abs=1.0)
     assert float(apb.bearing_to_dest) == pytest.approx(36.9, abs=0.05)
@@ -146,7 +146,7 @@ def test_a_position_that_is_old_is_not_told_as_one(view):
     told_ = told(replace(view, boat=replace(view.boat, age_s=6.0)))
     assert (told_["RMC"][0].status, told_["RMC"][0].lat) == ("V", "")
     assert {"HDT", "APB", "RMB"}.isdisjoint(told_)
-    assert {m.status for m in told_["MWV"]} == {"V"}     # an angle at the bow is as old as the heading
+    assert {m.status for m in told_["MWV"]} == {"V"}  # an angle at the bow is as old as the heading
     assert "MWD" in told_
 
 
@@ -177,21 +177,43 @@ numbers, turns = st.none() | st.floats(0.0, 359.9), st.none() | st.floats(-180.0
 ages = st.none() | st.floats(0.0, 30.0)
 places = st.tuples(st.floats(-4e4, 4e4), st.floats(-4e4, 4e4))
 boats = st.builds(
-    BoatView, age_s=ages, lat_deg=st.none() | st.floats(-90.0, 90.0), lon_deg=st.none() | st.floats(-180.0, 180.0),
-    at_en_m=st.none() | places, heading_deg=numbers, cog_deg=numbers, sog_mps=st.none() | speeds,
-    roll_deg=st.none() | st.floats(-90.0, 90.0), battery_v=st.none() | st.floats(0.0, 30.0))
+    BoatView,
+    age_s=ages,
+    lat_deg=st.none() | st.floats(-90.0, 90.0),
+    lon_deg=st.none() | st.floats(-180.0, 180.0),
+    at_en_m=st.none() | places,
+    heading_deg=numbers,
+    cog_deg=numbers,
+    sog_mps=st.none() | speeds,
+    roll_deg=st.none() | st.floats(-90.0, 90.0),
+    battery_v=st.none() | st.floats(0.0, 30.0),
+)
 winds = st.none() | st.builds(
-    WindView, health=st.sampled_from(["none", "settling", "good", "light", "untrusted"]), age_s=ages,
+    WindView,
+    health=st.sampled_from(["none", "settling", "good", "light", "untrusted"]),
+    age_s=ages,
     twd_from_deg=numbers,
-    tws_mps=st.none() | speeds, twa_deg=turns, awa_deg=turns, aws_mps=st.none() | speeds)
+    tws_mps=st.none() | speeds,
+    twa_deg=turns,
+    awa_deg=turns,
+    aws_mps=st.none() | speeds,
+)
 legs = st.builds(LegView, from_en_m=places, to_en_m=places, is_done=st.booleans(), is_loiter=st.booleans())
-plans = st.none() | st.builds(PlanView, leg=st.none() | st.integers(1, 300), legs=st.lists(legs,
-                                                                                           max_size=12).map(tuple))
+plans = st.none() | st.builds(
+    PlanView, leg=st.none() | st.integers(1, 300), legs=st.lists(legs, max_size=12).map(tuple)
+)
 marks = st.builds(GoalView, name=st.text(max_size=12), kind=st.just("point"), at_en_m=places)
 views = st.builds(
-    View, source=st.just("live"), name=st.just("t"), t_s=st.floats(0.0, 1e6), boat=boats, wind=winds, plan=plans,
+    View,
+    source=st.just("live"),
+    name=st.just("t"),
+    t_s=st.floats(0.0, 1e6),
+    boat=boats,
+    wind=winds,
+    plan=plans,
     goals=st.lists(marks, max_size=3).map(tuple),
-    state=st.builds(StateView, phase=st.just("standard"), is_sailing=st.none() | st.booleans()))
+    state=st.builds(StateView, phase=st.just("standard"), is_sailing=st.none() | st.booleans()),
+)
 
 
 @given(views, st.none() | st.floats(0.0, 4e9))

@@ -25,14 +25,14 @@ from sitl.scenario.traffic import free_port
 from tests.outputs.conftest import chosen, view_of
 
 STEP_S = 0.02
-WAITED_S = 0.5   # a busy machine makes a step as late as a tenth of this; who waits for a client waits for seconds
+WAITED_S = 0.5  # a busy machine makes a step as late as a tenth of this; who waits for a client waits for seconds
 
 
 async def tell(outputs, view, seconds):
     """Tell the view again and again; return the most processor time that it took, and see that it waits for nobody."""
     worst_s = 0.0
     until_s = time.perf_counter() + seconds
-    gc.disable()   # a tenth of a second for all that a session of tests holds, at whatever moment it falls
+    gc.disable()  # a tenth of a second for all that a session of tests holds, at whatever moment it falls
     try:
         while time.perf_counter() < until_s:
             began_s, busy_s = time.perf_counter(), time.thread_time()
@@ -47,6 +47,7 @@ async def tell(outputs, view, seconds):
 
 def with_outputs(frame, nmea, signalk, body):
     """Run ``body(outputs, said)`` with outputs that are open."""
+
     async def main():
         said = []
         async with Outputs(chosen(nmea, signalk, None), frame, said.append) as outputs:
@@ -81,7 +82,7 @@ def test_datagrams_of_one_sentence_each(frame, view):
                 lines.append(heard.recv(2048))
     assert all(line.startswith(b"$II") and line.endswith(b"\r\n") and line.count(b"$") == 1 for line in lines)
     kinds = [line[3:6] for line in lines]
-    assert kinds.count(b"RTE") == 1                # the route once, while it stays as it is
+    assert kinds.count(b"RTE") == 1  # the route once, while it stays as it is
     assert kinds.count(b"RMC") == kinds.count(b"RMB") > 5
 
 
@@ -111,7 +112,9 @@ def test_who_connects_is_told_the_route_first_and_again_when_it_changes(frame, v
     lines = with_outputs(frame, [f"tcp:{port}"], (), body).splitlines()
     routes = [line for line in lines if "RTE" in line]
     assert [route.partition("*")[0] for route in routes] == [
-        "$IIRTE,1,1,c,companion,W2,Northmar", "$IIRTE,1,1,c,companion,W2,W3"]
+        "$IIRTE,1,1,c,companion,W2,Northmar",
+        "$IIRTE,1,1,c,companion,W2,W3",
+    ]
 
 
 def test_one_that_never_reads_costs_nobody_anything(frame, view, monkeypatch):
@@ -129,7 +132,7 @@ def test_one_that_never_reads_costs_nobody_anything(frame, view, monkeypatch):
         await asyncio.sleep(0.1)
         server = outputs.nmea[0]
         most = len(server.clients)
-        for client in server.clients:    # so that they are full within a test's time
+        for client in server.clients:  # so that they are full within a test's time
             client._wire.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
         worst_s = await tell(outputs, view, 3.0)
         for each in silent:
@@ -171,7 +174,7 @@ def test_a_signal_k_server_that_takes_nothing_in_does_not_hold_the_voyage(frame,
         stuck.bind(("127.0.0.1", 0))
         stuck.listen()
 
-        big = AlarmView(code="x", level="error", text="a" * 100_000)   # fills it at once
+        big = AlarmView(code="x", level="error", text="a" * 100_000)  # fills it at once
 
         async def body(outputs, said):
             worst_s = 0.0
@@ -188,8 +191,9 @@ def test_a_signal_k_server_that_takes_nothing_in_does_not_hold_the_voyage(frame,
     assert dropped > 5
 
 
-@pytest.mark.parametrize("answer", [
-    b"", b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n", b"rubbish\r\n\r\n" * 50])
+@pytest.mark.parametrize(
+    "answer", [b"", b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n", b"rubbish\r\n\r\n" * 50]
+)
 def test_what_is_no_signal_k_server_is_told_of(frame, view, answer):
     async def body(outputs, said):
         async with asyncio.timeout(10.0):
@@ -228,23 +232,31 @@ def test_a_view_that_cannot_be_told_is_said_and_costs_nothing(frame, view):
 
 
 # ------------------------------------------------------------------------------------------- names
-@pytest.mark.parametrize("name", [
-    "", "udp:10110", "tcp", "tcp:0", "udp:h:99999", "ws://h", "udp:a b:1", "serial:/dev/x"])
+@pytest.mark.parametrize(
+    "name", ["", "udp:10110", "tcp", "tcp:0", "udp:h:99999", "ws://h", "udp:a b:1", "serial:/dev/x"]
+)
 def test_a_place_that_is_none_is_refused(name):
     with pytest.raises(InputError, match=r"--nmea.*write udp:HOST:PORT"):
         chosen([name], (), None)
 
 
-@pytest.mark.parametrize("name", [
-    "", "h:3000", "http://h", "ws://", "ws://u:p@h", "ws://h?token=x", "tcp:8375", "ws://h:x"])
+@pytest.mark.parametrize(
+    "name", ["", "h:3000", "http://h", "ws://", "ws://u:p@h", "ws://h?token=x", "tcp:8375", "ws://h:x"]
+)
 def test_a_signal_k_server_that_is_none_is_refused(name):
     with pytest.raises(InputError, match=r"--signalk.*write ws://HOST:3000"):
         chosen((), [name], None)
 
 
-@pytest.mark.parametrize(("text", "mode", "says"), [
-    ("abc", 0o644, "can be read by others"), ("", 0o600, "holds no token"), ("a b", 0o600, "holds no token"),
-    ("ä", 0o600, "holds no token")])
+@pytest.mark.parametrize(
+    ("text", "mode", "says"),
+    [
+        ("abc", 0o644, "can be read by others"),
+        ("", 0o600, "holds no token"),
+        ("a b", 0o600, "holds no token"),
+        ("ä", 0o600, "holds no token"),
+    ],
+)
 def test_a_token_that_must_not_be_used_is_not_and_that_is_known(tmp_path, text, mode, says):
     file, guard = tmp_path / "token", Guard()
     file.write_text(text)
@@ -279,6 +291,7 @@ def test_without_its_library_a_websocket_is_left_out_in_one_line(monkeypatch):
 
 def test_a_broadcast_that_is_not_permitted_is_told_of(frame, view, monkeypatch):
     """As in the service's sandbox; the voyage goes on, and so do the other outputs."""
+
     def refuse(self, data, addr=None):
         self._protocol.error_received(PermissionError(errno.EPERM, "x"))
 
@@ -289,8 +302,10 @@ def test_a_broadcast_that_is_not_permitted_is_told_of(frame, view, monkeypatch):
         return said
 
     said = with_outputs(frame, ["udp:255.255.255.255:10110"], (), body)
-    assert said[:2] == ["NMEA 0183 udp:255.255.255.255:10110: sending",
-                        "NMEA 0183 udp:255.255.255.255:10110: not permitted; trying again"]
+    assert said[:2] == [
+        "NMEA 0183 udp:255.255.255.255:10110: sending",
+        "NMEA 0183 udp:255.255.255.255:10110: not permitted; trying again",
+    ]
 
 
 def test_a_delta_is_small_and_plain_json(frame, view):

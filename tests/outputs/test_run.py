@@ -42,8 +42,21 @@ def mission(path, output=""):
 
 
 def run(path, *words):
-    return cli.main(["run", str(path), "--link", f"udpin:127.0.0.1:{free_port()}", "--wait", "1.5", "--out",
-                     str(path.parent / "v"), "--state", str(path.parent / "s.json"), *words])
+    return cli.main(
+        [
+            "run",
+            str(path),
+            "--link",
+            f"udpin:127.0.0.1:{free_port()}",
+            "--wait",
+            "1.5",
+            "--out",
+            str(path.parent / "v"),
+            "--state",
+            str(path.parent / "s.json"),
+            *words,
+        ]
+    )
 
 
 def lines(heard):
@@ -73,13 +86,24 @@ def test_a_signal_k_server_that_is_not_there_is_told_of_once(tmp_path, capfd):
     assert said.count(f"note: Signal K tcp:127.0.0.1:{port}: nobody listens there; trying again") == 1
 
 
-@pytest.mark.parametrize(("output", "words", "says"), [
-    ('nmea = ["udp:10110"]', (), "m.toml: [output] nmea: 'udp:10110' is no place to send NMEA 0183 to; write udp:HOST"),
-    ('signalk = ["http://h"]', (), "m.toml: [output] signalk: 'http://h' is no Signal K server; write ws://HOST:3000"),
-    ('signalk_token = "t"', (), "m.toml: [output] signalk_token: there is no WebSocket to use it on"),
-    ("", ("--nmea", "tcp:x"), "--nmea: tcp:x: is no place to send NMEA 0183 to"),
-    ("", ("--signalk", "h:3000"), "--signalk: h:3000: is no Signal K server"),
-])
+@pytest.mark.parametrize(
+    ("output", "words", "says"),
+    [
+        (
+            'nmea = ["udp:10110"]',
+            (),
+            "m.toml: [output] nmea: 'udp:10110' is no place to send NMEA 0183 to; write udp:HOST",
+        ),
+        (
+            'signalk = ["http://h"]',
+            (),
+            "m.toml: [output] signalk: 'http://h' is no Signal K server; write ws://HOST:3000",
+        ),
+        ('signalk_token = "t"', (), "m.toml: [output] signalk_token: there is no WebSocket to use it on"),
+        ("", ("--nmea", "tcp:x"), "--nmea: tcp:x: is no place to send NMEA 0183 to"),
+        ("", ("--signalk", "h:3000"), "--signalk: h:3000: is no Signal K server"),
+    ],
+)
 def test_what_cannot_be_told_is_refused_in_one_line(tmp_path, capfd, output, words, says):
     path = mission(tmp_path, f"[output]\n{output}" if output else "")
     assert run(path, *words) in {2, 66}
@@ -93,16 +117,21 @@ def empty(path):
     path.touch(mode=0o600)
 
 
-@pytest.mark.parametrize(("make", "says", "where"), [
-    (lambda path: None, "the Signal K token: no such file", "mission"), (empty, "holds no token", "option"),
-    (os.mkfifo, "the Signal K token: cannot be read (it is a FIFO and no regular file)", "option")])
+@pytest.mark.parametrize(
+    ("make", "says", "where"),
+    [
+        (lambda path: None, "the Signal K token: no such file", "mission"),
+        (empty, "holds no token", "option"),
+        (os.mkfifo, "the Signal K token: cannot be read (it is a FIFO and no regular file)", "option"),
+    ],
+)
 def test_without_a_token_that_can_be_used_a_server_is_told_without_one(tmp_path, capfd, make, says, where):
     """It was exit code 2 or 66: the boat stayed ashore for a display."""
     make(tmp_path / "t")
     server = f"ws://127.0.0.1:{free_port()}"
     path = mission(tmp_path, f'[output]\nsignalk = ["{server}"]\nsignalk_token = "t"' if where == "mission" else "")
     words = ("--signalk", server, "--signalk-token", str(tmp_path / "t")) if where == "option" else ()
-    assert run(path, *words) == 1                  # for want of an autopilot
+    assert run(path, *words) == 1  # for want of an autopilot
     out, err = capfd.readouterr()
     assert f"{tmp_path / 't'}: {says}" in err
     assert f"note: Signal K {server}: nobody listens there; trying again" in out
@@ -129,17 +158,36 @@ def test_a_voyage_is_told_to_a_real_signal_k_server(tmp_path):
     with Server(tmp_path / "server") as server:
         text = (missions / "archipelago.toml").read_text()
         text = text.replace('"archipelago.wkt"', f'"{missions}/archipelago.wkt"').replace(
-            '"archipelago-shore.wkt"', f'"{missions}/archipelago-shore.wkt"')
+            '"archipelago-shore.wkt"', f'"{missions}/archipelago-shore.wkt"'
+        )
         (tmp_path / "m.toml").write_text(f'{text}\n[output]\nsignalk = ["{server.ws}"]\n')
         (tmp_path / "s.toml").write_text(
             'name = "s"\nmission = "m.toml"\nlimit_s = 90.0\nspeedup = 8.0\n[wind]\nmodel = "ou"\nfrom_deg = 0.0\n'
-            'tws_mps = 5.0\nsd_deg = 9.0\ntau_s = 28.0\n')
-        run_live(load_scenario(tmp_path / "s.toml"), tmp_path / "s.toml", 0, tmp_path / "v", autopilot="embedded",
-                 program=None, speedup=None, truth=TrueTrack())
-        told = {path: server.get(path) for path in (
-            "navigation.position", "navigation.speedOverGround", "navigation.state", "environment.wind.directionTrue",
-            "environment.wind.angleApparent", "navigation.courseGreatCircle.nextPoint.distance",
-            "performance.polarSpeed", "steering.autopilot.state")}
+            "tws_mps = 5.0\nsd_deg = 9.0\ntau_s = 28.0\n"
+        )
+        run_live(
+            load_scenario(tmp_path / "s.toml"),
+            tmp_path / "s.toml",
+            0,
+            tmp_path / "v",
+            autopilot="embedded",
+            program=None,
+            speedup=None,
+            truth=TrueTrack(),
+        )
+        told = {
+            path: server.get(path)
+            for path in (
+                "navigation.position",
+                "navigation.speedOverGround",
+                "navigation.state",
+                "environment.wind.directionTrue",
+                "environment.wind.angleApparent",
+                "navigation.courseGreatCircle.nextPoint.distance",
+                "performance.polarSpeed",
+                "steering.autopilot.state",
+            )
+        }
     assert all(value is not None and value["value"] is not None for value in told.values()), told
     assert {value["$source"] for value in told.values()} == {"sailboat-companion"}
     assert (told["navigation.state"]["value"], told["steering.autopilot.state"]["value"]) == ("sailing", "route")

@@ -58,22 +58,28 @@ def test_what_is_told_can_be_read_back(server, frame, view, way):
         assert position["latitude"] == pytest.approx(view.boat.lat_deg, abs=1e-7)
         assert position["longitude"] == pytest.approx(view.boat.lon_deg, abs=1e-7)
         for path, value in (
-            ("navigation.speedOverGround", 1.5), ("navigation.courseOverGroundTrue", math.radians(36.87)),
-            ("navigation.headingTrue", math.radians(35.0)), ("navigation.state", "sailing"),
-            ("environment.wind.directionTrue", math.radians(80.0)), ("environment.wind.speedOverGround", 5.0),
+            ("navigation.speedOverGround", 1.5),
+            ("navigation.courseOverGroundTrue", math.radians(36.87)),
+            ("navigation.headingTrue", math.radians(35.0)),
+            ("navigation.state", "sailing"),
+            ("environment.wind.directionTrue", math.radians(80.0)),
+            ("environment.wind.speedOverGround", 5.0),
             ("environment.wind.angleTrueGround", math.radians(45.0)),
-            ("environment.wind.angleApparent", math.radians(36.0)), ("environment.wind.speedApparent", 6.1),
+            ("environment.wind.angleApparent", math.radians(36.0)),
+            ("environment.wind.speedApparent", 6.1),
             ("navigation.courseGreatCircle.crossTrackError", 5.0),
             ("navigation.courseGreatCircle.bearingTrackTrue", math.atan2(60.0, 80.0)),
             ("navigation.courseGreatCircle.nextPoint.distance", math.hypot(32.0, 51.0)),
-            ("performance.velocityMadeGood", 1.0), ("performance.polarSpeed", 1.5),
-            ("performance.beatAngle", math.radians(46.0)), ("performance.tackTrue", math.radians(125.0)),
+            ("performance.velocityMadeGood", 1.0),
+            ("performance.polarSpeed", 1.5),
+            ("performance.beatAngle", math.radians(46.0)),
+            ("performance.tackTrue", math.radians(125.0)),
             ("steering.autopilot.state", "route"),
         ):
             got = await server.value(path)
             assert got == (value if isinstance(value, str) else pytest.approx(value, abs=2e-4)), path
         assert server.get("environment.wind.directionTrue")["$source"] == "sailboat-companion"
-        assert server.get("environment.wind.angleApparent")["meta"]["units"] == "rad"    # a path that it knows
+        assert server.get("environment.wind.angleApparent")["meta"]["units"] == "rad"  # a path that it knows
 
     said = asyncio.run(told(frame, chosen((), [getattr(server, way)], None), [view], look))
     assert said[0].endswith("connected")
@@ -175,6 +181,7 @@ def test_its_own_reader_of_nmea_understands_our_sentences(tmp_path, frame, view)
     """The second independent parser; RMB makes the waypoint the server's destination (its course API)."""
     port = free_port()
     with Server(tmp_path / "home", nmea_port=port) as server:
+
         async def look(_):
             wind = await server.value("environment.wind.angleApparent")
             assert wind == pytest.approx(math.radians(36.0), abs=1e-3)

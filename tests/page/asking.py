@@ -70,9 +70,12 @@ class Browser:
 
     async def get(self, path="/", method="GET", body=b"", **headers):
         """Return status, headers and body of one request; ``headers`` with _ for -; None leaves one out."""
-        fields = {"Host": f"127.0.0.1:{self.port}", "Connection": "close",
-                  **({"Content-Length": str(len(body))} if body or method == "POST" else {}),
-                  **{name.replace("_", "-"): value for name, value in headers.items()}}
+        fields = {
+            "Host": f"127.0.0.1:{self.port}",
+            "Connection": "close",
+            **({"Content-Length": str(len(body))} if body or method == "POST" else {}),
+            **{name.replace("_", "-"): value for name, value in headers.items()},
+        }
         head = "".join(f"{k}: {v}\r\n" for k, v in fields.items() if v is not None)
         raw = await self.raw(f"{method} {path} HTTP/1.1\r\n{head}\r\n".encode() + body)
         top, _, rest = raw.partition(b"\r\n\r\n")
@@ -82,14 +85,24 @@ class Browser:
 
     async def order(self, words="hold", path="/api/order", token=TOKEN, **headers):
         """Post an order as the page does; return status and answer."""
-        status, _, body = await self.get(path, "POST", json.dumps({"order": words}).encode(), **{
-            "Origin": f"http://127.0.0.1:{self.port}", "Content_Type": "application/json", "X_Companion": "1",
-            "Authorization": f"Bearer {token}", **headers})
+        status, _, body = await self.get(
+            path,
+            "POST",
+            json.dumps({"order": words}).encode(),
+            **{
+                "Origin": f"http://127.0.0.1:{self.port}",
+                "Content_Type": "application/json",
+                "X_Companion": "1",
+                "Authorization": f"Bearer {token}",
+                **headers,
+            },
+        )
         return status, json.loads(body) if body else None
 
 
 def with_page(talk, source=None, token="", names=(), charts=()):
     """Return what ``talk(browser, source, server)`` returns while the page is served."""
+
     async def whole():
         port = free_port()
         mine = source if source is not None else LiveSource(name="test")

@@ -14,13 +14,18 @@ BOUNDS = (-1.90, 50.60, -1.70, 50.80)
 
 def png(pixels):
     """Return an image (rows, columns, 3) of bytes as PNG."""
+
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     rows, columns, _ = pixels.shape
     raw = b"".join(b"\0" + row.tobytes() for row in pixels)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 2, 0, 0, 0))
-            + chunk(b"IDAT", zlib.compress(raw)) + chunk(b"IEND", b""))
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">IIBBBBB", columns, rows, 8, 2, 0, 0, 0))
+        + chunk(b"IDAT", zlib.compress(raw))
+        + chunk(b"IEND", b"")
+    )
 
 
 def tile_of(lat_deg, lon_deg, z):
@@ -61,15 +66,26 @@ def mbtiles(path, bounds=BOUNDS, zooms=range(10, 16), tile=painted, **said):
         base.execute("CREATE TABLE metadata (name text, value text)")
         base.execute("CREATE TABLE tiles (zoom_level integer, tile_column integer, tile_row integer, tile_data blob)")
         base.execute("CREATE UNIQUE INDEX tile_index ON tiles (zoom_level, tile_column, tile_row)")
-        rows = {"name": "Painted depths", "format": "png", "bounds": ",".join(map(str, bounds)),
-                "minzoom": str(min(zooms, default=0)), "maxzoom": str(max(zooms, default=0)),
-                "attribution": '<a href="https://example.org">&copy; nobody</a>', **said}
+        rows = {
+            "name": "Painted depths",
+            "format": "png",
+            "bounds": ",".join(map(str, bounds)),
+            "minzoom": str(min(zooms, default=0)),
+            "maxzoom": str(max(zooms, default=0)),
+            "attribution": '<a href="https://example.org">&copy; nobody</a>',
+            **said,
+        }
         base.executemany("INSERT INTO metadata VALUES (?, ?)", [(k, v) for k, v in rows.items() if v is not None])
         for z in zooms:
             (left, top), (right, bottom) = tile_of(north, west, z), tile_of(south, east, z)
-            base.executemany("INSERT INTO tiles VALUES (?, ?, ?, ?)", [
-                (z, x, (1 << z) - 1 - y, tile(z, x, y))
-                for x in range(left, right + 1) for y in range(top, bottom + 1)])
+            base.executemany(
+                "INSERT INTO tiles VALUES (?, ?, ?, ?)",
+                [
+                    (z, x, (1 << z) - 1 - y, tile(z, x, y))
+                    for x in range(left, right + 1)
+                    for y in range(top, bottom + 1)
+                ],
+            )
     base.close()
     return path
 

@@ -11,8 +11,12 @@ from tests.view.conftest import sail
 def sailed(tmp_path_factory):
     """A short beat, held by an order on the way."""
     folder = tmp_path_factory.mktemp("sailed")
-    return sail(folder, folder / "voyage", EventSpec(at_s=70.0, kind="order", order="hold"),
-                EventSpec(at_s=90.0, kind="order", order="go_on"))
+    return sail(
+        folder,
+        folder / "voyage",
+        EventSpec(at_s=70.0, kind="order", order="hold"),
+        EventSpec(at_s=90.0, kind="order", order="go_on"),
+    )
 
 
 @pytest.fixture(scope="session")

@@ -17,9 +17,20 @@ from tests.page.asking import TOKEN, Asked, hang_up, taking_orders, view_at, wit
 
 
 # ----------------------------------------------------------------------------------- names bent to this machine
-@pytest.mark.parametrize("host", [
-    "evil.example", "evil.example:{port}", "127.0.0.1.evil.example:{port}", "localhost.evil.example:{port}",
-    "127.0.0.1:1", "", "localhost:{port}@evil.example", "[::1", "local host:{port}"])
+@pytest.mark.parametrize(
+    "host",
+    [
+        "evil.example",
+        "evil.example:{port}",
+        "127.0.0.1.evil.example:{port}",
+        "localhost.evil.example:{port}",
+        "127.0.0.1:1",
+        "",
+        "localhost:{port}@evil.example",
+        "[::1",
+        "local host:{port}",
+    ],
+)
 def test_a_name_that_was_bent_to_this_machine_reads_nothing(host):
     async def talk(browser, live, _):
         live.show(view_at(1.0), (), None)
@@ -34,14 +45,26 @@ def test_a_name_that_was_bent_to_this_machine_reads_nothing(host):
 def test_a_request_with_two_hosts_or_none_is_refused():
     async def talk(browser, *_):
         own = f"Host: 127.0.0.1:{browser.port}\r\n"
-        return (await browser.raw(f"GET / HTTP/1.1\r\n{own}Host: evil.example\r\n\r\n".encode()),
-                await browser.raw(b"GET / HTTP/1.1\r\n\r\n"), await browser.raw(b"GET / HTTP/1.0\r\n\r\n"))
+        return (
+            await browser.raw(f"GET / HTTP/1.1\r\n{own}Host: evil.example\r\n\r\n".encode()),
+            await browser.raw(b"GET / HTTP/1.1\r\n\r\n"),
+            await browser.raw(b"GET / HTTP/1.0\r\n\r\n"),
+        )
 
     assert all(answer.startswith((b"HTTP/1.1 400", b"HTTP/1.1 421")) for answer in with_page(talk))
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1:{port}", "localhost:{port}", "LOCALHOST:{port}", "[::1]:{port}",
-                                  "10.0.0.7:{port}", "blueos.local:{port}"])
+@pytest.mark.parametrize(
+    "host",
+    [
+        "127.0.0.1:{port}",
+        "localhost:{port}",
+        "LOCALHOST:{port}",
+        "[::1]:{port}",
+        "10.0.0.7:{port}",
+        "blueos.local:{port}",
+    ],
+)
 def test_our_own_names_and_addresses_are_known(host):
     async def talk(browser, *_):
         return await browser.get("/api/hello", Host=host.format(port=browser.port))
@@ -50,8 +73,18 @@ def test_our_own_names_and_addresses_are_known(host):
 
 
 # ------------------------------------------------------------------------------------------- pages of others
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1:{port}", "http://127.0.0.1",
-                                    "http://127.0.0.1:{port}.evil.example", "http://localhost:{port}", None])
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "http://evil.example",
+        "null",
+        "https://127.0.0.1:{port}",
+        "http://127.0.0.1",
+        "http://127.0.0.1:{port}.evil.example",
+        "http://localhost:{port}",
+        None,
+    ],
+)
 def test_an_order_of_a_page_from_elsewhere_is_refused(origin):
     async def talk(browser, *_):
         return await browser.order(Origin=None if origin is None else origin.format(port=browser.port))
@@ -72,9 +105,16 @@ def test_nothing_is_read_by_a_page_from_elsewhere_and_no_slot_is_taken(path, met
     assert not any(name.startswith("access-control") for name in headers)
 
 
-@pytest.mark.parametrize("headers", [
-    {"X_Companion": None}, {"X_Companion": "0"}, {"Content_Type": "text/plain"},
-    {"Content_Type": "application/x-www-form-urlencoded"}, {"Content_Type": None}])
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"X_Companion": None},
+        {"X_Companion": "0"},
+        {"Content_Type": "text/plain"},
+        {"Content_Type": "application/x-www-form-urlencoded"},
+        {"Content_Type": None},
+    ],
+)
 def test_what_a_form_can_send_is_no_order(headers):
     async def talk(browser, *_):
         return await browser.order(**headers)
@@ -143,12 +183,31 @@ def test_a_page_that_only_shows_takes_none():
     assert with_page(talk)[0] == 403
 
 
-@pytest.mark.parametrize("body", [b"", b"{", b"[]", b'{"order": 5}', b'{"order": "fly"}', b'{"order": ""}', b"\xff",
-                                  b'{"order": "goal 0 0"}', b'{"other": "hold"}'])
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b'{"order": 5}',
+        b'{"order": "fly"}',
+        b'{"order": ""}',
+        b"\xff",
+        b'{"order": "goal 0 0"}',
+        b'{"other": "hold"}',
+    ],
+)
 def test_what_is_no_order_is_told_so(body):
     async def talk(browser, *_):
-        return await browser.get("/api/order", "POST", body, Origin=f"http://127.0.0.1:{browser.port}",
-                                 Content_Type="application/json", X_Companion="1", Authorization=f"Bearer {TOKEN}")
+        return await browser.get(
+            "/api/order",
+            "POST",
+            body,
+            Origin=f"http://127.0.0.1:{browser.port}",
+            Content_Type="application/json",
+            X_Companion="1",
+            Authorization=f"Bearer {TOKEN}",
+        )
 
     (status, _, answer), orders = taking_orders(talk)
     assert (status, orders) == (400, [])
@@ -179,12 +238,21 @@ def test_a_token_is_made_for_its_owner_alone_and_one_that_others_read_is_refused
 
 
 # ------------------------------------------------------------------------------------------------- rubbish
-@pytest.mark.parametrize("rubbish", [
-    b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03", b"\x00" * 500, b"GET\r\n\r\n", b"{}\r\n",
-    b"GET / HTTP/9.9\r\n\r\n", b"GET / HTTP/1.1\r\nHost: a\r\n: b\r\n\r\n", b"SSH-2.0-x\r\n",
-    b"POST /api/order HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: -1\r\n\r\n",
-    b"POST /api/order HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\nGET",
-    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + b"a" * (2 * MOST_HEAD) + b"\r\n\r\n"])
+@pytest.mark.parametrize(
+    "rubbish",
+    [
+        b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03",
+        b"\x00" * 500,
+        b"GET\r\n\r\n",
+        b"{}\r\n",
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: a\r\n: b\r\n\r\n",
+        b"SSH-2.0-x\r\n",
+        b"POST /api/order HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: -1\r\n\r\n",
+        b"POST /api/order HTTP/1.1\r\nHost: a\r\nContent-Length: 5\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\nGET",
+        b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + b"a" * (2 * MOST_HEAD) + b"\r\n\r\n",
+    ],
+)
 def test_rubbish_is_answered_or_hung_up_on_and_the_next_is_served(rubbish):
     async def talk(browser, *_):
         answer = await browser.raw(rubbish, at_most_s=2.0)
@@ -203,8 +271,19 @@ def test_a_body_is_bounded():
     assert (status, orders) == (413, [])
 
 
-@pytest.mark.parametrize("path", ["/../server.py", "/%2e%2e/server.py", "/..%2f..%2fetc/passwd", "/web/index.html",
-                                  "//etc/passwd", "/api/moments/0", "/api/moments/-1", "/tsconfig.json"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/../server.py",
+        "/%2e%2e/server.py",
+        "/..%2f..%2fetc/passwd",
+        "/web/index.html",
+        "//etc/passwd",
+        "/api/moments/0",
+        "/api/moments/-1",
+        "/tsconfig.json",
+    ],
+)
 def test_nothing_but_the_pages_files_is_read(path):
     async def talk(browser, *_):
         return await browser.get(path)
@@ -212,9 +291,19 @@ def test_nothing_but_the_pages_files_is_read(path):
     assert with_page(talk)[0] == 404
 
 
-@pytest.mark.parametrize(("asked", "status", "size"), [
-    ("bytes=0-9", 206, 10), ("bytes=-5", 206, 5), ("bytes=0-0,2-2", 200, None), ("bytes=" + "0-0," * 3000, 200, None),
-    ("bytes=9999999-", 416, 0), ("bytes=5-2", 416, 0), ("bytes=-", 200, None), ("lines=1-2", 200, None)])
+@pytest.mark.parametrize(
+    ("asked", "status", "size"),
+    [
+        ("bytes=0-9", 206, 10),
+        ("bytes=-5", 206, 5),
+        ("bytes=0-0,2-2", 200, None),
+        ("bytes=" + "0-0," * 3000, 200, None),
+        ("bytes=9999999-", 416, 0),
+        ("bytes=5-2", 416, 0),
+        ("bytes=-", 200, None),
+        ("lines=1-2", 200, None),
+    ],
+)
 def test_one_range_is_served_and_never_many(asked, status, size):
     async def talk(browser, *_):
         return await browser.get("/index.html", Range=asked), await browser.get("/index.html")
@@ -267,16 +356,26 @@ def test_a_request_that_never_ends_is_hung_up_on(monkeypatch):
 def posting(browser, size=1000, host=None, origin=None, token=TOKEN, more=""):
     """Return the head of a POST whose body does not come."""
     own = f"127.0.0.1:{browser.port}"
-    return (f"POST /api/order HTTP/1.1\r\nHost: {host or own}\r\nOrigin: {origin or f'http://{own}'}\r\n"
-            f"Content-Type: application/json\r\nX-Companion: 1\r\nAuthorization: Bearer {token}\r\n"
-            f"{more or f'Content-Length: {size}'}\r\n\r\n").encode()
+    return (
+        f"POST /api/order HTTP/1.1\r\nHost: {host or own}\r\nOrigin: {origin or f'http://{own}'}\r\n"
+        f"Content-Type: application/json\r\nX-Companion: 1\r\nAuthorization: Bearer {token}\r\n"
+        f"{more or f'Content-Length: {size}'}\r\n\r\n"
+    ).encode()
 
 
-@pytest.mark.parametrize(("wrong", "status"), [
-    ({"host": "evil.example"}, 421), ({"origin": "http://evil.example"}, 403), ({"token": "x" * 24}, 401),
-    ({"size": MOST_BODY + 1}, 413), ({"more": "Transfer-Encoding: chunked"}, 411)])
+@pytest.mark.parametrize(
+    ("wrong", "status"),
+    [
+        ({"host": "evil.example"}, 421),
+        ({"origin": "http://evil.example"}, 403),
+        ({"token": "x" * 24}, 401),
+        ({"size": MOST_BODY + 1}, 413),
+        ({"more": "Transfer-Encoding: chunked"}, 411),
+    ],
+)
 def test_who_may_not_is_told_so_before_a_byte_of_the_body_is_read(wrong, status):
     """A body was read to its end, four megabytes of the editor's, before it was looked at who sends it (issue 43)."""
+
     async def talk(browser, *_):
         return await browser.raw(posting(browser, **wrong), at_most_s=2.0)
 

@@ -86,8 +86,11 @@ def test_a_recorded_voyage_is_scrubbed_played_and_read_by_everybody(record):
         window.until("return companion.view.t_s < 62")
         assert "done" not in window.js("return document.getElementById('log').firstChild.textContent")
         for palette in ("day", "dusk", "night"):
-            window.js("const p = document.getElementById('palette'); p.value = arguments[0]; "
-                      "p.dispatchEvent(new Event('change'))", palette)
+            window.js(
+                "const p = document.getElementById('palette'); p.value = arguments[0]; "
+                "p.dispatchEvent(new Event('change'))",
+                palette,
+            )
             assert window.barriers() == [], palette
             keep(window, f"recorded-{palette}")
         assert window.complaints() == []
@@ -114,7 +117,8 @@ def test_a_chart_lies_under_the_own_water_where_it_belongs(record, tmp_path):
                 const zoom = Math.max(...all.map((i) => Number(i.getAttribute('href').split('/')[3])));
                 return all.every((i) => i.getAttribute('href').split('/')[3] == zoom) && zoom""")
             x, y = tile_of(*place, shown)
-            inside = window.js("""
+            inside = window.js(
+                """
                 return import('/map.js').then(({onScreen}) => {
                   const image = document.querySelector(`#map .chart image[href$="/${arguments[0]}"]`);
                   if (image === null) return null;
@@ -122,13 +126,20 @@ def test_a_chart_lies_under_the_own_water_where_it_belongs(record, tmp_path):
                   const map = document.getElementById('map').getBoundingClientRect();
                   const p = new DOMPoint(at[0] + map.left, at[1] + map.top).matrixTransform(m);
                   const b = image.getBBox();
-                  return [(p.x - b.x) / b.width, (p.y - b.y) / b.height]; })""", f"{shown}/{x}/{y}", east_m, north_m)
+                  return [(p.x - b.x) / b.width, (p.y - b.y) / b.height]; })""",
+                f"{shown}/{x}/{y}",
+                east_m,
+                north_m,
+            )
             share = share_in_tile(*place, shown)
             assert inside == [pytest.approx(share[0], abs=0.02), pytest.approx(share[1], abs=0.02)], (keys, shown)
         window.keys("a")
         for palette in ("day", "dusk", "night"):
-            window.js("const p = document.getElementById('palette'); p.value = arguments[0]; "
-                      "p.dispatchEvent(new Event('change'))", palette)
+            window.js(
+                "const p = document.getElementById('palette'); p.value = arguments[0]; "
+                "p.dispatchEvent(new Event('change'))",
+                palette,
+            )
             time.sleep(0.3)
             assert window.barriers() == [], palette
             keep(window, f"chart-{palette}")
@@ -165,8 +176,13 @@ def test_on_a_phone_nothing_is_wider_than_the_screen(record):
         window.js("companion.timeline.go(companion.timeline.index(60))")
         window.until("return companion.view.t_s > 59")
         assert window.js("return document.documentElement.scrollWidth") <= 390
-        assert window.js("return [...document.querySelectorAll('.scroll')].filter("
-                         "(box) => box.scrollWidth > box.clientWidth).map((box) => box.id)") == []
+        assert (
+            window.js(
+                "return [...document.querySelectorAll('.scroll')].filter("
+                "(box) => box.scrollWidth > box.clientWidth).map((box) => box.id)"
+            )
+            == []
+        )
         assert window.barriers() == []
         keep(window, "phone")
         assert window.complaints() == []
@@ -185,7 +201,8 @@ def test_two_voyages_are_seen_beside_each_other_from_setting_sail_on(record, sai
         # of one voyage twice the boats lie on each other
         assert window.js(
             "const at = (q) => document.querySelector(q).getAttribute('transform').match(/translate\\(([^)]*)/)[1];"
-            "return at('#map .ghost path') === at('#map .boat .hull')")
+            "return at('#map .ghost path') === at('#map .boat .hull')"
+        )
         keep(window, "beside")
         assert window.complaints() == []
 
@@ -225,7 +242,7 @@ def test_live_views_are_shown_the_link_is_lost_and_comes_back_and_old_data_look_
         again = LiveSource(name="beat", unix_s=0.0)
         window.until("return companion.isOver || !companion.isUp")
         assert port_before.is_closed
-        window.driver.refresh()   # who reloads meanwhile gets the browser's own page
+        window.driver.refresh()  # who reloads meanwhile gets the browser's own page
         with serving(again, port=port) as (url, call):
             for view, events in moments[:50]:
                 call(again.show, view, events, sailed.area)
@@ -252,7 +269,7 @@ def test_a_link_that_breaks_is_said_and_healed_without_a_reload(sailed):
         with serving(live, port=port) as (url, _):
             window.open(url)
             window.until("return companion.view !== null")
-            live.hub.close = lambda: None   # killed: nothing is said
+            live.hub.close = lambda: None  # killed: nothing is said
         window.until("return !companion.isUp")
         window.until("return document.body.classList.contains('stale')")
         assert "No link" in window.text("stale")
@@ -272,8 +289,12 @@ def test_words_of_others_are_shown_as_words(sailed):
 
     nasty = "<img src=x onerror=alert(1)><script>alert(2)</script>"
     view = next(v for v in sailed.views if v.state.is_sailing)
-    view = replace(view, name=nasty, alarms=(AlarmView(code="x", level="error", text=nasty, age_s=1.0),),
-                   vessels=(VesselView(name=nasty, at_en_m=(10.0, 10.0), alarm="act", range_m=10.0),))
+    view = replace(
+        view,
+        name=nasty,
+        alarms=(AlarmView(code="x", level="error", text=nasty, age_s=1.0),),
+        vessels=(VesselView(name=nasty, at_en_m=(10.0, 10.0), alarm="act", range_m=10.0),),
+    )
     live = LiveSource(name=nasty, unix_s=0.0)
     live.show(view, (), sailed.area)
     with serving(live) as (url, _), Window() as window:
@@ -301,7 +322,7 @@ def test_an_order_asks_for_the_token_once_and_a_wrong_one_is_told(sailed):
             for n, token in enumerate(tokens):
                 window.until("return document.getElementById('token') !== null")
                 window.keys(token, "\n")
-                if n + 1 < len(tokens):   # refused where it is given
+                if n + 1 < len(tokens):  # refused where it is given
                     window.until("return document.getElementById('tokenanswer').textContent.includes('wrong')")
                     assert window.js("return document.getElementById('confirm')") is None
             window.until("return document.getElementById('confirm') !== null && document.getElementById('dialog').open")
@@ -319,8 +340,25 @@ def test_the_demonstration_is_watched_live_an_order_is_given_and_obeyed(tmp_path
     """The companion, the autopilot and the browser are processes of their own."""
     port, token = free_port(), tmp_path / "token"
     done = subprocess.Popen(
-        [sys.executable, "-m", "sitl.cli", "demo", "--seed", "3", "--speedup", "6", "--out", str(tmp_path / "v"),
-         "--http", str(port), "--http-token", str(token)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        [
+            sys.executable,
+            "-m",
+            "sitl.cli",
+            "demo",
+            "--seed",
+            "3",
+            "--speedup",
+            "6",
+            "--out",
+            str(tmp_path / "v"),
+            "--http",
+            str(port),
+            "--http-token",
+            str(token),
+        ],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
     try:
         with Window() as window:
             url = f"http://127.0.0.1:{port}/"
@@ -333,7 +371,7 @@ def test_the_demonstration_is_watched_live_an_order_is_given_and_obeyed(tmp_path
                     assert time.monotonic() < until_s
                     assert done.poll() is None, done.stderr.read()
                     time.sleep(1.0)
-            window.complaints()   # of the time before it listened
+            window.complaints()  # of the time before it listened
             window.until("return companion.view && companion.view.state.is_sailing && companion.view.plan", 60.0)
             window.until("return companion.view.boat.sog_mps > 1")
             keep(window, "live")
@@ -345,7 +383,7 @@ def test_the_demonstration_is_watched_live_an_order_is_given_and_obeyed(tmp_path
             window.until("return companion.view.orders.standing && companion.view.orders.standing.verb === 'hold'")
             window.until("return companion.view.state.phase === 'holding'")
             assert "done" in window.text("answer")
-            window.click("[data-verb=home]")   # its plan is seen before it is confirmed
+            window.click("[data-verb=home]")  # its plan is seen before it is confirmed
             window.until("return document.querySelector('#preview dl') !== null")
             assert window.js("return document.querySelectorAll('#map .preview path').length") > 0
             keep(window, "preview")
@@ -353,7 +391,7 @@ def test_the_demonstration_is_watched_live_an_order_is_given_and_obeyed(tmp_path
             window.driver.refresh()
             window.until("return document.body.dataset.ready === '1' && companion.view !== null")
             window.until("return companion.past.t_s.length > 60")
-            window.click("[data-verb=go_on]")   # the token is kept for the window
+            window.click("[data-verb=go_on]")  # the token is kept for the window
             window.until("return document.getElementById('confirm') !== null")
             window.click("#confirm")
             window.until("return companion.view.orders.standing === null")
@@ -361,7 +399,7 @@ def test_the_demonstration_is_watched_live_an_order_is_given_and_obeyed(tmp_path
             assert window.complaints() == []
             assert is_own(window, url)
     finally:
-        done.terminate()   # a SIGINT is ignored by what was begun in a shell's background
+        done.terminate()  # a SIGINT is ignored by what was begun in a shell's background
         try:
             done.wait(30.0)
         except subprocess.TimeoutExpired:

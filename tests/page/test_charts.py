@@ -39,8 +39,7 @@ def test_both_formats_give_the_same_tiles_and_say_the_same(both):
 
 
 @given(z=st.integers(-3, 40), x=st.integers(-5, 1 << 40), y=st.integers(-5, 1 << 40))
-@settings(max_examples=80,
-          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_where_there_is_no_tile_the_water_is_clear(both, z, x, y):
     for chart in open_charts(both):
         kind, data = chart.tile(z, x, y)
@@ -48,18 +47,21 @@ def test_where_there_is_no_tile_the_water_is_clear(both, z, x, y):
         assert data == NO_TILE or (z in ZOOMS and data == painted(z, x, y))
 
 
-@pytest.mark.parametrize(("made", "problem"), [
-    (lambda path: path.write_bytes(b"KAP/BSB chart"), "neither MBTiles nor PMTiles"),
-    (lambda path: path.write_bytes(b""), "neither MBTiles nor PMTiles"),
-    (lambda path: path.write_bytes(b"SQLite format 3\0" + b"\xff" * 3000), "broken chart"),
-    (lambda path: path.write_bytes(b"PMTiles\x03" + b"\xff" * 300), "chart"),
-    (lambda path: sqlite3.connect(path).execute("CREATE TABLE voyages (a)").connection.close(), "no MBTiles"),
-    (lambda path: mbtiles(path, zooms=()), "without tiles"),
-    (lambda path: mbtiles(path, zooms=(10,), format="pbf"), "vector tiles"),
-    (lambda path: mbtiles(path, zooms=(10,), format="geojson"), "not known"),
-    (lambda path: path.mkdir(), "cannot be read"),
-    (lambda path: None, "no such file"),
-])
+@pytest.mark.parametrize(
+    ("made", "problem"),
+    [
+        (lambda path: path.write_bytes(b"KAP/BSB chart"), "neither MBTiles nor PMTiles"),
+        (lambda path: path.write_bytes(b""), "neither MBTiles nor PMTiles"),
+        (lambda path: path.write_bytes(b"SQLite format 3\0" + b"\xff" * 3000), "broken chart"),
+        (lambda path: path.write_bytes(b"PMTiles\x03" + b"\xff" * 300), "chart"),
+        (lambda path: sqlite3.connect(path).execute("CREATE TABLE voyages (a)").connection.close(), "no MBTiles"),
+        (lambda path: mbtiles(path, zooms=()), "without tiles"),
+        (lambda path: mbtiles(path, zooms=(10,), format="pbf"), "vector tiles"),
+        (lambda path: mbtiles(path, zooms=(10,), format="geojson"), "not known"),
+        (lambda path: path.mkdir(), "cannot be read"),
+        (lambda path: None, "no such file"),
+    ],
+)
 def test_what_is_no_chart_is_refused_in_one_line(tmp_path, made, problem):
     path = tmp_path / "what #1 100%.mbtiles"
     made(path)
@@ -70,8 +72,13 @@ def test_what_is_no_chart_is_refused_in_one_line(tmp_path, made, problem):
 
 
 def test_vector_tiles_in_pmtiles_are_refused(tmp_path):
-    vectors = mbtiles(tmp_path / "v.mbtiles", zooms=(10,), tile=lambda *_: b"\x1f\x8b vectors", format="pbf",
-                      json=json.dumps({"vector_layers": []}))
+    vectors = mbtiles(
+        tmp_path / "v.mbtiles",
+        zooms=(10,),
+        tile=lambda *_: b"\x1f\x8b vectors",
+        format="pbf",
+        json=json.dumps({"vector_layers": []}),
+    )
     with pytest.raises(InputError, match="vector tiles"):
         open_chart(pmtiles(tmp_path / "v.pmtiles", vectors))
 
@@ -99,15 +106,14 @@ def _with_bounds(path, bounds):
 
 
 @given(data=st.data())
-@settings(max_examples=60,
-          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_chart_with_flipped_bytes_is_refused_or_gives_pictures(both, tmp_path, data):
     path = data.draw(st.sampled_from(both))
     raw = bytearray(path.read_bytes())
     for _ in range(data.draw(st.integers(1, 20))):
         raw[data.draw(st.integers(0, min(len(raw), 20_000) - 1))] = data.draw(st.integers(0, 255))
     broken = tmp_path / path.name
-    broken.write_bytes(raw[:data.draw(st.integers(100, len(raw)))])
+    broken.write_bytes(raw[: data.draw(st.integers(100, len(raw)))])
     with contextlib.suppress(InputError):
         chart = open_chart(broken)
         for z in ZOOMS:
@@ -120,11 +126,19 @@ def test_the_page_serves_tiles_that_a_browser_keeps_and_no_others(both):
     async def talk(browser, *_):
         x, y = tile_of(*PLACE, 12)
         hello = json.loads((await browser.get("/api/hello"))[2])
-        told = [await browser.get(f"/tiles/{chart['tag']}/12/{x}/{y}", Accept_Encoding="gzip")
-                for chart in hello["charts"]]
-        others = [(await browser.get(path))[0] for path in (
-            "/tiles/000000000000/12/1/1", f"/tiles/{charts[0].tag}/12/1", f"/tiles/{charts[0].tag}/-1/1/1",
-            f"/tiles/{charts[0].tag}/1/1/999999999", f"/tiles/..%2f{charts[0].tag}/1/1/1")]
+        told = [
+            await browser.get(f"/tiles/{chart['tag']}/12/{x}/{y}", Accept_Encoding="gzip") for chart in hello["charts"]
+        ]
+        others = [
+            (await browser.get(path))[0]
+            for path in (
+                "/tiles/000000000000/12/1/1",
+                f"/tiles/{charts[0].tag}/12/1",
+                f"/tiles/{charts[0].tag}/-1/1/1",
+                f"/tiles/{charts[0].tag}/1/1/999999999",
+                f"/tiles/..%2f{charts[0].tag}/1/1/1",
+            )
+        ]
         return hello, told, others, painted(12, x, y)
 
     hello, told, others, right = with_page(talk, LiveSource(name="a"), charts=charts)

@@ -63,9 +63,13 @@ set_auto = true
 guided = true
 """
 CASES = {
-    "ring": ("field-ring", 1, (5.0, 0.0)), "lane": ("field-lane", 1, (8.0, 20.0)),
-    "rock": ("field-rock", 1, (3.0, 250.0)), "leave": ("field-square", 2, (5.0, 43.0)),
-    "motor": ("motor", 3, (5.0, 0.0)), "mixed": (None, 1, (6.0, 330.0))}
+    "ring": ("field-ring", 1, (5.0, 0.0)),
+    "lane": ("field-lane", 1, (8.0, 20.0)),
+    "rock": ("field-rock", 1, (3.0, 250.0)),
+    "leave": ("field-square", 2, (5.0, 43.0)),
+    "motor": ("motor", 3, (5.0, 0.0)),
+    "mixed": (None, 1, (6.0, 330.0)),
+}
 
 
 def seen_of(case, tmp_path):
@@ -98,16 +102,19 @@ def told_by_python(seen):
     fan = heading_fan(seen)
     projection = seen.projection
     return {
-        "wanted": seen.wanted(points), "right": seen.sailable(points, 1), "left": seen.sailable(points, -1),
+        "wanted": seen.wanted(points),
+        "right": seen.sailable(points, 1),
+        "left": seen.sailable(points, -1),
         "fans": None if projection is None else np.column_stack(projection.fan(points)),
-        "rose": np.column_stack([fan.headings_rad, fan.speeds_mps, fan.worth_mps])}
+        "rose": np.column_stack([fan.headings_rad, fan.speeds_mps, fan.worth_mps]),
+    }
 
 
 def compare(told, seen):
     for name, expected in told_by_python(seen).items():
         if expected is not None:
             pair = np.asarray(told[name]), np.asarray(expected)
-            if name == "fans":   # angles: half a turn may be either
+            if name == "fans":  # angles: half a turn may be either
                 pair = np.exp(1j * pair[0]), np.exp(1j * pair[1])
             assert np.abs(pair[0] - pair[1]).max() < 1e-6, name
 
@@ -120,9 +127,11 @@ def test_node_computes_what_the_companion_does(case, tmp_path):
     mission, seen = seen_of(case, tmp_path)
     ask = ASK.replace("arguments[0]", "given[0]").replace("arguments[1]", "given[1]")
     (tmp_path / "given.json").write_text(json.dumps([page_data(mission, seen, []), points_of(seen).tolist()]))
-    script = ((WEB / "calc.js").read_text()
-              + f"\nconst given = JSON.parse(require('fs').readFileSync({str(tmp_path / 'given.json')!r}));\n"
-              + f"console.log(JSON.stringify((() => {{{ask}}})()));")
+    script = (
+        (WEB / "calc.js").read_text()
+        + f"\nconst given = JSON.parse(require('fs').readFileSync({str(tmp_path / 'given.json')!r}));\n"
+        + f"console.log(JSON.stringify((() => {{{ask}}})()));"
+    )
     (tmp_path / "ask.cjs").write_text(script)
     done = subprocess.run([node, str(tmp_path / "ask.cjs")], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -37,21 +37,22 @@ def test_its_pure_functions():
     if node is None:
         pytest.skip("no node here: apt install nodejs")
     done = subprocess.run(
-        [node, "--test", *map(str, sorted(CHECKS.glob("*.test.mjs")))], capture_output=True, text=True, check=False)
+        [node, "--test", *map(str, sorted(CHECKS.glob("*.test.mjs")))], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr
 
 
 def test_over_the_wire_it_is_small():
     size = sum(len(gzip.compress(path.read_bytes(), 9)) for path in WEB.iterdir())
     editor = sum(len(gzip.compress(path.read_bytes(), 9)) for path in EDITOR.iterdir())
-    assert size < 60_000   # 400 kB are allowed
-    assert editor < 40_000   # what it needs of the page beside
+    assert size < 60_000  # 400 kB are allowed
+    assert editor < 40_000  # what it needs of the page beside
 
 
 def test_no_file_of_it_names_another_host():
     for path in (*WEB.iterdir(), *EDITOR.iterdir()):
         found = set(re.findall(r"(?:https?:|wss?:)?//[\w.-]+\.\w+", path.read_text()))
-        assert found <= {"http://www.w3.org"}, path   # the name of SVG, asked for by nobody
+        assert found <= {"http://www.w3.org"}, path  # the name of SVG, asked for by nobody
 
 
 def test_words_of_others_never_become_markup():

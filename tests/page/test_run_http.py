@@ -18,13 +18,33 @@ from tests.view.conftest import write_mission
 
 def tried(tmp_path, *words):
     """Run without an autopilot: what is wrong with the page is told before, or sailed without."""
-    return cli.main(["run", str(write_mission(tmp_path)), "--link", f"udpin:127.0.0.1:{free_port()}", "--wait", "0.3",
-                     "--out", str(tmp_path / "v"), "--state", str(tmp_path / "s.json"), *map(str, words)])
+    return cli.main(
+        [
+            "run",
+            str(write_mission(tmp_path)),
+            "--link",
+            f"udpin:127.0.0.1:{free_port()}",
+            "--wait",
+            "0.3",
+            "--out",
+            str(tmp_path / "v"),
+            "--state",
+            str(tmp_path / "s.json"),
+            *map(str, words),
+        ]
+    )
 
 
-@pytest.mark.parametrize("words", [
-    ("--http-token", "t"), ("--http-name", "boat.local"), ("--chart", "a.mbtiles"), ("--http", "x"),
-    ("--http", "127.0.0.1:99999")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("--http-token", "t"),
+        ("--http-name", "boat.local"),
+        ("--chart", "a.mbtiles"),
+        ("--http", "x"),
+        ("--http", "127.0.0.1:99999"),
+    ],
+)
 def test_a_page_that_cannot_be_is_one_line(words, tmp_path, capfd):
     code = tried(tmp_path, *words)
     err = capfd.readouterr().err
@@ -41,14 +61,21 @@ def readable(path):
     path.chmod(0o644)
 
 
-@pytest.mark.parametrize(("make", "says"), [
-    (readable, "chmod 600"), (fifo, "it is a FIFO and no regular file"), (Path.mkdir, "Is a directory"),
-    (lambda path: path.write_text("short"), "can be read by others"), (lambda path: None, "no such file")])
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (readable, "chmod 600"),
+        (fifo, "it is a FIFO and no regular file"),
+        (Path.mkdir, "Is a directory"),
+        (lambda path: path.write_text("short"), "can be read by others"),
+        (lambda path: None, "no such file"),
+    ],
+)
 def test_with_a_token_that_cannot_be_used_she_is_sailed_and_the_page_takes_no_orders(make, says, tmp_path, capfd):
     """It was exit code 2 or 66: the boat stayed ashore for a page."""
     token = tmp_path / ("token" if says != "no such file" else "no/such/folder/token")
     make(token)
-    assert tried(tmp_path, "--http", free_port(), "--http-token", token) == 1   # for want of an autopilot
+    assert tried(tmp_path, "--http", free_port(), "--http-token", token) == 1  # for want of an autopilot
     err = capfd.readouterr().err
     assert err.count("note: sailed without the orders on the page: ") == 1
     assert says in err
@@ -69,7 +96,7 @@ def test_with_its_port_in_use_she_is_sailed_without_a_page(tmp_path, capfd):
         other.bind(("127.0.0.1", 0))
         other.listen()
         port = other.getsockname()[1]
-        assert tried(tmp_path, "--http", port) == 1   # for want of an autopilot, not of a page
+        assert tried(tmp_path, "--http", port) == 1  # for want of an autopilot, not of a page
     out, err = capfd.readouterr()
     assert out.count("sailing on without the live page: ") == 1
     assert "in use" in out
@@ -90,8 +117,14 @@ def test_without_a_chart_that_is_none_she_is_sailed_all_the_same(tmp_path, capfd
 def test_a_simulated_voyage_is_told_of_its_charts(tmp_path, capsys):
     assert sitl_cli.main(["run", "demo", "--live", "--chart", str(tmp_path / "a.mbtiles")]) == 2
     assert "--http PORT" in capsys.readouterr().err
-    args = argparse.Namespace(http=("127.0.0.1", 8765), http_token=None, live=True, autopilot="embedded", cpu=None,
-                              chart=[Path("a.mbtiles"), Path("b.pmtiles")])
+    args = argparse.Namespace(
+        http=("127.0.0.1", 8765),
+        http_token=None,
+        live=True,
+        autopilot="embedded",
+        cpu=None,
+        chart=[Path("a.mbtiles"), Path("b.pmtiles")],
+    )
     assert page_words(args)[-4:] == ["--chart", "a.mbtiles", "--chart", "b.pmtiles"]
 
 

@@ -55,15 +55,22 @@ def test_views_come_as_they_are_made_and_the_log_with_numbers():
 
     found = with_page(talk)
     assert [(name, number) for name, number, _ in found] == [
-        ("log", "1"), ("log", "2"), ("view", None), ("log", "3"), ("view", None)]
+        ("log", "1"),
+        ("log", "2"),
+        ("view", None),
+        ("log", "3"),
+        ("view", None),
+    ]
     assert [data["t_s"] for name, _, data in found if name == "view"] == [1.0, 2.0]
 
 
 def test_who_comes_back_gets_what_he_has_missed_and_no_more():
     async def talk(browser, live, _):
         live.show(view_at(1.0), [event(n) for n in range(1, 11)], None)
-        return (await watch(browser, lambda found: len(found) >= 4, last=7),
-                await watch(browser, lambda found: len(found) >= 11, last=99))   # of a voyage before
+        return (
+            await watch(browser, lambda found: len(found) >= 4, last=7),
+            await watch(browser, lambda found: len(found) >= 11, last=99),
+        )  # of a voyage before
 
     missed, whole = with_page(talk)
     assert [number for name, number, _ in missed if name == "log"] == ["8", "9", "10"]
@@ -102,9 +109,8 @@ def test_what_takes_long_to_make_and_to_pack_is_not_made_on_the_voyages_loop(mon
     def noted(work):
         return lambda *given, **more: by.append(threading.get_ident()) or work(*given, **more)
 
-
     async def talk(browser, live, _):
-        monkeypatch.setattr(Past, "of", noted(Past.of))   # the page's own files are packed by now, once for all
+        monkeypatch.setattr(Past, "of", noted(Past.of))  # the page's own files are packed by now, once for all
         monkeypatch.setattr(gzip, "compress", noted(gzip.compress))
         for n in range(3000):
             live.show(view_at(float(n)), (event(n + 1),), None)
@@ -238,7 +244,7 @@ def test_a_voyage_beside_another_is_in_its_metres():
     record.beside = other
     beside, hello = with_page(talk, record)
     assert hello["beside"] == "test"
-    assert set(beside["past"]["north_m"]) == {113.0}   # 111 m to the degree's thousandth
+    assert set(beside["past"]["north_m"]) == {113.0}  # 111 m to the degree's thousandth
     assert set(beside["past"]["east_m"]) == {1.0}
     assert with_page(lambda browser, *_: browser.get("/api/beside"), record_of(5))[0] == 404
 

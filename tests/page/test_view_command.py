@@ -22,12 +22,24 @@ def said(capsys, *words):
     return code, capsys.readouterr().err
 
 
-@pytest.mark.parametrize("words", [
-    (), ("nowhere",), ("nowhere", "--link", "udpin:127.0.0.1:1"), ("--link", "udpin:127.0.0.1:1", "--export", "x.html"),
-    ("nowhere", "--http", "many"), ("nowhere", "--http", "0"), ("nowhere", "--http", "a b:80"), ("--link", "nothing"),
-    ("nowhere", "--http-name", "-x-"), ("nowhere", "--chart", "no.mbtiles"),
-    ("nowhere", "--chart", "README.md"), ("nowhere", "--chart", "README.md", "--export", "x.html"),
-    ("--link", "udpin:127.0.0.1:1", "--beside", "nowhere")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        (),
+        ("nowhere",),
+        ("nowhere", "--link", "udpin:127.0.0.1:1"),
+        ("--link", "udpin:127.0.0.1:1", "--export", "x.html"),
+        ("nowhere", "--http", "many"),
+        ("nowhere", "--http", "0"),
+        ("nowhere", "--http", "a b:80"),
+        ("--link", "nothing"),
+        ("nowhere", "--http-name", "-x-"),
+        ("nowhere", "--chart", "no.mbtiles"),
+        ("nowhere", "--chart", "README.md"),
+        ("nowhere", "--chart", "README.md", "--export", "x.html"),
+        ("--link", "udpin:127.0.0.1:1", "--beside", "nowhere"),
+    ],
+)
 def test_what_cannot_be_viewed_is_one_line(words, capsys):
     code, err = said(capsys, *words)
     assert code == 2
@@ -54,15 +66,22 @@ def test_a_folder_that_is_half_written_is_shown_as_far_as_it_goes(name, sailed, 
     folder = tmp_path / "v"
     shutil.copytree(sailed.folder, folder)
     data = (folder / name).read_bytes()
-    (folder / name).write_bytes(data[:2 * len(data) // 3])
+    (folder / name).write_bytes(data[: 2 * len(data) // 3])
     code = cli.main(["view", str(folder), "--export", str(tmp_path / "v.html")])
     err = capsys.readouterr().err
     assert (code == 0 and (tmp_path / "v.html").stat().st_size > 30_000) or (code == 2 and err.count("\n") == 1)
 
 
-@pytest.mark.parametrize(("name", "content"), [
-    ("track.csv", b""), ("track.csv", b"\x00\xff"), ("area.json", b"{"), ("voyage.toml", b"[run]\n"),
-    ("decisions.jsonl", b"[]\n")])
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("track.csv", b""),
+        ("track.csv", b"\x00\xff"),
+        ("area.json", b"{"),
+        ("voyage.toml", b"[run]\n"),
+        ("decisions.jsonl", b"[]\n"),
+    ],
+)
 def test_a_folder_with_rubbish_in_it_is_one_line(name, content, sailed, tmp_path, capsys):
     folder = tmp_path / "v"
     shutil.copytree(sailed.folder, folder)
@@ -116,7 +135,8 @@ def test_ashore_the_page_shows_what_the_radio_brings():
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
             while not over.wait(0.2):
                 beat = wire.MAVLink_heartbeat_message(
-                    wire.MAV_TYPE_SURFACE_BOAT, wire.MAV_AUTOPILOT_ARDUPILOTMEGA, 1, 10, 4, 3)
+                    wire.MAV_TYPE_SURFACE_BOAT, wire.MAV_AUTOPILOT_ARDUPILOTMEGA, 1, 10, 4, 3
+                )
                 udp.sendto(autopilot.pack(beat), ("127.0.0.1", radio))
                 for message in status_messages(STATUS, 1.0, 3):
                     udp.sendto(companion.pack(message), ("127.0.0.1", radio))

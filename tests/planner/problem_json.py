@@ -21,8 +21,13 @@ def _wkt(geometry: shapely.Geometry) -> str:
 
     def rings(polygon: shapely.Geometry) -> str:
         loops = (polygon.exterior, *polygon.interiors)
-        return "(" + ", ".join("(" + ", ".join(f"{x!r} {y!r}" for x, y in shapely.get_coordinates(r).tolist()) + ")"
-                               for r in loops) + ")"
+        return (
+            "("
+            + ", ".join(
+                "(" + ", ".join(f"{x!r} {y!r}" for x, y in shapely.get_coordinates(r).tolist()) + ")" for r in loops
+            )
+            + ")"
+        )
 
     if geometry.geom_type == "Polygon":
         return "POLYGON " + rings(geometry)
@@ -31,9 +36,18 @@ def _wkt(geometry: shapely.Geometry) -> str:
 
 def _spread_dict(s: Spread) -> dict[str, Any]:
     return {
-        "vessel": s.vessel, "x": s.x_m, "y": s.y_m, "course_deg": math.degrees(s.course_rad), "keep_m": s.keep_m,
-        "along_m": s.along_m, "along_mps": s.along_mps, "across_m": s.across_m, "across_mps": s.across_mps,
-        "own_mps": s.own_mps, "sigma_m": s.sigma_m, "sigma_mps": s.sigma_mps,
+        "vessel": s.vessel,
+        "x": s.x_m,
+        "y": s.y_m,
+        "course_deg": math.degrees(s.course_rad),
+        "keep_m": s.keep_m,
+        "along_m": s.along_m,
+        "along_mps": s.along_mps,
+        "across_m": s.across_m,
+        "across_mps": s.across_mps,
+        "own_mps": s.own_mps,
+        "sigma_m": s.sigma_m,
+        "sigma_mps": s.sigma_mps,
     }
 
 
@@ -51,29 +65,49 @@ def to_dict(p: Problem) -> dict[str, Any]:
         if s.half_width_rad is not None:
             sigma["half_width_deg"] = [deg(x) for x in s.half_width_rad]
     out: dict[str, Any] = {
-        "id": p.id, "title": p.title,
+        "id": p.id,
+        "title": p.title,
         "start": {"x": p.start_en[0], "y": p.start_en[1], "heading_deg": deg(p.start_heading_rad)},
         "goal": {"x": p.goal_en[0], "y": p.goal_en[1], "radius": p.goal_radius_m},
         "obstacles": [_wkt(g) for g in p.obstacles],
         "fence": None if p.fence is None else _wkt(p.fence),
-        "wind": {"from_deg": deg(p.wind.twd_from_rad), "speed_mps": p.wind.tws_mps, "sigma": sigma,
-                 **({} if p.wind.strength is None else {"strength": p.wind.strength.to_dict()})},
+        "wind": {
+            "from_deg": deg(p.wind.twd_from_rad),
+            "speed_mps": p.wind.tws_mps,
+            "sigma": sigma,
+            **({} if p.wind.strength is None else {"strength": p.wind.strength.to_dict()}),
+        },
         "boat": {
-            "no_go_half_deg": deg(p.boat.no_go_half_rad), "max_twa_deg": deg(p.boat.max_twa_rad),
+            "no_go_half_deg": deg(p.boat.no_go_half_rad),
+            "max_twa_deg": deg(p.boat.max_twa_rad),
             "turn_rate_rad_s": p.boat.turn_rate_radps,
-            "speed": {"model": "polar", "twa_deg": [deg(a) for a in p.boat.polar_twa_rad],
-                      "v_mps": list(p.boat.polar_mps)},
+            "speed": {
+                "model": "polar",
+                "twa_deg": [deg(a) for a in p.boat.polar_twa_rad],
+                "v_mps": list(p.boat.polar_mps),
+            },
             **({"tack_loss_s": p.boat.tack_loss_s} if p.boat.tack_loss_s else {}),
             **({"gybe_loss_s": p.boat.gybe_loss_s} if p.boat.gybe_loss_s else {}),
             **({} if p.boat.can_tack else {"can_tack": False}),
-            **{name: value for name in ("gybe_room_m", "max_tws_mps", "min_tws_mps")
-               if (value := getattr(p.boat, name)) is not None},
+            **{
+                name: value
+                for name in ("gybe_room_m", "max_tws_mps", "min_tws_mps")
+                if (value := getattr(p.boat, name)) is not None
+            },
             **({"tack_fails": p.boat.tack_fails} if p.boat.tack_fails else {}),
             **({"irons_s": p.boat.irons_s} if p.boat.irons_s != IRONS_S else {}),
             **({"lee_mps": list(p.boat.lee_mps)} if any(p.boat.lee_mps) else {}),
-            **({} if p.boat.speeds is None else {"speeds": {
-                "tws_mps": list(p.boat.speeds.tws_mps), "twa_deg": [deg(a) for a in p.boat.speeds.twa_rad],
-                "v_mps": [list(row) for row in p.boat.speeds.v_mps]}}),
+            **(
+                {}
+                if p.boat.speeds is None
+                else {
+                    "speeds": {
+                        "tws_mps": list(p.boat.speeds.tws_mps),
+                        "twa_deg": [deg(a) for a in p.boat.speeds.twa_rad],
+                        "v_mps": [list(row) for row in p.boat.speeds.v_mps],
+                    }
+                }
+            ),
         },
         "delta_s": p.delta_s,
     }
@@ -86,10 +120,18 @@ def to_dict(p: Problem) -> dict[str, Any]:
             out[name] = {"set_deg": deg(water.set_rad), "drift_mps": water.drift_mps}
     if p.targets:
         out["targets"] = [
-            {"x": t.x_m, "y": t.y_m, "vx": t.vx_mps, "vy": t.vy_mps, "radius_m": t.radius_m,
-             "growth_mps": t.growth_mps, "from_s": t.from_s, "name": t.name,
-             **({"until_s": t.until_s} if math.isfinite(t.until_s) else {}),
-             **({"spread": _spread_dict(t.spread)} if t.spread is not None else {})}
+            {
+                "x": t.x_m,
+                "y": t.y_m,
+                "vx": t.vx_mps,
+                "vy": t.vy_mps,
+                "radius_m": t.radius_m,
+                "growth_mps": t.growth_mps,
+                "from_s": t.from_s,
+                "name": t.name,
+                **({"until_s": t.until_s} if math.isfinite(t.until_s) else {}),
+                **({"spread": _spread_dict(t.spread)} if t.spread is not None else {}),
+            }
             for t in p.targets
         ]
     if p.vessels_part is not None:
@@ -101,8 +143,12 @@ def to_dict(p: Problem) -> dict[str, Any]:
     if p.leg_saving != LEG_SAVING:
         out["leg_saving"] = p.leg_saving
     if p.beat is not None:
-        out["beat"] = {"no_go_half_deg": deg(p.beat.no_go_half_rad), "corridor_m": p.beat.corridor_m,
-                       "clearance_m": p.beat.clearance_m, "tack_s": p.beat.tack_s}
+        out["beat"] = {
+            "no_go_half_deg": deg(p.beat.no_go_half_rad),
+            "corridor_m": p.beat.corridor_m,
+            "clearance_m": p.beat.clearance_m,
+            "tack_s": p.beat.tack_s,
+        }
     if p.tracking is not None:
         out["tracking"] = _tracking_dict(p.tracking)
     if p.zone is not None:
@@ -113,8 +159,12 @@ def to_dict(p: Problem) -> dict[str, Any]:
 def _tracking_dict(t: Tracking) -> dict[str, Any]:
     return {
         **{name: getattr(t.helm, name) for name in HELM_KEYS},
-        "no_go_half_deg": math.degrees(t.helm.no_go_half_rad), "floor_m": t.floor_m, "reach_m": t.reach_m,
-        "solids": [_wkt(g) for g in t.solids], "limits": None if t.limits is None else _wkt(t.limits),
+        "no_go_half_deg": math.degrees(t.helm.no_go_half_rad),
+        "floor_m": t.floor_m,
+        "reach_m": t.reach_m,
+        "solids": [_wkt(g) for g in t.solids],
+        "limits": None if t.limits is None else _wkt(t.limits),
         "before": None if t.before_en is None else {"x": t.before_en[0], "y": t.before_en[1]},
-        "correlation_s": t.correlation_s, "known": t.is_known,
+        "correlation_s": t.correlation_s,
+        "known": t.is_known,
     }

@@ -98,10 +98,22 @@ NASTY = {
     "a millimetre off": {"obstacles": ["POLYGON((0.001 -50,50 -50,50 50,0.001 50,0.001 -50))"]},
     "touching": {"obstacles": ["POLYGON((0 -50,50 -50,50 50,0 50,0 -50))"]},
     "fence without room": {"fence": "POLYGON((-1 -1,1 -1,1 201,-1 201,-1 -1))"},
-    "no-go of 180": {"boat": {"no_go_half_deg": 180, "max_twa_deg": 180, "turn_rate_rad_s": 1,
-                              "speed": {"model": "constant", "v_mps": 1}}},
-    "polar of zeros": {"boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 1,
-                                "speed": {"model": "polar", "twa_deg": [0, 180], "v_mps": [0, 0]}}},
+    "no-go of 180": {
+        "boat": {
+            "no_go_half_deg": 180,
+            "max_twa_deg": 180,
+            "turn_rate_rad_s": 1,
+            "speed": {"model": "constant", "v_mps": 1},
+        }
+    },
+    "polar of zeros": {
+        "boat": {
+            "no_go_half_deg": 45,
+            "max_twa_deg": 180,
+            "turn_rate_rad_s": 1,
+            "speed": {"model": "polar", "twa_deg": [0, 180], "v_mps": [0, 0]},
+        }
+    },
     "current above speed": {"current": {"set_deg": 180, "drift_mps": 9}},
     "risk of nothing": {"risk": {"max_path_risk": 1e-9}},
     "start is goal": {"goal": {"x": 0, "y": 0, "radius": 5}},
@@ -111,15 +123,29 @@ NASTY = {
 @pytest.mark.parametrize("name", NASTY)
 @pytest.mark.parametrize("algorithm", [name for name in ALGORITHMS if name != "auto"])
 def test_bad_input_is_a_plan_or_a_reason_within_the_budget(algorithm, name):
-    p = Problem.from_json({
-        "id": "n", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 0}, "goal": {"x": 0, "y": 200, "radius": 5},
-        "obstacles": [], "fence": None, "delta_s": 0.7,
-        "wind": {"from_deg": 60, "speed_mps": 5,
-                 "sigma": {"model": "ar1", "sigma0_deg": 2, "sigma_inf_deg": 8, "rho_hz": 0.03}},
-        "boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
-                 "speed": {"model": "constant", "v_mps": 1.5}},
-        **NASTY[name],
-    })
+    p = Problem.from_json(
+        {
+            "id": "n",
+            "title": "",
+            "start": {"x": 0, "y": 0, "heading_deg": 0},
+            "goal": {"x": 0, "y": 200, "radius": 5},
+            "obstacles": [],
+            "fence": None,
+            "delta_s": 0.7,
+            "wind": {
+                "from_deg": 60,
+                "speed_mps": 5,
+                "sigma": {"model": "ar1", "sigma0_deg": 2, "sigma_inf_deg": 8, "rho_hz": 0.03},
+            },
+            "boat": {
+                "no_go_half_deg": 45,
+                "max_twa_deg": 180,
+                "turn_rate_rad_s": 0.5,
+                "speed": {"model": "constant", "v_mps": 1.5},
+            },
+            **NASTY[name],
+        }
+    )
     answer = plan(p, algorithm=algorithm, expansions=min(200_000, EFFORT[algorithm] // 4))
     assert answer.reason
     if answer.has_path:

@@ -40,46 +40,59 @@ def metres(low, high):
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-@pytest.mark.parametrize(("change", "words"), [
-    ({"obstacles": ["POLYGON ((nan 0, 10 0, 10 10, nan 0))"]}, "not a finite number"),
-    ({"obstacles": ["POLYGON ((inf 0, 10 0, 10 10, inf 0))"]}, "not a finite number"),
-    ({"fence": "POLYGON ((0 NaN, 10 0, 10 10, 0 NaN))"}, "not a finite number"),
-    ({"start": {"x": math.nan, "y": 0, "heading_deg": 0}}, "start.x"),
-    ({"goal": {"x": 0, "y": 100, "radius": -1}}, "negative"),
-    ({"delta_s": 0.3}, "delta_s"), ({"delta_s": 1.0}, "delta_s"), ({"delta_s": math.nan}, "delta_s"),
-    ({"wind": {"from_deg": 0, "speed_mps": 0, "sigma": {"model": "none"}}}, "no wind"),
-    ({"wind": {"from_deg": 0, "speed_mps": math.inf, "sigma": {"model": "none"}}}, "speed_mps"),
-    ({"boat": BOAT | {"speed": {"model": "constant", "v_mps": 0}}}, "zero everywhere"),
-    ({"boat": BOAT | {"speed": {"model": "polar", "twa_deg": [0, 180], "v_mps": [0, 0]}}}, "zero everywhere"),
-    ({"boat": BOAT | {"speed": {"model": "constant", "v_mps": 1e-9}}}, "zero everywhere"),
-    ({"boat": BOAT | {"turn_rate_rad_s": 0}}, "turn rate"),
-    ({"boat": BOAT | {"gybe_room_m": math.nan, "can_tack": False}}, "gybe_room_m"),
-    ({"obstacles": [box(-10, -5, 10, 0.002)]}, "start is inside"),
-    ({"goal": {"x": 2e9, "y": 0, "radius": 1}}, "1e9 m"),
-])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"obstacles": ["POLYGON ((nan 0, 10 0, 10 10, nan 0))"]}, "not a finite number"),
+        ({"obstacles": ["POLYGON ((inf 0, 10 0, 10 10, inf 0))"]}, "not a finite number"),
+        ({"fence": "POLYGON ((0 NaN, 10 0, 10 10, 0 NaN))"}, "not a finite number"),
+        ({"start": {"x": math.nan, "y": 0, "heading_deg": 0}}, "start.x"),
+        ({"goal": {"x": 0, "y": 100, "radius": -1}}, "negative"),
+        ({"delta_s": 0.3}, "delta_s"),
+        ({"delta_s": 1.0}, "delta_s"),
+        ({"delta_s": math.nan}, "delta_s"),
+        ({"wind": {"from_deg": 0, "speed_mps": 0, "sigma": {"model": "none"}}}, "no wind"),
+        ({"wind": {"from_deg": 0, "speed_mps": math.inf, "sigma": {"model": "none"}}}, "speed_mps"),
+        ({"boat": BOAT | {"speed": {"model": "constant", "v_mps": 0}}}, "zero everywhere"),
+        ({"boat": BOAT | {"speed": {"model": "polar", "twa_deg": [0, 180], "v_mps": [0, 0]}}}, "zero everywhere"),
+        ({"boat": BOAT | {"speed": {"model": "constant", "v_mps": 1e-9}}}, "zero everywhere"),
+        ({"boat": BOAT | {"turn_rate_rad_s": 0}}, "turn rate"),
+        ({"boat": BOAT | {"gybe_room_m": math.nan, "can_tack": False}}, "gybe_room_m"),
+        ({"obstacles": [box(-10, -5, 10, 0.002)]}, "start is inside"),
+        ({"goal": {"x": 2e9, "y": 0, "radius": 1}}, "1e9 m"),
+    ],
+)
 def test_invalid_with_the_reason(change, words, algorithm):
     answer = outcome(algorithm, **change)
     assert answer.status is PlanStatus.INVALID
     assert words in answer.reason
 
 
-@pytest.mark.parametrize("change", [
-    {"goal": {"x": 0, "y": 100, "radius": 0}, "obstacles": [box(-10, 40, 10, 50)]},
-    {"goal": {"x": 0, "y": 50, "radius": 0}, "obstacles": [box(-10, 40, 0, 50)]},
-    {"goal": {"x": 0, "y": 0, "radius": 0}},
-    {"start": {"x": FAR, "y": FAR, "heading_deg": 0}, "goal": {"x": FAR, "y": FAR + 100, "radius": 2},
-     "obstacles": [box(FAR - 10, FAR + 40, FAR + 10, FAR + 50)]},
-    {"goal": {"x": FAR, "y": FAR, "radius": 2}, "obstacles": [box(-10, 40, 10, 50)]},
-    {"goal": {"x": 0, "y": FAR, "radius": 2}, "fence": box(-FAR, -FAR, FAR, 2 * FAR)},
-    {"obstacles": [box(-10, 40, 10, 50), box(FAR, FAR, FAR + 10, FAR + 10)]},
-    {"obstacles": ["POLYGON ((-20 40, 20 60, 20 40, -20 60, -20 40))"]},            # crosses itself
-    {"obstacles": [box(-20, 40, 10, 50), box(-10, 45, 20, 60), box(-20, 40, 10, 50)]},
-    {"obstacles": ["POLYGON ((0 10, 0 90, 0 10))", "POLYGON ((5 5, 5 5, 5 5, 5 5))", "POLYGON EMPTY"]},
-    {"obstacles": [box(-10, -5, 10, 0)]}, {"obstacles": [box(-10, -5, 10, -0.001)]},
-    {"obstacles": [box(-10, -5, 10, 0.0009)]},                                      # the format's slack is 1 mm
-    {"boat": BOAT | {"turn_rate_rad_s": 1e-9}}, {"boat": BOAT | {"turn_rate_rad_s": 1e9}},
-    {"boat": BOAT | {"speed": {"model": "constant", "v_mps": 1e-5}}},
-])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"goal": {"x": 0, "y": 100, "radius": 0}, "obstacles": [box(-10, 40, 10, 50)]},
+        {"goal": {"x": 0, "y": 50, "radius": 0}, "obstacles": [box(-10, 40, 0, 50)]},
+        {"goal": {"x": 0, "y": 0, "radius": 0}},
+        {
+            "start": {"x": FAR, "y": FAR, "heading_deg": 0},
+            "goal": {"x": FAR, "y": FAR + 100, "radius": 2},
+            "obstacles": [box(FAR - 10, FAR + 40, FAR + 10, FAR + 50)],
+        },
+        {"goal": {"x": FAR, "y": FAR, "radius": 2}, "obstacles": [box(-10, 40, 10, 50)]},
+        {"goal": {"x": 0, "y": FAR, "radius": 2}, "fence": box(-FAR, -FAR, FAR, 2 * FAR)},
+        {"obstacles": [box(-10, 40, 10, 50), box(FAR, FAR, FAR + 10, FAR + 10)]},
+        {"obstacles": ["POLYGON ((-20 40, 20 60, 20 40, -20 60, -20 40))"]},  # crosses itself
+        {"obstacles": [box(-20, 40, 10, 50), box(-10, 45, 20, 60), box(-20, 40, 10, 50)]},
+        {"obstacles": ["POLYGON ((0 10, 0 90, 0 10))", "POLYGON ((5 5, 5 5, 5 5, 5 5))", "POLYGON EMPTY"]},
+        {"obstacles": [box(-10, -5, 10, 0)]},
+        {"obstacles": [box(-10, -5, 10, -0.001)]},
+        {"obstacles": [box(-10, -5, 10, 0.0009)]},  # the format's slack is 1 mm
+        {"boat": BOAT | {"turn_rate_rad_s": 1e-9}},
+        {"boat": BOAT | {"turn_rate_rad_s": 1e9}},
+        {"boat": BOAT | {"speed": {"model": "constant", "v_mps": 1e-5}}},
+    ],
+)
 def test_strange_but_sailable(change):
     raw = simple(**change)
     answer = plan(Problem.from_json(raw), expansions=6_000)
@@ -87,12 +100,15 @@ def test_strange_but_sailable(change):
     assert evaluate(Problem.from_json(raw), answer.waypoints_en).is_feasible
 
 
-@pytest.mark.parametrize(("goal_y", "obstacles"), [
-    (100, [box(-200, 40, 0, 60), box(0, 60, 200, 80)]),                             # corner to corner
-    (-45, [box(-200, -40, 0, -20), box(0, -20, 200, -10)]),
-    (100, ["POLYGON ((-200 50, 200 50, 0 60, -200 50))"]),                          # its tips on the fence
-    (100, ["POLYGON ((-200 40, 0 50, -200 60, -200 40))", "POLYGON ((200 40, 0 50, 200 60, 200 40))"]),
-])
+@pytest.mark.parametrize(
+    ("goal_y", "obstacles"),
+    [
+        (100, [box(-200, 40, 0, 60), box(0, 60, 200, 80)]),  # corner to corner
+        (-45, [box(-200, -40, 0, -20), box(0, -20, 200, -10)]),
+        (100, ["POLYGON ((-200 50, 200 50, 0 60, -200 50))"]),  # its tips on the fence
+        (100, ["POLYGON ((-200 40, 0 50, -200 60, -200 40))", "POLYGON ((200 40, 0 50, 200 60, 200 40))"]),
+    ],
+)
 def test_two_that_touch_in_one_point_leave_a_way_through_it(goal_y, obstacles):
     raw = simple(goal={"x": 0, "y": goal_y, "radius": 2}, obstacles=obstacles, fence=box(-200, -50, 200, 150))
     answer = plan(Problem.from_json(raw), expansions=20_000)
@@ -107,9 +123,9 @@ def test_two_that_share_an_edge_leave_none():
 def test_thousands_of_slivers_are_not_united():
     raw = simple(obstacles=slivers(2_500, 1, 60.0), boat=BOAT | {"speed": POLAR})
     p = Problem.from_json(raw)
-    assert len(make_world(p).corners) == 0                    # of tangled obstacles no corners are worked out
+    assert len(make_world(p).corners) == 0  # of tangled obstacles no corners are worked out
     answer = plan(p, expansions=20_000)
-    assert "eval_solid" not in p.__dict__                     # nor is everything united for the exact check
+    assert "eval_solid" not in p.__dict__  # nor is everything united for the exact check
     assert answer.status is not PlanStatus.INVALID
     if answer.has_path:
         line = shapely.LineString(answer.waypoints_en)
@@ -117,18 +133,21 @@ def test_thousands_of_slivers_are_not_united():
 
 
 @settings(max_examples=60)
-@given(random_problems(), st.lists(st.tuples(metres(-150, 150), metres(-50, 350)), min_size=2, max_size=8),
-       st.sampled_from([0.0, 3.0]))
+@given(
+    random_problems(),
+    st.lists(st.tuples(metres(-150, 150), metres(-50, 350)), min_size=2, max_size=8),
+    st.sampled_from([0.0, 3.0]),
+)
 def test_the_test_by_neighbours_agrees_with_the_test_against_everything(raw, points, floor):
     p = Problem.from_json(raw | {"clearance_floor_m": floor})
     shore = SolidObstacles(p)
     shore.is_large = True
-    corners = [tuple(c) for g in p.obstacles for c in shapely.get_coordinates(g)[:2]]      # legs that touch
+    corners = [tuple(c) for g in p.obstacles for c in shapely.get_coordinates(g)[:2]]  # legs that touch
     places = [*points, *corners[:3]]
     shapes = [shapely.LineString([a, b]) for a, b in itertools.pairwise(places) if a != b]
     solid = p.solid
     for shape in [*shapes, *map(shapely.Point, places)]:
-        if abs(_depth(solid, shape)) < 1e-5:                   # on the edge of the slack either may be
+        if abs(_depth(solid, shape)) < 1e-5:  # on the edge of the slack either may be
             continue
         assert shore.hits(shape) == bool(p.eval_solid.intersects(shape))
     clear = shore.clearances_m(np.asarray(shapes, dtype=object))
@@ -165,11 +184,27 @@ def wild(draw):
         points = draw(st.lists(st.tuples(st.one_of(ordinary, numbers), ordinary), min_size=3, max_size=6))
         rings.append("POLYGON ((" + ", ".join(f"{x!r} {y!r}" for x, y in [*points, points[0]]) + "))")
     raw["obstacles"] = raw["obstacles"] + rings
-    for group, key in draw(st.lists(st.sampled_from([
-        ("start", "x"), ("start", "heading_deg"), ("goal", "x"), ("goal", "y"), ("goal", "radius"),
-        ("wind", "from_deg"), ("wind", "speed_mps"), ("boat", "no_go_half_deg"), ("boat", "max_twa_deg"),
-        ("boat", "turn_rate_rad_s"), ("boat", "tack_loss_s"), ("boat", "gybe_room_m"),
-    ]), max_size=2)):
+    for group, key in draw(
+        st.lists(
+            st.sampled_from(
+                [
+                    ("start", "x"),
+                    ("start", "heading_deg"),
+                    ("goal", "x"),
+                    ("goal", "y"),
+                    ("goal", "radius"),
+                    ("wind", "from_deg"),
+                    ("wind", "speed_mps"),
+                    ("boat", "no_go_half_deg"),
+                    ("boat", "max_twa_deg"),
+                    ("boat", "turn_rate_rad_s"),
+                    ("boat", "tack_loss_s"),
+                    ("boat", "gybe_room_m"),
+                ]
+            ),
+            max_size=2,
+        )
+    ):
         raw[group] = raw[group] | {key: draw(numbers)}
     return raw
 

@@ -55,7 +55,7 @@ def test_the_whole_answer_is_within_the_budget(name):
         assert plan(p, budget_s=0.3, seed=seed).has_path
         return time.process_time() - began_s
 
-    assert any(taken_s(seed) <= 1.1 * 0.3 + 0.05 for seed in range(5))   # a busy machine is slow once, not five times
+    assert any(taken_s(seed) <= 1.1 * 0.3 + 0.05 for seed in range(5))  # a busy machine is slow once, not five times
 
 
 def test_plans_that_can_be_sailed_are_handed_out_as_they_come(clock):
@@ -143,7 +143,7 @@ def test_the_first_path_is_judged_where_what_it_settled_to_is_no_answer():
     asked = []
     now.listen(lambda path: asked.append(float(path[0])) or 1e3)
     now.first_s = 1e5
-    assert not now.improved(lambda: np.array([1.0]), 100.0)   # it may settle
+    assert not now.improved(lambda: np.array([1.0]), 100.0)  # it may settle
     now.first_s = 0.0
     assert now.improved(lambda: np.array([2.0]), 90.0)
     assert asked == [2.0, 1.0]

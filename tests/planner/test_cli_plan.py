@@ -15,13 +15,23 @@ from companion.planner.problem.evaluate import evaluate
 from tests.planner.problem_json import to_dict
 
 GOOD = {
-    "id": "pond", "title": "Across the pond", "start": {"x": 0, "y": 0, "heading_deg": 0},
-    "goal": {"x": 0, "y": 200, "radius": 5}, "obstacles": ["POLYGON((-20 80,30 80,30 120,-20 120,-20 80))"],
+    "id": "pond",
+    "title": "Across the pond",
+    "start": {"x": 0, "y": 0, "heading_deg": 0},
+    "goal": {"x": 0, "y": 200, "radius": 5},
+    "obstacles": ["POLYGON((-20 80,30 80,30 120,-20 120,-20 80))"],
     "fence": None,
-    "wind": {"from_deg": 30, "speed_mps": 5,
-             "sigma": {"model": "ar1", "sigma0_deg": 2, "sigma_inf_deg": 6, "rho_hz": 0.03}},
-    "boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
-             "speed": {"model": "constant", "v_mps": 1.5}},
+    "wind": {
+        "from_deg": 30,
+        "speed_mps": 5,
+        "sigma": {"model": "ar1", "sigma0_deg": 2, "sigma_inf_deg": 6, "rho_hz": 0.03},
+    },
+    "boat": {
+        "no_go_half_deg": 45,
+        "max_twa_deg": 180,
+        "turn_rate_rad_s": 0.5,
+        "speed": {"model": "constant", "v_mps": 1.5},
+    },
     "delta_s": 0.7,
 }
 
@@ -85,8 +95,9 @@ def test_explain_adds_reasons(capsys, file):
 
 def test_an_obstacle_is_called_by_its_name(capsys, file, tmp_path):
     """Of a mission's "Shark Island" it said "obstacle 1"."""
-    _, out, _ = run(capsys, file(obstacle_names=["Duck Rock"]), "--expansions", "1500", "--explain",
-                    "--explain-budget", "0.5")
+    _, out, _ = run(
+        capsys, file(obstacle_names=["Duck Rock"]), "--expansions", "1500", "--explain", "--explain-budget", "0.5"
+    )
     assert "of Duck Rock" in out
     assert "obstacle 1" not in out
     assert to_dict(Problem.from_json(file(obstacle_names=["Duck Rock"])))["obstacle_names"] == ["Duck Rock"]
@@ -99,13 +110,17 @@ def test_a_missions_obstacles_keep_their_names_in_its_problem():
     goal = frame.en_from_geo(mission.goals[0].point)
 
     def names(margin_m):
-        grown = replace(mission, options=msgspec.structs.replace(
-            mission.options, area=msgspec.structs.replace(mission.options.area, margin_m=margin_m)))
+        grown = replace(
+            mission,
+            options=msgspec.structs.replace(
+                mission.options, area=msgspec.structs.replace(mission.options.area, margin_m=margin_m)
+            ),
+        )
         problem = leg_problem(grown, (0.0, 0.0), 0.0, goal, 10.0, wind=AssumedWind(from_deg=0.0, speed_mps=5.0))
         return [problem.obstacle_name(i) for i in range(len(problem.obstacles))]
 
     assert sorted(names(1.0)) == ["East bank", "Middle bank", "West bank"]
-    assert "Middle bank and East bank" in names(30.0)   # grown together
+    assert "Middle bank and East bank" in names(30.0)  # grown together
 
 
 def test_no_plan_is_exit_1_with_the_reason(capsys, file, tmp_path):
@@ -117,21 +132,32 @@ def test_no_plan_is_exit_1_with_the_reason(capsys, file, tmp_path):
     assert picture.exists()
 
 
-@pytest.mark.parametrize("change", [
-    {"start": {"x": 0, "y": 100, "heading_deg": 0}}, {"delta_s": 0.2}, {"delta_s": math.nan},
-    {"wind": {**GOOD["wind"], "speed_mps": 0}}, {"goal": {"x": 0, "y": 200, "radius": -1}},
-])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"start": {"x": 0, "y": 100, "heading_deg": 0}},
+        {"delta_s": 0.2},
+        {"delta_s": math.nan},
+        {"wind": {**GOOD["wind"], "speed_mps": 0}},
+        {"goal": {"x": 0, "y": 200, "radius": -1}},
+    ],
+)
 def test_what_cannot_be_planned_is_exit_2_with_the_reason(capsys, file, change):
     code, out, err = run(capsys, file(**change), "--budget", "0.2")
     assert code == 2
     assert "invalid" in out + err
 
 
-@pytest.mark.parametrize(("text", "place"), [
-    ("{", "JSON"), ("[]", "JSON object"), ('{"id": "x"}', "start"),
-    (json.dumps({**GOOD, "obstacles": ["POLYGON((0 0"]}), "obstacles"),
-    (json.dumps({**GOOD, "boat": {**GOOD["boat"], "speed": {"model": "warp"}}}), "speed"),
-])
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("{", "JSON"),
+        ("[]", "JSON object"),
+        ('{"id": "x"}', "start"),
+        (json.dumps({**GOOD, "obstacles": ["POLYGON((0 0"]}), "obstacles"),
+        (json.dumps({**GOOD, "boat": {**GOOD["boat"], "speed": {"model": "warp"}}}), "speed"),
+    ],
+)
 def test_what_cannot_be_read_is_exit_2_and_one_line(capsys, tmp_path, text, place):
     path = tmp_path / "bad.json"
     path.write_text(text, encoding="utf-8")

@@ -18,12 +18,23 @@ from companion.planner.problem.evaluate import evaluate
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 GROWING = {
-    "id": "growing", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 45}, "goal": {"x": 0, "y": 450, "radius": 5},
-    "obstacles": [], "fence": None,
-    "wind": {"from_deg": 0, "speed_mps": 5,
-             "sigma": {"model": "kalman", "sigma0_deg": 2.0, "growth_deg_per_sqrt_s": 1.0}},
-    "boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
-             "speed": {"model": "constant", "v_mps": 2.0}},
+    "id": "growing",
+    "title": "",
+    "start": {"x": 0, "y": 0, "heading_deg": 45},
+    "goal": {"x": 0, "y": 450, "radius": 5},
+    "obstacles": [],
+    "fence": None,
+    "wind": {
+        "from_deg": 0,
+        "speed_mps": 5,
+        "sigma": {"model": "kalman", "sigma0_deg": 2.0, "growth_deg_per_sqrt_s": 1.0},
+    },
+    "boat": {
+        "no_go_half_deg": 45,
+        "max_twa_deg": 180,
+        "turn_rate_rad_s": 0.5,
+        "speed": {"model": "constant", "v_mps": 2.0},
+    },
     "delta_s": 0.8,
 }
 
@@ -53,7 +64,7 @@ def test_many_legs_are_few_courses(bent):
     assert [leg for course in merged for leg in course.legs] == list(answer.legs)
     assert all(k.manoeuvre == "" for course in merged for k in course.legs[1:])
     first = merged[0].headings_rad
-    assert first[1] - first[0] > BEND_RAD   # it bends far, a little at a time
+    assert first[1] - first[0] > BEND_RAD  # it bends far, a little at a time
 
 
 def test_the_words_and_the_table_name_courses_and_their_ranges(bent):
@@ -79,8 +90,24 @@ def test_a_tack_begins_a_course():
 def test_a_mission_is_planned_and_explained_from_goal_to_goal(capsys, tmp_path):
     out = tmp_path / "plans.json"
     course = str(MISSIONS / "buoy-course.toml")
-    assert cli.main(["plan", course, "--expansions", "3000", "--explain", "--explain-budget", "0.2", "--wind", "6@20",
-                     "--out", str(out)]) == 0
+    assert (
+        cli.main(
+            [
+                "plan",
+                course,
+                "--expansions",
+                "3000",
+                "--explain",
+                "--explain-budget",
+                "0.2",
+                "--wind",
+                "6@20",
+                "--out",
+                str(out),
+            ]
+        )
+        == 0
+    )
     text = capsys.readouterr().out
     assert text.count("above the bound") == 3
     assert "Straight there" in text or "close-hauled" in text

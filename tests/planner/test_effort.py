@@ -39,7 +39,7 @@ def test_a_path_is_judged_when_it_is_time_and_not_within_its_own_judgement():
     def judge(path):
         judged.append(path)
         assert not effort.improved(lambda: path, 100.0)
-        return 1e3   # the next one then
+        return 1e3  # the next one then
 
     effort.listen(judge)
     effort.first_s = 0.0
@@ -64,6 +64,6 @@ def test_a_part_does_not_pay_for_the_judgement(monkeypatch):
     effort.needed_s, effort.has_answer = 4.0, True
     now[0] = 4.9
     assert not part.is_over
-    now[0] = 7.1      # with what another judgement needs, beyond the whole
+    now[0] = 7.1  # with what another judgement needs, beyond the whole
     assert effort.is_late
     assert part.is_over

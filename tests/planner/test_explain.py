@@ -16,10 +16,19 @@ AR1 = {"model": "ar1", "sigma0_deg": 8.0, "sigma_inf_deg": 8.0, "rho_hz": 0.03}
 
 def problem(**change):
     base = {
-        "id": "t", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 0}, "goal": {"x": 0, "y": 400, "radius": 2},
-        "obstacles": [BLOCK], "fence": None, "wind": {"from_deg": 90, "speed_mps": 5, "sigma": NONE},
-        "boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
-                 "speed": {"model": "constant", "v_mps": 1.5}},
+        "id": "t",
+        "title": "",
+        "start": {"x": 0, "y": 0, "heading_deg": 0},
+        "goal": {"x": 0, "y": 400, "radius": 2},
+        "obstacles": [BLOCK],
+        "fence": None,
+        "wind": {"from_deg": 90, "speed_mps": 5, "sigma": NONE},
+        "boat": {
+            "no_go_half_deg": 45,
+            "max_twa_deg": 180,
+            "turn_rate_rad_s": 0.5,
+            "speed": {"model": "constant", "v_mps": 1.5},
+        },
         "delta_s": 0.7,
     }
     return Problem.from_json({**base, **change})
@@ -90,8 +99,12 @@ def test_a_straight_reach_needs_no_reason():
 def test_the_fence_binds_where_the_path_touches_it():
     fence = "POLYGON((-20 -20,200 -20,200 420,-20 420,-20 -20))"
     block = "POLYGON((20 100,190 100,190 300,20 300,20 100))"
-    p = problem(obstacles=[block], fence=fence, start={"x": 100, "y": 0, "heading_deg": 0},
-                goal={"x": 100, "y": 400, "radius": 2})
+    p = problem(
+        obstacles=[block],
+        fence=fence,
+        start={"x": 100, "y": 0, "heading_deg": 0},
+        goal={"x": 100, "y": 400, "radius": 2},
+    )
     answer = with_clearance(p, plan(p, expansions=EFFORT))
     assert all(leg.clearance_m is not None for leg in answer.legs)
     line = leg_bounds(p, answer.legs[0])

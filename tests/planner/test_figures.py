@@ -30,7 +30,7 @@ from companion.planner.problem.evaluate import evaluate, shore_of
 from companion.planner.reference.astar import search
 from companion.planners import AstarSettings
 
-SAMPLES = 6000   # as they are drawn
+SAMPLES = 6000  # as they are drawn
 PICTURES = Path(__file__).resolve().parents[2] / "docs" / "figures"
 PAPERS = ("wolsieffer-", "wind-filter", "busser-", "field-", "wrsc2013-")
 
@@ -85,8 +85,10 @@ def test_figure_6_b_is_not_shut_by_the_growth_that_makes_a_as_wide_as_his(seed):
 
 
 def test_figure_6_c_and_d_down_wind_it_makes_no_difference():
-    c, d = (plan(four_polygons(delta, is_up=False), algorithm="rrtstar", expansions=SAMPLES, seed=1)
-            for delta in (DELTA_6A, DELTA_6B))
+    c, d = (
+        plan(four_polygons(delta, is_up=False), algorithm="rrtstar", expansions=SAMPLES, seed=1)
+        for delta in (DELTA_6A, DELTA_6B)
+    )
     assert c.has_path
     assert d.cost_s == pytest.approx(c.cost_s, rel=0.01)
 
@@ -94,8 +96,11 @@ def test_figure_6_c_and_d_down_wind_it_makes_no_difference():
 def is_east_of_the_island(waypoints_en):
     """Whether a path goes up the right-hand channel: how it crosses the latitude of the island's middle."""
     points = np.asarray(waypoints_en)
-    return all(a[0] + (200.0 - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > 0.0
-               for a, b in pairwise(points) if (a[1] - 200.0) * (b[1] - 200.0) < 0.0)
+    return all(
+        a[0] + (200.0 - a[1]) / (b[1] - a[1]) * (b[0] - a[0]) > 0.0
+        for a, b in pairwise(points)
+        if (a[1] - 200.0) * (b[1] - 200.0) < 0.0
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -15,14 +15,14 @@ from companion.planner import Plan, plan
 
 SOUTH = Path("sitl/missions/southern-tide.toml")
 WIND = AssumedWind(from_deg=0.0, speed_mps=5.0)
-HIGH_S = 1_795_262_400.0      # 2026-11-21T12:00:00Z
+HIGH_S = 1_795_262_400.0  # 2026-11-21T12:00:00Z
 
 
 @pytest.fixture
 def mission_with(tmp_path):
     def write(current, table=""):
         text, end = SOUTH.read_text(encoding="utf-8"), "\n[operator]"
-        head, tail = text[:text.index("[current]")], text[text.index(end):]
+        head, tail = text[: text.index("[current]")], text[text.index(end) :]
         (tmp_path / "m.toml").write_text(head + (f"[current]\n{current}\n" if current else "") + tail, encoding="utf-8")
         (tmp_path / "southern-tide.wkt").write_text(SOUTH.with_suffix(".wkt").read_text(encoding="utf-8"))
         (tmp_path / "tide.csv").write_text(table)
@@ -46,11 +46,14 @@ def test_a_preview_reckons_with_the_current_and_the_wind_over_the_water(mission_
     assert still.wind.twd_from_rad == 0.0
 
 
-@pytest.mark.parametrize(("current", "is_planned"), [
-    ("set_deg = 90.0\ndrift_mps = 0.4\nsigma_mps = 0.15", True),
-    ("set_deg = 90.0\ndrift_mps = 0.4\nsigma_mps = 0.3", False),      # it may as well be none
-    ("set_deg = 90.0\ndrift_mps = 0.04\nsigma_mps = 0.02", False),     # too weak to matter
-])
+@pytest.mark.parametrize(
+    ("current", "is_planned"),
+    [
+        ("set_deg = 90.0\ndrift_mps = 0.4\nsigma_mps = 0.15", True),
+        ("set_deg = 90.0\ndrift_mps = 0.4\nsigma_mps = 0.3", False),  # it may as well be none
+        ("set_deg = 90.0\ndrift_mps = 0.04\nsigma_mps = 0.02", False),  # too weak to matter
+    ],
+)
 def test_a_preview_and_the_boat_at_the_start_agree_on_what_is_planned_for(mission_with, current, is_planned):
     mission = mission_with(current)
     on_board = CurrentEstimator(ardurover_sitl().speed_mps, water_of(mission))
@@ -61,8 +64,10 @@ def test_a_preview_and_the_boat_at_the_start_agree_on_what_is_planned_for(missio
 
 
 def test_each_leg_has_the_row_of_a_tide_table_that_it_begins_in(mission_with):
-    mission = mission_with('table = "tide.csv"\nsigma_mps = 0.1', (
-        "time, set_deg, drift_mps\n2026-11-21T12:00:00Z, 90, 0.6\n2026-11-21T13:00:00Z, 270, 0.6\n"))
+    mission = mission_with(
+        'table = "tide.csv"\nsigma_mps = 0.1',
+        ("time, set_deg, drift_mps\n2026-11-21T12:00:00Z, 90, 0.6\n2026-11-21T13:00:00Z, 270, 0.6\n"),
+    )
     assert first_problem(mission, HIGH_S).current.set_rad == pytest.approx(0.5 * math.pi)
     assert first_problem(mission, HIGH_S + 3600.0).current.set_rad == pytest.approx(1.5 * math.pi)
     assert first_problem(mission).current.drift_mps == 0.0, "no row without a time"

@@ -106,6 +106,7 @@ def test_forked_by_a_fork_server_it_plans_the_same_dies_hangs_and_comes_back():
 
 def test_a_child_that_dies_with_nothing_asked_for_is_there_again_when_something_is(monkeypatch):
     """It was started by the next request, which waited for its kernels: 25 s on a tenth of a core."""
+
     async def main():
         async with PlannerWorker() as planner:
             await planner.ready()
@@ -116,7 +117,7 @@ def test_a_child_that_dies_with_nothing_asked_for_is_there_again_when_something_
                 assert now_s() < until_s
                 await asyncio.sleep(0.05)
             assert planner.restarts == 1
-            monkeypatch.setattr(planner, "_warm", nothing)    # there is nothing to wait for
+            monkeypatch.setattr(planner, "_warm", nothing)  # there is nothing to wait for
             assert (await planner.plan(Problem.from_json(simple()), expansions=1_000)).has_path
             assert planner.restarts == 1
 
@@ -164,7 +165,7 @@ worker.serve()
 
 def test_a_child_that_compiles_is_alive_however_long_it_takes(monkeypatch):
     """It was given 180 s, and taken for hung: the first start on a slow or busy machine failed (issue 12, point 18)."""
-    monkeypatch.setattr(worker, "_SILENCE_S", 3.0)   # a busy machine has paused a child for one
+    monkeypatch.setattr(worker, "_SILENCE_S", 3.0)  # a busy machine has paused a child for one
 
     async def main():
         said = []
@@ -172,7 +173,7 @@ def test_a_child_that_compiles_is_alive_however_long_it_takes(monkeypatch):
             await planner.ready(said.append)
             assert planner.restarts == 0
             assert {"3 of 20", "19 of 20"} <= set(said)
-            os.kill(planner.pid, signal.SIGKILL)   # under way: a request waits for the new one's kernels
+            os.kill(planner.pid, signal.SIGKILL)  # under way: a request waits for the new one's kernels
             await asyncio.sleep(0.2)
             assert (await planner.plan(Problem.from_json(simple()), expansions=3_000)).has_path
             assert planner.restarts == 1
@@ -183,9 +184,11 @@ def test_a_child_that_compiles_is_alive_however_long_it_takes(monkeypatch):
 @pytest.mark.parametrize(("deaths", "is_ready"), [(2, True), (99, False)])
 def test_a_child_that_is_killed_while_it_gets_ready_is_started_again(tmp_path, deaths, is_ready):
     """A kill in the first seconds was the end of the voyage: "the planner's process did not start", exit 1."""
-    dies = ("import pathlib, sys; lives = pathlib.Path(sys.argv[1]); n = len(list(lives.iterdir())); "
-            "(lives / str(n)).touch(); n < int(sys.argv[2]) and sys.exit(9); "
-            "from companion.planner.worker import serve; serve()")
+    dies = (
+        "import pathlib, sys; lives = pathlib.Path(sys.argv[1]); n = len(list(lives.iterdir())); "
+        "(lives / str(n)).touch(); n < int(sys.argv[2]) and sys.exit(9); "
+        "from companion.planner.worker import serve; serve()"
+    )
 
     async def main():
         async with PlannerWorker(command=[sys.executable, "-c", dies, str(tmp_path), str(deaths)]) as planner:
@@ -204,6 +207,7 @@ def test_a_child_that_falls_silent_while_it_compiles_is_replaced(monkeypatch):
 
     async def main():
         async with PlannerWorker(command=[sys.executable, "-c", SLOW]) as planner:
+
             def stop_it(word):
                 os.kill(planner.pid, signal.SIGSTOP)
 
@@ -233,10 +237,13 @@ worker.answer_requests(sys.stdin.buffer, sys.stdout.buffer)
 """
 
 
-@pytest.mark.parametrize(("end", "said", "restarts"), [
-    ("os._exit(9)", "died", 1), ("time.sleep(99.0)", "did not answer in time", 1), ("raise MemoryError", "failed", 0)])
+@pytest.mark.parametrize(
+    ("end", "said", "restarts"),
+    [("os._exit(9)", "died", 1), ("time.sleep(99.0)", "did not answer in time", 1), ("raise MemoryError", "failed", 0)],
+)
 def test_a_child_that_is_killed_or_too_slow_leaves_the_best_that_it_had_found(end, said, restarts):
     """It left nothing, however good its path was: on a slow computer the boat never set sail (issue 33)."""
+
     async def main():
         async with PlannerWorker(command=[sys.executable, "-c", ENDS.format(end=end)]) as planner:
             await planner.ready()
@@ -271,6 +278,7 @@ worker.answer_requests(sys.stdin.buffer, sys.stdout.buffer)
 
 def test_a_child_that_shows_life_is_not_killed_for_slowness():
     """It was killed after its budget and three seconds, on a computer that had given it a third of one."""
+
     async def main():
         async with PlannerWorker(grace_s=0.5, command=[sys.executable, "-c", STARVED.format(slices=15)]) as planner:
             await planner.ready()
@@ -304,6 +312,7 @@ worker.answer_requests(sys.stdin.buffer, sys.stdout.buffer)
 
 def test_a_child_says_what_it_gets_of_the_processor_when_it_is_ready():
     """Before the first answer nobody knew, and the first plan is the one that all others begin with."""
+
     async def main():
         async with PlannerWorker(command=[sys.executable, "-c", SLEEPY]) as planner:
             assert planner.share == 1.0
@@ -326,6 +335,7 @@ def test_a_child_that_has_had_its_budget_and_does_not_end_is_hung():
 
 def test_an_answer_that_waits_is_taken_however_late_it_is_looked_for(monkeypatch):
     """A process that is starved itself came back after its deadline, and killed a child that had answered."""
+
     async def main():
         async with PlannerWorker() as planner:
             await planner.ready()

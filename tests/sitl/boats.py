@@ -34,7 +34,8 @@ def boat_process(*options: str) -> Iterator[tuple[str, int, int]]:
     tcp, udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
     process = subprocess.Popen(
         [sys.executable, "-m", "sitl.cli", "boat", "--port", str(tcp), "--udp", str(udp), *options],
-        stdout=subprocess.PIPE, text=True,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     try:
         line = process.stdout.readline()
@@ -131,8 +132,21 @@ class Client:
             spec = {"en": spec}
         lat, lon = spec.get("e7") or (e7(*spec["en"]) if "en" in spec else (0, 0))
         return mav.MAVLink_mission_item_int_message(
-            1, 1, seq, spec.get("frame", 3), spec.get("command", 16), 0, 1, spec.get("p1", 0.0), spec.get("p2", 0.0),
-            0.0, 0.0, lat, lon, 0.0, kind,
+            1,
+            1,
+            seq,
+            spec.get("frame", 3),
+            spec.get("command", 16),
+            0,
+            1,
+            spec.get("p1", 0.0),
+            spec.get("p2", 0.0),
+            0.0,
+            0.0,
+            lat,
+            lon,
+            0.0,
+            kind,
         )
 
     async def upload(self, specs: Sequence[Any], kind: int = 0, timeout: float = 30.0) -> int:
@@ -160,13 +174,24 @@ class Client:
 
 
 def sail(
-    job: Callable[[Client], Awaitable[Any]], *, wind: WindModel | None = None, seed: int = 1, is_warm: bool = True,
-    is_moored: bool = False, has_motor: bool = False, heading_deg: float = 0.0, **parameters: float,
+    job: Callable[[Client], Awaitable[Any]],
+    *,
+    wind: WindModel | None = None,
+    seed: int = 1,
+    is_warm: bool = True,
+    is_moored: bool = False,
+    has_motor: bool = False,
+    heading_deg: float = 0.0,
+    **parameters: float,
 ) -> Any:
     """Run ``job`` with a client of a boat, under the virtual clock."""
+
     async def main() -> Any:
         config = AutopilotConfig(
-            is_warm=is_warm, is_moored=is_moored, heading_rad=math.radians(heading_deg), parameters=parameters,
+            is_warm=is_warm,
+            is_moored=is_moored,
+            heading_rad=math.radians(heading_deg),
+            parameters=parameters,
             has_motor=has_motor,
         )
         autopilot = SimulatedAutopilot(config, wind or Constant(0.0, 5.0), seed)

@@ -45,7 +45,7 @@ async def course(client: Client) -> list[float]:
 def test_the_same_course_on_the_real_one(mark: None, tmp_path: Path) -> None:
     async def real() -> tuple[list[float], int]:
         async with ArduRover(
-            PROGRAM, HOME, Constant(0.0, 5.0), speedup=15.0, parameters={"SAIL_XTRACK_MAX": 20.0}, folder=tmp_path,
+            PROGRAM, HOME, Constant(0.0, 5.0), speedup=15.0, parameters={"SAIL_XTRACK_MAX": 20.0}, folder=tmp_path
         ) as boat:
             link = open_link(boat.link)
             client = Client(link.write, None)
@@ -150,10 +150,14 @@ def test_a_program_that_ends_is_reported(tmp_path: Path) -> None:
         clock.run(main(), speedup=10.0)
 
 
-@pytest.mark.parametrize(("content", "words"), [
-    (b"<html>not found</html>", "too small"), (b"\0" * 2_000_000, "not a Linux x86-64 program"),
-    (b"\x7fELF\x02\x01".ljust(18, b"\0") + b"\x3e\0" + b"\0" * 2_000_000, "does not run here"),
-])
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"<html>not found</html>", "too small"),
+        (b"\0" * 2_000_000, "not a Linux x86-64 program"),
+        (b"\x7fELF\x02\x01".ljust(18, b"\0") + b"\x3e\0" + b"\0" * 2_000_000, "does not run here"),
+    ],
+)
 def test_what_was_fetched_is_checked(tmp_path: Path, content: bytes, words: str) -> None:
     source, target = tmp_path / "source", tmp_path / "cache" / "ardurover"
     source.write_bytes(content)

@@ -35,13 +35,21 @@ FRAME = LocalFrame(ORIGIN)
 
 
 @given(
-    lat=st.floats(-85.0, 85.0), lon=st.floats(-179.99, 179.99), course=st.floats(0.0, 359.99),
+    lat=st.floats(-85.0, 85.0),
+    lon=st.floats(-179.99, 179.99),
+    course=st.floats(0.0, 359.99),
     speed=st.floats(0.0, 50.0),
     mmsi=st.integers(200_000_000, 799_999_999),
 )
 def test_a_receivers_sentence_says_where_the_ship_is(lat, lon, course, speed, mmsi):
-    vessel = AisVessel(mmsi=mmsi, position=GeoPoint(lat_deg=lat, lon_deg=lon), cog_deg=course, sog_mps=speed,
-                    heading_deg=course, nav_status=0)
+    vessel = AisVessel(
+        mmsi=mmsi,
+        position=GeoPoint(lat_deg=lat, lon_deg=lon),
+        cog_deg=course,
+        sog_mps=speed,
+        heading_deg=course,
+        nav_status=0,
+    )
     report = NmeaDecoder().feed(sentences(vessel).strip(), 1.0)
     assert report.mmsi == mmsi
     assert not report.is_class_b
@@ -58,8 +66,13 @@ def passed(vane, *messages):
     return frame, mav.MAVLink(None).parse_char(frame)
 
 
-@given(st.floats(0.0, 359.9), st.floats(-math.pi, math.pi), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0),
-       st.floats(2.0, 12.0))
+@given(
+    st.floats(0.0, 359.9),
+    st.floats(-math.pi, math.pi),
+    st.floats(-3.0, 3.0),
+    st.floats(-3.0, 3.0),
+    st.floats(2.0, 12.0),
+)
 def test_a_vane_broken_on_the_link_says_what_a_broken_one_would(twd_deg, yaw, north, east, speed):
     def attitude(yaw):
         return mav.MAVLink_attitude_message(0, 0.0, 0.0, yaw, 0.0, 0.0, 0.0)
@@ -69,16 +82,16 @@ def test_a_vane_broken_on_the_link_says_what_a_broken_one_would(twd_deg, yaw, no
     wind = mav.MAVLink_wind_message(twd_deg, speed, 0.0)
     vane = FaultyVane(seed=0)
     frame, _ = passed(vane, attitude(yaw), way, wind)
-    assert frame[9:-2] == bytes(wind.pack(mav.MAVLink(None, srcSystem=1, srcComponent=1)))[9:-2]   # untouched
+    assert frame[9:-2] == bytes(wind.pack(mav.MAVLink(None, srcSystem=1, srcComponent=1)))[9:-2]  # untouched
     vane.set(VaneFault(state=VaneState.FROZEN))
-    _, heard = passed(vane, wind)   # nothing has moved yet
+    _, heard = passed(vane, wind)  # nothing has moved yet
     assert abs(difference_rad(math.radians(heard.direction), math.radians(twd_deg))) < 1e-3
     assert math.isclose(heard.speed, speed, abs_tol=1e-3)
     vane.set(VaneFault())
     passed(vane, attitude(yaw), at_rest, wind)
     vane.set(VaneFault(state=VaneState.FROZEN))
     _, heard = passed(vane, attitude(yaw + 0.5), mav.MAVLink_wind_message(twd_deg + 5.0, speed, 0.0))
-    assert abs(difference_rad(math.radians(heard.direction), math.radians(twd_deg) + 0.5)) < 1e-3   # it turns with her
+    assert abs(difference_rad(math.radians(heard.direction), math.radians(twd_deg) + 0.5)) < 1e-3  # it turns with her
     vane.set(VaneFault(state=VaneState.OFFSET, value_rad=0.2))
     _, heard = passed(vane, wind)
     assert abs(difference_rad(math.radians(heard.direction), math.radians(twd_deg) + 0.2)) < 1e-3
@@ -114,7 +127,7 @@ def test_a_ship_without_ais_is_judged_and_not_told():
     event = EventSpec(at_s=0.0, kind="vessel", east_m=300.0, course_deg=180.0, sog_mps=5.0, is_on_ais=False)
     reports, truth = run_virtual(heard_for(20, event, 0.0))
     assert reports == []
-    assert truth.vessels_m["211000001"] == pytest.approx(292.0, abs=0.1)   # half a beam off its middle
+    assert truth.vessels_m["211000001"] == pytest.approx(292.0, abs=0.1)  # half a beam off its middle
 
 
 def test_an_intruder_comes_at_our_boat():
@@ -145,7 +158,7 @@ def test_a_relay_carries_both_ways_and_its_link_is_cut_for_a_while():
         async with Relay(f"udpout:127.0.0.1:{port}", seed=1) as relay:
             companion = open_link(relay.link)
             await companion.open(heard.append)
-            relay.line.near.write(frame(0))       # as the companion's first word: the boat then knows whom to answer
+            relay.line.near.write(frame(0))  # as the companion's first word: the boat then knows whom to answer
             await asyncio.sleep(0.1)
             boat.write(frame(1)[:7])
             boat.write(frame(1)[7:] + frame(2))
@@ -183,6 +196,7 @@ class Afloat:
 
 def test_the_voyage_is_over_with_its_summary_however_long_the_picture_takes(tmp_path):
     """At a quarter of a core a voyage of 45 s was said to have taken 130."""
+
     async def watched():
         truth, summary = TrueTrack(), tmp_path / "summary.json"
         others = Others(FRAME, Constant(0.0, 5.0), 0, port=free_port())
@@ -201,8 +215,9 @@ PROGRAM = find()
 @pytest.mark.parametrize("name", ["crossing", "head-on", "overtaking"])
 def test_the_real_autopilot_sails_among_ships(name, tmp_path):
     source = Path(f"sitl/scenarios/{name}.toml")
-    verdict = run_live(load_scenario(source), source, 1, tmp_path / "v", autopilot="ardurover", program=PROGRAM,
-                       speedup=None)
+    verdict = run_live(
+        load_scenario(source), source, 1, tmp_path / "v", autopilot="ardurover", program=PROGRAM, speedup=None
+    )
     assert verdict.passed, [c for c in verdict.checks if not c.passed]
 
 
@@ -210,7 +225,9 @@ def test_the_real_autopilot_sails_among_ships(name, tmp_path):
 def test_a_run_that_is_terminated_leaves_nobody_behind(begun, tmp_path):
     with subprocess.Popen(
         [sys.executable, "-m", "sitl.cli", "run", "rocks", "--live", "--out", str(tmp_path / "v")],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
     ) as run:
         try:
             left = {}
@@ -218,7 +235,7 @@ def test_a_run_that_is_terminated_leaves_nobody_behind(begun, tmp_path):
                 time.sleep(0.02)
                 left = children(run.pid)
             if begun == "companion.cli":
-                while "WAITING" not in run.stdout.readline():   # its own progress
+                while "WAITING" not in run.stdout.readline():  # its own progress
                     pass
                 left = children(run.pid)
             run.terminate()
@@ -261,10 +278,17 @@ def test_the_boat_ends_with_the_one_who_began_it():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
         ear.bind(("127.0.0.1", 0))
         ear.settimeout(60.0)
-        boat = [sys.executable, "-m", "sitl.run.live_boat", "sitl/scenarios/demo.toml", "--endpoint",
-                f"udpout:127.0.0.1:{ear.getsockname()[1]}"]
+        boat = [
+            sys.executable,
+            "-m",
+            "sitl.run.live_boat",
+            "sitl/scenarios/demo.toml",
+            "--endpoint",
+            f"udpout:127.0.0.1:{ear.getsockname()[1]}",
+        ]
         starter = subprocess.Popen(
-            [sys.executable, "-c", f"import subprocess; subprocess.run({boat!r})"], stdin=subprocess.DEVNULL)
+            [sys.executable, "-c", f"import subprocess; subprocess.run({boat!r})"], stdin=subprocess.DEVNULL
+        )
         try:
             ear.recv(300)
         finally:

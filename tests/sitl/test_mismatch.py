@@ -18,22 +18,25 @@ OTHER = Path("sitl/scenarios/other-boat.toml")
 BOTH = Path("sitl/scenarios/tide-and-lee.toml")
 
 
-@pytest.mark.parametrize(("text", "place", "words"), [
-    ("[boat]\ntack_fails=1.5", "boat.tack_fails", "at most 1.0"),
-    ("[boat]\nbeat=-0.2", "boat.beat", "at least 0.2"),
-    ("[boat]\nleeway_deg=nan", "boat.leeway_deg", "0"),
-    ("[boat]\nleeway=4", "boat", "did you mean `leeway_deg`?"),
-    ("[current]\ndrift_mps=-1", "current.drift_mps", "at least 0.0"),
-    ("[current]\ntide_s=0", "current.tide_s", "above 0.0"),
-    ("[current]\nset=3", "current", "set_deg"),
-    ("[waves]\nheight_m=1", "waves", "known:"),
-    ("[waves]\nperiod_s='long'", "waves.period_s", "expected a number, got a text"),
-    ("[sensors]\ngps_noise_m=inf", "sensors.gps_noise_m", "at most 100.0"),
-    ("[sensors]\nvane=10", "sensors", "did you mean `vane_deg`?"),
-    ("[[wind.lees]]\neast_m=0\nnorth_m=0", "wind.lees[0]", "radius_m"),
-    ("[[wind.lees]]\neast_m=0\nnorth_m=0\nradius_m=5\nlos=1", "wind.lees[0]", "did you mean `loss`?"),
-    ("[wind]\ngust_spread=2.0", "wind.gust_spread", "at most 1.0"),
-])
+@pytest.mark.parametrize(
+    ("text", "place", "words"),
+    [
+        ("[boat]\ntack_fails=1.5", "boat.tack_fails", "at most 1.0"),
+        ("[boat]\nbeat=-0.2", "boat.beat", "at least 0.2"),
+        ("[boat]\nleeway_deg=nan", "boat.leeway_deg", "0"),
+        ("[boat]\nleeway=4", "boat", "did you mean `leeway_deg`?"),
+        ("[current]\ndrift_mps=-1", "current.drift_mps", "at least 0.0"),
+        ("[current]\ntide_s=0", "current.tide_s", "above 0.0"),
+        ("[current]\nset=3", "current", "set_deg"),
+        ("[waves]\nheight_m=1", "waves", "known:"),
+        ("[waves]\nperiod_s='long'", "waves.period_s", "expected a number, got a text"),
+        ("[sensors]\ngps_noise_m=inf", "sensors.gps_noise_m", "at most 100.0"),
+        ("[sensors]\nvane=10", "sensors", "did you mean `vane_deg`?"),
+        ("[[wind.lees]]\neast_m=0\nnorth_m=0", "wind.lees[0]", "radius_m"),
+        ("[[wind.lees]]\neast_m=0\nnorth_m=0\nradius_m=5\nlos=1", "wind.lees[0]", "did you mean `loss`?"),
+        ("[wind]\ngust_spread=2.0", "wind.gust_spread", "at most 1.0"),
+    ],
+)
 def test_what_cannot_be_is_one_line_with_its_place(tmp_path, text, place, words):
     path = tmp_path / "s.toml"
     path.write_text(f"name='x'\nmission='m.toml'\n{text}\n")
@@ -63,8 +66,7 @@ MADE = {
     WavesSpec: lambda spec: scenario_departures(scenario_with(waves=spec)),
     SensorsSpec: lambda spec: scenario_departures(scenario_with(sensors=spec)),
     CurrentSpec: lambda spec: waters_of(current=spec).stream,
-    LeeSpec: lambda spec: waters_of(
-        wind=msgspec.structs.replace(load_scenario(OTHER).wind, lees=(spec,))).lees,
+    LeeSpec: lambda spec: waters_of(wind=msgspec.structs.replace(load_scenario(OTHER).wind, lees=(spec,))).lees,
 }
 
 

@@ -17,8 +17,18 @@ from tests.sitl.runner.jobs import jobs_in, quick
 
 
 def row(seed, time_s=300.0, *, scenario="demo", water="abc", **more):
-    return {"scenario": scenario, "hash": water, "seed": seed, "passed": True, "arrived": True, "contacts": 0,
-            "time_s": time_s, "min_clearance_m": 12.0, "tacks": 6, **more}
+    return {
+        "scenario": scenario,
+        "hash": water,
+        "seed": seed,
+        "passed": True,
+        "arrived": True,
+        "contacts": 0,
+        "time_s": time_s,
+        "min_clearance_m": 12.0,
+        "tacks": 6,
+        **more,
+    }
 
 
 def table(rows, campaign="campaign"):
@@ -37,7 +47,7 @@ def change_of(comparison, name, group="demo"):
 def test_the_same_is_the_same():
     found = compare(table(noisy(range(8), 1)), table(noisy(range(8), 1)))
     assert (found.same, len(found.pairs), found.worse) == (8, 8, ())
-    assert compare(table(noisy(range(8), 1)), table(noisy(range(8), 1, gybes=3))).same == 8   # counted since
+    assert compare(table(noisy(range(8), 1)), table(noisy(range(8), 1, gybes=3))).same == 8  # counted since
     assert compare(table(noisy(range(8), 1, gybes=2)), table(noisy(range(8), 1, gybes=3))).same == 0
     text = told(found)
     assert "8 pairs, 8 of them the same in every figure\nno figure that is measured here changed\nnot worse" in text
@@ -157,8 +167,10 @@ def test_values_of_several_kinds_are_kept(tmp_path):
     rows = [{"seed": 0, "a": 1, "b": None, "c": "x"}, {"seed": 1, "a": 2.5, "b": True, "c": 3}]
     path = tmp_path / "t.parquet"
     write_table(Table(campaign="quick", by=made_by(), keys=("seed",), rows=tuple(rows)), path)
-    assert read_table(path).rows == ({"seed": 0, "a": 1.0, "b": None, "c": "x"},
-                                     {"seed": 1, "a": 2.5, "b": True, "c": "3"})
+    assert read_table(path).rows == (
+        {"seed": 0, "a": 1.0, "b": None, "c": "x"},
+        {"seed": 1, "a": 2.5, "b": True, "c": "3"},
+    )
 
 
 def test_parts_are_joined_to_the_file_of_the_whole(tmp_path, ledger, capsys):
@@ -195,7 +207,7 @@ def test_the_command_shows_compares_and_fails_on_worse(tmp_path, ledger, capsys)
             figures = {**result["figures"], "time_s": 2.0 * result["figures"]["time_s"]}
             file.add(key, {**result, "arrived": True, "figures": figures}, {})
     words = ["results", "compare", str(ledger.with_suffix(".parquet")), str(slow), "--json", str(tmp_path / "c.json")]
-    assert cli.main([*words, "--fail-on-worse"]) == 0   # nobody arrived in the first: no pair of times
+    assert cli.main([*words, "--fail-on-worse"]) == 0  # nobody arrived in the first: no pair of times
     assert "5 pairs, 0 of them the same" in capsys.readouterr().out
     faster = tmp_path / "faster.parquet"
     rows = tuple({**r, "time_s": 1.0, "seed": n} for r in read_table(slow).rows for n in range(12))

@@ -28,18 +28,21 @@ def test_our_scenarios_load_and_their_weather_repeats(path):
     assert [a.at(t) for t in (0.0, 100.0, 50.0)] == [b.at(t) for t in (0.0, 100.0, 50.0)]
 
 
-@pytest.mark.parametrize(("text", "place", "words"), [
-    ("name = 'x'", "", "mission"),
-    ("name='x'\nmission='no.toml'", "mission", "there is no file"),
-    ("name='x'\nmission='m.toml'\nlimitt_s=3", "", "limit_s"),
-    ("name='x'\nmission='m.toml'\n[wind]\nmodel='gale'", "wind.model", "gale"),
-    ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='kraken'", "events", "kraken"),
-    ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='far_order'", "events", "[satellite]"),
-    ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='vane'\nstate='frozn'", "events", "frozen"),
-    ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='leak'\nstate='on'", "events", "known: none"),
-    ("name='x'\nmission='m.toml'\n[satellite]\nlos=1", "", "loss"),
-    ("name=", "", "TOML"),
-])
+@pytest.mark.parametrize(
+    ("text", "place", "words"),
+    [
+        ("name = 'x'", "", "mission"),
+        ("name='x'\nmission='no.toml'", "mission", "there is no file"),
+        ("name='x'\nmission='m.toml'\nlimitt_s=3", "", "limit_s"),
+        ("name='x'\nmission='m.toml'\n[wind]\nmodel='gale'", "wind.model", "gale"),
+        ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='kraken'", "events", "kraken"),
+        ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='far_order'", "events", "[satellite]"),
+        ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='vane'\nstate='frozn'", "events", "frozen"),
+        ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='leak'\nstate='on'", "events", "known: none"),
+        ("name='x'\nmission='m.toml'\n[satellite]\nlos=1", "", "loss"),
+        ("name=", "", "TOML"),
+    ],
+)
 def test_bad_scenarios(tmp_path, text, place, words):
     path = tmp_path / "s.toml"
     path.write_text(text)
@@ -80,9 +83,11 @@ def test_the_example_is_a_scenario_that_can_be_read_and_nothing_is_written_over(
     assert (scenario.name, len(scenario.events), scenario.expect.max_time_s) == ("squall", 2, 600.0)
     assert cli.main(["example", str(folder)]) == 2
     assert "nothing is written over" in capsys.readouterr().err
-    bare = "\n".join(line.removeprefix("# ") if re.match(r"# (\w+ = |\[)", line) else line
-                     for line in (folder / "squall.toml").read_text().splitlines())
-    (folder / "all.toml").write_text(bare)   # what is commented out is right, too
+    bare = "\n".join(
+        line.removeprefix("# ") if re.match(r"# (\w+ = |\[)", line) else line
+        for line in (folder / "squall.toml").read_text().splitlines()
+    )
+    (folder / "all.toml").write_text(bare)  # what is commented out is right, too
     assert load_scenario(folder / "all.toml").current is not None
 
 
@@ -102,7 +107,7 @@ def test_a_free_port_is_nobodys_of_udp_and_of_tcp_and_none_that_the_system_gives
         with socket.socket(socket.AF_INET, kind) as other:
             other.bind(("127.0.0.1", taken))
             assert free_port() != taken
-        assert next(drawn) != taken - PORTS.start     # that one was drawn
+        assert next(drawn) != taken - PORTS.start  # that one was drawn
     assert PORTS.stop <= 32_768
 
 

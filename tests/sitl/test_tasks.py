@@ -36,7 +36,7 @@ def test_beside_the_marks_and_up_to_the_line_is_not_through_it():
 def test_a_start_is_after_the_gun_and_soon(after_s, passed):
     start = GateLine(port_en_m=(-10.0, 50.0), starboard_en_m=(10.0, 50.0), after_s=after_s)
     way = track((0.0, 0.0), (0.0, 70.0))
-    t_s = [100.0 + 0.25 * n for n in range(len(way))]   # crossed after about 7 s
+    t_s = [100.0 + 0.25 * n for n in range(len(way))]  # crossed after about 7 s
     found = list(findings(ExpectSpec(start_within_s=4.0), Tasks(gates=(start,)), t_s, way, set()))
     assert [ok for _, ok, *_ in found] == passed
 
@@ -46,7 +46,8 @@ def test_the_gun_by_the_clock_is_in_the_tracks_time():
     way = track((0.0, 0.0), (0.0, 70.0))
     t_s = [0.25 * n for n in range(len(way))]
     (_, ok, late_s, _), *_ = findings(
-        ExpectSpec(start_within_s=4.0), Tasks(gates=(start,), epoch_s=995.0), t_s, way, set())
+        ExpectSpec(start_within_s=4.0), Tasks(gates=(start,), epoch_s=995.0), t_s, way, set()
+    )
     assert ok
     assert late_s == pytest.approx(2.0, abs=0.5)
 
@@ -62,7 +63,7 @@ def test_the_time_in_a_box_is_from_first_entry_and_each_box_follows_the_one_befo
     t_s = [float(n) for n in range(len(way))]
     assert shares_inside(t_s, way, [first, second], 9.0) == [0.9, 1.0]
     assert shares_inside(t_s, way, [second, first], 9.0) == [1.0, 0.0]
-    assert shares_inside(t_s, way, [first], 60.0) == [0.0]   # not so long
+    assert shares_inside(t_s, way, [first], 60.0) == [0.0]  # not so long
 
 
 def test_what_was_seen_is_the_water_within_half_a_swath_of_the_track():

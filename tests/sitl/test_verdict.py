@@ -28,11 +28,21 @@ def hulls(en_m, heading_deg=0.0, hull=DOT):
 
 def test_a_verdict_is_printed_in_words(capsys):
     """It printed "pass  no unhandled error: [] ([])" (issue 13, what still made him stop)."""
-    print_verdict(judge(
-        scenario="x", seed=1, expect=ExpectSpec(arrived=True, contacts=0, min_clearance_m=2.0, alerts=("irons",)),
-        truth=_truth([45.0] * 20), solid=shapely.Polygon(), hull=DOT, goal_en_m=(100.0, 0.0),
-        summary={"arrived": True, "replans": 0}, status_times_s=[0.0], alerts=[], ordered=[],
-    ))
+    print_verdict(
+        judge(
+            scenario="x",
+            seed=1,
+            expect=ExpectSpec(arrived=True, contacts=0, min_clearance_m=2.0, alerts=("irons",)),
+            truth=_truth([45.0] * 20),
+            solid=shapely.Polygon(),
+            hull=DOT,
+            goal_en_m=(100.0, 0.0),
+            summary={"arrived": True, "replans": 0},
+            status_times_s=[0.0],
+            alerts=[],
+            ordered=[],
+        )
+    )
     out = capsys.readouterr().out
     assert "pass  no unhandled error: none (wanted: none)" in out
     assert "pass  arrived: yes (wanted: yes)" in out
@@ -49,9 +59,18 @@ def test_a_boat_that_is_to_hold_is_judged_by_how_far_she_goes_meanwhile(held, wi
         truth.add(5.0 + t_s, (10.0 * (min(t_s, 10) + max(0, t_s - 20)), 0.0), 0.0, 1.0, (0.0, 5.0))
     for limit_m in (1.0, 200.0):
         verdict = judge(
-            scenario="x", seed=1, expect=ExpectSpec(held=HeldSpec(from_s=held[0], to_s=held[1], within_m=limit_m)),
-            truth=truth, solid=shapely.Polygon(), hull=DOT, goal_en_m=(0.0, 0.0), summary={"arrived": True},
-            status_times_s=None, alerts=[], began_s=5.0)
+            scenario="x",
+            seed=1,
+            expect=ExpectSpec(held=HeldSpec(from_s=held[0], to_s=held[1], within_m=limit_m)),
+            truth=truth,
+            solid=shapely.Polygon(),
+            hull=DOT,
+            goal_en_m=(0.0, 0.0),
+            summary={"arrived": True},
+            status_times_s=None,
+            alerts=[],
+            began_s=5.0,
+        )
         check = next(c for c in verdict.checks if c.name == "held within, m")
         if within_m is None:
             assert (check.passed, check.figure) == (False, None)
@@ -99,17 +118,29 @@ def test_the_hull_is_where_the_planes_geometry_has_it():
     for _ in range(50):
         en, heading = rng.uniform(-25, 25, 2), rng.uniform(-np.pi, np.pi)
         box = shapely.affinity.translate(
-            shapely.affinity.rotate(shapely.box(-1.0, -4.0, 1.0, 4.0), -np.degrees(heading), origin=(0, 0)), *en)
+            shapely.affinity.rotate(shapely.box(-1.0, -4.0, 1.0, 4.0), -np.degrees(heading), origin=(0, 0)), *en
+        )
         assert hulls([en], np.degrees(heading), LONG).least_m(ISLAND)[0] == pytest.approx(
-            shapely.distance(box, ISLAND), abs=1e-9)
+            shapely.distance(box, ISLAND), abs=1e-9
+        )
 
 
 def test_a_boat_that_never_sailed_touched_nothing_and_does_not_pass():
     def verdict(truth):
-        return judge(scenario="x", seed=0, expect=ExpectSpec(arrived=None), truth=truth, solid=ISLAND, hull=DOT,
-                     goal_en_m=(0.0, 99.0), summary={}, status_times_s=None, alerts=())
+        return judge(
+            scenario="x",
+            seed=0,
+            expect=ExpectSpec(arrived=None),
+            truth=truth,
+            solid=ISLAND,
+            hull=DOT,
+            goal_en_m=(0.0, 99.0),
+            summary={},
+            status_times_s=None,
+            alerts=(),
+        )
 
-    assert verdict(_truth([0.0] * 400)).passed is False   # through the island
+    assert verdict(_truth([0.0] * 400)).passed is False  # through the island
     away = _truth([0.0] * 400)
     away.en_m = [(50.0, north) for _, north in away.en_m]
     assert verdict(away).passed
@@ -139,9 +170,25 @@ def test_tacks_are_counted_on_the_way_only():
     """Past the goal the autopilot loiters as it likes."""
     late = [60.0] * 100 + [-60.0] * 60
     expect = ExpectSpec(arrived=None, within_m=5.0, max_tacks=0)
+
     def passed(goal_north_m):
-        return judge(scenario="s", seed=0, expect=expect, truth=_truth(late), solid=shapely.Polygon(), hull=DOT,
-                     goal_en_m=(0.0, goal_north_m), summary={}, status_times_s=None, alerts=()).checks[-1].passed
+        return (
+            judge(
+                scenario="s",
+                seed=0,
+                expect=expect,
+                truth=_truth(late),
+                solid=shapely.Polygon(),
+                hull=DOT,
+                goal_en_m=(0.0, goal_north_m),
+                summary={},
+                status_times_s=None,
+                alerts=(),
+            )
+            .checks[-1]
+            .passed
+        )
+
     assert passed(50.0)
     assert not passed(500.0)
 
@@ -165,9 +212,17 @@ def test_silence_counts_both_ends():
 def test_a_verdict_fails_for_each_reason_by_name():
     truth = _truth([45.0] * 20)
     verdict = judge(
-        scenario="x", seed=1, expect=ExpectSpec(arrived=True, contacts=0, within_m=1.0, alerts=("irons",)),
-        truth=truth, solid=shapely.Point(0, 5).buffer(1.0), hull=DOT, goal_en_m=(100.0, 0.0),
-        summary={"arrived": False}, status_times_s=[0.0], alerts=[], errors=["boom"],
+        scenario="x",
+        seed=1,
+        expect=ExpectSpec(arrived=True, contacts=0, within_m=1.0, alerts=("irons",)),
+        truth=truth,
+        solid=shapely.Point(0, 5).buffer(1.0),
+        hull=DOT,
+        goal_en_m=(100.0, 0.0),
+        summary={"arrived": False},
+        status_times_s=[0.0],
+        alerts=[],
+        errors=["boom"],
     )
     failed = {c.name for c in verdict.checks if not c.passed}
     assert failed == {"no unhandled error", "arrived", "contacts", "distance to the goal, m", "announced irons"}
@@ -198,8 +253,19 @@ def test_a_board_near_a_mark_and_a_miss_sailed_again_are_not_the_rounding():
 
 
 def verdict_of(truth, hull=DOT, **how):
-    return judge(scenario="x", seed=0, expect=how.pop("expect", ExpectSpec(arrived=None, contacts=9)), truth=truth,
-                 solid=ISLAND, hull=hull, goal_en_m=(0.0, 99.0), summary={}, status_times_s=None, alerts=(), **how)
+    return judge(
+        scenario="x",
+        seed=0,
+        expect=how.pop("expect", ExpectSpec(arrived=None, contacts=9)),
+        truth=truth,
+        solid=ISLAND,
+        hull=hull,
+        goal_en_m=(0.0, 99.0),
+        summary={},
+        status_times_s=None,
+        alerts=(),
+        **how,
+    )
 
 
 def passes_by(off_m):
@@ -211,7 +277,7 @@ def passes_by(off_m):
 @pytest.mark.parametrize(("off_m", "hull", "keeps"), [(8.2, DOT, True), (7.8, DOT, False), (8.8, LONG, False)])
 def test_in_ordinary_weather_the_hull_keeps_the_floor(off_m, hull, keeps):
     assert verdict_of(passes_by(off_m), hull, floor_m=8.0).passed is keeps
-    assert verdict_of(passes_by(off_m), hull).passed                   # not asked for
+    assert verdict_of(passes_by(off_m), hull).passed  # not asked for
 
 
 def test_the_higher_of_floor_and_expectation_is_asked_for():
@@ -220,9 +286,9 @@ def test_the_higher_of_floor_and_expectation_is_asked_for():
     assert verdict_of(passes_by(9.5), floor_m=8.0, expect=expect).passed
 
 
-@pytest.mark.parametrize(("called_at_s", "passed"), [
-    ((), False), ((10.0,), False), ((0.0, 60.0), True), ((200.0,), False), (None, True),
-])
+@pytest.mark.parametrize(
+    ("called_at_s", "passed"), [((), False), ((10.0,), False), ((0.0, 60.0), True), ((200.0,), False), (None, True)]
+)
 def test_a_contact_is_announced_in_time(called_at_s, passed):
     """The track of 100 s touches at 50 s."""
     truth = passes_by(-5.0)
@@ -231,17 +297,20 @@ def test_a_contact_is_announced_in_time(called_at_s, passed):
     assert verdict_of(passes_by(5.0), expect=expect, called_at_s=()).passed
 
 
-@pytest.mark.parametrize(("event", "ordinary"), [
-    (EventSpec(at_s=1.0, kind="wind_speed", tws_mps=13.0), True),
-    (EventSpec(at_s=1.0, kind="wind_shift", veer_deg=40.0), True),
-    (EventSpec(at_s=1.0, kind="wind_shift", veer_deg=-120.0), False),
-    (EventSpec(at_s=1.0, kind="link_cut", for_s=1.2), True),
-    (EventSpec(at_s=1.0, kind="link_cut", for_s=30.0), False),
-    (EventSpec(at_s=1.0, kind="link_cut"), False),
-    (EventSpec(at_s=1.0, kind="link_quality", loss=0.1, delay_s=1.5), True),
-    (EventSpec(at_s=1.0, kind="link_quality", loss=0.6), False),
-    (EventSpec(at_s=1.0, kind="gps_jump", east_m=30.0), False),
-    (EventSpec(at_s=1.0, kind="mode", mode="HOLD"), False),
-])
+@pytest.mark.parametrize(
+    ("event", "ordinary"),
+    [
+        (EventSpec(at_s=1.0, kind="wind_speed", tws_mps=13.0), True),
+        (EventSpec(at_s=1.0, kind="wind_shift", veer_deg=40.0), True),
+        (EventSpec(at_s=1.0, kind="wind_shift", veer_deg=-120.0), False),
+        (EventSpec(at_s=1.0, kind="link_cut", for_s=1.2), True),
+        (EventSpec(at_s=1.0, kind="link_cut", for_s=30.0), False),
+        (EventSpec(at_s=1.0, kind="link_cut"), False),
+        (EventSpec(at_s=1.0, kind="link_quality", loss=0.1, delay_s=1.5), True),
+        (EventSpec(at_s=1.0, kind="link_quality", loss=0.6), False),
+        (EventSpec(at_s=1.0, kind="gps_jump", east_m=30.0), False),
+        (EventSpec(at_s=1.0, kind="mode", mode="HOLD"), False),
+    ],
+)
 def test_what_is_ordinary(event, ordinary):
     assert is_ordinary(event) is ordinary

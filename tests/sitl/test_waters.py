@@ -17,10 +17,10 @@ places = st.tuples(st.floats(-2000, 2000), st.floats(-2000, 2000))
 
 def test_a_lee_is_behind_its_island_and_fills_again():
     waters = Waters(wind=NORTHERLY, lees=(ISLAND,))
-    assert waters.wind_at(0.0, (100.0, 200.0))[1] == 6.0                                  # to windward
-    assert waters.wind_at(0.0, (100.0, 49.0))[1] == pytest.approx(2.4, abs=0.05)          # close behind
+    assert waters.wind_at(0.0, (100.0, 200.0))[1] == 6.0  # to windward
+    assert waters.wind_at(0.0, (100.0, 49.0))[1] == pytest.approx(2.4, abs=0.05)  # close behind
     assert waters.wind_at(0.0, (100.0, -150.0))[1] == pytest.approx(6.0 * (1 - 0.6 / math.e), abs=0.05)
-    assert waters.wind_at(0.0, (300.0, 0.0))[1] == pytest.approx(6.0, abs=0.01)           # beside it
+    assert waters.wind_at(0.0, (300.0, 0.0))[1] == pytest.approx(6.0, abs=0.01)  # beside it
     assert waters.wind_at(0.0, (100.0, -3000.0))[1] == pytest.approx(6.0, abs=0.01)
 
 
@@ -49,7 +49,7 @@ def test_a_tide_runs_to_and_fro_or_turns():
     assert tide.at(600.0, (0.0, 0.0)) == pytest.approx((-0.8, 0.0))
     assert tide.at(350.0, (0.0, 0.0)) == pytest.approx((0.0, 0.0))
     turning = replace(tide, tide_turns=1.0)
-    assert turning.at(350.0, (0.0, 0.0)) == pytest.approx((0.0, -0.8))   # from east to south: with the clock
+    assert turning.at(350.0, (0.0, 0.0)) == pytest.approx((0.0, -0.8))  # from east to south: with the clock
     for t in range(0, 1000, 50):
         assert math.hypot(*turning.at(float(t), (0.0, 0.0))) == pytest.approx(0.8)
 

@@ -63,11 +63,14 @@ def test_a_wind_is_a_function_of_time(seed: int, times: list[float]) -> None:
 
 
 def test_events_compose() -> None:
-    wind = Scripted(Constant(math.radians(350.0), 5.0), (
-        WindEvent(at_s=10.0, veer_rad=math.radians(20.0), over_s=10.0),
-        WindEvent(at_s=50.0, tws_mps=0.0, over_s=5.0, for_s=20.0),
-        WindEvent(at_s=100.0, tws_mps=7.5, for_s=5.0),
-    ))
+    wind = Scripted(
+        Constant(math.radians(350.0), 5.0),
+        (
+            WindEvent(at_s=10.0, veer_rad=math.radians(20.0), over_s=10.0),
+            WindEvent(at_s=50.0, tws_mps=0.0, over_s=5.0, for_s=20.0),
+            WindEvent(at_s=100.0, tws_mps=7.5, for_s=5.0),
+        ),
+    )
     assert wind.at(9.0) == (pytest.approx(math.radians(350.0)), 5.0)
     assert math.degrees(difference_rad(wind.at(15.0)[0], 0.0)) == pytest.approx(0.0, abs=1e-6)
     assert math.degrees(wind.at(30.0)[0]) == pytest.approx(10.0)
@@ -88,11 +91,16 @@ def test_record(tmp_path: Path) -> None:
     assert wind.at(99.0)[1] == 6.0
 
 
-@pytest.mark.parametrize(("text", "place"), [
-    ("t_s,wind_from_deg\n1,2\n", "line 1"), ("t_s,wind_from_deg,wind_speed_ms\n1,2,x\n", "line 2"),
-    ("t_s,wind_from_deg,wind_speed_ms\n1,2,3\n1,2,3\n", "line 3"), ("t_s,wind_from_deg,wind_speed_ms\n", "no wind"),
-    ("t_s,wind_from_deg,wind_speed_ms\n1,2,500\n", "line 2"),
-])
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("t_s,wind_from_deg\n1,2\n", "line 1"),
+        ("t_s,wind_from_deg,wind_speed_ms\n1,2,x\n", "line 2"),
+        ("t_s,wind_from_deg,wind_speed_ms\n1,2,3\n1,2,3\n", "line 3"),
+        ("t_s,wind_from_deg,wind_speed_ms\n", "no wind"),
+        ("t_s,wind_from_deg,wind_speed_ms\n1,2,500\n", "line 2"),
+    ],
+)
 def test_bad_records_are_named(tmp_path: Path, text: str, place: str) -> None:
     path = tmp_path / "bad.csv"
     path.write_text(text)

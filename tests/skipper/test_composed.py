@@ -35,8 +35,14 @@ def goal(composed, en_m=(80.0, -50.0), name="the ring"):
 
 
 def make(*goals, obstacles=(), permissions=ALL_PERMITTED, config=None, **world):
-    return World(skipper=skipper(voyage(*goals, obstacles=obstacles), **(config or {})), expansions=1500, sigma=0.05,
-                 heading=math.pi / 2.0, permissions=permissions, **world)
+    return World(
+        skipper=skipper(voyage(*goals, obstacles=obstacles), **(config or {})),
+        expansions=1500,
+        sigma=0.05,
+        heading=math.pi / 2.0,
+        permissions=permissions,
+        **world,
+    )
 
 
 def steered(world):
@@ -62,7 +68,7 @@ def test_a_circle_is_sailed_for_its_time_and_a_mark_by_plan_behind_it():
     way = world.track[-800:]
     assert all(25.0 < distance_m(p, RING.at_en) < 75.0 for p in way)
     bearings = [math.atan2(p[0] - 80.0, p[1]) for p in way]
-    assert {round(b) for b in bearings} >= {-3, -2, -1, 0, 1, 2, 3}          # all round it
+    assert {round(b) for b in bearings} >= {-3, -2, -1, 0, 1, 2, 3}  # all round it
     assert all(abs(difference_rad(a.heading_rad, 0.0)) >= world.no_go - 1e-9 for _, a in steered(world))
     assert world.run(300, lambda w: w.state.phase is Phase.DONE)
     assert world.state.progress.reached == (0, 1)
@@ -91,8 +97,11 @@ def test_until_a_place_is_reached_by_a_field_that_goes_round_something_that_only
 
 
 def test_a_station_is_kept_until_told_to_go_on():
-    world = make(goal(field("stay", stay=StayAt(at_en=(60.0, 0.0))), (60.0, 0.0)), MARK,
-                 permissions=replace(ALL_PERMITTED, orders=("all",)))
+    world = make(
+        goal(field("stay", stay=StayAt(at_en=(60.0, 0.0))), (60.0, 0.0)),
+        MARK,
+        permissions=replace(ALL_PERMITTED, orders=("all",)),
+    )
     assert world.run(120, lambda w: distance_m(w.position, (60.0, 0.0)) < 8.0)
     world.run(150)
     assert max(distance_m(p, (60.0, 0.0)) for p in world.track[-600:]) < 20.0
@@ -104,7 +113,7 @@ def test_a_station_is_kept_until_told_to_go_on():
 
 
 def test_what_stands_still_is_kept_clear_of_though_the_field_leads_over_it():
-    rock = box(60.0, -62.0, 100.0, -38.0)           # on the ring
+    rock = box(60.0, -62.0, 100.0, -38.0)  # on the ring
     world = make(goal(field("ring", Until.TIME, 240.0, ring=RING), (30.0, 0.0)), obstacles=(rock,))
     assert world.run(400, lambda w: w.state.phase is Phase.DONE)
     assert world.clearance() > 4.0
@@ -127,8 +136,11 @@ def test_a_field_that_leads_nowhere_is_given_up_by_name_and_she_loiters_at_its_p
 
 def test_a_field_that_has_a_value_again_steers_again():
     """Two places that pull alike: in the middle they cancel. She is carried out of it."""
-    named = {"west": Heading(heading_rad=-math.pi / 2.0), "east": Heading(heading_rad=math.pi / 2.0),
-             "rock": AwayFrom(at_en=(20.0, 300.0), range_m=100.0)}
+    named = {
+        "west": Heading(heading_rad=-math.pi / 2.0),
+        "east": Heading(heading_rad=math.pi / 2.0),
+        "rock": AwayFrom(at_en=(20.0, 300.0), range_m=100.0),
+    }
     world = make(goal(field("west + east + 0.2 * rock", Until.TIME, 900.0, **named), (20.0, 0.0)))
     assert world.run(120, lambda w: "no field" in codes(w))
     world.run(60)
@@ -152,8 +164,9 @@ def test_without_a_wind_the_field_is_given_up_and_the_autopilot_sails_by_its_own
 
 
 def test_without_permission_to_steer_she_waits_at_its_place_and_it_is_said():
-    world = make(goal(field("ring", Until.TIME, 150.0, ring=RING)), MARK,
-                 permissions=replace(ALL_PERMITTED, may_steer=False))
+    world = make(
+        goal(field("ring", Until.TIME, 150.0, ring=RING)), MARK, permissions=replace(ALL_PERMITTED, may_steer=False)
+    )
     assert world.run(120, lambda w: w.state.phase is Phase.HOLDING)
     assert "steering is not permitted" in world.state.why
     assert world.run(300, lambda w: w.state.phase is Phase.DONE)
@@ -164,14 +177,27 @@ def test_without_permission_to_steer_she_waits_at_its_place_and_it_is_said():
 def test_stay_until_a_vessel_is_in_the_square_then_leave_it():
     leave = field("out", Until.OUTSIDE, 300.0, SQUARE, out=OutOf(water_en=SQUARE))
     stay = field("stay", Until.VESSEL, 900.0, SQUARE, stay=StayAt(at_en=(0.0, 0.0)))
-    world = make(goal(stay, (0.0, 0.0), "stay"), goal(leave, (-90.0, 0.0), "leave"),
-                 config={"traffic_clearance_m": 20.0})
+    world = make(
+        goal(stay, (0.0, 0.0), "stay"), goal(leave, (-90.0, 0.0), "leave"), config={"traffic_clearance_m": 20.0}
+    )
     heard = Targets.empty(FRAME)
     least, entered, left = math.inf, None, None
     for _ in range(400):
         there = (160.0 - 1.5 * max(0.0, world.t - 120.0), 10.0)
-        heard = heard.heard(report(world.t, there, name="Nellie", course_rad=-math.pi / 2.0, speed_mps=1.5,
-                                   heading_rad=-math.pi / 2.0, bow_m=2.0, stern_m=2.0, port_m=1.0, starboard_m=1.0))
+        heard = heard.heard(
+            report(
+                world.t,
+                there,
+                name="Nellie",
+                course_rad=-math.pi / 2.0,
+                speed_mps=1.5,
+                heading_rad=-math.pi / 2.0,
+                bow_m=2.0,
+                stern_m=2.0,
+                port_m=1.0,
+                starboard_m=1.0,
+            )
+        )
         world.extra = {"traffic": heard.picture(world.t)}
         world.step()
         inside = max(abs(world.position[0]), abs(world.position[1])) < 60.0

@@ -17,8 +17,12 @@ REFUGE, HOME = (60.0, 90.0), (0.0, 0.0)
 
 
 def under_way(ends=None, *, has_refuge=True, **config):
-    world = make(FAR, obstacles=(), voyage={"refuges": (REFUGE,)} if has_refuge else {},
-                 config={"ends": ends or Ends(), **config})
+    world = make(
+        FAR,
+        obstacles=(),
+        voyage={"refuges": (REFUGE,)} if has_refuge else {},
+        config={"ends": ends or Ends(), **config},
+    )
     world.shown["home"] = FRAME.geo_from_en(*HOME)
     assert world.run(60, lambda w: w.state.voyage.sailing)
     world.run(30)
@@ -55,12 +59,19 @@ def test_each_cause_leads_where_the_mission_says_and_on_when_it_is_over(cause, e
         assert world.state.voyage.arrived
         return
     assert world.run(400, lambda w: "; waiting until" in w.state.why)
-    assert distance_m(world.position, where or here) < (30.0 if where else 150.0)   # darkness takes half a minute
+    assert distance_m(world.position, where or here) < (30.0 if where else 150.0)  # darkness takes half a minute
     plans = world.count(RequestPlan)
     world.run(60)
     assert world.count(RequestPlan) == plans
-    CAUSES[cause](world, **{"leak": {"is_wet": False}, "dark": {"is_dark": False}, "shore_lost": {"is_silent": False},
-                            "battery": {"is_low": False}}[cause])
+    CAUSES[cause](
+        world,
+        **{
+            "leak": {"is_wet": False},
+            "dark": {"is_dark": False},
+            "shore_lost": {"is_silent": False},
+            "battery": {"is_low": False},
+        }[cause],
+    )
     assert world.run(900, is_done)
     assert world.state.voyage.arrived
 
@@ -116,6 +127,5 @@ def test_what_will_be_done_is_said_once_before_she_sails():
     [(t_s, _, text)] = said(world, "safe ends")
     assert t_s <= said(world, "under way")[0][0]
     assert "leaking: to the nearest refuge, else loiter near by" in text
-    with_home = announcement(
-        SkipperConfig(safe_end=SafeEnd.RETURN, voyage_timeout_s=60.0), world.skipper.voyage.boat)
+    with_home = announcement(SkipperConfig(safe_end=SafeEnd.RETURN, voyage_timeout_s=60.0), world.skipper.voyage.boat)
     assert "out of time: to the nearest refuge, else home, loiter near by" in with_home

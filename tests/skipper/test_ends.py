@@ -22,8 +22,9 @@ ASIDE = {"wind": lambda t: (1.5, 5.0)}
 
 
 def homeward(home=(0.0, 0.0), goals=(BEHIND,), obstacles=(ISLAND,), **more):
-    world = make(*goals, obstacles=obstacles, config={"safe_end": SafeEnd.RETURN, **more.pop("config", {})},
-                 **{**ASIDE, **more})
+    world = make(
+        *goals, obstacles=obstacles, config={"safe_end": SafeEnd.RETURN, **more.pop("config", {})}, **{**ASIDE, **more}
+    )
     world.shown["home"] = FRAME.geo_from_en(*home) if isinstance(home, tuple) else home
     return world
 
@@ -41,15 +42,20 @@ def test_the_way_home_is_planned_round_the_island_and_ends_in_a_loiter():
     assert distance_m(world.position, (0.0, 0.0)) < 30.0
     assert world.clearance() > 5.0
     reasons = [a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)]
-    assert act.ReplanReason.NEXT_GOAL in reasons          # on from the last goal, before she is there
+    assert act.ReplanReason.NEXT_GOAL in reasons  # on from the last goal, before she is there
     world.run(60)
     assert world.state.phase is Phase.DONE
 
 
-@pytest.mark.parametrize(("home", "words"), [
-    ((0.0, 100.0), "not in free water"), ((0.0, 75.0), "5 m from o0"),
-    (GeoPoint(lat_deg=40.0, lon_deg=-1.3), "km from"), (None, "has not told where home is"),
-])
+@pytest.mark.parametrize(
+    ("home", "words"),
+    [
+        ((0.0, 100.0), "not in free water"),
+        ((0.0, 75.0), "5 m from o0"),
+        (GeoPoint(lat_deg=40.0, lon_deg=-1.3), "km from"),
+        (None, "has not told where home is"),
+    ],
+)
 def test_a_home_that_cannot_be_sailed_to_is_told_at_the_start_and_at_the_end(home, words):
     world = homeward(home)
     assert world.run(900, is_done)
@@ -104,8 +110,9 @@ def test_the_nearest_refuge_and_on_when_the_battery_is_charged():
 
 def test_a_refuge_without_a_way_is_passed_over_for_the_next():
     ring = box(40, 70, 80, 110).difference(box(45, 75, 75, 105))
-    world = make(Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(ring,),
-                 voyage={"refuges": ((60.0, 90.0), (250.0, 60.0))})
+    world = make(
+        Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(ring,), voyage={"refuges": ((60.0, 90.0), (250.0, 60.0))}
+    )
     assert world.run(60, lambda w: w.state.voyage.sailing)
     world.run(10)
     charged(world, 0.08)
@@ -125,10 +132,14 @@ def test_a_critical_battery_without_a_refuge_sails_home_where_the_mission_ends_t
 
 
 # ------------------------------------------------------------------------------------------------------- time
-@pytest.mark.parametrize(("more", "where"), [
-    ({"voyage": {"refuges": ((120.0, 60.0),)}}, (120.0, 60.0)), ({"config": {"safe_end": SafeEnd.RETURN}}, (0.0, 0.0)),
-    ({}, None),
-])
+@pytest.mark.parametrize(
+    ("more", "where"),
+    [
+        ({"voyage": {"refuges": ((120.0, 60.0),)}}, (120.0, 60.0)),
+        ({"config": {"safe_end": SafeEnd.RETURN}}, (0.0, 0.0)),
+        ({}, None),
+    ],
+)
 def test_out_of_time_the_goals_are_given_up(more, where):
     config = {"voyage_timeout_s": 60.0, **more.pop("config", {})}
     world = make(Goal(en_m=(900.0, 0.0), radius_m=8.0), obstacles=(), config=config, **more)
@@ -260,5 +271,5 @@ def test_a_monitor_that_knows_no_charge_tells_by_the_autopilots_limits():
     assert not said(world, "battery critical")
     text(world, "Battery 1 is critical 9.70V used 0 mAh")
     assert world.run(300, lambda w: "at the refuge 1" in w.state.why)
-    world.shown["battery_failed"] = False      # changed, and the autopilot restarted
+    world.shown["battery_failed"] = False  # changed, and the autopilot restarted
     assert world.run(600, is_done)

@@ -18,8 +18,9 @@ ORDERS = ("replan", "hold", "go_on", "stop", "skip_goal", "home", "goal 51.1020 
 
 def trouble(world, rng):
     """Make one thing go wrong, or right again."""
-    kind = rng.choice((
-        "silence", "jump", "planner", "upload", "restart", "operator", "vane", "reboot", "text", "wish", "calm"))
+    kind = rng.choice(
+        ("silence", "jump", "planner", "upload", "restart", "operator", "vane", "reboot", "text", "wish", "calm")
+    )
     if kind == "silence":
         world.heartbeat_age = rng.choice((3.5, 10.0, 40.0))
     elif kind == "jump":

@@ -25,10 +25,14 @@ IDENTITY = Identity(system=1, uid="5a", is_confirmed=True, vehicle_type=11, fram
 
 def make(*goals, obstacles=(), wind=None, **config):
     voyage = Voyage(name="motor", frame=FRAME, goals=goals, area=area(*obstacles), boat=MOTOR, home_en_m=(0.0, 0.0))
-    world = World(skipper=Skipper(voyage=voyage, config=SkipperConfig(sails=False, **config)), identity=IDENTITY,
-                  expansions=1500, no_go=0.0)
+    world = World(
+        skipper=Skipper(voyage=voyage, config=SkipperConfig(sails=False, **config)),
+        identity=IDENTITY,
+        expansions=1500,
+        no_go=0.0,
+    )
     if wind is None:
-        world.extra = {"wind": WindEstimate()}      # none was ever told
+        world.extra = {"wind": WindEstimate()}  # none was ever told
     return world
 
 
@@ -37,13 +41,16 @@ def codes(world):
 
 
 def test_marks_by_plan_without_a_wind_straight_and_round_a_rock():
-    world = make(Goal(en_m=(0.0, 200.0), radius_m=6.0), Goal(en_m=(200.0, 200.0), radius_m=6.0),
-                 obstacles=(box(-20.0, 80.0, 20.0, 110.0),))
+    world = make(
+        Goal(en_m=(0.0, 200.0), radius_m=6.0),
+        Goal(en_m=(200.0, 200.0), radius_m=6.0),
+        obstacles=(box(-20.0, 80.0, 20.0, 110.0),),
+    )
     assert world.run(400, lambda w: w.state.phase is Phase.DONE)
     assert world.state.progress.reached == (0, 1)
     assert world.clearance() > 6.0
     sailed = sum(math.dist(a, b) for a, b in zip(world.track, world.track[1:], strict=False))
-    assert sailed < 470.0                       # nothing is beaten
+    assert sailed < 470.0  # nothing is beaten
     assert not codes(world) & {"becalmed", "in irons", "wind untrusted", "no progress", "drifting"}
 
 
@@ -56,18 +63,24 @@ def test_it_is_under_way_at_once():
 def test_by_field_without_a_wind(guidance):
     from companion.skipper.step.config import Guidance
 
-    tree = FieldTree(expression=parse("ring", ("ring",), "", ""),
-                     atoms=(("ring", Round(at_en=(0.0, 80.0), radius_m=40.0)),))
-    goal = Goal(en_m=(0.0, 40.0), radius_m=8.0, name="ring",
-                field=Composed(tree=tree, until=Until.TIME, for_s=200.0) if guidance == "ring" else None)
-    world = make(goal, Goal(en_m=(0.0, 160.0), radius_m=6.0),
-                 guidance=Guidance.PLAN if guidance == "ring" else Guidance.FIELD)
+    tree = FieldTree(
+        expression=parse("ring", ("ring",), "", ""), atoms=(("ring", Round(at_en=(0.0, 80.0), radius_m=40.0)),)
+    )
+    goal = Goal(
+        en_m=(0.0, 40.0),
+        radius_m=8.0,
+        name="ring",
+        field=Composed(tree=tree, until=Until.TIME, for_s=200.0) if guidance == "ring" else None,
+    )
+    world = make(
+        goal, Goal(en_m=(0.0, 160.0), radius_m=6.0), guidance=Guidance.PLAN if guidance == "ring" else Guidance.FIELD
+    )
     assert world.run(20, lambda w: w.mode is Mode.GUIDED)
     assert world.run(500, lambda w: w.state.phase is Phase.DONE)
     if guidance == "ring":
         steered = [a for _, a in world.actions if isinstance(a, act.SteerHeading)]
-        assert any(a.thrust < 1.0 for a in steered)                     # slower through turns
-        assert any(abs(a.heading_rad) < 0.2 for a in steered)           # north, into where a wind would come from
+        assert any(a.thrust < 1.0 for a in steered)  # slower through turns
+        assert any(abs(a.heading_rad) < 0.2 for a in steered)  # north, into where a wind would come from
         assert all(distance_m(p, (0.0, 80.0)) < 50.0 for p in world.track[300:1000])
 
 

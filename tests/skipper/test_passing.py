@@ -33,8 +33,11 @@ def said(w, code):
 
 def crossed_s(w):
     """Return when the track cuts the line northward between the marks [s]."""
-    return next(n / 5.0 for n, (a, b) in enumerate(zip(w.track, w.track[1:], strict=False))
-                if a[1] < 80.0 <= b[1] and abs(b[0]) < 25.0)
+    return next(
+        n / 5.0
+        for n, (a, b) in enumerate(zip(w.track, w.track[1:], strict=False))
+        if a[1] < 80.0 <= b[1] and abs(b[0]) < 25.0
+    )
 
 
 def test_a_gate_is_passed_where_the_track_crosses_it():
@@ -62,7 +65,7 @@ def test_from_beyond_the_line_she_comes_round_and_crosses_it_the_right_way():
 def test_crossed_the_wrong_way_it_does_not_count_and_that_is_said():
     w = world(line(), END)
     w.run(30.0, lambda w: w.state.voyage.sailing)
-    way = [(28.0, 0.0), (28.0, 88.0), (18.0, 88.0), (18.0, 70.0)]   # round the starboard mark, and back through
+    way = [(28.0, 0.0), (28.0, 88.0), (18.0, 88.0), (18.0, 70.0)]  # round the starboard mark, and back through
     for a, b in itertools.pairwise(way):
         for share in np.arange(0.0, 1.0, 2.0 / math.dist(a, b)):
             w.position = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
@@ -83,11 +86,14 @@ def test_a_gate_that_was_passed_by_outside_is_sailed_again():
     assert abs(w.track[-1][0]) < 27.0
 
 
-@pytest.mark.parametrize(("when", "shown"), [
-    ({"after_s": 90.0}, {}),
-    ({"after_s": 90.0}, {"utc_at_boot_s": UTC_AT_BOOT}),
-    ({"not_before_s": UTC_AT_BOOT + 100.0 + 95.0}, {"utc_at_boot_s": UTC_AT_BOOT}),
-])
+@pytest.mark.parametrize(
+    ("when", "shown"),
+    [
+        ({"after_s": 90.0}, {}),
+        ({"after_s": 90.0}, {"utc_at_boot_s": UTC_AT_BOOT}),
+        ({"not_before_s": UTC_AT_BOOT + 100.0 + 95.0}, {"utc_at_boot_s": UTC_AT_BOOT}),
+    ],
+)
 def test_she_waits_before_the_line_and_crosses_after_the_gun(when, shown):
     w = world(line(**when), END, shown=shown)
     assert w.run(300.0, lambda w: bool(w.state.progress.reached))
@@ -135,7 +141,7 @@ def test_a_line_crossed_while_nobody_looked_counts():
     w = world(line(), END)
     w.run(100.0, lambda w: w.position[1] > 74.0)
     saved = w.skipper.persisted(w.state)
-    while w.position[1] < 84.0:   # killed: the autopilot sails on
+    while w.position[1] < 84.0:  # killed: the autopilot sails on
         w.sail(0.2)
         w.t += 0.2
     w.state = w.skipper.initial(saved)
@@ -166,7 +172,7 @@ def box(**stay):
 
 def out_of_it(w, since):
     """Return how many of the track's points since a moment are out of the box."""
-    return sum(not shapely.contains_xy(SQUARE, *p) for p in w.track[int(5 * since):])
+    return sum(not shapely.contains_xy(SQUARE, *p) for p in w.track[int(5 * since) :])
 
 
 def test_she_stays_in_a_box_for_its_time_and_goes_on():
@@ -187,7 +193,7 @@ def test_in_a_box_without_a_time_she_stays_until_told():
     assert "until told to go on" in w.state.why
     w.order("hold")
     w.run(5.0)
-    w.order("go_on")   # the end of the hold, not of the stay
+    w.order("go_on")  # the end of the hold, not of the stay
     w.run(20.0)
     assert w.state.progress.reached == ()
     w.order("go_on")

@@ -26,9 +26,13 @@ STRANGE = {"vehicle": {"is_ours": False}}
 HELD = {"orders": {"standing": Standing(verb=Verb.HOLD, by="crew", name="here", since_s=0.0)}}
 NOTHING_LEFT = {"progress": {"gate": 99}}
 ASHORE = {"mission": {"checked": True, "route": None}, "voyage": {"sailing": False}}
-DOUBT = {"position": {"doubt": PositionDoubt(
-    since_s=0.0, t_s=0.0, settled_s=0.0, reckoned_en_m=(0.0, 0.0), velocity_en_mps=(0.0, 0.0),
-    why="it jumped")}}
+DOUBT = {
+    "position": {
+        "doubt": PositionDoubt(
+            since_s=0.0, t_s=0.0, settled_s=0.0, reckoned_en_m=(0.0, 0.0), velocity_en_mps=(0.0, 0.0), why="it jumped"
+        )
+    }
+}
 DRIFTS = {"alarms": {"raised": (Raised(name="drifting", since_s=0.0),)}}
 IN_LOITER, IN_GUIDED = {"steering": {"own_mode": Mode.LOITER}}, {"steering": {"own_mode": Mode.GUIDED}}
 IN_IRONS = {"steering": {"until_s": 1e9, "heading_rad": 0.0, "own_mode": Mode.GUIDED}}
@@ -56,8 +60,13 @@ def before_island(s, state):
     island = min(ISLANDS, key=lambda p: p.distance(shapely.Point(there)))
     east, north = island.centroid.x - there[0], island.centroid.y - there[1]
     far_m = math.hypot(east, north)
-    off_m = next(m for m in range(500) if island.distance(
-        shapely.Point(there[0] + east * (1.0 + m / far_m), there[1] + north * (1.0 + m / far_m))) > 8.0 and m > 5)
+    off_m = next(
+        m
+        for m in range(500)
+        if island.distance(shapely.Point(there[0] + east * (1.0 + m / far_m), there[1] + north * (1.0 + m / far_m)))
+        > 8.0
+        and m > 5
+    )
     here = (there[0] + east * (1.0 + off_m / far_m), there[1] + north * (1.0 + off_m / far_m))
     return replace(unsure(s, state), position_en_m=here, vehicle=replace(s.vehicle, velocity_en_mps=(0.0, 3.0)))
 
@@ -67,8 +76,11 @@ def south_of_island(s, state):
     island = min(ISLANDS, key=lambda p: p.distance(shapely.Point(s.position_en_m)))
     west, south, _, _ = island.bounds
     held = showing(mode=Mode.LOITER)(unsure(s, state), state)
-    return replace(held, position_en_m=(west + 6.0, south - 30.0), wind_before=WindBefore(
-        twd_from_rad=math.pi, tws_mps=5.0, turned_rad=math.pi / 2.0))
+    return replace(
+        held,
+        position_en_m=(west + 6.0, south - 30.0),
+        wind_before=WindBefore(twd_from_rad=math.pi, tws_mps=5.0, turned_rad=math.pi / 2.0),
+    )
 
 
 def homeward_over_island(s, state):
@@ -76,31 +88,46 @@ def homeward_over_island(s, state):
     island = min(ISLANDS, key=lambda p: p.distance(shapely.Point(here)))
     bearing = math.atan2(island.centroid.x - here[0], island.centroid.y - here[1])
     way = showing(mode=Mode.RTL, waypoint_distance_m=2000.0, target_bearing_rad=bearing)(s, state)
-    return replace(way, permissions=replace(s.permissions, may_upload=False), vehicle=replace(
-        s.vehicle, velocity_en_mps=(9.0, 9.0)))
+    return replace(
+        way,
+        permissions=replace(s.permissions, may_upload=False),
+        vehicle=replace(s.vehicle, velocity_en_mps=(9.0, 9.0)),
+    )
 
 
 # (first, second) -> the state of tests.skipper.test_walk, the parts that are changed in it, what is seen
 SITUATIONS = {
     ("await autopilot", "stand by"): ("standard", STRANGE, silent),
     ("stand by", "given up"): ("given up", STRANGE, None),
-    ("keep off", "operator"): ("operator", {"operator": {"stop": Stop(
-        t_s=0.0, before_s=0.0, mode=Mode.RTL, is_armed=True, cause="battery")}}, homeward_over_island),
+    ("keep off", "operator"): (
+        "operator",
+        {"operator": {"stop": Stop(t_s=0.0, before_s=0.0, mode=Mode.RTL, is_armed=True, cause="battery")}},
+        homeward_over_island,
+    ),
     ("operator", "await mission"): ("operator", {"mission": {"checked": False, "read_since_s": 1e9}}, None),
     ("await mission", "held ashore"): ("waiting", HELD | {"mission": {"checked": False, "read_since_s": 1e9}}, None),
     ("held ashore", "await start"): ("waiting", HELD | NOTHING_LEFT | ASHORE, None),
     ("await start", "first plan"): ("waiting", NOTHING_LEFT | ASHORE, None),
     ("first plan", "set sail"): ("waiting", ASHORE, None),
-    ("set sail", "stand off"): ("standard", DOUBT | IN_LOITER | {"voyage": {"sailing": False}},
-                                showing(mode=Mode.LOITER)),
+    ("set sail", "stand off"): (
+        "standard",
+        DOUBT | IN_LOITER | {"voyage": {"sailing": False}},
+        showing(mode=Mode.LOITER),
+    ),
     ("seek sea room", "stop a drift"): (
-        "standard", IN_LOITER | DRIFTS | {"position": {"last_seen": None}}, south_of_island),
+        "standard",
+        IN_LOITER | DRIFTS | {"position": {"last_seen": None}},
+        south_of_island,
+    ),
     ("stop a drift", "rest"): ("done", IN_LOITER | DRIFTS, showing(mode=Mode.LOITER)),
     ("rest", "hold"): ("done", {}, unsure),
     ("hold", "brake"): ("standard", {"position": {"last_seen": None}}, before_island),
     ("sail on", "last resort"): ("last resort", IN_LOITER, showing(mode=Mode.LOITER)),
-    ("last resort", "lie at diversion"): ("holding", {"alarms": {"raised": (
-        Raised(name="vessel too near", since_s=0.0),)}}, lambda s, state: replace(s, traffic=on_collision_course(s))),
+    ("last resort", "lie at diversion"): (
+        "holding",
+        {"alarms": {"raised": (Raised(name="vessel too near", since_s=0.0),)}},
+        lambda s, state: replace(s, traffic=on_collision_course(s)),
+    ),
     ("lie at diversion", "bear away"): ("holding", IN_IRONS, showing(mode=Mode.GUIDED)),
     ("bear away", "give back helm"): ("standard", IN_IRONS, showing(mode=Mode.GUIDED)),
     ("give back helm", "repair"): ("standard", lambda state: IN_GUIDED | mixed(state), showing(mode=Mode.GUIDED)),

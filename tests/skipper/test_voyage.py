@@ -56,8 +56,9 @@ def is_sailing(world):
 def make(*goals, config=None, obstacles=ISLANDS, **world):
     """Return a world whose plans have every tack as a waypoint: much to upload that can go wrong."""
     made = voyage(*(goals or (GOAL,)), obstacles=obstacles, **world.pop("voyage", {}))
-    return World(skipper=skipper(made, **{"autopilot_beats": False, **(config or {})}),
-                 **{"wind": swinging, **FAST, **world})
+    return World(
+        skipper=skipper(made, **{"autopilot_beats": False, **(config or {})}), **{"wind": swinging, **FAST, **world}
+    )
 
 
 def said(world, code):
@@ -109,8 +110,9 @@ def test_a_voyage_begins_beside_something_solid_by_leading_away_from_it(off_m, m
 def test_replans_at_each_waypoint_from_the_next_one_and_before_it_is_reached():
     world = make()
     assert world.run(1500, is_done)
-    asked = [(t, a) for t, a in world.actions if isinstance(a, act.RequestPlan)
-             and a.reason is act.ReplanReason.WAYPOINT]
+    asked = [
+        (t, a) for t, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.WAYPOINT
+    ]
     assert len(asked) >= 2
     for _, action in asked:
         assert action.from_seq is not None
@@ -140,16 +142,21 @@ def forecast_plans(world):
 @pytest.mark.parametrize(("policy", "count"), [(ReplanPolicy.FORECAST, 1), (ReplanPolicy.WAYPOINT, 0)])
 def test_by_forecast_policy_a_wind_that_becomes_less_certain_means_a_plan_at_once(policy, count):
     """Wolsieffer's discussion: planning again only when the uncertainty changes significantly."""
-    world = make(Goal(en_m=(600.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0),
-                 config={"replan_policy": policy}, sigma=math.radians(5.0))
+    world = make(
+        Goal(en_m=(600.0, 0.0), radius_m=6.0),
+        obstacles=(),
+        wind=lambda t: (0.0, 5.0),
+        config={"replan_policy": policy},
+        sigma=math.radians(5.0),
+    )
     assert world.run(60)
     assert not forecast_plans(world)
-    world.sigma = math.radians(6.0)      # by a fifth: nothing
+    world.sigma = math.radians(6.0)  # by a fifth: nothing
     assert world.run(20)
     assert not forecast_plans(world)
     world.sigma = math.radians(12.0)
     assert world.run(30)
-    assert len(forecast_plans(world)) == count   # one: the new plan, or the old one that was kept, knows of it
+    assert len(forecast_plans(world)) == count  # one: the new plan, or the old one that was kept, knows of it
     assert all(a.from_seq is None and "less certain" in a.text for a in forecast_plans(world))
 
 
@@ -176,8 +183,11 @@ def plans_for(world, reason):
 @pytest.mark.parametrize(("turned_deg", "plans"), [(19.0, 0), (-19.0, 0), (21.0, 1), (-21.0, 1)])
 def test_the_mean_of_the_wind_has_turned_by_twenty_degrees(turned_deg, plans):
     """Büsser 3.2.1, on a reach without a waypoint: by 19 degrees no plan, by 21 one."""
-    world = make(Goal(en_m=(700.0, 0.0), radius_m=6.0), obstacles=(),
-                 wind=lambda t: (math.radians(turned_deg if t > 50.0 else 0.0), 5.0))
+    world = make(
+        Goal(en_m=(700.0, 0.0), radius_m=6.0),
+        obstacles=(),
+        wind=lambda t: (math.radians(turned_deg if t > 50.0 else 0.0), 5.0),
+    )
     assert world.run(50)
     assert world.state.voyage.sailing
     assert world.run(120)
@@ -203,8 +213,9 @@ def test_off_the_leg_by_more_than_is_allowed(more_m, is_planned):
 
 def test_a_plan_is_made_anew_when_it_is_old():
     """Büsser's 60 minutes, cut to one and a half: a leg of four minutes without a waypoint on it."""
-    world = make(Goal(en_m=(700.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0),
-                 config={"plan_age_s": 90.0})
+    world = make(
+        Goal(en_m=(700.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0), config={"plan_age_s": 90.0}
+    )
     assert world.skipper.config.plan_age_s == 90.0
     assert world.run(600, is_done)
     asked = [t for t, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.PLAN_AGE]
@@ -216,8 +227,9 @@ def test_a_header_that_closes_the_leg_is_answered_within_seconds():
     world = make(Goal(en_m=(300.0, 330.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0 if t < 40 else 0.5, 5.0))
     assert world.run(40)
     assert is_sailing(world)
-    assert world.run(25, lambda w: any(
-        isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.NO_GO for _, a in w.actions))
+    assert world.run(
+        25, lambda w: any(isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.NO_GO for _, a in w.actions)
+    )
     assert world.run(900, is_done)
 
 
@@ -229,11 +241,15 @@ def test_a_board_of_short_legs_is_watched_as_one(step_m):
     here, route = world.position, world.state.mission.route
     bends = [math.radians(50.0 + 1.5 * n) for n in range(round(120.0 / step_m))]
     points = list(accumulate(bends, lambda at, course: moved(at, course, step_m), initial=here))
-    points.append(moved(points[-1], math.radians(-50.0), 60.0))     # she tacks there
+    points.append(moved(points[-1], math.radians(-50.0), 60.0))  # she tacks there
     item = route.items[0]
     chain = replace(
-        route, items=(item,) * len(points), points_en_m=(*points[1:], route.points_en_m[-1]),
-        leg_from_en_m=tuple(points), gate_of=(-1,) * len(points))
+        route,
+        items=(item,) * len(points),
+        points_en_m=(*points[1:], route.points_en_m[-1]),
+        leg_from_en_m=tuple(points),
+        gate_of=(-1,) * len(points),
+    )
     state = with_parts(world.state, mission={"route": chain, "index": 0})
     ctx = StepContext(world.skipper.voyage, world.skipper.config, state, world.snapshot())
     assert board_end(ctx, (points[0], points[1])) == points[-2]
@@ -261,8 +277,13 @@ def test_five_laps_of_the_regatta_course_without_missing_a_buoy(side):
     hand = 1.0 if side is Side.PORT else -1.0
     places = [(0.0, 150.0), (-90.0 * hand, 75.0), (0.0, 0.0)]
     start = (20.0 * hand, -40.0)
-    world = make(*(Goal(en_m=p, side=side, name=f"buoy {n}") for n, p in enumerate(places)), obstacles=(),
-                 voyage={"laps": 5}, position=start, expansions=600)
+    world = make(
+        *(Goal(en_m=p, side=side, name=f"buoy {n}") for n, p in enumerate(places)),
+        obstacles=(),
+        voyage={"laps": 5},
+        position=start,
+        expansions=600,
+    )
     seen = set()
 
     def look(w):
@@ -273,17 +294,19 @@ def test_five_laps_of_the_regatta_course_without_missing_a_buoy(side):
     assert len(world.state.progress.reached) == 15
     assert Phase.BUOY_APPROACH in seen
     for number, place in enumerate(places[:2]):
-        turned = sum(
-            difference_rad(bearing_rad(place, b), bearing_rad(place, a))
-            for a, b in pairwise(world.track))
+        turned = sum(difference_rad(bearing_rad(place, b), bearing_rad(place, a)) for a, b in pairwise(world.track))
         assert -hand * turned / (2 * math.pi) == pytest.approx(5.0, abs=0.25), number
         assert min(distance_m(place, p) for p in world.track) > 3.0
 
 
 def regatta(**changes):
     places = [(0.0, 150.0), (-90.0, 75.0), (0.0, 0.0)]
-    return make(*(Goal(en_m=p, side=Side.PORT, name=f"buoy {n}") for n, p in enumerate(places)), obstacles=(),
-                expansions=600, **changes)
+    return make(
+        *(Goal(en_m=p, side=Side.PORT, name=f"buoy {n}") for n, p in enumerate(places)),
+        obstacles=(),
+        expansions=600,
+        **changes,
+    )
 
 
 def turned(world, buoy):
@@ -310,15 +333,16 @@ def carry_round(world, buoy, until):
 
 
 @pytest.mark.parametrize("killed", [False, True])
-@pytest.mark.parametrize(("under_way", "slow"), [
-    ("plan", {"plan_s": 6.0}), ("upload", {"upload_s": 8.0})], ids=["planned", "uploaded"])
+@pytest.mark.parametrize(
+    ("under_way", "slow"), [("plan", {"plan_s": 6.0}), ("upload", {"upload_s": 8.0})], ids=["planned", "uploaded"]
+)
 def test_a_buoy_left_on_the_wrong_side_is_not_reached_before_it_is_rounded(killed, under_way, slow):
     """Buoy course, seeds 0 and 3: missed, and reached a second later, from where the boat had missed it.
 
     What was being planned or uploaded when it was missed does not count for the second rounding either.
     """
     buoy = (0.0, 150.0)
-    config = {"grid_size_m": 30.0, "keep_gain_s": 0.0, "keep_gain": 0.0}   # whatever gains a little is uploaded
+    config = {"grid_size_m": 30.0, "keep_gain_s": 0.0, "keep_gain": 0.0}  # whatever gains a little is uploaded
     world = regatta(position=(20.0, -40.0), config=config, **slow)
     assert world.run(600, lambda w: distance_m(w.position, buoy) < 60.0)
     carry_round(world, buoy, lambda w: turned(w, buoy) > math.radians(150.0))
@@ -329,7 +353,7 @@ def test_a_buoy_left_on_the_wrong_side_is_not_reached_before_it_is_rounded(kille
     carry_round(world, buoy, lambda w: said(w, "buoy missed"))
     missed, since = len(world.actions), world.state.pending.next_id - 1
     world.run(12)
-    asked = [a for _, a in world.actions[missed - 1:]]
+    asked = [a for _, a in world.actions[missed - 1 :]]
     assert any(isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.MISSED_BUOY for a in asked)
     assert all(a.plan_id >= since for a in asked if isinstance(a, act.UploadMission))
     assert world.state.progress.reached == ()
@@ -357,8 +381,14 @@ def test_a_band_bounds_the_way():
 
 def test_a_long_voyage_starts_its_numbering_again():
     places = [(0.0, 60.0), (60.0, 60.0), (60.0, 0.0), (0.0, 0.0)]
-    world = make(*(Goal(en_m=p, radius_m=6.0) for p in places), obstacles=(), voyage={"laps": 6},
-                 config={"max_items": 14}, wind=lambda t: (math.radians(45), 5.0), expansions=300)
+    world = make(
+        *(Goal(en_m=p, radius_m=6.0) for p in places),
+        obstacles=(),
+        voyage={"laps": 6},
+        config={"max_items": 14},
+        wind=lambda t: (math.radians(45), 5.0),
+        expansions=300,
+    )
     assert world.run(3000, is_done)
     assert len(world.state.progress.reached) == 24
     assert max(len(a.items) for _, a in world.actions if isinstance(a, act.UploadMission)) <= 24
@@ -373,10 +403,13 @@ def test_a_dry_run_touches_nothing_and_says_what_it_waits_for():
     assert "permission" in world.state.why
 
 
-@pytest.mark.parametrize(("given", "words"), [
-    (Permissions(may_upload=True), "operator to set AUTO"),
-    (Permissions(may_upload=True, may_set_mode=True), "operator to arm"),
-])
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (Permissions(may_upload=True), "operator to set AUTO"),
+        (Permissions(may_upload=True, may_set_mode=True), "operator to arm"),
+    ],
+)
 def test_waits_for_what_it_may_not_do(given, words):
     world = make(permissions=given)
     world.run(60)
@@ -395,10 +428,13 @@ def test_does_not_take_a_boat_that_somebody_drives():
     assert "waiting for the operator" in world.state.why
 
 
-@pytest.mark.parametrize(("missing", "words"), [
-    ({"vehicle": None, "position_en_m": None, "vehicle_age_s": None}, "position"),
-    ({"heartbeat_age_s": None}, "nothing yet"),
-])
+@pytest.mark.parametrize(
+    ("missing", "words"),
+    [
+        ({"vehicle": None, "position_en_m": None, "vehicle_age_s": None}, "position"),
+        ({"heartbeat_age_s": None}, "nothing yet"),
+    ],
+)
 def test_waiting_names_what_is_missing(missing, words):
     world = make(extra=missing)
     world.run(10)
@@ -485,8 +521,11 @@ def test_a_foreign_mission_is_not_resumed_at_the_start():
     assert world.mission == theirs
     assert not world.armed
     assert "not ours" in world.state.why
-    allowed = make(mission=theirs, seq=1, permissions=Permissions(
-        may_upload=True, may_set_mode=True, may_arm=True, may_replace_foreign=True))
+    allowed = make(
+        mission=theirs,
+        seq=1,
+        permissions=Permissions(may_upload=True, may_set_mode=True, may_arm=True, may_replace_foreign=True),
+    )
     assert allowed.run(1500, is_done)
 
 
@@ -533,8 +572,9 @@ def test_killed_in_the_middle_of_an_upload_the_mixture_is_put_right():
     assert world.clearance() > world.skipper.config.margin_floor_m
 
 
-@pytest.mark.parametrize("result", [UploadResult.TIMEOUT, UploadResult.REFUSED, UploadResult.MISMATCH,
-                                    UploadResult.LINK])
+@pytest.mark.parametrize(
+    "result", [UploadResult.TIMEOUT, UploadResult.REFUSED, UploadResult.MISMATCH, UploadResult.LINK]
+)
 def test_failed_uploads_are_looked_at_and_made_good(result):
     world = make(uploads_fail=lambda n: result if n in {2, 3, 5} else UploadResult.OK)
     assert world.run(1800, is_done)
@@ -602,11 +642,16 @@ def test_a_closed_way_ends_in_a_named_hold():
 
 
 def test_a_way_that_opens_only_at_the_floor_is_sailed_with_less_margin():
-    gate = (box(-300, 150, -13, 200), box(13, 150, 300, 200))    # the floor, and her track beside the line
-    world = make(Goal(en_m=(0.0, 300.0), radius_m=6.0), obstacles=gate, wind=lambda t: (math.pi / 2, 5.0),
-                 voyage={"limits": box(-280, -100, 280, 500)})
+    gate = (box(-300, 150, -13, 200), box(13, 150, 300, 200))  # the floor, and her track beside the line
+    world = make(
+        Goal(en_m=(0.0, 300.0), radius_m=6.0),
+        obstacles=gate,
+        wind=lambda t: (math.pi / 2, 5.0),
+        voyage={"limits": box(-280, -100, 280, 500)},
+    )
     world.extra["limits"] = AutopilotLimits(
-        sail_no_go_angle_rad=world.no_go, sail_xtrack_max_m=world.corridor, wp_speed_mps=2.0)
+        sail_no_go_angle_rad=world.no_go, sail_xtrack_max_m=world.corridor, wp_speed_mps=2.0
+    )
     assert world.run(900, is_done)
     assert world.clearance() > 8.0
     assert any("margin" in entry[2] for entry in world.log)
@@ -640,7 +685,7 @@ def test_after_two_failed_tacks_it_gybes_round():
     world.order("replan")
     assert world.run(30, lambda w: said(w, "gybing round"))
     world.run(3)
-    points = world.state.mission.route.points_en_m[world.state.mission.index:-1]
+    points = world.state.mission.route.points_en_m[world.state.mission.index : -1]
     courses = [bearing_rad(a, b) for a, b in pairwise([world.position, *points])]
     assert len(points) >= 5
     assert not any(is_tack(a, b, 0.0) for a, b in pairwise(courses[1:]))
@@ -681,7 +726,7 @@ def test_a_position_that_jumped_is_planned_from_when_the_way_from_there_is_shut(
     asked = world.count(act.RequestPlan)
     middle = (-5.0, 140.0)
     away = bearing_rad(world.state.mission.route.points_en_m[world.state.mission.index], middle)
-    world.position = moved(middle, away, 55.0)      # moved, and truly so: behind an island, seen from the waypoint
+    world.position = moved(middle, away, 55.0)  # moved, and truly so: behind an island, seen from the waypoint
     moved_at = len(world.track)
     world.run(3)
     assert any(r.name == "position jump" for r in world.state.alarms.raised)
@@ -698,9 +743,10 @@ def test_a_boat_that_drifted_behind_something_before_it_sails_is_planned_for_aga
     away = bearing_rad(world.state.mission.route.points_en_m[0], middle)
     there = moved(middle, away, 75.0)
     steps = math.ceil(distance_m(world.position, there) / 4.0)
-    for n in range(steps):                          # she drifts: a boat that leapt would not be believed
-        world.position = moved(world.position, bearing_rad(world.position, there),
-                               distance_m(world.position, there) / (steps - n))
+    for n in range(steps):  # she drifts: a boat that leapt would not be believed
+        world.position = moved(
+            world.position, bearing_rad(world.position, there), distance_m(world.position, there) / (steps - n)
+        )
         world.step()
     asked = world.t - steps
     assert world.run(28, lambda w: any(t >= asked for t, a in w.actions if isinstance(a, act.RequestPlan)))
@@ -735,7 +781,7 @@ def test_a_position_failsafe_is_no_operator_and_the_boat_sails_on(text):
     assert world.mode is Mode.HOLD
     plans = world.count(act.RequestPlan)
     assert world.run(10, lambda w: w.mode is Mode.AUTO)
-    assert world.count(act.RequestPlan) == plans + 1          # from where it drifted to, before AUTO
+    assert world.count(act.RequestPlan) == plans + 1  # from where it drifted to, before AUTO
     world.drift_mps = 0.0
     assert world.run(1500, is_done)
     assert said(world, "position failsafe")
@@ -782,7 +828,7 @@ def test_a_mission_held_back_by_an_upload_cut_short_is_ours_and_planned_on_from(
     assert world.run(300, lambda w: any(kind == "upload" for _, kind, _ in w.pending))
     action = next(a for _, kind, a in world.pending if kind == "upload")
     assert action.stopgap is not None
-    world.install((*world.mission[:action.keep_first], action.stopgap, *action.items[action.keep_first + 1:]))
+    world.install((*world.mission[: action.keep_first], action.stopgap, *action.items[action.keep_first + 1 :]))
     assert world.run(10, lambda w: said(w, "held back"))
     assert not said(world, "foreign mission")
     assert is_same_mission(world.state.mission.route.items, world.mission)
@@ -846,8 +892,13 @@ def test_a_critical_battery_goes_to_the_refuge():
 
 # ------------------------------------------------------------------------------------------- headings
 def test_by_headings_under_guided_it_arrives_and_hands_back():
-    world = make(Goal(en_m=(250.0, 120.0), radius_m=8.0), Goal(en_m=(0.0, 200.0), radius_m=8.0), obstacles=(),
-                 config={"guidance": Guidance.HEADING}, wind=lambda t: (0.0, 5.0))
+    world = make(
+        Goal(en_m=(250.0, 120.0), radius_m=8.0),
+        Goal(en_m=(0.0, 200.0), radius_m=8.0),
+        obstacles=(),
+        config={"guidance": Guidance.HEADING},
+        wind=lambda t: (0.0, 5.0),
+    )
     assert world.run(40, lambda w: w.mode is Mode.GUIDED)
     assert world.run(1500, is_done)
     assert world.state.progress.reached == (0, 1)
@@ -875,8 +926,14 @@ def test_by_headings_the_operator_is_still_the_operator():
 def test_by_headings_it_rounds_buoys(side):
     hand = 1.0 if side is Side.PORT else -1.0
     places = [(0.0, 150.0), (-90.0 * hand, 75.0), (0.0, 0.0)]
-    world = make(*(Goal(en_m=p, side=side) for p in places), obstacles=(), config={"guidance": Guidance.HEADING},
-                 voyage={"laps": 2, "home": (20.0 * hand, -40.0)}, position=(20.0 * hand, -40.0), expansions=600)
+    world = make(
+        *(Goal(en_m=p, side=side) for p in places),
+        obstacles=(),
+        config={"guidance": Guidance.HEADING},
+        voyage={"laps": 2, "home": (20.0 * hand, -40.0)},
+        position=(20.0 * hand, -40.0),
+        expansions=600,
+    )
     assert world.run(3000, is_done)
     assert len(world.state.progress.reached) == 6
     assert min(distance_m(places[0], p) for p in world.track) > 3.0
@@ -887,15 +944,24 @@ def test_by_headings_it_rounds_buoys(side):
 def test_by_headings_nothing_is_steered_to_the_buoys_side_of_what_is_wanted(side, twd_deg):
     """Büsser 3.2.4, on the way to a windward mark: 30 degrees off the buoy, and never 10 nearer."""
     hand, buoy = 1.0 if side is Side.PORT else -1.0, (0.0, 150.0)
-    world = make(Goal(en_m=buoy, side=side), Goal(en_m=(0.0, 0.0)), obstacles=(), wind=swinging_about(twd_deg),
-                 config={"guidance": Guidance.HEADING}, expansions=600)
+    world = make(
+        Goal(en_m=buoy, side=side),
+        Goal(en_m=(0.0, 0.0)),
+        obstacles=(),
+        wind=swinging_about(twd_deg),
+        config={"guidance": Guidance.HEADING},
+        expansions=600,
+    )
     near, before = [], [(world.position, 0)]
 
     def look(w):
         place, seen = before[0]
         if w.state.progress.gate == 0 and 10.0 < distance_m(place, buoy) < 25.0:
-            near.extend(hand * difference_rad(a.heading_rad, bearing_rad(place, buoy))
-                        for _, a in w.actions[seen:] if isinstance(a, act.SteerHeading))
+            near.extend(
+                hand * difference_rad(a.heading_rad, bearing_rad(place, buoy))
+                for _, a in w.actions[seen:]
+                if isinstance(a, act.SteerHeading)
+            )
         before[0] = (w.position, len(w.actions))
         return is_done(w)
 
@@ -905,10 +971,10 @@ def test_by_headings_nothing_is_steered_to_the_buoys_side_of_what_is_wanted(side
     assert world.state.progress.missed == 0
 
 
-@pytest.mark.parametrize(("place", "words"), [
-    ((0.0, -267.0), "she is 167 m outside the fence"),
-    ((0.0, -111_000.0), "she is 111 km from the first goal"),
-])
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [((0.0, -267.0), "she is 167 m outside the fence"), ((0.0, -111_000.0), "she is 111 km from the first goal")],
+)
 def test_a_boat_that_lies_elsewhere_is_told_so(place, words):
     """It said "next try in 10 s" and nothing else (issue 13, point 6)."""
     world = make(voyage={"limits": shapely.box(-200.0, -100.0, 200.0, 400.0)})

@@ -38,8 +38,22 @@ from tests.skipper.test_voyage import ISLANDS, make
 from tests.skipper.world import check_invariants, order, with_parts
 from tests.traffic.conftest import vessel
 
-ORDERS = ("hold", "go_on", "skip_goal", "refuge", "refuge 3", "refuge Nowhere", "home", "goal 51.1020 -1.3000",
-          "goal 10 10", "replan", "stop", "adopt", "replace", "why")
+ORDERS = (
+    "hold",
+    "go_on",
+    "skip_goal",
+    "refuge",
+    "refuge 3",
+    "refuge Nowhere",
+    "home",
+    "goal 51.1020 -1.3000",
+    "goal 10 10",
+    "replan",
+    "stop",
+    "adopt",
+    "replace",
+    "why",
+)
 
 
 # --------------------------------------------------------------------------------------------- states
@@ -110,9 +124,23 @@ def states():
 
 
 NAMES = (
-    "idle", "waiting", "new calculation", "first upload", "standard", "planning under way", "uploading under way",
-    "operator", "comparing", "holding", "last resort", "destination approach", "done", "buoy approach",
-    "after a failed upload", "to a place", "given up",
+    "idle",
+    "waiting",
+    "new calculation",
+    "first upload",
+    "standard",
+    "planning under way",
+    "uploading under way",
+    "operator",
+    "comparing",
+    "holding",
+    "last resort",
+    "destination approach",
+    "done",
+    "buoy approach",
+    "after a failed upload",
+    "to a place",
+    "given up",
 )
 
 
@@ -122,8 +150,10 @@ def wind(**changes):
 
 
 def forecast(tws_mps):
-    return lambda s: wind(forecast=s.wind.forecast and replace(
-        s.wind.forecast, mean_tws_mps=np.full_like(s.wind.forecast.mean_tws_mps, tws_mps)))(s)
+    return lambda s: wind(
+        forecast=s.wind.forecast
+        and replace(s.wind.forecast, mean_tws_mps=np.full_like(s.wind.forecast.mean_tws_mps, tws_mps))
+    )(s)
 
 
 def status(**changes):
@@ -139,12 +169,16 @@ def event(*events):
 
 
 def ids(state):
-    return [n for n in (
-        state.pending.plan.request_id if state.pending.plan else None,
-        state.pending.upload.upload_id if state.pending.upload else None,
-        state.pending.read[0] if state.pending.read else None,
-        state.pending.command[0] if state.pending.command else None,
-    ) if n is not None] or [99_999]
+    return [
+        n
+        for n in (
+            state.pending.plan.request_id if state.pending.plan else None,
+            state.pending.upload.upload_id if state.pending.upload else None,
+            state.pending.read[0] if state.pending.read else None,
+            state.pending.command[0] if state.pending.command else None,
+        )
+        if n is not None
+    ] or [99_999]
 
 
 def outcomes(make_outcome):
@@ -171,12 +205,17 @@ def towards_an_island(snapshot, in_s=200.0):
 def on_collision_course(snapshot, gap_m=90.0):
     """Return the picture of a boat of 12 m that is ``gap_m`` to the east and comes straight at ours."""
     east, north = snapshot.position_en_m
-    return TrafficPicture(t_s=snapshot.t_s, vessels=(vessel(
-        en=(east + gap_m, north), course_deg=270.0, speed_mps=4.0, t_s=snapshot.t_s,
-        size=(6.0, 6.0, 2.0, 2.0)),))
+    return TrafficPicture(
+        t_s=snapshot.t_s,
+        vessels=(
+            vessel(
+                en=(east + gap_m, north), course_deg=270.0, speed_mps=4.0, t_s=snapshot.t_s, size=(6.0, 6.0, 2.0, 2.0)
+            ),
+        ),
+    )
 
 
-MIDNIGHT_S = 1_780_963_200.0   # 2026-06-09, UTC
+MIDNIGHT_S = 1_780_963_200.0  # 2026-06-09, UTC
 
 
 EVENTS = {
@@ -191,12 +230,15 @@ EVENTS = {
     "light wind": forecast(0.1),
     "becalmed": lambda s: replace(
         vehicle(velocity_en_mps=(0.0, 0.0))(s),
-        wind=replace(s.wind, health=WindHealth.LIGHT, mean_tws_mps=0.1, present_tws_mps=0.1)),
+        wind=replace(s.wind, health=WindHealth.LIGHT, mean_tws_mps=0.1, present_tws_mps=0.1),
+    ),
     "drifting": lambda s: replace(
         vehicle(velocity_en_mps=towards_an_island(s))(s),
-        wind=replace(s.wind, health=WindHealth.LIGHT, mean_tws_mps=0.1, present_tws_mps=0.1)),
+        wind=replace(s.wind, health=WindHealth.LIGHT, mean_tws_mps=0.1, present_tws_mps=0.1),
+    ),
     "in irons": lambda s: replace(
-        vehicle(velocity_en_mps=(0.0, -0.1), heading_rad=s.wind.present_twd_from_rad or 0.0)(s)),
+        vehicle(velocity_en_mps=(0.0, -0.1), heading_rad=s.wind.present_twd_from_rad or 0.0)(s)
+    ),
     "vessel too near": lambda s: replace(s, traffic=on_collision_course(s)),
     "no progress": vehicle(velocity_en_mps=(0.0, 0.0)),
     "heading against course": vehicle(velocity_en_mps=(-1.0, -1.0), heading_rad=math.pi / 4),
@@ -244,7 +286,8 @@ EVENTS = {
     "header": lambda s: wind(present_twd_from_rad=(s.wind.present_twd_from_rad or 0.0) + 0.6)(s),
     "90 degree shift": lambda s: wind(
         mean_twd_from_rad=(s.wind.mean_twd_from_rad or 0.0) + 1.6,
-        present_twd_from_rad=(s.wind.present_twd_from_rad or 0.0) + 1.6)(s),
+        present_twd_from_rad=(s.wind.present_twd_from_rad or 0.0) + 1.6,
+    )(s),
     # events and orders
     "waypoint reached": event(WaypointReached(seq=1)),
     "waypoint reached, nonsense": event(WaypointReached(seq=5000)),
@@ -253,9 +296,15 @@ EVENTS = {
     "two stations": event(order("hold"), order("home", by=(254, 190))),
     "all at once": event(AutopilotRebooted(), order("replan"), WaypointReached(seq=2)),
     # outcomes
-    "stale outcomes": lambda s: replace(s, outcomes=(
-        PlanOutcome(request_id=77_777), UploadOutcome(upload_id=77_777, result=UploadResult.OK),
-        ReadOutcome(read_id=77_777, items=()), CommandOutcome(command_id=77_777, result=CommandResult.REFUSED))),
+    "stale outcomes": lambda s: replace(
+        s,
+        outcomes=(
+            PlanOutcome(request_id=77_777),
+            UploadOutcome(upload_id=77_777, result=UploadResult.OK),
+            ReadOutcome(read_id=77_777, items=()),
+            CommandOutcome(command_id=77_777, result=CommandResult.REFUSED),
+        ),
+    ),
     "planner died": outcomes(lambda n: PlanOutcome(request_id=n, text="killed")),
     **{f"upload {r.value}": outcomes(lambda n, r=r: UploadOutcome(upload_id=n, result=r)) for r in UploadResult},
     "read failed": outcomes(lambda n: ReadOutcome(read_id=n, text="time-out")),
@@ -267,6 +316,7 @@ EVENTS = {
     "upload only": lambda s: replace(s, permissions=Permissions(may_upload=True)),
     "an hour later": lambda s: replace(s, t_s=s.t_s + 3700.0),
 }
+
 
 def seen_after(change, snapshot, state):
     wants_state = change.__code__.co_argcount == 2
@@ -350,12 +400,13 @@ def test_each_watchdog_enters_and_leaves_and_says_so(dog):
         from companion.messages import MissionItem
 
         theirs = (MissionItem(command=16, lat_e7=1, lon_e7=1), MissionItem(command=20))
-        for n in (1, 3):   # read twice before it is believed
+        for n in (1, 3):  # read twice before it is believed
             read = state.pending.read
             assert read is not None
             assert not state.mission.foreign
-            state, _ = skipper.step(state, replace(
-                snapshot, t_s=snapshot.t_s + n, outcomes=(ReadOutcome(read_id=read[0], items=theirs),)))
+            state, _ = skipper.step(
+                state, replace(snapshot, t_s=snapshot.t_s + n, outcomes=(ReadOutcome(read_id=read[0], items=theirs),))
+            )
             state, _ = skipper.step(state, replace(snapshot, t_s=snapshot.t_s + n + 1, outcomes=()))
         state, raised = run(state, snapshot, 4, snapshot.t_s + 5)
         assert raised
@@ -377,18 +428,26 @@ def raised_in(world, name, seconds):
 def test_no_progress_is_noticed_and_answered_with_a_plan():
     world = make(obstacles=())
     world.run(60)
-    world.sail = lambda dt: None      # weed: the boat stands still in a good wind, not pointing at it
+    world.sail = lambda dt: None  # weed: the boat stands still in a good wind, not pointing at it
     world.speed = 0.6
     assert raised_in(world, "no progress", 400)
-    assert world.run(60, lambda w: any(
-        isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.NO_PROGRESS for _, a in w.actions))
+    assert world.run(
+        60,
+        lambda w: any(
+            isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.NO_PROGRESS for _, a in w.actions
+        ),
+    )
     del world.sail
     assert world.run(300, lambda w: not any(r.name == "no progress" for r in w.state.alarms.raised))
 
 
 def test_a_stuck_waypoint_is_pushed_on():
-    world = make(Goal(en_m=(150.0, 0.0), radius_m=6.0), Goal(en_m=(150.0, 200.0), radius_m=6.0), obstacles=(),
-                 wind=lambda t: (math.radians(-45), 5.0))
+    world = make(
+        Goal(en_m=(150.0, 0.0), radius_m=6.0),
+        Goal(en_m=(150.0, 200.0), radius_m=6.0),
+        obstacles=(),
+        wind=lambda t: (math.radians(-45), 5.0),
+    )
     assert world.run(60, lambda w: w.state.mission.index >= 0 and len(w.mission) > 2 and w.seq == 1)
     world.run(300, lambda w: w.position[0] > 152.0 or w.seq > 1)
     # The autopilot goes on counting the waypoint that lies behind.
@@ -440,29 +499,54 @@ def test_the_table_has_an_entry_an_exit_and_an_action_for_each():
 # What boats and shores of other releases send, and missions say, for good: a new row is added here, none is changed.
 # The watchdogs' numbers on the air, with the key in [safety] and its default where one ends the voyage early.
 NUMBERS = {
-    "link silent": (1,), "position lost": (2,), "position jump": (3,), "wind untrusted": (4,), "becalmed": (5,),
-    "drifting": (6,), "in irons": (7,), "vessel too near": (8,), "no progress": (9,), "heading against course": (10,),
-    "off the corridor": (11,), "stuck waypoint": (12,), "mission ended": (13,), "fence breach": (14,),
-    "foreign mission": (15,), "reboot": (16,), "battery low": (17,), "battery critical": (18, "battery", "refuge"),
-    "leaking": (19, "leak", "refuge"), "dark": (20, "dark", "say"), "shore lost": (21, "shore_lost", "say"),
-    "out of time": (22, "out_of_time", "refuge"), "dragged off": (23,), "planner dead": (24,),
-    "strong wind": (25, "strong_wind", "refuge"), "light wind": (26, "light_wind", "say"), "fence off": (27,),
+    "link silent": (1,),
+    "position lost": (2,),
+    "position jump": (3,),
+    "wind untrusted": (4,),
+    "becalmed": (5,),
+    "drifting": (6,),
+    "in irons": (7,),
+    "vessel too near": (8,),
+    "no progress": (9,),
+    "heading against course": (10,),
+    "off the corridor": (11,),
+    "stuck waypoint": (12,),
+    "mission ended": (13,),
+    "fence breach": (14,),
+    "foreign mission": (15,),
+    "reboot": (16,),
+    "battery low": (17,),
+    "battery critical": (18, "battery", "refuge"),
+    "leaking": (19, "leak", "refuge"),
+    "dark": (20, "dark", "say"),
+    "shore lost": (21, "shore_lost", "say"),
+    "out of time": (22, "out_of_time", "refuge"),
+    "dragged off": (23,),
+    "planner dead": (24,),
+    "strong wind": (25, "strong_wind", "refuge"),
+    "light wind": (26, "light_wind", "say"),
+    "fence off": (27,),
     "wind contradicted": (28,),
 }
 # The figures of [safety]: default, more than, at least, at most.
 FIGURES = {
-    "battery_v": (None, 0.0, None, None), "battery_reserve": (1.5, None, 0.0, 10.0),
-    "dark_below_deg": (-6.0, None, -18.0, 45.0), "shore_lost_s": (600.0, None, 10.0, None),
+    "battery_v": (None, 0.0, None, None),
+    "battery_reserve": (1.5, None, 0.0, 10.0),
+    "dark_below_deg": (-6.0, None, -18.0, 45.0),
+    "shore_lost_s": (600.0, None, 10.0, None),
 }
 
 
 def test_numbers_on_the_air_and_keys_of_missions_are_given_for_good():
     assert {dog.name: (dog.number, *((dog.ends.key, str(dog.ends.default)) if dog.ends else ())) for dog in TABLE} == (
-        NUMBERS)
+        NUMBERS
+    )
     assert len({dog.number for dog in TABLE}) == len(TABLE)
     assert {s.key: (s.default, s.above, s.least, s.most) for s in SETTINGS.values()} == FIGURES
     assert {cause.key: WORD_OF[cause.answer] for cause in FAILSAFES if cause.key} == {
-        "position_failsafe": "sail_on", "battery_failsafe": "refuge", "fence_failsafe": "sail_on",
+        "position_failsafe": "sail_on",
+        "battery_failsafe": "refuge",
+        "fence_failsafe": "sail_on",
         "shore_failsafe": "stay",
     }
 

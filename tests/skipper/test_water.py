@@ -21,9 +21,13 @@ from tests.skipper.world import World, voyage, with_parts
 
 # Pairs of numbers that are no places: said here, so that a new one is thought about.
 NO_PLACES = {
-    ("GoalProgress", "history"),         # carried over by hand
-    ("Announced", "codes"), ("Alarms", "entering"), ("GoalProgress", "covered"),
-    ("Signs", "seen_s"), ("Persisted", "inside"), ("Persisted", "covered"),
+    ("GoalProgress", "history"),  # carried over by hand
+    ("Announced", "codes"),
+    ("Alarms", "entering"),
+    ("GoalProgress", "covered"),
+    ("Signs", "seen_s"),
+    ("Persisted", "inside"),
+    ("Persisted", "covered"),
     ("AutopilotStatus", "servo_us"),
 }
 
@@ -60,9 +64,13 @@ def test_no_place_of_the_state_is_forgotten():
     found = reached(SkipperState, Persisted, Vessel)
     assert {Approach, Standing, Fix, Adrift, PendingPlan} <= found
     missed = [
-        (cls.__name__, f.name) for cls in found for f in fields(cls)
-        if pairs_in(typing.get_type_hints(cls)[f.name]) and not (is_place(f.name) or is_velocity(f.name))
-        and (cls.__name__, f.name) not in NO_PLACES]
+        (cls.__name__, f.name)
+        for cls in found
+        for f in fields(cls)
+        if pairs_in(typing.get_type_hints(cls)[f.name])
+        and not (is_place(f.name) or is_velocity(f.name))
+        and (cls.__name__, f.name) not in NO_PLACES
+    ]
     assert missed == []
 
 
@@ -75,21 +83,32 @@ def test_everything_that_is_remembered_is_where_it_was():
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
     world.run(120)
     state = with_parts(
-        world.state, voyage={"rest_en_m": (10.0, 20.0)},
+        world.state,
+        voyage={"rest_en_m": (10.0, 20.0)},
         progress={
             "searched": ((1.0, 2.0), (3.0, 4.0)),
-            "approaches": (Approach(goal=0, en_m=(7.0, 8.0), sweeps=(((0.0, 0.0), (9.0, 9.0)),)),)},
-        position={"doubt": PositionDoubt(
-            since_s=1.0, t_s=1.0, settled_s=1.0, reckoned_en_m=(30.0, 40.0), velocity_en_mps=(1.0, 0.0),
-            why="it jumped")},
+            "approaches": (Approach(goal=0, en_m=(7.0, 8.0), sweeps=(((0.0, 0.0), (9.0, 9.0)),)),),
+        },
+        position={
+            "doubt": PositionDoubt(
+                since_s=1.0,
+                t_s=1.0,
+                settled_s=1.0,
+                reckoned_en_m=(30.0, 40.0),
+                velocity_en_mps=(1.0, 0.0),
+                why="it jumped",
+            )
+        },
         adrift=Adrift(places=(Fix(t_s=0.0, en_m=(5.0, 6.0)),), ground_en_mps=(0.5, 0.0)),
-        orders={"standing": Standing(verb=Verb.GOAL, by="crew", name="there", en_m=(100.0, 200.0))})
+        orders={"standing": Standing(verb=Verb.GOAL, by="crew", name="there", en_m=(100.0, 200.0))},
+    )
     shift = shifted(world)
     out = in_water(state, shift)
     assert state.mission.route is not None
     assert len(state.progress.history) > 2
     for old, new in [
-        (state.voyage.rest_en_m, out.voyage.rest_en_m), (state.position.last_seen.en_m, out.position.last_seen.en_m),
+        (state.voyage.rest_en_m, out.voyage.rest_en_m),
+        (state.position.last_seen.en_m, out.position.last_seen.en_m),
         (state.orders.standing.en_m, out.orders.standing.en_m),
         (state.progress.approaches[0].en_m, out.progress.approaches[0].en_m),
         (state.progress.approaches[0].sweeps[0][1], out.progress.approaches[0].sweeps[0][1]),
@@ -114,17 +133,17 @@ def test_the_water_is_left_when_she_is_far_from_its_origin_and_nothing_is_under_
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
     frame = world.skipper.voyage.frame
     skipper, far = replace(world.skipper, voyage=passage(world)), frame.geo_from_en(400.0, 301.0)
-    assert not world.skipper.leaves_water(world.state, far)       # no passage
+    assert not world.skipper.leaves_water(world.state, far)  # no passage
     assert skipper.leaves_water(world.state, far)
     assert not skipper.leaves_water(world.state, frame.geo_from_en(400.0, 299.0))
     world.run(3, lambda w: w.state.pending.plan is not None)
     asked = world.state
     assert asked.pending.plan is not None
-    assert not skipper.leaves_water(asked, far)                   # its answer would come in the metres of this water
+    assert not skipper.leaves_water(asked, far)  # its answer would come in the metres of this water
     seen = with_parts(world.state, pending={"plan": None}, position={"last_seen": Fix(t_s=0.0, en_m=(400.0, 290.0))})
     assert skipper.leaves_water(seen, far)
     jumped = with_parts(seen, position={"doubt": Fix(t_s=0.0, en_m=(300.0, 0.0))})
-    assert not skipper.leaves_water(jumped, far)                  # a position that may be false
+    assert not skipper.leaves_water(jumped, far)  # a position that may be false
     assert not skipper.leaves_water(with_parts(seen, position={"last_seen": Fix(t_s=0.0, en_m=(-200.0, 0.0))}), far)
 
 

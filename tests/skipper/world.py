@@ -62,21 +62,37 @@ def en_of(lat_e7: int, lon_e7: int) -> tuple[float, float]:
 
 
 def area(*polygons, limits=None) -> LocalArea:
-    return LocalArea(frame=FRAME, names=tuple(f"o{i}" for i in range(len(polygons))), polygons=tuple(polygons),
-                     own_margins_m=(0.0,) * len(polygons), limits=limits)
+    return LocalArea(
+        frame=FRAME,
+        names=tuple(f"o{i}" for i in range(len(polygons))),
+        polygons=tuple(polygons),
+        own_margins_m=(0.0,) * len(polygons),
+        limits=limits,
+    )
 
 
 def voyage(*goals: Goal, obstacles=(), limits=None, laps=1, home=(0.0, 0.0), refuges=()) -> Voyage:
     boat = Boat(polar=ardurover_sitl(), turn_rate_radps=0.8)
-    return Voyage(name="test", frame=FRAME, goals=goals or (Goal(en_m=(0.0, 300.0)),), laps=laps,
-                  area=area(*obstacles, limits=limits), boat=boat, home_en_m=home,
-                  refuges=tuple(Refuge(name=f"{n + 1}", en_m=p) for n, p in enumerate(refuges)))
+    return Voyage(
+        name="test",
+        frame=FRAME,
+        goals=goals or (Goal(en_m=(0.0, 300.0)),),
+        laps=laps,
+        area=area(*obstacles, limits=limits),
+        boat=boat,
+        home_en_m=home,
+        refuges=tuple(Refuge(name=f"{n + 1}", en_m=p) for n, p in enumerate(refuges)),
+    )
 
 
 def order(words, t_s=0.0, *, by=(255, 190), command=31010) -> Order:
     """Return an order as a station gives it; ``words`` as a person types them."""
-    return Order(wanted=phrase(words.split()), t_s=t_s, command=command,
-                 source=Source(kind="mavlink", system=by[0], component=by[1]))
+    return Order(
+        wanted=phrase(words.split()),
+        t_s=t_s,
+        command=command,
+        source=Source(kind="mavlink", system=by[0], component=by[1]),
+    )
 
 
 def forecast(t_s: float, twd_rad: float, tws_mps: float = 5.0, sigma_rad: float = 0.05) -> WindForecast:
@@ -84,16 +100,24 @@ def forecast(t_s: float, twd_rad: float, tws_mps: float = 5.0, sigma_rad: float 
     level = np.array([0.5, 0.8, 0.9, 0.95])
     z = np.array([0.674, 1.282, 1.645, 1.96])
     return WindForecast(
-        t_s=t_s, horizon_s=np.array(HORIZONS), mean_twd_from_rad=np.full(n, twd_rad),
+        t_s=t_s,
+        horizon_s=np.array(HORIZONS),
+        mean_twd_from_rad=np.full(n, twd_rad),
         sigma_twd_rad=np.full(n, sigma_rad),
-        mean_tws_mps=np.full(n, tws_mps), sigma_tws_mps=np.full(n, 0.5), level=level,
-        half_width_rad=np.outer(np.full(n, sigma_rad), z), correlation_time_s=30.0)
+        mean_tws_mps=np.full(n, tws_mps),
+        sigma_tws_mps=np.full(n, 0.5),
+        level=level,
+        half_width_rad=np.outer(np.full(n, sigma_rad), z),
+        correlation_time_s=30.0,
+    )
 
 
 def with_parts(state, **parts):
     """A state with other parts: ``{field: value}`` changes a part, anything else takes its place."""
-    return replace(state, **{
-        name: replace(getattr(state, name), **new) if isinstance(new, dict) else new for name, new in parts.items()})
+    return replace(
+        state,
+        **{name: replace(getattr(state, name), **new) if isinstance(new, dict) else new for name, new in parts.items()},
+    )
 
 
 @dataclass
@@ -116,7 +140,7 @@ class World:
     sigma: float = 0.05
     corridor: float = 10.0
     no_go: float = math.radians(45.0)
-    circle_m: float | None = None   # the autopilot's own fence around home, kept while ``fence_breached`` is told
+    circle_m: float | None = None  # the autopilot's own fence around home, kept while ``fence_breached`` is told
     upload_s: float = 1.0
     plan_s: float = 1.0
     expansions: int = 3000
@@ -126,20 +150,23 @@ class World:
     position_offset: tuple[float, float] = (0.0, 0.0)
     system_status: int = 4
     ekf_ok: bool = True
-    shown: dict = field(default_factory=dict)   # what else the status shows
-    identity: Identity = field(default_factory=lambda: Identity(
-        system=1, uid="5a", is_confirmed=True, vehicle_type=11, frame_class=2, sails=True))
-    drift_mps: float = 0.0      # along the heading, while nobody sails
-    current: Callable[[float], tuple[float, float]] = lambda t: (0.0, 0.0)   # of the water, east north
-    motor: bool = False         # it runs
-    tack_asked: bool = False    # heard on a leg that is beaten
-    turning_to: float = 0.0     # the tack that a turn through the wind ends on, 0 when there is none
+    shown: dict = field(default_factory=dict)  # what else the status shows
+    identity: Identity = field(
+        default_factory=lambda: Identity(
+            system=1, uid="5a", is_confirmed=True, vehicle_type=11, frame_class=2, sails=True
+        )
+    )
+    drift_mps: float = 0.0  # along the heading, while nobody sails
+    current: Callable[[float], tuple[float, float]] = lambda t: (0.0, 0.0)  # of the water, east north
+    motor: bool = False  # it runs
+    tack_asked: bool = False  # heard on a leg that is beaten
+    turning_to: float = 0.0  # the tack that a turn through the wind ends on, 0 when there is none
     uploads_fail: Callable[[int], UploadResult] = lambda n: UploadResult.OK
     planner: Callable | None = None
     state: SkipperState | None = None
     pending: list = field(default_factory=list)
     stopped: list = field(default_factory=list)
-    forged_reads: list = field(default_factory=list)   # what the next reads find in place of the mission
+    forged_reads: list = field(default_factory=list)  # what the next reads find in place of the mission
     events: list = field(default_factory=list)
     actions: list = field(default_factory=list)
     log: list = field(default_factory=list)
@@ -168,7 +195,7 @@ class World:
     def sail(self, dt: float) -> None:
         water = self.current(self.t)
         self.position = (self.position[0] + dt * water[0], self.position[1] + dt * water[1])
-        if self.motor:          # it keeps the boat where it is
+        if self.motor:  # it keeps the boat where it is
             self.speed, self.position = 0.0, (self.position[0] - dt * water[0], self.position[1] - dt * water[1])
             return
         twd, tws = self.wind(self.t)
@@ -222,7 +249,7 @@ class World:
         if (out or asked) and self.t - self.last_tack > 5.0:
             self.turning_to, self.last_tack, self.tacks = -tack, self.t, self.tacks + 1
         if self.turning_to == tack:
-            self.turning_to = 0.0          # through the wind
+            self.turning_to = 0.0  # through the wind
         return wrap_pi(twd - (self.turning_to or tack) * self.no_go)
 
     # ----------------------------------------------------------------------------------- application
@@ -245,8 +272,11 @@ class World:
             self.pending = [p for p in self.pending if p[1] == "plan"]
 
     def answer(self) -> list:
-        stopped = [UploadOutcome(upload_id=a.upload_id, result=UploadResult.TIMEOUT, text="stopped")
-                   for _, kind, a in self.stopped if kind == "upload"]
+        stopped = [
+            UploadOutcome(upload_id=a.upload_id, result=UploadResult.TIMEOUT, text="stopped")
+            for _, kind, a in self.stopped
+            if kind == "upload"
+        ]
         self.stopped = []
         due = [p for p in self.pending if p[0] <= self.t]
         self.pending = [p for p in self.pending if p[0] > self.t]
@@ -254,8 +284,9 @@ class World:
 
     def _answer(self, kind: str, action):
         if kind == "plan":
-            make = self.planner or (lambda p, seed: plan(
-                p, expansions=self.expansions, seed=seed, algorithm=self.algorithm))
+            make = self.planner or (
+                lambda p, seed: plan(p, expansions=self.expansions, seed=seed, algorithm=self.algorithm)
+            )
             return PlanOutcome(request_id=action.request_id, plan=make(action.problem, action.seed))
         if kind == "upload":
             self.uploads += 1
@@ -269,7 +300,7 @@ class World:
                         self.mission_state = MissionState.NOT_STARTED
             elif result is UploadResult.TIMEOUT:
                 half = len(action.items) // 2
-                self.install((*action.items[:half], *self.mission[half:len(action.items)]))
+                self.install((*action.items[:half], *self.mission[half : len(action.items)]))
             return UploadOutcome(upload_id=action.upload_id, result=result)
         if kind == "read":
             items = self.forged_reads.pop(0) if self.forged_reads else self.mission
@@ -316,22 +347,52 @@ class World:
         here = (self.position[0] + self.position_offset[0], self.position[1] + self.position_offset[1])
         water = (0.0, 0.0) if self.motor else self.current(self.t)
         velocity = (self.speed * math.sin(self.heading) + water[0], self.speed * math.cos(self.heading) + water[1])
-        vehicle = VehicleState(t_s=self.t, boot_s=self.boot_s + self.t, position=FRAME.geo_from_en(*here),
-                               velocity_en_mps=velocity, heading_rad=self.heading)
+        vehicle = VehicleState(
+            t_s=self.t,
+            boot_s=self.boot_s + self.t,
+            position=FRAME.geo_from_en(*here),
+            velocity_en_mps=velocity,
+            heading_rad=self.heading,
+        )
         status = AutopilotStatus(
-            t_s=self.t, boot_s=self.boot_s + self.t, mode=self.mode, is_armed=self.armed, ekf_ok=self.ekf_ok,
+            t_s=self.t,
+            boot_s=self.boot_s + self.t,
+            mode=self.mode,
+            is_armed=self.armed,
+            ekf_ok=self.ekf_ok,
             system_status=self.system_status,
-            mission_seq=self.seq, mission_total=len(self.mission), mission_state=self.mission_state, **self.shown)
+            mission_seq=self.seq,
+            mission_total=len(self.mission),
+            mission_state=self.mission_state,
+            **self.shown,
+        )
         out = Snapshot(
             identity=self.identity,
-            t_s=self.t, vehicle=vehicle, vehicle_age_s=0.1, position_en_m=here, autopilot=status, autopilot_age_s=0.2,
-            heartbeat_age_s=self.heartbeat_age, permissions=self.permissions,
-            wind=WindEstimate(health=self.wind_health, forecast=forecast(self.t, mean, mean_tws, self.sigma),
-                          mean_twd_from_rad=mean, mean_tws_mps=mean_tws, sigma_twd_rad=self.sigma,
-                          present_twd_from_rad=present, present_tws_mps=tws, record_s=100.0 + self.t),
+            t_s=self.t,
+            vehicle=vehicle,
+            vehicle_age_s=0.1,
+            position_en_m=here,
+            autopilot=status,
+            autopilot_age_s=0.2,
+            heartbeat_age_s=self.heartbeat_age,
+            permissions=self.permissions,
+            wind=WindEstimate(
+                health=self.wind_health,
+                forecast=forecast(self.t, mean, mean_tws, self.sigma),
+                mean_twd_from_rad=mean,
+                mean_tws_mps=mean_tws,
+                sigma_twd_rad=self.sigma,
+                present_twd_from_rad=present,
+                present_tws_mps=tws,
+                record_s=100.0 + self.t,
+            ),
             limits=AutopilotLimits(
-                sail_no_go_angle_rad=self.no_go, sail_xtrack_max_m=self.corridor, fence_circle_m=self.circle_m),
-            mission=MissionOnBoard(), events=tuple(self.events), outcomes=tuple(self.answer()))
+                sail_no_go_angle_rad=self.no_go, sail_xtrack_max_m=self.corridor, fence_circle_m=self.circle_m
+            ),
+            mission=MissionOnBoard(),
+            events=tuple(self.events),
+            outcomes=tuple(self.answer()),
+        )
         self.events = []
         return replace(out, **self.extra)
 
@@ -385,13 +446,18 @@ def check_invariants(before, after, snapshot, actions) -> None:
             if before.mission.route is not None and after.pending.upload is not None:
                 assert action.items[: action.keep_first] == before.mission.route.items[: action.keep_first]
         if after.phase is Phase.OPERATOR:
-            assert isinstance(action, (
-                act.Announce, act.Acknowledge, act.CancelPlan, act.ReadMission, act.StopOrders)), action
+            assert isinstance(
+                action, (act.Announce, act.Acknowledge, act.CancelPlan, act.ReadMission, act.StopOrders)
+            ), action
     assert after.why
     if after.phase in {Phase.WAITING, Phase.HOLDING}:
         assert "wait" in after.why, f"{after.phase.value}, and not said for what: {after.why}"
-    ids = [getattr(a, n) for a in actions for n in ("request_id", "upload_id", "read_id", "command_id")
-           if hasattr(a, n) and not isinstance(a, act.CancelPlan)]
+    ids = [
+        getattr(a, n)
+        for a in actions
+        for n in ("request_id", "upload_id", "read_id", "command_id")
+        if hasattr(a, n) and not isinstance(a, act.CancelPlan)
+    ]
     assert len(ids) == len(set(ids))
 
 

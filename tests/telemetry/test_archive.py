@@ -45,7 +45,7 @@ def test_the_oldest_telemetry_goes_first_then_tracks_decisions_last(voyages):
 def test_what_is_recorded_now_and_what_is_not_ours_stays(voyages):
     (voyages / "v1/notes.txt").write_text("mine")
     (voyages / "photos").mkdir()
-    (voyages / "photos" / TLOG).write_bytes(bytes(9000))     # no voyage: nothing was decided there
+    (voyages / "photos" / TLOG).write_bytes(bytes(9000))  # no voyage: nothing was decided there
     outside = voyages.parent / "elsewhere"
     outside.mkdir()
     (outside / DECISIONS).write_bytes(bytes(9000))
@@ -55,7 +55,8 @@ def test_what_is_recorded_now_and_what_is_not_ours_stays(voyages):
     VoyageArchive(folder=voyages, budget_bytes=0).tidy()
     lock.release()
     assert {n for n in names(voyages) if n.startswith("v0")} == {
-        f"v0/{n}" for n in (TLOG, TRACK, DECISIONS, VOYAGE, "mission/mission.toml")}
+        f"v0/{n}" for n in (TLOG, TRACK, DECISIONS, VOYAGE, "mission/mission.toml")
+    }
     assert {n for n in names(voyages) if not n.startswith("v0")} == {"v1/notes.txt", f"photos/{TLOG}", "a.state.json"}
     assert (outside / DECISIONS).exists()
 
@@ -69,13 +70,13 @@ def test_for_a_disk_that_something_else_has_filled_only_telemetry_is_given(voyag
 def test_a_voyage_keeps_the_budget_from_its_start_and_says_what_it_dropped(voyages):
     """Each restart made a folder with 3 GB of its own (issue 12, point 13)."""
     with Recorder(voyages / "now", archive=VoyageArchive(folder=voyages, budget_bytes=2600)) as recorder:
-        assert VoyageArchive(folder=voyages).used_bytes() <= 2600 + 300    # its own header has come since
+        assert VoyageArchive(folder=voyages).used_bytes() <= 2600 + 300  # its own header has come since
         recorder.decision({"kind": "start"})
         recorder.tend(STAMPS)
         for _ in range(200):
             recorder.frame(bytes(100))
             recorder.decision({"k": 1})
-    assert recorder.dropped > 0      # one voyage alone does not take more than all may
+    assert recorder.dropped > 0  # one voyage alone does not take more than all may
     own = sum(p.stat().st_size for p in (voyages / "now").iterdir())
     assert own <= 2600 + 300
     told = next(r for r in read_jsonl(voyages / "now" / DECISIONS) if r["kind"] == "dropped")

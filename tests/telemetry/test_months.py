@@ -21,8 +21,8 @@ from companion.telemetry.folder.recorder import (
 )
 
 DAY_S = 86_400
-BUDGET = 5_000_000   # a thousandth of what a boat has, as are the records: 330 kB a day
-FRAME = bytes.fromhex("fd0900000001bf00000000000000120800040330fa")   # a heartbeat; its checksum is of no matter
+BUDGET = 5_000_000  # a thousandth of what a boat has, as are the records: 330 kB a day
+FRAME = bytes.fromhex("fd0900000001bf00000000000000120800040330fa")  # a heartbeat; its checksum is of no matter
 
 
 def row(t_s):
@@ -58,12 +58,12 @@ def test_in_ninety_days_the_budget_is_never_exceeded(tmp_path, restarts_every_da
     assert BUDGET / 2 < worst <= BUDGET
     decisions = list(itertools.chain.from_iterable(read_decisions(f) for f in sorted(tmp_path.iterdir())))
     noted = [d["t_s"] for d in decisions if d["kind"] == "test"]
-    assert noted == [float(t) for t in range(0, 90 * DAY_S, 3600)]   # every one of them
+    assert noted == [float(t) for t in range(0, 90 * DAY_S, 3600)]  # every one of them
     assert any(d["kind"] == "dropped" and "telemetry" in str(d["voyages"]) for d in decisions)
 
 
 def test_parts_are_read_as_one_record(tmp_path):
-    folder = tmp_path / "voyage"   # the archive drops what else is in it, and above lie other tests' voyages
+    folder = tmp_path / "voyage"  # the archive drops what else is in it, and above lie other tests' voyages
     with Recorder(folder, archive=VoyageArchive(folder=tmp_path, budget_bytes=320_000), is_durable=False) as recorder:
         recorder.voyage({})
         for t_s in range(400):

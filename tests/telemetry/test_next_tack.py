@@ -22,16 +22,28 @@ def sailed(tmp_path, *, from_deg, sd_deg=0.1, mission="open-water.toml", seed=1)
 
     def see(status, step):
         snapshot = step.snapshot
-        if (snapshot.autopilot is None or snapshot.autopilot.mode is not Mode.AUTO or not snapshot.autopilot.is_armed
-                or step.state.phase is Phase.DONE or snapshot.vehicle is None or snapshot.vehicle.speed_mps < 1.0):
+        if (
+            snapshot.autopilot is None
+            or snapshot.autopilot.mode is not Mode.AUTO
+            or not snapshot.autopilot.is_armed
+            or step.state.phase is Phase.DONE
+            or snapshot.vehicle is None
+            or snapshot.vehicle.speed_mps < 1.0
+        ):
             return
         off_rad = difference_rad(snapshot.wind.present_twd_from_rad, snapshot.vehicle.heading_rad)
         shown.append((snapshot.t_s, status.next_tack_s, off_rad > 0.0))
 
-    scenario = Scenario(name="tacks", mission=mission, limit_s=500.0, expect=ExpectSpec(),
-                        wind=WindSpec(tws_mps=5.0, from_deg=from_deg, sd_deg=sd_deg))
-    run_virtual(run_embedded(
-        scenario, MISSIONS / "scenario.toml", seed, tmp_path / "v", expansions=3000, on_status=see))
+    scenario = Scenario(
+        name="tacks",
+        mission=mission,
+        limit_s=500.0,
+        expect=ExpectSpec(),
+        wind=WindSpec(tws_mps=5.0, from_deg=from_deg, sd_deg=sd_deg),
+    )
+    run_virtual(
+        run_embedded(scenario, MISSIONS / "scenario.toml", seed, tmp_path / "v", expansions=3000, on_status=see)
+    )
     tacks = [b[0] for a, b in itertools.pairwise(shown) if a[2] != b[2]]
     return shown, tacks
 

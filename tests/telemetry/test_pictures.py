@@ -46,8 +46,9 @@ def drawn(monkeypatch):
 @pytest.fixture(scope="module")
 def sailed(tmp_path_factory):
     out = tmp_path_factory.mktemp("pictures") / "v"
-    scenario = Scenario(name="open-water", mission="open-water.toml", limit_s=150.0, wind=WindSpec(sd_deg=2.0),
-                        expect=ExpectSpec())
+    scenario = Scenario(
+        name="open-water", mission="open-water.toml", limit_s=150.0, wind=WindSpec(sd_deg=2.0), expect=ExpectSpec()
+    )
     run_virtual(run_embedded(scenario, ROOT / "sitl/missions/scenario.toml", 1, out, expansions=2000))
     return out
 
@@ -68,10 +69,17 @@ def test_the_voyages_picture(sailed, drawn, tmp_path):
     (folder / "track.csv").write_text("\n".join(lines) + "\n")
     voyage.plot_voyage(read_voyage(folder), tmp_path / "v.png")
     names, said, _ = words(drawn[0])
-    assert {"first plan", "sailed on port tack", "adrift, or in other hands", "goal and its radius", "first position",
-            "last position", "no-go zone"} <= names
+    assert {
+        "first plan",
+        "sailed on port tack",
+        "adrift, or in other hands",
+        "goal and its radius",
+        "first position",
+        "last position",
+        "no-go zone",
+    } <= names
     assert "Windward mark" in said
-    assert any(text.endswith(" m") for text in said)   # the scale
+    assert any(text.endswith(" m") for text in said)  # the scale
     title = drawn[0].get_suptitle()
     assert "9 June 2026, 10:13 UTC" in title
     assert "50°49.02' N 1°18.60' W" in title
@@ -89,8 +97,12 @@ def test_no_legend_lies_over_a_curve(sailed, drawn, tmp_path):
 
 
 def test_the_missions_picture_names_its_goals_and_marks(drawn, tmp_path, capsys):
-    assert cli.main(["mission", "check", str(MISSIONS / "buoy-course.toml"), "--plot", str(tmp_path / "m.png"),
-                     "--no-plan"]) == 0
+    assert (
+        cli.main(
+            ["mission", "check", str(MISSIONS / "buoy-course.toml"), "--plot", str(tmp_path / "m.png"), "--no-plan"]
+        )
+        == 0
+    )
     assert cli.main(["fence", "check", str(MISSIONS / "buoy-course.toml"), "--plot", str(tmp_path / "f.png")]) == 0
     for figure, wanted in zip(drawn, ("mark to leave to port", "goal"), strict=True):
         names, said, _ = words(figure)
@@ -100,11 +112,24 @@ def test_the_missions_picture_names_its_goals_and_marks(drawn, tmp_path, capsys)
 
 
 def test_the_plans_picture_tells_obstacles_from_their_margin_and_keeps_the_colours_of_its_legend(
-    drawn, tmp_path, capsys,
+    drawn, tmp_path, capsys
 ):
     """It drew obstacles grown by the margin, called them obstacles, and its no-go colours were in no legend."""
-    assert cli.main(["plan", str(ROOT / "sitl/missions/two-channels.toml"), "--plot", str(tmp_path / "p.png"),
-                     "--expansions", "500", "--algorithm", "rrtstar"]) == 0
+    assert (
+        cli.main(
+            [
+                "plan",
+                str(ROOT / "sitl/missions/two-channels.toml"),
+                "--plot",
+                str(tmp_path / "p.png"),
+                "--expansions",
+                "500",
+                "--algorithm",
+                "rrtstar",
+            ]
+        )
+        == 0
+    )
     names, said, _ = words(drawn[0])
     assert {"obstacles", "margin of 10 m: no plan enters", "no-go zone of the boat"} <= names
     assert "obstacle" not in names
@@ -115,7 +140,8 @@ def test_the_plans_picture_tells_obstacles_from_their_margin_and_keeps_the_colou
     wedges = [p for p in axes.patches if isinstance(p, Wedge)]
     assert wedges
     assert {to_rgba(w.get_facecolor()) for w in wedges if w.zorder > 0.6} == {
-        to_rgba(shown["no-go zone of the boat"].get_color())}
+        to_rgba(shown["no-go zone of the boat"].get_color())
+    }
 
 
 def test_the_report_tells_the_voyage_and_writes_its_track(sailed, tmp_path, capsys):
@@ -135,8 +161,9 @@ def test_the_report_tells_the_voyage_and_writes_its_track(sailed, tmp_path, caps
         assert found.points[-1].lat_deg == pytest.approx(c["lat_deg"][known][-1], abs=1e-7)
     times = gpxpy.parse(tracks[0].read_text()).tracks[0].segments[0].points
     assert (times[-1].time - times[0].time).total_seconds() == pytest.approx(
-        c["t_s"][known][-1] - c["t_s"][known][0], abs=0.01)
-    assert cli.main(["report", str(sailed), "--track", str(tracks[0])]) == 2   # not without --force
+        c["t_s"][known][-1] - c["t_s"][known][0], abs=0.01
+    )
+    assert cli.main(["report", str(sailed), "--track", str(tracks[0])]) == 2  # not without --force
     assert cli.main(["report", str(sailed), "--track", str(tmp_path / "t.wkt")]) == 2
 
 

@@ -40,7 +40,7 @@ class Terminal(io.StringIO):
             elif part.endswith("J") and part.startswith("\x1b"):
                 lines[row:] = [lines[row][:column]]
             else:
-                lines[row] = lines[row][:column] + part + lines[row][column + len(part):]
+                lines[row] = lines[row][:column] + part + lines[row][column + len(part) :]
                 column += len(part)
         return lines
 
@@ -54,8 +54,9 @@ def steps():
     for n in range(3):
         said = (Announce(severity=Severity.WARNING, code="x", text="the fence is not in force"),) if n == 1 else ()
         snapshot = replace(world.snapshot(), t_s=float(n))
-        out.append(Step(snapshot=snapshot, state=_with(world.state, why=LONG), actions=said,
-                        voyage=world.skipper.voyage))
+        out.append(
+            Step(snapshot=snapshot, state=_with(world.state, why=LONG), actions=said, voyage=world.skipper.voyage)
+        )
     return out
 
 
@@ -114,4 +115,5 @@ def test_what_is_left_behind_is_said_with_where_she_will_end():
     end = world.state.mission.route.items[-1].point
     assert re.fullmatch(
         rf"the boat sails on in AUTO: \d+ items to go, the last a loiter at {end.lat_deg:.5f}, {end.lon_deg:.5f}",
-        left_behind(step))
+        left_behind(step),
+    )

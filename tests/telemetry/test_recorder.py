@@ -49,7 +49,8 @@ def small(tmp_path):
     folder = tmp_path / "small"
     folder.mkdir()
     done = subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", folder], capture_output=True, check=False)
+        ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", folder], capture_output=True, check=False
+    )
     if done.returncode != 0:
         pytest.skip(f"no file system can be mounted here: {done.stderr.decode().strip()}")
     yield folder
@@ -73,9 +74,9 @@ def test_a_real_full_disk_pauses_all_records_leaves_none_torn_and_takes_them_up_
             recorder.decision({"k": k, "text": 100 * "x"})
         assert recorder.trouble == os.strerror(errno.ENOSPC)
         kept = [r["k"] for r in read_jsonl(small / "v" / DECISIONS)]
-        assert kept == list(range(len(kept)))      # not one torn line among them
+        assert kept == list(range(len(kept)))  # not one torn line among them
         assert 0 < recorder.dropped == 300 - len(kept)
-        recorder.frame(b"12345678")                # none of them tells of what another lacks
+        recorder.frame(b"12345678")  # none of them tells of what another lacks
         assert (small / "v" / TLOG).stat().st_size == 0
         recorder.tend(STAMPS)
         assert recorder.trouble
@@ -98,7 +99,7 @@ def test_records_stop_before_the_disk_is_full_and_the_state_still_finds_room(sma
         recorder.decision({"kind": "x"})
         assert read_jsonl(small / "v" / DECISIONS) == []
         Disk().replace(small / "state.json", 20_000 * b"x")
-        recorder.summary({"arrived": True})        # the last chance: it may use the reserve
+        recorder.summary({"arrived": True})  # the last chance: it may use the reserve
         assert (small / "v" / "summary.json").exists()
 
 
@@ -167,8 +168,11 @@ def test_the_kernel_says_full_in_the_middle_of_a_write():
 
 
 def test_two_companions_do_not_record_into_one_folder(tmp_path):
-    with Recorder(tmp_path / "v"), pytest.raises(JobError, match="another companion is recording"), \
-            Recorder(tmp_path / "v"):
+    with (
+        Recorder(tmp_path / "v"),
+        pytest.raises(JobError, match="another companion is recording"),
+        Recorder(tmp_path / "v"),
+    ):
         pass
     with Recorder(tmp_path / "v") as recorder:
         assert recorder.trouble == ""

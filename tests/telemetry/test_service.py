@@ -47,7 +47,7 @@ def test_it_is_ready_once_alive_each_time_and_says_when_it_stops(manager):
     first, second, last = heard(listening)
     assert first == "READY=1\nSTATUS=waiting: for wind\nWATCHDOG=1"
     status = second.splitlines()[0]
-    assert status.startswith("STATUS=standard: item 2 of 5")     # one line, whatever it was
+    assert status.startswith("STATUS=standard: item 2 of 5")  # one line, whatever it was
     assert len(status) <= STATUS_CHARACTERS + len("STATUS=")
     assert second.splitlines()[1] == "WATCHDOG=1"
     assert last == "STOPPING=1"
@@ -87,14 +87,32 @@ def test_companion_run_tells_the_manager_while_it_waits_for_an_autopilot(manager
     environment, listening = manager
     link = f"udpin:127.0.0.1:{free_port()}"
     ended = subprocess.run(
-        [sys.executable, "-m", "companion.cli", "run", "sitl/missions/open-water.toml", "--link", link, "--out",
-         str(tmp_path / "voyage"), "--state", str(tmp_path / "voyage/state.json"), "--wait", "3"],
-        env={**os.environ, **environment}, capture_output=True, text=True, timeout=300, check=False)
+        [
+            sys.executable,
+            "-m",
+            "companion.cli",
+            "run",
+            "sitl/missions/open-water.toml",
+            "--link",
+            link,
+            "--out",
+            str(tmp_path / "voyage"),
+            "--state",
+            str(tmp_path / "voyage/state.json"),
+            "--wait",
+            "3",
+        ],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
     assert ended.returncode == 1
     before, told = [], heard(listening)
     while not told[0].startswith("READY=1"):
         before.append(told.pop(0))
-    assert all(text.endswith("EXTEND_TIMEOUT_USEC=120000000") for text in before)   # it may take long to get ready
+    assert all(text.endswith("EXTEND_TIMEOUT_USEC=120000000") for text in before)  # it may take long to get ready
     assert told[0].startswith("READY=1\nSTATUS=waiting: ")
     assert sum("WATCHDOG=1" in text for text in told) >= 2
     assert told[-1] == "STOPPING=1"
@@ -121,15 +139,19 @@ def test_the_unit_file_starts_the_program_as_it_is():
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="needs systemd-analyze")
 def test_the_unit_is_exposed_little(tmp_path):
     """It was 8.3, exposed (issue 12, point 17)."""
-    said = subprocess.run(["systemd-analyze", "security", "--offline=true", "--no-pager", "--threshold=20", str(UNIT)],
-                          capture_output=True, text=True, check=False)
+    said = subprocess.run(
+        ["systemd-analyze", "security", "--offline=true", "--no-pager", "--threshold=20", str(UNIT)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     if "offline" in said.stderr:
         pytest.skip("this systemd-analyze reads no unit files")
     assert said.returncode == 0, said.stdout[-300:] + said.stderr
     unit = tmp_path / UNIT.name
     unit.write_text(UNIT.read_text().replace("/usr/bin/companion", "/bin/true"))
     checked = subprocess.run(["systemd-analyze", "verify", str(unit)], capture_output=True, text=True, check=False)
-    assert "companion@" not in checked.stderr   # it names what it does not know
+    assert "companion@" not in checked.stderr  # it names what it does not know
 
 
 @pytest.mark.parametrize("number", [errno.ENOENT, errno.EIO, errno.ESTALE, errno.ENODEV, errno.ENOMEM])
@@ -137,8 +159,9 @@ def test_the_unit_is_exposed_little(tmp_path):
 def test_a_file_that_is_not_there_for_a_moment_is_no_reason_to_give_up(tmp_path, monkeypatch, capfd, name, number):
     """Exit code 2 was final for the unit: a card mounted a second late ended the voyage (issue 12, point 15)."""
     assert leave(tmp_path, monkeypatch, name, number) == 66
-    assert re.fullmatch(rf"companion run: .*{re.escape(name)}.*: (no such file|cannot be read \(.*\)); .*\n",
-                        capfd.readouterr().err)
+    assert re.fullmatch(
+        rf"companion run: .*{re.escape(name)}.*: (no such file|cannot be read \(.*\)); .*\n", capfd.readouterr().err
+    )
 
 
 @pytest.mark.parametrize("number", [errno.EACCES, errno.EISDIR])
@@ -151,7 +174,8 @@ def leave(folder, monkeypatch, name, number):
     """Run a mission with one of its files missing or failing; return the exit code."""
     (folder / "lake.toml").write_text(
         'name = "lake"\n[[goal]]\nlat = 50.817\nlon = -1.3085\n[area]\nobstacles = ["rocks.wkt"]\n'
-        '[boat]\npolar = "boat.pol"\n')
+        '[boat]\npolar = "boat.pol"\n'
+    )
     (folder / "rocks.wkt").write_text("POLYGON ((-1.3 50.81, -1.299 50.81, -1.299 50.811, -1.3 50.81))")
     (folder / "boat.pol").write_text("TWA\\TWS;4;8\n0;0;0\n90;3;5\n180;2;4\n")
     (folder / "key").write_text("a passphrase")
@@ -166,7 +190,17 @@ def leave(folder, monkeypatch, name, number):
                 raise OSError(number, os.strerror(number))
             return really(file, *args, **kwargs)
 
-        monkeypatch.setattr(io, "open", failing)   # what pathlib calls
+        monkeypatch.setattr(io, "open", failing)  # what pathlib calls
     monkeypatch.chdir(folder)
-    return cli.main(["run", str(folder / "lake.toml"), "--link", f"udpin:127.0.0.1:{free_port()}", "--wait", "1",
-                     "--signing-key", str(folder / "key")])
+    return cli.main(
+        [
+            "run",
+            str(folder / "lake.toml"),
+            "--link",
+            f"udpin:127.0.0.1:{free_port()}",
+            "--wait",
+            "1",
+            "--signing-key",
+            str(folder / "key"),
+        ]
+    )

@@ -30,14 +30,16 @@ def test_dither_is_no_movement_and_a_slow_creep_is():
 def test_what_is_not_told_is_not_counted():
     assert moved((), (1500, 0, 1500), (), (1500, 0, 1500)) == {}
     assert moved((1500, 0, 1000), (0, 0, 1100), (1900, 0, 1100)) == {
-        "1": {"movements": 1, "travel_us": 400}, "3": {"movements": 1, "travel_us": 100}}
+        "1": {"movements": 1, "travel_us": 400},
+        "3": {"movements": 1, "travel_us": 100},
+    }
 
 
 def test_a_voyage_tells_rudder_and_sheet_in_its_summary_and_in_words(tmp_path, capsys):
     path = Path("sitl/scenarios/upwind.toml")
     assert run_virtual(run_embedded(load_scenario(path), path, 0, tmp_path)).passed
     servos = json.loads((tmp_path / "summary.json").read_text())["servos"]
-    assert set(servos) == {"1", "4"}     # SERVO1_FUNCTION 26, SERVO4_FUNCTION 89; the throttle rests
+    assert set(servos) == {"1", "4"}  # SERVO1_FUNCTION 26, SERVO4_FUNCTION 89; the throttle rests
     assert all(servo["movements"] > 0 and servo["travel_us"] >= 10 for servo in servos.values())
     assert cli.main(["report", str(tmp_path)]) == 0
     told = capsys.readouterr().out

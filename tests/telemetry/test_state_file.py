@@ -21,9 +21,20 @@ from sitl.faults.computer_faults import FaultyDisk
 
 ITEMS = (MissionItem(command=16, lat_e7=508170000, lon_e7=-13100000), MissionItem(command=17, lat_e7=5, lon_e7=7))
 ROUTE = Route(
-    items=marked(ITEMS), points_en_m=((0.0, 1.0), (2.0, 3.0)), leg_from_en_m=((0.0, 0.0), (0.0, 1.0)), gate_of=(0, -1),
-    plan_id=3, plan_t_s=12.5, plan_twd_from_rad=0.1, plan_tws_mps=5.0, plan_half_width_rad=0.2, margin_m=12.0,
-    delta_s=0.9, cost_s=60.0, why="because")
+    items=marked(ITEMS),
+    points_en_m=((0.0, 1.0), (2.0, 3.0)),
+    leg_from_en_m=((0.0, 0.0), (0.0, 1.0)),
+    gate_of=(0, -1),
+    plan_id=3,
+    plan_t_s=12.5,
+    plan_twd_from_rad=0.1,
+    plan_tws_mps=5.0,
+    plan_half_width_rad=0.2,
+    margin_m=12.0,
+    delta_s=0.9,
+    cost_s=60.0,
+    why="because",
+)
 SAVED = Persisted(voyage="a", gate=1, sailing=True, route=ROUTE, pending=None, unsure=ROUTE, own_mode=Mode.LOITER)
 
 
@@ -76,7 +87,9 @@ def test_a_damaged_state_is_refused_in_one_line_and_kept_aside(name, tmp_path):
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=True) | st.text(max_size=6),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=4), max_leaves=6)
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=4),
+    max_leaves=6,
+)
 
 
 @settings(max_examples=120)
@@ -118,7 +131,7 @@ def test_a_state_that_could_not_be_saved_is_saved_when_it_can(tmp_path):
         assert state.trouble == "No space left on device"
         disk.become("ok")
         await state.save(SAVED)
-        assert not (tmp_path / "state.json").exists()     # not at every step: a sick card answers slowly
+        assert not (tmp_path / "state.json").exists()  # not at every step: a sick card answers slowly
         await asyncio.sleep(state_file.TRY_EVERY_S)
         await state.save(SAVED)
         assert state.trouble == ""
@@ -143,7 +156,7 @@ def test_a_card_that_does_not_answer_is_not_waited_for(tmp_path, monkeypatch):
     async def voyage():
         began = time.monotonic()
         await state.save(SAVED)
-        await state.save(SAVED)      # nor is it asked twice
+        await state.save(SAVED)  # nor is it asked twice
         assert time.monotonic() - began < 0.4
         assert state.trouble == "the disk does not answer"
 
@@ -157,4 +170,4 @@ def test_the_lists_of_other_missions_in_the_folder_are_known(tmp_path):
     (tmp_path / "note.json").write_text("{}")
     assert file(tmp_path / "b.state.json").known() == (SAVED.names[0],)
     assert file(tmp_path / "a.state.json").known() == ()
-    assert (tmp_path / "broken.state.json").exists()      # another mission's: not ours to put aside
+    assert (tmp_path / "broken.state.json").exists()  # another mission's: not ours to put aside

@@ -29,24 +29,63 @@ from companion.view.values import (
 UNIX_S = 1_795_000_000.0
 LEGS = (LegView(from_en_m=(0.0, 0.0), to_en_m=(60.0, 80.0)), LegView(from_en_m=(60.0, 80.0), to_en_m=(160.0, 80.0)))
 VIEW = View(
-    source="live", name="bay", t_s=600.0, age_s=0.4,
+    source="live",
+    name="bay",
+    t_s=600.0,
+    age_s=0.4,
     state=StateView(phase="standard", why="item 2 of 4 to North mark", mode="AUTO", is_armed=True, is_sailing=True),
-    alarms=(AlarmView(code="drifting", level="critical", text="drifting: onto Rock in 120 s", age_s=42.0),
-            AlarmView(code="battery low", level="warning", text="19 %", age_s=5.0)),
-    boat=BoatView(age_s=0.4, at_en_m=(28.0, 29.0), heading_deg=35.0, cog_deg=37.0, sog_mps=1.5, roll_deg=-12.0,
-                  vmg_mps=1.0,
-              cross_track_m=5.0, waypoint_m=60.0, goal_m=140.0, clearance_m=11.4, tack="starboard", battery_v=12.13,
-              battery_share=0.8),
-    wind=WindView(health="settling", age_s=0.5, twd_from_deg=80.0, tws_mps=5.0, sigma_deg=9.0, tws_sigma_mps=0.6,
-              twa_deg=45.0, awa_deg=36.0, aws_mps=6.1),
+    alarms=(
+        AlarmView(code="drifting", level="critical", text="drifting: onto Rock in 120 s", age_s=42.0),
+        AlarmView(code="battery low", level="warning", text="19 %", age_s=5.0),
+    ),
+    boat=BoatView(
+        age_s=0.4,
+        at_en_m=(28.0, 29.0),
+        heading_deg=35.0,
+        cog_deg=37.0,
+        sog_mps=1.5,
+        roll_deg=-12.0,
+        vmg_mps=1.0,
+        cross_track_m=5.0,
+        waypoint_m=60.0,
+        goal_m=140.0,
+        clearance_m=11.4,
+        tack="starboard",
+        battery_v=12.13,
+        battery_share=0.8,
+    ),
+    wind=WindView(
+        health="settling",
+        age_s=0.5,
+        twd_from_deg=80.0,
+        tws_mps=5.0,
+        sigma_deg=9.0,
+        tws_sigma_mps=0.6,
+        twa_deg=45.0,
+        awa_deg=36.0,
+        aws_mps=6.1,
+    ),
     polar=PolarView(name="p", tws_mps=5.0, twa_deg=(0.0, 90.0), speed_mps=(1.5, 1.5)),
-    plan=PlanView(number=17, age_s=252.0, leg=2, count=4, promised_risk=0.1, path_risk=0.31, next_tack_s=100.0,
-                  legs=LEGS,
-              there_s=192.0, there_late_s=250.0),
+    plan=PlanView(
+        number=17,
+        age_s=252.0,
+        leg=2,
+        count=4,
+        promised_risk=0.1,
+        path_risk=0.31,
+        next_tack_s=100.0,
+        legs=LEGS,
+        there_s=192.0,
+        there_late_s=250.0,
+    ),
     vessels=(VesselView(name="FERRY", cpa_m=41.0, cpa_s=72.0, alarm="act"),),
-    goals=(GoalView(name="North mark", kind="point", at_en_m=(160.0, 80.0), is_next=True, distance_m=141.0,
-                bearing_deg=69.0),),
-    figures=Figures(goals=2, goals_reached=0, tacks=3), health=(Part(name="wind", grade="poor", text="too short"),),
+    goals=(
+        GoalView(
+            name="North mark", kind="point", at_en_m=(160.0, 80.0), is_next=True, distance_m=141.0, bearing_deg=69.0
+        ),
+    ),
+    figures=Figures(goals=2, goals_reached=0, tacks=3),
+    health=(Part(name="wind", grade="poor", text="too short"),),
 )
 
 
@@ -54,8 +93,9 @@ def shown(view, **changed):
     history = History()
     if view is not None:
         history.take(view, ())
-    return Shown(**{"link": "udpin:x", "view": view, "history": history, "helm": KeyCommands(), "unix_s": UNIX_S,
-                    **changed})
+    return Shown(
+        **{"link": "udpin:x", "view": view, "history": history, "helm": KeyCommands(), "unix_s": UNIX_S, **changed}
+    )
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(80, 24), (60, 20)])
@@ -67,9 +107,18 @@ def test_what_it_says(columns, rows):
     assert lines[0].startswith(" bay  STANDARD  AUTO armed")
     assert "age 0 s" in lines[0]
     for part in (
-        "item 2 of 4 to North mark", "CRITICAL drifting 42 s: onto Rock in 120 s", "080°±9° 9.7±1.2 kn",
-        "45°S, apparent 36°S 11.9", "HDG 035° COG 037° 2.9 kn", "2/4 60 m at 032°, xt +5 m", "1/2 141 m at 069° North",
-        "in 1:40, 3 done", "there in 3:12", "11 m of land, FERRY 41 m", "wind too short", "now 080°",
+        "item 2 of 4 to North mark",
+        "CRITICAL drifting 42 s: onto Rock in 120 s",
+        "080°±9° 9.7±1.2 kn",
+        "45°S, apparent 36°S 11.9",
+        "HDG 035° COG 037° 2.9 kn",
+        "2/4 60 m at 032°, xt +5 m",
+        "1/2 141 m at 069° North",
+        "in 1:40, 3 done",
+        "there in 3:12",
+        "11 m of land, FERRY 41 m",
+        "wind too short",
+        "now 080°",
         "q quit  ? help  w why  h hold",
     ):
         assert part in text, f"{part!r} is not in\n{text}"
@@ -80,10 +129,22 @@ def test_it_counts_the_alarms_that_it_has_no_room_for():
     assert "(+1 alarm)" in draw(shown(VIEW), 60, 20).text
 
 
-@pytest.mark.parametrize("view", [
-    None, View(source="radio", name="", t_s=0.0, state=StateView(phase="not heard")),
-    View(source="radio", name="", t_s=0.0, state=StateView(phase="x"), boat=BoatView(), wind=WindView(health="good"),
-         plan=PlanView())])
+@pytest.mark.parametrize(
+    "view",
+    [
+        None,
+        View(source="radio", name="", t_s=0.0, state=StateView(phase="not heard")),
+        View(
+            source="radio",
+            name="",
+            t_s=0.0,
+            state=StateView(phase="x"),
+            boat=BoatView(),
+            wind=WindView(health="good"),
+            plan=PlanView(),
+        ),
+    ],
+)
 def test_what_is_not_known_is_no_zero(view):
     text = draw(shown(view), 80, 24).text
     text = re.sub(r"\d\d:\d\d:\d\d|udpin:x|for 0 s", "", text)
@@ -108,8 +169,12 @@ def test_a_companion_that_is_silent_beside_an_autopilot_that_is_not_looks_old():
 def test_nothing_that_somebody_sends_reaches_the_terminal_as_a_command():
     """A vessel may call herself anything."""
     evil = "\x1b[2J\x1b]0;x\x07\r\n\u202e\u0000\x9b31m"
-    view = replace(VIEW, vessels=(replace(VIEW.vessels[0], name=evil),), state=replace(VIEW.state, why=evil),
-                   alarms=(AlarmView(code=evil, level="error", text=evil),))
+    view = replace(
+        VIEW,
+        vessels=(replace(VIEW.vessels[0], name=evil),),
+        state=replace(VIEW.state, why=evil),
+        alarms=(AlarmView(code=evil, level="error", text=evil),),
+    )
     frame = draw(shown(view, said=evil), 80, 24)
     assert all(len(c) == 1 and c.isprintable() for row in frame.cells for c, _ in row)
 
@@ -142,7 +207,8 @@ def test_the_changes_make_the_next_frame_of_the_one_before(data):
         after.cells = [data.draw(st.lists(cells, min_size=size[0], max_size=size[0])) for _ in range(size[1])]
         stream.feed("\x1b[?7l" + changes(before, after))
         assert [line.rstrip() for line in screen.display] == [
-            "".join(c for c, _ in row).rstrip() for row in after.cells]
+            "".join(c for c, _ in row).rstrip() for row in after.cells
+        ]
         bold = {Style.BOLD, Style.STARBOARD, Style.BAD, Style.WARN}
         for row, line in enumerate(after.cells):
             for column, (_, style) in enumerate(line):
@@ -164,8 +230,17 @@ def test_it_redraws_little_all_the_voyage_long(beat):
     for view, events in beat.moments:
         history.take(view, events)
         for half in (0.0, 0.5):
-            frame = draw(Shown(link="x", view=aged(view, half), history=history, helm=KeyCommands(),
-                               unix_s=UNIX_S + view.t_s + half), 80, 24)
+            frame = draw(
+                Shown(
+                    link="x",
+                    view=aged(view, half),
+                    history=history,
+                    helm=KeyCommands(),
+                    unix_s=UNIX_S + view.t_s + half,
+                ),
+                80,
+                24,
+            )
             sizes.append(len(changes(before, frame).encode()))
             before = frame
     per_s = 2.0 * sum(sizes[1:]) / len(sizes[1:])

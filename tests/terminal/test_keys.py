@@ -54,13 +54,13 @@ def test_what_the_mission_does_not_permit_is_not_asked_of_her():
     helm, given_ = typed("h", orders=("go_on",))
     assert given_ == []
     assert "does not permit" in helm.said
-    assert typed("w", orders=())[1] == ["why"]      # always answered
+    assert typed("w", orders=())[1] == ["why"]  # always answered
 
 
 def test_the_end():
     assert typed("q")[0].is_over
-    assert typed("gq")[0].is_over is False          # an answer to the question: no
-    assert typed("g\x03")[0].is_over                # Ctrl-C, wherever one is
+    assert typed("gq")[0].is_over is False  # an answer to the question: no
+    assert typed("g\x03")[0].is_over  # Ctrl-C, wherever one is
 
 
 @given(st.text(alphabet=string.printable, max_size=40))

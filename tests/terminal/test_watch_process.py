@@ -64,10 +64,14 @@ class Boat:
             while not self._is_over:
                 if not is_silent:
                     number += 1
-                    view = replace(VIEW, t_s=600.0 + number, orders=OrdersView(permitted=self.permitted),
-                                   age_s=8.0 if self.is_silent else 0.4)
+                    view = replace(
+                        VIEW,
+                        t_s=600.0 + number,
+                        orders=OrdersView(permitted=self.permitted),
+                        age_s=8.0 if self.is_silent else 0.4,
+                    )
                     wire.sendall(msgspec.json.encode({"view": view, "events": ()}) + b"\n")
-                is_silent = self.is_silent    # its last word is old already: a test waits less
+                is_silent = self.is_silent  # its last word is old already: a test waits less
                 time.sleep(0.1)
 
     def close(self):
@@ -90,8 +94,13 @@ class Terminal:
         self.stream = pyte.ByteStream(self.screen)
         self.data = b""
         self.process = subprocess.Popen(
-            [sys.executable, "-c", OWN_TERMINAL, "watch", *words], stdin=slave, stdout=slave, stderr=slave,
-            start_new_session=True, env={**os.environ, "TERM": "xterm"})
+            [sys.executable, "-c", OWN_TERMINAL, "watch", *words],
+            stdin=slave,
+            stdout=slave,
+            stderr=slave,
+            start_new_session=True,
+            env={**os.environ, "TERM": "xterm"},
+        )
         self.slave = slave
 
     def _set_size(self, fd):
@@ -162,8 +171,8 @@ def test_a_dashboard_that_redraws_little_is_resized_and_leaves_the_terminal_as_i
     terminal.read(1.0)
     begin = len(terminal.data)
     terminal.read(3.0)
-    assert (len(terminal.data) - begin) / 3.0 < 100.0       # nothing changes but the clock: 20 bytes a second
-    time.sleep(2.0)          # nobody reads (Ctrl-S, a line that takes nothing): frames are left out, none is cut
+    assert (len(terminal.data) - begin) / 3.0 < 100.0  # nothing changes but the clock: 20 bytes a second
+    time.sleep(2.0)  # nobody reads (Ctrl-S, a line that takes nothing): frames are left out, none is cut
     terminal.resize(60, 20)
     terminal.until(lambda: terminal.text.split("\n")[19].startswith(" q quit"))
     assert "Parts  wind too short" in terminal.text
@@ -189,7 +198,7 @@ def test_keys_give_orders_and_what_moves_her_is_asked_first(terminal, boat):
     terminal.shows("goal 50.81951 -1.30801: she leaves her way. y: yes")
     terminal.type("y")
     terminal.shows("done: so be it, goal 50.81951 -1.30801")
-    terminal.type("\x1b[A")                                  # an arrow: no key of ours
+    terminal.type("\x1b[A")  # an arrow: no key of ours
     terminal.type("q")
     assert terminal.ends() == 0
     assert boat.orders == ["hold", "goal 50.81951 -1.30801"]
@@ -220,8 +229,13 @@ def test_nothing_is_there_and_the_ssh_is_dropped(tmp_path):
 
 def lines(tmp_path, *words):
     return subprocess.Popen(
-        [sys.executable, "-m", "companion.cli", "watch", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(Path.cwd())})
+        [sys.executable, "-m", "companion.cli", "watch", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path.cwd())},
+    )
 
 
 def test_without_a_terminal_it_is_lines(tmp_path, boat):
@@ -248,13 +262,20 @@ def test_without_a_terminal_nobody_waits_for_ever(tmp_path):
     process = lines(tmp_path, "--socket", "boat.sock", "--timeout", "1")
     out, err = process.communicate(timeout=PATIENCE_S)
     assert (process.returncode, out) == (3, "")
-    assert err == ("companion watch: boat.sock: nobody is there (No such file or directory): companion run needs "
-                   "--socket\n")
+    assert err == (
+        "companion watch: boat.sock: nobody is there (No such file or directory): companion run needs --socket\n"
+    )
 
 
-@pytest.mark.parametrize(("words", "says"), [
-    ((), "--link: is missing: there is nobody to watch"), (("--link", "x", "--socket", "y"), "two ways to one boat"),
-    (("--link", "x"), "x"), (("--link", "udpin:127.0.0.1:14999", "--signing-key", "nowhere"), "nowhere")])
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ((), "--link: is missing: there is nobody to watch"),
+        (("--link", "x", "--socket", "y"), "two ways to one boat"),
+        (("--link", "x"), "x"),
+        (("--link", "udpin:127.0.0.1:14999", "--signing-key", "nowhere"), "nowhere"),
+    ],
+)
 def test_what_cannot_be_watched_is_refused_in_one_line(words, says, capfd):
     from companion import cli
 

@@ -18,12 +18,25 @@ def report(t_s: float, en: tuple[float, float] | None, mmsi: int = 211000001, **
     return AisReport(t_s=t_s, mmsi=mmsi, position=None if en is None else FRAME.geo_from_en(*en), **more)
 
 
-def vessel(en: tuple[float, float] = (0.0, 0.0), course_deg: float | None = 0.0, speed_mps: float | None = 5.0,
-           size: tuple[float, float, float, float] = (50.0, 50.0, 8.0, 8.0), **more: Any) -> Vessel:
+def vessel(
+    en: tuple[float, float] = (0.0, 0.0),
+    course_deg: float | None = 0.0,
+    speed_mps: float | None = 5.0,
+    size: tuple[float, float, float, float] = (50.0, 50.0, 8.0, 8.0),
+    **more: Any,
+) -> Vessel:
     """A vessel at t = 0."""
     course = None if course_deg is None else math.radians(course_deg)
-    values: dict[str, Any] = {"mmsi": 211000001, "t_s": 0.0, "heard_s": 0.0, "antenna_en_m": en, "course_rad": course,
-                              "speed_mps": speed_mps, "heading_rad": course, "hull": hull_of(*size, is_class_b=False)}
+    values: dict[str, Any] = {
+        "mmsi": 211000001,
+        "t_s": 0.0,
+        "heard_s": 0.0,
+        "antenna_en_m": en,
+        "course_rad": course,
+        "speed_mps": speed_mps,
+        "heading_rad": course,
+        "hull": hull_of(*size, is_class_b=False),
+    }
     return Vessel(**(values | more))
 
 

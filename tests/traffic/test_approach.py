@@ -66,8 +66,9 @@ coordinate = st.floats(-2000.0, 2000.0)
 
 @settings(max_examples=200)
 @given(coordinate, coordinate, angle, st.floats(0.0, 12.0), angle, st.floats(0.0, 4.0), st.floats(2.0, 150.0))
-def test_cpa_is_the_least_sampled_distance(x: float, y: float, course: float, speed: float, ours: float, v: float,
-                                           bow: float) -> None:
+def test_cpa_is_the_least_sampled_distance(
+    x: float, y: float, course: float, speed: float, ours: float, v: float, bow: float
+) -> None:
     ship = vessel((x, y), course, speed, size=(bow, 20.0, 6.0, 9.0))
     we = own(course_deg=ours, speed_mps=v, radius_m=1.0)
     a = cpa(we, ship, 0.0)
@@ -119,10 +120,19 @@ def test_risk_of_the_disc_against_drawn_positions() -> None:
 
 
 @settings(max_examples=150)
-@given(angle, st.floats(0.0, 15.0), st.floats(-0.1, 0.1), st.floats(-120.0, 0.0), st.floats(0.0, 900.0),
-       st.booleans(), st.floats(0.0, 0.5), st.sampled_from([0.1, 1e-3, 1e-6]))
-def test_the_discs_hold_the_region_at_every_moment(course: float, speed: float, turn: float, heard: float, at: float,
-                                                   class_b: bool, timing: float, risk: float) -> None:
+@given(
+    angle,
+    st.floats(0.0, 15.0),
+    st.floats(-0.1, 0.1),
+    st.floats(-120.0, 0.0),
+    st.floats(0.0, 900.0),
+    st.booleans(),
+    st.floats(0.0, 0.5),
+    st.sampled_from([0.1, 1e-3, 1e-6]),
+)
+def test_the_discs_hold_the_region_at_every_moment(
+    course: float, speed: float, turn: float, heard: float, at: float, class_b: bool, timing: float, risk: float
+) -> None:
     """What a planner keeps out of contains hull, clearance and k sigma about the predicted centre, at all times."""
     ship = vessel((50.0, -20.0), course, speed, turn_rate_radps=turn, is_class_b=class_b, t_s=heard)
     keep = Keep(sigmas=risk_factor(risk), own_timing_mps=timing)

@@ -12,21 +12,32 @@ from tests.traffic.conftest import FRAME, own, report, vessel
 SAIL = {"nav_status": 8, "size": (5.0, 5.0, 2.0, 2.0)}
 
 
-def encounter(ours: tuple[tuple[float, float], float], theirs: tuple[tuple[float, float], float], *, speed: float = 2.0,
-              wind_deg: float | None = 0.0, is_sailing: bool = True, our_speed: float = 2.0, **more: object):
+def encounter(
+    ours: tuple[tuple[float, float], float],
+    theirs: tuple[tuple[float, float], float],
+    *,
+    speed: float = 2.0,
+    wind_deg: float | None = 0.0,
+    is_sailing: bool = True,
+    our_speed: float = 2.0,
+    **more: object,
+):
     we = own(ours[0], ours[1], our_speed, is_sailing=is_sailing)
     ship = vessel(theirs[0], theirs[1], speed, **more)
     return classify(we, ship, cpa(we, ship, 0.0), None if wind_deg is None else math.radians(wind_deg))
 
 
-@pytest.mark.parametrize(("ours", "theirs", "role"), [
-    # We close-hauled on port tack (heading 45), she on starboard (heading 315): we give way, and the reverse.
-    (((0, 0), 45), ((200, 0), 315), Role.GIVE_WAY),
-    (((0, 0), 315), ((-200, 0), 45), Role.STAND_ON),
-    # Both on starboard tack: windward gives way.
-    (((0, 0), 280), ((-200, -150), 310), Role.GIVE_WAY),
-    (((0, 0), 300), ((-60, 150), 230), Role.STAND_ON),
-])
+@pytest.mark.parametrize(
+    ("ours", "theirs", "role"),
+    [
+        # We close-hauled on port tack (heading 45), she on starboard (heading 315): we give way, and the reverse.
+        (((0, 0), 45), ((200, 0), 315), Role.GIVE_WAY),
+        (((0, 0), 315), ((-200, 0), 45), Role.STAND_ON),
+        # Both on starboard tack: windward gives way.
+        (((0, 0), 280), ((-200, -150), 310), Role.GIVE_WAY),
+        (((0, 0), 300), ((-60, 150), 230), Role.STAND_ON),
+    ],
+)
 def test_rule_12(ours, theirs, role) -> None:  # type: ignore[no-untyped-def]
     e = encounter(ours, theirs, **SAIL)
     assert e.rule is Rule.SAILING, e
@@ -59,11 +70,18 @@ def test_rule_13_begins_two_points_abaft_the_beam(bearing: float) -> None:
     assert (e.rule is Rule.OVERTAKING) is overtaking
 
 
-@pytest.mark.parametrize(("more", "role"), [
-    ({"nav_status": 0, "ship_type": 70}, Role.STAND_ON),
-    ({"nav_status": 2}, Role.GIVE_WAY), ({"nav_status": 3}, Role.GIVE_WAY), ({"nav_status": 4}, Role.GIVE_WAY),
-    ({"nav_status": 7}, Role.GIVE_WAY), ({"ship_type": 30}, Role.GIVE_WAY), ({}, Role.KEEP_CLEAR),
-])
+@pytest.mark.parametrize(
+    ("more", "role"),
+    [
+        ({"nav_status": 0, "ship_type": 70}, Role.STAND_ON),
+        ({"nav_status": 2}, Role.GIVE_WAY),
+        ({"nav_status": 3}, Role.GIVE_WAY),
+        ({"nav_status": 4}, Role.GIVE_WAY),
+        ({"nav_status": 7}, Role.GIVE_WAY),
+        ({"ship_type": 30}, Role.GIVE_WAY),
+        ({}, Role.KEEP_CLEAR),
+    ],
+)
 def test_rule_18(more: dict[str, int], role: Role) -> None:
     e = encounter(((0, 0), 90), ((400, 200), 180), speed=5.0, **more)
     assert (e.rule, e.role) == (Rule.RESPONSIBILITIES, role)

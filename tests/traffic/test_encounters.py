@@ -70,11 +70,16 @@ def test_nobody_is_met_who_is_far_off_in_time_or_by_a_boat_that_lies_still():
     assert look((), own(speed_mps=0.1), vessel((0.0, 200.0), 180.0, 5.0, **POWER)) == ()
 
 
-@pytest.mark.parametrize(("more", "rule"), [
-    ({"nav_status": 7}, Rule.RESPONSIBILITIES), ({"nav_status": 2}, Rule.RESPONSIBILITIES),
-    ({"nav_status": 3}, Rule.RESPONSIBILITIES), ({"nav_status": 4}, Rule.RESPONSIBILITIES),
-    ({"ship_type": 30}, Rule.RESPONSIBILITIES),
-])
+@pytest.mark.parametrize(
+    ("more", "rule"),
+    [
+        ({"nav_status": 7}, Rule.RESPONSIBILITIES),
+        ({"nav_status": 2}, Rule.RESPONSIBILITIES),
+        ({"nav_status": 3}, Rule.RESPONSIBILITIES),
+        ({"nav_status": 4}, Rule.RESPONSIBILITIES),
+        ({"ship_type": 30}, Rule.RESPONSIBILITIES),
+    ],
+)
 def test_rule_18_b_is_given_way_to_at_once(more, rule):
     [held] = look((), *crossing(**more))
     assert held.encounter.rule is rule
@@ -135,7 +140,7 @@ def test_under_power_a_vessel_to_port_that_does_not_act_is_not_turned_to_port_fo
     we, ship = crossing(from_deg=270.0, away_s=100.0, **POWER)
     [held] = look((), power(we), ship)
     assert (held.encounter.rule, held.encounter.role) == (Rule.CROSSING, Role.STAND_ON)
-    assert not held.not_to_port          # she is stood on to
+    assert not held.not_to_port  # she is stood on to
     we, ship = crossing(from_deg=270.0, away_s=25.0, **POWER)
     [now] = look((held,), power(we), ship, t_s=1.0)
     assert now.evident

@@ -22,7 +22,7 @@ from companion.messages import AisReport
 from companion.traffic.feeds import MAX_PARTIAL, SILENT_S, AisFeed, open_feed, parse_feed
 
 SPEEDUP = 20.0
-PATIENCE_S = 400.0      # hurried seconds: an answer that does not come is a failure, not a wait for ever
+PATIENCE_S = 400.0  # hurried seconds: an answer that does not come is a failure, not a wait for ever
 
 
 def hurried(what: Coroutine[Any, Any, None]) -> None:
@@ -54,8 +54,12 @@ def test_udp_takes_sentences_and_json_and_counts_the_rest() -> None:
         async with open_feed(f"udpin:127.0.0.1:{port}", heard.append) as feed:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
                 for data in (
-                    sentence(211000001) + sentence(211000002), json.dumps({"id": 7, "lat": 50.8, "lon": -1.3}).encode(),
-                    b'{"id": 7, "lat": 95}', b"\x00\xff" * 400, b"", sentence(211000003).replace(b"A", b"B", 1),
+                    sentence(211000001) + sentence(211000002),
+                    json.dumps({"id": 7, "lat": 50.8, "lon": -1.3}).encode(),
+                    b'{"id": 7, "lat": 95}',
+                    b"\x00\xff" * 400,
+                    b"",
+                    sentence(211000003).replace(b"A", b"B", 1),
                 ):
                     sender.sendto(data, ("127.0.0.1", port))
             await until(lambda: feed.counts.refused >= 3)
@@ -103,7 +107,7 @@ def test_tcp_connects_again_when_the_receiver_restarts() -> None:
         heard: list[AisReport] = []
         port = free_port(socket.SOCK_STREAM)
         async with open_feed(f"tcp:127.0.0.1:{port}", heard.append) as feed:
-            await until(lambda: bool(feed.last_error))             # nobody is there yet
+            await until(lambda: bool(feed.last_error))  # nobody is there yet
             line = sentence(211000001)
             async with receiver(port, line[:20], line[20:], sentence(211000002)[:11]):
                 await until(lambda: len(heard) == 1)
@@ -165,7 +169,7 @@ def test_serial_is_read_and_found_again_after_it_was_unplugged(tmp_path: Path) -
             port.unplug()
             await until(lambda: bool(feed.last_error))
             assert feed.last_error in feed.sentence()
-            await asyncio.sleep(30.0)                              # and while it is away nothing ends
+            await asyncio.sleep(30.0)  # and while it is away nothing ends
             port.plug()
             await until(lambda: feed.connections == 2)
             port.say(sentence(211000002))
@@ -193,7 +197,7 @@ def test_a_name_that_is_no_serial_port_is_tried_again_and_told(tmp_path: Path) -
 def test_a_feed_that_stops_is_silent_after_a_minute_and_heard_again() -> None:
     async def listen() -> None:
         feed = AisFeed(parse_feed("tcp:127.0.0.1:10110"), lambda _: None)
-        assert not feed.is_silent                                  # it was opened just now
+        assert not feed.is_silent  # it was opened just now
         await asyncio.sleep(SILENT_S + 1.0)
         assert feed.is_silent
         feed.stream(sentence(211000001))
@@ -208,8 +212,10 @@ def test_a_feed_that_stops_is_silent_after_a_minute_and_heard_again() -> None:
 # ------------------------------------------------------------------------------------------- noise
 @settings(max_examples=150)
 @given(
-    st.lists(st.binary(max_size=300) | st.sampled_from(
-        [b"!AIVDM,", b"\r\n", b"$", b"\\s:x*00\\", b"{", b"\x00" * 50]), max_size=20),
+    st.lists(
+        st.binary(max_size=300) | st.sampled_from([b"!AIVDM,", b"\r\n", b"$", b"\\s:x*00\\", b"{", b"\x00" * 50]),
+        max_size=20,
+    ),
     st.lists(st.integers(1, 40), min_size=1, max_size=8),
 )
 def test_noise_on_a_stream_is_counted_and_the_next_line_is_read(noise: list[bytes], cuts: list[int]) -> None:
@@ -220,8 +226,8 @@ def test_noise_on_a_stream_is_counted_and_the_next_line_is_read(noise: list[byte
         at = 0
         while at < len(data):
             step = cuts[at % len(cuts)]
-            feed.stream(data[at:at + step])
-            feed.datagram(data[at:at + step])
+            feed.stream(data[at : at + step])
+            feed.datagram(data[at : at + step])
             at += step
         assert len(feed._partial) <= MAX_PARTIAL
         found = len(heard)

@@ -39,8 +39,9 @@ def test_checksum_00_is_a_checksum() -> None:
 
 
 def test_not_available_is_unknown() -> None:
-    lines = sentences(type=1, mmsi=235000001, lat=51.0, lon=-1.0, course=360.0, speed=102.3, heading=511, turn=-128,
-                      status=15)
+    lines = sentences(
+        type=1, mmsi=235000001, lat=51.0, lon=-1.0, course=360.0, speed=102.3, heading=511, turn=-128, status=15
+    )
     r = NmeaDecoder().feed(lines[0], 0.0)
     assert r is not None
     assert (r.course_rad, r.speed_mps, r.heading_rad, r.turn_rate_radps, r.nav_status) == (None,) * 5
@@ -51,8 +52,9 @@ def test_not_available_is_unknown() -> None:
 
 
 def test_a_static_report_in_two_sentences_with_others_between() -> None:
-    a, b = sentences(type=5, mmsi=235000002, shipname="EVER WIDE", ship_type=70, to_bow=150, to_stern=50, to_port=10,
-                     to_starboard=20)
+    a, b = sentences(
+        type=5, mmsi=235000002, shipname="EVER WIDE", ship_type=70, to_bow=150, to_stern=50, to_port=10, to_starboard=20
+    )
     d = NmeaDecoder()
     assert d.feed(a, 0.0) is None
     assert d.feed(TYPE1, 0.5) is not None
@@ -110,8 +112,9 @@ def test_noise_never_raises(line: str | bytes) -> None:
 
 
 @settings(max_examples=200)
-@given(st.text(alphabet="0123456789:;<=>?@ABCDEFGHIJKLMNOPQRSTUVW`abcdefghijklmnopqrstuvw", max_size=60),
-       st.integers(0, 5))
+@given(
+    st.text(alphabet="0123456789:;<=>?@ABCDEFGHIJKLMNOPQRSTUVW`abcdefghijklmnopqrstuvw", max_size=60), st.integers(0, 5)
+)
 def test_any_payload_with_a_right_checksum_is_a_finite_report_or_nothing(payload: str, fill: int) -> None:
     body = f"AIVDM,1,1,,A,{payload},{fill}"
     check = 0
@@ -127,26 +130,48 @@ def test_any_payload_with_a_right_checksum_is_a_finite_report_or_nothing(payload
 
 
 def test_json_feed() -> None:
-    r = decode_json(json.dumps({"id": 7, "lat": 48.36, "lon": -4.54, "heading_deg": -90, "speed_mps": 1.5,
-                                "length_m": 6.0, "spare": [1]}).encode(), 3.0)
+    r = decode_json(
+        json.dumps(
+            {"id": 7, "lat": 48.36, "lon": -4.54, "heading_deg": -90, "speed_mps": 1.5, "length_m": 6.0, "spare": [1]}
+        ).encode(),
+        3.0,
+    )
     assert r is not None
     assert r.mmsi == 7
     assert r.course_rad == pytest.approx(math.radians(270.0))
     assert (r.bow_m, r.stern_m) == (3.0, 3.0)
 
 
-@pytest.mark.parametrize("raw", [
-    b"", b"{", b"[]", b"null", b'{"lat": 91, "lon": 0}', b'{"lat": NaN, "lon": 0}', b'{"lat": "1", "lon": 0}',
-    b'{"lat": 1, "lon": 2, "mmsi": -4}', b'{"lat": 1, "lon": 2, "mmsi": 1e99}', b"\xff\xfe", b"[" * 5000,
-    b'{"lat": 1e400, "lon": 0}', b'{"lat": true, "lon": 0}', b" " * 9000,
-])
+@pytest.mark.parametrize(
+    "raw",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"null",
+        b'{"lat": 91, "lon": 0}',
+        b'{"lat": NaN, "lon": 0}',
+        b'{"lat": "1", "lon": 0}',
+        b'{"lat": 1, "lon": 2, "mmsi": -4}',
+        b'{"lat": 1, "lon": 2, "mmsi": 1e99}',
+        b"\xff\xfe",
+        b"[" * 5000,
+        b'{"lat": 1e400, "lon": 0}',
+        b'{"lat": true, "lon": 0}',
+        b" " * 9000,
+    ],
+)
 def test_bad_json_is_no_report(raw: bytes) -> None:
     assert decode_json(raw, 0.0) is None
 
 
 @settings(max_examples=150)
-@given(st.dictionaries(st.sampled_from(["lat", "lon", "mmsi", "id", "speed_mps", "heading_deg", "age_s", "length_m"]),
-                       st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5))))
+@given(
+    st.dictionaries(
+        st.sampled_from(["lat", "lon", "mmsi", "id", "speed_mps", "heading_deg", "age_s", "length_m"]),
+        st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5)),
+    )
+)
 def test_any_json_is_finite_or_nothing(raw: dict[str, object]) -> None:
     r = decode_json(json.dumps(raw).encode(), 0.0)
     if r is not None:

@@ -15,10 +15,28 @@ from companion.traffic import Decision, check_legs, decide, path_distance_m
 from companion.traffic.plans import ALIKE_M, SLACK_M, PlainLeg
 
 
-def disc(x: float, y: float, vx: float = 0.0, vy: float = 0.0, radius: float = 20.0, growth: float = 0.0,
-         begin: float = 0.0, end: float = 900.0) -> Target:
-    return Target(x_m=x, y_m=y, vx_mps=vx, vy_mps=vy, radius_m=radius, growth_mps=growth, from_s=begin, until_s=end,
-                name="it", mmsi=1)
+def disc(
+    x: float,
+    y: float,
+    vx: float = 0.0,
+    vy: float = 0.0,
+    radius: float = 20.0,
+    growth: float = 0.0,
+    begin: float = 0.0,
+    end: float = 900.0,
+) -> Target:
+    return Target(
+        x_m=x,
+        y_m=y,
+        vx_mps=vx,
+        vy_mps=vy,
+        radius_m=radius,
+        growth_mps=growth,
+        from_s=begin,
+        until_s=end,
+        name="it",
+        mmsi=1,
+    )
 
 
 LEG = PlainLeg(from_en=(0.0, 0.0), to_en=(0.0, 200.0), start_s=0.0, end_s=100.0)
@@ -28,8 +46,8 @@ def test_a_meeting_is_found_with_its_time() -> None:
     c = check_legs([LEG], [disc(0.0, 100.0)])
     assert c[0].time_s == pytest.approx(40.0, abs=0.01)
     assert c[0].depth_m == pytest.approx(20.0, abs=0.01)
-    assert check_legs([LEG], [disc(0.0, 100.0, vx=2.0)]) == ()          # it has gone when we come
-    assert check_legs([LEG], [disc(-200.0, 100.0, vx=4.0)])             # it comes when we do
+    assert check_legs([LEG], [disc(0.0, 100.0, vx=2.0)]) == ()  # it has gone when we come
+    assert check_legs([LEG], [disc(-200.0, 100.0, vx=4.0)])  # it comes when we do
 
 
 def test_what_is_sailed_already_does_not_count() -> None:
@@ -42,10 +60,32 @@ number = st.floats(-300.0, 300.0)
 
 
 @settings(max_examples=200)
-@given(number, number, st.floats(-5, 5), st.floats(-5, 5), st.floats(1.0, 60.0), st.floats(0.0, 1.0), number, number,
-       st.floats(5.0, 200.0), st.floats(0.0, 80.0), st.floats(0.0, 100.0))
-def test_check_agrees_with_sampling(x: float, y: float, vx: float, vy: float, radius: float, growth: float, tx: float,
-                                    ty: float, end: float, begin: float, window: float) -> None:
+@given(
+    number,
+    number,
+    st.floats(-5, 5),
+    st.floats(-5, 5),
+    st.floats(1.0, 60.0),
+    st.floats(0.0, 1.0),
+    number,
+    number,
+    st.floats(5.0, 200.0),
+    st.floats(0.0, 80.0),
+    st.floats(0.0, 100.0),
+)
+def test_check_agrees_with_sampling(
+    x: float,
+    y: float,
+    vx: float,
+    vy: float,
+    radius: float,
+    growth: float,
+    tx: float,
+    ty: float,
+    end: float,
+    begin: float,
+    window: float,
+) -> None:
     leg = PlainLeg(from_en=(0.0, 0.0), to_en=(tx, ty), start_s=0.0, end_s=end)
     d = disc(x, y, vx, vy, radius, growth, begin, begin + window)
     found = check_legs([leg], [d])
@@ -75,21 +115,24 @@ def test_decisions() -> None:
     assert decide((), since_replan_s=0.0, active_cost_s=200.0, new_cost_s=190.0) is Decision.KEEP
     assert decide((), since_replan_s=0.0, active_cost_s=200.0, new_cost_s=150.0) is Decision.REPLACE_BETTER
     assert decide((), since_replan_s=0.0, active_cost_s=200.0, new_cost_s=150.0, apart_m=ALIKE_M + 1.0) is Decision.KEEP
-    assert decide((), since_replan_s=0.0, active_cost_s=200.0, new_cost_s=130.0,
-                  apart_m=ALIKE_M + 1.0) is Decision.REPLACE_BETTER
+    assert (
+        decide((), since_replan_s=0.0, active_cost_s=200.0, new_cost_s=130.0, apart_m=ALIKE_M + 1.0)
+        is Decision.REPLACE_BETTER
+    )
 
 
 def test_path_distance_by_hand() -> None:
     a = [(0.0, 0.0), (0.0, 100.0)]
     assert path_distance_m(a, [(30.0, 0.0), (30.0, 100.0)]) == pytest.approx(30.0, abs=2.6)
-    assert path_distance_m(a, [(0.0, 40.0), (0.0, 100.0)]) == pytest.approx(0.0, abs=2.6)     # sailed since
+    assert path_distance_m(a, [(0.0, 40.0), (0.0, 100.0)]) == pytest.approx(0.0, abs=2.6)  # sailed since
     assert path_distance_m(a, [(0.0, 0.0), (80.0, 50.0), (0.0, 100.0)]) == pytest.approx(80.0, abs=3.0)
 
 
 @settings(max_examples=60)
 @given(number, number, number, number)
-def test_distance_of_two_straight_paths_from_one_start_is_that_of_their_ends(ax: float, ay: float, bx: float,
-                                                                              by: float) -> None:
+def test_distance_of_two_straight_paths_from_one_start_is_that_of_their_ends(
+    ax: float, ay: float, bx: float, by: float
+) -> None:
     a, b = np.array([[0.0, 0.0], [ax, ay]]), np.array([[0.0, 0.0], [bx, by]])
     assert path_distance_m(a, a) == pytest.approx(0.0, abs=1e-9)
     # Two runners at one pace: no leash is shorter than the ends' distance, none need be longer than that (+ step).

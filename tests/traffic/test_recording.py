@@ -25,10 +25,10 @@ def frames():
     data = Path(__file__).with_name("ais_scenario.tlog").read_bytes()
     codec, at, zero = wire.MAVLink(None), 0, None
     while at < len(data):
-        stamp = struct.unpack(">Q", data[at:at + 8])[0] / 1e6
+        stamp = struct.unpack(">Q", data[at : at + 8])[0] / 1e6
         length = data[at + 9] + 12
         zero = stamp if zero is None else zero
-        yield stamp - zero, codec.decode(bytearray(data[at + 8:at + 8 + length]))
+        yield stamp - zero, codec.decode(bytearray(data[at + 8 : at + 8 + length]))
         at += 8 + length
 
 
@@ -41,8 +41,12 @@ def fold(until_s: float) -> tuple[Targets, OwnShip]:
             targets = targets.heard(ais_report(t_s, message))
         else:
             velocity = (message.vy / 100.0, message.vx / 100.0)
-            own = OwnShip(t_s=t_s, en_m=HOME.en_from_geo(geo_point(message.lat, message.lon)), velocity_en_mps=velocity,
-                          heading_rad=math.radians(message.hdg / 100.0))
+            own = OwnShip(
+                t_s=t_s,
+                en_m=HOME.en_from_geo(geo_point(message.lat, message.lon)),
+                velocity_en_mps=velocity,
+                heading_rad=math.radians(message.hdg / 100.0),
+            )
     assert own is not None
     return targets, own
 
@@ -50,7 +54,7 @@ def fold(until_s: float) -> tuple[Targets, OwnShip]:
 def test_the_cargo_ship_that_will_pass_at_six_metres_is_an_alarm_a_minute_before() -> None:
     targets, own = fold(50.0)
     cargo = next(v for v in targets.picture(50.0).vessels if v.mmsi == CARGO)
-    assert cargo.speed_mps == pytest.approx(5.0, abs=0.06)          # 0.1 knots on the wire, not cm/s
+    assert cargo.speed_mps == pytest.approx(5.0, abs=0.06)  # 0.1 knots on the wire, not cm/s
     approach = cpa(own, cargo, 50.0)
     # It passes 6.3 m off (antenna to antenna) at 109.6 s; its size is unknown, a coaster's is assumed.
     assert approach.time_s == pytest.approx(59.6, abs=14.0)
@@ -75,5 +79,5 @@ def test_a_silent_trawler_grows_old_and_its_spread_with_it() -> None:
     after = next(v for v in late.picture(228.0).vessels if v.mmsi == TRAWLER)
     assert late.picture(228.0).age_s(after) > 80.0
     assert early.picture(136.0).age_s(before) < 15.0
-    assert after.reports <= before.reports + 2          # the repeats every 30 s bring no news
+    assert after.reports <= before.reports + 2  # the repeats every 30 s bring no news
     assert late.counts.late >= 1

@@ -117,8 +117,8 @@ def test_far_from_the_start_it_is_the_boats_own_surroundings_that_stay() -> None
     assert 77 in {v.mmsi for v in t.picture(5.0).vessels}
     assert len(t.picture(5.0).vessels) == 400
     assert 1399 not in {v.mmsi for v in t.picture(5.0).vessels}
-    t = t.heard(report(6.0, (0.0, 70_000.0), mmsi=78), here)         # 70 km from the start, and 55 from us
-    t = t.heard(report(6.0, (0.0, -46_000.0), mmsi=79), here)        # the other way round
+    t = t.heard(report(6.0, (0.0, 70_000.0), mmsi=78), here)  # 70 km from the start, and 55 from us
+    t = t.heard(report(6.0, (0.0, -46_000.0), mmsi=79), here)  # the other way round
     assert t.counts.far == 1
 
 
@@ -149,7 +149,7 @@ def test_a_flood_of_new_numbers_pushes_out_no_ship_on_collision_course_and_costs
     began = process_time()
     for k in range(1000):
         t = t.heard(report(1.0, (450.0 + 0.3 * k, -200.0), mmsi=5000 + k, speed_mps=0.0))
-    assert process_time() - began < 0.5     # 0.1 s; with all judged for each of them 1.5
+    assert process_time() - began < 0.5  # 0.1 s; with all judged for each of them 1.5
     assert 77 in {v.mmsi for v in t.picture(1.0).vessels}
 
 
@@ -175,13 +175,35 @@ numbers = st.one_of(st.none(), st.floats(allow_nan=True, allow_infinity=True))
 
 
 @settings(max_examples=150)
-@given(st.lists(st.tuples(st.floats(-1e4, 1e4), st.integers(1, 4), st.floats(-90, 90), st.floats(-180, 180), numbers,
-                          numbers, numbers, st.floats(-5, 1e4)), max_size=12))
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(-1e4, 1e4),
+            st.integers(1, 4),
+            st.floats(-90, 90),
+            st.floats(-180, 180),
+            numbers,
+            numbers,
+            numbers,
+            st.floats(-5, 1e4),
+        ),
+        max_size=12,
+    )
+)
 def test_nothing_a_feed_says_breaks_the_fold(rows: list[tuple[float, ...]]) -> None:
     t = Targets.empty(FRAME, TargetLimits(max_vessels=5))
     for t_s, mmsi, lat, lon, course, speed, turn, age in rows:
-        t = t.heard(AisReport(t_s=t_s, mmsi=mmsi, position=GeoPoint(lat_deg=lat, lon_deg=lon), course_rad=course,
-                              speed_mps=speed, turn_rate_radps=turn, age_s=age))
+        t = t.heard(
+            AisReport(
+                t_s=t_s,
+                mmsi=mmsi,
+                position=GeoPoint(lat_deg=lat, lon_deg=lon),
+                course_rad=course,
+                speed_mps=speed,
+                turn_rate_radps=turn,
+                age_s=age,
+            )
+        )
     assert t.counts.heard == len(rows)
     assert len(t.vessels) <= 5
     for v in t.vessels.values():

@@ -14,13 +14,18 @@ from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import EventSpec, Scenario, WindSpec
 from tests.one_mark import one_mark
 
-MISSION = one_mark("beat", (50.8179000, -1.3100000), 60.0, tables="""orders = ["hold", "go_on"]
+MISSION = one_mark(
+    "beat",
+    (50.8179000, -1.3100000),
+    60.0,
+    tables="""orders = ["hold", "go_on"]
 local_orders = "all"
 [[refuge]]
 name = "Bay"
 lat = 50.8172000
 lon = -1.3085000
-""")
+""",
+)
 ROCK = "rock|exclusion|POLYGON ((-1.3104 50.8173, -1.3101 50.8173, -1.3101 50.8175, -1.3104 50.8175, -1.3104 50.8173))"
 
 
@@ -31,7 +36,7 @@ class Seen:
     folder: Path
     mission: Path
     steps: list = field(default_factory=list)
-    moments: list = field(default_factory=list)   # (View, events)
+    moments: list = field(default_factory=list)  # (View, events)
     area: object = None
 
     @property
@@ -51,8 +56,9 @@ def write_mission(folder):
 
 def sail(folder, out, *events, limit_s=240.0):
     path = write_mission(folder)
-    scenario = Scenario(name="beat", mission="mission.toml", limit_s=limit_s, wind=WindSpec(from_deg=0.0, sd_deg=6.0),
-                        events=events)
+    scenario = Scenario(
+        name="beat", mission="mission.toml", limit_s=limit_s, wind=WindSpec(from_deg=0.0, sd_deg=6.0), events=events
+    )
     mission = load_mission(path)
     fold = ViewFold(voyage_of(mission), config_of(mission), epoch_s=scenario.epoch_s)
     figures, seen = VoyageFigures(), Seen(folder=out, mission=path, area=fold.area)
@@ -70,5 +76,9 @@ def sail(folder, out, *events, limit_s=240.0):
 def beat(tmp_path_factory):
     """Sailed once: held by an order on the way, and told to go on."""
     folder = tmp_path_factory.mktemp("beat")
-    return sail(folder, folder / "voyage", EventSpec(at_s=70.0, kind="order", order="hold"),
-                EventSpec(at_s=90.0, kind="order", order="go_on"))
+    return sail(
+        folder,
+        folder / "voyage",
+        EventSpec(at_s=70.0, kind="order", order="hold"),
+        EventSpec(at_s=90.0, kind="order", order="go_on"),
+    )

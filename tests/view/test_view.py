@@ -22,8 +22,10 @@ from companion.view import Past, ViewFold, recorded_views, sample_of, values
 from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of, polar_of
 from tests.view.conftest import write_mission
 
-RULES = {name: jsonschema.Draft202012Validator({**schema(), "$ref": f"#/$defs/{name}"})
-         for name in ("View", "Event", "Area", "Past")}
+RULES = {
+    name: jsonschema.Draft202012Validator({**schema(), "$ref": f"#/$defs/{name}"})
+    for name in ("View", "Event", "Area", "Past")
+}
 
 
 def valid(of, name="View"):
@@ -40,8 +42,7 @@ def test_every_view_event_and_area_of_a_voyage_is_what_the_schema_says(beat):
     valid(Past.of([sample_of(view) for view in beat.views], 0.0), "Past")
 
 
-@pytest.mark.parametrize(("risks", "told"), [
-    ((0.2, 0.1), 0.3), ((0.7, 0.6), 1.0), ((0.2, None), 0.05), ((), 0.05)])
+@pytest.mark.parametrize(("risks", "told"), [((0.2, 0.1), 0.3), ((0.7, 0.6), 1.0), ((0.2, None), 0.05), ((), 0.05)])
 def test_the_chance_of_being_forced_off_the_plan_is_what_its_legs_add_up_to(beat, risks, told):
     """It said 0 % in all beside a leg of 20 %: it was of another part of the way than the legs beside it."""
     route = next(step.state.mission.route for step in beat.steps if step.state.mission.route is not None)
@@ -55,11 +56,18 @@ def test_the_chance_of_being_forced_off_the_plan_is_what_its_legs_add_up_to(beat
 
 def test_the_bound_of_a_plan_is_not_told_of_what_is_left_of_it(beat):
     """A plan that was kept was told to take 2:17, "no less than 3:07": the bound was of the whole way."""
-    view, step = next((view, step) for view, step in zip(beat.views, beat.steps, strict=True)
-                      if view.plan is not None and view.plan.bound_s)
+    view, step = next(
+        (view, step)
+        for view, step in zip(beat.views, beat.steps, strict=True)
+        if view.plan is not None and view.plan.bound_s
+    )
     route = step.state.mission.route
-    plan = next(o.plan for s in beat.steps for o in s.snapshot.outcomes
-                if isinstance(o, PlanOutcome) and o.request_id == route.plan_id and o.plan is not None)
+    plan = next(
+        o.plan
+        for s in beat.steps
+        for o in s.snapshot.outcomes
+        if isinstance(o, PlanOutcome) and o.request_id == route.plan_id and o.plan is not None
+    )
     chosen = Chosen(t_s=0.0, reason="start", plan=plan)
     assert _bound_s(replace(route, cost_s=plan.cost_s), chosen) == pytest.approx(plan.lower_bound_s, abs=0.06)
     assert _bound_s(replace(route, cost_s=plan.cost_s - 20.0), chosen) is None
@@ -74,8 +82,9 @@ def test_what_the_boat_makes_of_her_polar_is_of_the_water(beat):
     still = polar_of(step, voyage, config)
     current = (0.4, -0.3)
     vehicle, wind = step.snapshot.vehicle, step.snapshot.wind
-    carried = replace(vehicle, velocity_en_mps=tuple(
-        v + c for v, c in zip(vehicle.velocity_en_mps, current, strict=True)))
+    carried = replace(
+        vehicle, velocity_en_mps=tuple(v + c for v, c in zip(vehicle.velocity_en_mps, current, strict=True))
+    )
     twd_rad, tws_mps = over_water(wind.present_twd_from_rad, wind.mean_tws_mps, current)
     water = replace(STILL_WATER, east_mps=current[0], north_mps=current[1], is_significant=True)
     moving = polar_of(replace(step, snapshot=replace(step.snapshot, vehicle=carried, current=water)), voyage, config)
@@ -87,24 +96,41 @@ def test_what_the_boat_makes_of_her_polar_is_of_the_water(beat):
 def test_where_she_was_on_her_polar_is_of_the_water_as_where_she_is():
     """Her past dots were of her way over the ground beside a point, and a polar, of the water."""
     polar = values.PolarView(name="", tws_mps=5.0, live_twa_deg=-75.0, live_mps=1.5, twa_deg=(), speed_mps=())
-    view = values.View(source="live", name="", t_s=1.0, state=values.StateView(phase="sailing"), polar=polar,
-                       boat=values.BoatView(sog_mps=2.0, heading_deg=10.0))
+    view = values.View(
+        source="live",
+        name="",
+        t_s=1.0,
+        state=values.StateView(phase="sailing"),
+        polar=polar,
+        boat=values.BoatView(sog_mps=2.0, heading_deg=10.0),
+    )
     kept = Past.of([sample_of(view), sample_of(replace(view, polar=None))], None)
     assert kept.polar_mps == (1.5, None)
     assert kept.polar_twa_deg == (-75.0, None)
 
 
 def test_close_to_the_wind_no_share_of_the_polar_is_told():
-    polar = values.PolarView(name="", tws_mps=5.0, live_twa_deg=-75.0, live_mps=1.5, twa_deg=(60.0, 90.0),
-                             speed_mps=(1.0, 3.0), beat_deg=45.0)
+    polar = values.PolarView(
+        name="",
+        tws_mps=5.0,
+        live_twa_deg=-75.0,
+        live_mps=1.5,
+        twa_deg=(60.0, 90.0),
+        speed_mps=(1.0, 3.0),
+        beat_deg=45.0,
+    )
     assert polar.live_share() == pytest.approx(0.75)
     assert replace(polar, beat_deg=84.0).live_share() is None
     assert replace(polar, live_mps=None).live_share() is None
 
 
 def test_a_tack_that_the_autopilot_makes_by_itself_is_told_as_such(beat):
-    told = {(bool(leg.is_beat), view.plan.next_tack_is_planned) for view in beat.under_way
-            for leg in view.plan.legs[:1] if view.plan.next_tack_s is not None and leg.is_beat is not None}
+    told = {
+        (bool(leg.is_beat), view.plan.next_tack_is_planned)
+        for view in beat.under_way
+        for leg in view.plan.legs[:1]
+        if view.plan.next_tack_s is not None and leg.is_beat is not None
+    }
     assert (True, False) in told
     for view in beat.under_way:
         assert (view.plan.next_tack_s is None) == (view.plan.next_tack_is_planned is None)
@@ -176,7 +202,7 @@ def test_without_its_telemetry_log_a_voyage_is_seen_by_its_track(beat, tmp_path)
     for (then, _), live in zip(moments, beat.views, strict=True):
         valid(then)
         if live.boat.at_en_m is not None:
-            assert then.boat.at_en_m == pytest.approx(live.boat.at_en_m, abs=0.11)   # rounded twice
+            assert then.boat.at_en_m == pytest.approx(live.boat.at_en_m, abs=0.11)  # rounded twice
             assert then.boat.tack == live.boat.tack
     assert {e.kind for _, events in moments for e in events} == {"phase", "plan"}
 
@@ -201,11 +227,11 @@ def test_the_time_of_day_is_the_autopilots_where_this_computers_is_another(tmp_p
     before, _ = fold.take(step, status, VoyageFigures())
     told = replace(step, snapshot=Snapshot(t_s=6.0, autopilot=autopilot))
     view, _ = fold.take(told, status, VoyageFigures())
-    assert before.unix_s == 1_005.0        # nobody has told another
+    assert before.unix_s == 1_005.0  # nobody has told another
     assert view.unix_s == epoch_s + 6.0
     live = LiveSource(name="test", unix_s=1_000.0)
     live.show(view, (), None)
-    assert live.unix_s == epoch_s          # the strips' clock is the page's
+    assert live.unix_s == epoch_s  # the strips' clock is the page's
 
 
 def test_what_is_not_known_is_null_and_never_nought(tmp_path):
@@ -226,8 +252,13 @@ ANGLES = st.floats(0.0, 2.0 * math.pi)
 
 
 def vehicle(east_mps, north_mps, heading_rad=0.0):
-    return VehicleState(t_s=0.0, boot_s=0.0, position=GeoPoint(lat_deg=50.8, lon_deg=-1.3),
-                        velocity_en_mps=(east_mps, north_mps), heading_rad=heading_rad)
+    return VehicleState(
+        t_s=0.0,
+        boot_s=0.0,
+        position=GeoPoint(lat_deg=50.8, lon_deg=-1.3),
+        velocity_en_mps=(east_mps, north_mps),
+        heading_rad=heading_rad,
+    )
 
 
 @given(twd=ANGLES, tws=st.floats(0.5, 20.0), heading=ANGLES)
@@ -238,7 +269,7 @@ def test_at_rest_the_apparent_wind_is_the_true_one(twd, tws, heading):
 
 
 def test_sailing_on_the_apparent_wind_comes_from_further_ahead():
-    heading = math.radians(310.0)   # wind from north: starboard tack, 50 degrees off
+    heading = math.radians(310.0)  # wind from north: starboard tack, 50 degrees off
     awa, aws = apparent(0.0, 5.0, vehicle(2.0 * math.sin(heading), 2.0 * math.cos(heading), heading))
     assert 0.0 < awa < math.radians(50.0)
     assert aws > 5.0
@@ -250,16 +281,34 @@ def forecast(sigma_deg):
     horizons = np.array([0.0, 60.0, 300.0])
     sigma = np.radians(np.array(sigma_deg))
     return WindForecast(
-        t_s=0.0, horizon_s=horizons, mean_twd_from_rad=np.zeros(3), sigma_twd_rad=sigma, mean_tws_mps=np.full(3, 5.0),
-        sigma_tws_mps=np.full(3, 0.5), level=np.zeros(0), half_width_rad=np.zeros((3, 0)), correlation_time_s=60.0)
+        t_s=0.0,
+        horizon_s=horizons,
+        mean_twd_from_rad=np.zeros(3),
+        sigma_twd_rad=sigma,
+        mean_tws_mps=np.full(3, 5.0),
+        sigma_tws_mps=np.full(3, 0.5),
+        level=np.zeros(0),
+        half_width_rad=np.zeros((3, 0)),
+        correlation_time_s=60.0,
+    )
 
 
 def step_at(here, sigma_deg=(2.0, 6.0, 12.0), heading_deg=310.0):
     heading = math.radians(heading_deg)
-    wind = WindEstimate(health=WindHealth.GOOD, forecast=forecast(sigma_deg), mean_twd_from_rad=0.0, mean_tws_mps=5.0,
-                    present_twd_from_rad=0.0, present_tws_mps=5.0)
-    snapshot = Snapshot(t_s=0.0, vehicle=vehicle(2.0 * math.sin(heading), 2.0 * math.cos(heading), heading),
-                        position_en_m=here, wind=wind)
+    wind = WindEstimate(
+        health=WindHealth.GOOD,
+        forecast=forecast(sigma_deg),
+        mean_twd_from_rad=0.0,
+        mean_tws_mps=5.0,
+        present_twd_from_rad=0.0,
+        present_tws_mps=5.0,
+    )
+    snapshot = Snapshot(
+        t_s=0.0,
+        vehicle=vehicle(2.0 * math.sin(heading), 2.0 * math.cos(heading), heading),
+        position_en_m=here,
+        wind=wind,
+    )
     return Step(snapshot=snapshot, state=SkipperState(), actions=(), voyage=None)
 
 
@@ -268,7 +317,7 @@ def test_the_no_go_zone_widens_by_the_promises_quantile(tmp_path):
     zone = no_go_of(step_at((0.0, 0.0)), fold_of(tmp_path)._voyage, config)
     assert [w.horizon_s for w in zone.wedges] == [0.0, 60.0, 300.0]
     for wedge, sigma in zip(zone.wedges, (2.0, 6.0, 12.0), strict=True):
-        assert wedge.widening_deg == pytest.approx(1.6449 * sigma, abs=0.02)   # the one-sided 95 % of a normal
+        assert wedge.widening_deg == pytest.approx(1.6449 * sigma, abs=0.02)  # the one-sided 95 % of a normal
         assert wedge.half_deg == pytest.approx(zone.half_deg + wedge.widening_deg, abs=0.02)
     assert zone.half_deg == pytest.approx(47.0, abs=0.01)
 
@@ -279,14 +328,14 @@ def test_a_mark_to_windward_has_two_laylines_and_each_fetches_it(off_deg, far_m,
     lines = laylines_of(step_at((0.0, 0.0)), voyage, SkipperConfig(), "mark", mark)
     assert lines.is_beat
     by = {line.tack: line for line in lines.lines}
-    assert by["starboard"].course_deg == pytest.approx(360.0 - lines.angle_deg, abs=0.1)   # wind over the right side
+    assert by["starboard"].course_deg == pytest.approx(360.0 - lines.angle_deg, abs=0.1)  # wind over the right side
     assert by["port"].course_deg == pytest.approx(lines.angle_deg, abs=0.1)
-    reach = by["port"].reach_s          # she is on starboard tack, and meets the other tack's layline
+    reach = by["port"].reach_s  # she is on starboard tack, and meets the other tack's layline
     if reach is not None:
         heading, course = math.radians(310.0), math.radians(by["port"].course_deg)
         east, north = 2.0 * reach * math.sin(heading), 2.0 * reach * math.cos(heading)
         off = (mark[0] - east) * math.cos(course) - (mark[1] - north) * math.sin(course)
-        assert abs(off) < 1.1           # reach_s is whole seconds
+        assert abs(off) < 1.1  # reach_s is whole seconds
         assert (mark[0] - east) * math.sin(course) + (mark[1] - north) * math.cos(course) > -1.1
 
 

@@ -35,7 +35,7 @@ def test_the_last_resort_is_named_in_the_record_and_the_voyage_replays(tmp_path)
     phases = [d["phase"] for d in records if d["kind"] == "phase"]
     assert phases.count("last resort") == 1
     modes = [d["mode"] for d in records if d.get("action") == "SetMode"]
-    assert modes == [10, 15, 10]                      # AUTO, GUIDED, AUTO
+    assert modes == [10, 15, 10]  # AUTO, GUIDED, AUTO
     assert "operator" not in phases
     assert not replay(tmp_path).differences
 
@@ -44,7 +44,7 @@ def test_the_last_resort_is_named_in_the_record_and_the_voyage_replays(tmp_path)
 def test_intruders_from_other_sides(tmp_path, bearing_deg, gap_m):
     scenario = load_scenario(LAST_RESORT)
     event = msgspec.structs.replace(scenario.events[0], bearing_deg=bearing_deg, gap_m=gap_m)
-    expect = msgspec.structs.replace(scenario.expect, alerts=())     # astern there may be time for a plan
+    expect = msgspec.structs.replace(scenario.expect, alerts=())  # astern there may be time for a plan
     verdict = sail(LAST_RESORT, 1, tmp_path, msgspec.structs.replace(scenario, events=(event,), expect=expect))
     assert verdict.passed, failed(verdict)
 
@@ -73,15 +73,16 @@ def test_two_boats_that_do_not_look_meet(tmp_path):
     assert seeing.passed, failed(seeing)
     near = blind.figures["vessel_distances_m"]["211000001"]
     assert near < 60.0 < seeing.figures["vessel_distances_m"]["211000001"]
-    assert near > 8.0      # the other boat looks
+    assert near > 8.0  # the other boat looks
 
 
 def test_killed_in_the_middle_of_it_the_companion_takes_the_boat_back_to_auto(tmp_path):
     scenario = load_scenario(LAST_RESORT)
     kill = EventSpec(at_s=126.0, kind="kill_companion", restart_after_s=4.0)
     expect = msgspec.structs.replace(scenario.expect, alerts=(), max_silence_s=None)
-    verdict = sail(LAST_RESORT, 0, tmp_path,
-                   msgspec.structs.replace(scenario, events=(*scenario.events, kill), expect=expect))
+    verdict = sail(
+        LAST_RESORT, 0, tmp_path, msgspec.structs.replace(scenario, events=(*scenario.events, kill), expect=expect)
+    )
     assert verdict.passed, failed(verdict)
 
 

@@ -17,8 +17,12 @@ YEAR_S = 365.0 * 86_400.0
 
 def sail(folder, *events):
     scenario = msgspec.structs.replace(
-        load_scenario(BASE), limit_s=400.0, wind=WindSpec(sd_deg=6.0, tws_mps=5.0), events=events,
-        expect=ExpectSpec(arrived=True, min_clearance_m=2.0))
+        load_scenario(BASE),
+        limit_s=400.0,
+        wind=WindSpec(sd_deg=6.0, tws_mps=5.0),
+        events=events,
+        expect=ExpectSpec(arrived=True, min_clearance_m=2.0),
+    )
     return run_virtual(run_embedded(scenario, BASE, 1, folder, expansions=4_000))
 
 
@@ -27,7 +31,7 @@ def test_started_again_a_year_ago_she_sails_on_and_the_record_says_what_time_it_
     assert verdict.passed, verdict.checks
     records = read_jsonl(tmp_path / "decisions.jsonl")
     starts = [n for n, r in enumerate(records) if r["kind"] == "start"]
-    assert "adopted" in [r.get("code") for r in records[starts[1]:] if r.get("action") == "Announce"]
+    assert "adopted" in [r.get("code") for r in records[starts[1] :] if r.get("action") == "Announce"]
     told = [r for r in records if r["kind"] == "clock"]
     assert len(told) == 1
     assert records.index(told[0]) > starts[1]

@@ -49,7 +49,7 @@ class Shore:
     @property
     def said(self):
         messages = Codec(1, 191).feed(bytes(self.bytes))
-        return "".join(m.text for m in messages if m.get_type() == "STATUSTEXT")   # in parts of 50 letters
+        return "".join(m.text for m in messages if m.get_type() == "STATUSTEXT")  # in parts of 50 letters
 
 
 @pytest.fixture(scope="module")
@@ -61,9 +61,15 @@ def short(tmp_path_factory):
 
 
 def sail(short, out, *events, limit_s=600.0, exit_on_arrival=True):
-    scenario = Scenario(name="reach", mission="mission.toml", limit_s=limit_s, events=events,
-                        wind=WindSpec(sd_deg=6.0), exit_on_arrival=exit_on_arrival,
-                        expect=ExpectSpec(min_clearance_m=2.0))
+    scenario = Scenario(
+        name="reach",
+        mission="mission.toml",
+        limit_s=limit_s,
+        events=events,
+        wind=WindSpec(sd_deg=6.0),
+        exit_on_arrival=exit_on_arrival,
+        expect=ExpectSpec(min_clearance_m=2.0),
+    )
     shore = Shore()
     verdict = run_virtual(run_embedded(scenario, short / "scenario.toml", 1, out, expansions=4000, observer=shore))
     return verdict, shore
@@ -95,8 +101,11 @@ def test_a_voyage_outlives_its_disk_and_is_recorded_again_when_it_is_well(state,
 def test_started_again_on_a_full_disk_it_takes_over_by_the_mark_in_its_mission(short, tmp_path):
     """Not even the restart got through: exit code 1, again and again (issue 12, point 13)."""
     verdict, _ = sail(
-        short, tmp_path, EventSpec(at_s=20.0, kind="disk", state="full"),
-        EventSpec(at_s=70.0, kind="kill_companion", restart_after_s=4.0))
+        short,
+        tmp_path,
+        EventSpec(at_s=20.0, kind="disk", state="full"),
+        EventSpec(at_s=70.0, kind="kill_companion", restart_after_s=4.0),
+    )
     assert verdict.passed, verdict.checks
     # of the first life nothing after the 20th second, of the second nothing at all
     rows = (tmp_path / "track.csv").read_text().splitlines()
@@ -119,12 +128,11 @@ def test_a_mission_that_has_arrived_says_what_would_sail_it_again(short, tmp_pat
     code, said = outcome_of("reach", first | {"plans": 0, "uploads": 0, "time_s": 2.0, "tacks": 0})
     assert code == 0
     assert said.startswith("arrived, with nothing sailed anew: at this start she lay at the goal of reach already")
-    sail(short, tmp_path)      # another boat, the same state
+    sail(short, tmp_path)  # another boat, the same state
     again = json.loads((tmp_path / "summary.json").read_bytes())
     assert again["arrived_before"] is True
     assert again["uploads"] == 0
-    assert outcome_of("reach", again) == (
-        2, "not sailed: reach had arrived before this start; --again sails it again")
+    assert outcome_of("reach", again) == (2, "not sailed: reach had arrived before this start; --again sails it again")
 
 
 def test_a_dry_run_leaves_the_state_of_a_voyage_that_is_interrupted(short, tmp_path):
@@ -138,8 +146,15 @@ def test_a_dry_run_leaves_the_state_of_a_voyage_that_is_interrupted(short, tmp_p
         autopilot = SimulatedAutopilot(AutopilotConfig(home=mission.origin, is_warm=True), Constant(0.0, 5.0), seed=1)
         wires = MemoryLink("dry", seed=1)
         async with serve(autopilot, [wires.far]):
-            return await app.sail(mission, wires.near, InlinePlanner(), tmp_path / "dry", SailOptions(
-                dry_run=True, limit_s=50.0, offload=at_once, is_durable=False, state_path=state, expansions=2000))
+            return await app.sail(
+                mission,
+                wires.near,
+                InlinePlanner(),
+                tmp_path / "dry",
+                SailOptions(
+                    dry_run=True, limit_s=50.0, offload=at_once, is_durable=False, state_path=state, expansions=2000
+                ),
+            )
 
     summary = run_virtual(dry())
     assert summary["end_why"].startswith("a plan is ready")
@@ -153,13 +168,14 @@ def test_a_voyage_is_replayed_where_its_mission_is_no_more(short, tmp_path, monk
     (there / "missions/shore").mkdir()
     (there / "missions/rock.wkt").rename(there / "missions/shore/rock.wkt")
     mission = MISSION.replace('"rock.wkt"', '"shore/rock.wkt", "../rock.wkt"').replace(
-        "[operator]", '[boat]\npolar = "own.csv"\n[operator]')
+        "[operator]", '[boat]\npolar = "own.csv"\n[operator]'
+    )
     (there / "missions/mission.toml").write_text(mission.replace('name = "reach"\n', "", 1))
     (there / "rock.wkt").write_text(ROCK.replace("-1.308", "-1.338"))
     (there / "missions/own.csv").write_text(POLAR)
     verdict, _ = sail(there / "missions", there / "voyage")
     assert verdict.passed, verdict.checks
-    with (there / "voyage/track.csv").open() as track:   # she sailed by her own polar, 2.5 kn at best
+    with (there / "voyage/track.csv").open() as track:  # she sailed by her own polar, 2.5 kn at best
         assert max(float(row["sog_mps"] or 0.0) for row in csv.DictReader(track)) < 1.4
     here = tmp_path / "elsewhere"
     shutil.move(there / "voyage", here)
@@ -183,8 +199,13 @@ POLAR = """TWA\\TWS;4;6;10
 
 def test_started_again_beside_the_boat_in_her_loiter_it_says_so_too(short, tmp_path):
     """On the same boat it took its own list over and said "all 0 goals reached", "arrived; 2 s" and 0."""
-    verdict, _ = sail(short, tmp_path, EventSpec(at_s=150.0, kind="kill_companion", restart_after_s=4.0),
-                      limit_s=180.0, exit_on_arrival=False)
+    verdict, _ = sail(
+        short,
+        tmp_path,
+        EventSpec(at_s=150.0, kind="kill_companion", restart_after_s=4.0),
+        limit_s=180.0,
+        exit_on_arrival=False,
+    )
     assert verdict.passed, verdict.checks
     again = json.loads((tmp_path / "summary.json").read_bytes())
     assert (again["arrived"], again["arrived_before"], again["uploads"]) == (True, True, 0)

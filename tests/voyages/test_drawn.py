@@ -46,8 +46,10 @@ set_auto = true
 # East with the wind abeam, with a rock on the straight line.
 DRAWING = [(60.0, 0.0), {"en": (150.0, 0.0)}, {"command": 17, "en": (180.0, 30.0)}]
 RING = [(-80.0, -120.0), (260.0, -120.0), (260.0, 160.0), (-80.0, 160.0)]
-FENCE = [*({"command": 5001, "en": en, "p1": 4.0, "frame": 0} for en in RING),
-         {"command": 5004, "en": (105.0, 0.0), "p1": 12.0, "frame": 0}]
+FENCE = [
+    *({"command": 5001, "en": en, "p1": 4.0, "frame": 0} for en in RING),
+    {"command": 5004, "en": (105.0, 0.0), "p1": 12.0, "frame": 0},
+]
 RALLY = [{"command": 5100, "en": (10.0, 10.0)}]
 
 
@@ -62,7 +64,9 @@ class Bay:
         self.folder = tmp_path / "voyages" / "first"
         self.boat = SimulatedAutopilot(
             AutopilotConfig(home=HOME, heading_rad=math.pi / 2, is_warm=True, is_moored=True),
-            AR1(0.0, 6.0, seed=1, sd_rad=0.05), seed=1)
+            AR1(0.0, 6.0, seed=1, sd_rad=0.05),
+            seed=1,
+        )
         self.line, self.radio = MemoryLink("companion", seed=1), MemoryLink("station", seed=2)
         self.station = Client(self.radio.near.write, self.boat, system=255, component=190)
         self.crew = MemoryLink("crew", seed=3)
@@ -92,7 +96,8 @@ class Bay:
     async def find(self):
         settings = load_settings(self.path)
         self.found = await find_on(
-            self.line.near, settings, self.path, self.state_path, self.plan, self.said.append, wait_s=30.0)
+            self.line.near, settings, self.path, self.state_path, self.plan, self.said.append, wait_s=30.0
+        )
         return self.found
 
     async def sail(self, *, folder=None, on_step=None, **options):
@@ -107,13 +112,26 @@ class Bay:
             if on_step is not None:
                 on_step(step)
 
-        settings = {"epoch_s": 1.78e9, "offload": at_once, "is_durable": False, "limit_s": 500.0, "expansions": 2000,
-                    "state_path": self.state_path, "known": (found.board,), "is_again": found.is_new,
-                    "exit_on_arrival": True,
-                    "settings": DrawnSettings(
-                        options=load_settings(self.path), path=self.path, state_path=self.state_path)}
-        return await sail(found.drawn.mission, self.line.near, FaultyPlanner(), folder or self.folder,
-                          SailOptions(**settings | options), on_status=look)
+        settings = {
+            "epoch_s": 1.78e9,
+            "offload": at_once,
+            "is_durable": False,
+            "limit_s": 500.0,
+            "expansions": 2000,
+            "state_path": self.state_path,
+            "known": (found.board,),
+            "is_again": found.is_new,
+            "exit_on_arrival": True,
+            "settings": DrawnSettings(options=load_settings(self.path), path=self.path, state_path=self.state_path),
+        }
+        return await sail(
+            found.drawn.mission,
+            self.line.near,
+            FaultyPlanner(),
+            folder or self.folder,
+            SailOptions(**settings | options),
+            on_status=look,
+        )
 
     def announced(self, folder=None):
         lines = ((folder or self.folder) / "decisions.jsonl").read_text().splitlines()
@@ -279,14 +297,24 @@ def test_an_upload_of_ours_that_was_cut_short_over_the_drawing_is_known(tmp_path
 
 
 # ------------------------------------------------------------------------------------------- nothing to sail
-@pytest.mark.parametrize(("mission", "fence", "words"), [
-    ([], None, "there is no mission on the autopilot"),
-    ([], FENCE, "there is no mission on the autopilot, only a fence"),
-    ([(60.0, 0.0), {"command": 178, "frame": 2}], None, "item 2: error: DO_CHANGE_SPEED is nothing that a voyage does"),
-    ([(60.0, 0.0), (105.0, 2.0)], FENCE, "item 2: error: 51.100018, -1.298501 is inside the obstacle 'obstacle 1'"),
-    ([(60.0, 0.0), {"command": 177, "p1": 1.0, "p2": -1.0, "frame": 2}], None,
-     "item 2: error: DO_JUMP repeats without end"),
-])
+@pytest.mark.parametrize(
+    ("mission", "fence", "words"),
+    [
+        ([], None, "there is no mission on the autopilot"),
+        ([], FENCE, "there is no mission on the autopilot, only a fence"),
+        (
+            [(60.0, 0.0), {"command": 178, "frame": 2}],
+            None,
+            "item 2: error: DO_CHANGE_SPEED is nothing that a voyage does",
+        ),
+        ([(60.0, 0.0), (105.0, 2.0)], FENCE, "item 2: error: 51.100018, -1.298501 is inside the obstacle 'obstacle 1'"),
+        (
+            [(60.0, 0.0), {"command": 177, "p1": 1.0, "p2": -1.0, "frame": 2}],
+            None,
+            "item 2: error: DO_JUMP repeats without end",
+        ),
+    ],
+)
 def test_a_drawing_that_cannot_be_sailed_is_refused_here_and_on_the_radio(tmp_path, mission, fence, words):
     bay = Bay(tmp_path)
 
@@ -311,8 +339,12 @@ def test_a_list_of_ours_without_its_drawing_is_not_taken_for_one(tmp_path):
 
     async def work():
         async with Link(bay.line.near) as link, Autopilot(link) as autopilot:
-            items = marked([waypoint(GeoPoint(lat_deg=51.101, lon_deg=-1.3)),
-                            waypoint(GeoPoint(lat_deg=51.101, lon_deg=-1.3), command=17)])
+            items = marked(
+                [
+                    waypoint(GeoPoint(lat_deg=51.101, lon_deg=-1.3)),
+                    waypoint(GeoPoint(lat_deg=51.101, lon_deg=-1.3), command=17),
+                ]
+            )
             assert (await autopilot.upload_mission(items)).is_ok
         await bay.find()
 

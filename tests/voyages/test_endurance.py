@@ -15,10 +15,10 @@ from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import load_scenario
 
 SCENARIO = Path("sitl/scenarios/endurance.toml")
-SETTLED_S = 2.0 * 3600.0       # every kind of thing has happened once by then
+SETTLED_S = 2.0 * 3600.0  # every kind of thing has happened once by then
 EVERY_S = 1800.0
 # Of companion, autopilot and judge together. A day has 86 400 steps: one forgotten object in each would be seen.
-MAY_GROW = 20_000              # objects
+MAY_GROW = 20_000  # objects
 MAY_GROW_BYTES = 30_000_000
 PAGE_BYTES = 4096
 # Twice what a day was measured to write [bytes].
@@ -41,7 +41,7 @@ def test_endurance_a_day_without_a_human(tmp_path):
 
     verdict = run_virtual(run_embedded(load_scenario(SCENARIO), SCENARIO, 1, tmp_path, on_status=look))
     sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
-    print(f"t s, objects, bytes: {seen[0]} to {seen[-1]}; files: {sizes}")   # shown by pytest -rA
+    print(f"t s, objects, bytes: {seen[0]} to {seen[-1]}; files: {sizes}")  # shown by pytest -rA
     assert verdict.passed, verdict.checks
     assert len(seen) > 40
     assert seen[-1][1] - seen[0][1] < MAY_GROW, seen

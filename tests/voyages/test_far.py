@@ -27,21 +27,21 @@ class Shore:
     """Gives a hold twice over, one that has expired, forgeries, a go_on; its own bytes and its own counters."""
 
     def __init__(self):
-        self.statuses = []      # (time, counts), in the order in which they came
+        self.statuses = []  # (time, counts), in the order in which they came
 
     async def __call__(self, satellite, event, frame, wanted_by, errors):
         self.satellite, self.told = satellite, 0
         hold = self.order(1, HOLD, 3600.0)
         await self.until_told(hold, 1, DONE)
-        satellite.send(self.order(2, HOME, -7200.0))                      # it lay about for hours
-        satellite.send(self.order(9, HOME, 3600.0, key=bytes(32)))        # a stranger's
-        satellite.send(hold[:-1] + bytes([hold[-1] ^ 1]))                 # damaged
-        satellite.send(by_the_page.write("The status", KEY, 1, minute=1))   # its own voice, played back
+        satellite.send(self.order(2, HOME, -7200.0))  # it lay about for hours
+        satellite.send(self.order(9, HOME, 3600.0, key=bytes(32)))  # a stranger's
+        satellite.send(hold[:-1] + bytes([hold[-1] ^ 1]))  # damaged
+        satellite.send(by_the_page.write("The status", KEY, 1, minute=1))  # its own voice, played back
         await self.until_told(self.order(2, HOME, -7200.0), 2, EXPIRED)
-        await asyncio.sleep(max(0.0, 600.0 - now_s()))                    # she was killed, and lives again
+        await asyncio.sleep(max(0.0, 600.0 - now_s()))  # she was killed, and lives again
         satellite.send(hold)
         await self.until_told(self.order(3, GO_ON, 3600.0), 3, DONE)
-        satellite.send(hold)                                               # the hold once more, behind the go_on
+        satellite.send(hold)  # the hold once more, behind the go_on
 
     def order(self, counter, verb, left_s, key=KEY):
         expires = int((self.satellite.epoch_s + now_s() + left_s - YEAR_2020_S) // 60) + 1
@@ -53,7 +53,7 @@ class Shore:
             self.satellite.send(data)
             for _ in range(15):
                 await asyncio.sleep(20.0)
-                for at_s, heard in self.satellite.heard[self.told:]:
+                for at_s, heard in self.satellite.heard[self.told :]:
                     self.statuses.append((at_s, by_the_page.read("The status", heard, KEY)))
                 self.told = len(self.satellite.heard)
                 if any((c["order"], c["reply"] & 0xF) == (counter, reply) for _, c in self.statuses):
@@ -66,11 +66,16 @@ def test_a_voyage_by_satellite_each_order_once_the_late_one_never_and_over_a_kil
     monkeypatch.setattr(injection, "order_far", shore)
     (tmp_path / "m.toml").write_text(Path("missions/buoy-course.toml").read_text().replace("laps = 5", "laps = 1"))
     scenario = msgspec.structs.replace(
-        load_scenario(SOURCE), mission="m.toml", limit_s=4000.0,
+        load_scenario(SOURCE),
+        mission="m.toml",
+        limit_s=4000.0,
         satellite=SatelliteSpec(delay_s=10.0, delay_most_s=120.0, loss=0.3, duplicate=0.5, status_every_s=300.0),
-        events=(EventSpec(at_s=20.0, kind="far_order"),
-                EventSpec(at_s=500.0, kind="kill_companion", restart_after_s=5.0)),
-        expect=ExpectSpec(alerts=("order",), marks_rounded=3, held=HeldSpec(from_s=200.0, to_s=600.0, within_m=35.0)))
+        events=(
+            EventSpec(at_s=20.0, kind="far_order"),
+            EventSpec(at_s=500.0, kind="kill_companion", restart_after_s=5.0),
+        ),
+        expect=ExpectSpec(alerts=("order",), marks_rounded=3, held=HeldSpec(from_s=200.0, to_s=600.0, within_m=35.0)),
+    )
     verdict = run_virtual(run_embedded(scenario, tmp_path / "s.toml", 1, tmp_path))
     assert verdict.passed, failed(verdict)
     decisions = list(read_jsonl(tmp_path / "decisions.jsonl"))
@@ -99,10 +104,14 @@ def test_an_order_that_comes_two_hours_late_counts_for_nothing(tmp_path, seed):
 
 def test_what_the_mission_does_not_permit_is_refused_and_told(tmp_path):
     scenario = msgspec.structs.replace(
-        load_scenario(SOURCE), mission="../missions/open-water.toml", limit_s=120.0, exit_on_arrival=False,
+        load_scenario(SOURCE),
+        mission="../missions/open-water.toml",
+        limit_s=120.0,
+        exit_on_arrival=False,
         satellite=SatelliteSpec(delay_s=1.0, delay_most_s=5.0),
         events=(EventSpec(at_s=20.0, kind="far_order", order="hold", answer="refused"),),
-        expect=ExpectSpec(arrived=None))
+        expect=ExpectSpec(arrived=None),
+    )
     verdict = run_virtual(run_embedded(scenario, SOURCE, 0, tmp_path))
     assert verdict.passed, failed(verdict)
     said = [d["text"] for d in read_jsonl(tmp_path / "decisions.jsonl") if d.get("code") == "order"]
@@ -118,7 +127,8 @@ class HighLatencyStation(Station):
         assert not self.of("HIGH_LATENCY2")
         for param, wait_s in ((1.0, 21.0), (0.0, 11.0), (3.0, 1.0)):
             command = wire.MAVLink_command_long_message(
-                1, 191, wire.MAV_CMD_CONTROL_HIGH_LATENCY, 0, param, 0, 0, 0, 0, 0, 0)
+                1, 191, wire.MAV_CMD_CONTROL_HIGH_LATENCY, 0, param, 0, 0, 0, 0, 0, 0
+            )
             await self.send(transport, command, wait_s)
 
 
@@ -127,8 +137,11 @@ def test_high_latency_is_spoken_while_it_is_asked_for(tmp_path, monkeypatch):
     monkeypatch.setattr(injection, "give_order", station)
     path = Path("sitl/scenarios/upwind.toml")
     scenario = msgspec.structs.replace(
-        load_scenario(path), events=(EventSpec(at_s=60.0, kind="order"),), limit_s=110.0,
-        expect=ExpectSpec(arrived=None, within_m=None))
+        load_scenario(path),
+        events=(EventSpec(at_s=60.0, kind="order"),),
+        limit_s=110.0,
+        expect=ExpectSpec(arrived=None, within_m=None),
+    )
     verdict = run_virtual(run_embedded(scenario, path, 0, tmp_path))
     assert verdict.passed, failed(verdict)
     heard = station.of("HIGH_LATENCY2")

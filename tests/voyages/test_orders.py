@@ -51,14 +51,19 @@ class Station:
     async def talk(self, transport):
         beat = wire.MAVLink_heartbeat_message(wire.MAV_TYPE_GCS, wire.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3)
         await self.send(transport, beat, 1.0)
-        for confirmation in (0, 1):      # the second as if the first answer had been lost
+        for confirmation in (0, 1):  # the second as if the first answer had been lost
             await self.send(transport, self.long(191, 1, confirmation), 1.5)
         for component in (190, 1, 0):
             await self.send(transport, self.long(component, 8), 1.5)
         await self.send(transport, self.long(191, 99), 1.5)
         await self.send(transport, self.long(191, 0, command=wire.MAV_CMD_DO_SET_MODE), 1.5)
-        await self.send(transport, wire.MAVLink_command_int_message(
-            1, 191, wire.MAV_FRAME_GLOBAL, wire.MAV_CMD_USER_2, 0, 0, 0, 0, 0, 0, 0, 0, 0), 1.5)
+        await self.send(
+            transport,
+            wire.MAVLink_command_int_message(
+                1, 191, wire.MAV_FRAME_GLOBAL, wire.MAV_CMD_USER_2, 0, 0, 0, 0, 0, 0, 0, 0, 0
+            ),
+            1.5,
+        )
 
     @staticmethod
     def long(component, verb, confirmation=0, command=wire.MAV_CMD_USER_1):
@@ -76,8 +81,13 @@ class Station:
 def test_a_station_that_knows_pymavlink_alone_is_answered(tmp_path, monkeypatch):
     station = Station()
     monkeypatch.setattr(injection, "give_order", station)
-    verdict = sail(tmp_path, [EventSpec(at_s=60.0, kind="order")], limit_s=100.0, exit_on_arrival=False,
-                   expect=ExpectSpec(**PARKED))
+    verdict = sail(
+        tmp_path,
+        [EventSpec(at_s=60.0, kind="order")],
+        limit_s=100.0,
+        exit_on_arrival=False,
+        expect=ExpectSpec(**PARKED),
+    )
     assert verdict.passed, failed(verdict)
     acks = [(a.command, a.result) for a in station.of("COMMAND_ACK")]
     assert acks == [(31010, 0), (31010, 0), (31010, 3), (176, 3), (31011, 2)]
@@ -120,17 +130,27 @@ def test_what_the_mission_does_not_permit_is_refused_and_she_sails_on(tmp_path):
     mission = Path("sitl/missions/open-water.toml").read_text().replace('orders = "all"\n', "")
     (tmp_path / "m.toml").write_text(mission)
     scenario = msgspec.structs.replace(
-        load_scenario(HOLD), mission="m.toml", limit_s=300.0, expect=ExpectSpec(alerts=("order",), within_m=40.0),
-        events=(order(20.0, "hold", "refused"), order(40.0, "stop", "refused"), order(60.0, "why")))
+        load_scenario(HOLD),
+        mission="m.toml",
+        limit_s=300.0,
+        expect=ExpectSpec(alerts=("order",), within_m=40.0),
+        events=(order(20.0, "hold", "refused"), order(40.0, "stop", "refused"), order(60.0, "why")),
+    )
     verdict = run_virtual(run_embedded(scenario, tmp_path / "s.toml", 0, tmp_path / "v"))
     assert verdict.passed, failed(verdict)
 
 
 def test_given_up_she_sails_to_the_end_of_what_is_on_board_and_on_when_told(tmp_path):
     verdict = sail(
-        tmp_path, [order(30.0, "stop"), order(60.0, "hold", "not now"), order(90.0, "go_on")],
-        expect=ExpectSpec(alerts=("order",), within_m=40.0), limit_s=400.0)
+        tmp_path,
+        [order(30.0, "stop"), order(60.0, "hold", "not now"), order(90.0, "go_on")],
+        expect=ExpectSpec(alerts=("order",), within_m=40.0),
+        limit_s=400.0,
+    )
     assert verdict.passed, failed(verdict)
-    asked = {d["t_s"] for d in read_jsonl(tmp_path / "decisions.jsonl") if d.get("action") in {
-        "UploadMission", "SetMode", "SetCurrent", "RequestPlan", "Arm"}}
+    asked = {
+        d["t_s"]
+        for d in read_jsonl(tmp_path / "decisions.jsonl")
+        if d.get("action") in {"UploadMission", "SetMode", "SetCurrent", "RequestPlan", "Arm"}
+    }
     assert not [t_s for t_s in asked if 34.0 <= t_s <= 89.0]

@@ -38,9 +38,9 @@ STATE = "state.json"
 class Moment:
     """What may be left of the state if the power fails now, and what is on the autopilot."""
 
-    honest: bytes | None     # what was synced is there, what was not is lost
-    kept: bytes | None       # all that was asked for is there
-    torn: bytes | None       # half of what was written, under the name that it was to have
+    honest: bytes | None  # what was synced is there, what was not is lost
+    kept: bytes | None  # all that was asked for is there
+    torn: bytes | None  # half of what was written, under the name that it was to have
 
 
 class ForgetfulDisk(Disk):
@@ -48,8 +48,8 @@ class ForgetfulDisk(Disk):
 
     def __init__(self):
         self.moments, self.paths = [], {}
-        self.written, self.synced = {}, {}           # by path: content that was written, and of it what was synced
-        self.named, self.name_synced = None, None    # content of the state's name, and of it what was synced
+        self.written, self.synced = {}, {}  # by path: content that was written, and of it what was synced
+        self.named, self.name_synced = None, None  # content of the state's name, and of it what was synced
 
     def create(self, path):
         fd = super().create(path)
@@ -86,21 +86,31 @@ class ForgetfulDisk(Disk):
 
     def note(self):
         named, synced = self.named, self.name_synced
-        self.moments.append(Moment(
-            honest=None if synced is None else synced[0], kept=None if named is None else named[1],
-            torn=None if named is None else named[1][: len(named[1]) // 2]))
+        self.moments.append(
+            Moment(
+                honest=None if synced is None else synced[0],
+                kept=None if named is None else named[1],
+                torn=None if named is None else named[1][: len(named[1]) // 2],
+            )
+        )
 
 
 def scenario(**changes):
     return msgspec.structs.replace(
-        load_scenario(BASE), limit_s=400.0, wind=WindSpec(sd_deg=6.0, tws_mps=5.0), has_ftp=False,
-        expect=ExpectSpec(min_clearance_m=2.0), **changes)
+        load_scenario(BASE),
+        limit_s=400.0,
+        wind=WindSpec(sd_deg=6.0, tws_mps=5.0),
+        has_ftp=False,
+        expect=ExpectSpec(min_clearance_m=2.0),
+        **changes,
+    )
 
 
 def items_of(autopilot):
     return tuple(
         MissionItem(command=i.command, lat_e7=i.x, lon_e7=i.y, alt_m=i.z, frame=i.frame, params=i[2:6])
-        for i in autopilot.pilot.helm.mission.items[1:])
+        for i in autopilot.pilot.helm.mission.items[1:]
+    )
 
 
 class Witness:
@@ -129,15 +139,32 @@ def whose(skipper, saved, aboard):
     state = skipper.initial(saved)
     uid = state.vehicle.uid or "5a"
     ours = Identity(system=1, uid=uid, is_confirmed=True, vehicle_type=11, frame_class=2, sails=True)
-    status = AutopilotStatus(t_s=0.0, mode=Mode.AUTO, is_armed=True, ekf_ok=True, mission_seq=1,
-                             mission_total=len(aboard), mission_state=MissionState.ACTIVE)
-    seen = Snapshot(t_s=0.0, autopilot=status, autopilot_age_s=0.0, heartbeat_age_s=0.0, permissions=ALL_PERMITTED,
-                    identity=ours)
+    status = AutopilotStatus(
+        t_s=0.0,
+        mode=Mode.AUTO,
+        is_armed=True,
+        ekf_ok=True,
+        mission_seq=1,
+        mission_total=len(aboard),
+        mission_state=MissionState.ACTIVE,
+    )
+    seen = Snapshot(
+        t_s=0.0, autopilot=status, autopilot_age_s=0.0, heartbeat_age_s=0.0, permissions=ALL_PERMITTED, identity=ours
+    )
     state, asked = skipper.step(state, seen)
     read = next(a for a in asked if isinstance(a, actions.ReadMission))
-    state, said = skipper.step(state, Snapshot(
-        t_s=1.0, autopilot=status, autopilot_age_s=0.0, heartbeat_age_s=0.0, permissions=ALL_PERMITTED, identity=ours,
-        outcomes=(ReadOutcome(read_id=read.read_id, items=aboard),)))
+    state, said = skipper.step(
+        state,
+        Snapshot(
+            t_s=1.0,
+            autopilot=status,
+            autopilot_age_s=0.0,
+            heartbeat_age_s=0.0,
+            permissions=ALL_PERMITTED,
+            identity=ours,
+            outcomes=(ReadOutcome(read_id=read.read_id, items=aboard),),
+        ),
+    )
     return state, {a.code for a in said if isinstance(a, actions.Announce)}
 
 
@@ -149,9 +176,13 @@ def test_after_a_power_cut_at_any_write_the_mission_on_board_is_known(durable, m
     (tmp_path / "mission.toml").write_text(SHORT_MISSION + "[skipper]\nautopilot_beats = false\n")
     (tmp_path / "rock.wkt").write_text(ROCK)
     source = tmp_path / "scenario.toml"
-    many = scenario(mission="mission.toml", events=(
-        EventSpec(at_s=55.0, kind="wind_shift", veer_deg=40.0, over_s=4.0),
-        EventSpec(at_s=85.0, kind="wind_shift", veer_deg=-60.0, over_s=4.0)))
+    many = scenario(
+        mission="mission.toml",
+        events=(
+            EventSpec(at_s=55.0, kind="wind_shift", veer_deg=40.0, over_s=4.0),
+            EventSpec(at_s=85.0, kind="wind_shift", veer_deg=-60.0, over_s=4.0),
+        ),
+    )
     verdict = run_virtual(run_embedded(many, source, 1, tmp_path / "v", expansions=3000, observer=witness))
     assert verdict.passed, verdict.checks
     mission = load_mission(many.mission_path(source))
@@ -163,8 +194,14 @@ def test_after_a_power_cut_at_any_write_the_mission_on_board_is_known(durable, m
         plain = tuple(replace(item, alt_m=0.0) for item in aboard)
         now, older = disk.moments[number - 1], disk.moments[max(0, number - 13)]
         # an honest card has every list that may be there: no mark is needed
-        for left, there in ((now.honest, plain), (now.kept, plain), (now.torn, aboard), (older.honest, aboard),
-                            (older.torn, aboard), (None, aboard)):
+        for left, there in (
+            (now.honest, plain),
+            (now.kept, plain),
+            (now.torn, aboard),
+            (older.honest, aboard),
+            (older.torn, aboard),
+            (None, aboard),
+        ):
             state, said = whose(skipper, believed(left), there)
             assert not state.mission.foreign
             assert said & {"adopted", "held back", "mixture"}
@@ -206,6 +243,7 @@ def test_whole_voyages_whose_power_is_cut_arrive(card, durable, tmp_path):
         cut = Cut()
         cut.folder = tmp_path / str(number)
         kill = EventSpec(at_s=rng.uniform(30.0, 180.0), kind="kill_companion", restart_after_s=3.0)
-        verdict = run_virtual(run_embedded(
-            scenario(events=(kill,)), BASE, number, cut.folder, expansions=4000, observer=cut))
+        verdict = run_virtual(
+            run_embedded(scenario(events=(kill,)), BASE, number, cut.folder, expansions=4000, observer=cut)
+        )
         assert verdict.passed, (number, kill.at_s, verdict.checks)

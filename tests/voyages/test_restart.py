@@ -62,10 +62,11 @@ def tear(folder, rng):
 
 def sail(folder, *, has_ftp=True, kill_at_s=None, torn=None, change=None, wait_s=4.0, limit_s=400.0, arrived=True):
     scenario = msgspec.structs.replace(
-        load_scenario(BASE), has_ftp=has_ftp, limit_s=limit_s,
+        load_scenario(BASE),
+        has_ftp=has_ftp,
+        limit_s=limit_s,
         wind=WindSpec(sd_deg=6.0, tws_mps=5.0),
-        events=() if kill_at_s is None else (
-            EventSpec(at_s=kill_at_s, kind="kill_companion", restart_after_s=wait_s),),
+        events=() if kill_at_s is None else (EventSpec(at_s=kill_at_s, kind="kill_companion", restart_after_s=wait_s),),
         expect=ExpectSpec(arrived=arrived, min_clearance_m=2.0 if arrived else None),
     )
     cut = PowerCut(folder, torn, change)
@@ -80,7 +81,8 @@ def uploads_of(records):
     """Return (start, end) of every upload [s]."""
     ends = {r["upload_id"]: r["t_s"] for r in records if r.get("outcome") == "UploadOutcome"}
     return [
-        (r["t_s"], ends[r["upload_id"]]) for r in records
+        (r["t_s"], ends[r["upload_id"]])
+        for r in records
         if r.get("action") == "UploadMission" and r["upload_id"] in ends
     ]
 
@@ -120,7 +122,7 @@ def check_restart(number, calm_voyages, folder):
     records = decisions(folder)
     begins = [n for n, r in enumerate(records) if r["kind"] == "start"]
     assert len(begins) == 2
-    before, after = records[: begins[1]], records[begins[1]:]
+    before, after = records[: begins[1]], records[begins[1] :]
     saved = after[0]["persisted"]
     if saved is None or (saved["route"] is None and saved["pending"] is None):
         return "nothing to adopt"
@@ -195,11 +197,12 @@ def lose(folder):
     (folder / "state.json").unlink()
 
 
-@pytest.mark.parametrize(("change", "refusal"), [
-    (stale, "another voyage"), (damage, "it is kept as state.json.damaged"), (strangers, ""), (lose, ""),
-])
+@pytest.mark.parametrize(
+    ("change", "refusal"),
+    [(stale, "another voyage"), (damage, "it is kept as state.json.damaged"), (strangers, ""), (lose, "")],
+)
 def test_a_state_that_does_not_fit_is_reported_and_the_boat_is_sailed_on_by_the_mark_in_her_mission(
-    change, refusal, tmp_path,
+    change, refusal, tmp_path
 ):
     """It ended as "foreign" and without control (issue 12, points 14 and 15)."""
     verdict, _ = sail(tmp_path, kill_at_s=70.0, change=change)
@@ -219,8 +222,23 @@ def test_a_state_that_does_not_fit_is_reported_and_the_boat_is_sailed_on_by_the_
 
 # What 0.1.0 wrote of a voyage and of a list on the autopilot.
 OF_0_1_0 = {"format", "voyage", "gate", "sailing", "route", "pending", "own_mode"}
-ROUTE_OF_0_1_0 = {"items", "points", "from", "gates", "plan_id", "plan_t_s", "plan_twd_from_rad", "plan_tws_mps",
-                  "plan_half_width_rad", "margin_m", "delta_s", "risk", "cost_s", "rung", "why"}
+ROUTE_OF_0_1_0 = {
+    "items",
+    "points",
+    "from",
+    "gates",
+    "plan_id",
+    "plan_t_s",
+    "plan_twd_from_rad",
+    "plan_tws_mps",
+    "plan_half_width_rad",
+    "margin_m",
+    "delta_s",
+    "risk",
+    "cost_s",
+    "rung",
+    "why",
+}
 
 
 def older(folder):
@@ -240,7 +258,7 @@ def test_the_state_of_an_older_version_is_read_and_its_mission_sailed_on(tmp_pat
     verdict, _ = sail(tmp_path, kill_at_s=70.0, change=older)
     assert verdict.passed, verdict.checks
     records = decisions(tmp_path)
-    after = records[[n for n, r in enumerate(records) if r["kind"] == "start"][1]:]
+    after = records[[n for n, r in enumerate(records) if r["kind"] == "start"][1] :]
     assert not [r["text"] for r in after if r["kind"] == "refusal"]
     assert "adopted" in [r.get("code") for r in after if r.get("action") == "Announce"]
     assert "mismatch" not in [r["reason"] for r in after if r.get("action") == "RequestPlan"]
@@ -264,11 +282,14 @@ class Stranger(PowerCut):
 
 def test_a_strangers_mission_is_not_resumed_and_nothing_is_asked_of_the_boat(tmp_path):
     scenario = msgspec.structs.replace(
-        load_scenario(BASE), limit_s=130.0, expect=ExpectSpec(arrived=False),
-        events=(EventSpec(at_s=70.0, kind="kill_companion", restart_after_s=4.0),))
+        load_scenario(BASE),
+        limit_s=130.0,
+        expect=ExpectSpec(arrived=False),
+        events=(EventSpec(at_s=70.0, kind="kill_companion", restart_after_s=4.0),),
+    )
     run_virtual(run_embedded(scenario, BASE, 1, tmp_path, expansions=EXPANSIONS, observer=Stranger(tmp_path)))
     records = decisions(tmp_path)
-    after = records[[n for n, r in enumerate(records) if r["kind"] == "start"][1]:]
+    after = records[[n for n, r in enumerate(records) if r["kind"] == "start"][1] :]
     said = [(r["code"], r["text"]) for r in after if r.get("action") == "Announce"]
     assert any(code == "foreign mission" and "replace_foreign" in text for code, text in said)
     assert "adopted" not in dict(said)

@@ -24,8 +24,17 @@ from sitl.scenario.scenario import load_scenario
 FOLDER = Path("sitl/scenarios")
 # What is folded again from the record: the new inputs of a failsafe's answer and of a watched rest among them.
 REPLAYED = {
-    "station-lost", "mode-switch", "at-rest", "watched", "rules-head-on", "field-ring", "field-square", "far-north",
-    "tacks-fail", "planner-dead"}
+    "station-lost",
+    "mode-switch",
+    "at-rest",
+    "watched",
+    "rules-head-on",
+    "field-ring",
+    "field-square",
+    "far-north",
+    "tacks-fail",
+    "planner-dead",
+}
 LONG = {"endurance", "far-away", "ocean"}
 # Sailed with seed 0 by tests of their own, which ask for the verdict and for more: test_traffic, test_by_field and
 # test_passage.
@@ -45,9 +54,11 @@ def ends_by_itself(folder):
 
 def plans_by(algorithm):
     """Every plan is by that planner, and none was left to auto."""
+
     def check(folder):
         decisions = [json.loads(line) for line in (folder / "decisions.jsonl").read_text().splitlines()]
         assert {d["plan"]["algorithm"] for d in decisions if d["kind"] == "plan"} == {algorithm}
+
     return check
 
 
@@ -110,20 +121,27 @@ def is_steered_and_plans_its_tacks(folder):
 
 
 # What the record of one must show besides.
-RECORDED = {"field-ring": goes_round, "field-square": leaves_when_entered,
-            "foreign-mission": is_said_once_in_a_while, "out-of-time": ends_by_itself,
-            "by-heading": is_steered_and_plans_its_tacks,
-            "by-astar": plans_by("astar"), "by-astar-flat": plans_by("astar"), "by-rrtstar": plans_by("rrtstar"),
-            "crossing-by-rrtstar": risks_a_vessel, "wind-limits": waits_for_less_wind,
-            "tacks-fail": counts_tacks_that_fail}
+RECORDED = {
+    "field-ring": goes_round,
+    "field-square": leaves_when_entered,
+    "foreign-mission": is_said_once_in_a_while,
+    "out-of-time": ends_by_itself,
+    "by-heading": is_steered_and_plans_its_tacks,
+    "by-astar": plans_by("astar"),
+    "by-astar-flat": plans_by("astar"),
+    "by-rrtstar": plans_by("rrtstar"),
+    "crossing-by-rrtstar": risks_a_vessel,
+    "wind-limits": waits_for_less_wind,
+    "tacks-fail": counts_tacks_that_fail,
+}
 
 
 # Where a file lets her wait for long and nothing more happens, the wait is shorter; -m campaign sails it as it is.
 # What is changed: of the events of a kind these values, and the limit.
 SHORTER = {
-    "box": ("order", {"at_s": 820.0}, 2400.0),                    # told to go on after the five minutes that are judged
-    "calm-current": ("wind_speed", {"for_s": 600.0}, 900.0),      # becalmed from 242 s on
-    "link-lost": ("link_cut", {}, 600.0),                         # she loiters at the mission's end
+    "box": ("order", {"at_s": 820.0}, 2400.0),  # told to go on after the five minutes that are judged
+    "calm-current": ("wind_speed", {"for_s": 600.0}, 900.0),  # becalmed from 242 s on
+    "link-lost": ("link_cut", {}, 600.0),  # she loiters at the mission's end
 }
 
 
@@ -189,9 +207,9 @@ def test_after_arrival_the_companion_stays_until_it_is_told_to_end(tmp_path):
     assert verdict.passed, verdict.checks
     stayed = summary(tmp_path / "stayed")
     assert (stayed["end_reason"], stayed["end_phase"], stayed["arrived"]) == ("out of time", "done", True)
-    assert stayed["time_s"] < 400.0     # the voyage's, not the watch's
+    assert stayed["time_s"] < 400.0  # the voyage's, not the watch's
     tracked = (tmp_path / "stayed" / "track.csv").read_text().count("\n")
-    assert tracked > 440                # a row a second, to the end of the watch
+    assert tracked > 440  # a row a second, to the end of the watch
 
 
 def summary(folder):

@@ -88,8 +88,15 @@ def test_a_ship_of_a_udp_feed_is_avoided_and_the_voyage_replays(tmp_path, port):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             while True:
                 place = frame.geo_from_en(*ship.at(now_s()))
-                said = {"id": 7, "name": "Intruder", "lat": place.lat_deg, "lon": place.lon_deg, "length_m": 100.0,
-                        "heading_deg": event.course_deg, "speed_mps": event.sog_mps}
+                said = {
+                    "id": 7,
+                    "name": "Intruder",
+                    "lat": place.lat_deg,
+                    "lon": place.lon_deg,
+                    "length_m": 100.0,
+                    "heading_deg": event.course_deg,
+                    "speed_mps": event.sog_mps,
+                }
                 sender.sendto(json.dumps(said).encode(), ("127.0.0.1", port))
                 await asyncio.sleep(5.0)
 
@@ -124,10 +131,15 @@ def test_a_feed_name_that_is_none_is_bad_input(tmp_path):
         feeds_of(load_mission(with_feeds(tmp_path, "udp:nowhere")))
 
 
-@pytest.mark.parametrize("report", [
-    AisReport(t_s=0.1 + 0.2, mmsi=7, position=GeoPoint(lat_deg=51.1, lon_deg=-1.3), course_rad=math.pi / 3, name="x"),
-    AisReport(t_s=1.0, mmsi=8, is_class_b=True, age_s=2.5),
-])
+@pytest.mark.parametrize(
+    "report",
+    [
+        AisReport(
+            t_s=0.1 + 0.2, mmsi=7, position=GeoPoint(lat_deg=51.1, lon_deg=-1.3), course_rad=math.pi / 3, name="x"
+        ),
+        AisReport(t_s=1.0, mmsi=8, is_class_b=True, age_s=2.5),
+    ],
+)
 def test_a_report_survives_its_record(report):
     assert ais_of(json.loads(json.dumps(ais_record(report)))) == report
 
@@ -143,12 +155,12 @@ def test_four_ships_at_once_and_the_paths_look_alike(tmp_path):
     assert all(b - a >= 20.0 for a, b in pairwise(asked))
     changes = [d for d in records if d.get("action") == "UploadMission" and "path_distance_m" in d]
     given_up = [d for d in changes if d["old_route"] != "safe"]
-    assert [d["old_route"].split()[1] for d in given_up] == [f"21100000{n}" for n in range(1, 5)]   # as they are heard
+    assert [d["old_route"].split()[1] for d in given_up] == [f"21100000{n}" for n in range(1, 5)]  # as they are heard
     assert max(d["path_distance_m"] for d in given_up) > ALIKE_M
     safe_since = [t for t in asked if t > given_up[-1]["t_s"]]
     assert len(safe_since) > 2
     assert all(d["path_distance_m"] <= ALIKE_M for d in changes if d["old_route"] == "safe")
-    assert sum(d["t_s"] > given_up[-1]["t_s"] for d in changes) < len(safe_since)   # it stays
+    assert sum(d["t_s"] > given_up[-1]["t_s"] for d in changes) < len(safe_since)  # it stays
     shared = [d for d in records if d.get("action") == "RequestPlan" and d.get("vessels")]
     for plan in shared:
         assert plan["instant"]["wind"] + plan["instant"]["vessels"] == pytest.approx(1.0 - plan["delta_s"])

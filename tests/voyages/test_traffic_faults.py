@@ -21,12 +21,19 @@ from sitl.scenario.scenario import load_scenario
 from sitl.scenario.traffic import ship_of
 from tests.voyages.test_traffic import CROSSING, decisions, failed, port, unheard, with_feeds  # noqa: F401 - a fixture
 
-AFTER_S = 260.0      # the ship has gone by: the voyage need not be sailed to its end
+AFTER_S = 260.0  # the ship has gone by: the voyage need not be sailed to its end
 
 
 def ais(mmsi, point, course_deg, speed_mps, **more):
-    values = {"type": 1, "mmsi": mmsi, "lat": point.lat_deg, "lon": point.lon_deg, "course": course_deg,
-              "speed": speed_mps * 3600.0 / 1852.0, "heading": int(course_deg)}
+    values = {
+        "type": 1,
+        "mmsi": mmsi,
+        "lat": point.lat_deg,
+        "lon": point.lon_deg,
+        "course": course_deg,
+        "speed": speed_mps * 3600.0 / 1852.0,
+        "heading": int(course_deg),
+    }
     return [line.encode() for line in encode_dict(values | more, talker_id="AI", sentence_type="VDM")]
 
 
@@ -51,6 +58,7 @@ def sail(folder, udp, speak, *, limit_s=AFTER_S):
 
     async def voyage():
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+
             def send(data):
                 sender.sendto(data, ("127.0.0.1", udp))
 
@@ -73,14 +81,16 @@ def on_air(out):
                     found.append(document["traffic"])
                     worst = document["traffic"]["worst"]
                     assert (worst is None or worst["alarm"] not in {"act", "touch"}) or (
-                        exit_code(document, 10.0) == EXIT_ALARM)
+                        exit_code(document, 10.0) == EXIT_ALARM
+                    )
     return found
 
 
 def is_safe(verdict):
     """Nothing broke and nothing was hit; a voyage that was cut short has not arrived."""
     return set(failed(verdict)) <= {"arrived", "distance of the last position to the goal, m", "alerts"} and (
-        verdict.figures["vessel_distances_m"]["211000001"] >= 50.0)
+        verdict.figures["vessel_distances_m"]["211000001"] >= 50.0
+    )
 
 
 def test_noise_fragments_and_floods_hide_no_ship(tmp_path, port):  # noqa: F811 - the fixture
@@ -89,17 +99,28 @@ def test_noise_fragments_and_floods_hide_no_ship(tmp_path, port):  # noqa: F811 
         n = 0
         while True:
             here = frame.geo_from_en(*ship.at(now_s()))
-            first, second = ais(211000001, here, 180.0, 5.0, type=5, shipname="NELLIE", ship_type=70, to_bow=50,
-                                to_stern=50, to_port=8, to_starboard=8)
+            first, second = ais(
+                211000001,
+                here,
+                180.0,
+                5.0,
+                type=5,
+                shipname="NELLIE",
+                ship_type=70,
+                to_bow=50,
+                to_stern=50,
+                to_port=8,
+                to_starboard=8,
+            )
             good = ais(211000001, here, 180.0, 5.0)[0]
-            send(second + b"\r\n" + first)                              # the second part comes first
-            send(first)                                                 # and one that is never finished
-            send(good.replace(b",A,", b",B,", 1))                       # a wrong checksum
+            send(second + b"\r\n" + first)  # the second part comes first
+            send(first)  # and one that is never finished
+            send(good.replace(b",A,", b",B,", 1))  # a wrong checksum
             send(b"\x00\xff!AIVDM,9,9,,A,*00" * 20)
-            send(b'{"id": 8, "lat": 50.82, "lon": -1.305, "age_s": 3000}')        # an hour's clock error
+            send(b'{"id": 8, "lat": 50.82, "lon": -1.305, "age_s": 3000}')  # an hour's clock error
             if n == 5:
                 for _ in range(40):
-                    send(b"\r\n".join([good] * 60))                     # 2400 reports within a second
+                    send(b"\r\n".join([good] * 60))  # 2400 reports within a second
             send(good)
             n += 1
             await asyncio.sleep(5.0)
@@ -134,6 +155,7 @@ def test_two_ships_with_one_number_are_both_kept_clear_of(tmp_path, port):  # no
 
 def test_a_ship_reported_on_top_of_us_and_a_feed_that_stops(tmp_path, port):  # noqa: F811 - the fixture
     """From 90 s to 120 s somebody claims to be where we are; at 120 s the feed falls silent, the ship coming."""
+
     async def speak(frame, ship, boat, send):
         await asyncio.sleep(40.0)
         while now_s() < 120.0:
@@ -163,8 +185,19 @@ def test_ages_that_jump_move_no_ship_out_of_sight(tmp_path, port, jump_s):  # no
         while True:
             for age_s in (jump_s, 0.0):
                 point = frame.geo_from_en(*ship.at(now_s()))
-                send(json.dumps({"id": 211000001, "lat": point.lat_deg, "lon": point.lon_deg, "heading_deg": 180.0,
-                                 "speed_mps": 5.0, "length_m": 100.0, "age_s": age_s}).encode())
+                send(
+                    json.dumps(
+                        {
+                            "id": 211000001,
+                            "lat": point.lat_deg,
+                            "lon": point.lon_deg,
+                            "heading_deg": 180.0,
+                            "speed_mps": 5.0,
+                            "length_m": 100.0,
+                            "age_s": age_s,
+                        }
+                    ).encode()
+                )
             await asyncio.sleep(5.0)
 
     verdict, _ = sail(tmp_path, port, speak)

@@ -16,7 +16,8 @@ from sitl.scenario.scenario import EventSpec, ExpectSpec, Scenario, WindSpec, lo
 from tests.one_mark import one_mark
 
 SHORT_MISSION = one_mark("short", (50.8181, -1.3100000), 60.0).replace(
-    "[operator]", "[risk]\ndelta_s = 0.85\n[operator]")
+    "[operator]", "[risk]\ndelta_s = 0.85\n[operator]"
+)
 # A rock right between the boat and the mark, 30 m wide.
 ROCK = "rock|exclusion|POLYGON ((-1.3102 50.8175, -1.3098 50.8175, -1.3098 50.8177, -1.3102 50.8177, -1.3102 50.8175))"
 
@@ -31,8 +32,12 @@ def short(tmp_path_factory):
 
 def sail(short, out, seed=1, events=(), expect=None, limit_s=600.0, expansions=6000, **wind):
     scenario = Scenario(
-        name="short", mission="mission.toml", limit_s=limit_s, events=tuple(events),
-        wind=WindSpec(**{"sd_deg": 6.0, "tws_mps": 5.0, **wind}), expect=expect or ExpectSpec(min_clearance_m=2.0),
+        name="short",
+        mission="mission.toml",
+        limit_s=limit_s,
+        events=tuple(events),
+        wind=WindSpec(**{"sd_deg": 6.0, "tws_mps": 5.0, **wind}),
+        expect=expect or ExpectSpec(min_clearance_m=2.0),
     )
     return run_virtual(run_embedded(scenario, short / "scenario.toml", seed, out, expansions=expansions))
 
@@ -119,12 +124,15 @@ def test_the_picture_is_drawn(voyage, tmp_path):
 
 
 def test_an_operator_takes_the_boat_and_gives_it_back(short, tmp_path):
-    verdict = sail(short, tmp_path, events=[
-        EventSpec(at_s=50.0, kind="mode", mode="HOLD"), EventSpec(at_s=80.0, kind="mode", mode="AUTO"),
-    ])
+    verdict = sail(
+        short,
+        tmp_path,
+        events=[EventSpec(at_s=50.0, kind="mode", mode="HOLD"), EventSpec(at_s=80.0, kind="mode", mode="AUTO")],
+    )
     assert verdict.passed, verdict.checks
     acted = [
-        d for d in decisions(tmp_path)
+        d
+        for d in decisions(tmp_path)
         if 53.0 < d["t_s"] < 80.0 and d.get("action") in {"SetMode", "Arm", "UploadMission", "SetCurrent"}
     ]
     assert not acted
@@ -148,8 +156,12 @@ def test_a_strangers_mission_at_the_start_is_replaced_where_the_mission_file_all
     """The permission existed, and no key of the mission gave it (issue 13, point 1)."""
     (tmp_path / "rock.wkt").write_text(ROCK)
     (tmp_path / "mission.toml").write_text(SHORT_MISSION + f"replace_foreign = {str(allowed).lower()}\n")
-    verdict = sail(tmp_path, tmp_path / "v", limit_s=400.0 if allowed else 60.0, events=[
-        EventSpec(at_s=0.5, kind="foreign_mission", east_m=60.0, north_m=80.0)])
+    verdict = sail(
+        tmp_path,
+        tmp_path / "v",
+        limit_s=400.0 if allowed else 60.0,
+        events=[EventSpec(at_s=0.5, kind="foreign_mission", east_m=60.0, north_m=80.0)],
+    )
     summary = json.loads((tmp_path / "v/summary.json").read_text())
     assert summary["arrived"] is allowed, verdict.checks
     assert allowed or "[operator] replace_foreign" in summary["end_why"]

@@ -53,8 +53,16 @@ class World:
         configs = systems or {"ours": {}}
         self.boats, self.lines = {}, {}
         for name, change in configs.items():
-            config = AutopilotConfig(**{"home": self.mission.start, "heading_rad": math.pi / 2, "is_warm": True,
-                                        "is_moored": True, "uid": name.encode(), **change})
+            config = AutopilotConfig(
+                **{
+                    "home": self.mission.start,
+                    "heading_rad": math.pi / 2,
+                    "is_warm": True,
+                    "is_moored": True,
+                    "uid": name.encode(),
+                    **change,
+                }
+            )
             self.boats[name] = SimulatedAutopilot(config, AR1(0.0, 6.0, seed=1, sd_rad=0.05), seed=1)
             self.lines[name] = MemoryLink(name, seed=1)
         self.air = RadioChannel(*(line.near for line in self.lines.values()))
@@ -67,8 +75,14 @@ class World:
                 on_step(step)
 
         settings = {"epoch_s": 1.78e9, "offload": at_once, "is_durable": False, "limit_s": 400.0, "expansions": 2000}
-        return await sail(self.mission, air or self.air, FaultyPlanner(), folder or self.folder,
-                          SailOptions(**settings | options), on_status=look)
+        return await sail(
+            self.mission,
+            air or self.air,
+            FaultyPlanner(),
+            folder or self.folder,
+            SailOptions(**settings | options),
+            on_status=look,
+        )
 
     def run(self, work=None, **options):
         async def whole():
@@ -247,8 +261,10 @@ def test_of_two_that_start_together_one_sails(tmp_path):
 
     async def work():
         async with serve(world.boats["ours"], [world.lines["ours"].far, second.far]):
-            runs = [asyncio.create_task(world.sail(token=9)),
-                    asyncio.create_task(world.sail(air=second.near, folder=tmp_path / "second", token=5))]
+            runs = [
+                asyncio.create_task(world.sail(token=9)),
+                asyncio.create_task(world.sail(air=second.near, folder=tmp_path / "second", token=5)),
+            ]
             return await asyncio.gather(*runs, return_exceptions=True)
 
     refused, sailed = run_virtual(work())

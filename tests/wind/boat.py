@@ -19,12 +19,11 @@ def voyage(*, seconds=1500.0, seed=5, speed_mps=6.0, leg_s=120.0, dt_s=1.0, boat
         side = 1.0 if phase < leg_s else -1.0
         into = min(1.0, (phase % leg_s) / 6.0) if t > leg_s / 2 else 1.0
         angle = close * side * (2.0 * into - 1.0)
-        yaw = math.radians(2.0) * math.sin(t / 2.3)            # she yaws in the waves
+        yaw = math.radians(2.0) * math.sin(t / 2.3)  # she yaws in the waves
         heading = mean_rad - angle + yaw
         velocity = (boat_mps * math.sin(heading), boat_mps * math.cos(heading))
         boat = VehicleState(t_s=float(t), boot_s=float(t), position=HERE, velocity_en_mps=velocity, heading_rad=heading)
-        true = WindSample(
-            t_s=float(t), twd_from_rad=float(twd), tws_mps=float(tws), source=WindSource.SIMULATED)
+        true = WindSample(t_s=float(t), twd_from_rad=float(twd), tws_mps=float(tws), source=WindSource.SIMULATED)
         yield boat, apparent_wind(true, boat), true
 
 

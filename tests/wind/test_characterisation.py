@@ -25,14 +25,22 @@ def wandering(seed, *, noise_deg, step_deg=0.6, seconds=5400):
     t = np.arange(0.0, seconds)
     walk = np.cumsum(math.radians(step_deg) * rng.normal(size=t.size))
     read = walk + math.radians(noise_deg) * rng.normal(size=t.size)
-    return Record(name=f"walk_{seed}", t_s=t, twd_from_rad=read, tws_mps=6.0 + 0.5 * rng.normal(size=t.size),
-                  turning=np.zeros(t.size, dtype=np.bool_))
+    return Record(
+        name=f"walk_{seed}",
+        t_s=t,
+        twd_from_rad=read,
+        tws_mps=6.0 + 0.5 * rng.normal(size=t.size),
+        turning=np.zeros(t.size, dtype=np.bool_),
+    )
 
 
 @pytest.fixture(scope="module")
 def found():
-    return characterise([wandering(seed, noise_deg=NOISE_DEG) for seed in (1, 2)],
-                        noises_deg=(1.5, 3.0, NOISE_DEG, 12.0, 24.0), windows=(30, 300))
+    return characterise(
+        [wandering(seed, noise_deg=NOISE_DEG) for seed in (1, 2)],
+        noises_deg=(1.5, 3.0, NOISE_DEG, 12.0, 24.0),
+        windows=(30, 300),
+    )
 
 
 def test_the_noise_that_was_put_in_scores_best_at_every_horizon(found):
@@ -104,17 +112,20 @@ def test_the_command_prints_writes_and_draws_the_grid(tmp_path, capsys):
     assert {(c["r_deg"], c["window"]) for c in document["filter"]} == {(r, n) for r in NOISES_DEG for n in WINDOWS}
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["nowhere.csv", "--filter", "f.png"], "nowhere.csv: no such file; name a CSV"),
-    ([".", "--filter", "f.png"], "no CSV records in the folder; name a record"),
-    (["short.csv", "--filter", "f.png"], "short.csv: too short to score; a horizon needs 20 forecasts"),
-    (["short.csv", "--filter", "f"], "end it in one of .png"),
-    (["short.csv", "--filter", "no/such/f.png"], "make the folder first"),
-    (["short.csv", "--filter"], "expected one argument"),
-    (["short.csv", "--filter", "f.png", "--cost"], "not allowed with argument"),
-    (["short.csv", "--filter", "f.png", "--plot", "p.png"], "not allowed with argument"),
-    (["short.csv", "--filter", "f.png", "--estimator", "all"], "leave one of them out"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere.csv", "--filter", "f.png"], "nowhere.csv: no such file; name a CSV"),
+        ([".", "--filter", "f.png"], "no CSV records in the folder; name a record"),
+        (["short.csv", "--filter", "f.png"], "short.csv: too short to score; a horizon needs 20 forecasts"),
+        (["short.csv", "--filter", "f"], "end it in one of .png"),
+        (["short.csv", "--filter", "no/such/f.png"], "make the folder first"),
+        (["short.csv", "--filter"], "expected one argument"),
+        (["short.csv", "--filter", "f.png", "--cost"], "not allowed with argument"),
+        (["short.csv", "--filter", "f.png", "--plot", "p.png"], "not allowed with argument"),
+        (["short.csv", "--filter", "f.png", "--estimator", "all"], "leave one of them out"),
+    ],
+)
 def test_bad_usage_is_one_line_and_draws_nothing(arguments, words, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     if "short.csv" in arguments:

@@ -63,12 +63,15 @@ def test_cost_is_a_ratio_to_the_kalman_filter(csv_record, capsys):
     assert lines[2].split()[0] == "default"
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["nowhere.csv"], "no such file"),
-    (["RECORD", "--estimator", "oracle"], "choose default"),
-    (["RECORD", "--plot", "/no/such/folder/p.png"], "/no/such/folder/p.png: /no/such/folder does not exist"),
-    (["RECORD", "--plot", "p.nonsense"], "end it in one of .png"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere.csv"], "no such file"),
+        (["RECORD", "--estimator", "oracle"], "choose default"),
+        (["RECORD", "--plot", "/no/such/folder/p.png"], "/no/such/folder/p.png: /no/such/folder does not exist"),
+        (["RECORD", "--plot", "p.nonsense"], "end it in one of .png"),
+    ],
+)
 def test_bad_usage_exits_2_with_one_line(arguments, words, csv_record, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert main(["wind", *[str(csv_record) if a == "RECORD" else a for a in arguments]]) == 2

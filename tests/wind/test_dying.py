@@ -15,7 +15,7 @@ from companion.wind import VaneParameters, WindTracker, WindVerdict, apparent_wi
 from tests.wind.boat import HERE
 
 BREEZE_S, END_S = 300.0, 900.0
-SET = (0.5, 0.0)       # the current that carries her, east north [m/s]
+SET = (0.5, 0.0)  # the current that carries her, east north [m/s]
 
 
 def wind_dies(*, tws_mps=0.0, current=SET, vane_sticks=True):
@@ -85,7 +85,7 @@ def test_every_estimator_follows_a_speed_that_has_no_direction(name):
     for k in range(300, 600):
         estimator.update(float(k), float(k), 0.0, weight=0.0, speed_weight=1.0)
     direction, _, speed, _ = estimator.forecast(0.0)
-    assert direction == pytest.approx(before, abs=0.03)      # within what the wind showed
+    assert direction == pytest.approx(before, abs=0.03)  # within what the wind showed
     assert speed < 0.3
 
 
@@ -110,6 +110,6 @@ def test_the_skippers_means_fall_with_the_wind():
         seen[boat.t_s] = fold.tick(boat.t_s).snapshot.wind
     assert seen[BREEZE_S - 1.0].mean_tws_mps == pytest.approx(5.0, abs=0.2)
     assert seen[BREEZE_S + 10.0].present_tws_mps < 0.1
-    assert seen[BREEZE_S + 45.0].mean_tws_mps == pytest.approx(2.5, abs=0.2)     # half of the 90 s
+    assert seen[BREEZE_S + 45.0].mean_tws_mps == pytest.approx(2.5, abs=0.2)  # half of the 90 s
     assert seen[BREEZE_S + 95.0].mean_tws_mps < 0.1
     assert seen[END_S - 1.0].health is WindHealth.LIGHT

@@ -140,7 +140,7 @@ def test_memory_does_not_grow(name):
             e.update(part * 4500.0 + 0.25 * k, 0.3 * math.sin(k / 50.0), 5.0)
         sizes.append(len(pickle.dumps(e)))
         if name not in {"default", "mean90"}:
-            break                              # the two with long memories are followed for hours
+            break  # the two with long memories are followed for hours
     if len(sizes) > 1:
         assert sizes[-1] <= 1.02 * sizes[1]
     assert sizes[-1] < 400_000

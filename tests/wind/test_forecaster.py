@@ -12,7 +12,7 @@ from companion.wind.study.score import HORIZONS_S
 from lab.simulated_wind import NOISE_RADPS, RHO_HZ, equation_17, weather
 from lab.wind_fit import Prepared, crps_circular, figures
 
-STATIONARY_RAD = NOISE_RADPS / math.sqrt(1.0 - (1.0 - RHO_HZ) ** 2)      # 18.7 deg, equation 17 at 1 s
+STATIONARY_RAD = NOISE_RADPS / math.sqrt(1.0 - (1.0 - RHO_HZ) ** 2)  # 18.7 deg, equation 17 at 1 s
 SEEDS = range(40, 48)
 
 

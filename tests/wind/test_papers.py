@@ -26,13 +26,13 @@ def test_the_kalman_filter_is_equations_1_to_8():
         if w is None:
             w, p, q = z, r.copy(), np.zeros((2, 2))
             continue
-        prior = p + q                                        # (2)
-        gain = prior @ np.linalg.inv(prior + r)              # (3)
-        v = z - w                                            # (4)
-        w = w + gain @ v                                     # (5)
-        p = (np.eye(2) - gain) @ prior                       # (6)
-        window = [*window[-(n - 1):], np.outer(v, v)]
-        q = gain @ (sum(window) / len(window)) @ gain.T      # (8), (7)
+        prior = p + q  # (2)
+        gain = prior @ np.linalg.inv(prior + r)  # (3)
+        v = z - w  # (4)
+        w = w + gain @ v  # (5)
+        p = (np.eye(2) - gain) @ prior  # (6)
+        window = [*window[-(n - 1) :], np.outer(v, v)]
+        q = gain @ (sum(window) / len(window)) @ gain.T  # (8), (7)
     mean, sigma, speed, sigma_speed = kalman.forecast(100.0)
     ahead = p + 100.0 * q
     assert mean == pytest.approx(w[1], abs=1e-6)
@@ -76,14 +76,17 @@ def test_ar1_is_recovered_within_its_errors(dt_s):
         assert found.step_s == dt_s
         assert 0.01 < found.rho_error_hz / rho < 0.2
     assert max(abs(v) for v in off) < 4.0
-    assert 0.4 < float(np.std(off)) < 1.8               # the errors are neither boast nor alibi
+    assert 0.4 < float(np.std(off)) < 1.8  # the errors are neither boast nor alibi
 
 
 def test_ar1_takes_irregular_steps():
     record = equation_17(3, seconds=14400.0)
     keep = np.random.default_rng(2).random(len(record)) < 0.5
     thin = Record(
-        name="thin", t_s=record.t_s[keep], twd_from_rad=record.twd_from_rad[keep], tws_mps=record.tws_mps[keep],
+        name="thin",
+        t_s=record.t_s[keep],
+        twd_from_rad=record.twd_from_rad[keep],
+        tws_mps=record.tws_mps[keep],
         turning=record.turning[keep],
     )
     found = fit_ar1(thin)
@@ -108,7 +111,7 @@ def test_circular_crps_is_its_definition(error, sigma):
         return np.abs((a + math.pi) % (2 * math.pi) - math.pi)
 
     fft = np.fft.fft
-    apart = np.real(np.fft.ifft(fft(density) * fft(density)))     # of X + X', symmetric: X - X' has the same law
+    apart = np.real(np.fft.ifft(fft(density) * fft(density)))  # of X + X', symmetric: X - X' has the same law
     near = float(np.sum(density * arc(x - error)))
     spread = float(np.sum(np.roll(apart, 0) * arc(2 * x[0] + np.arange(2000) * (2 * math.pi / 2000))))
     assert crps_circular(error, sigma) == pytest.approx(near - 0.5 * spread, abs=3e-3)
@@ -123,7 +126,10 @@ def test_crps_limits():
 def test_turning_and_calm_are_not_targets():
     record = weather(4, seconds=2000.0)
     marked = Record(
-        name="m", t_s=record.t_s, twd_from_rad=record.twd_from_rad, tws_mps=record.tws_mps,
+        name="m",
+        t_s=record.t_s,
+        twd_from_rad=record.twd_from_rad,
+        tws_mps=record.tws_mps,
         turning=record.t_s % 60.0 < 30.0,
     )
     everything, half = score(record, make("mean90")), score(marked, make("mean90"))
@@ -139,16 +145,19 @@ def test_csv_is_read():
     assert record.duration_s == 1.0
 
 
-@pytest.mark.parametrize(("lines", "words"), [
-    (["a,b", "1,2"], "line 1: no column t_s"),
-    (["t_s,wind_from_deg,wind_speed_ms", "0,x,5", "1,2,3"], "line 2: wind_from_deg is 'x'"),
-    (["t_s,wind_from_deg,wind_speed_ms", "0,1,5", "0,2,3"], "line 3: time 0 is not after 0"),
-    (["t_s,wind_from_deg,wind_speed_ms", "0,1,-5", "1,2,3"], "line 2: wind speed -5 is negative"),
-    (["t_s,wind_from_deg,wind_speed_ms", "0,nan,5", "1,2,3"], "line 2: wind_from_deg is nan"),
-    (["t_s,wind_from_deg,wind_speed_ms", "0,1"], "line 2: wind_speed_ms is ''"),
-    (["t_s,wind_from_deg,wind_speed_ms", "0,1,5"], "1 readings"),
-    ([], "no column t_s"),
-])
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (["a,b", "1,2"], "line 1: no column t_s"),
+        (["t_s,wind_from_deg,wind_speed_ms", "0,x,5", "1,2,3"], "line 2: wind_from_deg is 'x'"),
+        (["t_s,wind_from_deg,wind_speed_ms", "0,1,5", "0,2,3"], "line 3: time 0 is not after 0"),
+        (["t_s,wind_from_deg,wind_speed_ms", "0,1,-5", "1,2,3"], "line 2: wind speed -5 is negative"),
+        (["t_s,wind_from_deg,wind_speed_ms", "0,nan,5", "1,2,3"], "line 2: wind_from_deg is nan"),
+        (["t_s,wind_from_deg,wind_speed_ms", "0,1"], "line 2: wind_speed_ms is ''"),
+        (["t_s,wind_from_deg,wind_speed_ms", "0,1,5"], "1 readings"),
+        ([], "no column t_s"),
+    ],
+)
 def test_bad_csv_is_refused_in_one_line(lines, words):
     with pytest.raises(InputError) as caught:
         parse_csv(lines, "bad.csv")

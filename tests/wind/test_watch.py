@@ -39,8 +39,8 @@ def test_a_frozen_vane():
     assert WindVerdict.FROZEN not in verdicts(log, 0.0, 500.0)
     found = [t for t, s in log if WindVerdict.FROZEN in s.verdicts]
     assert found, "never recognised"
-    assert found[0] <= 620.0                         # at the first tack under it, if not before
-    assert found[-1] < 802.0                         # clears as soon as the vane moves
+    assert found[0] <= 620.0  # at the first tack under it, if not before
+    assert found[-1] < 802.0  # clears as soon as the vane moves
     widest = max(s.widening for _, s in log if WindVerdict.FROZEN in s.verdicts)
     assert widest > 2.0
     bad = [s for t, s in log if WindVerdict.FROZEN in s.verdicts]
@@ -105,8 +105,11 @@ def test_a_shift_is_not_a_spike():
 def test_a_vane_mounted_wrong(error_deg):
     # Straightened after an hour, the verdict goes: ten tacks later it is forgotten.
     log, _ = sail(
-        lambda t, boat, felt: turned(felt, math.radians(error_deg) if t < 3600.0 else 0.0), seconds=7800.0, leg_s=110.0,
-        seed=2, boat_mps=3.0,
+        lambda t, boat, felt: turned(felt, math.radians(error_deg) if t < 3600.0 else 0.0),
+        seconds=7800.0,
+        leg_s=110.0,
+        seed=2,
+        boat_mps=3.0,
     )
     last = next(s for t, s in log if t >= 3590.0)
     assert WindVerdict.MISALIGNED in last.verdicts
@@ -118,7 +121,8 @@ def test_a_vane_mounted_wrong(error_deg):
 def test_tacks_that_see_different_directions():
     """Upwash: the vane reads 7 deg too wide on both tacks, so the true wind jumps by more than twice that at a tack."""
     log, _ = sail(
-        lambda t, boat, felt: turned(felt, math.radians(math.copysign(7.0, felt.awa_rad))), seconds=4000.0, leg_s=150.0)
+        lambda t, boat, felt: turned(felt, math.radians(math.copysign(7.0, felt.awa_rad))), seconds=4000.0, leg_s=150.0
+    )
     assert WindVerdict.MISALIGNED in verdicts(log, 2000.0)
     assert math.degrees(log[-1][1].side_rad) == pytest.approx(7.0, abs=3.0)
 
@@ -188,8 +192,9 @@ def test_wind_that_the_autopilot_holds():
     found = [t for t, s in log if WindVerdict.HELD in s.verdicts]
     assert 405.0 < found[0] < 425.0
     assert 595.0 < found[-1] < 601.0
-    assert all(s.sample.quality is WindQuality.HELD and s.widening > 1.0 for t,
-               s in log if WindVerdict.HELD in s.verdicts)
+    assert all(
+        s.sample.quality is WindQuality.HELD and s.widening > 1.0 for t, s in log if WindVerdict.HELD in s.verdicts
+    )
 
 
 def test_wind_below_the_least_speed_of_the_vane_is_held():
@@ -216,8 +221,9 @@ def test_no_speed_sensor_and_an_invented_direction():
 
 
 def test_a_speed_of_nothing_on_a_boat_that_sails_is_no_sensor():
-    log = wind_of_the_autopilot(WindTracker(), seconds=60.0, change=lambda boat, s,
-                                felt: (replace(s, tws_mps=0.0), felt))
+    log = wind_of_the_autopilot(
+        WindTracker(), seconds=60.0, change=lambda boat, s, felt: (replace(s, tws_mps=0.0), felt)
+    )
     assert WindVerdict.NO_SPEED_SENSOR in log[-1][1].verdicts
 
 
@@ -229,7 +235,7 @@ def test_the_low_pass_is_accounted_for():
     assert log[-1][1].extra_sigma_rad > math.radians(0.5)
     a, b = filtered.forecast_table(900.0), plain.forecast_table(900.0)
     assert a.sigma_twd_rad[0] > b.sigma_twd_rad[0]
-    assert a.sigma_twd_rad[8] < 1.1 * b.sigma_twd_rad[8]          # at two minutes it hardly matters
+    assert a.sigma_twd_rad[8] < 1.1 * b.sigma_twd_rad[8]  # at two minutes it hardly matters
 
 
 def test_no_forecast_before_wind_and_the_planner_gets_a_table_after():
@@ -283,7 +289,7 @@ def test_a_steady_wind_over_a_drifting_boat_is_a_wind():
         room.update(boat)
         room.update(apparent_wind(sample, boat))
         assert WindVerdict.HELD not in room.update(sample).verdicts
-    later = replace(true, t_s=200.0, twd_from_rad=1.0)      # the same true wind, though the vane has turned
+    later = replace(true, t_s=200.0, twd_from_rad=1.0)  # the same true wind, though the vane has turned
     for t in range(180, 200):
         boat = replace(boat, t_s=float(t))
         room.update(boat)

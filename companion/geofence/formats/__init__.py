@@ -15,7 +15,22 @@ from companion.geofence.formats.untrusted import MAX_BYTES, MAX_POSITIONS, decod
 from companion.geofence.formats.wkt import KINDS, drawings_of
 
 __all__ = [
-    "FORMATS", "KINDS", "MAX_BYTES", "MAX_FENCE_ITEMS", "MAX_POSITIONS", "STORAGE_BYTES", "Findings", "Written",
-    "decode", "drawings_of", "format_of", "items_to_zones", "lines_as_route", "parse", "read_bytes", "storage_bytes",
-    "write", "zones_to_items",
+    "FORMATS",
+    "KINDS",
+    "MAX_BYTES",
+    "MAX_FENCE_ITEMS",
+    "MAX_POSITIONS",
+    "STORAGE_BYTES",
+    "Findings",
+    "Written",
+    "decode",
+    "drawings_of",
+    "format_of",
+    "items_to_zones",
+    "lines_as_route",
+    "parse",
+    "read_bytes",
+    "storage_bytes",
+    "write",
+    "zones_to_items",
 ]

@@ -20,9 +20,9 @@ from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 
-MAX_FENCE_ITEMS = 84   # ArduRover 4.7: "Only 84 items are supported" (672 bytes of storage, 8 a piece)
-STORAGE_BYTES = 672    # ... and "Fence exceeds storage size": see ``storage_bytes``
-MAX_RING = 255         # vertices of one polygon
+MAX_FENCE_ITEMS = 84  # ArduRover 4.7: "Only 84 items are supported" (672 bytes of storage, 8 a piece)
+STORAGE_BYTES = 672  # ... and "Fence exceeds storage size": see ``storage_bytes``
+MAX_RING = 255  # vertices of one polygon
 
 _VERTEX = {
     Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION: ZoneKind.INCLUSION,
@@ -41,7 +41,7 @@ def float32(value: float) -> float:
 
 
 def zones_to_items(
-    zones: Sequence[Zone], *, return_point: GeoPoint | None = None,
+    zones: Sequence[Zone], *, return_point: GeoPoint | None = None
 ) -> tuple[tuple[MissionItem, ...], Losses]:
     """Return the fence items of the zones and what they do not carry."""
     losses = Losses()
@@ -58,9 +58,7 @@ def zones_to_items(
             moved |= not math.isclose(items[-1].params[0], zone.shape.radius_m, rel_tol=1e-12)
             moved |= not _exact(center.lon_deg) or not _exact(center.lat_deg)
             continue
-        command = (
-            Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION if keep_in else Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION
-        )
+        command = Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION if keep_in else Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION
         vertices = np.asarray(zone.shape.exterior.coords)[:-1, :2]
         items.extend(_item(command, wrap_lon_deg(float(x)), float(y), float(len(vertices))) for x, y in vertices)
         moved |= not all(_exact(float(v)) for v in vertices.ravel())
@@ -96,13 +94,17 @@ def _exact(degrees: float) -> bool:
 
 def _item(command: int, lon_deg: float, lat_deg: float, param1: float) -> MissionItem:
     return MissionItem(
-        command=int(command), lat_e7=round(lat_deg * 1e7), lon_e7=round(lon_deg * 1e7), frame=0,
-        params=(param1, 0.0, 0.0, 0.0), autocontinue=False,
+        command=int(command),
+        lat_e7=round(lat_deg * 1e7),
+        lon_e7=round(lon_deg * 1e7),
+        frame=0,
+        params=(param1, 0.0, 0.0, 0.0),
+        autocontinue=False,
     )
 
 
 def items_to_zones(
-    items: Sequence[MissionItem], findings: Findings, *, first: int = 0,
+    items: Sequence[MissionItem], findings: Findings, *, first: int = 0
 ) -> tuple[tuple[Zone, ...], GeoPoint | None]:
     """Return the zones and the return point of a fence item list; faults go to ``findings``.
 
@@ -122,8 +124,13 @@ def items_to_zones(
             if radius_m > 0.0 and math.isfinite(radius_m):
                 zones.append(Zone(kind=_CIRCLE[Command(item.command)], shape=Circle(item.point, radius_m)))
             else:
-                findings.add(FindingLevel.ERROR, Code.DEGENERATE, place, f"the circle's radius is {radius_m:g} m",
-                             "give it a positive radius")
+                findings.add(
+                    FindingLevel.ERROR,
+                    Code.DEGENERATE,
+                    place,
+                    f"the circle's radius is {radius_m:g} m",
+                    "give it a positive radius",
+                )
             index += 1
         elif item.command in _VERTEX:
             count = int(item.params[0]) if math.isfinite(item.params[0]) else 0
@@ -135,7 +142,9 @@ def items_to_zones(
             run = items[index:end]
             if count < 3 or len(run) != count:
                 findings.add(
-                    FindingLevel.ERROR, Code.FORMAT, place,
+                    FindingLevel.ERROR,
+                    Code.FORMAT,
+                    place,
                     f"the polygon announces {item.params[0]:g} vertices and {len(run)} follow",
                     "each vertex carries the number of vertices; at least 3",
                 )
@@ -149,8 +158,13 @@ def items_to_zones(
             )
             index += count
         else:
-            findings.add(FindingLevel.ERROR, Code.FORMAT, place, f"command {item.command} does not belong in a fence",
-                         "commands 5000 to 5004 do")
+            findings.add(
+                FindingLevel.ERROR,
+                Code.FORMAT,
+                place,
+                f"command {item.command} does not belong in a fence",
+                "commands 5000 to 5004 do",
+            )
             index += 1
     return tuple(zones), return_point
 

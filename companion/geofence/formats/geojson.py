@@ -22,8 +22,12 @@ from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 
 _KINDS = {
-    "inclusion": ZoneKind.INCLUSION, "keep-in": ZoneKind.INCLUSION, "fence": ZoneKind.INCLUSION,
-    "exclusion": ZoneKind.EXCLUSION, "keep-out": ZoneKind.EXCLUSION, "obstacle": ZoneKind.EXCLUSION,
+    "inclusion": ZoneKind.INCLUSION,
+    "keep-in": ZoneKind.INCLUSION,
+    "fence": ZoneKind.INCLUSION,
+    "exclusion": ZoneKind.EXCLUSION,
+    "keep-out": ZoneKind.EXCLUSION,
+    "obstacle": ZoneKind.EXCLUSION,
 }
 
 
@@ -42,8 +46,9 @@ class _GeoJsonReading(Reading):
         name_node = properties.get("name")
         name = str(name_node.value) if name_node is not None and isinstance(name_node.value, str | int) else ""
         if geometry is None:
-            self.findings.add(FindingLevel.ERROR, Code.EMPTY, node.path, "the feature has no geometry",
-                              "draw it or remove it")
+            self.findings.add(
+                FindingLevel.ERROR, Code.EMPTY, node.path, "the feature has no geometry", "draw it or remove it"
+            )
             return
         self.geometry(geometry, properties, name)
 
@@ -59,16 +64,18 @@ class _GeoJsonReading(Reading):
             for member in members:
                 self.geometry(member, properties, name, depth + 1)
             if not members:
-                self.findings.add(FindingLevel.ERROR, Code.EMPTY, node.path, "the collection is empty",
-                                  "draw it or remove it")
+                self.findings.add(
+                    FindingLevel.ERROR, Code.EMPTY, node.path, "the collection is empty", "draw it or remove it"
+                )
             return
         coordinates = node.member("coordinates")
         if shape.startswith("Multi"):
             single = shape.removeprefix("Multi")
             members = list(coordinates)
             if not members:
-                self.findings.add(FindingLevel.ERROR, Code.EMPTY, node.path, f"the {shape} is empty",
-                                  "draw it or remove it")
+                self.findings.add(
+                    FindingLevel.ERROR, Code.EMPTY, node.path, f"the {shape} is empty", "draw it or remove it"
+                )
             for member in members:
                 self._single(single, member, properties, kind=kind, name=name, margin_m=margin_m)
         else:
@@ -84,7 +91,13 @@ class _GeoJsonReading(Reading):
         return _KINDS[word]
 
     def _single(
-        self, shape: str, coordinates: JsonNode, properties: JsonNode, *, kind: ZoneKind, name: str,
+        self,
+        shape: str,
+        coordinates: JsonNode,
+        properties: JsonNode,
+        *,
+        kind: ZoneKind,
+        name: str,
         margin_m: float | None,
     ) -> None:
         place = coordinates.path.removesuffix(".coordinates")
@@ -100,8 +113,13 @@ class _GeoJsonReading(Reading):
             if role is not None and role.value == "track":
                 self.tracks.append(self._track(points, properties, name, coordinates))
             elif len(set(points)) < 2:
-                self.findings.add(FindingLevel.ERROR, Code.DEGENERATE, place, "the line has fewer than two points",
-                                  "draw it or remove it")
+                self.findings.add(
+                    FindingLevel.ERROR,
+                    Code.DEGENERATE,
+                    place,
+                    "the line has fewer than two points",
+                    "draw it or remove it",
+                )
             elif self._on_globe(points, place):
                 self.marks.append(Mark(geometry=LineString(points), kind=kind, name=name, margin_m=margin_m))
         elif shape == "Point":
@@ -113,8 +131,14 @@ class _GeoJsonReading(Reading):
             raise coordinates.fail(f"{shape[:30]!r} is not a geometry of GeoJSON")
 
     def _point(
-        self, position: tuple[float, float], node: JsonNode, properties: JsonNode, *, kind: ZoneKind,
-        name: str, margin_m: float | None,
+        self,
+        position: tuple[float, float],
+        node: JsonNode,
+        properties: JsonNode,
+        *,
+        kind: ZoneKind,
+        name: str,
+        margin_m: float | None,
     ) -> None:
         place = node.path.removesuffix(".coordinates")
         if not self._on_globe([position], place):
@@ -168,7 +192,10 @@ class _GeoJsonReading(Reading):
         for x, y in points:
             if abs(y) > 90.0 or abs(x) > 360.0:
                 self.findings.add(
-                    FindingLevel.ERROR, Code.SWAPPED_AXES, place, f"latitude {y:g} is outside ±90 degrees",
+                    FindingLevel.ERROR,
+                    Code.SWAPPED_AXES,
+                    place,
+                    f"latitude {y:g} is outside ±90 degrees",
                     "GeoJSON writes longitude first: swap them",
                 )
                 return False
@@ -191,15 +218,16 @@ def _item(point: GeoPoint, properties: JsonNode, *, rally: bool) -> MissionItem:
     continues = properties.get("autocontinue")
     return MissionItem(
         command=Command.NAV_RALLY_POINT if rally else integer("command", Command.NAV_WAYPOINT, 0xFFFF),
-        lat_e7=round(point.lat_deg * 1e7), lon_e7=round(point.lon_deg * 1e7), alt_m=number("alt_m", 0.0),
-        frame=integer("frame", 3, 255), params=(params[0], params[1], params[2], params[3]),
+        lat_e7=round(point.lat_deg * 1e7),
+        lon_e7=round(point.lon_deg * 1e7),
+        alt_m=number("alt_m", 0.0),
+        frame=integer("frame", 3, 255),
+        params=(params[0], params[1], params[2], params[3]),
         autocontinue=continues.flag() if continues is not None else True,
     )
 
 
-def read_geojson(
-    text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, areas: bool = False,
-) -> Document:
+def read_geojson(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, areas: bool = False) -> Document:
     """Return what a GeoJSON text holds; polygons without a ``kind`` property are of ``kind``.
 
     Points without properties that say what they are are the places to sail to, or, with ``areas``, dangers.
@@ -211,8 +239,13 @@ def read_geojson(
     if crs is not None:
         named = json.dumps(crs.value)
         if not any(word in named for word in ("CRS84", "4326", "4979")):
-            reading.findings.add(FindingLevel.ERROR, Code.WRONG_SRID, "crs", f"{named[:60]} is not WGS 84",
-                                 "export it as WGS 84 (RFC 7946)")
+            reading.findings.add(
+                FindingLevel.ERROR,
+                Code.WRONG_SRID,
+                "crs",
+                f"{named[:60]} is not WGS 84",
+                "export it as WGS 84 (RFC 7946)",
+            )
     if root_kind == "FeatureCollection":
         for feature in root.member("features"):
             reading.feature(feature)
@@ -231,14 +264,22 @@ def read_geojson(
     items = tuple(reading.items) or pins
     names = (tuple(reading.item_names) if any(reading.item_names) else ()) or pin_names
     document = Document(
-        source=source, format="geojson", zones=tuple(reading.zones), marks=tuple(reading.marks),
-        items=items, item_names=names, home=places.get("home"),
-        rally=tuple(reading.rally), return_point=reading.return_point, tracks=tuple(reading.tracks),
+        source=source,
+        format="geojson",
+        zones=tuple(reading.zones),
+        marks=tuple(reading.marks),
+        items=items,
+        item_names=names,
+        home=places.get("home"),
+        rally=tuple(reading.rally),
+        return_point=reading.return_point,
+        tracks=tuple(reading.tracks),
         findings=tuple(reading.findings),
     )
     if document.is_empty and not reading.findings:
         reading.findings.add(
-            FindingLevel.ERROR, Code.EMPTY, "", "holds no feature", "an empty file is not 'no obstacles'")
+            FindingLevel.ERROR, Code.EMPTY, "", "holds no feature", "an empty file is not 'no obstacles'"
+        )
         return Document(source=source, format="geojson", findings=tuple(reading.findings))
     return document
 
@@ -246,9 +287,11 @@ def read_geojson(
 def write_geojson(document: Document) -> Written:
     """Return the document as a FeatureCollection; nothing is lost."""
     losses = Losses()
-    leave_out(losses, document, {
-        "zones", "marks", "items", "item names", "rally", "return", "home", "tracks", "names", "margins",
-    })
+    leave_out(
+        losses,
+        document,
+        {"zones", "marks", "items", "item names", "rally", "return", "home", "tracks", "names", "margins"},
+    )
     features: list[dict[str, Any]] = []
 
     def add(geometry: dict[str, Any], **properties: object) -> None:
@@ -264,8 +307,12 @@ def write_geojson(document: Document) -> Written:
     for mark in document.marks:
         coordinates = [[wrap_lon_deg(c[0]), c[1]] for c in mark.geometry.coords]
         is_point = isinstance(mark.geometry, Point)
-        add({"type": "Point" if is_point else "LineString", "coordinates": coordinates[0] if is_point else coordinates},
-            kind=mark.kind.value, name=mark.name, margin_m=mark.margin_m)
+        add(
+            {"type": "Point" if is_point else "LineString", "coordinates": coordinates[0] if is_point else coordinates},
+            kind=mark.kind.value,
+            name=mark.name,
+            margin_m=mark.margin_m,
+        )
     names = document.item_names or ("",) * len(document.items)
     for item, name in zip(document.items, names, strict=True):
         add(_point(item.point), role="waypoint", name=name, **_item_properties(item))
@@ -276,8 +323,12 @@ def write_geojson(document: Document) -> Written:
     if document.return_point is not None:
         add(_point(document.return_point), role="return")
     for track in document.tracks:
-        add({"type": "LineString", "coordinates": [[p.lon_deg, p.lat_deg] for p in track.points]},
-            role="track", name=track.name, times_s=list(track.times_s) if track.times_s is not None else None)
+        add(
+            {"type": "LineString", "coordinates": [[p.lon_deg, p.lat_deg] for p in track.points]},
+            role="track",
+            name=track.name,
+            times_s=list(track.times_s) if track.times_s is not None else None,
+        )
     text = json.dumps({"type": "FeatureCollection", "features": features}, ensure_ascii=False, indent=1)
     return Written((text + "\n").encode(), tuple(losses))
 
@@ -295,6 +346,9 @@ def _rings(polygon: Polygon) -> list[list[list[float]]]:
 
 def _item_properties(item: MissionItem) -> dict[str, Any]:
     return {
-        "command": int(item.command), "params": list(item.params), "alt_m": item.alt_m, "frame": item.frame,
+        "command": int(item.command),
+        "params": list(item.params),
+        "alt_m": item.alt_m,
+        "frame": item.frame,
         "autocontinue": item.autocontinue,
     }

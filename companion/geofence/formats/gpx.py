@@ -41,8 +41,9 @@ class _GpxReading(Reading):
         if lat_deg is None or lon_deg is None or not (math.isfinite(lat_deg) and math.isfinite(lon_deg)):
             raise InputError(self.source, place, "has no finite lat and lon")
         if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
-            raise InputError(self.source, place, f"lat {lat_deg:g} lon {lon_deg:g} is not on the globe",
-                             "are they swapped?")
+            raise InputError(
+                self.source, place, f"lat {lat_deg:g} lon {lon_deg:g} is not on the globe", "are they swapped?"
+            )
         return GeoPoint(lat_deg=lat_deg, lon_deg=lon_deg)
 
     def line(self, points: list[GeoPoint], kind: ZoneKind, name: str, place: str) -> None:
@@ -57,11 +58,13 @@ def read_gpx(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
     """Return what a GPX file holds; with ``areas`` its lines are dangers or limits, not routes."""
     parse_xml(data, source)
     try:
-        gpx = gpxpy.parse(data.decode("utf-8-sig") if not data.startswith((b"\xff\xfe", b"\xfe\xff"))
-                          else data.decode("utf-16"))
+        gpx = gpxpy.parse(
+            data.decode("utf-8-sig") if not data.startswith((b"\xff\xfe", b"\xfe\xff")) else data.decode("utf-16")
+        )
     except (gpxpy.gpx.GPXException, ValueError, TypeError, AttributeError, OverflowError) as error:
-        raise InputError(source, "", f"is not GPX ({str(error).splitlines()[0][:80] if str(error) else 'damaged'})"
-                         ) from None
+        raise InputError(
+            source, "", f"is not GPX ({str(error).splitlines()[0][:80] if str(error) else 'damaged'})"
+        ) from None
     reading = _GpxReading(source, kind, areas=areas)
     count = len(gpx.waypoints) + sum(len(r.points) for r in gpx.routes) + gpx.get_track_points_no()
     if count > MAX_POSITIONS:
@@ -74,15 +77,24 @@ def read_gpx(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
         _track(track, f"trk {number}", reading)
     if reading.route or reading.tracks:
         for _, _, name in reading.pins:
-            reading.findings.add(FindingLevel.NOTE, Code.DROPPED, "",
-                                 f"the waypoint {name} is no part of a route and is not used")
+            reading.findings.add(
+                FindingLevel.NOTE, Code.DROPPED, "", f"the waypoint {name} is no part of a route and is not used"
+            )
     else:
         pins_as_route(reading.pins, reading.route, reading.places, reading.findings)
     items, names = items_of(reading.route)
     document = Document(
-        source=source, format="gpx", zones=tuple(reading.zones), marks=tuple(reading.marks), items=items,
-        item_names=names, home=reading.places.get("home"), return_point=reading.places.get("return"),
-        rally=tuple(reading.rally), tracks=tuple(reading.tracks), findings=tuple(reading.findings),
+        source=source,
+        format="gpx",
+        zones=tuple(reading.zones),
+        marks=tuple(reading.marks),
+        items=items,
+        item_names=names,
+        home=reading.places.get("home"),
+        return_point=reading.places.get("return"),
+        rally=tuple(reading.rally),
+        tracks=tuple(reading.tracks),
+        findings=tuple(reading.findings),
     )
     if document.is_empty and not reading.findings:
         reading.findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no route, track or waypoint")
@@ -96,10 +108,14 @@ def _waypoint(node: Any, place: str, reading: _GpxReading) -> None:
     if role in {"home", "return"}:
         reading.places[role] = point
     elif role == "rally":
-        reading.rally.append(MissionItem(
-            command=Command.NAV_RALLY_POINT, lat_e7=round(point.lat_deg * 1e7), lon_e7=round(point.lon_deg * 1e7),
-            alt_m=_altitude_m(node),
-        ))
+        reading.rally.append(
+            MissionItem(
+                command=Command.NAV_RALLY_POINT,
+                lat_e7=round(point.lat_deg * 1e7),
+                lon_e7=round(point.lon_deg * 1e7),
+                alt_m=_altitude_m(node),
+            )
+        )
     elif role in _KINDS or reading.areas:
         geometry = Point(point.lon_deg, point.lat_deg)
         reading.marks.append(Mark(geometry=geometry, kind=_KINDS.get(role, reading.kind), name=node.name or ""))
@@ -117,8 +133,12 @@ def _route(node: Any, place: str, reading: _GpxReading) -> None:
     if role in _KINDS or (reading.areas and role != _MISSION):
         reading.line(points, _KINDS.get(role, reading.kind), node.name or "", place)
     elif reading.route:
-        reading.findings.add(FindingLevel.WARNING, Code.FORMAT, place,
-                             "the file has several routes; the first is the mission, this one is kept as a track")
+        reading.findings.add(
+            FindingLevel.WARNING,
+            Code.FORMAT,
+            place,
+            "the file has several routes; the first is the mission, this one is kept as a track",
+        )
         reading.tracks.append(Track(points=tuple(points), name=node.name or ""))
     else:
         reading.route.extend(
@@ -138,9 +158,9 @@ def _track(node: Any, place: str, reading: _GpxReading) -> None:
             continue
         times = [p.time for p in segment.points]
         times_s = tuple(t.timestamp() for t in times if t is not None)
-        reading.tracks.append(Track(
-            points=tuple(points), times_s=times_s if len(times_s) == len(points) else None, name=node.name or "",
-        ))
+        reading.tracks.append(
+            Track(points=tuple(points), times_s=times_s if len(times_s) == len(points) else None, name=node.name or "")
+        )
 
 
 def write_gpx(document: Document) -> Written:
@@ -151,17 +171,20 @@ def write_gpx(document: Document) -> Written:
     gpx.creator = "companion"
 
     def mark(point: GeoPoint, role: str, name: str = "", alt_m: float | None = None) -> None:
-        gpx.waypoints.append(gpxpy.gpx.GPXWaypoint(
-            point.lat_deg, point.lon_deg, elevation=alt_m, name=printable(name) or None, type=role,
-        ))
+        gpx.waypoints.append(
+            gpxpy.gpx.GPXWaypoint(
+                point.lat_deg, point.lon_deg, elevation=alt_m, name=printable(name) or None, type=role
+            )
+        )
 
     points = route_of(document, losses)
     if points:
         route = gpxpy.gpx.GPXRoute(name="mission")
         route.type = _MISSION
         route.points.extend(
-            gpxpy.gpx.GPXRoutePoint(p.lat_deg, p.lon_deg, elevation=a or None, name=printable(n) or None,
-                                    symbol="diamond", type="WPT")
+            gpxpy.gpx.GPXRoutePoint(
+                p.lat_deg, p.lon_deg, elevation=a or None, name=printable(n) or None, symbol="diamond", type="WPT"
+            )
             for p, a, n in points
         )
         gpx.routes.append(route)

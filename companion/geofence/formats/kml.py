@@ -76,8 +76,12 @@ class _KmlReading(Reading):
         for part in text.split():
             fields = part.split(",")
             if len(fields) not in {2, 3}:
-                raise InputError(self.source, place, f"{part[:40]!r} is not lon,lat[,alt]",
-                                 "tuples are separated by spaces, decimals by points")
+                raise InputError(
+                    self.source,
+                    place,
+                    f"{part[:40]!r} is not lon,lat[,alt]",
+                    "tuples are separated by spaces, decimals by points",
+                )
             values = [number(f, self.source, place) for f in fields if f]
             if len(values) < 2:
                 raise InputError(self.source, place, f"{part[:40]!r} is not lon,lat[,alt]")
@@ -91,8 +95,13 @@ class _KmlReading(Reading):
         """Return whether all positions exist, with a finding if not."""
         for x, y, _ in coordinates:
             if abs(y) > 90.0 or abs(x) > 360.0:
-                self.findings.add(FindingLevel.ERROR, Code.SWAPPED_AXES, place,
-                                  f"latitude {y:g} is outside ±90 degrees", "KML writes longitude first")
+                self.findings.add(
+                    FindingLevel.ERROR,
+                    Code.SWAPPED_AXES,
+                    place,
+                    f"latitude {y:g} is outside ±90 degrees",
+                    "KML writes longitude first",
+                )
                 return False
         return True
 
@@ -126,9 +135,17 @@ def read_kml(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
         pins_as_route(reading.pins, reading.route, reading.places, reading.findings)
     items, names = items_of(reading.route)
     document = Document(
-        source=source, format="kml", zones=tuple(reading.zones), marks=tuple(reading.marks), items=items,
-        item_names=names, home=reading.places.get("home"), return_point=reading.places.get("return"),
-        rally=tuple(reading.rally), tracks=tuple(reading.tracks), findings=tuple(reading.findings),
+        source=source,
+        format="kml",
+        zones=tuple(reading.zones),
+        marks=tuple(reading.marks),
+        items=items,
+        item_names=names,
+        home=reading.places.get("home"),
+        return_point=reading.places.get("return"),
+        rally=tuple(reading.rally),
+        tracks=tuple(reading.tracks),
+        findings=tuple(reading.findings),
     )
     if document.is_empty and not any(f.severity is FindingLevel.ERROR for f in reading.findings):
         reading.findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no placemark with a shape")
@@ -187,8 +204,13 @@ def _shape(element: Any, name: str, data_of: dict[str, str], place: str, *, read
         if not (role or word or margin or reading.areas):
             reading.pins.append((track_points(lonlat)[0], coordinates[0][2], name))
             return
-        _point(lonlat[0], coordinates[0][2], Mark(geometry=Point(lonlat[0]), kind=kind, name=name, margin_m=margin_m),
-               role, reading)
+        _point(
+            lonlat[0],
+            coordinates[0][2],
+            Mark(geometry=Point(lonlat[0]), kind=kind, name=name, margin_m=margin_m),
+            role,
+            reading,
+        )
     elif role == "route":
         names = data_of.get("names", "").split("\n") if data_of.get("names") else [""] * len(lonlat)
         names += [""] * (len(lonlat) - len(names))
@@ -197,12 +219,13 @@ def _shape(element: Any, name: str, data_of: dict[str, str], place: str, *, read
         )
     elif role == "track":
         times = [number(t, reading.source, place) for t in data_of.get("times_s", "").split()]
-        reading.tracks.append(Track(
-            points=track_points(lonlat), times_s=tuple(times) if len(times) == len(lonlat) else None, name=name,
-        ))
+        reading.tracks.append(
+            Track(points=track_points(lonlat), times_s=tuple(times) if len(times) == len(lonlat) else None, name=name)
+        )
     elif len(set(lonlat)) < 2:
-        reading.findings.add(FindingLevel.ERROR, Code.DEGENERATE, place, "the line has fewer than two points",
-                             "draw it or remove it")
+        reading.findings.add(
+            FindingLevel.ERROR, Code.DEGENERATE, place, "the line has fewer than two points", "draw it or remove it"
+        )
     else:
         reading.marks.append(Mark(geometry=LineString(unwrapped(lonlat)), kind=kind, name=name, margin_m=margin_m))
 
@@ -212,10 +235,14 @@ def _point(lonlat: tuple[float, float], alt_m: float, mark: Mark, role: str, rea
     if role in {"home", "return"}:
         reading.places[role] = point
     elif role == "rally":
-        reading.rally.append(MissionItem(
-            command=Command.NAV_RALLY_POINT, lat_e7=round(point.lat_deg * 1e7), lon_e7=round(point.lon_deg * 1e7),
-            alt_m=alt_m,
-        ))
+        reading.rally.append(
+            MissionItem(
+                command=Command.NAV_RALLY_POINT,
+                lat_e7=round(point.lat_deg * 1e7),
+                lon_e7=round(point.lon_deg * 1e7),
+                alt_m=alt_m,
+            )
+        )
     else:
         reading.marks.append(mark)
 
@@ -223,9 +250,11 @@ def _point(lonlat: tuple[float, float], alt_m: float, mark: Mark, role: str, rea
 def write_kml(document: Document) -> Written:
     """Return the document as KML."""
     losses = Losses()
-    leave_out(losses, document, {
-        "zones", "marks", "items", "item names", "rally", "return", "home", "tracks", "names", "margins",
-    })
+    leave_out(
+        losses,
+        document,
+        {"zones", "marks", "items", "item names", "rally", "return", "home", "tracks", "names", "margins"},
+    )
     body: list[str] = []
     for zone in document.zones:
         polygon = as_polygon(zone, losses)
@@ -250,7 +279,8 @@ def write_kml(document: Document) -> Written:
         body.append(_placemark(track.name, shape, role="track", times_s=times))
     text = (
         '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>\n'
-        + "\n".join(body) + "\n</Document></kml>\n"
+        + "\n".join(body)
+        + "\n</Document></kml>\n"
     )
     return Written(text.encode(), tuple(losses))
 
@@ -267,7 +297,8 @@ def write_kmz(document: Document) -> Written:
 def _placemark(name: str, shape: str, **data_of: object) -> str:
     entries = "".join(
         f'<Data name="{key}"><value>{escape(printable(str(value)))}</value></Data>'
-        for key, value in data_of.items() if value is not None
+        for key, value in data_of.items()
+        if value is not None
     )
     return f"<Placemark><name>{escape(printable(name))}</name><ExtendedData>{entries}</ExtendedData>{shape}</Placemark>"
 
@@ -287,6 +318,4 @@ def _line(geometry: Point | LineString) -> str:
 
 
 def _tuples(coordinates: Any) -> str:
-    return " ".join(
-        ",".join([decimal(wrap_lon_deg(c[0])), *(decimal(v) for v in c[1:])]) for c in coordinates
-    )
+    return " ".join(",".join([decimal(wrap_lon_deg(c[0])), *(decimal(v) for v in c[1:])]) for c in coordinates)

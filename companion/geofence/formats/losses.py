@@ -30,8 +30,15 @@ class Written:
 
 
 # What a document holds that is worth a file, and what each is called.
-_WORDS = {"zones": "zone", "marks": "point or line obstacle", "items": "mission", "rally": "rally point",
-          "tracks": "track", "home": "home", "return": "return point"}
+_WORDS = {
+    "zones": "zone",
+    "marks": "point or line obstacle",
+    "items": "mission",
+    "rally": "rally point",
+    "tracks": "track",
+    "home": "home",
+    "return": "return point",
+}
 _FIELDS = {"return": "return_point"}
 
 
@@ -43,7 +50,7 @@ class Losses(list[Finding]):
         self.append(Finding(severity=severity, code=Code.NOT_CARRIED, place="", text=text, remedy=remedy))
 
     def drop(
-        self, what: str, count: int, *, severity: FindingLevel = FindingLevel.WARNING, why: str = "", remedy: str = "",
+        self, what: str, count: int, *, severity: FindingLevel = FindingLevel.WARNING, why: str = "", remedy: str = ""
     ) -> None:
         """Say that ``count`` things, ``what`` in the singular, are not carried."""
         if count:
@@ -59,13 +66,23 @@ def leave_out(losses: Losses, document: Document, carried: Iterable[str]) -> Non
     kept = set(carried)
     if not any(getattr(document, _FIELDS.get(what, what)) for what in _WORDS if what in kept):
         words = ", ".join(_WORDS[what] for what in _WORDS if what in kept)
-        losses.append(Finding(severity=FindingLevel.ERROR, code=Code.EMPTY, place="",
-                              text=f"would hold nothing: the source has no {words}"))
+        losses.append(
+            Finding(
+                severity=FindingLevel.ERROR,
+                code=Code.EMPTY,
+                place="",
+                text=f"would hold nothing: the source has no {words}",
+            )
+        )
     if "zones" not in kept:
         losses.drop("zone", len(document.zones), severity=FindingLevel.ERROR)
     if "marks" not in kept:
-        losses.drop("point or line obstacle", len(document.marks), severity=FindingLevel.ERROR,
-                    remedy="say --point-radius M to draw them")
+        losses.drop(
+            "point or line obstacle",
+            len(document.marks),
+            severity=FindingLevel.ERROR,
+            remedy="say --point-radius M to draw them",
+        )
     if "items" not in kept:
         losses.drop("mission item", len(document.items))
     if "rally" not in kept:
@@ -113,8 +130,12 @@ def without_holes(zones: Sequence[Zone], losses: Losses) -> list[Zone]:
         name = zone.name or "a zone"
         if zone.kind is ZoneKind.INCLUSION:
             out.extend(
-                Zone(kind=ZoneKind.EXCLUSION, shape=Polygon(ring), name=f"{zone.name} hole {i + 1}".strip(),
-                     margin_m=zone.margin_m)
+                Zone(
+                    kind=ZoneKind.EXCLUSION,
+                    shape=Polygon(ring),
+                    name=f"{zone.name} hole {i + 1}".strip(),
+                    margin_m=zone.margin_m,
+                )
                 for i, ring in enumerate(zone.shape.interiors)
             )
             losses.add(FindingLevel.NOTE, f"{count} hole(s) of {name} become keep-out zones of their own")

@@ -71,13 +71,20 @@ def _row(fields: list[str], source: str, place: str, findings: Findings) -> tupl
     )
     if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
         findings.add(
-            FindingLevel.ERROR, Code.SWAPPED_AXES if abs(lon_deg) <= 90.0 else Code.OUT_OF_RANGE, place,
-            f"{lat_deg:g}, {lon_deg:g} is not on the globe", "the file writes latitude before longitude",
+            FindingLevel.ERROR,
+            Code.SWAPPED_AXES if abs(lon_deg) <= 90.0 else Code.OUT_OF_RANGE,
+            place,
+            f"{lat_deg:g}, {lon_deg:g} is not on the globe",
+            "the file writes latitude before longitude",
         )
         lat_deg = lon_deg = 0.0
     item = MissionItem(
-        command=whole["command"], lat_e7=round(lat_deg * 1e7), lon_e7=round(lon_deg * 1e7), alt_m=alt_m,
-        frame=whole["frame"], params=(params[0], params[1], params[2], params[3]),
+        command=whole["command"],
+        lat_e7=round(lat_deg * 1e7),
+        lon_e7=round(lon_deg * 1e7),
+        alt_m=alt_m,
+        frame=whole["frame"],
+        params=(params[0], params[1], params[2], params[3]),
         autocontinue=number(fields[11], source, f"{place} autocontinue") != 0.0,
     )
     return whole["seq"], item
@@ -87,8 +94,13 @@ def _sorted_out(rows: list[tuple[int, MissionItem]], source: str, findings: Find
     """Tell missions, fences and rally points apart by their commands."""
     for position, (seq, _) in enumerate(rows):
         if seq != position + (rows[0][0] if rows[0][0] in {0, 1} else 0):
-            findings.add(FindingLevel.ERROR, Code.FORMAT, f"item {seq}", f"stands where item {position} should be",
-                         "is a line missing?")
+            findings.add(
+                FindingLevel.ERROR,
+                Code.FORMAT,
+                f"item {seq}",
+                f"stands where item {position} should be",
+                "is a line missing?",
+            )
             break
     first = rows[0][0] if rows else 0
     items = [item for _, item in rows]
@@ -102,14 +114,25 @@ def _sorted_out(rows: list[tuple[int, MissionItem]], source: str, findings: Find
         if home.lat_deg == 0.0 and home.lon_deg == 0.0:
             home = None
     if mission and (fence or rally):
-        findings.add(FindingLevel.WARNING, Code.FORMAT, "", "mixes mission items with fence or rally items",
-                     "autopilots hold them in separate lists")
+        findings.add(
+            FindingLevel.WARNING,
+            Code.FORMAT,
+            "",
+            "mixes mission items with fence or rally items",
+            "autopilots hold them in separate lists",
+        )
     zones, return_point = items_to_zones(fence, findings)
     if not rows:
         findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no item")
     return Document(
-        source=source, format="waypoints", zones=zones, items=tuple(mission), home=home, rally=tuple(rally),
-        return_point=return_point, findings=tuple(findings),
+        source=source,
+        format="waypoints",
+        zones=zones,
+        items=tuple(mission),
+        home=home,
+        rally=tuple(rally),
+        return_point=return_point,
+        findings=tuple(findings),
     )
 
 
@@ -174,20 +197,29 @@ def read_fen(text: str, source: str) -> Document:
     findings = Findings()
     rows = _rows(text.split("\n"), source, findings)
     if len(rows) < 2:
-        findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no fence ring",
-                     "line 1 is the return point, the ring follows")
+        findings.add(
+            FindingLevel.ERROR, Code.EMPTY, "", "holds no fence ring", "line 1 is the return point, the ring follows"
+        )
         return Document(source=source, format="fen", findings=tuple(findings))
     lon_deg, lat_deg, place = rows[0]
     return_point = None
     if abs(lat_deg) <= 90.0:
         return_point = GeoPoint(lat_deg=lat_deg, lon_deg=wrap_lon_deg(lon_deg))
     else:
-        findings.add(FindingLevel.ERROR, Code.SWAPPED_AXES, place, f"latitude {lat_deg:g} is outside ±90 degrees",
-                     "a .fen writes latitude before longitude")
+        findings.add(
+            FindingLevel.ERROR,
+            Code.SWAPPED_AXES,
+            place,
+            f"latitude {lat_deg:g} is outside ±90 degrees",
+            "a .fen writes latitude before longitude",
+        )
     polygons = polygons_from_rings([[r[:2] for r in rows[1:]]], ZoneKind.INCLUSION, "ring", findings)
     return Document(
-        source=source, format="fen", zones=tuple(Zone(kind=ZoneKind.INCLUSION, shape=p) for p in polygons),
-        return_point=return_point, findings=tuple(findings),
+        source=source,
+        format="fen",
+        zones=tuple(Zone(kind=ZoneKind.INCLUSION, shape=p) for p in polygons),
+        return_point=return_point,
+        findings=tuple(findings),
     )
 
 
@@ -195,7 +227,7 @@ def read_poly(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION) ->
     """Return a .poly: one closed ring, or several named ones in the Regions variant."""
     findings = Findings()
     zones: list[Zone] = []
-    blocks: list[tuple[str, int, list[str]]] = [("", 1, [])]   # name, number of the first line, lines
+    blocks: list[tuple[str, int, list[str]]] = [("", 1, [])]  # name, number of the first line, lines
     for line_number, raw in enumerate(text.split("\n"), start=1):
         named = re.match(r"\s*Name\s*:(.*)", raw, re.IGNORECASE)
         if named:
@@ -232,12 +264,19 @@ def read_rally(text: str, source: str) -> Document:
             raise InputError(source, place, f"{line[:40]!r} is not 'RALLY lat lon alt ...'")
         lat_deg, lon_deg, alt_m = (number(f, source, place) for f in fields[1:4])
         if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
-            findings.add(FindingLevel.ERROR, Code.SWAPPED_AXES, place, f"{lat_deg:g}, {lon_deg:g} is not on the globe",
-                         "the file writes latitude first")
+            findings.add(
+                FindingLevel.ERROR,
+                Code.SWAPPED_AXES,
+                place,
+                f"{lat_deg:g}, {lon_deg:g} is not on the globe",
+                "the file writes latitude first",
+            )
             continue
-        rally.append(MissionItem(
-            command=Command.NAV_RALLY_POINT, lat_e7=round(lat_deg * 1e7), lon_e7=round(lon_deg * 1e7), alt_m=alt_m,
-        ))
+        rally.append(
+            MissionItem(
+                command=Command.NAV_RALLY_POINT, lat_e7=round(lat_deg * 1e7), lon_e7=round(lon_deg * 1e7), alt_m=alt_m
+            )
+        )
     return Document(source=source, format="rally", rally=tuple(rally), findings=tuple(findings))
 
 
@@ -255,8 +294,9 @@ def _rows(lines: list[str], source: str, findings: Findings, *, first: int = 1) 
         if len(fields) == 1 and "," in fields[0]:
             fields = fields[0].split(",")
         if len(fields) not in {2, 3}:
-            raise InputError(source, place, f"has {len(fields)} fields, not 'latitude longitude'",
-                             "is the file cut off?")
+            raise InputError(
+                source, place, f"has {len(fields)} fields, not 'latitude longitude'", "is the file cut off?"
+            )
         lat_deg, lon_deg = number(fields[0], source, place), number(fields[1], source, place)
         rows.append((lon_deg, lat_deg, place))
         if len(rows) > MAX_POSITIONS:

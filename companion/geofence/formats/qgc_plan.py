@@ -53,13 +53,23 @@ def read_plan(text: str, source: str) -> Document:
         if point is not None:
             values = list(node)
             altitude_m = values[2].number() if len(values) > 2 else 0.0
-            rally.append(MissionItem(
-                command=Command.NAV_RALLY_POINT, lat_e7=round(point.lat_deg * 1e7),
-                lon_e7=round(point.lon_deg * 1e7), alt_m=altitude_m,
-            ))
+            rally.append(
+                MissionItem(
+                    command=Command.NAV_RALLY_POINT,
+                    lat_e7=round(point.lat_deg * 1e7),
+                    lon_e7=round(point.lon_deg * 1e7),
+                    alt_m=altitude_m,
+                )
+            )
     return Document(
-        source=source, format="plan", zones=tuple(zones), items=tuple(items), home=home, rally=tuple(rally),
-        return_point=return_point, findings=tuple(findings),
+        source=source,
+        format="plan",
+        zones=tuple(zones),
+        items=tuple(items),
+        home=home,
+        rally=tuple(rally),
+        return_point=return_point,
+        findings=tuple(findings),
     )
 
 
@@ -71,8 +81,11 @@ def _point(node: JsonNode, findings: Findings) -> GeoPoint | None:
     if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
         swapped = abs(lat_deg) <= 180.0 and abs(lon_deg) <= 90.0
         findings.add(
-            FindingLevel.ERROR, Code.SWAPPED_AXES if swapped else Code.OUT_OF_RANGE, node.path,
-            f"{lat_deg:g}, {lon_deg:g} is not on the globe", "a .plan writes latitude first",
+            FindingLevel.ERROR,
+            Code.SWAPPED_AXES if swapped else Code.OUT_OF_RANGE,
+            node.path,
+            f"{lat_deg:g}, {lon_deg:g} is not on the globe",
+            "a .plan writes latitude first",
         )
         return None
     return GeoPoint(lat_deg=lat_deg, lon_deg=lon_deg)
@@ -98,12 +111,22 @@ def _items(mission: JsonNode, findings: Findings) -> list[MissionItem]:
         if item.command == Command.DO_JUMP:
             target = ids.get(int(item.params[0]))
             if target is None:
-                findings.add(FindingLevel.ERROR, Code.FORMAT, f"mission.items[{index}]",
-                             f"jumps to item {item.params[0]:g}, which is not there", "set the jump's target again")
+                findings.add(
+                    FindingLevel.ERROR,
+                    Code.FORMAT,
+                    f"mission.items[{index}]",
+                    f"jumps to item {item.params[0]:g}, which is not there",
+                    "set the jump's target again",
+                )
             elif target != item.params[0]:
                 items[index] = MissionItem(
-                    command=item.command, lat_e7=item.lat_e7, lon_e7=item.lon_e7, alt_m=item.alt_m, frame=item.frame,
-                    params=(float(target), *item.params[1:]), autocontinue=item.autocontinue,
+                    command=item.command,
+                    lat_e7=item.lat_e7,
+                    lon_e7=item.lon_e7,
+                    alt_m=item.alt_m,
+                    frame=item.frame,
+                    params=(float(target), *item.params[1:]),
+                    autocontinue=item.autocontinue,
                 )
     return items
 
@@ -119,7 +142,10 @@ def _expanded(node: JsonNode, findings: Findings) -> list[JsonNode]:
         findings.add(FindingLevel.NOTE, Code.EXPANDED, node.path, f"the {name} is expanded to its {len(simple)} items")
     else:
         findings.add(
-            FindingLevel.ERROR, Code.EXPANDED, node.path, f"the {name} has no stored items to expand",
+            FindingLevel.ERROR,
+            Code.EXPANDED,
+            node.path,
+            f"the {name} has no stored items to expand",
             "open the plan in QGroundControl 4 and save it again, or replace the survey by waypoints",
         )
     return simple
@@ -135,12 +161,21 @@ def _simple_item(node: JsonNode, findings: Findings) -> MissionItem:
     values = [0.0 if p.value is None else p.number() for p in raw[:7]]
     lat_deg, lon_deg = values[4], values[5]
     if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
-        findings.add(FindingLevel.ERROR, Code.SWAPPED_AXES, node.path, f"{lat_deg:g}, {lon_deg:g} is not on the globe",
-                     "a .plan writes latitude first")
+        findings.add(
+            FindingLevel.ERROR,
+            Code.SWAPPED_AXES,
+            node.path,
+            f"{lat_deg:g}, {lon_deg:g} is not on the globe",
+            "a .plan writes latitude first",
+        )
         lat_deg = lon_deg = 0.0
     continues = node.get("autoContinue")
     return MissionItem(
-        command=command, lat_e7=round(lat_deg * 1e7), lon_e7=round(lon_deg * 1e7), alt_m=values[6], frame=frame,
+        command=command,
+        lat_e7=round(lat_deg * 1e7),
+        lon_e7=round(lon_deg * 1e7),
+        alt_m=values[6],
+        frame=frame,
         params=(values[0], values[1], values[2], values[3]),
         autocontinue=continues.flag() if continues is not None else True,
     )
@@ -184,8 +219,9 @@ def write_plan(document: Document) -> Written:
         inclusion = zone.kind is ZoneKind.INCLUSION
         if isinstance(zone.shape, Circle):
             center = [zone.shape.center.lat_deg, zone.shape.center.lon_deg]
-            circles.append({"version": 1, "inclusion": inclusion,
-                            "circle": {"center": center, "radius": zone.shape.radius_m}})
+            circles.append(
+                {"version": 1, "inclusion": inclusion, "circle": {"center": center, "radius": zone.shape.radius_m}}
+            )
         else:
             ring = [list(v) for v in ring_of(zone.shape)]
             polygons.append({"version": 1, "inclusion": inclusion, "polygon": ring})
@@ -199,17 +235,21 @@ def write_plan(document: Document) -> Written:
     if document.return_point is not None:
         fence["breachReturn"] = [document.return_point.lat_deg, document.return_point.lon_deg, 0]
     plan = {
-        "fileType": "Plan", "version": 1, "groundStation": "QGroundControl",
+        "fileType": "Plan",
+        "version": 1,
+        "groundStation": "QGroundControl",
         "mission": {
-            "version": 2, "firmwareType": _FIRMWARE_ARDUPILOT, "vehicleType": _VEHICLE_SURFACE_BOAT,
-            "cruiseSpeed": 2, "hoverSpeed": 2, "globalPlanAltitudeMode": 1,
+            "version": 2,
+            "firmwareType": _FIRMWARE_ARDUPILOT,
+            "vehicleType": _VEHICLE_SURFACE_BOAT,
+            "cruiseSpeed": 2,
+            "hoverSpeed": 2,
+            "globalPlanAltitudeMode": 1,
             "plannedHomePosition": [home.lat_deg, home.lon_deg, 0] if home is not None else [0, 0, 0],
             "items": [_plan_item(i + 1, item) for i, item in enumerate(document.items)],
         },
         "geoFence": fence,
-        "rallyPoints": {
-            "version": 2, "points": [[i.lat_e7 / 1e7, i.lon_e7 / 1e7, i.alt_m] for i in document.rally],
-        },
+        "rallyPoints": {"version": 2, "points": [[i.lat_e7 / 1e7, i.lon_e7 / 1e7, i.alt_m] for i in document.rally]},
     }
     return Written((json.dumps(plan, indent=1) + "\n").encode(), tuple(losses))
 
@@ -217,7 +257,13 @@ def write_plan(document: Document) -> Written:
 def _plan_item(number: int, item: MissionItem) -> dict[str, Any]:
     params = [*item.params, item.lat_e7 / 1e7, item.lon_e7 / 1e7, item.alt_m]
     return {
-        "type": "SimpleItem", "doJumpId": number, "command": int(item.command), "frame": item.frame,
-        "autoContinue": item.autocontinue, "AMSLAltAboveTerrain": None, "Altitude": item.alt_m,
-        "AltitudeMode": _ALTITUDE_MODE.get(item.frame, 1), "params": params,
+        "type": "SimpleItem",
+        "doJumpId": number,
+        "command": int(item.command),
+        "frame": item.frame,
+        "autoContinue": item.autocontinue,
+        "AMSLAltAboveTerrain": None,
+        "Altitude": item.alt_m,
+        "AltitudeMode": _ALTITUDE_MODE.get(item.frame, 1),
+        "params": params,
     }

@@ -38,7 +38,8 @@ FAR_M = 50_000.0  # what lies farther from the mission is a mistake
 
 _WKT_WORD = re.compile(
     r"\b(POINT|LINESTRING|LINEARRING|POLYGON|TRIANGLE|TIN|MULTI\w+|GEOMETRYCOLLECTION|POLYHEDRALSURFACE|"
-    r"CURVEPOLYGON|CIRCULARSTRING|COMPOUNDCURVE)\s*+((ZM|Z|M)\s*+)?(\(|EMPTY)", re.IGNORECASE,
+    r"CURVEPOLYGON|CIRCULARSTRING|COMPOUNDCURVE)\s*+((ZM|Z|M)\s*+)?(\(|EMPTY)",
+    re.IGNORECASE,
 )
 _PAIR = re.compile(r"\s*+-?\d++([.,]\d*+)?[\s;,]++-?\d")
 
@@ -150,6 +151,7 @@ def _write_wkt(document: Document, *, srid: bool = False) -> Written:
 
 F = Format
 # In the order in which a file's content is asked about them: what is certain first, what looks alike last.
+# fmt: off
 FORMATS: tuple[Format, ...] = (
     F(name="kmz", said="KMZ", endings=(".kmz",), knows=lambda c: c.is_zip,
       read=_read_kmz, write=lambda d, _: write_kmz(d)),
@@ -176,13 +178,19 @@ FORMATS: tuple[Format, ...] = (
       knows=lambda c: c.extension == ".poly" or c.has_names or bool(c.pairs),
       read=lambda c: read_poly(c.text, c.source, kind=c.kind), write=lambda d, _: write_poly(d)),
 )
+# fmt: on
 _BY_NAME = {row.name: row for row in FORMATS}
 _BY_ENDING = {ending: row for row in FORMATS for ending in row.endings}
 
 
 def read(
-    path: str | Path, *, kind: ZoneKind = ZoneKind.EXCLUSION, axis: str = "auto", near: GeoPoint | None = None,
-    areas: bool = False, far_m: float = FAR_M,
+    path: str | Path,
+    *,
+    kind: ZoneKind = ZoneKind.EXCLUSION,
+    axis: str = "auto",
+    near: GeoPoint | None = None,
+    areas: bool = False,
+    far_m: float = FAR_M,
 ) -> Document:
     """Read a file of any known format, told by its content.
 
@@ -198,7 +206,12 @@ def read(
 
 
 def parse(
-    data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, axis: str = "auto", areas: bool = False,
+    data: bytes,
+    source: str,
+    *,
+    kind: ZoneKind = ZoneKind.EXCLUSION,
+    axis: str = "auto",
+    areas: bool = False,
     extension: str = "",
 ) -> Document:
     """Return what the bytes of a file hold; see ``read``. The extension only decides between what looks alike."""
@@ -222,8 +235,12 @@ def format_of(path: str | Path, among: Sequence[str] = ()) -> str:
     suffix = Path(path).suffix.lower()
     known = among or tuple(_BY_ENDING)
     if suffix not in known:
-        raise InputError(str(path), "", f"{suffix or 'no extension'!r} is not a format that this can be written in",
-                         "use " + ", ".join(known))
+        raise InputError(
+            str(path),
+            "",
+            f"{suffix or 'no extension'!r} is not a format that this can be written in",
+            "use " + ", ".join(known),
+        )
     return _BY_ENDING[suffix].name
 
 
@@ -238,9 +255,11 @@ def write(document: Document, path: str | Path, *, format_name: str = "", part: 
 def check_place(document: Document, near: GeoPoint, far_m: float = FAR_M) -> Document:
     """Return the document with a finding if part of it lies more than ``far_m`` from ``near``."""
     frame = LocalFrame(near)
-    places = [(z.name or f"{noun} {i + 1}", z.shape)
-              for noun, kind in (("fence", ZoneKind.INCLUSION), ("obstacle", ZoneKind.EXCLUSION))
-              for i, z in enumerate(z for z in document.zones if z.kind is kind)]
+    places = [
+        (z.name or f"{noun} {i + 1}", z.shape)
+        for noun, kind in (("fence", ZoneKind.INCLUSION), ("obstacle", ZoneKind.EXCLUSION))
+        for i, z in enumerate(z for z in document.zones if z.kind is kind)
+    ]
     places += [(m.name or f"mark {i + 1}", m.geometry) for i, m in enumerate(document.marks)]
     for name, shape in places:
         center = center_of(shape)
@@ -254,7 +273,9 @@ def check_place(document: Document, near: GeoPoint, far_m: float = FAR_M) -> Doc
                 code = Code.SWAPPED_AXES
                 remedy = 'latitude and longitude look swapped: try --axis latlon (in a mission: axis = "latlon")'
         finding = Finding(
-            severity=FindingLevel.ERROR, code=code, place=name,
+            severity=FindingLevel.ERROR,
+            code=code,
+            place=name,
             text=f"lies {distance_m / 1000.0:.0f} km from the mission, at {center.lat_deg:.4f}, {center.lon_deg:.4f}",
             remedy=remedy,
         )

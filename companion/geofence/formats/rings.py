@@ -22,11 +22,11 @@ Ring = Sequence[Sequence[float]]
 
 # A tangle worse than this is not repaired: n edges can cross n² / 2 times, so a small file would take hours.
 MAX_CROSSINGS = 5000
-MAX_FACES = 2000             # of a self-crossing keep-in ring ...
+MAX_FACES = 2000  # of a self-crossing keep-in ring ...
 MAX_FACE_EDGES = 50_000_000  # ... and that times its edges: each face is held against each edge
-HOPELESS_EDGES = 20_000      # from here on GEOS takes too long to see that a tangle is none of its business ...
+HOPELESS_EDGES = 20_000  # from here on GEOS takes too long to see that a tangle is none of its business ...
 HOPELESS_CROSSINGS = 500_000  # ... as one with more crossings than this is
-DATE_LINE_DEG = 30.0         # a ring across the antimeridian that is wider is worth a word; a bay there is not
+DATE_LINE_DEG = 30.0  # a ring across the antimeridian that is wider is worth a word; a bay there is not
 _DRAWN = 32
 
 _TANGLED = "it is too tangled to be repaired"
@@ -42,7 +42,7 @@ class Findings(list[Finding]):
 
 
 def polygons_from_rings(
-    rings: Sequence[Ring], kind: ZoneKind, place: str, findings: Findings, *, closed: bool = True,
+    rings: Sequence[Ring], kind: ZoneKind, place: str, findings: Findings, *, closed: bool = True
 ) -> list[Polygon]:
     """Return the valid polygons that an outer ring and its holes (lon, lat) describe; none when nothing is left.
 
@@ -81,22 +81,30 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
     bad = ~np.isfinite(coordinates).all(axis=1)
     if bad.any():
         findings.add(
-            FindingLevel.ERROR, Code.NOT_FINITE, f"{place} vertex {int(np.argmax(bad)) + 1}",
-            "a coordinate is not a finite number", "write degrees",
+            FindingLevel.ERROR,
+            Code.NOT_FINITE,
+            f"{place} vertex {int(np.argmax(bad)) + 1}",
+            "a coordinate is not a finite number",
+            "write degrees",
         )
         return np.empty((0, 2))
     is_closed = coordinates.shape[0] > 1 and bool(np.array_equal(coordinates[0], coordinates[-1]))
     if not is_closed:
         if closed:
             findings.add(
-                FindingLevel.ERROR, Code.UNCLOSED, place,
+                FindingLevel.ERROR,
+                Code.UNCLOSED,
+                place,
                 f"the ring is not closed: it starts at {_at(coordinates[0])} and ends at {_at(coordinates[-1])}",
                 "repeat the first vertex at the end (a repair would)",
             )
         coordinates = np.vstack([coordinates, coordinates[:1]])
     if np.unique(coordinates, axis=0).shape[0] < 3:
         findings.add(
-            FindingLevel.ERROR, Code.DEGENERATE, place, "the ring has fewer than three different vertices",
+            FindingLevel.ERROR,
+            Code.DEGENERATE,
+            place,
+            "the ring has fewer than three different vertices",
             "draw an area, or a POINT or LINESTRING with a radius",
         )
         return np.empty((0, 2))
@@ -106,7 +114,9 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
         coordinates = unwrapped(coordinates)
         if float(np.ptp(coordinates[:, 0])) > DATE_LINE_DEG:
             findings.add(
-                FindingLevel.WARNING, Code.ANTIMERIDIAN, place,
+                FindingLevel.WARNING,
+                Code.ANTIMERIDIAN,
+                place,
                 "the ring spans more than 180 degrees of longitude and is read as crossing the antimeridian",
             )
         if not math.isclose(coordinates[0, 0], coordinates[-1, 0], abs_tol=1e-6):
@@ -121,17 +131,23 @@ def _on_globe(coordinates: NDArray[np.float64], place: str, findings: Findings) 
     if lat_bad.any():
         vertex = coordinates[int(np.argmax(lat_bad))]
         findings.add(
-            FindingLevel.ERROR, Code.SWAPPED_AXES if abs(vertex[0]) <= 90.0 else Code.OUT_OF_RANGE, place,
+            FindingLevel.ERROR,
+            Code.SWAPPED_AXES if abs(vertex[0]) <= 90.0 else Code.OUT_OF_RANGE,
+            place,
             f"latitude {vertex[1]:g} is outside ±90 degrees",
             'latitude and longitude look swapped: try --axis latlon (or axis = "latlon")'
-            if abs(vertex[0]) <= 90.0 else "write WGS 84 degrees",
+            if abs(vertex[0]) <= 90.0
+            else "write WGS 84 degrees",
         )
         return False
     lon_bad = np.abs(coordinates[:, 0]) > 360.0
     if lon_bad.any():
         findings.add(
-            FindingLevel.ERROR, Code.OUT_OF_RANGE, place,
-            f"longitude {coordinates[int(np.argmax(lon_bad)), 0]:g} is outside ±180 degrees", "write WGS 84 degrees",
+            FindingLevel.ERROR,
+            Code.OUT_OF_RANGE,
+            place,
+            f"longitude {coordinates[int(np.argmax(lon_bad)), 0]:g} is outside ±180 degrees",
+            "write WGS 84 degrees",
         )
     return not lon_bad.any()
 
@@ -148,14 +164,14 @@ def _repaired(polygon: Polygon, kind: ZoneKind, place: str, findings: Findings) 
     effect = (
         f"a repair would make {len(pieces)} polygon{'s' if len(pieces) != 1 else ''} of "
         f"{_hectares(pieces)} ha in place of {_hectares([polygon])} ha"
-        if pieces else _TANGLED if tangled else "nothing would be left of it"
+        if pieces
+        else _TANGLED
+        if tangled
+        else "nothing would be left of it"
     )
     code = Code.SELF_CROSSING if "intersect" in reason.lower() else Code.DEGENERATE
     name = "the ring crosses itself" if code is Code.SELF_CROSSING else "the polygon is not valid"
-    findings.add(
-        FindingLevel.ERROR, code, place, f"{name} ({_plain(reason)}); {effect}",
-        _REDRAW,
-    )
+    findings.add(FindingLevel.ERROR, code, place, f"{name} ({_plain(reason)}); {effect}", _REDRAW)
     return pieces
 
 
@@ -178,7 +194,7 @@ def is_hopeless(polygon: Polygon) -> bool:
 
     crossings = 0
     for k in np.random.default_rng(0).choice(n, _DRAWN, replace=False):
-        a, b = start[k:k + 1], end[k:k + 1]
+        a, b = start[k : k + 1], end[k : k + 1]
         cut = (side(a, b, start) * side(a, b, end) < 0.0) & (side(start, end, a) * side(start, end, b) < 0.0)
         crossings += int(np.count_nonzero(cut))
     return crossings * n > 2 * _DRAWN * HOPELESS_CROSSINGS
@@ -195,10 +211,10 @@ def is_tangled(polygon: Polygon) -> bool:
     order = np.random.default_rng(0).permutation(len(edges))
     seen = pairs = 0
     while seen < len(edges):
-        some = order[seen: 2 * seen + 1]
+        some = order[seen : 2 * seen + 1]
         pairs += tree.query(edges[some], predicate="intersects").shape[1] - 3 * len(some)  # itself and its neighbours
         seen += len(some)
-        if pairs > 2 * MAX_CROSSINGS:   # each is found from both edges
+        if pairs > 2 * MAX_CROSSINGS:  # each is found from both edges
             return True
     return False
 

@@ -16,6 +16,7 @@ from companion.words import counted
 
 # What every format that holds shapes, routes and points gathers while it is read.
 
+
 class Reading:
     """One file being read: a zone that does not say what it is, is ``kind``; read for its ``areas``, so is a pin."""
 
@@ -55,16 +56,20 @@ def items_of(points: Iterable[RoutePoint]) -> tuple[tuple[MissionItem, ...], tup
     """Return route points as waypoints and their names."""
     items, names = [], []
     for point, alt_m, name in points:
-        items.append(MissionItem(
-            command=Command.NAV_WAYPOINT, lat_e7=round(point.lat_deg * 1e7), lon_e7=round(point.lon_deg * 1e7),
-            alt_m=alt_m if math.isfinite(alt_m) else 0.0,
-        ))
+        items.append(
+            MissionItem(
+                command=Command.NAV_WAYPOINT,
+                lat_e7=round(point.lat_deg * 1e7),
+                lon_e7=round(point.lon_deg * 1e7),
+                alt_m=alt_m if math.isfinite(alt_m) else 0.0,
+            )
+        )
         names.append(name)
     return tuple(items), tuple(names) if any(names) else ()
 
 
 def pins_as_route(
-    pins: Sequence[RoutePoint], route: list[RoutePoint], places: dict[str, GeoPoint], findings: Findings,
+    pins: Sequence[RoutePoint], route: list[RoutePoint], places: dict[str, GeoPoint], findings: Findings
 ) -> None:
     """Make pins that say nothing of themselves the route of a file that has no line; one called start is its home.
 
@@ -77,27 +82,30 @@ def pins_as_route(
             route.append(pin)
     if route:
         start = ", the one called start for the start" if len(route) < len(pins) else ""
-        findings.add(FindingLevel.NOTE, Code.FORMAT, "",
-                     f"{counted(len(route), 'pin')} taken for places to sail to, in the file's order{start}")
+        findings.add(
+            FindingLevel.NOTE,
+            Code.FORMAT,
+            "",
+            f"{counted(len(route), 'pin')} taken for places to sail to, in the file's order{start}",
+        )
 
 
 def pins_as_dangers(pins: Sequence[RoutePoint], kind: ZoneKind, findings: Findings) -> list[Mark]:
     """Return pins beside a line, which tells the way itself, as what they are on a chart of dangers."""
     if pins:
         findings.add(
-            FindingLevel.NOTE, Code.FORMAT, "", f"{counted(len(pins), 'pin')} beside the line taken for dangers")
+            FindingLevel.NOTE, Code.FORMAT, "", f"{counted(len(pins), 'pin')} beside the line taken for dangers"
+        )
     return [Mark(geometry=Point(p.lon_deg, p.lat_deg), kind=kind, name=name) for p, _, name in pins]
 
 
 def line_as_area(
-    points: Sequence[GeoPoint], kind: ZoneKind, name: str, place: str, *, findings: Findings,
+    points: Sequence[GeoPoint], kind: ZoneKind, name: str, place: str, *, findings: Findings
 ) -> list[Zone | Mark]:
     """Return a drawn line as what it is on a chart of dangers: closed, an area; open, a line to stay clear of."""
     lonlat = [(p.lon_deg, p.lat_deg) for p in points]
     if len(lonlat) >= 4 and lonlat[0] == lonlat[-1]:
-        return [
-            Zone(kind=kind, shape=p, name=name) for p in polygons_from_rings([lonlat], kind, place, findings)
-        ]
+        return [Zone(kind=kind, shape=p, name=name) for p in polygons_from_rings([lonlat], kind, place, findings)]
     if len(set(lonlat)) < 2:
         return []
     return [Mark(geometry=LineString(unwrapped(lonlat)), kind=kind, name=name)]

@@ -18,8 +18,8 @@ from companion.disk import read_regular
 from companion.errors import InputError, unreadable
 
 MAX_BYTES = 16 * 1024 * 1024  # a coast of 500,000 vertices; more is a mistake or an attack
-MAX_POSITIONS = 500_000       # vertices and items that one file may hold
-MAX_DEPTH = 64                # brackets within brackets
+MAX_POSITIONS = 500_000  # vertices and items that one file may hold
+MAX_DEPTH = 64  # brackets within brackets
 
 _DECIMAL_COMMA = re.compile(r"(?<![\d,])(-?\d+),(\d+)(?![\d,])")
 
@@ -94,6 +94,7 @@ def printable(text: str) -> str:
 
 
 # A JSON value that knows where it stands, so that every complaint names the place.
+
 
 @dataclass(frozen=True, slots=True)
 class JsonNode:
@@ -171,8 +172,12 @@ def parse_json(text: str, source: str) -> JsonNode:
         what, _, byte = str(error).partition("(byte ")
         number = byte.rstrip(")")
         line = data[: int(number)].count(b"\n") + 1 if number.isdigit() else data.count(b"\n") + 1
-        raise InputError(source, f"line {line}", f"is not JSON ({what.strip().rstrip(':')})",
-                         "is the file cut off?" if "truncated" in what else "") from None
+        raise InputError(
+            source,
+            f"line {line}",
+            f"is not JSON ({what.strip().rstrip(':')})",
+            "is the file cut off?" if "truncated" in what else "",
+        ) from None
     except (RecursionError, UnicodeDecodeError):
         raise InputError(source, "", "is nested too deeply or not UTF-8") from None
 
@@ -180,12 +185,19 @@ def parse_json(text: str, source: str) -> JsonNode:
 def _kind(value: object) -> str:
     if value is None:
         return "null"
-    names = {dict: "an object", list: "a list", str: "a text", bool: "true or false", int: "a number",
-             float: "a number"}
+    names = {
+        dict: "an object",
+        list: "a list",
+        str: "a text",
+        bool: "true or false",
+        int: "a number",
+        float: "a number",
+    }
     return names.get(type(value), "a value")
 
 
 # XML that strangers wrote: no DTD, no entities, no external references, bounded depth.
+
 
 def parse_xml(data: bytes, source: str) -> Any:
     """Return the root element. Raises InputError with the line for anything malformed or hostile."""
@@ -197,8 +209,9 @@ def parse_xml(data: bytes, source: str) -> Any:
         line, column = error.position
         what = str(error).split(":", maxsplit=1)[0]
         cut = "no element" in what or "unclosed" in what
-        raise InputError(source, f"line {line} column {column + 1}", f"is not XML ({what})",
-                         "is the file cut off?" if cut else "") from None
+        raise InputError(
+            source, f"line {line} column {column + 1}", f"is not XML ({what})", "is the file cut off?" if cut else ""
+        ) from None
     except (ValueError, LookupError) as error:
         raise InputError(source, "line 1", f"is not XML ({str(error)[:60]})", "save it as UTF-8") from None
     level = [root]

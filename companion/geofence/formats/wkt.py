@@ -29,13 +29,27 @@ Coordinates = list[tuple[float, float]]
 _LEXEME = re.compile(r"\s*(?:([A-Za-z]+)|([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)|([(),;]))")
 _SRID = re.compile(r"\s*SRID\s*=\s*(\d+)\s*;", re.IGNORECASE)
 _PREFIX = re.compile(r"([^|()]*)\|(?:([^|()]*)\|)?")
-KINDS: dict[str, ZoneKind | None] = {   # what may stand between the bars
-    "": None, "inclusion": ZoneKind.INCLUSION, "keep-in": ZoneKind.INCLUSION, "fence": ZoneKind.INCLUSION,
-    "exclusion": ZoneKind.EXCLUSION, "keep-out": ZoneKind.EXCLUSION, "obstacle": ZoneKind.EXCLUSION,
+KINDS: dict[str, ZoneKind | None] = {  # what may stand between the bars
+    "": None,
+    "inclusion": ZoneKind.INCLUSION,
+    "keep-in": ZoneKind.INCLUSION,
+    "fence": ZoneKind.INCLUSION,
+    "exclusion": ZoneKind.EXCLUSION,
+    "keep-out": ZoneKind.EXCLUSION,
+    "obstacle": ZoneKind.EXCLUSION,
 }
 _NAMES = {
-    "POINT", "LINESTRING", "LINEARRING", "POLYGON", "TRIANGLE", "MULTIPOINT", "MULTILINESTRING", "MULTIPOLYGON",
-    "GEOMETRYCOLLECTION", "POLYHEDRALSURFACE", "TIN",
+    "POINT",
+    "LINESTRING",
+    "LINEARRING",
+    "POLYGON",
+    "TRIANGLE",
+    "MULTIPOINT",
+    "MULTILINESTRING",
+    "MULTIPOLYGON",
+    "GEOMETRYCOLLECTION",
+    "POLYHEDRALSURFACE",
+    "TIN",
 }
 
 
@@ -66,8 +80,9 @@ def drawings_of(text: str, source: str) -> list[Drawing]:
     """Return the statements of a WKT text, each with what was drawn. Raises InputError where it is no WKT."""
     findings = Findings()
     return [
-        Drawing(s.line, s.last, s.name, s.kind,
-                tuple(_Scanner(s.text, source, s.line, findings, latlon=False).geometries()))
+        Drawing(
+            s.line, s.last, s.name, s.kind, tuple(_Scanner(s.text, source, s.line, findings, latlon=False).geometries())
+        )
         for s in _statements(text, source)
     ]
 
@@ -93,19 +108,26 @@ def read_wkt(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, lat
         held += scanner.positions
     if not zones and not marks and not findings:
         findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no geometry", "an empty file is not 'no obstacles'")
-    return Document(
-        source=source, format="wkt", zones=tuple(zones), marks=tuple(marks), findings=tuple(findings)
-    )
+    return Document(source=source, format="wkt", zones=tuple(zones), marks=tuple(marks), findings=tuple(findings))
 
 
 def _collect(
-    name: str, body: object, statement: _Statement, kind: ZoneKind, *,
-    findings: Findings, zones: list[Zone], marks: list[Mark],
+    name: str,
+    body: object,
+    statement: _Statement,
+    kind: ZoneKind,
+    *,
+    findings: Findings,
+    zones: list[Zone],
+    marks: list[Mark],
 ) -> None:
     own, place = statement.kind or kind, f"line {statement.line}"
     if body is None:
         findings.add(
-            FindingLevel.ERROR, Code.EMPTY, place, f"{name} EMPTY holds nothing",
+            FindingLevel.ERROR,
+            Code.EMPTY,
+            place,
+            f"{name} EMPTY holds nothing",
             "draw it or remove it; an empty obstacle is not 'no obstacles'",
         )
         return
@@ -113,7 +135,10 @@ def _collect(
         coordinates = [tuple(c) for c in body] if isinstance(body, list) else []
         if any(abs(y) > 90.0 or abs(x) > 360.0 for x, y in coordinates):
             findings.add(
-                FindingLevel.ERROR, Code.SWAPPED_AXES, place, "a position is not on the globe (lat ±90, lon ±180)",
+                FindingLevel.ERROR,
+                Code.SWAPPED_AXES,
+                place,
+                "a position is not on the globe (lat ±90, lon ±180)",
                 "are they swapped? try --axis latlon",
             )
             return
@@ -130,7 +155,7 @@ def _collect(
 def _statements(text: str, source: str) -> Iterator[_Statement]:
     """Yield the statements: a geometry may run over several lines; it ends where its brackets close."""
     require_shallow("\n".join(line.split("#", 1)[0] for line in text.split("\n")), source)
-    pending: list[str] = []   # the lines of the statement being gathered
+    pending: list[str] = []  # the lines of the statement being gathered
     start, depth, is_whole = 0, 0, False
     for number, raw in enumerate(text.split("\n"), start=1):
         line = raw.split("#", 1)[0].rstrip()
@@ -162,7 +187,7 @@ def _statement(text: str, line: int, last: int, source: str) -> _Statement:
         if word not in KINDS:
             raise InputError(source, f"line {line}", f"{word!r} is not a kind", "write inclusion or exclusion")
         kind = KINDS[word]
-        text = text[prefix.end():]
+        text = text[prefix.end() :]
     return _Statement(line, last, name, kind, text)
 
 
@@ -185,7 +210,10 @@ class _Scanner:
             self._at = srid.end()
             if srid.group(1) not in {"0", "4326"}:
                 findings.add(
-                    FindingLevel.ERROR, Code.WRONG_SRID, f"line {line}", f"SRID {srid.group(1)} is not WGS 84 degrees",
+                    FindingLevel.ERROR,
+                    Code.WRONG_SRID,
+                    f"line {line}",
+                    f"SRID {srid.group(1)} is not WGS 84 degrees",
                     "transform it to EPSG:4326 first (ST_Transform, QGIS 'Save as')",
                 )
         self._kind, self._word = self._next()
@@ -201,7 +229,7 @@ class _Scanner:
     def _next(self) -> tuple[str, str]:
         match = _LEXEME.match(self._text, self._at)
         if not match:
-            rest = self._text[self._at:].strip()
+            rest = self._text[self._at :].strip()
             if rest:
                 raise self._fail(f"{rest[:20]!r} does not belong in WKT", _hint(rest))
             return "end", ""
@@ -247,9 +275,7 @@ class _Scanner:
             yield name, None
             return
         if dims:
-            self._findings.add(
-                FindingLevel.NOTE, Code.DROPPED, self._place(), f"the {dims} coordinates are not used"
-            )
+            self._findings.add(FindingLevel.NOTE, Code.DROPPED, self._place(), f"the {dims} coordinates are not used")
         yield from self._body(name)
 
     def _body(self, name: str) -> Iterator[tuple[str, object]]:
@@ -354,6 +380,7 @@ def _geometries(document: Document) -> Iterator[tuple[str, ZoneKind, BaseGeometr
 
 def wrapped(geometry: BaseGeometry) -> BaseGeometry:
     """Return the geometry with every longitude on ±180, as files have it."""
+
     def bring(coordinates: NDArray[np.float64]) -> NDArray[np.float64]:
         out = coordinates.copy()
         out[:, 0] = [wrap_lon_deg(float(x)) for x in out[:, 0]]

@@ -35,10 +35,10 @@ from companion.words import counted
 # A ground station draws for an autopilot that sails straight lines. The voyage takes from it where to go; whatever else
 # the items ask for is either what the voyage does, too, or refused: nothing that was drawn is passed over in silence.
 
-MAX_GOALS = 1000   # that laps may make of a drawing; a voyage of more is meant otherwise
-STAY_M = 25.0      # half the side of the box in which the boat stays: its loiter swings 12 m
-MAX_STEPS = 20 * MAX_GOALS   # jumps among jumps that pass no waypoint end here
-GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})   # MAV_FRAMEs whose x and y are latitude and longitude
+MAX_GOALS = 1000  # that laps may make of a drawing; a voyage of more is meant otherwise
+STAY_M = 25.0  # half the side of the box in which the boat stays: its loiter swings 12 m
+MAX_STEPS = 20 * MAX_GOALS  # jumps among jumps that pass no waypoint end here
+GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})  # MAV_FRAMEs whose x and y are latitude and longitude
 REDRAW = "change the drawing and upload it again"
 
 _LOITERS = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TIME, Command.NAV_LOITER_TURNS})
@@ -88,13 +88,13 @@ class DrawnCourse:
         """What of it cannot be sailed."""
         return tuple(f for f in self.findings if f.severity is FindingLevel.ERROR)
 
-
     def skipper(self, options: SkipperOptions) -> SkipperOptions:
         """Return the ``[skipper]`` table with laps, end and station as they are drawn; what is not drawn stays."""
         drawn: dict[str, Any] = {"laps": self.laps, "end": self.end, "station_s": self.station_s}
         plain = DrawnCourse()
         return msgspec.structs.replace(
-            options, **{name: value for name, value in drawn.items() if value != getattr(plain, name)})
+            options, **{name: value for name, value in drawn.items() if value != getattr(plain, name)}
+        )
 
 
 def command_name(command: int) -> str:
@@ -119,21 +119,31 @@ def course_of(items: Sequence[MissionItem]) -> DrawnCourse:
     if ending == Command.NAV_RETURN_TO_LAUNCH:
         end, walked = "home", walked[:-1]
     if ending in _ENDS and last < len(items):
-        found.say(last + 1, f"stands behind item {last} ({found.name(last)}), where the mission ends: it would never "
-                  "be sailed", "take one of them out")
+        found.say(
+            last + 1,
+            f"stands behind item {last} ({found.name(last)}), where the mission ends: it would never be sailed",
+            "take one of them out",
+        )
     final = walked[-1] if walked and end != "home" else None
     station_s = 0.0 if final is None else max(0.0, _stay_s(items[final - 1]))
     if final is not None and station_s > 0.0:
         found.say(
-            final, f"{found.name(final)} of {station_s:g} s is the last: she stays until told", "", FindingLevel.NOTE)
+            final, f"{found.name(final)} of {station_s:g} s is the last: she stays until told", "", FindingLevel.NOTE
+        )
     stays = {n: max(0.0, _stay_s(items[n - 1])) for n in walked}
     if final is not None and walked.count(final) == 1:
-        stays[final] = 0.0   # the mission's own end keeps the boat
-    stops = [MissionStop(number=n, point=items[n - 1].point,
-                         stay_s=stays[n]) for n in walked if _has_place(items[n - 1])]
+        stays[final] = 0.0  # the mission's own end keeps the boat
+    stops = [
+        MissionStop(number=n, point=items[n - 1].point, stay_s=stays[n]) for n in walked if _has_place(items[n - 1])
+    ]
     lap = _lap(stops) if jumps else len(stops)
-    return DrawnCourse(stops=tuple(stops[:lap]), laps=len(stops) // lap if lap else 1, end=end, station_s=station_s,
-                  findings=found.ordered())
+    return DrawnCourse(
+        stops=tuple(stops[:lap]),
+        laps=len(stops) // lap if lap else 1,
+        end=end,
+        station_s=station_s,
+        findings=found.ordered(),
+    )
 
 
 class _Found:
@@ -148,8 +158,9 @@ class _Found:
 
     def say(self, number: int, text: str, remedy: str = REDRAW, severity: FindingLevel = FindingLevel.ERROR) -> None:
         code = Code.NOT_CARRIED if severity is FindingLevel.ERROR else Code.DROPPED
-        self._findings.setdefault((number, text), Finding(
-            severity=severity, code=code, place=f"item {number}", text=text, remedy=remedy))
+        self._findings.setdefault(
+            (number, text), Finding(severity=severity, code=code, place=f"item {number}", text=text, remedy=remedy)
+        )
 
     def ordered(self) -> tuple[Finding, ...]:
         return tuple(self._findings[key] for key in sorted(self._findings, key=lambda key: key[0]))
@@ -171,8 +182,11 @@ def _judged(items: Sequence[MissionItem], found: _Found) -> dict[int, tuple[int,
         elif item.command not in _STOPS and item.command != Command.NAV_RETURN_TO_LAUNCH:
             found.say(number, f"{name} is nothing that a voyage does", "take it out of the drawing and upload it again")
         if item.command in _STOPS and item.frame not in GLOBAL_FRAMES:
-            found.say(number, f"{name} is in frame {item.frame}, which has no latitude and longitude",
-                      "draw it in a global frame")
+            found.say(
+                number,
+                f"{name} is in frame {item.frame}, which has no latitude and longitude",
+                "draw it in a global frame",
+            )
         elif item.command in _STOPS and not _has_place(item):
             found.say(number, f"{name} has no place (0, 0)", "place it on the map and upload again")
     return jumps
@@ -184,8 +198,9 @@ def _stay_s(item: MissionItem) -> float:
 
 def _lap(stops: list[MissionStop]) -> int:
     """Return how many stops are one lap: all of them, where they do not repeat."""
-    return next((p for p in range(1, len(stops)) if len(stops) % p == 0 and stops == stops[:p] * (len(stops) // p)),
-                len(stops))
+    return next(
+        (p for p in range(1, len(stops)) if len(stops) % p == 0 and stops == stops[:p] * (len(stops) // p)), len(stops)
+    )
 
 
 def _has_place(item: MissionItem) -> bool:
@@ -200,8 +215,10 @@ def _jump_trouble(items: Sequence[MissionItem], number: int, item: MissionItem) 
     if target != int(target) or not 1 <= target <= len(items):
         return f"jumps to item {target:g}, which is not there", "let it jump to an earlier item"
     if target > number:
-        return f"jumps forward to item {target:g}: what lies between would be passed over", \
-            "take out what shall not be sailed"
+        return (
+            f"jumps forward to item {target:g}: what lies between would be passed over",
+            "take out what shall not be sailed",
+        )
     if repeats < 0:
         return "repeats without end (-1)", f"write how often, up to {MAX_GOALS} goals in all"
     if repeats > MAX_GOALS:
@@ -236,8 +253,8 @@ def _walk(items: Sequence[MissionItem], jumps: dict[int, tuple[int, int]]) -> tu
 
 
 SOURCE = "the drawing"
-NO_NAME = "drawn"      # the mission of a drawing, without a mission file that names it
-_TAG_DIGITS = 6        # of the drawing's hash in its mission's name: two drawings are two voyages
+NO_NAME = "drawn"  # the mission of a drawing, without a mission file that names it
+_TAG_DIGITS = 6  # of the drawing's hash in its mission's name: two drawings are two voyages
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -256,15 +273,24 @@ class DrawnMission:
 
 
 def drawing_of(
-    items: Sequence[MissionItem], fence: Sequence[MissionItem], rally: Sequence[MissionItem],
+    items: Sequence[MissionItem],
+    fence: Sequence[MissionItem],
+    rally: Sequence[MissionItem],
     home: GeoPoint | None = None,
 ) -> Document:
     """Return the lists of an autopilot (the mission without its home) as a document; faults are in its findings."""
     findings = Findings()
     zones, return_point = items_to_zones(fence, findings, first=1)
     return Document(
-        source=SOURCE, format="autopilot", zones=zones, items=tuple(items), home=home, rally=tuple(rally),
-        return_point=return_point, findings=tuple(replace(f, place=f"fence {f.place}") for f in findings))
+        source=SOURCE,
+        format="autopilot",
+        zones=zones,
+        items=tuple(items),
+        home=home,
+        rally=tuple(rally),
+        return_point=return_point,
+        findings=tuple(replace(f, place=f"fence {f.place}") for f in findings),
+    )
 
 
 def kept(document: Document) -> Written:
@@ -288,22 +314,37 @@ def drawn_mission(document: Document, settings: MissionOptions, path: Path, plan
     """
     course = course_of(document.items)
     refusals = [*(f for f in document.findings if f.severity is FindingLevel.ERROR), *course.refusals]
-    refusals += [_refusal(f"rally point {n}", "has no place (0, 0)") for n, r in enumerate(document.rally, start=1)
-                 if not (r.lat_e7 or r.lon_e7)]
+    refusals += [
+        _refusal(f"rally point {n}", "has no place (0, 0)")
+        for n, r in enumerate(document.rally, start=1)
+        if not (r.lat_e7 or r.lon_e7)
+    ]
     if not document.items:
-        refusals.append(_refusal("", "there is no mission on the autopilot" + (
-            ", only a fence" if document.zones else ""), "draw waypoints and upload them"))
+        refusals.append(
+            _refusal(
+                "",
+                "there is no mission on the autopilot" + (", only a fence" if document.zones else ""),
+                "draw waypoints and upload them",
+            )
+        )
     elif not course.stops and not refusals:
         refusals.append(_refusal("", "it leads nowhere: there is no waypoint in it", "draw one and upload it"))
     if refusals:
         return DrawnMission(mission=None, refusals=tuple(refusals))
     options = msgspec.structs.replace(
-        settings, name=f"{settings.name or NO_NAME} {tag(document)}", from_autopilot=True,
+        settings,
+        name=f"{settings.name or NO_NAME} {tag(document)}",
+        from_autopilot=True,
         goal=tuple(stop.goal(f"item {stop.number}") for stop in course.stops),
-        refuge=(*settings.refuge, *(RefugeOptions(
-            lat=r.point.lat_deg, lon=r.point.lon_deg, name=f"rally {n}")
-            for n, r in enumerate(document.rally, start=1))),
-        skipper=course.skipper(settings.skipper))
+        refuge=(
+            *settings.refuge,
+            *(
+                RefugeOptions(lat=r.point.lat_deg, lon=r.point.lon_deg, name=f"rally {n}")
+                for n, r in enumerate(document.rally, start=1)
+            ),
+        ),
+        skipper=course.skipper(settings.skipper),
+    )
     # The file of the drawing belongs to the area by name; its zones are taken from the drawing itself.
     names = {f"[[goal]] {n}": f"item {stop.number}" for n, stop in enumerate(course.stops, start=1)}
     names |= {f"[[refuge]] {len(settings.refuge) + n}": f"rally point {n}" for n, _ in enumerate(document.rally, 1)}
@@ -315,8 +356,10 @@ def drawn_mission(document: Document, settings: MissionOptions, path: Path, plan
         return DrawnMission(mission=None, refusals=(_refusal(names[error.place], error.problem),))
     area = msgspec.structs.replace(options.area, obstacles=(*options.area.obstacles, str(plan.absolute())))
     mission = replace(mission, options=msgspec.structs.replace(options, area=area))
-    refusals = [_refusal(names.get(place, f"{path}: {place}"), problem, REDRAW if place in names else remedy)
-                for place, problem, remedy in place_troubles(mission)]
+    refusals = [
+        _refusal(names.get(place, f"{path}: {place}"), problem, REDRAW if place in names else remedy)
+        for place, problem, remedy in place_troubles(mission)
+    ]
     if refusals:
         return DrawnMission(mission=None, refusals=tuple(refusals))
     notes = [f for f in (*document.findings, *course.findings) if f.severity is not FindingLevel.ERROR]

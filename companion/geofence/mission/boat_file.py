@@ -19,7 +19,7 @@ from companion.geofence.mission.options import BoatOptions
 from companion.words import expected
 
 MAX_BYTES = 1_000_000
-OWN = ("file", "polar")   # keys of a mission's [boat] that are none of the boat's
+OWN = ("file", "polar")  # keys of a mission's [boat] that are none of the boat's
 
 
 class PolarTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -56,8 +56,7 @@ def parse_boat_file(text: str, source: str) -> BoatFile:
         return msgspec.convert(raw, BoatFile)
     except msgspec.ValidationError as error:
         what, _, where = str(error).partition(" - at `$")
-        raise InputError(
-            source, where.strip("`."), expected(what), "companion boat guess writes an example") from None
+        raise InputError(source, where.strip("`."), expected(what), "companion boat guess writes an example") from None
 
 
 def with_boat_file(options: BoatOptions, mission_text: str, path: Path) -> BoatOptions:

@@ -10,13 +10,7 @@ from companion.geofence.formats.losses import Losses, Written
 from companion.geofence.formats.registry import write
 from companion.geofence.mission.autopilot_mission import MissionStop, course_of
 from companion.geofence.mission.mission import Mission
-from companion.geofence.mission.options import (
-    AreaOptions,
-    MissionOptions,
-    RefugeOptions,
-    SkipperOptions,
-    StartOptions,
-)
+from companion.geofence.mission.options import AreaOptions, MissionOptions, RefugeOptions, SkipperOptions, StartOptions
 from companion.geofence.mission.text import dump_options
 from companion.geofence.shapes import Circle, Zone, ZoneKind
 from companion.messages import Command, GeoPoint, waypoint
@@ -25,8 +19,9 @@ from companion.messages import Command, GeoPoint, waypoint
 def document_of(mission: Mission) -> Document:
     """Return a mission as a document: goals as waypoints, the start as home, obstacles and fence as zones."""
     return Document(
-        source=str(mission.path), format="toml", zones=(*mission.area.fence.zones,
-                                                        *(o.zone() for o in mission.area.obstacles)),
+        source=str(mission.path),
+        format="toml",
+        zones=(*mission.area.fence.zones, *(o.zone() for o in mission.area.obstacles)),
         items=tuple(waypoint(g.point) for g in mission.goals),
         item_names=tuple(g.name for g in mission.goals) if any(g.name for g in mission.goals) else (),
         home=mission.start,
@@ -44,8 +39,10 @@ def goal_losses(mission: Mission) -> Losses:
     if any(g.box or g.search for g in mission.goals):
         losses.add(FindingLevel.WARNING, "of a box or a search only its roomiest place is carried by this format")
     if any(g.field for g in mission.goals):
-        losses.add(FindingLevel.WARNING,
-                   "of a field only the place where the mission leads meanwhile is carried by this format")
+        losses.add(
+            FindingLevel.WARNING,
+            "of a field only the place where the mission leads meanwhile is carried by this format",
+        )
     plain = replace_defaults(mission.options)
     if plain:
         losses.add(FindingLevel.NOTE, f"the mission's own settings ({', '.join(plain)}) are not carried by this format")
@@ -55,9 +52,11 @@ def goal_losses(mission: Mission) -> Losses:
 def replace_defaults(options: MissionOptions) -> list[str]:
     """Return the names of the tables that differ from their defaults."""
     default = MissionOptions(goal=options.goal)
-    return [t for t in ("field", "risk", "boat", "wind", "operator", "skipper", "planner", "passage", "safety",
-                        "traffic")
-            if getattr(options, t) != getattr(default, t)]
+    return [
+        t
+        for t in ("field", "risk", "boat", "wind", "operator", "skipper", "planner", "passage", "safety", "traffic")
+        if getattr(options, t) != getattr(default, t)
+    ]
 
 
 # Nothing is permitted by default; a new file names what could be.
@@ -81,9 +80,16 @@ class MissionFiles:
 
 
 def mission_files(
-    document: Document, name: str, *, start: GeoPoint | None = None, goals: tuple[GeoPoint, ...] = (),
-    margin_m: float | None = None, floor_m: float | None = None, radius_m: float | None = None,
-    point_radius_m: float | None = None, land: Document | None = None,
+    document: Document,
+    name: str,
+    *,
+    start: GeoPoint | None = None,
+    goals: tuple[GeoPoint, ...] = (),
+    margin_m: float | None = None,
+    floor_m: float | None = None,
+    radius_m: float | None = None,
+    point_radius_m: float | None = None,
+    land: Document | None = None,
 ) -> MissionFiles:
     """Return the files of a mission made from a drawing.
 
@@ -94,16 +100,21 @@ def mission_files(
     course = course_of(() if goals else document.items)
     for finding in course.findings:
         is_loss = finding.severity is FindingLevel.ERROR
-        losses.add(FindingLevel.WARNING if is_loss else FindingLevel.NOTE,
-                   f"{finding.place}: {finding.text}" + (": not carried over" if is_loss else ""))
+        losses.add(
+            FindingLevel.WARNING if is_loss else FindingLevel.NOTE,
+            f"{finding.place}: {finding.text}" + (": not carried over" if is_loss else ""),
+        )
     names = document.item_names or ("",) * len(document.items)
     points = [MissionStop(number=n, point=point).goal("", radius_m) for n, point in enumerate(goals, start=1)]
     goal_options = points or [stop.goal(names[stop.number - 1], radius_m) for stop in course.stops]
     if not goal_options:
         raise ValueError("there is no goal: give --goal, or draw waypoints")
     home = start or document.home
-    whole = replace(document, zones=(*document.zones, *(land.zones if land else ())),
-                    marks=(*document.marks, *(land.marks if land else ())))
+    whole = replace(
+        document,
+        zones=(*document.zones, *(land.zones if land else ())),
+        marks=(*document.marks, *(land.marks if land else ())),
+    )
     stem = re.sub(r"[^\w-]+", "-", name).strip("-").lower() or "mission"
     files: dict[str, bytes] = {}
     solid = replace(whole, zones=tuple(z for z in whole.zones if z.kind is ZoneKind.EXCLUSION))
@@ -121,11 +132,14 @@ def mission_files(
     defaults = AreaOptions()
     margin = margin_m if margin_m is not None else defaults.margin_m
     options = MissionOptions(
-        name=name, goal=tuple(goal_options),
+        name=name,
+        goal=tuple(goal_options),
         start=StartOptions(lat=home.lat_deg, lon=home.lon_deg) if home is not None else None,
         refuge=tuple(RefugeOptions(lat=r.point.lat_deg, lon=r.point.lon_deg) for r in document.rally),
         area=AreaOptions(
-            obstacles=obstacle_names, fence=fence_name, margin_m=margin,
+            obstacles=obstacle_names,
+            fence=fence_name,
+            margin_m=margin,
             margin_floor_m=min(defaults.margin_floor_m if floor_m is None else floor_m, margin),
             point_radius_m=point_radius_m if point_radius_m is not None else defaults.point_radius_m,
         ),

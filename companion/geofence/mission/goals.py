@@ -26,13 +26,13 @@ from companion.geofence.mission.options import (
 from companion.geofence.shapes import Shape, ZoneKind, center_of, polygon_en
 from companion.messages import GeoPoint
 
-NARROWEST_M = 10.0   # between what is kept clear of the two marks: a track strays 3 m to either side, and tacks
-PREVIEW_M = 5.0      # previews sail to within this of a gate's middle
-LOITER_ROOM_M = 16.0   # a sailboat's loiter swings 12 m, about a place that is met within 3 m
-LEAST_WATER = 0.5      # share of a search's area
-MOST_SWEEPS = 200      # each is two plans and two uploads
-WIDEST_M = 2000.0    # a longer line is two marks that do not belong together
-WATER_M = 3000.0     # across: what a field speaks of, or leads out of, is looked over from where the boat is
+NARROWEST_M = 10.0  # between what is kept clear of the two marks: a track strays 3 m to either side, and tacks
+PREVIEW_M = 5.0  # previews sail to within this of a gate's middle
+LOITER_ROOM_M = 16.0  # a sailboat's loiter swings 12 m, about a place that is met within 3 m
+LEAST_WATER = 0.5  # share of a search's area
+MOST_SWEEPS = 200  # each is two plans and two uploads
+WIDEST_M = 2000.0  # a longer line is two marks that do not belong together
+WATER_M = 3000.0  # across: what a field speaks of, or leads out of, is looked over from where the boat is
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,13 +133,17 @@ class GoalReader:
         point = GeoPoint(lat_deg=goal.lat, lon_deg=goal.lon)
         if isinstance(goal, FieldOptions):
             return MissionGoal(point=point, radius_m=goal.radius_m, name=goal.name, field=self._by_field(goal, place))
-        return MissionGoal(point=point, radius_m=goal.radius_m, rounding=goal.rounding, name=goal.name,
-                    bandwidth_m=goal.bandwidth_m)
+        return MissionGoal(
+            point=point, radius_m=goal.radius_m, rounding=goal.rounding, name=goal.name, bandwidth_m=goal.bandwidth_m
+        )
 
     def waters_of(self, options: MissionOptions) -> dict[str, Shape]:
         """Return the water that each atom of a field leads out of, by its name."""
-        return {name: self._water(atom.polygon, f"[field.{name}] polygon") for name, atom in options.field.items()
-                if isinstance(atom, LeaveAtomOptions)}
+        return {
+            name: self._water(atom.polygon, f"[field.{name}] polygon")
+            for name, atom in options.field.items()
+            if isinstance(atom, LeaveAtomOptions)
+        }
 
     def _by_field(self, goal: FieldOptions, place: str) -> GoalField:
         source, needs_water = str(self.path), goal.until in {"vessel", "outside"}
@@ -148,8 +152,12 @@ class GoalReader:
         if needs_water and goal.polygon is None:
             raise InputError(source, f"{place} until", f'"{goal.until}" names no water', "add polygon")
         if goal.polygon is not None and not needs_water:
-            raise InputError(source, f"{place} polygon", f'until = "{goal.until}" does not ask for any water',
-                             'leave it out, or write until = "vessel" or "outside"')
+            raise InputError(
+                source,
+                f"{place} polygon",
+                f'until = "{goal.until}" does not ask for any water',
+                'leave it out, or write until = "vessel" or "outside"',
+            )
         shape = None if goal.polygon is None else self._water(goal.polygon, f"{place} polygon")
         return GoalField(text=goal.field, until=goal.until, for_s=goal.for_s, shape=shape)
 
@@ -158,8 +166,12 @@ class GoalReader:
         west, south, east, north = polygon_en(shape, LocalFrame(center_of(shape)), cover=False).bounds
         across_m = float(np.hypot(east - west, north - south))
         if across_m > WATER_M:
-            raise InputError(str(self.path), place, f"is {across_m / 1000.0:.1f} km across",
-                             f"{WATER_M / 1000.0:g} km are the most for what a field leads out of or watches")
+            raise InputError(
+                str(self.path),
+                place,
+                f"is {across_m / 1000.0:.1f} km across",
+                f"{WATER_M / 1000.0:g} km are the most for what a field leads out of or watches",
+            )
         return shape
 
     def _box(self, goal: BoxOptions, place: str, area: Area) -> MissionGoal:
@@ -169,10 +181,18 @@ class GoalReader:
         room = shapely.maximum_inscribed_circle(water, tolerance=0.5) if not water.is_empty else None
         room_m = 0.0 if room is None else float(room.length)
         if room is None or room_m < LOITER_ROOM_M:
-            raise InputError(str(self.path), place, f"the roomiest place in it has {room_m:.0f} m about it: a loiter "
-                             f"needs {LOITER_ROOM_M:g} m", "draw a larger box, or in freer water")
-        return MissionGoal(point=frame.geo_from_en(*room.coords[0]), radius_m=room_m, name=goal.name,
-                    box=GoalBox(shape=shape, for_s=goal.for_s))
+            raise InputError(
+                str(self.path),
+                place,
+                f"the roomiest place in it has {room_m:.0f} m about it: a loiter needs {LOITER_ROOM_M:g} m",
+                "draw a larger box, or in freer water",
+            )
+        return MissionGoal(
+            point=frame.geo_from_en(*room.coords[0]),
+            radius_m=room_m,
+            name=goal.name,
+            box=GoalBox(shape=shape, for_s=goal.for_s),
+        )
 
     def _search(self, goal: SearchOptions, place: str, area: Area) -> MissionGoal:
         shape = self._shape(goal.polygon, f"{place} polygon")
@@ -180,18 +200,34 @@ class GoalReader:
         whole, water = polygon_en(shape, frame, cover=False), free_water(shape, frame, area)
         share = float(water.area / whole.area)
         if share < LEAST_WATER:
-            raise InputError(str(self.path), place, f"only {100.0 * share:.0f} % of it is free water",
-                             "draw it in the water, or correct the area's files")
+            raise InputError(
+                str(self.path),
+                place,
+                f"only {100.0 * share:.0f} % of it is free water",
+                "draw it in the water, or correct the area's files",
+            )
         sweeps = float(water.area) / goal.swath_m / max(goal.swath_m, float(np.sqrt(whole.area)))
         if sweeps > MOST_SWEEPS:
-            raise InputError(str(self.path), f"{place} swath_m", f"{goal.swath_m:g} m make about {sweeps:.0f} sweeps",
-                             f"write a larger swath, or a smaller area: {MOST_SWEEPS} are the most")
+            raise InputError(
+                str(self.path),
+                f"{place} swath_m",
+                f"{goal.swath_m:g} m make about {sweeps:.0f} sweeps",
+                f"write a larger swath, or a smaller area: {MOST_SWEEPS} are the most",
+            )
         if goal.swath_m > float(np.sqrt(whole.area)):
-            raise InputError(str(self.path), f"{place} swath_m", f"{goal.swath_m:g} m is wider than the area itself",
-                             "write what is seen from the track, or make it a point to sail to")
+            raise InputError(
+                str(self.path),
+                f"{place} swath_m",
+                f"{goal.swath_m:g} m is wider than the area itself",
+                "write what is seen from the track, or make it a point to sail to",
+            )
         room = shapely.maximum_inscribed_circle(water, tolerance=0.5)
-        return MissionGoal(point=frame.geo_from_en(*room.coords[0]), radius_m=float(room.length), name=goal.name,
-                    search=GoalSearch(shape=shape, swath_m=goal.swath_m, coverage=goal.coverage))
+        return MissionGoal(
+            point=frame.geo_from_en(*room.coords[0]),
+            radius_m=float(room.length),
+            name=goal.name,
+            search=GoalSearch(shape=shape, swath_m=goal.swath_m, coverage=goal.coverage),
+        )
 
     def _shape(self, text: str, place: str) -> Shape:
         """Return the one polygon or circle that WKT, or a file, holds."""
@@ -199,12 +235,17 @@ class GoalReader:
         if is_file(text):
             path = self.path.parent / text
             if not path.is_file():
-                raise InputError(source, f"{place} {text}", "there is no such file",
-                                 "write POLYGON ((lon lat, ...)), or a file beside the mission")
+                raise InputError(
+                    source,
+                    f"{place} {text}",
+                    "there is no such file",
+                    "write POLYGON ((lon lat, ...)), or a file beside the mission",
+                )
             document = read(path, kind=ZoneKind.INCLUSION, axis=self.axis, areas=True).require_clean()
         else:
-            document = parse(text.encode(), f"{source}: {place}", kind=ZoneKind.INCLUSION,
-                             axis=self.axis).require_clean()
+            document = parse(
+                text.encode(), f"{source}: {place}", kind=ZoneKind.INCLUSION, axis=self.axis
+            ).require_clean()
         if len(document.zones) != 1:
             raise InputError(source, place, f"holds {len(document.zones)} polygons", "one is meant")
         return document.zones[0].shape
@@ -228,7 +269,8 @@ def refuges_of(options: MissionOptions) -> tuple[RefugePoint, ...]:
     """Return the refuges of a mission file, called by their number where they have no name."""
     return tuple(
         RefugePoint(point=GeoPoint(lat_deg=r.lat, lon_deg=r.lon), radius_m=r.radius_m, name=r.name or f"{n}")
-        for n, r in enumerate(options.refuge, start=1))
+        for n, r in enumerate(options.refuge, start=1)
+    )
 
 
 def _gate(goal: GateOptions, source: str, place: str) -> MissionGoal:
@@ -240,14 +282,27 @@ def _gate(goal: GateOptions, source: str, place: str) -> MissionGoal:
         raise InputError(source, f"{place} after_s", "not_before names the gun already", "write one of them")
     least_m = 2.0 * goal.mark_radius_m + NARROWEST_M
     if width_m < least_m:
-        raise InputError(source, place, f"its marks are {width_m:.1f} m apart: {NARROWEST_M:g} m are needed between "
-                         f"what is kept clear of them, {least_m:g} m in all",
-                         "move the marks apart, or write a smaller mark_radius_m")
+        raise InputError(
+            source,
+            place,
+            f"its marks are {width_m:.1f} m apart: {NARROWEST_M:g} m are needed between "
+            f"what is kept clear of them, {least_m:g} m in all",
+            "move the marks apart, or write a smaller mark_radius_m",
+        )
     if width_m > WIDEST_M:
-        raise InputError(source, place, f"its marks are {width_m / 1000.0:.1f} km apart",
-                         "are lat and lon right? a line is 2 km long at the most")
-    gate = GoalGate(port=port, starboard=starboard, keep_m=goal.mark_radius_m, after_s=goal.after_s,
-                not_before_s=None if goal.not_before is None else goal.not_before.timestamp())
+        raise InputError(
+            source,
+            place,
+            f"its marks are {width_m / 1000.0:.1f} km apart",
+            "are lat and lon right? a line is 2 km long at the most",
+        )
+    gate = GoalGate(
+        port=port,
+        starboard=starboard,
+        keep_m=goal.mark_radius_m,
+        after_s=goal.after_s,
+        not_before_s=None if goal.not_before is None else goal.not_before.timestamp(),
+    )
     middle = frame.geo_from_en(0.5 * east_m, 0.5 * north_m)
     return MissionGoal(point=middle, radius_m=PREVIEW_M, name=goal.name, gate=gate)
 

@@ -39,7 +39,7 @@ from companion.geofence.shapes import Obstacle, Shape, Zone, ZoneKind
 from companion.messages import GeoPoint
 from companion.words import file_name
 
-AS_IT_IS: Mapping[Path, bytes] = {}   # nothing is given: every file is read from the disk
+AS_IT_IS: Mapping[Path, bytes] = {}  # nothing is given: every file is read from the disk
 RANGE_M = 50_000.0  # the frame is below 1 m wrong to here; what lies farther off is a mistake
 
 
@@ -158,8 +158,11 @@ class Mission:
         """Return the mission that is told to these too, after its own displays."""
         own = self.output
         output = msgspec.structs.replace(
-            own, nmea=(*own.nmea, *nmea), signalk=(*own.signalk, *signalk),
-            signalk_token=own.signalk_token if token_file is None else str(token_file.absolute()))
+            own,
+            nmea=(*own.nmea, *nmea),
+            signalk=(*own.signalk, *signalk),
+            signalk_token=own.signalk_token if token_file is None else str(token_file.absolute()),
+        )
         return replace(self, options=msgspec.structs.replace(self.options, output=output))
 
     def permitting(self, *names: str) -> Mission:
@@ -209,8 +212,12 @@ def read_mission(path: Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
     """Read a mission as ``load_mission`` does, without a look at whether its places lie in free water."""
     options = _options_of(path, given)
     if options.from_autopilot and not options.goal:
-        raise InputError(str(path), "from_autopilot", "the goals of this mission are drawn on the autopilot, not here",
-                         "companion run reads them there and sails them")
+        raise InputError(
+            str(path),
+            "from_autopilot",
+            "the goals of this mission are drawn on the autopilot, not here",
+            "companion run reads them there and sails them",
+        )
     if not options.goal:
         raise InputError(str(path), "goal", "is missing", GOAL_MISSING)
     return assembled(options, path, given=given)
@@ -228,13 +235,17 @@ def load_settings(path: str | Path) -> MissionOptions:
     path = Path(path)
     options = _options_of(path, AS_IT_IS)
     if options.goal:
-        raise InputError(str(path), "[[goal]]", "the goals are those that are drawn on the autopilot",
-                         "take them out of this file, or sail it without --from-autopilot")
+        raise InputError(
+            str(path),
+            "[[goal]]",
+            "the goals are those that are drawn on the autopilot",
+            "take them out of this file, or sail it without --from-autopilot",
+        )
     return msgspec.structs.replace(options, name=called(options.name, path), from_autopilot=True)
 
 
 def assembled(
-    options: MissionOptions, path: Path, drawn: Document | None = None, given: Mapping[Path, bytes] = AS_IT_IS,
+    options: MissionOptions, path: Path, drawn: Document | None = None, given: Mapping[Path, bytes] = AS_IT_IS
 ) -> Mission:
     """Return the mission of ``options`` with the files that they name, which lie relative to ``path``.
 
@@ -250,18 +261,27 @@ def assembled(
     area, findings = load_area(options.area, path, origin, given, far_m)
     if drawn is not None:
         limits = tuple(z for z in drawn.zones if z.kind is ZoneKind.INCLUSION)
-        area = Area(obstacles=(*area.obstacles, *drawn.as_obstacles(options.area.point_radius_m)),
-                    fence=Fence(zones=(*area.fence.zones, *limits)))
+        area = Area(
+            obstacles=(*area.obstacles, *drawn.as_obstacles(options.area.point_radius_m)),
+            fence=Fence(zones=(*area.fence.zones, *limits)),
+        )
     mission = Mission(
         options=options,
         goals=reader.goals_of(options, area),
         start=GeoPoint(lat_deg=options.start.lat, lon_deg=options.start.lon) if options.start else None,
-        area=area, path=path, findings=(*name_findings(options.name, path), *findings),
-        refuges=refuges_of(options), waters=reader.waters_of(options),
+        area=area,
+        path=path,
+        findings=(*name_findings(options.name, path), *findings),
+        refuges=refuges_of(options),
+        waters=reader.waters_of(options),
     )
     if mission.polar_path is not None:
-        _require(mission.polar_path, str(path), "[boat] polar",
-                 'write a file beside the mission, "ardurover" or a speed in m/s')
+        _require(
+            mission.polar_path,
+            str(path),
+            "[boat] polar",
+            'write a file beside the mission, "ardurover" or a speed in m/s',
+        )
     if mission.tide_path is not None:
         _require(mission.tide_path, str(path), "[current] table", "write a tide table beside the mission")
     return mission
@@ -276,7 +296,10 @@ def _require(path: Path, source: str, place: str, remedy: str) -> None:
 
 
 def load_area(
-    options: AreaOptions, mission_path: Path, origin: GeoPoint, given: Mapping[Path, bytes] = AS_IT_IS,
+    options: AreaOptions,
+    mission_path: Path,
+    origin: GeoPoint,
+    given: Mapping[Path, bytes] = AS_IT_IS,
     far_m: float = FAR_M,
 ) -> tuple[Area, tuple[Finding, ...]]:
     """Return the area that ``[area]`` names and what its files gave rise to; nothing of it is farther than ``far_m``.
@@ -291,14 +314,15 @@ def load_area(
     def load(name: str, key: str, kind: ZoneKind) -> Document:
         path = folder / name
         if path in given:
-            document = check_place(parse(given[path], str(path), kind=kind, axis=options.axis, areas=True,
-                                         extension=path.suffix.lower()), origin, far_m).require_clean()
+            document = check_place(
+                parse(given[path], str(path), kind=kind, axis=options.axis, areas=True, extension=path.suffix.lower()),
+                origin,
+                far_m,
+            ).require_clean()
         else:
             _require(path, str(mission_path), f"[area] {key}", "paths are relative to the mission file")
-            document = read(path, kind=kind, axis=options.axis, near=origin, areas=True,
-                            far_m=far_m).require_clean()
-        findings.extend(replace(f, source=str(path)) for f in document.findings
-                        if f.severity is not FindingLevel.NOTE)
+            document = read(path, kind=kind, axis=options.axis, near=origin, areas=True, far_m=far_m).require_clean()
+        findings.extend(replace(f, source=str(path)) for f in document.findings if f.severity is not FindingLevel.NOTE)
         return document
 
     for name in options.obstacles:
@@ -308,8 +332,12 @@ def load_area(
     if options.fence is not None:
         document = load(options.fence, "fence", ZoneKind.INCLUSION)
         if not document.zones:
-            raise InputError(str(folder / options.fence), "", "holds no polygon or circle to stay inside",
-                             "draw the fence as an area")
+            raise InputError(
+                str(folder / options.fence),
+                "",
+                "holds no polygon or circle to stay inside",
+                "draw the fence as an area",
+            )
         zones.extend(document.zones)
         obstacles.extend(o for o in document.with_zones(()).as_obstacles(options.point_radius_m))
     return Area(obstacles=tuple(obstacles), fence=Fence(zones=tuple(zones))), tuple(findings)
@@ -335,13 +363,19 @@ def place_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
     for place, point in places:
         east_m, north_m = frame.en_from_geo(point)
         if max(abs(east_m), abs(north_m)) > RANGE_M:
-            yield (place, f"is {np.hypot(east_m, north_m) / 1000.0:.0f} km from the origin",
-                   f"{_asked(point, mission.origin)} beyond 50 km it is a passage, which says so: [passage] leg_m")
+            yield (
+                place,
+                f"is {np.hypot(east_m, north_m) / 1000.0:.0f} km from the origin",
+                f"{_asked(point, mission.origin)} beyond 50 km it is a passage, which says so: [passage] leg_m",
+            )
             continue
         problem = trouble_at(local, (east_m, north_m))
         if problem:
-            yield (place, f"{point.lat_deg:.6f}, {point.lon_deg:.6f} {problem}",
-                   "move it into free water or correct the area's files")
+            yield (
+                place,
+                f"{point.lat_deg:.6f}, {point.lon_deg:.6f} {problem}",
+                "move it into free water or correct the area's files",
+            )
     for number, goal in enumerate(mission.goals, start=1):
         problem = "" if goal.gate is None else gate_trouble(goal.gate, frame, local, mission.margin_floor_m)
         if problem:
@@ -363,18 +397,25 @@ def passage_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
         near = [way[number - 1][1]] if is_goal and number > 0 else [point] if is_goal else [p for _, p in way]
         least_m = min(float(np.hypot(*frame.en_from_geo(other))) for other in near)
         if least_m > leg_m:
-            yield (place, f"is {least_m / 1000.0:.0f} km from {way[number - 1][0] if is_goal else 'every goal'}",
-                   f"are lat and lon swapped? [passage] leg_m says {leg_m / 1000.0:g} km")
+            yield (
+                place,
+                f"is {least_m / 1000.0:.0f} km from {way[number - 1][0] if is_goal else 'every goal'}",
+                f"are lat and lon swapped? [passage] leg_m says {leg_m / 1000.0:g} km",
+            )
             continue
         local = mission.area.about(frame, RANGE_M)
         problem = trouble_at(local, (0.0, 0.0))
         if problem:
-            yield (place, f"{point.lat_deg:.6f}, {point.lon_deg:.6f} {problem}",
-                   "move it into free water or correct the area's files")
+            yield (
+                place,
+                f"{point.lat_deg:.6f}, {point.lon_deg:.6f} {problem}",
+                "move it into free water or correct the area's files",
+            )
             continue
         goal = next((g for p, g in zip(goals, mission.goals, strict=True) if p[0] == place), None)
-        problem = "" if goal is None or goal.gate is None else gate_trouble(
-            goal.gate, frame, local, mission.margin_floor_m)
+        problem = (
+            "" if goal is None or goal.gate is None else gate_trouble(goal.gate, frame, local, mission.margin_floor_m)
+        )
         if problem:
             yield place, problem, "move its marks into free water or correct the area's files"
 
@@ -407,8 +448,10 @@ def gate_trouble(gate: GoalGate, frame: LocalFrame, local: LocalArea, floor_m: f
     if clearance_m >= floor_m:
         return ""
     where = np.asarray(opening)[int(np.argmin(local.clearance_m(opening)))]
-    return (f"between its marks there are {max(0.0, clearance_m):.0f} m to {local.nearest_name(where)}: "
-            f"the margin's floor is {floor_m:g} m")
+    return (
+        f"between its marks there are {max(0.0, clearance_m):.0f} m to {local.nearest_name(where)}: "
+        f"the margin's floor is {floor_m:g} m"
+    )
 
 
 # What a mission is called: by its name, or by its file's; and what is worth knowing about that.

@@ -97,7 +97,12 @@ class FieldOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 GoalOptions = PointOptions | GateOptions | BoxOptions | SearchOptions | FieldOptions
 KINDS: dict[str, type[GoalOptions]] = {
-    "point": PointOptions, "gate": GateOptions, "box": BoxOptions, "search": SearchOptions, "field": FieldOptions}
+    "point": PointOptions,
+    "gate": GateOptions,
+    "box": BoxOptions,
+    "search": SearchOptions,
+    "field": FieldOptions,
+}
 
 
 def kind_of(goal: GoalOptions) -> str:
@@ -121,7 +126,7 @@ class PointAtomOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class StationAtomOptions(
-    Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="station",
+    Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="station"
 ):
     """``kind = "station"``: to a place, and about it once it is there: short boards, or loops."""
 
@@ -151,7 +156,7 @@ class CircleAtomOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class RepulsivePointAtomOptions(
-    Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="repulsive_point",
+    Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="repulsive_point"
 ):
     """``kind = "repulsive_point"``: away from a place, twice as strong as what leads on, fading with the distance."""
 
@@ -162,7 +167,7 @@ class RepulsivePointAtomOptions(
 
 
 class RepulsiveLineAtomOptions(
-    Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="repulsive_line",
+    Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="repulsive_line"
 ):
     """``kind = "repulsive_line"``: away from the endless line through two places, to either side."""
 
@@ -172,7 +177,7 @@ class RepulsiveLineAtomOptions(
 
 
 class HeadingAtomOptions(
-    Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="heading",
+    Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind", tag="heading"
 ):
     """``kind = "heading"``: the same heading everywhere."""
 
@@ -187,12 +192,25 @@ class LeaveAtomOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 AtomOptions = (
-    PointAtomOptions | StationAtomOptions | LineAtomOptions | CircleAtomOptions | RepulsivePointAtomOptions
-    | RepulsiveLineAtomOptions | HeadingAtomOptions | LeaveAtomOptions)
+    PointAtomOptions
+    | StationAtomOptions
+    | LineAtomOptions
+    | CircleAtomOptions
+    | RepulsivePointAtomOptions
+    | RepulsiveLineAtomOptions
+    | HeadingAtomOptions
+    | LeaveAtomOptions
+)
 ATOMS: dict[str, type[AtomOptions]] = {
-    "point": PointAtomOptions, "station": StationAtomOptions, "line": LineAtomOptions, "circle": CircleAtomOptions,
-    "repulsive_point": RepulsivePointAtomOptions, "repulsive_line": RepulsiveLineAtomOptions,
-    "heading": HeadingAtomOptions, "leave": LeaveAtomOptions}
+    "point": PointAtomOptions,
+    "station": StationAtomOptions,
+    "line": LineAtomOptions,
+    "circle": CircleAtomOptions,
+    "repulsive_point": RepulsivePointAtomOptions,
+    "repulsive_line": RepulsiveLineAtomOptions,
+    "heading": HeadingAtomOptions,
+    "leave": LeaveAtomOptions,
+}
 
 
 Positive = Annotated[float, Meta(gt=0.0)]
@@ -335,8 +353,13 @@ if TYPE_CHECKING:
     PlannerOptions = _Planner
 else:
     PlannerOptions = msgspec.defstruct(
-        "PlannerOptions", [_planner_key(key) for row in ALGORITHMS.values() for key in row.keys.values()],
-        bases=(_Planner,), frozen=True, forbid_unknown_fields=True, kw_only=True)
+        "PlannerOptions",
+        [_planner_key(key) for row in ALGORITHMS.values() for key in row.keys.values()],
+        bases=(_Planner,),
+        frozen=True,
+        forbid_unknown_fields=True,
+        kw_only=True,
+    )
 
 
 class PassageOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -429,11 +452,17 @@ if TYPE_CHECKING:
     SafetyOptions = _Safety
 else:
     SafetyOptions = msgspec.defstruct(
-        "SafetyOptions", [
+        "SafetyOptions",
+        [
             *((ending.key, Literal[tuple(map(str, End))], ending.default.value) for ending in ENDINGS.values()),
             *map(_figure, SETTINGS.values()),
             *((cause.key, Literal[tuple(CHOICES)], WORD_OF[cause.answer]) for cause in FAILSAFES if cause.key),
-        ], bases=(_Safety,), frozen=True, forbid_unknown_fields=True, kw_only=True)
+        ],
+        bases=(_Safety,),
+        frozen=True,
+        forbid_unknown_fields=True,
+        kw_only=True,
+    )
 
 
 class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -51,16 +51,37 @@ def parse_options(text: str, source: str) -> MissionOptions:
         raise _input_error(str(error), source, raw) from None
 
 
-GOAL_MISSING = ("add [[goal]] with lat and lon; goals drawn in a ground station are sailed by "
-                "companion run --from-autopilot FILE, or from_autopilot = true in it")
+GOAL_MISSING = (
+    "add [[goal]] with lat and lon; goals drawn in a ground station are sailed by "
+    "companion run --from-autopilot FILE, or from_autopilot = true in it"
+)
 
 
 def dump_options(options: MissionOptions) -> str:
     """Return the options as TOML, leaving out what has its default."""
     data = without_defaults(options)
     order = [
-        "name", "description", "from_autopilot", "start", "goal", "field", "refuge", "area", "wind", "current", "risk",
-        "boat", "autopilot", "operator", "skipper", "planner", "passage", "safety", "traffic", "output"]
+        "name",
+        "description",
+        "from_autopilot",
+        "start",
+        "goal",
+        "field",
+        "refuge",
+        "area",
+        "wind",
+        "current",
+        "risk",
+        "boat",
+        "autopilot",
+        "operator",
+        "skipper",
+        "planner",
+        "passage",
+        "safety",
+        "traffic",
+        "output",
+    ]
     # whatever has no place in the order yet comes last, and is not lost
     return toml({k: data[k] for k in (*order, *data) if k in data})
 
@@ -116,8 +137,12 @@ def _refuse_odd_atoms(atoms: object, source: str) -> None:
         if kind not in ATOMS:
             near = difflib.get_close_matches(str(kind), ATOMS, n=1, cutoff=0.5)
             problem = "is missing" if kind is None else f"{_short(kind)} is no kind of atom"
-            raise InputError(source, f"{table} kind", problem,
-                             f'did you mean "{near[0]}"?' if near else "write " + " or ".join(f'"{k}"' for k in ATOMS))
+            raise InputError(
+                source,
+                f"{table} kind",
+                problem,
+                f'did you mean "{near[0]}"?' if near else "write " + " or ".join(f'"{k}"' for k in ATOMS),
+            )
         try:
             msgspec.convert(atom, AtomOptions)
         except msgspec.ValidationError as error:
@@ -128,8 +153,12 @@ def _refuse_odd_atoms(atoms: object, source: str) -> None:
             if unknown:
                 fields = ("kind", *ATOMS[kind].__struct_fields__)
                 near = difflib.get_close_matches(unknown.group(1), fields, n=1, cutoff=0.5)
-                raise InputError(source, f"{table} {unknown.group(1)}", "unknown key",
-                                 f"did you mean {near[0]!r}?" if near else "known keys: " + ", ".join(fields)) from None
+                raise InputError(
+                    source,
+                    f"{table} {unknown.group(1)}",
+                    "unknown key",
+                    f"did you mean {near[0]!r}?" if near else "known keys: " + ", ".join(fields),
+                ) from None
             if missing:
                 raise InputError(source, f"{table} {missing.group(1)}", "is missing", "add it") from None
             raise InputError(source, f"{table} {key}".rstrip(), expected(problem)) from None
@@ -178,8 +207,10 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
         near = difflib.get_close_matches(key, fields, n=1, cutoff=0.5)
         elsewhere = [t for t, keys in known.items() if key in keys and t != table]
         remedy = (
-            f"did you mean {near[0]!r}?" if near
-            else f"it belongs in [{elsewhere[0]}]" if elsewhere and elsewhere[0]
+            f"did you mean {near[0]!r}?"
+            if near
+            else f"it belongs in [{elsewhere[0]}]"
+            if elsewhere and elsewhere[0]
             else "known keys: " + ", ".join(fields)
         )
         return InputError(source, f"{place} {key}".strip(), "unknown key", remedy)
@@ -191,11 +222,19 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
     if place.endswith(" kind") and place.startswith("[[goal]]"):
         kind = _value_at(raw, path)
         near = difflib.get_close_matches(str(kind), KINDS, n=1, cutoff=0.5)
-        return InputError(source, place, f"{_short(kind)} is no kind of goal",
-                          f'did you mean "{near[0]}"?' if near else "write " + " or ".join(f'"{k}"' for k in KINDS))
+        return InputError(
+            source,
+            place,
+            f"{_short(kind)} is no kind of goal",
+            f'did you mean "{near[0]}"?' if near else "write " + " or ".join(f'"{k}"' for k in KINDS),
+        )
     if problem.startswith("Invalid enum value"):
-        return InputError(source, place, f"{_short(_value_at(raw, path))} is none of the choices",
-                          "write " + " or ".join(f'"{choice}"' for choice in choices(MissionOptions, path)))
+        return InputError(
+            source,
+            place,
+            f"{_short(_value_at(raw, path))} is none of the choices",
+            "write " + " or ".join(f'"{choice}"' for choice in choices(MissionOptions, path)),
+        )
     value = _value_at(raw, path)
     shown = f"{_short(value)} is wrong: " if value is not None and not isinstance(value, dict | list) else ""
     swap = ""

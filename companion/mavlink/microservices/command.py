@@ -20,12 +20,12 @@ class TransferOutcome(enum.Enum):
     """How a conversation ended."""
 
     OK = "ok"
-    REFUSED = "refused"            # the autopilot said no; the text has its words
-    TIMEOUT = "timeout"            # it stopped answering
-    UNCONFIRMED = "unconfirmed"    # all was sent, the last acknowledgement never came: read back
-    MISMATCH = "mismatch"          # what it has is not what was written
-    UNSUPPORTED = "unsupported"    # it does not know this protocol or command
-    LINK = "link"                  # the link is dead: no heartbeat
+    REFUSED = "refused"  # the autopilot said no; the text has its words
+    TIMEOUT = "timeout"  # it stopped answering
+    UNCONFIRMED = "unconfirmed"  # all was sent, the last acknowledgement never came: read back
+    MISMATCH = "mismatch"  # what it has is not what was written
+    UNSUPPORTED = "unsupported"  # it does not know this protocol or command
+    LINK = "link"  # the link is dead: no heartbeat
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +116,14 @@ class Texts:
 
     # Chatter that has nothing to do with a refusal.
     _NOISE = (
-        "Field Elevation", "Sailboat: Tacking", "Reached waypoint", "Mission: ", "Auto mission changed", "EKF3 ",
-        "GPS ", "Flight plan received",
+        "Field Elevation",
+        "Sailboat: Tacking",
+        "Reached waypoint",
+        "Mission: ",
+        "Auto mission changed",
+        "EKF3 ",
+        "GPS ",
+        "Flight plan received",
     )
 
     def __init__(self, party: Party) -> None:
@@ -167,8 +173,13 @@ class CommandSend:
     """Sends a COMMAND_LONG (or a prepared COMMAND_INT) until it is answered."""
 
     def __init__(
-        self, party: Party, command: int, params: tuple[float, ...] = (), *,
-        message: Message | None = None, give_up_s: float = 8.0,
+        self,
+        party: Party,
+        command: int,
+        params: tuple[float, ...] = (),
+        *,
+        message: Message | None = None,
+        give_up_s: float = 8.0,
     ) -> None:
         self.result: CommandAnswer | None = None
         self._party, self._command, self._params, self._message = party, command, params, message
@@ -193,9 +204,12 @@ class CommandSend:
         """Take the acknowledgement."""
         self._texts.take(message)
         if (
-            message.get_type() != "COMMAND_ACK" or message.command != self._command or self.result is not None
+            message.get_type() != "COMMAND_ACK"
+            or message.command != self._command
+            or self.result is not None
             or self._ack is not None
-            or not self._party.is_from_target(message) or not self._party.is_for_us(message)
+            or not self._party.is_from_target(message)
+            or not self._party.is_for_us(message)
         ):
             return []
         if message.result == wire.MAV_RESULT_ACCEPTED:
@@ -217,8 +231,9 @@ class CommandSend:
             unsupported = self._ack == wire.MAV_RESULT_UNSUPPORTED
             words = str(self._texts) or f"COMMAND_ACK {self._ack} ({RESULT_WORDS.get(self._ack, 'unknown')})"
             self.result = CommandAnswer(
-                outcome=TransferOutcome.UNSUPPORTED if unsupported else TransferOutcome.REFUSED, text=words,
-                result=self._ack
+                outcome=TransferOutcome.UNSUPPORTED if unsupported else TransferOutcome.REFUSED,
+                text=words,
+                result=self._ack,
             )
             return []
         if not self._retry.again(t_s):

@@ -30,8 +30,16 @@ _EOF, _UNKNOWN_COMMAND, _NOT_FOUND = 6, 7, 10
 # the protocol has 5 (no session free). Then sessions are reset and it is tried once more.
 _PERHAPS_BUSY = frozenset({1, 2, 4, 5, 8})
 ERRORS = {
-    1: "failed", 2: "failed (errno)", 3: "wrong size", 4: "no such session", 5: "no session free",
-    6: "end of file", 7: "unknown command", 8: "file exists", 9: "file protected", 10: "file not found",
+    1: "failed",
+    2: "failed (errno)",
+    3: "wrong size",
+    4: "no such session",
+    5: "no session free",
+    6: "end of file",
+    7: "unknown command",
+    8: "file exists",
+    9: "file protected",
+    10: "file not found",
 }
 
 
@@ -61,7 +69,7 @@ def unpack(payload: list[int]) -> Packet:
     """Return the packet in a payload; ``data`` is cut to the size that the packet states."""
     raw = bytes(payload).ljust(_PAYLOAD_BYTES, b"\x00")
     seq, session, opcode, size, req_opcode, burst, _, offset = _HEAD.unpack_from(raw)
-    return Packet(seq, session, opcode, size, req_opcode, burst, offset, raw[_HEAD.size:_HEAD.size + size])
+    return Packet(seq, session, opcode, size, req_opcode, burst, offset, raw[_HEAD.size : _HEAD.size + size])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,8 +121,10 @@ class _Ftp:
     def _answer(self, message: Message) -> Packet | None:
         """Return the packet if it answers the present request."""
         if (
-            self.result is not None or message.get_type() != "FILE_TRANSFER_PROTOCOL"
-            or not self._party.is_from_target(message) or not self._party.is_for_us(message)
+            self.result is not None
+            or message.get_type() != "FILE_TRANSFER_PROTOCOL"
+            or not self._party.is_from_target(message)
+            or not self._party.is_for_us(message)
         ):
             return None
         packet = unpack(message.payload)
@@ -138,9 +148,7 @@ class _Ftp:
         self, outcome: TransferOutcome, text: str = "", *, data: bytes = b"", error: int | None = None
     ) -> list[Message]:
         # + 2: a late answer to the last request cannot be taken for one to the next session's first
-        self.result = FtpResult(
-            outcome=outcome, text=text, data=data, error=error, next_seq=(self._seq + 2) & 0xFFFF
-        )
+        self.result = FtpResult(outcome=outcome, text=text, data=data, error=error, next_seq=(self._seq + 2) & 0xFFFF)
         return []
 
 
@@ -177,7 +185,7 @@ class FtpWrite(_Ftp):
             self._at += len(self._request.data)
         if self._at >= len(self._data):
             return self._ask(t_s, TERMINATE)
-        return self._ask(t_s, WRITE, offset=self._at, data=self._data[self._at:self._at + CHUNK_BYTES])
+        return self._ask(t_s, WRITE, offset=self._at, data=self._data[self._at : self._at + CHUNK_BYTES])
 
     def _gave_up(self) -> list[Message]:
         if self._request.opcode == TERMINATE:

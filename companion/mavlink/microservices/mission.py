@@ -47,8 +47,13 @@ class ListUpload:
     """
 
     def __init__(
-        self, party: Party, mission_type: MissionType, items: Sequence[MissionItem], *,
-        first: int = 0, partial: bool = False,
+        self,
+        party: Party,
+        mission_type: MissionType,
+        items: Sequence[MissionItem],
+        *,
+        first: int = 0,
+        partial: bool = False,
     ) -> None:
         if partial and not items:
             raise ValueError("a partial write needs items")
@@ -82,8 +87,11 @@ class ListUpload:
         kind = message.get_type()
         if (
             kind not in {"MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK"}
-            or not self._party.is_from_target(message) or not self._party.is_for_us(message)
-            or message.mission_type != self._type or self.result is not None or self._refusal is not None
+            or not self._party.is_from_target(message)
+            or not self._party.is_for_us(message)
+            or message.mission_type != self._type
+            or self.result is not None
+            or self._refusal is not None
         ):
             return []
         if kind == "MISSION_ACK":
@@ -105,7 +113,7 @@ class ListUpload:
                 return self._end(TransferOutcome.UNCONFIRMED, "all items sent, no final acknowledgement")
             return self._end(
                 TransferOutcome.TIMEOUT,
-                f"the autopilot stopped asking after {len(self._sent)} of {len(self._items)} items"
+                f"the autopilot stopped asking after {len(self._sent)} of {len(self._items)} items",
             )
         if not self._retry.again(t_s):
             return self._end(TransferOutcome.TIMEOUT, "no answer to the offer of a list")
@@ -185,14 +193,16 @@ class ListDownload:
         if (
             kind not in {"MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM", "MISSION_ACK"}
             or self.result is not None
-            or not self._party.is_from_target(message) or not self._party.is_for_us(message)
+            or not self._party.is_from_target(message)
+            or not self._party.is_for_us(message)
             or message.mission_type != self._type
         ):
             return []
         if kind == "MISSION_ACK":
             # refusal of the list; ACKs of an upload before it (0, 13) are not about us
             if self._count is None and message.type not in {
-                wire.MAV_MISSION_ACCEPTED, wire.MAV_MISSION_INVALID_SEQUENCE
+                wire.MAV_MISSION_ACCEPTED,
+                wire.MAV_MISSION_INVALID_SEQUENCE,
             }:
                 words = f"MISSION_ACK {message.type} ({ACK_WORDS.get(message.type, 'unknown')}) {self._texts}"
                 self.result = DownloadResult(outcome=TransferOutcome.REFUSED, text=words.strip())
@@ -220,8 +230,10 @@ class ListDownload:
     def tick(self, t_s: float) -> list[Message]:
         """Ask again, or give up."""
         if not self._retry.again(t_s):
-            text = "no answer to the request of a list" if self._count is None else (
-                f"item {len(self._items)} of {self._count} never came"
+            text = (
+                "no answer to the request of a list"
+                if self._count is None
+                else (f"item {len(self._items)} of {self._count} never came")
             )
             self.result = DownloadResult(outcome=TransferOutcome.TIMEOUT, text=text)
             return []
@@ -257,14 +269,17 @@ class ListClear:
         del t_s
         self._texts.take(message)
         if (
-            message.get_type() == "MISSION_ACK" and message.mission_type == self._type
-            and self._party.is_from_target(message) and self._party.is_for_us(message)
+            message.get_type() == "MISSION_ACK"
+            and message.mission_type == self._type
+            and self._party.is_from_target(message)
+            and self._party.is_for_us(message)
         ):
             refused = message.type != wire.MAV_MISSION_ACCEPTED
             words = f"MISSION_ACK {message.type} ({ACK_WORDS.get(message.type, 'unknown')}) {self._texts}".strip()
             self.result = ListResult(
-                outcome=TransferOutcome.REFUSED if refused else TransferOutcome.OK, text=words if refused else "",
-                ack=message.type
+                outcome=TransferOutcome.REFUSED if refused else TransferOutcome.OK,
+                text=words if refused else "",
+                ack=message.type,
             )
         return []
 

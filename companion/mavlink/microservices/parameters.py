@@ -17,9 +17,7 @@ from companion.mavlink.wire.frames import Message
 
 # 4.7 renamed these [ArduPilot PR #29617]; SRn_ numbered serial links from 0, MAVn_ numbers MAVLink links from 1.
 _RENAMED = {"SYSID_THISMAV": "MAV_SYSID", "SYSID_MYGCS": "MAV_GCS_SYSID"}
-_STREAMS = (
-    "RAW_SENS", "EXT_STAT", "RC_CHAN", "RAW_CTRL", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3", "PARAMS", "ADSB",
-)
+_STREAMS = ("RAW_SENS", "EXT_STAT", "RC_CHAN", "RAW_CTRL", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3", "PARAMS", "ADSB")
 ALIASES: Mapping[str, str] = {
     **_RENAMED,
     **{f"SR{n}_{stream}": f"MAV{n + 1}_{stream}" for n in range(7) for stream in _STREAMS},
@@ -98,11 +96,15 @@ class ParamRead:
         """Take the value."""
         del t_s
         if (
-            message.get_type() == "PARAM_VALUE" and self._party.is_from_target(message)
-            and message.param_id in self._names and self.result is None
+            message.get_type() == "PARAM_VALUE"
+            and self._party.is_from_target(message)
+            and message.param_id in self._names
+            and self.result is None
         ):
             self.result = ParamAnswer(
-                outcome=TransferOutcome.OK, name=message.param_id, value=float(message.param_value),
+                outcome=TransferOutcome.OK,
+                name=message.param_id,
+                value=float(message.param_value),
                 param_type=message.param_type,
             )
         return []
@@ -112,7 +114,8 @@ class ParamRead:
         if not self._retry.again(t_s):
             names = " or ".join(self._names)
             self.result = ParamAnswer(
-                outcome=TransferOutcome.TIMEOUT, name=self._names[0],
+                outcome=TransferOutcome.TIMEOUT,
+                name=self._names[0],
                 text=f"no answer for parameter {names} (it does not exist, or unsigned frames are ignored)",
             )
             return []
@@ -128,9 +131,7 @@ class ParamRead:
 class ParamSet:
     """Writes one parameter until it is echoed with the value that was asked for."""
 
-    def __init__(
-        self, party: Party, name: str, value: float, param_type: int = wire.MAV_PARAM_TYPE_REAL32
-    ) -> None:
+    def __init__(self, party: Party, name: str, value: float, param_type: int = wire.MAV_PARAM_TYPE_REAL32) -> None:
         self.result: ParamAnswer | None = None
         self._party, self._name, self._type = party, name, param_type
         self._value = _float32(value)
@@ -151,8 +152,10 @@ class ParamSet:
         """Take the echo."""
         del t_s
         if (
-            message.get_type() == "PARAM_VALUE" and message.param_id == self._name
-            and self._party.is_from_target(message) and self.result is None
+            message.get_type() == "PARAM_VALUE"
+            and message.param_id == self._name
+            and self._party.is_from_target(message)
+            and self.result is None
         ):
             value = float(message.param_value)
             if abs(value - self._value) <= 1e-6 * max(1.0, abs(self._value)):
@@ -177,9 +180,7 @@ class ParamSet:
         return []
 
     def _say(self) -> Message:
-        return wire.MAVLink_param_set_message(
-            *self._party.target, self._name.encode("ascii"), self._value, self._type
-        )
+        return wire.MAVLink_param_set_message(*self._party.target, self._name.encode("ascii"), self._value, self._type)
 
 
 class ParamList:
@@ -226,12 +227,12 @@ class ParamList:
         self._wake_s = t_s + SILENCE_S
         missing = [i for i in range(self._count) if i not in self._by_index]
         if self._silent > MAX_SILENT_ROUNDS or (not self._by_index and self._silent > 4):
-            text = f"{len(missing)} of {self._count} parameters never came" if self._count else (
-                "no parameter replies (is signing enabled on the autopilot?)"
+            text = (
+                f"{len(missing)} of {self._count} parameters never came"
+                if self._count
+                else ("no parameter replies (is signing enabled on the autopilot?)")
             )
-            self.result = ParamTable(
-                outcome=TransferOutcome.TIMEOUT, values=self._values, types=self._types, text=text
-            )
+            self.result = ParamTable(outcome=TransferOutcome.TIMEOUT, values=self._values, types=self._types, text=text)
             return []
         if not self._by_index:
             return [wire.MAVLink_param_request_list_message(*self._party.target)]

@@ -33,13 +33,13 @@ from companion.safety import SENSORS
 
 # A fix farther off than a boat sails in the time since the last one, and this, is a leap.
 LEAP_M = 20.0
-LEAP_MPS = 8.0         # no boat of ours sails faster
+LEAP_MPS = 8.0  # no boat of ours sails faster
 # It is believed when so many in a row agree, or two that are this far apart in time [s].
 LEAP_FIXES = 3
 LEAP_S = 2.0
 # After a longer silence any place is possible [s].
 MEMORY_S = 10.0
-DEGREE_M = 111_195.0   # of latitude, on the mean sphere
+DEGREE_M = 111_195.0  # of latitude, on the mean sphere
 
 
 def leap_m(distance_m: float, elapsed_s: float) -> float:
@@ -91,22 +91,40 @@ REBOOT_BACK_S = 5.0
 ATTITUDE_MAX_AGE_S = 1.5
 # NAV_CONTROLLER_OUTPUT and FENCE_STATUS stop when they have nothing to say; then they are unknown after [s].
 QUIET_S = 5.0
-KNOWS_TIME_S = 1_577_836_800.0    # 2020: an autopilot that has no time yet tells less
+KNOWS_TIME_S = 1_577_836_800.0  # 2020: an autopilot that has no time yet tells less
 # What tells of the status; an autopilot sends as many kinds again that tell nothing here.
-_TELLING = frozenset({
-    "HEARTBEAT", "MISSION_CURRENT", "MISSION_ITEM_REACHED", "NAV_CONTROLLER_OUTPUT", "EKF_STATUS_REPORT", "GPS_RAW_INT",
-    "GPS2_RAW", "SYS_STATUS", "RC_CHANNELS", "SERVO_OUTPUT_RAW", "HOME_POSITION", "SYSTEM_TIME", "NAMED_VALUE_FLOAT",
-    "FENCE_STATUS",
-})
+_TELLING = frozenset(
+    {
+        "HEARTBEAT",
+        "MISSION_CURRENT",
+        "MISSION_ITEM_REACHED",
+        "NAV_CONTROLLER_OUTPUT",
+        "EKF_STATUS_REPORT",
+        "GPS_RAW_INT",
+        "GPS2_RAW",
+        "SYS_STATUS",
+        "RC_CHANNELS",
+        "SERVO_OUTPUT_RAW",
+        "HOME_POSITION",
+        "SYSTEM_TIME",
+        "NAMED_VALUE_FLOAT",
+        "FENCE_STATUS",
+    }
+)
 _APPARENT = ("AppWndSpd", "AppWndDir")
 # Heartbeats that say the same before a change is believed, of so many, none older than this [s].
 BEATS_AGREE, BEATS_KEPT, BEATS_S = 2, 3, 3.5
 # A command that changes mode or arming shows in a heartbeat within this time of its acknowledgement [s].
 SHOWS_S = 3.0
-_CHANGING = frozenset({
-    wire.MAV_CMD_DO_SET_MODE, wire.MAV_CMD_COMPONENT_ARM_DISARM, wire.MAV_CMD_MISSION_START,
-    wire.MAV_CMD_NAV_RETURN_TO_LAUNCH, wire.MAV_CMD_NAV_LOITER_UNLIM,
-})
+_CHANGING = frozenset(
+    {
+        wire.MAV_CMD_DO_SET_MODE,
+        wire.MAV_CMD_COMPONENT_ARM_DISARM,
+        wire.MAV_CMD_MISSION_START,
+        wire.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        wire.MAV_CMD_NAV_LOITER_UNLIM,
+    }
+)
 
 
 class VehicleAssembler:
@@ -142,7 +160,7 @@ class VehicleAssembler:
         self._nav_s: float | None = None
         self._fence_s: float | None = None
         self._gps2_s: float | None = None
-        self._fenced_s = 0.0   # since when it tells of a fence without a gap
+        self._fenced_s = 0.0  # since when it tells of a fence without a gap
         self._fence_told = (False, -1)
         # Of each sensor: whether it was told beyond its entry, when, and what is believed.
         self._sensed: dict[str, tuple[bool | None, float, float | None]] = {}
@@ -222,7 +240,7 @@ class VehicleAssembler:
         is_told = self._acknowledged_s is not None and t_s - self._acknowledged_s <= SHOWS_S
         believes = not recent or is_told or recent.count(says) + 1 >= BEATS_AGREE
         if believes and says != self._fact:
-            self._fact, self._acknowledged_s = says, None   # one acknowledgement, one change
+            self._fact, self._acknowledged_s = says, None  # one acknowledgement, one change
             self._beats.clear()
         self._beats.append((t_s, says))
         return believes
@@ -252,7 +270,8 @@ class VehicleAssembler:
         if told is None:
             return []
         self._status = changed(
-            self._status or AutopilotStatus(t_s=t_s), **{**self._quiet(t_s), **told}, t_s=t_s, boot_s=self._boot_s)
+            self._status or AutopilotStatus(t_s=t_s), **{**self._quiet(t_s), **told}, t_s=t_s, boot_s=self._boot_s
+        )
         return [self._status]
 
     def _told(self, t_s: float, kind: str, message: Message) -> dict[str, Any] | None:
@@ -261,11 +280,15 @@ class VehicleAssembler:
             now: dict[str, Any] = {"system_status": message.system_status}
             if self._believes_beat(t_s, message) or self._status is None:
                 now |= {
-                    "mode": codec.mode(message), "is_armed": codec.is_armed(message), "vehicle_type": int(message.type)}
+                    "mode": codec.mode(message),
+                    "is_armed": codec.is_armed(message),
+                    "vehicle_type": int(message.type),
+                }
             return now
         if kind == "MISSION_CURRENT":
             return {
-                "mission_seq": message.seq, "mission_total": None if message.total == 0xFFFF else message.total,
+                "mission_seq": message.seq,
+                "mission_total": None if message.total == 0xFFFF else message.total,
                 "mission_state": _mission_state(message.mission_state),
             }
         if kind == "MISSION_ITEM_REACHED":
@@ -274,7 +297,8 @@ class VehicleAssembler:
             self._nav_s = t_s
             return {
                 "waypoint_distance_m": codec.waypoint_distance_m(message),
-                "target_bearing_rad": codec.target_bearing_rad(message), "cross_track_m": codec.cross_track_m(message),
+                "target_bearing_rad": codec.target_bearing_rad(message),
+                "cross_track_m": codec.cross_track_m(message),
             }
         if kind == "EKF_STATUS_REPORT":
             return {"ekf_ok": codec.ekf_ok(message)}
@@ -311,8 +335,10 @@ class VehicleAssembler:
             # What is told for a moment, by whomever, is not missed afterwards.
             on: dict[str, Any] = {"fence_on": True} if t_s - self._fenced_s >= QUIET_S else {}
             return {
-                **on, "fence_breached": fence[0] and last[0],
-                **({"fence_breaches": fence[1]} if fence[1] == last[1] else {})}
+                **on,
+                "fence_breached": fence[0] and last[0],
+                **({"fence_breaches": fence[1]} if fence[1] == last[1] else {}),
+            }
         return None
 
     def _quiet(self, t_s: float) -> dict[str, Any]:

@@ -113,7 +113,8 @@ def vehicle_state(t_s: float, message: Message, attitude_now: Attitude | None) -
         boot_s=message.time_boot_ms / 1e3,
         position=position,
         velocity_en_mps=(
-            number(message.vy, -limit, limit, "vy") / 100.0, number(message.vx, -limit, limit, "vx") / 100.0
+            number(message.vy, -limit, limit, "vy") / 100.0,
+            number(message.vx, -limit, limit, "vx") / 100.0,
         ),
         heading_rad=heading_rad,
         roll_rad=attitude_now.roll_rad if attitude_now else None,
@@ -189,7 +190,7 @@ def servo_us(message: Message) -> tuple[int, ...]:
     """Return the outputs of SERVO_OUTPUT_RAW from the first to the last that is driven [us]; one that is not is 0."""
     raw = [int(getattr(message, f"servo{n + 1}_raw")) for n in range(16)]
     driven = [n for n, value in enumerate(raw) if value not in {0, 0xFFFF}]
-    return tuple(0 if value == 0xFFFF else value for value in raw[:driven[-1] + 1]) if driven else ()
+    return tuple(0 if value == 0xFFFF else value for value in raw[: driven[-1] + 1]) if driven else ()
 
 
 def cross_track_m(message: Message) -> float:
@@ -300,13 +301,21 @@ def heartbeat(system_status: int = wire.MAV_STATE_ACTIVE, token: int = 0) -> Mes
     )
 
 
-def mission_item_int(
-    target: tuple[int, int], seq: int, item: MissionItem, mission_type: MissionType
-) -> Message:
+def mission_item_int(target: tuple[int, int], seq: int, item: MissionItem, mission_type: MissionType) -> Message:
     """Return ``item`` as MISSION_ITEM_INT number ``seq``."""
     return wire.MAVLink_mission_item_int_message(
-        target[0], target[1], seq, item.frame, item.command, 0, int(item.autocontinue),
-        *item.params, item.lat_e7, item.lon_e7, item.alt_m, int(mission_type),
+        target[0],
+        target[1],
+        seq,
+        item.frame,
+        item.command,
+        0,
+        int(item.autocontinue),
+        *item.params,
+        item.lat_e7,
+        item.lon_e7,
+        item.alt_m,
+        int(mission_type),
     )
 
 
@@ -320,8 +329,19 @@ def reposition(target: tuple[int, int], point: GeoPoint) -> Message:
     """Return COMMAND_INT DO_REPOSITION to ``point``; the autopilot must be in GUIDED."""
     lat_e7, lon_e7 = e7(point)
     return wire.MAVLink_command_int_message(
-        target[0], target[1], wire.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, wire.MAV_CMD_DO_REPOSITION,
-        0, 0, -1.0, 0.0, 0.0, 0.0, lat_e7, lon_e7, 0.0,
+        target[0],
+        target[1],
+        wire.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+        wire.MAV_CMD_DO_REPOSITION,
+        0,
+        0,
+        -1.0,
+        0.0,
+        0.0,
+        0.0,
+        lat_e7,
+        lon_e7,
+        0.0,
     )
 
 
@@ -330,22 +350,27 @@ def heading_setpoint(target: tuple[int, int], boot_s: float, heading_rad: float,
     half = wrap_pi(heading_rad) / 2.0
     ignore_rates = 0b00000111
     return wire.MAVLink_set_attitude_target_message(
-        round(boot_s * 1e3) & 0xFFFFFFFF, target[0], target[1], ignore_rates,
-        [math.cos(half), 0.0, 0.0, math.sin(half)], 0.0, 0.0, 0.0, thrust,
+        round(boot_s * 1e3) & 0xFFFFFFFF,
+        target[0],
+        target[1],
+        ignore_rates,
+        [math.cos(half), 0.0, 0.0, math.sin(half)],
+        0.0,
+        0.0,
+        0.0,
+        thrust,
     )
 
 
 def status_texts(severity: int, text: str, text_id: int) -> list[Message]:
     """Return ``text`` as STATUSTEXT chunks of 50 bytes; one that fits has id 0. At most 250 bytes are sent."""
-    raw = one_line(text).encode("ascii", "replace")[:250]   # many a station prints it as it comes
+    raw = one_line(text).encode("ascii", "replace")[:250]  # many a station prints it as it comes
     if len(raw) <= 50:
         return [wire.MAVLink_statustext_message(severity, raw, 0, 0)]
-    chunks = [raw[i:i + 50] for i in range(0, len(raw), 50)]
+    chunks = [raw[i : i + 50] for i in range(0, len(raw), 50)]
     if len(chunks[-1]) == 50:
         chunks.append(b"")  # the last chunk ends with a zero byte
-    return [
-        wire.MAVLink_statustext_message(severity, chunk, 1 + text_id % 65535, i) for i, chunk in enumerate(chunks)
-    ]
+    return [wire.MAVLink_statustext_message(severity, chunk, 1 + text_id % 65535, i) for i, chunk in enumerate(chunks)]
 
 
 class TextAssembler:

@@ -39,8 +39,8 @@ _NONE16 = 0xFFFF
 _NONE8 = 0xFF
 _STATE_BYTES, _CODE_BYTES = 24, 16
 FLOATS = ("co_twd", "co_tws", "co_sig", "co_psafe", "co_tack", "co_xt")
-PREFIX = "co_"     # figures of the table (``companion.figures``) are sent beside the wind by names that begin so
-SLOW = "co_plan"   # of a slow computer: nine plans of ten take so long [s]; sent beside the wind, not packed
+PREFIX = "co_"  # figures of the table (``companion.figures``) are sent beside the wind by names that begin so
+SLOW = "co_plan"  # of a slow computer: nine plans of ten take so long [s]; sent beside the wind, not packed
 # From here on a part that was not heard again is old [s]: four turns of the plain messages.
 STALE_S = 35.0
 
@@ -82,17 +82,36 @@ def pack_status(status: CompanionStatus) -> bytes:
     room = MAX_PAYLOAD_BYTES - _PACK.size - len(state) - len(code) - len(order)
     text = status.alert_text.encode("ascii", "replace")[:room]
     head = _PACK.pack(
-        VERSION, int(max(0.0, status.t_s) * 10.0) & 0xFFFFFFFF,
-        _f32(status.waypoint_distance_m), _f32(status.goal_distance_m), _f32(status.cross_track_m),
-        _f32(status.clearance_m), _f32(status.promised_risk), lat_e7, lon_e7,
+        VERSION,
+        int(max(0.0, status.t_s) * 10.0) & 0xFFFFFFFF,
+        _f32(status.waypoint_distance_m),
+        _f32(status.goal_distance_m),
+        _f32(status.cross_track_m),
+        _f32(status.clearance_m),
+        _f32(status.promised_risk),
+        lat_e7,
+        lon_e7,
         _centidegrees(status.twd_from_rad),
         _u16(None if status.twd_sigma_rad is None else math.degrees(status.twd_sigma_rad), 100.0),
-        _u16(status.tws_mps, 100.0), _u16(status.tws_sigma_mps, 100.0), _u16(status.next_tack_s),
-        _u16(status.plan_id), _u16(status.plan_age_s), _u16(status.replans), _u16(status.tacks),
+        _u16(status.tws_mps, 100.0),
+        _u16(status.tws_sigma_mps, 100.0),
+        _u16(status.next_tack_s),
+        _u16(status.plan_id),
+        _u16(status.plan_age_s),
+        _u16(status.replans),
+        _u16(status.tacks),
         _u16(status.battery_v, 100.0),
-        _u16(status.waypoint_seq), _u16(status.waypoint_count), _u16(status.bytes_out_per_s),
-        _u16(status.order_age_s, 0.1), _centidegrees(status.current_set_rad), _u16(status.current_drift_mps, 100.0),
-        _u8(status.goal_index), _u8(status.goal_count), len(state), len(code), len(order),
+        _u16(status.waypoint_seq),
+        _u16(status.waypoint_count),
+        _u16(status.bytes_out_per_s),
+        _u16(status.order_age_s, 0.1),
+        _centidegrees(status.current_set_rad),
+        _u16(status.current_drift_mps, 100.0),
+        _u8(status.goal_index),
+        _u8(status.goal_count),
+        len(state),
+        len(code),
+        len(order),
     )
     return head + state + code + order + text
 
@@ -106,12 +125,38 @@ def unpack_status(payload: bytes, t_s: float | None = None) -> CompanionStatus:
     if len(payload) < _PACK.size or payload[0] != VERSION:
         raise ValueError(f"status payload of {len(payload)} bytes, version {payload[0] if payload else None}")
     (
-        _, tenths, waypoint_m, goal_m, cross_m, clearance_m, risk, lat_e7, lon_e7, twd, sigma, tws, tws_sigma, tack,
-        plan, age, replans, tacks, battery, seq, count, traffic, order_age,
-        current_set, drift,
-        goal, goals, state_end, code_size, order_size,
+        _,
+        tenths,
+        waypoint_m,
+        goal_m,
+        cross_m,
+        clearance_m,
+        risk,
+        lat_e7,
+        lon_e7,
+        twd,
+        sigma,
+        tws,
+        tws_sigma,
+        tack,
+        plan,
+        age,
+        replans,
+        tacks,
+        battery,
+        seq,
+        count,
+        traffic,
+        order_age,
+        current_set,
+        drift,
+        goal,
+        goals,
+        state_end,
+        code_size,
+        order_size,
     ) = _PACK.unpack_from(payload)
-    words = payload[_PACK.size:]
+    words = payload[_PACK.size :]
     code_end = state_end + code_size
     order_end = code_end + order_size
     if order_end > len(words):
@@ -120,19 +165,32 @@ def unpack_status(payload: bytes, t_s: float | None = None) -> CompanionStatus:
     return CompanionStatus(
         t_s=tenths / 10.0 if t_s is None else t_s,
         state=words[:state_end].decode("ascii", "replace"),
-        goal_index=_count(goal, _NONE8), goal_count=_count(goals, _NONE8),
-        waypoint_seq=_count(seq), waypoint_count=_count(count),
-        waypoint_distance_m=_float(waypoint_m), goal_distance_m=_float(goal_m), cross_track_m=_float(cross_m),
-        clearance_m=_float(clearance_m), promised_risk=_float(risk), position=geo_point(lat_e7, lon_e7),
+        goal_index=_count(goal, _NONE8),
+        goal_count=_count(goals, _NONE8),
+        waypoint_seq=_count(seq),
+        waypoint_count=_count(count),
+        waypoint_distance_m=_float(waypoint_m),
+        goal_distance_m=_float(goal_m),
+        cross_track_m=_float(cross_m),
+        clearance_m=_float(clearance_m),
+        promised_risk=_float(risk),
+        position=geo_point(lat_e7, lon_e7),
         twd_from_rad=None if twd == _NONE16 else math.radians(twd / 100.0),
         twd_sigma_rad=None if sigma_deg is None else math.radians(sigma_deg),
         current_set_rad=None if current_set == _NONE16 else math.radians(current_set / 100.0),
         current_drift_mps=_scaled(drift, 100.0),
-        tws_mps=_scaled(tws, 100.0), tws_sigma_mps=_scaled(tws_sigma, 100.0), next_tack_s=_scaled(tack),
-        plan_id=_count(plan), plan_age_s=_scaled(age), replans=_count(replans), tacks=_count(tacks),
-        battery_v=_scaled(battery, 100.0), bytes_out_per_s=_scaled(traffic),
+        tws_mps=_scaled(tws, 100.0),
+        tws_sigma_mps=_scaled(tws_sigma, 100.0),
+        next_tack_s=_scaled(tack),
+        plan_id=_count(plan),
+        plan_age_s=_scaled(age),
+        replans=_count(replans),
+        tacks=_count(tacks),
+        battery_v=_scaled(battery, 100.0),
+        bytes_out_per_s=_scaled(traffic),
         alert_code=words[state_end:code_end].decode("ascii", "replace"),
-        order=words[code_end:order_end].decode("ascii", "replace"), order_age_s=_scaled(order_age, 0.1),
+        order=words[code_end:order_end].decode("ascii", "replace"),
+        order_age_s=_scaled(order_age, 0.1),
         alert_text=words[order_end:].decode("ascii", "replace"),
     )
 
@@ -143,13 +201,16 @@ def status_messages(status: CompanionStatus, boot_s: float, turn: int) -> list[M
     ``boot_s`` is the autopilot's boot time [s], which plain messages are stamped with.
     """
     payload = pack_status(status)
-    messages = [wire.MAVLink_tunnel_message(
-        0, 0, PAYLOAD_TYPE, len(payload), list(payload.ljust(MAX_PAYLOAD_BYTES, b"\x00"))
-    )]
+    messages = [
+        wire.MAVLink_tunnel_message(0, 0, PAYLOAD_TYPE, len(payload), list(payload.ljust(MAX_PAYLOAD_BYTES, b"\x00")))
+    ]
     if status.traffic is not None and turn % 2 == 0:
         seen = pack_traffic(status.traffic)
-        messages.append(wire.MAVLink_tunnel_message(
-            0, 0, TRAFFIC_PAYLOAD_TYPE, len(seen), list(seen.ljust(MAX_PAYLOAD_BYTES, b"\x00"))))
+        messages.append(
+            wire.MAVLink_tunnel_message(
+                0, 0, TRAFFIC_PAYLOAD_TYPE, len(seen), list(seen.ljust(MAX_PAYLOAD_BYTES, b"\x00"))
+            )
+        )
     turn %= 4
     if turn == 3:
         wind = wind_cov(status, boot_s)
@@ -157,7 +218,7 @@ def status_messages(status: CompanionStatus, boot_s: float, turn: int) -> list[M
         figures = [_named(boot_s, name, value) for name, value in status.figures]
         return [*messages, *([] if wind is None else [wind]), *slow, *figures]
     values = named_values(status)
-    for name in FLOATS[2 * turn:2 * turn + 2]:
+    for name in FLOATS[2 * turn : 2 * turn + 2]:
         value = values[name]
         if value is not None:
             messages.append(_named(boot_s, name, value))
@@ -226,10 +287,10 @@ class StatusReader:
         kind = message.get_type()
         try:
             if kind == "TUNNEL" and message.payload_type == PAYLOAD_TYPE:
-                self._packed = unpack_status(bytes(message.payload[:message.payload_length]), t_s)
+                self._packed = unpack_status(bytes(message.payload[: message.payload_length]), t_s)
                 self._heard_s["status"] = t_s
             elif kind == "TUNNEL" and message.payload_type == TRAFFIC_PAYLOAD_TYPE:
-                self._traffic = unpack_traffic(bytes(message.payload[:message.payload_length]))
+                self._traffic = unpack_traffic(bytes(message.payload[: message.payload_length]))
                 self._heard_s["traffic"] = t_s
             elif kind == "WIND_COV":
                 self._take_wind(t_s, message)
@@ -258,17 +319,27 @@ class StatusReader:
         traffic = self._traffic if age_s.get("traffic", math.inf) <= STALE_S else None
         answer_s = self._plan_answer_s if age_s.get(SLOW, math.inf) <= STALE_S else None
         return StatusReport(
-            status=replace(status, traffic=traffic, plan_answer_s=answer_s, figures=tuple(
-                (name, value) for name, value in self._figures.items() if age_s[name] <= STALE_S)),
-            age_s=age_s, has_packed=has_packed)
+            status=replace(
+                status,
+                traffic=traffic,
+                plan_answer_s=answer_s,
+                figures=tuple((name, value) for name, value in self._figures.items() if age_s[name] <= STALE_S),
+            ),
+            age_s=age_s,
+            has_packed=has_packed,
+        )
 
     def _take_wind(self, t_s: float, message: Message) -> None:
         north, east = float(message.wind_x), float(message.wind_y)
         tws = math.hypot(north, east)
         across, along = float(message.horiz_accuracy), float(message.var_horiz)
         self._plain = replace(
-            self._plain, t_s=t_s, twd_from_rad=wrap_two_pi(math.atan2(-east, -north)), tws_mps=tws,
-            twd_sigma_rad=across / tws if math.isfinite(across) and tws > 0.1 else None, tws_sigma_mps=_float(along),
+            self._plain,
+            t_s=t_s,
+            twd_from_rad=wrap_two_pi(math.atan2(-east, -north)),
+            tws_mps=tws,
+            twd_sigma_rad=across / tws if math.isfinite(across) and tws > 0.1 else None,
+            tws_sigma_mps=_float(along),
         )
         self._heard_s["wind"] = t_s
 
@@ -306,14 +377,23 @@ def pack_traffic(status: TrafficStatus) -> bytes:
     """Return the payload of a TUNNEL, at most 128 bytes; the name is cut to what fits."""
     bearing = status.bearing_rad
     head = _TRAFFIC_PACK.pack(
-        TRAFFIC_VERSION, _byte(status.feeds), _byte(status.silent_feeds), _byte(status.shared_mmsi),
+        TRAFFIC_VERSION,
+        _byte(status.feeds),
+        _byte(status.silent_feeds),
+        _byte(status.shared_mmsi),
         _byte(status.clock_jumps),
-        _u16(status.vessels), _u16(status.refused), _u16(status.silence_s), _u16(status.tcpa_s),
+        _u16(status.vessels),
+        _u16(status.refused),
+        _u16(status.silence_s),
+        _u16(status.tcpa_s),
         _NONE16 if bearing is None else round(math.degrees(wrap_two_pi(bearing)) * 100.0) % 36000,
-        _f32(status.range_m), _f32(status.cpa_m), _f32(status.promised_risk), _f32(status.path_risk),
+        _f32(status.range_m),
+        _f32(status.cpa_m),
+        _f32(status.promised_risk),
+        _f32(status.path_risk),
     )
     words = _MARK.join(w.replace(_MARK, " ") for w in (status.alarm, status.role, status.rule, status.name))
-    return head + words.encode("ascii", "replace")[:MAX_PAYLOAD_BYTES - _TRAFFIC_PACK.size]
+    return head + words.encode("ascii", "replace")[: MAX_PAYLOAD_BYTES - _TRAFFIC_PACK.size]
 
 
 def unpack_traffic(payload: bytes) -> TrafficStatus:
@@ -324,17 +404,30 @@ def unpack_traffic(payload: bytes) -> TrafficStatus:
     """
     if len(payload) < _TRAFFIC_PACK.size or payload[0] != TRAFFIC_VERSION:
         raise ValueError(f"traffic payload of {len(payload)} bytes, version {payload[0] if payload else None}")
-    (_, feeds, silent, shared, jumps, vessels, refused, silence, tcpa, bearing, range_m, cpa_m, promised,
-     path) = _TRAFFIC_PACK.unpack_from(payload)
-    words = payload[_TRAFFIC_PACK.size:].decode("ascii", "replace").split(_MARK)
+    (_, feeds, silent, shared, jumps, vessels, refused, silence, tcpa, bearing, range_m, cpa_m, promised, path) = (
+        _TRAFFIC_PACK.unpack_from(payload)
+    )
+    words = payload[_TRAFFIC_PACK.size :].decode("ascii", "replace").split(_MARK)
     if len(words) != _WORDS:
         raise ValueError("traffic payload is torn")
     return TrafficStatus(
-        vessels=vessels, refused=refused, feeds=feeds, silent_feeds=silent, shared_mmsi=shared, clock_jumps=jumps,
-        silence_s=_scaled(silence), tcpa_s=_scaled(tcpa), range_m=_float(range_m), cpa_m=_float(cpa_m),
-        promised_risk=_float(promised), path_risk=_float(path),
+        vessels=vessels,
+        refused=refused,
+        feeds=feeds,
+        silent_feeds=silent,
+        shared_mmsi=shared,
+        clock_jumps=jumps,
+        silence_s=_scaled(silence),
+        tcpa_s=_scaled(tcpa),
+        range_m=_float(range_m),
+        cpa_m=_float(cpa_m),
+        promised_risk=_float(promised),
+        path_risk=_float(path),
         bearing_rad=None if bearing == _NONE16 else math.radians(bearing / 100.0),
-        alarm=words[0], role=words[1], rule=words[2], name=words[3],
+        alarm=words[0],
+        role=words[1],
+        rule=words[2],
+        name=words[3],
     )
 
 
@@ -345,13 +438,13 @@ def unpack_traffic(payload: bytes) -> TrafficStatus:
 # autopilot's, and custom0 is its base mode, where ArduPilot has it too. custom1 and custom2 are ours.
 
 CONTROL_COMMAND = int(wire.MAV_CMD_CONTROL_HIGH_LATENCY)
-HIGH_LATENCY_S = 5.0          # as the protocol has it (mavlink.io, High Latency Protocol)
+HIGH_LATENCY_S = 5.0  # as the protocol has it (mavlink.io, High Latency Protocol)
 NO_TEMPERATURE = -128
 FIX_3D = 3
 
 
 def high_latency2(
-    status: CompanionStatus, vehicle: VehicleState | None, autopilot: AutopilotStatus | None, watchdog: str = "",
+    status: CompanionStatus, vehicle: VehicleState | None, autopilot: AutopilotStatus | None, watchdog: str = ""
 ) -> Message | None:
     """Return the message, None while the position or the mode is not known: it has no number for that.
 
@@ -360,22 +453,36 @@ def high_latency2(
     if vehicle is None or autopilot is None or autopilot.mode is None:
         return None
     lat_e7, lon_e7 = e7(vehicle.position)
-    base_mode = wire.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | (
-        wire.MAV_MODE_FLAG_SAFETY_ARMED if autopilot.is_armed else 0)
+    base_mode = wire.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | (wire.MAV_MODE_FLAG_SAFETY_ARMED if autopilot.is_armed else 0)
     remaining, risk = autopilot.battery_remaining, status.promised_risk
     return wire.MAVLink_high_latency2_message(
-        timestamp=round(vehicle.boot_s * 1e3) & 0xFFFFFFFF, type=autopilot.vehicle_type or wire.MAV_TYPE_SURFACE_BOAT,
-        autopilot=wire.MAV_AUTOPILOT_ARDUPILOTMEGA, custom_mode=int(autopilot.mode), latitude=lat_e7, longitude=lon_e7,
-        altitude=0, target_altitude=0, heading=_half_degrees(vehicle.heading_rad),
+        timestamp=round(vehicle.boot_s * 1e3) & 0xFFFFFFFF,
+        type=autopilot.vehicle_type or wire.MAV_TYPE_SURFACE_BOAT,
+        autopilot=wire.MAV_AUTOPILOT_ARDUPILOTMEGA,
+        custom_mode=int(autopilot.mode),
+        latitude=lat_e7,
+        longitude=lon_e7,
+        altitude=0,
+        target_altitude=0,
+        heading=_half_degrees(vehicle.heading_rad),
         target_heading=_half_degrees(autopilot.target_bearing_rad),
         target_distance=_saturated16(status.waypoint_distance_m, 0.1),
-        throttle=0, airspeed=0, airspeed_sp=0, groundspeed=_saturated8(vehicle.speed_mps, 5.0),
-        windspeed=_saturated8(status.tws_mps, 5.0), wind_heading=_half_degrees(status.twd_from_rad), eph=0, epv=0,
-        temperature_air=NO_TEMPERATURE, climb_rate=0,
+        throttle=0,
+        airspeed=0,
+        airspeed_sp=0,
+        groundspeed=_saturated8(vehicle.speed_mps, 5.0),
+        windspeed=_saturated8(status.tws_mps, 5.0),
+        wind_heading=_half_degrees(status.twd_from_rad),
+        eph=0,
+        epv=0,
+        temperature_air=NO_TEMPERATURE,
+        climb_rate=0,
         battery=-1 if remaining is None else round(100.0 * remaining),
-        wp_num=_saturated16(status.waypoint_seq), failure_flags=_failures(autopilot),
+        wp_num=_saturated16(status.waypoint_seq),
+        failure_flags=_failures(autopilot),
         custom0=base_mode - 256 if base_mode > 127 else base_mode,
-        custom1=-1 if risk is None else round(100.0 * (1.0 - risk)), custom2=number_of(watchdog),
+        custom1=-1 if risk is None else round(100.0 * (1.0 - risk)),
+        custom2=number_of(watchdog),
     )
 
 

@@ -40,10 +40,10 @@ class _Layout:
     kind: type[Any]
     codec: struct.Struct
     crc_extra: bytes
-    names: tuple[str, ...]                          # of the fields, in the order of the frame
+    names: tuple[str, ...]  # of the fields, in the order of the frame
     texts: tuple[str, ...]
-    read: Callable[[Any], tuple[Any, ...]]      # their values as they are packed, in that order
-    blank: dict[str, Any]                           # what else an instance has
+    read: Callable[[Any], tuple[Any, ...]]  # their values as they are packed, in that order
+    blank: dict[str, Any]  # what else an instance has
 
 
 @functools.cache
@@ -62,8 +62,14 @@ def _layout(number: int) -> _Layout | None:
     made = vars(kind(*(b"" if name in texts else 0 for name in kind.fieldnames)))
     told = {*names, *(f"_{name}_raw" for name in texts), "_header", "_msgbuf", "_payload", "_crc"}
     return _Layout(
-        kind=kind, codec=kind.unpacker, crc_extra=bytes([kind.crc_extra]), names=names, texts=texts, read=read,
-        blank={name: value for name, value in made.items() if name not in told})
+        kind=kind,
+        codec=kind.unpacker,
+        crc_extra=bytes([kind.crc_extra]),
+        names=names,
+        texts=texts,
+        read=read,
+        blank={name: value for name, value in made.items() if name not in told},
+    )
 
 
 class Dialect(wire.MAVLink):  # type: ignore[misc]
@@ -81,9 +87,9 @@ class Dialect(wire.MAVLink):  # type: ignore[misc]
             return super().decode(msgbuf)
         crc = _checksum(frame[1:size] + layout.crc_extra)
         if crc != frame[size] | frame[size + 1] << 8:
-            return super().decode(msgbuf)   # which says what is wrong
+            return super().decode(msgbuf)  # which says what is wrong
         codec = layout.codec
-        values = codec.unpack(frame[_HEADER_BYTES:size].ljust(codec.size, b"\0")[:codec.size])   # zeros are not sent
+        values = codec.unpack(frame[_HEADER_BYTES:size].ljust(codec.size, b"\0")[: codec.size])  # zeros are not sent
         message = object.__new__(layout.kind)
         own = message.__dict__
         own.update(layout.blank)
@@ -102,9 +108,12 @@ class Dialect(wire.MAVLink):  # type: ignore[misc]
         if layout is None or _checksum is None or self.signing.sign_outgoing:
             return bytes(message.pack(self))
         payload = layout.codec.pack(*layout.read(message)).rstrip(b"\0") or b"\0"
-        frame = _HEADER.pack(
-            _STX, len(payload), 0, 0, self.seq, self.srcSystem, self.srcComponent, number & 0xFFFF, number >> 16
-        ) + payload
+        frame = (
+            _HEADER.pack(
+                _STX, len(payload), 0, 0, self.seq, self.srcSystem, self.srcComponent, number & 0xFFFF, number >> 16
+            )
+            + payload
+        )
         return frame + _CRC.pack(_checksum(frame[1:] + layout.crc_extra))
 
 
@@ -166,7 +175,7 @@ class Codec:
     def __init__(self, system: int, component: int, signing: SigningState | None = None) -> None:
         self.dropped: Counter[Drop] = Counter()
         self.frames_in = 0
-        self.signed_in = 0   # of them, those with a signature, whether or not it was checked
+        self.signed_in = 0  # of them, those with a signature, whether or not it was checked
         self.frames_out = 0
         self._buffer = bytearray()
         self._mav = Dialect(None, srcSystem=system, srcComponent=component)
@@ -229,7 +238,7 @@ class Codec:
                 self.dropped[Drop.NOISE] += 1
                 at += 1
                 continue
-            message = self._decode(buffer[at:at + size])
+            message = self._decode(buffer[at : at + size])
             if message is None:
                 self.dropped[Drop.NOISE] += 1
                 at += 1
@@ -279,7 +288,7 @@ class Codec:
         """Count a frame that is not signed with our key; a command to us is somebody's who wants to be heard."""
         self.dropped[Drop.BAD_SIGNATURE if frame[2] & _SIGNED else Drop.UNSIGNED] += 1
         kind = int.from_bytes(frame[7:10], "little")
-        payload = frame[_HEADER_BYTES:_HEADER_BYTES + frame[1]]
+        payload = frame[_HEADER_BYTES : _HEADER_BYTES + frame[1]]
         if kind in _COMMANDS and len(payload) > _TARGET_COMPONENT and payload[_TARGET_COMPONENT] == self.component:
             self.dropped[Drop.UNSIGNED_COMMAND] += 1
 
@@ -292,7 +301,7 @@ class Codec:
         self.dropped[Drop.NOISE] += len(data)
         at = data.find(b"\xfe\x09")
         while at >= 0:
-            frame = data[at:at + _V1_HEARTBEAT_BYTES]
+            frame = data[at : at + _V1_HEARTBEAT_BYTES]
             if len(frame) == _V1_HEARTBEAT_BYTES and frame[5] == wire.MAVLINK_MSG_ID_HEARTBEAT:
                 crc = wire.x25crc(frame[1:-2] + bytes([wire.MAVLink_heartbeat_message.crc_extra])).crc
                 self.dropped[Drop.MAVLINK_1] += crc == int.from_bytes(frame[-2:], "little")

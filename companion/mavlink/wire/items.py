@@ -19,14 +19,12 @@ ENDING = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
 
 # MAV_FRAME: _INT twins and what they are stored as.
 _FRAMES = {5: 0, 6: 3, 11: 10}
-_VERTICES = frozenset({
-    Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
-})
+_VERTICES = frozenset({Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION})
 _CIRCLES = frozenset({Command.NAV_FENCE_CIRCLE_INCLUSION, Command.NAV_FENCE_CIRCLE_EXCLUSION})
 # Commands that ArduPilot stores without a place.
-_PLACELESS = frozenset({
-    Command.NAV_RETURN_TO_LAUNCH, Command.NAV_DELAY, Command.DO_JUMP, Command.DO_CHANGE_SPEED, Command.DO_FENCE_ENABLE,
-})
+_PLACELESS = frozenset(
+    {Command.NAV_RETURN_TO_LAUNCH, Command.NAV_DELAY, Command.DO_JUMP, Command.DO_CHANGE_SPEED, Command.DO_FENCE_ENABLE}
+)
 
 # mission.dat of MAVFTP: magic, data type, options, first item, number of items; then packed MISSION_ITEM_INT.
 _HEADER = struct.Struct("<HHHHH")
@@ -63,7 +61,7 @@ def sailed(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
     """Return the items up to and with the first that ends a mission: what the boat can ever sail."""
     for i, item in enumerate(items):
         if item.command in ENDING:
-            return tuple(items[:i + 1])
+            return tuple(items[: i + 1])
     return tuple(items)
 
 
@@ -86,9 +84,7 @@ def mission_hash(items: Sequence[MissionItem]) -> str:
     digest = hashlib.sha256()
     for item in sailed(items):
         kept = canonical(item)
-        digest.update(
-            struct.pack("<HBii4f", kept.command, kept.frame, kept.lat_e7, kept.lon_e7, *kept.params)
-        )
+        digest.update(struct.pack("<HBii4f", kept.command, kept.frame, kept.lat_e7, kept.lon_e7, *kept.params))
     return digest.hexdigest()[:16]
 
 
@@ -110,8 +106,18 @@ def pack_mission_dat(
     data = bytearray(_HEADER.pack(_MAGIC, int(mission_type), options, start, len(items)))
     for i, item in enumerate(items):
         data += _ITEM.pack(
-            *item.params, item.lat_e7, item.lon_e7, item.alt_m, start + i, item.command,
-            1, 1, item.frame, 0, int(item.autocontinue), int(mission_type),
+            *item.params,
+            item.lat_e7,
+            item.lon_e7,
+            item.alt_m,
+            start + i,
+            item.command,
+            1,
+            1,
+            item.frame,
+            0,
+            int(item.autocontinue),
+            int(mission_type),
         )
     return bytes(data)
 
@@ -137,10 +143,17 @@ def unpack_mission_dat(data: bytes) -> tuple[MissionType, int, tuple[MissionItem
         if seq != start + i:
             raise ValueError(f"item {start + i} of mission.dat says it is number {seq}")
         params = tuple(p if math.isfinite(p) else 0.0 for p in (p1, p2, p3, p4))
-        items.append(MissionItem(
-            command=command, lat_e7=x, lon_e7=y, alt_m=z if math.isfinite(z) else 0.0, frame=frame,
-            params=(params[0], params[1], params[2], params[3]), autocontinue=bool(auto),
-        ))
+        items.append(
+            MissionItem(
+                command=command,
+                lat_e7=x,
+                lon_e7=y,
+                alt_m=z if math.isfinite(z) else 0.0,
+                frame=frame,
+                params=(params[0], params[1], params[2], params[3]),
+                autocontinue=bool(auto),
+            )
+        )
     return MissionType(kind), start, tuple(items)
 
 

@@ -80,8 +80,9 @@ class StreamMonitor:
 
     def below_rate(self, t_s: float) -> tuple[Stream, ...]:
         """Return the vital streams that are stale, or come at less than half of the rate asked for."""
-        return tuple(s for s in self.table if s.is_vital and (
-            not (rate_hz := self.rate_hz(t_s, s)) or rate_hz < 0.5 * s.rate_hz))
+        return tuple(
+            s for s in self.table if s.is_vital and (not (rate_hz := self.rate_hz(t_s, s)) or rate_hz < 0.5 * s.rate_hz)
+        )
 
 
 def _since(times: deque[float], t_s: float, window_s: float) -> int:

@@ -23,7 +23,25 @@ from companion.orders.far.order import (
 from companion.orders.far.status import FarStatus, pack_status, unpack_status
 
 __all__ = [
-    "BEGINNING_SIZE", "MOST_COUNTER", "MOST_JUMP", "WINDOW", "Beginning", "FarKey", "FarOrder", "FarStatus",
-    "Reply", "Taken", "begun", "judged", "minutes_of", "pack_beginning", "pack_order", "pack_status", "reply_of",
-    "unix_of", "unpack_beginning", "unpack_order", "unpack_status",
+    "BEGINNING_SIZE",
+    "MOST_COUNTER",
+    "MOST_JUMP",
+    "WINDOW",
+    "Beginning",
+    "FarKey",
+    "FarOrder",
+    "FarStatus",
+    "Reply",
+    "Taken",
+    "begun",
+    "judged",
+    "minutes_of",
+    "pack_beginning",
+    "pack_order",
+    "pack_status",
+    "reply_of",
+    "unix_of",
+    "unpack_beginning",
+    "unpack_order",
+    "unpack_status",
 ]

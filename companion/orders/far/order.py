@@ -19,7 +19,7 @@ from companion.orders.order import BY_VERB, Place, Result, Verb, Wanted, mark_of
 # Little-endian, without gaps. A value that does not fit is told as the nearest that does: never as another one, never
 # as unknown. What is not known has a number of its own, which is never 0.
 
-EPOCH_S = 1_577_836_800      # 2020-01-01T00:00:00Z: minutes in three bytes from here on last until 2051
+EPOCH_S = 1_577_836_800  # 2020-01-01T00:00:00Z: minutes in three bytes from here on last until 2051
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +80,7 @@ class Layout:
         """Return the counts in ``size`` bytes."""
         counts, at = {}, 0
         for one in self.fields:
-            counts[one.name] = int.from_bytes(data[at:at + one.size], "little", signed=one.is_signed)
+            counts[one.name] = int.from_bytes(data[at : at + one.size], "little", signed=one.is_signed)
             at += one.size
         return counts
 
@@ -111,7 +111,7 @@ def unix_of(minutes: int) -> float:
 # or for another system is no order of this one. The key file is that of ``companion key new``.
 
 SEAL_BYTES = 8
-ORDER, STATUS, BEGINNING, NAME = "order", "status", "beginning", "name"   # purposes
+ORDER, STATUS, BEGINNING, NAME = "order", "status", "beginning", "name"  # purposes
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -156,31 +156,46 @@ class FarKey:
     def _code(self, purpose: str, body: bytes) -> bytes:
         since = f" began {self.began}" if purpose == ORDER and self.began else ""
         own = hmac.digest(
-            self.key, f"companion far {purpose} 1 system {self.system}{since}".encode("ascii"), hashlib.sha256)
+            self.key, f"companion far {purpose} 1 system {self.system}{since}".encode("ascii"), hashlib.sha256
+        )
         return hmac.digest(own, body, hashlib.sha256)[:SEAL_BYTES]
 
 
 VERSION = 1
 MOST_COUNTER = 0xFFFF
 MARK_BYTES = 4
-LAYOUT = Layout((
-    BitField(name="version", size=1, says=f"{VERSION}"),
-    BitField(name="verb", size=1, says="its number, as in [orders](../guides/orders.md)"),
-    BitField(name="number", size=1, says="of a refuge in the mission, 0: the nearest, or by `lat`; else 0"),
-    BitField(name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"),
-    BitField(name="counter", size=2, says="from 1, never twice since one beginning"),
-    BitField(name="lat", size=4, is_signed=True, unit="1e-7 deg",
-          says="of a goal; of a refuge the number of its name (`param3` in [orders](../guides/orders.md)) or 0; "
-               "else 0"),
-    BitField(name="lon", size=4, is_signed=True, unit="1e-7 deg", says="of a goal; else 0"),
-))
+LAYOUT = Layout(
+    (
+        BitField(name="version", size=1, says=f"{VERSION}"),
+        BitField(name="verb", size=1, says="its number, as in [orders](../guides/orders.md)"),
+        BitField(name="number", size=1, says="of a refuge in the mission, 0: the nearest, or by `lat`; else 0"),
+        BitField(
+            name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"
+        ),
+        BitField(name="counter", size=2, says="from 1, never twice since one beginning"),
+        BitField(
+            name="lat",
+            size=4,
+            is_signed=True,
+            unit="1e-7 deg",
+            says="of a goal; of a refuge the number of its name (`param3` in [orders](../guides/orders.md)) or 0; "
+            "else 0",
+        ),
+        BitField(name="lon", size=4, is_signed=True, unit="1e-7 deg", says="of a goal; else 0"),
+    )
+)
 SIZE = LAYOUT.size + SEAL_BYTES
-BEGINNING_LAYOUT = Layout((
-    BitField(name="version", size=1, says=f"{VERSION}"),
-    BitField(name="began", size=3, unit="min since 2020-01-01 UTC",
-             says="when it was given: later than every one before"),
-    BitField(name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"),
-))
+BEGINNING_LAYOUT = Layout(
+    (
+        BitField(name="version", size=1, says=f"{VERSION}"),
+        BitField(
+            name="began", size=3, unit="min since 2020-01-01 UTC", says="when it was given: later than every one before"
+        ),
+        BitField(
+            name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"
+        ),
+    )
+)
 BEGINNING_SIZE = BEGINNING_LAYOUT.size + SEAL_BYTES
 
 
@@ -208,8 +223,10 @@ class Beginning:
 def pack_beginning(beginning: Beginning, key: FarKey) -> bytes:
     """Return a beginning's 15 bytes. Raises ValueError: it lies at no time."""
     try:
-        return key.sealed(BEGINNING, BEGINNING_LAYOUT.pack(
-            {"version": VERSION, "began": beginning.began, "expires": beginning.expires_min}))
+        return key.sealed(
+            BEGINNING,
+            BEGINNING_LAYOUT.pack({"version": VERSION, "began": beginning.began, "expires": beginning.expires_min}),
+        )
     except OverflowError:
         raise ValueError("a moment is too far away for its field") from None
 
@@ -237,8 +254,15 @@ def pack_order(order: FarOrder, key: FarKey) -> bytes:
         raise ValueError(wanted.fault or "nothing is wanted")
     if not 0 < order.counter <= MOST_COUNTER:
         raise ValueError(f"the counter {order.counter} is not in 1 to {MOST_COUNTER}")
-    counts = {"version": VERSION, "verb": BY_VERB[wanted.verb].number, "number": 0, "expires": order.expires_min,
-              "counter": order.counter, "lat": 0, "lon": 0}
+    counts = {
+        "version": VERSION,
+        "verb": BY_VERB[wanted.verb].number,
+        "number": 0,
+        "expires": order.expires_min,
+        "counter": order.counter,
+        "lat": 0,
+        "lon": 0,
+    }
     if wanted.verb is Verb.GOAL:
         if wanted.place is None or wanted.place.trouble:
             raise ValueError("a goal needs a position" if wanted.place is None else wanted.place.trouble)
@@ -266,13 +290,21 @@ def unpack_order(data: bytes, key: FarKey) -> FarOrder:
         raise ValueError(f"there is no order {counts['verb']}")
     if counts["counter"] == 0:
         raise ValueError("its counter is 0")
-    if (number and verb is not Verb.REFUGE) or (lat and verb not in {Verb.REFUGE, Verb.GOAL}) or (
-        lon and verb is not Verb.GOAL) or (verb is Verb.REFUGE and lat < 0):
+    if (
+        (number and verb is not Verb.REFUGE)
+        or (lat and verb not in {Verb.REFUGE, Verb.GOAL})
+        or (lon and verb is not Verb.GOAL)
+        or (verb is Verb.REFUGE and lat < 0)
+    ):
         raise ValueError(f"{verb} takes no such number or place")
     place = Place(lat_deg=lat / 1e7, lon_deg=lon / 1e7) if verb is Verb.GOAL else None
     mark = lat if verb is Verb.REFUGE else 0
-    return FarOrder(wanted=Wanted(verb=verb, number=number, mark=mark, place=place), counter=counts["counter"],
-                    expires_min=counts["expires"], mark=data[-MARK_BYTES:].hex())
+    return FarOrder(
+        wanted=Wanted(verb=verb, number=number, mark=mark, place=place),
+        counter=counts["counter"],
+        expires_min=counts["expires"],
+        mark=data[-MARK_BYTES:].hex(),
+    )
 
 
 # The judge of orders from far away: they come late, twice, in any order, or not at all.
@@ -287,8 +319,8 @@ def unpack_order(data: bytes, key: FarKey) -> FarOrder:
 # is played back.
 
 WINDOW = 64
-MOST_JUMP = 1024                       # counters ahead of the highest: as many messages as are lost in a row, and more
-MOST_AHEAD_S = 7 * 86_400.0 + 3600.0   # an order that lives longer is somebody's mistake, or a wrong clock
+MOST_JUMP = 1024  # counters ahead of the highest: as many messages as are lost in a row, and more
+MOST_AHEAD_S = 7 * 86_400.0 + 3600.0  # an order that lives longer is somebody's mistake, or a wrong clock
 # A beginning may be so far ahead of the boat's clock: one of a clock that is days ahead would keep every other one out.
 MOST_CLOCK_S = 3600.0
 FORMAT = 2
@@ -345,8 +377,12 @@ class Taken:
 
     def to_dict(self, key_name: str) -> dict[str, Any]:
         """Return plain JSON values."""
-        return {"format": FORMAT, "key": key_name, "began": self.began,
-                "replies": {str(n): [mark, reply.value] for n, (mark, reply) in self.replies.items()}}
+        return {
+            "format": FORMAT,
+            "key": key_name,
+            "began": self.began,
+            "replies": {str(n): [mark, reply.value] for n, (mark, reply) in self.replies.items()},
+        }
 
     @classmethod
     def from_dict(cls, data: Any, key_name: str) -> Taken:
@@ -386,7 +422,7 @@ def judged(order: FarOrder, taken: Taken, unix_s: float | None) -> tuple[Reply |
     if order.counter > taken.highest + MOST_JUMP:
         return Reply.AHEAD, taken
     if unix_s is None:
-        return Reply.NO_CLOCK, taken   # sent again when it knows, it may count
+        return Reply.NO_CLOCK, taken  # sent again when it knows, it may count
     left_s = unix_of(order.expires_min) - unix_s
     if left_s <= 0.0:
         reply = Reply.EXPIRED
@@ -404,7 +440,7 @@ def begun(beginning: Beginning, taken: Taken, unix_s: float | None) -> tuple[Rep
         its reply, and what is taken from now on, to be kept.
     """
     if beginning.began == taken.began:
-        return Reply.BEGUN, taken    # come again
+        return Reply.BEGUN, taken  # come again
     if beginning.began < taken.began:
         return Reply.OLD, taken
     if unix_s is None:

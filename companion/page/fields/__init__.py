@@ -35,7 +35,7 @@ from companion.field.tree import (
 from companion.geofence import Mission
 from companion.mission_check import FieldPreview
 
-WINDS_MPS = [0.5 * n for n in range(2, 31)]   # what the slider stops at
+WINDS_MPS = [0.5 * n for n in range(2, 31)]  # what the slider stops at
 
 
 def field_page(mission: Mission, seen: FieldPreview, words: list[str]) -> bytes:
@@ -43,8 +43,11 @@ def field_page(mission: Mission, seen: FieldPreview, words: list[str]) -> bytes:
     web = resources.files("companion.page.fields").joinpath("web")
     data = msgspec.json.encode(page_data(mission, seen, words)).replace(b"<", b"\\u003c").decode()
     page = web.joinpath("page.html").read_text()
-    for name, text in (("CALC", web.joinpath("calc.js").read_text()), ("DRAW", web.joinpath("draw.js").read_text()),
-                       ("DATA", data)):
+    for name, text in (
+        ("CALC", web.joinpath("calc.js").read_text()),
+        ("DRAW", web.joinpath("draw.js").read_text()),
+        ("DATA", data),
+    ):
         page = page.replace(f"\n{name}\n", f"\n{text}\n")
     return page.encode()
 
@@ -58,17 +61,29 @@ def page_data(mission: Mission, seen: FieldPreview, words: list[str]) -> dict[st
     look_s = max(habits.polar_mps)
     area = seen.area
     return {
-        "title": f"{mission.name}, goal {seen.number}: {seen.tree.text}", "words": words,
+        "title": f"{mission.name}, goal {seen.number}: {seen.tree.text}",
+        "words": words,
         "solid": [ring for polygon in area.polygons for ring in _rings(polygon)],
         "fence": [] if area.limits is None else _rings(area.limits),
-        "boat": seen.here_en, "place": seen.place_en, "radius": seen.radius_m, "centre": seen.centre_en,
-        "half": seen.half_m, "wind": {"twd": seen.conditions.seen.twd_from_rad or 0.0, "tws": tws},
+        "boat": seen.here_en,
+        "place": seen.place_en,
+        "radius": seen.radius_m,
+        "centre": seen.centre_en,
+        "half": seen.half_m,
+        "wind": {"twd": seen.conditions.seen.twd_from_rad or 0.0, "tws": tws},
         "marks": [_mark(name, atom) for name, atom in seen.tree.atoms if not isinstance(atom, Heading)],
         "field": {
-            "tree": _node(seen.tree.expression), "atoms": {name: _atom(atom, look_s) for name, atom in seen.tree.atoms},
-            "sails": habits.is_sailing, "noGo": habits.no_go_half_rad, "turnRate": habits.turn_rate_radps,
-            "tackS": habits.tack_s, "lagS": max(habits.lag_s, 0.1), "leeway": habits.leeway_share,
-            "winds": WINDS_MPS, "twa": twa, "speeds": speeds,
+            "tree": _node(seen.tree.expression),
+            "atoms": {name: _atom(atom, look_s) for name, atom in seen.tree.atoms},
+            "sails": habits.is_sailing,
+            "noGo": habits.no_go_half_rad,
+            "turnRate": habits.turn_rate_radps,
+            "tackS": habits.tack_s,
+            "lagS": max(habits.lag_s, 0.1),
+            "leeway": habits.leeway_share,
+            "winds": WINDS_MPS,
+            "twa": twa,
+            "speeds": speeds,
         },
     }
 
@@ -89,8 +104,13 @@ def _atom(atom: Atom, fastest_mps: float) -> dict[str, Any]:
     if isinstance(atom, Along):
         return {"kind": "line", "from": atom.from_en, "to": atom.to_en, "zone": atom.zone_m}
     if isinstance(atom, Round):
-        return {"kind": "circle", "at": atom.at_en, "radius": atom.radius_m, "clockwise": atom.is_clockwise,
-                "zone": atom.zone_m}
+        return {
+            "kind": "circle",
+            "at": atom.at_en,
+            "radius": atom.radius_m,
+            "clockwise": atom.is_clockwise,
+            "zone": atom.zone_m,
+        }
     if isinstance(atom, AwayFrom):
         return {"kind": "repulsive_point", "at": atom.at_en, "range": atom.range_m}
     if isinstance(atom, AwayFromLine):
@@ -99,8 +119,11 @@ def _atom(atom: Atom, fastest_mps: float) -> dict[str, Any]:
         return {"kind": "heading", "heading": atom.heading_rad}
     west, south, east, north = atom.water_en.bounds
     look_s = min(MOST_LOOK_S, max(LOOK_S, 1.5 * math.hypot(east - west, north - south) / max(fastest_mps, 0.3)))
-    return {"kind": "leave", "rings": _rings(shapely.buffer(atom.water_en, BEYOND_M, join_style="mitre")),
-            "range": look_s}
+    return {
+        "kind": "leave",
+        "rings": _rings(shapely.buffer(atom.water_en, BEYOND_M, join_style="mitre")),
+        "range": look_s,
+    }
 
 
 def _mark(name: str, atom: Atom) -> dict[str, Any]:
@@ -108,8 +131,12 @@ def _mark(name: str, atom: Atom) -> dict[str, Any]:
         kind = "line" if isinstance(atom, Along) else "repulsive_line"
         return {"kind": kind, "name": name, "at": atom.from_en, "to": atom.to_en}
     if isinstance(atom, OutOf):
-        return {"kind": "leave", "name": name, "at": (atom.water_en.bounds[0], atom.water_en.bounds[3]),
-                "rings": _rings(atom.water_en)}
+        return {
+            "kind": "leave",
+            "name": name,
+            "at": (atom.water_en.bounds[0], atom.water_en.bounds[3]),
+            "rings": _rings(atom.water_en),
+        }
     if isinstance(atom, Round):
         return {"kind": "circle", "name": name, "at": atom.at_en, "radius": atom.radius_m}
     if isinstance(atom, AwayFrom):
@@ -121,5 +148,6 @@ def _mark(name: str, atom: Atom) -> dict[str, Any]:
 def _rings(shape: BaseGeometry) -> list[list[tuple[float, float]]]:
     """Return the rings of polygons."""
     polygons = [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon"]
-    return [[(float(x), float(y)) for x, y in ring.coords[:-1]]
-            for p in polygons for ring in (p.exterior, *p.interiors)]
+    return [
+        [(float(x), float(y)) for x, y in ring.coords[:-1]] for p in polygons for ring in (p.exterior, *p.interiors)
+    ]

@@ -5,6 +5,17 @@ from companion.planner.problem.parts import ASSUMED_SHARE, BoatLimits, ProblemWi
 from companion.planner.problem.value import VESSELS_SHARE, defect_of, resolved, sigmas_for, vessel_count
 
 __all__ = [
-    "ASSUMED_SHARE", "VESSELS_SHARE", "BoatLimits", "ProblemWind", "RiskLimit", "Sigma", "Strength",
-    "assumed", "defect_of", "evaluate", "resolved", "sigmas_for", "vessel_count",
+    "ASSUMED_SHARE",
+    "VESSELS_SHARE",
+    "BoatLimits",
+    "ProblemWind",
+    "RiskLimit",
+    "Sigma",
+    "Strength",
+    "assumed",
+    "defect_of",
+    "evaluate",
+    "resolved",
+    "sigmas_for",
+    "vessel_count",
 ]

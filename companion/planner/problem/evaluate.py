@@ -78,7 +78,7 @@ def solve_heading(p: Problem, course_rad: float, t_s: float) -> tuple[float, flo
 # more uncertain the wind is, and never closed by a shift. ``Problem.beat`` says what the autopilot does; a leg inside
 # the widened zone is then allowed if it is clear by ``clearance_m``, and takes ``beat_s``.
 
-ANGLES = 46   # nodes of the beaten speed inside the zone: a degree apart at 45 degrees
+ANGLES = 46  # nodes of the beaten speed inside the zone: a degree apart at 45 degrees
 
 
 def beat_s(problem: Problem, beat: Beat, dx_m: float, dy_m: float) -> tuple[float, float]:
@@ -142,23 +142,33 @@ def beaten(problem: Problem, beat: Beat) -> Problem:
     boat = problem.boat
     still, tacking = replace(problem, current=NO_CURRENT), beat
     if problem.current.drift_mps > 0.0:
-        tacking = replace(beat, tack_s=0.0)   # while the boat tacks in place a share of its speed would be carried back
+        tacking = replace(beat, tack_s=0.0)  # while the boat tacks in place a share of its speed would be carried back
     inside = [float(a) for a in np.linspace(0.0, beat.no_go_half_rad, ANGLES)]
     made = [beaten_mps(still, tacking, angle) for angle in inside]
     outside = [(a, v) for a, v in zip(boat.polar_twa_rad, boat.polar_mps, strict=True) if a > beat.no_go_half_rad]
     clear = beat.clearance_m
     targets = tuple(replace(t, radius_m=t.radius_m + beat.corridor_m) for t in problem.targets)
     return replace(
-        problem, beat=None, risk=None,
-        zone=None if problem.zone is None else replace(
-            problem.zone, half_rad=max(0.0, problem.zone.half_rad - 2.0 * NO_GO_SLACK_RAD),
-            open_half_rad=min(problem.no_go_max_rad, math.pi)),
-        delta_s=0.5, targets=targets,
+        problem,
+        beat=None,
+        risk=None,
+        zone=None
+        if problem.zone is None
+        else replace(
+            problem.zone,
+            half_rad=max(0.0, problem.zone.half_rad - 2.0 * NO_GO_SLACK_RAD),
+            open_half_rad=min(problem.no_go_max_rad, math.pi),
+        ),
+        delta_s=0.5,
+        targets=targets,
         clearance_floor_m=problem.clearance_floor_m + clear,
         wind=replace(problem.wind, sigma=type(problem.wind.sigma)()),
         boat=replace(
-            boat, no_go_half_rad=0.0, polar_twa_rad=(*inside, *(a for a, _ in outside)),
-            polar_mps=(*made, *(v for _, v in outside))),
+            boat,
+            no_go_half_rad=0.0,
+            polar_twa_rad=(*inside, *(a for a, _ in outside)),
+            polar_mps=(*made, *(v for _, v in outside)),
+        ),
     )
 
 
@@ -181,7 +191,8 @@ class SolidObstacles:
         self._problem = problem
         self.is_large = sum(shapely.get_num_coordinates(g) for g in problem.obstacles) > LARGE
         self._parts = np.asarray(
-            [g if g.is_valid else shapely.make_valid(g) for g in problem.obstacles if not g.is_empty], dtype=object)
+            [g if g.is_valid else shapely.make_valid(g) for g in problem.obstacles if not g.is_empty], dtype=object
+        )
         self._tree = shapely.STRtree(self._parts)
         self._fence = problem.fence_polygon
         self._line = None if self._fence is None else self._fence.boundary
@@ -205,7 +216,8 @@ class SolidObstacles:
         floor = self._problem.clearance_floor_m
         near = self._tree.query(shape, predicate="dwithin", distance=floor + _REACH_M)
         is_inside = self._fence is None or (
-            bool(self._fence.contains_properly(shape)) and not bool(shapely.dwithin(self._line, shape, _REACH_M)))
+            bool(self._fence.contains_properly(shape)) and not bool(shapely.dwithin(self._line, shape, _REACH_M))
+        )
         if len(near) == 0 and is_inside:
             return False
         corridor = shape.buffer(_CORRIDOR_M)
@@ -229,7 +241,7 @@ class SolidObstacles:
         return nearest if len(self._parts) or self._line is not None else None
 
 
-@lru_cache(maxsize=8)   # by identity; an index of thousands of shapes is made once for a search
+@lru_cache(maxsize=8)  # by identity; an index of thousands of shapes is made once for a search
 def shore_of(problem: Problem) -> SolidObstacles:
     """Return the exact test of legs against all that is solid in the problem."""
     return SolidObstacles(problem)
@@ -303,8 +315,17 @@ def evaluate(problem: Problem, waypoints_en: ArrayLike) -> Evaluation:
     points = [(float(x), float(y)) for x, y in np.asarray(waypoints_en, dtype=np.float64).reshape(-1, 2)]
     if not points or not all(math.isfinite(c) for q in points for c in q):
         text = "non-finite waypoint" if points else "no path"
-        return Evaluation(is_feasible=False, reasons=(text,), time_s=math.inf, sail_s=0.0, turn_s=0.0, length_m=0.0,
-                          tacks=0, gybes=0, legs=())
+        return Evaluation(
+            is_feasible=False,
+            reasons=(text,),
+            time_s=math.inf,
+            sail_s=0.0,
+            turn_s=0.0,
+            length_m=0.0,
+            tacks=0,
+            gybes=0,
+            legs=(),
+        )
     if math.dist(points[0], p.start_en) > START_SLACK_M:
         reasons.append("first waypoint is not the start")
     points[0] = p.start_en
@@ -342,8 +363,10 @@ def evaluate(problem: Problem, waypoints_en: ArrayLike) -> Evaluation:
             reasons.append(f"leg {i}: the turn into it is a tack, or too near to one, and this boat cannot tack")
         wound += turn
         if i > 0 and p.boat.room_m > 0.0 and abs(wound) > p.boat.most_turn_rad + NO_GO_SLACK_RAD:
-            reasons.append(f"leg {i}: the boat has turned {math.degrees(abs(wound)):.0f} deg without a leg of "
-                           f"{p.boat.room_m:.1f} m")
+            reasons.append(
+                f"leg {i}: the boat has turned {math.degrees(abs(wound)):.0f} deg without a leg of "
+                f"{p.boat.room_m:.1f} m"
+            )
         if length >= p.boat.room_m - 1e-6:
             wound = 0.0
         t += spent
@@ -359,14 +382,19 @@ def evaluate(problem: Problem, waypoints_en: ArrayLike) -> Evaluation:
             tacks += round(crossings)
             t1, v = t + beaten_s, length / beaten_s
         elif zoned:
-            reasons.append(f"leg {i}: the autopilot would beat it, or not keep to it, in the wind that it knows, and "
-                           "there is no room for that")
+            reasons.append(
+                f"leg {i}: the autopilot would beat it, or not keep to it, in the wind that it knows, and "
+                "there is no room for that"
+            )
         elif is_closed:
-            reasons.append(f"leg {i}: |TWA| {math.degrees(abs(twa)):.2f} deg is inside the no-go zone "
-                           f"{math.degrees(half):.2f} deg")
+            reasons.append(
+                f"leg {i}: |TWA| {math.degrees(abs(twa)):.2f} deg is inside the no-go zone {math.degrees(half):.2f} deg"
+            )
         if abs(twa) > p.boat.max_twa_rad + NO_GO_SLACK_RAD:
-            reasons.append(f"leg {i}: |TWA| {math.degrees(abs(twa)):.2f} deg is beyond the limit "
-                           f"{math.degrees(p.boat.max_twa_rad):.1f} deg")
+            reasons.append(
+                f"leg {i}: |TWA| {math.degrees(abs(twa)):.2f} deg is beyond the limit "
+                f"{math.degrees(p.boat.max_twa_rad):.1f} deg"
+            )
         if not math.isfinite(t1):
             reasons.append(f"leg {i}: the boat makes no way on it")
         if shore_of(p).hits(shapely.LineString([a, b])):
@@ -375,15 +403,36 @@ def evaluate(problem: Problem, waypoints_en: ArrayLike) -> Evaluation:
         hit = target_hit(p, a, b, t, t1, 0.0 if beat is None else beat.corridor_m) if hit is None else hit
         if hit is not None:
             reasons.append(f"leg {i}: meets target {hit}")
-        legs.append(Leg(from_en=a, to_en=b, heading_rad=wrap_two_pi(h), twa_rad=wrap_pi(-twa), turn_rad=turn,
-                        length_m=length, speed_mps=v, start_s=t, end_s=t1, sigma_rad=sigma, no_go_half_rad=half,
-                        is_beat=beat is not None, manoeuvre=named))
+        legs.append(
+            Leg(
+                from_en=a,
+                to_en=b,
+                heading_rad=wrap_two_pi(h),
+                twa_rad=wrap_pi(-twa),
+                turn_rad=turn,
+                length_m=length,
+                speed_mps=v,
+                start_s=t,
+                end_s=t1,
+                sigma_rad=sigma,
+                no_go_half_rad=half,
+                is_beat=beat is not None,
+                manoeuvre=named,
+            )
+        )
         sail_s += t1 - t
         length_m += length
         t, heading = t1, h
     return Evaluation(
-        is_feasible=not reasons, reasons=tuple(reasons), time_s=t, sail_s=sail_s, turn_s=turn_s, length_m=length_m,
-        tacks=tacks, gybes=gybes, legs=tuple(legs),
+        is_feasible=not reasons,
+        reasons=tuple(reasons),
+        time_s=t,
+        sail_s=sail_s,
+        turn_s=turn_s,
+        length_m=length_m,
+        tacks=tacks,
+        gybes=gybes,
+        legs=tuple(legs),
     )
 
 

@@ -57,8 +57,9 @@ class _JsonReader:
         except (TypeError, ValueError) as error:
             text = repr(self.raw[key])
             text = text if len(text) < 60 else text[:57] + "..."
-            raise InputError(self.source, where, f"{text} is not what belongs here ({error})",
-                             "see docs/reference/problem-format.md") from error
+            raise InputError(
+                self.source, where, f"{text} is not what belongs here ({error})", "see docs/reference/problem-format.md"
+            ) from error
 
     def number(self, key: str, default: Any = ...) -> float:
         """Return a float (may be NaN: that is for ``defect`` to say)."""
@@ -175,9 +176,29 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
     if not isinstance(targets, (list, tuple)):
         raise InputError(source, "targets", "is not a list", "write a list of objects")
     twa, mps = _parse_speed(boat.child("speed"))
-    known = {"id", "title", "start", "goal", "obstacles", "fence", "wind", "boat", "delta_s", "notes", "current",
-             "adrift", "targets", "allocation", "risk", "clearance_floor_m", "leg_saving", "beat", "obstacle_names",
-             "tracking", "zone"}
+    known = {
+        "id",
+        "title",
+        "start",
+        "goal",
+        "obstacles",
+        "fence",
+        "wind",
+        "boat",
+        "delta_s",
+        "notes",
+        "current",
+        "adrift",
+        "targets",
+        "allocation",
+        "risk",
+        "clearance_floor_m",
+        "leg_saving",
+        "beat",
+        "obstacle_names",
+        "tracking",
+        "zone",
+    }
     fields: dict[str, Any] = dict(  # noqa: C408, the names of Problem's fields
         id=top.text("id", ""),
         title=top.text("title", ""),
@@ -237,8 +258,12 @@ def _parse_speed(speed: _JsonReader) -> tuple[tuple[float, ...], tuple[float, ..
         raise InputError(speed.source, f"{speed.place}.model", f"{model!r} is unknown", "write constant or polar")
     twa, mps = speed.numbers("twa_deg"), speed.numbers("v_mps")
     if len(twa) != len(mps) or not twa:
-        raise InputError(speed.source, speed.place, "twa_deg and v_mps differ in length or are empty",
-                         "give one speed for each angle")
+        raise InputError(
+            speed.source,
+            speed.place,
+            "twa_deg and v_mps differ in length or are empty",
+            "give one speed for each angle",
+        )
     if any(b < a for a, b in itertools.pairwise(twa)):
         raise InputError(speed.source, f"{speed.place}.twa_deg", "does not increase", "sort the polar by angle")
     return tuple(math.radians(a) for a in twa), mps
@@ -254,27 +279,44 @@ def _parse_sigma(sigma: _JsonReader) -> Sigma:
     if model == "none":
         return Sigma()
     if model == "kalman":
-        return Sigma(model=model, sigma0_rad=_spread(sigma.number("sigma0_deg")),
-                     growth_rad_per_sqrt_s=_spread(sigma.number("growth_deg_per_sqrt_s")))
+        return Sigma(
+            model=model,
+            sigma0_rad=_spread(sigma.number("sigma0_deg")),
+            growth_rad_per_sqrt_s=_spread(sigma.number("growth_deg_per_sqrt_s")),
+        )
     if model == "ar1":
-        return Sigma(model=model, sigma0_rad=_spread(sigma.number("sigma0_deg")),
-                     sigma_inf_rad=_spread(sigma.number("sigma_inf_deg")), rho_hz=sigma.number("rho_hz"))
+        return Sigma(
+            model=model,
+            sigma0_rad=_spread(sigma.number("sigma0_deg")),
+            sigma_inf_rad=_spread(sigma.number("sigma_inf_deg")),
+            rho_hz=sigma.number("rho_hz"),
+        )
     if model != "forecast":
-        raise InputError(sigma.source, f"{sigma.place}.model", f"{model!r} is unknown",
-                         "write one of " + ", ".join(SIGMA_MODELS))
+        raise InputError(
+            sigma.source, f"{sigma.place}.model", f"{model!r} is unknown", "write one of " + ", ".join(SIGMA_MODELS)
+        )
     horizon = sigma.numbers("horizon_s")
     degrees = sigma.numbers("sigma_deg")
     half = sigma.numbers("half_width_deg") if sigma.raw.get("half_width_deg") is not None else None
     _require_table(sigma, "horizon_s", horizon, degrees, *(() if half is None else (half,)))
-    return Sigma(model=model, horizon_s=horizon, sigma_rad=tuple(map(_spread, degrees)),
-                 half_width_rad=None if half is None else tuple(map(_spread, half)))
+    return Sigma(
+        model=model,
+        horizon_s=horizon,
+        sigma_rad=tuple(map(_spread, degrees)),
+        half_width_rad=None if half is None else tuple(map(_spread, half)),
+    )
 
 
 def _parse_strength(strength: _JsonReader) -> Strength:
     horizon, mean, sigma = (strength.numbers(key) for key in ("horizon_s", "mean_mps", "sigma_mps"))
     _require_table(strength, "horizon_s", horizon, mean, sigma)
-    return Strength(horizon_s=horizon, mean_mps=mean, sigma_mps=sigma,
-                    correlation_s=strength.number("correlation_s", 60.0), is_known=strength.flag("known", True))
+    return Strength(
+        horizon_s=horizon,
+        mean_mps=mean,
+        sigma_mps=sigma,
+        correlation_s=strength.number("correlation_s", 60.0),
+        is_known=strength.flag("known", True),
+    )
 
 
 def _parse_speeds(speeds: _JsonReader) -> Speeds:
@@ -287,29 +329,41 @@ def _parse_speeds(speeds: _JsonReader) -> Speeds:
 
 def _require_table(table: _JsonReader, key: str, nodes: Sequence[float], *columns: Sequence[Any]) -> None:
     if not nodes or any(len(column) != len(nodes) for column in columns):
-        raise InputError(table.source, table.place, "the columns differ in length or are empty",
-                         f"give one value for each of {key}")
+        raise InputError(
+            table.source, table.place, "the columns differ in length or are empty", f"give one value for each of {key}"
+        )
     if any(not b > a for a, b in itertools.pairwise(nodes)):
         raise InputError(table.source, f"{table.place}.{key}", "does not increase", "sort the table by it")
 
 
 def _parse_target(target: _JsonReader) -> Target:
     return Target(
-        x_m=target.number("x"), y_m=target.number("y"), vx_mps=target.number("vx", 0.0),
-        vy_mps=target.number("vy", 0.0), radius_m=target.number("radius_m"),
-        growth_mps=target.number("growth_mps", 0.0), from_s=target.number("from_s", 0.0),
-        until_s=target.number("until_s", math.inf), name=target.text("name", ""),
+        x_m=target.number("x"),
+        y_m=target.number("y"),
+        vx_mps=target.number("vx", 0.0),
+        vy_mps=target.number("vy", 0.0),
+        radius_m=target.number("radius_m"),
+        growth_mps=target.number("growth_mps", 0.0),
+        from_s=target.number("from_s", 0.0),
+        until_s=target.number("until_s", math.inf),
+        name=target.text("name", ""),
         spread=_parse_spread(target.child("spread")) if target.raw.get("spread") is not None else None,
     )
 
 
 def _parse_spread(spread: _JsonReader) -> Spread:
     return Spread(
-        vessel=spread.whole("vessel"), x_m=spread.number("x"), y_m=spread.number("y"),
-        course_rad=math.radians(spread.number("course_deg")), keep_m=spread.number("keep_m"),
-        along_m=spread.number("along_m"), along_mps=spread.number("along_mps", 0.0),
-        across_m=spread.number("across_m"), across_mps=spread.number("across_mps", 0.0),
-        own_mps=spread.number("own_mps", 0.0), sigma_m=spread.number("sigma_m"),
+        vessel=spread.whole("vessel"),
+        x_m=spread.number("x"),
+        y_m=spread.number("y"),
+        course_rad=math.radians(spread.number("course_deg")),
+        keep_m=spread.number("keep_m"),
+        along_m=spread.number("along_m"),
+        along_mps=spread.number("along_mps", 0.0),
+        across_m=spread.number("across_m"),
+        across_mps=spread.number("across_mps", 0.0),
+        own_mps=spread.number("own_mps", 0.0),
+        sigma_m=spread.number("sigma_m"),
         sigma_mps=spread.number("sigma_mps", 0.0),
     )
 
@@ -319,8 +373,9 @@ def _parse_allocation(allocation: _JsonReader) -> float:
 
 
 def _parse_risk(risk: _JsonReader) -> RiskLimit:
-    return RiskLimit(max_path_risk=risk.number("max_path_risk"),
-                     correlation_time_s=risk.number("correlation_time_s", 60.0))
+    return RiskLimit(
+        max_path_risk=risk.number("max_path_risk"), correlation_time_s=risk.number("correlation_time_s", 60.0)
+    )
 
 
 def _parse_current(current: _JsonReader) -> Current:
@@ -328,14 +383,18 @@ def _parse_current(current: _JsonReader) -> Current:
 
 
 def _parse_zone(zone: _JsonReader) -> AutopilotBeatZone:
-    return AutopilotBeatZone(from_rad=math.radians(zone.number("from_deg")),
-                             half_rad=math.radians(zone.number("half_deg")))
+    return AutopilotBeatZone(
+        from_rad=math.radians(zone.number("from_deg")), half_rad=math.radians(zone.number("half_deg"))
+    )
 
 
 def _parse_beat(beat: _JsonReader) -> Beat:
     return Beat(
-        no_go_half_rad=math.radians(beat.number("no_go_half_deg")), corridor_m=beat.number("corridor_m"),
-        clearance_m=beat.number("clearance_m"), tack_s=beat.number("tack_s", 0.0))
+        no_go_half_rad=math.radians(beat.number("no_go_half_deg")),
+        corridor_m=beat.number("corridor_m"),
+        clearance_m=beat.number("clearance_m"),
+        tack_s=beat.number("tack_s", 0.0),
+    )
 
 
 def _parse_tracking(track: _JsonReader) -> Tracking:
@@ -355,8 +414,12 @@ def _parse_tracking(track: _JsonReader) -> Tracking:
     limits, before = track.raw.get("limits"), track.raw.get("before")
     at = None if before is None else track.child("before")
     return Tracking(
-        helm=helm, floor_m=track.number("floor_m"), reach_m=track.number("reach_m", 0.0),
+        helm=helm,
+        floor_m=track.number("floor_m"),
+        reach_m=track.number("reach_m", 0.0),
         solids=tuple(_polygon(w, track.source, f"tracking.solids[{i}]") for i, w in enumerate(solids)),
         limits=None if limits is None else _polygon(limits, track.source, "tracking.limits"),
         before_en=None if at is None else (at.number("x"), at.number("y")),
-        correlation_s=track.number("correlation_s", 60.0), is_known=track.flag("known", True))
+        correlation_s=track.number("correlation_s", 60.0),
+        is_known=track.flag("known", True),
+    )

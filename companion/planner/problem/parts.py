@@ -233,8 +233,13 @@ class Strength:
 
     def to_dict(self) -> dict[str, object]:
         """Return its JSON object."""
-        return {"horizon_s": list(self.horizon_s), "mean_mps": list(self.mean_mps), "sigma_mps": list(self.sigma_mps),
-                "correlation_s": self.correlation_s, "known": self.is_known}
+        return {
+            "horizon_s": list(self.horizon_s),
+            "mean_mps": list(self.mean_mps),
+            "sigma_mps": list(self.sigma_mps),
+            "correlation_s": self.correlation_s,
+            "known": self.is_known,
+        }
 
     def mean_at(self, t_s: ArrayLike) -> NDArray[np.float64]:
         """Return what is expected at times [m/s]."""

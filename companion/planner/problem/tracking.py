@@ -45,7 +45,8 @@ class Tracking:
         before = self.before_en or (0.0, 0.0)
         return (
             all(math.isfinite(x) for x in (self.floor_m, self.reach_m, self.correlation_s, *before))
-            and min(self.floor_m, self.reach_m, self.correlation_s) >= 0.0)
+            and min(self.floor_m, self.reach_m, self.correlation_s) >= 0.0
+        )
 
     @cached_property
     def tree(self) -> shapely.STRtree:
@@ -58,8 +59,10 @@ class Tracking:
     @cached_property
     def _indices(self) -> tuple[PolygonIndex, PolygonIndex]:
         limits = self.limits
-        return (PolygonIndex([g if g.is_valid else shapely.make_valid(g) for g in self.solids if not g.is_empty]),
-                PolygonIndex([] if limits is None or limits.is_empty else [limits]))
+        return (
+            PolygonIndex([g if g.is_valid else shapely.make_valid(g) for g in self.solids if not g.is_empty]),
+            PolygonIndex([] if limits is None or limits.is_empty else [limits]),
+        )
 
     def distance_m(self, places_en: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return each place's distance from everything solid [m], 0 inside; (n, 2) places, inf where there is none.

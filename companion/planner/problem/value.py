@@ -92,7 +92,7 @@ class Problem:
 
     def obstacle_name(self, index: int) -> str:
         """Return what an obstacle is called: by its name, else by its number from 1."""
-        names = self.obstacle_names[index:index + 1]
+        names = self.obstacle_names[index : index + 1]
         return names[0] if names and names[0] else f"obstacle {index + 1}"
 
     # ----------------------------------------------------------------------------------------- no-go
@@ -203,6 +203,7 @@ class Problem:
 
 # Why a problem cannot be planned by anybody: numbers that are none, limits that contradict each other.
 
+
 def _coordinates(p: Problem) -> NDArray[np.float64]:
     shapes = [*p.obstacles, *([] if p.fence is None else [p.fence])]
     return np.asarray(shapely.get_coordinates(shapes), dtype=np.float64) if shapes else np.empty((0, 2))
@@ -212,18 +213,36 @@ def defect_of(p: Problem) -> str | None:
     """Return the first thing wrong, or None."""
     b, w = p.boat, p.wind
     named = {
-        "start.x": p.start_en[0], "start.y": p.start_en[1], "start.heading_deg": p.start_heading_rad,
-        "goal.x": p.goal_en[0], "goal.y": p.goal_en[1], "goal.radius": p.goal_radius_m,
-        "wind.from_deg": w.twd_from_rad, "wind.speed_mps": 1.0 if w.tws_mps is None else w.tws_mps,
-        "boat.no_go_half_deg": b.no_go_half_rad, "boat.max_twa_deg": b.max_twa_rad,
-        "boat.turn_rate_rad_s": b.turn_rate_radps, "delta_s": p.delta_s, "boat.tack_loss_s": b.tack_loss_s,
+        "start.x": p.start_en[0],
+        "start.y": p.start_en[1],
+        "start.heading_deg": p.start_heading_rad,
+        "goal.x": p.goal_en[0],
+        "goal.y": p.goal_en[1],
+        "goal.radius": p.goal_radius_m,
+        "wind.from_deg": w.twd_from_rad,
+        "wind.speed_mps": 1.0 if w.tws_mps is None else w.tws_mps,
+        "boat.no_go_half_deg": b.no_go_half_rad,
+        "boat.max_twa_deg": b.max_twa_rad,
+        "boat.turn_rate_rad_s": b.turn_rate_radps,
+        "delta_s": p.delta_s,
+        "boat.tack_loss_s": b.tack_loss_s,
         "boat.gybe_loss_s": b.gybe_loss_s,
-        "boat.gybe_room_m": b.gybe_room_m or 0.0, "current": p.current.set_rad + p.current.drift_mps,
+        "boat.gybe_room_m": b.gybe_room_m or 0.0,
+        "current": p.current.set_rad + p.current.drift_mps,
         "adrift": p.adrift.set_rad + p.adrift.drift_mps,
-        "clearance_floor_m": p.clearance_floor_m, "leg_saving": p.leg_saving,
-        "wind.sigma": sum((w.sigma.sigma0_rad, w.sigma.growth_rad_per_sqrt_s, w.sigma.sigma_inf_rad,
-                           w.sigma.rho_hz, *w.sigma.horizon_s, *w.sigma.sigma_rad,
-                           *(w.sigma.half_width_rad or ()))),
+        "clearance_floor_m": p.clearance_floor_m,
+        "leg_saving": p.leg_saving,
+        "wind.sigma": sum(
+            (
+                w.sigma.sigma0_rad,
+                w.sigma.growth_rad_per_sqrt_s,
+                w.sigma.sigma_inf_rad,
+                w.sigma.rho_hz,
+                *w.sigma.horizon_s,
+                *w.sigma.sigma_rad,
+                *(w.sigma.half_width_rad or ()),
+            )
+        ),
         "boat.speed": sum((*b.polar_twa_rad, *b.polar_mps)),
     }
     for t in p.targets:
@@ -252,34 +271,66 @@ def defect_of(p: Problem) -> str | None:
         (0.0 <= b.tack_fails < 1.0, f"tack_fails {b.tack_fails:g} is outside 0 <= tack_fails < 1"),
         (0.0 <= b.speed_error <= 1.0, f"speed_error {b.speed_error:g} is outside 0 to 1"),
         (0.0 <= b.irons_s < math.inf, "irons_s is no time of 0 s or more"),
-        (len(b.lee_mps) == 2 and all(0.0 <= lee < math.inf for lee in b.lee_mps),
-         "lee_mps is not two speeds, each 0 or more"),
-        (all(limit is None or 0.0 < limit < math.inf for limit in (b.max_tws_mps, b.min_tws_mps)),
-         "a limit of wind is not above zero"),
-        (b.max_tws_mps is None or b.min_tws_mps is None or b.min_tws_mps < b.max_tws_mps,
-         "min_tws_mps is not below max_tws_mps"),
+        (
+            len(b.lee_mps) == 2 and all(0.0 <= lee < math.inf for lee in b.lee_mps),
+            "lee_mps is not two speeds, each 0 or more",
+        ),
+        (
+            all(limit is None or 0.0 < limit < math.inf for limit in (b.max_tws_mps, b.min_tws_mps)),
+            "a limit of wind is not above zero",
+        ),
+        (
+            b.max_tws_mps is None or b.min_tws_mps is None or b.min_tws_mps < b.max_tws_mps,
+            "min_tws_mps is not below max_tws_mps",
+        ),
         (w.strength is None or w.strength.is_sound, "wind.strength has a number that is negative or not finite"),
         (b.speeds is None or b.speeds.is_sound, "boat.speeds has a number that is negative or not finite"),
         (min(p.current.drift_mps, p.adrift.drift_mps) >= 0.0, "the current's drift is negative"),
         (p.clearance_floor_m >= 0.0, "the clearance floor is negative"),
         (p.leg_saving >= 0.0, "leg_saving is negative"),
-        (min((w.sigma.sigma0_rad, w.sigma.growth_rad_per_sqrt_s, w.sigma.sigma_inf_rad, w.sigma.rho_hz,
-              *w.sigma.sigma_rad, *(w.sigma.half_width_rad or ()))) >= 0.0,
-         "a sigma, growth or rate of the wind is negative"),
-        (p.risk is None or (0.0 < p.risk.max_path_risk <= 1.0 and p.risk.correlation_time_s > 0.0),
-         "risk needs 0 < max_path_risk <= 1 and correlation_time_s > 0"),
+        (
+            min(
+                (
+                    w.sigma.sigma0_rad,
+                    w.sigma.growth_rad_per_sqrt_s,
+                    w.sigma.sigma_inf_rad,
+                    w.sigma.rho_hz,
+                    *w.sigma.sigma_rad,
+                    *(w.sigma.half_width_rad or ()),
+                )
+            )
+            >= 0.0,
+            "a sigma, growth or rate of the wind is negative",
+        ),
+        (
+            p.risk is None or (0.0 < p.risk.max_path_risk <= 1.0 and p.risk.correlation_time_s > 0.0),
+            "risk needs 0 < max_path_risk <= 1 and correlation_time_s > 0",
+        ),
         (p.fence is None or not p.fence.is_empty, "the fence is empty"),
         (p.fence_polygon is None or not p.fence_polygon.is_empty, "the fence less the clearance floor is empty"),
-        (p.vessels_part is None or 0.0 < p.vessels_part < 1.0 - p.delta_s,
-         "allocation.vessels is not between 0 and 1 - delta_s"),
-        (p.beat is None or (0.0 < p.beat.no_go_half_rad < 0.5 * math.pi and 0.0 < p.beat.corridor_m < math.inf
-                            and 0.0 <= p.beat.clearance_m < math.inf and 0.0 <= p.beat.tack_s < math.inf),
-         "beat needs 0 < no_go_half_deg < 90, corridor_m > 0, clearance_m >= 0 and tack_s >= 0"),
+        (
+            p.vessels_part is None or 0.0 < p.vessels_part < 1.0 - p.delta_s,
+            "allocation.vessels is not between 0 and 1 - delta_s",
+        ),
+        (
+            p.beat is None
+            or (
+                0.0 < p.beat.no_go_half_rad < 0.5 * math.pi
+                and 0.0 < p.beat.corridor_m < math.inf
+                and 0.0 <= p.beat.clearance_m < math.inf
+                and 0.0 <= p.beat.tack_s < math.inf
+            ),
+            "beat needs 0 < no_go_half_deg < 90, corridor_m > 0, clearance_m >= 0 and tack_s >= 0",
+        ),
         (p.tracking is None or p.tracking.is_finite, "tracking has a number that is negative or not finite"),
-        (p.beat is None or p.current.drift_mps == 0.0 or p.zone is not None,
-         "a beat left to the autopilot in a current needs its zone"),
-        (p.zone is None or (math.isfinite(p.zone.from_rad) and 0.0 <= p.zone.half_rad < math.pi),
-         "zone needs a finite from_deg and 0 <= half_deg < 180"),
+        (
+            p.beat is None or p.current.drift_mps == 0.0 or p.zone is not None,
+            "a beat left to the autopilot in a current needs its zone",
+        ),
+        (
+            p.zone is None or (math.isfinite(p.zone.from_rad) and 0.0 <= p.zone.half_rad < math.pi),
+            "zone needs a finite from_deg and 0 <= half_deg < 180",
+        ),
     )
     for holds, text in checks:
         if not holds:
@@ -324,14 +375,19 @@ def sigmas_for(part: float, vessels: int) -> float:
 def sized(targets: Sequence[Target], sigmas: float) -> tuple[Target, ...]:
     """Return the targets as regions: the uncertain ones with ``sigmas`` standard deviations added to their radius."""
     return tuple(
-        t if t.spread is None else replace(
-            t, radius_m=t.radius_m + sigmas * t.spread.sigma_m, growth_mps=t.growth_mps + sigmas * t.spread.sigma_mps,
-            spread=None)
+        t
+        if t.spread is None
+        else replace(
+            t,
+            radius_m=t.radius_m + sigmas * t.spread.sigma_m,
+            growth_mps=t.growth_mps + sigmas * t.spread.sigma_mps,
+            spread=None,
+        )
         for t in targets
     )
 
 
-@lru_cache(maxsize=16)   # a search asks again and again; problems are the same by identity
+@lru_cache(maxsize=16)  # a search asks again and again; problems are the same by identity
 def resolved(problem: Problem) -> Problem:
     """Return the same with its promise shared out: the wind's delta_s, and uncertain targets as discs of their size."""
     if not problem.is_shared:

@@ -73,9 +73,9 @@ def flat_lonlat_from_en(origin: GeoPoint, en_m: ArrayLike) -> NDArray[np.float64
 
 DIRECTIONS = 24
 STEP_M = 1.0
-EDGE_M = 500.0        # an edge of a solid is cut into pieces so long: each bends by millimetres
-OBLIQUE = 1.09        # the most of sin(course) (1 + cos² course)
-SAFETY = 1.05         # of the errors found on the box's edge and in its middle
+EDGE_M = 500.0  # an edge of a solid is cut into pieces so long: each bends by millimetres
+OBLIQUE = 1.09  # the most of sin(course) (1 + cos² course)
+SAFETY = 1.05  # of the errors found on the box's edge and in its middle
 
 
 class FlatPlane:
@@ -125,14 +125,22 @@ class FlatPlane:
             return shapely.transform(shapely.segmentize(shape, EDGE_M), self.to)
 
         start, goal = (tuple(float(c) for c in row) for row in self.to([p.start_en, p.goal_en]))
-        boat = replace(p.boat, no_go_half_rad=p.boat.no_go_half_rad + turn,
-                       max_twa_rad=p.boat.max_twa_rad - (turn if p.boat.max_twa_rad < math.pi else 0.0))
+        boat = replace(
+            p.boat,
+            no_go_half_rad=p.boat.no_go_half_rad + turn,
+            max_twa_rad=p.boat.max_twa_rad - (turn if p.boat.max_twa_rad < math.pi else 0.0),
+        )
         zone = p.zone and replace(p.zone, half_rad=p.zone.half_rad + turn)
         return replace(
-            p, start_en=(start[0], start[1]), goal_en=(goal[0], goal[1]), boat=boat, zone=zone,
+            p,
+            start_en=(start[0], start[1]),
+            goal_en=(goal[0], goal[1]),
+            boat=boat,
+            zone=zone,
             obstacles=tuple(flat(shape).buffer(bend, join_style="mitre") for shape in p.obstacles),
             fence=None if p.fence is None else flat(p.fence).buffer(-bend, join_style="mitre"),
-            goal_radius_m=p.goal_radius_m / (1.0 + scale), targets=tuple(self._target(t, scale) for t in p.targets),
+            goal_radius_m=p.goal_radius_m / (1.0 + scale),
+            targets=tuple(self._target(t, scale) for t in p.targets),
         )
 
     def _scales(self, box: tuple[float, float, float, float]) -> NDArray[np.float64]:
@@ -145,8 +153,15 @@ class FlatPlane:
         here, later = self.to([at, at + np.array([t.vx_mps, t.vy_mps])])
         vx, vy = later - here
         x, y = here - np.array([vx, vy]) * t.from_s
-        return replace(t, x_m=float(x), y_m=float(y), vx_mps=float(vx), vy_mps=float(vy),
-                       radius_m=t.radius_m * (1.0 + scale), growth_mps=t.growth_mps * (1.0 + scale))
+        return replace(
+            t,
+            x_m=float(x),
+            y_m=float(y),
+            vx_mps=float(vx),
+            vy_mps=float(vy),
+            radius_m=t.radius_m * (1.0 + scale),
+            growth_mps=t.growth_mps * (1.0 + scale),
+        )
 
 
 def _room_m(p: Problem) -> float:
@@ -156,11 +171,11 @@ def _room_m(p: Problem) -> float:
     return min((float(shapely.distance(shape, end)) for shape in shapes for end in ends), default=math.inf)
 
 
-CELLS_ACROSS = 40        # of the default grid, start to goal: 20 m for the 800 m legs that AVALON was tested on
+CELLS_ACROSS = 40  # of the default grid, start to goal: 20 m for the 800 m legs that AVALON was tested on
 STATE_BYTES = 8 + 8 + 4 + 1 + 2 * 12  # cost, clock, parent, closed, and room for two heap entries
 CHUNK = 2000
-BORDER_S = 60.0          # of each step outside an abrupt tunnel: a tack is worth it, a long board is not
-LEAST_SHARE = 0.25       # of the spacing: a goal nearer to the start's row or column than this counts as on it
+BORDER_S = 60.0  # of each step outside an abrupt tunnel: a tack is worth it, a long board is not
+LEAST_SHARE = 0.25  # of the spacing: a goal nearer to the start's row or column than this counts as on it
 
 DEFAULTS = AstarSettings()
 
@@ -205,8 +220,16 @@ def grid_of(problem: Problem, grid_m: float) -> NodeGrid:
 
     x, dx, columns, start_column, goal_column = fit(x0, x1, sx, gx)
     y, dy, rows, start_row, goal_row = fit(y0, y1, sy, gy)
-    return NodeGrid(x0_m=x, y0_m=y, dx_m=dx, dy_m=dy, columns=columns, rows=rows,
-                start=start_row * columns + start_column, goal=goal_row * columns + goal_column)
+    return NodeGrid(
+        x0_m=x,
+        y0_m=y,
+        dx_m=dx,
+        dy_m=dy,
+        columns=columns,
+        rows=rows,
+        start=start_row * columns + start_column,
+        goal=goal_row * columns + goal_column,
+    )
 
 
 def steps_of(grid: NodeGrid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -214,9 +237,7 @@ def steps_of(grid: NodeGrid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     offsets = [(i, j) for j in range(-2, 3) for i in range(-2, 3) if (i, j) != (0, 0)]
     courses = sorted({_course(i, j, grid) for i, j in offsets})
     number = {course: k for k, course in enumerate(courses)}
-    rows = [
-        (i, j, number[_course(i, j, grid)], math.hypot(i * grid.dx_m, j * grid.dy_m)) for i, j in offsets
-    ]
+    rows = [(i, j, number[_course(i, j, grid)], math.hypot(i * grid.dx_m, j * grid.dy_m)) for i, j in offsets]
     return np.array(rows, dtype=np.float64), np.array(courses)
 
 
@@ -250,7 +271,7 @@ def ship_discs(problem: Problem, settings: AstarSettings) -> NDArray[np.float64]
 
 
 def _discs_of(
-    problem: Problem, ship: Target, mean_mps: float, horizon_s: float, match_s: float,
+    problem: Problem, ship: Target, mean_mps: float, horizon_s: float, match_s: float
 ) -> list[tuple[float, float, float]]:
     until = min(ship.until_s, horizon_s)
     if until < ship.from_s:
@@ -269,7 +290,10 @@ def _discs_of(
 
 
 def search(
-    problem: Problem, effort: Effort, seed: int, settings: AstarSettings = DEFAULTS,  # noqa: ARG001
+    problem: Problem,
+    effort: Effort,
+    seed: int,  # noqa: ARG001
+    settings: AstarSettings = DEFAULTS,
 ) -> Outcome:
     """Search one grid until the goal is reached, the heap is empty or the effort is over; the seed is not used.
 
@@ -290,8 +314,10 @@ def search(
     trace: dict[str, Any] = {"grid_m": grid_m, "columns": grid.columns, "rows": grid.rows}
     if grid.memory_bytes > settings.memory_bytes:
         fits = grid_m * math.sqrt(grid.memory_bytes / settings.memory_bytes)
-        reason = (f"a grid of {grid_m:.3g} m needs {grid.memory_bytes / 1e6:.0f} MB, more than the "
-                  f"{settings.memory_bytes / 1e6:.0f} MB allowed; one of {fits:.3g} m would fit")
+        reason = (
+            f"a grid of {grid_m:.3g} m needs {grid.memory_bytes / 1e6:.0f} MB, more than the "
+            f"{settings.memory_bytes / 1e6:.0f} MB allowed; one of {fits:.3g} m would fit"
+        )
         return Outcome(waypoints_en=None, status=PlanStatus.NOT_FOUND, reason=reason, trace=trace)
     return _run(problem, effort, settings, grid, trace)
 
@@ -310,8 +336,12 @@ def _by_flat(problem: Problem, effort: Effort, settings: AstarSettings) -> Outco
         return outcome
     way = plane.back(outcome.waypoints_en)
     way[0] = problem.start_en
-    return replace(outcome, waypoints_en=way, lower_bound_s=simple_bound_s(problem),
-                   trace={**outcome.trace, "flat_en": outcome.waypoints_en})
+    return replace(
+        outcome,
+        waypoints_en=way,
+        lower_bound_s=simple_bound_s(problem),
+        trace={**outcome.trace, "flat_en": outcome.waypoints_en},
+    )
 
 
 def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGrid, trace: dict[str, Any]) -> Outcome:
@@ -321,8 +351,9 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
     for k, course in enumerate(courses):
         heading, speed = ground_track(problem, math.sin(course), math.cos(course))
         twa = abs(wrap_pi(heading - problem.wind.twd_from_rad))
-        is_sailable = (max(settings.min_twa_rad, problem.no_go_min_rad) - 1e-9 <= twa <= deepest + 1e-9
-                       and not is_zoned(problem, math.sin(course), math.cos(course)))
+        is_sailable = max(settings.min_twa_rad, problem.no_go_min_rad) - 1e-9 <= twa <= deepest + 1e-9 and not is_zoned(
+            problem, math.sin(course), math.cos(course)
+        )
         way[k] = wrap_pi(heading), speed if is_sailable else 0.0, twa
     (sx, sy), (gx, gy) = problem.start_en, problem.goal_en
     goal_heading = target_heading(courses, way[:, 1] > 0.0, heading_of(gx - sx, gy - sy))
@@ -344,19 +375,47 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
         tunnel, border_m = 10.0 / settings.tunnel_width_m, 0.0
         if settings.is_tunnel_abrupt:
             tunnel, border_m = BORDER_S, 0.5 * settings.tunnel_width_m
-    weight = np.array([
-        settings.turn_s_per_rad, settings.tack_s, settings.gybe_s, tunnel, fast, border_m, settings.max_turn_rad])
+    weight = np.array(
+        [settings.turn_s_per_rad, settings.tack_s, settings.gybe_s, tunnel, fast, border_m, settings.max_turn_rad]
+    )
     frame = np.array([grid.x0_m, grid.y0_m, grid.dx_m, grid.dy_m, problem.start_heading_rad])
     disc, w = ship_discs(problem, settings), world_of(problem)
     while count[kernels.REACHED] == 0 and count[kernels.HEAP] > 0 and not effort.is_over:
         chunk = effort.remaining(CHUNK)
         if chunk <= 0:
             break
-        effort.spend(int(kernels.expand(
-            chunk, g, clock, parent, closed, heap_f, heap_state, count, frame,
-            np.array([grid.columns, grid.rows]), grid.start, grid.goal, goal_heading, step, way, weight, disc, w.edge,
-            w.cell_first, w.cell_edge, w.grid, w.shape, w.number, w.no_go_model, w.table, w.target,
-        )))
+        effort.spend(
+            int(
+                kernels.expand(
+                    chunk,
+                    g,
+                    clock,
+                    parent,
+                    closed,
+                    heap_f,
+                    heap_state,
+                    count,
+                    frame,
+                    np.array([grid.columns, grid.rows]),
+                    grid.start,
+                    grid.goal,
+                    goal_heading,
+                    step,
+                    way,
+                    weight,
+                    disc,
+                    w.edge,
+                    w.cell_first,
+                    w.cell_edge,
+                    w.grid,
+                    w.shape,
+                    w.number,
+                    w.no_go_model,
+                    w.table,
+                    w.target,
+                )
+            )
+        )
     trace |= {"expanded": int(count[kernels.EXPANDED]), "seen": int(count[kernels.SEEN])}
     if count[kernels.REACHED] != 1:
         status, why = PlanStatus.TIMEOUT, "the effort ended first"

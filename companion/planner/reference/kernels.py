@@ -14,9 +14,9 @@ from companion.kernels.jit import kernel
 from companion.planner.problem.parts import CLEAR_TURN_RAD
 
 TWO_PI = 2.0 * math.pi
-EDGE_PAD = 1e-6     # of a heading laid on the edge of the no-go zone [rad]: below the judge's slack
-ZONE_PAD = math.radians(0.3)    # of a course laid on the edge of the autopilot's zone: the table's step is 0.25 degrees
-STEER_ROUNDS = 6    # of the fixed point between a leg's heading and its end's no-go zone
+EDGE_PAD = 1e-6  # of a heading laid on the edge of the no-go zone [rad]: below the judge's slack
+ZONE_PAD = math.radians(0.3)  # of a course laid on the edge of the autopilot's zone: the table's step is 0.25 degrees
+STEER_ROUNDS = 6  # of the fixed point between a leg's heading and its end's no-go zone
 # ``number``'s places
 TWD, HALF, DEEP, RATE, TACK, GYBE, W0, W1, RHO, CX, CY, ZONE, ZONE_HALF = range(13)
 
@@ -182,7 +182,7 @@ def turn_time(before, after, number):  # type: ignore[no-untyped-def]
 
 @kernel
 def straight(  # type: ignore[no-untyped-def]
-    x, y, heading, t, tx, ty, number, model, table, polar, course,
+    x, y, heading, t, tx, ty, number, model, table, polar, course
 ):
     """Return (ok, heading, start of the leg [s], end [s]) of the straight leg to (tx, ty); no collision test."""
     dx, dy = tx - x, ty - y
@@ -204,7 +204,7 @@ def straight(  # type: ignore[no-untyped-def]
 
 @kernel
 def steer(  # type: ignore[no-untyped-def]
-    x, y, heading, t, tx, ty, reach, number, model, table, polar, course,
+    x, y, heading, t, tx, ty, reach, number, model, table, polar, course
 ):
     """Algorithm 1: (ok, x, y) where the boat gets from (x, y) on its way to (tx, ty), ``reach`` metres at most.
 
@@ -301,8 +301,32 @@ def _in_disc(ax, ay, bx, by, disc):  # type: ignore[no-untyped-def]
 
 @kernel
 def expand(  # type: ignore[no-untyped-def]
-    most, g, clock, parent, closed, heap_f, heap_state, count, frame, shape, start, goal, goal_heading, step, way,
-    weight, disc, edge, cell_first, cell_edge, grid, edge_shape, number, model, table, target,
+    most,
+    g,
+    clock,
+    parent,
+    closed,
+    heap_f,
+    heap_state,
+    count,
+    frame,
+    shape,
+    start,
+    goal,
+    goal_heading,
+    step,
+    way,
+    weight,
+    disc,
+    edge,
+    cell_first,
+    cell_edge,
+    grid,
+    edge_shape,
+    number,
+    model,
+    table,
+    target,
 ):
     """Expand up to ``most`` states; count[REACHED] tells when the goal state was taken from the heap.
 

@@ -40,7 +40,7 @@ from companion.planner.reference.world import ReferenceWorld, bounds_of, world_o
 from companion.planner.risk.chance_constraint import PROMISE_FACTOR, process_of
 from companion.planners import RrtstarSettings
 
-REACH_SHARE = 0.2      # of the search box's diagonal: OMPL's default range
+REACH_SHARE = 0.2  # of the search box's diagonal: OMPL's default range
 DEFAULTS = RrtstarSettings()
 CHUNK = 256
 FIRST_CAPACITY = 20_000
@@ -51,7 +51,11 @@ class RrtTree:
     """The growing tree: the kernel's arrays and nothing else."""
 
     def __init__(
-        self, problem: Problem, world: ReferenceWorld, seed: int, settings: RrtstarSettings = DEFAULTS,
+        self,
+        problem: Problem,
+        world: ReferenceWorld,
+        seed: int,
+        settings: RrtstarSettings = DEFAULTS,
         vessels: TreeVessels = NO_VESSELS,
     ) -> None:
         self.world = world
@@ -73,11 +77,20 @@ class RrtTree:
         process = process_of(problem)
         # The plan will promise PROMISE_FACTOR times its risk: the tree keeps that much below the limit.
         limit = problem.risk.max_path_risk / PROMISE_FACTOR if problem.risk is not None else math.inf
-        self._risk_number = np.array([
-            float(problem.risk is not None), process.model, process.s0, process.s1, process.rho, process.tau, limit,
-            settings.risk_weight_s if problem.risk is not None else 0.0, settings.state_risk_weight_s,
-            float(settings.is_rewired),
-        ])
+        self._risk_number = np.array(
+            [
+                float(problem.risk is not None),
+                process.model,
+                process.s0,
+                process.s1,
+                process.rho,
+                process.tau,
+                limit,
+                settings.risk_weight_s if problem.risk is not None else 0.0,
+                settings.state_risk_weight_s,
+                float(settings.is_rewired),
+            ]
+        )
         self._risk_table = np.ascontiguousarray(np.array([process.table_t, process.table_s]))
 
     def _resize(self, capacity: int) -> None:
@@ -96,10 +109,35 @@ class RrtTree:
             self._resize(2 * self.node.shape[0])
         w = self.world
         kernels.grow(
-            samples, self.node, self.link, self._goal_node, self.count, self._random, self._box, self._goal,
-            self._reach_m, self._settings.goal_bias, self._near, self._near_d, self._stack, self._fresh, w.edge,
-            w.cell_first, w.cell_edge, w.grid, w.shape, w.number, w.no_go_model, w.table, w.polar, w.course, w.target,
-            self._risk_number, self._risk_table, self._vessels.window, self._vessels.disc,
+            samples,
+            self.node,
+            self.link,
+            self._goal_node,
+            self.count,
+            self._random,
+            self._box,
+            self._goal,
+            self._reach_m,
+            self._settings.goal_bias,
+            self._near,
+            self._near_d,
+            self._stack,
+            self._fresh,
+            w.edge,
+            w.cell_first,
+            w.cell_edge,
+            w.grid,
+            w.shape,
+            w.number,
+            w.no_go_model,
+            w.table,
+            w.polar,
+            w.course,
+            w.target,
+            self._risk_number,
+            self._risk_table,
+            self._vessels.window,
+            self._vessels.disc,
         )
 
     @property
@@ -129,8 +167,7 @@ class RrtTree:
 
 
 def search(
-    problem: Problem, effort: Effort, seed: int, settings: RrtstarSettings = DEFAULTS,
-    vessels: TreeVessels = NO_VESSELS,
+    problem: Problem, effort: Effort, seed: int, settings: RrtstarSettings = DEFAULTS, vessels: TreeVessels = NO_VESSELS
 ) -> Outcome:
     """Grow the tree until the effort is over; an expansion is one sample drawn.
 
@@ -156,7 +193,9 @@ def search(
             if cost < judged and effort.improved(lambda: tree.path_to(tree.best), cost):
                 judged = cost
     trace = {
-        "tree": tree.edges(), "states": tree.size, "rewired": int(tree.count[kernels.REWIRED]),
+        "tree": tree.edges(),
+        "states": tree.size,
+        "rewired": int(tree.count[kernels.REWIRED]),
         "refused": int(tree.count[kernels.REFUSED]),
     }
     if tree.best < 0:

@@ -30,7 +30,7 @@ def _errors(row, course, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def passing(  # type: ignore[no-untyped-def]
-    ax, ay, bx, by, t, t0, t1, before_course, has_before, is_summed, vessel, disc,
+    ax, ay, bx, by, t, t0, t1, before_course, has_before, is_summed, vessel, disc
 ):
     """Return (ok, expected entries) of the edge from a to b: a turn on the spot from t to t0, then the leg to t1.
 
@@ -39,8 +39,11 @@ def passing(  # type: ignore[no-untyped-def]
     vessel's part is reached: without a sum of entries (``is_summed``) an edge clear of them all is not looked at.
     The pieces are those that the judge of whole paths takes (``companion.planner.risk.chance_constraint``).
     """
-    if not is_summed and not meets_target(ax, ay, ax, ay, t, t0, disc) and not meets_target(
-            ax, ay, bx, by, t0, t1, disc):
+    if (
+        not is_summed
+        and not meets_target(ax, ay, ax, ay, t, t0, disc)
+        and not meets_target(ax, ay, bx, by, t0, t1, disc)
+    ):
         return True, 0.0
     course, span = math.atan2(bx - ax, by - ay), t1 - t0
     out, spread, errors = np.empty(3), np.empty(9), np.empty((3, 4))
@@ -57,8 +60,12 @@ def passing(  # type: ignore[no-untyped-def]
                 if vessel[k, FROM] < t <= vessel[k, UNTIL]:
                     _errors(vessel[k], before_course, errors)
                     spread_at(t, errors, spread)
-                    before = inside(ax - vessel[k, VX0] - vessel[k, VVX] * t, ay - vessel[k, VY0] - vessel[k, VVY] * t,
-                                    spread, vessel[k, KEEP])
+                    before = inside(
+                        ax - vessel[k, VX0] - vessel[k, VVX] * t,
+                        ay - vessel[k, VY0] - vessel[k, VVY] * t,
+                        spread,
+                        vessel[k, KEEP],
+                    )
         for phase in range(2):
             begin, end, ux, uy = t, t0, 0.0, 0.0
             if phase == 1:
@@ -71,9 +78,17 @@ def passing(  # type: ignore[no-untyped-def]
                     continue
                 _errors(vessel[k], course, errors)
                 piece(
-                    lo, hi, ax + ux * (lo - begin) - vessel[k, VX0] - vessel[k, VVX] * lo,
-                    ay + uy * (lo - begin) - vessel[k, VY0] - vessel[k, VVY] * lo, ux - vessel[k, VVX],
-                    uy - vessel[k, VVY], errors, vessel[k, KEEP], before, out)
+                    lo,
+                    hi,
+                    ax + ux * (lo - begin) - vessel[k, VX0] - vessel[k, VVX] * lo,
+                    ay + uy * (lo - begin) - vessel[k, VY0] - vessel[k, VVY] * lo,
+                    ux - vessel[k, VVX],
+                    uy - vessel[k, VVY],
+                    errors,
+                    vessel[k, KEEP],
+                    before,
+                    out,
+                )
                 if out[2] > vessel[k, PART]:
                     return False, total
                 total += out[0]
@@ -120,7 +135,8 @@ def _state_risk(twa, t, number, risk_number, risk_table):  # type: ignore[no-unt
     """Return the chance that the wind at time t has this heading in the boat's own no-go zone."""
     margin = abs(twa) - number[HALF]
     sigma = sigma_at(
-        t, int(risk_number[MODEL]), risk_number[S0], risk_number[S1], risk_number[RHO], risk_table[0], risk_table[1])
+        t, int(risk_number[MODEL]), risk_number[S0], risk_number[S1], risk_number[RHO], risk_table[0], risk_table[1]
+    )
     if sigma <= 1e-12:
         return 0.0 if margin >= -1e-9 else 1.0
     return tail(margin / sigma)
@@ -133,8 +149,23 @@ def _cost(t, risk, most, risk_number):  # type: ignore[no-untyped-def]
 
 @kernel
 def _reach(  # type: ignore[no-untyped-def]
-    node, i, tx, ty, before_twa, before_t, most_cost, number, model, table, polar, course, target, risk_number,
-    risk_table, vessel, disc,
+    node,
+    i,
+    tx,
+    ty,
+    before_twa,
+    before_t,
+    most_cost,
+    number,
+    model,
+    table,
+    polar,
+    course,
+    target,
+    risk_number,
+    risk_table,
+    vessel,
+    disc,
 ):
     """Return (ok, heading, time, risk, greatest risk of a state) at (tx, ty) sailed straight from node i.
 
@@ -142,26 +173,43 @@ def _reach(  # type: ignore[no-untyped-def]
     risk of a leg's states is that at its ends: in between the spread is in between.
     """
     ok, h, t0, t1 = straight(
-        node[i, X], node[i, Y], node[i, H], node[i, T], tx, ty, number, model, table, polar, course)
+        node[i, X], node[i, Y], node[i, H], node[i, T], tx, ty, number, model, table, polar, course
+    )
     if not ok or (target.shape[0] > 0 and meets_target(node[i, X], node[i, Y], tx, ty, t0, t1, target)):
         return False, h, t1, 0.0, 0.0
     risk, most = node[i, R], node[i, M]
     twa = wrap(h - number[TWD])
     if risk_number[LIMITED] > 0.5:
         risk += leg_risk(
-            t0, t1, twa, before_twa, before_t, number[HALF], int(risk_number[MODEL]), risk_number[S0],
-            risk_number[S1], risk_number[RHO], risk_number[TAU], risk_table[0], risk_table[1])
+            t0,
+            t1,
+            twa,
+            before_twa,
+            before_t,
+            number[HALF],
+            int(risk_number[MODEL]),
+            risk_number[S0],
+            risk_number[S1],
+            risk_number[RHO],
+            risk_number[TAU],
+            risk_table[0],
+            risk_table[1],
+        )
         if risk > risk_number[LIMIT]:
             return False, h, t1, risk, most
     if risk_number[STATE_WEIGHT] > 0.0:
-        most = max(most, _state_risk(twa, t0, number, risk_number, risk_table),
-                   _state_risk(twa, t1, number, risk_number, risk_table))
+        most = max(
+            most,
+            _state_risk(twa, t0, number, risk_number, risk_table),
+            _state_risk(twa, t1, number, risk_number, risk_table),
+        )
     if vessel.shape[0] > 0:
         if _cost(t1, risk, most, risk_number) > most_cost:
             return False, h, t1, risk, most
         is_summed = risk_number[LIMITED] > 0.5
         ok, entries = passing(
-            node[i, X], node[i, Y], tx, ty, node[i, T], t0, t1, node[i, G], before_t >= 0.0, is_summed, vessel, disc)
+            node[i, X], node[i, Y], tx, ty, node[i, T], t0, t1, node[i, G], before_t >= 0.0, is_summed, vessel, disc
+        )
         if not ok:
             return False, h, t1, risk, most
         if is_summed:
@@ -181,8 +229,26 @@ def _twa_before(node, link, i, number):  # type: ignore[no-untyped-def]
 
 @kernel
 def _adopt(  # type: ignore[no-untyped-def]
-    node, link, new, j, h, t, risk, most, stack, fresh, number, model, table, polar, course, target, risk_number,
-    risk_table, vessel, disc,
+    node,
+    link,
+    new,
+    j,
+    h,
+    t,
+    risk,
+    most,
+    stack,
+    fresh,
+    number,
+    model,
+    table,
+    polar,
+    course,
+    target,
+    risk_number,
+    risk_table,
+    vessel,
+    disc,
 ):
     """Give node j the parent ``new`` if it and everything below it stays feasible and no cost rises."""
     top, n = 0, 0
@@ -204,9 +270,24 @@ def _adopt(  # type: ignore[no-untyped-def]
             fresh[n, H], fresh[n, T], fresh[n, R] = fresh[top, H], fresh[top, T], fresh[top, R]
             fresh[n, M], fresh[n, G] = fresh[top, M], fresh[top, G]
             ok, ch, ct, cr, cm = _reach(
-                fresh, n, node[child, X], node[child, Y], wrap(fresh[top, H] - number[TWD]), fresh[top, T],
-                node[child, C] + 1e-9, number, model, table, polar, course, target, risk_number, risk_table, vessel,
-                disc)
+                fresh,
+                n,
+                node[child, X],
+                node[child, Y],
+                wrap(fresh[top, H] - number[TWD]),
+                fresh[top, T],
+                node[child, C] + 1e-9,
+                number,
+                model,
+                table,
+                polar,
+                course,
+                target,
+                risk_number,
+                risk_table,
+                vessel,
+                disc,
+            )
             if not ok:
                 return False
             fresh[n, H], fresh[n, T], fresh[n, R], fresh[n, M] = ch, ct, cr, cm
@@ -227,9 +308,35 @@ def _adopt(  # type: ignore[no-untyped-def]
 
 @kernel
 def grow(  # type: ignore[no-untyped-def]
-    samples, node, link, goal_node, count, random, box, goal, reach, goal_bias, near, near_d, stack, fresh,
-    edge, cell_first, cell_edge, grid, shape, number, model, table, polar, course, target, risk_number, risk_table,
-    vessel, disc,
+    samples,
+    node,
+    link,
+    goal_node,
+    count,
+    random,
+    box,
+    goal,
+    reach,
+    goal_bias,
+    near,
+    near_d,
+    stack,
+    fresh,
+    edge,
+    cell_first,
+    cell_edge,
+    grid,
+    shape,
+    number,
+    model,
+    table,
+    polar,
+    course,
+    target,
+    risk_number,
+    risk_table,
+    vessel,
+    disc,
 ):
     """Draw ``samples`` states and let the tree grow by RRT* (Karaman and Frazzoli 2011, algorithm 6, k-nearest).
 
@@ -258,8 +365,19 @@ def grow(  # type: ignore[no-untyped-def]
                 if d < nearest_d:
                     nearest, nearest_d, within2 = i, d, d * d
         ok, x, y = steer(
-            node[nearest, X], node[nearest, Y], node[nearest, H], node[nearest, T], sx, sy, reach, number, model,
-            table, polar, course)
+            node[nearest, X],
+            node[nearest, Y],
+            node[nearest, H],
+            node[nearest, T],
+            sx,
+            sy,
+            reach,
+            number,
+            model,
+            table,
+            polar,
+            course,
+        )
         if not ok:
             count[REFUSED] += 1
             continue
@@ -297,8 +415,24 @@ def grow(  # type: ignore[no-untyped-def]
                 continue
             before_twa, before_t = _twa_before(node, link, i, number)
             ok, h, t, risk, most = _reach(
-                node, i, x, y, before_twa, before_t, best_c, number, model, table, polar, course, target, risk_number,
-                risk_table, vessel, disc)
+                node,
+                i,
+                x,
+                y,
+                before_twa,
+                before_t,
+                best_c,
+                number,
+                model,
+                table,
+                polar,
+                course,
+                target,
+                risk_number,
+                risk_table,
+                vessel,
+                disc,
+            )
             cost = _cost(t, risk, most, risk_number)
             if not ok or cost >= best_c:
                 continue
@@ -324,14 +458,50 @@ def grow(  # type: ignore[no-untyped-def]
             if j == best or link[j, PARENT] < 0:
                 continue
             ok, h, t, risk, most = _reach(
-                node, new, node[j, X], node[j, Y], before_twa, before_t, node[j, C], number, model, table, polar,
-                course, target, risk_number, risk_table, vessel, disc)
+                node,
+                new,
+                node[j, X],
+                node[j, Y],
+                before_twa,
+                before_t,
+                node[j, C],
+                number,
+                model,
+                table,
+                polar,
+                course,
+                target,
+                risk_number,
+                risk_table,
+                vessel,
+                disc,
+            )
             if not ok or _cost(t, risk, most, risk_number) >= node[j, C] - 1e-9:
                 continue
             if first_hit(x, y, node[j, X], node[j, Y], edge, cell_first, cell_edge, grid, shape) <= 1.0:
                 continue
-            if _adopt(node, link, new, j, h, t, risk, most, stack, fresh, number, model, table, polar, course, target,
-                      risk_number, risk_table, vessel, disc):
+            if _adopt(
+                node,
+                link,
+                new,
+                j,
+                h,
+                t,
+                risk,
+                most,
+                stack,
+                fresh,
+                number,
+                model,
+                table,
+                polar,
+                course,
+                target,
+                risk_number,
+                risk_table,
+                vessel,
+                disc,
+            ):
                 count[REWIRED] += 1
         best_goal, best_cost = -1, np.inf
         for g in range(count[GOALS]):

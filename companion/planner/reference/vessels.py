@@ -24,7 +24,7 @@ from companion.planner.reference import rrtstar_kernels as kernels
 from companion.planner.risk.chance_constraint import vessel_risk
 from companion.planner.risk.kernels import LEAST_SIGMA_M, inside, spread_at
 
-KEPT = 1.0 - 1e-6    # of its part that the tree uses: the judge's times differ by the last digits
+KEPT = 1.0 - 1e-6  # of its part that the tree uses: the judge's times differ by the last digits
 SLACK = 1e-9
 ABOVE = "the path found is at some instant likelier to be too near to a vessel than was promised"
 
@@ -63,8 +63,24 @@ def carried(problem: Problem) -> tuple[Problem, TreeVessels] | None:
 
 
 def _row(whose: float, t: Target, s: Spread, part: float) -> tuple[float, ...]:
-    return (whose, t.from_s, min(t.until_s, 1e15), s.x_m, s.y_m, t.vx_mps, t.vy_mps, s.keep_m, math.sin(s.course_rad),
-            math.cos(s.course_rad), s.along_m, s.along_mps, s.across_m, s.across_mps, s.own_mps, part)
+    return (
+        whose,
+        t.from_s,
+        min(t.until_s, 1e15),
+        s.x_m,
+        s.y_m,
+        t.vx_mps,
+        t.vy_mps,
+        s.keep_m,
+        math.sin(s.course_rad),
+        math.cos(s.course_rad),
+        s.along_m,
+        s.along_mps,
+        s.across_m,
+        s.across_mps,
+        s.own_mps,
+        part,
+    )
 
 
 def _at_start(problem: Problem, s: Spread) -> float:
@@ -76,16 +92,28 @@ def _at_start(problem: Problem, s: Spread) -> float:
 
 def _disc(t: Target, s: Spread, sigmas: float) -> tuple[float, ...]:
     """Return a region outside which the part is not reached: the larger deviation is convex, its chord is above it."""
+
     def sigma_m(at_s: float) -> float:
-        return math.hypot(max(abs(s.along_m + s.along_mps * at_s), abs(s.across_m + s.across_mps * at_s)),
-                          s.own_mps * at_s, LEAST_SIGMA_M)
+        return math.hypot(
+            max(abs(s.along_m + s.along_mps * at_s), abs(s.across_m + s.across_mps * at_s)),
+            s.own_mps * at_s,
+            LEAST_SIGMA_M,
+        )
 
     first = sigma_m(t.from_s)
     slope = math.hypot(max(abs(s.along_mps), abs(s.across_mps)), s.own_mps)
     if math.isfinite(t.until_s) and t.until_s > t.from_s:
         slope = (sigma_m(t.until_s) - first) / (t.until_s - t.from_s)
-    return (s.x_m, s.y_m, t.vx_mps, t.vy_mps, s.keep_m + sigmas * (first - slope * t.from_s), sigmas * slope, t.from_s,
-            min(t.until_s, 1e15))
+    return (
+        s.x_m,
+        s.y_m,
+        t.vx_mps,
+        t.vy_mps,
+        s.keep_m + sigmas * (first - slope * t.from_s),
+        sigmas * slope,
+        t.from_s,
+        min(t.until_s, 1e15),
+    )
 
 
 def is_kept(problem: Problem, legs: tuple[Leg, ...]) -> bool:
@@ -95,6 +123,7 @@ def is_kept(problem: Problem, legs: tuple[Leg, ...]) -> bool:
 
 def judge_of(problem: Problem, free: Problem) -> Callable[[list[tuple[float, float]]], Evaluation]:
     """Return the exact scorer of a path in ``free``, the problem without its vessels, that holds it to their share."""
+
     def judge(path: list[tuple[float, float]]) -> Evaluation:
         judged = evaluate(free, np.asarray(path))
         if not judged.is_feasible or is_kept(problem, judged.legs):
@@ -108,5 +137,13 @@ def keep_share(problem: Problem, plan: Plan) -> Plan:
     """Return the plan, or it without its path where that risks more for vessels at some instant than they are given."""
     if not plan.has_path or is_kept(problem, plan.legs):
         return plan
-    return replace(plan, status=PlanStatus.NOT_FOUND, reason=ABOVE, waypoints_en=np.empty((0, 2)), legs=(),
-                   cost_s=math.inf, first_s=None, why=Why(text=ABOVE))
+    return replace(
+        plan,
+        status=PlanStatus.NOT_FOUND,
+        reason=ABOVE,
+        waypoints_en=np.empty((0, 2)),
+        legs=(),
+        cost_s=math.inf,
+        first_s=None,
+        why=Why(text=ABOVE),
+    )

@@ -79,19 +79,40 @@ def world_of(p: Problem) -> ReferenceWorld:
         model = NO_GO_TABLE
         table = np.array([s.horizon_s, [p.widening_rad(t) for t in s.horizon_s]], dtype=np.float64)
     b, c = p.boat, p.current
-    number = np.array([
-        p.wind.twd_from_rad, b.no_go_half_rad, b.max_twa_rad, b.turn_rate_radps,
-        b.tack_loss_s if b.can_tack else math.inf, b.gybe_loss_s,
-        *widen, c.drift_mps * math.sin(c.set_rad), c.drift_mps * math.cos(c.set_rad),
-        *((p.zone.from_rad, p.zone.half_rad) if p.zone is not None and c.drift_mps > 0.0 else (0.0, 0.0)),
-    ], dtype=np.float64)
-    target = np.array([
-        [t.x_m, t.y_m, t.vx_mps, t.vy_mps, t.radius_m, t.growth_mps, t.from_s, min(t.until_s, 1e15)] for t in p.targets
-    ], dtype=np.float64).reshape(-1, 8)
+    number = np.array(
+        [
+            p.wind.twd_from_rad,
+            b.no_go_half_rad,
+            b.max_twa_rad,
+            b.turn_rate_radps,
+            b.tack_loss_s if b.can_tack else math.inf,
+            b.gybe_loss_s,
+            *widen,
+            c.drift_mps * math.sin(c.set_rad),
+            c.drift_mps * math.cos(c.set_rad),
+            *((p.zone.from_rad, p.zone.half_rad) if p.zone is not None and c.drift_mps > 0.0 else (0.0, 0.0)),
+        ],
+        dtype=np.float64,
+    )
+    target = np.array(
+        [
+            [t.x_m, t.y_m, t.vx_mps, t.vy_mps, t.radius_m, t.growth_mps, t.from_s, min(t.until_s, 1e15)]
+            for t in p.targets
+        ],
+        dtype=np.float64,
+    ).reshape(-1, 8)
     return ReferenceWorld(
-        edge=edge, cell_first=cell_first, cell_edge=cell_edge, grid=grid, shape=shape, number=number,
-        no_go_model=model, table=table, polar=np.array([b.polar_twa_rad, b.polar_mps], dtype=np.float64),
-        course=_courses(p), target=target,
+        edge=edge,
+        cell_first=cell_first,
+        cell_edge=cell_edge,
+        grid=grid,
+        shape=shape,
+        number=number,
+        no_go_model=model,
+        table=table,
+        polar=np.array([b.polar_twa_rad, b.polar_mps], dtype=np.float64),
+        course=_courses(p),
+        target=target,
     )
 
 

@@ -31,11 +31,11 @@ from companion.planner.problem.value import Problem
 
 WINDS = 200
 SEED = 15
-STEPS_OF_PLAN, LONGEST = 50, 5     # steps in the plan's own time; a wind in which it takes longer does not get there
+STEPS_OF_PLAN, LONGEST = 50, 5  # steps in the plan's own time; a wind in which it takes longer does not get there
 QUANTILES = (0.1, 0.5, 0.9)
-NODES_MPS, NODES_RAD, NODES_TWA = 33, 17, 361   # of the tables of progress: winds, their turns, angles to them
-REACH = 3.5                        # standard deviations that they reach to
-FAILED_S = IRONS_S + 4.0           # head to wind, and until the boat has way on again
+NODES_MPS, NODES_RAD, NODES_TWA = 33, 17, 361  # of the tables of progress: winds, their turns, angles to them
+REACH = 3.5  # standard deviations that they reach to
+FAILED_S = IRONS_S + 4.0  # head to wind, and until the boat has way on again
 MOST_FAILURES = 20
 
 Floats = NDArray[np.float64]
@@ -52,9 +52,13 @@ def arrival(problem: Problem, legs: Sequence[Leg]) -> Arrival | None:
     until_s = late if math.isfinite(late) else LONGEST * legs[-1].end_s
     boat = problem.boat
     return Arrival(
-        early_s=early, median_s=median, late_s=late, doubts=doubts,
+        early_s=early,
+        median_s=median,
+        late_s=late,
+        doubts=doubts,
         over_max=None if boat.max_tws_mps is None else strength.over(boat.max_tws_mps, until_s),
-        under_min=None if boat.min_tws_mps is None else strength.under(boat.min_tws_mps, until_s))
+        under_min=None if boat.min_tws_mps is None else strength.under(boat.min_tws_mps, until_s),
+    )
 
 
 def _speeds(problem: Problem, strength: Strength) -> tuple[Speeds, tuple[str, ...]]:
@@ -65,11 +69,16 @@ def _speeds(problem: Problem, strength: Strength) -> tuple[Speeds, tuple[str, ..
         tws = problem.wind.tws_mps or float(strength.mean_at(0.0))
         doubts.append("her speed is taken to go with the wind's")
         zero = (0.0,) * len(boat.polar_mps)
-        speeds = Speeds(tws_mps=(0.0, tws, 2.0 * tws), twa_rad=boat.polar_twa_rad,
-                        v_mps=(zero, boat.polar_mps, tuple(2.0 * v for v in boat.polar_mps)))
+        speeds = Speeds(
+            tws_mps=(0.0, tws, 2.0 * tws),
+            twa_rad=boat.polar_twa_rad,
+            v_mps=(zero, boat.polar_mps, tuple(2.0 * v for v in boat.polar_mps)),
+        )
     elif float(min(strength.mean_mps)) - 2.0 * float(max(strength.sigma_mps)) < speeds.lowest_mps:
-        doubts.append(f"her polar begins at {speeds.lowest_mps:.1f} m/s: in less wind she is taken to be slower than "
-                      "in proportion to it")
+        doubts.append(
+            f"her polar begins at {speeds.lowest_mps:.1f} m/s: in less wind she is taken to be slower than "
+            "in proportion to it"
+        )
     return speeds, tuple(doubts)
 
 
@@ -83,8 +92,8 @@ def _noise() -> Floats:
 class _Averaged:
     """A Gauss-Markov process by its means over steps: their share of the variance, and from step to step."""
 
-    share: float     # of the variance of an instant
-    keep: float      # of a step's mean in the next
+    share: float  # of the variance of an instant
+    keep: float  # of a step's mean in the next
 
     @classmethod
     def of(cls, step_s: float, correlation_s: float) -> _Averaged:
@@ -114,7 +123,7 @@ def _drawn(noise: Floats, keep: float, fresh: float) -> Floats:
 
 @kernel
 def _sailed(
-    edges: Floats, table: Floats, at_wind: NDArray[np.int64], at_turn: NDArray[np.int64], step_s: float,
+    edges: Floats, table: Floats, at_wind: NDArray[np.int64], at_turn: NDArray[np.int64], step_s: float
 ) -> Floats:
     """Return how long the path takes in each wind [s], inf where the steps end before it does.
 
@@ -211,8 +220,11 @@ def _lost_s(problem: Problem, legs: Sequence[Leg], noise: Floats) -> Floats | fl
         return 0.0
     tacks = float(sum(leg.manoeuvre == "tack" for leg in legs))
     if problem.beat is not None:
-        tacks += sum(beat_s(problem, problem.beat, leg.to_en[0] - leg.from_en[0], leg.to_en[1] - leg.from_en[1])[1]
-                     for leg in legs if leg.is_beat)
+        tacks += sum(
+            beat_s(problem, problem.beat, leg.to_en[0] - leg.from_en[0], leg.to_en[1] - leg.from_en[1])[1]
+            for leg in legs
+            if leg.is_beat
+        )
     # of so many tacks, each tried until it comes off: a number with this mean and variance, drawn as a normal
     mean = tacks * chance / (1.0 - chance)
     failures = np.clip(mean + math.sqrt(mean / (1.0 - chance)) * noise[0], 0.0, MOST_FAILURES * max(tacks, 1.0))
@@ -226,11 +238,14 @@ def _quantile(times_s: Floats, p: float) -> float:
 
 def in_words(found: Arrival, cost_s: float) -> str:
     """Return when a plan arrives, for a person."""
+
     def by(t_s: float) -> str:
         return f"{t_s:.0f} s" if math.isfinite(t_s) else f"later than {LONGEST * cost_s:.0f} s"
 
-    text = (f"In the wind's spread it arrives after {by(found.median_s)} (median), {by(found.early_s)} in one wind of "
-            f"ten, {by(found.late_s)} at the latest in nine of ten.")
+    text = (
+        f"In the wind's spread it arrives after {by(found.median_s)} (median), {by(found.early_s)} in one wind of "
+        f"ten, {by(found.late_s)} at the latest in nine of ten."
+    )
     return text + "".join(f" {doubt[0].upper()}{doubt[1:]}." for doubt in found.doubts)
 
 
@@ -239,8 +254,10 @@ def limits_in_words(problem: Problem, found: Arrival) -> str:
     allowed, boat = 1.0 - problem.delta_s, problem.boat
     broken = [
         f"{name} than {limit:g} m/s with {100.0 * chance:.0f} %"
-        for name, limit, chance in (("more wind", boat.max_tws_mps, found.over_max),
-                                    ("less wind", boat.min_tws_mps, found.under_min))
-        if limit is not None and chance is not None and chance > allowed]
+        for name, limit, chance in (
+            ("more wind", boat.max_tws_mps, found.over_max),
+            ("less wind", boat.min_tws_mps, found.under_min),
+        )
+        if limit is not None and chance is not None and chance > allowed
+    ]
     return f"{' and '.join(broken)} at the worst instant of it; {100.0 * allowed:.0f} % is allowed" if broken else ""
-

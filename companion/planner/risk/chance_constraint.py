@@ -81,14 +81,16 @@ def vessel_risk(problem: Problem, legs: Sequence[Leg]) -> VesselRisk:
         by_name[name] = min(1.0, by_name.get(name, 0.0) + VESSELS_PROMISE_FACTOR * float(entries.sum()))
     computed = float(min(1.0, by_leg.sum()))
     return VesselRisk(
-        computed=computed, total=min(1.0, VESSELS_PROMISE_FACTOR * computed),
+        computed=computed,
+        total=min(1.0, VESSELS_PROMISE_FACTOR * computed),
         worst_instant=min(1.0, sum(worst.values())),
-        by_name=tuple(sorted(by_name.items(), key=lambda n: -n[1])), legs=tuple(float(x) for x in by_leg),
+        by_name=tuple(sorted(by_name.items(), key=lambda n: -n[1])),
+        legs=tuple(float(x) for x in by_leg),
     )
 
 
 def _walk(
-    legs: Sequence[Leg], windows: Sequence[tuple[Target, Spread]], wide_m: float,
+    legs: Sequence[Leg], windows: Sequence[tuple[Target, Spread]], wide_m: float
 ) -> tuple[NDArray[np.float64], float]:
     """Return the expected entries on each leg, and the largest P(inside) of any instant, for one vessel.
 
@@ -113,8 +115,17 @@ def _walk(
                 bx = leg.from_en[0] + velocity[0] * (lo - begin) - spread.x_m - target.vx_mps * lo
                 by = leg.from_en[1] + velocity[1] * (lo - begin) - spread.y_m - target.vy_mps * lo
                 kernels.piece(
-                    lo, hi, bx, by, velocity[0] - target.vx_mps, velocity[1] - target.vy_mps, _errors(spread, along),
-                    spread.keep_m + (wide_m if leg.is_beat else 0.0), before, out)
+                    lo,
+                    hi,
+                    bx,
+                    by,
+                    velocity[0] - target.vx_mps,
+                    velocity[1] - target.vy_mps,
+                    _errors(spread, along),
+                    spread.keep_m + (wide_m if leg.is_beat else 0.0),
+                    before,
+                    out,
+                )
                 entries[i] += out[0]
                 before, worst = float(out[1]), max(worst, float(out[2]))
         t = leg.end_s
@@ -123,20 +134,23 @@ def _walk(
 
 def _errors(spread: Spread, along: tuple[float, float]) -> NDArray[np.float64]:
     s, c = math.sin(spread.course_rad), math.cos(spread.course_rad)
-    return np.array([
-        [s, c, spread.along_m, spread.along_mps], [c, -s, spread.across_m, spread.across_mps],
-        [along[0], along[1], 0.0, spread.own_mps],
-    ])
+    return np.array(
+        [
+            [s, c, spread.along_m, spread.along_mps],
+            [c, -s, spread.across_m, spread.across_mps],
+            [along[0], along[1], 0.0, spread.own_mps],
+        ]
+    )
 
 
 PROMISE_FACTOR = 1.15
 """What is promised over what is computed: a simulation of 2,000 winds scatters by a tenth at a share of 5 %."""
 DEFAULT_CORRELATION_S = 60.0
 MAX_STEPS = 400_000
-RISK_ROUNDS = 8             # parts that the bisection under a limit divides its effort into
+RISK_ROUNDS = 8  # parts that the bisection under a limit divides its effort into
 RISK_TURNS = 16
 MOST_EXTRA_SIGMAS = 8.0
-EXTRA_RESOLUTION = 0.02     # of the bisection [standard deviations]
+EXTRA_RESOLUTION = 0.02  # of the bisection [standard deviations]
 
 
 class WindProcess(NamedTuple):
@@ -224,8 +238,12 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
     out = []
     for i, leg in enumerate(legs):
         worst = max(
-            _instant(abs(twa[i]) - half, kernels.sigma_at(t, process.model, process.s0, process.s1, process.rho,
-                                                           process.table_t, process.table_s))
+            _instant(
+                abs(twa[i]) - half,
+                kernels.sigma_at(
+                    t, process.model, process.s0, process.s1, process.rho, process.table_t, process.table_s
+                ),
+            )
             for t in (leg.start_s, leg.end_s, *(h for h in process.table_t if leg.start_s < h < leg.end_s))
         )
         out.append(LegRisk(first_entry=float(first[i]), worst_instant=worst))
@@ -233,7 +251,11 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
     wind, vessels = min(1.0, PROMISE_FACTOR * computed), vessel_risk(problem, legs)
     tacks = tacks_at_risk(problem, legs)
     return PathRisk(
-        legs=tuple(out), computed=computed, wind=wind, vessels=vessels, tacks=tacks,
+        legs=tuple(out),
+        computed=computed,
+        wind=wind,
+        vessels=vessels,
+        tacks=tacks,
         total=min(1.0, wind + vessels.total + sum(tack.risk for tack in tacks)),
         correlation_time_s=process.correlation_time_s,
     )
@@ -257,12 +279,29 @@ def _full() -> NDArray[np.float64]:
 
 
 def _first_passage(
-    times: tuple[NDArray[np.float64], NDArray[np.float64]], twa: NDArray[np.float64], half: float, p: WindProcess,
+    times: tuple[NDArray[np.float64], NDArray[np.float64]],
+    twa: NDArray[np.float64],
+    half: float,
+    p: WindProcess,
     out: NDArray[np.float64],
 ) -> None:
     start, end = times
-    steps = kernels.first_passage(start, end, twa, float(half), p.model, float(p.s0), float(p.s1), float(p.rho),
-                                  float(p.tau), p.table_t, p.table_s, MAX_STEPS, _full(), out)
+    steps = kernels.first_passage(
+        start,
+        end,
+        twa,
+        float(half),
+        p.model,
+        float(p.s0),
+        float(p.s1),
+        float(p.rho),
+        float(p.tau),
+        p.table_t,
+        p.table_s,
+        MAX_STEPS,
+        _full(),
+        out,
+    )
     if steps < 0:  # a voyage of days in a wind of seconds: whatever is not excluded happens
         out[-1] = max(0.0, 1.0 - out[:-1].sum())
 
@@ -275,7 +314,8 @@ def with_risk(problem: Problem, plan: Plan) -> Plan:
     of_tacks = tack_risks(plan.legs, risk.tacks)
     legs = tuple(
         replace(leg, risk=min(1.0, wind.first_entry + vessels + tacks))
-        for leg, wind, vessels, tacks in zip(plan.legs, risk.legs, risk.vessels.legs, of_tacks, strict=True))
+        for leg, wind, vessels, tacks in zip(plan.legs, risk.legs, risk.vessels.legs, of_tacks, strict=True)
+    )
     plan = replace(plan, legs=legs, risk=risk.total, vessel_risk=risk.vessels.total, tack_risk=risk.of_tacks)
     return replace(plan, why=with_parts(plan.why, problem, risk)) if problem.is_shared else plan
 
@@ -284,15 +324,21 @@ def with_parts(why: Why, problem: Problem, risk: PathRisk) -> Why:
     """Return the words and data of a plan with what its promise is made of."""
     part = problem.vessels_share
     named = ", ".join(f"{name} {100.0 * value:.2g} %" for name, value in risk.vessels.by_name[:3])
-    text = (f"Off the plan {100.0 * risk.total:.2g} %: wind {100.0 * risk.wind:.2g} %, vessels "
-            f"{100.0 * risk.vessels.total:.2g} % ({named}). At each instant {100.0 * (1.0 - problem.delta_s):.2g} %: "
-            f"wind {100.0 * (1.0 - problem.wind_delta_s):.2g} %, vessels {100.0 * part:.2g} %.")
+    text = (
+        f"Off the plan {100.0 * risk.total:.2g} %: wind {100.0 * risk.wind:.2g} %, vessels "
+        f"{100.0 * risk.vessels.total:.2g} % ({named}). At each instant {100.0 * (1.0 - problem.delta_s):.2g} %: "
+        f"wind {100.0 * (1.0 - problem.wind_delta_s):.2g} %, vessels {100.0 * part:.2g} %."
+    )
     data = {
         "risk": {
-            "wind": risk.wind, "vessels": risk.vessels.total, "by_vessel": dict(risk.vessels.by_name),
-            "instant_wind": 1.0 - problem.wind_delta_s, "instant_vessels": part,
-            "instant_vessels_worst": risk.vessels.worst_instant, "count": vessel_count(problem.targets),
-        },
+            "wind": risk.wind,
+            "vessels": risk.vessels.total,
+            "by_vessel": dict(risk.vessels.by_name),
+            "instant_wind": 1.0 - problem.wind_delta_s,
+            "instant_vessels": part,
+            "instant_vessels_worst": risk.vessels.worst_instant,
+            "count": vessel_count(problem.targets),
+        }
     }
     return Why(text=f"{why.text} {text}".strip(), data={**why.data, **data})
 
@@ -303,14 +349,27 @@ def keep_limit(problem: Problem, plan: Plan) -> Plan:
     plan = with_risk(problem, plan)
     if problem.risk is None or plan.risk is None or plan.risk <= problem.risk.max_path_risk:
         return plan
-    reason = (f"the path found has a risk of {100.0 * plan.risk:.3g} %, above the limit of "
-              f"{100.0 * problem.risk.max_path_risk:.3g} %")
-    return replace(plan, status=PlanStatus.NOT_FOUND, reason=reason, waypoints_en=np.empty((0, 2)), legs=(),
-                   cost_s=math.inf, first_s=None, why=Why(text=reason))
+    reason = (
+        f"the path found has a risk of {100.0 * plan.risk:.3g} %, above the limit of "
+        f"{100.0 * problem.risk.max_path_risk:.3g} %"
+    )
+    return replace(
+        plan,
+        status=PlanStatus.NOT_FOUND,
+        reason=reason,
+        waypoints_en=np.empty((0, 2)),
+        legs=(),
+        cost_s=math.inf,
+        first_s=None,
+        why=Why(text=reason),
+    )
 
 
 def search_within(
-    search: Search, problem: Problem, effort: Effort, seed: int,
+    search: Search,
+    problem: Problem,
+    effort: Effort,
+    seed: int,
     on_better: Callable[[NDArray[np.float64]], object] | None = None,
 ) -> Outcome:
     """Return the fastest path found whose promised risk is within ``problem.risk``; ``on_better`` is told of each.
@@ -331,8 +390,9 @@ def search_within(
         seconds, steps = effort.remaining_s, (effort.limit or 0) - effort.used
         if not settled:
             seconds, steps = min(seconds, effort.budget_s / RISK_ROUNDS), min(steps, (effort.limit or 0) // RISK_ROUNDS)
-        inner = Effort(None if math.isinf(effort.budget_s) else max(1e-3, seconds),
-                       None if effort.limit is None else max(1, steps))
+        inner = Effort(
+            None if math.isinf(effort.budget_s) else max(1e-3, seconds), None if effort.limit is None else max(1, steps)
+        )
         inner.judging_s, inner.needed_s = effort.judging_s / RISK_ROUNDS, effort.needed_s
         outcome = search(widened(problem, extra), inner, seed)
         effort.spend(inner.used)
@@ -369,8 +429,10 @@ def search_within(
                 break
             settled, extra = True, kept
     if best is None:
-        reason = (f"no path within the limit of {100.0 * limit:.3g} % on its risk; the least risky found has "
-                  f"{100.0 * least:.3g} %")
+        reason = (
+            f"no path within the limit of {100.0 * limit:.3g} % on its risk; the least risky found has "
+            f"{100.0 * least:.3g} %"
+        )
         return Outcome(waypoints_en=None, reason=reason)
     return replace(best, lower_bound_s=bound_s, trace={**best.trace, "extra_sigmas": kept})
 

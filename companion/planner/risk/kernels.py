@@ -30,10 +30,10 @@ from companion.kernels.jit import kernel
 
 NONE, KALMAN, AR1, TABLE = 0, 1, 2, 3
 
-Z_MAX = 6.5          # the grid ends here; beyond lies 4e-11 of the wind
-Z_CELLS = 260        # cells of 0.05 standard deviations
-NEVER = 7.0          # standard deviations that no step goes: 3e-12
-R_STEP = 0.965       # correlation over one step: its standard deviation, 0.26, is five cells
+Z_MAX = 6.5  # the grid ends here; beyond lies 4e-11 of the wind
+Z_CELLS = 260  # cells of 0.05 standard deviations
+NEVER = 7.0  # standard deviations that no step goes: 3e-12
+R_STEP = 0.965  # correlation over one step: its standard deviation, 0.26, is five cells
 # Between steps a continuous process peeks over the barrier; a barrier nearer by this many step deviations
 # accounts for it (Chernoff 1965; Broadie, Glasserman and Kou 1997: -zeta(1/2) / sqrt(2 pi)).
 BARRIER_SHIFT = 0.5826
@@ -41,7 +41,7 @@ BARRIER_SHIFT = 0.5826
 
 @kernel
 def sigma_at(  # type: ignore[no-untyped-def]
-    t_s, model, s0, s1, rho, table_t, table_s,
+    t_s, model, s0, s1, rho, table_t, table_s
 ):
     """Return sigma [rad] at time t: s1 is the growth [rad/sqrt s] of model 1, the limit [rad] of model 2."""
     if model == 1:
@@ -106,7 +106,7 @@ def _kernel(r, dz, out):  # type: ignore[no-untyped-def]
             low = high
         for j in range(first, last):
             out[i, j] /= total
-        if 2 * i + 1 < n:   # the other half is its mirror image
+        if 2 * i + 1 < n:  # the other half is its mirror image
             out[n - 1 - i, :] = out[i, ::-1]
 
 
@@ -150,7 +150,7 @@ def _absorb(p, low, high, dz):  # type: ignore[no-untyped-def]
 
 @kernel
 def first_passage(  # type: ignore[no-untyped-def]
-    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, max_steps, full, out,
+    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, max_steps, full, out
 ):
     """Fill out[k]: the probability that the wind first forces the boat into the no-go zone on leg k.
 
@@ -249,7 +249,7 @@ def tail(z):  # type: ignore[no-untyped-def]
 
 @kernel
 def leg_risk(  # type: ignore[no-untyped-def]
-    t0, t1, twa, before_twa, before_t, half, model, s0, s1, rho, tau, table_t, table_s,
+    t0, t1, twa, before_twa, before_t, half, model, s0, s1, rho, tau, table_t, table_s
 ):
     """Return what a leg adds to a bound on the path's risk: Boole over its entry and its up-crossings.
 
@@ -296,8 +296,8 @@ def leg_risk(  # type: ignore[no-untyped-def]
     return min(1.0, entry + total)
 
 
-FAR_SIGMAS = 6.5       # farther outside than this nothing happens
-LEAST_SIGMA_M = 0.3    # a spread is not taken smaller: no report is better
+FAR_SIGMAS = 6.5  # farther outside than this nothing happens
+LEAST_SIGMA_M = 0.3  # a spread is not taken smaller: no report is better
 MOST_ANGLES = 1440
 
 
@@ -401,7 +401,7 @@ def entry_rate(mx, my, vx, vy, s, radius):  # type: ignore[no-untyped-def]
 
 @kernel
 def piece(  # type: ignore[no-untyped-def]
-    t0, t1, bx, by, wx, wy, errors, radius, before, out,
+    t0, t1, bx, by, wx, wy, errors, radius, before, out
 ):
     """Integrate over [t0, t1] and fill out (3,): expected entries, P(inside) at the end, the largest P(inside).
 

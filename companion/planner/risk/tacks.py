@@ -24,8 +24,8 @@ from companion.planner.plan import Leg
 from companion.planner.problem.evaluate import beat_s, shore_of
 from companion.planner.problem.value import Problem
 
-MOST_FAILURES = 5      # in a row that are looked at
-EDGE_STEP_M = 10.0     # between the places of a corridor's edge at which a tack is looked at
+MOST_FAILURES = 5  # in a row that are looked at
+EDGE_STEP_M = 10.0  # between the places of a corridor's edge at which a tack is looked at
 Place = tuple[float, float]
 
 
@@ -61,7 +61,7 @@ def tacks_at_risk(problem: Problem, legs: Sequence[Leg]) -> tuple[TackAtRisk, ..
     return _at_risk(problem, tuple(replace(leg, risk=0.0, clearance_m=0.0) for leg in legs))
 
 
-@lru_cache(maxsize=16)   # by identity and value: the search asks of its best path, and who writes the plan again
+@lru_cache(maxsize=16)  # by identity and value: the search asks of its best path, and who writes the plan again
 def _at_risk(problem: Problem, legs: tuple[Leg, ...]) -> tuple[TackAtRisk, ...]:
     chance = problem.boat.tack_fails
     solids = _Solids(problem)
@@ -106,15 +106,19 @@ def _beaten(problem: Problem, solids: _Solids, n: int, leg: Leg, chance: float) 
     speed = problem.boat.speed_mps(beat.no_go_half_rad)
     reach_m = beat.corridor_m + solids.far_m(speed, problem.wind.tws_mps or 0.0)
     if solids.distance_m(line) > reach_m:
-        return None   # the whole beat is far from everything
+        return None  # the whole beat is far from everything
     steps = max(1, math.ceil(leg.length_m / EDGE_STEP_M))
     sides, places = [], []
     for k in range(steps):
         along = (k + 0.5) / steps * leg.length_m
         for side in (-1.0, 1.0):
             sides.append(side)
-            places.append((leg.from_en[0] + along * ux + side * beat.corridor_m * uy,
-                           leg.from_en[1] + along * uy - side * beat.corridor_m * ux))
+            places.append(
+                (
+                    leg.from_en[0] + along * ux + side * beat.corridor_m * uy,
+                    leg.from_en[1] + along * uy - side * beat.corridor_m * ux,
+                )
+            )
     worst: TackAtRisk | None = None
     risk = 0.0
     for side, at, distance_m in zip(sides, places, solids.distances_m(shapely.points(places)), strict=True):
@@ -123,12 +127,18 @@ def _beaten(problem: Problem, solids: _Solids, n: int, leg: Leg, chance: float) 
         tack = solids.tack(problem, n, at, course, speed, chance, distance_m)
         if tack is not None:
             risk += tack.risk / (2.0 * steps)
-            worst = tack if worst is None or tack.failures < worst.failures or (
-                tack.failures == worst.failures and tack.lack_m > worst.lack_m) else worst
+            worst = (
+                tack
+                if worst is None
+                or tack.failures < worst.failures
+                or (tack.failures == worst.failures and tack.lack_m > worst.lack_m)
+                else worst
+            )
     if worst is None:
         return None
-    return TackAtRisk(leg=n, at_en=worst.at_en, failures=worst.failures, risk=min(1.0, tacks * risk),
-                      lack_m=worst.lack_m)
+    return TackAtRisk(
+        leg=n, at_en=worst.at_en, failures=worst.failures, risk=min(1.0, tacks * risk), lack_m=worst.lack_m
+    )
 
 
 class _Solids:
@@ -161,15 +171,28 @@ class _Solids:
     def far_m(self, speed_mps: float, tws_mps: float) -> float:
         """Return how far from a corner the failures of a tack can lead, and need room."""
         if (speed_mps, tws_mps) not in self._far_m:
-            first = np.concatenate(failed_tack((0.0, 0.0), course_rad=0.0, speed_mps=speed_mps, twd_from_rad=0.0,
-                                               tws_mps=tws_mps, irons_s=self.irons_s))
+            first = np.concatenate(
+                failed_tack(
+                    (0.0, 0.0),
+                    course_rad=0.0,
+                    speed_mps=speed_mps,
+                    twd_from_rad=0.0,
+                    tws_mps=tws_mps,
+                    irons_s=self.irons_s,
+                )
+            )
             lee_m = self.irons_s * self.most_lee_mps
-            self._far_m[speed_mps, tws_mps] = (
-                MOST_FAILURES * (float(np.max(np.hypot(*first.T))) + lee_m) + self.need_m)
+            self._far_m[speed_mps, tws_mps] = MOST_FAILURES * (float(np.max(np.hypot(*first.T))) + lee_m) + self.need_m
         return self._far_m[speed_mps, tws_mps]
 
     def tack(
-        self, problem: Problem, leg: int, at: Place, course_rad: float, speed_mps: float, chance: float,
+        self,
+        problem: Problem,
+        leg: int,
+        at: Place,
+        course_rad: float,
+        speed_mps: float,
+        chance: float,
         distance_m: float | None = None,
     ) -> TackAtRisk | None:
         """Return what a tack there comes to when it fails, None: it has room for what it does then.
@@ -188,9 +211,19 @@ class _Solids:
         lee = lee_set(course_rad=course_rad, twd_from_rad=twd, lee_mps=lee_mps)
         waters = [carried] if lee_mps == 0.0 else [carried, (carried[0] + lee[0], carried[1] + lee[1])]
         for failures in range(1, MOST_FAILURES + 1):
-            tracks = [track for water in waters for track in failed_tack(
-                place, course_rad=course_rad, speed_mps=speed, twd_from_rad=twd, tws_mps=tws, current_en_mps=water,
-                irons_s=problem.boat.irons_s)]
+            tracks = [
+                track
+                for water in waters
+                for track in failed_tack(
+                    place,
+                    course_rad=course_rad,
+                    speed_mps=speed,
+                    twd_from_rad=twd,
+                    tws_mps=tws,
+                    current_en_mps=water,
+                    irons_s=problem.boat.irons_s,
+                )
+            ]
             room = min(self.distances_m(shapely.linestrings(np.array(tracks)))) - self.need_m
             if room <= 0.0:
                 lack = max(-room, self._lack_m(at, np.concatenate(tracks)))
@@ -229,5 +262,7 @@ def in_words(problem: Problem, tacks: Sequence[TackAtRisk]) -> Iterator[str]:
     for tack in tacks:
         where = f"{tack.at_en[0]:.0f} E, {tack.at_en[1]:.0f} N"
         often = "once" if tack.failures == 1 else f"{tack.failures} times in a row"
-        yield (f"A tack that fails {often} at {where} would bring her onto something: {100.0 * tack.risk:.2g} % "
-               f"at {100.0 * problem.boat.tack_fails:.2g} % for one.")
+        yield (
+            f"A tack that fails {often} at {where} would bring her onto something: {100.0 * tack.risk:.2g} % "
+            f"at {100.0 * problem.boat.tack_fails:.2g} % for one."
+        )

@@ -115,8 +115,9 @@ def straighten(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
     j = i + count
     if j + 1 >= n:
         return 0
-    x, y, ok = cross(xs[i - 1], ys[i - 1], xs[i] - xs[i - 1], ys[i] - ys[i - 1], xs[j], ys[j],
-                     xs[j + 1] - xs[j], ys[j + 1] - ys[j])
+    x, y, ok = cross(
+        xs[i - 1], ys[i - 1], xs[i] - xs[i - 1], ys[i] - ys[i - 1], xs[j], ys[j], xs[j + 1] - xs[j], ys[j + 1] - ys[j]
+    )
     if not ok:
         return 0
     xs[i], ys[i] = x, y
@@ -125,8 +126,17 @@ def straighten(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
 
 @kernel
 def propose(
-    b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float, goal: Floats, size: float, spots: Floats,
-    at: Floats, course: Floats, rng: NDArray[np.uint64],
+    b: BoatModel,
+    xs: Floats,
+    ys: Floats,
+    n: int,
+    h0: float,
+    goal: Floats,
+    size: float,
+    spots: Floats,
+    at: Floats,
+    course: Floats,
+    rng: NDArray[np.uint64],
 ) -> int:
     """Change the path in place by one random move and return its new number of points (0: no such move).
 
@@ -135,46 +145,46 @@ def propose(
     u = uniform(rng)
     step = size * math.exp(-14.0 * uniform(rng))
     inner = n - 2
-    if b.room > 0.0 and inner > 0 and uniform(rng) < 0.12:                # turn a corner the long way round, or not
+    if b.room > 0.0 and inner > 0 and uniform(rng) < 0.12:  # turn a corner the long way round, or not
         i = 1 + int(uniform(rng) * inner)
         if uniform(rng) < 0.5:
             return straighten(xs, ys, n, i, 1 + int(2.0 * uniform(rng)))
         return go_round(b, xs, ys, n, i, at, course, int(WAYS * uniform(rng)))
-    if b.kind != 0 and inner > 0 and uniform(rng) < 0.15:                 # lay close-hauled legs again in time
+    if b.kind != 0 and inner > 0 and uniform(rng) < 0.15:  # lay close-hauled legs again in time
         i = int(uniform(rng) * (n - 2))
         j = min(n - 1, i + 2 + int(8.0 * uniform(rng) * uniform(rng)))
-        if uniform(rng) < 0.25:                                           # (sometimes to the end, or from the start)
+        if uniform(rng) < 0.25:  # (sometimes to the end, or from the start)
             j = n - 1
         if uniform(rng) < 0.25:
             i = 0
         r, longer = uniform(rng), -1
-        if r < 0.1 and n + j - i < MOST_POINTS:                           # ... each of them in two parts
+        if r < 0.1 and n + j - i < MOST_POINTS:  # ... each of them in two parts
             for m in range(j - 1, i - 1, -1):
                 n = _insert(xs, ys, n, m + 1, 0.5 * (xs[m] + xs[m + 1]), 0.5 * (ys[m] + ys[m + 1]))
             j += j - i
-        elif r < 0.2 and n + 1 < MOST_POINTS:                             # ... one of them in two parts
+        elif r < 0.2 and n + 1 < MOST_POINTS:  # ... one of them in two parts
             m = i + int(uniform(rng) * (j - i))
             f = uniform(rng)
             n = _insert(xs, ys, n, m + 1, xs[m] + f * (xs[m + 1] - xs[m]), ys[m] + f * (ys[m + 1] - ys[m]))
             j += 1
-        elif r < 0.45 and j - i > 2:                                      # ... without some of the points between
+        elif r < 0.45 and j - i > 2:  # ... without some of the points between
             m = i + 1 + int(uniform(rng) * (j - i - 1))
             count = min(j - m, 1 + int(3.0 * uniform(rng) * uniform(rng)))
             if j - count - i < 2:
                 return 0
             n = _delete(xs, ys, n, m, count)
             j -= count
-        elif r < 0.85:                                                    # ... one of them longer or shorter
+        elif r < 0.85:  # ... one of them longer or shorter
             longer = i + int(uniform(rng) * (j - i))
         if not relay(b, xs, ys, n, h0, i, j, longer, step if uniform(rng) < 0.5 else -step):
             return 0
         return n
-    if u < 0.18 and inner > 0:                                            # push a corner anywhere
+    if u < 0.18 and inner > 0:  # push a corner anywhere
         i = 1 + int(uniform(rng) * inner)
         xs[i] += step * (2.0 * uniform(rng) - 1.0)
         ys[i] += step * (2.0 * uniform(rng) - 1.0)
         return n
-    if u < 0.36 and inner > 0:                                            # slide a corner along one of its legs
+    if u < 0.36 and inner > 0:  # slide a corner along one of its legs
         i = 1 + int(uniform(rng) * inner)
         if uniform(rng) < 0.5:
             ux, uy = _course(xs, ys, i - 1)
@@ -184,7 +194,7 @@ def propose(
         ax, ay = xs[i], ys[i]
         xs[i] += s * ux
         ys[i] += s * uy
-        if uniform(rng) < 0.6:                                            # ... and keep the courses next to it
+        if uniform(rng) < 0.6:  # ... and keep the courses next to it
             back = uniform(rng) < 0.5
             m = i - 1 if back else i + 1
             if 0 < m < n - 1:
@@ -204,7 +214,7 @@ def propose(
                     return 0
                 xs[m], ys[m] = x, y
         return n
-    if u < 0.46 and inner > 1:                                            # shift a block of legs, courses kept
+    if u < 0.46 and inner > 1:  # shift a block of legs, courses kept
         i = 1 + int(uniform(rng) * inner)
         j = min(n - 2, i + int(4.0 * uniform(rng) * uniform(rng) + uniform(rng)))
         ux, uy = _course(xs, ys, i - 1)
@@ -215,7 +225,7 @@ def propose(
             xs[k] += s * ux
             ys[k] += s * uy
         return n
-    if u < 0.56:                                                          # replace a stretch by one corner
+    if u < 0.56:  # replace a stretch by one corner
         i = int(uniform(rng) * (n - 1))
         j = min(n - 1, i + 1 + int(4.0 * uniform(rng) * uniform(rng) + 0.7))
         t, h = at[i], course[i]
@@ -226,17 +236,17 @@ def propose(
         if j > i + 1:
             n = _delete(xs, ys, n, i + 1, j - i - 1)
         return _insert(xs, ys, n, i + 1, x, y)
-    if u < 0.64 and inner > 0:                                            # leave corners out
+    if u < 0.64 and inner > 0:  # leave corners out
         i = 1 + int(uniform(rng) * inner)
         count = min(n - 1 - i, 1 + int(3.0 * uniform(rng) * uniform(rng)))
         return _delete(xs, ys, n, i, count)
-    if u < 0.70 and n + 1 < MOST_POINTS:                                  # a new corner beside a leg
+    if u < 0.70 and n + 1 < MOST_POINTS:  # a new corner beside a leg
         i = int(uniform(rng) * (n - 1))
         f = uniform(rng)
         x = xs[i] + f * (xs[i + 1] - xs[i]) + step * (2.0 * uniform(rng) - 1.0)
         y = ys[i] + f * (ys[i + 1] - ys[i]) + step * (2.0 * uniform(rng) - 1.0)
         return _insert(xs, ys, n, i + 1, x, y)
-    if u < 0.80 and spots.shape[0] > 0:                                   # touch an obstacle's corner
+    if u < 0.80 and spots.shape[0] > 0:  # touch an obstacle's corner
         q = int(uniform(rng) * spots.shape[0])
         x, y = spots[q, 0], spots[q, 1]
         best, m = math.inf, -1
@@ -258,12 +268,12 @@ def propose(
             return 0
         xs[i], ys[i] = x, y
         return n
-    if u < 0.88 and n > 1:                                                # move the end in the goal's disc
+    if u < 0.88 and n > 1:  # move the end in the goal's disc
         radius = goal[2]
         if radius <= 0.0:
             return 0
         m = n - 1
-        if uniform(rng) < 0.5 and n > 2:                                  # ... carrying the last corner with it
+        if uniform(rng) < 0.5 and n > 2:  # ... carrying the last corner with it
             s = min(step, radius) * (2.0 * uniform(rng) - 1.0)
             ux, uy = _course(xs, ys, m - 2)
             xs[m - 1] += s * ux
@@ -284,14 +294,14 @@ def propose(
             f = radius / d
             xs[m], ys[m] = goal[0] + f * dx, goal[1] + f * dy
         return n
-    if u < 0.94:                                                          # two courses in the other order
+    if u < 0.94:  # two courses in the other order
         i = int(uniform(rng) * (n - 1))
         if i + 2 >= n:
             return 0
         xs[i + 1] = xs[i] + xs[i + 2] - xs[i + 1]
         ys[i + 1] = ys[i] + ys[i + 2] - ys[i + 1]
         return n
-    if n > 2:                                                             # all corners to their times
+    if n > 2:  # all corners to their times
         fit_corners(b, xs, ys, n, h0, 1 + int(uniform(rng) * inner), True)
         return n
     return 0
@@ -304,8 +314,11 @@ def shared(xs: Floats, ys: Floats, n: int, ox: Floats, oy: Floats, on: int) -> t
     while head < n and head < on and xs[head] == ox[head] and ys[head] == oy[head]:
         head += 1
     tail = 0
-    while tail < n - head and tail < on - head and xs[n - 1 - tail] == ox[on - 1 - tail] and (
-        ys[n - 1 - tail] == oy[on - 1 - tail]
+    while (
+        tail < n - head
+        and tail < on - head
+        and xs[n - 1 - tail] == ox[on - 1 - tail]
+        and (ys[n - 1 - tail] == oy[on - 1 - tail])
     ):
         tail += 1
     return head, tail
@@ -363,8 +376,18 @@ def collides(g: SegmentGrid, xs: Floats, ys: Floats, n: int, head: int, tail: in
 
 @kernel
 def anneal(
-    g: SegmentGrid, b: BoatModel, points: Floats, h0: float, goal: Floats, size: float, spots: Floats, rounds: int,
-    hot: float, cold: float, price: float, rng: NDArray[np.uint64],
+    g: SegmentGrid,
+    b: BoatModel,
+    points: Floats,
+    h0: float,
+    goal: Floats,
+    size: float,
+    spots: Floats,
+    rounds: int,
+    hot: float,
+    cold: float,
+    price: float,
+    rng: NDArray[np.uint64],
 ) -> tuple[float, Floats, float, Floats]:
     """Anneal for ``rounds`` moves from temperature ``hot`` to ``cold`` [s]; the path must be feasible.
 

@@ -185,8 +185,10 @@ class Searcher:
         d = math.hypot(gx, gy)
         ends = [np.array([gx, gy])]
         if d > r > 0.0:
-            ends = [np.array([gx - a * r * 0.999999, gy - c * r * 0.999999])
-                    for a, c in ((gx / d, gy / d), (0.0, math.copysign(1.0, gy)))] + ends
+            ends = [
+                np.array([gx - a * r * 0.999999, gy - c * r * 0.999999])
+                for a, c in ((gx / d, gy / d), (0.0, math.copysign(1.0, gy)))
+            ] + ends
         return ends
 
     def quick(self) -> None:
@@ -208,8 +210,11 @@ class Searcher:
         gx, gy, r = self.goal
         (x, y) = guide[-1]
         d = math.hypot(gx - x, gy - y)
-        end = [guide] if d <= r else [np.vstack([guide, [[gx - f * r * (gx - x) / d, gy - f * r * (gy - y) / d]]])
-                                      for f in (0.0, 0.999999)]
+        end = (
+            [guide]
+            if d <= r
+            else [np.vstack([guide, [[gx - f * r * (gx - x) / d, gy - f * r * (gy - y) / d]]]) for f in (0.0, 0.999999)]
+        )
         found = False
         for path in end:
             found = self.offer(self.along(path, most=12), origin) is not None or found
@@ -302,8 +307,12 @@ class Searcher:
         if len(inside) == 0:
             return x0, y0, x1, y1
         px, py = (x1 - x0) / (side - 1), (y1 - y0) / (side - 1)
-        return (max(x0, float(inside[:, 0].min()) - px), max(y0, float(inside[:, 1].min()) - py),
-                min(x1, float(inside[:, 0].max()) + px), min(y1, float(inside[:, 1].max()) + py))
+        return (
+            max(x0, float(inside[:, 0].min()) - px),
+            max(y0, float(inside[:, 1].min()) - py),
+            min(x1, float(inside[:, 0].max()) + px),
+            min(y1, float(inside[:, 1].max()) + py),
+        )
 
     def left(self) -> tuple[float, float]:
         """Return (expansions, seconds) that a search for other paths may take: the end belongs to the best path."""
@@ -319,8 +328,17 @@ class Searcher:
         """Computing time left [s]; inf where expansions decide, so that nothing depends on the machine."""
         return self.effort.remaining_s if self.effort.limit is None else math.inf
 
-    def lattice(self, cells: int, reach: int, *, margin: float, half_at_s: float, stretch: float = 1.0,
-                bound_s: float | None = None, side: int = 0) -> Candidate | None:
+    def lattice(
+        self,
+        cells: int,
+        reach: int,
+        *,
+        margin: float,
+        half_at_s: float,
+        stretch: float = 1.0,
+        bound_s: float | None = None,
+        side: int = 0,
+    ) -> Candidate | None:
         """Run one lattice whose axes fit the no-go zone at ``half_at_s`` and offer its path."""
         b = self.world.boat
         half = self.world.problem.no_go_half_rad(half_at_s)
@@ -329,10 +347,17 @@ class Searcher:
         most = min(8.0 * steps, max(2_000.0, 0.8 * self.pops_per_s * seconds))
         downwind = self.world.goal[1] < 0.0 and b.down < math.pi - 1e-6
         found = run_lattice(
-            self.world, self.gauge, cells=cells, reach=reach,
+            self.world,
+            self.gauge,
+            cells=cells,
+            reach=reach,
             half_rad=math.pi - b.down if downwind else max(half, b.up, b.zone_open),
-            box=self.inner_box(margin), downwind=downwind, stretch=stretch,
-            bound_s=self.upper_s if bound_s is None else bound_s, max_pops=int(most), side=side,
+            box=self.inner_box(margin),
+            downwind=downwind,
+            stretch=stretch,
+            bound_s=self.upper_s if bound_s is None else bound_s,
+            max_pops=int(most),
+            side=side,
         )
         if found.pops > 20_000:
             self.pops_per_s = found.pops / max(1e-6, self.effort.elapsed_s - began_s)
@@ -344,8 +369,16 @@ class Searcher:
         began_s = self.effort.elapsed_s
         steps, seconds = self.left()
         most = min(2.0 * steps, max(500.0, 0.2 * self.pops_per_s * seconds))
-        found = run_drift(self.world, self.gauge, cells=cells, box=self.inner_box(0.5), bound_s=bound_s,
-                          max_pops=int(most), stride=stride, side=side)
+        found = run_drift(
+            self.world,
+            self.gauge,
+            cells=cells,
+            box=self.inner_box(0.5),
+            bound_s=bound_s,
+            max_pops=int(most),
+            stride=stride,
+            side=side,
+        )
         self.effort.spend(max(1, found.pops // 2))
         if found.pops > 5_000:
             self.pops_per_s = 4.0 * found.pops / max(1e-6, self.effort.elapsed_s - began_s)
@@ -382,10 +415,15 @@ class Searcher:
         half = max(self.world.problem.no_go_half_rad(begin + 0.7 * span), self.world.boat.up)
         downwind = e[1] < a[1] and self.world.boat.down < math.pi - 1e-6
         found = run_lattice(
-            self.world, self.gauge, cells=(800, 2_000, 5_000)[int(3.0 * uniform(self.rng))],
-            reach=2 + int(2.0 * uniform(self.rng)), half_rad=math.pi - self.world.boat.down if downwind else half,
-            box=(low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin), downwind=downwind,
-            origin=(float(a[0]), float(a[1]), h, begin), goal=(float(e[0]), float(e[1]), 0.0),
+            self.world,
+            self.gauge,
+            cells=(800, 2_000, 5_000)[int(3.0 * uniform(self.rng))],
+            reach=2 + int(2.0 * uniform(self.rng)),
+            half_rad=math.pi - self.world.boat.down if downwind else half,
+            box=(low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin),
+            downwind=downwind,
+            origin=(float(a[0]), float(a[1]), h, begin),
+            goal=(float(e[0]), float(e[1]), 0.0),
             bound_s=begin + span * 1.01 + 0.5 / self.world.boat.omega,
             max_pops=int(min(60_000.0, max(2_000.0, 0.4 * self.pops_per_s * self.deciding_s))),
         )
@@ -413,8 +451,18 @@ class Searcher:
         at = [c.cost_s * hot * (cold / hot) ** f for f in (f0, f1)]
         size, began_s = float(np.max(np.ptp(c.points, axis=0))) + 1e-9, self.effort.elapsed_s
         cost, points, _, last = anneal(
-            self.world.grid, self.world.boat, c.last, self.world.h0, self.goal, 0.5 * size, self._spots(c), moves,
-            at[0], at[1], price, self.rng,
+            self.world.grid,
+            self.world.boat,
+            c.last,
+            self.world.h0,
+            self.goal,
+            0.5 * size,
+            self._spots(c),
+            moves,
+            at[0],
+            at[1],
+            price,
+            self.rng,
         )
         self.effort.spend(moves)
         c.move_s = (self.effort.elapsed_s - began_s) / moves
@@ -503,12 +551,34 @@ def _tidy(world: SearchWorld, points: Floats) -> Floats:
 
 
 _LADDER = ((400, 2), (1_600, 2), (6_000, 2), (24_000, 2), (100_000, 2), (400_000, 2), (1_600_000, 2))
-_LATTICES = ((6_000, 3), (2_500, 3), (24_000, 2), (12_000, 3), (40_000, 3), (100_000, 2), (60_000, 3), (160_000, 2),
-             (200_000, 3), (400_000, 2), (800_000, 2))
+_LATTICES = (
+    (6_000, 3),
+    (2_500, 3),
+    (24_000, 2),
+    (12_000, 3),
+    (40_000, 3),
+    (100_000, 2),
+    (60_000, 3),
+    (160_000, 2),
+    (200_000, 3),
+    (400_000, 2),
+    (800_000, 2),
+)
 _TURNS_S, _TURNS_TESTS = 0.25, 60_000
 """What must be left, in seconds or in visibility tests, for the bound on turns, which takes some 30 ms."""
-_DRIFTS = ((1_600, 1.45), (6_000, 4.0), (6_000, 2.5), (6_000, 1.45), (12_000, 4.0), (12_000, 2.5), (24_000, 4.0),
-           (24_000, 1.45), (24_000, 2.5), (60_000, 2.5), (60_000, 1.45))
+_DRIFTS = (
+    (1_600, 1.45),
+    (6_000, 4.0),
+    (6_000, 2.5),
+    (6_000, 1.45),
+    (12_000, 4.0),
+    (12_000, 2.5),
+    (24_000, 4.0),
+    (24_000, 1.45),
+    (24_000, 2.5),
+    (60_000, 2.5),
+    (60_000, 1.45),
+)
 
 
 def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
@@ -541,9 +611,15 @@ def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
         _improve(searcher)
     if searcher.best is None:
         return Outcome(waypoints_en=None, lower_bound_s=bound.value_s)
-    return Outcome(waypoints_en=searcher.waypoints_en(), lower_bound_s=bound.value_s,
-                   trace={"origin": searcher.best.origin, "candidates": len(searcher.pool),
-                          "paths": tuple(world.to_en(c.points) for c in searcher.pool)})
+    return Outcome(
+        waypoints_en=searcher.waypoints_en(),
+        lower_bound_s=bound.value_s,
+        trace={
+            "origin": searcher.best.origin,
+            "candidates": len(searcher.pool),
+            "paths": tuple(world.to_en(c.points) for c in searcher.pool),
+        },
+    )
 
 
 def _endpoint_in_solid(world: SearchWorld) -> str | None:
@@ -556,8 +632,10 @@ def _endpoint_in_solid(world: SearchWorld) -> str | None:
 
 
 def _hopeless(problem: Problem) -> str:
-    return (f"the goal lies where the no-go zone lets no path lead: {math.degrees(problem.no_go_half_rad(0.0)):.1f} "
-            f"deg on each side at the start, {math.degrees(min(problem.no_go_max_rad, math.pi)):.1f} deg later")
+    return (
+        f"the goal lies where the no-go zone lets no path lead: {math.degrees(problem.no_go_half_rad(0.0)):.1f} "
+        f"deg on each side at the start, {math.degrees(min(problem.no_go_max_rad, math.pi)):.1f} deg later"
+    )
 
 
 def _first_paths(s: Searcher) -> str | None:
@@ -565,7 +643,7 @@ def _first_paths(s: Searcher) -> str | None:
     if len(s.world.grid.edges) == 0:
         return None if s.best is not None else _lattices(s)
     s.lattice(400, 2, margin=0.5, half_at_s=1.3 * s.bound.value_s)
-    if s.world.boat.zone_half > 0.0:   # the metric knows nothing of courses that the autopilot does not keep to
+    if s.world.boat.zone_half > 0.0:  # the metric knows nothing of courses that the autopilot does not keep to
         s.lattice(1_600, 2, margin=0.5, half_at_s=1.3 * s.bound.value_s)
     s.geodesic(4_000)
     return None if s.best is not None else _lattices(s)
@@ -608,7 +686,7 @@ def _improve(s: Searcher) -> None:
     if has_solid and not s.is_done:
         s.geodesic(s.tests(40_000, 0.15))
     while not s.is_done:
-        s.have_judged()   # also where the first path stays the best
+        s.have_judged()  # also where the first path stays the best
         before = s.effort.fraction
         if before >= FINE_FROM:
             s.finish()
@@ -625,14 +703,20 @@ def _improve(s: Searcher) -> None:
             s.geodesic(int(0.25 * left))
             s.effort.spend(s.bound.sharpen_late(s.upper_s, min(40_000, int(0.1 * left))) // 8)
             if s.effort.remaining_s > _TURNS_S if s.effort.limit is None else left > _TURNS_TESTS:
-                s.bound.sharpen_turns(s.upper_s)   # draws no path: no step is counted for it
+                s.bound.sharpen_turns(s.upper_s)  # draws no path: no step is counted for it
         elif drifts and spent <= 0.35 * before and len(drifts) >= len(lattices):
             s.drift(*drifts.pop(0), 1.05 * s.upper_s)
         elif lattices and spent <= 0.35 * before:
             cells, reach = lattices.pop(0)
             late = s.upper_s * (1.0, 0.5, 0.8)[len(lattices) % 3]
-            s.lattice(cells, reach, margin=0.5, half_at_s=late, stretch=1.0 + 0.07 * (len(lattices) % 4),
-                      bound_s=1.05 * s.upper_s)
+            s.lattice(
+                cells,
+                reach,
+                margin=0.5,
+                half_at_s=late,
+                stretch=1.0 + 0.07 * (len(lattices) % 4),
+                bound_s=1.05 * s.upper_s,
+            )
         else:
             s.next_turn()
             if has_solid and s.turns % 3 == 0 and not s.is_done:

@@ -62,8 +62,10 @@ class Boards:
         self._times, self._halves = self._climb(grows)
         slope = np.tan(np.minimum(self._halves, _STEEP_RAD))
         self._across = np.concatenate([[0.0], np.cumsum(slope[:-1] * self._heights[1])])
-        self._blocked = [(self._way(np.array(begin)).tolist(), self._way(np.array(end)).tolist())
-                         for begin, end in _solid(world, self._cuts)]
+        self._blocked = [
+            (self._way(np.array(begin)).tolist(), self._way(np.array(end)).tolist())
+            for begin, end in _solid(world, self._cuts)
+        ]
         self._metric = self._sailing()
         low = world.goal[1] - self._radius
         self._goal = float(self._way(np.array([low]))[0])
@@ -75,7 +77,7 @@ class Boards:
         nodes = boat.twa[(boat.twa > self._least_rad) & (boat.twa < 0.5 * math.pi)]
         angles = np.unique(np.concatenate([np.linspace(self._least_rad, 0.5 * math.pi, 721), nodes]))
         speeds = np.interp(angles, boat.twa, boat.mps) * (1.0 + 1e-5)
-        made = np.maximum(speeds[:-1], speeds[1:]) * np.cos(angles[:-1])        # at its largest between two angles
+        made = np.maximum(speeds[:-1], speeds[1:]) * np.cos(angles[:-1])  # at its largest between two angles
         best = np.maximum.accumulate(made[::-1])[::-1]
         t, times, halves = 0.0, [], []
         for _ in self._heights:
@@ -132,13 +134,23 @@ class Boards:
 
         def within(x0: float, x1: float) -> range:
             """Return the strips that reach within what can be crossed off the wind of [x0, x1]."""
-            return range(max(0, int(np.searchsorted(self._cuts, x0 - off_m)) - 1),
-                         min(count, int(np.searchsorted(self._cuts, x1 + off_m, side="right"))))
+            return range(
+                max(0, int(np.searchsorted(self._cuts, x0 - off_m)) - 1),
+                min(count, int(np.searchsorted(self._cuts, x1 + off_m, side="right"))),
+            )
 
-        nearby = np.column_stack([np.searchsorted(self._cuts, self._cuts[:-1] - off_m, side="right") - 1,
-                                  np.searchsorted(self._cuts, self._cuts[1:] + off_m)]).clip(0, count).ravel()
+        nearby = (
+            np.column_stack(
+                [
+                    np.searchsorted(self._cuts, self._cuts[:-1] - off_m, side="right") - 1,
+                    np.searchsorted(self._cuts, self._cuts[1:] + off_m),
+                ]
+            )
+            .clip(0, count)
+            .ravel()
+        )
         near_start, gx = within(0.0, 0.0), self.world.goal[0]
-        port = [math.inf] * count                     # boards that move towards +x
+        port = [math.inf] * count  # boards that move towards +x
         for i in within(gx - self._radius, gx + self._radius):
             port[i] = lowest(i, self._goal - widths[i])
         starboard = list(port)
@@ -157,7 +169,8 @@ class Boards:
             before = either
             port, starboard = (
                 [min(own[i], lowest(i, min(other[i], lateral[i]) - widths[i])) for i in range(count)]
-                for own, other in ((port, starboard), (starboard, port)))
+                for own, other in ((port, starboard), (starboard, port))
+            )
         return spent_s
 
     def _turn_s(self, way_m: float) -> float:
@@ -215,15 +228,17 @@ def _solid(world: SearchWorld, cuts: Floats) -> list[tuple[list[float], list[flo
     strip = np.arange(len(edge)) - np.repeat(np.cumsum(last - first) - (last - first), last - first) + first[edge]
     ax, ay, bx, by = edges[edge].T
     run = np.where(np.abs(bx - ax) > 1e-12, bx - ax, 1.0)
-    shares = [np.where(np.abs(bx - ax) > 1e-12, ((x - ax) / run).clip(0.0, 1.0), end)
-          for x, end in ((cuts[strip] - _PAD_M, 0.0), (cuts[strip + 1] + _PAD_M, 1.0))]
+    shares = [
+        np.where(np.abs(bx - ax) > 1e-12, ((x - ax) / run).clip(0.0, 1.0), end)
+        for x, end in ((cuts[strip] - _PAD_M, 0.0), (cuts[strip + 1] + _PAD_M, 1.0))
+    ]
     ys = [ay + f * (by - ay) for f in shares]
     low, high = np.minimum(*ys) - _PAD_M, np.maximum(*ys) + _PAD_M
     order = np.lexsort((low, strip))
     gaps: list[tuple[int, float, float]] = []
     now, top = -1, math.inf
     for i, a, b in zip(strip[order].tolist(), low[order].tolist(), high[order].tolist(), strict=True):
-        if i != now:                                            # beyond the outermost boundary is outside the fence
+        if i != now:  # beyond the outermost boundary is outside the fence
             gaps += [(now, top, math.inf), (i, -math.inf, a)]
             now, top = i, b
         elif a > top:
@@ -272,7 +287,7 @@ def turning_s(world: SearchWorld) -> float:
         return abs((a - c + math.pi) % (2.0 * math.pi) - math.pi)
 
     lost = 0.0
-    if abs(course) + spread < least - NO_GO_SLACK_RAD and least < 0.5 * math.pi:   # a leg may be deeper by the slack
+    if abs(course) + spread < least - NO_GO_SLACK_RAD and least < 0.5 * math.pi:  # a leg may be deeper by the slack
         ends = (least, -least)
         sweep = min(apart(world.h0, e) for e in ends) + 2.0 * least if b.can_tack else math.pi
         lost = min(b.tack_s, b.gybe_s) if b.can_tack else b.gybe_s
@@ -317,7 +332,7 @@ def progress_s(problem: Problem, goal: tuple[float, float], radius_m: float) -> 
     times = np.concatenate([[0.0], np.geomspace(scale / 500.0, 1e4 * scale, _STEPS)])
     half = np.array([problem.no_go_half_rad(float(t)) for t in times]) - NO_GO_SLACK_RAD
     index = np.searchsorted(angle, half, side="left")
-    index = np.maximum(0, index - 1)                                            # one sample wider: outer bound
+    index = np.maximum(0, index - 1)  # one sample wider: outer bound
     closed = half > top
     # The best progress along n of all angles from each moment's on: the best between two moments' angles, gathered.
     parts, place = np.unique(np.minimum(index, len(angle) - 1), return_inverse=True)
@@ -351,12 +366,14 @@ def late_s(problem: Problem, late: Gauge, metric_s: float, at_s: float) -> float
     angle = np.unique(np.clip(np.concatenate([np.linspace(least, top, _ANGLES), half, nodes]), least, top))
     v = np.interp(angle, problem.boat.polar_twa_rad, problem.boat.polar_mps) * (1.0 + 1e-5)
     side, ahead = v * np.sin(angle), v * np.cos(angle)
-    gauged = np.maximum(np.max(np.outer(side, late.normals[:, 0]) + np.outer(ahead, late.normals[:, 1]), axis=1),
-                        np.max(np.outer(-side, late.normals[:, 0]) + np.outer(ahead, late.normals[:, 1]), axis=1))
-    beyond = np.maximum.accumulate(gauged[::-1])[::-1]                          # over all angles >= this one
+    gauged = np.maximum(
+        np.max(np.outer(side, late.normals[:, 0]) + np.outer(ahead, late.normals[:, 1]), axis=1),
+        np.max(np.outer(-side, late.normals[:, 0]) + np.outer(ahead, late.normals[:, 1]), axis=1),
+    )
+    beyond = np.maximum.accumulate(gauged[::-1])[::-1]  # over all angles >= this one
     index = np.minimum(np.searchsorted(angle, half, side="left"), len(angle) - 1)
     fastest = np.maximum(1.0, beyond[index])
-    made = np.concatenate([[0.0], np.cumsum(fastest[:-1] * np.diff(times))])   # at its largest over each step
+    made = np.concatenate([[0.0], np.cumsum(fastest[:-1] * np.diff(times))])  # at its largest over each step
     if metric_s >= made[-1]:
         return at_s + metric_s - float(made[-1])
     return float(np.interp(metric_s, made, times))
@@ -396,8 +413,7 @@ class Bound:
         limit = upper_s - self.turning_s if math.isfinite(upper_s) else math.inf
         nodes = graph_nodes(world.corners, gauge, (*world.goal, world.goal_radius), limit)
         _, parent, low, end, made = geodesics(
-            world.grid, nodes, gauge.normals, gauge.blocked, gauge.table, goal, 0, limit, tests,
-            self.ends,
+            world.grid, nodes, gauge.normals, gauge.blocked, gauge.table, goal, 0, limit, tests, self.ends
         )
         found = end >= 0 and made <= tests
         if end >= 0:
@@ -428,14 +444,20 @@ class Bound:
         half = problem.no_go_half_rad(at_s)
         if half > MOST_LATE_RAD:
             return 0
-        late = make_gauge(replace(problem, wind=replace(problem.wind, sigma=type(problem.wind.sigma)()),
-                                  boat=replace(problem.boat, no_go_half_rad=max(0.0, half - NO_GO_SLACK_RAD))))
+        late = make_gauge(
+            replace(
+                problem,
+                wind=replace(problem.wind, sigma=type(problem.wind.sigma)()),
+                boat=replace(problem.boat, no_go_half_rad=max(0.0, half - NO_GO_SLACK_RAD)),
+            )
+        )
         if not late.can_move or len(late.blocked):
             return 0
         goal = np.array([*world.goal, world.goal_radius])
         nodes = graph_nodes(world.corners, late, (*world.goal, world.goal_radius), math.inf)
         _, parent, low, end, made = geodesics(
-            world.grid, nodes, late.normals, late.blocked, late.table, goal, 0, math.inf, tests, self.ends)
+            world.grid, nodes, late.normals, late.blocked, late.table, goal, 0, math.inf, tests, self.ends
+        )
         if math.isfinite(low):
             count = 2 + (len(nodes) if end < 0 or made > tests else int(np.sum(parent >= 0)))
             low = (low - 4.0 * TOUCH_M * late.table_max * count) / late.slack
@@ -463,8 +485,9 @@ def cut_off(world: SearchWorld) -> str | None:
             if water.contains(start) and water.disjoint(disc):
                 return "the start's water has no way to the goal: obstacles or the fence close it"
     with_basins = [g for g in world.solids if len(g.interiors)]
-    for part in polygons(shapely.buffer(np.asarray(with_basins, dtype=object), -TOUCH_M, join_style="mitre",
-                                        mitre_limit=5.0)):
+    for part in polygons(
+        shapely.buffer(np.asarray(with_basins, dtype=object), -TOUCH_M, join_style="mitre", mitre_limit=5.0)
+    ):
         filled = shapely.Polygon(part.exterior)
         for ring in part.interiors:
             basin = shapely.Polygon(ring)
@@ -479,8 +502,10 @@ def no_course(problem: Problem) -> str | None:
     """Return why no course can be sailed at all, or None."""
     points = velocities(Courses.of(problem), max(0.0, problem.no_go_min_rad - NO_GO_SLACK_RAD))
     if len(points) == 0:
-        return (f"no course is allowed: the no-go zone reaches {math.degrees(problem.no_go_min_rad):.1f} deg on "
-                f"each side and the deepest course is {math.degrees(problem.boat.max_twa_rad):.1f} deg")
+        return (
+            f"no course is allowed: the no-go zone reaches {math.degrees(problem.no_go_min_rad):.1f} deg on "
+            f"each side and the deepest course is {math.degrees(problem.boat.max_twa_rad):.1f} deg"
+        )
     if float(np.max(np.hypot(points[:, 0], points[:, 1]))) <= 1e-9:
         return "the boat makes no way on any course that is allowed"
     return None

@@ -131,8 +131,13 @@ class Courses(NamedTuple):
     @classmethod
     def of(cls, p: Problem) -> Courses:
         """Return those of a problem."""
-        return cls(p.boat.polar_twa_rad, p.boat.polar_mps, p.boat.max_twa_rad, p.current.drift_mps,
-                   p.current.set_rad - p.wind.twd_from_rad)
+        return cls(
+            p.boat.polar_twa_rad,
+            p.boat.polar_mps,
+            p.boat.max_twa_rad,
+            p.current.drift_mps,
+            p.current.set_rad - p.wind.twd_from_rad,
+        )
 
 
 def velocities(p: Courses, half_rad: float) -> Floats:
@@ -153,14 +158,15 @@ def make_gauge(p: Problem) -> Gauge:
     return _gauge(Courses.of(p), max(0.0, p.no_go_min_rad))
 
 
-@lru_cache(maxsize=16)   # by value: a plan asks for that of the same boat and wind in several waters
+@lru_cache(maxsize=16)  # by value: a plan asks for that of the same boat and wind in several waters
 def _gauge(p: Courses, least: float) -> Gauge:
     points = velocities(p, least)
     moving = len(points) > 0 and float(np.max(np.hypot(points[:, 0], points[:, 1]))) > 1e-9
     if not moving:
         none = np.empty((0, 2))
-        return Gauge(normals=none, table=np.full(_TABLE, 1e9), table_max=0.0, blocked=none, least_half_rad=least,
-                     can_move=False)
+        return Gauge(
+            normals=none, table=np.full(_TABLE, 1e9), table_max=0.0, blocked=none, least_half_rad=least, can_move=False
+        )
     with_rest = np.vstack([points, np.zeros((1, 2))])
     hull = _hull(with_rest)
     # Normals: of every hull edge that has the origin strictly inside; an edge through the origin blocks.
@@ -180,15 +186,24 @@ def _gauge(p: Courses, least: float) -> Gauge:
     table = np.minimum(values[:-1], values[1:]) * (1.0 - 2e-5)
     steepest = float(np.max(np.hypot(normals[:, 0], normals[:, 1]))) if len(normals) else 0.0
     dip = steepest * (2.0 * math.pi / _TABLE) ** 2
-    return Gauge(normals=thin, table=np.maximum(0.0, table - dip), table_max=steepest, blocked=blocked,
-                 least_half_rad=least, can_move=True, slack=_slack(p, thin, least))
+    return Gauge(
+        normals=thin,
+        table=np.maximum(0.0, table - dip),
+        table_max=steepest,
+        blocked=blocked,
+        least_half_rad=least,
+        can_move=True,
+        slack=_slack(p, thin, least),
+    )
 
 
 def _slack(p: Courses, normals: Floats, least_rad: float) -> float:
     """Return the largest gauge of the velocities within the angular slack of the limits, at least 1."""
     top = min(p.max_twa_rad, math.pi)
-    angles = np.array([max(0.0, least_rad - NO_GO_SLACK_RAD * f) for f in (1.0, 0.5)]
-                      + [min(math.pi, top + NO_GO_SLACK_RAD * f) for f in (1.0, 0.5)])
+    angles = np.array(
+        [max(0.0, least_rad - NO_GO_SLACK_RAD * f) for f in (1.0, 0.5)]
+        + [min(math.pi, top + NO_GO_SLACK_RAD * f) for f in (1.0, 0.5)]
+    )
     v = np.interp(angles, p.polar_twa_rad, p.polar_mps)
     worst = 1.0
     for sign in (1.0, -1.0):
@@ -206,6 +221,11 @@ def _thin(normals: Floats) -> Floats:
     bins = np.floor((angle + math.pi) / (2.0 * math.pi) * 720.0).astype(int)
     _, first = np.unique(bins, return_index=True)
     # The longest chords (the tangents that bridge the no-go zone) carry the value: always keep the extremes.
-    extreme = {int(np.argmax(normals[:, 0])), int(np.argmin(normals[:, 0])), int(np.argmax(normals[:, 1])),
-               int(np.argmin(normals[:, 1])), int(np.argmax(np.hypot(normals[:, 0], normals[:, 1])))}
+    extreme = {
+        int(np.argmax(normals[:, 0])),
+        int(np.argmin(normals[:, 0])),
+        int(np.argmax(normals[:, 1])),
+        int(np.argmin(normals[:, 1])),
+        int(np.argmax(np.hypot(normals[:, 0], normals[:, 1]))),
+    }
     return np.ascontiguousarray(normals[sorted(set(first.tolist()) | extreme)])

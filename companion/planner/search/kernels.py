@@ -181,7 +181,7 @@ def is_refused(b: BoatModel, a: float, vx: float, vy: float) -> bool:
 @kernel
 def track(b: BoatModel, dx: float, dy: float, t: float) -> tuple[float, float]:
     """Return (TWA of the heading, speed over ground) that makes the ground direction (dx, dy) good."""
-    course = wrap(math.atan2(dx, dy))   # dead down wind is -π, as everywhere
+    course = wrap(math.atan2(dx, dy))  # dead down wind is -π, as everywhere
     if b.cx == 0.0 and b.cy == 0.0:
         return course, speed_at(b, course)
     size = math.hypot(dx, dy)
@@ -194,7 +194,7 @@ def track(b: BoatModel, dx: float, dy: float, t: float) -> tuple[float, float]:
         if not zoned:
             half = max(half, b.zone_open)
     best_h, best, any_h, any_v = course, 0.0, course, 0.0
-    n = 60      # six degrees: two roots within one are a polar's dent, which the scorer may still find
+    n = 60  # six degrees: two roots within one are a polar's dent, which the scorer may still find
     last = _cross_track(b, course - math.pi, dx, dy)
     for i in range(1, n + 1):
         h1 = course - math.pi + 2.0 * math.pi * i / n

@@ -37,14 +37,12 @@ from companion.planner.search.kernels import (
 from companion.planner.search.moves import corner, edge_angle
 from companion.planner.search.world import SearchWorld
 
-LEAST_SINE = 0.1   # of the angle between a lattice's axes
+LEAST_SINE = 0.1  # of the angle between a lattice's axes
 _START, _CLOCKWISE, _COUNTER, _MOVE, _ROUND = 1, 2, 3, 4, 5
 
 
 @kernel
-def _misses(
-    b: BoatModel, x: float, y: float, h: float, t: float, mx: float, my: float, ex: float, ey: float
-) -> bool:
+def _misses(b: BoatModel, x: float, y: float, h: float, t: float, mx: float, my: float, ex: float, ey: float) -> bool:
     """Do the two legs by way of (mx, my) keep clear of every target?"""
     for leg in range(2):
         qx, qy = (mx, my) if leg == 0 else (ex, ey)
@@ -59,7 +57,14 @@ def _misses(
 
 @kernel
 def _wound(
-    b: BoatModel, came: NDArray[np.uint8], s: int, nj: int, steps: Ints, angle: Floats, lengths: Floats, h0: float,
+    b: BoatModel,
+    came: NDArray[np.uint8],
+    s: int,
+    nj: int,
+    steps: Ints,
+    angle: Floats,
+    lengths: Floats,
+    h0: float,
     deep: float,
 ) -> float:
     """Return how far the boat has turned [rad, signed] in state ``s`` since its last leg as long as ``b.room``.
@@ -90,8 +95,20 @@ def _wound(
 
 @kernel
 def lattice_search(
-    g: SegmentGrid, b: BoatModel, origin: Floats, axes: Floats, shape: Ints, steps: Ints, goal: Floats, box: Floats,
-    gauge: Floats, slack: float, bound: float, max_pops: int, shot_m: float, side: int,
+    g: SegmentGrid,
+    b: BoatModel,
+    origin: Floats,
+    axes: Floats,
+    shape: Ints,
+    steps: Ints,
+    goal: Floats,
+    box: Floats,
+    gauge: Floats,
+    slack: float,
+    bound: float,
+    max_pops: int,
+    shot_m: float,
+    side: int,
 ) -> tuple[float, Floats, int]:
     """Search; return (arrival time, points (n, 2), states expanded).
 
@@ -184,16 +201,23 @@ def lattice_search(
                 if abs(a) >= worst_half(b, t1, t2):
                     direct = True
                     turns = b.room == 0.0 or abs(wound + wrap(a - angle[k])) <= b.most_turn
-                    if t2 < best and turns and is_free(g, x, y, ex, ey) and not (
-                        meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, ex, ey, t1, t2)
+                    if (
+                        t2 < best
+                        and turns
+                        and is_free(g, x, y, ex, ey)
+                        and not (meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, ex, ey, t1, t2))
                     ):
                         best, best_state, end_x, end_y, with_via = t2, s, ex, ey, False
             if not direct and b.can_tack:
                 first = 0 if gy > 0.0 else 2
                 for way in range(2):
                     mx, my, t2, ok = corner(b, x, y, angle[k], t, ex, ey, first + way, first + 1 - way)
-                    if ok and t2 < best and is_free(g, x, y, mx, my) and is_free(g, mx, my, ex, ey) and (
-                        b.targets.shape[0] == 0 or _misses(b, x, y, angle[k], t, mx, my, ex, ey)
+                    if (
+                        ok
+                        and t2 < best
+                        and is_free(g, x, y, mx, my)
+                        and is_free(g, mx, my, ex, ey)
+                        and (b.targets.shape[0] == 0 or _misses(b, x, y, angle[k], t, mx, my, ex, ey))
                     ):
                         best, best_state, end_x, end_y = t2, s, ex, ey
                         via_x, via_y, with_via = mx, my, True
@@ -212,9 +236,12 @@ def lattice_search(
                 t1 = t + turn_time(b, angle[k], deep) + round_t + turn_time(b, deep, angle[k1])
                 label, node1 = _ROUND, i1 * nj + j1
                 s1 = node1 * nd + k1
-            elif move < 2 and b.room > 0.0 and came[s] != _START and abs(
-                wound + wrap(angle[(k + 1 - 2 * move) % nd] - angle[k])
-            ) > b.most_turn:
+            elif (
+                move < 2
+                and b.room > 0.0
+                and came[s] != _START
+                and abs(wound + wrap(angle[(k + 1 - 2 * move) % nd] - angle[k])) > b.most_turn
+            ):
                 continue
             elif move == 0:
                 k1 = (k + 1) % nd
@@ -244,8 +271,10 @@ def lattice_search(
             f1 = t1 + h_node[node1]
             if f1 >= best:
                 continue
-            if move < 2 and b.targets.shape[0] > 0 and (
-                came[s] == (_COUNTER if move == 0 else _CLOCKWISE) or meets_target(b, x, y, x, y, t, t1)
+            if (
+                move < 2
+                and b.targets.shape[0] > 0
+                and (came[s] == (_COUNTER if move == 0 else _CLOCKWISE) or meets_target(b, x, y, x, y, t, t1))
             ):
                 continue
             if move > 1:
@@ -314,7 +343,7 @@ def _leeward(b: BoatModel, axes: Floats) -> tuple[int, int]:
     along = np.arange(most, dtype=np.float64)[:, None]
     steps = sign * (along[:, None] * axes[0] + along[None] * axes[1])
     lengths = np.hypot(steps[..., 0], steps[..., 1]).ravel()
-    for n in np.argsort(lengths, kind="stable")[np.count_nonzero(lengths < b.room):].tolist():
+    for n in np.argsort(lengths, kind="stable")[np.count_nonzero(lengths < b.room) :].tolist():
         i, j = divmod(n, most)
         dx, dy = steps[i, j].tolist()
         a, v = track(b, dx, dy, 0.0)
@@ -336,10 +365,19 @@ def _over_ground(b: BoatModel, u: Floats, half_rad: float) -> Floats:
 
 
 def run_lattice(
-    world: SearchWorld, gauge: Gauge, *, cells: int, reach: int, half_rad: float,
+    world: SearchWorld,
+    gauge: Gauge,
+    *,
+    cells: int,
+    reach: int,
+    half_rad: float,
     box: tuple[float, float, float, float],
-    bound_s: float = math.inf, max_pops: int = 1 << 60, downwind: bool = False, stretch: float = 1.0,
-    origin: tuple[float, float, float, float] | None = None, goal: tuple[float, float, float] | None = None,
+    bound_s: float = math.inf,
+    max_pops: int = 1 << 60,
+    downwind: bool = False,
+    stretch: float = 1.0,
+    origin: tuple[float, float, float, float] | None = None,
+    goal: tuple[float, float, float] | None = None,
     side: int = 0,
 ) -> LatticeResult:
     """Search a lattice of about ``cells`` nodes whose axes lie at ``half_rad`` from the wind (or from dead down).
@@ -379,13 +417,23 @@ def run_lattice(
     if not steps or ni * nj * len(steps) > 24_000_000:
         return LatticeResult(cost_s=math.inf, points=None, pops=0)
     cost, points, pops = lattice_search(
-        world.grid, b, np.array(origin), axes, np.array([ni, nj, -low[0], -low[1], *_leeward(b, axes)], np.int32),
-        np.array([(i, j) for _, i, j in steps], np.int32), np.array(goal),
-        np.array(box), gauge.table, goal[2] * gauge.table_max, bound_s, max_pops, 6.0 * max(sizes), side,
+        world.grid,
+        b,
+        np.array(origin),
+        axes,
+        np.array([ni, nj, -low[0], -low[1], *_leeward(b, axes)], np.int32),
+        np.array([(i, j) for _, i, j in steps], np.int32),
+        np.array(goal),
+        np.array(box),
+        gauge.table,
+        goal[2] * gauge.table_max,
+        bound_s,
+        max_pops,
+        6.0 * max(sizes),
+        side,
     )
     found = math.isfinite(cost) and len(points) > 0
-    return LatticeResult(cost_s=float(cost) if found else math.inf, points=points if found else None,
-                         pops=int(pops))
+    return LatticeResult(cost_s=float(cost) if found else math.inf, points=points if found else None, pops=int(pops))
 
 
 # A search whose close-hauled courses follow the no-go zone as it moves: for wind that gets uncertain quickly.
@@ -400,8 +448,18 @@ _FIXED = 16
 
 @kernel
 def drift_search(
-    g: SegmentGrid, b: BoatModel, h0: float, goal: Floats, box: Floats, shape: Ints, step: float, gauge: Floats,
-    slack: float, bound: float, max_pops: int, side: int,
+    g: SegmentGrid,
+    b: BoatModel,
+    h0: float,
+    goal: Floats,
+    box: Floats,
+    shape: Ints,
+    step: float,
+    gauge: Floats,
+    slack: float,
+    bound: float,
+    max_pops: int,
+    side: int,
 ) -> tuple[float, Floats, int]:
     """Search from the origin; return (time, points (n, 2), states expanded). Arguments as ``lattice_search``."""
     nx, ny = shape[0], shape[1]
@@ -458,7 +516,7 @@ def drift_search(
             t1 = t + turn_guess(b, h, a)
             t2 = t1 + step / v
             if k < 2:
-                for _ in range(6):                       # the angle at the edge of the time that the angle makes
+                for _ in range(6):  # the angle at the edge of the time that the angle makes
                     settled = abs(a) >= worst_half(b, t1, t2) - 1e-7
                     if settled:
                         break
@@ -494,9 +552,7 @@ def drift_search(
                 if r1 >= b.room:
                     w1 = 0.0
                 wound[q], run[q] = w1, r1
-            if b.targets.shape[0] > 0 and (
-                meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, x1, y1, t1, t2)
-            ):
+            if b.targets.shape[0] > 0 and (meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, x1, y1, t1, t2)):
                 continue
             time[q], px[q], py[q], course[q], parent[q] = t2, x1, y1, wrap(a), s
             keys, items, size = push(keys, items, size, f1, q)
@@ -535,18 +591,33 @@ def drift_search(
 
 
 def run_drift(
-    world: SearchWorld, gauge: Gauge, *, cells: int, box: tuple[float, float, float, float], bound_s: float,
-    max_pops: int, stride: float = 1.45, side: int = 0,
+    world: SearchWorld,
+    gauge: Gauge,
+    *,
+    cells: int,
+    box: tuple[float, float, float, float],
+    bound_s: float,
+    max_pops: int,
+    stride: float = 1.45,
+    side: int = 0,
 ) -> LatticeResult:
     """Search a grid of about ``cells`` cells within ``box``, with steps ``stride`` cells long."""
     width, height = max(box[2] - box[0], 1e-3), max(box[3] - box[1], 1e-3)
     size = math.sqrt(width * height / cells)
     nx, ny = int(width / size) + 1, int(height / size) + 1
     time_s, points, pops = drift_search(
-        world.grid, world.boat, world.h0, np.array([*world.goal, world.goal_radius]), np.array(box),
-        np.array([nx, ny], np.int32), stride * size, gauge.table, world.goal_radius * gauge.table_max, bound_s,
-        max_pops, side,
+        world.grid,
+        world.boat,
+        world.h0,
+        np.array([*world.goal, world.goal_radius]),
+        np.array(box),
+        np.array([nx, ny], np.int32),
+        stride * size,
+        gauge.table,
+        world.goal_radius * gauge.table_max,
+        bound_s,
+        max_pops,
+        side,
     )
     found = math.isfinite(time_s) and len(points) > 1
-    return LatticeResult(cost_s=float(time_s) if found else math.inf, points=points if found else None,
-                         pops=int(pops))
+    return LatticeResult(cost_s=float(time_s) if found else math.inf, points=points if found else None, pops=int(pops))

@@ -68,7 +68,7 @@ def corner(
         t2 = tc + l2
         if r + 1 < rounds:
             n1, n2 = edge_angle(b, k1, ta, tb), edge_angle(b, k2, tc, t2)
-            if b.room > 0.0 and turn_time(b, a1, a2) > tc - tb:   # the way round belongs to both legs
+            if b.room > 0.0 and turn_time(b, a1, a2) > tc - tb:  # the way round belongs to both legs
                 n1, n2 = edge_angle(b, k1, ta, tc), edge_angle(b, k2, tb, t2)
             settled = abs(n1 - a1) + abs(n2 - a2) < 1e-10
             a1, a2 = n1, n2
@@ -115,9 +115,7 @@ def fit_corners(b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float, first: 
                         force and abs(a) < half + 0.1 and abs(a2) < half + 0.1 and a * a2 < 0.0
                     )
                     if wants and abs(a2) < near and abs(wrap(a - a2)) > 0.02:
-                        x, y, _, ok = corner(
-                            b, xs[i], ys[i], h, t, xs[i + 2], ys[i + 2], kind_of(a), kind_of(a2)
-                        )
+                        x, y, _, ok = corner(b, xs[i], ys[i], h, t, xs[i + 2], ys[i + 2], kind_of(a), kind_of(a2))
                         if ok:
                             xs[i + 1], ys[i + 1] = x, y
                             continue
@@ -140,9 +138,7 @@ def _laid(b: BoatModel, kind: int, t: float, h: float, length: float) -> tuple[f
 
 
 @kernel
-def relay(
-    b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float, i: int, j: int, longer: int, by: float
-) -> bool:
+def relay(b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float, i: int, j: int, longer: int, by: float) -> bool:
     """Lay the close-hauled legs between points i and j again, each at the edge of the no-go zone of its own time.
 
     Lengths are kept (that of leg ``longer`` grows by ``by`` [m]) except the two at the last tack, which close the
@@ -345,13 +341,13 @@ def rounded(g: SegmentGrid, b: BoatModel, points: Floats, h0: float) -> Floats:
             k = 2 if x2 == 0.0 and y2 == 0.0 else 3
             e, _, closes = overshoot(ux, uy, wx, wy, x1 + x2, y1 + y2)
             closes = closes and m > 1
-            for mode in range(3):           # the same two lines; drawn back; straight to the end of the leg
+            for mode in range(3):  # the same two lines; drawn back; straight to the end of the leg
                 if mode < 2 and not closes:
                     continue
                 if mode > 0 and best < math.inf:
                     continue
                 back = e if mode == 0 else 0.0
-                qx[0], qy[0] = px, py       # the incoming leg is sailed already: from its end on
+                qx[0], qy[0] = px, py  # the incoming leg is sailed already: from its end on
                 qx[1], qy[1] = px + back * ux, py + back * uy
                 qx[2], qy[2] = qx[1] + x1, qy[1] + y1
                 qx[3], qy[3] = qx[2] + x2, qy[2] + y2
@@ -359,7 +355,8 @@ def rounded(g: SegmentGrid, b: BoatModel, points: Floats, h0: float) -> Floats:
                 slides = mode == 1 and i + 2 < n
                 if slides:
                     ex, ey, slides = cross(
-                        qx[k], qy[k], wx, wy, xs[i + 1], ys[i + 1], xs[i + 2] - xs[i + 1], ys[i + 2] - ys[i + 1])
+                        qx[k], qy[k], wx, wy, xs[i + 1], ys[i + 1], xs[i + 2] - xs[i + 1], ys[i + 2] - ys[i + 1]
+                    )
                 if mode == 1 and not slides:
                     continue
                 qx[k + 1], qy[k + 1] = ex, ey
@@ -399,6 +396,7 @@ def fitted(b: BoatModel, points: Floats, h0: float) -> Floats:
 
 
 # Guides made sailable: a straight segment as the direct leg, as equal tacks, or as tacks that fit the room.
+
 
 @kernel
 def check_path(g: SegmentGrid, b: BoatModel, points: Floats, h0: float) -> float:

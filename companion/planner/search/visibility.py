@@ -30,8 +30,16 @@ def _time(normals: Floats, dx: float, dy: float) -> float:
 
 @kernel
 def geodesics(
-    g: SegmentGrid, nodes: Floats, normals: Floats, blocked: Floats, table: Floats, goal: Floats, mode: int,
-    bound: float, budget: int, ends: Floats,
+    g: SegmentGrid,
+    nodes: Floats,
+    normals: Floats,
+    blocked: Floats,
+    table: Floats,
+    goal: Floats,
+    mode: int,
+    bound: float,
+    budget: int,
+    ends: Floats,
 ) -> tuple[Floats, Ints, float, int, int]:
     """Search the visibility graph over ``nodes`` (node 0 is the start) with the gauge as the cost.
 
@@ -165,8 +173,9 @@ def circle_cuts(edges: Floats, goal: Floats) -> Floats:
     """Return the points where boundary segments cut the goal's circle, (k, 2)."""
     if len(edges) == 0 or goal[2] <= 0.0:
         return np.empty((0, 2))
-    near = ((np.minimum(edges[:, 0], edges[:, 2]) <= goal[0] + goal[2])
-            & (np.maximum(edges[:, 0], edges[:, 2]) >= goal[0] - goal[2]))
+    near = (np.minimum(edges[:, 0], edges[:, 2]) <= goal[0] + goal[2]) & (
+        np.maximum(edges[:, 0], edges[:, 2]) >= goal[0] - goal[2]
+    )
     edges = edges[near]
     p, d = edges[:, :2] - goal[:2], edges[:, 2:] - edges[:, :2]
     a, b = np.sum(d * d, axis=1), np.sum(p * d, axis=1)

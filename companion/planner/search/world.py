@@ -100,7 +100,7 @@ def merged_solids(p: Problem) -> tuple[list[shapely.Geometry], shapely.Geometry 
     broken = ~shapely.is_valid(given)
     given[broken] = shapely.make_valid(given[broken])
     if p.clearance_floor_m > 0.0 and len(given):
-        given = shapely.buffer(given, p.clearance_floor_m, quad_segs=16)   # as the scorer does
+        given = shapely.buffer(given, p.clearance_floor_m, quad_segs=16)  # as the scorer does
     solids = polygons(given)
     if len(solids) > 300 and len(shapely.STRtree(solids).query(solids)[0]) > TANGLE + len(solids):
         return solids, p.fence_polygon, True
@@ -111,10 +111,10 @@ def merged_solids(p: Problem) -> tuple[list[shapely.Geometry], shapely.Geometry 
         meet = shapely.intersects(every[left], every[right])
         touching = np.zeros(len(every), dtype=np.bool_)
         touching[left[meet]] = touching[right[meet]] = True
-        if np.any(touching):   # each group of those that meet by itself: a third of the time of all at once
+        if np.any(touching):  # each group of those that meet by itself: a third of the time of all at once
             solids = [*every[~touching], *polygons(shapely.disjoint_subset_union_all(every[touching]))]
     every = np.asarray(solids, dtype=object)
-    thin = shapely.area(every) < TOUCH_M * shapely.length(every)     # the in-radius is at least area / length
+    thin = shapely.area(every) < TOUCH_M * shapely.length(every)  # the in-radius is at least area / length
     solids = [g for g, is_thin in zip(solids, thin, strict=True) if not (is_thin and _vanishes(g))]
     fence = p.fence_polygon
     if fence is None:
@@ -129,9 +129,7 @@ def merged_solids(p: Problem) -> tuple[list[shapely.Geometry], shapely.Geometry 
     return inside, fence, False
 
 
-def boundary_edges(
-    q: Floats, owner: NDArray[np.int64], skin_m: float = SKIN_M
-) -> tuple[Floats, Floats, Floats]:
+def boundary_edges(q: Floats, owner: NDArray[np.int64], skin_m: float = SKIN_M) -> tuple[Floats, Floats, Floats]:
     """Return (segments (m, 4) moved into the solid, the solid's convex corners (k, 2), their outward bisectors).
 
     ``q`` are the vertices of all rings, ``owner`` (not falling) the ring of each; a ring has the solid on its left. A
@@ -151,13 +149,13 @@ def boundary_edges(
     _part_touching(q, after)
     before = np.empty_like(after)
     before[after] = np.arange(len(after))
-    x, y = np.ascontiguousarray(q.T)      # columns by themselves: numpy takes several times as long for rows of two
+    x, y = np.ascontiguousarray(q.T)  # columns by themselves: numpy takes several times as long for rows of two
     out_x, out_y = x[after] - x, y[after] - y
     size = np.hypot(out_x, out_y)
     long = np.maximum(size, 1e-300)
     out_x, out_y = out_x / long, out_y / long
     in_x, in_y = out_x[before], out_y[before]
-    both_x, both_y = -in_y - out_y, in_x + out_x                # the two normals' sum: the bisector
+    both_x, both_y = -in_y - out_y, in_x + out_x  # the two normals' sum: the bisector
     denominator = np.maximum(1.0 + (in_y * out_y + in_x * out_x), 1e-9)
     shift_x, shift_y = skin_m * both_x / denominator, skin_m * both_y / denominator
     cap = np.minimum(20.0 * skin_m, 0.25 * np.minimum(size, size[before]))
@@ -165,9 +163,11 @@ def boundary_edges(
     moved_x, moved_y = x + shift_x * share, y + shift_y * share
     convex = in_x * out_y - in_y * out_x > 1e-9
     far = np.maximum(np.hypot(both_x[convex], both_y[convex]), 1e-12)
-    return (np.column_stack([moved_x, moved_y, moved_x[after], moved_y[after]]),
-            np.column_stack([x[convex], y[convex]]),
-            np.column_stack([-(both_x[convex] / far), -(both_y[convex] / far)]))
+    return (
+        np.column_stack([moved_x, moved_y, moved_x[after], moved_y[after]]),
+        np.column_stack([x[convex], y[convex]]),
+        np.column_stack([-(both_x[convex] / far), -(both_y[convex] / far)]),
+    )
 
 
 def _after(owner: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -214,11 +214,11 @@ def _rings(
     """Return the vertices of all boundaries in the wind frame, the solid on the left, and the ring of each."""
     outer = [] if fence is None else polygons(fence)
     shapes = [
-        *shapely.orient_polygons(np.asarray(solids, dtype=object)),            # exterior counter-clockwise
+        *shapely.orient_polygons(np.asarray(solids, dtype=object)),  # exterior counter-clockwise
         *shapely.orient_polygons(np.asarray(outer, dtype=object), exterior_cw=True),  # here the solid is outside
     ]
     points, owner = shapely.get_coordinates(shapely.get_rings(np.asarray(shapes, dtype=object)), return_index=True)
-    inner = np.flatnonzero(owner[1:] == owner[:-1])                            # all but the end, which is the begin
+    inner = np.flatnonzero(owner[1:] == owner[:-1])  # all but the end, which is the begin
     return to_wind(p, points.take(inner, axis=0)), owner.take(inner)
 
 
@@ -226,7 +226,7 @@ def make_grid(edges: Floats) -> SegmentGrid:
     """Return the segments in a uniform grid of about two cells a segment, a million at most."""
     if len(edges) == 0:
         return SegmentGrid(0.0, 0.0, 1.0, 1, 1, np.zeros(2, np.int32), np.empty(0, np.int32), edges)
-    x, y = edges[:, 0], edges[:, 1]                             # each end of a segment begins another
+    x, y = edges[:, 0], edges[:, 1]  # each end of a segment begins another
     x0, x1, y0, y1 = float(x.min()), float(x.max()), float(y.min()), float(y.max())
     width, height = max(x1 - x0, 1e-3), max(y1 - y0, 1e-3)
     cells = min(1_000_000, max(256, 4 * len(edges)))
@@ -263,12 +263,31 @@ def make_boat(p: Problem) -> BoatModel:
         rows.append([xy[0], xy[1], v[0], v[1], t.radius_m, t.growth_mps, t.from_s, t.until_s, 0.0])
     up, down = _best_angles(p)
     return BoatModel(
-        np.asarray(b.polar_twa_rad, np.float64), np.asarray(b.polar_mps, np.float64), b.turn_rate_radps,
-        b.no_go_half_rad, b.max_twa_rad, SIGMA_KINDS[s.model] if p.is_time_varying or s.model == "forecast" else 0,
-        s.sigma0_rad, s.growth_rad_per_sqrt_s, s.sigma_inf_rad, s.rho_hz, p.k_delta, horizon, width,
-        b.tack_loss_s, b.gybe_loss_s, p.current.drift_mps * math.sin(angle), p.current.drift_mps * math.cos(angle),
-        up, down, np.asarray(rows, np.float64).reshape(-1, 9), b.can_tack, b.room_m,
-        b.most_turn_rad, _round_s(p, up), *_zone(p),
+        np.asarray(b.polar_twa_rad, np.float64),
+        np.asarray(b.polar_mps, np.float64),
+        b.turn_rate_radps,
+        b.no_go_half_rad,
+        b.max_twa_rad,
+        SIGMA_KINDS[s.model] if p.is_time_varying or s.model == "forecast" else 0,
+        s.sigma0_rad,
+        s.growth_rad_per_sqrt_s,
+        s.sigma_inf_rad,
+        s.rho_hz,
+        p.k_delta,
+        horizon,
+        width,
+        b.tack_loss_s,
+        b.gybe_loss_s,
+        p.current.drift_mps * math.sin(angle),
+        p.current.drift_mps * math.cos(angle),
+        up,
+        down,
+        np.asarray(rows, np.float64).reshape(-1, 9),
+        b.can_tack,
+        b.room_m,
+        b.most_turn_rad,
+        _round_s(p, up),
+        *_zone(p),
     )._replace(base=_constant_base(p))
 
 
@@ -304,10 +323,17 @@ def make_world(p: Problem) -> SearchWorld:
     gx, gy = to_wind(p, np.asarray([p.goal_en]))[0].tolist()
     x, y = np.append(edges[:, 0], (0.0, gx)), np.append(edges[:, 1], (0.0, gy))
     return SearchWorld(
-        problem=p, grid=make_grid(edges), boat=make_boat(p), corners=corners, outward=outward,
-        marks=np.ascontiguousarray(to_wind(p, marks)), goal=(gx, gy),
+        problem=p,
+        grid=make_grid(edges),
+        boat=make_boat(p),
+        corners=corners,
+        outward=outward,
+        marks=np.ascontiguousarray(to_wind(p, marks)),
+        goal=(gx, gy),
         goal_radius=p.goal_radius_m,
         h0=(p.start_heading_rad - p.wind.twd_from_rad + math.pi) % (2.0 * math.pi) - math.pi,
-        box=(float(x.min()), float(y.min()), float(x.max()), float(y.max())), fence_box=fence is not None,
-        solids=tuple(solids), free=fence,
+        box=(float(x.min()), float(y.min()), float(x.max()), float(y.max())),
+        fence_box=fence is not None,
+        solids=tuple(solids),
+        free=fence,
     )

@@ -30,11 +30,11 @@ from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.tracking import Tracking
 from companion.planner.problem.value import Problem
 
-RUN_UP_M = 40.0      # of the leg before the start: the boat is on it, and rounds the corner between
-BESIDE_M = 15.0      # of that leg's end the corner is the plan's; within this of the boat's own place the error grows
-SPARE_M = 0.3        # a start that is nearer than the floor need come no nearer than this more
-SIGMA_AT_S = 60.0    # horizon at which the spread is taken for boards
-STRIDE = 10          # places of a track, a fifth of a second apart
+RUN_UP_M = 40.0  # of the leg before the start: the boat is on it, and rounds the corner between
+BESIDE_M = 15.0  # of that leg's end the corner is the plan's; within this of the boat's own place the error grows
+SPARE_M = 0.3  # a start that is nearer than the floor need come no nearer than this more
+SIGMA_AT_S = 60.0  # horizon at which the spread is taken for boards
+STRIDE = 10  # places of a track, a fifth of a second apart
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,16 +70,23 @@ class ExpectedTrack:
         return self.lack_m <= self.error_m
 
 
-@lru_cache(maxsize=8)   # by identity
+@lru_cache(maxsize=8)  # by identity
 def curve_mps(problem: Problem) -> NDArray[np.float64]:
     """Return the problem's polar as the prediction takes it."""
     boat = problem.boat
     return np.interp(np.linspace(0.0, math.pi, CURVE_NODES), boat.polar_twa_rad, boat.polar_mps)
 
 
-def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray[np.float64],
-             legs: Sequence[Leg] | None = None, *, has_boards: bool = True, has_loops: bool = True,
-             part: slice | None = None, sailed_m: float = 0.0) -> ExpectedTrack:
+def expected(
+    problem: Problem,
+    waypoints_en: Sequence[Sequence[float]] | NDArray[np.float64],
+    legs: Sequence[Leg] | None = None,
+    *,
+    has_boards: bool = True,
+    has_loops: bool = True,
+    part: slice | None = None,
+    sailed_m: float = 0.0,
+) -> ExpectedTrack:
     """Return what is expected of a path of a problem that has ``tracking``.
 
     Args:
@@ -103,15 +110,27 @@ def expected(problem: Problem, waypoints_en: Sequence[Sequence[float]] | NDArray
     beats = tuple(leg.is_beat for leg in legs) if len(legs) == len(path) - 1 else (False,) * (len(path) - 1)
     begin, end, _ = (part or slice(None)).indices(len(path))
     before = tracking.before_en if begin == 0 else _point(path[begin - 1])
-    seen = _expected(problem, path[begin:end].tobytes(), beats[begin:end - 1], before, has_boards, has_loops,
-                     0.0 if begin else sailed_m)
+    seen = _expected(
+        problem,
+        path[begin:end].tobytes(),
+        beats[begin : end - 1],
+        before,
+        has_boards,
+        has_loops,
+        0.0 if begin else sailed_m,
+    )
     return replace(seen, leg=seen.leg + begin, worst_leg=seen.worst_leg + begin) if begin else seen
 
 
-@lru_cache(maxsize=32)   # by identity: a search's best path is asked for again when the plan is written
+@lru_cache(maxsize=32)  # by identity: a search's best path is asked for again when the plan is written
 def _expected(
-    problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...], before_en: tuple[float, float] | None,
-    has_boards: bool, has_loops: bool, sailed_m: float,
+    problem: Problem,
+    path_bytes: bytes,
+    is_beat: tuple[bool, ...],
+    before_en: tuple[float, float] | None,
+    has_boards: bool,
+    has_loops: bool,
+    sailed_m: float,
 ) -> ExpectedTrack:
     tracking = problem.tracking
     assert tracking is not None
@@ -131,27 +150,31 @@ def _expected(
     stated_m = stated_error_m(best, has_short=not tracking.is_known)
     error = np.where(near & has_loops, loop_m(best), stated_m)[leg]
     if not first:
-        error = error * np.minimum(1.0, np.hypot(*(en - path[0]).T) / BESIDE_M)   # where the boat begins is known
+        error = error * np.minimum(1.0, np.hypot(*(en - path[0]).T) / BESIDE_M)  # where the boat begins is known
     room = distance - error - tracking.reach_m
     need = np.full(len(room), tracking.floor_m)
     clear = np.flatnonzero(room >= need)
     begin = int(clear[0]) if len(clear) else len(room)
-    need[:begin] = np.minimum(need[:begin], room[0] - SPARE_M)   # nearer already, where the boat begins
+    need[:begin] = np.minimum(need[:begin], room[0] - SPARE_M)  # nearer already, where the boat begins
     is_beaten = beats[leg]
     judged = np.where(is_beaten, math.inf, room)
     lack = np.where(is_beaten, 0.0, np.maximum(0.0, need - room))
     worst, least = int(np.argmax(lack)), int(np.argmin(judged))
     found = ExpectedTrack(
-        clearance_m=float(judged[least]), at_en=_point(en[least]), leg=int(leg[least]), is_kept=not lack[worst] > 0.0,
-        lack_m=float(lack[worst]), error_m=min(float(error[worst]), stated_m), worst_en=_point(en[worst]),
+        clearance_m=float(judged[least]),
+        at_en=_point(en[least]),
+        leg=int(leg[least]),
+        is_kept=not lack[worst] > 0.0,
+        lack_m=float(lack[worst]),
+        error_m=min(float(error[worst]), stated_m),
+        worst_en=_point(en[worst]),
         near_en=_nearest(tracking, en[worst]),
-        worst_leg=int(leg[worst]))
+        worst_leg=int(leg[worst]),
+    )
     return _with_boards(problem, tracking, whole, first, beats, found) if has_boards and bool(beats.any()) else found
 
 
-def _with_run_up(
-    before_en: tuple[float, float] | None, path: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], int]:
+def _with_run_up(before_en: tuple[float, float] | None, path: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
     """Return the path behind a run-up on the leg before its start, and how many legs that is."""
     if before_en is None:
         return path, 0
@@ -163,7 +186,11 @@ def _with_run_up(
 
 
 def _with_boards(
-    problem: Problem, tracking: Tracking, whole: NDArray[np.float64], first: int, beats: NDArray[np.bool_],
+    problem: Problem,
+    tracking: Tracking,
+    whole: NDArray[np.float64],
+    first: int,
+    beats: NDArray[np.bool_],
     found: ExpectedTrack,
 ) -> ExpectedTrack:
     """Return what is expected with the legs that are beaten: at each board, with probability delta_s."""
@@ -171,29 +198,48 @@ def _with_boards(
     curve = curve_mps(problem)
     length_s = 4.0 * float(np.sum(np.hypot(*np.diff(whole, axis=0).T))) / max(float(np.max(curve)), 0.1) + 60.0
     twd = problem.wind.twd_from_rad
-    winds = drawn_winds(twd, sigma_rad=sigma, tau_s=tracking.correlation_s, length_s=length_s) if sigma > 0.0 else (
-        np.array([[twd]]))
-    whole = whole[:first + int(np.flatnonzero(beats)[-1]) + 3]   # what comes later is nothing to it
-    tracks = [predict(whole, tracking.helm, curve_mps=curve, twd_from_rad=wind,
-                      heading_rad=None if first else problem.start_heading_rad) for wind in winds]
+    winds = (
+        drawn_winds(twd, sigma_rad=sigma, tau_s=tracking.correlation_s, length_s=length_s)
+        if sigma > 0.0
+        else (np.array([[twd]]))
+    )
+    whole = whole[: first + int(np.flatnonzero(beats)[-1]) + 3]  # what comes later is nothing to it
+    tracks = [
+        predict(
+            whole,
+            tracking.helm,
+            curve_mps=curve,
+            twd_from_rad=wind,
+            heading_rad=None if first else problem.start_heading_rad,
+        )
+        for wind in winds
+    ]
     out = found
     for n in np.flatnonzero(beats):
         for rows in _boards(tracking, tracks, whole, int(n) + first):
             if len(rows) < 0.25 * len(tracks):
-                continue   # few winds bring the boat there at all
+                continue  # few winds bring the boat there at all
             rows.sort()
             room, place = rows[math.floor((1.0 - problem.delta_s) * len(rows) + 1e-9)]
             if room < out.clearance_m:
                 out = _changed(out, clearance_m=room, at_en=place, leg=int(n))
             lack = tracking.floor_m - room
             if lack > max(out.lack_m, 1e-9):
-                out = _changed(out, is_kept=False, lack_m=lack, error_m=0.0, worst_en=place, worst_leg=int(n),
-                               is_beat=True, near_en=_nearest(tracking, np.asarray(place)))
+                out = _changed(
+                    out,
+                    is_kept=False,
+                    lack_m=lack,
+                    error_m=0.0,
+                    worst_en=place,
+                    worst_leg=int(n),
+                    is_beat=True,
+                    near_en=_nearest(tracking, np.asarray(place)),
+                )
     return out
 
 
 def _boards(
-    tracking: Tracking, tracks: Sequence[PredictedTrack], whole: NDArray[np.float64], leg: int,
+    tracking: Tracking, tracks: Sequence[PredictedTrack], whole: NDArray[np.float64], leg: int
 ) -> list[list[tuple[float, tuple[float, float]]]]:
     """Return of each board's length of a leg, for each track that comes there: the least clearance, and where."""
     on_leg = [track.en_m[track.leg == leg] for track in tracks]
@@ -211,9 +257,7 @@ def _boards(
     return list(rows.values())
 
 
-def _nearest_of_each(
-    tracking: Tracking, en: NDArray[np.float64], group: NDArray[np.int64],
-) -> list[tuple[int, float]]:
+def _nearest_of_each(tracking: Tracking, en: NDArray[np.float64], group: NDArray[np.int64]) -> list[tuple[int, float]]:
     """Return of each group of places, numbered from 0, which comes nearest to anything solid, and how near.
 
     Distance changes by no more than one moves: of the places between every ``STRIDE``-th only those are measured that

@@ -30,22 +30,22 @@ Path = list[tuple[float, float]]
 Judge = Callable[[Path], Evaluation]
 """Says of a path whether it is feasible, and how long it takes."""
 
-AT_MOST = 80                # changes to one path: each costs a check and a prediction
-FOR_AN_ARC = 30             # ... and for each arc of short legs in it
-SLOWEST_MPS = 0.3           # taken for a leg that the polar says nothing of
-AROUND = 2                  # waypoints on either side of a change, where it is judged
-SHORTER_SHARE, SHORTER_S = 0.006, 0.4   # what a waypoint less may cost
+AT_MOST = 80  # changes to one path: each costs a check and a prediction
+FOR_AN_ARC = 30  # ... and for each arc of short legs in it
+SLOWEST_MPS = 0.3  # taken for a leg that the polar says nothing of
+AROUND = 2  # waypoints on either side of a change, where it is judged
+SHORTER_SHARE, SHORTER_S = 0.006, 0.4  # what a waypoint less may cost
 SHORT_SHARE, SHORT_EXTRA_S = 0.03, 2.0  # ... and a leg less that cannot be followed
-PUSH_M = (1.0, 2.5, 5.0)    # a corner is pushed by as much
-AGAIN_S = 0.04              # another search is not begun with less: its water alone takes most of that
-LESS_M = 0.05               # ... where that takes as much of what is lacking, or half of it
-BEAT_MORE_M = 1.0           # of room for a beat whose boards come too near
-MEET_M = 60.0               # legs that meet farther from their corners do not meet
+PUSH_M = (1.0, 2.5, 5.0)  # a corner is pushed by as much
+AGAIN_S = 0.04  # another search is not begun with less: its water alone takes most of that
+LESS_M = 0.05  # ... where that takes as much of what is lacking, or half of it
+BEAT_MORE_M = 1.0  # of room for a beat whose boards come too near
+MEET_M = 60.0  # legs that meet farther from their corners do not meet
 BEYOND_M = (0.0, 3.0, 6.0)  # an arc's ends, on along the legs around it, before the leg between them is long enough
-SPARE = 1.001               # of that length
-NARROWER_M = (0.0, 4.0, 2.0)   # the water of another search, where the track of the first does not keep the floor
-NARROWER_SHARE, NARROWER_TIME_SHARE = 0.15, 0.06   # of the expansions, or of the seconds, for each
-DEAR = 1.3                  # times the time of the path that cannot be sailed: what takes longer is another way
+SPARE = 1.001  # of that length
+NARROWER_M = (0.0, 4.0, 2.0)  # the water of another search, where the track of the first does not keep the floor
+NARROWER_SHARE, NARROWER_TIME_SHARE = 0.15, 0.06  # of the expansions, or of the seconds, for each
+DEAR = 1.3  # times the time of the path that cannot be sailed: what takes longer is another way
 
 
 def with_track(search: Search, judge: Judge | None = None) -> Search:
@@ -53,6 +53,7 @@ def with_track(search: Search, judge: Judge | None = None) -> Search:
 
     ``judge``: what the changes to a path have to pass; None: the exact scorer.
     """
+
     def tracked(problem: Problem, effort: Effort, seed: int) -> Outcome:
         outcome = search(problem, effort, seed)
         if outcome.waypoints_en is None:
@@ -62,9 +63,10 @@ def with_track(search: Search, judge: Judge | None = None) -> Search:
         path, seen = laid(problem, [(float(x), float(y)) for x, y in outcome.waypoints_en], judge, effort)
         if seen.is_beat and problem.beat is not None and effort.has_time(AGAIN_S):
             # More water about what is beaten; what has none is sailed.
-            wider = replace(problem, beat=replace(
-                problem.beat, clearance_m=problem.beat.clearance_m + seen.lack_m + BEAT_MORE_M))
-            effort.reserve(effort.needed_s)   # what was kept back for this is spent now
+            wider = replace(
+                problem, beat=replace(problem.beat, clearance_m=problem.beat.clearance_m + seen.lack_m + BEAT_MORE_M)
+            )
+            effort.reserve(effort.needed_s)  # what was kept back for this is spent now
             again = search(wider, effort, seed)
             if again.waypoints_en is not None:
                 outcome = again
@@ -80,7 +82,12 @@ def with_track(search: Search, judge: Judge | None = None) -> Search:
 
 
 def roomier(
-    search: Search, problem: Problem, path: Path, effort: Effort, seed: int, judge: Judge | None = None,
+    search: Search,
+    problem: Problem,
+    path: Path,
+    effort: Effort,
+    seed: int,
+    judge: Judge | None = None,
     laying_s: float | None = None,
 ) -> Path | None:
     """Return a path that keeps the floor, of those that shorter searches find, in narrower water at last; or None.
@@ -108,8 +115,12 @@ def roomier(
         effort.spend(again.used)
         if found.waypoints_en is None:
             continue
-        other, seen = laid(problem, [(float(x), float(y)) for x, y in found.waypoints_en], judge,
-                           effort if laying_s is None else Effort(laying_s, None))
+        other, seen = laid(
+            problem,
+            [(float(x), float(y)) for x, y in found.waypoints_en],
+            judge,
+            effort if laying_s is None else Effort(laying_s, None),
+        )
         judged = exact(other)
         if seen.is_kept and judged.is_feasible and (best is None or judged.time_s < best[0]):
             best = judged.time_s, other
@@ -124,12 +135,14 @@ def lacking(problem: Problem, seen: ExpectedTrack) -> str:
     floor = problem.tracking.floor_m
     east, north = seen.worst_en or (0.0, 0.0)
     what = "a beat left to the autopilot" if seen.is_beat else "the track that would be sailed"
-    return (f"{what} comes to {floor - seen.lack_m:.1f} m of something solid at {east:.0f} east, {north:.0f} north; "
-            f"the floor is {floor:.1f} m")
+    return (
+        f"{what} comes to {floor - seen.lack_m:.1f} m of something solid at {east:.0f} east, {north:.0f} north; "
+        f"the floor is {floor:.1f} m"
+    )
 
 
 def laid(
-    problem: Problem, path: Path, judge: Judge | None = None, effort: Effort | None = None,
+    problem: Problem, path: Path, judge: Judge | None = None, effort: Effort | None = None
 ) -> tuple[Path, ExpectedTrack]:
     """Return the path with few corners, all of which can be followed and keep the floor, as far as that is possible.
 
@@ -142,7 +155,7 @@ def laid(
         return path, expected(problem, path, judged.legs)
     path, judged = _fewer(problem, judge, path, judged, effort)
     pushed, seen = _pushed(problem, judge, path, expected(problem, path, judged.legs), effort)
-    if pushed is not path:   # a corner that was put into a leg may have made two of it that are too short
+    if pushed is not path:  # a corner that was put into a leg may have made two of it that are too short
         pushed, judged = _fewer(problem, judge, pushed, judge(pushed), effort)
         seen = expected(problem, pushed, judged.legs)
     return pushed, seen
@@ -153,9 +166,7 @@ def _scorer(problem: Problem) -> Judge:
     return lambda path: evaluate(exact, np.asarray(path))
 
 
-def _fewer(
-    problem: Problem, judge: Judge, path: Path, judged: Evaluation, effort: Effort,
-) -> tuple[Path, Evaluation]:
+def _fewer(problem: Problem, judge: Judge, path: Path, judged: Evaluation, effort: Effort) -> tuple[Path, Evaluation]:
     """Leave out corners and short legs, the shortest first, while it costs little and brings it nearer to nothing.
 
     A change is judged where it is made: what has been tried there is not tried again for a change elsewhere.
@@ -196,7 +207,7 @@ def _fewer(
 
 
 def _changes(
-    problem: Problem, path: Path, n: int, least_m: float, tried: set[tuple[float, ...]],
+    problem: Problem, path: Path, n: int, least_m: float, tried: set[tuple[float, ...]]
 ) -> list[tuple[Path, slice, slice]]:
     """Return what a path can be changed to about leg n, the fastest first, and ``_changed`` of each.
 
@@ -232,7 +243,8 @@ def _sailed_s(problem: Problem, path: Path) -> float:
     twd = problem.wind.twd_from_rad
     return sum(
         math.dist(a, b) / max(problem.boat.speed_mps(wrap_pi(math.atan2(b[0] - a[0], b[1] - a[1]) - twd)), SLOWEST_MPS)
-        for a, b in itertools.pairwise(path))
+        for a, b in itertools.pairwise(path)
+    )
 
 
 def _changed(path: Path, option: Path) -> tuple[slice, slice]:
@@ -249,7 +261,7 @@ def _lengths_m(path: Path) -> list[float]:
 
 
 def _pushed(
-    problem: Problem, judge: Judge, path: Path, seen: ExpectedTrack, effort: Effort,
+    problem: Problem, judge: Judge, path: Path, seen: ExpectedTrack, effort: Effort
 ) -> tuple[Path, ExpectedTrack]:
     """Push corners away from what the track comes too near to, until it keeps the floor or nothing helps."""
     count = 0
@@ -295,7 +307,7 @@ def _pushes(problem: Problem, path: Path, seen: ExpectedTrack) -> Iterator[Path]
     middle = np.asarray(path[leg]) + 0.5 * (np.asarray(path[leg + 1]) - np.asarray(path[leg]))
     for push in PUSH_M:
         place = middle + push * unit
-        yield [*path[:leg + 1], (float(place[0]), float(place[1])), *path[leg + 1:]]
+        yield [*path[: leg + 1], (float(place[0]), float(place[1])), *path[leg + 1 :]]
 
 
 def _rounded(path: Path, n: int, lengths: list[float], least_m: float) -> Iterator[Path]:
@@ -306,11 +318,11 @@ def _rounded(path: Path, n: int, lengths: list[float], least_m: float) -> Iterat
     before, after = (path[first - 1], path[first]), (path[last + 1], path[last + 2])
     one = meeting(*before, *after)
     if one is not None:
-        yield [*path[:first], one, *path[last + 2:]]
+        yield [*path[:first], one, *path[last + 2 :]]
     for middle in range(first, last + 1):
         a, b = meeting(*before, path[middle], path[middle + 1]), meeting(path[middle], path[middle + 1], *after)
         if a is not None and b is not None:
-            yield [*path[:first], a, b, *path[last + 2:]]
+            yield [*path[:first], a, b, *path[last + 2 :]]
 
 
 def _arc(n: int, lengths: list[float], least_m: float) -> tuple[int, int]:
@@ -335,9 +347,8 @@ def _stretched(path: Path, n: int, lengths: list[float], least_m: float) -> Iter
         for share in (0.5, 1.0, 0.0) if gap > 0.0 else (0.5,):
             # the start stays where it is
             ends = (_on(b, a, share * gap), _on(a, b, (1.0 - share) * gap)) if gap > 0.0 else (a, b)
-            option = [*path[:first], *ends, *path[last + 2:]]
-            if option[0] == path[0] and sum(
-                    math.dist(p, q) < least_m for p, q in itertools.pairwise(option)) < shorts:
+            option = [*path[:first], *ends, *path[last + 2 :]]
+            if option[0] == path[0] and sum(math.dist(p, q) < least_m for p, q in itertools.pairwise(option)) < shorts:
                 yield option
 
 
@@ -354,15 +365,15 @@ def _without(path: Path, n: int) -> Iterator[Path]:
     if n > 0 and n + 1 < last:
         meet = meeting(path[n - 1], path[n], path[n + 1], path[n + 2])
         if meet is not None:
-            yield [*path[:n], meet, *path[n + 2:]]
+            yield [*path[:n], meet, *path[n + 2 :]]
     if n > 0:
-        yield [*path[:n], *path[n + 1:]]
+        yield [*path[:n], *path[n + 1 :]]
     if n + 1 < last:
-        yield [*path[:n + 1], *path[n + 2:]]
+        yield [*path[: n + 1], *path[n + 2 :]]
 
 
 def meeting(
-    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float],
+    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]
 ) -> tuple[float, float] | None:
     """Return where the leg from a to b, sailed on, meets the leg from c to d, sailed back; None where they do not."""
     ux, uy = b[0] - a[0], b[1] - a[1]

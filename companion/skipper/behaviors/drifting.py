@@ -25,22 +25,22 @@ from companion.skipper.step.state import Fix, Phase
 from companion.skipper.way import PointEn, distance_m, water_at
 from companion.skipper.way.drift import DriftAhead, drift_ahead
 
-STEERAGE_MPS = 0.4     # less wind than this moves no boat that could be steered
-DRIFT_MPS = 0.15       # a slower velocity is a receiver's noise
-SLOW_MPS = 0.04        # of a drift seen in places: 2.4 m in a minute; slower is a receiver's noise, too
-PLACE_S, SLOW_PLACES, LEAST_S = 10.0, 6, 30.0   # places of a boat that hardly moves: one in 10 s, a minute, half of it
+STEERAGE_MPS = 0.4  # less wind than this moves no boat that could be steered
+DRIFT_MPS = 0.15  # a slower velocity is a receiver's noise
+SLOW_MPS = 0.04  # of a drift seen in places: 2.4 m in a minute; slower is a receiver's noise, too
+PLACE_S, SLOW_PLACES, LEAST_S = 10.0, 6, 30.0  # places of a boat that hardly moves: one in 10 s, a minute, half of it
 SAILS_MPS = 0.5
-AGAINST_RAD = math.radians(60.0)   # a boat that sails makes less leeway than this, in any current that it can stem
-ASTERN_MPS = 0.3       # slower going astern shows nothing: a turn, a wave, a noisy receiver
-ASTERN_RAD = math.radians(30.0)    # the course is so near to dead astern of the bow
-AWAY_M = 25.0          # LOITER has been measured to stay within 12 m of its point
-TAU_S = 10.0           # of the mean velocity: longer than a wave, shorter than a board
-SPARE = 1.3            # what can stem a drift is this much faster
-FAILED_S = 60.0        # a means that has not stopped the drift within this will not
-CALL = "anchor"        # the code under which the crew is called
-CALL_S = 60.0          # between two calls to the anchor
-NEAR_S = 120.0         # the anchor is called for beside every other means when there is no more time than this
-CLEAR_S = 600.0        # what the watchdog is told where nothing is met
+AGAINST_RAD = math.radians(60.0)  # a boat that sails makes less leeway than this, in any current that it can stem
+ASTERN_MPS = 0.3  # slower going astern shows nothing: a turn, a wave, a noisy receiver
+ASTERN_RAD = math.radians(30.0)  # the course is so near to dead astern of the bow
+AWAY_M = 25.0  # LOITER has been measured to stay within 12 m of its point
+TAU_S = 10.0  # of the mean velocity: longer than a wave, shorter than a board
+SPARE = 1.3  # what can stem a drift is this much faster
+FAILED_S = 60.0  # a means that has not stopped the drift within this will not
+CALL = "anchor"  # the code under which the crew is called
+CALL_S = 60.0  # between two calls to the anchor
+NEAR_S = 120.0  # the anchor is called for beside every other means when there is no more time than this
+CLEAR_S = 600.0  # what the watchdog is told where nothing is met
 HAIR_M = 0.5
 
 
@@ -130,7 +130,7 @@ def drift(ctx: StepContext) -> DriftAhead | None:
     """Return where the boat drifts, None when it sails, lies still, or it cannot be told."""
     ground, wind, boat, vehicle = over_ground(ctx), ctx.wind_now, ctx.reckoned_en, ctx.snapshot.vehicle
     if vehicle is not None and is_driven_astern(ctx):
-        ground = vehicle.velocity_en_mps   # of now: the mean is still of how the boat sailed
+        ground = vehicle.velocity_en_mps  # of now: the mean is still of how the boat sailed
     if ground is None or wind is None or boat is None:
         return None
     if not (wind[1] < STEERAGE_MPS or _is_carried(ctx, boat, ground)):
@@ -179,7 +179,7 @@ def _stems(ctx: StepContext, ahead: DriftAhead) -> bool:
     twa = abs(difference_rad(wind[0], against_rad))
     speed = boat.polar.speed_mps(max(twa, ctx.no_go_half_rad), wind[1])
     if twa < ctx.no_go_half_rad:
-        speed *= math.cos(ctx.no_go_half_rad) / math.cos(twa)    # by tacking
+        speed *= math.cos(ctx.no_go_half_rad) / math.cos(twa)  # by tacking
     return speed >= SPARE * ahead.speed_mps
 
 
@@ -192,10 +192,18 @@ def _always(ctx: StepContext, ahead: DriftAhead) -> bool:  # noqa: ARG001
 
 
 MEANS: tuple[Means, ...] = (
-    Means(name="motor", when="the mission says that there is one, and setting modes is permitted",
-          will_do=_has_motor, use=_run_motor),
-    Means(name="loiter", when="the wind is enough to sail against the drift, and setting modes is permitted",
-          will_do=_stems, use=_nothing),
+    Means(
+        name="motor",
+        when="the mission says that there is one, and setting modes is permitted",
+        will_do=_has_motor,
+        use=_run_motor,
+    ),
+    Means(
+        name="loiter",
+        when="the wind is enough to sail against the drift, and setting modes is permitted",
+        will_do=_stems,
+        use=_nothing,
+    ),
     Means(name="anchor", when="always", will_do=_always, use=_nothing),
 )
 
@@ -256,7 +264,8 @@ def lies_in_loiter(ctx: StepContext) -> bool:
     away_m = distance_m(boat, place)
     return away_m <= AWAY_M or (
         away_m <= AWAY_M + ROOMIER_M
-        and water_at(ctx.voyage.area, boat).path_clearance_m([boat, place]) >= ctx.config.margin_floor_m)
+        and water_at(ctx.voyage.area, boat).path_clearance_m([boat, place]) >= ctx.config.margin_floor_m
+    )
 
 
 def is_cramped(ctx: StepContext) -> bool:

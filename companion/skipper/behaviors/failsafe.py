@@ -32,18 +32,19 @@ from companion.skipper.step import CancelPlan, Phase, StepContext
 from companion.skipper.step.state import PATIENT, Adrift, FieldSteering, Signs, Stop
 from companion.skipper.way import PointEn, bearing_rad, distance_m, moved
 
-TOLD_S = 5.0          # a sign this long before or after the change of mode belongs to it
-ASKED_S = 30.0        # an AUTO that shows so long after it was accepted is the one that was asked for
-FILTER_S = 30.0       # a heartbeat that is critical so soon after the filter failed is critical because of it
-NEAR_S = 25.0         # somebody else's way is let be until what it leads over is so near: a LOITER needs half of it
+TOLD_S = 5.0  # a sign this long before or after the change of mode belongs to it
+ASKED_S = 30.0  # an AUTO that shows so long after it was accepted is the one that was asked for
+FILTER_S = 30.0  # a heartbeat that is critical so soon after the filter failed is critical because of it
+NEAR_S = 25.0  # somebody else's way is let be until what it leads over is so near: a LOITER needs half of it
 SLOW_MPS = 1.0
-HULL_M = 2.0          # the way of the boat's antenna is not that of its hull
-CLOSER_M = 1.0        # what leads away from something is let be
+HULL_M = 2.0  # the way of the boat's antenna is not that of its hull
+CLOSER_M = 1.0  # what leads away from something is let be
 KEPT_OFF, KEPT_OFF_S = "kept off", 1800.0
 _SAILED_TO = frozenset(
-    {Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TIME, Command.NAV_LOITER_TURNS})
+    {Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TIME, Command.NAV_LOITER_TURNS}
+)
 REBOOT_RACE_S = 15.0  # a mode change this long before a reboot shows was the reboot, not the operator
-MOVED_US = 100        # a stick or switch that is moved moves by more than this; at rest it trembles by a few
+MOVED_US = 100  # a stick or switch that is moved moves by more than this; at rest it trembles by a few
 SAILED = frozenset({Mode.AUTO, Mode.GUIDED, *STOPPING}) - {Mode.HOLD}
 
 
@@ -73,13 +74,16 @@ def follow_stops(ctx: StepContext) -> None:
         if cause not in before.standing and not of_filter:
             signs = _seen(signs, cause, ctx.t_s)
     if None not in {before.breaches, status.fence_breaches} and status.fence_breaches != before.breaches:
-        signs = _seen(signs, "fence", ctx.t_s)   # outside already, and the autopilot acts again
+        signs = _seen(signs, "fence", ctx.t_s)  # outside already, and the autopilot acts again
     helm = (status.mode, status.is_armed)
     if status.battery_failed is False and "battery" in before.standing:
         ctx.set(alarms=changed(ctx.state.alarms, battery_critical=False))
-    ctx.set(operator=changed(
-        ctx.state.operator,
-        signs=replace(signs, standing=up, breaches=status.fence_breaches, helm=helm, helm_s=ctx.t_s)))
+    ctx.set(
+        operator=changed(
+            ctx.state.operator,
+            signs=replace(signs, standing=up, breaches=status.fence_breaches, helm=helm, helm_s=ctx.t_s),
+        )
+    )
     stop = ctx.state.operator.stop
     if status.is_armed and status.mode not in STOPPING:
         ctx.set(operator=changed(ctx.state.operator, stop=None))
@@ -87,12 +91,17 @@ def follow_stops(ctx: StepContext) -> None:
         # a loiter that we asked for in it
         ctx.set(operator=changed(ctx.state.operator, stop=replace(stop, mode=status.mode, is_armed=True)))
     elif (stop is not None and (stop.mode, stop.is_armed) != helm) or (stop is None and _was_sailed(ctx, before)):
-        ctx.set(operator=changed(ctx.state.operator, stop=Stop(
-            t_s=ctx.t_s, before_s=before.helm_s, mode=status.mode, is_armed=status.is_armed, cause=PERSON)))
+        ctx.set(
+            operator=changed(
+                ctx.state.operator,
+                stop=Stop(
+                    t_s=ctx.t_s, before_s=before.helm_s, mode=status.mode, is_armed=status.is_armed, cause=PERSON
+                ),
+            )
+        )
     stop = ctx.state.operator.stop
     if stop is not None and ctx.t_s - stop.t_s <= TOLD_S:
-        ctx.set(operator=changed(
-            ctx.state.operator, stop=replace(stop, cause=_cause(stop, ctx.state.operator.signs))))
+        ctx.set(operator=changed(ctx.state.operator, stop=replace(stop, cause=_cause(stop, ctx.state.operator.signs))))
 
 
 def _was_sailed(ctx: StepContext, before: Signs) -> bool:
@@ -142,11 +151,17 @@ def take_over(ctx: StepContext) -> bool:
     ctx.set(
         steering=changed(ctx.state.steering, own_mode=stop.mode),
         operator=changed(
-            ctx.state.operator, since_s=None, is_back=True, answering=stop.cause, sent_home=stop.mode in HOMEWARD),
-        plans=changed(ctx.state.plans, retry=PATIENT))
+            ctx.state.operator, since_s=None, is_back=True, answering=stop.cause, sent_home=stop.mode in HOMEWARD
+        ),
+        plans=changed(ctx.state.plans, retry=PATIENT),
+    )
     ctx.phase(Phase.HOLDING, waits_for(ctx) or "stopped: waiting for a plan from where she is")
-    ctx.say(Severity.WARNING, f"{stop.cause} failsafe",
-             f"put into {stop.mode.name} by the autopilot's {stop.cause} failsafe: {answer.value}", every_s=0.0)
+    ctx.say(
+        Severity.WARNING,
+        f"{stop.cause} failsafe",
+        f"put into {stop.mode.name} by the autopilot's {stop.cause} failsafe: {answer.value}",
+        every_s=0.0,
+    )
     return True
 
 
@@ -181,9 +196,10 @@ def _others_way(ctx: StepContext) -> tuple[str, list[PointEn]]:
         return "", []
     aboard = state.mission.read_items
     if status.mode is Mode.AUTO and state.mission.foreign and aboard is not None and status.mission_seq:
-        items = [item for item in aboard[status.mission_seq - 1:] if item.command in _SAILED_TO]
+        items = [item for item in aboard[status.mission_seq - 1 :] if item.command in _SAILED_TO]
         return "the mission on the autopilot, which is not ours,", [
-            ctx.voyage.frame.en_from_geo(item.point) for item in items]
+            ctx.voyage.frame.en_from_geo(item.point) for item in items
+        ]
     far_m, course, boat = status.waypoint_distance_m, status.target_bearing_rad, ctx.boat_en
     is_homeward = stop is not None and stop.cause != PERSON and {stop.mode, status.mode} <= HOMEWARD
     if stop is None or not is_homeward or far_m is None or course is None or boat is None:
@@ -206,8 +222,11 @@ def _begin(way: list[PointEn], far_m: float) -> list[PointEn]:
 def is_answered(ctx: StepContext) -> bool:
     """Return whether the boat lies in a stop that is ours to end."""
     status = ctx.autopilot
-    held = status is not None and ctx.state.operator.stop is not None and (
-        status.mode is ctx.state.steering.own_mode or ctx.is_leaving)
+    held = (
+        status is not None
+        and ctx.state.operator.stop is not None
+        and (status.mode is ctx.state.steering.own_mode or ctx.is_leaving)
+    )
     return bool(ctx.state.operator.answering) and held
 
 
@@ -233,13 +252,16 @@ def follow_answer(ctx: StepContext) -> None:
     if not state.operator.answering or ctx.autopilot is None:
         return
     if is_answered(ctx):
-        if stop is not None and (stop.cause == PERSON or (
-                state.operator.signs.rc_moved_s > stop.t_s and RECEIVER not in state.operator.signs.standing)):
+        if stop is not None and (
+            stop.cause == PERSON
+            or (state.operator.signs.rc_moved_s > stop.t_s and RECEIVER not in state.operator.signs.standing)
+        ):
             ctx.set(
                 operator=changed(ctx.state.operator, answering="", stop=replace(stop, cause=PERSON)),
-                steering=changed(ctx.state.steering, own_mode=None))
+                steering=changed(ctx.state.steering, own_mode=None),
+            )
         elif stop is not None and ctx.config.ends.answer(stop.cause) is not Recovery.LEAVE:
-            ctx.set(operator=changed(ctx.state.operator, answering=stop.cause))   # a better sign came late
+            ctx.set(operator=changed(ctx.state.operator, answering=stop.cause))  # a better sign came late
         return
     if ctx.autopilot.mode is Mode.AUTO and not _has_asked_for_auto(ctx):
         ctx.say(Severity.NOTICE, "answered", "a person has set AUTO: sailing on", every_s=0.0)
@@ -255,10 +277,13 @@ def _has_asked_for_auto(ctx: StepContext) -> bool:
     """Return whether AUTO shows by our own order: at the change of mode, the only moment when it matters."""
     state = ctx.state
     if state.steering.own_mode is None:
-        return True   # seen before
+        return True  # seen before
     pending = state.pending.command is not None and state.pending.command[2] == Mode.AUTO.name
-    accepted = state.pending.accepted is not None and state.pending.accepted[0] == Mode.AUTO.name and (
-        ctx.t_s - state.pending.accepted[1] <= ASKED_S)
+    accepted = (
+        state.pending.accepted is not None
+        and state.pending.accepted[0] == Mode.AUTO.name
+        and (ctx.t_s - state.pending.accepted[1] <= ASKED_S)
+    )
     return pending or accepted
 
 
@@ -272,7 +297,8 @@ def begin_again(ctx: StepContext) -> None:
         pending=changed(ctx.state.pending, command=None),
         by_field=FieldSteering(),
         operator=changed(ctx.state.operator, answering="", stop=None, signs=Signs()),
-        adrift=Adrift())
+        adrift=Adrift(),
+    )
     if not keeps:
         ctx.set(voyage=changed(ctx.state.voyage, sailing=False), operator=changed(ctx.state.operator, since_s=None))
         ctx.phase(Phase.WAITING, "the autopilot rebooted: waiting for its mission to be read")
@@ -286,8 +312,12 @@ def operator_has_it(ctx: StepContext) -> bool:
     gone = ctx.is_taken
     if state.phase is not Phase.OPERATOR:
         if not gone:
-            held = state.steering.until_s is not None or state.by_field.resort.engaged or ctx.steers or (
-                state.steering.own_mode is Mode.LOITER and is_busy(ctx, Mode.LOITER.name))
+            held = (
+                state.steering.until_s is not None
+                or state.by_field.resort.engaged
+                or ctx.steers
+                or (state.steering.own_mode is Mode.LOITER and is_busy(ctx, Mode.LOITER.name))
+            )
             if status.mode is Mode.AUTO and state.steering.own_mode is not None and not held:
                 ctx.set(steering=changed(ctx.state.steering, own_mode=None))
             return False
@@ -297,14 +327,15 @@ def operator_has_it(ctx: StepContext) -> bool:
             operator=changed(ctx.state.operator, since_s=ctx.t_s),
             pending=changed(ctx.state.pending, plan=None, command=None),
             steering=changed(ctx.state.steering, own_mode=None, until_s=None),
-            by_field=FieldSteering())
+            by_field=FieldSteering(),
+        )
         if take_over(ctx):
             return False
         ctx.phase(Phase.OPERATOR, f"{_taken(ctx)}, not by us: the companion does nothing until AUTO comes back")
         ctx.say(Severity.NOTICE, "operator", ctx.state.why, every_s=0.0)
         return True
     if gone or status.mode is not Mode.AUTO:
-        if gone and take_over(ctx):   # its sign came later than the change of mode
+        if gone and take_over(ctx):  # its sign came later than the change of mode
             return False
         ctx.phase(Phase.OPERATOR, f"{_taken(ctx)}: waiting for AUTO")
         return True
@@ -313,7 +344,8 @@ def operator_has_it(ctx: StepContext) -> bool:
         operator=changed(ctx.state.operator, since_s=None, is_back=True, answering="", given_back_s=ctx.t_s),
         mission=changed(ctx.state.mission, checked=False, read_since_s=ctx.t_s),
         plans=changed(ctx.state.plans, retry=PATIENT),
-        progress=changed(ctx.state.progress, history=()))
+        progress=changed(ctx.state.progress, history=()),
+    )
     ctx.phase(Phase.WAITING, "AUTO is back: waiting for the mission on board to be compared")
     ctx.say(Severity.NOTICE, "operator back", f"AUTO is back after {ctx.t_s - since:.0f} s", every_s=0.0)
     return False

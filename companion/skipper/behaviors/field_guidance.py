@@ -37,26 +37,26 @@ from companion.skipper.way.gates import marks_of
 from companion.traffic import Vessel, predict
 from companion.traffic.colregs import expected
 
-NAME = "vessel too near"      # the watchdog's
-KEEP_SHARE = 0.5              # of the distance that plans keep: what the last resort defends
-GROWN_S = 30.0                # the growth of a vessel's disc is that of its next half minute
+NAME = "vessel too near"  # the watchdog's
+KEEP_SHARE = 0.5  # of the distance that plans keep: what the last resort defends
+GROWN_S = 30.0  # the growth of a vessel's disc is that of its next half minute
 LOOK_S = 90.0
 STILL_MPS = 0.3
-PLAN_EVERY_S = 20.0           # Büsser 5.2
-LEFT_ALONE_S = 60.0           # after somebody set AUTO in the middle of it
-LAG_S = 3.0                   # a boat of a few metres gathers its speed in this time
+PLAN_EVERY_S = 20.0  # Büsser 5.2
+LEFT_ALONE_S = 60.0  # after somebody set AUTO in the middle of it
+LAG_S = 3.0  # a boat of a few metres gathers its speed in this time
 HORIZON_S = 60.0
-QUICK_RADPS = math.radians(20.0)   # a boat that turns faster ends its boards on the station by tacking
-WEAK = 5.0                    # of 10: what else a field says must be weaker for a station to be kept
-AROUND_M = 60.0               # outside a vessel's disc: nearer than this it is not on a station
-ROOM_M = 12.0                 # of the boards and loops about a station, beyond what is kept clear of the shore
-STOP_M = 3.0                  # a motorboat lies still this near to its station
-SLOW = 0.3                    # of full thrust, at least: a motorboat is slower in a turn, or circles a mark inside it
-PATIENCE_S = 5.0      # without a heading ArduRover's GUIDED stops it after 3 s: a field that is weak keeps its last
-BACK_S = 10.0         # a field that was given up has said something for so long
-LEAVE_S = 45.0        # a plan from here takes a few seconds; one that is not found is the ladder's
-STEP_S = 1.5          # what made the boat leave, an order or the end, is seen a step after it asked for the plan
-INSIDE_M = 1.5        # a vessel is in the water when it is so far in: its position is noisy
+QUICK_RADPS = math.radians(20.0)  # a boat that turns faster ends its boards on the station by tacking
+WEAK = 5.0  # of 10: what else a field says must be weaker for a station to be kept
+AROUND_M = 60.0  # outside a vessel's disc: nearer than this it is not on a station
+ROOM_M = 12.0  # of the boards and loops about a station, beyond what is kept clear of the shore
+STOP_M = 3.0  # a motorboat lies still this near to its station
+SLOW = 0.3  # of full thrust, at least: a motorboat is slower in a turn, or circles a mark inside it
+PATIENCE_S = 5.0  # without a heading ArduRover's GUIDED stops it after 3 s: a field that is weak keeps its last
+BACK_S = 10.0  # a field that was given up has said something for so long
+LEAVE_S = 45.0  # a plan from here takes a few seconds; one that is not found is the ladder's
+STEP_S = 1.5  # what made the boat leave, an order or the end, is seen a step after it asked for the plan
+INSIDE_M = 1.5  # a vessel is in the water when it is so far in: its position is noisy
 
 
 # ------------------------------------------------------------------------------------- what is seen
@@ -69,9 +69,14 @@ def obstacles(ctx: StepContext, vessels: Sequence[Vessel]) -> tuple[MovingObstac
         motion = None if held_of(ctx, vessel) is None else expected(vessel)
         now, later = predict(vessel, ctx.t_s, motion), predict(vessel, ctx.t_s + GROWN_S, motion)
         radius_m = now.radius_m(GIVE_UP_RISK)
-        out.append(MovingObstacle(
-            en_m=now.mean_en_m, velocity_en_mps=now.velocity_en_mps, keep_m=radius_m + own_m,
-            growth_mps=max(0.0, later.radius_m(GIVE_UP_RISK) - radius_m) / GROWN_S))
+        out.append(
+            MovingObstacle(
+                en_m=now.mean_en_m,
+                velocity_en_mps=now.velocity_en_mps,
+                keep_m=radius_m + own_m,
+                growth_mps=max(0.0, later.radius_m(GIVE_UP_RISK) - radius_m) / GROWN_S,
+            )
+        )
     return tuple(out)
 
 
@@ -112,9 +117,13 @@ def situation(ctx: StepContext) -> Situation | None:
     seen = obstacles(ctx, near(ctx))
     buoys = tuple(MovingObstacle(en_m=mark, keep_m=keep_m) for mark, keep_m in marks_of(ctx.voyage))
     return Situation(
-        t_s=ctx.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
+        t_s=ctx.t_s,
+        en_m=boat,
+        velocity_en_mps=vehicle.velocity_en_mps,
+        heading_rad=vehicle.heading_rad,
         twd_from_rad=wind[0] if wind is not None and ctx.config.sails else None,
-        tws_mps=wind[1] if wind is not None else 0.0, obstacles=(*seen, *buoys),
+        tws_mps=wind[1] if wind is not None else 0.0,
+        obstacles=(*seen, *buoys),
     )
 
 
@@ -124,9 +133,14 @@ def habits(ctx: StepContext, tws_mps: float) -> GuidanceSettings:
     twa, speed = boat.polar.curve(max(1.0, tws_mps))
     return GuidanceSettings(
         is_sailing=ctx.config.sails,
-        no_go_half_rad=ctx.planned_no_go_rad, polar_twa_rad=tuple(map(float, twa)),
-        polar_mps=tuple(map(float, speed)), turn_rate_radps=boat.turn_rate_radps, tack_s=max(1.0, boat.tack_loss_s),
-        lag_s=LAG_S, horizon_s=HORIZON_S, keep_m=ctx.config.margin_floor_m + boat.hull.reach_m,   # of the boat's place
+        no_go_half_rad=ctx.planned_no_go_rad,
+        polar_twa_rad=tuple(map(float, twa)),
+        polar_mps=tuple(map(float, speed)),
+        turn_rate_radps=boat.turn_rate_radps,
+        tack_s=max(1.0, boat.tack_loss_s),
+        lag_s=LAG_S,
+        horizon_s=HORIZON_S,
+        keep_m=ctx.config.margin_floor_m + boat.hull.reach_m,  # of the boat's place
     )
 
 
@@ -155,8 +169,7 @@ def heading(ctx: StepContext) -> Setpoint | None:
         setpoint = _composed(ctx, seen, gate.field)
         setpoint = replace(setpoint, reason=f"{gate.name}: {setpoint.reason}")
     else:
-        guidance, setpoint = step(
-            ctx.state.by_field.guidance, seen, intent(ctx, seen), habits(ctx, seen.tws_mps))
+        guidance, setpoint = step(ctx.state.by_field.guidance, seen, intent(ctx, seen), habits(ctx, seen.tws_mps))
         ctx.set(by_field=replace(ctx.state.by_field, guidance=guidance))
     return setpoint if ctx.config.sails else _slowed(setpoint, seen)
 
@@ -191,7 +204,7 @@ def _composed(ctx: StepContext, seen: Situation, field: Composed) -> Setpoint:
     value = made(seen.en_m)[0]
     wanted = Intent(field=made, zone=zone_of(tree, conditions), clearance=ctx.voyage.area.clearance_m)
     is_weak = math.hypot(value[0], value[1]) < LEAST
-    if is_weak:   # for a moment: over a point that is sailed to
+    if is_weak:  # for a moment: over a point that is sailed to
         wanted = replace(hold_heading(seen.heading_rad if last is None else last), clearance=wanted.clearance)
     guidance, setpoint = step(memory.guidance, seen, wanted, can)
     ctx.set(by_field=replace(memory, guidance=guidance, station=StationState(), way_out_rad=way_out))
@@ -234,27 +247,34 @@ def last_resort(ctx: StepContext) -> bool:
             return False
         if not (may.may_steer and may.may_set_mode):
             ctx.say(
-                Severity.CRITICAL, "no last resort", "a vessel is too near to plan for, and steering is not permitted")
+                Severity.CRITICAL, "no last resort", "a vessel is too near to plan for, and steering is not permitted"
+            )
             return False
         if situation(ctx) is None:
             return False
     elif memory.seen_guided and status.mode is Mode.AUTO and not is_busy(ctx, Mode.GUIDED.name):
         ctx.set(
             steering=changed(ctx.state.steering, own_mode=None),
-            by_field=FieldSteering(not_before_s=ctx.t_s + LEFT_ALONE_S))
+            by_field=FieldSteering(not_before_s=ctx.t_s + LEFT_ALONE_S),
+        )
         ctx.say(Severity.NOTICE, "last resort over", "somebody set AUTO: the field lets go", every_s=0.0)
         return False
     resort = memory.resort.step(ctx.t_s, too_near=raised, can_plan=_is_planned(ctx), clear_s=0.0)
     if memory.resort.engaged and not resort.engaged:
         ctx.set(by_field=FieldSteering())
-        ctx.say(Severity.NOTICE, "last resort over", f"the way is clear again after "
-                 f"{ctx.t_s - memory.resort.since_s:.0f} s: back to AUTO and the plan", every_s=0.0)
+        ctx.say(
+            Severity.NOTICE,
+            "last resort over",
+            f"the way is clear again after {ctx.t_s - memory.resort.since_s:.0f} s: back to AUTO and the plan",
+            every_s=0.0,
+        )
         return False
     if not memory.resort.engaged:
         met = meets_in(ctx)
         whose = f"{met[1]}, met in {met[0]:.0f} s" if met is not None and met[1] else "a vessel"
-        ctx.set(   # the guidance gets out of irons by itself
-            steering=changed(ctx.state.steering, until_s=None, heading_rad=None))
+        ctx.set(  # the guidance gets out of irons by itself
+            steering=changed(ctx.state.steering, until_s=None, heading_rad=None)
+        )
         ctx.say(Severity.WARNING, "last resort", f"too near to plan for: {whose}; steering by field", every_s=0.0)
     clear_s = None if raised else (memory.clear_s if memory.clear_s is not None else ctx.t_s)
     guided = status.mode is Mode.GUIDED
@@ -270,8 +290,10 @@ def last_resort(ctx: StepContext) -> bool:
         return True
     ctx.act(SteerHeading(heading_rad=told.heading_rad, thrust=told.thrust, text=f"last resort: {told.reason}"))
     where = f"{math.degrees(told.heading_rad) % 360.0:.0f}°"
-    ctx.phase(Doing.LAST_RESORT, f"keeping clear by field: {where} ({told.reason})"
-               + ("" if raised else "; clear, waiting for the plan"))
+    ctx.phase(
+        Doing.LAST_RESORT,
+        f"keeping clear by field: {where} ({told.reason})" + ("" if raised else "; clear, waiting for the plan"),
+    )
     return True
 
 
@@ -279,8 +301,11 @@ def _is_planned(ctx: StepContext) -> bool:
     """Return whether a plan asked for since the water was clear has been answered and is on board."""
     state, clear_s = ctx.state, ctx.state.by_field.clear_s
     return (
-        clear_s is not None and state.plans.last_s >= clear_s and state.pending.plan is None
-        and state.pending.upload is None and not state.mission.repair
+        clear_s is not None
+        and state.plans.last_s >= clear_s
+        and state.pending.plan is None
+        and state.pending.upload is None
+        and not state.mission.repair
     )
 
 
@@ -314,7 +339,7 @@ def keeps_station(ctx: StepContext) -> bool:
     off = "" if boat is None else f", {distance_m(boat, place):.0f} m off"
     ctx.phase(Doing.HOLDING, f"keeping station: waiting {left_s:.0f} s more{off}")
     if ctx.guidance is not Guidance.FIELD or not ctx.steers or not ctx.config.sails:
-        hand_back(ctx)   # out of GUIDED; a motorboat lies still in the autopilot's own loiter
+        hand_back(ctx)  # out of GUIDED; a motorboat lies still in the autopilot's own loiter
         return True
     status, seen = ctx.autopilot, situation(ctx)
     if status is not None and status.mode is not Mode.GUIDED:
@@ -323,8 +348,9 @@ def keeps_station(ctx: StepContext) -> bool:
         ctx.set(steering=changed(ctx.state.steering, own_mode=Mode.GUIDED))
         after, setpoint = keep(memory.station, seen, _station_at(ctx, place), habits(ctx, seen.tws_mps))
         ctx.set(by_field=replace(ctx.state.by_field, station=after))
-        ctx.act(SteerHeading(
-            heading_rad=setpoint.heading_rad, thrust=setpoint.thrust, text=f"station: {setpoint.reason}"))
+        ctx.act(
+            SteerHeading(heading_rad=setpoint.heading_rad, thrust=setpoint.thrust, text=f"station: {setpoint.reason}")
+        )
     return True
 
 
@@ -346,8 +372,12 @@ def follow_field(ctx: StepContext) -> None:
         ctx.set(by_field=memory)
     if has_field and diversion(ctx) is None:
         if gate is not None and gate.field is not None and not (memory.composed and memory.left_s is None):
-            ctx.say(Severity.NOTICE, "field", f"{gate.name}: steered by {gate.field.tree.text}, "
-                     f"{gate.field.until_words}", every_s=0.0)
+            ctx.say(
+                Severity.NOTICE,
+                "field",
+                f"{gate.name}: steered by {gate.field.tree.text}, {gate.field.until_words}",
+                every_s=0.0,
+            )
         ctx.set(by_field=replace(memory, composed=True, left_s=None))
     elif memory.composed:
         left_s = ctx.t_s if memory.left_s is None else memory.left_s
@@ -359,8 +389,11 @@ def follow_field(ctx: StepContext) -> None:
 def _is_left(ctx: StepContext, since_s: float) -> bool:
     """Return whether nothing need be steered on: a plan asked for since then is in place, or none can be waited for."""
     state, bound = ctx.state, diversion(ctx)
-    goes_on = state.voyage.sailing and not state.voyage.over and (
-        bound.has_place if bound is not None else ctx.gate is not None)
+    goes_on = (
+        state.voyage.sailing
+        and not state.voyage.over
+        and (bound.has_place if bound is not None else ctx.gate is not None)
+    )
     if not goes_on or ctx.config.guidance is Guidance.FIELD or situation(ctx) is None:
         return True
     is_planned = state.plans.last_s >= since_s - STEP_S and state.pending.plan is None and state.pending.upload is None
@@ -399,11 +432,21 @@ def has_sailed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
     why = _over(ctx, gate, field, boat)
     if not why:
         return False
-    ctx.set(progress=changed(
-        ctx.state.progress, gate=ctx.state.progress.gate + 1, reached=(*ctx.state.progress.reached, gate.goal),
-        closest_m=math.inf, inside=None))
-    ctx.say(Severity.NOTICE, "goal", f"{gate.name}: {why} after {inside.age_s(ctx.t_s, utc_s(ctx)):.0f} s by field",
-             every_s=0.0)
+    ctx.set(
+        progress=changed(
+            ctx.state.progress,
+            gate=ctx.state.progress.gate + 1,
+            reached=(*ctx.state.progress.reached, gate.goal),
+            closest_m=math.inf,
+            inside=None,
+        )
+    )
+    ctx.say(
+        Severity.NOTICE,
+        "goal",
+        f"{gate.name}: {why} after {inside.age_s(ctx.t_s, utc_s(ctx)):.0f} s by field",
+        every_s=0.0,
+    )
     return True
 
 

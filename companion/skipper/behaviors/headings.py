@@ -24,10 +24,10 @@ from companion.skipper.way import Gate, PointEn, Side, bearing_rad, cross_track_
 from companion.skipper.way.drift import DriftAhead, drift_ahead
 
 DRIFT_LIMIT_RAD = math.radians(20.0)  # more is not leeway but a current or a compass error
-STEERAGE_MPS = 0.5                    # slower than this the drift angle means nothing
-AT_BUOY = 3.0                         # rounding radii
+STEERAGE_MPS = 0.5  # slower than this the drift angle means nothing
+AT_BUOY = 3.0  # rounding radii
 TACK_HYSTERESIS_RAD = math.radians(10.0)
-BACK_S, BACK_M = 4.0, 8.0             # the line is aimed at so far ahead, in time and at the least
+BACK_S, BACK_M = 4.0, 8.0  # the line is aimed at so far ahead, in time and at the least
 BACK_LIMIT_RAD = math.radians(45.0)
 
 
@@ -128,9 +128,9 @@ def _is_at_buoy(gate: Gate | None, boat: PointEn) -> bool:
     return distance_m(boat, gate.buoy_en_m) < AT_BUOY * distance_m(gate.en_m, gate.buoy_en_m)
 
 
-REACT_S = 8.0        # a step to see it, a plan, its upload and reading back, the turn: six seconds; and two to spare
-OFF_LINE_M = 2.0        # how far the autopilot wanders off its line
-SLOW_MPS = 0.5       # slower the boat does not come far in that time
+REACT_S = 8.0  # a step to see it, a plan, its upload and reading back, the turn: six seconds; and two to spare
+OFF_LINE_M = 2.0  # how far the autopilot wanders off its line
+SLOW_MPS = 0.5  # slower the boat does not come far in that time
 HAIR_M = 0.5
 
 
@@ -140,21 +140,25 @@ def ahead_of(ctx: StepContext) -> DriftAhead | None:
     if boat is None or leg is None or status is None or not ctx.ahead():
         return None
     if status.mode not in {Mode.AUTO, ctx.sails_in} or ctx.is_by_field:
-        return None   # the field looks ahead by itself, and follows no leg
+        return None  # the field looks ahead by itself, and follows no leg
     speed, left_m = ctx.speed_mps, distance_m(boat, leg[1])
     if speed < SLOW_MPS or left_m < 1.0:
         return None
     course = bearing_rad(boat, leg[1])
     if status.mode is Mode.GUIDED and ctx.is_closed(boat, leg[1], ctx.wind_now):
-        steered = course_rad(ctx)   # nothing turns the boat there but another plan
+        steered = course_rad(ctx)  # nothing turns the boat there but another plan
         if steered is None:
             return None
         course, left_m = steered, math.inf
     hull_m, water = ctx.voyage.boat.hull.reach_m, water_at(ctx.voyage.area, boat)
     here_m = float(water.clearance_m([boat])[0])
     found = drift_ahead(
-        water, boat, (speed * math.sin(course), speed * math.cos(course)),
-        floor_m=max(0.0, min(hull_m + OFF_LINE_M, here_m - HAIR_M)), horizon_s=min(REACT_S, left_m / speed))
+        water,
+        boat,
+        (speed * math.sin(course), speed * math.cos(course)),
+        floor_m=max(0.0, min(hull_m + OFF_LINE_M, here_m - HAIR_M)),
+        horizon_s=min(REACT_S, left_m / speed),
+    )
     return None if found.is_clear else found
 
 

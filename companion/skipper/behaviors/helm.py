@@ -14,7 +14,7 @@ from companion.skipper.way.geometry import is_past
 ARMING, CURRENT = "arming", "set current"
 TACK = "tack"
 MOTOR_ON, MOTOR_OFF = "motor on", "motor off"
-CHECK_S = 3.0   # MISSION_CURRENT comes once a second: by then it shows what was asked for
+CHECK_S = 3.0  # MISSION_CURRENT comes once a second: by then it shows what was asked for
 
 
 def is_busy(ctx: StepContext, what: str) -> bool:
@@ -40,7 +40,8 @@ def _ask(ctx: StepContext, what: str, order: Callable[[int], Action]) -> bool:
 def set_mode(ctx: StepContext, mode: Mode, text: str) -> bool:
     """Ask for a mode; False when not permitted or not now."""
     if not ctx.snapshot.permissions.may_set_mode or not _ask(
-            ctx, mode.name, lambda number: SetMode(command_id=number, mode=mode, text=text)):
+        ctx, mode.name, lambda number: SetMode(command_id=number, mode=mode, text=text)
+    ):
         return False
     ctx.set(steering=changed(ctx.state.steering, own_mode=None if mode is Mode.AUTO else mode))
     return True
@@ -62,8 +63,7 @@ def tack(ctx: StepContext, code: str, text: str) -> bool:
 
 def run_motor(ctx: StepContext, *, on: bool, text: str) -> bool:
     """Ask for the motor to be run or not; False when not permitted or not now."""
-    return _ask(
-        ctx, MOTOR_ON if on else MOTOR_OFF, lambda number: RunMotor(command_id=number, is_on=on, text=text))
+    return _ask(ctx, MOTOR_ON if on else MOTOR_OFF, lambda number: RunMotor(command_id=number, is_on=on, text=text))
 
 
 def make_current(ctx: StepContext, seq: int) -> bool:
@@ -92,19 +92,30 @@ def leave_passed(ctx: StepContext) -> None:
     The list was made for a boat that had not come so far; sent back it would turn round in whatever water there is.
     """
     state, route, boat = ctx.state, ctx.state.mission.route, ctx.boat_en
-    if route is None or boat is None or state.pending.upload is not None or (
-            ctx.t_s - state.mission.uploaded_s > CHECK_S):
+    if (
+        route is None
+        or boat is None
+        or state.pending.upload is not None
+        or (ctx.t_s - state.mission.uploaded_s > CHECK_S)
+    ):
         return
     area, floor_m, index = ctx.voyage.area, ctx.config.margin_floor_m, state.mission.index
-    while index < ctx.last_waypoint() and route.gate_of[index] < 0 and is_past(
-            boat, route.leg_from_en_m[index], route.points_en_m[index]):
+    while (
+        index < ctx.last_waypoint()
+        and route.gate_of[index] < 0
+        and is_past(boat, route.leg_from_en_m[index], route.points_en_m[index])
+    ):
         back_m, on_m = (area.path_clearance_m([boat, route.points_en_m[n]]) for n in (index, index + 1))
         if on_m < min(floor_m, back_m):
             break
         index += 1
     if index > state.mission.index and make_current(ctx, index + 1):
-        ctx.say(Severity.NOTICE, "passed", f"item {state.mission.index + 1} was passed while it was on its way: "
-                 f"sailing for item {index + 1}", every_s=0.0)
+        ctx.say(
+            Severity.NOTICE,
+            "passed",
+            f"item {state.mission.index + 1} was passed while it was on its way: sailing for item {index + 1}",
+            every_s=0.0,
+        )
 
 
 def repair(ctx: StepContext) -> bool:

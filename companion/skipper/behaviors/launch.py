@@ -20,8 +20,8 @@ from companion.skipper.way.geometry import distance_m, leg_distance_m
 
 ARRIVED_BEFORE = "all goals were reached before this start; --again sails the mission again"
 MAY_UPLOAD = "[operator] set_auto = true in the mission, and no --dry-run"
-HAIR_M = 0.3             # what a repaired start's lead-in may come nearer by
-STALE_S = 60.0           # a plan that waits for permission is renewed no more often than this
+HAIR_M = 0.3  # what a repaired start's lead-in may come nearer by
+STALE_S = 60.0  # a plan that waits for permission is renewed no more often than this
 
 
 def start(ctx: StepContext) -> None:
@@ -38,15 +38,17 @@ def start(ctx: StepContext) -> None:
         if snapshot.permissions.may_upload:
             upload(ctx, state.plans.ready_route, 1, "the first plan")
         return
-    shut = next(filter(None, (fenced_off(ctx, gate) for gate in ctx.gates[ctx.state.progress.gate:])), "")
+    shut = next(filter(None, (fenced_off(ctx, gate) for gate in ctx.gates[ctx.state.progress.gate :])), "")
     if shut:
         ctx.phase(Phase.WAITING, f"waiting: {shut}")
         ctx.say(Severity.ERROR, "fenced off", f"not setting sail: {shut}")
         return
     wants = []
     if ctx.boat_en is None:
-        wants.append("a position" + (
-            f" that can be believed: {state.position.doubt.why}" if state.position.doubt is not None else ""))
+        wants.append(
+            "a position"
+            + (f" that can be believed: {state.position.doubt.why}" if state.position.doubt is not None else "")
+        )
     if ctx.autopilot is not None and not ctx.autopilot.ekf_ok:
         wants.append("the autopilot's position filter (EKF)")
     wind = snapshot.wind
@@ -93,7 +95,8 @@ def finished(ctx: StepContext) -> None:
     if status is not None and status.is_armed and status.mode is Mode.AUTO and ctx.state.mission.route is not None:
         ctx.set(
             voyage=changed(ctx.state.voyage, sailing=True),
-            mission=changed(ctx.state.mission, own_index=ctx.state.mission.index))
+            mission=changed(ctx.state.mission, own_index=ctx.state.mission.index),
+        )
         return
     ctx.phase(Phase.DONE, ARRIVED_BEFORE)
 
@@ -129,7 +132,8 @@ def launch(ctx: StepContext) -> None:
         ctx.set(
             voyage=changed(ctx.state.voyage, sailing=True),
             progress=changed(ctx.state.progress, history=()),
-            mission=changed(ctx.state.mission, own_index=state.mission.index))
+            mission=changed(ctx.state.mission, own_index=state.mission.index),
+        )
         ctx.phase(Phase.STANDARD, "under way")
         ctx.say(Severity.NOTICE, "under way", "AUTO and armed: under way", every_s=0.0)
         _look_at_margin(ctx)
@@ -178,8 +182,11 @@ def _look_at_margin(ctx: StepContext) -> None:
     limits = replace(limits, sail_xtrack_max_m=ctx.tack_corridor_m)
     asked = required_margin(limits, speed_mps=boat.polar.max_speed_mps(wind[1]), hull=boat.hull)
     if asked.total_m > ctx.config.margin_m + 0.5:
-        ctx.say(Severity.WARNING, "margin",
-                 f"the margin is {ctx.config.margin_m:g} m; the autopilot's habits ask for {asked.describe()}")
+        ctx.say(
+            Severity.WARNING,
+            "margin",
+            f"the margin is {ctx.config.margin_m:g} m; the autopilot's habits ask for {asked.describe()}",
+        )
 
 
 def _look_at_home(ctx: StepContext) -> None:

@@ -26,10 +26,10 @@ from companion.skipper.step.saved import Standing
 from companion.skipper.step.state import PATIENT, Answered, FieldSteering, Phase
 from companion.skipper.way import Approach, PointEn, distance_m
 
-REMEMBERED_S = 10.0   # longer than any station repeats a command that is not answered
-STATIONS = 8          # whose last order is remembered
-HERE_M = 40.0         # a loiter that is farther from the boat than this is not here
-CODE = "order"        # what is said of orders
+REMEMBERED_S = 10.0  # longer than any station repeats a command that is not answered
+STATIONS = 8  # whose last order is remembered
+HERE_M = 40.0  # a loiter that is farther from the boat than this is not here
+CODE = "order"  # what is said of orders
 # The key of the mission's [operator] that permits what comes on each way, and the name of it in ``Permissions``.
 _PERMITTED_BY = {MAVLINK: "orders", LOCAL: "local_orders", FAR: "far_orders"}
 Found = tuple[str, PointEn]
@@ -40,8 +40,12 @@ def take_orders(ctx: StepContext) -> None:
     standing = ctx.state.orders.standing
     if standing is not None and standing.since_s is None:
         ctx.set(orders=changed(ctx.state.orders, standing=replace(standing, since_s=ctx.t_s)))
-        ctx.say(Severity.NOTICE, CODE, f"since before this start she is under an order: {standing.words}, "
-                 f"{standing.why}", every_s=0.0)
+        ctx.say(
+            Severity.NOTICE,
+            CODE,
+            f"since before this start she is under an order: {standing.words}, {standing.why}",
+            every_s=0.0,
+        )
     for event in ctx.snapshot.events:
         if isinstance(event, Order):
             _answer(ctx, event)
@@ -56,13 +60,28 @@ def _answer(ctx: StepContext, order: Order) -> None:
     else:
         answer = _judged(ctx, order)
         others = tuple(a for a in lately if a.order.source != order.source)
-        ctx.set(orders=changed(
-            ctx.state.orders, answered=(*others, Answered(order=order, answer=answer, t_s=ctx.t_s))[-STATIONS:]))
+        ctx.set(
+            orders=changed(
+                ctx.state.orders, answered=(*others, Answered(order=order, answer=answer, t_s=ctx.t_s))[-STATIONS:]
+            )
+        )
     source = order.source
-    ctx.act(Acknowledge(way=source.kind, system=source.system, component=source.component, command=order.command,
-                         result=answer.result, text=answer.text))
-    ctx.say(Severity.NOTICE if answer.result is Result.DONE else Severity.WARNING, CODE,
-             f"{lead_in(order.wanted)}{answer.text}", every_s=0.0)
+    ctx.act(
+        Acknowledge(
+            way=source.kind,
+            system=source.system,
+            component=source.component,
+            command=order.command,
+            result=answer.result,
+            text=answer.text,
+        )
+    )
+    ctx.say(
+        Severity.NOTICE if answer.result is Result.DONE else Severity.WARNING,
+        CODE,
+        f"{lead_in(order.wanted)}{answer.text}",
+        every_s=0.0,
+    )
 
 
 def _judged(ctx: StepContext, order: Order) -> Answer:
@@ -95,7 +114,7 @@ def _why(ctx: StepContext) -> str:
 
 
 def _stand(
-    ctx: StepContext, order: Order, text: str, *, place: tuple[str, tuple[float, float]] | None = None,
+    ctx: StepContext, order: Order, text: str, *, place: tuple[str, tuple[float, float]] | None = None
 ) -> Answer:
     """Let an order stand, in place of the one that stood."""
     assert order.wanted.verb is not None
@@ -103,9 +122,10 @@ def _stand(
     name, en_m = place if place is not None else ("", None)
     ctx.set(
         orders=changed(
-            ctx.state.orders,
-            standing=Standing(verb=order.wanted.verb, by=by, name=name, en_m=en_m, since_s=ctx.t_s)),
-        plans=changed(ctx.state.plans, retry=PATIENT))
+            ctx.state.orders, standing=Standing(verb=order.wanted.verb, by=by, name=name, en_m=en_m, since_s=ctx.t_s)
+        ),
+        plans=changed(ctx.state.plans, retry=PATIENT),
+    )
     instead = f"; in place of {before.words}, {before.why}" if before is not None and before.by != by else ""
     return _done(text + instead)
 
@@ -138,10 +158,14 @@ def _hold(ctx: StepContext, order: Order) -> Answer:
     answer = _stand(ctx, order, f"loitering here, where there is room, until {Verb.GO_ON}")
     _let_go_of_plan(ctx)
     route, boat = ctx.state.mission.route, ctx.boat_en
-    if route is not None and boat is not None and ctx.state.pending.upload is None and not ctx.ahead() and (
-        distance_m(boat, route.points_en_m[-1]) > HERE_M
+    if (
+        route is not None
+        and boat is not None
+        and ctx.state.pending.upload is None
+        and not ctx.ahead()
+        and (distance_m(boat, route.points_en_m[-1]) > HERE_M)
     ):
-        hold(ctx, _why(ctx), anew=True)   # on the boat's way to the loiter that ends the mission: that is not here
+        hold(ctx, _why(ctx), anew=True)  # on the boat's way to the loiter that ends the mission: that is not here
     return answer
 
 
@@ -160,12 +184,14 @@ def _go_on(ctx: StepContext, _: Order) -> Answer:
     ctx.set(
         orders=changed(ctx.state.orders, standing=None),
         plans=changed(ctx.state.plans, retry=PATIENT),
-        progress=changed(ctx.state.progress, history=()))
+        progress=changed(ctx.state.progress, history=()),
+    )
     if was.verb is Verb.STOP and ctx.state.voyage.sailing:
         # As when a person gives the boat back: what is on board is compared, and planned from where it is.
         ctx.set(
             mission=changed(ctx.state.mission, checked=False, read_since_s=ctx.t_s),
-            operator=changed(ctx.state.operator, is_back=True))
+            operator=changed(ctx.state.operator, is_back=True),
+        )
         ctx.phase(Phase.WAITING, "to go on: waiting for the mission on board to be compared")
     return _done(f"the end of {was.words}: {_next(ctx)}")
 
@@ -191,7 +217,8 @@ def _skip_goal(ctx: StepContext, _: Order) -> Answer:
     ctx.set(
         orders=changed(ctx.state.orders, skipped=ctx.state.orders.skipped + 1),
         progress=changed(ctx.state.progress, missed_s=None),
-        plans=changed(ctx.state.plans, retry=PATIENT, asked=text))
+        plans=changed(ctx.state.plans, retry=PATIENT, asked=text),
+    )
     return _done(f"{text}: {_next(ctx)}")
 
 
@@ -241,7 +268,8 @@ def _stop(ctx: StepContext, order: Order) -> Answer:
         pending=changed(ctx.state.pending, read=None, command=None),
         steering=changed(ctx.state.steering, until_s=None),
         by_field=FieldSteering(),
-        plans=changed(ctx.state.plans, asked="", ready_route=None))
+        plans=changed(ctx.state.plans, asked="", ready_route=None),
+    )
     mode = "an unknown mode" if status is None or status.mode is None else status.mode.name
     upload = ", but for the end of an upload that is under way" if is_busy else ""
     return _stand(ctx, order, f"nothing more is asked of her until {Verb.GO_ON}{upload}; she is in {mode}")
@@ -272,8 +300,16 @@ def _say_why(ctx: StepContext, _: Order) -> Answer:
 
 
 _DEEDS: dict[Verb, Callable[[StepContext, Order], Answer]] = {
-    Verb.HOLD: _hold, Verb.GO_ON: _go_on, Verb.SKIP_GOAL: _skip_goal, Verb.REFUGE: _refuge, Verb.HOME: _home,
-    Verb.GOAL: _goal, Verb.REPLAN: _replan, Verb.STOP: _stop, Verb.ADOPT: _adopt, Verb.REPLACE: _replace,
+    Verb.HOLD: _hold,
+    Verb.GO_ON: _go_on,
+    Verb.SKIP_GOAL: _skip_goal,
+    Verb.REFUGE: _refuge,
+    Verb.HOME: _home,
+    Verb.GOAL: _goal,
+    Verb.REPLAN: _replan,
+    Verb.STOP: _stop,
+    Verb.ADOPT: _adopt,
+    Verb.REPLACE: _replace,
     Verb.WHY: _say_why,
 }
 
@@ -288,8 +324,13 @@ def _let_go_of_plan(ctx: StepContext) -> None:
 def _see_through(ctx: StepContext) -> None:
     """End an order to sail to a place once the boat is there: the goals that are left are next."""
     standing, bound, boat = ctx.state.orders.standing, diversion(ctx), ctx.boat_en
-    if standing is None or bound is None or bound.kind is not DiversionKind.GOAL or boat is None or (
-            not ctx.state.voyage.sailing):
+    if (
+        standing is None
+        or bound is None
+        or bound.kind is not DiversionKind.GOAL
+        or boat is None
+        or (not ctx.state.voyage.sailing)
+    ):
         return
     off_m = distance_m(boat, bound.en_m)
     if off_m > bound.radius_m and not is_at_rest(ctx):
@@ -302,7 +343,8 @@ def holds_ashore(ctx: StepContext) -> bool:
     """Say that an order keeps the boat from being set sailing, while it does."""
     status, standing = ctx.autopilot, ctx.state.orders.standing
     is_under_way = ctx.state.voyage.sailing or (
-        ctx.state.mission.route is not None and status is not None and status.is_armed and status.mode is Mode.AUTO)
+        ctx.state.mission.route is not None and status is not None and status.is_armed and status.mode is Mode.AUTO
+    )
     if standing is None or standing.verb is not Verb.HOLD or is_under_way:
         return False
     ctx.phase(Phase.WAITING, f"held, {standing.why}: waiting {UNTIL_TOLD}")
@@ -313,8 +355,10 @@ def leaves_alone(ctx: StepContext) -> bool:
     """Say that the boat is given up, while it is; True: nothing is asked of it."""
     if not ctx.is_given_up:
         return False
-    ctx.phase(Phase.OPERATOR if ctx.state.voyage.sailing else Phase.WAITING,
-               f"given up, {_why(ctx)}: nothing is asked of her, waiting {UNTIL_TOLD}")
+    ctx.phase(
+        Phase.OPERATOR if ctx.state.voyage.sailing else Phase.WAITING,
+        f"given up, {_why(ctx)}: nothing is asked of her, waiting {UNTIL_TOLD}",
+    )
     return True
 
 
@@ -386,8 +430,10 @@ def preview(ctx: StepContext, wanted: Wanted) -> RequestPlan | str:
     name, en_m = found
     ctx.set(
         pending=changed(ctx.state.pending, plan=None),
-        orders=changed(ctx.state.orders, standing=Standing(
-            verb=wanted.verb, by="a preview", name=name, en_m=en_m, since_s=ctx.t_s)))
+        orders=changed(
+            ctx.state.orders, standing=Standing(verb=wanted.verb, by="a preview", name=name, en_m=en_m, since_s=ctx.t_s)
+        ),
+    )
     missing = lacks(ctx)
     if missing:
         return f"for a plan there is no {missing}"

@@ -40,15 +40,15 @@ from companion.skipper.way.position_plausibility import (
     is_impossible,
 )
 
-AHEAD_S = 20.0        # what the boat sails until a LOITER that is asked for now has it, and some more
+AHEAD_S = 20.0  # what the boat sails until a LOITER that is asked for now has it, and some more
 SLOW_MPS = 1.0
-GLITCH_S = 3.0        # a position that is back sooner has done no harm
-SAVE_S = 30.0         # between two places that are saved ...
-NEAR_M, NEAR_S = 100.0, 5.0   # ... and with something so near, where a jump matters that is no longer than that
-UNKNOWN_S = 120.0     # how long a start has taken when no clock tells
-POINT_S = 5.0         # after LOITER was accepted what is told may still be the distance of the leg before it
-RUNS_S = 8.0          # how far a boat runs on in HOLD, where its sails are eased, in seconds at its speed of now
-BESIDE_HULL_M = 2.0         # of what it runs on towards
+GLITCH_S = 3.0  # a position that is back sooner has done no harm
+SAVE_S = 30.0  # between two places that are saved ...
+NEAR_M, NEAR_S = 100.0, 5.0  # ... and with something so near, where a jump matters that is no longer than that
+UNKNOWN_S = 120.0  # how long a start has taken when no clock tells
+POINT_S = 5.0  # after LOITER was accepted what is told may still be the distance of the leg before it
+RUNS_S = 8.0  # how far a boat runs on in HOLD, where its sails are eased, in seconds at its speed of now
+BESIDE_HULL_M = 2.0  # of what it runs on towards
 POINT_SHUT = "the loiter's point cannot be sailed to from here"
 CODE = "position doubted"
 
@@ -57,35 +57,46 @@ CODE = "position doubted"
 def follow(ctx: StepContext) -> None:
     """Begin a doubt of the position, reckon on from where the boat was, and end it when there is evidence."""
     state, here, vehicle, age = (
-        ctx.state, ctx.snapshot.position_en_m, ctx.snapshot.vehicle, ctx.snapshot.vehicle_age_s)
+        ctx.state,
+        ctx.snapshot.position_en_m,
+        ctx.snapshot.vehicle,
+        ctx.snapshot.vehicle_age_s,
+    )
     if here is None or vehicle is None or age is None or age > FRESH_S:
         return
     _follow_filter(ctx)
     seen = _evidence(ctx, here, ctx.t_s - age)
     doubt = _begun(ctx, seen) if state.position.doubt is None else state.position.doubt.after(seen)
-    ctx.set(position=changed(
-        ctx.state.position,
-        restored=None if doubt is not None or utc_s(ctx) is not None else ctx.state.position.restored))
+    ctx.set(
+        position=changed(
+            ctx.state.position,
+            restored=None if doubt is not None or utc_s(ctx) is not None else ctx.state.position.restored,
+        )
+    )
     if doubt is None:
         _remember(ctx, here, None)
         return
-    if seen.is_jump and state.steering.own_mode is Mode.LOITER and ctx.autopilot is not None and (
-        ctx.autopilot.mode is Mode.LOITER
+    if (
+        seen.is_jump
+        and state.steering.own_mode is Mode.LOITER
+        and ctx.autopilot is not None
+        and (ctx.autopilot.mode is Mode.LOITER)
     ):
         ctx.set(position=changed(ctx.state.position, anew=Mode.HOLD))
     why = "" if state.position.doubt is None else doubt.believed_for(seen)
     if why:
         ctx.set(
             position=changed(ctx.state.position, doubt=None, back_s=ctx.t_s),
-            alarms=changed(
-                ctx.state.alarms, raised=tuple(r for r in state.alarms.raised if r.name != "position jump")))
+            alarms=changed(ctx.state.alarms, raised=tuple(r for r in state.alarms.raised if r.name != "position jump")),
+        )
         code = "position back" if doubt.is_back(here) else "position believed"
         ctx.say(Severity.NOTICE, code, f"the position is believed again: {why}", every_s=0.0)
         _remember(ctx, here, None)
         return
-    if state.position.doubt is None and not seen.is_jump:   # of a jump the watchdog speaks
-        ctx.say(Severity.WARNING, CODE, f"the position is doubted: {doubt.why}; reckoned on from where she was",
-                 every_s=0.0)
+    if state.position.doubt is None and not seen.is_jump:  # of a jump the watchdog speaks
+        ctx.say(
+            Severity.WARNING, CODE, f"the position is doubted: {doubt.why}; reckoned on from where she was", every_s=0.0
+        )
     ctx.set(position=changed(ctx.state.position, doubt=doubt))
     _remember(ctx, here, doubt)
 
@@ -97,16 +108,22 @@ def _evidence(ctx: StepContext, here: PointEn, at_s: float) -> Evidence:
     velocity = (0.0, 0.0) if vehicle is None else vehicle.velocity_en_mps
     told = status.gps2 if status is not None else None
     second = None if told is None else ctx.voyage.frame.en_from_geo(told)
-    if state.position.doubt is None:   # nothing of the rest matters
+    if state.position.doubt is None:  # nothing of the rest matters
         return Evidence(t_s=at_s, en_m=here, velocity_en_mps=velocity, is_jump=jumped, second_en_m=second)
     place = state.position.doubt.reckoned_en_m
     room_m, other_m = (float(room) for room in solid.clearance_m([here, place]))
     return Evidence(
-        t_s=at_s, en_m=here, velocity_en_mps=velocity, is_jump=jumped, is_possible=room_m > -ERROR_M,
+        t_s=at_s,
+        en_m=here,
+        velocity_en_mps=velocity,
+        is_jump=jumped,
+        is_possible=room_m > -ERROR_M,
         is_well=status is None or (status.ekf_ok and status.system_status != CRITICAL),
-        is_other_possible=other_m > -(ERROR_M + state.position.doubt.error_m), room_m=min(room_m, other_m),
+        is_other_possible=other_m > -(ERROR_M + state.position.doubt.error_m),
+        room_m=min(room_m, other_m),
         second_en_m=second,
-        is_given=state.operator.given_back_s >= state.position.doubt.since_s)
+        is_given=state.operator.given_back_s >= state.position.doubt.since_s,
+    )
 
 
 def _begun(ctx: StepContext, seen: Evidence) -> PositionDoubt | None:
@@ -117,18 +134,31 @@ def _begun(ctx: StepContext, seen: Evidence) -> PositionDoubt | None:
     if seen.is_jump and last is not None:
         silent_s = seen.t_s - last.t_s
         gap = f" in a silence of {silent_s:.0f} s" if silent_s > SILENT_S else ""
-        begun = PositionDoubt(since_s=ctx.t_s, t_s=last.t_s, settled_s=seen.t_s, reckoned_en_m=last.en_m,
-                              velocity_en_mps=last.velocity_en_mps, lost_m=lost_m,
-                              why=f"it jumped {ctx.jump_m:.0f} m{gap}")
+        begun = PositionDoubt(
+            since_s=ctx.t_s,
+            t_s=last.t_s,
+            settled_s=seen.t_s,
+            reckoned_en_m=last.en_m,
+            velocity_en_mps=last.velocity_en_mps,
+            lost_m=lost_m,
+            why=f"it jumped {ctx.jump_m:.0f} m{gap}",
+        )
         return begun.after(seen)
     if seen.is_contradicted and seen.second_en_m is not None:
         disputed_s = state.position.disputed_s if state.position.disputed_s is not None else ctx.t_s
         ctx.set(position=changed(ctx.state.position, disputed_s=disputed_s))
         if ctx.t_s - disputed_s >= DISPUTED_S:
             off_m = math.dist(seen.second_en_m, seen.en_m)
-            return PositionDoubt(since_s=ctx.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=seen.second_en_m,
-                                 velocity_en_mps=seen.velocity_en_mps, farthest_m=off_m, is_dispute=True,
-                                 why=f"a second receiver is {off_m:.0f} m away from it")
+            return PositionDoubt(
+                since_s=ctx.t_s,
+                t_s=seen.t_s,
+                settled_s=seen.t_s,
+                reckoned_en_m=seen.second_en_m,
+                velocity_en_mps=seen.velocity_en_mps,
+                farthest_m=off_m,
+                is_dispute=True,
+                why=f"a second receiver is {off_m:.0f} m away from it",
+            )
     elif state.position.disputed_s is not None:
         ctx.set(position=changed(ctx.state.position, disputed_s=None))
     if state.position.restored is not None:
@@ -138,9 +168,15 @@ def _begun(ctx: StepContext, seen: Evidence) -> PositionDoubt | None:
     if is_impossible(ctx.voyage.area, seen.en_m, margin_m=ctx.config.margin_m):
         deep_m = -float(ctx.voyage.area.unfenced.clearance_m([seen.en_m])[0])
         name = ctx.voyage.area.nearest_name(seen.en_m) or "an obstacle"
-        return PositionDoubt(since_s=ctx.t_s, t_s=seen.t_s, settled_s=seen.t_s, reckoned_en_m=seen.en_m,
-                             velocity_en_mps=seen.velocity_en_mps, error_m=deep_m + ctx.config.margin_m,
-                             why=f"it is {deep_m:.0f} m inside {name}")
+        return PositionDoubt(
+            since_s=ctx.t_s,
+            t_s=seen.t_s,
+            settled_s=seen.t_s,
+            reckoned_en_m=seen.en_m,
+            velocity_en_mps=seen.velocity_en_mps,
+            error_m=deep_m + ctx.config.margin_m,
+            why=f"it is {deep_m:.0f} m inside {name}",
+        )
     return None
 
 
@@ -148,19 +184,28 @@ def _since_the_last_start(ctx: StepContext, before: SavedPlace, seen: Evidence) 
     """Return the doubt of a fix that is not where the boat can have come to since it was saved, or was in doubt."""
     now_s, saved, late_s = utc_s(ctx), ctx.state.mission.adoptable, ctx.t_s - seen.t_s
     if now_s is not None and now_s < before.utc_s:
-        now_s = None   # a clock that was set back since tells nothing
+        now_s = None  # a clock that was set back since tells nothing
     passed_s = UNKNOWN_S if now_s is None else max(0.0, now_s - late_s - before.utc_s)
     last = Fix(t_s=seen.t_s - passed_s, en_m=before.en_m, velocity_en_mps=before.velocity_en_mps)
     off_m = ctx.innovation_m(last, held_in=None if saved is None else saved.own_mode)
     was_doubted = before.farthest_m > 0.0 and passed_s < LASTS_S
     if not was_doubted and (now_s is None or off_m < JUMP_M):
         return None
-    why = "it is in doubt before this start" if was_doubted else (
-        f"it jumped {off_m:.0f} m in the {passed_s:.0f} s before this start")
+    why = (
+        "it is in doubt before this start"
+        if was_doubted
+        else (f"it jumped {off_m:.0f} m in the {passed_s:.0f} s before this start")
+    )
     doubt = PositionDoubt(
-        since_s=ctx.t_s, t_s=last.t_s, settled_s=seen.t_s, reckoned_en_m=last.en_m,
-        velocity_en_mps=last.velocity_en_mps, error_m=before.error_m, farthest_m=before.farthest_m,
-        why=why).after(seen)
+        since_s=ctx.t_s,
+        t_s=last.t_s,
+        settled_s=seen.t_s,
+        reckoned_en_m=last.en_m,
+        velocity_en_mps=last.velocity_en_mps,
+        error_m=before.error_m,
+        farthest_m=before.farthest_m,
+        why=why,
+    ).after(seen)
     return None if was_doubted and doubt.is_back(seen.en_m) else doubt
 
 
@@ -177,7 +222,11 @@ def _follow_filter(ctx: StepContext) -> None:
 def _remember(ctx: StepContext, here: PointEn, doubt: PositionDoubt | None) -> None:
     """Keep for who comes after a kill where the boat is, and how fast; and at once when a doubt begins or ends."""
     now_s, before, vehicle, age = (
-        utc_s(ctx), ctx.state.position.place, ctx.snapshot.vehicle, ctx.snapshot.vehicle_age_s)
+        utc_s(ctx),
+        ctx.state.position.place,
+        ctx.snapshot.vehicle,
+        ctx.snapshot.vehicle_age_s,
+    )
     if now_s is None or vehicle is None or age is None or not ctx.state.voyage.sailing:
         return
     en_m = here if doubt is None else doubt.reckoned_en_m
@@ -187,11 +236,18 @@ def _remember(ctx: StepContext, here: PointEn, doubt: PositionDoubt | None) -> N
         if passed_s < SAVE_S and not is_near:
             return
     east, north = vehicle.velocity_en_mps
-    ctx.set(position=changed(ctx.state.position, place=SavedPlace(
-        utc_s=round(now_s - age, 1), en_m=(round(en_m[0], 1), round(en_m[1], 1)),
-        velocity_en_mps=(round(east, 2), round(north, 2)),
-        error_m=0.0 if doubt is None else round(doubt.error_m, 1),
-        farthest_m=0.0 if doubt is None else max(JUMP_M, round(doubt.farthest_m, 1)))))
+    ctx.set(
+        position=changed(
+            ctx.state.position,
+            place=SavedPlace(
+                utc_s=round(now_s - age, 1),
+                en_m=(round(en_m[0], 1), round(en_m[1], 1)),
+                velocity_en_mps=(round(east, 2), round(north, 2)),
+                error_m=0.0 if doubt is None else round(doubt.error_m, 1),
+                farthest_m=0.0 if doubt is None else max(JUMP_M, round(doubt.farthest_m, 1)),
+            ),
+        )
+    )
 
 
 # --------------------------------------------------------------------------------------------- held
@@ -207,9 +263,13 @@ def is_other_shut(ctx: StepContext) -> bool:
     share = min(1.0, AHEAD_S * max(vehicle.speed_mps, SLOW_MPS) / left_m) if left_m > 0.0 else 0.0
     drift = (AHEAD_S * vehicle.velocity_en_mps[0], AHEAD_S * vehicle.velocity_en_mps[1])
     floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m) + doubt.error_m
-    return min(
-        ctx.voyage.area.path_clearance_m([place, (place[0] + d[0], place[1] + d[1])])
-        for d in ((share * way[0], share * way[1]), drift)) < floor_m
+    return (
+        min(
+            ctx.voyage.area.path_clearance_m([place, (place[0] + d[0], place[1] + d[1])])
+            for d in ((share * way[0], share * way[1]), drift)
+        )
+        < floor_m
+    )
 
 
 def _is_steered_falsely(ctx: StepContext) -> bool:
@@ -226,7 +286,7 @@ def stands_off(ctx: StepContext) -> bool:
     if status is None or not ctx.snapshot.permissions.may_set_mode:
         return False
     if not status.ekf_ok or status.system_status == CRITICAL:
-        return False   # nor would it loiter then
+        return False  # nor would it loiter then
     if state.position.anew is None and _is_point_shut(ctx):
         ctx.set(position=changed(ctx.state.position, anew=Mode.HOLD))
     if ctx.state.position.anew is not None:
@@ -238,10 +298,11 @@ def stands_off(ctx: StepContext) -> bool:
         return False
     is_held = status.mode is state.steering.own_mode and state.steering.own_mode is Mode.LOITER
     if is_held:
-        stops_drift(ctx)   # which the reckoned track tells, too
+        stops_drift(ctx)  # which the reckoned track tells, too
         ctx.phase(
             Phase.HOLDING,
-            f"the position is doubted, {state.position.doubt.why}: waiting in a loiter until it can be believed")
+            f"the position is doubted, {state.position.doubt.why}: waiting in a loiter until it can be believed",
+        )
         return True
     is_stopped = status.mode is state.steering.own_mode and state.steering.own_mode in {Mode.HOLD, *HOMEWARD}
     if not (is_stopped or ctx.steers or _is_steered_falsely(ctx) or is_other_shut(ctx)):
@@ -250,18 +311,25 @@ def stands_off(ctx: StepContext) -> bool:
         return is_stopped
     if set_mode(ctx, Mode.LOITER, "the position is doubted and the reckoned place is not clear ahead"):
         ctx.set(operator=changed(ctx.state.operator, is_back=True))
-        ctx.say(Severity.WARNING, "standing off",
-                 f"the position is doubted ({state.position.doubt.why}) and the reckoned place is not clear ahead: "
-                  "loitering",
-                 every_s=0.0)
+        ctx.say(
+            Severity.WARNING,
+            "standing off",
+            f"the position is doubted ({state.position.doubt.why}) and the reckoned place is not clear ahead: "
+            "loitering",
+            every_s=0.0,
+        )
     return True
 
 
 def _is_point_shut(ctx: StepContext) -> bool:
     """Return whether a LOITER of ours, sailed back to the point that the autopilot tells, would lead over something."""
     status, boat = ctx.autopilot, ctx.boat_en
-    if status is None or boat is None or ctx.state.position.doubt is not None or (
-            status.mode is not Mode.LOITER or ctx.state.steering.own_mode is not Mode.LOITER):
+    if (
+        status is None
+        or boat is None
+        or ctx.state.position.doubt is not None
+        or (status.mode is not Mode.LOITER or ctx.state.steering.own_mode is not Mode.LOITER)
+    ):
         return False
     far_m, course = status.waypoint_distance_m, status.target_bearing_rad
     name, accepted_s = ctx.state.pending.accepted or ("", -math.inf)

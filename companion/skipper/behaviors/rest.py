@@ -16,10 +16,7 @@ from companion.skipper.behaviors.helm import hand_back, repair
 from companion.skipper.planning.diversions import home_trouble, is_at_rest, pressing
 from companion.skipper.step import CancelPlan, Diversion, DiversionKind, Phase, SafeEnd, StepContext
 
-ANSWERED = {
-    "": "for a person",
-    SHORE: "until the link to the shore is back, or a person gives AUTO",
-}
+ANSWERED = {"": "for a person", SHORE: "until the link to the shore is back, or a person gives AUTO"}
 TAKEN = "until a person takes her and gives AUTO back"
 UNTIL_TOLD = "until told to go on"
 
@@ -28,14 +25,20 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
     """Lie at the end of a diversion; True while the boat does."""
     if not is_at_rest(ctx) or ctx.state.steering.own_mode in STOPPING:
         return False
-    if ctx.is_raised(OUT_OF_TIME) and ctx.config.ends.end(OUT_OF_TIME) is not End.SAY and not (
-        ctx.state.operator.answering or pressing(ctx) is not None or bound.is_ordered
+    if (
+        ctx.is_raised(OUT_OF_TIME)
+        and ctx.config.ends.end(OUT_OF_TIME) is not End.SAY
+        and not (ctx.state.operator.answering or pressing(ctx) is not None or bound.is_ordered)
     ):
         reached = len(ctx.state.progress.reached)
         _end(ctx, f"out of time: {reached} of {len(ctx.voyage.legs)} goals reached", arrived=False)
         return True
-    if (bound.kind is DiversionKind.HOME and ctx.gate is None and not ctx.state.operator.answering
-            and not bound.is_ordered):
+    if (
+        bound.kind is DiversionKind.HOME
+        and ctx.gate is None
+        and not ctx.state.operator.answering
+        and not bound.is_ordered
+    ):
         ctx.set(voyage=changed(ctx.state.voyage, home_reached=True))
         rest(ctx)
         return True
@@ -53,8 +56,14 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
 
 def _how_long(ctx: StepContext) -> str:
     """Return how long a diversion that nobody ordered keeps the boat."""
-    until = next((ENDINGS[name].until for name in BY_RANK if ENDINGS[name].until and ctx.is_raised(name)
-                  and ctx.config.ends.end(name) is not End.SAY), "")
+    until = next(
+        (
+            ENDINGS[name].until
+            for name in BY_RANK
+            if ENDINGS[name].until and ctx.is_raised(name) and ctx.config.ends.end(name) is not End.SAY
+        ),
+        "",
+    )
     return until or ANSWERED.get(ctx.state.operator.answering, TAKEN)
 
 
@@ -76,8 +85,11 @@ def rest(ctx: StepContext) -> None:
         before = " before this start" if ctx.state.voyage.arrived else ""
         _end(ctx, f"{reached}{before}{home}{end}", arrived=not trouble)
         return
-    stopped = ctx.state.steering.own_mode in STOPPING and ctx.autopilot is not None and (
-        ctx.autopilot.mode is ctx.state.steering.own_mode)
+    stopped = (
+        ctx.state.steering.own_mode in STOPPING
+        and ctx.autopilot is not None
+        and (ctx.autopilot.mode is ctx.state.steering.own_mode)
+    )
     # the loiter's place is the same wherever the boat has been
     ctx.set(operator=changed(ctx.state.operator, is_back=False))
     why = waits_for(ctx) if stopped else ""

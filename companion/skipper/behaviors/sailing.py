@@ -41,14 +41,14 @@ from companion.skipper.way.geometry import along_m, bear_away_rad, bearing_rad, 
 from companion.skipper.way.voyage import PointEn
 from companion.traffic.plans import MIN_INTERVAL_S
 
-LEAD_S = 3.5         # a step to see it, the command, and the turn until the boat goes no farther that way
-LEAST_MPS = 1.0      # slower the boat may not get through the wind
-APART_S = 6.0        # between two tacks: the autopilot's own 5 s, and a step
-LOOK_S = 8.0         # of the other tack, which must be better
+LEAD_S = 3.5  # a step to see it, the command, and the turn until the boat goes no farther that way
+LEAST_MPS = 1.0  # slower the boat may not get through the wind
+APART_S = 6.0  # between two tacks: the autopilot's own 5 s, and a step
+LOOK_S = 8.0  # of the other tack, which must be better
 GAIN_M = 1.0
-NEXT_S = 2.0         # the tack that is asked for in the next step begins so far on
-LAST_S = 20.0        # so near the leg's end the layline decides, which the autopilot sees
-TURNING = 0.5        # of the boat's angle to the wind, more or less: then it is turning, or has borne away
+NEXT_S = 2.0  # the tack that is asked for in the next step begins so far on
+LAST_S = 20.0  # so near the leg's end the layline decides, which the autopilot sees
+TURNING = 0.5  # of the boat's angle to the wind, more or less: then it is turning, or has borne away
 
 
 def short_tack(ctx: StepContext) -> None:
@@ -69,10 +69,10 @@ def short_tack(ctx: StepContext) -> None:
     if ctx.t_s - ctx.state.steering.tacked_s < APART_S or is_busy(ctx, TACK) or is_uploading:
         return
     if not ctx.is_closed(boat, leg[1], wind):
-        return   # the leg is open: the autopilot follows it
+        return  # the leg is open: the autopilot follows it
     off = difference_rad(wind[0], vehicle.heading_rad)
     if not 0.5 * ctx.no_go_half_rad < abs(off) < 1.5 * ctx.no_go_half_rad:
-        return   # the boat is not close-hauled: turning, or bearing away
+        return  # the boat is not close-hauled: turning, or bearing away
     side = 1.0 if off >= 0.0 else -1.0
     floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
     now_m = _clearance_m(ctx, boat, vehicle.heading_rad, LEAD_S)
@@ -116,12 +116,23 @@ def _may_fail(ctx: StepContext, boat: PointEn, wind: tuple[float, float], floor_
 
 
 def _failed(
-    there: PointEn, course_rad: float, speed_mps: float, wind: tuple[float, float], carried_en_mps: PointEn,
+    there: PointEn,
+    course_rad: float,
+    speed_mps: float,
+    wind: tuple[float, float],
+    carried_en_mps: PointEn,
     irons_s: float,
 ) -> tuple[list[PointEn], list[PointEn]]:
     """Return the tracks of a tack that fails, blown back and not, as lists of places."""
-    blown, still = failed_tack(there, course_rad=course_rad, speed_mps=speed_mps, twd_from_rad=wind[0],
-                               tws_mps=wind[1], current_en_mps=carried_en_mps, irons_s=irons_s)
+    blown, still = failed_tack(
+        there,
+        course_rad=course_rad,
+        speed_mps=speed_mps,
+        twd_from_rad=wind[0],
+        tws_mps=wind[1],
+        current_en_mps=carried_en_mps,
+        irons_s=irons_s,
+    )
     return [(float(e), float(n)) for e, n in blown], [(float(e), float(n)) for e, n in still]
 
 
@@ -147,8 +158,13 @@ def shift_tack(ctx: StepContext) -> None:
     boat, leg, wind, vehicle, status = ctx.boat_en, ctx.leg(), ctx.wind_now, ctx.snapshot.vehicle, ctx.autopilot
     if not ctx.config.shifts or boat is None or leg is None or wind is None or vehicle is None or status is None:
         return
-    if not ctx.ahead() or status.mode is not Mode.AUTO or ctx.speed_mps < LEAST_MPS or tacks_fail(ctx) or (
-            not ctx.voyage.boat.can_tack):
+    if (
+        not ctx.ahead()
+        or status.mode is not Mode.AUTO
+        or ctx.speed_mps < LEAST_MPS
+        or tacks_fail(ctx)
+        or (not ctx.voyage.boat.can_tack)
+    ):
         return
     is_too_soon = ctx.t_s - ctx.state.steering.tacked_s < ctx.config.shift_tacks_apart_s
     if is_too_soon or is_busy(ctx, TACK) or ctx.state.pending.upload is not None:
@@ -170,19 +186,21 @@ def shift_tack(ctx: StepContext) -> None:
         return
     headed_deg = math.degrees(shift_rad if is_port else -shift_rad)
     edge = "layline" if beat.table.corridor_m < ctx.tack_corridor_m - 0.1 else "corridor's edge"
-    words = f"headed {headed_deg:.0f}°" if headed_deg >= 0.5 else (
-        f"lifted {max(0.0, -headed_deg):.0f}°, near the {edge}")
+    words = (
+        f"headed {headed_deg:.0f}°" if headed_deg >= 0.5 else (f"lifted {max(0.0, -headed_deg):.0f}°, near the {edge}")
+    )
     tack(ctx, "shift tack", f"{words}: tack; expected gain {gain_s:.1f} s of {to_go_s:.0f} to go")
 
 
 HAIR_M = 0.5
-STEER_S = 25.0               # bearing away longer than this has failed
-SAILS_MPS = 0.8              # out of irons
+STEER_S = 25.0  # bearing away longer than this has failed
+SAILS_MPS = 0.8  # out of irons
 IN_IRONS = "she was in irons"
 SAILS_TWA_RAD = math.radians(60.0)
 # Reasons that can wait among vessels, where plans must not follow each other fast (Büsser 5.2).
-ROUTINE = frozenset({
-    ReplanReason.WAYPOINT, ReplanReason.FORECAST, ReplanReason.WIND_SHIFT, ReplanReason.PLAN_AGE, ReplanReason.OFF_LEG})
+ROUTINE = frozenset(
+    {ReplanReason.WAYPOINT, ReplanReason.FORECAST, ReplanReason.WIND_SHIFT, ReplanReason.PLAN_AGE, ReplanReason.OFF_LEG}
+)
 
 
 def is_at_end(ctx: StepContext) -> bool:
@@ -195,7 +213,7 @@ def stand_off(ctx: StepContext) -> bool:
     if not stands_off(ctx):
         return False
     if not is_at_end(ctx) and ctx.state.position.doubt is None and ctx.state.pending.upload is None:
-        _consider(ctx)   # from where the boat is known to be, while its loiter is begun anew
+        _consider(ctx)  # from where the boat is known to be, while its loiter is begun anew
     return True
 
 
@@ -242,8 +260,12 @@ def follow_route(ctx: StepContext) -> bool:
     if ctx.steers:
         _send_heading(ctx)
     elif ctx.guidance is not Guidance.PLAN:
-        ctx.say(Severity.WARNING, "guidance", f"guidance by {ctx.guidance.value} is asked for and steering is "
-                 "not permitted: by plan", every_s=600.0)
+        ctx.say(
+            Severity.WARNING,
+            "guidance",
+            f"guidance by {ctx.guidance.value} is asked for and steering is not permitted: by plan",
+            every_s=600.0,
+        )
         check_current(ctx)
     else:
         leave_passed(ctx)
@@ -296,8 +318,12 @@ def _goes_on_at_once(ctx: StepContext) -> bool:
     that a plan and its upload take; AUTO takes one, and a plan made under way begins where it will be.
     """
     state = ctx.state
-    return state.steering.own_mode in HOMEWARD and state.pending.upload is None and bool(ctx.ahead()) and (
-        not _is_outside(ctx) and _is_way_clear(ctx))
+    return (
+        state.steering.own_mode in HOMEWARD
+        and state.pending.upload is None
+        and bool(ctx.ahead())
+        and (not _is_outside(ctx) and _is_way_clear(ctx))
+    )
 
 
 def _is_way_clear(ctx: StepContext) -> bool:
@@ -331,7 +357,7 @@ def _send_heading(ctx: StepContext) -> None:
     if status is None:
         return
     own = ctx.state.steering.own_mode
-    is_stopping = own in STOPPING and is_busy(ctx, own.name)   # asked for, and not shown yet
+    is_stopping = own in STOPPING and is_busy(ctx, own.name)  # asked for, and not shown yet
     if status.mode is not Mode.GUIDED:
         if not is_stopping:
             set_mode(ctx, Mode.GUIDED, f"steering by {'field' if ctx.guidance is Guidance.FIELD else 'headings'}")
@@ -363,20 +389,20 @@ def _consider(ctx: StepContext) -> None:
     if trigger.reason in ROUTINE and near(ctx):
         interval_s = max(interval_s, MIN_INTERVAL_S)
     if trigger.reason in ROUTINE - {ReplanReason.OFF_LEG} and stands_on(ctx):
-        return   # rule 17 a i: course and speed are kept
+        return  # rule 17 a i: course and speed are kept
     if ctx.t_s - state.plans.last_s < interval_s:
         return
     if request(ctx, trigger.reason, from_index=trigger.from_index, text=trigger.text):
         at = ctx.state.plans.replanned_index if trigger.from_index is None else trigger.from_index
         ctx.set(
             operator=changed(ctx.state.operator, is_back=False),
-            plans=changed(ctx.state.plans, asked="", replanned_index=at))
+            plans=changed(ctx.state.plans, asked="", replanned_index=at),
+        )
 
 
 def bear_away(ctx: StepContext) -> bool:
     """Bear away out of irons under GUIDED; True while the helm is ours."""
-    state, status, vehicle, boat, wind = (
-        ctx.state, ctx.autopilot, ctx.snapshot.vehicle, ctx.boat_en, ctx.wind_now)
+    state, status, vehicle, boat, wind = (ctx.state, ctx.autopilot, ctx.snapshot.vehicle, ctx.boat_en, ctx.wind_now)
     if state.steering.until_s is None:
         if "in irons" not in ctx.fresh or boat is None or vehicle is None or wind is None:
             return False
@@ -390,17 +416,24 @@ def bear_away(ctx: StepContext) -> bool:
             return False
     heading_rad = ctx.state.steering.heading_rad or 0.0
     until = ctx.state.steering.until_s
-    out = vehicle is not None and wind is not None and vehicle.speed_mps > SAILS_MPS and (
-        abs(difference_rad(wind[0], vehicle.heading_rad)) > SAILS_TWA_RAD)
+    out = (
+        vehicle is not None
+        and wind is not None
+        and vehicle.speed_mps > SAILS_MPS
+        and (abs(difference_rad(wind[0], vehicle.heading_rad)) > SAILS_TWA_RAD)
+    )
     refused = status is not None and status.mode is Mode.AUTO and not is_busy(ctx, Mode.GUIDED.name)
     over = out or refused or (until is not None and ctx.t_s > until)
-    if over and (refused or ctx.steers or set_mode(
-            ctx, Mode.AUTO, "sailing again" if out else "bearing away took too long")):
+    if over and (
+        refused or ctx.steers or set_mode(ctx, Mode.AUTO, "sailing again" if out else "bearing away took too long")
+    ):
         # The mode we asked for ourselves stays ours until AUTO shows.
         ctx.set(
             steering=changed(
-                ctx.state.steering, until_s=None, heading_rad=None, own_mode=None if refused else Mode.GUIDED),
-            plans=changed(ctx.state.plans, asked=IN_IRONS))
+                ctx.state.steering, until_s=None, heading_rad=None, own_mode=None if refused else Mode.GUIDED
+            ),
+            plans=changed(ctx.state.plans, asked=IN_IRONS),
+        )
         return False
     ctx.act(SteerHeading(heading_rad=heading_rad, text="out of irons"))
     ctx.phase(ctx.state.phase, f"in irons: waiting for her to bear away to {math.degrees(heading_rad) % 360.0:.0f}°")
@@ -429,8 +462,12 @@ def _name(ctx: StepContext) -> None:
         ctx.phase(Phase.HOLDING, f"loitering in the mission's safe end: waiting for a plan{again}{tail}")
     elif bound is not None:
         ctx.phase(Phase.STANDARD, f"item {state.mission.index + 1} of {len(route.items)} {bound.sentence}{step}{tail}")
-    elif gate is not None and is_buoy(gate) and gate.buoy_en_m is not None and ctx.boat_en is not None and (
-        distance_m(ctx.boat_en, gate.buoy_en_m) < 4.0 * distance_m(gate.en_m, gate.buoy_en_m)
+    elif (
+        gate is not None
+        and is_buoy(gate)
+        and gate.buoy_en_m is not None
+        and ctx.boat_en is not None
+        and (distance_m(ctx.boat_en, gate.buoy_en_m) < 4.0 * distance_m(gate.en_m, gate.buoy_en_m))
     ):
         ctx.phase(Phase.BUOY_APPROACH, f"{gate.name} to {gate.side.value}{step}{tail}")
     elif state.mission.index == ctx.last_waypoint() and route.gate_of[state.mission.index] == len(ctx.gates) - 1:

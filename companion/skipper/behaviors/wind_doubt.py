@@ -31,21 +31,21 @@ from companion.skipper.way.drift import HORIZON_S, floor_after_s
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.voyage import AreaLike, PointEn, water_at
 
-SAID_S = 60.0                       # between two words on a wind that is not known
-SEA_ROOM = "sea room"               # the rung of a route that leads there, and the code under which it is said
-ASTERN_SHARE = 0.2                  # of the wind's speed: how fast a LOITER by a wrong wind is driven astern
-SPREAD_RAD = math.radians(15.0)     # of the true wind while it is not measured
-PAD_RAD = math.radians(10.0)        # outside the true no-go zone, for the same reason
-EASED_RAD = math.radians(10.0)      # a sheet that is eased farther than this for the true wind does not draw
-LOOKS_EVERY_S = 5.0                 # for sea room: hundreds of legs and drifts are tried
-ROOMY_S = 60.0                      # of drift gained: for less the boat is not sent elsewhere
+SAID_S = 60.0  # between two words on a wind that is not known
+SEA_ROOM = "sea room"  # the rung of a route that leads there, and the code under which it is said
+ASTERN_SHARE = 0.2  # of the wind's speed: how fast a LOITER by a wrong wind is driven astern
+SPREAD_RAD = math.radians(15.0)  # of the true wind while it is not measured
+PAD_RAD = math.radians(10.0)  # outside the true no-go zone, for the same reason
+EASED_RAD = math.radians(10.0)  # a sheet that is eased farther than this for the true wind does not draw
+LOOKS_EVERY_S = 5.0  # for sea room: hundreds of legs and drifts are tried
+ROOMY_S = 60.0  # of drift gained: for less the boat is not sent elsewhere
 RINGS_M = (40.0, 60.0, 80.0, 120.0, 160.0, 240.0)
 DIRECTIONS = 36
-AHEAD_S = 3.0                       # what the boat sails on until it turns on to a leg that is being uploaded
-WAY_MPS = 0.3                       # made good towards it: slower the leg is not sailed
-TURNS_S = 20.0                      # from lying head to wind until it is
-STRAYS_M = 15.0                     # from the loiter's point: LOITER turns in circles of 12 m
-LEG_CLEAR_M = 1.0                       # beside the hull: what the rest of a leg that it was set off must keep
+AHEAD_S = 3.0  # what the boat sails on until it turns on to a leg that is being uploaded
+WAY_MPS = 0.3  # made good towards it: slower the leg is not sailed
+TURNS_S = 20.0  # from lying head to wind until it is
+STRAYS_M = 15.0  # from the loiter's point: LOITER turns in circles of 12 m
+LEG_CLEAR_M = 1.0  # beside the hull: what the rest of a leg that it was set off must keep
 HAIR_M = 0.5
 
 
@@ -75,18 +75,24 @@ def doubted_wind(ctx: StepContext) -> DoubtedWind | None:
     told, vehicle = ctx.wind_now, ctx.snapshot.vehicle
     if told is not None and vehicle is not None and goes_astern(ctx):
         return DoubtedWind(
-            true_from_rad=vehicle.heading_rad, told_from_rad=told[0], drift_en_mps=vehicle.velocity_en_mps)
+            true_from_rad=vehicle.heading_rad, told_from_rad=told[0], drift_en_mps=vehicle.velocity_en_mps
+        )
     before, route = ctx.snapshot.wind_before, ctx.state.mission.route
     if before is None and told is not None and route is not None and route.plan_tws_mps > 0.0:
         # Not remembered over a restart: the wind that the way on board was planned in is.
-        before = WindBefore(twd_from_rad=route.plan_twd_from_rad, tws_mps=route.plan_tws_mps,
-                            turned_rad=difference_rad(told[0], route.plan_twd_from_rad))
+        before = WindBefore(
+            twd_from_rad=route.plan_twd_from_rad,
+            tws_mps=route.plan_tws_mps,
+            turned_rad=difference_rad(told[0], route.plan_twd_from_rad),
+        )
     if before is None or abs(before.turned_rad) < ctx.no_go_half_rad:
-        return None   # within that the told no-go zone keeps the bow off the true wind
+        return None  # within that the told no-go zone keeps the bow off the true wind
     leeward, speed = before.twd_from_rad + math.pi, ASTERN_SHARE * before.tws_mps
     return DoubtedWind(
-        true_from_rad=before.twd_from_rad, told_from_rad=wrap_pi(before.twd_from_rad + before.turned_rad),
-        drift_en_mps=(speed * math.sin(leeward), speed * math.cos(leeward)))
+        true_from_rad=before.twd_from_rad,
+        told_from_rad=wrap_pi(before.twd_from_rad + before.turned_rad),
+        drift_en_mps=(speed * math.sin(leeward), speed * math.cos(leeward)),
+    )
 
 
 # ------------------------------------------------------------------------------------------ sea room
@@ -97,12 +103,14 @@ def seeks_sea_room(ctx: StepContext) -> bool:
     if not ctx.snapshot.unsure or status is None or boat is None or vehicle is None or route is None:
         return False
     if not (may.may_set_mode and may.may_upload and status.ekf_ok and state.voyage.sailing) or (
-            state.by_field.resort.engaged or state.mission.foreign):
+        state.by_field.resort.engaged or state.mission.foreign
+    ):
         return False
     wind = doubted_wind(ctx)
     water = water_at(ctx.voyage.area, boat)
-    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m,
-                  max(0.0, float(water.clearance_m([boat])[0]) - HAIR_M))
+    floor_m = min(
+        ctx.config.margin_floor_m, ctx.config.margin_m, max(0.0, float(water.clearance_m([boat])[0]) - HAIR_M)
+    )
     if state.pending.upload is not None:
         leads_there = state.pending.upload.route.rung == SEA_ROOM
         if leads_there:
@@ -114,34 +122,49 @@ def seeks_sea_room(ctx: StepContext) -> bool:
             hand_back(ctx)
         ctx.phase(Phase.HOLDING, route.why)
         return True
-    if wind is None or left_s >= HORIZON_S or _stays(ctx, boat, wind) or ctx.t_s < max(
-            state.pending.upload_retry.not_before_s, state.adrift.looked_s + LOOKS_EVERY_S):
+    if (
+        wind is None
+        or left_s >= HORIZON_S
+        or _stays(ctx, boat, wind)
+        or ctx.t_s < max(state.pending.upload_retry.not_before_s, state.adrift.looked_s + LOOKS_EVERY_S)
+    ):
         return False
     ctx.set(adrift=replace(state.adrift, looked_s=ctx.t_s))
-    runs_s = 0.0 if goes_astern(ctx) else AHEAD_S   # a sheet that draws stops the boat at once
+    runs_s = 0.0 if goes_astern(ctx) else AHEAD_S  # a sheet that draws stops the boat at once
     ahead = (boat[0] + runs_s * vehicle.velocity_en_mps[0], boat[1] + runs_s * vehicle.velocity_en_mps[1])
     starts = [ahead]
-    if status.mode is Mode.LOITER:   # it turns in circles: the leg begins anywhere about here
+    if status.mode is Mode.LOITER:  # it turns in circles: the leg begins anywhere about here
         starts += [moved(boat, math.radians(off), AHEAD_S * vehicle.speed_mps) for off in (0.0, 90.0, 180.0, 270.0)]
     found = sea_room(
-        water, boat, starts, wind, no_go_half_rad=ctx.no_go_half_rad, clear_m=(ctx.config.margin_m, floor_m))
+        water, boat, starts, wind, no_go_half_rad=ctx.no_go_half_rad, clear_m=(ctx.config.margin_m, floor_m)
+    )
     if found is None or found[1] < left_s + ROOMY_S:
         return False
     _stop_planning(ctx)
     place, gained_s = found
     keep = min(state.mission.index, len(route.items) - 1)
     onto = water.nearest_name(boat) or "something"
-    text = (f"{ctx.snapshot.unsure}: a loiter here would drift onto {onto} in {left_s:.0f} s; waiting until there is "
-            f"{'sea room' if gained_s >= HORIZON_S else f'room for {gained_s:.0f} s'}")
+    text = (
+        f"{ctx.snapshot.unsure}: a loiter here would drift onto {onto} in {left_s:.0f} s; waiting until there is "
+        f"{'sea room' if gained_s >= HORIZON_S else f'room for {gained_s:.0f} s'}"
+    )
     away = replace(
-        route, items=(*route.items[:keep], waypoint(
-            ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)),
-        points_en_m=(*route.points_en_m[:keep], place), leg_from_en_m=(*route.leg_from_en_m[:keep], boat),
-        gate_of=(*route.gate_of[:keep], -1), rung=SEA_ROOM, risk=None, cost_s=None, median_s=None, late_s=None,
-        bound_for="", why=text)
+        route,
+        items=(*route.items[:keep], waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)),
+        points_en_m=(*route.points_en_m[:keep], place),
+        leg_from_en_m=(*route.leg_from_en_m[:keep], boat),
+        gate_of=(*route.gate_of[:keep], -1),
+        rung=SEA_ROOM,
+        risk=None,
+        cost_s=None,
+        median_s=None,
+        late_s=None,
+        bound_for="",
+        why=text,
+    )
     upload(ctx, away, keep + 1, text)
     if not state.adrift.loitered:
-        ctx.set(adrift=replace(ctx.state.adrift, loiter_en_m=None))   # the next LOITER begins elsewhere
+        ctx.set(adrift=replace(ctx.state.adrift, loiter_en_m=None))  # the next LOITER begins elsewhere
     ctx.say(Severity.WARNING, SEA_ROOM, text, every_s=0.0)
     ctx.phase(Phase.HOLDING, text)
     return True
@@ -171,9 +194,7 @@ def _is_on_the_way(ctx: StepContext, water: AreaLike, boat: PointEn, place: Poin
     return made_good_mps >= WAY_MPS or ctx.t_s - ctx.state.mission.uploaded_s < TURNS_S
 
 
-def _left_s(
-    water: AreaLike, place: PointEn, wind: DoubtedWind, floor_m: float, *, beyond_s: float = 0.0,
-) -> float:
+def _left_s(water: AreaLike, place: PointEn, wind: DoubtedWind, floor_m: float, *, beyond_s: float = 0.0) -> float:
     """Return for how long a LOITER that begins at a place keeps the floor [s], at most ``HORIZON_S``.
 
     Anything up to ``beyond_s`` where it does so for no longer than that.
@@ -189,7 +210,12 @@ def _left_s(
 
 
 def sea_room(
-    water: AreaLike, boat: PointEn, starts: Sequence[PointEn], wind: DoubtedWind, *, no_go_half_rad: float,
+    water: AreaLike,
+    boat: PointEn,
+    starts: Sequence[PointEn],
+    wind: DoubtedWind,
+    *,
+    no_go_half_rad: float,
     clear_m: Sequence[float],
 ) -> tuple[PointEn, float] | None:
     """Return the nearest place from which a LOITER drifts clear, else the one from which it does so longest [s].
@@ -203,7 +229,8 @@ def sea_room(
     for least_m in clear_m:
         for place in _places(boat, wind, no_go_half_rad):
             if float(water.clearance_m(np.array([place]))[0]) < least_m + STRAYS_M or (
-                    min(water.path_clearance_m([boat, start, place]) for start in starts) < least_m):
+                min(water.path_clearance_m([boat, start, place]) for start in starts) < least_m
+            ):
                 continue
             left_s = _left_s(water, place, wind, least_m, beyond_s=0.0 if best is None else best[1])
             if best is None or left_s > best[1]:
@@ -235,11 +262,11 @@ def holds(ctx: StepContext) -> bool:
     if state.by_field.resort.engaged or not ctx.snapshot.permissions.may_set_mode or not status.ekf_ok:
         return False
     if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
-        if memory.loiter_en_m is None:   # by a wrong wind the boat may be carried off it, which is a drift
+        if memory.loiter_en_m is None:  # by a wrong wind the boat may be carried off it, which is a drift
             ctx.set(adrift=replace(memory, loiter_en_m=ctx.boat_en, loiter_s=ctx.t_s))
         ctx.phase(Phase.HOLDING, f"{why}: waiting in a loiter until the wind is known")
         return True
-    if state.steering.until_s is not None:      # out of irons, it was believed
+    if state.steering.until_s is not None:  # out of irons, it was believed
         ctx.set(steering=changed(ctx.state.steering, until_s=None, heading_rad=None))
     if not is_busy(ctx, Mode.LOITER.name) and set_mode(ctx, Mode.LOITER, why):
         ctx.set(operator=changed(ctx.state.operator, is_back=True))

@@ -23,8 +23,9 @@ _SURELY_M = 0.004
 
 def marked(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
     """Return ``items`` with our mark in each that has a place."""
-    return tuple(replace(item, alt_m=_mark_cm(item) / 100.0 + _SURELY_M) if _has_place(item) else item
-                 for item in items)
+    return tuple(
+        replace(item, alt_m=_mark_cm(item) / 100.0 + _SURELY_M) if _has_place(item) else item for item in items
+    )
 
 
 def are_marked(items: Sequence[MissionItem]) -> bool:
@@ -38,7 +39,8 @@ def is_remnant(items: Sequence[MissionItem], drawn: Sequence[MissionItem]) -> bo
     left = {(item.command, item.lat_e7, item.lon_e7) for item in drawn}
     ours = [item for item in items if _has_place(item) and _is_marked(item)]
     return bool(ours) and all(
-        item in ours or (item.command, item.lat_e7, item.lon_e7) in left for item in effective(items))
+        item in ours or (item.command, item.lat_e7, item.lon_e7) in left for item in effective(items)
+    )
 
 
 def _has_place(item: MissionItem) -> bool:
@@ -51,4 +53,4 @@ def _is_marked(item: MissionItem) -> bool:
 
 def _mark_cm(item: MissionItem) -> int:
     mark = 1 + zlib.crc32(_PLACE.pack(item.command, item.lat_e7, item.lon_e7)) % MARKS
-    return mark if mark % 50 else mark + 7   # never a round altitude, which people give
+    return mark if mark % 50 else mark + 7  # never a round altitude, which people give

@@ -21,7 +21,7 @@ from companion.skipper.step.state import Inside, saved_of
 from companion.words import counted
 
 REMEDY = "it is not resumed; waiting for [operator] replace_foreign, or an order, to allow its replacement"
-FOREIGN_REREAD_S = 30.0   # a mission that is not ours is read again this often
+FOREIGN_REREAD_S = 30.0  # a mission that is not ours is read again this often
 
 
 def mission_is_known(ctx: StepContext) -> bool:
@@ -41,9 +41,14 @@ def mission_is_known(ctx: StepContext) -> bool:
         age_s = ctx.t_s - state.mission.read_t_s
         if state.voyage.sailing and age_s > ctx.config.reread_s and state.pending.read is None:
             _read(ctx, "a look now and then whether it is still ours")
-        elif state.mission.read_t_s > state.mission.read_since_s and state.mission.read_items is not None and (
-            state.mission.route is not None and state.mission.read_t_s == ctx.t_s
-            and not is_same_mission(state.mission.read_items, state.mission.route.items)
+        elif (
+            state.mission.read_t_s > state.mission.read_since_s
+            and state.mission.read_items is not None
+            and (
+                state.mission.route is not None
+                and state.mission.read_t_s == ctx.t_s
+                and not is_same_mission(state.mission.read_items, state.mission.route.items)
+            )
         ):
             ctx.set(mission=changed(ctx.state.mission, checked=False, read_since_s=state.mission.read_t_s))
         else:
@@ -104,8 +109,9 @@ def _compare(ctx: StepContext, items: tuple[MissionItem, ...]) -> bool:
         if saved is not None:
             _take_up(ctx, saved)
             ctx.set(voyage=changed(ctx.state.voyage, sailing=state.voyage.sailing or _under_way(ctx)))
-        ctx.set(mission=changed(
-            ctx.state.mission, route=state.mission.route or newest, unsure_route=newest, repair=True))
+        ctx.set(
+            mission=changed(ctx.state.mission, route=state.mission.route or newest, unsure_route=newest, repair=True)
+        )
         return True
     # Under way we know what we have put there: a list of ours that we did not put there is somebody's order.
     if not state.voyage.sailing and (mission_hash(items) in state.mission.known or are_marked(items)):
@@ -113,9 +119,15 @@ def _compare(ctx: StepContext, items: tuple[MissionItem, ...]) -> bool:
         return True
     if not state.mission.read_twice and not state.mission.foreign:
         # behind this very read, which has the step's own time
-        ctx.set(mission=changed(
-            ctx.state.mission, checked=False, read_since_s=math.nextafter(ctx.t_s, math.inf), read_twice=True,
-            adoptable=saved))
+        ctx.set(
+            mission=changed(
+                ctx.state.mission,
+                checked=False,
+                read_since_s=math.nextafter(ctx.t_s, math.inf),
+                read_twice=True,
+                adoptable=saved,
+            )
+        )
         phase = ctx.state.phase if state.voyage.sailing else Phase.WAITING
         ctx.phase(phase, "waiting for a second reading: the mission that was read is not ours")
         return False
@@ -124,9 +136,15 @@ def _compare(ctx: StepContext, items: tuple[MissionItem, ...]) -> bool:
         return True
     text = f"the mission on the autopilot ({len(items)} items) is not ours"
     # What we had is kept as after a restart: a mission of ours that is read again is taken over.
-    ctx.set(mission=changed(
-        ctx.state.mission, foreign=text, route=None, unsure_route=None,
-        adoptable=saved or saved_of(state, ctx.voyage.name)))
+    ctx.set(
+        mission=changed(
+            ctx.state.mission,
+            foreign=text,
+            route=None,
+            unsure_route=None,
+            adoptable=saved or saved_of(state, ctx.voyage.name),
+        )
+    )
     if not state.mission.foreign:
         ctx.say(Severity.ERROR, "foreign mission", f"{text}; {REMEDY}", every_s=0.0)
         ctx.say(Severity.WARNING, "drawn mission", offer(items, adopts=ctx.config.adopts), every_s=0.0)
@@ -144,8 +162,8 @@ def _is_ours_again(ctx: StepContext) -> bool:
     state = ctx.state
     if state.mission.read_items is None or state.mission.read_t_s != ctx.t_s:
         patient = (
-            ctx.t_s - state.mission.read_t_s > FOREIGN_REREAD_S
-            and ctx.t_s >= state.pending.read_retry.not_before_s)
+            ctx.t_s - state.mission.read_t_s > FOREIGN_REREAD_S and ctx.t_s >= state.pending.read_retry.not_before_s
+        )
         if patient and state.pending.read is None:
             _read(ctx, "is it still a stranger's?")
         return False
@@ -165,8 +183,12 @@ def _take_over(ctx: StepContext, items: tuple[MissionItem, ...], saved: Persiste
     if not _under_way(ctx):
         _take_up(ctx, saved)
         ctx.set(mission=changed(ctx.state.mission, route=None, unsure_route=None))
-        ctx.say(Severity.NOTICE, "earlier mission", "the mission on board is an earlier one of ours, or the drawing "
-                 "that is sailed: it is replaced", every_s=0.0)
+        ctx.say(
+            Severity.NOTICE,
+            "earlier mission",
+            "the mission on board is an earlier one of ours, or the drawing that is sailed: it is replaced",
+            every_s=0.0,
+        )
         return
     ctx.set(mission=changed(ctx.state.mission, route=_route_of(ctx, items), unsure_route=None))
     _adopt(ctx, saved, "an earlier one of ours, or the drawing: sailing on by it until there is a plan")
@@ -178,11 +200,17 @@ def _route_of(ctx: StepContext, items: tuple[MissionItem, ...]) -> Route:
     home = ctx.voyage.home_en_m or ctx.boat_en or (0.0, 0.0)
     points = tuple(
         home if item.command == Command.NAV_RETURN_TO_LAUNCH else ctx.voyage.frame.en_from_geo(item.point)
-        for item in whole)
+        for item in whole
+    )
     facts = ctx.blank_facts(NO_PLAN, ctx.config.margin_m, ctx.config.delta_s, HELD_BACK)
     return replace(
-        facts, items=whole, points_en_m=points, leg_from_en_m=(points[0], *points[:-1]), gate_of=(-1,) * len(whole),
-        why="a mission of ours that was not saved")
+        facts,
+        items=whole,
+        points_en_m=points,
+        leg_from_en_m=(points[0], *points[:-1]),
+        gate_of=(-1,) * len(whole),
+        why="a mission of ours that was not saved",
+    )
 
 
 def _under_way(ctx: StepContext) -> bool:
@@ -192,11 +220,18 @@ def _under_way(ctx: StepContext) -> bool:
 
 def _take_up(ctx: StepContext, saved: Persisted) -> None:
     """Take up the voyage where it was: the gates that are passed, and the way round the next buoy."""
-    ctx.set(progress=changed(
-        ctx.state.progress, gate=saved.gate, approaches=saved.approaches,
-        bearing_rad=0.5 * math.pi * saved.quarters, is_blind=True,
-        inside=None if saved.inside is None else Inside(goal=saved.inside[0], t_s=ctx.t_s, utc_s=saved.inside[1]),
-        searched=saved.searched, covered=saved.covered))
+    ctx.set(
+        progress=changed(
+            ctx.state.progress,
+            gate=saved.gate,
+            approaches=saved.approaches,
+            bearing_rad=0.5 * math.pi * saved.quarters,
+            is_blind=True,
+            inside=None if saved.inside is None else Inside(goal=saved.inside[0], t_s=ctx.t_s, utc_s=saved.inside[1]),
+            searched=saved.searched,
+            covered=saved.covered,
+        )
+    )
 
 
 def _adopt(ctx: StepContext, saved: Persisted, what: str = "ours") -> None:
@@ -208,10 +243,12 @@ def _adopt(ctx: StepContext, saved: Persisted, what: str = "ours") -> None:
         mission=changed(ctx.state.mission, index=index, own_index=index),
         steering=changed(ctx.state.steering, own_mode=saved.own_mode),
         adrift=replace(ctx.state.adrift, motor=saved.motor),
-        operator=changed(ctx.state.operator, is_back=saved.own_mode in STOPPING),   # the boat has drifted since
+        operator=changed(ctx.state.operator, is_back=saved.own_mode in STOPPING),  # the boat has drifted since
         # Armed but not in AUTO: somebody else has taken the boat while we were away.
         voyage=changed(
-            ctx.state.voyage, sailing=_under_way(ctx) or (saved.sailing and status is not None and status.is_armed)))
+            ctx.state.voyage, sailing=_under_way(ctx) or (saved.sailing and status is not None and status.is_armed)
+        ),
+    )
     ctx.say(Severity.NOTICE, "adopted", f"the mission on board is {what}, taken over at item {index + 1}", every_s=0.0)
 
 
@@ -228,6 +265,7 @@ def adopt(ctx: StepContext) -> str:
     trouble = hindrance(state.mission.read_items)
     if trouble:
         return f"what was drawn cannot be sailed: {trouble}"
-    ctx.act(AdoptDrawing(
-        text=f"the mission of {counted(len(state.mission.read_items), 'item')} that was drawn is adopted"))
+    ctx.act(
+        AdoptDrawing(text=f"the mission of {counted(len(state.mission.read_items), 'item')} that was drawn is adopted")
+    )
     return ""

@@ -11,7 +11,7 @@ from companion.mavlink.vehicle_identity import ROVERS, Identity, type_words
 from companion.messages import Severity
 from companion.skipper.step import CancelPlan, Phase, StepContext, StopOrders
 
-BOAT_CLASS = 2         # FRAME_CLASS of ArduRover
+BOAT_CLASS = 2  # FRAME_CLASS of ArduRover
 SAY_EVERY_S = 60.0
 
 
@@ -19,9 +19,12 @@ def judge(ctx: StepContext) -> None:
     """Judge whose autopilot is heard, before anything else is done; stop all orders when it may not be ours."""
     identity = ctx.snapshot.identity
     if ctx.snapshot.has_company:
-        ctx.say(Severity.ERROR, "second companion",
-                 "a second companion speaks for this boat: stop one of the two, they give her different orders",
-                 every_s=SAY_EVERY_S)
+        ctx.say(
+            Severity.ERROR,
+            "second companion",
+            "a second companion speaks for this boat: stop one of the two, they give her different orders",
+            every_s=SAY_EVERY_S,
+        )
     wrong = _wrong(ctx, identity)
     if wrong:
         ctx.say(Severity.ERROR, "not ours", f"no orders: {wrong}", every_s=SAY_EVERY_S)
@@ -30,7 +33,8 @@ def judge(ctx: StepContext) -> None:
         if ctx.state.vehicle.doubt:
             ctx.set(
                 vehicle=changed(ctx.state.vehicle, doubt=""),
-                mission=changed(ctx.state.mission, checked=False, read_since_s=ctx.t_s))
+                mission=changed(ctx.state.mission, checked=False, read_since_s=ctx.t_s),
+            )
             ctx.say(Severity.NOTICE, "ours", "the autopilot is known to be ours", every_s=0.0)
         if ctx.state.vehicle.uid is None:
             ctx.set(vehicle=changed(ctx.state.vehicle, uid=identity.uid, system=identity.system))
@@ -68,16 +72,22 @@ def _stranger(ctx: StepContext, identity: Identity) -> str:
     """Return why the autopilot is another than the one that this voyage began with, "" when it is not."""
     kind, known, told = identity.vehicle_type, ctx.state.vehicle.uid, identity.uid
     if identity.is_contested:
-        return ("two autopilots speak with one system id: give one of them another SYSID_THISMAV and name ours in "
-                "[autopilot] system, or sign the link")
+        return (
+            "two autopilots speak with one system id: give one of them another SYSID_THISMAV and name ours in "
+            "[autopilot] system, or sign the link"
+        )
     if kind is not None and kind not in ROVERS:
         return f"the vehicle is a {type_words(kind)}, not a rover: is it the right autopilot?"
     if known is not None and identity.is_confirmed and told != known:
-        return (f"the autopilot is another one than this voyage began with (UID {told or 'none'}, not "
-                f"{known or 'none'}): connect ours again, or begin anew without the saved state")
+        return (
+            f"the autopilot is another one than this voyage began with (UID {told or 'none'}, not "
+            f"{known or 'none'}): connect ours again, or begin anew without the saved state"
+        )
     if ctx.snapshot.neighbours and not ctx.state.voyage.sailing:
-        return (f"other autopilots are heard ({'; '.join(ctx.snapshot.neighbours)}): say which is yours, with "
-                "--system N or [autopilot] system in the mission")
+        return (
+            f"other autopilots are heard ({'; '.join(ctx.snapshot.neighbours)}): say which is yours, with "
+            "--system N or [autopilot] system in the mission"
+        )
     return ""
 
 

@@ -13,6 +13,14 @@ from companion.skipper.planning.vessels import (
 from companion.skipper.step.route import HOME_RADIUS_M
 
 __all__ = [
-    "ALIKE_S", "GIVE_UP_RISK", "HOME_RADIUS_M", "HORIZON_S", "OWN_TIMING_MPS", "PART_BY_RUNG", "SETTLED_M",
-    "next_tack", "next_tack_s", "soon",
+    "ALIKE_S",
+    "GIVE_UP_RISK",
+    "HOME_RADIUS_M",
+    "HORIZON_S",
+    "OWN_TIMING_MPS",
+    "PART_BY_RUNG",
+    "SETTLED_M",
+    "next_tack",
+    "next_tack_s",
+    "soon",
 ]

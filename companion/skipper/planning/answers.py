@@ -30,11 +30,11 @@ from companion.skipper.way.geometry import distance_m, gybe_round, moved
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
 
-SLOW = "slow computer"   # the code under which it is said
-SAME_M = 1.0             # a new waypoint this near to the old one is the old one
+SLOW = "slow computer"  # the code under which it is said
+SAME_M = 1.0  # a new waypoint this near to the old one is the old one
 # Plans from a waypoint between here and a goal: one from the boat leads to the same goal.
 AT_WAYPOINT = frozenset({ReplanReason.WAYPOINT, ReplanReason.FORECAST})
-GYBE_RADIUS_M = 8.0      # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
+GYBE_RADIUS_M = 8.0  # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
 
 
 def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
@@ -45,7 +45,7 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
     ctx.set(pending=changed(ctx.state.pending, plan=None))
     _note_latency(ctx, pending, outcome)
     if ctx.state.phase is Phase.OPERATOR or ctx.is_taken:
-        return   # the operator may have taken the boat in this very step
+        return  # the operator may have taken the boat in this very step
     if ctx.state.voyage.sailing and not ctx.state.mission.checked:
         return
     plan = outcome.plan
@@ -55,17 +55,30 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
             return
         not_found(ctx, pending, reason)
         return
-    ctx.set(plans=changed(
-        ctx.state.plans, unanswered=0, effort=min(1.0, MORE * ctx.state.plans.effort), rung=0,
-        retry=ctx.failed(ctx.state.plans.retry) if pending.rung > 0 else Retry()))
+    ctx.set(
+        plans=changed(
+            ctx.state.plans,
+            unanswered=0,
+            effort=min(1.0, MORE * ctx.state.plans.effort),
+            rung=0,
+            retry=ctx.failed(ctx.state.plans.retry) if pending.rung > 0 else Retry(),
+        )
+    )
     keep, set_current = _place(ctx, pending)
     if keep is None:
         ctx.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
         return
-    if pending.reason in AT_WAYPOINT and is_begun_risky(pending.problem, plan.legs) and may_restart_leg(ctx) and (
-            pending.from_index is not None and _may_still_turn_before(ctx, pending.start_en_m)
-            and request(ctx, pending.reason, text="the tack at the next waypoint may touch when it fails")):
-        return   # no plan from that waypoint takes its tack away
+    if (
+        pending.reason in AT_WAYPOINT
+        and is_begun_risky(pending.problem, plan.legs)
+        and may_restart_leg(ctx)
+        and (
+            pending.from_index is not None
+            and _may_still_turn_before(ctx, pending.start_en_m)
+            and request(ctx, pending.reason, text="the tack at the next waypoint may touch when it fails")
+        )
+    ):
+        return  # no plan from that waypoint takes its tack away
     if _keep_old(ctx, pending, plan):
         return
     refused = put_in_place(ctx, pending, plan, keep, set_current)
@@ -82,15 +95,16 @@ def _note_latency(ctx: StepContext, pending: PendingPlan, outcome: PlanOutcome) 
     if plan is not None and plan.status is PlanStatus.UNANSWERED:
         return
     took_s = ctx.t_s - pending.t_s
-    if pending.reason is ReplanReason.START and plan is not None and plan.speed is not None:   # it may be given longer
+    if pending.reason is ReplanReason.START and plan is not None and plan.speed is not None:  # it may be given longer
         took_s -= max(0.0, plan.elapsed_s - ctx.config.first_plan_budget_s)
     latency = ctx.state.plans.latency.with_answer(
-        took_s, ctx.config.plan_budget_s, None if plan is None else plan.speed)
+        took_s, ctx.config.plan_budget_s, None if plan is None else plan.speed
+    )
     ctx.set(plans=changed(ctx.state.plans, latency=latency))
     if latency.is_slow:
         earlier = f"; it is asked {ctx.late_s:.0f} s earlier" if ctx.late_s > 0.0 else ""
         ctx.say(Severity.NOTICE, SLOW, f"a slow computer plans such water: {latency.words}{earlier}", every_s=math.inf)
-    elif latency.speed is not None:   # measured: in real time
+    elif latency.speed is not None:  # measured: in real time
         ctx.say(Severity.INFO, "planner", f"this computer plans such water: {latency.words}", every_s=math.inf)
 
 
@@ -110,12 +124,18 @@ def _place(ctx: StepContext, pending: PendingPlan) -> tuple[int | None, int | No
         return state.mission.index, state.mission.index + 1
     boat = ctx.boat_en
     if state.mission.index <= k:
-        if pending.reason in AT_WAYPOINT and boat is not None and (
-                distance_m(boat, state.mission.route.points_en_m[state.mission.index]) < SHORT_S * ctx.speed_mps):
-            return None, None   # an upload begins the leg anew, and what is left of it is too short to be followed
+        if (
+            pending.reason in AT_WAYPOINT
+            and boat is not None
+            and (distance_m(boat, state.mission.route.points_en_m[state.mission.index]) < SHORT_S * ctx.speed_mps)
+        ):
+            return None, None  # an upload begins the leg anew, and what is left of it is too short to be followed
         return k + 1, None
-    if state.mission.index == k + 1 and boat is not None and (
-            distance_m(boat, pending.start_en_m) < ctx.config.grid_size_m):
+    if (
+        state.mission.index == k + 1
+        and boat is not None
+        and (distance_m(boat, pending.start_en_m) < ctx.config.grid_size_m)
+    ):
         return k + 1, k + 2
     return None, None
 
@@ -133,7 +153,7 @@ def _keep_old(ctx: StepContext, pending: PendingPlan, plan: Plan) -> bool:
     if not points or not ends or pending.lead_in or route.bound_for != pending.facts.bound_for:
         return False
     if pending.gate >= 0:
-        points = route.points_en_m[first:ends[0] + 1]
+        points = route.points_en_m[first : ends[0] + 1]
     elif not pending.facts.bound_for:
         return False
     problem = pending.problem
@@ -145,27 +165,50 @@ def _keep_old(ctx: StepContext, pending: PendingPlan, plan: Plan) -> bool:
     before_en, leg_from_en = None, route.leg_from_en_m[first]
     if pending.from_index is not None:
         before_en, leg_from_en = route.leg_from_en_m[pending.from_index], pending.start_en_m
-    seen = of_way(problem, [pending.start_en_m, *points], heading_rad=problem.start_heading_rad, before_en=before_en,
-                  sailed_m=distance_m(leg_from_en, pending.start_en_m))
+    seen = of_way(
+        problem,
+        [pending.start_en_m, *points],
+        heading_rad=problem.start_heading_rad,
+        before_en=before_en,
+        sailed_m=distance_m(leg_from_en, pending.start_en_m),
+    )
     if not seen.is_kept or is_riskier(problem, old.legs, plan.legs):
         return False
     if problem.targets:
         tail = [(float(e), float(n)) for e, n in plan.waypoints_en]
-        way = [*route.points_en_m[ctx.state.mission.index:first], *tail]
-        verdict = decide(meetings(ctx), since_replan_s=0.0, active_cost_s=old.time_s, new_cost_s=plan.cost_s,
-                         apart_m=apart_m(ctx, way))
+        way = [*route.points_en_m[ctx.state.mission.index : first], *tail]
+        verdict = decide(
+            meetings(ctx),
+            since_replan_s=0.0,
+            active_cost_s=old.time_s,
+            new_cost_s=plan.cost_s,
+            apart_m=apart_m(ctx, way),
+        )
         if verdict is not Decision.KEEP:
             return False
     elif gain > max(ctx.config.keep_gain_s, ctx.config.keep_gain * old.time_s):
         return False
     facts, when, told = pending.facts, arrival(problem, old.legs), path_risk(problem, old.legs)
-    ctx.set(mission=changed(ctx.state.mission, route=replace(
-        route, plan_t_s=facts.plan_t_s, plan_twd_from_rad=facts.plan_twd_from_rad, plan_tws_mps=facts.plan_tws_mps,
-        plan_half_width_rad=facts.plan_half_width_rad, risk=told.total, vessel_risk=told.vessels.total,
-        cost_s=old.time_s, median_s=_time(when, "median_s"), late_s=_time(when, "late_s"),
-    )))
+    ctx.set(
+        mission=changed(
+            ctx.state.mission,
+            route=replace(
+                route,
+                plan_t_s=facts.plan_t_s,
+                plan_twd_from_rad=facts.plan_twd_from_rad,
+                plan_tws_mps=facts.plan_tws_mps,
+                plan_half_width_rad=facts.plan_half_width_rad,
+                risk=told.total,
+                vessel_risk=told.vessels.total,
+                cost_s=old.time_s,
+                median_s=_time(when, "median_s"),
+                late_s=_time(when, "late_s"),
+            ),
+        )
+    )
     ctx.say(
-        Severity.INFO, "plan kept",
+        Severity.INFO,
+        "plan kept",
         f"{pending.reason.words}: the old plan stays ({old.time_s:.0f} s; a new one gains {max(0.0, gain):.1f} s)",
         every_s=0.0,
     )
@@ -183,47 +226,71 @@ def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, 
     if tacks_fail(ctx):
         # Tacks have failed: turn the other way round where there is room.
         points = list(_gybed_round(ctx, pending, start, points))
-        seen = of_way(pending.problem, [start, *points], heading_rad=pending.problem.start_heading_rad, before_en=None,
-                      has_loops=False)
+        seen = of_way(
+            pending.problem,
+            [start, *points],
+            heading_rad=pending.problem.start_heading_rad,
+            before_en=None,
+            has_loops=False,
+        )
         if not seen.is_kept:
-            points = [*pending.lead_in, *planned[1:]]   # rather a tack that may fail than a loop onto something
+            points = [*pending.lead_in, *planned[1:]]  # rather a tack that may fail than a loop onto something
         elif expected_m is not None:
             expected_m = min(expected_m, seen.clearance_m)
         ctx.say(Severity.NOTICE, "gybing round", "tacks have failed: gybing round where there is room")
     bound = diversion(ctx)
     tail = Tail(
-        start_en=start, points_en=tuple(points), gate=pending.gate,
-        is_place=bound is not None and bound.kind is DiversionKind.BOX and bound.name == pending.facts.bound_for)
+        start_en=start,
+        points_en=tuple(points),
+        gate=pending.gate,
+        is_place=bound is not None and bound.kind is DiversionKind.BOX and bound.name == pending.facts.bound_for,
+    )
     facts = replace(
-        pending.facts, risk=plan.risk, vessel_risk=plan.vessel_risk, cost_s=plan.cost_s,
-        median_s=_time(plan.arrival, "median_s"), late_s=_time(plan.arrival, "late_s"),
-        expected_clearance_m=expected_m, why=plan.why.text or plan.reason)
+        pending.facts,
+        risk=plan.risk,
+        vessel_risk=plan.vessel_risk,
+        cost_s=plan.cost_s,
+        median_s=_time(plan.arrival, "median_s"),
+        late_s=_time(plan.arrival, "late_s"),
+        expected_clearance_m=expected_m,
+        why=plan.why.text or plan.reason,
+    )
     old = ctx.state.mission.route
     if keep + len(tail.points_en) + 1 > ctx.config.max_items and old is not None:
         # Start the numbering again with what is still ahead of the boat.
         ahead = slice(ctx.state.mission.index, keep)
-        old = replace(old, items=old.items[ahead], points_en_m=old.points_en_m[ahead],
-                      leg_from_en_m=old.leg_from_en_m[ahead], gate_of=old.gate_of[ahead])
+        old = replace(
+            old,
+            items=old.items[ahead],
+            points_en_m=old.points_en_m[ahead],
+            leg_from_en_m=old.leg_from_en_m[ahead],
+            gate_of=old.gate_of[ahead],
+        )
         keep, set_current = len(old.items), 1
     route = splice(
-        ctx.voyage, ctx.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts)
+        ctx.voyage, ctx.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts
+    )
     if ctx.state.mission.route is not None and _is_same(ctx.state.mission.route, route):
         ctx.set(
             progress=changed(ctx.state.progress, missed_s=None),
             mission=changed(
                 ctx.state.mission,
                 route=replace(
-                    route, items=ctx.state.mission.route.items, points_en_m=ctx.state.mission.route.points_en_m)))
+                    route, items=ctx.state.mission.route.items, points_en_m=ctx.state.mission.route.points_en_m
+                ),
+            ),
+        )
         ctx.say(Severity.INFO, "plan kept", f"{pending.reason.words}: the new plan is the old one", every_s=0.0)
         return ""
-    way = route.points_en_m[ctx.state.mission.index if set_current is None else set_current - 1:-1]
+    way = route.points_en_m[ctx.state.mission.index if set_current is None else set_current - 1 : -1]
     met = meetings(ctx)
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
     change = Change(apart_m=apart_m(ctx, way), unsafe=unsafe) if ctx.state.mission.route is not None else Change()
     _look_at_time(ctx, route)
     clear = said(expected_m, ctx.config.margin_floor_m)
     return upload(
-        ctx, route, set_current, f"{pending.reason.words}: {facts.why}{clear}", change=change, planned=pending)
+        ctx, route, set_current, f"{pending.reason.words}: {facts.why}{clear}", change=change, planned=pending
+    )
 
 
 def _gybed_round(ctx: StepContext, pending: PendingPlan, start: PointEn, points: list[PointEn]) -> tuple[PointEn, ...]:
@@ -232,9 +299,13 @@ def _gybed_round(ctx: StepContext, pending: PendingPlan, start: PointEn, points:
     if pending.lead_in and vehicle is not None:
         heading = vehicle.heading_rad
     return gybe_round(
-        moved(start, heading, -1.0), [start, *points], twd_from_rad=pending.facts.plan_twd_from_rad,
-        radius_m=GYBE_RADIUS_M, area=ctx.voyage.area,
-        floor_m=min(ctx.config.margin_floor_m, pending.facts.margin_m))[1:]
+        moved(start, heading, -1.0),
+        [start, *points],
+        twd_from_rad=pending.facts.plan_twd_from_rad,
+        radius_m=GYBE_RADIUS_M,
+        area=ctx.voyage.area,
+        floor_m=min(ctx.config.margin_floor_m, pending.facts.margin_m),
+    )[1:]
 
 
 def _look_at_time(ctx: StepContext, route: Route) -> None:
@@ -245,9 +316,12 @@ def _look_at_time(ctx: StepContext, route: Route) -> None:
     left_s = limit_s - ctx.state.voyage.under_way_s
     if route.late_s is None or route.late_s > left_s:
         late = "not told" if route.late_s is None else f"{route.late_s:.0f} s"
-        ctx.say(Severity.WARNING, "may be late",
-                 f"{left_s:.0f} s are left of the voyage's time, and she is there in {route.cost_s:.0f} s; in nine "
-                 f"winds of ten: {late}")
+        ctx.say(
+            Severity.WARNING,
+            "may be late",
+            f"{left_s:.0f} s are left of the voyage's time, and she is there in {route.cost_s:.0f} s; in nine "
+            f"winds of ten: {late}",
+        )
 
 
 def _time(when: Arrival | None, quantile: Literal["median_s", "late_s"]) -> float | None:
@@ -263,7 +337,7 @@ def _apart(points: list[PointEn]) -> list[PointEn]:
         if distance_m(out[-1], point) >= SAME_M:
             out.append(point)
         elif n == len(points) - 1 and len(out) > 1:
-            out[-1] = point   # the end stays where it was planned
+            out[-1] = point  # the end stays where it was planned
         elif n == len(points) - 1:
             out.append(point)
     return out

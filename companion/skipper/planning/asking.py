@@ -25,13 +25,13 @@ from companion.skipper.way import Gate, bearing_rad, distance_m, half_width_rad,
 from companion.skipper.way.position_plausibility import is_impossible
 from companion.skipper.way.stemming import waiting_place
 
-UPLOAD_LATENCY_S = 1.5   # item protocol, a few dozen items, and the read-back
-SLOW_MPS = 0.5           # slower than this the course over ground says nothing about the heading
-WIDTH_AHEAD_S = 60.0     # how far ahead the interval is taken that a plan remembers of its wind
+UPLOAD_LATENCY_S = 1.5  # item protocol, a few dozen items, and the read-back
+SLOW_MPS = 0.5  # slower than this the course over ground says nothing about the heading
+WIDTH_AHEAD_S = 60.0  # how far ahead the interval is taken that a plan remembers of its wind
 
 
 def request(
-    ctx: StepContext, reason: ReplanReason, *, from_index: int | None = None, rung: int = 0, text: str = "",
+    ctx: StepContext, reason: ReplanReason, *, from_index: int | None = None, rung: int = 0, text: str = ""
 ) -> bool:
     """Ask for a plan from item ``from_index`` of the route or, with None, from the boat; False when it cannot be.
 
@@ -46,25 +46,40 @@ def request(
     target, gate, bound = aimed
     wind = ctx.wind_mean
     floor_m = min(ctx.config.margin_floor_m, step.margin_m)
-    start = repaired(
-        ctx.voyage, start, margin_m=step.margin_m, floor_m=floor_m, twd_from_rad=wind[0] if wind else None)
+    start = repaired(ctx.voyage, start, margin_m=step.margin_m, floor_m=floor_m, twd_from_rad=wind[0] if wind else None)
     aim = _aim(ctx, target, gate, start, step)
     number = ctx.new_id()
     shared = shares(ctx, start.en_m, start.after_s, rung, step.delta_s)
     name = ", ".join(part for part in (step.name, "start repaired" if start.text else "") if part)
     try:
-        problem = Problem.from_json(problem_dict(
-            ctx.voyage, target, start=start, aim=aim, forecast=forecast, margin_m=step.margin_m,
-            delta_s=shared.wind_delta_s, no_go_half_rad=ctx.planned_no_go_rad, floor_m=floor_m, title=reason.value,
-            beat=problem_beat(ctx, step.margin_m), max_path_risk=step.max_path_risk, current=current,
-            failing=_failing(ctx),
-            is_wind_known=ctx.snapshot.wind.health is not WindHealth.UNTRUSTED,
-            doubt=ctx.snapshot.doubt if ctx.config.sails else None,
-            zone_half_rad=ctx.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
-            tracking=problem_tracking(
-                ctx, start, from_index, floor_m=min(ctx.config.margin_floor_m, ctx.config.margin_m),
-                forecast=forecast),
-        ))
+        problem = Problem.from_json(
+            problem_dict(
+                ctx.voyage,
+                target,
+                start=start,
+                aim=aim,
+                forecast=forecast,
+                margin_m=step.margin_m,
+                delta_s=shared.wind_delta_s,
+                no_go_half_rad=ctx.planned_no_go_rad,
+                floor_m=floor_m,
+                title=reason.value,
+                beat=problem_beat(ctx, step.margin_m),
+                max_path_risk=step.max_path_risk,
+                current=current,
+                failing=_failing(ctx),
+                is_wind_known=ctx.snapshot.wind.health is not WindHealth.UNTRUSTED,
+                doubt=ctx.snapshot.doubt if ctx.config.sails else None,
+                zone_half_rad=ctx.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
+                tracking=problem_tracking(
+                    ctx,
+                    start,
+                    from_index,
+                    floor_m=min(ctx.config.margin_floor_m, ctx.config.margin_m),
+                    forecast=forecast,
+                ),
+            )
+        )
     except (ValueError, InputError) as error:
         ctx.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
         ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(ctx.state.plans.retry)))
@@ -72,28 +87,46 @@ def request(
     problem = replace(problem, delta_s=shared.delta_s, targets=shared.targets, vessels_part=shared.part)
     facts = replace(
         ctx.blank_facts(number, step.margin_m, shared.delta_s, name),
-        plan_twd_from_rad=over_ground(
-            problem.wind.twd_from_rad, problem.wind.tws_mps or 0.0, current.planned_en_mps)[0],
+        plan_twd_from_rad=over_ground(problem.wind.twd_from_rad, problem.wind.tws_mps or 0.0, current.planned_en_mps)[
+            0
+        ],
         plan_half_width_rad=half_width_rad(forecast, start.after_s + WIDTH_AHEAD_S, ctx.config.wind_change_level),
-        vessels_part=shared.part or 0.0, bound_for=bound.name if bound is not None and not step.nearer_goal else "",
+        vessels_part=shared.part or 0.0,
+        bound_for=bound.name if bound is not None and not step.nearer_goal else "",
     )
     if ctx.state.pending.plan is not None:
         ctx.act(CancelPlan(request_id=ctx.state.pending.plan.request_id))
     pending = PendingPlan(
-        request_id=number, t_s=ctx.t_s, reason=reason, from_index=from_index, rung=rung, gate=aim.gate,
-        lead_in=start.lead_in, start_en_m=start.en_m, facts=facts, problem=problem,
+        request_id=number,
+        t_s=ctx.t_s,
+        reason=reason,
+        from_index=from_index,
+        rung=rung,
+        gate=aim.gate,
+        lead_in=start.lead_in,
+        start_en_m=start.en_m,
+        facts=facts,
+        problem=problem,
     )
     ctx.set(
         pending=changed(ctx.state.pending, plan=pending),
-        plans=changed(
-            ctx.state.plans, last_s=ctx.t_s, rung=rung, replans=ctx.state.plans.replans + 1))
+        plans=changed(ctx.state.plans, last_s=ctx.t_s, rung=rung, replans=ctx.state.plans.replans + 1),
+    )
     budget = ctx.config.first_plan_budget_s if reason is ReplanReason.START else ctx.config.plan_budget_s
     why = "; ".join(part for part in (text, start.text, f"step: {name}" if name else "") if part)
-    ctx.act(RequestPlan(
-        request_id=number, problem=problem, reason=reason, budget_s=ctx.state.plans.effort * budget, seed=number,
-        from_seq=None if from_index is None else from_index + 1,
-        planner=step.planner.about(ctx.voyage.frame.origin), rung=name, text=why,
-    ))
+    ctx.act(
+        RequestPlan(
+            request_id=number,
+            problem=problem,
+            reason=reason,
+            budget_s=ctx.state.plans.effort * budget,
+            seed=number,
+            from_seq=None if from_index is None else from_index + 1,
+            planner=step.planner.about(ctx.voyage.frame.origin),
+            rung=name,
+            text=why,
+        )
+    )
     return True
 
 
@@ -102,8 +135,10 @@ def _failing(ctx: StepContext) -> dict[str, Any]:
     tacking, given = ctx.state.tacking, ctx.voyage.boat.tack_fails
     failing: dict[str, Any] = {"tack_fails": tacking.chance(given)}
     if given > 0.0 and tacking.failed:
-        failing |= {"irons_s": max(IRONS_S, tacking.irons_s),
-                    "lee_mps": [tacking.starboard_lee_mps, tacking.port_lee_mps]}
+        failing |= {
+            "irons_s": max(IRONS_S, tacking.irons_s),
+            "lee_mps": [tacking.starboard_lee_mps, tacking.port_lee_mps],
+        }
     return failing
 
 
@@ -122,11 +157,11 @@ def _start(ctx: StepContext, from_index: int | None) -> Start | None:
         bow = vehicle.heading_rad if ctx.snapshot.current.is_significant else heading
         tacking = ctx.state.tacking
         if tacking.is_counted:
-            bow = tacking.settled_rad   # the boat lies in irons, and falls off to its old tack
+            bow = tacking.settled_rad  # the boat lies in irons, and falls off to its old tack
         return Start(en_m=place, heading_rad=bow, after_s=ahead)
     if route is None or not ctx.state.mission.index <= from_index < len(route.items):
         return None
-    way = [boat, *route.points_en_m[ctx.state.mission.index:from_index + 1]]
+    way = [boat, *route.points_en_m[ctx.state.mission.index : from_index + 1]]
     speed = max(vehicle.speed_mps, SLOW_MPS)
     return Start(
         en_m=route.points_en_m[from_index],
@@ -162,7 +197,7 @@ def _gate_after(ctx: StepContext, from_index: int | None) -> int | None:
     """Return the gate that a plan from there is for: the first not completed before or at that item."""
     gate, route = ctx.state.progress.gate, ctx.state.mission.route
     if from_index is not None and route is not None:
-        done = [g for g in route.gate_of[ctx.state.mission.index:from_index + 1] if g >= 0]
+        done = [g for g in route.gate_of[ctx.state.mission.index : from_index + 1] if g >= 0]
         gate = max([gate, *(g + 1 for g in done)])
     return gate if gate < len(ctx.gates) else None
 
@@ -190,7 +225,8 @@ def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung)
     candidates.sort(key=lambda p: distance_m(p, target.en_m))
     candidates += [
         moved(start.en_m, course + side, share * left)
-        for share in (0.75, 0.5, 0.35, 0.2) for side in (0.0, 0.35, -0.35, 0.8, -0.8)
+        for share in (0.75, 0.5, 0.35, 0.2)
+        for side in (0.0, 0.35, -0.35, 0.8, -0.8)
     ]
     for place in candidates:
         if float(ctx.voyage.area.clearance_m([place])[0]) >= step.margin_m + ctx.config.loiter_radius_m:

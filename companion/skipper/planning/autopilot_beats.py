@@ -16,12 +16,12 @@ from companion.skipper.step.wind_shifts import shifting
 from companion.skipper.way import PointEn, bearing_rad, cross_track_m, moved
 
 IRONS_MEMORY_S = 600.0
-TACKS_FAIL_AFTER = TRIES    # failures in a row, or times in irons within IRONS_MEMORY_S, before tacks are left
-WIDEST_M = 50.0         # a wider corridor is no corridor ...
-WIDEST_BY_SHIFTS_M = 200.0   # ... but where the boat tacks on the shifts: then its edges are seldom met
-CARRIED_S = 2.5         # of a tack, at the corridor's edge: where the water takes the boat meanwhile
-OFF_LINE_M = 2.0        # so near the line a leg that begins anew is the same leg
-FOLLOWS_RAD = math.radians(10.0)   # this far outside its no-go zone the autopilot keeps to the line
+TACKS_FAIL_AFTER = TRIES  # failures in a row, or times in irons within IRONS_MEMORY_S, before tacks are left
+WIDEST_M = 50.0  # a wider corridor is no corridor ...
+WIDEST_BY_SHIFTS_M = 200.0  # ... but where the boat tacks on the shifts: then its edges are seldom met
+CARRIED_S = 2.5  # of a tack, at the corridor's edge: where the water takes the boat meanwhile
+OFF_LINE_M = 2.0  # so near the line a leg that begins anew is the same leg
+FOLLOWS_RAD = math.radians(10.0)  # this far outside its no-go zone the autopilot keeps to the line
 # A tack takes this long: who should have tacked a moment ago is tacking [s].
 TACKING_S = 4.0
 # Below this speed the time to a waypoint says nothing [m/s].
@@ -166,14 +166,22 @@ def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
     vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
     wind_rad = wind.mean_twd_from_rad if wind.present_twd_from_rad is None else wind.present_twd_from_rad
     tws_mps = wind.mean_tws_mps if wind.present_tws_mps is None else wind.present_tws_mps
-    if route is None or wind_rad is None or tws_mps is None or vehicle is None or here is None or (
-            vehicle.speed_mps < MIN_SPEED_MPS):
+    if (
+        route is None
+        or wind_rad is None
+        or tws_mps is None
+        or vehicle is None
+        or here is None
+        or (vehicle.speed_mps < MIN_SPEED_MPS)
+    ):
         return None
     limits = snapshot.limits or AutopilotLimits()
     no_go_rad, begin = limits.sail_no_go_angle_rad, seen.state.mission.index
     legs = [
-        (start, end) for item, start, end in zip(
-            route.items[begin:], route.leg_from_en_m[begin:], route.points_en_m[begin:], strict=True)
+        (start, end)
+        for item, start, end in zip(
+            route.items[begin:], route.leg_from_en_m[begin:], route.points_en_m[begin:], strict=True
+        )
         if item.command == Command.NAV_WAYPOINT
     ]
     side = difference_rad(wind_rad, vehicle.heading_rad) > 0.0
@@ -200,7 +208,12 @@ def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
 
 
 def _own_tack_s(
-    here: PointEn, velocity_en: PointEn, leg: tuple[PointEn, PointEn], wind_rad: float, *, side: bool,
+    here: PointEn,
+    velocity_en: PointEn,
+    leg: tuple[PointEn, PointEn],
+    wind_rad: float,
+    *,
+    side: bool,
     limits: AutopilotLimits,
 ) -> float | None:
     """Return when a boat that beats along a leg meets its corridor's edge or the layline [s]; ``side``: as off_rad."""

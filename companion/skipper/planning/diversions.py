@@ -22,10 +22,10 @@ from companion.skipper.way.geometry import disc_wkt, distance_m
 from companion.skipper.way.voyage import PointEn, Refuge
 from companion.traffic import Policy
 
-DRAGGED = "dragged off"   # a watchdog
+DRAGGED = "dragged off"  # a watchdog
 HOME, REST = "home", "the place to rest"
-GOAL_RADIUS_M = 10.0     # a place that is named under way: there within this
-FENCE_SAID_S = 600.0     # between two words on a fence that is drawn
+GOAL_RADIUS_M = 10.0  # a place that is named under way: there within this
+FENCE_SAID_S = 600.0  # between two words on a fence that is drawn
 
 
 def diversion(ctx: StepContext) -> Diversion | None:
@@ -34,16 +34,32 @@ def diversion(ctx: StepContext) -> Diversion | None:
     It is found once, and anew only when a part of the state that it is made of has been replaced.
     """
     state = ctx.state
-    parts = (state.mission, state.operator, state.alarms, state.orders, state.voyage, state.plans, state.progress,
-             state.by_field, state.steering, state.position)
+    parts = (
+        state.mission,
+        state.operator,
+        state.alarms,
+        state.orders,
+        state.voyage,
+        state.plans,
+        state.progress,
+        state.by_field,
+        state.steering,
+        state.position,
+    )
     if ctx.found is None or any(new is not old for new, old in zip(parts, ctx.found[0], strict=True)):
         ctx.found = parts, _find(ctx)
     return ctx.found[1]
 
 
 def _find(ctx: StepContext) -> Diversion | None:
-    return pressing(ctx) or _ordered(ctx) or _at_the_end(ctx) or _kept_in(ctx) or _before_start(ctx) or (
-        _in_box(ctx) or _off_field(ctx))
+    return (
+        pressing(ctx)
+        or _ordered(ctx)
+        or _at_the_end(ctx)
+        or _kept_in(ctx)
+        or _before_start(ctx)
+        or (_in_box(ctx) or _off_field(ctx))
+    )
 
 
 def is_composed(ctx: StepContext) -> bool:
@@ -58,13 +74,20 @@ def _off_field(ctx: StepContext) -> Diversion | None:
     if gate is None or gate.field is None or ctx.state.voyage.over:
         return None
     why = ctx.state.by_field.lost or (
-        "" if may.may_steer and may.may_set_mode else "its field is not sailed, for steering is not permitted")
+        "" if may.may_steer and may.may_set_mode else "its field is not sailed, for steering is not permitted"
+    )
     if not why:
         return None
     left_s = stay_left_s(ctx, gate)
     until = "until it can be sailed, or told to go on" if math.isinf(left_s) else f"{left_s:.0f} s more"
-    return Diversion(kind=DiversionKind.FIELD, name=f"the place of {gate.name}", why=why, en_m=gate.en_m,
-                     radius_m=gate.radius_m, until=until)
+    return Diversion(
+        kind=DiversionKind.FIELD,
+        name=f"the place of {gate.name}",
+        why=why,
+        en_m=gate.en_m,
+        radius_m=gate.radius_m,
+        until=until,
+    )
 
 
 def _in_box(ctx: StepContext) -> Diversion | None:
@@ -74,8 +97,14 @@ def _in_box(ctx: StepContext) -> Diversion | None:
         return None
     left_s = stay_left_s(ctx, gate)
     until = "until told to go on" if gate.box.for_s is None else f"{left_s:.0f} s more"
-    return Diversion(kind=DiversionKind.BOX, name=f"the box {gate.name}", why="to stay in it", en_m=gate.en_m,
-                  radius_m=gate.radius_m, until=until)
+    return Diversion(
+        kind=DiversionKind.BOX,
+        name=f"the box {gate.name}",
+        why="to stay in it",
+        en_m=gate.en_m,
+        radius_m=gate.radius_m,
+        until=until,
+    )
 
 
 def _before_start(ctx: StepContext) -> Diversion | None:
@@ -97,8 +126,11 @@ def pressing(ctx: StepContext) -> Diversion | None:
     """Return the diversion that comes before every order: battery, leak, or a failsafe that is answered."""
     state, ends = ctx.state, ctx.config.ends
     answer = ends.answer(state.operator.answering)
-    why = "the autopilot has lost its link to the shore" if state.operator.answering == SHORE else (
-        f"the autopilot's {state.operator.answering} failsafe")
+    why = (
+        "the autopilot has lost its link to the shore"
+        if state.operator.answering == SHORE
+        else (f"the autopilot's {state.operator.answering} failsafe")
+    )
     if answer is Recovery.SHELTER:
         is_battery = state.operator.answering == "battery"
         # the boat is stopped: something must be done
@@ -174,8 +206,11 @@ def _kept_in(ctx: StepContext) -> Diversion | None:
         staying = _stay(ctx, trouble)
         if staying is not None or here is None:
             return staying
-    place = route.points_en_m[ctx.last_waypoint()] if route is not None and is_bound else (
-        fence.place_inside(ctx.voyage.area, here, room_m))
+    place = (
+        route.points_en_m[ctx.last_waypoint()]
+        if route is not None and is_bound
+        else (fence.place_inside(ctx.voyage.area, here, room_m))
+    )
     return Diversion(kind=DiversionKind.INSIDE, name=name, why=trouble, en_m=place)
 
 
@@ -198,8 +233,12 @@ def _fence_before(ctx: StepContext, gate: Gate | None) -> tuple[HomeCircle | Dra
 def speak_of_fence(ctx: StepContext) -> None:
     """Say that somebody has drawn a fence on the autopilot that takes water which the mission leaves."""
     if ctx.drawn is not None:
-        ctx.say(Severity.WARNING, "fence drawn", f"{ctx.drawn.words} takes water of the mission's: plans keep inside "
-                 "of it", every_s=FENCE_SAID_S)
+        ctx.say(
+            Severity.WARNING,
+            "fence drawn",
+            f"{ctx.drawn.words} takes water of the mission's: plans keep inside of it",
+            every_s=FENCE_SAID_S,
+        )
 
 
 def _found(ctx: StepContext, end: End, why: str) -> Diversion | None:
@@ -239,8 +278,9 @@ def _refuge(ctx: StepContext, why: str) -> Diversion | None:
     if chosen is None:
         by_distance = sorted(refuges, key=lambda r: distance_m(here, r.en_m) if here is not None else 0.0)
         chosen = by_distance[ctx.state.plans.retry.failures % len(by_distance)]
-    return Diversion(kind=DiversionKind.REFUGE, name=refuge_name(chosen), why=why, en_m=chosen.en_m,
-                     radius_m=chosen.radius_m)
+    return Diversion(
+        kind=DiversionKind.REFUGE, name=refuge_name(chosen), why=why, en_m=chosen.en_m, radius_m=chosen.radius_m
+    )
 
 
 def refuge_name(refuge: Refuge) -> str:
@@ -262,13 +302,16 @@ def place_trouble(ctx: StepContext, what: str, en_m: PointEn) -> str:
     if not far_m <= ctx.voyage.far_m:
         return f"{what} is {far_m / 1000.0:.0f} km from this water"
     if far_m > ctx.voyage.area.reach_m:
-        return ""   # what lies there is seen when the boat comes there
+        return ""  # what lies there is seen when the boat comes there
     clearance = float(ctx.voyage.area.clearance_m([en_m])[0])
     floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
     if clearance < floor_m:
         near, bare = ctx.voyage.area.nearest_name(en_m), float(ctx.voyage.area.unfenced.clearance_m([en_m])[0])
-        where = f"{clearance:.0f} m from {near}" if clearance > 0.0 else (
-            "outside the fence" if bare > 0.0 else f"not in free water but in {near}")
+        where = (
+            f"{clearance:.0f} m from {near}"
+            if clearance > 0.0
+            else ("outside the fence" if bare > 0.0 else f"not in free water but in {near}")
+        )
         return f"{what} is {where}: the margin's floor is {floor_m:g} m"
     return ""
 
@@ -287,7 +330,7 @@ def _back(ctx: StepContext) -> Diversion | None:
     if rest is None or boat is None or not (off or _is_bound(ctx, REST)):
         return None
     if not _is_bound(ctx, REST) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
-        return None   # the autopilot's own loiter goes back there
+        return None  # the autopilot's own loiter goes back there
     return Diversion(kind=DiversionKind.REST, name=REST, why="she is off the place where she was to rest", en_m=rest)
 
 
@@ -300,8 +343,14 @@ def gate_for(ctx: StepContext, bound: Diversion) -> Gate:
     """Return a diversion as a gate that completes nothing; buoys are something to keep clear of on this leg too."""
     discs = tuple(disc_wkt(mark, keep_m) for mark, keep_m in marks_of(ctx.voyage))
     return Gate(
-        en_m=bound.en_m, radius_m=bound.radius_m, goal=-1, ends_goal=False, name=bound.name, from_en_m=None,
-        keep_out=discs)
+        en_m=bound.en_m,
+        radius_m=bound.radius_m,
+        goal=-1,
+        ends_goal=False,
+        name=bound.name,
+        from_en_m=None,
+        keep_out=discs,
+    )
 
 
 def is_at_rest(ctx: StepContext) -> bool:
@@ -324,15 +373,21 @@ def words(config: SkipperConfig, name: str) -> str:
     last = "say so" if ENDINGS[name].sails_on else "loiter near by"
     home = "home, " if config.safe_end is SafeEnd.RETURN else ""
     return {
-        End.SAY: "say so", End.STAY: "loiter near by",
-        End.REFUGE: f"to the nearest refuge, else {home}{last}", End.HOME: f"home, else to the nearest refuge, {last}",
+        End.SAY: "say so",
+        End.STAY: "loiter near by",
+        End.REFUGE: f"to the nearest refuge, else {home}{last}",
+        End.HOME: f"home, else to the nearest refuge, {last}",
     }[end]
 
 
 def announcement(config: SkipperConfig, boat: Boat) -> str:
     """Return all of it in one sentence, and how vessels are met, to be said before setting sail."""
-    limits = {"voyage_timeout_s": config.voyage_timeout_s, "max_tws_mps": boat.max_tws_mps,
-              "min_tws_mps": boat.min_tws_mps, "": 0.0}
+    limits = {
+        "voyage_timeout_s": config.voyage_timeout_s,
+        "max_tws_mps": boat.max_tws_mps,
+        "min_tws_mps": boat.min_tws_mps,
+        "": 0.0,
+    }
     names = [name for name, ending in ENDINGS.items() if limits[ending.asked_by] is not None]
     said = [f"{name}: {words(config, name)}" for name in names]
     for name in (cause.name for cause in FAILSAFES):

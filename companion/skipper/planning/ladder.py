@@ -41,8 +41,7 @@ def rungs(config: SkipperConfig, *, track_m: float = 0.0, in_current: bool = Fal
     limit = config.max_path_risk
     floor = min(config.margin_floor_m + track_m, config.margin_m)
     room = config.margin_m - floor
-    out = [Rung(name="", margin_m=config.margin_m, delta_s=config.delta_s, max_path_risk=limit,
-                planner=config.planner)]
+    out = [Rung(name="", margin_m=config.margin_m, delta_s=config.delta_s, max_path_risk=limit, planner=config.planner)]
     if config.planner.algorithm != AUTO.algorithm:
         out.append(replace(out[0], name=f"planner {AUTO.algorithm}", planner=AUTO))
     needed = min(config.margin_floor_m, config.margin_m) + track_m
@@ -54,8 +53,9 @@ def rungs(config: SkipperConfig, *, track_m: float = 0.0, in_current: bool = Fal
     for share in (*config.margin_ladder, 0.0):
         margin = floor + share * room
         if margin < out[-1].margin_m - 1e-9:
-            out.append(Rung(
-                name=f"margin {margin:.1f} m", margin_m=margin, delta_s=config.delta_s, max_path_risk=limit))
+            out.append(
+                Rung(name=f"margin {margin:.1f} m", margin_m=margin, delta_s=config.delta_s, max_path_risk=limit)
+            )
     if limit is not None:
         out.append(Rung(name=f"margin {floor:.1f} m, path's risk not bounded", margin_m=floor, delta_s=config.delta_s))
     for delta in config.delta_s_ladder:

@@ -17,11 +17,11 @@ from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.stemming import waiting_place
 
-FOUL = "current too strong"   # the code under which it is said
-TRIES = 3              # of a planner that does not answer, before the next step of the ladder
-LESS, LEAST_EFFORT = 0.5, 0.05   # of the planning budget: after each request that was not answered; never less
-MORE = 1.2             # ... and after each that was
-HOLD_ROOM = 2.0   # times the loiter's radius: it may lie here for hours, and a HOLD carries it off before help comes
+FOUL = "current too strong"  # the code under which it is said
+TRIES = 3  # of a planner that does not answer, before the next step of the ladder
+LESS, LEAST_EFFORT = 0.5, 0.05  # of the planning budget: after each request that was not answered; never less
+MORE = 1.2  # ... and after each that was
+HOLD_ROOM = 2.0  # times the loiter's radius: it may lie here for hours, and a HOLD carries it off before help comes
 
 
 def asks_again(ctx: StepContext, pending: PendingPlan, reason: str) -> bool:
@@ -32,11 +32,14 @@ def asks_again(ctx: StepContext, pending: PendingPlan, reason: str) -> bool:
     problem may be what the planner dies of; and for its first step where that is another planner.
     """
     state = ctx.state
-    ctx.set(plans=changed(
-        ctx.state.plans, unanswered=state.plans.unanswered + 1,
-        effort=max(LEAST_EFFORT, LESS * state.plans.effort)))
+    ctx.set(
+        plans=changed(
+            ctx.state.plans, unanswered=state.plans.unanswered + 1, effort=max(LEAST_EFFORT, LESS * state.plans.effort)
+        )
+    )
     if ctx.state.plans.unanswered < TRIES and request(
-            ctx, pending.reason, from_index=pending.from_index, rung=pending.rung, text=reason):
+        ctx, pending.reason, from_index=pending.from_index, rung=pending.rung, text=reason
+    ):
         ctx.say(Severity.WARNING, "no answer", f"{reason}: asked again, with less effort", every_s=0.0)
         return True
     ctx.set(plans=changed(ctx.state.plans, unanswered=0))
@@ -48,8 +51,9 @@ def asks_again(ctx: StepContext, pending: PendingPlan, reason: str) -> bool:
     ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(state.plans.retry), rung=0))
     wait_s = ctx.state.plans.retry.not_before_s - ctx.t_s
     stays = "what is on board is sound and stays; " if sails else ""
-    ctx.say(Severity.WARNING, "no answer", f"{reason}: {stays}asked again in {wait_s:.0f} s, with less effort",
-             every_s=0.0)
+    ctx.say(
+        Severity.WARNING, "no answer", f"{reason}: {stays}asked again in {wait_s:.0f} s, with less effort", every_s=0.0
+    )
     return True
 
 
@@ -58,8 +62,13 @@ def _keeps_floor(ctx: StepContext, pending: PendingPlan) -> bool:
     boat, vehicle, leg, ahead = ctx.boat_en, ctx.snapshot.vehicle, ctx.leg(), ctx.ahead()
     if boat is None or vehicle is None or leg is None or not ahead:
         return True
-    return of_way(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad, before_en=None,
-                  sailed_m=distance_m(leg[0], boat)).is_within_error
+    return of_way(
+        pending.problem,
+        [boat, *ahead],
+        heading_rad=vehicle.heading_rad,
+        before_en=None,
+        sailed_m=distance_m(leg[0], boat),
+    ).is_within_error
 
 
 def _risk_of_old(ctx: StepContext, pending: PendingPlan) -> str:
@@ -77,8 +86,12 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
     where = ladder[min(pending.rung, len(ladder) - 1)].name or "as configured"
     met = meetings(ctx) if state.mission.route is not None else ()
     if (
-        (pending.rung == 0 or leads_there(ctx, pending)) and state.mission.route is not None and not met
-        and is_on_board_sound(ctx) and _keeps_floor(ctx, pending) and not _risk_of_old(ctx, pending)
+        (pending.rung == 0 or leads_there(ctx, pending))
+        and state.mission.route is not None
+        and not met
+        and is_on_board_sound(ctx)
+        and _keeps_floor(ctx, pending)
+        and not _risk_of_old(ctx, pending)
     ):
         ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(state.plans.retry), rung=0))
         ctx.say(Severity.WARNING, "no plan", f"no new plan ({reason}): the old one is sound and stays", every_s=0.0)
@@ -99,19 +112,29 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
     ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(state.plans.retry), rung=0))
     risk = _risk_of_old(ctx, pending)
     if risk and state.mission.route is not None and not met and is_on_board_sound(ctx) and _keeps_floor(ctx, pending):
-        ctx.say(Severity.WARNING, "no plan",
-                 f"no plan on any step of the ladder ({reason}): the old one stays; {risk}", every_s=0.0)
+        ctx.say(
+            Severity.WARNING,
+            "no plan",
+            f"no plan on any step of the ladder ({reason}): the old one stays; {risk}",
+            every_s=0.0,
+        )
         return
     if met and is_on_board_sound(ctx):
         # Loitering in a vessel's way is no better than sailing on through it: the operator must know.
         ctx.say(
-            Severity.CRITICAL, "no way clear",
-            f"no plan keeps clear of {met[0].name}, met in {met[0].time_s:.0f} s: the old plan stays", every_s=0.0)
+            Severity.CRITICAL,
+            "no way clear",
+            f"no plan keeps clear of {met[0].name}, met in {met[0].time_s:.0f} s: the old plan stays",
+            every_s=0.0,
+        )
         return
     wait = ctx.state.plans.retry.not_before_s - ctx.t_s
     ctx.say(
-        Severity.CRITICAL, "no plan at all",
-        f"no plan on any step of the ladder ({reason}): holding, trying again in {wait:.0f} s", every_s=0.0)
+        Severity.CRITICAL,
+        "no plan at all",
+        f"no plan on any step of the ladder ({reason}): holding, trying again in {wait:.0f} s",
+        every_s=0.0,
+    )
     hold(ctx, f"no plan found: {reason}")
 
 
@@ -134,8 +157,7 @@ def _wait_against(ctx: StepContext, pending: PendingPlan, foul: str, *, count: i
     if place is None:
         where = f"nowhere near is she carried clear, {where}"
     ctx.say(Severity.CRITICAL, FOUL, f"{foul}: {where}")
-    if not is_here and pending.rung + 1 < count and request(
-            ctx, pending.reason, rung=count - 1, text=foul):
+    if not is_here and pending.rung + 1 < count and request(ctx, pending.reason, rung=count - 1, text=foul):
         return
     ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(ctx.state.plans.retry), rung=0))
     hold(ctx, foul)
@@ -152,20 +174,27 @@ def hold(ctx: StepContext, why: str, *, anew: bool = False) -> None:
     boat, wind, state = ctx.boat_en, ctx.wind_mean, ctx.state
     ctx.phase(Phase.HOLDING if state.voyage.sailing else Phase.WAITING, f"waiting for a plan: {why}")
     if boat is None or not state.voyage.sailing or state.mission.route is None:
-        return   # not under way
+        return  # not under way
     if state.mission.index >= len(state.mission.route.items) - 1 and not anew:
-        return   # already in the safe end of the mission
+        return  # already in the safe end of the mission
     config = ctx.known_config
     place, room = loiter_place(
-        ctx.voyage, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m)
+        ctx.voyage, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m
+    )
     keep = state.mission.index
     end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
     route = replace(
-        state.mission.route, items=(*state.mission.route.items[:keep], end),
+        state.mission.route,
+        items=(*state.mission.route.items[:keep], end),
         points_en_m=(*state.mission.route.points_en_m[:keep], place),
         leg_from_en_m=(*state.mission.route.leg_from_en_m[:keep], boat),
         gate_of=(*state.mission.route.gate_of[:keep], -1),
-        rung="hold", risk=None, cost_s=None, median_s=None, late_s=None,
-        bound_for="", why=f"{why}; loitering with {room:.0f} m of room",
+        rung="hold",
+        risk=None,
+        cost_s=None,
+        median_s=None,
+        late_s=None,
+        bound_for="",
+        why=f"{why}; loitering with {room:.0f} m of room",
     )
     upload(ctx, route, keep + 1, route.why)

@@ -26,14 +26,14 @@ from companion.skipper.way import PointEn, distance_m, moved
 from companion.traffic import Policy, Role, Vessel, predict
 from companion.traffic.colregs import APPARENT_RAD, OngoingEncounter
 
-AHEAD_S = 60.0               # crossing ahead of a bow by more than this is no risk
-BOW_STEP = 1.0               # of their radius: the row's discs overlap, nothing slips through
+AHEAD_S = 60.0  # crossing ahead of a bow by more than this is no risk
+BOW_STEP = 1.0  # of their radius: the row's discs overlap, nothing slips through
 BOW_HORIZON_S = 300.0
-MEET_SHARE = 0.6             # of their radius: a route is given up later than a plan keeps away
+MEET_SHARE = 0.6  # of their radius: a route is given up later than a plan keeps away
 LEAST_MPS = 0.5
-PASSES_CLEAR = 2.0           # times the clearance: who will pass so far off needs nobody's steady course
-APPARENT_S, APPARENT_M = 30.0, (50.0, 150.0)   # how long, and how far ahead of us, the change of course is to show
-CROSSING_RAD = (math.radians(20.0), math.radians(160.0))   # between the courses of two vessels that cross
+PASSES_CLEAR = 2.0  # times the clearance: who will pass so far off needs nobody's steady course
+APPARENT_S, APPARENT_M = 30.0, (50.0, 150.0)  # how long, and how far ahead of us, the change of course is to show
+CROSSING_RAD = (math.radians(20.0), math.radians(160.0))  # between the courses of two vessels that cross
 PORT_RAD = (math.radians(-45.0), math.radians(-95.0))
 
 
@@ -52,14 +52,18 @@ def is_stood_on_to(ctx: StepContext, vessel: Vessel) -> bool:
         return held.stands_on
     # A boat that hardly moves meets nobody: it has no course to keep.
     return ctx.speed_mps >= LEAST_MPS and any(
-        a.encounter.role is Role.STAND_ON for a in ctx.state.traffic.watch
-        if (a.vessel.mmsi, a.vessel.branch) == (vessel.mmsi, vessel.branch))
+        a.encounter.role is Role.STAND_ON
+        for a in ctx.state.traffic.watch
+        if (a.vessel.mmsi, a.vessel.branch) == (vessel.mmsi, vessel.branch)
+    )
 
 
 def stands_on(ctx: StepContext) -> bool:
     """Return whether course and speed are to be kept: there is an encounter in which we stand on."""
-    return any(h.stands_on and h.apart_s is None and h.cpa_m < PASSES_CLEAR * ctx.config.traffic_clearance_m
-               for h in ctx.state.traffic.encounters)
+    return any(
+        h.stands_on and h.apart_s is None and h.cpa_m < PASSES_CLEAR * ctx.config.traffic_clearance_m
+        for h in ctx.state.traffic.encounters
+    )
 
 
 def bow_discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, share: float = 1.0) -> tuple[Target, ...]:
@@ -78,22 +82,31 @@ def bow_discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, share: fl
         reach = there.reach_m + AHEAD_S * speed
         for n in range(1, 1 + math.ceil(reach / (BOW_STEP * radius))):
             centre = moved(there.mean_en_m, there.course_rad, min(n * BOW_STEP * radius, reach))
-            out.append(Target(
-                x_m=centre[0], y_m=centre[1], vx_mps=there.velocity_en_mps[0], vy_mps=there.velocity_en_mps[1],
-                radius_m=radius, growth_mps=0.0, from_s=0.0, until_s=BOW_HORIZON_S, name=vessel.label,
-                mmsi=vessel.mmsi))
+            out.append(
+                Target(
+                    x_m=centre[0],
+                    y_m=centre[1],
+                    vx_mps=there.velocity_en_mps[0],
+                    vy_mps=there.velocity_en_mps[1],
+                    radius_m=radius,
+                    growth_mps=0.0,
+                    from_s=0.0,
+                    until_s=BOW_HORIZON_S,
+                    name=vessel.label,
+                    mmsi=vessel.mmsi,
+                )
+            )
     return tuple(out)
 
 
 def regions(
-    ctx: StepContext, vessels: Sequence[Vessel], start_en: PointEn, after_s: float, *, is_met: bool,
+    ctx: StepContext, vessels: Sequence[Vessel], start_en: PointEn, after_s: float, *, is_met: bool
 ) -> tuple[Target, ...]:
     """Return what a plan that starts at ``start_en`` in ``after_s`` keeps out of by the rules.
 
     ``is_met``: the way sailed now meets a vessel, so that there is a change of course to be seen.
     """
-    out = [replace(d, name=f"ahead of {d.name}")
-           for d in bow_discs(ctx, vessels, ctx.t_s + after_s)]
+    out = [replace(d, name=f"ahead of {d.name}") for d in bow_discs(ctx, vessels, ctx.t_s + after_s)]
     for vessel in vessels if is_met else ():
         held = held_of(ctx, vessel)
         if held is not None and held.must_act and not held.altered:
@@ -111,7 +124,17 @@ def _apparent(ctx: StepContext, held: OngoingEncounter, start_en: PointEn) -> li
     out = []
     for off in courses:
         centre = moved(start_en, held.course_rad + off, ahead_m)
-        out.append(Target(
-            x_m=centre[0], y_m=centre[1], vx_mps=0.0, vy_mps=0.0, radius_m=ahead_m * math.sin(APPARENT_RAD),
-            growth_mps=0.0, from_s=0.0, until_s=2.0 * ahead_m / speed, name=f"apparent to {held.label}"))
+        out.append(
+            Target(
+                x_m=centre[0],
+                y_m=centre[1],
+                vx_mps=0.0,
+                vy_mps=0.0,
+                radius_m=ahead_m * math.sin(APPARENT_RAD),
+                growth_mps=0.0,
+                from_s=0.0,
+                until_s=2.0 * ahead_m / speed,
+                name=f"apparent to {held.label}",
+            )
+        )
     return out

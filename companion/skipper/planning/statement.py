@@ -25,13 +25,31 @@ from companion.skipper.step.wind_limits import strength_of
 from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m, half_width_rad, mean_twd_rad, moved
 
 # The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
-REPAIR_RINGS_M = (3.0, 6.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 90.0, 140.0, 210.0, 320.0, 480.0, 720.0, 1080.0,
-                  1620.0, 2430.0, 3645.0)
+REPAIR_RINGS_M = (
+    3.0,
+    6.0,
+    10.0,
+    15.0,
+    20.0,
+    30.0,
+    45.0,
+    60.0,
+    90.0,
+    140.0,
+    210.0,
+    320.0,
+    480.0,
+    720.0,
+    1080.0,
+    1620.0,
+    2430.0,
+    3645.0,
+)
 REPAIR_DIRECTIONS = 24
-NOTCH = 2.0     # radius of the notch as a multiple of what the start lacks: room to turn out of it
-LEG_SAVING = 8e-5   # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
-HAIR_M = 0.2    # a repaired point stands this far clear of the margin it was repaired for
-PIECE_M = 2000.0   # a geodesic is off a chord of this length by 8 cm at most, at 75 degrees of latitude too
+NOTCH = 2.0  # radius of the notch as a multiple of what the start lacks: room to turn out of it
+LEG_SAVING = 8e-5  # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
+HAIR_M = 0.2  # a repaired point stands this far clear of the margin it was repaired for
+PIECE_M = 2000.0  # a geodesic is off a chord of this length by 8 cm at most, at 75 degrees of latitude too
 _EARTH = Geod(ellps="WGS84")
 
 
@@ -60,7 +78,7 @@ class Aim:
 
 
 def wind_part(
-    forecast: WindForecast, *, after_s: float, length_s: float, delta_s: float, is_known: bool = True,
+    forecast: WindForecast, *, after_s: float, length_s: float, delta_s: float, is_known: bool = True
 ) -> dict[str, Any]:
     """Return the ``wind`` of a problem that starts ``after_s`` from the forecast's moment.
 
@@ -91,9 +109,7 @@ def wind_part(
     }
 
 
-def repaired(
-    voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, twd_from_rad: float | None,
-) -> Start:
+def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, twd_from_rad: float | None) -> Start:
     """Return the start made plannable if it is nearer than ``margin_m`` to an obstacle or limit.
 
     Down to ``floor_m`` the margin around it gets a notch, so that the plan begins where the boat is. Nearer than
@@ -128,8 +144,11 @@ def repaired(
         if best is not None:
             text = f"the start is {here:.1f} m from an obstacle or limit: led {ring_m:.0f} m into free water first"
             return Start(
-                en_m=best[1], heading_rad=bearing_rad(start.en_m, best[1]), after_s=start.after_s,
-                lead_in=(best[1],), text=text,
+                en_m=best[1],
+                heading_rad=bearing_rad(start.en_m, best[1]),
+                after_s=start.after_s,
+                lead_in=(best[1],),
+                text=text,
             )
     return start
 
@@ -186,12 +205,25 @@ def band(voyage: Voyage, gate: Gate, start_en: PointEn, aim_en: PointEn) -> Poly
 
 
 def problem_dict(
-    voyage: Voyage, gate: Gate, *, start: Start, aim: Aim, forecast: WindForecast,
-    margin_m: float, delta_s: float, no_go_half_rad: float, floor_m: float = 0.0,
-    title: str = "", beat: dict[str, Any] | None = None,
-    max_path_risk: float | None = None, tracking: dict[str, Any] | None = None,
-    current: WaterCurrent = STILL_WATER, zone_half_rad: float = 0.0, doubt: WindAngleUncertainty | None = None,
-    failing: dict[str, Any] | None = None, is_wind_known: bool = True,
+    voyage: Voyage,
+    gate: Gate,
+    *,
+    start: Start,
+    aim: Aim,
+    forecast: WindForecast,
+    margin_m: float,
+    delta_s: float,
+    no_go_half_rad: float,
+    floor_m: float = 0.0,
+    title: str = "",
+    beat: dict[str, Any] | None = None,
+    max_path_risk: float | None = None,
+    tracking: dict[str, Any] | None = None,
+    current: WaterCurrent = STILL_WATER,
+    zone_half_rad: float = 0.0,
+    doubt: WindAngleUncertainty | None = None,
+    failing: dict[str, Any] | None = None,
+    is_wind_known: bool = True,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
 
@@ -219,15 +251,23 @@ def problem_dict(
     half_rad = max(no_go_half_rad, voyage.boat.no_go_half_rad)
     if doubt is not None:
         forecast = doubt.widened(
-            forecast, beat_rad=half_rad, speed_mps=voyage.boat.polar.speed_mps(half_rad, speed),
-            leeway_rad=voyage.boat.made_good_rad(half_rad, speed) - half_rad)
+            forecast,
+            beat_rad=half_rad,
+            speed_mps=voyage.boat.polar.speed_mps(half_rad, speed),
+            leeway_rad=voyage.boat.made_good_rad(half_rad, speed) - half_rad,
+        )
     wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s, is_known=is_wind_known)
     water: dict[str, Any] = {}
     if current.is_significant:
         water["current"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
         water["zone"] = {"from_deg": wind["from_deg"], "half_deg": math.degrees(zone_half_rad)}
-        wind = wind_part(forecast_over_water(forecast, current), after_s=start.after_s, length_s=length_s,
-                         delta_s=delta_s, is_known=is_wind_known)
+        wind = wind_part(
+            forecast_over_water(forecast, current),
+            after_s=start.after_s,
+            length_s=length_s,
+            delta_s=delta_s,
+            is_known=is_wind_known,
+        )
     boat = dict(voyage.boat.problem_boat(wind["speed_mps"]))
     boat["speeds"] = voyage.boat.problem_speeds()
     boat.update(failing or {})
@@ -248,13 +288,14 @@ def problem_dict(
         **water,
         "beat": beat,
         "tracking": tracking,
-        "risk": None if max_path_risk is None else {
-            "max_path_risk": max_path_risk, "correlation_time_s": forecast.correlation_time_s},
+        "risk": None
+        if max_path_risk is None
+        else {"max_path_risk": max_path_risk, "correlation_time_s": forecast.correlation_time_s},
     }
 
 
 def _notched(
-    voyage: Voyage, start: Start, obstacles: Sequence[str], fence: str | None, floor_m: float,
+    voyage: Voyage, start: Start, obstacles: Sequence[str], fence: str | None, floor_m: float
 ) -> tuple[list[str], str | None]:
     """Return obstacles and fence with the notch around the start: there the floor holds instead of the margin."""
     disc = shapely.buffer(shapely.points(start.en_m), start.notch_m, quad_segs=4)
@@ -264,8 +305,10 @@ def _notched(
     for text in obstacles:
         rest = shapely.difference(shapely.from_wkt(text), opening)
         open_obstacles.extend(
-            shapely.to_wkt(p, rounding_precision=4) for p in shapely.get_parts(rest)
-            if isinstance(p, Polygon) and not p.is_empty)
+            shapely.to_wkt(p, rounding_precision=4)
+            for p in shapely.get_parts(rest)
+            if isinstance(p, Polygon) and not p.is_empty
+        )
     if fence is not None:
         inner = voyage.area.fence_wkt(floor_m, start.en_m)
         if inner is not None:
@@ -296,7 +339,8 @@ def leg_line(frame: LocalFrame, from_en: PointEn, to_en: PointEn, near_en: Point
     stations_m = np.linspace(begin_m, end_m, max(2, 1 + int(np.ceil((end_m - begin_m) / PIECE_M))))
     count = len(stations_m)
     lon_deg, lat_deg, _ = _EARTH.fwd(
-        np.full(count, a.lon_deg), np.full(count, a.lat_deg), np.full(count, azimuth_deg), stations_m)
+        np.full(count, a.lon_deg), np.full(count, a.lat_deg), np.full(count, azimuth_deg), stations_m
+    )
     return LineString(frame.array_en_from_lonlat(np.column_stack([lon_deg, lat_deg])))
 
 

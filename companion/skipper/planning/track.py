@@ -23,7 +23,7 @@ TRACKS_M = (2.0, 2.5, 4.0, 8.0)
 
 
 def problem_tracking(
-    ctx: StepContext, start: Start, from_index: int | None, *, floor_m: float, forecast: WindForecast,
+    ctx: StepContext, start: Start, from_index: int | None, *, floor_m: float, forecast: WindForecast
 ) -> dict[str, Any]:
     """Return the ``tracking`` of a problem: the autopilot's parameters, the hull, and what is solid as it is."""
     limits, area, route = ctx.snapshot.limits, ctx.voyage.area, ctx.state.mission.route
@@ -34,13 +34,20 @@ def problem_tracking(
     elif start.lead_in:
         before = ctx.boat_en
     return {
-        "wp_radius_m": helm.wp_radius_m, "turn_radius_m": helm.turn_radius_m, "wp_speed_mps": helm.wp_speed_mps,
-        "accel_mps2": helm.accel_mps2, "jerk_mps3": helm.jerk_mps3, "corridor_m": helm.corridor_m,
+        "wp_radius_m": helm.wp_radius_m,
+        "turn_radius_m": helm.turn_radius_m,
+        "wp_speed_mps": helm.wp_speed_mps,
+        "accel_mps2": helm.accel_mps2,
+        "jerk_mps3": helm.jerk_mps3,
+        "corridor_m": helm.corridor_m,
         "no_go_half_deg": float(np.degrees(ctx.no_go_half_rad)),
-        "floor_m": floor_m, "reach_m": ctx.voyage.boat.hull.reach_m,
-        "solids": area.obstacles_wkt(0.0), "limits": area.fence_wkt(0.0, start.en_m),
+        "floor_m": floor_m,
+        "reach_m": ctx.voyage.boat.hull.reach_m,
+        "solids": area.obstacles_wkt(0.0),
+        "limits": area.fence_wkt(0.0, start.en_m),
         "before": None if before is None else {"x": before[0], "y": before[1]},
-        "correlation_s": forecast.correlation_time_s, "known": _is_known(ctx),
+        "correlation_s": forecast.correlation_time_s,
+        "known": _is_known(ctx),
     }
 
 
@@ -53,7 +60,8 @@ def steps(ctx: StepContext) -> tuple[Rung, ...]:
     error_m = stated_error_m(best, has_short=not _is_known(ctx))
     track_m = error_m + ctx.voyage.boat.hull.reach_m
     return rungs(
-        ctx.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m), in_current=in_current)
+        ctx.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m), in_current=in_current
+    )
 
 
 def _is_known(ctx: StepContext) -> bool:
@@ -63,7 +71,12 @@ def _is_known(ctx: StepContext) -> bool:
 
 
 def of_way(
-    problem: Problem, way: Sequence[PointEn], *, heading_rad: float, before_en: PointEn | None, sailed_m: float = 0.0,
+    problem: Problem,
+    way: Sequence[PointEn],
+    *,
+    heading_rad: float,
+    before_en: PointEn | None,
+    sailed_m: float = 0.0,
     has_loops: bool = True,
 ) -> ExpectedTrack:
     """Return what is expected of a way that begins elsewhere than the problem, its beats left aside.
@@ -74,8 +87,9 @@ def of_way(
     tracking = problem.tracking
     if tracking is None or len(way) < 2:
         return ExpectedTrack()
-    from_here = replace(problem, start_en=way[0], start_heading_rad=heading_rad,
-                        tracking=replace(tracking, before_en=before_en))
+    from_here = replace(
+        problem, start_en=way[0], start_heading_rad=heading_rad, tracking=replace(tracking, before_en=before_en)
+    )
     return expected(from_here, np.asarray(way), has_boards=False, has_loops=has_loops, sailed_m=sailed_m)
 
 

@@ -30,17 +30,17 @@ from companion.skipper.way.judge import predicted_beat
 from companion.traffic import Decision, decide
 from companion.traffic.plans import MIN_INTERVAL_S
 
-TOO_LATE_S = SHORT_S + 2.0   # an upload begins the leg anew: what is left of it then must be long enough to be followed
-BEND_RAD = math.radians(6.0)     # a smaller change of course at a waypoint is not worth a plan of its own ...
-BENDS_RAD = math.radians(25.0)   # a greater one, in all, ends a board
-BEND_PLAN_AGE_S = 60.0           # ... unless the last one is this old
-FORECAST_SHARE = 0.5         # of the interval that the plan used: a smaller change of the mean does not matter
+TOO_LATE_S = SHORT_S + 2.0  # an upload begins the leg anew: what is left of it then must be long enough to be followed
+BEND_RAD = math.radians(6.0)  # a smaller change of course at a waypoint is not worth a plan of its own ...
+BENDS_RAD = math.radians(25.0)  # a greater one, in all, ends a board
+BEND_PLAN_AGE_S = 60.0  # ... unless the last one is this old
+FORECAST_SHARE = 0.5  # of the interval that the plan used: a smaller change of the mean does not matter
 FORECAST_RAD = math.radians(5.0)
-CURRENT_MPS, CURRENT_SHARE = 0.15, 0.25   # a current is another when it differs by so much, and so much of the plan's
-CURRENT_INTERVAL_S = 60.0    # its estimate settles within minutes, and each waypoint takes it in anyway
-FORECAST_SPEED = 0.3         # share of the wind speed
-FORECAST_WIDTH = 1.5         # times as wide, or as narrow, and ...
-FORECAST_WIDTH_RAD = math.radians(3.0)   # ... by this much
+CURRENT_MPS, CURRENT_SHARE = 0.15, 0.25  # a current is another when it differs by so much, and so much of the plan's
+CURRENT_INTERVAL_S = 60.0  # its estimate settles within minutes, and each waypoint takes it in anyway
+FORECAST_SPEED = 0.3  # share of the wind speed
+FORECAST_WIDTH = 1.5  # times as wide, or as narrow, and ...
+FORECAST_WIDTH_RAD = math.radians(3.0)  # ... by this much
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,8 +72,11 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
         # It need not lead to our goals: nothing is planned but another way, and that as soon as the wind is known.
         if ctx.snapshot.wind.record_s < config.wind_settle_s:
             return None
-        return Trigger(reason=ReplanReason.MISMATCH, text="the mission on board is of no plan that is known",
-                       interval_s=config.min_replan_interval_s)
+        return Trigger(
+            reason=ReplanReason.MISMATCH,
+            text="the mission on board is of no plan that is known",
+            interval_s=config.min_replan_interval_s,
+        )
     changed = _diversion(ctx, bound)
     if changed is not None:
         return changed
@@ -83,14 +86,18 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     boat = ctx.boat_en
     if ctx.drawn is not None and ctx.drawn.cuts([boat, *ctx.ahead()]):
-        return Trigger(reason=ReplanReason.OBSTACLE, text=f"{ctx.drawn.words} cuts the way", urgent=True,
-                       interval_s=config.no_go_replan_interval_s)
+        return Trigger(
+            reason=ReplanReason.OBSTACLE,
+            text=f"{ctx.drawn.words} cuts the way",
+            urgent=True,
+            interval_s=config.no_go_replan_interval_s,
+        )
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
     if ctx.guidance is Guidance.FIELD and ctx.steers:
         if is_composed(ctx) and route is not None and ctx.state.progress.gate in route.gate_of:
-            return None   # what is on board leads to the goal's place: that is where it goes when it is not steered
-        return _at_end(ctx) or _extension(ctx, bound)   # the mission on board need not be the way that is sailed
+            return None  # what is on board leads to the goal's place: that is where it goes when it is not steered
+        return _at_end(ctx) or _extension(ctx, bound)  # the mission on board need not be the way that is sailed
     trigger = _traffic(ctx)
     if trigger is None and not ctx.is_raised("wind untrusted"):
         trigger = _no_go(ctx)
@@ -98,25 +105,34 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
     return trigger or _extension(ctx, bound) or _wind(ctx) or _unsure(ctx) or _waypoint(ctx)
 
 
-REASONS = {DiversionKind.REFUGE: ReplanReason.REFUGE, DiversionKind.HOME: ReplanReason.HOME,
-           DiversionKind.REST: ReplanReason.REST, DiversionKind.GOAL: ReplanReason.ORDER,
-           DiversionKind.INSIDE: ReplanReason.OBSTACLE,
-           DiversionKind.START: ReplanReason.NEXT_GOAL, DiversionKind.BOX: ReplanReason.NEXT_GOAL,
-           DiversionKind.FIELD: ReplanReason.RETRY}
+REASONS = {
+    DiversionKind.REFUGE: ReplanReason.REFUGE,
+    DiversionKind.HOME: ReplanReason.HOME,
+    DiversionKind.REST: ReplanReason.REST,
+    DiversionKind.GOAL: ReplanReason.ORDER,
+    DiversionKind.INSIDE: ReplanReason.OBSTACLE,
+    DiversionKind.START: ReplanReason.NEXT_GOAL,
+    DiversionKind.BOX: ReplanReason.NEXT_GOAL,
+    DiversionKind.FIELD: ReplanReason.RETRY,
+}
 
 
 def _diversion(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
     """The boat is bound for somewhere else than its route leads to: a diversion that begins, or one that is over."""
     route = ctx.state.mission.route
     leads_to = route.bound_for if route is not None else ""
-    is_first = ctx.state.plans.retry.failures == 0   # then the wait between two tries counts
+    is_first = ctx.state.plans.retry.failures == 0  # then the wait between two tries counts
     interval_s = 0.0 if is_first else ctx.config.min_replan_interval_s
     if bound is not None and leads_to != bound.name:
         return Trigger(reason=REASONS[bound.kind], text=bound.sentence, urgent=is_first, interval_s=interval_s)
     is_home = leads_to == HOME and homeward(ctx) is not None
     if bound is None and leads_to and not is_home and not ctx.state.voyage.over:
-        return Trigger(reason=ReplanReason.NEXT_GOAL, text=f"no longer bound for {leads_to}: sailing on",
-                       urgent=is_first, interval_s=interval_s)
+        return Trigger(
+            reason=ReplanReason.NEXT_GOAL,
+            text=f"no longer bound for {leads_to}: sailing on",
+            urgent=is_first,
+            interval_s=interval_s,
+        )
     return None
 
 
@@ -160,13 +176,23 @@ def _no_go(ctx: StepContext) -> Trigger | None:
     since = ctx.state.plans.no_go_since_s if ctx.state.plans.no_go_since_s is not None else ctx.t_s
     ctx.set(plans=changed(ctx.state.plans, no_go_since_s=since))
     drift = predicted_beat(
-        boat, vehicle.heading_rad, leg[0], target, twd_from_rad=wind[0], no_go_half_rad=ctx.no_go_half_rad,
-        corridor_m=ctx.tack_corridor_m, area=ctx.voyage.area, current_en_mps=ctx.current_en_mps,
-        speed_mps=ctx.voyage.boat.polar.speed_mps(ctx.no_go_half_rad, wind[1]))
+        boat,
+        vehicle.heading_rad,
+        leg[0],
+        target,
+        twd_from_rad=wind[0],
+        no_go_half_rad=ctx.no_go_half_rad,
+        corridor_m=ctx.tack_corridor_m,
+        area=ctx.voyage.area,
+        current_en_mps=ctx.current_en_mps,
+        speed_mps=ctx.voyage.boat.polar.speed_mps(ctx.no_go_half_rad, wind[1]),
+    )
     floor = min(ctx.config.margin_floor_m, ctx.config.margin_m)
     straight = ctx.voyage.area.path_clearance_m([boat, target])
-    text = (f"TWA {math.degrees(twa):.0f}° to the waypoint is inside {math.degrees(ctx.no_go_half_rad):.0f}°: "
-            f"{drift.off_leg_m:.0f} m off the leg, {drift.clearance_m:.0f} m clear")
+    text = (
+        f"TWA {math.degrees(twa):.0f}° to the waypoint is inside {math.degrees(ctx.no_go_half_rad):.0f}°: "
+        f"{drift.off_leg_m:.0f} m off the leg, {drift.clearance_m:.0f} m clear"
+    )
     if drift.clearance_m < floor and drift.clearance_m < straight - 1.0 and ctx.t_s - since >= 1.0:
         interval_s = ctx.config.no_go_replan_interval_s
         return Trigger(reason=ReplanReason.NO_GO, text=text, interval_s=interval_s, urgent=True)
@@ -177,9 +203,13 @@ def _no_go(ctx: StepContext) -> Trigger | None:
 
 def _position(ctx: StepContext) -> Trigger | None:
     """The boat is not where the plan has it, or is nowhere on it."""
-    if ctx.state.position.doubt is not None:   # with a position all the same: see StepContext.plans_in_doubt
-        return Trigger(reason=ReplanReason.OFF_LEG, text="the position jumped, and the way from there is not clear",
-                       interval_s=ctx.config.no_go_replan_interval_s, urgent=True)
+    if ctx.state.position.doubt is not None:  # with a position all the same: see StepContext.plans_in_doubt
+        return Trigger(
+            reason=ReplanReason.OFF_LEG,
+            text="the position jumped, and the way from there is not clear",
+            interval_s=ctx.config.no_go_replan_interval_s,
+            urgent=True,
+        )
     if ctx.is_raised("off the corridor"):
         return Trigger(reason=ReplanReason.OFF_LEG, text="off the leg", interval_s=_patience_off_leg_s(ctx))
     if ctx.is_raised("no progress"):
@@ -200,8 +230,11 @@ def _at_end(ctx: StepContext) -> Trigger | None:
 def _patience_off_leg_s(ctx: StepContext) -> float:
     """Return how long after the last plan the next may be made; less when something stands before the waypoint."""
     boat, leg, config = ctx.boat_en, ctx.leg(), ctx.config
-    blocked = boat is not None and leg is not None and (
-        ctx.voyage.area.path_clearance_m([boat, leg[1]]) < config.margin_floor_m)
+    blocked = (
+        boat is not None
+        and leg is not None
+        and (ctx.voyage.area.path_clearance_m([boat, leg[1]]) < config.margin_floor_m)
+    )
     if blocked:
         return config.no_go_replan_interval_s
     return config.min_replan_interval_s
@@ -214,18 +247,22 @@ def _wind(ctx: StepContext) -> Trigger | None:
         return None
     turned = abs(difference_rad(mean[0], route.plan_twd_from_rad))
     if turned > config.wind_change_rad and turned > route.plan_half_width_rad:
-        text = (f"the 90 s mean has turned {math.degrees(turned):.0f}° from the plan's wind; it allowed for "
-                f"±{math.degrees(route.plan_half_width_rad):.0f}°")
+        text = (
+            f"the 90 s mean has turned {math.degrees(turned):.0f}° from the plan's wind; it allowed for "
+            f"±{math.degrees(route.plan_half_width_rad):.0f}°"
+        )
         return Trigger(reason=ReplanReason.WIND_SHIFT, text=text, interval_s=config.min_replan_interval_s)
     planned = route.plan_current_east_mps, route.plan_current_north_mps
     changed_mps = distance_m(ctx.current_en_mps, planned)
     if changed_mps > max(CURRENT_MPS, CURRENT_SHARE * math.hypot(*planned)):
         text = f"{ctx.snapshot.current.sentence()}: {changed_mps:.2f} m/s off the plan's"
-        return Trigger(reason=ReplanReason.CURRENT, text=text, interval_s=max(
-            CURRENT_INTERVAL_S, config.min_replan_interval_s))
+        return Trigger(
+            reason=ReplanReason.CURRENT, text=text, interval_s=max(CURRENT_INTERVAL_S, config.min_replan_interval_s)
+        )
     if ctx.t_s - route.plan_t_s > config.plan_age_s:
         return Trigger(
-            reason=ReplanReason.PLAN_AGE, text="the plan is 60 minutes old", interval_s=config.min_replan_interval_s)
+            reason=ReplanReason.PLAN_AGE, text="the plan is 60 minutes old", interval_s=config.min_replan_interval_s
+        )
     return None
 
 
@@ -237,8 +274,10 @@ def _unsure(ctx: StepContext) -> Trigger | None:
     width_rad = _width_rad(ctx)
     if not _is_wider(width_rad, route.plan_half_width_rad):
         return None
-    text = (f"the wind has become less certain: ±{math.degrees(width_rad):.0f}°, the plan allowed for "
-            f"±{math.degrees(route.plan_half_width_rad):.0f}°")
+    text = (
+        f"the wind has become less certain: ±{math.degrees(width_rad):.0f}°, the plan allowed for "
+        f"±{math.degrees(route.plan_half_width_rad):.0f}°"
+    )
     return Trigger(reason=ReplanReason.FORECAST, text=text, interval_s=config.min_replan_interval_s)
 
 
@@ -265,14 +304,16 @@ def _extension(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
     elif ends >= len(ctx.gates) - 1 and homeward(ctx) is None:
         return None
     elif 0 <= ends < len(ctx.gates) - 1 and waits_for_gun(ctx, ctx.gates[ends + 1]):
-        return None   # where the boat waits is planned for when it is next
+        return None  # where the boat waits is planned for when it is next
     left = path_length_m([boat, *ctx.ahead()])
     if left > (ctx.config.look_ahead_s + ctx.late_s) * max(ctx.speed_mps, 1.0) or not may_restart_leg(ctx):
         return None
     return Trigger(
-        reason=ReplanReason.NEXT_GOAL, text=f"the mission reaches {left:.0f} m ahead, there is more to sail",
+        reason=ReplanReason.NEXT_GOAL,
+        text=f"the mission reaches {left:.0f} m ahead, there is more to sail",
         from_index=last,
-        interval_s=ctx.config.settle_s)
+        interval_s=ctx.config.settle_s,
+    )
 
 
 def _waypoint(ctx: StepContext) -> Trigger | None:
@@ -281,9 +322,9 @@ def _waypoint(ctx: StepContext) -> Trigger | None:
     if route is None or boat is None or leg is None or state.plans.replanned_index >= state.mission.index:
         return None
     last = ctx.last_waypoint()
-    passes = any(g >= 0 for g in route.gate_of[state.mission.index:last])
+    passes = any(g >= 0 for g in route.gate_of[state.mission.index : last])
     if state.mission.index >= last or passes or is_buoy(ctx.gate):
-        return None   # the tail to the next goal is there already: see _extension
+        return None  # the tail to the next goal is there already: see _extension
     left_s = distance_m(boat, leg[1]) / max(ctx.speed_mps, 0.3)
     if not TOO_LATE_S + ctx.late_s < left_s <= ctx.config.lead_s + ctx.late_s or ctx.is_raised("wind untrusted"):
         return None
@@ -294,15 +335,18 @@ def _waypoint(ctx: StepContext) -> Trigger | None:
     if ctx.config.replan_policy is ReplanPolicy.FORECAST and not forecast_matters(ctx):
         ctx.set(plans=changed(ctx.state.plans, replanned_index=state.mission.index))
         return None
-    reason = (ReplanReason.WAYPOINT if ctx.config.replan_policy is ReplanPolicy.WAYPOINT else ReplanReason.FORECAST)
+    reason = ReplanReason.WAYPOINT if ctx.config.replan_policy is ReplanPolicy.WAYPOINT else ReplanReason.FORECAST
     return Trigger(
-        reason=reason, text=f"waypoint {state.mission.index + 1} in {left_s:.0f} s", from_index=state.mission.index,
-        interval_s=ctx.config.min_replan_interval_s)
+        reason=reason,
+        text=f"waypoint {state.mission.index + 1} in {left_s:.0f} s",
+        from_index=state.mission.index,
+        interval_s=ctx.config.min_replan_interval_s,
+    )
 
 
 def _is_bend(route: Route, index: int) -> bool:
     """Return whether the course hardly changes at a waypoint: a leg bent as the no-go zone widens, no manoeuvre."""
-    if index + 1 >= len(route.points_en_m) or distance_m(*route.points_en_m[index:index + 2]) < 1.0:
+    if index + 1 >= len(route.points_en_m) or distance_m(*route.points_en_m[index : index + 2]) < 1.0:
         return False
     before = bearing_rad(route.leg_from_en_m[index], route.points_en_m[index])
     after = bearing_rad(route.points_en_m[index], route.points_en_m[index + 1])

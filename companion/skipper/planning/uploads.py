@@ -24,14 +24,19 @@ from companion.skipper.step.state import PendingPlan, PendingUpload, Retry
 from companion.skipper.way import PointEn, distance_m
 from companion.skipper.way.judge import judge
 
-SPARE_M = 0.3          # a boat below the floor may come no nearer than this more: the turn away takes room
-TACKS_RISK = 1e-3      # a chance of contact by failed tacks is greater than another by more than this
-MARGIN_M = 0.1         # margins that differ by less are the same
+SPARE_M = 0.3  # a boat below the floor may come no nearer than this more: the turn away takes room
+TACKS_RISK = 1e-3  # a chance of contact by failed tacks is greater than another by more than this
+MARGIN_M = 0.1  # margins that differ by less are the same
 
 
 def upload(
-    ctx: StepContext, route: Route, set_current: int | None, text: str, *,
-    whole: bool = False, change: Change | None = None,
+    ctx: StepContext,
+    route: Route,
+    set_current: int | None,
+    text: str,
+    *,
+    whole: bool = False,
+    change: Change | None = None,
     planned: PendingPlan | None = None,
 ) -> str:
     """Ask for the upload of a route, with our mark; without permission it stays ready and the status says so.
@@ -54,8 +59,14 @@ def upload(
         # A list that is not ours to keep a part of: whoever gives an armed boat AUTO meanwhile must not sail a mixture.
         closing = stopgap(route, 0, 0) if ctx.autopilot is not None and ctx.autopilot.is_armed else None
     action = UploadMission(
-        upload_id=number, items=route.items, keep_first=keep, set_current=set_current, plan_id=route.plan_id,
-        text=text, stopgap=None if closing is None else marked([closing])[0], change=change or Change(),
+        upload_id=number,
+        items=route.items,
+        keep_first=keep,
+        set_current=set_current,
+        plan_id=route.plan_id,
+        text=text,
+        stopgap=None if closing is None else marked([closing])[0],
+        change=change or Change(),
     )
     if not ctx.act(action):
         ctx.set(plans=changed(ctx.state.plans, ready_route=route))
@@ -63,9 +74,15 @@ def upload(
         return ""
     # A read that is still under way will tell of the mission before this upload: its answer is not wanted.
     ctx.set(
-        pending=changed(ctx.state.pending, read=None, upload=PendingUpload(
-            upload_id=number, t_s=ctx.t_s, route=route, set_current=set_current, keep_first=action.keep_first)),
-        plans=changed(ctx.state.plans, ready_route=None))
+        pending=changed(
+            ctx.state.pending,
+            read=None,
+            upload=PendingUpload(
+                upload_id=number, t_s=ctx.t_s, route=route, set_current=set_current, keep_first=action.keep_first
+            ),
+        ),
+        plans=changed(ctx.state.plans, ready_route=None),
+    )
     return ""
 
 
@@ -81,22 +98,38 @@ def take_upload(ctx: StepContext, outcome: UploadOutcome) -> None:
         ctx.set(
             pending=changed(ctx.state.pending, upload=None, upload_retry=Retry()),
             mission=changed(
-                ctx.state.mission, route=pending.route, index=index, own_index=max(index, 0), checked=True,
-                foreign="", unsure_route=None, replace_foreign=False, uploaded_s=ctx.t_s,
+                ctx.state.mission,
+                route=pending.route,
+                index=index,
+                own_index=max(index, 0),
+                checked=True,
+                foreign="",
+                unsure_route=None,
+                replace_foreign=False,
+                uploaded_s=ctx.t_s,
                 asked_s=ctx.t_s if pending.set_current is not None else ctx.state.mission.asked_s,
-                asked_seq=pending.set_current if ctx.state.voyage.sailing else None),
-            progress=changed(   # an upload that was on its way at the miss does not lead back
-                ctx.state.progress, missed_s=missed_s if missed_s is not None and pending.t_s <= missed_s else None),
+                asked_seq=pending.set_current if ctx.state.voyage.sailing else None,
+            ),
+            progress=changed(  # an upload that was on its way at the miss does not lead back
+                ctx.state.progress, missed_s=missed_s if missed_s is not None and pending.t_s <= missed_s else None
+            ),
             plans=changed(
-                ctx.state.plans, no_go_since_s=None,
-                replanned_index=ctx.state.plans.replanned_index if pending.set_current != 1 else -1))
+                ctx.state.plans,
+                no_go_since_s=None,
+                replanned_index=ctx.state.plans.replanned_index if pending.set_current != 1 else -1,
+            ),
+        )
         return
     ctx.set(
         pending=changed(ctx.state.pending, upload=None, upload_retry=ctx.failed(ctx.state.pending.upload_retry)),
-        mission=changed(ctx.state.mission, unsure_route=pending.route, checked=False, read_since_s=ctx.t_s))
+        mission=changed(ctx.state.mission, unsure_route=pending.route, checked=False, read_since_s=ctx.t_s),
+    )
     ctx.say(
-        Severity.ERROR, "upload failed",
-        f"upload {outcome.result.value}: {outcome.text or 'no words'}; reading what is on board", every_s=0.0)
+        Severity.ERROR,
+        "upload failed",
+        f"upload {outcome.result.value}: {outcome.text or 'no words'}; reading what is on board",
+        every_s=0.0,
+    )
 
 
 # --------------------
@@ -170,10 +203,21 @@ def refusal(ctx: StepContext, route: Route, set_current: int | None, pending: Pe
     new = [begins, *route.points_en_m[first:-1]]
     old, ahead, leg = [boat, *ctx.ahead()], ctx.ahead(), ctx.leg()
     sailed_m = 0.0 if leg is None else distance_m(leg[0], boat)
-    before = ExpectedTrack() if not ahead else of_way(
-        problem, old, heading_rad=vehicle.heading_rad, before_en=None, sailed_m=sailed_m, has_loops=has_loops)
-    seen = of_way(problem, new, heading_rad=heading_rad, before_en=None, has_loops=has_loops,
-                  sailed_m=sailed_m if set_current is None else 0.0)
+    before = (
+        ExpectedTrack()
+        if not ahead
+        else of_way(
+            problem, old, heading_rad=vehicle.heading_rad, before_en=None, sailed_m=sailed_m, has_loops=has_loops
+        )
+    )
+    seen = of_way(
+        problem,
+        new,
+        heading_rad=heading_rad,
+        before_en=None,
+        has_loops=has_loops,
+        sailed_m=sailed_m if set_current is None else 0.0,
+    )
     low = _below_floor(problem, seen, before if ahead and _is_sailed(ctx) else None, here_m=here_m)
     if low or not ahead or not is_open(ctx, pending, before):
         return low
@@ -209,7 +253,7 @@ def leads_there(ctx: StepContext, pending: PendingPlan) -> bool:
         return False
     if pending.gate < 0:
         return bool(pending.facts.bound_for)
-    return pending.gate in route.gate_of[ctx.state.mission.index:-1]
+    return pending.gate in route.gate_of[ctx.state.mission.index : -1]
 
 
 def is_on_board_sound(ctx: StepContext) -> bool:
@@ -228,9 +272,18 @@ def is_sound(ctx: StepContext, way: Sequence[PointEn]) -> bool:
         return False
     floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
     return all(
-        judge(part, boat=ctx.voyage.boat, no_go_half_rad=ctx.no_go_half_rad, twd_from_rad=wind[0], tws_mps=wind[1],
-              area=ctx.voyage.area, beat_room_m=room_m(ctx), current_en_mps=ctx.current_en_mps).is_sound(floor_m)
-        for part, wind in ((way, mean), (way[:2], now)))
+        judge(
+            part,
+            boat=ctx.voyage.boat,
+            no_go_half_rad=ctx.no_go_half_rad,
+            twd_from_rad=wind[0],
+            tws_mps=wind[1],
+            area=ctx.voyage.area,
+            beat_room_m=room_m(ctx),
+            current_en_mps=ctx.current_en_mps,
+        ).is_sound(floor_m)
+        for part, wind in ((way, mean), (way[:2], now))
+    )
 
 
 def _less(ctx: StepContext, pending: PendingPlan, new: list[PointEn], old: list[PointEn], *, heading_rad: float) -> str:
@@ -243,10 +296,12 @@ def _less(ctx: StepContext, pending: PendingPlan, new: list[PointEn], old: list[
         return f"its delta_s is {facts.delta_s:g}, that of the way on board, which is open, {route.delta_s:g}"
     here = replace(resolved(pending.problem), start_en=new[0], start_heading_rad=heading_rad)
     legs = [evaluate(replace(here, start_en=way[0]), np.asarray(way)).legs for way in (new, old)]
-    tacks = [min(1.0, of_risky(tacks_at_risk(here, each))) for each in legs]   # a union bound may be above 1
+    tacks = [min(1.0, of_risky(tacks_at_risk(here, each))) for each in legs]  # a union bound may be above 1
     if tacks[0] > tacks[1] + TACKS_RISK:
-        return (f"tacks of it that fail are likelier to end in a contact: {100.0 * tacks[0]:.2g} %, "
-                f"of the way on board {100.0 * tacks[1]:.2g} %")
+        return (
+            f"tacks of it that fail are likelier to end in a contact: {100.0 * tacks[0]:.2g} %, "
+            f"of the way on board {100.0 * tacks[1]:.2g} %"
+        )
     limit = ctx.config.max_path_risk
     if limit is not None and here.risk is not None:
         risks = [path_risk(here, each).total for each in legs]

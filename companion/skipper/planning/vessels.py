@@ -26,19 +26,19 @@ from companion.traffic.occupancy import Keep
 from companion.traffic.plans import PlainLeg, TimedLeg, pressing
 from companion.traffic.predict import tail_factor
 
-PART_BY_RUNG = (1.0, 4.0, 8.0)   # times the vessels' part of the promise, by the ladder's rung
-LEAST_DELTA_S = 0.5          # no plan promises less: of the ladder's last rungs the vessels get what is left
-GIVE_UP_RISK = 1e-1          # the active route is given up for a likelier meeting, at an instant, only
-OWN_TIMING_MPS = 0.1         # how fast our own place along the route becomes uncertain: a sailboat's speed, tacks
-HORIZON_S = 600.0            # the plan is made again long before
-ALIKE_S = 300.0              # successive ways are compared over this time
-SETTLED_M = 50.0             # discs this uncertain grow no more: else later ones would close a lake
-UNKNOWN_S = 30.0             # a vessel of unknown course could be anywhere soon: only the next moments count
-NEAREST = 12                 # vessels that a plan looks at: half of them those that come nearest, if both go on or we
+PART_BY_RUNG = (1.0, 4.0, 8.0)  # times the vessels' part of the promise, by the ladder's rung
+LEAST_DELTA_S = 0.5  # no plan promises less: of the ladder's last rungs the vessels get what is left
+GIVE_UP_RISK = 1e-1  # the active route is given up for a likelier meeting, at an instant, only
+OWN_TIMING_MPS = 0.1  # how fast our own place along the route becomes uncertain: a sailboat's speed, tacks
+HORIZON_S = 600.0  # the plan is made again long before
+ALIKE_S = 300.0  # successive ways are compared over this time
+SETTLED_M = 50.0  # discs this uncertain grow no more: else later ones would close a lake
+UNKNOWN_S = 30.0  # a vessel of unknown course could be anywhere soon: only the next moments count
+NEAREST = 12  # vessels that a plan looks at: half of them those that come nearest, if both go on or we
 #                              stay; then those that could be met soonest, however the boat turns and we do
-OWN_MPS = 4.0                # no boat of ours closes faster by itself
-FAR_RISK = 1e-2              # that a vessel is nearer than counted when those that could be met are chosen
-HAIR_M = 1.0                 # a boat within a disc is let out of it: the disc ends this much before the boat
+OWN_MPS = 4.0  # no boat of ours closes faster by itself
+FAR_RISK = 1e-2  # that a vessel is nearer than counted when those that could be met are chosen
+HAIR_M = 1.0  # a boat within a disc is let out of it: the disc ends this much before the boat
 
 
 def near(ctx: StepContext) -> tuple[Vessel, ...]:
@@ -62,10 +62,16 @@ def near(ctx: StepContext) -> tuple[Vessel, ...]:
         own = ctx.snapshot.vehicle
         velocities = ((0.0, 0.0), own.velocity_en_mps if own is not None else (0.0, 0.0))
         held = {(h.mmsi, h.branch) for h in ctx.state.traffic.encounters}
-        by_peril = sorted(soon, key=lambda s: (
-            s[1:3] not in held, min(peril_m(boat, velocity, s[3], ctx.t_s) for velocity in velocities), s[1:3]))
-        kept = {s[1:3] for s in by_peril[:NEAREST // 2]}
-        kept.update(s[1:3] for s in [s for s in soon if s[1:3] not in kept][:NEAREST - len(kept)])
+        by_peril = sorted(
+            soon,
+            key=lambda s: (
+                s[1:3] not in held,
+                min(peril_m(boat, velocity, s[3], ctx.t_s) for velocity in velocities),
+                s[1:3],
+            ),
+        )
+        kept = {s[1:3] for s in by_peril[: NEAREST // 2]}
+        kept.update(s[1:3] for s in [s for s in soon if s[1:3] not in kept][: NEAREST - len(kept)])
         soon = [s for s in soon if s[1:3] in kept]
     return tuple(vessel for *_, vessel in soon)
 
@@ -74,8 +80,12 @@ def discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, sigmas: float
     """Return where not to be because of ``vessels``, in times from ``t_s`` on [s], ``sigmas`` wide."""
     hull = ctx.voyage.boat.hull
     keep = Keep(
-        sigmas=sigmas, clearance_m=ctx.config.traffic_clearance_m, horizon_s=HORIZON_S, own_timing_mps=OWN_TIMING_MPS,
-        own_radius_m=hull.reach_m, ahead_m=ctx.config.traffic_clearance_m,
+        sigmas=sigmas,
+        clearance_m=ctx.config.traffic_clearance_m,
+        horizon_s=HORIZON_S,
+        own_timing_mps=OWN_TIMING_MPS,
+        own_radius_m=hull.reach_m,
+        ahead_m=ctx.config.traffic_clearance_m,
         settled_m=SETTLED_M,
     )
     known = [v for v in vessels if v.is_moving_known]
@@ -83,8 +93,11 @@ def discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, sigmas: float
     met = {(h.mmsi, h.branch) for h in ctx.state.traffic.encounters}
     holding = [v for v in known if (v.mmsi, v.branch) in met]
     known = [v for v in known if (v.mmsi, v.branch) not in met]
-    return (*(d for v in holding for d in planning_discs([v], t_s, keep, motion=expected(v))),
-            *planning_discs(known, t_s, keep), *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)))
+    return (
+        *(d for v in holding for d in planning_discs([v], t_s, keep, motion=expected(v))),
+        *planning_discs(known, t_s, keep),
+        *planning_discs(unknown, t_s, replace(keep, horizon_s=UNKNOWN_S)),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,7 +148,7 @@ def shares(ctx: StepContext, start_en: PointEn, after_s: float, rung: int, delta
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
     if rung == 0 and ctx.state.traffic.encounters:
         out += regions(ctx, vessels, start_en, after_s, is_met=is_met)
-    least = max(LEAST_DELTA_S, 1.0 - of_wind - part)   # a half and not the last digit below it
+    least = max(LEAST_DELTA_S, 1.0 - of_wind - part)  # a half and not the last digit below it
     return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)
 
 
@@ -154,7 +167,7 @@ def timed_legs(ctx: StepContext, points: Sequence[PointEn] | None = None) -> tup
         closed = ctx.no_go_half_rad
         speed = model.polar.speed_mps(max(twa, closed), wind[1])
         if twa < closed:
-            speed *= math.cos(closed) / math.cos(twa)   # the autopilot will beat there
+            speed *= math.cos(closed) / math.cos(twa)  # the autopilot will beat there
         begin = t_s + abs(difference_rad(course, heading)) / model.turn_rate_radps
         t_s = begin + length / max(speed, LOST_MPS)
         legs.append(PlainLeg(from_en=a, to_en=b, start_s=begin, end_s=t_s))
@@ -180,8 +193,12 @@ def soon(legs: Sequence[TimedLeg], seconds: float) -> list[PointEn]:
         if leg.start_s >= seconds:
             break
         share = min(1.0, (seconds - leg.start_s) / (leg.end_s - leg.start_s))
-        points.append((leg.from_en[0] + share * (leg.to_en[0] - leg.from_en[0]),
-                       leg.from_en[1] + share * (leg.to_en[1] - leg.from_en[1])))
+        points.append(
+            (
+                leg.from_en[0] + share * (leg.to_en[0] - leg.from_en[0]),
+                leg.from_en[1] + share * (leg.to_en[1] - leg.from_en[1]),
+            )
+        )
     return points
 
 

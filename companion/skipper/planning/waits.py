@@ -12,13 +12,13 @@ from companion.skipper.step.context import StepContext
 from companion.skipper.way import Gate, Line, PointEn, bearing_rad, distance_m, moved
 from companion.skipper.way.line import ahead_m, course_rad
 
-WAIT_M = 40.0         # from where the line is crossed: the loiter swings 12 m, and drifts
+WAIT_M = 40.0  # from where the line is crossed: the loiter swings 12 m, and drifts
 FARTHEST_M = 70.0
-SIDES_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0)   # of the course across the line, from the wait to it
-SAILABLE_RAD = math.radians(8.0)   # outside the no-go zone by this, the leg to the line is one board
+SIDES_DEG = (0.0, 15.0, -15.0, 30.0, -30.0, 45.0, -45.0)  # of the course across the line, from the wait to it
+SAILABLE_RAD = math.radians(8.0)  # outside the no-go zone by this, the leg to the line is one board
 SLOWEST_MPS = 0.3
-RESERVE_S = 8.0       # later than the estimate: gusts carry the boat there 4 s before it (measured), and early is worse
-NEAR_M = 120.0        # from farther away the time is not foreseen so well: it goes to the line first, and waits there
+RESERVE_S = 8.0  # later than the estimate: gusts carry the boat there 4 s before it (measured), and early is worse
+NEAR_M = 120.0  # from farther away the time is not foreseen so well: it goes to the line first, and waits there
 FAR_SHARE = 0.6
 
 
@@ -63,7 +63,7 @@ def _to_line_s(ctx: StepContext, gate: Gate) -> float:
     closed = ctx.planned_no_go_rad
     twa = abs(difference_rad(wind[0], bearing_rad(boat, cut)))
     speed = ctx.voyage.boat.polar.speed_mps(max(twa, closed), wind[1])
-    if twa < closed:   # the way of two boards
+    if twa < closed:  # the way of two boards
         speed *= math.cos(closed) / max(math.cos(twa), 0.1)
     time_s = distance_m(boat, cut) / max(speed, SLOWEST_MPS)
     return time_s if distance_m(boat, cut) <= NEAR_M else FAR_SHARE * time_s
@@ -73,8 +73,11 @@ def _cut(gate: Gate) -> PointEn:
     """Return where a gate's line is crossed."""
     assert gate.line is not None
     back_m = ahead_m(gate.line, gate.en_m)
-    return moved(gate.en_m, course_rad(gate.line) + math.pi, back_m) if back_m > 0.0 else moved(
-        gate.en_m, course_rad(gate.line), -back_m)
+    return (
+        moved(gate.en_m, course_rad(gate.line) + math.pi, back_m)
+        if back_m > 0.0
+        else moved(gate.en_m, course_rad(gate.line), -back_m)
+    )
 
 
 def waiting_en(ctx: StepContext, gate: Gate) -> PointEn:

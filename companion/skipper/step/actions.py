@@ -15,24 +15,24 @@ class ReplanReason(enum.Enum):
     """Why a plan was asked for."""
 
     START = "start"
-    WAYPOINT = "waypoint"              # Wolsieffer: at each waypoint, from the next one
-    FORECAST = "forecast"              # the forecast has changed enough to matter
-    WIND_SHIFT = "wind_shift"          # Büsser: 20 deg
-    CURRENT = "current"                # the current has changed against the plan's
-    PLAN_AGE = "plan_age"              # Büsser: 60 minutes
-    OFF_LEG = "off_leg"                # Büsser: off the leg by more than the grid size
-    NO_GO = "no_go"                    # the present wind makes the leg unsailable
+    WAYPOINT = "waypoint"  # Wolsieffer: at each waypoint, from the next one
+    FORECAST = "forecast"  # the forecast has changed enough to matter
+    WIND_SHIFT = "wind_shift"  # Büsser: 20 deg
+    CURRENT = "current"  # the current has changed against the plan's
+    PLAN_AGE = "plan_age"  # Büsser: 60 minutes
+    OFF_LEG = "off_leg"  # Büsser: off the leg by more than the grid size
+    NO_GO = "no_go"  # the present wind makes the leg unsailable
     NEXT_GOAL = "next_goal"
     MISSED_BUOY = "missed_buoy"
     NO_PROGRESS = "no_progress"
     OPERATOR_BACK = "operator_back"
-    OBSTACLE = "obstacle"              # the area or the traffic changed
-    REFUGE = "refuge"                  # the battery is critical, or the voyage out of time
-    HOME = "home"                      # all goals are reached, or the autopilot wants the boat home
-    REST = "rest"                      # dragged off the place where the boat loiters
-    ORDER = "order"                    # somebody asked for it, or it has come out of irons
-    RETRY = "retry"                    # a step of the ladder after nothing was found
-    MISMATCH = "mismatch"              # the mission on the autopilot is not the one that was uploaded
+    OBSTACLE = "obstacle"  # the area or the traffic changed
+    REFUGE = "refuge"  # the battery is critical, or the voyage out of time
+    HOME = "home"  # all goals are reached, or the autopilot wants the boat home
+    REST = "rest"  # dragged off the place where the boat loiters
+    ORDER = "order"  # somebody asked for it, or it has come out of irons
+    RETRY = "retry"  # a step of the ladder after nothing was found
+    MISMATCH = "mismatch"  # the mission on the autopilot is not the one that was uploaded
 
     @property
     def words(self) -> str:
@@ -209,6 +209,19 @@ class AdoptDrawing:
 
 
 Action = (
-    RequestPlan | CancelPlan | UploadMission | UploadFence | ReadMission | SetMode | Arm | SetCurrent
-    | Tack | RunMotor | SteerHeading | Announce | Acknowledge | StopOrders | AdoptDrawing
+    RequestPlan
+    | CancelPlan
+    | UploadMission
+    | UploadFence
+    | ReadMission
+    | SetMode
+    | Arm
+    | SetCurrent
+    | Tack
+    | RunMotor
+    | SteerHeading
+    | Announce
+    | Acknowledge
+    | StopOrders
+    | AdoptDrawing
 )

@@ -18,23 +18,23 @@ from companion.traffic import Policy
 class ReplanPolicy(enum.Enum):
     """When a new plan is made at a waypoint."""
 
-    WAYPOINT = "waypoint"      # at every waypoint, from the next one (Wolsieffer 2020, section VI)
-    FORECAST = "forecast"      # only when the forecast, its spread included, has changed enough to matter
+    WAYPOINT = "waypoint"  # at every waypoint, from the next one (Wolsieffer 2020, section VI)
+    FORECAST = "forecast"  # only when the forecast, its spread included, has changed enough to matter
 
 
 class Guidance(enum.Enum):
     """What steers the boat."""
 
-    PLAN = "plan"              # the mission, in AUTO
-    HEADING = "heading"        # the plan's headings, in GUIDED (Büsser's own interface)
-    FIELD = "field"            # vector fields, in GUIDED; the mission on board is what is left when we are gone
+    PLAN = "plan"  # the mission, in AUTO
+    HEADING = "heading"  # the plan's headings, in GUIDED (Büsser's own interface)
+    FIELD = "field"  # vector fields, in GUIDED; the mission on board is what is left when we are gone
 
 
 class SafeEnd(enum.Enum):
     """How the voyage ends. Every mission ends in a NAV_LOITER_UNLIM; none in RTL, whose way nobody looks at."""
 
-    LOITER = "loiter"          # at the last goal, or near it at a place with room to leeward
-    RETURN = "return"          # at home, the way there planned like any other
+    LOITER = "loiter"  # at the last goal, or near it at a place with room to leeward
+    RETURN = "return"  # at home, the way there planned like any other
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,20 +72,20 @@ class Ends:
 class Permissions:
     """What the operator allows. The default is a dry run: look, plan, speak, touch nothing."""
 
-    may_upload: bool = False           # put missions on the autopilot
+    may_upload: bool = False  # put missions on the autopilot
     may_upload_fence: bool = False
     may_arm: bool = False
-    may_set_mode: bool = False         # AUTO to begin with, and the modes of the watchdogs
-    may_steer: bool = False            # GUIDED headings (out of irons, buoys by heading)
+    may_set_mode: bool = False  # AUTO to begin with, and the modes of the watchdogs
+    may_steer: bool = False  # GUIDED headings (out of irons, buoys by heading)
     may_replace_foreign: bool = False  # a mission that is not ours may be overwritten before setting sail
-    orders: tuple[str, ...] = ()       # verbs that the crew may give by MAVLink, or "all" (``companion.orders``)
+    orders: tuple[str, ...] = ()  # verbs that the crew may give by MAVLink, or "all" (``companion.orders``)
     local_orders: tuple[str, ...] = ()  # ... over the socket on board
-    far_orders: tuple[str, ...] = ()   # ... over the satellite link
+    far_orders: tuple[str, ...] = ()  # ... over the satellite link
 
 
 DRY_RUN = Permissions()
 ALL_PERMITTED = Permissions(
-    may_upload=True, may_upload_fence=True, may_arm=True, may_set_mode=True, may_steer=True, orders=(ALL,),
+    may_upload=True, may_upload_fence=True, may_arm=True, may_set_mode=True, may_steer=True, orders=(ALL,)
 )
 
 
@@ -93,65 +93,65 @@ ALL_PERMITTED = Permissions(
 class SkipperConfig:
     """Thresholds of the rules. Watchdog thresholds are in ``companion.safety``."""
 
-    sails: bool = True                 # False: a motor boat is what the mission asks for
+    sails: bool = True  # False: a motor boat is what the mission asks for
     # planning
     delta_s: float = 0.95
     max_path_risk: float | None = None  # of ever being forced into the no-go zone along a plan; None: not bounded
     delta_s_ladder: tuple[float, ...] = (0.90, 0.80, 0.66)  # tried in this order when nothing is found
-    margin_m: float = 15.0             # >= 15 m at 3 m/s: a breach coasts 6 to 10 m (ardurover notes, fence)
-    margin_floor_m: float = 8.0        # never planned closer than this, whatever the ladder
-    margin_ladder: tuple[float, ...] = (0.75, 0.5)          # share of margin - floor that is left
-    planner: PlannerChoice = AUTO             # by which algorithm; what it does not find is planned by ``auto``
+    margin_m: float = 15.0  # >= 15 m at 3 m/s: a breach coasts 6 to 10 m (ardurover notes, fence)
+    margin_floor_m: float = 8.0  # never planned closer than this, whatever the ladder
+    margin_ladder: tuple[float, ...] = (0.75, 0.5)  # share of margin - floor that is left
+    planner: PlannerChoice = AUTO  # by which algorithm; what it does not find is planned by ``auto``
     plan_budget_s: float = 1.0
     first_plan_budget_s: float = 2.0
-    plan_timeout_s: float = 20.0       # no answer from the planner: the request is counted as failed
-    no_go_half_rad: float = 0.785398   # SAIL_NO_GO_ANGLE 45 deg
-    tack_corridor_m: float = 10.0      # SAIL_XTRACK_MAX, its default, until it has been read
-    autopilot_beats: bool = True       # where the water is clear by its corridor the autopilot beats by itself
-    shifts: bool = False               # there it is asked for a tack where the wind's shifts make one worth it
+    plan_timeout_s: float = 20.0  # no answer from the planner: the request is counted as failed
+    no_go_half_rad: float = 0.785398  # SAIL_NO_GO_ANGLE 45 deg
+    tack_corridor_m: float = 10.0  # SAIL_XTRACK_MAX, its default, until it has been read
+    autopilot_beats: bool = True  # where the water is clear by its corridor the autopilot beats by itself
+    shifts: bool = False  # there it is asked for a tack where the wind's shifts make one worth it
     shift_tacks_apart_s: float = 10.0  # ... and no sooner after the last that was asked for
-    no_go_pad_rad: float = 0.034907    # legs at least 2 deg outside: then the autopilot adds no tacks of its own
+    no_go_pad_rad: float = 0.034907  # legs at least 2 deg outside: then the autopilot adds no tacks of its own
     replan_policy: ReplanPolicy = ReplanPolicy.WAYPOINT
-    announce_m: float = 5.0            # the autopilot announces a waypoint 3 to 5 m early
-    lead_s: float = 12.0               # the new tail is asked for this long before the waypoint
-    keep_gain: float = 0.02            # a sound old tail stays unless the new one is at least 2 % faster
-    keep_gain_s: float = 2.0           # ... and at least this much
-    horizon_m: float = 5000.0          # the local plan covers the next few miles only (Büsser 4)
+    announce_m: float = 5.0  # the autopilot announces a waypoint 3 to 5 m early
+    lead_s: float = 12.0  # the new tail is asked for this long before the waypoint
+    keep_gain: float = 0.02  # a sound old tail stays unless the new one is at least 2 % faster
+    keep_gain_s: float = 2.0  # ... and at least this much
+    horizon_m: float = 5000.0  # the local plan covers the next few miles only (Büsser 4)
     # Büsser's skipper, section 3.2.1
     wind_change_rad: float = 0.349066  # 20 deg
-    wind_change_level: float = 0.80    # ... and outside this interval of the forecast that the plan used
+    wind_change_level: float = 0.80  # ... and outside this interval of the forecast that the plan used
     plan_age_s: float = 3600.0
     grid_size_m: float = 20.0
-    manoeuvre_m: float = 3.0           # D_maneuver
-    buoy_angle_rad: float = 0.523599   # 30 deg, experimentally his
+    manoeuvre_m: float = 3.0  # D_maneuver
+    buoy_angle_rad: float = 0.523599  # 30 deg, experimentally his
     traffic_clearance_m: float = 50.0  # between hulls, beyond what is not known of where a vessel will be
-    traffic_time_s: float = 90.0       # an approach within that distance and this time is an alarm
+    traffic_time_s: float = 90.0  # an approach within that distance and this time is an alarm
     traffic_policy: Policy = Policy.KEEP_CLEAR
     # uploads
-    settle_s: float = 5.0              # a mode or sequence number that was asked for shows within this
-    reread_s: float = 300.0            # the mission on board is read again this often
-    upload_timeout_s: float = 60.0     # no outcome: counted as failed, the mission on the autopilot unknown
-    read_timeout_s: float = 180.0      # a hundred items one by one, where every second message is lost
+    settle_s: float = 5.0  # a mode or sequence number that was asked for shows within this
+    reread_s: float = 300.0  # the mission on board is read again this often
+    upload_timeout_s: float = 60.0  # no outcome: counted as failed, the mission on the autopilot unknown
+    read_timeout_s: float = 180.0  # a hundred items one by one, where every second message is lost
     # Then the numbering starts again: a transfer takes 7 ms an item, and the smallest board holds 655.
     max_items: int = 200
     safe_end: SafeEnd = SafeEnd.LOITER
-    loiter_radius_m: float = 15.0      # room the last item needs (measured: 12.1 m from the point)
+    loiter_radius_m: float = 15.0  # room the last item needs (measured: 12.1 m from the point)
     # patience
-    min_replan_interval_s: float = 20.0        # Büsser 5.2: never a new plan more often than every 20 s
-    no_go_patience_s: float = 4.0      # the present wind must close the leg for this long ...
-    no_go_off_leg_m: float = 4.0       # ... and take the boat this far off it, or below the margin's floor
-    no_go_replan_interval_s: float = 8.0       # a leg that became unsailable is more urgent
-    look_ahead_s: float = 40.0         # the mission reaches at least this far ahead while goals remain
+    min_replan_interval_s: float = 20.0  # Büsser 5.2: never a new plan more often than every 20 s
+    no_go_patience_s: float = 4.0  # the present wind must close the leg for this long ...
+    no_go_off_leg_m: float = 4.0  # ... and take the boat this far off it, or below the margin's floor
+    no_go_replan_interval_s: float = 8.0  # a leg that became unsailable is more urgent
+    look_ahead_s: float = 40.0  # the mission reaches at least this far ahead while goals remain
     command_timeout_s: float = 10.0
     backoff_first_s: float = 10.0
     backoff_factor: float = 2.0
     backoff_max_s: float = 300.0
-    announce_interval_s: float = 30.0          # the same sentence is not said again sooner
-    wind_settle_s: float = 30.0                # wind is believed after this long at the start
+    announce_interval_s: float = 30.0  # the same sentence is not said again sooner
+    wind_settle_s: float = 30.0  # wind is believed after this long at the start
     # Steered in GUIDED the mission is on board all the same, its count kept in step; but a companion that dies leaves a
     # boat that loiters where it is.
     guidance: Guidance = Guidance.PLAN
-    station_s: float = 0.0             # how long to stay at the last goal
-    adopts: bool = False               # the goals were drawn on the autopilot: others may be, under way
+    station_s: float = 0.0  # how long to stay at the last goal
+    adopts: bool = False  # the goals were drawn on the autopilot: others may be, under way
     ends: Ends = Ends()
     voyage_timeout_s: float | None = None  # under way for longer than this the goals are given up; None: never

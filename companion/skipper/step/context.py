@@ -57,10 +57,10 @@ from companion.skipper.way.autopilot_fence import Drawn, HomeCircle, circle_of, 
 from companion.skipper.way.position_plausibility import innovation_m
 from companion.skipper.way.stemming import Water
 
-FRESH_S = 3.0          # a part older than this is not acted upon
-BEATEN_MPS = 10.0      # the wind in which the boat may have sailed while nobody looked
-SHOWS_S = 2.5          # a command that was accepted shows in the next heartbeats: it is not repeated before that
-DRIFT_LOOK_S = 20.0    # a boat in HOLD is where its drift takes it within this
+FRESH_S = 3.0  # a part older than this is not acted upon
+BEATEN_MPS = 10.0  # the wind in which the boat may have sailed while nobody looked
+SHOWS_S = 2.5  # a command that was accepted shows in the next heartbeats: it is not repeated before that
+DRIFT_LOOK_S = 20.0  # a boat in HOLD is where its drift takes it within this
 
 
 def permitted(action: Action, permissions: Permissions) -> bool:
@@ -101,29 +101,40 @@ def _is_fence_off(state: SkipperState, snapshot: Snapshot) -> bool:
 class StepContext:
     """The work of one step. ``voyage`` is in the water that the autopilot's fences leave: ``circle`` and ``drawn``."""
 
-    def __init__(
-        self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot,
-    ) -> None:
+    def __init__(self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot) -> None:
         self.circle = circle_of(voyage, snapshot.limits, snapshot.autopilot, snapshot.position_en_m)
-        self.drawn = drawn_of(voyage.area, snapshot.fence, snapshot.limits, config.margin_m,
-                              is_off=_is_fence_off(state, snapshot))
+        self.drawn = drawn_of(
+            voyage.area, snapshot.fence, snapshot.limits, config.margin_m, is_off=_is_fence_off(state, snapshot)
+        )
         self.voyage, self.config = _kept_in(voyage, self.drawn, self.circle), config
         self.state = state
         self.snapshot = snapshot if config.sails else replace(snapshot, wind=still_air(snapshot.t_s))
         self.actions: list[Action] = []
-        self.found: tuple[tuple[object, ...], Diversion | None] | None = None   # the diversion, by what it was found
-        self.fresh: tuple[str, ...] = ()   # watchdogs that were raised in this step
+        self.found: tuple[tuple[object, ...], Diversion | None] | None = None  # the diversion, by what it was found
+        self.fresh: tuple[str, ...] = ()  # watchdogs that were raised in this step
         self._gates: tuple[tuple[Approach, ...], tuple[Gate, ...]] | None = None
 
     # ------------------------------------------------------------------------------------- changing
     def set(
-        self, *,
-        wants: tuple[str, ...] | None = None, vehicle: VehicleIdentity | None = None,
-        mission: LoadedMission | None = None, progress: GoalProgress | None = None, voyage: VoyageState | None = None,
-        plans: Planning | None = None, pending: Pending | None = None, operator: OperatorState | None = None,
-        steering: SteeringState | None = None, by_field: FieldSteering | None = None, adrift: Adrift | None = None,
-        tacking: Tacking | None = None, position: PositionState | None = None, orders: Orders | None = None,
-        alarms: Alarms | None = None, traffic: TrafficState | None = None, announced: Announced | None = None,
+        self,
+        *,
+        wants: tuple[str, ...] | None = None,
+        vehicle: VehicleIdentity | None = None,
+        mission: LoadedMission | None = None,
+        progress: GoalProgress | None = None,
+        voyage: VoyageState | None = None,
+        plans: Planning | None = None,
+        pending: Pending | None = None,
+        operator: OperatorState | None = None,
+        steering: SteeringState | None = None,
+        by_field: FieldSteering | None = None,
+        adrift: Adrift | None = None,
+        tacking: Tacking | None = None,
+        position: PositionState | None = None,
+        orders: Orders | None = None,
+        alarms: Alarms | None = None,
+        traffic: TrafficState | None = None,
+        announced: Announced | None = None,
     ) -> None:
         """Replace parts of the state whole; a part that is None stays."""
         state = self.state
@@ -172,7 +183,8 @@ class StepContext:
     def act(self, action: Action) -> bool:
         """Ask for an action; False (nothing is asked) when it is not permitted, the autopilot not ours, or given up."""
         is_order = isinstance(
-            action, UploadMission | UploadFence | SetMode | Arm | SetCurrent | SteerHeading | Tack | RunMotor)
+            action, UploadMission | UploadFence | SetMode | Arm | SetCurrent | SteerHeading | Tack | RunMotor
+        )
         if is_order and (self.is_given_up or not self.state.vehicle.is_ours):
             return False
         if not permitted(action, self.snapshot.permissions):
@@ -200,8 +212,7 @@ class StepContext:
 
     def failed(self, retry: Retry) -> Retry:
         """Return the patience after another failure: the wait doubles up to the longest."""
-        wait = min(
-            self.config.backoff_first_s * self.config.backoff_factor**retry.failures, self.config.backoff_max_s)
+        wait = min(self.config.backoff_first_s * self.config.backoff_factor**retry.failures, self.config.backoff_max_s)
         return Retry(failures=retry.failures + 1, not_before_s=self.t_s + wait)
 
     def approach(self, approach: Approach) -> None:
@@ -212,12 +223,18 @@ class StepContext:
         others = tuple(a for a in self.state.progress.approaches if a.goal != approach.goal)
         self.set(
             progress=changed(
-                self.state.progress, approaches=(*others, approach), bearing_rad=0.0, closest_m=math.inf,
-                gate=next(n for n, gate in enumerate(self.gates) if gate.goal == approach.goal)))
+                self.state.progress,
+                approaches=(*others, approach),
+                bearing_rad=0.0,
+                closest_m=math.inf,
+                gate=next(n for n, gate in enumerate(self.gates) if gate.goal == approach.goal),
+            )
+        )
         self.void_route()
 
     def void_route(self) -> None:
         """Let no item of the mission on board, or on its way there, count for the gate that is next or a later one."""
+
         def void(route: Route) -> Route:
             return replace(route, gate_of=tuple(-1 if g >= self.state.progress.gate else g for g in route.gate_of))
 
@@ -233,7 +250,7 @@ class StepContext:
         """The voyage's gates, in order."""
         approaches = self.state.progress.approaches
         if self._gates is None or self._gates[0] is not approaches:
-            self._gates = (approaches, gates_of(self.voyage, approaches))   # which hashes the whole voyage
+            self._gates = (approaches, gates_of(self.voyage, approaches))  # which hashes the whole voyage
         return self._gates[1]
 
     @property
@@ -292,7 +309,7 @@ class StepContext:
         if here is None or leg is None or vehicle is None or not self.state.voyage.sailing:
             return False
         goes_to = leg[1]
-        if self.state.steering.own_mode in STOPPING:   # drifting, turning, or on a way that is not ours
+        if self.state.steering.own_mode in STOPPING:  # drifting, turning, or on a way that is not ours
             east, north = vehicle.velocity_en_mps
             goes_to = (here[0] + DRIFT_LOOK_S * east, here[1] + DRIFT_LOOK_S * north)
         area, floor_m = self.voyage.area, min(self.config.margin_floor_m, self.config.margin_m)
@@ -317,10 +334,13 @@ class StepContext:
             return 0.0
         status, own = self.snapshot.autopilot, held_in or self.state.steering.own_mode
         return innovation_m(
-            (here[0] - last.en_m[0], here[1] - last.en_m[1]), max(0.0, self.t_s - age - last.t_s),
-            last.velocity_en_mps, vehicle.velocity_en_mps,
+            (here[0] - last.en_m[0], here[1] - last.en_m[1]),
+            max(0.0, self.t_s - age - last.t_s),
+            last.velocity_en_mps,
+            vehicle.velocity_en_mps,
             fastest_mps=self.voyage.boat.polar.max_speed_mps(BEATEN_MPS) + self.snapshot.current.drift_mps,
-            is_held=own in {Mode.LOITER, Mode.HOLD} and status is not None and status.mode is own)
+            is_held=own in {Mode.LOITER, Mode.HOLD} and status is not None and status.mode is own,
+        )
 
     @property
     def speed_mps(self) -> float:
@@ -346,8 +366,9 @@ class StepContext:
     def through_en_mps(self) -> tuple[float, float]:
         """The boat's velocity less that current [m/s]: over the ground where none is significant; 0 when unknown."""
         vehicle, (east, north) = self.snapshot.vehicle, self.current_en_mps
-        return (0.0, 0.0) if vehicle is None else (
-            vehicle.velocity_en_mps[0] - east, vehicle.velocity_en_mps[1] - north)
+        return (
+            (0.0, 0.0) if vehicle is None else (vehicle.velocity_en_mps[0] - east, vehicle.velocity_en_mps[1] - north)
+        )
 
     @property
     def water(self) -> Water | None:
@@ -355,8 +376,9 @@ class StepContext:
         wind = self.wind_mean
         if wind is None or not self.snapshot.current.is_significant:
             return None
-        return Water(boat=self.voyage.boat, wind=wind, current_en_mps=self.current_en_mps,
-                     no_go_half_rad=self.no_go_half_rad)
+        return Water(
+            boat=self.voyage.boat, wind=wind, current_en_mps=self.current_en_mps, no_go_half_rad=self.no_go_half_rad
+        )
 
     @property
     def no_go_half_rad(self) -> float:
@@ -486,7 +508,7 @@ class StepContext:
     def ahead(self) -> tuple[PointEn, ...]:
         """Return the waypoints still to be sailed, without the safe end; empty when loitering at it."""
         route = self.state.mission.route
-        return route.points_en_m[self.state.mission.index:-1] if route is not None else ()
+        return route.points_en_m[self.state.mission.index : -1] if route is not None else ()
 
     def last_waypoint(self) -> int:
         """Return the index of the last waypoint before the safe end, -1 without one."""
@@ -497,7 +519,14 @@ class StepContext:
         """Return the figures of a plan that is being asked for now."""
         wind = self.wind_mean or (0.0, 0.0)
         return Route(
-            plan_id=plan_id, plan_t_s=self.t_s, plan_twd_from_rad=wind[0], plan_tws_mps=wind[1],
-            plan_current_east_mps=self.current_en_mps[0], plan_current_north_mps=self.current_en_mps[1],
-            plan_half_width_rad=0.0, margin_m=margin_m, delta_s=delta_s, rung=rung,
+            plan_id=plan_id,
+            plan_t_s=self.t_s,
+            plan_twd_from_rad=wind[0],
+            plan_tws_mps=wind[1],
+            plan_current_east_mps=self.current_en_mps[0],
+            plan_current_north_mps=self.current_en_mps[1],
+            plan_half_width_rad=0.0,
+            margin_m=margin_m,
+            delta_s=delta_s,
+            rung=rung,
         )

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-KEPT = 20              # answers
-IN_TIME_S = 2.0        # what the lead times have room for, whatever the budget; and ...
-BEYOND_S = 1.0         # ... how much longer than its budget an answer may take at no cost
-LONGEST_S = 60.0       # later than this nothing follows an answer: the wind that it is for is another
-PATIENCE = 3.0         # times what nine answers of ten take: so long an answer is waited for
+KEPT = 20  # answers
+IN_TIME_S = 2.0  # what the lead times have room for, whatever the budget; and ...
+BEYOND_S = 1.0  # ... how much longer than its budget an answer may take at no cost
+LONGEST_S = 60.0  # later than this nothing follows an answer: the wind that it is for is another
+PATIENCE = 3.0  # times what nine answers of ten take: so long an answer is waited for
 MOST_PATIENCE_S = 120.0
-SLOW = 0.3             # of the reference core: a computer with less is called slow
+SLOW = 0.3  # of the reference core: a computer with less is called slow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,8 +37,11 @@ class PlannerLatency:
     def with_answer(self, took_s: float, budget_s: float, speed: float | None = None) -> PlannerLatency:
         """Return it with another answer, of that budget; a ``speed`` that was not measured is what it was."""
         return replace(
-            self, answers_s=(*self.answers_s, round(max(0.0, took_s), 1))[-KEPT:],
-            room_s=max(IN_TIME_S, budget_s + BEYOND_S), speed=self.speed if speed is None else round(speed, 2))
+            self,
+            answers_s=(*self.answers_s, round(max(0.0, took_s), 1))[-KEPT:],
+            room_s=max(IN_TIME_S, budget_s + BEYOND_S),
+            speed=self.speed if speed is None else round(speed, 2),
+        )
 
     @property
     def median_s(self) -> float | None:

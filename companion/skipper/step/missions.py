@@ -47,13 +47,11 @@ def is_same_mission(a: Sequence[MissionItem], b: Sequence[MissionItem]) -> bool:
 def is_mixture(items: Sequence[MissionItem], old: Sequence[MissionItem], new: Sequence[MissionItem]) -> bool:
     """Return whether every item is ours, from one of two missions at its index: an upload that was cut short."""
     ours = [{(m.command, m.lat_e7, m.lon_e7) for m in pair} for pair in _by_index(old, new)]
-    return len(items) <= len(ours) and all(
-        (m.command, m.lat_e7, m.lon_e7) in ours[i] for i, m in enumerate(items)
-    )
+    return len(items) <= len(ours) and all((m.command, m.lat_e7, m.lon_e7) in ours[i] for i, m in enumerate(items))
 
 
 def _by_index(old: Sequence[MissionItem], new: Sequence[MissionItem]) -> list[list[MissionItem]]:
-    return [list(old[i:i + 1]) + list(new[i:i + 1]) for i in range(max(len(old), len(new)))]
+    return [list(old[i : i + 1]) + list(new[i : i + 1]) for i in range(max(len(old), len(new)))]
 
 
 def ends_safely(items: Sequence[MissionItem]) -> bool:
@@ -63,15 +61,15 @@ def ends_safely(items: Sequence[MissionItem]) -> bool:
 
 
 # ------------------------------------------------------------------------------------------ safe end
-LEEWARD_ROOM_M = 40.0   # a boat with eased sails drifts this far before somebody looks
+LEEWARD_ROOM_M = 40.0  # a boat with eased sails drifts this far before somebody looks
 RINGS_M = (0.0, 15.0, 30.0, 50.0, 80.0, 120.0)
 DIRECTIONS = 16
-ROOMIER_M = 50.0      # a place with the room that is wanted is worth sailing this far
-ROOMIER_BY_M = 3.0    # ... and a somewhat roomier one only for this much of room
+ROOMIER_M = 50.0  # a place with the room that is wanted is worth sailing this far
+ROOMIER_BY_M = 3.0  # ... and a somewhat roomier one only for this much of room
 
 
 def loiter_place(
-    voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float, *, wanted_m: float = 0.0,
+    voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float, *, wanted_m: float = 0.0
 ) -> tuple[PointEn, float]:
     """Return where to loiter after ``end_en`` and the room there [m].
 
@@ -109,7 +107,7 @@ def loiter_place(
 
 
 def end_item(
-    voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float,
+    voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float
 ) -> tuple[MissionItem, PointEn]:
     """Return the loiter that ends the mission and where it is."""
     place, _ = loiter_place(voyage, config, end_en, twd_from_rad)
@@ -123,12 +121,18 @@ class Tail:
 
     start_en: PointEn
     points_en: tuple[PointEn, ...]
-    gate: int                  # -1: the last point completes nothing (a nearer goal, the local plan's horizon)
-    is_place: bool = False     # the boat is to loiter at its end, and nowhere near by
+    gate: int  # -1: the last point completes nothing (a nearer goal, the local plan's horizon)
+    is_place: bool = False  # the boat is to loiter at its end, and nowhere near by
 
 
 def splice(
-    voyage: Voyage, config: SkipperConfig, old: Route | None, *, keep: int, tail: Tail, twd_from_rad: float,
+    voyage: Voyage,
+    config: SkipperConfig,
+    old: Route | None,
+    *,
+    keep: int,
+    tail: Tail,
+    twd_from_rad: float,
     facts: Route,
 ) -> Route:
     """Return the route that keeps the first ``keep`` items of ``old`` and continues with ``tail`` and a safe end.
@@ -147,20 +151,23 @@ def splice(
         starts.append(start)
         gates.append(tail.gate if n == len(tail.points_en) - 1 else -1)
         start = point
-    item, place = end_item(voyage, config, start, twd_from_rad) if not tail.is_place else (
-        waypoint(voyage.frame.geo_from_en(*start), command=Command.NAV_LOITER_UNLIM), start)
+    item, place = (
+        end_item(voyage, config, start, twd_from_rad)
+        if not tail.is_place
+        else (waypoint(voyage.frame.geo_from_en(*start), command=Command.NAV_LOITER_UNLIM), start)
+    )
     items.append(item)
     points.append(place)
     starts.append(start)
     gates.append(-1)
     return replace(
-        facts, items=tuple(items), points_en_m=tuple(points), leg_from_en_m=tuple(starts), gate_of=tuple(gates),
+        facts, items=tuple(items), points_en_m=tuple(points), leg_from_en_m=tuple(starts), gate_of=tuple(gates)
     )
 
 
 # ----------------------------------------------------------------------------------------- transfer
-HELD_BACK = "held back"   # the rung of a route that ends in a stopgap
-NO_PLAN = -1              # the plan of a route that was found on board: ours, and nobody knows what for
+HELD_BACK = "held back"  # the rung of a route that ends in a stopgap
+NO_PLAN = -1  # the plan of a route that was found on board: ours, and nobody knows what for
 
 
 def stopgap(route: Route, keep: int, index: int) -> MissionItem | None:
@@ -189,9 +196,16 @@ def held_back(items: Sequence[MissionItem], route: Route) -> Route | None:
     for item, point in zip(route.items, route.points_en_m, strict=True):
         if (item.lat_e7, item.lon_e7) == whole[-1][1:]:
             return replace(
-                route, items=(*route.items[:n], items[n]), points_en_m=(*route.points_en_m[:n], point),
+                route,
+                items=(*route.items[:n], items[n]),
+                points_en_m=(*route.points_en_m[:n], point),
                 leg_from_en_m=(*route.leg_from_en_m[:n], route.leg_from_en_m[min(n, len(route.items) - 1)]),
-                gate_of=(*route.gate_of[:n], -1), rung=HELD_BACK, risk=None, cost_s=None, median_s=None, late_s=None,
+                gate_of=(*route.gate_of[:n], -1),
+                rung=HELD_BACK,
+                risk=None,
+                cost_s=None,
+                median_s=None,
+                late_s=None,
                 bound_for="",
                 why="an upload was cut short: the mission ends in a loiter on the way",
             )

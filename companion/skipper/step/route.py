@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from companion.messages import MissionItem
 from companion.skipper.way.voyage import PointEn
 
-HOME_RADIUS_M = 15.0     # home is where the boat was armed: a place in the water or at its edge, not a mark
+HOME_RADIUS_M = 15.0  # home is where the boat was armed: a place in the water or at its edge, not a mark
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,24 +24,24 @@ class Route:
     leg_from_en_m: tuple[PointEn, ...] = ()
     gate_of: tuple[int, ...] = ()
     plan_id: int
-    plan_t_s: float                    # when the plan was asked for
-    plan_twd_from_rad: float           # mean wind that the plan used
+    plan_t_s: float  # when the plan was asked for
+    plan_twd_from_rad: float  # mean wind that the plan used
     plan_tws_mps: float
-    plan_half_width_rad: float         # half width of the forecast's interval at config.wind_change_level
+    plan_half_width_rad: float  # half width of the forecast's interval at config.wind_change_level
     margin_m: float
     delta_s: float
-    rung: str = ""                     # the step of the ladder it was found on; empty: as configured
-    risk: float | None = None          # of the whole path, wind and vessels
-    plan_current_east_mps: float = 0.0   # the current that the plan reckons with
+    rung: str = ""  # the step of the ladder it was found on; empty: as configured
+    risk: float | None = None  # of the whole path, wind and vessels
+    plan_current_east_mps: float = 0.0  # the current that the plan reckons with
     plan_current_north_mps: float = 0.0
-    vessel_risk: float = 0.0           # the vessels' part of it
-    vessels_part: float = 0.0          # of 1 - delta_s, at each instant, the vessels' part
-    expected_clearance_m: float | None = None   # of the hull on the predicted track, the prediction's error taken off
+    vessel_risk: float = 0.0  # the vessels' part of it
+    vessels_part: float = 0.0  # of 1 - delta_s, at each instant, the vessels' part
+    expected_clearance_m: float | None = None  # of the hull on the predicted track, the prediction's error taken off
     cost_s: float | None = None
-    median_s: float | None = None               # when half the winds of the forecast's spread are there ...
-    late_s: float | None = None                 # ... and nine of ten; None: not told, or not in any time
+    median_s: float | None = None  # when half the winds of the forecast's spread are there ...
+    late_s: float | None = None  # ... and nine of ten; None: not told, or not in any time
     why: str = ""
-    bound_for: str = ""                # the diversion that its end serves; empty: the goals
+    bound_for: str = ""  # the diversion that its end serves; empty: the goals
 
 
 class DiversionKind(enum.Enum):
@@ -49,13 +49,13 @@ class DiversionKind(enum.Enum):
 
     REFUGE = "refuge"
     HOME = "home"
-    REST = "rest"            # back to where the boat loitered
-    GOAL = "goal"            # a place that somebody named
-    INSIDE = "inside"        # back into the autopilot's own fence
-    START = "start"          # before a start line, until the gun
-    BOX = "box"              # water to stay in
-    FIELD = "field"          # where the boat waits while a goal's field cannot be sailed
-    STAY = "stay"            # where there is room near by
+    REST = "rest"  # back to where the boat loitered
+    GOAL = "goal"  # a place that somebody named
+    INSIDE = "inside"  # back into the autopilot's own fence
+    START = "start"  # before a start line, until the gun
+    BOX = "box"  # water to stay in
+    FIELD = "field"  # where the boat waits while a goal's field cannot be sailed
+    STAY = "stay"  # where there is room near by
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +67,8 @@ class Diversion:
     why: str
     en_m: PointEn = (0.0, 0.0)
     radius_m: float = HOME_RADIUS_M
-    is_ordered: bool = False     # it lasts until it is told to go on
-    until: str = ""              # what it lasts for, where that is known
+    is_ordered: bool = False  # it lasts until it is told to go on
+    until: str = ""  # what it lasts for, where that is known
 
     @property
     def has_place(self) -> bool:

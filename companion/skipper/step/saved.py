@@ -14,19 +14,36 @@ from companion.skipper.step.route import Route
 from companion.skipper.way import Approach, PointEn
 
 FORMAT = 1
-MAX_ITEMS = 2000       # no autopilot holds more
+MAX_ITEMS = 2000  # no autopilot holds more
 MAX_GOALS = 10**6
-MAX_POINTS = 20_000    # of the track of a search
+MAX_POINTS = 20_000  # of the track of a search
 MAX_TACKS = 10**6
-MAX_QUARTERS = 10**6   # turns round one buoy
-_NUMBERS = ("plan_t_s", "plan_twd_from_rad", "plan_tws_mps", "plan_half_width_rad", "margin_m", "delta_s",
-            "vessel_risk", "vessels_part", "plan_current_east_mps", "plan_current_north_mps")
+MAX_QUARTERS = 10**6  # turns round one buoy
+_NUMBERS = (
+    "plan_t_s",
+    "plan_twd_from_rad",
+    "plan_tws_mps",
+    "plan_half_width_rad",
+    "margin_m",
+    "delta_s",
+    "vessel_risk",
+    "vessels_part",
+    "plan_current_east_mps",
+    "plan_current_north_mps",
+)
 _MAYBE = ("risk", "cost_s", "median_s", "late_s", "expected_clearance_m")
 _WORDS = ("rung", "why", "bound_for")
 # of states that were saved before there were any
 _DEFAULTS: dict[str, Any] = {
-    "vessel_risk": 0.0, "vessels_part": 0.0, "plan_current_east_mps": 0.0, "plan_current_north_mps": 0.0,
-    "bound_for": "", "expected_clearance_m": None, "median_s": None, "late_s": None}
+    "vessel_risk": 0.0,
+    "vessels_part": 0.0,
+    "plan_current_east_mps": 0.0,
+    "plan_current_north_mps": 0.0,
+    "bound_for": "",
+    "expected_clearance_m": None,
+    "median_s": None,
+    "late_s": None,
+}
 
 
 # ------------------- The order that stands: what the boat was told to do until it is told to go on.
@@ -96,24 +113,24 @@ class Persisted:
     route: Route | None
     pending: Route | None
     unsure: Route | None = None
-    own_mode: Mode | None = None       # the boat was steered by us in this mode: it is ours to hand back
-    motor: bool = False                # it was run by us: ours to switch off
-    under_way_s: float = 0.0           # how long the voyage has been under way, in whole minutes
-    arrived: bool = False              # nothing is left to sail, the way home included
-    uid: str | None = None             # of the autopilot, and ...
-    system: int | None = None          # ... its system id
-    approaches: tuple[Approach, ...] = ()   # the numbering of the gates hangs on them
-    quarters: int = 0                  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
-    standing: Standing | None = None   # the order that stands
-    skipped: int = 0                   # goals given up by order
-    set_sail_utc_s: float | None = None   # Unix time of setting sail
-    inside: tuple[int, float] | None = None   # the goal whose box the boat stays in, Unix time of entry
-    searched: tuple[tuple[float, float], ...] = ()   # the track of the search that is next
-    covered: tuple[tuple[int, float], ...] = ()      # goals searched, and the share that was seen
-    tacks: tuple[int, int] = (0, 0)    # tried, and of these failed
-    place: SavedPlace | None = None    # where the boat was
-    latency: PlannerLatency = NO_ANSWERS   # of the planner on this computer
-    water: GeoPoint | None = None      # the origin of all metres here; None: the mission's
+    own_mode: Mode | None = None  # the boat was steered by us in this mode: it is ours to hand back
+    motor: bool = False  # it was run by us: ours to switch off
+    under_way_s: float = 0.0  # how long the voyage has been under way, in whole minutes
+    arrived: bool = False  # nothing is left to sail, the way home included
+    uid: str | None = None  # of the autopilot, and ...
+    system: int | None = None  # ... its system id
+    approaches: tuple[Approach, ...] = ()  # the numbering of the gates hangs on them
+    quarters: int = 0  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
+    standing: Standing | None = None  # the order that stands
+    skipped: int = 0  # goals given up by order
+    set_sail_utc_s: float | None = None  # Unix time of setting sail
+    inside: tuple[int, float] | None = None  # the goal whose box the boat stays in, Unix time of entry
+    searched: tuple[tuple[float, float], ...] = ()  # the track of the search that is next
+    covered: tuple[tuple[int, float], ...] = ()  # goals searched, and the share that was seen
+    tacks: tuple[int, int] = (0, 0)  # tried, and of these failed
+    place: SavedPlace | None = None  # where the boat was
+    latency: PlannerLatency = NO_ANSWERS  # of the planner on this computer
+    water: GeoPoint | None = None  # the origin of all metres here; None: the mission's
 
     @property
     def lists(self) -> tuple[Route, ...]:
@@ -128,16 +145,29 @@ class Persisted:
     def to_dict(self) -> dict[str, Any]:
         """Return plain JSON values."""
         return {
-            "format": FORMAT, "voyage": self.voyage, "gate": self.gate, "sailing": self.sailing,
-            "route": _route_to_dict(self.route), "pending": _route_to_dict(self.pending),
-            "unsure": _route_to_dict(self.unsure), "own_mode": None if self.own_mode is None else self.own_mode.name,
-            "motor": self.motor, "under_way_s": self.under_way_s, "arrived": self.arrived, "uid": self.uid,
+            "format": FORMAT,
+            "voyage": self.voyage,
+            "gate": self.gate,
+            "sailing": self.sailing,
+            "route": _route_to_dict(self.route),
+            "pending": _route_to_dict(self.pending),
+            "unsure": _route_to_dict(self.unsure),
+            "own_mode": None if self.own_mode is None else self.own_mode.name,
+            "motor": self.motor,
+            "under_way_s": self.under_way_s,
+            "arrived": self.arrived,
+            "uid": self.uid,
             "system": self.system,
-            "approaches": [_approach_to_list(a) for a in self.approaches], "quarters": self.quarters,
-            "standing": _standing_to_dict(self.standing), "skipped": self.skipped,
-            "set_sail_utc_s": self.set_sail_utc_s, "inside": None if self.inside is None else list(self.inside),
-            "searched": [list(p) for p in self.searched], "covered": [list(c) for c in self.covered],
-            "tacks": list(self.tacks), "place": _place_to_list(self.place),
+            "approaches": [_approach_to_list(a) for a in self.approaches],
+            "quarters": self.quarters,
+            "standing": _standing_to_dict(self.standing),
+            "skipped": self.skipped,
+            "set_sail_utc_s": self.set_sail_utc_s,
+            "inside": None if self.inside is None else list(self.inside),
+            "searched": [list(p) for p in self.searched],
+            "covered": [list(c) for c in self.covered],
+            "tacks": list(self.tacks),
+            "place": _place_to_list(self.place),
             "latency": [list(self.latency.answers_s), self.latency.room_s, self.latency.speed],
             **({} if self.water is None else {"water": [self.water.lat_deg, self.water.lon_deg]}),
         }
@@ -153,27 +183,34 @@ class Persisted:
             if data["format"] != FORMAT:
                 raise ValueError(f"its format is {str(data['format'])[:20]}, not {FORMAT}")
             return cls(
-                voyage=_words(data["voyage"]), gate=_whole(data["gate"], 0, 10**9), sailing=_truth(data["sailing"]),
-                route=_route_from_dict(data["route"]), pending=_route_from_dict(data["pending"]),
+                voyage=_words(data["voyage"]),
+                gate=_whole(data["gate"], 0, 10**9),
+                sailing=_truth(data["sailing"]),
+                route=_route_from_dict(data["route"]),
+                pending=_route_from_dict(data["pending"]),
                 unsure=_route_from_dict(data.get("unsure")),
                 own_mode=None if data.get("own_mode") is None else Mode[data["own_mode"]],
                 motor=_truth(data.get("motor", False)),
-                under_way_s=_number(data.get("under_way_s", 0.0)), arrived=_truth(data.get("arrived", False)),
+                under_way_s=_number(data.get("under_way_s", 0.0)),
+                arrived=_truth(data.get("arrived", False)),
                 uid=None if data.get("uid") is None else _words(data["uid"]),
                 system=None if data.get("system") is None else _whole(data["system"], 1, 255),
-                approaches=tuple(_approach_from_list(a) for a in data.get("approaches", ())[:MAX_GOALS + 1]),
+                approaches=tuple(_approach_from_list(a) for a in data.get("approaches", ())[: MAX_GOALS + 1]),
                 quarters=_whole(data.get("quarters", 0), -MAX_QUARTERS, MAX_QUARTERS),
                 standing=_standing_from_dict(data.get("standing")),
                 skipped=_whole(data.get("skipped", 0), 0, MAX_GOALS),
                 set_sail_utc_s=None if data.get("set_sail_utc_s") is None else _number(data["set_sail_utc_s"]),
-                inside=None if data.get("inside") is None else (
-                    _whole(data["inside"][0], 0, MAX_GOALS), _number(data["inside"][1])),
+                inside=None
+                if data.get("inside") is None
+                else (_whole(data["inside"][0], 0, MAX_GOALS), _number(data["inside"][1])),
                 searched=tuple((_number(e), _number(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
                 covered=tuple((_whole(g, 0, MAX_GOALS), _number(s)) for g, s in data.get("covered", ())[:MAX_GOALS]),
-                tacks=_tacks(data.get("tacks", (0, 0))), place=_place_from_list(data.get("place")),
+                tacks=_tacks(data.get("tacks", (0, 0))),
+                place=_place_from_list(data.get("place")),
                 latency=_latency(data.get("latency")),
-                water=None if data.get("water") is None else GeoPoint(
-                    lat_deg=_number(data["water"][0]), lon_deg=_number(data["water"][1])),
+                water=None
+                if data.get("water") is None
+                else GeoPoint(lat_deg=_number(data["water"][0]), lon_deg=_number(data["water"][1])),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
@@ -184,22 +221,30 @@ def _latency(data: Any) -> PlannerLatency:
         return NO_ANSWERS
     answers, room, speed = data
     return PlannerLatency(
-        answers_s=tuple(max(0.0, _number(s)) for s in answers[-KEPT:]), room_s=max(0.0, _number(room)),
-        speed=None if speed is None else max(0.0, _number(speed)))
+        answers_s=tuple(max(0.0, _number(s)) for s in answers[-KEPT:]),
+        room_s=max(0.0, _number(room)),
+        speed=None if speed is None else max(0.0, _number(speed)),
+    )
 
 
 def _place_to_list(place: SavedPlace | None) -> list[float] | None:
-    return None if place is None else [
-        place.utc_s, *place.en_m, place.error_m, place.farthest_m, *place.velocity_en_mps]
+    return (
+        None if place is None else [place.utc_s, *place.en_m, place.error_m, place.farthest_m, *place.velocity_en_mps]
+    )
 
 
 def _place_from_list(data: Any) -> SavedPlace | None:
     if data is None:
         return None
     utc_s, east, north, error_m, farthest_m, *velocity = (_number(value) for value in data[:7])
-    east_mps, north_mps = velocity or (0.0, 0.0)   # of states that were saved before there was any
-    return SavedPlace(utc_s=utc_s, en_m=(east, north), error_m=abs(error_m), farthest_m=abs(farthest_m),
-                      velocity_en_mps=(east_mps, north_mps))
+    east_mps, north_mps = velocity or (0.0, 0.0)  # of states that were saved before there was any
+    return SavedPlace(
+        utc_s=utc_s,
+        en_m=(east, north),
+        error_m=abs(error_m),
+        farthest_m=abs(farthest_m),
+        velocity_en_mps=(east_mps, north_mps),
+    )
 
 
 def _approach_to_list(approach: Approach) -> list[Any]:
@@ -212,21 +257,30 @@ def _approach_to_list(approach: Approach) -> list[Any]:
 
 def _approach_from_list(data: list[Any]) -> Approach:
     goal, e, n, turn, *laid = data
-    approach = Approach(goal=_whole(goal, 0, MAX_GOALS), en_m=(_number(e), _number(n)),
-                        turn_rad=None if turn is None else _number(turn))
+    approach = Approach(
+        goal=_whole(goal, 0, MAX_GOALS), en_m=(_number(e), _number(n)), turn_rad=None if turn is None else _number(turn)
+    )
     if not laid:
         return approach
     sweeps, twd_from_rad, count = laid
     return replace(
-        approach, twd_from_rad=_number(twd_from_rad), round=_whole(count, 1, MAX_GOALS),
-        sweeps=tuple(((_number(a), _number(b)), (_number(c), _number(d))) for a, b, c, d in sweeps[:MAX_POINTS]))
+        approach,
+        twd_from_rad=_number(twd_from_rad),
+        round=_whole(count, 1, MAX_GOALS),
+        sweeps=tuple(((_number(a), _number(b)), (_number(c), _number(d))) for a, b, c, d in sweeps[:MAX_POINTS]),
+    )
 
 
 def _standing_to_dict(order: Standing | None) -> dict[str, Any] | None:
     if order is None:
         return None
-    return {"verb": order.verb.value, "by": order.by, "name": order.name, "before_s": order.before_s,
-            "en_m": None if order.en_m is None else list(order.en_m)}
+    return {
+        "verb": order.verb.value,
+        "by": order.by,
+        "name": order.name,
+        "before_s": order.before_s,
+        "en_m": None if order.en_m is None else list(order.en_m),
+    }
 
 
 def _standing_from_dict(data: dict[str, Any] | None) -> Standing | None:
@@ -236,8 +290,9 @@ def _standing_from_dict(data: dict[str, Any] | None) -> Standing | None:
     en_m = None if place is None else (_number(place[0]), _number(place[1]))
     if not BY_VERB[verb].stands or (en_m is None and verb not in {Verb.HOLD, Verb.STOP}):
         raise ValueError(f"it is damaged: no order stands as {verb}")
-    return Standing(verb=verb, by=_words(data["by"]), name=_words(data["name"]), en_m=en_m,
-                    before_s=_number(data["before_s"]))
+    return Standing(
+        verb=verb, by=_words(data["by"]), name=_words(data["name"]), en_m=en_m, before_s=_number(data["before_s"])
+    )
 
 
 def _route_to_dict(route: Route | None) -> dict[str, Any] | None:
@@ -257,10 +312,14 @@ def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
         return None
     items = tuple(
         MissionItem(
-            command=_whole(c, 0, 0xFFFF), lat_e7=_whole(lat, -10**9, 10**9), lon_e7=_whole(lon, -2 * 10**9, 2 * 10**9),
-            alt_m=_number(alt), frame=_whole(frame, 0, 255),
-            params=(_number(p[0]), _number(p[1]), _number(p[2]), _number(p[3])))
-        for c, lat, lon, alt, frame, p in data["items"][:MAX_ITEMS + 1]
+            command=_whole(c, 0, 0xFFFF),
+            lat_e7=_whole(lat, -(10**9), 10**9),
+            lon_e7=_whole(lon, -2 * 10**9, 2 * 10**9),
+            alt_m=_number(alt),
+            frame=_whole(frame, 0, 255),
+            params=(_number(p[0]), _number(p[1]), _number(p[2]), _number(p[3])),
+        )
+        for c, lat, lon, alt, frame, p in data["items"][: MAX_ITEMS + 1]
     )
     points = tuple((_number(e), _number(n)) for e, n in data["points"])
     starts = tuple((_number(e), _number(n)) for e, n in data["from"])
@@ -273,8 +332,14 @@ def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
         **{name: None if values[name] is None else _number(values[name]) for name in _MAYBE},
         **{name: _words(values[name]) for name in _WORDS},
     }
-    return Route(items=items, points_en_m=points, leg_from_en_m=starts, gate_of=gates,
-                 plan_id=_whole(data["plan_id"], -1, 10**12), **figures)
+    return Route(
+        items=items,
+        points_en_m=points,
+        leg_from_en_m=starts,
+        gate_of=gates,
+        plan_id=_whole(data["plan_id"], -1, 10**12),
+        **figures,
+    )
 
 
 def _tacks(data: Any) -> tuple[int, int]:

@@ -32,11 +32,11 @@ _LEVELS = np.array([0.5, 0.8, 0.9, 0.95])
 class WindHealth(enum.Enum):
     """How far the wind may be believed."""
 
-    NONE = "none"              # nothing heard
-    SETTLING = "settling"      # too short a record to forecast from
+    NONE = "none"  # nothing heard
+    SETTLING = "settling"  # too short a record to forecast from
     GOOD = "good"
-    LIGHT = "light"            # the direction is nearly without meaning
-    UNTRUSTED = "untrusted"    # frozen, turned or silent vane, or none
+    LIGHT = "light"  # the direction is nearly without meaning
+    UNTRUSTED = "untrusted"  # frozen, turned or silent vane, or none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,8 +50,8 @@ class WindEstimate:
     sigma_twd_rad: float | None = None
     present_twd_from_rad: float | None = None
     present_tws_mps: float | None = None
-    record_s: float = 0.0      # length of the record behind the forecast
-    verdict: str = ""          # why it is not GOOD, in words
+    record_s: float = 0.0  # length of the record behind the forecast
+    verdict: str = ""  # why it is not GOOD, in words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,18 +108,18 @@ class PlanOutcome:
     """The answer to RequestPlan; ``plan`` is None when the worker died or the request was refused."""
 
     request_id: int
-    plan: Any = None           # companion.planner.Plan
+    plan: Any = None  # companion.planner.Plan
     text: str = ""
 
 
 class UploadResult(enum.Enum):
     """How a transfer ended."""
 
-    OK = "ok"                  # written, read back, equal, and current where that was asked
-    REFUSED = "refused"        # the autopilot said no; text has its words
+    OK = "ok"  # written, read back, equal, and current where that was asked
+    REFUSED = "refused"  # the autopilot said no; text has its words
     TIMEOUT = "timeout"
-    MISMATCH = "mismatch"      # what was read back is not what was written
-    LINK = "link"              # the link died
+    MISMATCH = "mismatch"  # what was read back is not what was written
+    LINK = "link"  # the link died
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,7 +144,7 @@ class CommandResult(enum.Enum):
     """How a command ended."""
 
     ACCEPTED = "accepted"
-    REFUSED = "refused"        # text has the autopilot's reason verbatim
+    REFUSED = "refused"  # text has the autopilot's reason verbatim
     TIMEOUT = "timeout"
 
 
@@ -187,15 +187,15 @@ class Snapshot:
     wind: WindEstimate = WindEstimate()
     current: WaterCurrent = STILL_WATER
     doubt: WindAngleUncertainty | None = None
-    unsure: str = ""                       # why no plan may be made for wind and water now, in words; empty: it may
+    unsure: str = ""  # why no plan may be made for wind and water now, in words; empty: it may
     wind_before: WindBefore | None = None  # while the wind is doubted: what it was; None: not known, or believed
     mission: MissionOnBoard = MissionOnBoard()
-    identity: Identity = field(default_factory=Identity)   # as far as the autopilot has told it
-    neighbours: tuple[str, ...] = ()       # other autopilots on a link on which ours was not named, in words
-    shore_age_s: float | None = None       # since a ground station was heard
-    has_company: bool = False              # another companion speaks with our ids
+    identity: Identity = field(default_factory=Identity)  # as far as the autopilot has told it
+    neighbours: tuple[str, ...] = ()  # other autopilots on a link on which ours was not named, in words
+    shore_age_s: float | None = None  # since a ground station was heard
+    has_company: bool = False  # another companion speaks with our ids
     limits: AutopilotLimits | None = None  # None: not read yet
-    fence: tuple[Zone, ...] = ()           # drawn on the autopilot, as last read; (): nothing is, or it was not read
+    fence: tuple[Zone, ...] = ()  # drawn on the autopilot, as last read; (): nothing is, or it was not read
     permissions: Permissions = DRY_RUN
     planner_alive: bool = True
     traffic: TrafficPicture | None = None  # None: no vessel was ever heard
@@ -233,9 +233,23 @@ def still_air(t_s: float) -> WindEstimate:
     """Return the wind that a motorboat is planned in: steady, believed, and of no consequence."""
     n = len(_HORIZONS_S)
     forecast = WindForecast(
-        t_s=t_s, horizon_s=_HORIZONS_S, mean_twd_from_rad=np.zeros(n), sigma_twd_rad=np.full(n, SIGMA_RAD),
-        mean_tws_mps=np.full(n, SPEED_MPS), sigma_tws_mps=np.full(n, SIGMA_RAD), level=_LEVELS,
-        half_width_rad=np.full((n, len(_LEVELS)), SIGMA_RAD), correlation_time_s=3600.0)
+        t_s=t_s,
+        horizon_s=_HORIZONS_S,
+        mean_twd_from_rad=np.zeros(n),
+        sigma_twd_rad=np.full(n, SIGMA_RAD),
+        mean_tws_mps=np.full(n, SPEED_MPS),
+        sigma_tws_mps=np.full(n, SIGMA_RAD),
+        level=_LEVELS,
+        half_width_rad=np.full((n, len(_LEVELS)), SIGMA_RAD),
+        correlation_time_s=3600.0,
+    )
     return WindEstimate(
-        health=WindHealth.GOOD, forecast=forecast, mean_twd_from_rad=0.0, mean_tws_mps=SPEED_MPS,
-        sigma_twd_rad=SIGMA_RAD, present_twd_from_rad=0.0, present_tws_mps=SPEED_MPS, record_s=SETTLED_S)
+        health=WindHealth.GOOD,
+        forecast=forecast,
+        mean_twd_from_rad=0.0,
+        mean_tws_mps=SPEED_MPS,
+        sigma_twd_rad=SIGMA_RAD,
+        present_twd_from_rad=0.0,
+        present_tws_mps=SPEED_MPS,
+        record_s=SETTLED_S,
+    )

@@ -23,7 +23,7 @@ from companion.skipper.way.position_plausibility import PositionDoubt
 from companion.traffic import Assessment
 from companion.traffic.colregs import OngoingEncounter
 
-PRIOR_TACKS = 5.0    # so many of the voyage's own say as much as the mission
+PRIOR_TACKS = 5.0  # so many of the voyage's own say as much as the mission
 
 
 # --------------------
@@ -85,15 +85,15 @@ NO_TACKS = Tacking()
 class Phase(enum.Enum):
     """Büsser's states (Figure 3.1) and those that a voyage with an autopilot adds."""
 
-    IDLE = "idle"                                  # nothing to sail yet
-    WAITING = "waiting"                            # for position, EKF, wind, arming or permission
-    STANDARD = "standard"                          # Büsser 3.2.1
-    NEW_CALCULATION = "new calculation"            # 3.2.2: no valid plan until the planner answers
+    IDLE = "idle"  # nothing to sail yet
+    WAITING = "waiting"  # for position, EKF, wind, arming or permission
+    STANDARD = "standard"  # Büsser 3.2.1
+    NEW_CALCULATION = "new calculation"  # 3.2.2: no valid plan until the planner answers
     DESTINATION_APPROACH = "destination approach"  # 3.2.3: the last waypoint is the target
-    BUOY_APPROACH = "buoy approach"                # 3.2.4
-    LAST_RESORT = "last resort"                    # a vessel too near to plan for: steered by field
-    HOLDING = "holding"                            # nothing found or something wrong: in a safe item, waiting
-    OPERATOR = "operator"                          # somebody else has the boat
+    BUOY_APPROACH = "buoy approach"  # 3.2.4
+    LAST_RESORT = "last resort"  # a vessel too near to plan for: steered by field
+    HOLDING = "holding"  # nothing found or something wrong: in a safe item, waiting
+    OPERATOR = "operator"  # somebody else has the boat
     DONE = "done"
 
 
@@ -104,12 +104,12 @@ class PendingPlan:
     request_id: int
     t_s: float
     reason: ReplanReason
-    from_index: int | None             # route index that the plan starts at; None: the boat
+    from_index: int | None  # route index that the plan starts at; None: the boat
     rung: int
-    gate: int                          # the gate that the plan's end completes, -1 when none
-    lead_in: tuple[PointEn, ...]       # waypoints before the plan's start (a repaired start)
+    gate: int  # the gate that the plan's end completes, -1 when none
+    lead_in: tuple[PointEn, ...]  # waypoints before the plan's start (a repaired start)
     start_en_m: PointEn
-    facts: Route                       # figures of the plan to be, without items
+    facts: Route  # figures of the plan to be, without items
     problem: Any
 
 
@@ -172,11 +172,11 @@ class Signs:
     """What tells a failsafe from a person: when each cause last showed, and when the sticks or the switch moved."""
 
     seen_s: tuple[tuple[str, float], ...] = ()
-    standing: tuple[str, ...] = ()        # signs that are up now
-    breaches: int | None = None           # of the fence, as last counted
-    rc_us: tuple[int, ...] = ()           # of the channels that a person moves, as they last rested
+    standing: tuple[str, ...] = ()  # signs that are up now
+    breaches: int | None = None  # of the fence, as last counted
+    rc_us: tuple[int, ...] = ()  # of the channels that a person moves, as they last rested
     rc_moved_s: float = float("-inf")
-    helm: tuple[Mode | None, bool] | None = None   # mode and arming as last heard, and when
+    helm: tuple[Mode | None, bool] | None = None  # mode and arming as last heard, and when
     helm_s: float = float("-inf")
 
 
@@ -184,15 +184,15 @@ class Signs:
 class Adrift:
     """How the boat moves over ground, and what was done to stop a drift (``companion.skipper.behaviors.drifting``)."""
 
-    ground_en_mps: tuple[float, float] | None = None   # mean velocity of the last seconds
+    ground_en_mps: tuple[float, float] | None = None  # mean velocity of the last seconds
     ground_t_s: float = float("-inf")
-    places: tuple[Fix, ...] = ()       # of the last minute, of a boat that hardly moves
-    since_s: float | None = None       # since when a drift onto something is being stopped
-    loitered: bool = False             # LOITER has shown in this calm: it is not asked for again
-    loiter_en_m: PointEn | None = None # where it began ...
-    loiter_s: float = float("inf")     # ... and when, of a wind that is doubted
-    motor: bool = False                # the autopilot has accepted to run it
-    looked_s: float = float("-inf")    # when sea room was looked for last
+    places: tuple[Fix, ...] = ()  # of the last minute, of a boat that hardly moves
+    since_s: float | None = None  # since when a drift onto something is being stopped
+    loitered: bool = False  # LOITER has shown in this calm: it is not asked for again
+    loiter_en_m: PointEn | None = None  # where it began ...
+    loiter_s: float = float("inf")  # ... and when, of a wind that is doubted
+    motor: bool = False  # the autopilot has accepted to run it
+    looked_s: float = float("-inf")  # when sea room was looked for last
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,18 +200,18 @@ class FieldSteering:
     """Steering by field: the memory of the guidance and of the station keeper, and the last resort's."""
 
     resort: LastResort = field(default_factory=LastResort)
-    clear_s: float | None = None          # since when the water is clear
-    seen_guided: bool = False             # GUIDED has shown since the field took over
-    not_before_s: float = float("-inf")   # somebody set AUTO in the middle of it: not again before
+    clear_s: float | None = None  # since when the water is clear
+    seen_guided: bool = False  # GUIDED has shown since the field took over
+    not_before_s: float = float("-inf")  # somebody set AUTO in the middle of it: not again before
     guidance: GuidanceState = field(default_factory=GuidanceState)
     station: StationState = field(default_factory=StationState)
     station_since_s: float | None = None
-    composed: bool = False                # a goal's own field steers, or did until a plan from here is in place
-    left_s: float | None = None           # since when the latter
-    way_out_rad: float | None = None      # the way out of some water that is being taken
-    weak_since_s: float | None = None     # since when the field says nothing of where to go
-    strong_since_s: float | None = None   # ... and, given up for that, does again
-    lost: str = ""                        # why it is given up, in words
+    composed: bool = False  # a goal's own field steers, or did until a plan from here is in place
+    left_s: float | None = None  # since when the latter
+    way_out_rad: float | None = None  # the way out of some water that is being taken
+    weak_since_s: float | None = None  # since when the field says nothing of where to go
+    strong_since_s: float | None = None  # ... and, given up for that, does again
+    lost: str = ""  # why it is given up, in words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -254,12 +254,12 @@ class Charge:
 class VehicleIdentity:
     """Whose the autopilot is (``companion.skipper.board.vehicle_identity``), and whether it has started anew."""
 
-    uid: str | None = None             # of the autopilot that this voyage began with, and ...
-    system: int | None = None          # ... its system id
-    is_ours: bool = False              # in this step: it is that one, and a boat of ours
-    doubt: str = ""                    # why it was not, until it is
-    boot_s: float | None = None        # its time since boot, as last heard [s]
-    rebooted: bool = False             # in this very step
+    uid: str | None = None  # of the autopilot that this voyage began with, and ...
+    system: int | None = None  # ... its system id
+    is_ours: bool = False  # in this step: it is that one, and a boat of ours
+    doubt: str = ""  # why it was not, until it is
+    boot_s: float | None = None  # its time since boot, as last heard [s]
+    rebooted: bool = False  # in this very step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -268,73 +268,73 @@ class LoadedMission:
 
     route: Route | None = None
     adoptable: Persisted | None = None  # from before a restart or a foreign mission, until one of ours is found
-    known: tuple[str, ...] = ()        # hashes of lists that earlier voyages of ours may have left on board
-    checked: bool = False              # compared with ours since link, reboot, operator
-    read_twice: bool = False           # the last mission read was not ours: the next one decides
-    foreign: str = ""                  # why it is not ours; empty: it is, or there is none
+    known: tuple[str, ...] = ()  # hashes of lists that earlier voyages of ours may have left on board
+    checked: bool = False  # compared with ours since link, reboot, operator
+    read_twice: bool = False  # the last mission read was not ours: the next one decides
+    foreign: str = ""  # why it is not ours; empty: it is, or there is none
     unsure_route: Route | None = None  # of an upload that failed: the mission on board may be it or a mixture
-    read_since_s: float = float("-inf")   # a mission read before this does not count
-    read_items: tuple[MissionItem, ...] | None = None      # as last read
+    read_since_s: float = float("-inf")  # a mission read before this does not count
+    read_items: tuple[MissionItem, ...] | None = None  # as last read
     read_t_s: float = float("-inf")
-    replace_foreign: bool = False      # permission was given to overwrite what is on board
-    repair: bool = False               # it is a mixture of ours
+    replace_foreign: bool = False  # permission was given to overwrite what is on board
+    repair: bool = False  # it is a mixture of ours
     uploaded_s: float = float("-inf")  # when the last upload ended well
-    index: int = 0                     # target by the autopilot
-    own_index: int = 0                 # target by Büsser's double conditions
-    passed_since_s: float | None = None   # the target was passed by our own geometry, the autopilot still steers for it
-    asked_seq: int | None = None       # the item we made current, until the autopilot shows it
-    asked_s: float = float("-inf")     # when an item was last made current by us
+    index: int = 0  # target by the autopilot
+    own_index: int = 0  # target by Büsser's double conditions
+    passed_since_s: float | None = None  # the target was passed by our own geometry, the autopilot still steers for it
+    asked_seq: int | None = None  # the item we made current, until the autopilot shows it
+    asked_s: float = float("-inf")  # when an item was last made current by us
 
 
 @dataclass(frozen=True, kw_only=True)
 class GoalProgress:
     """How far the boat is with the voyage's goals."""
 
-    gate: int = 0                      # index of the gate being sailed to
-    approaches: tuple[Approach, ...] = ()   # where the way to a goal began, see companion.skipper.way.gates
-    bearing_rad: float = 0.0           # how far the boat has come round the buoy that is next, see gates.bearing_on
-    closest_m: float = float("inf")    # smallest distance to the present gate so far
-    is_blind: bool = False             # the voyage was taken up again: what the boat passed meanwhile was not seen
-    released: int = -1                 # the goal at whose line the boat no longer waits for the gun, or in whose box
-    inside: Inside | None = None       # the box that the boat stays in
+    gate: int = 0  # index of the gate being sailed to
+    approaches: tuple[Approach, ...] = ()  # where the way to a goal began, see companion.skipper.way.gates
+    bearing_rad: float = 0.0  # how far the boat has come round the buoy that is next, see gates.bearing_on
+    closest_m: float = float("inf")  # smallest distance to the present gate so far
+    is_blind: bool = False  # the voyage was taken up again: what the boat passed meanwhile was not seen
+    released: int = -1  # the goal at whose line the boat no longer waits for the gun, or in whose box
+    inside: Inside | None = None  # the box that the boat stays in
     searched: tuple[PointEn, ...] = ()  # the track of the search that is next
-    covered: tuple[tuple[int, float], ...] = ()   # goals searched, and the share that was seen
-    task: str = ""                     # how far the boat is with it, in words
-    reached: tuple[int, ...] = ()      # goals reached, in order
-    missed: int = 0                    # buoys passed on the wrong side and sailed again
-    missed_s: float | None = None      # when a gate was missed to which no upload since leads
+    covered: tuple[tuple[int, float], ...] = ()  # goals searched, and the share that was seen
+    task: str = ""  # how far the boat is with it, in words
+    reached: tuple[int, ...] = ()  # goals reached, in order
+    missed: int = 0  # buoys passed on the wrong side and sailed again
+    missed_s: float | None = None  # when a gate was missed to which no upload since leads
     history: tuple[tuple[float, float, float, float], ...] = ()  # t, east, north, distance to go: once per 10 s
-    history_plan: int = -1             # the plan that its distances are of
+    history_plan: int = -1  # the plan that its distances are of
 
 
 @dataclass(frozen=True, kw_only=True)
 class VoyageState:
     """The voyage from setting sail to its end."""
 
-    sailing: bool = False              # has been in AUTO and armed with our route
-    under_way_s: float = 0.0           # how long the voyage has been under way ...
+    sailing: bool = False  # has been in AUTO and armed with our route
+    under_way_s: float = 0.0  # how long the voyage has been under way ...
     last_step_s: float = float("-inf")  # ... counted from step to step
     set_sail_utc_s: float | None = None  # Unix time of setting sail, by the autopilot's clock
-    home_reached: bool = False         # the way home that follows the last goal is sailed
-    over: str = ""                     # why the voyage is over: what is left is to watch its loiter; empty: it is not
-    arrived: bool = False              # ... with all goals reached, and home where the mission ends there
-    rest_en_m: PointEn | None = None   # where the boat loiters since
+    home_reached: bool = False  # the way home that follows the last goal is sailed
+    over: str = ""  # why the voyage is over: what is left is to watch its loiter; empty: it is not
+    arrived: bool = False  # ... with all goals reached, and home where the mission ends there
+    rest_en_m: PointEn | None = None  # where the boat loiters since
 
 
 @dataclass(frozen=True, kw_only=True)
 class Planning:
     """When and how plans are asked for."""
 
-    ready_route: Route | None = None   # planned, not allowed or not yet possible to upload
-    asked: str = ""                    # why a new plan is wanted at once, until it is asked for; empty: it is not
-    last_s: float = float("-inf")      # when a plan was last asked for
+    ready_route: Route | None = None  # planned, not allowed or not yet possible to upload
+    asked: str = ""  # why a new plan is wanted at once, until it is asked for; empty: it is not
+    last_s: float = float("-inf")  # when a plan was last asked for
     retry: Retry = PATIENT
-    rung: int = 0                      # step of the ladder being tried
-    unanswered: int = 0                # requests in a row that the planner did not answer
-    latency: PlannerLatency = NO_ANSWERS   # how long the planner takes on this computer
-    effort: float = 1.0                # share of the planning budget that is asked for: less on a slow processor
+    rung: int = 0  # step of the ladder being tried
+    unanswered: int = 0  # requests in a row that the planner did not answer
+    latency: PlannerLatency = NO_ANSWERS  # how long the planner takes on this computer
+    effort: float = 1.0  # share of the planning budget that is asked for: less on a slow processor
     replans: int = 0
-    replanned_index: int = -1          # the target for which Wolsieffer's replan was asked
+    replanned_index: int = -1  # the target for which Wolsieffer's replan was asked
     no_go_since_s: float | None = None
 
 
@@ -346,48 +346,48 @@ class Pending:
     plan: PendingPlan | None = None
     upload: PendingUpload | None = None
     upload_retry: Retry = PATIENT
-    read: tuple[int, float] | None = None          # id, since
+    read: tuple[int, float] | None = None  # id, since
     read_retry: Retry = PATIENT
     command: tuple[int, float, str] | None = None  # id, since, what
     command_retry: Retry = PATIENT
-    accepted: tuple[str, float] | None = None      # the last command that was accepted, and when
+    accepted: tuple[str, float] | None = None  # the last command that was accepted, and when
 
 
 @dataclass(frozen=True, kw_only=True)
 class OperatorState:
     """Who has the boat when we have not: a person, or one of the autopilot's failsafes."""
 
-    since_s: float | None = None       # since when a person has the boat
+    since_s: float | None = None  # since when a person has the boat
     given_back_s: float = float("-inf")  # when a person last gave the boat back
-    is_back: bool = False              # AUTO has come back: plan from where the boat is now
+    is_back: bool = False  # AUTO has come back: plan from where the boat is now
     signs: Signs = Signs()
-    stop: Stop | None = None           # the boat is not being sailed though it was
-    answering: str = ""                # the cause whose stop we have ended or are ending; empty: none
-    sent_home: bool = False            # ... which put the boat into RTL
+    stop: Stop | None = None  # the boat is not being sailed though it was
+    answering: str = ""  # the cause whose stop we have ended or are ending; empty: none
+    sent_home: bool = False  # ... which put the boat into RTL
 
 
 @dataclass(frozen=True, kw_only=True)
 class SteeringState:
     """The modes and headings that are asked for beside the mission."""
 
-    own_mode: Mode | None = None       # a mode other than AUTO that we asked for ourselves
-    until_s: float | None = None       # bearing away in GUIDED until
+    own_mode: Mode | None = None  # a mode other than AUTO that we asked for ourselves
+    until_s: float | None = None  # bearing away in GUIDED until
     heading_rad: float | None = None
-    irons_s: tuple[float, ...] = ()    # when the boat was in irons
-    tacked_s: float = float("-inf")    # when a tack was last asked for
+    irons_s: tuple[float, ...] = ()  # when the boat was in irons
+    tacked_s: float = float("-inf")  # when a tack was last asked for
 
 
 @dataclass(frozen=True, kw_only=True)
 class PositionState:
     """Whether the reported position is believed (``behaviors.position_doubt``), and where the boat was last."""
 
-    last_seen: Fix | None = None       # the last position
+    last_seen: Fix | None = None  # the last position
     doubt: PositionDoubt | None = None  # it is not believed
-    back_s: float = float("-inf")      # when it was believed again: this step's jump is none
-    lost_s: float | None = None        # since when the autopilot's filter has had no position
-    disputed_s: float | None = None    # since when two receivers have said different things
-    anew: Mode | None = None           # a LOITER whose point jumped with the position is begun anew: what shows next
-    place: SavedPlace | None = None    # where the boat is believed or reckoned to be, for who comes after a kill
+    back_s: float = float("-inf")  # when it was believed again: this step's jump is none
+    lost_s: float | None = None  # since when the autopilot's filter has had no position
+    disputed_s: float | None = None  # since when two receivers have said different things
+    anew: Mode | None = None  # a LOITER whose point jumped with the position is begun anew: what shows next
+    place: SavedPlace | None = None  # where the boat is believed or reckoned to be, for who comes after a kill
     restored: SavedPlace | None = None  # where the boat was before this start, until the first fix is held against it
 
 
@@ -395,9 +395,9 @@ class PositionState:
 class Orders:
     """What was ordered from ashore or aboard (``companion.orders``)."""
 
-    standing: Standing | None = None   # the order that stands until the boat is told to go on
+    standing: Standing | None = None  # the order that stands until the boat is told to go on
     answered: tuple[Answered, ...] = ()  # the last order of each who gave one lately
-    skipped: int = 0                   # goals given up by order
+    skipped: int = 0  # goals given up by order
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -405,8 +405,8 @@ class Alarms:
     """Watchdogs, and what is known of the battery."""
 
     raised: tuple[Raised, ...] = ()
-    entering: tuple[tuple[str, float], ...] = ()   # watchdogs whose entry condition holds, since when
-    battery_critical: bool = False     # by the autopilot's own limit (BATT_CRT_VOLT, BATT_CRT_MAH)
+    entering: tuple[tuple[str, float], ...] = ()  # watchdogs whose entry condition holds, since when
+    battery_critical: bool = False  # by the autopilot's own limit (BATT_CRT_VOLT, BATT_CRT_MAH)
     charge: Charge | None = None
 
 
@@ -414,17 +414,17 @@ class Alarms:
 class TrafficState:
     """The vessels about, as they are watched."""
 
-    watch: tuple[Assessment, ...] = ()             # vessels in view, the worst first
-    encounters: tuple[OngoingEncounter, ...] = ()              # with vessels, under the policy "rules"
+    watch: tuple[Assessment, ...] = ()  # vessels in view, the worst first
+    encounters: tuple[OngoingEncounter, ...] = ()  # with vessels, under the policy "rules"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Announced:
     """What was said lately, so that it is not said again at once."""
 
-    codes: tuple[tuple[str, float], ...] = ()      # code, last said
-    watch: tuple[tuple[int, int, float], ...] = ()   # MMSI and branch of vessels said lately, when
-    encounters: tuple[tuple[int, int, str, float], ...] = ()   # MMSI, branch, what, when
+    codes: tuple[tuple[str, float], ...] = ()  # code, last said
+    watch: tuple[tuple[int, int, float], ...] = ()  # MMSI and branch of vessels said lately, when
+    encounters: tuple[tuple[int, int, str, float], ...] = ()  # MMSI, branch, what, when
     water_en_mps: tuple[float, float] | None = None  # the current that was said last; None: still water
 
 
@@ -437,7 +437,7 @@ class SkipperState:
 
     phase: Phase = Phase.IDLE
     why: str = "just started"
-    wants: tuple[str, ...] = ()        # what is missing, in words
+    wants: tuple[str, ...] = ()  # what is missing, in words
     vehicle: VehicleIdentity = VehicleIdentity()
     mission: LoadedMission = LoadedMission()
     progress: GoalProgress = GoalProgress()
@@ -448,7 +448,7 @@ class SkipperState:
     steering: SteeringState = SteeringState()
     by_field: FieldSteering = FieldSteering()
     adrift: Adrift = Adrift()
-    tacking: Tacking = NO_TACKS        # what the boat's tacks have told
+    tacking: Tacking = NO_TACKS  # what the boat's tacks have told
     position: PositionState = PositionState()
     orders: Orders = Orders()
     alarms: Alarms = Alarms()
@@ -472,17 +472,30 @@ def standing_saved(state: SkipperState) -> Standing | None:
 def saved_of(state: SkipperState, voyage: str) -> Persisted:
     """Return what of a state survives a kill."""
     return Persisted(
-        voyage=voyage, gate=state.progress.gate, sailing=state.voyage.sailing, route=state.mission.route,
+        voyage=voyage,
+        gate=state.progress.gate,
+        sailing=state.voyage.sailing,
+        route=state.mission.route,
         pending=state.pending.upload.route if state.pending.upload is not None else None,
-        unsure=state.mission.unsure_route, own_mode=state.steering.own_mode, motor=state.adrift.motor,
-        under_way_s=60.0 * (state.voyage.under_way_s // 60.0), arrived=state.voyage.arrived, uid=state.vehicle.uid,
+        unsure=state.mission.unsure_route,
+        own_mode=state.steering.own_mode,
+        motor=state.adrift.motor,
+        under_way_s=60.0 * (state.voyage.under_way_s // 60.0),
+        arrived=state.voyage.arrived,
+        uid=state.vehicle.uid,
         system=state.vehicle.system,
-        approaches=state.progress.approaches, quarters=round(state.progress.bearing_rad / (0.5 * math.pi)),
-        standing=standing_saved(state), skipped=state.orders.skipped, set_sail_utc_s=state.voyage.set_sail_utc_s,
-        inside=None if state.progress.inside is None or state.progress.inside.utc_s is None
+        approaches=state.progress.approaches,
+        quarters=round(state.progress.bearing_rad / (0.5 * math.pi)),
+        standing=standing_saved(state),
+        skipped=state.orders.skipped,
+        set_sail_utc_s=state.voyage.set_sail_utc_s,
+        inside=None
+        if state.progress.inside is None or state.progress.inside.utc_s is None
         else (state.progress.inside.goal, state.progress.inside.utc_s),
-        searched=state.progress.searched[:-1], covered=state.progress.covered,   # the last point moves with the boat
-        tacks=(state.tacking.tried, state.tacking.failed), place=state.position.place,
+        searched=state.progress.searched[:-1],
+        covered=state.progress.covered,  # the last point moves with the boat
+        tacks=(state.tacking.tried, state.tacking.failed),
+        place=state.position.place,
         latency=state.plans.latency,
     )
 

@@ -14,8 +14,8 @@ from companion.planner.problem import ASSUMED_SHARE, Strength
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.snapshot import WindHealth
 
-LEAST_S = 60.0       # ahead, however near the end of the plan is
-AHEAD_S = 600.0      # while there is no plan
+LEAST_S = 60.0  # ahead, however near the end of the plan is
+AHEAD_S = 600.0  # while there is no plan
 LEAST_SHARE = 0.03  # of the mean strength: what a cup anemometer errs by
 
 
@@ -30,9 +30,12 @@ def strength_of(forecast: WindForecast, *, after_s: float = 0.0, is_known: bool 
     sigma = np.interp(after_s + times, forecast.horizon_s, forecast.sigma_tws_mps)
     least = (LEAST_SHARE if is_known else ASSUMED_SHARE) * mean
     return Strength(
-        horizon_s=tuple(times.tolist()), mean_mps=tuple(mean.tolist()),
-        sigma_mps=tuple(np.maximum(sigma, least).tolist()), correlation_s=forecast.correlation_time_s,
-        is_known=is_known)
+        horizon_s=tuple(times.tolist()),
+        mean_mps=tuple(mean.tolist()),
+        sigma_mps=tuple(np.maximum(sigma, least).tolist()),
+        correlation_s=forecast.correlation_time_s,
+        is_known=is_known,
+    )
 
 
 def too_strong(ctx: StepContext) -> float | None:
@@ -48,11 +51,15 @@ def too_light(ctx: StepContext) -> float | None:
 def winds_wanted(ctx: StepContext) -> list[str]:
     """Return what the boat waits for before setting sail, in words; empty: the wind will do."""
     boat, allowed, out = ctx.voyage.boat, _allowed(ctx), []
-    for chance, name, limit in ((_strong(ctx), "less wind: above", boat.max_tws_mps),
-                                (_light(ctx), "more wind: below", boat.min_tws_mps)):
+    for chance, name, limit in (
+        (_strong(ctx), "less wind: above", boat.max_tws_mps),
+        (_light(ctx), "more wind: below", boat.min_tws_mps),
+    ):
         if chance is not None and chance > allowed:
-            out.append(f"{name} {limit:g} m/s with {100.0 * chance:.0f} % within {_until_s(ctx):.0f} s, "
-                       f"{100.0 * allowed:.0f} % is allowed")
+            out.append(
+                f"{name} {limit:g} m/s with {100.0 * chance:.0f} % within {_until_s(ctx):.0f} s, "
+                f"{100.0 * allowed:.0f} % is allowed"
+            )
     return out
 
 

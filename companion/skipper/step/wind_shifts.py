@@ -13,22 +13,22 @@ from companion.geo.angles import difference_rad
 from companion.messages import WindForecast
 from companion.skipper.step.context import StepContext
 
-WORTH = 0.01                   # tacked on where it gains at least this share of the speed made good
-NARROWEST_M = 20.0             # in a narrower corridor the boat meets the edge before a shift
-LEG_RAD = math.radians(25.0)   # a leg farther off the mean wind is sailed on one tack for the most part
-SOON_S, LONG_S = 30.0, 300.0   # horizons: mean and spread are read by the longer, how fast it shifts by both
+WORTH = 0.01  # tacked on where it gains at least this share of the speed made good
+NARROWEST_M = 20.0  # in a narrower corridor the boat meets the edge before a shift
+LEG_RAD = math.radians(25.0)  # a leg farther off the mean wind is sailed on one tack for the most part
+SOON_S, LONG_S = 30.0, 300.0  # horizons: mean and spread are read by the longer, how fast it shifts by both
 TAU_S = (15.0, 600.0)
-NARROWING = 0.8                # from table to table, as the laylines close in on the leg's end
-GROWN = 0.1, 0.995             # of the spread after the shorter of the later one, at the least and at the most
+NARROWING = 0.8  # from table to table, as the laylines close in on the leg's end
+GROWN = 0.1, 0.995  # of the spread after the shorter of the later one, at the least and at the most
 Floats = NDArray[np.float64]
 
 STEP_S = 2.0
 PLACES, SHIFTS = 21, 13
-SPREADS = 3.0          # the shifts that are looked at reach so many spreads to either side ...
-WITHIN_RAD = math.radians(5.0)   # ... and no farther than this within the angle that the boat sails: both tacks lead up
+SPREADS = 3.0  # the shifts that are looked at reach so many spreads to either side ...
+WITHIN_RAD = math.radians(5.0)  # ... and no farther than this within the angle that the boat sails: both tacks lead up
 MOST_ROUNDS = 250
-NEAR_M = 0.01          # of what steps gain: then the values are settled
-OUTSIDE_M = 1e3        # what going on out of the corridor costs: nobody does
+NEAR_M = 0.01  # of what steps gain: then the values are settled
+OUTSIDE_M = 1e3  # what going on out of the corridor costs: nobody does
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,14 +56,25 @@ def shifting(ctx: StepContext, leg_rad: float | None = None, ahead_m: float = ma
         return None
     half_rad = ctx.no_go_half_rad
     return shifts_of(
-        forecast, corridor_m=ctx.tack_corridor_m, speed_mps=boat.polar.speed_mps(half_rad, wind[1]),
-        half_rad=half_rad, tack_s=2.0 * half_rad / boat.turn_rate_radps + boat.tack_loss_s, leg_rad=leg_rad,
-        ahead_m=ahead_m)
+        forecast,
+        corridor_m=ctx.tack_corridor_m,
+        speed_mps=boat.polar.speed_mps(half_rad, wind[1]),
+        half_rad=half_rad,
+        tack_s=2.0 * half_rad / boat.turn_rate_radps + boat.tack_loss_s,
+        leg_rad=leg_rad,
+        ahead_m=ahead_m,
+    )
 
 
 def shifts_of(
-    forecast: WindForecast, *, corridor_m: float, speed_mps: float, half_rad: float, tack_s: float,
-    leg_rad: float | None = None, ahead_m: float = math.inf,
+    forecast: WindForecast,
+    *,
+    corridor_m: float,
+    speed_mps: float,
+    half_rad: float,
+    tack_s: float,
+    leg_rad: float | None = None,
+    ahead_m: float = math.inf,
 ) -> Shifting | None:
     """Return what a forecast's shifts are worth; None where it is too little, or not for this corridor or leg.
 
@@ -77,11 +88,15 @@ def shifts_of(
     off_rad = 0.0 if leg_rad is None else difference_rad(leg_rad, mean_rad)
     if corridor_m < NARROWEST_M or spread_rad <= 0.0 or abs(off_rad) > LEG_RAD:
         return None
-    table = shift_table(   # round figures: it is made anew when something has changed that matters
-        corridor_m=round(corridor_m, 1), spread_rad=math.radians(2.0 * max(1, round(math.degrees(spread_rad) / 2.0))),
+    table = shift_table(  # round figures: it is made anew when something has changed that matters
+        corridor_m=round(corridor_m, 1),
+        spread_rad=math.radians(2.0 * max(1, round(math.degrees(spread_rad) / 2.0))),
         tau_s=TAU_S[0] * 1.5 ** round(math.log(shift_time_s(forecast) / TAU_S[0], 1.5)),
-        speed_mps=round(max(0.2, speed_mps), 1), half_rad=half_rad,
-        leg_rad=math.radians(5.0 * round(math.degrees(off_rad) / 5.0)), tack_s=tack_s)
+        speed_mps=round(max(0.2, speed_mps), 1),
+        half_rad=half_rad,
+        leg_rad=math.radians(5.0 * round(math.degrees(off_rad) / 5.0)),
+        tack_s=tack_s,
+    )
     return Shifting(table=table, mean_rad=mean_rad) if table.made_good_mps > (1.0 + WORTH) * table.plainly_mps else None
 
 
@@ -149,7 +164,13 @@ class ShiftTable:
 
 @lru_cache(maxsize=64)
 def shift_table(
-    *, corridor_m: float, spread_rad: float, tau_s: float, speed_mps: float, half_rad: float, leg_rad: float,
+    *,
+    corridor_m: float,
+    spread_rad: float,
+    tau_s: float,
+    speed_mps: float,
+    half_rad: float,
+    leg_rad: float,
     tack_s: float,
 ) -> ShiftTable:
     """Return the table for a leg that is ``leg_rad`` to the right of the mean wind [rad].
@@ -179,12 +200,15 @@ def shift_table(
         hoped = values @ stay.T
         for tack in range(2):
             mine = hoped[tack]
-            stand[tack] = ahead[tack] + (1.0 - share[tack]) * mine[low[tack], across] + (
-                share[tack] * mine[low[tack] + 1, across])
+            stand[tack] = (
+                ahead[tack]
+                + (1.0 - share[tack]) * mine[low[tack], across]
+                + (share[tack] * mine[low[tack] + 1, across])
+            )
         best = np.maximum(stand, stand[::-1] - loss_m)
         # half a step at a time: crossings of equal length would swing for ever
         change = best - values
-        gained_m = float(change.min())   # no policy's step gains less than the least, the best's no more than the most
+        gained_m = float(change.min())  # no policy's step gains less than the least, the best's no more than the most
         values = values + 0.5 * (change - change[0, PLACES // 2, SHIFTS // 2])
         if float(change.max()) - gained_m < NEAR_M:
             break
@@ -192,15 +216,21 @@ def shift_table(
     # at the edge the boat must tack: what that gains is no more than a board
     worth_s = np.minimum((stand[::-1] - loss_m - stand) / mean_mps, longest_s)
     return ShiftTable(
-        corridor_m=corridor_m, reach_rad=reach_rad, worth_s=worth_s,
-        made_good_mps=gained_m / STEP_S, straight_mps=mean_mps * math.cos(leg_rad), tack_s=tack_s,
-        crossing_s=longest_s)
+        corridor_m=corridor_m,
+        reach_rad=reach_rad,
+        worth_s=worth_s,
+        made_good_mps=gained_m / STEP_S,
+        straight_mps=mean_mps * math.cos(leg_rad),
+        tack_s=tack_s,
+        crossing_s=longest_s,
+    )
 
 
 def _transitions(shifts: Floats, spread_rad: float, kept: float) -> Floats:
     """Return (from, to) the chance of each shift a step later."""
     scatter = spread_rad * math.sqrt(1.0 - kept * kept)
     between = 0.5 * (shifts[1:] + shifts[:-1])
-    below = np.array([[0.5 * (1.0 + math.erf((b - kept * s) / (scatter * math.sqrt(2.0)))) for b in between]
-                      for s in shifts])
+    below = np.array(
+        [[0.5 * (1.0 + math.erf((b - kept * s) / (scatter * math.sqrt(2.0)))) for b in between] for s in shifts]
+    )
     return np.diff(np.hstack([np.zeros((SHIFTS, 1)), below, np.ones((SHIFTS, 1))]), axis=1)

@@ -19,7 +19,7 @@ from companion.skipper.step.state import Charge
 from companion.skipper.step.wind_limits import too_light, too_strong
 from companion.skipper.way.geometry import along_m, cross_track_m, distance_m
 
-_J2000_UNIX_S = 946_728_000.0   # 2000-01-01 12:00 UTC
+_J2000_UNIX_S = 946_728_000.0  # 2000-01-01 12:00 UTC
 _DAY_S = 86_400.0
 
 
@@ -36,20 +36,21 @@ def sun_height_rad(lat_rad: float, lon_rad: float, unix_s: float) -> float:
     obliquity = math.radians(23.439 - 4e-7 * days)
     ascension = math.atan2(math.cos(obliquity) * math.sin(longitude), math.cos(longitude))
     declination = math.asin(math.sin(obliquity) * math.sin(longitude))
-    sidereal = math.radians((280.46062 + 360.98564737 * days) % 360.0)   # Greenwich mean
+    sidereal = math.radians((280.46062 + 360.98564737 * days) % 360.0)  # Greenwich mean
     hour_angle = sidereal + lon_rad - ascension
     return math.asin(
-        math.sin(lat_rad) * math.sin(declination) + math.cos(lat_rad) * math.cos(declination) * math.cos(hour_angle))
+        math.sin(lat_rad) * math.sin(declination) + math.cos(lat_rad) * math.cos(declination) * math.cos(hour_angle)
+    )
 
 
 IRONS_TWA_RAD = math.radians(35.0)
-IRONS_TWS_MPS = 1.5            # less wind than this is a calm, not irons
+IRONS_TWS_MPS = 1.5  # less wind than this is a calm, not irons
 MOVING_MPS = 0.5
 PROGRESS_WINDOW_S = 180.0
-RISE = 0.015       # it is charged; the last percent trembles
-FALL = 0.05        # the rate is told when the charge has fallen by this much ...
-LOOK_S = 300.0     # ... and for this long
-DETOUR = 2.0       # a beat is 1.4 times its straight way, and something lies between
+RISE = 0.015  # it is charged; the last percent trembles
+FALL = 0.05  # the rate is told when the charge has fallen by this much ...
+LOOK_S = 300.0  # ... and for this long
+DETOUR = 2.0  # a beat is 1.4 times its straight way, and something lies between
 LEAST_MPS = 0.5
 
 
@@ -116,7 +117,7 @@ def _progress(ctx: StepContext) -> float | None:
     if ctx.is_raised("becalmed") or not ctx.ahead() or not ctx.state.progress.history:
         return None
     if ctx.state.mission.route is None or ctx.state.progress.history_plan != ctx.state.mission.route.plan_id:
-        return None   # the history is of the plan before
+        return None  # the history is of the plan before
     old = ctx.state.progress.history[0]
     if ctx.t_s - old[0] < PROGRESS_WINDOW_S:
         return None
@@ -144,7 +145,7 @@ def _corridor(ctx: StepContext) -> float | None:
     """Share of the corridor used; in open water the grid size bounds it, not the margin, and a beat its own boards."""
     boat, leg = ctx.boat_en, ctx.leg()
     if boat is None or leg is None or not ctx.ahead() or ctx.state.steering.own_mode in STOPPING or is_composed(ctx):
-        return None      # stopped, or by a field of the boat's own, it follows no leg
+        return None  # stopped, or by a field of the boat's own, it follows no leg
     if distance_m(*leg) < 1.0:
         return 0.0
     if along_m(boat, *leg) < 0.0:
@@ -166,8 +167,7 @@ def _stuck(ctx: StepContext) -> float | None:
 
 def _ended(ctx: StepContext) -> float | None:
     route = ctx.state.mission.route
-    if route is None or ctx.gate is None or ctx.autopilot is None or diversion(ctx) is not None or (
-        is_composed(ctx)):
+    if route is None or ctx.gate is None or ctx.autopilot is None or diversion(ctx) is not None or (is_composed(ctx)):
         return None
     return float(ctx.state.mission.index >= len(route.items) - 1 or ctx.autopilot.mission_state.name == "COMPLETE")
 
@@ -212,8 +212,10 @@ def _dark(ctx: StepContext) -> float | None:
     if below_deg is None or status is None or vehicle is None or status.utc_at_boot_s is None or status.boot_s is None:
         return None
     height_rad = sun_height_rad(
-        math.radians(vehicle.position.lat_deg), math.radians(vehicle.position.lon_deg),
-        status.utc_at_boot_s + status.boot_s)
+        math.radians(vehicle.position.lat_deg),
+        math.radians(vehicle.position.lon_deg),
+        status.utc_at_boot_s + status.boot_s,
+    )
     return math.degrees(height_rad - math.radians(below_deg))
 
 
@@ -244,16 +246,33 @@ def _fence_off(ctx: StepContext) -> float | None:
 
 
 _MEASURES: dict[str, Callable[[StepContext], float | None]] = {
-    "link silent": _link, "position lost": _position_lost, "position jump": _jump, "wind untrusted": _wind,
+    "link silent": _link,
+    "position lost": _position_lost,
+    "position jump": _jump,
+    "wind untrusted": _wind,
     "wind contradicted": _contradicted,
-    "strong wind": too_strong, "light wind": too_light,
-    "becalmed": _becalmed, "drifting": meets_in_s, "in irons": _irons, "vessel too near": _too_near,
+    "strong wind": too_strong,
+    "light wind": too_light,
+    "becalmed": _becalmed,
+    "drifting": meets_in_s,
+    "in irons": _irons,
+    "vessel too near": _too_near,
     "no progress": _progress,
-    "heading against course": _heading, "off the corridor": _corridor, "stuck waypoint": _stuck,
-    "mission ended": _ended, "fence breach": _breach, "fence off": _fence_off, "foreign mission": _foreign,
+    "heading against course": _heading,
+    "off the corridor": _corridor,
+    "stuck waypoint": _stuck,
+    "mission ended": _ended,
+    "fence breach": _breach,
+    "fence off": _fence_off,
+    "foreign mission": _foreign,
     "reboot": _reboot,
-    "battery low": _battery_low, "battery critical": _battery_critical, "out of time": _time, "dragged off": _dragged,
-    "planner dead": _planner, "dark": _dark, "shore lost": _shore,
+    "battery low": _battery_low,
+    "battery critical": _battery_critical,
+    "out of time": _time,
+    "dragged off": _dragged,
+    "planner dead": _planner,
+    "dark": _dark,
+    "shore lost": _shore,
 }
 
 
@@ -282,8 +301,13 @@ def follow_charge(ctx: StepContext) -> None:
     if needed_s is None or left_s >= (ctx.config.ends.figure("battery_reserve") or 0.0) * needed_s:
         return
     ctx.set(alarms=changed(ctx.state.alarms, charge=replace(now, is_short=True)))
-    ctx.say(Severity.WARNING, "charge", f"the charge lasts {math.floor(left_s / 60.0)} min at its rate, the way to "
-             f"where she can wait takes {math.ceil(needed_s / 60.0)} min", every_s=0.0)
+    ctx.say(
+        Severity.WARNING,
+        "charge",
+        f"the charge lasts {math.floor(left_s / 60.0)} min at its rate, the way to "
+        f"where she can wait takes {math.ceil(needed_s / 60.0)} min",
+        every_s=0.0,
+    )
 
 
 def lasts_s(ctx: StepContext) -> float | None:

@@ -22,29 +22,33 @@ from companion.skipper.step.state import Tacking
 from companion.skipper.way.voyage import PointEn
 
 SETTLED_RAD = math.radians(30.0)
-NEAR_RAD = math.radians(20.0)      # of the wind, of which the mean of 5 s is known
-TURNED_RAD = math.radians(15.0)    # towards it, since it was settled
-ABORTED_S = 5.0                    # back sooner, the boat was told otherwise: an upload has begun its leg anew ...
-STOPPED = 0.4                      # ... unless its speed fell to less than this share: in a tack it falls to half
-LIES_S = 8.0                       # as the watchdog "in irons" has it
-FORGET_S = 20.0                    # settled longer ago than this, whatever follows is no tack from there
-LEAST_TWS_MPS = 1.5                # in less the boat does as it likes
-NEAR_SOLID_M = 60.0                # a tack that failed so near something asks for a new plan
-MOST_IRONS_S = 60.0                # more is a lull that it waited in: no room of a tack would be enough ever after
-MOST_LEE_MPS = 1.0                 # more is a position that has jumped
+NEAR_RAD = math.radians(20.0)  # of the wind, of which the mean of 5 s is known
+TURNED_RAD = math.radians(15.0)  # towards it, since it was settled
+ABORTED_S = 5.0  # back sooner, the boat was told otherwise: an upload has begun its leg anew ...
+STOPPED = 0.4  # ... unless its speed fell to less than this share: in a tack it falls to half
+LIES_S = 8.0  # as the watchdog "in irons" has it
+FORGET_S = 20.0  # settled longer ago than this, whatever follows is no tack from there
+LEAST_TWS_MPS = 1.5  # in less the boat does as it likes
+NEAR_SOLID_M = 60.0  # a tack that failed so near something asks for a new plan
+MOST_IRONS_S = 60.0  # more is a lull that it waited in: no room of a tack would be enough ever after
+MOST_LEE_MPS = 1.0  # more is a position that has jumped
 TACK_FAILED = "a tack failed"
 
 
 def watch_tacks(ctx: StepContext) -> None:
     """Follow the boat's tacks for one step."""
     now, vehicle, wind, status = ctx.state.tacking, ctx.snapshot.vehicle, ctx.wind_now, ctx.autopilot
-    sails = ctx.state.voyage.sailing and ctx.config.sails and status is not None and (
-        status.is_armed and status.mode in {Mode.AUTO, Mode.GUIDED})
+    sails = (
+        ctx.state.voyage.sailing
+        and ctx.config.sails
+        and status is not None
+        and (status.is_armed and status.mode in {Mode.AUTO, Mode.GUIDED})
+    )
     if not sails or vehicle is None or wind is None or wind[1] < LEAST_TWS_MPS:
         if now.side or now.began_s is not None:
             ctx.set(tacking=replace(now, side=0, began_s=None, is_counted=False))
         return
-    through_mps = math.dist(vehicle.velocity_en_mps, ctx.snapshot.current.en_mps)   # as it is believed to move
+    through_mps = math.dist(vehicle.velocity_en_mps, ctx.snapshot.current.en_mps)  # as it is believed to move
     then = followed(now, ctx.t_s, vehicle.heading_rad, wind[0], through_mps)
     if then.began_s is not None and now.began_s is None:
         then = replace(then, began_en_m=ctx.boat_en)
@@ -72,9 +76,16 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, 
             if not is_back or is_stopped or t_s - now.began_s >= ABORTED_S:
                 now = _counted(now, t_s, failed=is_back)
         elif fresh and now.began_s is None and side != now.side and _through_the_eye(now, heading_rad, off):
-            now = _counted(now, t_s, failed=False)   # between two looks
-        return replace(now, side=side, settled_rad=heading_rad, settled_s=t_s, settled_mps=speed_mps, began_s=None,
-                       is_counted=False)
+            now = _counted(now, t_s, failed=False)  # between two looks
+        return replace(
+            now,
+            side=side,
+            settled_rad=heading_rad,
+            settled_s=t_s,
+            settled_mps=speed_mps,
+            began_s=None,
+            is_counted=False,
+        )
     turned = now.side * difference_rad(heading_rad, now.settled_rad)
     is_near = abs(off) < NEAR_RAD or speed_mps < STOPPED * now.settled_mps
     if fresh and now.began_s is None and is_near and turned >= TURNED_RAD:
@@ -83,7 +94,7 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, 
 
 
 def lain(
-    now: Tacking, then: Tacking, t_s: float, boat_en_m: PointEn | None, twd_from_rad: float, current_en_mps: PointEn,
+    now: Tacking, then: Tacking, t_s: float, boat_en_m: PointEn | None, twd_from_rad: float, current_en_mps: PointEn
 ) -> Tacking:
     """Return ``then`` with what the failure that it ends has told: how long it lay, how fast it was set to lee.
 
@@ -107,8 +118,13 @@ def lain(
 
 
 def _counted(now: Tacking, t_s: float, *, failed: bool) -> Tacking:
-    return replace(now, tried=now.tried + 1, failed=now.failed + failed, in_a_row=now.in_a_row + 1 if failed else 0,
-                   failed_s=t_s if failed else now.failed_s)
+    return replace(
+        now,
+        tried=now.tried + 1,
+        failed=now.failed + failed,
+        in_a_row=now.in_a_row + 1 if failed else 0,
+        failed_s=t_s if failed else now.failed_s,
+    )
 
 
 def _through_the_eye(now: Tacking, heading_rad: float, off_rad: float) -> bool:
@@ -120,11 +136,17 @@ def _through_the_eye(now: Tacking, heading_rad: float, off_rad: float) -> bool:
 def _failed(ctx: StepContext, tacking: Tacking) -> None:
     """Say so, and ask for a plan from here where the boat has little room, or has tried often enough."""
     given, boat = ctx.voyage.boat.tack_fails, ctx.boat_en
-    told = "" if given <= 0.0 else (
-        f": the next one does by {100.0 * tacking.chance(given):.0f} %, "
-        f"give or take {100.0 * tacking.spread(given):.0f} %")
-    ctx.say(Severity.NOTICE, "tack failed",
-             f"{TACK_FAILED}, {tacking.failed} of {tacking.tried} so far{told}", every_s=0.0)
+    told = (
+        ""
+        if given <= 0.0
+        else (
+            f": the next one does by {100.0 * tacking.chance(given):.0f} %, "
+            f"give or take {100.0 * tacking.spread(given):.0f} %"
+        )
+    )
+    ctx.say(
+        Severity.NOTICE, "tack failed", f"{TACK_FAILED}, {tacking.failed} of {tacking.tried} so far{told}", every_s=0.0
+    )
     if given <= 0.0 or boat is None:
         return
     is_near = float(ctx.voyage.area.clearance_m([boat])[0]) < NEAR_SOLID_M

@@ -21,8 +21,8 @@ from companion.skipper.way.voyage import PointEn, outside_m, water_at
 from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, Policy, assess
 from companion.traffic.colregs import follow
 
-SHOWN = 8                # vessels kept in the state: the worst
-VESSEL_EVERY_S = 30.0           # between two lines of one vessel
+SHOWN = 8  # vessels kept in the state: the worst
+VESSEL_EVERY_S = 30.0  # between two lines of one vessel
 # Acting begins nearer than warning: the shares of a lake's limits (``companion.traffic.LAKE``).
 ACT_CPA, ACT_TCPA = 0.4, 0.5
 SEVERITY = {Alarm.WARN: Severity.WARNING, Alarm.ACT: Severity.CRITICAL, Alarm.TOUCH: Severity.CRITICAL}
@@ -31,8 +31,11 @@ SEVERITY = {Alarm.WARN: Severity.WARNING, Alarm.ACT: Severity.CRITICAL, Alarm.TO
 def limits(config: SkipperConfig) -> AlarmLimits:
     """Return when to warn and to act, from the distance and the time that the mission calls safe."""
     return AlarmLimits(
-        warn_cpa_m=config.traffic_clearance_m, warn_tcpa_s=config.traffic_time_s,
-        act_cpa_m=ACT_CPA * config.traffic_clearance_m, act_tcpa_s=ACT_TCPA * config.traffic_time_s)
+        warn_cpa_m=config.traffic_clearance_m,
+        warn_tcpa_s=config.traffic_time_s,
+        act_cpa_m=ACT_CPA * config.traffic_clearance_m,
+        act_tcpa_s=ACT_TCPA * config.traffic_time_s,
+    )
 
 
 def look_out(ctx: StepContext) -> None:
@@ -50,9 +53,13 @@ def look_out(ctx: StepContext) -> None:
         return
     hull, wind, adrift = ctx.voyage.boat.hull, ctx.wind_now, ctx.state.adrift
     own = OwnShip(
-        t_s=ctx.t_s, en_m=boat, velocity_en_mps=vehicle.velocity_en_mps, heading_rad=vehicle.heading_rad,
+        t_s=ctx.t_s,
+        en_m=boat,
+        velocity_en_mps=vehicle.velocity_en_mps,
+        heading_rad=vehicle.heading_rad,
         radius_m=hull.reach_m,
-        is_sailing=ctx.config.sails and not (adrift.motor and adrift.since_s is not None))   # rule 3 c
+        is_sailing=ctx.config.sails and not (adrift.motor and adrift.since_s is not None),
+    )  # rule 3 c
     found = assess(own, picture, limits(ctx.config), None if wind is None else wind[0])
     if ctx.config.traffic_policy is Policy.RULES:
         found = _meet(ctx, own, found)
@@ -64,8 +71,14 @@ def _meet(ctx: StepContext, own: OwnShip, found: Sequence[Assessment]) -> tuple[
     """Follow the encounters, say which have changed, and return the vessels with what the rules gave each of them."""
     state, mean = ctx.state, ctx.wind_mean
     before = {(h.mmsi, h.branch): h for h in state.traffic.encounters}
-    held = follow(state.traffic.encounters, own, found, t_s=ctx.t_s, clearance_m=ctx.config.traffic_clearance_m,
-                  twd_from_rad=None if mean is None else mean[0])
+    held = follow(
+        state.traffic.encounters,
+        own,
+        found,
+        t_s=ctx.t_s,
+        clearance_m=ctx.config.traffic_clearance_m,
+        twd_from_rad=None if mean is None else mean[0],
+    )
     now = {(h.mmsi, h.branch): h for h in held}
     told = {t[:2]: t for t in state.announced.encounters}
     for one in found:
@@ -76,7 +89,7 @@ def _meet(ctx: StepContext, own: OwnShip, found: Sequence[Assessment]) -> tuple[
         what = "evident" if after.evident else after.encounter.role.value
         if last is not None and (last[2] == what or (ctx.t_s - last[3] < VESSEL_EVERY_S and not after.evident)):
             continue
-        severity = (Severity.CRITICAL if after.evident else Severity.WARNING if after.stands_on else Severity.NOTICE)
+        severity = Severity.CRITICAL if after.evident else Severity.WARNING if after.stands_on else Severity.NOTICE
         ctx.say(severity, "encounter", after.sentence(one.approach), every_s=0.0)
         told[key] = (*key, what, ctx.t_s)
     for key, gone in before.items():
@@ -85,9 +98,12 @@ def _meet(ctx: StepContext, own: OwnShip, found: Sequence[Assessment]) -> tuple[
             told.pop(key, None)
     ctx.set(
         traffic=changed(ctx.state.traffic, encounters=held),
-        announced=changed(ctx.state.announced, encounters=tuple(told.values())))
-    return tuple(replace(one, encounter=now[key].encounter) if (
-        key := (one.vessel.mmsi, one.vessel.branch)) in now else one for one in found)
+        announced=changed(ctx.state.announced, encounters=tuple(told.values())),
+    )
+    return tuple(
+        replace(one, encounter=now[key].encounter) if (key := (one.vessel.mmsi, one.vessel.branch)) in now else one
+        for one in found
+    )
 
 
 def _say(ctx: StepContext, found: Sequence[Assessment]) -> None:
@@ -102,11 +118,11 @@ def _say(ctx: StepContext, found: Sequence[Assessment]) -> None:
 
 
 EVERY_S = 60.0
-MOVES_MPS = 0.15      # slower than this the fixes' noise tells no drift
-CARRIED_MPS = 3.0     # faster than this a disarmed boat is towed or carried
-LOITER_M = 20.0       # so near to where RTL ends it loiters there
-PATIENCE_S = 30.0     # an answer that is on its way is given this long before it is spoken of
-ANOTHER_MPS = 0.25       # it is said again when it has changed by so much
+MOVES_MPS = 0.15  # slower than this the fixes' noise tells no drift
+CARRIED_MPS = 3.0  # faster than this a disarmed boat is towed or carried
+LOITER_M = 20.0  # so near to where RTL ends it loiters there
+PATIENCE_S = 30.0  # an answer that is on its way is given this long before it is spoken of
+ANOTHER_MPS = 0.25  # it is said again when it has changed by so much
 REMIND_S = 1800.0
 
 
@@ -117,9 +133,12 @@ def speak_of_stop(ctx: StepContext) -> None:
     boat knows that, and is told only when it drifts onto something.
     """
     stop = ctx.state.operator.stop
-    if stop is None or ctx.autopilot is None or ctx.t_s - stop.t_s <= (
-        PATIENCE_S if is_answered(ctx) else TOLD_S
-    ) or ctx.is_said("adrift", EVERY_S):
+    if (
+        stop is None
+        or ctx.autopilot is None
+        or ctx.t_s - stop.t_s <= (PATIENCE_S if is_answered(ctx) else TOLD_S)
+        or ctx.is_said("adrift", EVERY_S)
+    ):
         return
     here, vehicle = ctx.snapshot.position_en_m, ctx.snapshot.vehicle
     ahead = None if here is None or vehicle is None else _ahead(ctx, here, vehicle.velocity_en_mps)
@@ -130,8 +149,12 @@ def speak_of_stop(ctx: StepContext) -> None:
     by = "a person" if stop.cause == PERSON else f"the {stop.cause} failsafe"
     what = f"{mode if stop.is_armed else 'disarmed'} by {by}"
     where = "; her position is not known" if here is None or ahead is None else _where(ctx, here, ahead)
-    ctx.say(Severity.CRITICAL if meets or not is_answered(ctx) else Severity.WARNING, "adrift",
-             f"{what}{where}; {_remedy(ctx)}", every_s=EVERY_S)
+    ctx.say(
+        Severity.CRITICAL if meets or not is_answered(ctx) else Severity.WARNING,
+        "adrift",
+        f"{what}{where}; {_remedy(ctx)}",
+        every_s=EVERY_S,
+    )
 
 
 def _ahead(ctx: StepContext, here: PointEn, velocity: tuple[float, float]) -> DriftAhead:
@@ -197,8 +220,12 @@ def watch_water(ctx: StepContext) -> None:
     if not current.is_significant:
         if told is not None:
             ctx.set(announced=changed(ctx.state.announced, water_en_mps=None))
-            ctx.say(Severity.INFO, "current", "the current is no longer told from still water: plans leave it out",
-                     every_s=0.0)
+            ctx.say(
+                Severity.INFO,
+                "current",
+                "the current is no longer told from still water: plans leave it out",
+                every_s=0.0,
+            )
         return
     if told is None or math.dist(told, current.en_mps) >= ANOTHER_MPS:
         ctx.set(announced=changed(ctx.state.announced, water_en_mps=current.en_mps))
@@ -212,7 +239,7 @@ def watch(ctx: StepContext) -> None:
     fresh: list[str] = []
     for dog in TABLE:
         value = measure(ctx, dog.name) if _is_watched(ctx, dog) else None
-        above = dog.enter >= dog.exit     # the figure is bad when it is large
+        above = dog.enter >= dog.exit  # the figure is bad when it is large
         enters = value is not None and (value >= dog.enter if above else value <= dog.enter)
         leaves = value is None or (value <= dog.exit if above else value >= dog.exit)
         if dog.enter == dog.exit:
@@ -238,9 +265,13 @@ def watch(ctx: StepContext) -> None:
         else:
             raised[dog.name] = replace(now, clear_since_s=clear)
     order = {dog.name: n for n, dog in enumerate(TABLE)}
-    ctx.set(alarms=changed(
-        ctx.state.alarms, raised=tuple(sorted(raised.values(), key=lambda r: order[r.name])),
-        entering=tuple(sorted(entering.items(), key=lambda e: order[e[0]]))))
+    ctx.set(
+        alarms=changed(
+            ctx.state.alarms,
+            raised=tuple(sorted(raised.values(), key=lambda r: order[r.name])),
+            entering=tuple(sorted(entering.items(), key=lambda e: order[e[0]])),
+        )
+    )
     for name in fresh:
         dog = BY_NAME[name]
         value = measure(ctx, name)
@@ -272,6 +303,4 @@ def _is_watched(ctx: StepContext, dog: Watchdog) -> bool:
 def _is_under_way(ctx: StepContext) -> bool:
     status = ctx.autopilot
     own = ctx.state.steering.own_mode
-    return (
-        ctx.state.voyage.sailing and status is not None and status.is_armed and status.mode in {Mode.AUTO, own}
-    )
+    return ctx.state.voyage.sailing and status is not None and status.is_armed and status.mode in {Mode.AUTO, own}

@@ -21,8 +21,8 @@ from companion.messages import AutopilotStatus
 from companion.skipper.way.geometry import bearing_rad, distance_m, moved
 from companion.skipper.way.voyage import AreaLike, PointEn, Voyage
 
-COARSE_M = 0.5     # home follows the boat while it is disarmed: not every step makes another area
-OUTSIDE_M = 5.0    # so far outside, an autopilot that keeps a fence has said so
+COARSE_M = 0.5  # home follows the boat while it is disarmed: not every step makes another area
+OUTSIDE_M = 5.0  # so far outside, an autopilot that keeps a fence has said so
 STEP_M = 5.0
 
 
@@ -53,8 +53,10 @@ class HomeCircle:
         if inside_m >= floor_m:
             return ""
         where = "outside" if inside_m < 0.0 else f"less than {floor_m:g} m inside"
-        return (f"{what} is {self.radius_m - inside_m:.0f} m from home, {where} {self.words}: "
-                "FENCE_TYPE 4 on the autopilot keeps to polygons only, FENCE_RADIUS widens it")
+        return (
+            f"{what} is {self.radius_m - inside_m:.0f} m from home, {where} {self.words}: "
+            "FENCE_TYPE 4 on the autopilot keeps to polygons only, FENCE_RADIUS widens it"
+        )
 
     def place_inside(self, area: AreaLike, from_en: PointEn, room_m: float) -> PointEn:
         """Return the place nearest to ``from_en`` on the way home that has ``room_m`` about it; home without one."""
@@ -86,8 +88,11 @@ class Drawn:
 
     def cuts(self, way_en: Sequence[PointEn]) -> bool:
         """Return whether a way leads into what is taken; one that begins in it is on its way out."""
-        return len(way_en) > 1 and self.inside_m(way_en[0]) > 0.0 and bool(
-            shapely.intersects(self.taken, shapely.linestrings(way_en)))
+        return (
+            len(way_en) > 1
+            and self.inside_m(way_en[0]) > 0.0
+            and bool(shapely.intersects(self.taken, shapely.linestrings(way_en)))
+        )
 
     def trouble(self, what: str, en_m: PointEn, floor_m: float) -> str:
         """Return why a place cannot be sailed to (empty: what is drawn does not forbid it)."""
@@ -103,7 +108,7 @@ class Drawn:
 
 
 def drawn_of(
-    area: AreaLike, zones: tuple[Zone, ...], limits: AutopilotLimits | None, margin_m: float, *, is_off: bool,
+    area: AreaLike, zones: tuple[Zone, ...], limits: AutopilotLimits | None, margin_m: float, *, is_off: bool
 ) -> Drawn | None:
     """Return what is drawn on the autopilot, None: it is off, or takes no water that the margin leaves."""
     if is_off or not zones or (limits is not None and not limits.fence_polygons):
@@ -113,7 +118,7 @@ def drawn_of(
 
 
 def circle_of(
-    voyage: Voyage, limits: AutopilotLimits | None, status: AutopilotStatus | None, here_en: PointEn | None,
+    voyage: Voyage, limits: AutopilotLimits | None, status: AutopilotStatus | None, here_en: PointEn | None
 ) -> HomeCircle | None:
     """Return the circle that the autopilot keeps, None: none is known, or it keeps none.
 

@@ -16,9 +16,9 @@ from companion.geo.angles import wrap_two_pi
 from companion.skipper.way.geometry import bearing_rad
 from companion.skipper.way.voyage import AreaLike, PointEn
 
-HORIZON_S = 300.0   # time to wake a crew, clear an anchor and let it go
-HAIR_M = 1e-6       # what rounding may make of a distance
-LOOKS = 241         # places looked at on the way; a dip between two of them still counts, at the nearest
+HORIZON_S = 300.0  # time to wake a crew, clear an anchor and let it go
+HAIR_M = 1e-6  # what rounding may make of a distance
+LOOKS = 241  # places looked at on the way; a dip between two of them still counts, at the nearest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,7 +66,11 @@ class DriftAhead:
 
 
 def drift_ahead(
-    area: AreaLike, here_en_m: PointEn, velocity_en_mps: tuple[float, float], *, floor_m: float,
+    area: AreaLike,
+    here_en_m: PointEn,
+    velocity_en_mps: tuple[float, float],
+    *,
+    floor_m: float,
     horizon_s: float = HORIZON_S,
 ) -> DriftAhead:
     """Follow a drift from a place for ``horizon_s`` and say what it meets.
@@ -87,7 +91,7 @@ def drift_ahead(
         raise ValueError(f"floor {floor_m} m must be 0 or more, horizon {horizon_s} s above 0")
     end = (here_en_m[0] + horizon_s * velocity_en_mps[0], here_en_m[1] + horizon_s * velocity_en_mps[1])
     path_m = area.path_clearance_m([here_en_m, end])
-    if path_m > floor_m + HAIR_M:   # no place on the way is nearer than the way: there is nothing to look at
+    if path_m > floor_m + HAIR_M:  # no place on the way is nearer than the way: there is nothing to look at
         return DriftAhead(velocity_en_mps=velocity_en_mps, end_en_m=end, clearance_m=path_m)
     t_s = np.linspace(0.0, horizon_s, LOOKS)
     places = np.asarray(here_en_m) + t_s[:, None] * np.asarray(velocity_en_mps)
@@ -98,14 +102,22 @@ def drift_ahead(
     floor_s = _first_s(t_s, clear_m, floor_m)
     at = (here_en_m[0] + floor_s * velocity_en_mps[0], here_en_m[1] + floor_s * velocity_en_mps[1])
     return DriftAhead(
-        velocity_en_mps=velocity_en_mps, end_en_m=end, clearance_m=least_m, floor_s=floor_s,
-        contact_s=_first_s(t_s, clear_m, 0.0) if least_m <= 0.0 else None, at_en_m=at,
+        velocity_en_mps=velocity_en_mps,
+        end_en_m=end,
+        clearance_m=least_m,
+        floor_s=floor_s,
+        contact_s=_first_s(t_s, clear_m, 0.0) if least_m <= 0.0 else None,
+        at_en_m=at,
         name=area.nearest_name(places[int(np.argmin(clear_m))]),
     )
 
 
 def floor_after_s(
-    area: AreaLike, here_en_m: PointEn, velocity_en_mps: tuple[float, float], *, floor_m: float,
+    area: AreaLike,
+    here_en_m: PointEn,
+    velocity_en_mps: tuple[float, float],
+    *,
+    floor_m: float,
     horizon_s: float = HORIZON_S,
 ) -> float:
     """Return when a drift first comes within ``floor_m`` of something [s], ``horizon_s`` where it does not by then.

@@ -32,12 +32,12 @@ from companion.skipper.way.line import (
 from companion.skipper.way.sweeps import Sweep
 from companion.skipper.way.voyage import AreaLike, Box, Composed, Goal, Line, PointEn, Search, Side, Voyage
 
-ARC_RAD = math.radians(100.0)       # gates around a buoy are at most this far apart
-STRAIGHT_RAD = math.radians(60.0)   # a bend the other way up to this is passed with one gate, not with a loop
-KEEP_SHARE = 0.5                    # the disc around the buoy that plans avoid, as a share of the rounding radius
-BARRIER_M = 60.0                    # shortest barrier
-SWEEP_RADIUS_M = 7.0                # the autopilot leaves a sweep's end 3 to 5 m before it
-BOX_RADIUS_M = 8.0                  # its loiter lies this near to a box's roomiest place, and nearer as it is planned
+ARC_RAD = math.radians(100.0)  # gates around a buoy are at most this far apart
+STRAIGHT_RAD = math.radians(60.0)  # a bend the other way up to this is passed with one gate, not with a loop
+KEEP_SHARE = 0.5  # the disc around the buoy that plans avoid, as a share of the rounding radius
+BARRIER_M = 60.0  # shortest barrier
+SWEEP_RADIUS_M = 7.0  # the autopilot leaves a sweep's end 3 to 5 m before it
+BOX_RADIUS_M = 8.0  # its loiter lies this near to a box's roomiest place, and nearer as it is planned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +97,7 @@ class Gate:
         return self.line is not None and not self.is_before_line
 
 
-@lru_cache(maxsize=8)   # asked for at every step, and the same until a buoy is missed
+@lru_cache(maxsize=8)  # asked for at every step, and the same until a buoy is missed
 def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate, ...]:
     """Return the gates of all laps in order. Every buoy is something to keep clear of on every leg.
 
@@ -120,21 +120,32 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
         if goal.line is not None:
             out.extend(
                 replace(gate, keep_out=(*discs, *gate.keep_out))
-                for gate in _cross(goal, i, name, None if is_once_more else before, after, voyage.area))
+                for gate in _cross(goal, i, name, None if is_once_more else before, after, voyage.area)
+            )
         elif goal.search is not None and approach is not None and approach.round > 0:
             out.extend(_sweep(goal, i, name, approach, discs))
         elif goal.side is Side.NONE:
-            out.append(Gate(
-                en_m=goal.en_m, radius_m=goal.radius_m if goal.box is None else BOX_RADIUS_M, goal=i,
-                ends_goal=True, name=name, from_en_m=before,
-                bandwidth_m=goal.bandwidth_m, keep_out=discs, box=goal.box, search=goal.search,
-                field=goal.field,
-            ))
+            out.append(
+                Gate(
+                    en_m=goal.en_m,
+                    radius_m=goal.radius_m if goal.box is None else BOX_RADIUS_M,
+                    goal=i,
+                    ends_goal=True,
+                    name=name,
+                    from_en_m=before,
+                    bandwidth_m=goal.bandwidth_m,
+                    keep_out=discs,
+                    box=goal.box,
+                    search=goal.search,
+                    field=goal.field,
+                )
+            )
         else:
             turn_rad = approach.turn_rad if approach is not None else None
             out.extend(
                 replace(gate, keep_out=(*discs, *gate.keep_out))
-                for gate in _round(goal, i, name, before, after, turn_rad, is_once_more=is_once_more))
+                for gate in _round(goal, i, name, before, after, turn_rad, is_once_more=is_once_more)
+            )
     return tuple(out)
 
 
@@ -153,13 +164,25 @@ def _sweep(goal: Goal, index: int, name: str, approach: Approach, discs: tuple[s
     """Return the gates that search an area: both ends of each sweep."""
     count = len(approach.sweeps)
     return [
-        Gate(en_m=end, radius_m=SWEEP_RADIUS_M, goal=index, is_first=n == 0 and k == 0, name=name, from_en_m=None,
-             ends_goal=n == count - 1 and k == 1, keep_out=discs, search=goal.search, sweep=(n + 1, count))
-        for n, sweep in enumerate(approach.sweeps) for k, end in enumerate(sweep)]
+        Gate(
+            en_m=end,
+            radius_m=SWEEP_RADIUS_M,
+            goal=index,
+            is_first=n == 0 and k == 0,
+            name=name,
+            from_en_m=None,
+            ends_goal=n == count - 1 and k == 1,
+            keep_out=discs,
+            search=goal.search,
+            sweep=(n + 1, count),
+        )
+        for n, sweep in enumerate(approach.sweeps)
+        for k, end in enumerate(sweep)
+    ]
 
 
 def _cross(
-    goal: Goal, index: int, name: str, before: PointEn | None, after: PointEn | None, area: AreaLike,
+    goal: Goal, index: int, name: str, before: PointEn | None, after: PointEn | None, area: AreaLike
 ) -> list[Gate]:
     """Return the gates that cross a line: a place beyond it, and one before it where the way begins elsewhere."""
     line = goal.line
@@ -167,18 +190,33 @@ def _cross(
     way_m = 0.0 if before is None else distance_m(before, goal.en_m)
     cut, course = crossing_en(line, before, after), course_rad(line)
     to = Gate(
-        en_m=moved(cut, course, BEYOND_M), radius_m=BEYOND_RADIUS_M, goal=index, ends_goal=True, name=name,
-        from_en_m=before, bandwidth_m=goal.bandwidth_m, keep_out=wings_wkt(line, area, way_m), line=line)
+        en_m=moved(cut, course, BEYOND_M),
+        radius_m=BEYOND_RADIUS_M,
+        goal=index,
+        ends_goal=True,
+        name=name,
+        from_en_m=before,
+        bandwidth_m=goal.bandwidth_m,
+        keep_out=wings_wkt(line, area, way_m),
+        line=line,
+    )
     if before is not None and ahead_m(line, before) <= -0.5 * BEFORE_M:
         return [to]
     place = moved(cut, course + math.pi, BEFORE_M)
     return [
         replace(to, en_m=place, radius_m=BEFORE_RADIUS_M, ends_goal=False, keep_out=(), is_before_line=True),
-        replace(to, from_en_m=place, is_first=False)]
+        replace(to, from_en_m=place, is_first=False),
+    ]
 
 
 def _round(
-    goal: Goal, index: int, name: str, before: PointEn | None, after: PointEn | None, turn_rad: float | None, *,
+    goal: Goal,
+    index: int,
+    name: str,
+    before: PointEn | None,
+    after: PointEn | None,
+    turn_rad: float | None,
+    *,
     is_once_more: bool,
 ) -> list[Gate]:
     """Return the gates that round a buoy.
@@ -214,13 +252,24 @@ def _round(
         else:
             wrong = wrap_pi(previous + difference_rad(place, previous) / 2.0 + math.pi)
             length = BARRIER_M
-        gates.append(Gate(
-            en_m=moved(buoy, place, goal.rounding_m), radius_m=max(goal.radius_m, 0.4 * goal.rounding_m), goal=index,
-            is_first=n == 0, ends_goal=n == len(shares) - 1, name=name, from_en_m=before if n == 0 else None,
-            bandwidth_m=goal.bandwidth_m if n == 0 else None, buoy_en_m=buoy, approach_en_m=before, side=goal.side,
-            turn_rad=turn, bearing_rad=-hand * (math.pi / 2.0 + share * turn),
-            keep_out=(barrier_wkt(buoy, wrong, length),),
-        ))
+        gates.append(
+            Gate(
+                en_m=moved(buoy, place, goal.rounding_m),
+                radius_m=max(goal.radius_m, 0.4 * goal.rounding_m),
+                goal=index,
+                is_first=n == 0,
+                ends_goal=n == len(shares) - 1,
+                name=name,
+                from_en_m=before if n == 0 else None,
+                bandwidth_m=goal.bandwidth_m if n == 0 else None,
+                buoy_en_m=buoy,
+                approach_en_m=before,
+                side=goal.side,
+                turn_rad=turn,
+                bearing_rad=-hand * (math.pi / 2.0 + share * turn),
+                keep_out=(barrier_wkt(buoy, wrong, length),),
+            )
+        )
         previous = place
     return gates
 

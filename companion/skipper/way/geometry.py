@@ -12,7 +12,7 @@ from companion.geo.angles import difference_rad, heading_of, wrap_pi
 from companion.skipper.way.voyage import AreaLike, PointEn
 
 BEAR_AWAY_RAD = math.radians(100.0)  # a beam reach with a little to spare: every boat gathers way on it
-LOOK_M = 40.0                        # water looked at on either side before bearing away
+LOOK_M = 40.0  # water looked at on either side before bearing away
 
 
 def distance_m(a: PointEn, b: PointEn) -> float:
@@ -66,7 +66,7 @@ def is_past(point: PointEn, a: PointEn, b: PointEn) -> bool:
 
 
 def waypoint_done(
-    boat: PointEn, before: PointEn, current: PointEn, after: PointEn | None, *, grid_m: float, manoeuvre_m: float,
+    boat: PointEn, before: PointEn, current: PointEn, after: PointEn | None, *, grid_m: float, manoeuvre_m: float
 ) -> bool:
     """Return whether a waypoint may be left behind: Büsser's double conditions (section 3.2.1).
 
@@ -93,8 +93,9 @@ def barrier_wkt(foot: PointEn, direction_rad: float, length_m: float) -> str:
     """Return a thin wedge from ``foot`` outwards."""
     tip = moved(foot, direction_rad, length_m)
     wide = 0.5
-    return polygon_wkt([foot, moved(tip, direction_rad + math.pi / 2.0, wide),
-                        moved(tip, direction_rad - math.pi / 2.0, wide)])
+    return polygon_wkt(
+        [foot, moved(tip, direction_rad + math.pi / 2.0, wide), moved(tip, direction_rad - math.pi / 2.0, wide)]
+    )
 
 
 def polygon_wkt(ring: list[PointEn]) -> str:
@@ -126,7 +127,12 @@ def is_tack(before_rad: float, after_rad: float, twd_from_rad: float) -> bool:
 
 
 def gybe_round(
-    start_en: PointEn, points: Sequence[PointEn], *, twd_from_rad: float, radius_m: float, area: AreaLike,
+    start_en: PointEn,
+    points: Sequence[PointEn],
+    *,
+    twd_from_rad: float,
+    radius_m: float,
+    area: AreaLike,
     floor_m: float,
 ) -> tuple[PointEn, ...]:
     """Return the waypoints with each tack replaced by a turn the other way round, where there is room for it.
@@ -140,7 +146,7 @@ def gybe_round(
         if n + 1 < len(points) and distance_m(before, corner) > 1e-6 and distance_m(corner, points[n + 1]) > 1e-6:
             course, following = bearing_rad(before, corner), bearing_rad(corner, points[n + 1])
             if is_tack(course, following, twd_from_rad):
-                side = -1.0 if difference_rad(following, course) > 0.0 else 1.0   # the other way round
+                side = -1.0 if difference_rad(following, course) > 0.0 else 1.0  # the other way round
                 center = moved(corner, course + side * math.pi / 2.0, radius_m)
                 total = 2.0 * math.pi - abs(difference_rad(following, course))
                 loop = [

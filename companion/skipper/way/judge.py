@@ -21,8 +21,8 @@ from companion.messages import WindForecast
 from companion.skipper.way.geometry import bearing_rad, cross_track_m, distance_m, moved
 from companion.skipper.way.voyage import AreaLike, PointEn
 
-SHORT_LEG_M = 3.0   # the autopilot turns within this: its angle does not matter
-LOST_MPS = 0.2      # a leg inside the no-go zone is sailed by the autopilot's own tacks at no less than this
+SHORT_LEG_M = 3.0  # the autopilot turns within this: its angle does not matter
+LOST_MPS = 0.2  # a leg inside the no-go zone is sailed by the autopilot's own tacks at no less than this
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,9 +69,19 @@ def mean_twd_rad(forecast: WindForecast, horizon_s: float) -> float:
 
 
 def judge(
-    path: Sequence[PointEn], *, boat: Boat, no_go_half_rad: float, twd_from_rad: float, tws_mps: float, area: AreaLike,
-    start_heading_rad: float | None = None, forecast: WindForecast | None = None, level: float = 0.0,
-    after_s: float = 0.0, beat_room_m: float | None = None, current_en_mps: tuple[float, float] = (0.0, 0.0),
+    path: Sequence[PointEn],
+    *,
+    boat: Boat,
+    no_go_half_rad: float,
+    twd_from_rad: float,
+    tws_mps: float,
+    area: AreaLike,
+    start_heading_rad: float | None = None,
+    forecast: WindForecast | None = None,
+    level: float = 0.0,
+    after_s: float = 0.0,
+    beat_room_m: float | None = None,
+    current_en_mps: tuple[float, float] = (0.0, 0.0),
 ) -> Verdict:
     """Judge a polyline that is sailed from its first point, ``after_s`` from now.
 
@@ -91,14 +101,22 @@ def judge(
         needed = no_go_half_rad
         if forecast is not None and level > 0.0:
             needed += half_width_rad(forecast, after_s + time_s, level)
-        if length > SHORT_LEG_M and twa - needed < spare and not (
-            twa < needed and beat_room_m is not None and area.path_clearance_m([a, b]) >= beat_room_m
+        if (
+            length > SHORT_LEG_M
+            and twa - needed < spare
+            and not (twa < needed and beat_room_m is not None and area.path_clearance_m([a, b]) >= beat_room_m)
         ):
             spare, worst = twa - needed, n
         if current_en_mps != (0.0, 0.0):
             water = over_water(twd_from_rad, tws_mps, current_en_mps)
-            made = made_good_mps(boat, course, twd_from_rad=water[0], tws_mps=water[1], current_en_mps=current_en_mps,
-                                 no_go_half_rad=no_go_half_rad)
+            made = made_good_mps(
+                boat,
+                course,
+                twd_from_rad=water[0],
+                tws_mps=water[1],
+                current_en_mps=current_en_mps,
+                no_go_half_rad=no_go_half_rad,
+            )
             if made is None:
                 spare, worst = min(spare, -no_go_half_rad), n
             speed = made or 0.0
@@ -124,8 +142,16 @@ class Drift:
 
 
 def predicted_beat(
-    boat_en: PointEn, heading_rad: float, leg_from: PointEn, target: PointEn, *, twd_from_rad: float,
-    no_go_half_rad: float, corridor_m: float, area: AreaLike, speed_mps: float = 1.0,
+    boat_en: PointEn,
+    heading_rad: float,
+    leg_from: PointEn,
+    target: PointEn,
+    *,
+    twd_from_rad: float,
+    no_go_half_rad: float,
+    corridor_m: float,
+    area: AreaLike,
+    speed_mps: float = 1.0,
     current_en_mps: tuple[float, float] = (0.0, 0.0),
 ) -> Drift:
     """Predict the sailing of a leg that the wind has closed (ArduRover: the no-go angle, tack at the corridor).
@@ -134,7 +160,7 @@ def predicted_beat(
     (``corridor_m``; 0: until the layline) or until it is past the target. In a current, what it makes good of that
     heading at ``speed_mps`` through the water.
     """
-    tack = 1.0 if difference_rad(twd_from_rad, heading_rad) >= 0.0 else -1.0   # +1: wind over starboard
+    tack = 1.0 if difference_rad(twd_from_rad, heading_rad) >= 0.0 else -1.0  # +1: wind over starboard
     course = twd_from_rad - tack * no_go_half_rad
     if current_en_mps != (0.0, 0.0):
         course = bearing_rad((0.0, 0.0), moved(current_en_mps, course, speed_mps))

@@ -15,13 +15,13 @@ import numpy as np
 from companion.skipper.way.geometry import along_m, barrier_wkt, bearing_rad, cross_track_m, distance_m, moved
 from companion.skipper.way.voyage import AreaLike, Line, PointEn
 
-BEFORE_M = 25.0     # the place before the line: room to settle on the course across it
-BEYOND_M = 14.0     # the place beyond: the autopilot leaves a waypoint 3 to 5 m early, and must have crossed by then
+BEFORE_M = 25.0  # the place before the line: room to settle on the course across it
+BEYOND_M = 14.0  # the place beyond: the autopilot leaves a waypoint 3 to 5 m early, and must have crossed by then
 BEYOND_RADIUS_M = 6.0
 BEFORE_RADIUS_M = 10.0
-STRAY_M = 3.0       # what the track strays from its leg: added to what is kept clear of a mark
-WING_M = 60.0       # shortest wing ...
-WING_SHARE = 1.5    # ... and this share of the way to the line is added
+STRAY_M = 3.0  # what the track strays from its leg: added to what is kept clear of a mark
+WING_M = 60.0  # shortest wing ...
+WING_SHARE = 1.5  # ... and this share of the way to the line is added
 STEP_M = 5.0
 
 

@@ -27,27 +27,27 @@ from dataclasses import dataclass, replace
 from companion.skipper.way.geometry import leg_distance_m
 from companion.skipper.way.voyage import AreaLike, PointEn
 
-ERROR_M = 5.0         # of a good fix, and of a chart's outline beside its margin
-BACK_M = 15.0         # back where it was reckoned misses that by no more, and ...
-BACK_SHARE = 0.5      # ... by no more of the farthest that the position was off it
-ERRS_MPS = 0.05       # the reckoned place errs by so much more each second that the velocity is heard
-LOST_ERRS_MPS = 1.0   # a position without a receiver errs by so much more each second
-LOST_S = 3.0          # a filter that was ill for less has not lost anything
-AGREE_M = 15.0        # two receivers, each up to a second late, and the filter's lag
-DISPUTED_S = 3.0      # receivers that say different things for so long have not just been heard one after the other
-CONFIRMED_S = 30.0    # two receivers that are wrong alike: an antenna's shadow, over by then
-LASTS_S = 600.0       # multipath, a jammer that passes, a filter that finds itself: all shorter
-QUIET_S = 20.0        # fixes in a row without a jump, where there is other evidence, or nothing near
-GAINS_MPS = 1.0       # what a boat gains or loses between two fixes, beside turning, and is carried by the water
-SILENT_S = 3.0        # a longer time between two fixes is a silence: nobody knows what was sailed in it
-SAILS_MPS = 0.8       # who is slower before or after a silence may have sailed faster in it
-HELD_MPS = 0.5        # by which a boat that is held is carried off the place of it
-STRAYS_M = 25.0       # what a boat in LOITER or HOLD is off its place when it is found again
-REACH_MPS = 2.0       # nothing solid within what is sailed in ``LASTS_S`` at this: what is believed is nobody's danger
+ERROR_M = 5.0  # of a good fix, and of a chart's outline beside its margin
+BACK_M = 15.0  # back where it was reckoned misses that by no more, and ...
+BACK_SHARE = 0.5  # ... by no more of the farthest that the position was off it
+ERRS_MPS = 0.05  # the reckoned place errs by so much more each second that the velocity is heard
+LOST_ERRS_MPS = 1.0  # a position without a receiver errs by so much more each second
+LOST_S = 3.0  # a filter that was ill for less has not lost anything
+AGREE_M = 15.0  # two receivers, each up to a second late, and the filter's lag
+DISPUTED_S = 3.0  # receivers that say different things for so long have not just been heard one after the other
+CONFIRMED_S = 30.0  # two receivers that are wrong alike: an antenna's shadow, over by then
+LASTS_S = 600.0  # multipath, a jammer that passes, a filter that finds itself: all shorter
+QUIET_S = 20.0  # fixes in a row without a jump, where there is other evidence, or nothing near
+GAINS_MPS = 1.0  # what a boat gains or loses between two fixes, beside turning, and is carried by the water
+SILENT_S = 3.0  # a longer time between two fixes is a silence: nobody knows what was sailed in it
+SAILS_MPS = 0.8  # who is slower before or after a silence may have sailed faster in it
+HELD_MPS = 0.5  # by which a boat that is held is carried off the place of it
+STRAYS_M = 25.0  # what a boat in LOITER or HOLD is off its place when it is found again
+REACH_MPS = 2.0  # nothing solid within what is sailed in ``LASTS_S`` at this: what is believed is nobody's danger
 
 
 def innovation_m(
-    way_en_m: PointEn, dt_s: float, before_mps: PointEn, now_mps: PointEn, *, fastest_mps: float, is_held: bool = False,
+    way_en_m: PointEn, dt_s: float, before_mps: PointEn, now_mps: PointEn, *, fastest_mps: float, is_held: bool = False
 ) -> float:
     """Return how much farther off a fix is than its last place and speed can have led the boat [m].
 
@@ -144,21 +144,25 @@ class PositionDoubt:
         """Return the doubt with one more fix: the boat reckoned on, the evidence added up."""
         dt_s = max(0.0, seen.t_s - self.t_s)
         (east, north), errs_mps = seen.velocity_en_mps, ERRS_MPS
-        if dt_s > SILENT_S:   # by the mean of both its ends, from which the boat may have turned
+        if dt_s > SILENT_S:  # by the mean of both its ends, from which the boat may have turned
             east, north = 0.5 * (east + self.velocity_en_mps[0]), 0.5 * (north + self.velocity_en_mps[1])
             errs_mps = max(math.hypot(*seen.velocity_en_mps), math.hypot(*self.velocity_en_mps)) + GAINS_MPS
         place = (self.reckoned_en_m[0] + dt_s * east, self.reckoned_en_m[1] + dt_s * north)
         if seen.is_contradicted and seen.second_en_m is not None:
-            place = seen.second_en_m   # where the other receiver has the boat is better than reckoned
+            place = seen.second_en_m  # where the other receiver has the boat is better than reckoned
         speaks_against = seen.is_jump or seen.is_contradicted or not (seen.is_possible and seen.is_well)
         confirmed_s = seen.t_s if self.confirmed_s is None else self.confirmed_s
         return replace(
-            self, t_s=max(self.t_s, seen.t_s), reckoned_en_m=place, velocity_en_mps=seen.velocity_en_mps,
+            self,
+            t_s=max(self.t_s, seen.t_s),
+            reckoned_en_m=place,
+            velocity_en_mps=seen.velocity_en_mps,
             error_m=self.error_m + errs_mps * dt_s,
             farthest_m=max(self.farthest_m, math.dist(place, seen.en_m)),
             settled_s=seen.t_s if speaks_against else self.settled_s,
             confirmed_s=confirmed_s if seen.is_confirmed and not speaks_against else None,
-            is_dispute=self.is_dispute and not seen.is_jump)
+            is_dispute=self.is_dispute and not seen.is_jump,
+        )
 
     def is_back(self, en_m: PointEn) -> bool:
         """Return whether a position that was off is back where the boat is reckoned."""

@@ -16,7 +16,7 @@ from companion.skipper.way.drift import drift_ahead
 from companion.skipper.way.geometry import bearing_rad, moved
 from companion.skipper.way.voyage import AreaLike, PointEn
 
-LEAST_MPS = 0.05       # a way made good that is slower than this is none: it would be lost in a gust
+LEAST_MPS = 0.05  # a way made good that is slower than this is none: it would be lost in a gust
 PLACES_M = (40.0, 80.0, 160.0, 320.0, 640.0)
 DIRECTIONS = 24
 
@@ -33,16 +33,27 @@ class Water:
     def made_good_mps(self, course_rad: float) -> float | None:
         """Return what the boat makes good along a course over the ground, None where that is no way to speak of."""
         from_rad, tws_mps = over_water(*self.wind, self.current_en_mps)
-        made = made_good_mps(self.boat, course_rad, twd_from_rad=from_rad, tws_mps=tws_mps,
-                             current_en_mps=self.current_en_mps, no_go_half_rad=self.no_go_half_rad)
+        made = made_good_mps(
+            self.boat,
+            course_rad,
+            twd_from_rad=from_rad,
+            tws_mps=tws_mps,
+            current_en_mps=self.current_en_mps,
+            no_go_half_rad=self.no_go_half_rad,
+        )
         return made if made is not None and made >= LEAST_MPS else None
 
     @property
     def carried_en_mps(self) -> tuple[float, float]:
         """How the boat is carried when it sails against it as well as it can; 0, 0: it can hold."""
         from_rad, tws_mps = over_water(*self.wind, self.current_en_mps)
-        return slowest_en_mps(self.boat, twd_from_rad=from_rad, tws_mps=tws_mps, current_en_mps=self.current_en_mps,
-                              no_go_half_rad=self.no_go_half_rad)
+        return slowest_en_mps(
+            self.boat,
+            twd_from_rad=from_rad,
+            tws_mps=tws_mps,
+            current_en_mps=self.current_en_mps,
+            no_go_half_rad=self.no_go_half_rad,
+        )
 
     def trouble(self, here: PointEn, there: PointEn) -> str:
         """Return why the boat cannot sail from here to there, in words; empty: the current does not keep it from it."""

@@ -23,14 +23,14 @@ from companion.skipper.way.voyage import PointEn
 
 Sweep = tuple[PointEn, PointEn]
 
-OVERLAP = 0.85        # of the swath: the distance between two sweeps at the most
-SHORTEST = 0.25       # of the swath: a shorter sweep is none
-RELAID_RAD = math.radians(30.0)   # the wind has turned so far from that which the sweeps were laid for: the rest anew
-SLIVER = 0.12         # of the swath: what is narrower than twice this is no gap
-STEP = 0.25           # of the swath: between two points of a track, and ...
-STRAIGHT = 4.0        # ... this at the most where it is straight ...
-BEND = 0.03           # ... to within this
-LEAST_GAP = 0.5       # of the swath's square: what is smaller is none
+OVERLAP = 0.85  # of the swath: the distance between two sweeps at the most
+SHORTEST = 0.25  # of the swath: a shorter sweep is none
+RELAID_RAD = math.radians(30.0)  # the wind has turned so far from that which the sweeps were laid for: the rest anew
+SLIVER = 0.12  # of the swath: what is narrower than twice this is no gap
+STEP = 0.25  # of the swath: between two points of a track, and ...
+STRAIGHT = 4.0  # ... this at the most where it is straight ...
+BEND = 0.03  # ... to within this
+LEAST_GAP = 0.5  # of the swath's square: what is smaller is none
 
 
 def sweeps_over(area: BaseGeometry, swath_m: float, twd_from_rad: float, near_en: PointEn) -> tuple[Sweep, ...]:
@@ -53,7 +53,7 @@ def sweeps_over(area: BaseGeometry, swath_m: float, twd_from_rad: float, near_en
 def _rows(piece: Polygon, swath_m: float, twd_from_rad: float, here: PointEn) -> list[Sweep]:
     """Return the sweeps of one piece. Turned so that the wind comes from above, they are rows from the top down."""
     pivot = (0.0, 0.0)
-    turned = affinity.rotate(piece, twd_from_rad, origin=pivot, use_radians=True)   # shapely turns to the left
+    turned = affinity.rotate(piece, twd_from_rad, origin=pivot, use_radians=True)  # shapely turns to the left
     west, south, east, north = turned.bounds
     count = max(1, math.ceil((north - south) / (OVERLAP * swath_m)))
     step = (north - south) / count
@@ -62,8 +62,11 @@ def _rows(piece: Polygon, swath_m: float, twd_from_rad: float, here: PointEn) ->
     out: list[Sweep] = []
     for n in range(count):
         row = LineString([(west - 1.0, north - (n + 0.5) * step), (east + 1.0, north - (n + 0.5) * step)])
-        parts = [p for p in shapely.get_parts(shapely.intersection(turned, row))
-                 if isinstance(p, LineString) and p.length >= SHORTEST * swath_m]
+        parts = [
+            p
+            for p in shapely.get_parts(shapely.intersection(turned, row))
+            if isinstance(p, LineString) and p.length >= SHORTEST * swath_m
+        ]
         spans = sorted((min(c[0] for c in p.coords), max(c[0] for c in p.coords)) for p in parts)
         if not spans:
             continue
@@ -84,7 +87,7 @@ def is_off(twd_from_rad: float, laid_for_rad: float) -> bool:
     return min(turned, math.pi - turned) > RELAID_RAD
 
 
-@lru_cache(maxsize=4)   # asked for more often than the track grows
+@lru_cache(maxsize=4)  # asked for more often than the track grows
 def covered(track: tuple[PointEn, ...], swath_m: float) -> BaseGeometry:
     """Return what a track has looked at: everything within half a swath of it."""
     if not track:
@@ -112,8 +115,11 @@ def grown(track: tuple[PointEn, ...], here: PointEn, swath_m: float) -> tuple[Po
     if track and distance_m(track[-1], here) < STEP * swath_m:
         return track
     point = (round(here[0], 1), round(here[1], 1))
-    is_straight = len(track) > 1 and distance_m(track[-2], point) <= STRAIGHT * swath_m and (
-        leg_distance_m(track[-1], track[-2], point) <= BEND * swath_m)
+    is_straight = (
+        len(track) > 1
+        and distance_m(track[-2], point) <= STRAIGHT * swath_m
+        and (leg_distance_m(track[-1], track[-2], point) <= BEND * swath_m)
+    )
     return (*(track[:-1] if is_straight else track), point)
 
 

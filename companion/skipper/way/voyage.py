@@ -27,7 +27,7 @@ class Side(enum.Enum):
     """On which side of the boat a buoy is left."""
 
     NONE = "none"
-    PORT = "port"              # turning left around it, as at the WRSC 2009
+    PORT = "port"  # turning left around it, as at the WRSC 2009
     STARBOARD = "starboard"
 
 
@@ -81,9 +81,9 @@ class Until(enum.Enum):
 
     TOLD = "told"
     TIME = "time"
-    PLACE = "place"            # the boat is at the goal
-    VESSEL = "vessel"          # another vessel is in its water
-    OUTSIDE = "outside"        # the boat is outside of its water
+    PLACE = "place"  # the boat is at the goal
+    VESSEL = "vessel"  # another vessel is in its water
+    OUTSIDE = "outside"  # the boat is outside of its water
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,8 +100,10 @@ class Composed:
         """What ends it."""
         at_most = "" if self.for_s is None or self.until is Until.TIME else f", {self.for_s:.0f} s at the most"
         return {
-            Until.TOLD: "until told to go on", Until.TIME: f"for {self.for_s or 0.0:.0f} s",
-            Until.PLACE: "until she is at its place", Until.VESSEL: "until a vessel is in its water",
+            Until.TOLD: "until told to go on",
+            Until.TIME: f"for {self.for_s or 0.0:.0f} s",
+            Until.PLACE: "until she is at its place",
+            Until.VESSEL: "until a vessel is in its water",
             Until.OUTSIDE: "until she is outside of its water",
         }[self.until] + at_most
 
@@ -203,7 +205,7 @@ class Refuge:
     radius_m: float = 15.0
 
 
-FAR_M = 50_000.0   # what lies farther off is not of this water; a passage says what is far for it
+FAR_M = 50_000.0  # what lies farther off is not of this water; a passage says what is far for it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

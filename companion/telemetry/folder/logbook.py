@@ -82,8 +82,7 @@ def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str,
         "name": mission.name,
         "origin": {"lat_deg": origin.lat_deg, "lon_deg": origin.lon_deg},
         "goals": [
-            {"x": g.en_m[0], "y": g.en_m[1], "radius_m": g.radius_m, "name": g.name, "side": g.side.value,
-             **_task(g)}
+            {"x": g.en_m[0], "y": g.en_m[1], "radius_m": g.radius_m, "name": g.name, "side": g.side.value, **_task(g)}
             for g in voyage.goals
         ],
         "obstacles": area.obstacles_wkt(0.0),
@@ -110,7 +109,9 @@ def voyage_record(mission: Mission, permissions: Permissions, run: dict[str, Any
         "run": run,
         "permissions": {name: getattr(permissions, name) for name in type(permissions).__slots__},
         "versions": {
-            "companion": __version__, "python": platform.python_version(), "machine": platform.machine(),
+            "companion": __version__,
+            "python": platform.python_version(),
+            "machine": platform.machine(),
             **dict(_versions("numpy", "numba", "shapely", "pymavlink", "filterpy")),
         },
         "argv": sys.argv[1:],
@@ -133,7 +134,7 @@ class Logbook:
         self._frames = 0
         self._framed_s, self._framed_us = float("nan"), 0
         self._phase = ""
-        self._frame: LocalFrame | None = None     # of the chart, and of the last record that says which
+        self._frame: LocalFrame | None = None  # of the chart, and of the last record that says which
         self._water: LocalFrame | None = None
 
     # ---------------------------------------------------------------------------------------------- time
@@ -162,7 +163,7 @@ class Logbook:
 
     def frame(self, t_s: float, frame: bytes) -> None:
         """Write a frame of the link down."""
-        if t_s != self._framed_s:   # the frames of one piece of bytes are of one moment
+        if t_s != self._framed_s:  # the frames of one piece of bytes are of one moment
             self._framed_s, self._framed_us = t_s, self.quantised(t_s)[0]
         self.recorder.frame(stamp(self._framed_us, frame))
 
@@ -171,19 +172,32 @@ class Logbook:
         self._frames += 1
 
     def begin(
-        self, t_s: float, mission: Mission, voyage: Voyage, permissions: Permissions, persisted: Persisted | None,
-        known: tuple[str, ...], run: Mapping[str, Any],
+        self,
+        t_s: float,
+        mission: Mission,
+        voyage: Voyage,
+        permissions: Permissions,
+        persisted: Persisted | None,
+        known: tuple[str, ...],
+        run: Mapping[str, Any],
     ) -> None:
         """Write down what is sailed, with copies of its files, and what was known of earlier voyages."""
         self._frame = self._water = voyage.frame
         self.recorder.whole(AREA, json.dumps(chart_record(mission, voyage, self._config.margin_m)).encode())
         copy = write_copies(mission, self.recorder)
         started = datetime.fromtimestamp(self._epoch_s + t_s, UTC).isoformat()
-        self.recorder.voyage(voyage_record(
-            mission, permissions, {**run, "epoch_s": self._epoch_s, "started_utc": started}, copy))
-        self.note(t_s, {
-            "kind": "start", "persisted": None if persisted is None else persisted.to_dict(), "known": list(known),
-            "epoch_s": self._epoch_s})
+        self.recorder.voyage(
+            voyage_record(mission, permissions, {**run, "epoch_s": self._epoch_s, "started_utc": started}, copy)
+        )
+        self.note(
+            t_s,
+            {
+                "kind": "start",
+                "persisted": None if persisted is None else persisted.to_dict(),
+                "known": list(known),
+                "epoch_s": self._epoch_s,
+            },
+        )
 
     def step(self, step: Step, clearance_m: float | None) -> None:
         """Write a step down: where the boat is, what was decided, and by which numbers."""

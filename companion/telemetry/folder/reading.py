@@ -56,8 +56,8 @@ class ChartGoal(Struct, frozen=True, kw_only=True):
     radius_m: float
     name: str = ""
     side: str = "none"
-    line: tuple[tuple[float, float], tuple[float, float]] | None = None   # the port mark and the starboard mark
-    water: str | None = None   # of a box or a search, WKT
+    line: tuple[tuple[float, float], tuple[float, float]] | None = None  # the port mark and the starboard mark
+    water: str | None = None  # of a box or a search, WKT
 
 
 class RecordedChart(Struct, frozen=True, kw_only=True):
@@ -183,12 +183,18 @@ def read_voyage(folder: Path) -> VoyageRecord:
             shapely.from_wkt(wkt)
     return VoyageRecord(
         folder=folder,
-        columns={name: np.array([row[name] for row in rows], dtype=np.float64)
-                 for name in TRACK_COLUMNS if name not in _WORDS},
+        columns={
+            name: np.array([row[name] for row in rows], dtype=np.float64)
+            for name in TRACK_COLUMNS
+            if name not in _WORDS
+        },
         texts={name: [row[name] for row in rows] for name in _WORDS},
         plans=_plans(read_decisions(folder), folder / DECISIONS, chart.origin),
-        chart=chart, figures=figures, summary=_converted(figures, Summary, folder / SUMMARY),
-        began_utc=run.started_utc, epoch_s=run.epoch_s,
+        chart=chart,
+        figures=figures,
+        summary=_converted(figures, Summary, folder / SUMMARY),
+        began_utc=run.started_utc,
+        epoch_s=run.epoch_s,
     )
 
 
@@ -223,8 +229,11 @@ def read_decisions(folder: Path) -> list[dict[str, Any]]:
     path = folder / DECISIONS
     records = read_jsonl(path)
     for number, record in enumerate(records, start=1):
-        if not (isinstance(record, dict) and isinstance(record.get("kind"), str)
-                and isinstance(record.get("t_s"), int | float)):
+        if not (
+            isinstance(record, dict)
+            and isinstance(record.get("kind"), str)
+            and isinstance(record.get("t_s"), int | float)
+        ):
             raise InputError(str(path), f"record {number}", "has no time and kind", DAMAGED)
     return records
 
@@ -292,9 +301,13 @@ def _shift(water: dict[str, Any], path: Path, origin: Origin) -> Shift:
 
 def _carried(way: PlannedWay, shift: Shift) -> PlannedWay:
     return msgspec.structs.replace(
-        way, waypoints=tuple(shift.point(p) for p in way.waypoints),
-        legs=tuple(msgspec.structs.replace(leg, start_en=shift.point(leg.start_en), end_en=shift.point(leg.end_en))
-                   for leg in way.legs))
+        way,
+        waypoints=tuple(shift.point(p) for p in way.waypoints),
+        legs=tuple(
+            msgspec.structs.replace(leg, start_en=shift.point(leg.start_en), end_en=shift.point(leg.end_en))
+            for leg in way.legs
+        ),
+    )
 
 
 def _read_json(path: Path) -> Any:

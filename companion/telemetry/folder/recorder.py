@@ -46,13 +46,13 @@ VOYAGE = "voyage.toml"
 AREA = "area.json"
 STATE = "state.json"
 PICTURE = "voyage.png"
-VERDICT = "verdict.json"    # of a scenario
-COPIES = "mission"          # the mission as it is sailed, with the files that it names
+VERDICT = "verdict.json"  # of a scenario
+COPIES = "mission"  # the mission as it is sailed, with the files that it names
 
 
-MOST_BYTES = 8 << 20   # of the open file; compressing takes as much memory
+MOST_BYTES = 8 << 20  # of the open file; compressing takes as much memory
 MOST_S = 86_400.0
-SHARE = 64             # a part is at most this share of what all may take
+SHARE = 64  # a part is at most this share of what all may take
 DROPPED_IN_ORDER = (TLOG, TRACK, DECISIONS)
 
 
@@ -90,9 +90,9 @@ class Segments:
     def __init__(self, folder: Path, disk: Disk, budget_bytes: int) -> None:
         self._folder, self._disk = folder, disk
         self.part_bytes = min(MOST_BYTES, budget_bytes // SHARE)
-        self.headroom_bytes = 2 * len(DROPPED_IN_ORDER) * self.part_bytes   # what is open, and its compressed copies
+        self.headroom_bytes = 2 * len(DROPPED_IN_ORDER) * self.part_bytes  # what is open, and its compressed copies
         self._since_s: dict[str, float] = {}
-        self._plain: list[Path] | None = None   # closed and not yet compressed; None: not looked for yet
+        self._plain: list[Path] | None = None  # closed and not yet compressed; None: not looked for yet
 
     def is_due(self, name: str, size: int, t_s: float) -> bool:
         """Return whether the open file of a record is to be closed."""
@@ -112,8 +112,9 @@ class Segments:
     def compress(self) -> None:
         """Compress the closed parts that are not yet, also those that a power cut left. Raises OSError."""
         if self._plain is None:
-            self._plain = [part for name in DROPPED_IN_ORDER for part in closed(self._folder / name)
-                           if part.suffix != ".gz"]
+            self._plain = [
+                part for name in DROPPED_IN_ORDER for part in closed(self._folder / name) if part.suffix != ".gz"
+            ]
         while self._plain:
             part = self._plain[0]
             self._disk.replace(part.with_name(f"{part.name}.gz"), gzip.compress(part.read_bytes(), mtime=0))
@@ -171,7 +172,7 @@ class VoyageArchive:
                 lock = FolderLock(voyage)
                 try:
                     if not lock.take():
-                        continue   # being recorded
+                        continue  # being recorded
                     freed = _remove(voyage, names)
                 except OSError:
                     continue
@@ -233,13 +234,31 @@ def _remove(voyage: Path, names: tuple[str, ...]) -> int:
 # The files of one voyage end here [bytes], restarts included: what comes later is dropped and counted. A day of the
 # endurance scenario writes about a tenth of it. Where all voyages together may take less, these are less in proportion.
 MAX_BYTES = {TLOG: 2_500_000_000, DECISIONS: 500_000_000, TRACK: 150_000_000}
-TIDY_EVERY = 12        # older voyages are looked through at so many calls of ``tend`` only: once a minute
-TAIL_BYTES = 1 << 20   # looked at for the end of the last whole line: no record is longer
+TIDY_EVERY = 12  # older voyages are looked through at so many calls of ``tend`` only: once a minute
+TAIL_BYTES = 1 << 20  # looked at for the end of the last whole line: no record is longer
 
 TRACK_COLUMNS = (
-    "t_s", "frames", "outcomes", "lat_deg", "lon_deg", "east_m", "north_m", "heading_deg", "sog_mps", "cog_deg",
-    "twd_deg", "twd_sigma_deg", "tws_mps", "mode", "phase", "waypoint", "cross_track_m", "clearance_m",
-    "current_deg", "current_mps", "current_sigma_mps",
+    "t_s",
+    "frames",
+    "outcomes",
+    "lat_deg",
+    "lon_deg",
+    "east_m",
+    "north_m",
+    "heading_deg",
+    "sog_mps",
+    "cog_deg",
+    "twd_deg",
+    "twd_sigma_deg",
+    "tws_mps",
+    "mode",
+    "phase",
+    "waypoint",
+    "cross_track_m",
+    "clearance_m",
+    "current_deg",
+    "current_mps",
+    "current_sigma_mps",
 )
 _HEADER = (",".join(TRACK_COLUMNS) + "\n").encode()
 
@@ -279,7 +298,7 @@ class Recorder:
     """
 
     def __init__(
-        self, folder: Path, *, disk: Disk | None = None, archive: VoyageArchive | None = None, is_durable: bool = True,
+        self, folder: Path, *, disk: Disk | None = None, archive: VoyageArchive | None = None, is_durable: bool = True
     ) -> None:
         self.folder = folder
         self.dropped = 0
@@ -288,17 +307,18 @@ class Recorder:
         share = 1.0 if archive is None else min(1.0, archive.budget_bytes / sum(MAX_BYTES.values()))
         self._caps = {name: int(share * most) for name, most in MAX_BYTES.items()}
         self._segments = Segments(
-            folder, self._disk, sum(MAX_BYTES.values()) if archive is None else archive.budget_bytes)
-        self._retired: list[int] = []   # files that were closed but for a write that may be under way
+            folder, self._disk, sum(MAX_BYTES.values()) if archive is None else archive.budget_bytes
+        )
+        self._retired: list[int] = []  # files that were closed but for a write that may be under way
         self._lock = FolderLock(folder)
         self._bytes: dict[str, int] = {}
         self._fds: dict[str, int] = {}
-        self._wanted: dict[str, bytes] = {}        # whole files that the disk would not take
-        self._row_t_s: float | None = None         # of the last row of the track that is on the disk
-        self._gap: tuple[float | None, int] = (None, 0)   # since that row; so many were dropped before it
-        self._ended: dict[str, float | None] = {}         # files that have all that they may hold, since that row
-        self._gone: tuple[str, ...] = ()                  # of older voyages, and not yet told
-        self._told: set[str] = set()                      # of those, which a record says to have ended
+        self._wanted: dict[str, bytes] = {}  # whole files that the disk would not take
+        self._row_t_s: float | None = None  # of the last row of the track that is on the disk
+        self._gap: tuple[float | None, int] = (None, 0)  # since that row; so many were dropped before it
+        self._ended: dict[str, float | None] = {}  # files that have all that they may hold, since that row
+        self._gone: tuple[str, ...] = ()  # of older voyages, and not yet told
+        self._told: set[str] = set()  # of those, which a record says to have ended
         self._tends = 0
 
     def __enter__(self) -> Self:
@@ -316,7 +336,7 @@ class Recorder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        with contextlib.suppress(OSError):   # the last moment for what the disk would not take
+        with contextlib.suppress(OSError):  # the last moment for what the disk would not take
             for name in list(self._wanted):
                 self._write_wanted(name)
         self._close()
@@ -471,7 +491,7 @@ class Recorder:
             try:
                 is_ours = self._lock.take()
             except OSError:
-                is_ours = True   # a file system without locks
+                is_ours = True  # a file system without locks
             if not is_ours:
                 raise BlockingIOError(errno.EWOULDBLOCK, "another companion is recording there")
         for name in (DECISIONS, TRACK, TLOG):

@@ -51,10 +51,19 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
     if isinstance(action, RequestPlan):
         problem = action.problem
         return {
-            "kind": "action", "action": kind, "request_id": action.request_id, "reason": action.reason.value,
-            "rung": action.rung, "text": action.text, "from_seq": action.from_seq, "seed": action.seed,
-            "budget_s": action.budget_s, "start": list(problem.start_en), "goal": list(problem.goal_en),
-            "delta_s": problem.delta_s, "twd_deg": math.degrees(wrap_two_pi(problem.wind.twd_from_rad)),
+            "kind": "action",
+            "action": kind,
+            "request_id": action.request_id,
+            "reason": action.reason.value,
+            "rung": action.rung,
+            "text": action.text,
+            "from_seq": action.from_seq,
+            "seed": action.seed,
+            "budget_s": action.budget_s,
+            "start": list(problem.start_en),
+            "goal": list(problem.goal_en),
+            "delta_s": problem.delta_s,
+            "twd_deg": math.degrees(wrap_two_pi(problem.wind.twd_from_rad)),
             "tws_mps": problem.wind.tws_mps,
             "widening": [[t, math.degrees(problem.no_go_half_rad(t))] for t in WIDENING_S],
             "cross_track_m": snapshot.autopilot.cross_track_m if snapshot.autopilot else None,
@@ -64,7 +73,8 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
         }
     if isinstance(action, UploadMission | UploadFence):
         fields = {
-            f.name: getattr(action, f.name) for f in dataclasses.fields(action)
+            f.name: getattr(action, f.name)
+            for f in dataclasses.fields(action)
             if f.name not in {"items", "change", "stopgap"}
         }
         if isinstance(action, UploadMission) and action.change.apart_m is not None:
@@ -73,11 +83,22 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
         stopgap = getattr(action, "stopgap", None)
         if stopgap is not None:
             fields["stopgap"] = [stopgap.command, stopgap.lat_e7, stopgap.lon_e7]
-        return {"kind": "action", "action": kind, **fields, "count": len(items), "hash": mission_hash(action.items),
-                "items": items}
+        return {
+            "kind": "action",
+            "action": kind,
+            **fields,
+            "count": len(items),
+            "hash": mission_hash(action.items),
+            "items": items,
+        }
     if isinstance(action, SteerHeading):
-        return {"kind": "action", "action": kind, "heading_deg": math.degrees(action.heading_rad),
-                "thrust": action.thrust, "text": action.text}
+        return {
+            "kind": "action",
+            "action": kind,
+            "heading_deg": math.degrees(action.heading_rad),
+            "thrust": action.thrust,
+            "text": action.text,
+        }
     values = {f.name: jsonable(getattr(action, f.name)) for f in dataclasses.fields(action)}
     return {"kind": "action", "action": kind, **values}
 
@@ -122,14 +143,21 @@ def outcome_record(outcome: Outcome) -> dict[str, Any]:
     if isinstance(outcome, PlanOutcome):
         plan = outcome.plan
         return {
-            "kind": "plan", "request_id": outcome.request_id, "text": outcome.text,
-            "status": None if plan is None else plan.status.value, "plan": None if plan is None else plan.to_dict(),
+            "kind": "plan",
+            "request_id": outcome.request_id,
+            "text": outcome.text,
+            "status": None if plan is None else plan.status.value,
+            "plan": None if plan is None else plan.to_dict(),
         }
     if isinstance(outcome, ReadOutcome):
         items = outcome.items
         return {
-            "kind": "outcome", "outcome": "ReadOutcome", "read_id": outcome.read_id, "text": outcome.text,
-            "count": None if items is None else len(items), "hash": None if items is None else mission_hash(items),
+            "kind": "outcome",
+            "outcome": "ReadOutcome",
+            "read_id": outcome.read_id,
+            "text": outcome.text,
+            "count": None if items is None else len(items),
+            "hash": None if items is None else mission_hash(items),
             "items": None if items is None else _rows(items),
         }
     values = {f.name: jsonable(getattr(outcome, f.name)) for f in dataclasses.fields(outcome)}
@@ -143,11 +171,22 @@ def water_record(step: Step, shift: Shift) -> dict[str, Any]:
     on the autopilot, which are degrees.
     """
     origin, route = shift.after.origin, step.state.mission.route
-    apart = [] if route is None else [
-        math.dist(shift.after.en_from_geo(item.point), en_m)
-        for item, en_m in zip(route.items, route.points_en_m, strict=True) if item.command == Command.NAV_WAYPOINT]
-    return {"kind": "water", "lat_deg": origin.lat_deg, "lon_deg": origin.lon_deg,
-            "turn_deg": math.degrees(shift.turn_rad), "drift_m": max(apart, default=None)}
+    apart = (
+        []
+        if route is None
+        else [
+            math.dist(shift.after.en_from_geo(item.point), en_m)
+            for item, en_m in zip(route.items, route.points_en_m, strict=True)
+            if item.command == Command.NAV_WAYPOINT
+        ]
+    )
+    return {
+        "kind": "water",
+        "lat_deg": origin.lat_deg,
+        "lon_deg": origin.lon_deg,
+        "turn_deg": math.degrees(shift.turn_rad),
+        "drift_m": max(apart, default=None),
+    }
 
 
 def track_row(step: Step, frames: int, clearance_m: float | None, frame: LocalFrame | None = None) -> tuple[Any, ...]:
@@ -160,10 +199,13 @@ def track_row(step: Step, frames: int, clearance_m: float | None, frame: LocalFr
     sigma_rad = sigma_ahead_rad(snapshot)
     return (
         # The time is written so that reading it back gives the same number: a replay depends on it.
-        repr(snapshot.t_s), frames, len(snapshot.outcomes),
+        repr(snapshot.t_s),
+        frames,
+        len(snapshot.outcomes),
         None if vehicle is None else round(vehicle.position.lat_deg, 7),
         None if vehicle is None else round(vehicle.position.lon_deg, 7),
-        _round(east_m, 2), _round(north_m, 2),
+        _round(east_m, 2),
+        _round(north_m, 2),
         None if vehicle is None else _degrees(vehicle.heading_rad),
         None if vehicle is None else round(vehicle.speed_mps, 2),
         None if vehicle is None else _degrees(math.atan2(*vehicle.velocity_en_mps)),
@@ -175,7 +217,9 @@ def track_row(step: Step, frames: int, clearance_m: float | None, frame: LocalFr
         None if autopilot is None else autopilot.mission_seq,
         None if autopilot is None else _round(autopilot.cross_track_m, 2),
         _round(clearance_m, 2),
-        _degrees(snapshot.current.set_rad), round(snapshot.current.drift_mps, 3), round(snapshot.current.sigma_mps, 3),
+        _degrees(snapshot.current.set_rad),
+        round(snapshot.current.drift_mps, 3),
+        round(snapshot.current.sigma_mps, 3),
     )
 
 
@@ -242,7 +286,8 @@ class Servos:
         """Return movements and travel of each output that moved, by its number."""
         return {
             str(number): {"movements": servo.movements, "travel_us": servo.travel_us}
-            for number, servo in sorted(self.by_number.items()) if servo.movements
+            for number, servo in sorted(self.by_number.items())
+            if servo.movements
         }
 
 
@@ -323,7 +368,8 @@ class VoyageFigures:
             if route.expected_clearance_m is not None:
                 self.promised_clearance_m = min(
                     route.expected_clearance_m,
-                    math.inf if self.promised_clearance_m is None else self.promised_clearance_m)
+                    math.inf if self.promised_clearance_m is None else self.promised_clearance_m,
+                )
             if self.promised_s is None:
                 self.promised_s, self.median_s, self.late_s = route.cost_s, route.median_s, route.late_s
             if route.risk is not None:
@@ -339,7 +385,7 @@ class VoyageFigures:
             self.contacts += clearance_m <= 0.0 and not self._touching
             self._touching = clearance_m <= 0.0
         if step.state.voyage.over:
-            return   # what follows is a loiter
+            return  # what follows is a loiter
         self.last_s = snapshot.t_s
         self.ranges.take(step)
         if autopilot is not None:
@@ -376,7 +422,7 @@ class VoyageFigures:
                 self._no_go_counted = True
         else:
             self._in_no_go_since = None
-        if step.state.phase is Phase.HOLDING:   # she circles round a point: no manoeuvre of the voyage's
+        if step.state.phase is Phase.HOLDING:  # she circles round a point: no manoeuvre of the voyage's
             self._side, self._pending = 0, None
             return
         side = 1 if off_rad > 0.0 else -1

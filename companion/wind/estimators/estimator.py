@@ -27,9 +27,9 @@ LEVELS = (0.5, 0.8, 0.9, 0.95, 0.98, 0.99)
 
 Floats = NDArray[np.float64]
 
-SIGMA_MAX_RAD = math.pi   # [rad] a normal this wide, wrapped, is uniform on the circle
+SIGMA_MAX_RAD = math.pi  # [rad] a normal this wide, wrapped, is uniform on the circle
 SIGMA_MIN_RAD = 1e-4
-_RESTART_S = 10.0       # [s] a clock that steps back further than this has been restarted
+_RESTART_S = 10.0  # [s] a clock that steps back further than this has been restarted
 _NORMAL = NormalDist()
 
 
@@ -48,7 +48,12 @@ class Estimator(Protocol):
     name: str
 
     def update(
-        self, t_s: float, direction_rad: float, speed_mps: float, *, weight: float = 1.0,
+        self,
+        t_s: float,
+        direction_rad: float,
+        speed_mps: float,
+        *,
+        weight: float = 1.0,
         speed_weight: float | None = None,
     ) -> None:
         """Take one reading."""
@@ -73,7 +78,7 @@ class Estimator(Protocol):
         ...
 
     def table(
-        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None,
+        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None
     ) -> WindForecast:
         """Return the forecast at ``t_s`` for ``horizons_s`` after it."""
         ...
@@ -107,7 +112,12 @@ class Base:
         return self._t_s is not None
 
     def update(
-        self, t_s: float, direction_rad: float, speed_mps: float, *, weight: float = 1.0,
+        self,
+        t_s: float,
+        direction_rad: float,
+        speed_mps: float,
+        *,
+        weight: float = 1.0,
         speed_weight: float | None = None,
     ) -> None:
         """Take one reading of the true wind (see ``Estimator``)."""
@@ -118,7 +128,7 @@ class Base:
             raise ValueError(f"reading {t_s}, {direction_rad}, {speed_mps} is not finite")
         if self._t_s is None:
             if weight <= 0.0 or of_speed <= 0.0:
-                return      # an estimator begins with a reading that it can believe
+                return  # an estimator begins with a reading that it can believe
             self._reference_rad = wrap_pi(direction_rad)
             dt_s = 0.0
         else:
@@ -162,7 +172,7 @@ class Base:
         return 3600.0
 
     def table(
-        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None,
+        self, t_s: float, horizons_s: Sequence[float] | None = None, levels: Sequence[float] | None = None
     ) -> WindForecast:
         """Return the forecast at ``t_s`` (not before the last update) as the planner's table."""
         horizon = np.asarray(HORIZONS_S if horizons_s is None else horizons_s, dtype=np.float64)
@@ -171,8 +181,14 @@ class Base:
             raise ValueError("no wind has been seen yet")
         rows, half = self._rows(max(0.0, t_s - self._t_s) + horizon, level)
         return WindForecast(
-            t_s=t_s, horizon_s=horizon, mean_twd_from_rad=rows[:, 0], sigma_twd_rad=rows[:, 1],
-            mean_tws_mps=rows[:, 2], sigma_tws_mps=rows[:, 3], level=level, half_width_rad=half,
+            t_s=t_s,
+            horizon_s=horizon,
+            mean_twd_from_rad=rows[:, 0],
+            sigma_twd_rad=rows[:, 1],
+            mean_tws_mps=rows[:, 2],
+            sigma_tws_mps=rows[:, 3],
+            level=level,
+            half_width_rad=half,
             correlation_time_s=self.correlation_time_s,
         )
 
@@ -180,8 +196,12 @@ class Base:
         """Return ``forecast`` (n, 4) and the half widths (n, m) at horizons [s, 0 or more] and levels."""
         rows = np.array([self.forecast(h) for h in horizons_s.tolist()], dtype=np.float64).reshape(-1, 4)
         half = np.array(
-            [[self._half_width(h, p, row[1]) for p in levels.tolist()]
-             for h, row in zip(horizons_s.tolist(), rows.tolist(), strict=True)], dtype=np.float64)
+            [
+                [self._half_width(h, p, row[1]) for p in levels.tolist()]
+                for h, row in zip(horizons_s.tolist(), rows.tolist(), strict=True)
+            ],
+            dtype=np.float64,
+        )
         return rows, half.reshape(horizons_s.size, levels.size)
 
 

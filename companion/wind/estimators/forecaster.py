@@ -37,6 +37,7 @@ from companion.wind.estimators.forecaster_kernels import Constants
 # ``tail`` were chosen by hand: seconds of own errors, pool, quantiles, roughness, shown spread; pull of the quantiles
 # to their prior; shrinkage of the pool.
 
+
 def _array(*values: float) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.array(values, dtype=np.float64)
 

@@ -18,26 +18,24 @@ from companion.kernels.jit import kernel
 # mypy: disable-error-code="no-any-return"
 
 
-
-
 Array = NDArray[np.float64]
 
-SCALE_S = np.array([1.0, 3.0, 10.0, 30.0, 90.0, 300.0, 900.0, 3600.0])   # time constants of the running means
+SCALE_S = np.array([1.0, 3.0, 10.0, 30.0, 90.0, 300.0, 900.0, 3600.0])  # time constants of the running means
 SPEED_SCALE_S = np.array([1.0, 5.0, 20.0, 60.0, 300.0, 1800.0])
-KNOT_S = np.array([3.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0])       # horizons that learn
-QUANTILE_P = np.array([0.0, 0.25, 0.5, 0.65, 0.8, 0.9, 0.95, 0.98, 0.99, 0.999])      # levels that learn
+KNOT_S = np.array([3.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0])  # horizons that learn
+QUANTILE_P = np.array([0.0, 0.25, 0.5, 0.65, 0.8, 0.9, 0.95, 0.98, 0.99, 0.999])  # levels that learn
 BAND_S = np.sqrt(SCALE_S[:-1] * SCALE_S[1:])
 SPEED_BAND_S = np.sqrt(SPEED_SCALE_S[:-1] * SPEED_SCALE_S[1:])
-_ROUGH_SCALE = 4       # roughness is measured about the 90 s mean
-_SPEED_SCALE = 3       # the 60 s mean of speed
+_ROUGH_SCALE = 4  # roughness is measured about the 90 s mean
+_SPEED_SCALE = 3  # the 60 s mean of speed
 
-EVERY_S = 5.0          # [s] between forecasts that are kept to be scored
-ROWS = 728             # an hour of them, and some
-ERROR_MAX_RAD = 1.5    # [rad] one wild error counts no more than this
-Z_MAX = 8.0            # |error| / sigma, likewise
-TARGET_MIN_MPS = 1.0   # [m/s] a reading in less wind says nothing about the direction
-WIND_MIN_MPS = 0.7     # [m/s] below it less wind makes the direction no worse: it has none
-_YOUNG_S = 60.0        # [s] weight of a 0.2 rad spread before any has been seen
+EVERY_S = 5.0  # [s] between forecasts that are kept to be scored
+ROWS = 728  # an hour of them, and some
+ERROR_MAX_RAD = 1.5  # [rad] one wild error counts no more than this
+Z_MAX = 8.0  # |error| / sigma, likewise
+TARGET_MIN_MPS = 1.0  # [m/s] a reading in less wind says nothing about the direction
+WIND_MIN_MPS = 0.7  # [m/s] below it less wind makes the direction no worse: it has none
+_YOUNG_S = 60.0  # [s] weight of a 0.2 rad spread before any has been seen
 _YOUNG_RAD2 = 0.04
 
 # Entries of State.now.
@@ -54,27 +52,27 @@ B_TREND, B_MEAN, B_SIGMA, B_SPEED, B_RETURN = (3 + i * J for i in range(5))
 class ForecasterState(NamedTuple):
     """Everything a forecaster knows."""
 
-    now: Array        # (14,) scalars
-    sums: Array       # (scales, 2) exponential sums of speed x (sin, cos)
-    mean: Array       # (scales,) their directions [rad]
-    speed: Array      # (speed scales, 2) weighted sum, weight
-    knot: Array       # (J, 12) learned per horizon
-    quantile: Array   # (J, levels) log of the quantile of |error| / sigma
-    ring: Array       # (ROWS, 3 + 5 J) forecasts to be scored
-    pointer: Array    # (J,) next row to score per knot
+    now: Array  # (14,) scalars
+    sums: Array  # (scales, 2) exponential sums of speed x (sin, cos)
+    mean: Array  # (scales,) their directions [rad]
+    speed: Array  # (speed scales, 2) weighted sum, weight
+    knot: Array  # (J, 12) learned per horizon
+    quantile: Array  # (J, levels) log of the quantile of |error| / sigma
+    ring: Array  # (ROWS, 3 + 5 J) forecasts to be scored
+    pointer: Array  # (J,) next row to score per knot
 
 
 class Constants(NamedTuple):
     """What was fitted to recorded wind (``prior.py``) and how long today's is remembered."""
 
-    survival: Array        # (2,) c, gamma of (1)
+    survival: Array  # (2,) c, gamma of (1)
     speed_survival: Array  # (2,) the same for the speed
-    sigma: Array           # (5,) log ratio to own error, tilt per ln h, exponents of roughness and wind, their h [s]
-    error: Array           # (2,) expected |error| at 60 s [rad] and its exponent in h
-    speed_error: Array     # (2,) expected |error| of speed at 60 s as a share of the speed, exponent in h
-    quantile: Array        # (levels,) quantiles of |error| / sigma at 60 s
-    tail: Array            # (1,) how much faster the tails grow with ln h
-    memory: Array          # (7,) see M_*
+    sigma: Array  # (5,) log ratio to own error, tilt per ln h, exponents of roughness and wind, their h [s]
+    error: Array  # (2,) expected |error| at 60 s [rad] and its exponent in h
+    speed_error: Array  # (2,) expected |error| of speed at 60 s as a share of the speed, exponent in h
+    quantile: Array  # (levels,) quantiles of |error| / sigma at 60 s
+    tail: Array  # (1,) how much faster the tails grow with ln h
+    memory: Array  # (7,) see M_*
 
 
 # Entries of Constants.memory: seconds, except the last two.
@@ -94,9 +92,14 @@ def prior_quantile(constants: Constants) -> Array:
 def new_state(constants: Constants) -> ForecasterState:
     """Return the state before the first reading."""
     return ForecasterState(
-        now=np.zeros(14), sums=np.zeros((SCALE_S.size, 2)), mean=np.zeros(SCALE_S.size),
-        speed=np.zeros((SPEED_SCALE_S.size, 2)), knot=np.zeros((J, 12)),
-        quantile=prior_quantile(constants), ring=np.zeros((ROWS, 3 + 5 * J)), pointer=np.zeros(J),
+        now=np.zeros(14),
+        sums=np.zeros((SCALE_S.size, 2)),
+        mean=np.zeros(SCALE_S.size),
+        speed=np.zeros((SPEED_SCALE_S.size, 2)),
+        knot=np.zeros((J, 12)),
+        quantile=prior_quantile(constants),
+        ring=np.zeros((ROWS, 3 + 5 * J)),
+        pointer=np.zeros(J),
     )
 
 
@@ -167,14 +170,14 @@ def _refresh(st: ForecasterState, con: Constants) -> None:
     below = con.error[0] * (KNOT_S[0] / 60.0) ** con.error[1]
     for j in range(J):
         kn, h = st.knot[j], KNOT_S[j]
-        weight = 60.0 + 4.0 * h                              # what is expected counts as this many seconds
+        weight = 60.0 + 4.0 * h  # what is expected counts as this many seconds
         expected = below * (h / KNOT_S[max(0, j - 1)]) ** con.error[1]
-        expected = min(expected, 0.8 * _shown(st, con, m, h))       # E|x| = 0.8 sigma of a normal
-        below = (kn[ERR] + weight * expected) / (kn[ERR_N] + weight)                            # (4a)
+        expected = min(expected, 0.8 * _shown(st, con, m, h))  # E|x| = 0.8 sigma of a normal
+        below = (kn[ERR] + weight * expected) / (kn[ERR_N] + weight)  # (4a)
         kn[LOG_ERR] = math.log(below)
-        kn[PHI] = min(1.0, max(0.0, (kn[XY] + 1.2 * math.exp(-h / 300.0)) / (kn[XX] + 1.2)))      # (2)
+        kn[PHI] = min(1.0, max(0.0, (kn[XY] + 1.2 * math.exp(-h / 300.0)) / (kn[XX] + 1.2)))  # (2)
         shrink = con.memory[M_SHRINK] * weight * (0.25 * below) ** 2
-        kn[SHARE] = min(1.0, max(0.0, kn[DE] / (kn[DD] + shrink)))                                # (3)
+        kn[SHARE] = min(1.0, max(0.0, kn[DE] / (kn[DD] + shrink)))  # (3)
         expected = con.speed_error[0] * (h / 60.0) ** con.speed_error[1] * wind
         kn[SPEED_LEVEL] = (kn[SPEED_ERR] + weight * expected) / (kn[SPEED_ERR_N] + weight)
 
@@ -185,17 +188,20 @@ def predict(st: ForecasterState, con: Constants, h: float) -> tuple[float, float
     j, f = _interpolation(h)
     a, b = st.knot[j], st.knot[j + 1]
     long = st.mean[SCALE_S.size - 1]
-    trend = _trend(st, con, h)                                                                   # (1)
-    back = long + ((1.0 - f) * a[PHI] + f * b[PHI]) * wrap(st.now[FAST] - long)                   # (2)
-    m = trend + ((1.0 - f) * a[SHARE] + f * b[SHARE]) * wrap(back - trend)                        # (3)
+    trend = _trend(st, con, h)  # (1)
+    back = long + ((1.0 - f) * a[PHI] + f * b[PHI]) * wrap(st.now[FAST] - long)  # (2)
+    m = trend + ((1.0 - f) * a[SHARE] + f * b[SHARE]) * wrap(back - trend)  # (3)
     s = con.sigma
     fade = 1.0 + h / s[4]
     log_sigma = (
-        s[0] + s[1] * math.log(min(max(h, KNOT_S[0]), 600.0) / 60.0) + (1.0 - f) * a[LOG_ERR] + f * b[LOG_ERR]
+        s[0]
+        + s[1] * math.log(min(max(h, KNOT_S[0]), 600.0) / 60.0)
+        + (1.0 - f) * a[LOG_ERR]
+        + f * b[LOG_ERR]
         + (s[2] * (_rough(st) - st.now[TYPICAL_ROUGH]) + s[3] * (_wind(st) - st.now[TYPICAL_WIND])) / fade
-    )                                                                                            # (4b)
-    sigma = min(math.exp(log_sigma), _shown(st, con, m, h))                                      # (4c)
-    sigma_speed = 1.2533 * ((1.0 - f) * a[SPEED_LEVEL] + f * b[SPEED_LEVEL])       # sqrt(π/2) mean |error|
+    )  # (4b)
+    sigma = min(math.exp(log_sigma), _shown(st, con, m, h))  # (4c)
+    sigma_speed = 1.2533 * ((1.0 - f) * a[SPEED_LEVEL] + f * b[SPEED_LEVEL])  # sqrt(π/2) mean |error|
     if h < KNOT_S[0]:
         part = max(0.1, h / KNOT_S[0]) ** con.error[1]
         sigma, sigma_speed = sigma * part, sigma_speed * part
@@ -330,13 +336,19 @@ def _remember(st: ForecasterState, con: Constants) -> None:
     head = (head + 1) % ROWS
     now[HEAD] = head
     for j in range(J):
-        if int(st.pointer[j]) == head:      # the oldest row is overwritten before it came due (a long gap)
+        if int(st.pointer[j]) == head:  # the oldest row is overwritten before it came due (a long gap)
             st.pointer[j] = (head + 1) % ROWS
 
 
 @kernel
 def update(
-    st: ForecasterState, con: Constants, prior: Array, dt: float, x: float, speed: float, weight: float,
+    st: ForecasterState,
+    con: Constants,
+    prior: Array,
+    dt: float,
+    x: float,
+    speed: float,
+    weight: float,
     speed_weight: float,
 ) -> None:
     """Take a reading ``dt`` after the last; the first has ``dt`` 0, and a direction that is believed."""
@@ -364,8 +376,16 @@ def update(
 
 @kernel
 def replay(
-    st: ForecasterState, con: Constants, prior: Array, t: Array, x: Array, speed: Array, ask: NDArray[np.bool_],
-    horizon: Array, z: Array, zp: Array,
+    st: ForecasterState,
+    con: Constants,
+    prior: Array,
+    t: Array,
+    x: Array,
+    speed: Array,
+    ask: NDArray[np.bool_],
+    horizon: Array,
+    z: Array,
+    zp: Array,
 ) -> Array:
     """Feed a record; return (asked, horizons, 4 + levels): mean, sigma, speed, its sigma, half width ratios."""
     out = np.zeros((int(ask.sum()), horizon.size, 4 + zp.size))

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from companion.geo.angles import wrap_pi
 from companion.wind.estimators.estimator import Base
 
-WINDOW, R_DEG, R_MPS = 100, 3.0, 0.5     # of a mission that says nothing; the paper gives none of them
+WINDOW, R_DEG, R_MPS = 100, 3.0, 0.5  # of a mission that says nothing; the paper gives none of them
 
 
 class AdaptiveKalman(Base):
@@ -47,27 +47,29 @@ class AdaptiveKalman(Base):
     def _step(self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float) -> None:
         kf = self._filter
         if dt_s == 0.0:
-            kf.x = np.array([[speed_mps], [x_rad]])                                    # (1)
+            kf.x = np.array([[speed_mps], [x_rad]])  # (1)
             return
         if weight <= 0.0 and speed_weight <= 0.0:
             return
         self._dt_s += 0.01 * (dt_s - self._dt_s)
-        kf.predict()                                                                   # (2)
+        kf.predict()  # (2)
         # The innovation goes the short way round the circle; a speed without a direction is no news of that.
         turned = wrap_pi(x_rad - kf.x[1, 0]) if weight > 0.0 else 0.0
         z = np.array([[speed_mps], [kf.x[1, 0] + turned]])
-        kf.update(z)                                                                   # (3) to (6)
+        kf.update(z)  # (3) to (6)
         outer = kf.y @ kf.y.T
         if len(self._window) == self._window.maxlen:
             self._sum -= self._window[0]
         self._window.append(outer)
         self._sum += outer
-        kf.Q = kf.K @ (self._sum / len(self._window)) @ kf.K.T                         # (7), (8)
+        kf.Q = kf.K @ (self._sum / len(self._window)) @ kf.K.T  # (7), (8)
 
     def _predict(self, horizon_s: float) -> tuple[float, float, float, float]:
         kf = self._filter
-        p = kf.P + (horizon_s / self._dt_s) * kf.Q                                     # (2), open loop
+        p = kf.P + (horizon_s / self._dt_s) * kf.Q  # (2), open loop
         return (
-            float(kf.x[1, 0]), math.sqrt(max(1e-10, float(p[1, 1]))),
-            float(kf.x[0, 0]), math.sqrt(max(1e-6, float(p[0, 0]))),
+            float(kf.x[1, 0]),
+            math.sqrt(max(1e-10, float(p[1, 1]))),
+            float(kf.x[0, 0]),
+            math.sqrt(max(1e-6, float(p[0, 0]))),
         )

@@ -16,10 +16,10 @@ from companion.wind.estimators.estimator import Base
 _KNOTS_S = (3.0, 10.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0)
 _EVERY_S = 5.0
 _MEMORY_S = 3600.0
-_FIRST_RAD = 0.22        # [rad] expected rms error at 60 s before any has been seen, growing as h^0.25
+_FIRST_RAD = 0.22  # [rad] expected rms error at 60 s before any has been seen, growing as h^0.25
 _FIRST_MPS = 0.8
 _ERROR_MAX_RAD = 1.5
-_NOTHING = 1e-6          # what rounding leaves of sums that are empty
+_NOTHING = 1e-6  # what rounding leaves of sums that are empty
 
 
 class RollingMean(Base):
@@ -38,8 +38,8 @@ class RollingMean(Base):
         self._clock_s = 0.0
         self._mean, self._speed = 0.0, 0.0
         self._kept: deque[tuple[float, float, float]] = deque(maxlen=int(_KNOTS_S[-1] / _EVERY_S) + 8)
-        self._dropped = 0                      # rows that have left ``_kept``
-        self._next = [0] * len(_KNOTS_S)       # absolute number of the next row to score
+        self._dropped = 0  # rows that have left ``_kept``
+        self._next = [0] * len(_KNOTS_S)  # absolute number of the next row to score
         self._square = [0.0] * len(_KNOTS_S)
         self._square_speed = [0.0] * len(_KNOTS_S)
         self._weight = [0.0] * len(_KNOTS_S)
@@ -61,7 +61,7 @@ class RollingMean(Base):
             old = self._window.popleft()
             self._sums = [a - b for a, b in zip(self._sums, old[1:], strict=True)]
         self._appended += 1
-        if self._appended % 1000 == 0:      # what rounding has left behind
+        if self._appended % 1000 == 0:  # what rounding has left behind
             self._sums = [sum(row[i] for row in self._window) for i in range(1, 5)]
         s, c, v, w = self._sums
         # A window without a direction, or without a speed, keeps the last.

@@ -18,8 +18,8 @@ from companion.geo.angles import wrap_pi
 from companion.wind.estimators.estimator import Base, gain
 
 _PHI_MIN, _PHI_MAX = 1e-3, 0.9999
-_FIRST_VARIANCE = math.radians(12.0) ** 2    # [rad²] spread of direction in ten minutes, before any is seen
-_CELL_S = 1.0                                # [s] resolution of the remembered past
+_FIRST_VARIANCE = math.radians(12.0) ** 2  # [rad²] spread of direction in ten minutes, before any is seen
+_CELL_S = 1.0  # [s] resolution of the remembered past
 
 
 class OrnsteinUhlenbeck(Base):
@@ -82,6 +82,6 @@ class OrnsteinUhlenbeck(Base):
     def _predict(self, horizon_s: float) -> tuple[float, float, float, float]:
         rho = self.rate_hz
         keep = math.exp(-rho * horizon_s)
-        mean = self._mean + (self._last - self._mean) * keep                       # (a)
-        variance = max(1e-8, self._yy * (1.0 - keep * keep))                       # (a)
+        mean = self._mean + (self._last - self._mean) * keep  # (a)
+        variance = max(1e-8, self._yy * (1.0 - keep * keep))  # (a)
         return mean, math.sqrt(variance), self._speed, math.sqrt(max(0.01, self._speed_variance))

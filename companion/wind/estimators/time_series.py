@@ -18,7 +18,7 @@ import numpy as np
 from companion.geo.angles import wrap_pi
 from companion.wind.estimators.estimator import Base, gain
 
-_EMPTY_CELLS_MAX = 400    # a gap longer than this many cells is a new beginning
+_EMPTY_CELLS_MAX = 400  # a gap longer than this many cells is a new beginning
 
 
 class Cells:
@@ -35,22 +35,20 @@ class Cells:
         self._last = 0.0
         self._slow = 0.0
         self._seen_s = 0.0
-        self.mean = 0.0            # [rad] the slow mean, on the line
-        self.scatter = 0.01        # [rad²] of single readings about their cell
+        self.mean = 0.0  # [rad] the slow mean, on the line
+        self.scatter = 0.01  # [rad²] of single readings about their cell
         self.speed = 0.0
         self.speed_variance = 1.0
         self._has_begun = False
 
-    def add(
-        self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float,
-    ) -> Iterator[float]:
+    def add(self, dt_s: float, x_rad: float, speed_mps: float, weight: float, speed_weight: float) -> Iterator[float]:
         """Take a reading; yield the departures [rad] of the cells that it completes."""
         if not self._has_begun:
             self._has_begun = True
             self._slow = self.mean = x_rad
             self.speed = speed_mps
         self._clock_s += dt_s
-        x = self._slow + wrap_pi(x_rad - self._slow)   # against a slow mean: one wild reading slips no turn
+        x = self._slow + wrap_pi(x_rad - self._slow)  # against a slow mean: one wild reading slips no turn
         if self._clock_s - self._end_s > _EMPTY_CELLS_MAX * self.width_s:
             self._end_s = self._clock_s
             self._sum = self._weight = 0.0
@@ -79,7 +77,7 @@ class Cells:
         return math.sqrt(max(0.01, self.speed_variance))
 
 
-_STABLE = 0.995          # the AR part is kept inside this much of its stability triangle
+_STABLE = 0.995  # the AR part is kept inside this much of its stability triangle
 
 
 class Arma(Base):
@@ -103,13 +101,13 @@ class Arma(Base):
 
     def _cell(self, y: float) -> None:
         phi = np.array([self._y1, self._y2, self._e1])
-        e = y - float(phi @ self._theta)                                              # (a)
+        e = y - float(phi @ self._theta)  # (a)
         limit = 4.0 * math.sqrt(self._variance)
         robust = max(-limit, min(limit, e))
         gain = self._p @ phi / (self._forget + phi @ self._p @ phi)
         theta = self._theta + gain * robust
         self._p = (self._p - np.outer(gain, phi @ self._p)) / self._forget
-        self._p *= min(1.0, 1e3 / float(np.trace(self._p)))    # no wind-up while nothing happens
+        self._p *= min(1.0, 1e3 / float(np.trace(self._p)))  # no wind-up while nothing happens
         a2 = max(-_STABLE, min(_STABLE, float(theta[1])))
         a1 = max(-_STABLE * (1.0 - a2), min(_STABLE * (1.0 - a2), float(theta[0])))
         self._theta = np.array([a1, a2, max(-_STABLE, min(_STABLE, float(theta[2])))])
@@ -127,8 +125,8 @@ class Arma(Base):
         psi1, psi2, total, before = 0.0, 0.0, 0.0, 0.0
         for i in range(whole + 1):
             mean_before, before = m1, total
-            m1, m2 = a1 * m1 + a2 * m2 + (b * self._e1 if i == 0 else 0.0), m1             # (a)
-            psi = 1.0 if i == 0 else a1 * psi1 + a2 * psi2 + (b if i == 1 else 0.0)       # (b)
+            m1, m2 = a1 * m1 + a2 * m2 + (b * self._e1 if i == 0 else 0.0), m1  # (a)
+            psi = 1.0 if i == 0 else a1 * psi1 + a2 * psi2 + (b if i == 1 else 0.0)  # (b)
             psi1, psi2 = psi, psi1
             total += psi * psi
         part = steps - whole
@@ -169,7 +167,7 @@ class Garch(Base):
         first = 0.2**2
         self._xx, self._xy = first, 0.9 * first
         self._variance = 0.06**2
-        self._next = [self._variance] * len(_GRID)     # s²_{k+1} of each pair
+        self._next = [self._variance] * len(_GRID)  # s²_{k+1} of each pair
         self._likelihood = [0.0] * len(_GRID)
         self._count = 0
 
@@ -187,8 +185,8 @@ class Garch(Base):
             s2 = self._next[i]
             self._likelihood[i] = self._forget * self._likelihood[i] - 0.5 * (math.log(s2) + square / s2)
             self._next[i] = max(
-                1e-8, self._variance * (1.0 - alpha_beta) + alpha * square + (alpha_beta - alpha) * s2,
-            )                                                                            # (a)
+                1e-8, self._variance * (1.0 - alpha_beta) + alpha * square + (alpha_beta - alpha) * s2
+            )  # (a)
         self._variance += share * (square - self._variance)
         self._xx += share * (self._y1 * self._y1 - self._xx)
         self._xy += share * (self._y1 * y - self._xy)

@@ -17,6 +17,20 @@ from companion.wind.study.score import (
 )
 
 __all__ = [
-    "FEWEST", "HORIZONS_S", "SCORED_LEVELS", "Ar1Fit", "Characterisation", "HorizonScore", "Record",
-    "Score", "asked_rows", "average", "characterise", "fit_ar1", "parse_csv", "runs", "score", "targets",
+    "FEWEST",
+    "HORIZONS_S",
+    "SCORED_LEVELS",
+    "Ar1Fit",
+    "Characterisation",
+    "HorizonScore",
+    "Record",
+    "Score",
+    "asked_rows",
+    "average",
+    "characterise",
+    "fit_ar1",
+    "parse_csv",
+    "runs",
+    "score",
+    "targets",
 ]

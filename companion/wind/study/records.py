@@ -57,7 +57,10 @@ class Record:
     def rotated(self, angle_rad: float) -> Record:
         """Return the record as it would have been with north elsewhere."""
         return Record(
-            name=self.name, t_s=self.t_s, twd_from_rad=self.twd_from_rad + angle_rad, tws_mps=self.tws_mps,
+            name=self.name,
+            t_s=self.t_s,
+            twd_from_rad=self.twd_from_rad + angle_rad,
+            tws_mps=self.tws_mps,
             turning=self.turning,
         )
 
@@ -107,7 +110,10 @@ def parse_csv(lines: Iterable[str], source: str) -> Record:
         raise InputError(source, "", f"{len(rows)} readings", "a record needs at least two")
     table = np.array(rows, dtype=np.float64)
     return Record(
-        name=source, t_s=table[:, 0], twd_from_rad=np.radians(table[:, 1]), tws_mps=table[:, 2],
+        name=source,
+        t_s=table[:, 0],
+        twd_from_rad=np.radians(table[:, 1]),
+        tws_mps=table[:, 2],
         turning=table[:, 3] != 0.0,
         heading_rad=np.radians(table[:, 4]) if i_head is not None else None,
         awa_rad=np.radians((table[:, 5] + 180.0) % 360.0 - 180.0) if i_awa is not None else None,
@@ -123,6 +129,7 @@ def parse_csv(lines: Iterable[str], source: str) -> Record:
 # conditional on the first reading) is profiled over mean and v and maximised over k; the errors are those of the
 # observed information. For the record's usual step Δ the paper's numbers follow: ρ = (1 − e^{-kΔ}) / Δ and
 # σ_w = sqrt(v (1 − e^{-2kΔ})) / Δ.
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ar1Fit:
@@ -161,8 +168,12 @@ def fit_ar1(record: Record) -> Ar1Fit:
         v = max(1e-12, float(np.mean(e * e / scale)))
         return _log_likelihood(e, v * scale), m, v
 
-    found = minimize_scalar(lambda u: -parts(math.exp(u))[0], bounds=(math.log(1e-5), math.log(5.0 / step)),
-                            method="bounded", options={"xatol": 1e-6})
+    found = minimize_scalar(
+        lambda u: -parts(math.exp(u))[0],
+        bounds=(math.log(1e-5), math.log(5.0 / step)),
+        method="bounded",
+        options={"xatol": 1e-6},
+    )
     k = math.exp(float(found.x))
     best, m, v = parts(k)
 
@@ -178,15 +189,20 @@ def fit_ar1(record: Record) -> Ar1Fit:
 
     at = np.array([math.log(k), math.log(v)])
     covariance = np.linalg.inv(_information(whole, at))
-    jacobian = np.array([
-        (np.array(paper(at + h)) - np.array(paper(at - h))) / 2e-4 for h in np.eye(2) * 1e-4
-    ]).T
+    jacobian = np.array([(np.array(paper(at + h)) - np.array(paper(at - h))) / 2e-4 for h in np.eye(2) * 1e-4]).T
     errors = np.sqrt(np.maximum(0.0, np.diag(jacobian @ covariance @ jacobian.T)))
     rho, noise = paper(at)
     return Ar1Fit(
-        step_s=step, rho_hz=rho, rho_error_hz=float(errors[0]), noise_radps=noise, noise_error_radps=float(errors[1]),
-        sigma_rad=math.sqrt(v), mean_twd_from_rad=wrap_pi(centre + m), correlation_time_s=1.0 / k,
-        log_likelihood=best, count=len(record),
+        step_s=step,
+        rho_hz=rho,
+        rho_error_hz=float(errors[0]),
+        noise_radps=noise,
+        noise_error_radps=float(errors[1]),
+        sigma_rad=math.sqrt(v),
+        mean_twd_from_rad=wrap_pi(centre + m),
+        correlation_time_s=1.0 / k,
+        log_likelihood=best,
+        count=len(record),
     )
 
 
@@ -202,7 +218,9 @@ def _information(function: Callable[[Array], float], at: Array, step: float = 1e
     for i in range(n):
         for j in range(n):
             found[i, j] = -(
-                function(at + h[i] + h[j]) - function(at + h[i] - h[j]) - function(at - h[i] + h[j])
+                function(at + h[i] + h[j])
+                - function(at + h[i] - h[j])
+                - function(at - h[i] + h[j])
                 + function(at - h[i] - h[j])
             ) / (4.0 * step * step)
     return found

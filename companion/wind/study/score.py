@@ -28,8 +28,8 @@ from companion.wind.study.records import Record
 HORIZONS_S = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 SCORED_LEVELS = (0.50, 0.80, 0.95)
 STEP_S, WARM_S, MIN_MPS, WITHIN_S = 30.0, 600.0, 1.0, 1.05
-TRACE_S = 120.0          # [s] horizon of Score.trace and Score.pit
-FEWEST = 20              # forecasts of a horizon below which it has no score
+TRACE_S = 120.0  # [s] horizon of Score.trace and Score.pit
+FEWEST = 20  # forecasts of a horizon below which it has no score
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class HorizonScore:
     mae_rad: float
     sigma_rad: float
     width95_rad: float
-    coverage: tuple[float, ...]       # of SCORED_LEVELS
+    coverage: tuple[float, ...]  # of SCORED_LEVELS
     speed_crps_mps: float
     speed_coverage95: float
 
@@ -112,7 +112,10 @@ def asked_rows(record: Record) -> NDArray[np.int_]:
 
 
 def score(
-    record: Record, estimator: Estimator, *, horizons_s: Sequence[float] = HORIZONS_S,
+    record: Record,
+    estimator: Estimator,
+    *,
+    horizons_s: Sequence[float] = HORIZONS_S,
     progress: Callable[[int], None] | None = None,
 ) -> Score:
     """Feed ``record`` to ``estimator`` and score it; ``progress`` hears the number of rows done now and then."""
@@ -141,10 +144,17 @@ def score(
             mean, sigma, mean_speed, sigma_speed = estimator.forecast(ahead)
             error, speed_error = wrap_pi(float(direction[j]) - mean), float(speed[j]) - mean_speed
             half = [min(math.pi, estimator.interval(ahead, p)) for p in SCORED_LEVELS]
-            errors[h].append((
-                crps_circular(error, sigma), abs(error), sigma, 2.0 * half[-1], *(abs(error) <= w for w in half),
-                crps_normal(speed_error, sigma_speed), abs(speed_error) <= normal_half_width(0.95) * sigma_speed,
-            ))
+            errors[h].append(
+                (
+                    crps_circular(error, sigma),
+                    abs(error),
+                    sigma,
+                    2.0 * half[-1],
+                    *(abs(error) <= w for w in half),
+                    crps_normal(speed_error, sigma_speed),
+                    abs(speed_error) <= normal_half_width(0.95) * sigma_speed,
+                )
+            )
             if h == TRACE_S:
                 pit.append(transform(estimator, ahead, error))
     found = []
@@ -152,12 +162,24 @@ def score(
         if len(errors[h]) >= FEWEST:
             m = np.mean(np.array(errors[h], dtype=np.float64), axis=0).tolist()
             n = 4 + len(SCORED_LEVELS)
-            found.append(HorizonScore(
-                horizon_s=h, count=len(errors[h]), crps_rad=m[0], mae_rad=m[1], sigma_rad=m[2], width95_rad=m[3],
-                coverage=tuple(m[4:n]), speed_crps_mps=m[n], speed_coverage95=m[n + 1],
-            ))
+            found.append(
+                HorizonScore(
+                    horizon_s=h,
+                    count=len(errors[h]),
+                    crps_rad=m[0],
+                    mae_rad=m[1],
+                    sigma_rad=m[2],
+                    width95_rad=m[3],
+                    coverage=tuple(m[4:n]),
+                    speed_crps_mps=m[n],
+                    speed_coverage95=m[n + 1],
+                )
+            )
     return Score(
-        record=record.name, estimator=estimator.name, horizons=tuple(found), pit=np.array(pit),
+        record=record.name,
+        estimator=estimator.name,
+        horizons=tuple(found),
+        pit=np.array(pit),
         trace=np.array(trace, dtype=np.float64).reshape(len(trace), 6),
     )
 
@@ -183,8 +205,11 @@ def average(scores: Sequence[Score]) -> Iterator[HorizonScore]:
             return float(np.mean(values))
 
         yield HorizonScore(
-            horizon_s=h, count=sum(s.count for s in of), crps_rad=mean([s.crps_rad for s in of]),
-            mae_rad=mean([s.mae_rad for s in of]), sigma_rad=mean([s.sigma_rad for s in of]),
+            horizon_s=h,
+            count=sum(s.count for s in of),
+            crps_rad=mean([s.crps_rad for s in of]),
+            mae_rad=mean([s.mae_rad for s in of]),
+            sigma_rad=mean([s.sigma_rad for s in of]),
             width95_rad=mean([s.width95_rad for s in of]),
             coverage=tuple(mean([s.coverage[i] for s in of]) for i in range(len(SCORED_LEVELS))),
             speed_crps_mps=mean([s.speed_crps_mps for s in of]),
@@ -244,6 +269,7 @@ class Characterisation:
 
     def best(self, horizon_s: float) -> FilterScore:
         """Return the cell of the least CRPS at a horizon of ``horizons_s``."""
+
         def crps(cell: FilterScore) -> float:
             found = cell.at(horizon_s)
             return float("inf") if found is None else found.crps_rad
@@ -257,13 +283,18 @@ def runs(noises_deg: Sequence[float] = NOISES_DEG, windows: Sequence[int] = WIND
 
 
 def characterise(
-    records: Sequence[Record], *, noises_deg: Sequence[float] = NOISES_DEG, windows: Sequence[int] = WINDOWS,
-    horizons_s: Sequence[float] = FILTER_HORIZONS_S, advance: Callable[[int], None] | None = None,
+    records: Sequence[Record],
+    *,
+    noises_deg: Sequence[float] = NOISES_DEG,
+    windows: Sequence[int] = WINDOWS,
+    horizons_s: Sequence[float] = FILTER_HORIZONS_S,
+    advance: Callable[[int], None] | None = None,
 ) -> Characterisation:
     """Return the filter's scores over ``records`` for every R [deg] and N [samples].
 
     ``advance`` hears of the readings that were fed, record by record.
     """
+
     def over(name: str, **options: float) -> tuple[HorizonScore, ...]:
         found: list[Score] = []
         for record in records:
@@ -275,6 +306,7 @@ def characterise(
     default = over("default")
     grid = [(r_deg, n) for r_deg in noises_deg for n in windows] if default else []
     return Characterisation(
-        records=tuple(record.name for record in records), default=default,
+        records=tuple(record.name for record in records),
+        default=default,
         cells=tuple(FilterScore(r_deg=r_deg, window=n, horizons=over("kalman", r_deg=r_deg, n=n)) for r_deg, n in grid),
     )

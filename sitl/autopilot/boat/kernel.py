@@ -58,7 +58,7 @@ SETTLING_HZ, FALLING_RADPS = 0.5, 0.35
 
 @kernel
 def side_mps(
-    coefficient: float, aws_mps: float, awa_rad: float, speed_mps: float, sail_rad: float, ideal_rad: float,
+    coefficient: float, aws_mps: float, awa_rad: float, speed_mps: float, sail_rad: float, ideal_rad: float
 ) -> float:
     """Return the speed to starboard [m/s] at which the water's push balances that of the sail.
 
@@ -153,31 +153,31 @@ LOOP_S = 0.02
 SUBSTEPS = 4
 
 # --- state -----------------------------------------------------------------------------------------------------
-S_E, S_N, S_YAW, S_V, S_VE, S_VN, S_RATE = range(7)            # position, heading, speed through water, over ground
-S_WDIR, S_WSPD = 7, 8                                          # true wind that acts (from, speed)
-S_TICK = 9                                                     # loops since the autopilot was made
-S_RUDDER, S_SAIL = 10, 11                                      # -1..1, and sail angle [rad]
+S_E, S_N, S_YAW, S_V, S_VE, S_VN, S_RATE = range(7)  # position, heading, speed through water, over ground
+S_WDIR, S_WSPD = 7, 8  # true wind that acts (from, speed)
+S_TICK = 9  # loops since the autopilot was made
+S_RUDDER, S_SAIL = 10, 11  # -1..1, and sail angle [rad]
 # vane: raw apparent, filtered apparent, filtered true
 S_AWA_RAW, S_AWS, S_AWA_SIN, S_AWA_COS, S_TWS, S_TWD_SIN, S_TWD_COS, S_VANE_SET = range(12, 20)
-S_WANT_RATE, S_INTEGRAL = 20, 21                               # rate controller
-S_STEER, S_THRUST = 22, 23                                     # how to steer (STEER_), desired speed
-S_WANT_YAW, S_WANT_TURN = 24, 25                               # set-points: heading [rad], turn rate [rad/s]
-S_OE, S_ON, S_DE, S_DN, S_XE, S_XN = range(26, 32)             # leg: origin, destination, the next destination
-S_FAST, S_IN, S_OUT = 32, 33, 34                               # corner at the end? curve lengths behind and ahead [m]
-S_PE, S_PN = 35, 36                                            # unit vector of the previous leg
-S_PHASE, S_U, S_SCALE = 37, 38, 39                             # target: curve in, straight, curve out; place; pace
-S_TE, S_TN = 40, 41                                            # target point
-S_XTRACK, S_DIST, S_BEARING = 42, 43, 44                       # cross-track (+: boat left of the leg), to go
+S_WANT_RATE, S_INTEGRAL = 20, 21  # rate controller
+S_STEER, S_THRUST = 22, 23  # how to steer (STEER_), desired speed
+S_WANT_YAW, S_WANT_TURN = 24, 25  # set-points: heading [rad], turn rate [rad/s]
+S_OE, S_ON, S_DE, S_DN, S_XE, S_XN = range(26, 32)  # leg: origin, destination, the next destination
+S_FAST, S_IN, S_OUT = 32, 33, 34  # corner at the end? curve lengths behind and ahead [m]
+S_PE, S_PN = 35, 36  # unit vector of the previous leg
+S_PHASE, S_U, S_SCALE = 37, 38, 39  # target: curve in, straight, curve out; place; pace
+S_TE, S_TN = 40, 41  # target point
+S_XTRACK, S_DIST, S_BEARING = 42, 43, 44  # cross-track (+: boat left of the leg), to go
 S_TACKING, S_TACK_YAW, S_TACK_START, S_TACK_END, S_TACK_ASKED = range(45, 50)
-S_LE, S_LN, S_LOITER_YAW = 50, 51, 52                          # where to loiter
-S_ARMED, S_EASE, S_NAV_YAW, S_TACKS = 54, 55, 56, 57           # sheet eased by avoidance; heading steered
-S_CURRENT_E, S_CURRENT_N = 58, 59                              # of the water [m/s]
-S_VANE_FAULT, S_VANE_VALUE, S_AVOID = 60, 61, 62               # FAULT_, its angle [rad]; near a fence
+S_LE, S_LN, S_LOITER_YAW = 50, 51, 52  # where to loiter
+S_ARMED, S_EASE, S_NAV_YAW, S_TACKS = 54, 55, 56, 57  # sheet eased by avoidance; heading steered
+S_CURRENT_E, S_CURRENT_N = 58, 59  # of the water [m/s]
+S_VANE_FAULT, S_VANE_VALUE, S_AVOID = 60, 61, 62  # FAULT_, its angle [rad]; near a fence
 S_MOORED, S_MOTOR, S_THROTTLE = 63, 64, 65
 S_INDIRECT = 66
-S_WANT_SPEED = 69                                             # desired speed, accelerated at P_ACCEL
-S_GPS_E, S_GPS_N = 67, 68                                       # error of the position that the autopilot believes
-S_COMPASS = 70                                                  # error of the heading that it believes [rad]
+S_WANT_SPEED = 69  # desired speed, accelerated at P_ACCEL
+S_GPS_E, S_GPS_N = 67, 68  # error of the position that the autopilot believes
+S_COMPASS = 70  # error of the heading that it believes [rad]
 # of a boat that is not the plan's (``P_OTHER``): leeway to starboard [m/s], the share of its speed that waves leave,
 # the turn that they give it [rad/s], a number on 0..1 for the next tack, tacks tried and failed, the tack that it was
 # last settled on (its sign of the wind's angle), whether this one was tried, until when it lies in irons
@@ -185,10 +185,37 @@ S_SIDE, S_SEA, S_WOBBLE, S_LOT, S_TRIES, S_FAILED, S_TACK_SIDE, S_TRIED, S_IRONS
 S_SIZE = 82
 
 # --- settings --------------------------------------------------------------------------------------------------
-(P_NOGO, P_XTRACK_MAX, P_IDEAL, P_SAIL_MIN, P_SAIL_MAX, P_LOITER_RADIUS, P_WP_RADIUS, P_WP_SPEED, P_PIVOT_RATE,
- P_ANG_P, P_RATE_P, P_RATE_I, P_RATE_FF, P_RATE_MAX, P_RATE_ACC, P_SCALE_BASE, P_POS_P, P_VEL_P, P_ACCEL,
- P_TURN_MAX_G, P_DIR_FILT, P_SPD_FILT, P_TRUE_FILT, P_WIND_TC, P_VANE, P_SPEED_MIN,
- P_TURN_RADIUS, P_VANE_OFFSET, P_SPEED_SENSOR) = range(29)
+(
+    P_NOGO,
+    P_XTRACK_MAX,
+    P_IDEAL,
+    P_SAIL_MIN,
+    P_SAIL_MAX,
+    P_LOITER_RADIUS,
+    P_WP_RADIUS,
+    P_WP_SPEED,
+    P_PIVOT_RATE,
+    P_ANG_P,
+    P_RATE_P,
+    P_RATE_I,
+    P_RATE_FF,
+    P_RATE_MAX,
+    P_RATE_ACC,
+    P_SCALE_BASE,
+    P_POS_P,
+    P_VEL_P,
+    P_ACCEL,
+    P_TURN_MAX_G,
+    P_DIR_FILT,
+    P_SPD_FILT,
+    P_TRUE_FILT,
+    P_WIND_TC,
+    P_VANE,
+    P_SPEED_MIN,
+    P_TURN_RADIUS,
+    P_VANE_OFFSET,
+    P_SPEED_SENSOR,
+) = range(29)
 # of a boat that is not the plan's; none of them counts without the first
 P_OTHER, P_LEEWAY, P_BEAT, P_REACH, P_RUN, P_TACK_FAILS, P_IRONS_S = range(32, 39)
 P_SIZE = 40
@@ -197,7 +224,7 @@ STEER_OFF, STEER_HOLD, STEER_LEG, STEER_LOITER, STEER_HEADING, STEER_RATE = rang
 FAULT_NONE, FAULT_FROZEN, FAULT_OFFSET, FAULT_SPIKES = range(4)
 REACHED, TACKED, TACK_TIMED_OUT = 1, 2, 4
 
-MOORED, ANCHORED = 1.0, 2.0       # in S_MOORED: until it is armed; whatever it does
+MOORED, ANCHORED = 1.0, 2.0  # in S_MOORED: until it is armed; whatever it does
 
 NOGO_PAD_RAD = math.radians(10.0)
 TACK_DONE_RAD = math.radians(10.0)
@@ -205,15 +232,15 @@ TACK_TIMEOUT_S = 5.0
 TACK_RETRY_S = 5.0
 TACK_REQUEST_S = 0.5
 MASS_KG = 2.0
-MOTOR_MPS = 2.0                   # speed under the auxiliary motor: what a small boat's makes
+MOTOR_MPS = 2.0  # speed under the auxiliary motor: what a small boat's makes
 TURNING_CIRCLE_M = 1.8
 RUDDER_MAX_RAD = math.radians(35.0)
 WIND_DELAY_S = 5.0
 # A tack is tried where the wind comes within the first of ahead, having been beyond the second.
 HEAD_TO_WIND_RAD = math.radians(12.0)
 SETTLED_RAD = math.radians(30.0)
-IRONS_DRAG = 4.0                  # in irons, sails and rudder across the stream: of the hull's own drag
-FALLING_OFF_S = 8.0               # at most, until the boat sails again
+IRONS_DRAG = 4.0  # in irons, sails and rudder across the stream: of the hull's own drag
+FALLING_OFF_S = 8.0  # at most, until the boat sails again
 # AP_WindVane filters with dt = 0.05 s, but its 20 Hz task runs at every second loop: 25 Hz.
 VANE_DT_S = 0.05
 VANE_LOOPS = 2
@@ -273,7 +300,7 @@ def _depart(s: Vector, p: Vector, twa: float, force: float, drag: float, rate: f
     if s[S_MOTOR] == 0.0:
         share = speed_share(abs(twa), p[P_BEAT], p[P_REACH], p[P_RUN])
         if force > 0.0:
-            force *= (share * s[S_SEA]) ** 2   # speed goes with the root of the force
+            force *= (share * s[S_SEA]) ** 2  # speed goes with the root of the force
         side = 1.0 if twa > 0.0 else -1.0
         if abs(twa) > SETTLED_RAD:
             if t >= s[S_IRONS_END] or side == s[S_TACK_SIDE]:
@@ -596,7 +623,12 @@ def _control(s: Vector, p: Vector) -> int:
 
 @kernel
 def advance(
-    s: Vector, p: Vector, wind: NDArray[np.float64], first_tick: int, noise: Vector, loops: int,
+    s: Vector,
+    p: Vector,
+    wind: NDArray[np.float64],
+    first_tick: int,
+    noise: Vector,
+    loops: int,
     polar: NDArray[np.float64],
 ) -> tuple[int, int]:
     """Run up to ``loops`` loops; return (loops done, events). Stops after the loop in which an event happens.

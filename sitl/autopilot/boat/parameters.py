@@ -299,7 +299,16 @@ NEW_NAMES = {
         f"SR{port}_{stream}": f"MAV{port + 1}_{stream}"
         for port in range(3)
         for stream in (
-            "RAW_SENS", "EXT_STAT", "RC_CHAN", "RAW_CTRL", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3", "PARAMS", "ADSB",
+            "RAW_SENS",
+            "EXT_STAT",
+            "RC_CHAN",
+            "RAW_CTRL",
+            "POSITION",
+            "EXTRA1",
+            "EXTRA2",
+            "EXTRA3",
+            "PARAMS",
+            "ADSB",
         )
     },
 }
@@ -401,8 +410,12 @@ def check_parameters(overrides: Mapping[str, float]) -> None:
     for name, value in overrides.items():
         if name not in known:
             near = difflib.get_close_matches(name.upper(), known, n=1)
-            raise InputError("--param", name, "is no parameter of this boat", f"did you mean {near[0]}?" if near else
-                             "docs/reference/simulated-autopilot.md says which it has")
+            raise InputError(
+                "--param",
+                name,
+                "is no parameter of this boat",
+                f"did you mean {near[0]}?" if near else "docs/reference/simulated-autopilot.md says which it has",
+            )
         if not math.isfinite(value) or len(name) > 16 or struct.unpack("f", struct.pack("f", value))[0] != value:
             raise InputError("--param", name, f"{value} cannot be a parameter", "write NAME=NUMBER")
 

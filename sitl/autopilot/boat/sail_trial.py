@@ -30,8 +30,12 @@ def settled_polar(parameters: Mapping[str, float]) -> Polar:
     told = Parameters(parameters)
     ideal, least, most = (math.radians(told.get(f"SAIL_ANGLE_{name}")) for name in ("IDEAL", "MIN", "MAX"))
     angles = np.radians(np.arange(181.0))
-    return Polar(twa_rad=angles, tws_mps=WINDS_MPS, name="SIM_Sailboat, settled",
-                 speed_mps_table=_settled_mps(angles, WINDS_MPS, ideal, least, most))
+    return Polar(
+        twa_rad=angles,
+        tws_mps=WINDS_MPS,
+        name="SIM_Sailboat, settled",
+        speed_mps_table=_settled_mps(angles, WINDS_MPS, ideal, least, most),
+    )
 
 
 @kernel
@@ -59,11 +63,17 @@ def tack_loss_s(parameters: Mapping[str, float], polar: Polar | None, tws_mps: f
 
 
 def _beaten(
-    parameters: Mapping[str, float], polar: Polar | None, tws_mps: float, tacks_s: tuple[float, ...],
+    parameters: Mapping[str, float], polar: Polar | None, tws_mps: float, tacks_s: tuple[float, ...]
 ) -> tuple[float, float, float]:
     """Return (way made to windward [m] in ``TRIED_S``, tacks, speed made good [m/s]), tacking at these times."""
-    vehicle = Vehicle(Constant(0.0, tws_mps), Parameters({**parameters, "SAIL_XTRACK_MAX": 0.0}), polar=polar,
-                      heading_rad=math.radians(60.0), is_moored=False, seed=0)
+    vehicle = Vehicle(
+        Constant(0.0, tws_mps),
+        Parameters({**parameters, "SAIL_XTRACK_MAX": 0.0}),
+        polar=polar,
+        heading_rad=math.radians(60.0),
+        is_moored=False,
+        seed=0,
+    )
     vehicle.set_armed(armed=True)
     vehicle.sail_leg((0.0, 0.0), (0.0, 1e4), None, is_corner=False, goes_on=False)
     for until_s in (*tacks_s, TRIED_S):

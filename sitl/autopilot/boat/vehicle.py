@@ -45,7 +45,7 @@ class HomeChart:
     def to_e7(self, en: tuple[float, float]) -> tuple[int, int]:
         """Return (lat, lon) x 1e7 of a position in metres."""
         found = self._told.get(en)
-        if found is None:   # several messages of one loop tell one place, and home or a destination is told for long
+        if found is None:  # several messages of one loop tell one place, and home or a destination is told for long
             if len(self._told) >= _TOLD:
                 self._told.clear()
             point = self._frame.geo_from_en(*en)
@@ -65,8 +65,8 @@ class HomeChart:
 
 
 _STEP_S = 0.1
-_GPS_STREAMS = (11, 12)   # of the seed: east, north
-_TACKS = 0x7AC4           # what tells the lots of tacks from a faulty vane's
+_GPS_STREAMS = (11, 12)  # of the seed: east, north
+_TACKS = 0x7AC4  # what tells the lots of tacks from a faulty vane's
 
 
 class Surroundings:
@@ -74,12 +74,15 @@ class Surroundings:
 
     def __init__(self, wind: WindModel, departures: Departures | None, waters: Waters | None, seed: int) -> None:
         self._wind, self._waters = wind, waters
-        self._home: Shift | None = None   # from its metres to those that the waters are in, where they are others
+        self._home: Shift | None = None  # from its metres to those that the waters are in, where they are others
         self.departures = departures or Departures()
         self._seed = seed
         sensors = self.departures.sensors
-        self._gps = [Process(1.0 / sensors.gps_noise_s, _STEP_S, seed, stream, from_mean=True)
-                     for stream in _GPS_STREAMS] if sensors.gps_noise_m > 0.0 else []
+        self._gps = (
+            [Process(1.0 / sensors.gps_noise_s, _STEP_S, seed, stream, from_mean=True) for stream in _GPS_STREAMS]
+            if sensors.gps_noise_m > 0.0
+            else []
+        )
 
     def carry(self, shift: Shift) -> None:
         """Count the boat's metres from elsewhere."""
@@ -99,8 +102,12 @@ class Surroundings:
         return self._wind.at(t_s) if self._waters is None else self._waters.wind_at(t_s, self._place(state))
 
     def look(
-        self, t_s: float, state: NDArray[np.float64], tide_en_mps: tuple[float, float],
-        jump_en_m: tuple[float, float], fault_rad: float,
+        self,
+        t_s: float,
+        state: NDArray[np.float64],
+        tide_en_mps: tuple[float, float],
+        jump_en_m: tuple[float, float],
+        fault_rad: float,
     ) -> None:
         """Set what changes: stream, waves, what the boat's position and compass err by, the next tack's lot.
 
@@ -136,11 +143,18 @@ class Vehicle:
     """The boat on the water. Positions are (east, north) [m] from home, headings compass radians."""
 
     def __init__(
-        self, wind: WindModel, parameters: Parameters, *, heading_rad: float, is_moored: bool, seed: int,
-        polar: Polar | None = None, surroundings: Surroundings | None = None,
+        self,
+        wind: WindModel,
+        parameters: Parameters,
+        *,
+        heading_rad: float,
+        is_moored: bool,
+        seed: int,
+        polar: Polar | None = None,
+        surroundings: Surroundings | None = None,
     ) -> None:
         self.state = np.zeros(k.S_SIZE)
-        self.tick = 0   # loops since the start: the state's own count
+        self.tick = 0  # loops since the start: the state's own count
         self.t_s = 0.0  # simulated time [s], of that count
         self.wind = wind
         self._parameters = parameters
@@ -150,7 +164,7 @@ class Vehicle:
         self._polar = np.zeros((0, 0)) if polar is None else polar_table(polar)
         self._still_until_s = 0.0
         self._surroundings = surroundings
-        self._looked = -1   # the first loop of the tenth of a second for which they were looked at
+        self._looked = -1  # the first loop of the tenth of a second for which they were looked at
         self._tide = self._jump = (0.0, 0.0)
         self._compass_rad = 0.0
         self.state[k.S_YAW] = heading_rad
@@ -255,8 +269,13 @@ class Vehicle:
         self._steer(k.STEER_OFF)
 
     def sail_leg(
-        self, origin: tuple[float, float], destination: tuple[float, float], following: tuple[float, float] | None,
-        *, is_corner: bool, goes_on: bool,
+        self,
+        origin: tuple[float, float],
+        destination: tuple[float, float],
+        following: tuple[float, float] | None,
+        *,
+        is_corner: bool,
+        goes_on: bool,
     ) -> None:
         """Follow the line from ``origin`` to ``destination``.
 
@@ -382,9 +401,7 @@ class Vehicle:
         if s[k.S_STEER] == k.STEER_LEG:
             le, ln = s[k.S_DE] - s[k.S_OE], s[k.S_DN] - s[k.S_ON]
             length = math.hypot(le, ln)
-            s[k.S_XTRACK] = (
-                ((north - s[k.S_ON]) * le - (east - s[k.S_OE]) * ln) / length if length > 1e-6 else 0.0
-            )
+            s[k.S_XTRACK] = ((north - s[k.S_ON]) * le - (east - s[k.S_OE]) * ln) / length if length > 1e-6 else 0.0
 
     # --------------------------------------------------------------------------------------- readings
     @property

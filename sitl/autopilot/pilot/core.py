@@ -18,18 +18,18 @@ from sitl.world import WindModel
 # Entering one of these gives the navigation its limits of acceleration and jerk.
 NAVIGATING = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL})
 POSITION_MODES = frozenset({Mode.AUTO, Mode.GUIDED, Mode.RTL, Mode.SMART_RTL, Mode.LOITER})
-KNOWN = frozenset({
-    Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.HOLD, Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED,
-})
+KNOWN = frozenset(
+    {Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.HOLD, Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED}
+)
 
 
 class MissionTask(enum.Enum):
     """What the boat is doing within its mode."""
 
-    LEG = "leg"                # to a waypoint of the mission
+    LEG = "leg"  # to a waypoint of the mission
     RTL = "rtl"
-    GUIDED = "guided"          # to a position that was sent
-    SETPOINT = "setpoint"      # a heading or turn rate that was sent
+    GUIDED = "guided"  # to a position that was sent
+    SETPOINT = "setpoint"  # a heading or turn rate that was sent
     LOITER = "loiter"
     HOLD = "hold"
 
@@ -39,7 +39,7 @@ INVALID_RESULT = 0x20000000
 INTERNAL_ERROR = f"Internal errors 0x{INVALID_RESULT:x} l:90 invalid arguments"
 WARM_BOOT_S = 60.0
 
-MOTORBOAT = {"SAIL_ENABLE": 0.0, "WNDVN_TYPE": 0.0}   # there is no sail, and nothing that tells the wind
+MOTORBOAT = {"SAIL_ENABLE": 0.0, "WNDVN_TYPE": 0.0}  # there is no sail, and nothing that tells the wind
 
 
 class Core:
@@ -56,13 +56,18 @@ class Core:
         self.parameters.put("SIM_WIND_SPD", tws)
         self.parameters.put("SYSID_THISMAV", float(config.sysid))
         self.vehicle = Vehicle(
-            wind, self.parameters, heading_rad=config.heading_rad, is_moored=config.is_moored, seed=seed,
-            polar=config.polar, surroundings=_about(config, wind, seed),
+            wind,
+            self.parameters,
+            heading_rad=config.heading_rad,
+            is_moored=config.is_moored,
+            seed=seed,
+            polar=config.polar,
+            surroundings=_about(config, wind, seed),
         )
         self.run_motor(on=False)
         self._told = (self.vehicle.position, self.chart.to_e7(self.vehicle.position))
         self.battery_v = config.battery_v
-        self.sensors: dict[str, float] = {}   # what a script of the boat's tells, by name
+        self.sensors: dict[str, float] = {}  # what a script of the boat's tells, by name
         self.roll_rad = 0.0
         self.power_up(-WARM_BOOT_S if config.is_warm else 0.0)
         if config.is_warm:
@@ -85,7 +90,7 @@ class Core:
         self.has_origin = False
         self.origin_en = (0.0, 0.0)
         self.home_en: tuple[float, float] | None = None
-        self.home_due_s = self.t_s     # of the next look at home, while disarmed
+        self.home_due_s = self.t_s  # of the next look at home, while disarmed
 
     # ---------------------------------------------------------------------------------------------- time
     @property
@@ -117,7 +122,7 @@ class Core:
     def latlon_e7(self) -> tuple[int, int]:
         """Where the autopilot believes to be [deg x 1e7]."""
         here = self.vehicle.position
-        if self._told[0] != here:   # several messages of one loop tell it
+        if self._told[0] != here:  # several messages of one loop tell it
             self._told = (here, self.chart.to_e7(here))
         return self._told[1]
 

@@ -19,7 +19,7 @@ from sitl.autopilot.pilot.core import INTERNAL_ERROR, POSITION_MODES, Core
 from sitl.autopilot.pilot.fence import FenceMonitor
 from sitl.autopilot.pilot.helm import ModeController
 
-READY_S = 42.0   # boot to "EKF3 IMU0 is using GPS" on the real one
+READY_S = 42.0  # boot to "EKF3 IMU0 is using GPS" on the real one
 # Measured on the real one, with FS_EKF_THRESH 0.8: a jump of 30 m, and a receiver switched off.
 GLITCH_FLAG = 0x8000
 GLITCH_SEEN_S, JUMP_TAKEN_S, JUMP_FAILSAFE_S, JUMP_OVER_S = 1.5, 3.8, 4.8, 11.0
@@ -35,7 +35,7 @@ class Ekf:
         self._fault = GpsFault()
         self._fault_s = -math.inf
         self.has_acted = False
-        self.has_second = False    # another receiver, whose truth the filter does not take
+        self.has_second = False  # another receiver, whose truth the filter does not take
 
     @property
     def gps_lost(self) -> bool:
@@ -122,7 +122,7 @@ class Arming:
         self._helm = helm
         self._fence = fence
         self._ekf = ekf
-        self.is_refused = False   # by a check of the autopilot's that knows why
+        self.is_refused = False  # by a check of the autopilot's that knows why
 
     def arm(self, *, force: bool) -> bool:
         """Arm; False, with the reasons announced, when refused."""
@@ -167,7 +167,7 @@ class Arming:
 CHANNELS_US = (1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, *([1500] * 8))
 # The middle of each of the mode switch's six places [us]: MODE1 to MODE6.
 SWITCH_US = (1165, 1295, 1425, 1555, 1685, 1800)
-SILENT_S = 0.5   # without pulses for longer than this the receiver has lost its transmitter
+SILENT_S = 0.5  # without pulses for longer than this the receiver has lost its transmitter
 
 
 class Radio:
@@ -210,20 +210,20 @@ class Radio:
 _CHECK_S = 0.1
 RADIO, STATION = 1, 2
 _NAMES = {RADIO: "Radio", STATION: "GCS"}
-_GOES_ON = {RADIO: "FS_THR_ENABLE", STATION: "FS_GCS_ENABLE"}   # 2: the mission goes on in AUTO
+_GOES_ON = {RADIO: "FS_THR_ENABLE", STATION: "FS_GCS_ENABLE"}  # 2: the mission goes on in AUTO
 _RTL, _SMART = 1, 3
 _BATTERY = (("low", "BATT_LOW_VOLT", "BATT_FS_LOW_ACT"), ("critical", "BATT_CRT_VOLT", "BATT_FS_CRT_ACT"))
 # Of the battery's actions the first in this list that was taken stays: a later one that stands behind it is not taken.
 _BATTERY_ORDER = (5, 2, 6, 1, 4, 3, 0)
-GIVE_UP_M = 100.0   # AC_FENCE_GIVE_UP_DISTANCE: farther outside than this a breach means HOLD, whatever is set
-RECOVERY_S = 10.0   # AC_FENCE_MANUAL_RECOVERY_TIME_MIN
+GIVE_UP_M = 100.0  # AC_FENCE_GIVE_UP_DISTANCE: farther outside than this a breach means HOLD, whatever is set
+RECOVERY_S = 10.0  # AC_FENCE_MANUAL_RECOVERY_TIME_MIN
 
 
 class Failsafe:
     """Watches; acts once when something begins, says when it has ended, never restores a mode."""
 
     def __init__(
-        self, core: Core, helm: ModeController, arming: Arming, fence: FenceMonitor, radio: Radio, ekf: Ekf,
+        self, core: Core, helm: ModeController, arming: Arming, fence: FenceMonitor, radio: Radio, ekf: Ekf
     ) -> None:
         self._core = core
         self._helm = helm
@@ -232,18 +232,18 @@ class Failsafe:
         self._radio = radio
         self._ekf = ekf
         self._gcs_heard_s: float | None = None
-        self._lost = self._acted = 0           # bits of the links
+        self._lost = self._acted = 0  # bits of the links
         self._lost_since_s = 0.0
         self._battery_since_s: dict[int, float] = {}
-        self.battery_level = 0                 # that was said: 1 low, 2 critical; it never falls
+        self.battery_level = 0  # that was said: 1 low, 2 critical; it never falls
         self._battery_action: int | None = None
         self._due_s = 0.0
-        self._revision = -1        # of the parameters that these two are taken from
+        self._revision = -1  # of the parameters that these two are taken from
         self._watches_station = False
         self._low_v = 0.0
         self._recovery_until_s = -math.inf
         self._acting = ""
-        self.stopped_by = ""    # "crash" or "action": that changed the mode or disarmed, and nobody has since
+        self.stopped_by = ""  # "crash" or "action": that changed the mode or disarmed, and nobody has since
 
     @property
     def is_active(self) -> bool:
@@ -254,15 +254,17 @@ class Failsafe:
     def due_s(self) -> float:
         """When to look again."""
         core, parameters = self._core, self._core.parameters
-        if parameters.revision != self._revision:   # they are asked for at every loop and change once in a voyage
+        if parameters.revision != self._revision:  # they are asked for at every loop and change once in a voyage
             self._revision = parameters.revision
             self._watches_station = bool(parameters.flag("FS_GCS_ENABLE"))
             self._low_v = max(parameters.get("BATT_LOW_VOLT"), parameters.get("BATT_CRT_VOLT"))
         watching = (
             (self._gcs_heard_s is not None and self._watches_station)
-            or self._radio.is_switched_off or self._lost
+            or self._radio.is_switched_off
+            or self._lost
             or 0.0 < core.battery_v < self._low_v
-            or core.roll_rad != 0.0 or self._ekf.is_watching
+            or core.roll_rad != 0.0
+            or self._ekf.is_watching
         )
         return self._due_s if watching else math.inf
 

@@ -16,8 +16,8 @@ from sitl.autopilot.pilot.mission import Item
 
 CHECK_S = 0.1
 TYPE_CIRCLE, TYPE_POLYGON = 2, 4
-BACKUP_M = 20.0   # so much farther outside the home circle there is another one: a new breach and a new action
-LONG_E7, PIECE_E7 = 4_500_000, 200_000   # an edge of half a degree is cut into pieces of two kilometres
+BACKUP_M = 20.0  # so much farther outside the home circle there is another one: a new breach and a new action
+LONG_E7, PIECE_E7 = 4_500_000, 200_000  # an edge of half a degree is cut into pieces of two kilometres
 _HALF_E7 = 1_800_000_000
 _POLYGONS = {mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION: 1.0, mav.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION: -1.0}
 _CIRCLES = {mav.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION: 1.0, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION: -1.0}
@@ -30,8 +30,7 @@ class Polygon:
         self.sign, self.vertices_en = sign, vertices_en
         edges = np.roll(vertices_en, -1, axis=0) - vertices_en
         lengths2 = np.maximum((edges**2).sum(axis=1), 1e-12)
-        self._edges = tuple(
-            zip(*(column.tolist() for column in (*vertices_en.T, *edges.T, lengths2)), strict=True))
+        self._edges = tuple(zip(*(column.tolist() for column in (*vertices_en.T, *edges.T, lengths2)), strict=True))
 
     def clearance_m(self, east: float, north: float) -> float:
         """Return the distance [m] to the edge, negative on the forbidden side."""
@@ -72,10 +71,8 @@ def zones(items: Sequence[Item], to_en: Callable[[int, int], tuple[float, float]
         item = items[i]
         if item.command in _POLYGONS:
             count = int(item.p1)
-            group = items[i:i + count]
-            if count < 3 or len(group) < count or any(
-                g.command != item.command or int(g.p1) != count for g in group
-            ):
+            group = items[i : i + count]
+            if count < 3 or len(group) < count or any(g.command != item.command or int(g.p1) != count for g in group):
                 return None
             out.append(Polygon(_POLYGONS[item.command], np.array([to_en(*place) for place in _ring(group)])))
             i += count
@@ -95,8 +92,10 @@ def _ring(group: Sequence[Item]) -> list[tuple[int, int]]:
         lat, lon = b.x - a.x, (b.y - a.y + _HALF_E7) % (2 * _HALF_E7) - _HALF_E7
         longest = max(abs(lat), abs(lon))
         count = 1 if longest < LONG_E7 else math.ceil(longest / PIECE_E7)
-        out += [(a.x + lat * n // count, (a.y + lon * n // count + _HALF_E7) % (2 * _HALF_E7) - _HALF_E7)
-                for n in range(count)]
+        out += [
+            (a.x + lat * n // count, (a.y + lon * n // count + _HALF_E7) % (2 * _HALF_E7) - _HALF_E7)
+            for n in range(count)
+        ]
     return out
 
 
@@ -114,10 +113,10 @@ class FenceMonitor:
         self.breach_type = 0
         self.breach_ms = 0
         self.is_limiting = False
-        self._switched_on = 0            # its types when it was switched on: one set later waits for the next time
+        self._switched_on = 0  # its types when it was switched on: one set later waits for the next time
         self._types = TYPE_POLYGON
         self._circle_clear_m = math.inf
-        self._circle_m = math.inf         # how far outside the home circle the next breach of it begins
+        self._circle_m = math.inf  # how far outside the home circle the next breach of it begins
         if core.parameters.flag("FENCE_ENABLE"):
             self.switch(enabled=True)
 

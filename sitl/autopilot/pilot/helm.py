@@ -30,9 +30,9 @@ class ModeController:
         self._mode_changed = mode_changed
         self.mission = StoredMission(self)
         self.mode = Mode.MANUAL
-        self.refused: Mode | None = None   # it cannot be entered now
+        self.refused: Mode | None = None  # it cannot be entered now
         self.task = MissionTask.HOLD
-        self._is_waiting = False       # AUTO was entered before there was an origin
+        self._is_waiting = False  # AUTO was entered before there was an origin
         self._is_reached = False
         self._corner_passed = False
         self._hold_until_s = -1.0
@@ -225,13 +225,18 @@ class ModeController:
         goal = self._place(item)
         following = self.mission.following(index)
         is_corner = (
-            item.command == mav.MAV_CMD_NAV_WAYPOINT and item.p1 <= 0.0
-            and following is not None and NAMES.get(following.command) in {"WP", "LoitUnlim", "LoitTime", "LoitTurns"}
+            item.command == mav.MAV_CMD_NAV_WAYPOINT
+            and item.p1 <= 0.0
+            and following is not None
+            and NAMES.get(following.command) in {"WP", "LoitUnlim", "LoitTime", "LoitTurns"}
         )
         origin = self._vehicle.destination if passed else self._vehicle.position
         self._vehicle.sail_leg(
-            origin, goal, self._place(following) if is_corner and following is not None else None,
-            is_corner=is_corner, goes_on=passed,
+            origin,
+            goal,
+            self._place(following) if is_corner and following is not None else None,
+            is_corner=is_corner,
+            goes_on=passed,
         )
         self.task = MissionTask.LEG
         return True

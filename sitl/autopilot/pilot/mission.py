@@ -15,35 +15,73 @@ MAX_MISSION = 655
 MAX_FENCE = 84
 MAX_RALLY = 50
 
-NAV_COMMANDS = frozenset({
-    mav.MAV_CMD_NAV_WAYPOINT, mav.MAV_CMD_NAV_LOITER_UNLIM, mav.MAV_CMD_NAV_LOITER_TURNS,
-    mav.MAV_CMD_NAV_LOITER_TIME, mav.MAV_CMD_NAV_RETURN_TO_LAUNCH, mav.MAV_CMD_NAV_GUIDED_ENABLE,
-    mav.MAV_CMD_NAV_DELAY, mav.MAV_CMD_NAV_SET_YAW_SPEED,
-})
-DO_COMMANDS = frozenset({
-    mav.MAV_CMD_CONDITION_DELAY, mav.MAV_CMD_CONDITION_DISTANCE, mav.MAV_CMD_DO_JUMP, mav.MAV_CMD_DO_CHANGE_SPEED,
-    mav.MAV_CMD_DO_SET_HOME, mav.MAV_CMD_DO_AUX_FUNCTION, mav.MAV_CMD_DO_GUIDED_LIMITS,
-    mav.MAV_CMD_DO_FENCE_ENABLE, mav.MAV_CMD_DO_SET_RELAY, mav.MAV_CMD_DO_SET_SERVO, mav.MAV_CMD_DO_SET_REVERSE,
-    mav.MAV_CMD_DO_SET_ROI, mav.MAV_CMD_JUMP_TAG, mav.MAV_CMD_DO_JUMP_TAG, mav.MAV_CMD_DO_SEND_BANNER,
-    mav.MAV_CMD_DO_SET_RESUME_REPEAT_DIST,
-})
+NAV_COMMANDS = frozenset(
+    {
+        mav.MAV_CMD_NAV_WAYPOINT,
+        mav.MAV_CMD_NAV_LOITER_UNLIM,
+        mav.MAV_CMD_NAV_LOITER_TURNS,
+        mav.MAV_CMD_NAV_LOITER_TIME,
+        mav.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        mav.MAV_CMD_NAV_GUIDED_ENABLE,
+        mav.MAV_CMD_NAV_DELAY,
+        mav.MAV_CMD_NAV_SET_YAW_SPEED,
+    }
+)
+DO_COMMANDS = frozenset(
+    {
+        mav.MAV_CMD_CONDITION_DELAY,
+        mav.MAV_CMD_CONDITION_DISTANCE,
+        mav.MAV_CMD_DO_JUMP,
+        mav.MAV_CMD_DO_CHANGE_SPEED,
+        mav.MAV_CMD_DO_SET_HOME,
+        mav.MAV_CMD_DO_AUX_FUNCTION,
+        mav.MAV_CMD_DO_GUIDED_LIMITS,
+        mav.MAV_CMD_DO_FENCE_ENABLE,
+        mav.MAV_CMD_DO_SET_RELAY,
+        mav.MAV_CMD_DO_SET_SERVO,
+        mav.MAV_CMD_DO_SET_REVERSE,
+        mav.MAV_CMD_DO_SET_ROI,
+        mav.MAV_CMD_JUMP_TAG,
+        mav.MAV_CMD_DO_JUMP_TAG,
+        mav.MAV_CMD_DO_SEND_BANNER,
+        mav.MAV_CMD_DO_SET_RESUME_REPEAT_DIST,
+    }
+)
 # DO commands that the vehicle verifies, and therefore reports as reached.
-REPORTED_DO = frozenset({
-    mav.MAV_CMD_DO_CHANGE_SPEED, mav.MAV_CMD_DO_SET_HOME, mav.MAV_CMD_DO_FENCE_ENABLE,
-    mav.MAV_CMD_DO_GUIDED_LIMITS, mav.MAV_CMD_DO_SET_REVERSE, mav.MAV_CMD_DO_SET_ROI,
-})
+REPORTED_DO = frozenset(
+    {
+        mav.MAV_CMD_DO_CHANGE_SPEED,
+        mav.MAV_CMD_DO_SET_HOME,
+        mav.MAV_CMD_DO_FENCE_ENABLE,
+        mav.MAV_CMD_DO_GUIDED_LIMITS,
+        mav.MAV_CMD_DO_SET_REVERSE,
+        mav.MAV_CMD_DO_SET_ROI,
+    }
+)
 NAMES = {
-    mav.MAV_CMD_NAV_WAYPOINT: "WP", mav.MAV_CMD_NAV_LOITER_UNLIM: "LoitUnlim",
-    mav.MAV_CMD_NAV_LOITER_TURNS: "LoitTurns", mav.MAV_CMD_NAV_LOITER_TIME: "LoitTime",
-    mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL", mav.MAV_CMD_NAV_GUIDED_ENABLE: "NavGuidedEnable",
-    mav.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed", mav.MAV_CMD_DO_SET_HOME: "SetHome",
-    mav.MAV_CMD_DO_FENCE_ENABLE: "FenceEnable", mav.MAV_CMD_DO_AUX_FUNCTION: "AuxFunction",
-    mav.MAV_CMD_NAV_DELAY: "Delay", mav.MAV_CMD_NAV_SET_YAW_SPEED: "NavSetYawSpeed",
+    mav.MAV_CMD_NAV_WAYPOINT: "WP",
+    mav.MAV_CMD_NAV_LOITER_UNLIM: "LoitUnlim",
+    mav.MAV_CMD_NAV_LOITER_TURNS: "LoitTurns",
+    mav.MAV_CMD_NAV_LOITER_TIME: "LoitTime",
+    mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL",
+    mav.MAV_CMD_NAV_GUIDED_ENABLE: "NavGuidedEnable",
+    mav.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed",
+    mav.MAV_CMD_DO_SET_HOME: "SetHome",
+    mav.MAV_CMD_DO_FENCE_ENABLE: "FenceEnable",
+    mav.MAV_CMD_DO_AUX_FUNCTION: "AuxFunction",
+    mav.MAV_CMD_NAV_DELAY: "Delay",
+    mav.MAV_CMD_NAV_SET_YAW_SPEED: "NavSetYawSpeed",
 }
-_LOCATION = frozenset({
-    mav.MAV_CMD_NAV_WAYPOINT, mav.MAV_CMD_NAV_LOITER_UNLIM, mav.MAV_CMD_NAV_LOITER_TURNS,
-    mav.MAV_CMD_NAV_LOITER_TIME, mav.MAV_CMD_NAV_RETURN_TO_LAUNCH, mav.MAV_CMD_DO_SET_HOME,
-})
+_LOCATION = frozenset(
+    {
+        mav.MAV_CMD_NAV_WAYPOINT,
+        mav.MAV_CMD_NAV_LOITER_UNLIM,
+        mav.MAV_CMD_NAV_LOITER_TURNS,
+        mav.MAV_CMD_NAV_LOITER_TIME,
+        mav.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        mav.MAV_CMD_DO_SET_HOME,
+    }
+)
 _FENCE_COMMANDS = frozenset(range(mav.MAV_CMD_NAV_FENCE_RETURN_POINT, mav.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION + 1))
 _FRAMES = {0: 0, 2: 2, 3: 3, 5: 0, 6: 3, 10: 10, 11: 10}
 # MISSION_ITEM_INT without its header, as files of MAVFTP hold it.
@@ -316,9 +354,7 @@ class StoredMission:
             item = self.items[index]
             if item.command in NAV_COMMANDS:
                 return index
-            jumping = item.command == mav.MAV_CMD_DO_JUMP and (
-                item.p2 < 0 or self._jumps.get(index, 0) < item.p2
-            )
+            jumping = item.command == mav.MAV_CMD_DO_JUMP and (item.p2 < 0 or self._jumps.get(index, 0) < item.p2)
             index = max(1, int(item.p1)) if jumping else index + 1
         return None
 

@@ -19,12 +19,18 @@ ORIGIN_S = 19.8
 HOME_S = 1.0
 # When after boot each is said [s], as on the real one.
 _TEXTS = (
-    (0.04, "Calibrating barometer"), (1.64, "Barometer 1 calibration complete"),
-    (1.66, "Beginning INS calibration. Do not move vehicle"), (2.28, "ArduPilot Ready"),
-    (2.28, "AHRS: DCM active"), (4.29, "EKF3 IMU0 initialised"),
-    (5.89, "EKF3 IMU0 tilt alignment complete"), (5.97, "EKF3 IMU0 MAG0 initial yaw alignment complete"),
-    (9.57, "GPS 1: probing for u-blox at 230400 baud"), (9.59, "GPS 1: detected u-blox"),
-    (19.77, "EKF3 IMU0 origin set"), (READY_S, "EKF3 IMU0 is using GPS"),
+    (0.04, "Calibrating barometer"),
+    (1.64, "Barometer 1 calibration complete"),
+    (1.66, "Beginning INS calibration. Do not move vehicle"),
+    (2.28, "ArduPilot Ready"),
+    (2.28, "AHRS: DCM active"),
+    (4.29, "EKF3 IMU0 initialised"),
+    (5.89, "EKF3 IMU0 tilt alignment complete"),
+    (5.97, "EKF3 IMU0 MAG0 initial yaw alignment complete"),
+    (9.57, "GPS 1: probing for u-blox at 230400 baud"),
+    (9.59, "GPS 1: detected u-blox"),
+    (19.77, "EKF3 IMU0 origin set"),
+    (READY_S, "EKF3 IMU0 is using GPS"),
     (READY_S, "AHRS: EKF3 active"),
 )
 

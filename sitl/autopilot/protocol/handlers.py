@@ -122,8 +122,7 @@ def _set_interval(pilot: Pilot, link: MavlinkPort, msgid: int, interval_us: floa
         return REFUSED
     if interval_us > 0.0 and interval_us * 1e-6 < _FASTEST_S - 1e-9:
         pilot.core.voice.announce(
-            mav.MAV_SEVERITY_INFO,
-            f"Requested rate for message ID {msgid} too fast. Increase SCHED_LOOP_RATE",
+            mav.MAV_SEVERITY_INFO, f"Requested rate for message ID {msgid} too fast. Increase SCHED_LOOP_RATE"
         )
         return REFUSED
     if interval_us == 0.0:
@@ -256,9 +255,7 @@ class ParameterServer:
         )
 
 
-_SETPOINTS = frozenset({
-    "SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_GLOBAL_INT", "SET_POSITION_TARGET_LOCAL_NED",
-})
+_SETPOINTS = frozenset({"SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_GLOBAL_INT", "SET_POSITION_TARGET_LOCAL_NED"})
 
 
 class Ports:
@@ -348,7 +345,7 @@ class Ports:
         if self._core.boot_s < FIRST_STREAMS_S:
             due = [i for i in due if i == mav.MAVLINK_MSG_ID_HEARTBEAT]
         if not link.is_plugged:
-            due = [i for i in due if i == mav.MAVLINK_MSG_ID_WIND]   # which is heard of on the other ports too
+            due = [i for i in due if i == mav.MAVLINK_MSG_ID_WIND]  # which is heard of on the other ports too
         for msgid in due:
             if msgid == mav.MAVLINK_MSG_ID_AIS_VESSEL:
                 message = self.ais_list.next_message(link.number, t_s)

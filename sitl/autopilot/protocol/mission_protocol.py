@@ -235,7 +235,7 @@ class FtpServer:
         if self._last is not None and self._last[:2] == (sender, seq):
             reply = self._last[2]  # our answer was lost: the same again, the work is not done twice
         else:
-            data = payload[_FRAME.size:_FRAME.size + min(size, _DATA_MAX)]
+            data = payload[_FRAME.size : _FRAME.size + min(size, _DATA_MAX)]
             code, answer, at = self._execute(opcode, session, data, offset, size)
             head = _FRAME.pack((seq + 1) & 0xFFFF, self._session, code, len(answer), opcode, 0, 0, at)
             reply = (head + answer).ljust(251, b"\0")
@@ -267,12 +267,12 @@ class FtpServer:
         if opcode == _READ:
             if self._is_writing:
                 return _nak(_FAIL)
-            piece = bytes(self._data[offset:offset + min(size or _DATA_MAX, _DATA_MAX)])
+            piece = bytes(self._data[offset : offset + min(size or _DATA_MAX, _DATA_MAX)])
             return (_ACK, piece, offset) if piece else _nak(_END)
         if opcode == _WRITE:
             if not self._is_writing or offset > len(self._data) or offset > HEADER.size + FILE_ITEM.size * 1400:
                 return _nak(_FAIL)
-            self._data[offset:offset + len(data)] = data
+            self._data[offset : offset + len(data)] = data
             return _ACK, b"", offset
         kind, self._kind = self._kind, None
         if self._is_writing:

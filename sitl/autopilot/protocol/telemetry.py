@@ -93,10 +93,23 @@ class AisList:
             turn = min(120, round(abs(v.turn_rate_dps) * 10.0))
             flags |= mav.AIS_FLAGS_VALID_TURN_RATE
         return mav.MAVLink_ais_vessel_message(
-            v.mmsi, round(v.position.lat_deg * 1e7), round(v.position.lon_deg * 1e7),
+            v.mmsi,
+            round(v.position.lat_deg * 1e7),
+            round(v.position.lon_deg * 1e7),
             36000 if v.cog_deg is None else round(v.cog_deg * 100.0),
             51100 if v.heading_deg is None else round(v.heading_deg * 100.0),
-            speed, turn, v.nav_status, 0, 0, 0, 0, 0, b"", b"", min(65535, int(t_s - entry.heard_s)), flags,
+            speed,
+            turn,
+            v.nav_status,
+            0,
+            0,
+            0,
+            0,
+            0,
+            b"",
+            b"",
+            min(65535, int(t_s - entry.heard_s)),
+            flags,
         )
 
 
@@ -137,8 +150,19 @@ def _sys_status(p: Pilot) -> Any:
         healthy &= ~mav.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
     percent = p.core.battery_percent
     return mav.MAVLink_sys_status_message(
-        present, enabled, healthy, 0, round(p.core.battery_v * 1000), 0, percent, 0, 0,
-        0, INVALID_RESULT >> 16 if p.core.internal_errors else 0, 0, p.core.internal_errors
+        present,
+        enabled,
+        healthy,
+        0,
+        round(p.core.battery_v * 1000),
+        0,
+        percent,
+        0,
+        0,
+        0,
+        INVALID_RESULT >> 16 if p.core.internal_errors else 0,
+        0,
+        p.core.internal_errors,
     )
 
 
@@ -166,9 +190,7 @@ def _local_position(p: Pilot) -> Any:
     if not p.core.has_origin:
         return None
     (ve, vn), (east, north), (east_0, north_0) = _velocity_en_mps(p), p.core.vehicle.position, p.core.origin_en
-    return mav.MAVLink_local_position_ned_message(
-        p.core.boot_ms, north - north_0, east - east_0, 0.0, vn, ve, 0.0
-    )
+    return mav.MAVLink_local_position_ned_message(p.core.boot_ms, north - north_0, east - east_0, 0.0, vn, ve, 0.0)
 
 
 def _vfr_hud(p: Pilot) -> Any:
@@ -196,7 +218,8 @@ def _gps2(p: Pilot) -> Any:
         return None
     lat, lon = p.core.chart.to_e7(p.core.vehicle.true_position)
     return mav.MAVLink_gps2_raw_message(
-        p.core.boot_us, 6, lat, lon, 0, 121, 200, 0, 65535, 10, 0, 0, 0, 0, 300, 300, 0, 0)
+        p.core.boot_us, 6, lat, lon, 0, 121, 200, 0, 65535, 10, 0, 0, 0, 0, 300, 300, 0, 0
+    )
 
 
 def _system_time(p: Pilot) -> Any:
@@ -206,7 +229,7 @@ def _system_time(p: Pilot) -> Any:
 
 def _wind(p: Pilot) -> Any:
     (twd, tws), (east, north) = p.core.vehicle.true_wind, p.ekf.velocity_error_en_mps
-    if (east, north) != (0.0, 0.0):   # it is the apparent wind less the velocity that is believed
+    if (east, north) != (0.0, 0.0):  # it is the apparent wind less the velocity that is believed
         east, north = tws * math.sin(twd) - east, tws * math.cos(twd) - north
         twd, tws = wrap_two_pi(math.atan2(east, north)), math.hypot(east, north)
     return mav.MAVLink_wind_message(math.degrees(twd), tws, 0.0)
@@ -298,9 +321,33 @@ def _high_latency2(p: Pilot) -> Any:
     heading = round(math.degrees(wrap_two_pi(p.core.vehicle.heading)) / 2) % 180
     speed = round(math.hypot(float(s[k.S_VE]), float(s[k.S_VN])) * 5)
     return mav.MAVLink_high_latency2_message(
-        p.core.boot_ms, 11, 3, int(p.helm.mode), lat, lon, 0, 0, heading, 0, min(65535, int(s[k.S_DIST] / 10)), 0, 0,
-        min(255, speed), 0, min(255, round(tws * 5)), round(math.degrees(twd) / 2) % 180, 24, 40, 20, 0,
-        p.core.battery_percent, p.helm.mission.current_seq, 0, 0, 0, 0,
+        p.core.boot_ms,
+        11,
+        3,
+        int(p.helm.mode),
+        lat,
+        lon,
+        0,
+        0,
+        heading,
+        0,
+        min(65535, int(s[k.S_DIST] / 10)),
+        0,
+        0,
+        min(255, speed),
+        0,
+        min(255, round(tws * 5)),
+        round(math.degrees(twd) / 2) % 180,
+        24,
+        40,
+        20,
+        0,
+        p.core.battery_percent,
+        p.helm.mission.current_seq,
+        0,
+        0,
+        0,
+        0,
     )
 
 
@@ -331,9 +378,7 @@ def named_floats(p: Pilot) -> tuple[Any, ...]:
 
 def _rc_channels(p: Pilot) -> Any:
     channels = p.radio.channels_us
-    return mav.MAVLink_rc_channels_message(
-        p.core.boot_ms, len(channels), *channels, *([0] * (18 - len(channels))), 255
-    )
+    return mav.MAVLink_rc_channels_message(p.core.boot_ms, len(channels), *channels, *([0] * (18 - len(channels))), 255)
 
 
 # What is said once a second and never changes is made once.
@@ -369,9 +414,13 @@ BUILDERS: dict[int, Callable[[Pilot], Any]] = {
         0, mav.MAV_LANDED_STATE_ON_GROUND
     ),
     # What there is.
-    mav.MAVLINK_MSG_ID_AHRS2: lambda p: mav.MAVLink_ahrs2_message(
-        0.0, 0.0, p.core.vehicle.heading, 0.0, *(p.core.latlon_e7 if p.core.has_origin else (0, 0))
-    ) if p.core.boot_s > 4.2 else None,
+    mav.MAVLINK_MSG_ID_AHRS2: lambda p: (
+        mav.MAVLink_ahrs2_message(
+            0.0, 0.0, p.core.vehicle.heading, 0.0, *(p.core.latlon_e7 if p.core.has_origin else (0, 0))
+        )
+        if p.core.boot_s > 4.2
+        else None
+    ),
     mav.MAVLINK_MSG_ID_RPM: lambda p: mav.MAVLink_rpm_message(p.core.vehicle.apparent[1], -1.0),
     mav.MAVLINK_MSG_ID_HEARTBEAT: heartbeat,
     mav.MAVLINK_MSG_ID_SYS_STATUS: _sys_status,

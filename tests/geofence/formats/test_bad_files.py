@@ -25,19 +25,22 @@ def found(text: str, extension: str = ".wkt", **options) -> list:
     return [f for f in parse(text.encode(), "f" + extension, extension=extension, **options).findings]  # noqa: C416
 
 
-@pytest.mark.parametrize(("text", "code", "words"), [
-    (f"POLYGON (({SQUARE}))", Code.UNCLOSED, "not closed"),
-    ("POLYGON ((0 0, 0.01 0.01, 0.01 0, 0 0.01, 0 0))", Code.SELF_CROSSING, "a repair would make 2 polygons"),
-    ("\n\nPOLYGON EMPTY", Code.EMPTY, "holds nothing"),
-    ("MULTIPOLYGON EMPTY", Code.EMPTY, "holds nothing"),
-    ("GEOMETRYCOLLECTION EMPTY", Code.EMPTY, "holds nothing"),
-    ("POLYGON ((0 0, 1 0, 0 0))", Code.DEGENERATE, "fewer than three"),
-    ("POLYGON ((50.8 -1.3, 150.9 -1.3, 50.8 -1.2, 50.8 -1.3))", None, ""),
-    ("POLYGON ((-1.3 150.8, -1.2 150.8, -1.3 150.9, -1.3 150.8))", Code.SWAPPED_AXES, "swapped"),
-    ("POLYGON ((-1.3 550.8, -181.2 150.8, -1.3 150.9, -1.3 550.8))", Code.SWAPPED_AXES, "latitude"),
-    (f"SRID=3857;POLYGON (({SQUARE}, 0 0))", Code.WRONG_SRID, "3857"),
-    ("# nothing here but a comment\n", Code.EMPTY, "holds no geometry"),
-])
+@pytest.mark.parametrize(
+    ("text", "code", "words"),
+    [
+        (f"POLYGON (({SQUARE}))", Code.UNCLOSED, "not closed"),
+        ("POLYGON ((0 0, 0.01 0.01, 0.01 0, 0 0.01, 0 0))", Code.SELF_CROSSING, "a repair would make 2 polygons"),
+        ("\n\nPOLYGON EMPTY", Code.EMPTY, "holds nothing"),
+        ("MULTIPOLYGON EMPTY", Code.EMPTY, "holds nothing"),
+        ("GEOMETRYCOLLECTION EMPTY", Code.EMPTY, "holds nothing"),
+        ("POLYGON ((0 0, 1 0, 0 0))", Code.DEGENERATE, "fewer than three"),
+        ("POLYGON ((50.8 -1.3, 150.9 -1.3, 50.8 -1.2, 50.8 -1.3))", None, ""),
+        ("POLYGON ((-1.3 150.8, -1.2 150.8, -1.3 150.9, -1.3 150.8))", Code.SWAPPED_AXES, "swapped"),
+        ("POLYGON ((-1.3 550.8, -181.2 150.8, -1.3 150.9, -1.3 550.8))", Code.SWAPPED_AXES, "latitude"),
+        (f"SRID=3857;POLYGON (({SQUARE}, 0 0))", Code.WRONG_SRID, "3857"),
+        ("# nothing here but a comment\n", Code.EMPTY, "holds no geometry"),
+    ],
+)
 def test_wkt_faults_are_found(text, code, words):
     findings = found(text)
     assert [f.code for f in findings if f.severity is FindingLevel.ERROR] == ([code] if code else [])
@@ -47,20 +50,23 @@ def test_wkt_faults_are_found(text, code, words):
         assert "\n" not in fault.line("f.wkt")
 
 
-@pytest.mark.parametrize(("text", "place"), [
-    ("POLYGON ((0 0, 1 0, 1 1, 0 0", "line 1"),
-    (f"POLYGON (({SQUARE}, 0 0))\nPOLYGON ((0 0, 1 x, 1 1, 0 0))", "line 2"),
-    ("POLYGON ((0 0 0 0 0, 1 1, 1 0, 0 0))", "line 1"),
-    ("POLYGON ((0,5 0,5, 1 1))", "line 1"),
-    ("POLYGON ((nan 0, 1 0, 1 1, nan 0))", "line 1"),
-    ("POLYGON ((0 0, 1 0, 1 inf, 0 0))", "line 1"),
-    ("POLYGON ((0 0, 1e999 0, 1 1, 0 0))", "line 1"),
-    ("CURVEPOLYGON ((0 0, 1 0, 1 1, 0 0))", "line 1"),
-    ("POLYGON ((0 0, 1 0, 1 1, 0 0)))", "line 1"),
-    ("Rock|shoal|POLYGON ((0 0, 1 0, 1 1, 0 0))", "line 1"),
-    ("POLYGON " + "(" * 200 + "0 0" + ")" * 200, "line 1"),
-    ("GEOMETRYCOLLECTION (" * 90 + "POINT (0 0)" + ")" * 90, "line 1"),
-])
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("POLYGON ((0 0, 1 0, 1 1, 0 0", "line 1"),
+        (f"POLYGON (({SQUARE}, 0 0))\nPOLYGON ((0 0, 1 x, 1 1, 0 0))", "line 2"),
+        ("POLYGON ((0 0 0 0 0, 1 1, 1 0, 0 0))", "line 1"),
+        ("POLYGON ((0,5 0,5, 1 1))", "line 1"),
+        ("POLYGON ((nan 0, 1 0, 1 1, nan 0))", "line 1"),
+        ("POLYGON ((0 0, 1 0, 1 inf, 0 0))", "line 1"),
+        ("POLYGON ((0 0, 1e999 0, 1 1, 0 0))", "line 1"),
+        ("CURVEPOLYGON ((0 0, 1 0, 1 1, 0 0))", "line 1"),
+        ("POLYGON ((0 0, 1 0, 1 1, 0 0)))", "line 1"),
+        ("Rock|shoal|POLYGON ((0 0, 1 0, 1 1, 0 0))", "line 1"),
+        ("POLYGON " + "(" * 200 + "0 0" + ")" * 200, "line 1"),
+        ("GEOMETRYCOLLECTION (" * 90 + "POINT (0 0)" + ")" * 90, "line 1"),
+    ],
+)
 def test_text_that_is_no_wkt_is_refused_with_its_line(text, place):
     with pytest.raises(InputError) as error:
         parse(text.encode(), "f.wkt", extension=".wkt")
@@ -68,15 +74,21 @@ def test_text_that_is_no_wkt_is_refused_with_its_line(text, place):
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("text", [
-    "polygon((0 0,0.01 0,0.01 0.01,0 0))", "POLYGON Z ((0 0 5, 0.01 0 5, 0.01 0.01 5, 0 0 5))",
-    "POLYGONZ((0 0 5, 0.01 0 5, 0.01 0.01 5, 0 0 5))", "SRID=4326;POLYGON ((0 0, 0.01 0, 0.01 0.01, 0 0))",
-    "﻿POLYGON ((0 0, 0.01 0,\r\n 0.01 0.01, 0 0))\r\n", "TRIANGLE ((0 0, 0.01 0, 0.01 0.01, 0 0))",
-    "# islands\nHog|exclusion|POLYGON ((0 0, 0.01 0, 0.01 0.01, 0 0)) # a remark",
-    "MULTIPOLYGON (((0 0, 0.01 0, 0.01 0.01, 0 0)))",
-    "GEOMETRYCOLLECTION (POLYGON ((0 0, 0.01 0, 0.01 0.01, 0 0)), GEOMETRYCOLLECTION (POINT (1 1)))",
-    "POLYGON((0 0, 0.01 0, 0.01 0.01, 0 0));",
-])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "polygon((0 0,0.01 0,0.01 0.01,0 0))",
+        "POLYGON Z ((0 0 5, 0.01 0 5, 0.01 0.01 5, 0 0 5))",
+        "POLYGONZ((0 0 5, 0.01 0 5, 0.01 0.01 5, 0 0 5))",
+        "SRID=4326;POLYGON ((0 0, 0.01 0, 0.01 0.01, 0 0))",
+        "﻿POLYGON ((0 0, 0.01 0,\r\n 0.01 0.01, 0 0))\r\n",
+        "TRIANGLE ((0 0, 0.01 0, 0.01 0.01, 0 0))",
+        "# islands\nHog|exclusion|POLYGON ((0 0, 0.01 0, 0.01 0.01, 0 0)) # a remark",
+        "MULTIPOLYGON (((0 0, 0.01 0, 0.01 0.01, 0 0)))",
+        "GEOMETRYCOLLECTION (POLYGON ((0 0, 0.01 0, 0.01 0.01, 0 0)), GEOMETRYCOLLECTION (POINT (1 1)))",
+        "POLYGON((0 0, 0.01 0, 0.01 0.01, 0 0));",
+    ],
+)
 def test_wkt_as_programs_write_it_is_read(text):
     document = parse(text.encode(), "f.wkt", extension=".wkt")
     document.require_clean()
@@ -84,8 +96,11 @@ def test_wkt_as_programs_write_it_is_read(text):
 
 
 def test_kinds_names_and_marks():
-    document = parse(b"Lake|inclusion|POLYGON ((0 0, 1 0, 1 1, 0 0))\nkeep-in|POLYGON ((0 0, 1 0, 1 1, 0 0))\n"
-                     b"MULTIPOINT ((0 0), 1 1)\nWreck|obstacle|LINESTRING (0 0, 1 1)", "f.wkt")
+    document = parse(
+        b"Lake|inclusion|POLYGON ((0 0, 1 0, 1 1, 0 0))\nkeep-in|POLYGON ((0 0, 1 0, 1 1, 0 0))\n"
+        b"MULTIPOINT ((0 0), 1 1)\nWreck|obstacle|LINESTRING (0 0, 1 1)",
+        "f.wkt",
+    )
     assert [(z.name, z.kind) for z in document.zones] == [("Lake", ZoneKind.INCLUSION), ("", ZoneKind.INCLUSION)]
     assert [m.geometry.geom_type for m in document.marks] == ["Point", "Point", "LineString"]
 
@@ -140,37 +155,59 @@ def test_a_repair_never_makes_the_sea_larger(ring, kind):
 
 def encloses(ring, point) -> bool:
     """Whether a ray to the east crosses the ring an odd number of times."""
-    return sum(
-        (y0 > point.y) != (y1 > point.y) and point.x < x0 + (point.y - y0) * (x1 - x0) / (y1 - y0)
-        for (x0, y0), (x1, y1) in itertools.pairwise([*ring, ring[0]])
-    ) % 2 == 1
+    return (
+        sum(
+            (y0 > point.y) != (y1 > point.y) and point.x < x0 + (point.y - y0) * (x1 - x0) / (y1 - y0)
+            for (x0, y0), (x1, y1) in itertools.pairwise([*ring, ring[0]])
+        )
+        % 2
+        == 1
+    )
 
 
-@pytest.mark.parametrize(("text", "extension", "place"), [
-    ('{"type": "FeatureCollection", "features": [{"geometry": {"type": "Polygon", "coordinates": [[[0, "x"]]]}}]}',
-     ".geojson", "features[0].geometry.coordinates[0][0][1]"),
-    ('{"type": "FeatureCollection",\n "features": [', ".geojson", "line 2"),
-    ('{"type": "Polygon", "coordinates": [[[0, NaN]]]}', ".geojson", "line 1"),
-    ('{"type": "Polygon", "coordinates": [[[0, 1e999]]]}', ".geojson", "line 1"),
-    ('{"type": "Circle", "coordinates": []}', ".geojson", "coordinates"),
-    ('{"type": "Feature", "properties": {"kind": "maybe"}, "geometry": {"type": "Point", "coordinates": [0, 0]}}',
-     ".geojson", "properties.kind"),
-    ('{"fileType": "GeoFence"}', ".plan", "fileType"),
-    ('{"fileType": "Plan", "mission": {"items": [{"type": "SimpleItem", "command": 16, "params": [0, 0]}]}}',
-     ".plan", "mission.items[0].params"),
-    ("QGC WPL 100\n", ".waypoints", "line 1"),
-    ("QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t43.6\t-72.1\t0\n", ".waypoints", "line 2"),
-    ("QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\tinf\t-72.1\t0\t1\n", ".waypoints", "line 2 lat"),
-    ("QGC WPL 110\n0\t1\t0\t16.5\t0\t0\t0\t0\t1\t-72.1\t0\t1\n", ".waypoints", "line 2 command"),
-    ("43.66 -72.15\n43.66 -72.15 1 1\n", ".fen", "line 2"),
-    ("<gpx version='1.1'><rte><rtept lat='1' lon='2'></rte></gpx>", ".gpx", "line 1 column 50"),
-    ("<gpx version='1.1'><wpt lat='1' lon='200'/></gpx>", ".gpx", "wpt 1"),
-    ("<gpx version='1.1'><wpt lat='nan' lon='20'/></gpx>", ".gpx", "wpt 1"),
-    ("<kml><Placemark><Point><coordinates>1;2</coordinates></Point></Placemark></kml>", ".kml", "Placemark 1"),
-    ("<html></html>", ".kml", "line 1"),
-    ("hello, sailor", ".txt", "line 1"),
-    ("", ".wkt", ""),
-])
+@pytest.mark.parametrize(
+    ("text", "extension", "place"),
+    [
+        (
+            (
+                '{"type": "FeatureCollection", "features": ['
+                '{"geometry": {"type": "Polygon", "coordinates": [[[0, "x"]]]}}]}'
+            ),
+            ".geojson",
+            "features[0].geometry.coordinates[0][0][1]",
+        ),
+        ('{"type": "FeatureCollection",\n "features": [', ".geojson", "line 2"),
+        ('{"type": "Polygon", "coordinates": [[[0, NaN]]]}', ".geojson", "line 1"),
+        ('{"type": "Polygon", "coordinates": [[[0, 1e999]]]}', ".geojson", "line 1"),
+        ('{"type": "Circle", "coordinates": []}', ".geojson", "coordinates"),
+        (
+            (
+                '{"type": "Feature", "properties": {"kind": "maybe"},'
+                ' "geometry": {"type": "Point", "coordinates": [0, 0]}}'
+            ),
+            ".geojson",
+            "properties.kind",
+        ),
+        ('{"fileType": "GeoFence"}', ".plan", "fileType"),
+        (
+            '{"fileType": "Plan", "mission": {"items": [{"type": "SimpleItem", "command": 16, "params": [0, 0]}]}}',
+            ".plan",
+            "mission.items[0].params",
+        ),
+        ("QGC WPL 100\n", ".waypoints", "line 1"),
+        ("QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t43.6\t-72.1\t0\n", ".waypoints", "line 2"),
+        ("QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\tinf\t-72.1\t0\t1\n", ".waypoints", "line 2 lat"),
+        ("QGC WPL 110\n0\t1\t0\t16.5\t0\t0\t0\t0\t1\t-72.1\t0\t1\n", ".waypoints", "line 2 command"),
+        ("43.66 -72.15\n43.66 -72.15 1 1\n", ".fen", "line 2"),
+        ("<gpx version='1.1'><rte><rtept lat='1' lon='2'></rte></gpx>", ".gpx", "line 1 column 50"),
+        ("<gpx version='1.1'><wpt lat='1' lon='200'/></gpx>", ".gpx", "wpt 1"),
+        ("<gpx version='1.1'><wpt lat='nan' lon='20'/></gpx>", ".gpx", "wpt 1"),
+        ("<kml><Placemark><Point><coordinates>1;2</coordinates></Point></Placemark></kml>", ".kml", "Placemark 1"),
+        ("<html></html>", ".kml", "line 1"),
+        ("hello, sailor", ".txt", "line 1"),
+        ("", ".wkt", ""),
+    ],
+)
 def test_other_formats_name_the_place(text, extension, place):
     with pytest.raises(InputError) as error:
         parse(text.encode(), "f" + extension, extension=extension)
@@ -218,8 +255,15 @@ def test_a_zip_bomb_is_refused():
 
 
 def test_encodings_and_decimal_commas():
-    lines = ["#saved by Mission Planner 1.3", "43,6607 -72,1500", "43,6600 -72,1510", "43,6600 -72,1490",
-             "43,6615 -72,1490", "43,6600 -72,1510", ""]
+    lines = [
+        "#saved by Mission Planner 1.3",
+        "43,6607 -72,1500",
+        "43,6600 -72,1510",
+        "43,6600 -72,1490",
+        "43,6615 -72,1490",
+        "43,6600 -72,1510",
+        "",
+    ]
     text = "\r\n".join(lines)
     for data in (text.encode(), b"\xef\xbb\xbf" + text.encode(), text.encode("utf-16")):
         document = parse(data, "f.fen", extension=".fen")
@@ -232,23 +276,23 @@ def test_encodings_and_decimal_commas():
 GOOD = {
     ".wkt": b"Rock|exclusion|POLYGON ((0 0, 0.01 0, 0.01 0.01, 0 0.01, 0 0))\nPOINT (0.1 0.1)\n",
     ".geojson": b'{"type":"FeatureCollection","features":[{"type":"Feature","properties":{"kind":"exclusion"},'
-                b'"geometry":{"type":"Polygon","coordinates":[[[0,0],[0.01,0],[0.01,0.01],[0,0]]]}}]}',
+    b'"geometry":{"type":"Polygon","coordinates":[[[0,0],[0.01,0],[0.01,0.01],[0,0]]]}}]}',
     ".plan": b'{"fileType":"Plan","version":1,"mission":{"items":[],"plannedHomePosition":[0,0,0]},'
-             b'"geoFence":{"circles":[{"inclusion":false,"circle":{"center":[0.001,0.001],"radius":30}}],"polygons":'
-             b'[{"inclusion":true,"polygon":[[0,0],[0.01,0],[0.01,0.01]]}]},"rallyPoints":{"points":[[0,0,0]]}}',
+    b'"geoFence":{"circles":[{"inclusion":false,"circle":{"center":[0.001,0.001],"radius":30}}],"polygons":'
+    b'[{"inclusion":true,"polygon":[[0,0],[0.01,0],[0.01,0.01]]}]},"rallyPoints":{"points":[[0,0,0]]}}',
     ".waypoints": b"QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t1.0\t2.0\t0\t1\n1\t0\t3\t16\t0\t0\t0\t0\t1.0\t2.1\t0\t1\n",
     ".fen": b"0.001 0.001\n0 0\n0 0.01\n0.01 0.01\n0 0\n",
     ".poly": b"0 0\n0 0.01\n0.01 0.01\n0 0\n",
     ".gpx": b"<gpx version='1.1'><rte><rtept lat='1' lon='2'><name>A</name></rtept></rte></gpx>",
     ".kml": b"<kml><Document><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>0,0 0.01,0 0.01,0.01 0,0"
-            b"</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></Document></kml>",
+    b"</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></Document></kml>",
     ".rally": b"RALLY\t0.001\t0.001\t40\t20\t0\t0\n",
     ".ewkt": b"SRID=4326;POLYGON ((0 0, 0.01 0, 0.01 0.01, 0 0.01, 0 0))\n",
 }
 
 
 def test_every_format_has_a_file_to_be_changed():
-    assert set(GOOD) == {row.endings[0] for row in FORMATS if row.name != "kmz"}   # a KMZ is a KML, packed
+    assert set(GOOD) == {row.endings[0] for row in FORMATS if row.name != "kmz"}  # a KMZ is a KML, packed
     assert len({ending for row in FORMATS for ending in row.endings}) == sum(len(row.endings) for row in FORMATS)
 
 
@@ -277,13 +321,32 @@ def test_fuzzed_files_are_refused_in_one_line_or_read(extension, data):
     elif how == "noise":
         bad = good[:at] + data.draw(st.binary(max_size=8)) + good[at:]
     elif how == "change":
-        bad = good[:at] + data.draw(st.binary(min_size=1, max_size=4)) + good[at + 2:]
+        bad = good[:at] + data.draw(st.binary(min_size=1, max_size=4)) + good[at + 2 :]
     elif how == "word":
-        word = data.draw(st.sampled_from([b"nan", b"-inf", b"1e999", b"null", b"[]", b"{}", b"()", b"EMPTY", b"0,5",
-                                          b"\x00", b"\xff\xfe", b"<!--", b"&amp;", b"-", b"99999999999999999999"]))
-        bad = good[:at] + word + good[at + data.draw(st.integers(0, 5)):]
+        word = data.draw(
+            st.sampled_from(
+                [
+                    b"nan",
+                    b"-inf",
+                    b"1e999",
+                    b"null",
+                    b"[]",
+                    b"{}",
+                    b"()",
+                    b"EMPTY",
+                    b"0,5",
+                    b"\x00",
+                    b"\xff\xfe",
+                    b"<!--",
+                    b"&amp;",
+                    b"-",
+                    b"99999999999999999999",
+                ]
+            )
+        )
+        bad = good[:at] + word + good[at + data.draw(st.integers(0, 5)) :]
     else:
-        bad = good[:at] + good[max(0, at - 40):]
+        bad = good[:at] + good[max(0, at - 40) :]
     document = refused_or_read(bad, extension)
     if document is None:
         return

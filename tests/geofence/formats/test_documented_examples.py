@@ -72,7 +72,9 @@ def test_qgroundcontrol_plan():
     assert document.home == GeoPoint(lat_deg=43.66, lon_deg=-72.15)
     assert [(i.command, i.lat_e7, i.lon_e7) for i in document.items] == [(16, 436612345, -721487654)]
     assert [(z.kind, isinstance(z.shape, Circle)) for z in document.zones] == [
-        (ZoneKind.INCLUSION, False), (ZoneKind.EXCLUSION, True)]
+        (ZoneKind.INCLUSION, False),
+        (ZoneKind.EXCLUSION, True),
+    ]
     assert len(document.rally) == 1
 
 

@@ -96,7 +96,10 @@ def test_mavsdk_imports_our_plans_and_waypoints(tmp_path):
     with boat_process("--warm", "--moored") as (host, _, udp):
         done = subprocess.run(
             [sys.executable, "-c", _IMPORT, host, str(udp), str(tmp_path / "demo.plan"), str(tmp_path / "m.waypoints")],
-            capture_output=True, text=True, timeout=60, check=False,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
         )
     assert done.returncode == 0, done.stdout + done.stderr
     found = json.loads(done.stdout.splitlines()[-1])
@@ -106,13 +109,16 @@ def test_mavsdk_imports_our_plans_and_waypoints(tmp_path):
     assert sorted(map(tuple, found["fence"])) == sorted((i.command, i.lat_e7, i.lon_e7, i.params[0]) for i in fence)
     # MAVSDK puts home in front a second time and leaves jumps as they were (which is why we read .waypoints ourselves)
     rows = [(i.command, i.lat_e7, i.lon_e7) for i in mission.items]
-    assert [tuple(r[:3]) for r in found["wpl"]][-len(rows):] == rows
+    assert [tuple(r[:3]) for r in found["wpl"]][-len(rows) :] == rows
 
 
 def companion(*argv) -> tuple[int, str, str]:
     done = subprocess.run(
         [sys.executable, "-m", "companion.cli", *map(str, argv)],
-        capture_output=True, text=True, timeout=90, check=False,
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
     )
     return done.returncode, done.stdout, done.stderr
 
@@ -181,8 +187,24 @@ def test_shore_tools_against_the_real_ardurover(tmp_path):
     folder.mkdir()
     with (folder / "log").open("w") as log:
         boat = subprocess.Popen(
-            [str(program), "--model", "sailboat", "--speedup", "4", f"-I{instance}", "--home", "50.817,-1.31,0,0",
-             "--defaults", str(DEFAULTS), "-w", "--serial0", "tcp:0"], cwd=folder, stdout=log, stderr=log,
+            [
+                str(program),
+                "--model",
+                "sailboat",
+                "--speedup",
+                "4",
+                f"-I{instance}",
+                "--home",
+                "50.817,-1.31,0,0",
+                "--defaults",
+                str(DEFAULTS),
+                "-w",
+                "--serial0",
+                "tcp:0",
+            ],
+            cwd=folder,
+            stdout=log,
+            stderr=log,
         )
     try:
         link = f"tcp:127.0.0.1:{5760 + 10 * instance}"
@@ -249,13 +271,17 @@ def test_a_link_that_dies_in_a_transfer_is_an_error(tmp_path):
     udp = free_port(socket.SOCK_DGRAM)
     boat = subprocess.Popen(
         [sys.executable, "-m", "sitl.cli", "boat", "--port", "0", "--udp", str(udp), "--warm", "--moored"],
-        stdout=subprocess.PIPE, text=True,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     try:
         assert boat.stdout.readline().startswith("sitl boat:")
         done = subprocess.run(
             [sys.executable, "-c", script, f"udpout:127.0.0.1:{udp}", str(boat.pid)],
-            capture_output=True, text=True, timeout=60, check=False,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
         )
     finally:
         boat.terminate()

@@ -30,13 +30,17 @@ def pin(lat, lon):
     return f"<Point><coordinates>{lon},{lat}</coordinates></Point>"
 
 
-@pytest.mark.parametrize("argv", [
-    ("mission", "convert", DEMO, "out.plan"), ("mission", "convert", DEMO, "out.toml"),
-    ("fence", "convert", DEMO, "out.kml"),
-    ("mission", "new", "out.toml", "--start", HERE, "--goal", THERE),
-    ("mission", "download", "out.plan", "--link", "udpin:127.0.0.1:1"),
-    ("fence", "download", "out.plan", "--link", "udpin:127.0.0.1:1"),
-])
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ("mission", "convert", DEMO, "out.plan"),
+        ("mission", "convert", DEMO, "out.toml"),
+        ("fence", "convert", DEMO, "out.kml"),
+        ("mission", "new", "out.toml", "--start", HERE, "--goal", THERE),
+        ("mission", "download", "out.plan", "--link", "udpin:127.0.0.1:1"),
+        ("fence", "download", "out.plan", "--link", "udpin:127.0.0.1:1"),
+    ],
+)
 def test_no_file_is_overwritten_without_force(capsys, tmp_path, monkeypatch, argv):
     monkeypatch.chdir(tmp_path)
     out = pathlib.Path(next(a for a in argv if str(a).startswith("out.")))
@@ -97,15 +101,20 @@ def test_our_own_mission_is_no_obstacle(capsys, tmp_path, name):
 
 def test_a_strangers_line_is_still_a_danger(tmp_path):
     path = tmp_path / "cable.gpx"
-    path.write_text('<gpx version="1.1" creator="x"><rte><rtept lat="50" lon="1"/>'
-                    '<rtept lat="50.1" lon="1"/></rte></gpx>')
+    path.write_text(
+        '<gpx version="1.1" creator="x"><rte><rtept lat="50" lon="1"/><rtept lat="50.1" lon="1"/></rte></gpx>'
+    )
     assert len(read(path, areas=True).marks) == 1
     assert len(read(path).items) == 2
 
 
 def test_pins_are_goals(capsys, tmp_path):
-    drawing = kml(tmp_path / "bay.kml", ("Start", pin(50.8170, -1.3100)), ("North mark", pin(50.8203, -1.3101)),
-                  ("Pier", pin(50.8190, -1.3110)))
+    drawing = kml(
+        tmp_path / "bay.kml",
+        ("Start", pin(50.8170, -1.3100)),
+        ("North mark", pin(50.8203, -1.3101)),
+        ("Pier", pin(50.8190, -1.3110)),
+    )
     code, out, _ = run(capsys, "mission", "new", tmp_path / "bay.toml", "--from", drawing)
     assert code == 0
     assert "2 pins taken for places to sail to, in the file's order, the one called start for the start" in out
@@ -113,7 +122,7 @@ def test_pins_are_goals(capsys, tmp_path):
     assert [g.name for g in mission.goals] == ["North mark", "Pier"]
     assert mission.start.lat_deg == pytest.approx(50.8170)
     assert mission.area.obstacles == ()
-    assert len(read(drawing, areas=True).marks) == 3   # on a chart of dangers they are dangers
+    assert len(read(drawing, areas=True).marks) == 3  # on a chart of dangers they are dangers
 
 
 def test_pins_beside_a_line_and_pins_with_a_kind_are_dangers(tmp_path):
@@ -150,7 +159,7 @@ def test_point_obstacles_are_drawn_when_their_radius_is_given(capsys, tmp_path, 
     rocks.write_text("POINT (-1.31 50.819)\nLINESTRING (-1.311 50.819, -1.311 50.8195)\n")
     code, out, _ = run(capsys, "fence", "convert", rocks, tmp_path / name)
     assert code == 1
-    if name == "rocks.fen":   # one keep-in ring, whatever the radius
+    if name == "rocks.fen":  # one keep-in ring, whatever the radius
         return
     assert "2 point or line obstacles are not carried by this format; say --point-radius M to draw them" in out
     assert run(capsys, "fence", "convert", rocks, tmp_path / name, "--point-radius", "15")[0] == 0
@@ -163,15 +172,31 @@ def test_point_obstacles_are_drawn_when_their_radius_is_given(capsys, tmp_path, 
 def test_the_point_radius_reaches_the_mission(capsys, tmp_path):
     rocks = tmp_path / "rocks.wkt"
     rocks.write_text("POINT (-1.31 50.819)\n")
-    assert run(capsys, "mission", "new", tmp_path / "m.toml", "--start", HERE, "--goal", THERE, "--land", rocks,
-               "--point-radius", "25")[0] == 0
+    assert (
+        run(
+            capsys,
+            "mission",
+            "new",
+            tmp_path / "m.toml",
+            "--start",
+            HERE,
+            "--goal",
+            THERE,
+            "--land",
+            rocks,
+            "--point-radius",
+            "25",
+        )[0]
+        == 0
+    )
     assert load_mission(tmp_path / "m.toml").area.obstacles[0].shape.radius_m == 25.0
 
 
 def test_what_an_upload_leaves_out_is_said(capsys, tmp_path):
     run(capsys, "mission", "convert", DEMO, tmp_path / "m.plan")
-    code, out, _ = run(capsys, "mission", "upload", tmp_path / "m.plan", "--link", "udpin:127.0.0.1:1",
-                       "--timeout", "0.1")
+    code, out, _ = run(
+        capsys, "mission", "upload", tmp_path / "m.plan", "--link", "udpin:127.0.0.1:1", "--timeout", "0.1"
+    )
     assert code == 1
     assert "keep-out zones" in out
     assert "left out with --part mission" in out
@@ -183,14 +208,17 @@ def test_what_is_written_is_what_is_counted(capsys, tmp_path):
     _, out, _ = run(capsys, "fence", "convert", drawing, tmp_path / "a.wkt")
     written = out.splitlines()[-1]
     assert "keep-out zones" in written
-    assert "mission item" not in written   # they are not in it
+    assert "mission item" not in written  # they are not in it
 
 
-@pytest.mark.parametrize(("line", "choices"), [
-    ('[[goal]]\nlat = 50.0\nlon = 1.0\nrounding = "left"\n', 'write "port" or "starboard"'),
-    ('[[goal]]\nlat = 50.0\nlon = 1.0\n[area]\naxis = "xy"\n', 'write "auto" or "lonlat" or "latlon"'),
-    ('[[goal]]\nlat = 50.0\nlon = 1.0\n[skipper]\nend = "stop"\n', 'write "loiter" or "home"'),
-])
+@pytest.mark.parametrize(
+    ("line", "choices"),
+    [
+        ('[[goal]]\nlat = 50.0\nlon = 1.0\nrounding = "left"\n', 'write "port" or "starboard"'),
+        ('[[goal]]\nlat = 50.0\nlon = 1.0\n[area]\naxis = "xy"\n', 'write "auto" or "lonlat" or "latlon"'),
+        ('[[goal]]\nlat = 50.0\nlon = 1.0\n[skipper]\nend = "stop"\n', 'write "loiter" or "home"'),
+    ],
+)
 def test_a_wrong_word_is_told_its_choices(capsys, tmp_path, line, choices):
     (tmp_path / "m.toml").write_text(line)
     code, _, err = run(capsys, "mission", "check", tmp_path / "m.toml")

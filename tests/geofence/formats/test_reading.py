@@ -26,7 +26,7 @@ def work(format_name, text):
             return None
         nonlocal done
         done += 1
-        made = dict(frame.f_locals)   # name -> the value that it had: what is handed in is no work
+        made = dict(frame.f_locals)  # name -> the value that it had: what is handed in is no work
 
         def line(frame, *_):
             nonlocal done

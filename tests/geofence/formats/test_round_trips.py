@@ -16,8 +16,17 @@ from tests.geofence.strategies import QUIET, documents
 
 SETTINGS = settings(**QUIET, max_examples=40)
 EXTENSION = {
-    "wkt": ".wkt", "ewkt": ".wkt", "geojson": ".geojson", "plan": ".plan", "waypoints": ".waypoints", "fen": ".fen",
-    "poly": ".poly", "gpx": ".gpx", "kml": ".kml", "kmz": ".kmz", "rally": ".rally",
+    "wkt": ".wkt",
+    "ewkt": ".wkt",
+    "geojson": ".geojson",
+    "plan": ".plan",
+    "waypoints": ".waypoints",
+    "fen": ".fen",
+    "poly": ".poly",
+    "gpx": ".gpx",
+    "kml": ".kml",
+    "kmz": ".kmz",
+    "rally": ".rally",
 }
 
 
@@ -76,8 +85,18 @@ def test_waypoints_carry_missions(document):
 
 
 @SETTINGS
-@given(documents(zone_count=(1, 5), item_count=(0, 0), holes=False, rally=False, tracks=False, marks=False,
-                 names=False, margins=False))
+@given(
+    documents(
+        zone_count=(1, 5),
+        item_count=(0, 0),
+        holes=False,
+        rally=False,
+        tracks=False,
+        marks=False,
+        names=False,
+        margins=False,
+    )
+)
 def test_waypoints_carry_fences(document):
     back, losses = there_and_back(replace(document, home=None), "waypoints", part="fence")
     assert losses == ()  # all coordinates are on the wire's lattice
@@ -86,8 +105,12 @@ def test_waypoints_carry_fences(document):
 
 
 @SETTINGS
-@given(documents(zone_count=(1, 5), item_count=(0, 0), circles=False, margins=False, rally=False, tracks=False,
-                 extras=False), st.sampled_from(["wkt", "ewkt"]))
+@given(
+    documents(
+        zone_count=(1, 5), item_count=(0, 0), circles=False, margins=False, rally=False, tracks=False, extras=False
+    ),
+    st.sampled_from(["wkt", "ewkt"]),
+)
 def test_wkt_carries_polygons_and_marks(document, name):
     back, losses = there_and_back(document, name)
     assert losses == ()
@@ -126,8 +149,20 @@ def test_kml_carries_routes_areas_and_tracks(document, name):
 
 
 @SETTINGS
-@given(documents(zone_count=(1, 1), item_count=(0, 0), circles=False, holes=False, names=False, margins=False,
-                 marks=False, rally=False, tracks=False, kinds=ZoneKind.INCLUSION))
+@given(
+    documents(
+        zone_count=(1, 1),
+        item_count=(0, 0),
+        circles=False,
+        holes=False,
+        names=False,
+        margins=False,
+        marks=False,
+        rally=False,
+        tracks=False,
+        kinds=ZoneKind.INCLUSION,
+    )
+)
 def test_fen_carries_one_ring_and_the_return_point(document):
     back, losses = there_and_back(replace(document, home=None), "fen")
     assert [zone_key(z) for z in back.zones] == [zone_key(z) for z in document.zones]
@@ -135,8 +170,21 @@ def test_fen_carries_one_ring_and_the_return_point(document):
 
 
 @SETTINGS
-@given(documents(zone_count=(1, 1), item_count=(0, 0), circles=False, holes=False, names=False, margins=False,
-                 marks=False, rally=False, tracks=False, kinds=ZoneKind.EXCLUSION, extras=False))
+@given(
+    documents(
+        zone_count=(1, 1),
+        item_count=(0, 0),
+        circles=False,
+        holes=False,
+        names=False,
+        margins=False,
+        marks=False,
+        rally=False,
+        tracks=False,
+        kinds=ZoneKind.EXCLUSION,
+        extras=False,
+    )
+)
 def test_poly_carries_one_ring(document):
     back, _ = there_and_back(document, "poly")
     assert [zone_key(z) for z in back.zones] == [zone_key(z) for z in document.zones]
@@ -150,8 +198,9 @@ def water(document: Document) -> shapely.Geometry:
     sea = shapely.box(*shapely.total_bounds([drawn(z) for z in document.zones]))
     for polygon in inside:
         sea = shapely.intersection(sea, polygon)
-    return shapely.difference(sea, shapely.union_all([drawn(z) for z in document.zones
-                                                      if z.kind is ZoneKind.EXCLUSION] or [Polygon()]))
+    return shapely.difference(
+        sea, shapely.union_all([drawn(z) for z in document.zones if z.kind is ZoneKind.EXCLUSION] or [Polygon()])
+    )
 
 
 PAIRS = list(itertools.permutations(["wkt", "geojson", "plan", "waypoints", "gpx", "kml"], 2))

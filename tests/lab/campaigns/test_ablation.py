@@ -65,8 +65,12 @@ def test_the_voyage_is_planned_so(tmp_path, name, is_certain):
     scenario = load_scenario(UPWIND)
     run_virtual(run_embedded(scenario, UPWIND, 0, tmp_path, variation=VARIATIONS[name]))
     rows = [json.loads(line) for line in (tmp_path / "decisions.jsonl").read_text().splitlines()]
-    half = [leg["no_go_half_deg"] for row in rows if row["kind"] == "plan" and row.get("plan")
-            for leg in row["plan"]["legs"]]
+    half = [
+        leg["no_go_half_deg"]
+        for row in rows
+        if row["kind"] == "plan" and row.get("plan")
+        for leg in row["plan"]["legs"]
+    ]
     least = mission_of(scenario, UPWIND).options.boat.no_go_half_deg
     assert half
     if is_certain:
@@ -76,14 +80,30 @@ def test_the_voyage_is_planned_so(tmp_path, name, is_certain):
 
 
 def record(variation, seed, time_s, **more):
-    return {"variation": variation, "seed": seed, "error": "", "arrived": True, "contacts": 0, "time_s": time_s,
-            "tacks": 3, "min_clearance_m": 12.0, "no_go_entries": 0, "floor_m": 6.0, **more}
+    return {
+        "variation": variation,
+        "seed": seed,
+        "error": "",
+        "arrived": True,
+        "contacts": 0,
+        "time_s": time_s,
+        "tacks": 3,
+        "min_clearance_m": 12.0,
+        "no_go_entries": 0,
+        "floor_m": 6.0,
+        **more,
+    }
 
 
 def test_times_are_paired_and_only_of_those_that_both_arrived():
-    records = [record(AS_IT_IS, 0, 100.0), record(AS_IT_IS, 1, 200.0), record(AS_IT_IS, 2, 50.0, arrived=False),
-               record("kalman", 0, 110.0), record("kalman", 1, 220.0, min_clearance_m=5.9),
-               record("kalman", 2, 9000.0, contacts=2)]
+    records = [
+        record(AS_IT_IS, 0, 100.0),
+        record(AS_IT_IS, 1, 200.0),
+        record(AS_IT_IS, 2, 50.0, arrived=False),
+        record("kalman", 0, 110.0),
+        record("kalman", 1, 220.0, min_clearance_m=5.9),
+        record("kalman", 2, 9000.0, contacts=2),
+    ]
     kalman = table(records, [AS_IT_IS, "kalman"]).splitlines()[2].split()
     assert kalman[:4] == ["kalman", "3/3", "1", "1"]
     assert " ".join(kalman[-4:]) == "1.100 (1.100 to 1.100)"
@@ -114,7 +134,7 @@ def test_a_voyage_of_each_is_sailed_and_written(tmp_path, capsys):
     assert head["campaign"] == "ablate"
     assert [line["key"]["variation"] for line in lines] == [AS_IT_IS, "no spread"]
     assert "1/1" in printed
-    out.write_text(first[:-20])   # interrupted in a line: what was sailed before it is not sailed again
+    out.write_text(first[:-20])  # interrupted in a line: what was sailed before it is not sailed again
     assert cli.main(words) == 0
     assert out.read_text() == first
     assert capsys.readouterr().out == printed

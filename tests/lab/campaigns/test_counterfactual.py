@@ -42,12 +42,15 @@ def test_of_a_jump_that_is_resisted_nothing_can_be_known_before_it_is_taken():
     assert moments((resisted,), CAUSES["false position"], 130.0, ALWAYS) == [122.0]
 
 
-@pytest.mark.parametrize(("reach", "first"), [
-    (Reach(lives=((0.0, 300.0),), link_up=((0.0, True), (95.0, False), (108.0, True)), operator_s=()), 108.0),
-    (Reach(lives=((0.0, 90.0), (105.0, 300.0)), link_up=((0.0, True),), operator_s=()), 105.0),
-    (Reach(lives=((0.0, 300.0),), link_up=((0.0, True),), operator_s=((98.0, 106.0),)), 106.0),
-    (Reach(lives=((0.0, 90.0),), link_up=((0.0, True),), operator_s=()), None),
-])
+@pytest.mark.parametrize(
+    ("reach", "first"),
+    [
+        (Reach(lives=((0.0, 300.0),), link_up=((0.0, True), (95.0, False), (108.0, True)), operator_s=()), 108.0),
+        (Reach(lives=((0.0, 90.0), (105.0, 300.0)), link_up=((0.0, True),), operator_s=()), 105.0),
+        (Reach(lives=((0.0, 300.0),), link_up=((0.0, True),), operator_s=((98.0, 106.0),)), 106.0),
+        (Reach(lives=((0.0, 90.0),), link_up=((0.0, True),), operator_s=()), None),
+    ],
+)
 def test_he_is_as_blind_and_as_deaf_as_the_companion(reach, first):
     assert moments((JUMP,), CAUSES["false position"], 112.0, reach) == ([] if first is None else [first])
 
@@ -56,8 +59,12 @@ def test_the_hand_takes_the_companions_place_for_good():
     from companion.messages import Mode
 
     sailed = by_hand(scenario(GUST, JUMP, KILL), 102.0, Mode.LOITER, 140.0)
-    assert kinds(sailed) == [("wind_speed", 50.0, None), ("gps_jump", 100.0, None), ("kill_companion", 102.0, None),
-                             ("mode", 102.0, "LOITER")]
+    assert kinds(sailed) == [
+        ("wind_speed", 50.0, None),
+        ("gps_jump", 100.0, None),
+        ("kill_companion", 102.0, None),
+        ("mode", 102.0, "LOITER"),
+    ]
     assert sailed.limit_s == 141.0
     assert kinds(by_hand(scenario(JUMP), 102.0, None, 140.0))[-1] == ("kill_companion", 102.0, None)
     assert kinds(without(scenario(GUST, JUMP), "false position")) == [("wind_speed", 50.0, None)]
@@ -76,15 +83,19 @@ def test_what_another_hand_avoids_is_not_excused():
         return 115.0 + (GAINED_S + 5.0 if loiters else 3.0)
 
     assert avoidable(scenario(JUMP), "false position", 115.0, ALWAYS, touches) == (
-        "a skipper who loiters at 102 s touches nothing")
+        "a skipper who loiters at 102 s touches nothing"
+    )
 
 
-@pytest.mark.parametrize(("changes", "more", "is_helped"), [
-    ({}, (), True),
-    ({"set_auto": False}, (), False),
-    ({}, (EventSpec(at_s=90.0, kind="foreign_mission"),), False),   # nothing is ordered while it is on board
-    ({}, (EventSpec(at_s=110.0, kind="foreign_mission"),), True),
-])
+@pytest.mark.parametrize(
+    ("changes", "more", "is_helped"),
+    [
+        ({}, (), True),
+        ({"set_auto": False}, (), False),
+        ({}, (EventSpec(at_s=90.0, kind="foreign_mission"),), False),  # nothing is ordered while it is on board
+        ({}, (EventSpec(at_s=110.0, kind="foreign_mission"),), True),
+    ],
+)
 def test_the_skipper_orders_no_more_than_the_companion_may(changes, more, is_helped):
     import msgspec
 

@@ -7,7 +7,7 @@ import pytest
 from lab.campaigns.encounters import KINDS, POLICIES, draw, encounters, job_of, row, sail
 from sitl.options import CampaignOptions
 
-EXPLAINED = {("sailing", "rules"): {72, 85}}   # docs/reference/traffic.md
+EXPLAINED = {("sailing", "rules"): {72, 85}}  # docs/reference/traffic.md
 
 
 def test_a_seed_draws_the_same_encounter_and_another_seed_another():
@@ -26,8 +26,9 @@ def test_every_sort_of_vessel_watch_and_receiver_is_drawn(kind):
     assert {e.every_s for e in events} == {2.0, 6.0, 10.0}
     assert 10 < sum("shoal" in s.mission for s in drawn) < 45
     crafts = {e.craft for e in events}
-    assert crafts == ({"sail"} if kind == "sailing" else {
-        "power", "fishing", "restricted", "not under command", "draught"})
+    assert crafts == (
+        {"sail"} if kind == "sailing" else {"power", "fishing", "restricted", "not under command", "draught"}
+    )
     assert all(s.limit_s <= 330.0 for s in drawn)
 
 
@@ -39,8 +40,9 @@ def test_a_handful_is_sailed_by_the_rules(kind, seed):
 
 def test_without_the_policy_the_distance_is_kept_and_nobody_is_stood_on_to():
     """A motor ship crosses and keeps her course."""
-    seed = next(n for n in range(100) if (e := draw(n, "crossing", "rules").events[0]).craft == "power"
-                and e.manner == "keeps")
+    seed = next(
+        n for n in range(100) if (e := draw(n, "crossing", "rules").events[0]).craft == "power" and e.manner == "keeps"
+    )
     record = sail(job_of("crossing", "keep clear", seed))
     assert record["passed"], record
     assert record["met"]["duty"] == "we stand on"

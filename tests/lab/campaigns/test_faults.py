@@ -91,23 +91,29 @@ def test_what_is_drawn_beside_a_seeds_own_faults_is_drawn_apart_and_leaves_them(
     assert {e.state for events in extra for e in events if e.kind == "disk"} == {"full", "read_only"}
     assert any({"gps_jump", "vane", "disk"} <= {e.kind for e in events} for events in extra)
     assert any(not events for events in extra)
-    assert all(e.at_s + (e.for_s or 0.0) < more.limit_s for _, more in together for e in more.events
-               if e.kind == "gps_jump")
+    assert all(
+        e.at_s + (e.for_s or 0.0) < more.limit_s for _, more in together for e in more.events if e.kind == "gps_jump"
+    )
     one_by_one = [draw(seed, base) for seed in range(20)]
     for name in BESIDE:
         one_by_one = [beside(seed, (name,), base, drawn) for seed, drawn in enumerate(one_by_one)]
     assert [sorted(one.events, key=str) for one in one_by_one] == [
-        sorted(more.events, key=str) for _, more in together[:20]]
+        sorted(more.events, key=str) for _, more in together[:20]
+    ]
     assert [beside(seed, ("guidance", "planner"), base) for seed in range(5)] == [plain for plain, _ in together[:5]]
 
 
 def test_a_vane_that_is_turned_far_is_a_false_wind_while_it_is():
     turned = EventSpec(at_s=10.0, kind="vane", state="offset", value_deg=-90.0, for_s=20.0)
-    written = [EventSpec(at_s=40.0, kind="parameter", parameter="WNDVN_DIR_OFS", value=70.0),
-               EventSpec(at_s=60.0, kind="parameter", parameter="WNDVN_DIR_OFS", value=0.0)]
-    others = [EventSpec(at_s=5.0, kind="vane", state="offset", value_deg=40.0),
-              EventSpec(at_s=5.0, kind="vane", state="spikes", value_deg=170.0),
-              EventSpec(at_s=5.0, kind="parameter", parameter="FENCE_RADIUS", value=100.0)]
+    written = [
+        EventSpec(at_s=40.0, kind="parameter", parameter="WNDVN_DIR_OFS", value=70.0),
+        EventSpec(at_s=60.0, kind="parameter", parameter="WNDVN_DIR_OFS", value=0.0),
+    ]
+    others = [
+        EventSpec(at_s=5.0, kind="vane", state="offset", value_deg=40.0),
+        EventSpec(at_s=5.0, kind="vane", state="spikes", value_deg=170.0),
+        EventSpec(at_s=5.0, kind="parameter", parameter="FENCE_RADIUS", value=100.0),
+    ]
     assert false_wind_spans([turned, *written, *others], 100.0) == [(10.0, 30.0), (40.0, 60.0)]
     assert false_wind_spans(written[:1], 100.0) == [(40.0, 100.0)]
     assert not any(false_wind_spans(draw(seed, load_scenario(BASE)).events, 300.0) for seed in range(50))
@@ -137,9 +143,33 @@ def drawn():
 def test_every_kind_of_fault_is_drawn_and_within_the_voyage(drawn):
     events = [e for scenario in drawn for e in scenario.events]
     assert {e.kind for e in events} == {
-        "link_quality", "link_cut", "link_half", "vane", "compass", "gps_jump", "gps_lost", "wind_shift", "wind_speed",
-        "current", "crew", "kill_planner", "planner_hang", "kill_companion", "disk", "reboot", "mode", "arm",
-        "foreign_mission", "battery", "radio_lost", "station", "knockdown", "neighbour", "spoof", "parameter", "leak",
+        "link_quality",
+        "link_cut",
+        "link_half",
+        "vane",
+        "compass",
+        "gps_jump",
+        "gps_lost",
+        "wind_shift",
+        "wind_speed",
+        "current",
+        "crew",
+        "kill_planner",
+        "planner_hang",
+        "kill_companion",
+        "disk",
+        "reboot",
+        "mode",
+        "arm",
+        "foreign_mission",
+        "battery",
+        "radio_lost",
+        "station",
+        "knockdown",
+        "neighbour",
+        "spoof",
+        "parameter",
+        "leak",
     }
     assert all(0.0 <= e.at_s < scenario.limit_s for scenario in drawn for e in scenario.events)
     assert {e.state for e in events if e.kind == "vane"} == {"frozen", "offset", "spikes"}
@@ -168,8 +198,9 @@ def test_every_failsafe_of_the_autopilot_is_drawn_with_its_actions_and_without_t
 
 def test_what_takes_long_is_rare_and_leaves_the_voyage_time(drawn):
     """A voyage that ends in the middle of half an hour's calm proves nothing; a campaign of them takes a day."""
-    long = [(s, e) for s in drawn for e in s.events
-            if e.kind in {"wind_speed", "link_cut"} and (e.for_s or 0.0) > 300.0]
+    long = [
+        (s, e) for s in drawn for e in s.events if e.kind in {"wind_speed", "link_cut"} and (e.for_s or 0.0) > 300.0
+    ]
     assert all(s.limit_s >= e.at_s + e.for_s for s, e in long)
     assert max(e.for_s for _, e in long if e.kind == "wind_speed") > 1200.0
     assert max(e.for_s for _, e in long if e.kind == "link_cut") > 2400.0
@@ -187,8 +218,9 @@ def test_a_voyage_with_faults_repeats_exactly(seed, tmp_path):
 
 
 def jumps(seeds, base):
-    return [draw_jump(seed, base, start_en=(0.0, 0.0), goal_en=(0.0, 170.0), solids_en=((10.0, 90.0),))
-            for seed in seeds]
+    return [
+        draw_jump(seed, base, start_en=(0.0, 0.0), goal_en=(0.0, 170.0), solids_en=((10.0, 90.0),)) for seed in seeds
+    ]
 
 
 def test_false_positions_are_drawn_of_every_kind_and_mode_and_within_their_bounds():
@@ -208,12 +240,16 @@ def test_false_positions_are_drawn_of_every_kind_and_mode_and_within_their_bound
 
 def test_a_false_position_that_only_ours_touched_by_is_a_fault_of_its_class():
     plain = {"kind": "followed", "mode": "by plan", "size": "to 100 m", "arrived": True, "simulated_s": 1.0}
-    table = jump_figures([
-        {**plain, "seed": 0, "passed": False, "touched_s": [80.0], "held_touched_s": []},
-        {**plain, "seed": 5, "passed": True, "touched_s": [], "held_touched_s": [90.0]}])
+    table = jump_figures(
+        [
+            {**plain, "seed": 0, "passed": False, "touched_s": [80.0], "held_touched_s": []},
+            {**plain, "seed": 5, "passed": True, "touched_s": [], "held_touched_s": [90.0]},
+        ]
+    )
     assert table["failed_seeds"] == [0]
     assert {(r["class"], r["touched"], r["held_touched"]) for r in table["classes"]} == {
-        (name, 1, 1) for name in ("followed", "followed, to 100 m", "by plan", "all")}
+        (name, 1, 1) for name in ("followed", "followed, to 100 m", "by plan", "all")
+    }
 
 
 # What the campaign found: a mission written one by one over a bad link (233), sails set on a position that had just
@@ -239,8 +275,7 @@ def test_nor_does_one_that_the_campaign_or_the_search_found(seed):
 # Explained in docs/lab/campaigns.md and not mended; whoever mends one moves it up.
 @pytest.mark.campaign
 @pytest.mark.xfail(strict=True, reason="found and not mended")
-@pytest.mark.parametrize("seed", [
-    198, 106980778, 1261850702, 1494742110, 1632617857, 1896519915, 2045914046])
+@pytest.mark.parametrize("seed", [198, 106980778, 1261850702, 1494742110, 1632617857, 1896519915, 2045914046])
 def test_what_was_found_and_is_not_mended_fails_still(seed):
     assert all(sail_kept(seed, again)["passed"] for again in range(6))
 
@@ -275,13 +310,14 @@ def test_what_comes_below_the_floor_in_ordinary_weather_fails(tmp_path):
         text = (BASE.parents[3] / "missions" / name).read_text() + (beside if name == "rocks.wkt" else "")
         (tmp_path / name).write_text(text.replace("margin_floor_m = 6.0", "margin_floor_m = 12.0"))
     base = tmp_path / "s.toml"
-    kept = (SEEDS / "9.toml").read_text()          # a gust, long after the rocks
+    kept = (SEEDS / "9.toml").read_text()  # a gust, long after the rocks
     base.write_text(kept.replace("../../../../missions/rocks.toml", "rocks.toml"))
     record = sailed(base, 9)
     assert record["weather_only"]
     assert not record["passed"]
     assert record["faults"] == [
-        f"{record['clearance_m']:.1f} m clear at {record['clearance_t_s']:.0f} s, in ordinary weather"]
+        f"{record['clearance_m']:.1f} m clear at {record['clearance_t_s']:.0f} s, in ordinary weather"
+    ]
 
 
 @dataclass
@@ -293,13 +329,26 @@ class Ghost:
     items: list = field(default_factory=list)
     link: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(is_up=True))
 
-    def at(self, east, north, *, believed=None, mode=Mode.AUTO, for_s=0.25, is_armed=True, fails=False,
-           stopped_by="", tws_mps=5.0, current_en_mps=(0.0, 0.0)):
+    def at(
+        self,
+        east,
+        north,
+        *,
+        believed=None,
+        mode=Mode.AUTO,
+        for_s=0.25,
+        is_armed=True,
+        fails=False,
+        stopped_by="",
+        tws_mps=5.0,
+        current_en_mps=(0.0, 0.0),
+    ):
         geo = self.watch.frame.geo_from_en
         point, seen = geo(east, north), geo(*(believed or (east, north)))
         autopilot = SimpleNamespace(
-            truth=SimpleNamespace(position=point, heading_rad=0.0, is_armed=is_armed, mode=mode,
-                                  tws_mps=tws_mps, twd_from_rad=0.0),
+            truth=SimpleNamespace(
+                position=point, heading_rad=0.0, is_armed=is_armed, mode=mode, tws_mps=tws_mps, twd_from_rad=0.0
+            ),
             core=SimpleNamespace(
                 chart=SimpleNamespace(point=lambda _: seen),
                 vehicle=SimpleNamespace(position=None, current_en_mps=current_en_mps),
@@ -340,19 +389,28 @@ def test_a_contact_is_excused_only_by_what_nobody_could_help(ghost):
     ghost.at(0.0, 0.0)
     touch(ghost)
     touch(ghost, believed=(40.0, 0.0), clear_s=REACTION_S - 2.0)
-    touch(ghost)                                       # right again, but only just
-    touch(ghost, believed=(12.0, 0.0))                 # wrong, but in the rock by its own belief
-    touch(ghost, mode=Mode.HOLD)                       # stopped, and free to be sailed
+    touch(ghost)  # right again, but only just
+    touch(ghost, believed=(12.0, 0.0))  # wrong, but in the rock by its own belief
+    touch(ghost, mode=Mode.HOLD)  # stopped, and free to be sailed
     touch(ghost, mode=Mode.HOLD, fails=True, clear_s=RESUME_S - 2.0)
-    touch(ghost)                                       # just let go by the failsafe
+    touch(ghost)  # just let go by the failsafe
     touch(ghost, mode=Mode.MANUAL, is_armed=False, fails=True)
     ghost.watch.operator_s = [(ghost.t_s, ghost.t_s + 20.0)]
     touch(ghost, mode=Mode.MANUAL, clear_s=20.0 + REACTION_S - 1.0)
-    touch(ghost)                                       # just given back
+    touch(ghost)  # just given back
     touch(ghost)
     assert excuses(ghost) == [
-        "unexcused", "false position", "false position", "unexcused", "unexcused", "autopilot refuses",
-        "autopilot refuses", "autopilot refuses", "operator", "operator", "unexcused",
+        "unexcused",
+        "false position",
+        "false position",
+        "unexcused",
+        "unexcused",
+        "autopilot refuses",
+        "autopilot refuses",
+        "autopilot refuses",
+        "operator",
+        "operator",
+        "unexcused",
     ]
     assert set(excuses(ghost)) < {*EXCUSES, "unexcused"}
     assert ghost.watch.clearance_m()[0] == 0.0
@@ -367,7 +425,7 @@ def test_a_corner_that_is_cut_between_two_looks_is_a_contact(ghost):
 def test_a_boat_that_was_stopped_is_excused_while_nobody_reaches_it(ghost):
     ghost.at(0.0, 0.0)
     ghost.link.is_up = False
-    touch(ghost)                                       # under way: the mission on board must be safe
+    touch(ghost)  # under way: the mission on board must be safe
     touch(ghost, mode=Mode.HOLD)
     ghost.link.is_up = True
     ghost.watch.lives = [(0.0, ghost.t_s)]
@@ -382,20 +440,23 @@ def test_what_a_failsafe_stopped_is_told_from_what_was_stopped_by_nobody(ghost):
     ghost.at(0.0, 0.0)
     touch(ghost, mode=Mode.HOLD, stopped_by="action")
     touch(ghost, mode=Mode.HOLD, stopped_by="crash", clear_s=REACTION_S - 1.0)
-    touch(ghost)                                       # just given back
-    touch(ghost, stopped_by="action")                  # in AUTO: it was ended
+    touch(ghost)  # just given back
+    touch(ghost, stopped_by="action")  # in AUTO: it was ended
     assert excuses(ghost) == ["failsafe", "crash", "crash", "unexcused"]
     assert len(ghost.watch.reach().stopped_s) == 2
 
 
-@pytest.mark.parametrize(("carried_s", "called_s", "tws_mps", "excuse"), [
-    (400.0, 250.0, 0.0, "drift"),           # two minutes and a half before
-    (400.0, 300.0, 0.0, "unexcused"),       # too late for a crew
-    (400.0, None, 0.0, "unexcused"),
-    (90.0, 345.0, 0.0, "drift"),            # there was no more time, and it was said within a minute of its beginning
-    (90.0, 375.0, 0.0, "unexcused"),
-    (400.0, 250.0, 5.0, "unexcused"),       # there was wind to sail by
-])
+@pytest.mark.parametrize(
+    ("carried_s", "called_s", "tws_mps", "excuse"),
+    [
+        (400.0, 250.0, 0.0, "drift"),  # two minutes and a half before
+        (400.0, 300.0, 0.0, "unexcused"),  # too late for a crew
+        (400.0, None, 0.0, "unexcused"),
+        (90.0, 345.0, 0.0, "drift"),  # there was no more time, and it was said within a minute of its beginning
+        (90.0, 375.0, 0.0, "unexcused"),
+        (400.0, 250.0, 5.0, "unexcused"),  # there was wind to sail by
+    ],
+)
 def test_a_drift_ashore_is_excused_where_the_crew_was_called_in_time(ghost, carried_s, called_s, tws_mps, excuse):
     ghost.at(0.0, 0.0, for_s=400.0 - carried_s)
     ghost.at(0.0, 0.0, for_s=carried_s, tws_mps=tws_mps, current_en_mps=(0.3, 0.0))
@@ -408,8 +469,14 @@ def test_when_a_person_had_the_boat():
     def mode(at_s, name):
         return EventSpec(at_s=at_s, kind="mode", mode=name)
 
-    events = [mode(10.0, "HOLD"), mode(15.0, "RTL"), mode(20.0, "AUTO"), mode(30.0, "AUTO"), mode(40.0, "LOITER"),
-              EventSpec(at_s=12.0, kind="reboot")]
+    events = [
+        mode(10.0, "HOLD"),
+        mode(15.0, "RTL"),
+        mode(20.0, "AUTO"),
+        mode(30.0, "AUTO"),
+        mode(40.0, "LOITER"),
+        EventSpec(at_s=12.0, kind="reboot"),
+    ]
     assert operator_spans(events, 60.0) == [(10.0, 20.0), (40.0, 60.0)]
     assert operator_spans(events[:4], 60.0) == [(10.0, 20.0)]
 
@@ -435,8 +502,10 @@ def test_what_is_on_board_is_whole_or_a_beginning_that_ends_at_a_waypoint_of_its
         assert ghost.watch.mixture_s() > 0.0, items
 
 
-@pytest.mark.parametrize(("for_s", "then", "is_mixture"), [
-    (0.5, [item(16, 9, 9)], False), (3.0, [item(16, 9, 9)], True), (0.5, [item(16, 1, 1), item(17, 4, 4)], True)])
+@pytest.mark.parametrize(
+    ("for_s", "then", "is_mixture"),
+    [(0.5, [item(16, 9, 9)], False), (3.0, [item(16, 9, 9)], True), (0.5, [item(16, 1, 1), item(17, 4, 4)], True)],
+)
 def test_what_a_stranger_s_upload_leaves_on_board_for_a_moment_is_his(ghost, for_s, then, is_mixture):
     """Seeds 744 and 949: his count had cut our mission to its first item, his own item was not written yet."""
     ours = [item(16, 1, 1), item(16, 2, 2), item(17, 4, 4)]

@@ -33,8 +33,10 @@ from sitl.world.environment import Constant
 
 DOCUMENT = Path("docs/reference/mavlink.md")
 # Names of messages in the code that are not read there: sent, asked for, or counted.
-NOT_READ = {("MISSION_CLEAR_ALL", "mavsdk_session"), *((name, "doctor") for name in (
-    "WIND", "GLOBAL_POSITION_INT", "ATTITUDE", "MISSION_CURRENT", "EKF_STATUS_REPORT"))}
+NOT_READ = {
+    ("MISSION_CLEAR_ALL", "mavsdk_session"),
+    *((name, "doctor") for name in ("WIND", "GLOBAL_POSITION_INT", "ATTITUDE", "MISSION_CURRENT", "EKF_STATUS_REPORT")),
+}
 TABLES = {"streams", "safety", "reads"}
 KEY = b"0123456789abcdef" * 2
 
@@ -51,7 +53,9 @@ def table():
 def test_the_table_of_messages_is_that_of_the_code():
     names = {kind.msgname for kind in wire.mavlink_map.values()}
     found = {
-        (node.value, path.stem) for path in Path("companion").rglob("*.py") if path.stem not in TABLES
+        (node.value, path.stem)
+        for path in Path("companion").rglob("*.py")
+        if path.stem not in TABLES
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value in names
     }
@@ -150,18 +154,23 @@ def test_between_a_live_boat_and_a_companion_it_passes_on_and_adds_its_own():
     assert not stats.faults
 
 
-@pytest.mark.parametrize(("argv", "words"), [
-    (["--boat", "udpout:10.0.0.1:14555", "--companion", "udpout:127.0.0.1:9"], "is not on the loopback"),
-    (["--boat", "/dev/null", "--companion", "udpout:127.0.0.1:9"], "is not on the loopback"),
-    (["--boat", "udpout:127.0.0.1:9"], "only one of them is given"),
-    (["--boat", "udpout:127.0.0.1:9", "--companion", "udpout:127.0.0.1:9", "--rate", "1e9"], "at most 500"),
-    (["--boat", "udpout:127.0.0.1:9", "--companion", "udpout:127.0.0.1:9", "--rate", "nan"], "at most 500"),
-    (["--boat", "udpout:127.0.0.1:9", "--companion", "udpout:127.0.0.1:9", "--count", "0"],
-     "at least 1 and at most 100000"),
-    (["--boat", "udpout:127.0.0.1:9", "--companion", "udpout:127.0.0.1:9", "--message", "FOO"], "--list"),
-    (["--document", "nowhere.md"], "cannot be read"),
-    (["--document", "README.md"], "is not in the file"),
-])
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["--boat", "udpout:10.0.0.1:14555", "--companion", "udpout:127.0.0.1:9"], "is not on the loopback"),
+        (["--boat", "/dev/null", "--companion", "udpout:127.0.0.1:9"], "is not on the loopback"),
+        (["--boat", "udpout:127.0.0.1:9"], "only one of them is given"),
+        (["--boat", "udpout:127.0.0.1:9", "--companion", "udpout:127.0.0.1:9", "--rate", "1e9"], "at most 500"),
+        (["--boat", "udpout:127.0.0.1:9", "--companion", "udpout:127.0.0.1:9", "--rate", "nan"], "at most 500"),
+        (
+            ["--boat", "udpout:127.0.0.1:9", "--companion", "udpout:127.0.0.1:9", "--count", "0"],
+            "at least 1 and at most 100000",
+        ),
+        (["--boat", "udpout:127.0.0.1:9", "--companion", "udpout:127.0.0.1:9", "--message", "FOO"], "--list"),
+        (["--document", "nowhere.md"], "cannot be read"),
+        (["--document", "README.md"], "is not in the file"),
+    ],
+)
 def test_bad_usage_is_one_line_and_nothing_is_sent(capsys, argv, words):
     assert cli.main(["hostile", *argv]) == 2
     err = capsys.readouterr().err

@@ -56,7 +56,10 @@ def test_a_method_is_a_missions_keys_and_guided_is_permitted_for_it():
     planned = Variation(tables={"skipper": {"autopilot_beats": False}})
     changed = Method(guidance="heading", planner="astar").variation(demo, planned).mission(demo)
     assert (changed.skipper.guidance, changed.skipper.planner, changed.skipper.autopilot_beats) == (
-        "heading", "astar", False)
+        "heading",
+        "astar",
+        False,
+    )
     assert changed.operator.guided
     assert not demo.operator.guided
 
@@ -107,8 +110,10 @@ def test_the_options():
     assert told == ["in AUTO, planner astar", "by heading, planner astar"]
 
 
-@pytest.mark.parametrize("words", [
-    ["faults", "--draw", "weather"], ["mismatch", "--draw", "guidance,"], ["campaign", "x.toml", "--planner", "mine"]])
+@pytest.mark.parametrize(
+    "words",
+    [["faults", "--draw", "weather"], ["mismatch", "--draw", "guidance,"], ["campaign", "x.toml", "--planner", "mine"]],
+)
 def test_what_cannot_be_drawn_is_refused(words, capsys):
     assert cli.main(words) == 2
     assert "is none of" in capsys.readouterr().err

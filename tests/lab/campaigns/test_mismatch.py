@@ -26,7 +26,7 @@ from sitl import cli
 from sitl.runner import ResultStore
 from sitl.scenario import HullSpec, SensorsSpec
 
-ROCKS = next(n for n, path in enumerate(WATERS) if path.stem == "rocks")   # a seed on the shortest water
+ROCKS = next(n for n, path in enumerate(WATERS) if path.stem == "rocks")  # a seed on the shortest water
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_a_seed_is_one_boat(drawn):
 
 
 def test_all_waters_take_turns_and_every_kind_comes(drawn):
-    assert [d.source for d in drawn[:len(WATERS)]] == list(WATERS)
+    assert [d.source for d in drawn[: len(WATERS)]] == list(WATERS)
     assert {kind for d in drawn for kind in d.kinds} == set(KINDS)
 
 
@@ -63,7 +63,7 @@ def test_what_is_drawn_is_what_its_name_says_and_within_what_was_asked_for(drawn
 
 
 def test_the_control_is_the_same_water_and_wind_and_nothing_else(drawn):
-    for seed, other in enumerate(drawn[:len(WATERS)]):
+    for seed, other in enumerate(drawn[: len(WATERS)]):
         control = draw(seed, only=())
         assert (control.source, control.kinds) == (other.source, ())
         assert control.scenario.wind.tws_mps == other.scenario.wind.tws_mps
@@ -72,7 +72,7 @@ def test_the_control_is_the_same_water_and_wind_and_nothing_else(drawn):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_kind_alone_is_in_every_voyage_of_the_same_water_and_wind(drawn, kind):
-    for seed, other in enumerate(drawn[:len(WATERS)]):
+    for seed, other in enumerate(drawn[: len(WATERS)]):
         alone = draw(seed, only=(kind,))
         assert (alone.source, alone.kinds) == (other.source, (kind,))
         assert alone.scenario.wind.tws_mps == other.scenario.wind.tws_mps
@@ -98,21 +98,52 @@ def test_a_voyage_is_judged_kept_and_repeats(tmp_path, capsys):
 
 def record(seed, *, kinds=(), passed=True, clear_m=12.0, time_s=100.0, arrived=True, legs=()):
     return {
-        "seed": seed, "scenario": "demo", "planned": False, "as_planned": False, "kinds": list(kinds),
-        "drawn": {}, "floor_m": 8.0, "passed": passed, "faults": [] if passed else ["contacts: 1"],
+        "seed": seed,
+        "scenario": "demo",
+        "planned": False,
+        "as_planned": False,
+        "kinds": list(kinds),
+        "drawn": {},
+        "floor_m": 8.0,
+        "passed": passed,
+        "faults": [] if passed else ["contacts: 1"],
         "below_floor": clear_m < 8.0,
-        "arrived": arrived, "contacts": int(not passed), "time_s": time_s, "tacks": 3, "min_clearance_m": clear_m,
-        "silence_s": 1.0, "replans": 2, "promised_risk": 0.1, "no_go_entries": 0, "end_reason": "arrived",
-        "path_risk": 0.2, "alerts": {}, "promised_s": 100.0, "legs": list(legs)}
+        "arrived": arrived,
+        "contacts": int(not passed),
+        "time_s": time_s,
+        "tacks": 3,
+        "min_clearance_m": clear_m,
+        "silence_s": 1.0,
+        "replans": 2,
+        "promised_risk": 0.1,
+        "no_go_entries": 0,
+        "end_reason": "arrived",
+        "path_risk": 0.2,
+        "alerts": {},
+        "promised_s": 100.0,
+        "legs": list(legs),
+    }
 
 
 RECORDS = [
-    record(0, kinds=("vane",), legs=[{"promised": 0.1, "came": True, "is_beat": False},
-                                     {"promised": 0.5, "came": True, "is_beat": True}]),
+    record(
+        0,
+        kinds=("vane",),
+        legs=[{"promised": 0.1, "came": True, "is_beat": False}, {"promised": 0.5, "came": True, "is_beat": True}],
+    ),
     record(1, kinds=("vane", "gusts"), clear_m=3.0, time_s=140.0),
     record(2, kinds=("gusts",), passed=False, clear_m=0.0, arrived=False),
-    {"seed": 3, "scenario": "gates", "planned": False, "as_planned": False, "kinds": [], "drawn": {},
-     "floor_m": None, "passed": False, "faults": ["unhandled: x"]},
+    {
+        "seed": 3,
+        "scenario": "gates",
+        "planned": False,
+        "as_planned": False,
+        "kinds": [],
+        "drawn": {},
+        "floor_m": None,
+        "passed": False,
+        "faults": ["unhandled: x"],
+    },
 ]
 
 
@@ -161,18 +192,23 @@ def test_a_leg_is_held_against_the_newest_plan_that_has_it(tmp_path):
         return json.dumps({"t_s": t_s, "kind": "plan", "plan": {"cost_s": 90.0 + t_s, "legs": [leg]}}) + "\n"
 
     (tmp_path / "decisions.jsonl").write_text(plan(1.0, 60.0) + plan(50.0, 45.0) + '{"t_s": 60, "ki')
-    sailed = [SailedSpan(t_s=t, end_en_m=end, course_rad=course, bow_rad=math.pi / 2.0, twd_from_rad=twd)
-              for t, end, course, twd in ((20.0, (100.1, 0.0), math.pi / 2.0, 0.0), (70.0, (100.0, 0.1), 1.0, 1.2),
-                                          (80.0, (120.0, 0.0), 1.0, 0.0))]
+    sailed = [
+        SailedSpan(t_s=t, end_en_m=end, course_rad=course, bow_rad=math.pi / 2.0, twd_from_rad=twd)
+        for t, end, course, twd in (
+            (20.0, (100.1, 0.0), math.pi / 2.0, 0.0),
+            (70.0, (100.0, 0.1), 1.0, 1.2),
+            (80.0, (120.0, 0.0), 1.0, 0.0),
+        )
+    ]
     found = legs_promised(tmp_path, sailed, math.radians(45.0))
     assert [leg["came"] for leg in found] == [False, True]
-    assert found[0]["promised"] == pytest.approx(0.0668, abs=1e-3)   # 1.5 sigma off
+    assert found[0]["promised"] == pytest.approx(0.0668, abs=1e-3)  # 1.5 sigma off
     assert found[1]["promised"] == pytest.approx(0.5, abs=1e-3)
     assert [leg["course_off_deg"] for leg in found] == [0.0, pytest.approx(math.degrees(1.0) - 90.0, abs=0.01)]
     assert found[1]["off_deg"] == pytest.approx(math.degrees(1.2 - math.pi / 2.0) - 45.0, abs=0.01)
     assert promised_s(tmp_path) == 91.0
     assert promised_s(tmp_path / "none") is None
-    assert arrival_promised(tmp_path) is None     # a record from before plans said so
+    assert arrival_promised(tmp_path) is None  # a record from before plans said so
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(1.0, 3.0), st.floats(-0.2, 0.2))

@@ -12,8 +12,16 @@ BEAT = SCENARIO_FOLDER / "figures" / "beat-500.toml"
 
 
 def record(who, seed, time_s, **more):
-    return {"who": who, "scenario": "a", "seed": seed, "arrived": True, "contacts": 0, "time_s": time_s, "tacks": 3,
-            **more}
+    return {
+        "who": who,
+        "scenario": "a",
+        "seed": seed,
+        "arrived": True,
+        "contacts": 0,
+        "time_s": time_s,
+        "tacks": 3,
+        **more,
+    }
 
 
 def job_of(who, wind=None):
@@ -25,16 +33,22 @@ def test_the_command_knows_the_sailors_that_there_are():
 
 
 def test_only_clean_pairs_of_a_seed_count():
-    records = [record("alone", 0, 100.0, best_s=90.0), record("alone", 1, 200.0, best_s=180.0),
-               record("alone", 2, 100.0, best_s=90.0), record("alone", 3, 1.0, best_s=1.0),
-               record("she", 0, 95.0), record("she", 1, 204.0), record("she", 2, 50.0, contacts=1),
-               {**record("she", 4, 1.0)}]
+    records = [
+        record("alone", 0, 100.0, best_s=90.0),
+        record("alone", 1, 200.0, best_s=180.0),
+        record("alone", 2, 100.0, best_s=90.0),
+        record("alone", 3, 1.0, best_s=1.0),
+        record("she", 0, 95.0),
+        record("she", 1, 204.0),
+        record("she", 2, 50.0, contacts=1),
+        {**record("she", 4, 1.0)},
+    ]
     (row,) = pairs(records, "alone").splitlines()[2:]
     cells = [cell.strip() for cell in row.strip("|").split("|")]
     assert cells[:5] == ["a", "she", "2 of 3", "150", "150"]
-    assert cells[5] == "-0.3"                                     # 149.5 of 150
-    assert cells[6].startswith("-1.6 (")                          # the root of 0.95 * 1.02
-    assert cells[7:] == ["+2.0", "3", "3"]                        # of 30 s that were possible 5 less 4
+    assert cells[5] == "-0.3"  # 149.5 of 150
+    assert cells[6].startswith("-1.6 (")  # the root of 0.95 * 1.02
+    assert cells[7:] == ["+2.0", "3", "3"]  # of 30 s that were possible 5 less 4
 
 
 def test_a_sailor_without_a_clean_pair_has_no_figures():
@@ -65,10 +79,27 @@ def test_what_is_no_wind_is_refused(wind, capsys):
 
 
 def test_by_the_shifts_she_is_held_against_ardurover_alone(tmp_path, capsys):
-    argv = ["baselines", "--who", "shifts", "alone-embedded", "--seeds", "1", "--scenarios", str(BEAT),
-            "--winds", "9,28", "--against", "alone-embedded", "--out", str(tmp_path / "b.jsonl")]
+    argv = [
+        "baselines",
+        "--who",
+        "shifts",
+        "alone-embedded",
+        "--seeds",
+        "1",
+        "--scenarios",
+        str(BEAT),
+        "--winds",
+        "9,28",
+        "--against",
+        "alone-embedded",
+        "--out",
+        str(tmp_path / "b.jsonl"),
+    ]
     assert cli.main(argv) == 0
     said = capsys.readouterr().out
-    (row,) = [line for line in said.splitlines() if line.startswith("| beat-500, 9°, 28 s | companion, by shifts | 1 |")
-              and "(" in line]
+    (row,) = [
+        line
+        for line in said.splitlines()
+        if line.startswith("| beat-500, 9°, 28 s | companion, by shifts | 1 |") and "(" in line
+    ]
     assert float(row.split("|")[6]) < 0.0

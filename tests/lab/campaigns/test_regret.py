@@ -12,8 +12,19 @@ from sitl.runner import SCENARIO_FOLDER
 
 
 def record(seed, time_s, who="companion", **more):
-    return {"who": who, "scenario": "demo", "seed": seed, "contacts": 0, "time_s": time_s, "tacks": 3, "best_s": 100.0,
-            "bound_s": 98.0, "coarser_s": 101.0, "best_tacks": 2, **more}
+    return {
+        "who": who,
+        "scenario": "demo",
+        "seed": seed,
+        "contacts": 0,
+        "time_s": time_s,
+        "tacks": 3,
+        "best_s": 100.0,
+        "bound_s": 98.0,
+        "coarser_s": 101.0,
+        "best_tacks": 2,
+        **more,
+    }
 
 
 def test_only_clean_arrivals_count():
@@ -40,8 +51,19 @@ def test_what_the_clairvoyant_cannot_sail_is_refused(name):
 
 def test_a_voyage_is_held_against_the_best_and_drawn(tmp_path, capsys):
     out, picture = tmp_path / "regret.json", tmp_path / "regret.png"
-    argv = ["regret", "--who", "alone-embedded", "--seeds", "1", "--scenarios", str(SCENARIO_FOLDER / "upwind.toml"),
-            "--json", str(out), "--plot", str(picture)]
+    argv = [
+        "regret",
+        "--who",
+        "alone-embedded",
+        "--seeds",
+        "1",
+        "--scenarios",
+        str(SCENARIO_FOLDER / "upwind.toml"),
+        "--json",
+        str(out),
+        "--plot",
+        str(picture),
+    ]
     assert cli.main(argv) == 0
     (row,) = json.loads(out.read_text())
     assert row["sailor"] == "alone, embedded"

@@ -11,9 +11,21 @@ from sitl.runner import ResultStore
 
 
 def voyage(seed, legs, *, kinds=(), clear_m=12.0, time_s=110.0, **also):
-    return {"seed": seed, "scenario": "demo", "planned": True, "as_planned": not kinds, "kinds": list(kinds),
-            "passed": True, "legs": legs, "below_floor": clear_m < 8.0, "min_clearance_m": clear_m, "arrived": True,
-            "time_s": time_s, "promised_s": 100.0, **also}
+    return {
+        "seed": seed,
+        "scenario": "demo",
+        "planned": True,
+        "as_planned": not kinds,
+        "kinds": list(kinds),
+        "passed": True,
+        "legs": legs,
+        "below_floor": clear_m < 8.0,
+        "min_clearance_m": clear_m,
+        "arrived": True,
+        "time_s": time_s,
+        "promised_s": 100.0,
+        **also,
+    }
 
 
 def honest(count, factor=1.0):
@@ -23,15 +35,22 @@ def honest(count, factor=1.0):
         legs = []
         for _ in range(10):
             promised = rng.choice((0.01, 0.08, 0.3))
-            legs.append({"promised": promised, "came": rng.random() < factor * promised, "is_beat": False,
-                         "sigma_deg": 10.0, "off_deg": rng.gauss(0.0, 10.0 * factor)})
+            legs.append(
+                {
+                    "promised": promised,
+                    "came": rng.random() < factor * promised,
+                    "is_beat": False,
+                    "sigma_deg": 10.0,
+                    "off_deg": rng.gauss(0.0, 10.0 * factor),
+                }
+            )
         beat = {"promised": 0.9, "came": False, "is_beat": True, "sigma_deg": 9.0, "off_deg": 90.0}
         yield voyage(seed, [*legs, beat])
 
 
 def test_promises_that_are_kept_lie_in_the_intervals():
     bins = no_go_curve(list(honest(300)))
-    assert [b.name for b in bins] == ["0.001 to 0.02", "0.05 to 0.1", "0.2 to 0.5"]   # beats are not promised
+    assert [b.name for b in bins] == ["0.001 to 0.02", "0.05 to 0.1", "0.2 to 0.5"]  # beats are not promised
     assert sum(b.of for b in bins) == 3000
     assert all(b.interval[0] <= b.promised <= b.interval[1] for b in bins)
 
@@ -62,15 +81,21 @@ def test_a_leg_that_was_begun_elsewhere_is_no_promise_of_the_wind():
 
 def test_the_floor_is_counted_by_how_much_differs():
     records = [voyage(n, [], kinds=["x"] * n, clear_m=12.0 - n) for n in range(9)]
-    records.append(voyage(9, [], kinds=["x"], clear_m=9.0, min_clearance_m=None))   # open water
+    records.append(voyage(9, [], kinds=["x"], clear_m=9.0, min_clearance_m=None))  # open water
     bins = floor_curve(records)
     assert [(b.name, b.came, b.of) for b in bins] == [
-        ("0", 0, 1), ("1 to 3", 0, 3), ("4 to 5", 1, 2), ("6 to 7", 2, 2), ("8 to 10", 1, 1)]
+        ("0", 0, 1),
+        ("1 to 3", 0, 3),
+        ("4 to 5", 1, 2),
+        ("6 to 7", 2, 2),
+        ("8 to 10", 1, 1),
+    ]
 
 
 def test_times_are_of_arrivals_only():
-    assert time_shares([voyage(0, []), voyage(1, [], time_s=90.0), voyage(2, [], arrived=False),
-                        voyage(3, [], promised_s=None)]) == [0.9, 1.1]
+    assert time_shares(
+        [voyage(0, []), voyage(1, [], time_s=90.0), voyage(2, [], arrived=False), voyage(3, [], promised_s=None)]
+    ) == [0.9, 1.1]
     assert "later than the expected time: 1 of 2" in told([voyage(0, []), voyage(1, [], time_s=90.0)])
 
 
@@ -80,7 +105,10 @@ def test_arrivals_are_held_against_each_quantile_that_was_stated():
     records += [voyage(3, [], arrived=False, arrival=stated), voyage(4, [])]
     bins = late_curve(records)
     assert [(b.name, b.promised, b.came, b.of) for b in bins] == [
-        ("after 10 %", 0.9, 2, 3), ("after 50 %", 0.5, 1, 3), ("after 90 %", pytest.approx(0.1), 0, 3)]
+        ("after 10 %", 0.9, 2, 3),
+        ("after 50 %", 0.5, 1, 3),
+        ("after 90 %", pytest.approx(0.1), 0, 3),
+    ]
     assert "later than the plan's quantiles of arrival" in told(records)
 
 

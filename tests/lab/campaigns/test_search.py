@@ -80,12 +80,22 @@ def test_the_chance_of_a_level_is_about_true():
 
 def test_what_is_found_is_left_as_a_scenario_that_repeats_it(tmp_path, monkeypatch, capsys):
     """Sailing is left out: the third voyage of the second generation touches."""
+
     def results(experiment, options):
         names = [experiment.key(job) for job in experiment.jobs]
         assert len({name["number"] for name in names}) == len(names)
-        records = [{"number": n, "seed": job.seed, "score_m": 5.0 + n % 3, "drawn": ["gusts"],
-                    "violates": n == 6, "passed": True, "faults": ["contacts: 1"] if n == 6 else []}
-                   for n, job in enumerate(experiment.jobs, start=len(made))]
+        records = [
+            {
+                "number": n,
+                "seed": job.seed,
+                "score_m": 5.0 + n % 3,
+                "drawn": ["gusts"],
+                "violates": n == 6,
+                "passed": True,
+                "faults": ["contacts: 1"] if n == 6 else [],
+            }
+            for n, job in enumerate(experiment.jobs, start=len(made))
+        ]
         made.extend(experiment.jobs)
         return type("Sailed", (), {"records": records, "lost": []})
 
@@ -95,7 +105,7 @@ def test_what_is_found_is_left_as_a_scenario_that_repeats_it(tmp_path, monkeypat
     assert cli.main(["search", "mismatch", "--each", "4", "--runs", "40"]) == 1
     out = capsys.readouterr().out
     assert "FOUND after 7 voyages: contacts: 1 (gusts); again: sitl run found/mismatch-6-" in out
-    path, = Path("found").glob("*.toml")
+    (path,) = Path("found").glob("*.toml")
     assert len(made) == 8
     kept, drawn = load_scenario(path), drawn_of(made[6])
     assert (kept.wind, kept.boat, kept.sensors, kept.current) == (drawn.wind, drawn.boat, drawn.sensors, drawn.current)
@@ -105,8 +115,17 @@ def test_what_is_found_is_left_as_a_scenario_that_repeats_it(tmp_path, monkeypat
 def test_a_voyage_that_is_excused_leads_nowhere(monkeypatch):
     job = Job(scenario=BASE, seed=0, case=SearchCase(what="faults", point=blind(random.Random(1)), number=0))
     for excuse, score_m in (("operator", None), ("none", 0.0)):
-        monkeypatch.setattr(search.faults, "sail_faults", lambda *_, e=excuse: {
-            "contacts": [{"excuse": e}], "clearance_m": 0.0, "events": [], "passed": False, "faults": []})
+        monkeypatch.setattr(
+            search.faults,
+            "sail_faults",
+            lambda *_, e=excuse: {
+                "contacts": [{"excuse": e}],
+                "clearance_m": 0.0,
+                "events": [],
+                "passed": False,
+                "faults": [],
+            },
+        )
         monkeypatch.setattr(search, "UNEXCUSED", "none")
         assert search.sail(job)["score_m"] == score_m
 

@@ -6,25 +6,25 @@ from types import SimpleNamespace
 
 import pytest
 
-from lab.campaigns.shown import (
-    AHEAD_S,
-    _leg_risks,
-    _plan_risks,
-    _way_m,
-    sail,
-    shown,
-    table_of,
-    tacked_s,
-    told,
-)
+from lab.campaigns.shown import AHEAD_S, _leg_risks, _plan_risks, _way_m, sail, shown, table_of, tacked_s, told
 from sitl.runner import Job
 
 DEMO = Path("sitl/scenarios/demo.toml")
 
 
 def voyage(**changed):
-    return {"there": [], "tack": [], "place": [], "wind": [], "clear": [], "legs": [], "whole": [], "polar": [],
-            "way": [], "turns": []} | changed
+    return {
+        "there": [],
+        "tack": [],
+        "place": [],
+        "wind": [],
+        "clear": [],
+        "legs": [],
+        "whole": [],
+        "polar": [],
+        "way": [],
+        "turns": [],
+    } | changed
 
 
 def row(rows, figure):
@@ -50,8 +50,15 @@ def test_a_tack_that_does_not_come_does_not_hold_and_is_of_its_own_kind():
 
 
 def test_places_winds_and_clearances_are_counted_by_their_own_bands():
-    rows = table_of([voyage(place=[[60, 10.0, 30.0], [60, 40.0, 30.0]], wind=[[60.0, True], [60.0, False]],
-                            clear=[[6.0, 7.0], [6.0, 5.0]])])
+    rows = table_of(
+        [
+            voyage(
+                place=[[60, 10.0, 30.0], [60, 40.0, 30.0]],
+                wind=[[60.0, True], [60.0, False]],
+                clear=[[6.0, 7.0], [6.0, 5.0]],
+            )
+        ]
+    )
     for figure in ("place in 60 s", "wind in 60 s", "clearance expected"):
         assert row(rows, figure)["held"] == 0.5
     assert len(told(rows).splitlines()) == 4
@@ -66,8 +73,12 @@ def test_a_chance_is_held_against_how_often_it_came():
 
 
 def test_the_polar_the_way_and_the_tacks_are_what_they_were():
-    rows = table_of([voyage(polar=[0.95, 1.2], way=[[110.0, 100.0]], turns=[[6, 6]]),
-                     voyage(polar=[1.0], way=[[99.0, 100.0]], turns=[[118, 6]])])
+    rows = table_of(
+        [
+            voyage(polar=[0.95, 1.2], way=[[110.0, 100.0]], turns=[[6, 6]]),
+            voyage(polar=[1.0], way=[[99.0, 100.0]], turns=[[118, 6]]),
+        ]
+    )
     assert row(rows, "share of the polar")["held"] == pytest.approx(2 / 3)
     assert row(rows, "share of the polar")["median_share"] == pytest.approx(0.0)
     assert row(rows, "distance sailed, m")["held"] == 0.5
@@ -77,16 +88,25 @@ def test_the_polar_the_way_and_the_tacks_are_what_they_were():
 def seen(t_s, number, to_en, risk, *, whole=0.2, goals=0):
     leg = SimpleNamespace(to_en_m=to_en, is_loiter=False, risk=risk)
     return SimpleNamespace(
-        t_s=t_s, plan=SimpleNamespace(number=number, legs=(leg,), path_risk=whole),
-        state=SimpleNamespace(is_sailing=True, is_over=False), figures=SimpleNamespace(goals_reached=goals))
+        t_s=t_s,
+        plan=SimpleNamespace(number=number, legs=(leg,), path_risk=whole),
+        state=SimpleNamespace(is_sailing=True, is_over=False),
+        figures=SimpleNamespace(goals_reached=goals),
+    )
 
 
 def test_she_is_forced_off_the_leg_that_she_is_on_and_off_the_plans_before():
-    views = [seen(0.0, 1, (0, 9), 0.1), seen(1.0, 1, (0, 9), 0.4), seen(2.0, 1, (9, 9), 0.2),
-             seen(5.0, 2, (9, 0), 0.0, whole=0.3), seen(9.0, 2, (9, 0), 0.0), seen(10.0, 2, (9, 0), 0.0, goals=1)]
+    views = [
+        seen(0.0, 1, (0, 9), 0.1),
+        seen(1.0, 1, (0, 9), 0.4),
+        seen(2.0, 1, (9, 9), 0.2),
+        seen(5.0, 2, (9, 0), 0.0, whole=0.3),
+        seen(9.0, 2, (9, 0), 0.0),
+        seen(10.0, 2, (9, 0), 0.0, goals=1),
+    ]
     assert _leg_risks(views, [4.0]) == [[0.1, False], [0.2, True], [0.0, False]]
     assert _plan_risks(views, [10.0], [4.0]) == [[0.2, True], [0.3, False]]
-    assert _plan_risks(views, [], [4.0]) == []   # a goal that was never reached
+    assert _plan_risks(views, [], [4.0]) == []  # a goal that was never reached
 
 
 def test_a_way_is_measured_in_chords():

@@ -68,16 +68,19 @@ def test_a_cancelled_upload_is_offered_again():
     counts = [i for i, m in enumerate(sent) if m.get_type() == "MISSION_COUNT"]
     assert len(counts) >= 2, "after ACK 15 the list is offered once more"
     asked = [m.seq for m in said(talk, 1) if m.get_type() == "MISSION_REQUEST"]
-    assert [m.seq for m in sent[1:counts[1]]] == asked, "each repeated request is answered"
+    assert [m.seq for m in sent[1 : counts[1]]] == asked, "each repeated request is answered"
     assert machine.result.outcome is TransferOutcome.TIMEOUT, "the recording has no second upload"
 
 
-@pytest.mark.parametrize(("low_s", "high_s", "ack", "words"), [
-    (0.0435, 2.0, 4, "Only 655 items are supported"),
-    (2.0431, 10.0, 3, "unsupported"),
-    (11.8, 12.0, 2, "unsupported frame"),
-    (22.0, 23.0, 10, "invalid param5 x"),
-])
+@pytest.mark.parametrize(
+    ("low_s", "high_s", "ack", "words"),
+    [
+        (0.0435, 2.0, 4, "Only 655 items are supported"),
+        (2.0431, 10.0, 3, "unsupported"),
+        (11.8, 12.0, 2, "unsupported frame"),
+        (22.0, 23.0, 10, "invalid param5 x"),
+    ],
+)
 def test_refusals_carry_the_reason(low_s, high_s, ack, words):
     talk = between(load("upload_refused_items"), low_s, high_s)
     first = said(talk, 191)[0]
@@ -145,12 +148,15 @@ def test_ftp_of_a_missing_file_is_unsupported():
     assert "file not found" in machine.result.text
 
 
-@pytest.mark.parametrize(("command", "params", "nth", "outcome", "words"), [
-    (176, (1.0, 10.0), 0, TransferOutcome.REFUSED, "No Mission. Can't set AUTO.; Flight mode change failed"),
-    (176, (1.0, 10.0), 1, TransferOutcome.OK, ""),
-    (400, (1.0,), 0, TransferOutcome.REFUSED, "Arm: Accels inconsistent; Arm: AHRS: waiting for home"),
-    (193, (), 0, TransferOutcome.UNSUPPORTED, ""),
-])
+@pytest.mark.parametrize(
+    ("command", "params", "nth", "outcome", "words"),
+    [
+        (176, (1.0, 10.0), 0, TransferOutcome.REFUSED, "No Mission. Can't set AUTO.; Flight mode change failed"),
+        (176, (1.0, 10.0), 1, TransferOutcome.OK, ""),
+        (400, (1.0,), 0, TransferOutcome.REFUSED, "Arm: Accels inconsistent; Arm: AHRS: waiting for home"),
+        (193, (), 0, TransferOutcome.UNSUPPORTED, ""),
+    ],
+)
 def test_commands_with_the_autopilots_words(command, params, nth, outcome, words):
     talk = load("commands_refused")
     starts = [t for t, m in talk if m.get_type() == "COMMAND_LONG" and m.command == command]

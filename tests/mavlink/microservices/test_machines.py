@@ -61,8 +61,11 @@ class LossyPeer:
             return [ours.MAVLink_mission_count_message(1, 191, len(self.items), message.mission_type)]
         elif kind == "MISSION_REQUEST_INT":
             item = self.items[message.seq]
-            return [ours.MAVLink_mission_item_int_message(
-                1, 191, message.seq, item.frame, item.command, 0, 1, *item.params, item.lat_e7, item.lon_e7, 0.0, 0)]
+            return [
+                ours.MAVLink_mission_item_int_message(
+                    1, 191, message.seq, item.frame, item.command, 0, 1, *item.params, item.lat_e7, item.lon_e7, 0.0, 0
+                )
+            ]
         if self.next is None:
             return []
         self.repeat_s = t_s + 1.0
@@ -139,6 +142,7 @@ def test_a_download_over_a_bad_line_is_exact(seed):
 @pytest.mark.parametrize("error", [1, 5])
 def test_a_session_left_open_is_reset_once(error):
     """ArduRover refuses to open a file with error 1 while a dead program's session is open; the protocol has 5."""
+
     def answer(request, opcode, data=b""):
         packet = Packet(request.seq + 1, 0, opcode, 0, request.opcode, 0, 0, data)
         raw = wire.MAVLink_file_transfer_protocol_message(0, 1, 191, packet.pack())
@@ -207,7 +211,7 @@ def test_a_signing_timestamp_that_cannot_be_stored_ends_nothing(tmp_path):
     key = tmp_path / "key"
     key.write_text("ab" * 32)
     key.chmod(0o600)
-    (tmp_path / "key.timestamp").mkdir()      # no file can take its place
+    (tmp_path / "key.timestamp").mkdir()  # no file can take its place
     store = SigningStore(key, EPOCH_S + 1e8)
     store.state.timestamp += 10**9
     store.save()

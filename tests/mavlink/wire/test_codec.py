@@ -146,10 +146,12 @@ def test_cross_track_is_positive_to_the_right():
 
 
 def test_the_caps_and_sentinels_are_unknown():
-    assert codec.waypoint_distance_m(
-        heard(wire.MAVLink_nav_controller_output_message(0, 0, 0, 0, 65535, 0, 0, 0))) is None
+    assert (
+        codec.waypoint_distance_m(heard(wire.MAVLink_nav_controller_output_message(0, 0, 0, 0, 65535, 0, 0, 0))) is None
+    )
     ship = wire.MAVLink_ais_vessel_message(
-        211000001, 0, 0, 36000, 51100, 1023, 121, 15, 0, 0, 0, 0, 0, b"", b"", 0, 0xFFF)
+        211000001, 0, 0, 36000, 51100, 1023, 121, 15, 0, 0, 0, 0, 0, b"", b"", 0, 0xFFF
+    )
     report = codec.ais_report(0.0, heard(ship))
     assert (report.position, report.course_rad, report.heading_rad) == (None, None, None)
     assert (report.speed_mps, report.turn_rate_radps, report.nav_status) == (None, None, None)
@@ -157,7 +159,8 @@ def test_the_caps_and_sentinels_are_unknown():
 
 def test_ais_of_an_own_receiver_keeps_the_definitions_units():
     ship = wire.MAVLink_ais_vessel_message(
-        211000001, 511000000, -13000000, 9000, 9000, 514, -20, 0, 36, 10, 20, 3, 4, b"CALL", b"SAILOR", 2, 0x1056)
+        211000001, 511000000, -13000000, 9000, 9000, 514, -20, 0, 36, 10, 20, 3, 4, b"CALL", b"SAILOR", 2, 0x1056
+    )
     own = codec.ais_report(0.0, heard(ship, component=191))
     assert own.speed_mps == pytest.approx(5.14)
     assert math.degrees(own.turn_rate_radps) == pytest.approx(-2.0)
@@ -186,7 +189,7 @@ def test_no_field_value_raises_or_gets_through_as_nonsense(name, data):
     else:
         low, high = {"u": (0, 1), "i": (-1, 1)}[kind[0]]
         bits = int("".join(c for c in kind if c.isdigit()))
-        top = 2 ** bits - 1 if kind[0] == "u" else 2 ** (bits - 1) - 1
+        top = 2**bits - 1 if kind[0] == "u" else 2 ** (bits - 1) - 1
         if isinstance(values[field], list):
             return
         values[field] = data.draw(st.sampled_from([low * (top + 1), top * high, 0, 1, top // 2]))
@@ -205,8 +208,10 @@ def test_bad_values_are_not_used():
     assembler = VehicleAssembler()
     assert assembler.take(0.0, heard(wire.MAVLink_wind_message(math.nan, 5.0, 0.0))) == []
     assert assembler.take(0.0, heard(wire.MAVLink_wind_message(10.0, 500.0, 0.0))) == []
-    assert assembler.take(0.0, heard(wire.MAVLink_global_position_int_message(
-        1000, 1_200_000_000, 0, 0, 0, 0, 0, 0, 0))) == []
+    assert (
+        assembler.take(0.0, heard(wire.MAVLink_global_position_int_message(1000, 1_200_000_000, 0, 0, 0, 0, 0, 0, 0)))
+        == []
+    )
 
 
 # ------------------------------------------------------------------------------------------ assembling
@@ -289,8 +294,8 @@ def test_a_fence_that_is_told_of_no_more_is_off():
     def seen(t_s, message):
         return assembler.take(t_s, heard(message))[-1].fence_on
 
-    assert seen(0.0, beat) is None                 # never told of
-    assert seen(1.0, fence) is None                # for a moment, by whomever
+    assert seen(0.0, beat) is None  # never told of
+    assert seen(1.0, fence) is None  # for a moment, by whomever
     assert seen(3.0, fence) is None
     assert seen(9.0, beat) is None
     for t_s in range(20, 26):
@@ -309,8 +314,10 @@ def test_what_is_not_looked_at_tells_nothing_of_the_status():
     for kind in wire.mavlink_map.values():
         if kind.msgname not in _TELLING:
             lengths = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
-            zeros = [b"" if what == "char" else [0] * lengths[name] if lengths[name] else 0
-                     for name, what in zip(kind.fieldnames, kind.fieldtypes, strict=True)]
+            zeros = [
+                b"" if what == "char" else [0] * lengths[name] if lengths[name] else 0
+                for name, what in zip(kind.fieldnames, kind.fieldtypes, strict=True)
+            ]
             assert assembler._told(1.0, kind.msgname, kind(*zeros)) is None, kind.msgname
 
 
@@ -321,8 +328,9 @@ def test_what_tells_a_failsafe_from_a_person_reaches_the_status():
     battery, receiver = wire.MAV_SYS_STATUS_SENSOR_BATTERY, wire.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 
     def told(enabled, health):
-        return last(assembler, wire.MAVLink_sys_status_message(
-            every, enabled, health, 0, 12600, 0, 90, 0, 0, 0, 0, 0, 0))
+        return last(
+            assembler, wire.MAVLink_sys_status_message(every, enabled, health, 0, 12600, 0, 90, 0, 0, 0, 0, 0, 0)
+        )
 
     well = told(every, every)
     assert (well.battery_failed, well.receiver_lost) == (False, False)
@@ -330,19 +338,21 @@ def test_what_tells_a_failsafe_from_a_person_reaches_the_status():
     assert (ill.battery_failed, ill.receiver_lost) == (True, True)
     off = told(every & ~battery & ~receiver, 0)
     assert (off.battery_failed, off.receiver_lost) == (None, None)
-    sticks = last(assembler, wire.MAVLink_rc_channels_message(
-        1000, 4, 1500, 1501, 0xFFFF, 1800, *([0] * 14), 255))
+    sticks = last(assembler, wire.MAVLink_rc_channels_message(1000, 4, 1500, 1501, 0xFFFF, 1800, *([0] * 14), 255))
     assert sticks.rc_us == (1500, 1501, 0, 1800)
-    servos = last(assembler, wire.MAVLink_servo_output_raw_message(
-        1000, 0, 1480, 0, 1500, 1740, 0xFFFF, *([0] * 11)))
+    servos = last(assembler, wire.MAVLink_servo_output_raw_message(1000, 0, 1480, 0, 1500, 1740, 0xFFFF, *([0] * 11)))
     assert servos.servo_us == (1480, 0, 1500, 1740)
     assert last(assembler, wire.MAVLink_servo_output_raw_message(1000, 0, *([0] * 16))).servo_us == ()
-    home = last(assembler, wire.MAVLink_home_position_message(
-        508170000, -13100000, 0, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0))
+    home = last(
+        assembler,
+        wire.MAVLink_home_position_message(
+            508170000, -13100000, 0, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0
+        ),
+    )
     assert home.home == GeoPoint(lat_deg=50.817, lon_deg=-1.31)
     breach = wire.MAVLink_fence_status_message(1, 3, 3, 0, 1)
     once = last(assembler, breach)
-    assert (once.fence_breached, once.fence_breaches) == (False, None)   # one alone may be forged
+    assert (once.fence_breached, once.fence_breaches) == (False, None)  # one alone may be forged
     twice = last(assembler, breach)
     assert (twice.fence_breached, twice.fence_breaches) == (True, 3)
 
@@ -356,15 +366,16 @@ def test_what_a_script_tells_of_a_sensor_is_believed_twice_and_forgotten_when_it
     assembler.take(0.0, heard(wire.MAVLink_heartbeat_message(11, 3, 65, 10, 4, 3)))
     assert [tell(0.1 * n, value) for n, value in enumerate((0.0, 1.0, 0.0, 0.0, 1.0))] == [None, None, None, 0.0, 0.0]
     assert [tell(0.6, 1.0), tell(0.7, math.nan), tell(0.8, 0.0)] == [1.0, 1.0, 1.0]
-    assert tell(5.5, 0.0, b"FOO") == 1.0   # nobody's sensor
+    assert tell(5.5, 0.0, b"FOO") == 1.0  # nobody's sensor
     assembler.take(5.9, heard(wire.MAVLink_heartbeat_message(11, 3, 65, 10, 4, 3)))
     assert assembler.status.sensors == ()
 
 
 def test_each_receiver_says_where_it_is_and_one_that_falls_silent_is_forgotten():
     def second(fix_type):
-        return heard(wire.MAVLink_gps2_raw_message(
-            0, fix_type, 511_000_000, -13_000_000, 0, 121, 200, 0, 65535, 10, 0, 0))
+        return heard(
+            wire.MAVLink_gps2_raw_message(0, fix_type, 511_000_000, -13_000_000, 0, 121, 200, 0, 65535, 10, 0, 0)
+        )
 
     assembler = VehicleAssembler()
     assembler.take(0.0, heard(wire.MAVLink_heartbeat_message(11, 3, 65, 10, 4, 3)))

@@ -54,7 +54,7 @@ def test_every_message_is_packed_and_read_as_pymavlink_does():
 
 def test_most_of_what_a_boat_hears_goes_the_short_way():
     assert all(_layout(wire.mavlink_map[n].id) for n in (0, 1, 24, 30, 33, 42, 62, 74, 168, 193, 251, 253))
-    assert _layout(wire.MAVLINK_MSG_ID_BATTERY_STATUS) is None   # an array: the long way
+    assert _layout(wire.MAVLINK_MSG_ID_BATTERY_STATUS) is None  # an array: the long way
 
 
 @pytest.mark.parametrize("spoil", ["crc", "length", "cut", "flags", "id", "mavlink 1"])

@@ -23,7 +23,7 @@ def test_recorded_frames_are_all_decoded_whatever_the_chunks():
     whole = [bytes(m.get_msgbuf()) for m in Codec(1, 191).feed(data)]
     assert whole == FRAMES
     by_byte = Codec(1, 191)
-    one = [bytes(m.get_msgbuf()) for i in range(len(data)) for m in by_byte.feed(data[i:i + 1])]
+    one = [bytes(m.get_msgbuf()) for i in range(len(data)) for m in by_byte.feed(data[i : i + 1])]
     assert one == FRAMES
     assert not by_byte.dropped
 
@@ -47,7 +47,7 @@ def test_truncated_frames_do_not_swallow_the_next():
     data, kept = b"", []
     for i, frame in enumerate(FRAMES):
         if i % 3 == 0:
-            data += frame[:rng.randrange(1, len(frame))]
+            data += frame[: rng.randrange(1, len(frame))]
         else:
             data += frame
             kept.append(frame)

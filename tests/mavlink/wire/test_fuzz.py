@@ -22,11 +22,29 @@ ITEMS = [MissionItem(command=16, lat_e7=511000000, lon_e7=-13000000)] * 3
 BEAT = wire.MAVLink_heartbeat_message(11, 3, 0, 4, 3, 3)
 # Messages that the machines listen to come more often than the rest.
 TALK = [
-    wire.mavlink_map[getattr(wire, f"MAVLINK_MSG_ID_{name}")] for name in (
-        "MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ITEM",
-        "COMMAND_ACK", "PARAM_VALUE", "FILE_TRANSFER_PROTOCOL", "STATUSTEXT", "HEARTBEAT", "MISSION_CURRENT",
-        "GLOBAL_POSITION_INT", "ATTITUDE", "TUNNEL", "WIND_COV", "NAMED_VALUE_FLOAT", "AIS_VESSEL", "COMMAND_LONG",
-        "HOME_POSITION", "AUTOPILOT_VERSION",
+    wire.mavlink_map[getattr(wire, f"MAVLINK_MSG_ID_{name}")]
+    for name in (
+        "MISSION_REQUEST",
+        "MISSION_REQUEST_INT",
+        "MISSION_ACK",
+        "MISSION_COUNT",
+        "MISSION_ITEM_INT",
+        "MISSION_ITEM",
+        "COMMAND_ACK",
+        "PARAM_VALUE",
+        "FILE_TRANSFER_PROTOCOL",
+        "STATUSTEXT",
+        "HEARTBEAT",
+        "MISSION_CURRENT",
+        "GLOBAL_POSITION_INT",
+        "ATTITUDE",
+        "TUNNEL",
+        "WIND_COV",
+        "NAMED_VALUE_FLOAT",
+        "AIS_VESSEL",
+        "COMMAND_LONG",
+        "HOME_POSITION",
+        "AUTOPILOT_VERSION",
     )
 ]
 
@@ -48,9 +66,16 @@ def frame(rng, seq):
 def machines():
     kind = MissionType.MISSION
     return [
-        ListUpload(PARTY, kind, ITEMS), ListUpload(PARTY, kind, ITEMS, first=2, partial=True),
-        ListDownload(PARTY, kind), ListClear(PARTY, kind), CommandSend(PARTY, 1, ()), ParamRead(PARTY, ["A"]),
-        ParamSet(PARTY, "A", 1.0), ParamList(PARTY), FtpWrite(PARTY, "x", b"y" * 500), FtpRead(PARTY, "x"),
+        ListUpload(PARTY, kind, ITEMS),
+        ListUpload(PARTY, kind, ITEMS, first=2, partial=True),
+        ListDownload(PARTY, kind),
+        ListClear(PARTY, kind),
+        CommandSend(PARTY, 1, ()),
+        ParamRead(PARTY, ["A"]),
+        ParamSet(PARTY, "A", 1.0),
+        ParamList(PARTY),
+        FtpWrite(PARTY, "x", b"y" * 500),
+        FtpRead(PARTY, "x"),
     ]
 
 

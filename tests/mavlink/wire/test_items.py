@@ -48,7 +48,7 @@ def test_padding_changes_the_length_and_nothing_that_is_sailed(items, count):
     assert len(long) == max(len(items), count)
     assert sailed(long) == sailed(items)
     assert mission_hash(long) == mission_hash(items)
-    assert all(i.command in ENDING for i in long[len(items):])
+    assert all(i.command in ENDING for i in long[len(items) :])
 
 
 @settings(max_examples=100)
@@ -63,8 +63,12 @@ def test_the_hash_names_what_is_sailed(items, data):
     moved = list(items)
     step = 1 if ended[where].lat_e7 < 900_000_000 else -1
     moved[where] = MissionItem(
-        command=ended[where].command, lat_e7=ended[where].lat_e7 + step, lon_e7=ended[where].lon_e7,
-        alt_m=ended[where].alt_m, frame=ended[where].frame, params=ended[where].params,
+        command=ended[where].command,
+        lat_e7=ended[where].lat_e7 + step,
+        lon_e7=ended[where].lon_e7,
+        alt_m=ended[where].alt_m,
+        frame=ended[where].frame,
+        params=ended[where].params,
     )
     assert mission_hash(moved) != mission_hash(items)
     assert first_difference(items, moved).startswith(f"item {where + 1} written")
@@ -96,19 +100,36 @@ def test_a_torn_or_foreign_mission_dat_says_so():
         unpack_mission_dat(b"\x00" * 60)
 
 
-@pytest.mark.parametrize(("written", "read"), [
-    # written to ArduRover 4.7.0-dev and read back from it on 2026-11-21
-    ({"command": 16, "alt_m": 1.236, "frame": 6, "params": (3.7, 2.0, 3.0, 4.0)},
-     {"command": 16, "alt_m": 1.23, "frame": 3, "params": (3.0, 0.0, 0.0, 0.0)}),
-    ({"command": 17, "params": (1.0, 2.0, -12.0, 45.0)}, {"command": 17, "params": (0.0, 0.0, -12.0, 0.0)}),
-    ({"command": 18, "params": (3.0, 0.0, 20.0, 1.0)}, {"command": 18, "params": (3.0, 0.0, 20.0, 1.0)}),
-    ({"command": 19, "params": (30.0, 0.0, 10.0, 1.0)}, {"command": 19, "params": (30.0, 0.0, 1.0, 1.0)}),
-    ({"command": 93, "params": (10.0, 0.0, 0.0, 0.0)}, {"command": 93, "frame": 0, "params": (10.0, 0.0, 0.0, 0.0)}),
-    ({"command": 177, "params": (1.0, 2.0, 0.0, 0.0)}, {"command": 177, "frame": 0, "params": (1.0, 2.0, 0.0, 0.0)}),
-    ({"command": 178, "params": (1.0, 2.5, 50.0, 0.0)}, {"command": 178, "frame": 0, "params": (1.0, 2.5, 50.0, 0.0)}),
-    ({"command": 207, "params": (1.0, 0.0, 0.0, 0.0)}, {"command": 207, "frame": 0, "params": (1.0, 0.0, 0.0, 0.0)}),
-    ({"command": 20, "params": (1.0, 2.0, 3.0, 4.0)}, {"command": 20, "frame": 0, "params": (0.0, 0.0, 0.0, 0.0)}),
-])
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        # written to ArduRover 4.7.0-dev and read back from it on 2026-11-21
+        (
+            {"command": 16, "alt_m": 1.236, "frame": 6, "params": (3.7, 2.0, 3.0, 4.0)},
+            {"command": 16, "alt_m": 1.23, "frame": 3, "params": (3.0, 0.0, 0.0, 0.0)},
+        ),
+        ({"command": 17, "params": (1.0, 2.0, -12.0, 45.0)}, {"command": 17, "params": (0.0, 0.0, -12.0, 0.0)}),
+        ({"command": 18, "params": (3.0, 0.0, 20.0, 1.0)}, {"command": 18, "params": (3.0, 0.0, 20.0, 1.0)}),
+        ({"command": 19, "params": (30.0, 0.0, 10.0, 1.0)}, {"command": 19, "params": (30.0, 0.0, 1.0, 1.0)}),
+        (
+            {"command": 93, "params": (10.0, 0.0, 0.0, 0.0)},
+            {"command": 93, "frame": 0, "params": (10.0, 0.0, 0.0, 0.0)},
+        ),
+        (
+            {"command": 177, "params": (1.0, 2.0, 0.0, 0.0)},
+            {"command": 177, "frame": 0, "params": (1.0, 2.0, 0.0, 0.0)},
+        ),
+        (
+            {"command": 178, "params": (1.0, 2.5, 50.0, 0.0)},
+            {"command": 178, "frame": 0, "params": (1.0, 2.5, 50.0, 0.0)},
+        ),
+        (
+            {"command": 207, "params": (1.0, 0.0, 0.0, 0.0)},
+            {"command": 207, "frame": 0, "params": (1.0, 0.0, 0.0, 0.0)},
+        ),
+        ({"command": 20, "params": (1.0, 2.0, 3.0, 4.0)}, {"command": 20, "frame": 0, "params": (0.0, 0.0, 0.0, 0.0)}),
+    ],
+)
 def test_what_the_real_autopilot_returns_is_the_same_item(written, read):
     sent = MissionItem(lat_e7=511000000, lon_e7=-12900000, **written)
     place = {} if written["command"] in PLACELESS else {"lat_e7": 511000000, "lon_e7": -12900000}

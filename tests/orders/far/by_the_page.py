@@ -32,7 +32,7 @@ def write(title, key, system, *, since=0, **values):
     for at, kind, name in layout(title):
         value = values.get(name, 1 if name == "version" else 0)
         if kind == "u24":
-            body[at:at + 3] = struct.pack("<I", value)[:3]
+            body[at : at + 3] = struct.pack("<I", value)[:3]
         else:
             struct.pack_into(f"<{CODES[kind]}", body, at, value)
     return bytes(body) + code(key, title.split()[1], system, bytes(body), since)
@@ -43,6 +43,9 @@ def read(title, data, key, system=1, since=0):
     assert data[-8:] == code(key, title.split()[1], system, data[:-8], since)
     counts = {}
     for at, kind, name in layout(title):
-        counts[name] = struct.unpack("<I", data[at:at + 3] + b"\0")[0] if kind == "u24" else \
-            struct.unpack_from(f"<{CODES[kind]}", data, at)[0]
+        counts[name] = (
+            struct.unpack("<I", data[at : at + 3] + b"\0")[0]
+            if kind == "u24"
+            else struct.unpack_from(f"<{CODES[kind]}", data, at)[0]
+        )
     return counts

@@ -42,7 +42,8 @@ def positive(most):
 
 POSITION = st.builds(GeoPoint, lat_deg=st.floats(-90.0, 90.0), lon_deg=st.floats(-180.0, 180.0))
 PLACE = st.builds(Place, lat_deg=st.floats(-90.0, 90.0), lon_deg=st.floats(-180.0, 180.0)).filter(
-    lambda place: not place.trouble)
+    lambda place: not place.trouble
+)
 WANTED = st.one_of(
     st.sampled_from(sorted(set(Verb) - {Verb.GOAL, Verb.REFUGE})).map(lambda verb: Wanted(verb=verb)),
     st.builds(Wanted, verb=st.just(Verb.GOAL), place=PLACE),
@@ -50,20 +51,47 @@ WANTED = st.one_of(
 )
 ORDERS = st.builds(FarOrder, wanted=WANTED, counter=st.integers(1, 0xFFFF), expires_min=st.integers(0, 0xFFFFFF))
 STATUSES = st.builds(
-    FarStatus, phase=st.sampled_from(status.PHASES), sequence=st.integers(0, 255),
-    minute=maybe(st.integers(0, 2**24 - 2)), is_heard=st.booleans(), is_armed=st.booleans(),
-    is_under_way=st.booleans(), has_trouble=st.booleans(),
-    standing=maybe(st.sampled_from(list(Verb))), position=maybe(POSITION), goal_m=positive(655_000.0),
-    waypoint_m=positive(65_000.0), speed_mps=positive(25.4), twd_from_rad=maybe(st.floats(-7.0, 7.0)),
-    tws_mps=positive(50.0), twd_sigma_rad=positive(3.1), goal=maybe(st.integers(1, 254)),
-    goals=maybe(st.integers(1, 254)), plan_age_s=positive(15_000.0), promised_risk=positive(1.0),
-    clearance_m=positive(508.0), cpa_m=positive(1016.0), alarm=st.sampled_from(["", *status.ALARMS]),
-    watchdog=st.sampled_from(["", *(dog.name for dog in TABLE)]), battery_v=positive(50.8),
-    order=maybe(st.integers(1, 0xFFFF)), reply=maybe(st.sampled_from(list(Reply))),
+    FarStatus,
+    phase=st.sampled_from(status.PHASES),
+    sequence=st.integers(0, 255),
+    minute=maybe(st.integers(0, 2**24 - 2)),
+    is_heard=st.booleans(),
+    is_armed=st.booleans(),
+    is_under_way=st.booleans(),
+    has_trouble=st.booleans(),
+    standing=maybe(st.sampled_from(list(Verb))),
+    position=maybe(POSITION),
+    goal_m=positive(655_000.0),
+    waypoint_m=positive(65_000.0),
+    speed_mps=positive(25.4),
+    twd_from_rad=maybe(st.floats(-7.0, 7.0)),
+    tws_mps=positive(50.0),
+    twd_sigma_rad=positive(3.1),
+    goal=maybe(st.integers(1, 254)),
+    goals=maybe(st.integers(1, 254)),
+    plan_age_s=positive(15_000.0),
+    promised_risk=positive(1.0),
+    clearance_m=positive(508.0),
+    cpa_m=positive(1016.0),
+    alarm=st.sampled_from(["", *status.ALARMS]),
+    watchdog=st.sampled_from(["", *(dog.name for dog in TABLE)]),
+    battery_v=positive(50.8),
+    order=maybe(st.integers(1, 0xFFFF)),
+    reply=maybe(st.sampled_from(list(Reply))),
 )
 # Half a count, and a little for the sum.
-STEPS = {"goal_m": 5.0, "waypoint_m": 0.5, "speed_mps": 0.05, "tws_mps": 0.1, "twd_sigma_rad": math.radians(0.5),
-         "plan_age_s": 30.0, "promised_risk": 0.002, "clearance_m": 1.0, "cpa_m": 2.0, "battery_v": 0.1}
+STEPS = {
+    "goal_m": 5.0,
+    "waypoint_m": 0.5,
+    "speed_mps": 0.05,
+    "tws_mps": 0.1,
+    "twd_sigma_rad": math.radians(0.5),
+    "plan_age_s": 30.0,
+    "promised_risk": 0.002,
+    "clearance_m": 1.0,
+    "cpa_m": 2.0,
+    "battery_v": 0.1,
+}
 
 
 @settings(max_examples=300)
@@ -103,23 +131,36 @@ def test_a_status_is_read_as_it_was_told_within_its_steps(told):
     assert counts["order"] == (told.order or 0)
 
 
-@pytest.mark.parametrize(("name", "value", "shown"), [
-    ("speed_mps", 99.0, 25.4), ("battery_v", 60.0, 50.8), ("goal_m", 1e9, 655_340.0), ("clearance_m", -3.0, 0.0),
-    ("plan_age_s", 1e6, 15_240.0), ("minute", 2**24, 2**24 - 2), ("minute", -5, 0), ("goal", 300, 254),
-])
+@pytest.mark.parametrize(
+    ("name", "value", "shown"),
+    [
+        ("speed_mps", 99.0, 25.4),
+        ("battery_v", 60.0, 50.8),
+        ("goal_m", 1e9, 655_340.0),
+        ("clearance_m", -3.0, 0.0),
+        ("plan_age_s", 1e6, 15_240.0),
+        ("minute", 2**24, 2**24 - 2),
+        ("minute", -5, 0),
+        ("goal", 300, 254),
+    ],
+)
 def test_what_does_not_fit_is_the_nearest_that_does_and_never_unknown(name, value, shown):
-    assert getattr(unpack_status(pack_status(FarStatus(phase="idle", **{name: value}), KEY), KEY), name) \
-        == pytest.approx(shown)
+    assert getattr(
+        unpack_status(pack_status(FarStatus(phase="idle", **{name: value}), KEY), KEY), name
+    ) == pytest.approx(shown)
 
 
-GOOD_ORDER = pack_order(FarOrder(wanted=Wanted(verb=Verb.GOAL, place=Place(lat_deg=50.8, lon_deg=-1.3)), counter=7,
-                                 expires_min=3_600_000), KEY)
+GOOD_ORDER = pack_order(
+    FarOrder(wanted=Wanted(verb=Verb.GOAL, place=Place(lat_deg=50.8, lon_deg=-1.3)), counter=7, expires_min=3_600_000),
+    KEY,
+)
 GOOD_STATUS = pack_status(FarStatus(phase="standard"), KEY)
 GOOD_BEGINNING = pack_beginning(Beginning(began=3_599_000, expires_min=3_600_000), KEY)
 
 
-@pytest.mark.parametrize(("data", "unpack"), [
-    (GOOD_ORDER, unpack_order), (GOOD_STATUS, unpack_status), (GOOD_BEGINNING, unpack_beginning)])
+@pytest.mark.parametrize(
+    ("data", "unpack"), [(GOOD_ORDER, unpack_order), (GOOD_STATUS, unpack_status), (GOOD_BEGINNING, unpack_beginning)]
+)
 def test_one_bit_changed_is_refused(data, unpack):
     unpack(data, KEY)
     for bit in range(8 * len(data)):
@@ -147,8 +188,10 @@ def test_what_is_not_ours_is_refused_in_one_line(data):
 @given(st.binary(min_size=16, max_size=16), st.binary(min_size=34, max_size=34))
 def test_with_the_right_code_too_nothing_but_a_message_is_taken(body, other):
     """Who has the key may be of another release: what cannot be said by this one is refused, or read and said alike."""
-    for unpack, pack, sealed in ((unpack_order, pack_order, KEY.sealed("order", body)),
-                                 (unpack_status, pack_status, KEY.sealed("status", other))):
+    for unpack, pack, sealed in (
+        (unpack_order, pack_order, KEY.sealed("order", body)),
+        (unpack_status, pack_status, KEY.sealed("status", other)),
+    ):
         for data in (sealed, KEY.sealed("order" if pack is pack_order else "status", b"\1" + sealed[1:-8])):
             try:
                 read = unpack(data, KEY)
@@ -157,7 +200,7 @@ def test_with_the_right_code_too_nothing_but_a_message_is_taken(body, other):
             if pack is pack_order and read.wanted.place is not None and read.wanted.place.trouble:
                 continue
             if "watchdog" in getattr(read, "watchdog", ""):
-                continue   # of a later release
+                continue  # of a later release
             assert unpack(pack(read, KEY), KEY) == read
 
 
@@ -190,26 +233,34 @@ def test_a_status_is_no_order_and_an_order_no_status():
         unpack_order(KEY.sealed("status", GOOD_ORDER[:16]), KEY)
 
 
-@pytest.mark.parametrize(("counts", "why"), [
-    ({"version": 2, "verb": 1, "counter": 1}, "version 2"), ({"verb": 77, "counter": 1}, "no order 77"),
-    ({"verb": 1}, "counter is 0"), ({"verb": 1, "counter": 1, "lat": 5}, "hold takes no such"),
-    ({"verb": 1, "counter": 1, "number": 5}, "hold takes no such"),
-    ({"verb": 4, "counter": 1, "lon": 5}, "refuge takes"),
-])
+@pytest.mark.parametrize(
+    ("counts", "why"),
+    [
+        ({"version": 2, "verb": 1, "counter": 1}, "version 2"),
+        ({"verb": 77, "counter": 1}, "no order 77"),
+        ({"verb": 1}, "counter is 0"),
+        ({"verb": 1, "counter": 1, "lat": 5}, "hold takes no such"),
+        ({"verb": 1, "counter": 1, "number": 5}, "hold takes no such"),
+        ({"verb": 4, "counter": 1, "lon": 5}, "refuge takes"),
+    ],
+)
 def test_an_order_that_says_too_much_is_refused(counts, why):
     with pytest.raises(ValueError, match=why):
         unpack_order(by_the_page.write(ORDER, KEY.key, 1, **counts), KEY)
 
 
-@pytest.mark.parametrize("bad", [
-    FarOrder(wanted=Wanted(verb=None, fault="no such"), counter=1, expires_min=1),
-    FarOrder(wanted=Wanted(verb=Verb.GOAL), counter=1, expires_min=1),
-    FarOrder(wanted=Wanted(verb=Verb.GOAL, place=Place(lat_deg=0.0, lon_deg=0.0)), counter=1, expires_min=1),
-    FarOrder(wanted=Wanted(verb=Verb.HOLD), counter=0, expires_min=1),
-    FarOrder(wanted=Wanted(verb=Verb.HOLD), counter=70_000, expires_min=1),
-    FarOrder(wanted=Wanted(verb=Verb.HOLD), counter=1, expires_min=1 << 24),
-    FarOrder(wanted=Wanted(verb=Verb.REFUGE, number=300), counter=1, expires_min=1),
-])
+@pytest.mark.parametrize(
+    "bad",
+    [
+        FarOrder(wanted=Wanted(verb=None, fault="no such"), counter=1, expires_min=1),
+        FarOrder(wanted=Wanted(verb=Verb.GOAL), counter=1, expires_min=1),
+        FarOrder(wanted=Wanted(verb=Verb.GOAL, place=Place(lat_deg=0.0, lon_deg=0.0)), counter=1, expires_min=1),
+        FarOrder(wanted=Wanted(verb=Verb.HOLD), counter=0, expires_min=1),
+        FarOrder(wanted=Wanted(verb=Verb.HOLD), counter=70_000, expires_min=1),
+        FarOrder(wanted=Wanted(verb=Verb.HOLD), counter=1, expires_min=1 << 24),
+        FarOrder(wanted=Wanted(verb=Verb.REFUGE, number=300), counter=1, expires_min=1),
+    ],
+)
 def test_what_cannot_be_said_is_not_packed(bad):
     with pytest.raises(ValueError, match=r"."):
         pack_order(bad, KEY)

@@ -15,14 +15,23 @@ NOW_S = unix_of(NOW_MIN)
 
 
 def order(counter, left_min=30, mark=""):
-    return FarOrder(wanted=Wanted(verb=Verb.HOLD), counter=counter, expires_min=NOW_MIN + left_min,
-                    mark=mark or f"{counter:08x}")
+    return FarOrder(
+        wanted=Wanted(verb=Verb.HOLD), counter=counter, expires_min=NOW_MIN + left_min, mark=mark or f"{counter:08x}"
+    )
 
 
-@pytest.mark.parametrize(("left_min", "reply"), [
-    (1, None), (0, Reply.EXPIRED), (-1, Reply.EXPIRED), (-600, Reply.EXPIRED), (7 * 1440, None),
-    (7 * 1440 + 120, Reply.TOO_LONG), (10**7, Reply.TOO_LONG),
-])
+@pytest.mark.parametrize(
+    ("left_min", "reply"),
+    [
+        (1, None),
+        (0, Reply.EXPIRED),
+        (-1, Reply.EXPIRED),
+        (-600, Reply.EXPIRED),
+        (7 * 1440, None),
+        (7 * 1440 + 120, Reply.TOO_LONG),
+        (10**7, Reply.TOO_LONG),
+    ],
+)
 def test_an_order_counts_until_it_expires(left_min, reply):
     assert judged(order(1, left_min), Taken(), NOW_S)[0] == reply
 
@@ -60,10 +69,19 @@ def test_a_counter_more_than_a_jump_ahead_is_refused_and_moves_nothing(highest):
     assert judged(order(highest + MOST_JUMP), taken, NOW_S)[0] is None
 
 
-@pytest.mark.parametrize(("began", "left_min", "now_s", "reply"), [
-    (NOW_MIN, 30, NOW_S, Reply.BEGUN), (NOW_MIN - 9000, 1, NOW_S, Reply.BEGUN), (NOW_MIN + 60, 90, NOW_S, Reply.BEGUN),
-    (NOW_MIN + 61, 90, NOW_S, Reply.CLOCK), (NOW_MIN, 0, NOW_S, Reply.EXPIRED), (NOW_MIN, 30, None, Reply.NO_CLOCK),
-    (NOW_MIN, 8 * 1440, NOW_S, Reply.TOO_LONG), (NOW_MIN - 9001, 30, NOW_S, Reply.OLD)])
+@pytest.mark.parametrize(
+    ("began", "left_min", "now_s", "reply"),
+    [
+        (NOW_MIN, 30, NOW_S, Reply.BEGUN),
+        (NOW_MIN - 9000, 1, NOW_S, Reply.BEGUN),
+        (NOW_MIN + 60, 90, NOW_S, Reply.BEGUN),
+        (NOW_MIN + 61, 90, NOW_S, Reply.CLOCK),
+        (NOW_MIN, 0, NOW_S, Reply.EXPIRED),
+        (NOW_MIN, 30, None, Reply.NO_CLOCK),
+        (NOW_MIN, 8 * 1440, NOW_S, Reply.TOO_LONG),
+        (NOW_MIN - 9001, 30, NOW_S, Reply.OLD),
+    ],
+)
 def test_a_beginning_counts_once_and_only_behind_every_one_before(began, left_min, now_s, reply):
     before = Taken({1: ("m", Reply.DONE)}, NOW_MIN - 9001 if reply is not Reply.OLD else NOW_MIN)
     given = Beginning(began=began, expires_min=NOW_MIN + left_min)
@@ -99,15 +117,26 @@ def test_with_another_key_the_counters_begin_anew():
     assert Taken.from_dict(taken.to_dict("old"), "new") == Taken()
 
 
-@pytest.mark.parametrize("data", [
-    None, [], {}, {"format": 3}, {"format": 1, "key": "k"}, {"format": 1, "key": "k", "replies": []},
-    {"format": 1, "key": "k", "replies": {"x": ["m", "done"]}}, {"format": 1, "key": "k", "replies": {"1": "done"}},
-    {"format": 1, "key": "k", "replies": {"1": ["m", "sunk"]}},
-    {"format": 1, "key": "k", "replies": {"0": ["m", "done"]}},
-    {"format": 2, "key": "k", "replies": {}}, {"format": 2, "key": "k", "began": -1, "replies": {}},
-    {"format": 2, "key": "k", "began": "1", "replies": {}}, {"format": 2, "key": "k", "began": 1 << 24, "replies": {}},
-    {"format": 1, "key": "k", "replies": {str(n): ["m", "done"] for n in range(1, 80)}},
-])
+@pytest.mark.parametrize(
+    "data",
+    [
+        None,
+        [],
+        {},
+        {"format": 3},
+        {"format": 1, "key": "k"},
+        {"format": 1, "key": "k", "replies": []},
+        {"format": 1, "key": "k", "replies": {"x": ["m", "done"]}},
+        {"format": 1, "key": "k", "replies": {"1": "done"}},
+        {"format": 1, "key": "k", "replies": {"1": ["m", "sunk"]}},
+        {"format": 1, "key": "k", "replies": {"0": ["m", "done"]}},
+        {"format": 2, "key": "k", "replies": {}},
+        {"format": 2, "key": "k", "began": -1, "replies": {}},
+        {"format": 2, "key": "k", "began": "1", "replies": {}},
+        {"format": 2, "key": "k", "began": 1 << 24, "replies": {}},
+        {"format": 1, "key": "k", "replies": {str(n): ["m", "done"] for n in range(1, 80)}},
+    ],
+)
 def test_a_damaged_memory_is_not_believed(data):
     with pytest.raises(ValueError, match=r"."):
         Taken.from_dict(data, "k")

@@ -63,7 +63,7 @@ def test_a_moving_target_is_met_only_at_its_time():
         return Problem.from_json(simple(goal={"x": 0, "y": -150, "radius": 1}, targets=[target]))
 
     turn = math.pi / 0.5
-    meet = -1.5 * (60 - turn)                       # where the boat is when the target crosses its track
+    meet = -1.5 * (60 - turn)  # where the boat is when the target crosses its track
     assert not evaluate(crossing(meet), [[0, 0], [0, -150]]).is_feasible
     assert evaluate(crossing(meet - 40), [[0, 0], [0, -150]]).is_feasible
 
@@ -85,7 +85,7 @@ def test_losses_are_paid_once_per_manoeuvre():
 
 
 # ------------------------------------------------------------------------ against the definition
-SCORER = os.environ.get("COMPANION_SCORE_PLAN")      # path of the format's score_plan.py
+SCORER = os.environ.get("COMPANION_SCORE_PLAN")  # path of the format's score_plan.py
 needs_scorer = pytest.mark.skipif(not SCORER or not Path(SCORER).exists(), reason="COMPANION_SCORE_PLAN is not set")
 
 
@@ -108,7 +108,7 @@ def test_agrees_with_the_definition_on_random_paths(raw, middle):
     assert ours.is_feasible == theirs["feasible"]
     assert ours.time_s == pytest.approx(theirs["time_s"], rel=1e-12)
     assert len(ours.reasons) == len(theirs["reasons"])
-    assert ours.tacks + ours.gybes == theirs["n_tacks"] + theirs["n_gybes"]    # a turn of 180 is either
+    assert ours.tacks + ours.gybes == theirs["n_tacks"] + theirs["n_gybes"]  # a turn of 180 is either
 
 
 @needs_scorer
@@ -127,11 +127,21 @@ def test_a_leg_with_the_wind_over_the_starboard_side_has_a_positive_twa():
     """Wind from north, heading north-west: the wind comes over the starboard side (house rule 2)."""
     from companion.planner import Problem
 
-    p = Problem.from_json({
-        "start": {"x": 0, "y": 0, "heading_deg": 0}, "goal": {"x": -100, "y": 100, "radius": 1}, "obstacles": [],
-        "fence": None, "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}}, "delta_s": 0.5,
-        "boat": {"no_go_half_deg": 40, "max_twa_deg": 180, "turn_rate_rad_s": 1,
-                 "speed": {"model": "constant", "v_mps": 1}},
-    })
+    p = Problem.from_json(
+        {
+            "start": {"x": 0, "y": 0, "heading_deg": 0},
+            "goal": {"x": -100, "y": 100, "radius": 1},
+            "obstacles": [],
+            "fence": None,
+            "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}},
+            "delta_s": 0.5,
+            "boat": {
+                "no_go_half_deg": 40,
+                "max_twa_deg": 180,
+                "turn_rate_rad_s": 1,
+                "speed": {"model": "constant", "v_mps": 1},
+            },
+        }
+    )
     assert math.degrees(evaluate(p, [[0, 0], [-100, 100]]).legs[0].twa_rad) == pytest.approx(45.0)
     assert math.degrees(evaluate(p, [[0, 0], [100, 100]]).legs[0].twa_rad) == pytest.approx(-45.0)

@@ -18,19 +18,24 @@ from tests.planner.problem_json import to_dict
 from tests.planner.problems import box, random_problems, simple
 
 
-@pytest.mark.parametrize(("change", "place"), [
-    ({"boat": {}}, "boat.speed"),
-    ({"obstacles": ["POLYGON ((0 0, 1"]}, "obstacles[0]"),
-    ({"obstacles": ["POINT (1 2)"]}, "obstacles[0]"),
-    ({"obstacles": "POLYGON EMPTY"}, "obstacles"),
-    ({"delta_s": "high"}, "delta_s"),
-    ({"delta_s": True}, "delta_s"),
-    ({"goal": {"x": 0, "y": 0}}, "goal.radius"),
-    ({"wind": {"from_deg": 0, "sigma": {"model": "garch"}}}, "wind.sigma.model"),
-    ({"wind": {"from_deg": 0, "sigma": {"model": "forecast", "horizon_s": [0, 0], "sigma_deg": [1, 2]}}},
-     "wind.sigma.horizon_s"),
-    ({"start": 3}, "start"),
-])
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        ({"boat": {}}, "boat.speed"),
+        ({"obstacles": ["POLYGON ((0 0, 1"]}, "obstacles[0]"),
+        ({"obstacles": ["POINT (1 2)"]}, "obstacles[0]"),
+        ({"obstacles": "POLYGON EMPTY"}, "obstacles"),
+        ({"delta_s": "high"}, "delta_s"),
+        ({"delta_s": True}, "delta_s"),
+        ({"goal": {"x": 0, "y": 0}}, "goal.radius"),
+        ({"wind": {"from_deg": 0, "sigma": {"model": "garch"}}}, "wind.sigma.model"),
+        (
+            {"wind": {"from_deg": 0, "sigma": {"model": "forecast", "horizon_s": [0, 0], "sigma_deg": [1, 2]}}},
+            "wind.sigma.horizon_s",
+        ),
+        ({"start": 3}, "start"),
+    ],
+)
 def test_what_cannot_be_read_names_the_place(change, place):
     with pytest.raises(InputError) as caught:
         Problem.from_json(simple(**change))
@@ -60,11 +65,17 @@ def test_write_then_read_is_the_same_problem(raw):
 
 def test_extensions_survive_write_then_read():
     raw = simple(
-        wind={"from_deg": 10, "speed_mps": 5, "sigma": {"model": "forecast", "horizon_s": [0, 60], "sigma_deg": [2, 8],
-                                                        "half_width_deg": [1, 9]}},
-        current={"set_deg": 90, "drift_mps": 0.3}, clearance_floor_m=3.0, leg_saving=2e-4,
+        wind={
+            "from_deg": 10,
+            "speed_mps": 5,
+            "sigma": {"model": "forecast", "horizon_s": [0, 60], "sigma_deg": [2, 8], "half_width_deg": [1, 9]},
+        },
+        current={"set_deg": 90, "drift_mps": 0.3},
+        clearance_floor_m=3.0,
+        leg_saving=2e-4,
         targets=[{"x": 1, "y": 2, "vx": 3, "vy": 4, "radius_m": 5, "growth_mps": 0.1, "from_s": 1, "until_s": 9}],
-        risk={"max_path_risk": 0.05, "correlation_time_s": 30}, note_of_mine="kept",
+        risk={"max_path_risk": 0.05, "correlation_time_s": 30},
+        note_of_mine="kept",
     )
     first = Problem.from_json(raw)
     again = Problem.from_json(to_dict(first))
@@ -72,7 +83,7 @@ def test_extensions_survive_write_then_read():
     assert again.clearance_floor_m == 3.0
     assert again.leg_saving == first.leg_saving == 2e-4
     assert again.extra["note_of_mine"] == "kept"
-    assert math.degrees(again.widening_rad(30.0)) == pytest.approx(5.0)      # half widths, not k sigma
+    assert math.degrees(again.widening_rad(30.0)) == pytest.approx(5.0)  # half widths, not k sigma
 
 
 def test_the_zone_widens_with_probability_and_time():
@@ -86,17 +97,22 @@ def test_the_zone_widens_with_probability_and_time():
     assert math.degrees(q.no_go_half_rad(1e9)) == pytest.approx(45 + norm.ppf(0.8) * 8)
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ({"delta_s": 0.4}, "delta_s"), ({"delta_s": 1.0}, "delta_s"), ({"delta_s": math.nan}, "delta_s"),
-    ({"wind": {"from_deg": 0, "speed_mps": 0, "sigma": {"model": "none"}}}, "no wind"),
-    ({"goal": {"x": 0, "y": 100, "radius": -1}}, "radius"),
-    ({"goal": {"x": math.inf, "y": 100, "radius": 1}}, "goal.x"),
-    ({"boat": simple()["boat"] | {"speed": {"model": "constant", "v_mps": 0}}}, "polar"),
-    ({"boat": simple()["boat"] | {"turn_rate_rad_s": 0}}, "turn rate"),
-    ({"obstacles": [box(-10, -10, 10, 10)]}, "start is inside"),
-    ({"obstacles": [box(-10, 90, 10, 110)]}, "goal is inside"),
-    ({"fence": box(-10, 5, 10, 110)}, "start is inside an obstacle or outside"),
-])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"delta_s": 0.4}, "delta_s"),
+        ({"delta_s": 1.0}, "delta_s"),
+        ({"delta_s": math.nan}, "delta_s"),
+        ({"wind": {"from_deg": 0, "speed_mps": 0, "sigma": {"model": "none"}}}, "no wind"),
+        ({"goal": {"x": 0, "y": 100, "radius": -1}}, "radius"),
+        ({"goal": {"x": math.inf, "y": 100, "radius": 1}}, "goal.x"),
+        ({"boat": simple()["boat"] | {"speed": {"model": "constant", "v_mps": 0}}}, "polar"),
+        ({"boat": simple()["boat"] | {"turn_rate_rad_s": 0}}, "turn rate"),
+        ({"obstacles": [box(-10, -10, 10, 10)]}, "start is inside"),
+        ({"obstacles": [box(-10, 90, 10, 110)]}, "goal is inside"),
+        ({"fence": box(-10, 5, 10, 110)}, "start is inside an obstacle or outside"),
+    ],
+)
 def test_what_cannot_be_planned_is_invalid_with_the_reason(change, words):
     answer = plan(Problem.from_json(simple(**change)), expansions=2_000)
     assert answer.status is PlanStatus.INVALID

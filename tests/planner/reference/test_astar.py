@@ -22,11 +22,19 @@ AVALON_MPS = [
 
 def problem(**change):
     base = {
-        "id": "t", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 90},
-        "goal": {"x": 0, "y": 800, "radius": 10}, "obstacles": [], "fence": None,
+        "id": "t",
+        "title": "",
+        "start": {"x": 0, "y": 0, "heading_deg": 90},
+        "goal": {"x": 0, "y": 800, "radius": 10},
+        "obstacles": [],
+        "fence": None,
         "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}},
-        "boat": {"no_go_half_deg": 45, "max_twa_deg": 160, "turn_rate_rad_s": 0.5,
-                 "speed": {"model": "polar", "twa_deg": AVALON_TWA, "v_mps": AVALON_MPS}},
+        "boat": {
+            "no_go_half_deg": 45,
+            "max_twa_deg": 160,
+            "turn_rate_rad_s": 0.5,
+            "speed": {"model": "polar", "twa_deg": AVALON_TWA, "v_mps": AVALON_MPS},
+        },
         "delta_s": 0.5,
     }
     return Problem.from_json({**base, **change})
@@ -71,8 +79,10 @@ def test_headings_stay_45_to_160_degrees_off_the_wind_and_turns_within_90(wind_f
 
 
 def test_it_is_dijkstra_s_optimum_with_less_work():
-    p = problem(wind={"from_deg": 40, "speed_mps": 5, "sigma": {"model": "none"}},
-                obstacles=["POLYGON((-100 300,150 300,150 450,-100 450,-100 300))"])
+    p = problem(
+        wind={"from_deg": 40, "speed_mps": 5, "sigma": {"model": "none"}},
+        obstacles=["POLYGON((-100 300,150 300,150 450,-100 450,-100 300))"],
+    )
     informed, _ = run(p)
     blind, _ = run(p, heuristic_mps=None)
     assert informed.trace["objective"] == pytest.approx(blind.trace["objective"], rel=1e-9)
@@ -80,8 +90,10 @@ def test_it_is_dijkstra_s_optimum_with_less_work():
 
 
 def test_the_turning_cost_makes_fewer_turns():
-    p = problem(wind={"from_deg": 20, "speed_mps": 5, "sigma": {"model": "none"}},
-                obstacles=["POLYGON((-100 300,150 300,150 450,-100 450,-100 300))"])
+    p = problem(
+        wind={"from_deg": 20, "speed_mps": 5, "sigma": {"model": "none"}},
+        obstacles=["POLYGON((-100 300,150 300,150 450,-100 450,-100 300))"],
+    )
     _, plain = run(p, turn_s_per_rad=0.0)
     _, smooth = run(p, turn_s_per_rad=8.0)
     turning = [sum(abs(leg.turn_rad) for leg in judged.legs) for judged in (plain, smooth)]
@@ -121,7 +133,7 @@ def test_with_his_largest_turn_of_90_degrees_it_gybes_round_where_the_wind_blows
     across = problem(wind={"from_deg": 5, "speed_mps": 5, "sigma": {"model": "none"}})
     _, his = run(across)
     assert his.gybes > 0
-    assert max(abs(leg.turn_rad) for leg in his.legs[1:]) <= 0.5 * math.pi + 1e-9   # the first may be any
+    assert max(abs(leg.turn_rad) for leg in his.legs[1:]) <= 0.5 * math.pi + 1e-9  # the first may be any
     _, judged = run(across, max_turn_rad=math.radians(150.0))
     assert judged.is_feasible
     assert judged.tacks > 0
@@ -194,6 +206,7 @@ def test_courses_that_the_autopilot_does_not_follow_are_none_of_the_16_headings(
     assert zoned_way.is_feasible
     assert not evaluate(zoned, [leg.from_en for leg in free_way.legs] + [zoned.goal_en]).is_feasible
     assert zoned_way.time_s > free_way.time_s
-    outcome = search(problem(current=tide, zone={"from_deg": 0.0, "half_deg": 179.0}), Effort(None, 10**8), 0,
-                     AstarSettings())
+    outcome = search(
+        problem(current=tide, zone={"from_deg": 0.0, "half_deg": 179.0}), Effort(None, 10**8), 0, AstarSettings()
+    )
     assert outcome.waypoints_en is None

@@ -28,7 +28,7 @@ def test_the_plane_is_within_what_the_docs_say(reach_m, lat, lon, bearing, share
     at = share * reach_m * np.array([math.sin(bearing), math.cos(bearing)])
     there = plane.to([at])
     assert math.dist(there[0], at) <= WITHIN[reach_m][0]
-    assert plane.back(there)[0] == pytest.approx(at, abs=1e-3)          # a corner is back where it was, to the mm
+    assert plane.back(there)[0] == pytest.approx(at, abs=1e-3)  # a corner is back where it was, to the mm
     ahead = plane.back(there + 10.0 * np.array([math.sin(course), math.cos(course)]))[0] - at
     off = (math.atan2(*ahead) - course + math.pi) % (2.0 * math.pi) - math.pi
     assert abs(math.degrees(off)) <= WITHIN[reach_m][1]
@@ -45,8 +45,12 @@ def test_the_worst_of_it_is_near_what_the_docs_say(lat):
 
 
 @settings(max_examples=40)
-@given(lat=lats, course=courses, at=st.tuples(st.floats(-20_000.0, 20_000.0), st.floats(-20_000.0, 20_000.0)),
-       length_m=st.floats(100.0, 10_000.0))
+@given(
+    lat=lats,
+    course=courses,
+    at=st.tuples(st.floats(-20_000.0, 20_000.0), st.floats(-20_000.0, 20_000.0)),
+    length_m=st.floats(100.0, 10_000.0),
+)
 def test_a_leg_bends_by_what_solids_are_grown_by_at_the_most(lat, course, at, length_m):
     plane = FlatPlane(GeoPoint(lat_deg=lat, lon_deg=10.0))
     way = plane.to([at]) + np.linspace(0.0, length_m, 21)[:, None] * np.array([[math.sin(course), math.cos(course)]])
@@ -57,23 +61,28 @@ def test_a_leg_bends_by_what_solids_are_grown_by_at_the_most(lat, course, at, le
 
 
 def upwind(**change):
-    return Problem.from_json(simple(
-        goal={"x": 30, "y": 2000, "radius": 5}, obstacles=[box(-200, 900, 250, 1000)], delta_s=0.5, **change))
+    return Problem.from_json(
+        simple(goal={"x": 30, "y": 2000, "radius": 5}, obstacles=[box(-200, 900, 250, 1000)], delta_s=0.5, **change)
+    )
 
 
 @pytest.mark.parametrize("lat", [0.0, 50.8, -70.0])
 def test_its_path_stands_in_the_true_frame_and_takes_about_as_long(lat):
     p = upwind()
     numbers = {"grid_m": 50.0, "max_turn_rad": math.radians(150.0)}
-    flat = plan(p, algorithm="astar", expansions=10**7, settings=AstarSettings(
-        **numbers, projection="flat", origin=GeoPoint(lat_deg=lat, lon_deg=-1.31)))
+    flat = plan(
+        p,
+        algorithm="astar",
+        expansions=10**7,
+        settings=AstarSettings(**numbers, projection="flat", origin=GeoPoint(lat_deg=lat, lon_deg=-1.31)),
+    )
     true = plan(p, algorithm="astar", expansions=10**7, settings=AstarSettings(**numbers))
     assert flat.has_path
     assert evaluate(p, flat.waypoints_en).is_feasible
     assert flat.cost_s == pytest.approx(true.cost_s, rel=0.1)
     # Planned in other metres: his corners lie on a grid of his plane.
     there = flat.trace["flat_en"]
-    assert not np.allclose(there, flat.waypoints_en[:len(there)], atol=0.01)
+    assert not np.allclose(there, flat.waypoints_en[: len(there)], atol=0.01)
     plane = FlatPlane(GeoPoint(lat_deg=lat, lon_deg=-1.31))
     assert plane.to(flat.waypoints_en) == pytest.approx(there, abs=1e-3)
 
@@ -82,8 +91,12 @@ def test_a_vessel_goes_into_his_plane_with_its_way():
     plane = FlatPlane(GeoPoint(lat_deg=50.8, lon_deg=-1.31))
     ship = Target(x_m=900.0, y_m=-400.0, vx_mps=3.0, vy_mps=4.0, radius_m=50.0, from_s=60.0, until_s=600.0)
     p = Problem.from_json(simple())
-    flat = plane.problem(Problem(**{f: getattr(p, f) for f in (
-        "start_en", "start_heading_rad", "goal_en", "goal_radius_m", "wind", "boat")}, targets=(ship,))).targets[0]
+    flat = plane.problem(
+        Problem(
+            **{f: getattr(p, f) for f in ("start_en", "start_heading_rad", "goal_en", "goal_radius_m", "wind", "boat")},
+            targets=(ship,),
+        )
+    ).targets[0]
     for t in (60.0, 200.0):
         there = plane.to([(ship.x_m + ship.vx_mps * t, ship.y_m + ship.vy_mps * t)])[0]
         assert (flat.x_m + flat.vx_mps * t, flat.y_m + flat.vy_mps * t) == pytest.approx(there, abs=0.05)
@@ -100,6 +113,9 @@ def test_only_a_choice_of_his_plane_is_told_of_the_origin():
     origin = GeoPoint(lat_deg=50.0, lon_deg=1.0)
     flat = PlannerChoice(algorithm="astar", settings=AstarSettings(projection="flat"))
     assert flat.about(origin).settings.origin == origin
-    for other in (AUTO, PlannerChoice(algorithm="astar", settings=AstarSettings()),
-                  PlannerChoice(algorithm="rrtstar", settings=RrtstarSettings())):
+    for other in (
+        AUTO,
+        PlannerChoice(algorithm="astar", settings=AstarSettings()),
+        PlannerChoice(algorithm="rrtstar", settings=RrtstarSettings()),
+    ):
         assert other.about(origin) is other

@@ -24,10 +24,19 @@ KALMAN = {"model": "kalman", "sigma0_deg": 3.0, "growth_deg_per_sqrt_s": 0.5}
 
 def problem(**change):
     base = {
-        "id": "t", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 0}, "goal": {"x": 0, "y": 400, "radius": 5},
-        "obstacles": [BLOCK], "fence": None, "wind": {"from_deg": 0, "speed_mps": 5, "sigma": AR1},
-        "boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
-                 "speed": {"model": "constant", "v_mps": 1.5}},
+        "id": "t",
+        "title": "",
+        "start": {"x": 0, "y": 0, "heading_deg": 0},
+        "goal": {"x": 0, "y": 400, "radius": 5},
+        "obstacles": [BLOCK],
+        "fence": None,
+        "wind": {"from_deg": 0, "speed_mps": 5, "sigma": AR1},
+        "boat": {
+            "no_go_half_deg": 45,
+            "max_twa_deg": 180,
+            "turn_rate_rad_s": 0.5,
+            "speed": {"model": "constant", "v_mps": 1.5},
+        },
         "delta_s": 0.7,
     }
     return Problem.from_json({**base, **change})
@@ -59,14 +68,24 @@ def test_inside_it_takes_the_edge_nearer_the_target_to_the_foot_of_the_perpendic
 
 
 def test_a_target_dead_to_windward_behind_a_wide_zone_cannot_be_approached():
-    wide = problem(boat={"no_go_half_deg": 95, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
-                         "speed": {"model": "constant", "v_mps": 1.5}})
+    wide = problem(
+        boat={
+            "no_go_half_deg": 95,
+            "max_twa_deg": 180,
+            "turn_rate_rad_s": 0.5,
+            "speed": {"model": "constant", "v_mps": 1.5},
+        }
+    )
     ok, _, _ = steer(wide, 0.0, 100.0)
     assert not ok
 
 
-@given(bearing=st.floats(-math.pi, math.pi), wind_from=st.floats(0.0, 360.0), t=st.floats(0.0, 600.0),
-       sigma=st.sampled_from([AR1, KALMAN, {"model": "none"}]))
+@given(
+    bearing=st.floats(-math.pi, math.pi),
+    wind_from=st.floats(0.0, 360.0),
+    t=st.floats(0.0, 600.0),
+    sigma=st.sampled_from([AR1, KALMAN, {"model": "none"}]),
+)
 @settings(max_examples=150)
 def test_whatever_it_steers_keeps_the_widened_zone_to_the_leg_s_end_and_comes_nearer(bearing, wind_from, t, sigma):
     p = problem(wind=wind(wind_from, sigma), delta_s=0.8, obstacles=[])
@@ -82,22 +101,41 @@ def test_whatever_it_steers_keeps_the_widened_zone_to_the_leg_s_end_and_comes_ne
 
 
 def test_the_deepest_angle_bounds_the_steering_too():
-    p = problem(boat={"no_go_half_deg": 45, "max_twa_deg": 150, "turn_rate_rad_s": 0.5,
-                      "speed": {"model": "constant", "v_mps": 1.5}})
+    p = problem(
+        boat={
+            "no_go_half_deg": 45,
+            "max_twa_deg": 150,
+            "turn_rate_rad_s": 0.5,
+            "speed": {"model": "constant", "v_mps": 1.5},
+        }
+    )
     ok, x, y = steer(p, 0.0, -100.0)
     assert ok
     assert math.degrees(abs(math.atan2(x, y))) == pytest.approx(150.0, abs=1e-3)
 
 
 # ----------------------------------------------------------------------------------- the tree
-@pytest.mark.parametrize("change", [
-    {}, {"wind": wind(sigma=KALMAN)}, {"wind": wind(200.0)},
-    {"boat": {"no_go_half_deg": 40, "max_twa_deg": 160, "turn_rate_rad_s": 0.3, "tack_loss_s": 3.0, "gybe_loss_s": 2.0,
-              "speed": {"model": "polar", "twa_deg": [0, 45, 90, 180], "v_mps": [0, 1.4, 2.0, 1.2]}}},
-    {"current": {"set_deg": 90, "drift_mps": 0.3}},
-    {"current": {"set_deg": 90, "drift_mps": 0.3}, "zone": {"from_deg": 10, "half_deg": 65}},
-    {"targets": [{"x": -200, "y": 300, "vx": 1.0, "vy": 0.0, "radius_m": 30}]},
-])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {},
+        {"wind": wind(sigma=KALMAN)},
+        {"wind": wind(200.0)},
+        {
+            "boat": {
+                "no_go_half_deg": 40,
+                "max_twa_deg": 160,
+                "turn_rate_rad_s": 0.3,
+                "tack_loss_s": 3.0,
+                "gybe_loss_s": 2.0,
+                "speed": {"model": "polar", "twa_deg": [0, 45, 90, 180], "v_mps": [0, 1.4, 2.0, 1.2]},
+            }
+        },
+        {"current": {"set_deg": 90, "drift_mps": 0.3}},
+        {"current": {"set_deg": 90, "drift_mps": 0.3}, "zone": {"from_deg": 10, "half_deg": 65}},
+        {"targets": [{"x": -200, "y": 300, "vx": 1.0, "vy": 0.0, "radius_m": 30}]},
+    ],
+)
 def test_every_state_s_time_is_the_scorer_s_time_of_its_path(change):
     p = problem(**change)
     tree = RrtTree(p, world_of(p), seed=3)
@@ -186,18 +224,23 @@ def test_the_tree_grows_past_its_first_arrays(monkeypatch):
 
 
 # ----------------------------------------------------------------------------------- collision
-@given(st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(1, 20), st.floats(0, 6)), min_size=1,
-                max_size=6), st.tuples(*[st.floats(-80, 80)] * 4))
+@given(
+    st.lists(
+        st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(1, 20), st.floats(0, 6)), min_size=1, max_size=6
+    ),
+    st.tuples(*[st.floats(-80, 80)] * 4),
+)
 @settings(max_examples=120)
 def test_first_hit_is_what_shapely_says(shapes, segment):
     import shapely
 
-    squares = [shapely.affinity.rotate(shapely.box(x - r, y - r, x + r, y + r), a, use_radians=True)
-               for x, y, r, a in shapes]
+    squares = [
+        shapely.affinity.rotate(shapely.box(x - r, y - r, x + r, y + r), a, use_radians=True) for x, y, r, a in shapes
+    ]
     p = problem(obstacles=[shapely.to_wkt(s, rounding_precision=-1) for s in squares])
     w = world_of(p)
     ax, ay, bx, by = segment
-    assume(math.dist((ax, ay), (bx, by)) > 1e-9)              # shapely divides by the length of a line
+    assume(math.dist((ax, ay), (bx, by)) > 1e-9)  # shapely divides by the length of a line
     line = shapely.LineString([(ax, ay), (bx, by)])
     border = p.solid.buffer(-0.5e-3, join_style="mitre").boundary
     distance = shapely.distance(border, line)
@@ -220,7 +263,11 @@ def test_a_start_in_an_obstacle_is_invalid_and_a_start_in_the_goal_is_there():
 
 def test_bounds_are_the_fence_or_half_the_distance_around():
     assert bounds_of(problem(fence="POLYGON((-300 -100,300 -100,300 500,-300 500,-300 -100))")) == (
-        -300.0, -100.0, 300.0, 500.0)
+        -300.0,
+        -100.0,
+        300.0,
+        500.0,
+    )
     x0, y0, x1, y1 = bounds_of(problem())
     assert x0 <= -260.0
     assert x1 >= 260.0
@@ -252,10 +299,10 @@ def test_a_state_s_cost_is_its_time_and_its_two_risks():
     settings = RrtstarSettings(risk_weight_s=7.0, state_risk_weight_s=11.0)
     tree = RrtTree(p, world_of(p), 2, settings)
     tree.grow(1500)
-    node = tree.node[:tree.size]
+    node = tree.node[: tree.size]
     time_s, risk, most = (node[:, k] for k in (kernels.T, kernels.R, kernels.M))
     assert node[:, kernels.C] == pytest.approx(time_s + 7.0 * risk + 11.0 * most)
-    parent = tree.link[1:tree.size, kernels.PARENT]
+    parent = tree.link[1 : tree.size, kernels.PARENT]
     assert (node[1:, kernels.M] >= node[parent, kernels.M]).all()
     assert tree.count[kernels.REWIRED] > 0
 
@@ -282,7 +329,7 @@ def test_no_branch_is_longer_than_the_range_and_the_goal_bias_draws_the_goal():
         assert np.hypot(*(tree.node[:n, :2] - tree.node[n, :2]).T).min() <= 25.0 + 1e-9
 
     def near_goal(t):
-        return np.mean(np.hypot(t.node[:t.size, 0], t.node[:t.size, 1] - 400.0) < 60.0)
+        return np.mean(np.hypot(t.node[: t.size, 0], t.node[: t.size, 1] - 400.0) < 60.0)
 
     assert near_goal(eager) > near_goal(lazy)
 

@@ -43,8 +43,7 @@ def nearest_m(p, legs):
             x, y = (a + share * (b - a) for a, b in zip(leg.from_en, leg.to_en, strict=True))
             for target, spread in uncertain(p.targets):
                 if target.from_s <= t <= target.until_s:
-                    near = min(near, math.hypot(
-                        x - spread.x_m - target.vx_mps * t, y - spread.y_m - target.vy_mps * t))
+                    near = min(near, math.hypot(x - spread.x_m - target.vx_mps * t, y - spread.y_m - target.vy_mps * t))
     return near
 
 
@@ -72,7 +71,7 @@ def test_under_a_limit_on_the_path_it_goes_round_where_that_is_tight():
     assert round_.risk <= 0.002
     assert round_.cost_s > through.cost_s
     assert nearest_m(tight, round_.legs) > nearest_m(loose, through.legs)
-    assert evaluate(tight, round_.waypoints_en).is_feasible     # clear of the closed disc, too
+    assert evaluate(tight, round_.waypoints_en).is_feasible  # clear of the closed disc, too
 
 
 def test_with_a_small_part_of_the_promise_it_goes_round():
@@ -83,14 +82,29 @@ def test_with_a_small_part_of_the_promise_it_goes_round():
 
 
 @settings(max_examples=8)
-@given(st.floats(-300.0, 300.0), st.floats(120.0, 240.0), st.floats(1.0, 6.0), st.booleans(),
-       st.sampled_from([None, 0.003, 0.02, 0.1]), st.floats(1e-4, 0.09), st.integers(0, 99))
+@given(
+    st.floats(-300.0, 300.0),
+    st.floats(120.0, 240.0),
+    st.floats(1.0, 6.0),
+    st.booleans(),
+    st.sampled_from([None, 0.003, 0.02, 0.1]),
+    st.floats(1e-4, 0.09),
+    st.integers(0, 99),
+)
 def test_no_path_that_is_returned_is_above_the_bound(off_m, course_deg, speed_mps, has_other, limit, part, seed):
     back_s, course = 225.0, math.radians(course_deg)
-    ships = (ship((450.0 + off_m - back_s * speed_mps * math.sin(course), -back_s * speed_mps * math.cos(course)),
-                  course_deg, speed_mps, 20.0), *(SCENES["crossing slowly"] if has_other else ()))
-    p = problem(ships, keep_of(10.0), 0.9, vessels_part=part,
-                risk=None if limit is None else RiskLimit(max_path_risk=limit))
+    ships = (
+        ship(
+            (450.0 + off_m - back_s * speed_mps * math.sin(course), -back_s * speed_mps * math.cos(course)),
+            course_deg,
+            speed_mps,
+            20.0,
+        ),
+        *(SCENES["crossing slowly"] if has_other else ()),
+    )
+    p = problem(
+        ships, keep_of(10.0), 0.9, vessels_part=part, risk=None if limit is None else RiskLimit(max_path_risk=limit)
+    )
     found = by_tree(p, seed, 200)
     if not found.has_path:
         assert found.status is not PlanStatus.FOUND

@@ -21,15 +21,30 @@ BOAT = Boat(polar=ardurover_sitl())
 
 
 def problem(tws=5.0, sigma=1.0, tau=60.0, goal=(600.0, 0.0), *, known=True, boat=BOAT, sigma_deg=0.0, **more):
-    spread = {"model": "kalman", "sigma0_deg": sigma_deg, "growth_deg_per_sqrt_s": 0.0} if sigma_deg else {
-        "model": "none"}
-    return Problem.from_json({
-        "start": {"x": 0, "y": 0, "heading_deg": 90}, "goal": {"x": goal[0], "y": goal[1], "radius": 1},
-        "obstacles": [], "delta_s": 0.9,
-        "wind": {"from_deg": 0, "speed_mps": tws, "sigma": spread, "strength": {
-            "horizon_s": [0.0, 600.0], "mean_mps": [tws, tws], "sigma_mps": [sigma, sigma], "correlation_s": tau,
-            "known": known}},
-        "boat": boat.problem_boat(tws) | {"speeds": boat.problem_speeds()} | more})
+    spread = (
+        {"model": "kalman", "sigma0_deg": sigma_deg, "growth_deg_per_sqrt_s": 0.0} if sigma_deg else {"model": "none"}
+    )
+    return Problem.from_json(
+        {
+            "start": {"x": 0, "y": 0, "heading_deg": 90},
+            "goal": {"x": goal[0], "y": goal[1], "radius": 1},
+            "obstacles": [],
+            "delta_s": 0.9,
+            "wind": {
+                "from_deg": 0,
+                "speed_mps": tws,
+                "sigma": spread,
+                "strength": {
+                    "horizon_s": [0.0, 600.0],
+                    "mean_mps": [tws, tws],
+                    "sigma_mps": [sigma, sigma],
+                    "correlation_s": tau,
+                    "known": known,
+                },
+            },
+            "boat": boat.problem_boat(tws) | {"speeds": boat.problem_speeds()} | more,
+        }
+    )
 
 
 def reach(p):
@@ -46,7 +61,7 @@ def simulated(tws, sigma, tau, length_m, planned_s, count=4000, step_s=0.5):
     while t < 5.0 * planned_s and not np.all(np.isfinite(out)):
         wind = np.clip(tws + sigma * x, 0.0, 15.0)
         v = np.interp(wind, np.linspace(0.0, 15.0, 601), speeds)
-        v = np.where(wind < 3.0, v * wind / 3.0, v)     # the polar begins at 3 m/s
+        v = np.where(wind < 3.0, v * wind / 3.0, v)  # the polar begins at 3 m/s
         ends = np.isinf(out) & (done + v * step_s >= length_m)
         out[ends] = t + (length_m - done[ends]) / v[ends]
         done += v * step_s
@@ -64,8 +79,9 @@ def test_a_boat_whose_speeds_may_be_off_spreads_its_arrivals_by_that():
         assert quantile == pytest.approx(planned_s * math.exp(0.35 * z), rel=0.02)
 
 
-@pytest.mark.parametrize(("tws", "sigma", "tau"), [
-    (5.0, 1.0, 5.0), (5.0, 1.5, 60.0), (4.0, 1.0, 600.0), (8.0, 2.0, 20.0)])
+@pytest.mark.parametrize(
+    ("tws", "sigma", "tau"), [(5.0, 1.0, 5.0), (5.0, 1.5, 60.0), (4.0, 1.0, 600.0), (8.0, 2.0, 20.0)]
+)
 def test_the_quantiles_are_those_of_an_independent_simulation(tws, sigma, tau):
     p = problem(tws, sigma, tau)
     found = arrival(p, reach(p))
@@ -82,8 +98,13 @@ def test_less_wind_costs_more_than_more_wind_gains():
 
 
 @settings(max_examples=25)
-@given(tws=st.floats(1.0, 12.0), share=st.floats(0.0, 0.6), tau=st.floats(1.0, 3000.0), turn=st.floats(0.0, 20.0),
-       fails=st.floats(0.0, 0.5))
+@given(
+    tws=st.floats(1.0, 12.0),
+    share=st.floats(0.0, 0.6),
+    tau=st.floats(1.0, 3000.0),
+    turn=st.floats(0.0, 20.0),
+    fails=st.floats(0.0, 0.5),
+)
 def test_quantiles_are_in_order_and_the_same_when_asked_again(tws, share, tau, turn, fails):
     p = problem(tws, share * tws, tau, goal=(300.0, 300.0), sigma_deg=turn, tack_fails=fails)
     legs = evaluate(p, [p.start_en, (200.0, 0.0), p.goal_en]).legs
@@ -112,13 +133,14 @@ def test_a_problem_that_says_nothing_of_the_strength_promises_nothing_of_the_tim
 def test_what_is_not_known_is_said_and_makes_late_later():
     p = problem(5.0, 1.2, 60.0)
     assert [d[:24] for d in arrival(p, reach(p)).doubts] == ["her polar begins at 3.0 "]
-    whole = problem(5.0, 1.2, 60.0, boat=Boat(polar=avalon()))     # from no wind at all
+    whole = problem(5.0, 1.2, 60.0, boat=Boat(polar=avalon()))  # from no wind at all
     assert arrival(whole, reach(whole)).doubts == ()
     assumed = problem(5.0, 1.2, 60.0, boat=Boat(polar=avalon()), known=False)
     assert "assumed" in in_words(arrival(assumed, reach(assumed)), 100.0)
     low = problem(2.5, 0.8, 300.0)
-    linear = replace(low.boat.speeds, tws_mps=(0.0, *low.boat.speeds.tws_mps),
-                     v_mps=((0.0,) * 73, *low.boat.speeds.v_mps))
+    linear = replace(
+        low.boat.speeds, tws_mps=(0.0, *low.boat.speeds.tws_mps), v_mps=((0.0,) * 73, *low.boat.speeds.v_mps)
+    )
     as_if = replace(low, boat=replace(low.boat, speeds=linear))
     assert arrival(low, reach(low)).late_s > 1.05 * arrival(as_if, reach(as_if)).late_s
     bare = replace(p, boat=replace(p.boat, speeds=None))
@@ -137,7 +159,7 @@ def test_a_wind_that_dies_may_never_bring_her_there():
 def test_the_boats_limits_are_chance_constraints():
     calm, windy = problem(7.0, 0.5, max_tws_mps=10.0, min_tws_mps=2.0), problem(9.5, 1.0, max_tws_mps=10.0)
     assert limits_in_words(calm, arrival(calm, reach(calm))) == ""
-    assert arrival(windy, reach(windy)).over_max == pytest.approx(0.3085, abs=1e-3)    # half a sigma
+    assert arrival(windy, reach(windy)).over_max == pytest.approx(0.3085, abs=1e-3)  # half a sigma
     said = explain(windy, plan(windy, expansions=2000), expansions=500).why.text
     assert "Not to be sailed: more wind than 10 m/s with 31 %" in said
     light = problem(1.5, 0.5, min_tws_mps=2.0)
@@ -153,11 +175,17 @@ def test_a_problem_is_written_and_read_the_same():
     assert (again.boat.max_tws_mps, again.boat.min_tws_mps, again.boat.tack_fails) == (10.0, 2.0, 0.1)
 
 
-@pytest.mark.parametrize(("change", "said"), [
-    ({"tack_fails": 1.0}, "tack_fails"), ({"max_tws_mps": 0.0}, "limit of wind"),
-    ({"max_tws_mps": 3.0, "min_tws_mps": 4.0}, "min_tws_mps"), ({"irons_s": -1.0}, "irons_s"),
-    ({"lee_mps": [0.1]}, "lee_mps"), ({"lee_mps": [0.1, -0.1]}, "lee_mps"),
-])
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"tack_fails": 1.0}, "tack_fails"),
+        ({"max_tws_mps": 0.0}, "limit of wind"),
+        ({"max_tws_mps": 3.0, "min_tws_mps": 4.0}, "min_tws_mps"),
+        ({"irons_s": -1.0}, "irons_s"),
+        ({"lee_mps": [0.1]}, "lee_mps"),
+        ({"lee_mps": [0.1, -0.1]}, "lee_mps"),
+    ],
+)
 def test_nonsense_is_a_defect(change, said):
     assert said in defect_of(problem(**change))
 

@@ -11,13 +11,7 @@ from bench.winds import simulate_entries
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.plan import Leg
 from companion.planner.risk import kernels
-from companion.planner.risk.chance_constraint import (
-    PROMISE_FACTOR,
-    path_risk,
-    process_of,
-    widened,
-    with_risk,
-)
+from companion.planner.risk.chance_constraint import PROMISE_FACTOR, path_risk, process_of, widened, with_risk
 
 AR1 = {"model": "ar1", "sigma0_deg": 2.0, "sigma_inf_deg": 8.0, "rho_hz": 0.036}
 STILL = {"model": "ar1", "sigma0_deg": 8.0, "sigma_inf_deg": 8.0, "rho_hz": 0.02}
@@ -28,10 +22,19 @@ NONE = np.zeros(1)
 
 def problem(sigma=AR1, **change):
     base = {
-        "id": "t", "title": "", "start": {"x": 0, "y": 0, "heading_deg": 0}, "goal": {"x": 0, "y": 400, "radius": 5},
-        "obstacles": [], "fence": None, "wind": {"from_deg": 0, "speed_mps": 5, "sigma": sigma},
-        "boat": {"no_go_half_deg": 45, "max_twa_deg": 180, "turn_rate_rad_s": 0.5,
-                 "speed": {"model": "constant", "v_mps": 1.5}},
+        "id": "t",
+        "title": "",
+        "start": {"x": 0, "y": 0, "heading_deg": 0},
+        "goal": {"x": 0, "y": 400, "radius": 5},
+        "obstacles": [],
+        "fence": None,
+        "wind": {"from_deg": 0, "speed_mps": 5, "sigma": sigma},
+        "boat": {
+            "no_go_half_deg": 45,
+            "max_twa_deg": 180,
+            "turn_rate_rad_s": 0.5,
+            "speed": {"model": "constant", "v_mps": 1.5},
+        },
         "delta_s": 0.9,
     }
     return Problem.from_json({**base, **change})
@@ -40,17 +43,42 @@ def problem(sigma=AR1, **change):
 def legs(*rows):
     """Legs from (start s, end s, TWA deg)."""
     return tuple(
-        Leg(from_en=(0, 0), to_en=(0, 1), heading_rad=math.radians(a) % (2 * math.pi), twa_rad=-math.radians(a),
-            turn_rad=0.0, length_m=1.0, speed_mps=1.0, start_s=t0, end_s=t1, sigma_rad=0.0, no_go_half_rad=0.0)
-        for t0, t1, a in rows)
+        Leg(
+            from_en=(0, 0),
+            to_en=(0, 1),
+            heading_rad=math.radians(a) % (2 * math.pi),
+            twa_rad=-math.radians(a),
+            turn_rad=0.0,
+            length_m=1.0,
+            speed_mps=1.0,
+            start_s=t0,
+            end_s=t1,
+            sigma_rad=0.0,
+            no_go_half_rad=0.0,
+        )
+        for t0, t1, a in rows
+    )
 
 
 def boole(p, path):
     """Return the union bound that a tree adds up edge by edge."""
     of, total, before_twa, before_s = process_of(p), 0.0, 0.0, -1.0
     for leg in path:
-        total += kernels.leg_risk(leg.start_s, leg.end_s, -leg.twa_rad, before_twa, before_s, p.boat.no_go_half_rad,
-                                  of.model, of.s0, of.s1, of.rho, of.tau, of.table_t, of.table_s)
+        total += kernels.leg_risk(
+            leg.start_s,
+            leg.end_s,
+            -leg.twa_rad,
+            before_twa,
+            before_s,
+            p.boat.no_go_half_rad,
+            of.model,
+            of.s0,
+            of.s1,
+            of.rho,
+            of.tau,
+            of.table_t,
+            of.table_s,
+        )
         before_twa, before_s = -leg.twa_rad, leg.end_s
     return total
 
@@ -128,8 +156,12 @@ def test_a_leg_in_the_zone_fails_for_sure_and_nothing_is_nothing():
     assert path_risk(problem(AR1), ()).total == 0.0
 
 
-@given(angle=st.floats(46.0, 120.0), more=st.floats(0.5, 20.0), t=st.floats(5.0, 2000.0),
-       sigma=st.sampled_from([AR1, KALMAN, TABLE, STILL]))
+@given(
+    angle=st.floats(46.0, 120.0),
+    more=st.floats(0.5, 20.0),
+    t=st.floats(5.0, 2000.0),
+    sigma=st.sampled_from([AR1, KALMAN, TABLE, STILL]),
+)
 @settings(max_examples=60)
 def test_risk_is_a_probability_that_falls_with_the_angle_and_rises_with_time(angle, more, t, sigma):
     p = problem(sigma)
@@ -172,13 +204,39 @@ def test_a_passage_of_a_day_costs_no_more_steps_than_the_wind_needs_to_settle():
     p, full = process_of(problem(AR1)), kernels.steps_of(kernels.R_STEP)
     out = np.zeros(1)
     steps = kernels.first_passage(
-        np.array([0.0]), np.array([86_400.0]), np.array([math.radians(80.0)]), math.radians(45.0), p.model, p.s0, p.s1,
-        p.rho, p.tau, p.table_t, p.table_s, 10**6, full, out)
+        np.array([0.0]),
+        np.array([86_400.0]),
+        np.array([math.radians(80.0)]),
+        math.radians(45.0),
+        p.model,
+        p.s0,
+        p.s1,
+        p.rho,
+        p.tau,
+        p.table_t,
+        p.table_s,
+        10**6,
+        full,
+        out,
+    )
     assert 0 < steps < 3000
     short = np.zeros(1)
     kernels.first_passage(
-        np.array([0.0]), np.array([8640.0]), np.array([math.radians(80.0)]), math.radians(45.0), p.model, p.s0, p.s1,
-        p.rho, p.tau, p.table_t, p.table_s, 10**6, full, short)
+        np.array([0.0]),
+        np.array([8640.0]),
+        np.array([math.radians(80.0)]),
+        math.radians(45.0),
+        p.model,
+        p.s0,
+        p.s1,
+        p.rho,
+        p.tau,
+        p.table_t,
+        p.table_s,
+        10**6,
+        full,
+        short,
+    )
     assert -math.log1p(-out[0]) == pytest.approx(-10.0 * math.log1p(-short[0]), rel=0.02)
 
 
@@ -202,8 +260,7 @@ def test_a_limit_is_kept_and_its_promise_is_true(algorithm, expansions):
 
 
 def test_a_limit_that_nothing_keeps_is_said_so():
-    wall = [
-        "POLYGON((-400 -60,-30 -60,-30 460,-400 460,-400 -60))", "POLYGON((30 -60,400 -60,400 460,30 460,30 -60))"]
+    wall = ["POLYGON((-400 -60,-30 -60,-30 460,-400 460,-400 -60))", "POLYGON((30 -60,400 -60,400 460,30 460,30 -60))"]
     p = problem(STILL, obstacles=wall, delta_s=0.6, risk={"max_path_risk": 1e-4})
     answer = plan(p, algorithm="rrtstar", expansions=3000)
     assert answer.status is PlanStatus.TIMEOUT

@@ -17,19 +17,34 @@ from companion.planner.risk.tacks import of_risky, tacks_at_risk
 from companion.planner.solve import CONTACT_S, DEARER
 from tests.planner.problem_json import to_dict
 
-BOAT = {"no_go_half_deg": 45.0, "max_twa_deg": 180.0, "turn_rate_rad_s": 0.5, "tack_loss_s": 3.0,
-        "speed": {"model": "constant", "v_mps": 2.0}}
+BOAT = {
+    "no_go_half_deg": 45.0,
+    "max_twa_deg": 180.0,
+    "turn_rate_rad_s": 0.5,
+    "tack_loss_s": 3.0,
+    "speed": {"model": "constant", "v_mps": 2.0},
+}
 
 
 def channel(fails=0.3, width_m=60.0, length_m=300.0, **extra):
     """Return a beat up a channel: walls on both sides, plans may go up to them."""
     half = 0.5 * width_m
-    walls = [f"POLYGON (({x} -50, {x + s * 40} -50, {x + s * 40} {length_m + 50}, {x} {length_m + 50}, {x} -50))"
-             for x, s in ((-half, -1), (half, 1))]
-    return Problem.from_json({
-        "start": {"x": 0, "y": 0, "heading_deg": 45}, "goal": {"x": 0, "y": length_m, "radius": 5},
-        "obstacles": walls, "fence": None, "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}},
-        "boat": BOAT | {"tack_fails": fails}, "delta_s": 0.9, **extra})
+    walls = [
+        f"POLYGON (({x} -50, {x + s * 40} -50, {x + s * 40} {length_m + 50}, {x} {length_m + 50}, {x} -50))"
+        for x, s in ((-half, -1), (half, 1))
+    ]
+    return Problem.from_json(
+        {
+            "start": {"x": 0, "y": 0, "heading_deg": 45},
+            "goal": {"x": 0, "y": length_m, "radius": 5},
+            "obstacles": walls,
+            "fence": None,
+            "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}},
+            "boat": BOAT | {"tack_fails": fails},
+            "delta_s": 0.9,
+            **extra,
+        }
+    )
 
 
 def test_without_a_chance_of_failure_a_plan_is_what_it_was():
@@ -43,7 +58,7 @@ def test_without_a_chance_of_failure_a_plan_is_what_it_was():
 def test_a_boat_whose_tacks_fail_tacks_earlier_within_a_tenth_of_the_time():
     careless, careful = plan(channel(0.0), expansions=20_000), plan(channel(), expansions=20_000)
     at_risk = tacks_at_risk(channel(), careless.legs)
-    assert any(tack.failures == 1 for tack in at_risk)     # up to the walls, which is the fastest
+    assert any(tack.failures == 1 for tack in at_risk)  # up to the walls, which is the fastest
     assert not any(tack.failures == 1 for tack in tacks_at_risk(channel(), careful.legs))
     assert careless.cost_s <= careful.cost_s <= DEARER * careless.cost_s
     assert careful.tack_risk < path_risk(channel(), careless).of_tacks
@@ -80,10 +95,16 @@ def test_where_nothing_else_is_worth_it_the_risk_is_counted_and_limited():
 def test_a_tack_is_the_riskier_the_nearer_the_wall(gap, chance):
     def to_wall(gap_m):
         wall = shapely.box(40.0 + gap_m, -200.0, 90.0 + gap_m, 200.0).wkt
-        p = Problem.from_json({
-            "start": {"x": 0, "y": 0, "heading_deg": 45}, "goal": {"x": 0, "y": 80, "radius": 1},
-            "obstacles": [wall], "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}},
-            "boat": BOAT | {"tack_fails": chance, "turn_rate_rad_s": 0.02}, "delta_s": 0.9})
+        p = Problem.from_json(
+            {
+                "start": {"x": 0, "y": 0, "heading_deg": 45},
+                "goal": {"x": 0, "y": 80, "radius": 1},
+                "obstacles": [wall],
+                "wind": {"from_deg": 0, "speed_mps": 5, "sigma": {"model": "none"}},
+                "boat": BOAT | {"tack_fails": chance, "turn_rate_rad_s": 0.02},
+                "delta_s": 0.9,
+            }
+        )
         return tacks_at_risk(p, evaluate(p, [(0, 0), (40, 40), (0, 80)]).legs)
 
     near, far = to_wall(gap), to_wall(gap + 5.0)
@@ -98,12 +119,12 @@ def test_a_tack_is_the_riskier_the_nearer_the_wall(gap, chance):
 
 def test_how_long_she_lies_and_how_she_is_set_is_in_the_room_of_a_tack_on_that_side_alone():
     p = channel(0.3, width_m=90.0)
-    p = replace(p, boat=replace(p.boat, turn_rate_radps=0.02))     # no room to gybe: the row goes on to the wall
+    p = replace(p, boat=replace(p.boat, turn_rate_radps=0.02))  # no room to gybe: the row goes on to the wall
     legs = evaluate(p, [(0, 0), (40, 40), (0, 80), (-40, 120), (0, 160)]).legs
 
     def failures(**boat):
         found = {tack.leg: tack.failures for tack in tacks_at_risk(replace(p, boat=replace(p.boat, **boat)), legs)}
-        return found[1], found[3]   # to the right on port tack, to the left on starboard
+        return found[1], found[3]  # to the right on port tack, to the left on starboard
 
     right, left = failures()
     assert right == left > 2
@@ -116,7 +137,7 @@ def test_how_long_she_lies_and_how_she_is_set_is_in_the_room_of_a_tack_on_that_s
 def test_room_to_gybe_ends_the_row_of_failures():
     wide = channel(0.3, width_m=200.0)
     legs = evaluate(wide, [(0, 0), (93, 93), (-12, 198), (0, 300)]).legs
-    slow = replace(wide, boat=replace(wide.boat, turn_rate_radps=0.02))    # 100 m of radius: she cannot
+    slow = replace(wide, boat=replace(wide.boat, turn_rate_radps=0.02))  # 100 m of radius: she cannot
     assert [t.failures for t in tacks_at_risk(slow, legs)][:1] == [4]
     quick = replace(wide, boat=replace(wide.boat, turn_rate_radps=3.0))
     assert tacks_at_risk(quick, legs) == ()

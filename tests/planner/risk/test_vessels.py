@@ -77,7 +77,7 @@ def test_the_parts_add_up_to_the_promise():
     assert (1.0 - p.wind_delta_s) + p.vessels_share == pytest.approx(0.1)
     assert p.k_delta > replace(p, targets=()).k_delta
     assert resolved(p).delta_s == p.wind_delta_s
-    k = tail_factor(0.005)                                  # two vessels, half of it each
+    k = tail_factor(0.005)  # two vessels, half of it each
     for target, disc in zip(p.targets, resolved(p).targets, strict=True):
         assert disc.spread is None
         assert disc.radius_m == pytest.approx(target.radius_m + k * target.spread.sigma_m)
@@ -146,8 +146,14 @@ def covariance(rows):
 
 
 @settings(max_examples=100)
-@given(st.floats(0.0, 2.0 * math.pi), st.floats(0.0, math.pi), st.floats(1.0, 80.0), st.floats(0.05, 1.0),
-       st.floats(5.0, 200.0), st.sampled_from([1e-4, 1e-3, 1e-2, 0.1]))
+@given(
+    st.floats(0.0, 2.0 * math.pi),
+    st.floats(0.0, math.pi),
+    st.floats(1.0, 80.0),
+    st.floats(0.05, 1.0),
+    st.floats(5.0, 200.0),
+    st.sampled_from([1e-4, 1e-3, 1e-2, 0.1]),
+)
 def test_outside_its_disc_a_vessel_is_met_with_its_part_at_most(bearing, axis, sigma, narrow, keep, part):
     s, c = math.sin(axis), math.cos(axis)
     spread = covariance([[s, c, sigma, 0.0], [c, -s, narrow * sigma, 0.0]])

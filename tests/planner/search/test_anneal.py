@@ -16,8 +16,10 @@ from companion.planner.search.world import make_world
 from tests.planner.problems import POLAR, simple
 
 PLAIN = simple()["boat"] | {"no_go_half_deg": 20, "speed": POLAR}
-BOATS = [make_world(Problem.from_json(simple(boat=PLAIN | kind))).boat
-         for kind in ({}, {"tack_loss_s": 5.0}, {"gybe_loss_s": 3.0, "gybe_room_m": 2.0})]
+BOATS = [
+    make_world(Problem.from_json(simple(boat=PLAIN | kind))).boat
+    for kind in ({}, {"tack_loss_s": 5.0}, {"gybe_loss_s": 3.0, "gybe_room_m": 2.0})
+]
 few = st.lists(st.tuples(st.integers(-2, 2), st.integers(-2, 2)), min_size=1, max_size=5)
 
 

@@ -96,8 +96,11 @@ def test_a_tack_that_costs_is_avoided_by_gybing():
     cheap = plan(Problem.from_json(simple(boat=boat)), expansions=60_000)
 
     def tacks(answer):
-        return sum(1 for a, b in zip(answer.legs, answer.legs[1:], strict=False)
-                   if a.twa_rad * b.twa_rad < 0 and abs(b.turn_rad) < math.pi / 2 + 0.1)
+        return sum(
+            1
+            for a, b in zip(answer.legs, answer.legs[1:], strict=False)
+            if a.twa_rad * b.twa_rad < 0 and abs(b.turn_rad) < math.pi / 2 + 0.1
+        )
 
     assert tacks(cheap) >= 1
     assert tacks(dear) == 0
@@ -116,7 +119,7 @@ def test_a_clearance_floor_is_kept():
     answer = plan(Problem.from_json(raw | {"clearance_floor_m": 6.0}), expansions=30_000)
     free = Problem.from_json(raw)
     nearest = min(leg.clearance_m for leg in answer.legs)
-    assert nearest == pytest.approx(0.0, abs=0.01)                       # to the obstacle grown by 6 m
+    assert nearest == pytest.approx(0.0, abs=0.01)  # to the obstacle grown by 6 m
     wall = free.obstacle_union
     assert wall.distance(shapely.LineString(answer.waypoints_en)) == pytest.approx(6.0, abs=0.1)
 
@@ -163,13 +166,29 @@ def test_annealing_keeps_a_path_feasible_and_never_makes_it_worse(raw, seed):
     world, gauge = make_world(p), make_gauge(p)
     if evaluate(p, [[0, 0]]).reasons[-1].startswith(("start", "goal")) or not gauge.can_move:
         return
-    found = run_lattice(world, gauge, cells=1_500, reach=2, half_rad=max(world.boat.up, p.no_go_half_rad(300.0)),
-                        box=(-300, -300, 400, 400))
+    found = run_lattice(
+        world,
+        gauge,
+        cells=1_500,
+        reach=2,
+        half_rad=max(world.boat.up, p.no_go_half_rad(300.0)),
+        box=(-300, -300, 400, 400),
+    )
     if found.points is None or not math.isfinite(check_path(world.grid, world.boat, found.points, world.h0)):
         return
     cost, points, _, last = anneal(
-        world.grid, world.boat, found.points, world.h0, np.array([*world.goal, world.goal_radius]), 100.0,
-        world.corners, 3_000, 0.5, 1e-4, 0.0, np.array([seed], np.uint64),
+        world.grid,
+        world.boat,
+        found.points,
+        world.h0,
+        np.array([*world.goal, world.goal_radius]),
+        100.0,
+        world.corners,
+        3_000,
+        0.5,
+        1e-4,
+        0.0,
+        np.array([seed], np.uint64),
     )
     assert cost <= found.cost_s + 1e-3
     for path in (points, last):

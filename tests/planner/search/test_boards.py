@@ -79,14 +79,21 @@ def test_never_more_than_a_feasible_path_turns(raw, tack_s, gybe_s, can_tack):
 
 
 @settings(max_examples=12)
-@given(st.floats(6, 60), st.floats(10, 150), st.floats(-60, 60), st.floats(-45, 45), st.floats(0, 1.5),
-       st.floats(0.2, 2.0))
+@given(
+    st.floats(6, 60), st.floats(10, 150), st.floats(-60, 60), st.floats(-45, 45), st.floats(0, 1.5), st.floats(0.2, 2.0)
+)
 def test_never_more_than_is_turned_in_a_channel(width, length, x, wind, growth, rate):
     walls = [box(-300, 100, x - width / 2, 100 + length), box(x + width / 2, 100, 300, 100 + length)]
-    p = Problem.from_json(simple(
-        obstacles=walls, fence=box(-250, -60, 250, 500), goal={"x": 20, "y": 400, "radius": 5}, delta_s=0.7,
-        boat=simple()["boat"] | {"turn_rate_rad_s": rate},
-        wind={"from_deg": wind, "sigma": {"model": "kalman", "sigma0_deg": 2.0, "growth_deg_per_sqrt_s": growth}}))
+    p = Problem.from_json(
+        simple(
+            obstacles=walls,
+            fence=box(-250, -60, 250, 500),
+            goal={"x": 20, "y": 400, "radius": 5},
+            delta_s=0.7,
+            boat=simple()["boat"] | {"turn_rate_rad_s": rate},
+            wind={"from_deg": wind, "sigma": {"model": "kalman", "sigma0_deg": 2.0, "growth_deg_per_sqrt_s": growth}},
+        )
+    )
     held(p)
 
 
@@ -95,16 +102,18 @@ def test_a_straight_channel_is_beaten_in_boards_of_its_width(width):
     walls = [box(-300, 50, -width / 2, 250), box(width / 2, 50, 300, 250)]
     p = Problem.from_json(simple(obstacles=walls, fence=box(-250, -60, 250, 400), goal={"x": 0, "y": 320, "radius": 5}))
     boards = boards_of(p)
-    tacks = 200.0 / width - 1.0          # each board climbs the width, the first and the last only end and begin inside
+    tacks = 200.0 / width - 1.0  # each board climbs the width, the first and the last only end and begin inside
     tack_s = 0.5 * math.pi / p.boat.turn_rate_radps
     sail_s = 315.0 * math.sqrt(2.0) / 1.5
     assert (tacks - 2.0) * tack_s <= max(boards.turning_s(sail_s, two) for two in (False, True))
     wide = boards_of(Problem.from_json(simple(fence=box(-250, -60, 250, 400), goal={"x": 0, "y": 320, "radius": 5})))
-    assert wide.turning_s(sail_s, as_two=False) <= 1.5 * tack_s + 1e-6       # the first turn, and one tack
+    assert wide.turning_s(sail_s, as_two=False) <= 1.5 * tack_s + 1e-6  # the first turn, and one tack
 
 
-@pytest.mark.parametrize(("name", "cost_s", "gap"), [
-    ("channel-beat", 771.7, 0.006), ("slalom", 788.7, 0.015), ("channels-noisy", 449.7, 0.01), ("gate", 420.3, 0.04)])
+@pytest.mark.parametrize(
+    ("name", "cost_s", "gap"),
+    [("channel-beat", 771.7, 0.006), ("slalom", 788.7, 0.015), ("channels-noisy", 449.7, 0.01), ("gate", 420.3, 0.04)],
+)
 def test_the_gap_of_narrow_water_is_small(name, cost_s, gap):
     p = load(name)
     bound = Bound(make_world(p), make_gauge(p))

@@ -52,7 +52,7 @@ def test_never_above_a_feasible_plan(raw):
     assert judged.is_feasible, judged.reasons
     assert judged.time_s == pytest.approx(s.best.cost_s, abs=1e-6)
     assert bound.value_s <= judged.time_s + 1e-9
-    for share in (0.5, 1.0, 1.6):                              # the late metric bounds whatever moment it is taken at
+    for share in (0.5, 1.0, 1.6):  # the late metric bounds whatever moment it is taken at
         bound.sharpen_late(share * judged.time_s, 10**5)
         assert bound.value_s <= judged.time_s + 1e-9
         bound.sharpen_turns(share * judged.time_s)
@@ -60,8 +60,12 @@ def test_never_above_a_feasible_plan(raw):
 
 
 def test_a_goal_whose_edge_lies_close_hauled_is_fetched_without_a_tack():
-    raw = simple(start={"x": 0, "y": 0, "heading_deg": 0}, goal={"x": 2, "y": 310, "radius": 2},
-                 wind={"from_deg": 45, "speed_mps": 5}, boat=simple()["boat"] | {"turn_rate_rad_s": 0.25})
+    raw = simple(
+        start={"x": 0, "y": 0, "heading_deg": 0},
+        goal={"x": 2, "y": 310, "radius": 2},
+        wind={"from_deg": 45, "speed_mps": 5},
+        boat=simple()["boat"] | {"turn_rate_rad_s": 0.25},
+    )
     p, s, bound = searched(raw)
     assert s.best is not None
     assert bound.value_s <= evaluate(p, s.world.to_en(s.best.points)).time_s < 1.01 * bound.value_s
@@ -78,11 +82,16 @@ def test_the_late_metric_sees_obstacles_in_a_closing_wind():
 
 
 @settings(max_examples=60)
-@given(st.floats(20, 70), st.sampled_from([180.0, 150.0]), st.floats(0, 60),
-       st.lists(st.tuples(st.floats(-180, 180), st.floats(1, 200)), min_size=1, max_size=5))
+@given(
+    st.floats(20, 70),
+    st.sampled_from([180.0, 150.0]),
+    st.floats(0, 60),
+    st.lists(st.tuples(st.floats(-180, 180), st.floats(1, 200)), min_size=1, max_size=5),
+)
 def test_the_gauge_is_below_every_mixture_of_courses(half, deepest, radius, legs):
-    p = Problem.from_json(simple(boat={"no_go_half_deg": half, "max_twa_deg": deepest, "turn_rate_rad_s": 1,
-                                       "speed": POLAR}))
+    p = Problem.from_json(
+        simple(boat={"no_go_half_deg": half, "max_twa_deg": deepest, "turn_rate_rad_s": 1, "speed": POLAR})
+    )
     g = make_gauge(p)
     x = y = t = 0.0
     for wish, duration in legs:
@@ -128,7 +137,7 @@ def test_what_cannot_be_reached_is_proved(name):
     answer = plan(load(name), expansions=50_000)
     assert answer.status is PlanStatus.INFEASIBLE
     assert answer.lower_bound_s == math.inf
-    assert answer.expansions < 50_000          # not waited for
+    assert answer.expansions < 50_000  # not waited for
 
 
 def test_no_way_up_wind_and_no_course_at_all():
@@ -148,10 +157,12 @@ def test_a_disc_that_reaches_round_a_wall_is_not_called_cut_off():
 @settings(max_examples=25)
 @given(st.floats(60, 89), st.floats(0.2, 3.0), st.floats(0.6, 0.95), st.floats(50, 400))
 def test_proved_hopeless_by_noise_means_that_no_search_finds_a_path(half, growth, delta, distance):
-    raw = simple(goal={"x": 0, "y": distance, "radius": 2}, delta_s=delta,
-                 boat=simple()["boat"] | {"no_go_half_deg": half, "turn_rate_rad_s": 20.0},
-                 wind={"from_deg": 0, "sigma": {"model": "kalman", "sigma0_deg": 0.0,
-                                                "growth_deg_per_sqrt_s": growth}})
+    raw = simple(
+        goal={"x": 0, "y": distance, "radius": 2},
+        delta_s=delta,
+        boat=simple()["boat"] | {"no_go_half_deg": half, "turn_rate_rad_s": 20.0},
+        wind={"from_deg": 0, "sigma": {"model": "kalman", "sigma0_deg": 0.0, "growth_deg_per_sqrt_s": growth}},
+    )
     p = Problem.from_json(raw)
     world, gauge = make_world(p), make_gauge(p)
     bound = Bound(world, gauge)

@@ -23,10 +23,15 @@ from tests.planner.problem_json import to_dict
 from tests.planner.problems import FOLDER, box, load, random_problems, simple
 
 DEG = math.pi / 180.0
-BOATS = st.sampled_from([
-    {"can_tack": False}, {"can_tack": False, "gybe_room_m": 4.0, "gybe_loss_s": 2.0}, {"tack_loss_s": 40.0},
-    {"gybe_loss_s": 30.0}, {"tack_loss_s": 5.0, "gybe_loss_s": 1.0, "gybe_room_m": 6.0},
-])
+BOATS = st.sampled_from(
+    [
+        {"can_tack": False},
+        {"can_tack": False, "gybe_room_m": 4.0, "gybe_loss_s": 2.0},
+        {"tack_loss_s": 40.0},
+        {"gybe_loss_s": 30.0},
+        {"tack_loss_s": 5.0, "gybe_loss_s": 1.0, "gybe_room_m": 6.0},
+    ]
+)
 
 
 def boat(**changes):
@@ -118,17 +123,21 @@ def test_a_round_keeps_both_lines(first, second, way, deepest):
 @settings(max_examples=60)
 @given(random_problems(), BOATS, st.lists(st.tuples(st.floats(-100, 100), st.floats(-50, 300)), min_size=1, max_size=9))
 def test_the_kernel_agrees_with_the_scorer(raw, changes, points):
-    raw = raw | {"obstacles": [], "fence": None, "boat": raw["boat"] | changes,
-                 "goal": {"x": points[-1][0], "y": points[-1][1], "radius": 1}}
+    raw = raw | {
+        "obstacles": [],
+        "fence": None,
+        "boat": raw["boat"] | changes,
+        "goal": {"x": points[-1][0], "y": points[-1][1], "radius": 1},
+    }
     p = Problem.from_json(raw)
     path = np.array([(0.0, 0.0), *points])
     judged, world = evaluate(p, path), make_world(p)
     walked = check_path(world.grid, world.boat, world.to_wind(path), world.h0)
-    assume(all(abs(abs(leg.turn_rad) - math.pi) > 1e-9 for leg in judged.legs))   # half a circle: a tack, or a gybe
+    assume(all(abs(abs(leg.turn_rad) - math.pi) > 1e-9 for leg in judged.legs))  # half a circle: a tack, or a gybe
     if math.isfinite(walked):
         assert judged.is_feasible, judged.reasons
         assert walked == pytest.approx(judged.time_s, rel=1e-9)
-    elif judged.is_feasible:                                  # only by the scorer's slack
+    elif judged.is_feasible:  # only by the scorer's slack
         narrowest = min((leg.margin_rad for leg in judged.legs if not leg.is_beat), default=math.inf)
         assert narrowest < 1e-3 or judged.time_s == math.inf or _is_near_a_limit(p, judged)
 
@@ -178,8 +187,11 @@ def test_the_cheaper_turn_is_taken(loss_s, expected):
 
 
 def test_a_gybe_that_costs_is_tacked_round():
-    down = simple(start={"x": 0, "y": 0, "heading_deg": 170}, goal={"x": 0, "y": -300, "radius": 2},
-                  boat=boat(gybe_loss_s=60.0, max_twa_deg=150))
+    down = simple(
+        start={"x": 0, "y": 0, "heading_deg": 170},
+        goal={"x": 0, "y": -300, "radius": 2},
+        boat=boat(gybe_loss_s=60.0, max_twa_deg=150),
+    )
     answer = plan(Problem.from_json(down), expansions=20_000)
     assert {n for n in names(answer) if n} == {"tack"}
     assert all(t["instead_of"] == "gybe" for t in turns(answer))
@@ -220,8 +232,17 @@ def test_annealing_keeps_the_turns_possible(changes, seed):
     answer = plan(p, expansions=1_500)
     world = make_world(p)
     _, points, _, last = anneal(
-        world.grid, world.boat, world.to_wind(answer.waypoints_en), world.h0,
-        np.array([*world.goal, world.goal_radius]), 60.0, world.corners, 3_000, 2.0, 1e-4, 0.0,
+        world.grid,
+        world.boat,
+        world.to_wind(answer.waypoints_en),
+        world.h0,
+        np.array([*world.goal, world.goal_radius]),
+        60.0,
+        world.corners,
+        3_000,
+        2.0,
+        1e-4,
+        0.0,
         np.array([seed], np.uint64),
     )
     for path in (points, last):

@@ -22,21 +22,42 @@ from companion.planner.track.expected import curve_mps
 from companion.planner.track.kept import laid
 
 MARGIN_M, FLOOR_M = 12.0, 6.0
-WALLS = [shapely.box(*(-150.0, y, 40.0, y + 0.8) if n % 2 == 0 else (-40.0, y, 150.0, y + 0.8))
-         for n, y in enumerate((60.0, 90.0, 120.0))]
+WALLS = [
+    shapely.box(*(-150.0, y, 40.0, y + 0.8) if n % 2 == 0 else (-40.0, y, 150.0, y + 0.8))
+    for n, y in enumerate((60.0, 90.0, 120.0))
+]
 
 
 def problem(walls=WALLS, *, wind_deg=180.0, tws=6.0, margin=MARGIN_M, goal=(0.0, 190.0), tracking=None, **more):
     boat = Boat(polar=ardurover_sitl()).problem_boat(tws)
-    track = {"floor_m": FLOOR_M, "reach_m": 0.5, "wp_radius_m": 3.0, "wp_speed_mps": 5.0,
-             "solids": [shapely.to_wkt(w) for w in walls], "limits": None, **(tracking or {})}
-    return Problem.from_json({
-        "id": "walls", "start": {"x": 0.0, "y": 0.0, "heading_deg": 0.0},
-        "goal": {"x": goal[0], "y": goal[1], "radius": 8.0},
-        "obstacles": [shapely.to_wkt(shapely.buffer(w, margin, quad_segs=8)) for w in walls], "fence": None,
-        "wind": {"from_deg": wind_deg, "speed_mps": tws,
-                 "sigma": {"model": "ar1", "sigma0_deg": 3.0, "sigma_inf_deg": 9.0, "rho_hz": 0.036}},
-        "boat": {**boat, "no_go_half_deg": 47.0}, "delta_s": 0.9, "leg_saving": 8e-5, "tracking": track, **more})
+    track = {
+        "floor_m": FLOOR_M,
+        "reach_m": 0.5,
+        "wp_radius_m": 3.0,
+        "wp_speed_mps": 5.0,
+        "solids": [shapely.to_wkt(w) for w in walls],
+        "limits": None,
+        **(tracking or {}),
+    }
+    return Problem.from_json(
+        {
+            "id": "walls",
+            "start": {"x": 0.0, "y": 0.0, "heading_deg": 0.0},
+            "goal": {"x": goal[0], "y": goal[1], "radius": 8.0},
+            "obstacles": [shapely.to_wkt(shapely.buffer(w, margin, quad_segs=8)) for w in walls],
+            "fence": None,
+            "wind": {
+                "from_deg": wind_deg,
+                "speed_mps": tws,
+                "sigma": {"model": "ar1", "sigma0_deg": 3.0, "sigma_inf_deg": 9.0, "rho_hz": 0.036},
+            },
+            "boat": {**boat, "no_go_half_deg": 47.0},
+            "delta_s": 0.9,
+            "leg_saving": 8e-5,
+            "tracking": track,
+            **more,
+        }
+    )
 
 
 def test_round_the_ends_of_walls_the_floor_is_kept_with_fewer_waypoints():
@@ -51,10 +72,15 @@ def test_round_the_ends_of_walls_the_floor_is_kept_with_fewer_waypoints():
     assert evaluate(tracked, found.waypoints_en).is_feasible
     assert lines.expected_clearance_m is None
     assert found.expected_clearance_m >= FLOOR_M
-    sailed = predict(found.waypoints_en, tracked.tracking.helm, curve_mps=curve_mps(tracked),
-                     twd_from_rad=tracked.wind.twd_from_rad, heading_rad=0.0)
+    sailed = predict(
+        found.waypoints_en,
+        tracked.tracking.helm,
+        curve_mps=curve_mps(tracked),
+        twd_from_rad=tracked.wind.twd_from_rad,
+        heading_rad=0.0,
+    )
     near = min(shapely.distance(shapely.LineString(sailed.en_m), w) for w in WALLS)
-    assert near > found.expected_clearance_m + 0.5   # the hull and the prediction's error are taken off
+    assert near > found.expected_clearance_m + 0.5  # the hull and the prediction's error are taken off
     again = plan(tracked, expansions=15_000, seed=1)
     assert np.array_equal(again.waypoints_en, found.waypoints_en)
 
@@ -65,15 +91,17 @@ def test_round_walls_ends_there_and_back_no_leg_is_too_short_to_be_followed(star
     lines = plan(replace(tracked, tracking=None), expansions=8_000, seed=1)
     found = plan(tracked, expansions=8_000, seed=1)
     short_m = SHORT_S * float(np.max(curve_mps(tracked)))
-    assert min(lengths_m(lines)) < short_m      # arcs, whose legs on either side meet nowhere
+    assert min(lengths_m(lines)) < short_m  # arcs, whose legs on either side meet nowhere
     assert min(lengths_m(found)) >= short_m
     assert expected(tracked, found.waypoints_en).is_kept
     assert found.cost_s <= 1.03 * lines.cost_s + 2.0
 
 
 def test_a_slalom_of_thick_walls_is_sailed_in_a_sixth_of_the_legs_all_long_enough():
-    walls = [shapely.box(*((-400.0, y, 9.0, y + 16.0) if n % 2 == 0 else (-9.0, y, 400.0, y + 16.0)))
-             for n, y in enumerate(60.0 + 52.0 * k for k in range(7))]
+    walls = [
+        shapely.box(*((-400.0, y, 9.0, y + 16.0) if n % 2 == 0 else (-9.0, y, 400.0, y + 16.0)))
+        for n, y in enumerate(60.0 + 52.0 * k for k in range(7))
+    ]
     tracked = problem(walls, tws=5.0, goal=(0.0, 480.0))
     lines = plan(replace(tracked, tracking=None), expansions=8_000, seed=1)
     found = plan(tracked, expansions=8_000, seed=1)
@@ -87,7 +115,7 @@ def test_a_slalom_of_thick_walls_is_sailed_in_a_sixth_of_the_legs_all_long_enoug
 def test_legs_in_which_ardurover_looped_onto_a_walls_end_are_no_plan():
     short = json.loads(Path("tests/boat/tracking/short_legs.json").read_text())
     ends = np.asarray(short["wall_end_en_m"])
-    back = np.asarray([-1.0, 1.0]) * (ends[0] - ends[1])[::-1] * 4.0      # square to the end
+    back = np.asarray([-1.0, 1.0]) * (ends[0] - ends[1])[::-1] * 4.0  # square to the end
     wall = shapely.Polygon([*ends, ends[1] + back, ends[0] + back])
     path = [(float(e), float(n)) for e, n in short["legs_en_m"]]
     tracked = replace(problem([wall], wind_deg=20.0, tws=5.0), start_en=path[0], goal_en=path[-1])
@@ -100,8 +128,16 @@ def test_legs_in_which_ardurover_looped_onto_a_walls_end_are_no_plan():
 
 def test_a_part_of_a_path_is_judged_as_in_the_whole():
     tracked = problem()
-    path = [(0.0, 0.0), (60.0, 20.0), (60.0, 50.0), (36.0, 75.0), (-60.0, 78.0), (-46.0, 105.0), (60.0, 110.0),
-            (0.0, 190.0)]
+    path = [
+        (0.0, 0.0),
+        (60.0, 20.0),
+        (60.0, 50.0),
+        (36.0, 75.0),
+        (-60.0, 78.0),
+        (-46.0, 105.0),
+        (60.0, 110.0),
+        (0.0, 190.0),
+    ]
     whole, part = expected(tracked, path), expected(tracked, path, part=slice(1, 6))
     assert not whole.is_kept
     assert whole.worst_leg == part.worst_leg
@@ -134,7 +170,7 @@ def test_where_the_closest_path_cannot_keep_the_floor_one_with_more_room_does():
     assert evaluate(tracked, found.waypoints_en).is_feasible
     lines = plan(replace(tracked, tracking=None), expansions=15_000, seed=1)
     assert not laid(tracked, [tuple(p) for p in lines.waypoints_en])[1].is_kept
-    assert found.lower_bound_s <= lines.cost_s   # the bound is the problem's own, not the narrower water's
+    assert found.lower_bound_s <= lines.cost_s  # the bound is the problem's own, not the narrower water's
 
 
 def test_open_water_has_nothing_to_be_clear_of():
@@ -150,7 +186,7 @@ def test_unread_parameters_widen_what_is_kept():
 
 
 def test_a_start_that_is_nearer_than_the_floor_need_only_come_no_nearer():
-    wall = [shapely.box(-60.0, -4.0, 60.0, -3.5)]     # astern of her
+    wall = [shapely.box(-60.0, -4.0, 60.0, -3.5)]  # astern of her
     away, along = [(0.0, 0.0), (0.0, 150.0)], [(0.0, 0.0), (55.0, -1.5), (55.0, 150.0)]
     here = problem(wall, wind_deg=270.0)
     assert expected(here, away).is_kept
@@ -159,7 +195,7 @@ def test_a_start_that_is_nearer_than_the_floor_need_only_come_no_nearer():
 
 
 def test_the_corner_at_the_start_counts_where_the_leg_before_is_known():
-    inside = [shapely.box(-22.0, 13.0, -13.0, 22.0)]    # within the corner that a wide radius cuts
+    inside = [shapely.box(-22.0, 13.0, -13.0, 22.0)]  # within the corner that a wide radius cuts
     path = [(0.0, 0.0), (0.0, 150.0)]
     wide = {"wp_radius_m": 10.0}
     before = {**wide, "before": {"x": -100.0, "y": 0.0}}
@@ -183,27 +219,44 @@ def test_boards_that_come_too_near_are_seen_and_those_with_room_are_kept():
     assert evaluate(narrow, path).legs[0].is_beat
     seen = expected(narrow, path)
     assert seen.is_beat
-    sailed = expected(narrow, path, has_boards=False)     # what paths are told apart by before their boards are sailed
+    sailed = expected(narrow, path, has_boards=False)  # what paths are told apart by before their boards are sailed
     assert sailed.lack_m <= seen.lack_m
     assert not sailed.is_beat
     assert not seen.is_kept
     assert expected(roomy, path).is_kept
-    assert expected(narrow, path, has_boards=False).is_kept    # the boards are what comes near
+    assert expected(narrow, path, has_boards=False).is_kept  # the boards are what comes near
 
 
 def test_more_is_asked_of_boards_where_the_mission_asks_for_more():
     path = [(0.0, 0.0), (0.0, 298.0)]
     rough = {"model": "ar1", "sigma0_deg": 12.0, "sigma_inf_deg": 18.6, "rho_hz": 0.036}
-    at = [expected(replace(channel(20.0), delta_s=d, wind=replace(channel(20.0).wind, sigma=replace(
-        channel(20.0).wind.sigma, sigma_inf_rad=math.radians(rough["sigma_inf_deg"])))), path).clearance_m
-        for d in (0.6, 0.98)]
+    at = [
+        expected(
+            replace(
+                channel(20.0),
+                delta_s=d,
+                wind=replace(
+                    channel(20.0).wind,
+                    sigma=replace(channel(20.0).wind.sigma, sigma_inf_rad=math.radians(rough["sigma_inf_deg"])),
+                ),
+            ),
+            path,
+        ).clearance_m
+        for d in (0.6, 0.98)
+    ]
     assert at[1] < at[0]
 
 
 # ------------------------------------------------------------------------------------------- the format
 def test_the_tracking_is_written_and_read_back():
-    before = problem(tracking={"before": {"x": -40.0, "y": 3.0}, "known": False, "correlation_s": 28.0,
-                               "limits": "POLYGON ((-200 -50, 200 -50, 200 250, -200 250, -200 -50))"})
+    before = problem(
+        tracking={
+            "before": {"x": -40.0, "y": 3.0},
+            "known": False,
+            "correlation_s": 28.0,
+            "limits": "POLYGON ((-200 -50, 200 -50, 200 250, -200 250, -200 -50))",
+        }
+    )
     again = Problem.from_json(before.to_dict() if hasattr(before, "to_dict") else _written(before))
     assert again.tracking.helm == before.tracking.helm
     for name in ("floor_m", "reach_m", "before_en", "correlation_s", "is_known"):
@@ -218,9 +271,16 @@ def _written(value):
     return to_dict(value)
 
 
-@pytest.mark.parametrize(("wrong", "word"), [
-    ({"wp_speed_mps": 0.0}, "wp_speed_mps"), ({"solids": "POLYGON"}, "solids"), ({"solids": ["POINT (1 2)"]}, "Point"),
-    ({"floor_m": "six"}, "floor_m"), ({"before": {"x": 1.0}}, "before.y")])
+@pytest.mark.parametrize(
+    ("wrong", "word"),
+    [
+        ({"wp_speed_mps": 0.0}, "wp_speed_mps"),
+        ({"solids": "POLYGON"}, "solids"),
+        ({"solids": ["POINT (1 2)"]}, "Point"),
+        ({"floor_m": "six"}, "floor_m"),
+        ({"before": {"x": 1.0}}, "before.y"),
+    ],
+)
 def test_what_cannot_be_read_is_named(wrong, word):
     with pytest.raises(InputError, match=word):
         problem(tracking=wrong)

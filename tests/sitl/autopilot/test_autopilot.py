@@ -53,8 +53,7 @@ def test_rates_that_are_refused() -> None:
         assert await c.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, 168, 20_000) == 2
         long = [m for m in c.of("STATUSTEXT") if m.id]
         assert [m.chunk_seq for m in long] == [0, 1]
-        assert "".join(m.text for m in long) == (
-            "Requested rate for message ID 168 too fast. Increase SCHED_LOOP_RATE")
+        assert "".join(m.text for m in long) == ("Requested rate for message ID 168 too fast. Increase SCHED_LOOP_RATE")
         assert await c.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, 251, 100_000) == 2
         assert c.texts()[-1] == "No ap_message for mavlink id (251)"
         assert await c.ask(mav.MAV_CMD_SET_MESSAGE_INTERVAL, 231, 100_000) == 2
@@ -203,6 +202,7 @@ def test_tack_request_on_a_reach_does_nothing() -> None:
 @pytest.mark.parametrize("has_motor", [True, False])
 def test_the_auxiliary_motor_holds_her_in_a_current_and_is_acknowledged_without_one(has_motor: bool) -> None:
     """As measured on the real one: 0.04 m/s in LOITER with it, 0.25 m/s without, 0 in reply to both."""
+
     async def job(c: Client) -> None:
         async def drifts_m() -> float:
             before = c.autopilot.truth
@@ -251,8 +251,11 @@ def test_reposition_and_velocity_setpoints() -> None:
         await c.wait("MISSION_ITEM_REACHED", 60.0)
         start = now_s()
         for _ in range(20):
-            c.send(mav.MAVLink_set_position_target_local_ned_message(
-                0, 1, 1, 1, 0b110111000111, 0, 0, 0, -2.0, 2.0, 0, 0, 0, 0, 0, 0))
+            c.send(
+                mav.MAVLink_set_position_target_local_ned_message(
+                    0, 1, 1, 1, 0b110111000111, 0, 0, 0, -2.0, 2.0, 0, 0, 0, 0, 0, 0
+                )
+            )
             await asyncio.sleep(0.5)
         assert math.degrees(c.autopilot.truth.heading_rad) == pytest.approx(135.0, abs=2.0)
         await asyncio.sleep(4.0)
@@ -362,8 +365,7 @@ def test_arming_in_a_breach_is_refused_until_the_fence_is_cleared() -> None:
 
 @settings(max_examples=60)
 @given(
-    seed=st.integers(0, 10_000), east=st.floats(-150.0, 150.0), north=st.floats(-150.0, 150.0),
-    inclusion=st.booleans(),
+    seed=st.integers(0, 10_000), east=st.floats(-150.0, 150.0), north=st.floats(-150.0, 150.0), inclusion=st.booleans()
 )
 def test_clearance_agrees_with_shapely(seed: int, east: float, north: float, *, inclusion: bool) -> None:
     import numpy as np
@@ -388,8 +390,12 @@ def test_clearance_agrees_with_shapely(seed: int, east: float, north: float, *, 
 def test_ais_is_off_by_default_and_has_the_real_units() -> None:
     async def job(c: Client) -> None:
         ship = AisVessel(
-            mmsi=211000001, position=GeoPoint(lat_deg=51.101, lon_deg=-1.3), cog_deg=180.0, sog_mps=5.0,
-            heading_deg=None, turn_rate_dps=-2.0,
+            mmsi=211000001,
+            position=GeoPoint(lat_deg=51.101, lon_deg=-1.3),
+            cog_deg=180.0,
+            sog_mps=5.0,
+            heading_deg=None,
+            turn_rate_dps=-2.0,
         )
         c.autopilot.hear_vessel(ship)
         c.autopilot.hear_vessel(AisVessel(mmsi=211000005, position=ship.position, is_class_b=True))
@@ -409,13 +415,16 @@ def test_ais_is_off_by_default_and_has_the_real_units() -> None:
 
 
 # ---------------------------------------------------------------------------------------------------- failsafes
-@pytest.mark.parametrize(("parameters", "mode", "text"), [
-    ({}, Mode.AUTO, None),
-    ({"FS_GCS_ENABLE": 1.0}, Mode.HOLD, "Radio Failsafe"),
-    ({"FS_GCS_ENABLE": 2.0}, Mode.HOLD, "Radio Failsafe"),
-    ({"FS_GCS_ENABLE": 2.0, "FS_THR_ENABLE": 0.0}, Mode.AUTO, "GCS Failsafe"),
-    ({"FS_GCS_ENABLE": 1.0, "FS_THR_ENABLE": 2.0}, Mode.AUTO, "Radio Failsafe"),
-])
+@pytest.mark.parametrize(
+    ("parameters", "mode", "text"),
+    [
+        ({}, Mode.AUTO, None),
+        ({"FS_GCS_ENABLE": 1.0}, Mode.HOLD, "Radio Failsafe"),
+        ({"FS_GCS_ENABLE": 2.0}, Mode.HOLD, "Radio Failsafe"),
+        ({"FS_GCS_ENABLE": 2.0, "FS_THR_ENABLE": 0.0}, Mode.AUTO, "GCS Failsafe"),
+        ({"FS_GCS_ENABLE": 1.0, "FS_THR_ENABLE": 2.0}, Mode.AUTO, "Radio Failsafe"),
+    ],
+)
 def test_loss_of_the_ground_station(parameters: dict[str, float], mode: Mode, text: str | None) -> None:
     async def job(c: Client) -> None:
         shore = mav.MAVLink(None, srcSystem=255, srcComponent=190)
@@ -562,7 +571,7 @@ def test_battery() -> None:
         await asyncio.sleep(12.0)
         assert c.last("SYS_STATUS").voltage_battery == 9900
         assert c.last("BATTERY_STATUS").battery_remaining == 10
-        assert not any(x.startswith("Battery") for x in c.texts())   # looked at on an armed boat only
+        assert not any(x.startswith("Battery") for x in c.texts())  # looked at on an armed boat only
 
     sail(job, BATT_LOW_VOLT=10.5)
 
@@ -581,6 +590,7 @@ def test_wind_set_by_parameter() -> None:
 # ------------------------------------------------------------------------------------- repeatability and noise
 def voyage(seed: int, step_s: float | None = None) -> tuple[str, Any]:
     """Sail half a mission in a shifting wind over a bad link; returns a hash of all bytes and the end."""
+
     async def main() -> tuple[str, Any]:
         autopilot = SimulatedAutopilot(AutopilotConfig(is_warm=True), AR1(0.0, 5.0, seed=seed, tws_sd_mps=0.5), seed)
         bad = Impairment(loss=0.1, duplicate=0.1, reorder=0.1, corrupt=0.02, delay_s=0.05)
@@ -629,8 +639,9 @@ def test_noise_and_broken_frames_are_survived() -> None:
     rng = random.Random(5)
     codec = mav.MAVLink(None, srcSystem=1, srcComponent=191)
     good = [
-        mav.MAVLink_mission_count_message(1, 1, 700, 0), mav.MAVLink_mission_count_message(1, 1, 3, 9),
-        mav.MAVLink_mission_item_int_message(1, 1, 3, 3, 16, 0, 1, math.nan, 0, 0, 0, 2**31 - 1, -2**31, math.inf, 0),
+        mav.MAVLink_mission_count_message(1, 1, 700, 0),
+        mav.MAVLink_mission_count_message(1, 1, 3, 9),
+        mav.MAVLink_mission_item_int_message(1, 1, 3, 3, 16, 0, 1, math.nan, 0, 0, 0, 2**31 - 1, -(2**31), math.inf, 0),
         mav.MAVLink_command_long_message(1, 1, 511, 0, math.nan, math.inf, 0, 0, 0, 0, 0),
         mav.MAVLink_command_long_message(1, 1, 176, 0, 1, 1e30, 0, 0, 0, 0, 0),
         mav.MAVLink_command_long_message(1, 1, 224, 0, -1e9, 0, 0, 0, 0, 0, 0),
@@ -656,7 +667,7 @@ def test_noise_and_broken_frames_are_survived() -> None:
             codec.seq = (codec.seq + 1) & 0xFF
             what = rng.random()
             if what < 0.3:
-                frame = frame[:rng.randrange(len(frame))]
+                frame = frame[: rng.randrange(len(frame))]
             elif what < 0.6:
                 frame[rng.randrange(len(frame))] ^= rng.randrange(1, 256)
             elif what < 0.7:

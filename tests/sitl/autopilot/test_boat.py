@@ -14,15 +14,22 @@ from sitl.cli import main
 from tests.sitl.boats import boat_process, free_port
 
 
-@pytest.mark.parametrize(("options", "words"), [
-    (["--wind", "storm"], "--wind: storm: is not a wind"), (["--home", "143,5"], "--home: latitude 143.0 is outside"),
-    (["--home", "51.1"], "write LAT,LON"), (["--speedup", "0"], "--speedup: 0 is out of range"),
-    (["--param", "WP_SPEED"], "write NAME=VALUE"), (["--param", "WP_SPED=1"], "did you mean WP_SPEED?"),
-    (["--param", "WP_SPEED=nan"], "cannot be a parameter"), (["--sysid", "300"], "--sysid: 300 is out of range"),
-    (["--port", "0", "--udp", "0"], "nobody could reach the boat"),
-    (["--wind", "none.csv"], "none.csv: cannot be read"),
-    (["--udp-out", "nowhere"], "host or port is missing"),
-])
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--wind", "storm"], "--wind: storm: is not a wind"),
+        (["--home", "143,5"], "--home: latitude 143.0 is outside"),
+        (["--home", "51.1"], "write LAT,LON"),
+        (["--speedup", "0"], "--speedup: 0 is out of range"),
+        (["--param", "WP_SPEED"], "write NAME=VALUE"),
+        (["--param", "WP_SPED=1"], "did you mean WP_SPEED?"),
+        (["--param", "WP_SPEED=nan"], "cannot be a parameter"),
+        (["--sysid", "300"], "--sysid: 300 is out of range"),
+        (["--port", "0", "--udp", "0"], "nobody could reach the boat"),
+        (["--wind", "none.csv"], "none.csv: cannot be read"),
+        (["--udp-out", "nowhere"], "host or port is missing"),
+    ],
+)
 def test_bad_options_are_one_line_and_exit_2(
     options: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -51,11 +58,29 @@ def test_a_taken_port_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
 def test_it_speaks_first_and_ends_by_itself() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", 0))
-        listener.settimeout(120.0)   # its kernels may have to be compiled first
+        listener.settimeout(120.0)  # its kernels may have to be compiled first
         port = listener.getsockname()[1]
         process = subprocess.Popen(
-            [sys.executable, "-m", "sitl.cli", "boat", "--port", "0", "--udp", "0", "--udp-out", f"127.0.0.1:{port}",
-             "--warm", "--speedup", "20", "--for", "20", "--sysid", "7"], stdout=subprocess.DEVNULL,
+            [
+                sys.executable,
+                "-m",
+                "sitl.cli",
+                "boat",
+                "--port",
+                "0",
+                "--udp",
+                "0",
+                "--udp-out",
+                f"127.0.0.1:{port}",
+                "--warm",
+                "--speedup",
+                "20",
+                "--for",
+                "20",
+                "--sysid",
+                "7",
+            ],
+            stdout=subprocess.DEVNULL,
         )
         try:
             data, _ = listener.recvfrom(4096)

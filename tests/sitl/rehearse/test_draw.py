@@ -47,7 +47,7 @@ def test_a_seed_is_one_voyage_and_no_doubt_is_the_plan(base, mission):
         plain, kinds = drawn(seed, base, mission, doubts(boat=0.0))
         assert kinds == ()
         assert [getattr(plain, name) for name in ("boat", "sensors", "current", "waves")] == [None] * 4
-        assert plain.wind.from_deg == both[seed][0].wind.from_deg   # the same wind, whatever the boat
+        assert plain.wind.from_deg == both[seed][0].wind.from_deg  # the same wind, whatever the boat
 
 
 def test_half_the_doubt_is_half_the_error(base, mission):
@@ -62,8 +62,11 @@ def test_half_the_doubt_is_half_the_error(base, mission):
 
 
 def test_what_the_mission_knows_makes_it_smaller(base, mission, tmp_path):
-    own = given(mission, boat=msgspec.structs.replace(mission.boat, polar="own.pol", leeway_deg=4.0),
-                current=CurrentOptions(set_deg=90.0, drift_mps=0.4, sigma_mps=0.05))
+    own = given(
+        mission,
+        boat=msgspec.structs.replace(mission.boat, polar="own.pol", leeway_deg=4.0),
+        current=CurrentOptions(set_deg=90.0, drift_mps=0.4, sigma_mps=0.05),
+    )
     assert own.polar_path is not None
     for seed in SEEDS:
         a, b = (drawn(seed, base, m, doubts())[0] for m in (mission, own))
@@ -118,24 +121,30 @@ def test_a_record_is_sailed_from_a_time_of_each_seed(tmp_path):
     assert math.degrees(blown.at(600.0)[0]) == pytest.approx(180.0)
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("strong", "is no wind; write SPEED@FROM"),
-    ("90@10", "is out of range"),
-    ("x.grb2", "GRIB is not read"),
-    ("nowhere.csv", "cannot be read"),
-])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("strong", "is no wind; write SPEED@FROM"),
+        ("90@10", "is out of range"),
+        ("x.grb2", "GRIB is not read"),
+        ("nowhere.csv", "cannot be read"),
+    ],
+)
 def test_a_wind_that_is_none_is_one_line(text, words):
     with pytest.raises(InputError, match=words) as caught:
         given_wind(text, WindSpec(), None)
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("lines", "words"), [
-    ("wind_from_deg,wind_speed_ms,share\n1,2\n", "line 2: is not three numbers"),
-    ("wind_from_deg,wind_speed_ms,share\n1,-2,1\n", "line 2: is out of range"),
-    ("wind_from_deg,wind_speed_ms,share\n1,2,0\n", "holds no wind"),
-    ("a,b\n1,2\n", "no column t_s"),
-])
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ("wind_from_deg,wind_speed_ms,share\n1,2\n", "line 2: is not three numbers"),
+        ("wind_from_deg,wind_speed_ms,share\n1,-2,1\n", "line 2: is out of range"),
+        ("wind_from_deg,wind_speed_ms,share\n1,2,0\n", "holds no wind"),
+        ("a,b\n1,2\n", "no column t_s"),
+    ],
+)
 def test_a_table_that_is_none_is_one_line_with_its_place(tmp_path, lines, words):
     path = tmp_path / "w.csv"
     path.write_text(lines)
@@ -161,8 +170,9 @@ def test_a_change_is_of_one_thing(base, mission):
     assert (later.begins - scenario.begins).total_seconds() == later.wind.from_s == 7200.0
 
 
-@pytest.mark.parametrize("text", [
-    "margin_m", "margin_m=x", "margin_m=-1", "delta_s=1.5", "SAIL_XTRACK_MAX=-1", "later=soon", "sail=3"])
+@pytest.mark.parametrize(
+    "text", ["margin_m", "margin_m=x", "margin_m=-1", "delta_s=1.5", "SAIL_XTRACK_MAX=-1", "later=soon", "sail=3"]
+)
 def test_a_change_that_is_none_is_refused(mission, text):
     with pytest.raises(InputError):
         change_of(text, mission)

@@ -30,8 +30,16 @@ ROCKS = Path("missions/rocks.toml").resolve()
 
 
 def record(seed, *, arrived=True, low=False, time_s=None, **more):
-    return {"seed": seed, "arrived": arrived, "below_floor": low, "contacts": 0, "time_s": time_s or 200.0 + seed,
-            "min_clearance_m": 7.0 if low else 12.0, "alerts": {}, **more}
+    return {
+        "seed": seed,
+        "arrived": arrived,
+        "below_floor": low,
+        "contacts": 0,
+        "time_s": time_s or 200.0 + seed,
+        "min_clearance_m": 7.0 if low else 12.0,
+        "alerts": {},
+        **more,
+    }
 
 
 # ------------------------------------------------------------------------------------------------ what is known
@@ -42,10 +50,10 @@ def test_it_ends_at_the_same_voyage_in_whatever_order_results_come():
     for order in range(4):
         follower, there = Follower(Limits(width=0.15, runs=400)), [None] * 400
         seeds = list(range(400))
-        for n in range(0, 400, 20):   # workers are ahead of each other by some voyages
-            block = seeds[n:n + 20]
+        for n in range(0, 400, 20):  # workers are ahead of each other by some voyages
+            block = seeds[n : n + 20]
             random.Random(order).shuffle(block)
-            seeds[n:n + 20] = block
+            seeds[n : n + 20] = block
         for seed in seeds:
             there[seed] = records[seed]
             if follower(there)[1]:
@@ -85,16 +93,23 @@ def test_of_the_minutes_the_chances_have_their_share_and_the_page_is_told_from_t
 
 
 def test_the_worst_come_in_the_order_of_what_they_cost():
-    records = [record(0), record(1, time_s=900.0), record(2, arrived=False, end_reason="out of time"),
-               record(3, low=True), record(4, contacts=1), record(5, arrived=False, error="ValueError()")]
+    records = [
+        record(0),
+        record(1, time_s=900.0),
+        record(2, arrived=False, end_reason="out of time"),
+        record(3, low=True),
+        record(4, contacts=1),
+        record(5, arrived=False, error="ValueError()"),
+    ]
     known = estimates_of(records)
     assert [r["seed"] for r in known.worst(6)] == [5, 4, 3, 2, 1, 0]
     assert [why_bad(r).split(" ")[0] for r in known.worst(4)] == ["an", "touched", "arrived", "did"]
 
 
 def test_watchdogs_are_counted_by_voyages_and_times_by_all():
-    known = estimates_of([record(0, alerts={"in irons": 3}), record(1, alerts={"in irons": 1, "done": 1}),
-                      record(2, arrived=False)])
+    known = estimates_of(
+        [record(0, alerts={"in irons": 3}), record(1, alerts={"in irons": 1, "done": 1}), record(2, arrived=False)]
+    )
     assert {name: share.came for name, share in known.watchdogs.items()} == {"in irons": 2}
     assert [q.value for q in known.times] == [200.0, 201.0, math.inf]
     assert "fewer than 90 % arrive (3:20 to never)" in "\n".join(told(known))
@@ -157,8 +172,9 @@ def test_a_user_rehearses_a_mission_goes_on_and_looks_at_the_worst(sailed, monke
     folder = sailed / "rehearsals" / "rocks"
     whole = (folder / "results.jsonl").read_bytes()
 
-    code, out, _ = run(sailed, monkeypatch, capsys, "--runs", "2", "--pairs", "1", "--try", "margin_m=15",
-                       "--json", "figures.json")
+    code, out, _ = run(
+        sailed, monkeypatch, capsys, "--runs", "2", "--pairs", "1", "--try", "margin_m=15", "--json", "figures.json"
+    )
     assert code == 0
     assert "1 in the file before" in out
     assert "margin_m 15, 1 pair: " in out
@@ -174,7 +190,7 @@ def test_a_user_rehearses_a_mission_goes_on_and_looks_at_the_worst(sailed, monke
     links = re.findall(r"href='(worst/[^']+)'", page)
     assert len(links) == 1
     assert (folder / links[0]).is_file()
-    assert "http" not in re.sub(r"base64,[^']+", "", page)   # it asks nobody for anything
+    assert "http" not in re.sub(r"base64,[^']+", "", page)  # it asks nobody for anything
     assert (folder / "rehearsal.png").read_bytes()[:4] == b"\x89PNG"
     worst = Path(figures["worst"][0]["folder"])
     assert (worst / "track.csv").is_file()
@@ -233,31 +249,48 @@ def test_on_another_machine_a_rehearsal_is_whole(sailed, monkeypatch):
     """Its scenario, mission, water and measured wind are packed, and are the same there."""
     monkeypatch.chdir(sailed)
     (sailed / "day.csv").write_text("t_s,wind_from_deg,wind_speed_ms\n0,10,5\n3600,40,6\n")
-    made = prepared(Path("rocks.toml"), Path("packed"), wind="day.csv", wind_error=None, doubt=1.0, faults=False,
-                    depart=None, limit_s=60.0)
+    made = prepared(
+        Path("rocks.toml"),
+        Path("packed"),
+        wind="day.csv",
+        wind_error=None,
+        doubt=1.0,
+        faults=False,
+        depart=None,
+        limit_s=60.0,
+    )
     bundle = ScenarioBundle.of(made.source)
-    assert sorted(Path(name).name for name, _ in bundle.packed) == ["day.csv", "rehearsal.toml", "rocks.toml",
-                                                                  "rocks.wkt"]
+    assert sorted(Path(name).name for name, _ in bundle.packed) == [
+        "day.csv",
+        "rehearsal.toml",
+        "rocks.toml",
+        "rocks.wkt",
+    ]
     job = Job(scenario=made.source, seed=3, case=RehearsalCase(doubts=made.doubts))
     assert key_of(replace(job, scenario=bundle.here()))["hash"] == key_of(job)["hash"]
     assert made.tells_the_hour
 
 
 # A ring of land round the goal: there is water on both sides, and no way from one to the other.
-RING = ("POLYGON ((-1.3115 50.8175, -1.3085 50.8175, -1.3085 50.8195, -1.3115 50.8195, -1.3115 50.8175), "
-        "(-1.3108 50.8180, -1.3108 50.8191, -1.3092 50.8191, -1.3092 50.8180, -1.3108 50.8180))\n")
+RING = (
+    "POLYGON ((-1.3115 50.8175, -1.3085 50.8175, -1.3085 50.8195, -1.3115 50.8195, -1.3115 50.8175), "
+    "(-1.3108 50.8180, -1.3108 50.8191, -1.3092 50.8191, -1.3092 50.8180, -1.3108 50.8180))\n"
+)
 
 
-@pytest.mark.parametrize(("old", "new", "words", "told_"), [
-    ("[start]\nlat = 50.8170000\nlon = -1.3100000\nheading_deg = 60.0\n", "", (), "[start]: is missing"),
-    ("rocks.wkt", "ring.wkt", (), "no way leads there in 5 m/s from 0°"),
-    ("rocks.wkt", "reef.wkt", (), "reef.wkt"),
-    ("", "", ("--wind", "gale"), "gale: is no wind"),
-    ("", "", ("--wind-error", "5"), "is no error of a wind; write DEG,MPS"),
-    ("", "", ("--depart", "2026-11-24T08:00"), "has no zone"),
-    ("", "", ("--try", "jib=1"), "is not a change that is known"),
-    ("", "", ("--dask", "tcp://127.0.0.1:1"), "no Dask scheduler answers"),
-])
+@pytest.mark.parametrize(
+    ("old", "new", "words", "told_"),
+    [
+        ("[start]\nlat = 50.8170000\nlon = -1.3100000\nheading_deg = 60.0\n", "", (), "[start]: is missing"),
+        ("rocks.wkt", "ring.wkt", (), "no way leads there in 5 m/s from 0°"),
+        ("rocks.wkt", "reef.wkt", (), "reef.wkt"),
+        ("", "", ("--wind", "gale"), "gale: is no wind"),
+        ("", "", ("--wind-error", "5"), "is no error of a wind; write DEG,MPS"),
+        ("", "", ("--depart", "2026-11-24T08:00"), "has no zone"),
+        ("", "", ("--try", "jib=1"), "is not a change that is known"),
+        ("", "", ("--dask", "tcp://127.0.0.1:1"), "no Dask scheduler answers"),
+    ],
+)
 def test_what_cannot_be_rehearsed_is_said_at_once_in_one_line(tmp_path, monkeypatch, capsys, old, new, words, told_):
     monkeypatch.setattr("sitl.runner.executors.ANSWER_S", 0.5)
     shutil.copy(ROCKS.parent / "rocks.wkt", tmp_path)
@@ -274,8 +307,15 @@ def test_what_cannot_be_rehearsed_is_said_at_once_in_one_line(tmp_path, monkeypa
 
 def test_where_the_first_voyage_was_not_done_no_chances_are_told():
     outcome = RehearsalOutcome(known=estimates_of([None, {"seed": 1}]), ends="the time is over")
-    sailed = CampaignResults(records=[{"seed": 1}], held=StoredResults(campaign="rehearsal", by=made_by()), lost=[],
-                             now=1, wall_s=47.0, cpu_s=5.3)
+    sailed = CampaignResults(
+        records=[{"seed": 1}],
+        held=StoredResults(campaign="rehearsal", by=made_by()),
+        lost=[],
+        now=1,
+        wall_s=47.0,
+        cpu_s=5.3,
+    )
     assert _words(outcome, sailed, is_told=False) == [
         "the time is over; 1 voyage in 47 s, 5.30 CPU s each",
-        "no chances yet, for the first seed is not done: more --minutes, and the same command goes on"]
+        "no chances yet, for the first seed is not done: more --minutes, and the same command goes on",
+    ]

@@ -53,7 +53,7 @@ def test_more_voyages_make_it_narrower_and_none_leave_it_open():
     widths = [share_of(n, n).width for n in (0, 1, 5, 20, 56, 200)]
     assert widths == sorted(widths, reverse=True)
     assert widths[0] == 1.0
-    assert share_of(52, 52).width > 0.1 >= share_of(53, 53).width   # what docs/guides/rehearse.md says of --sure 10
+    assert share_of(52, 52).width > 0.1 >= share_of(53, 53).width  # what docs/guides/rehearse.md says of --sure 10
 
 
 def test_the_median_is_inside_at_all_looks_and_those_who_never_arrive_count():
@@ -62,7 +62,7 @@ def test_the_median_is_inside_at_all_looks_and_those_who_never_arrive_count():
     for _ in range(60):
         times = [rng.random() if rng.random() < 0.8 else math.inf for _ in range(120)]
         found = (quantile_of(sorted(times[:n]), 0.5) for n in range(10, 120, 10))
-        outside += any(not q.low <= 0.625 <= q.high for q in found)   # 0.8 x = 0.5
+        outside += any(not q.low <= 0.625 <= q.high for q in found)  # 0.8 x = 0.5
     assert outside <= 3
     late = quantile_of(sorted(times), 0.9)
     assert (late.value, late.high) == (math.inf, math.inf)

@@ -27,7 +27,8 @@ subprocess.run([sys.executable, "-c", code])
 
 async def part_of_a_core(share: CpuShare | None) -> float:
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-c", BUSY, stdout=asyncio.subprocess.PIPE, preexec_fn=None if share is None else share.enter)
+        sys.executable, "-c", BUSY, stdout=asyncio.subprocess.PIPE, preexec_fn=None if share is None else share.enter
+    )
     hold = None if share is None else asyncio.create_task(share.hold(process.pid))
     told, _ = await process.communicate()
     if hold is not None:
@@ -63,6 +64,7 @@ def crowded():
 
 def test_what_is_under_a_share_and_the_boat_beside_it_go_before_other_load(crowded):
     """A voyage on a tenth of a core beside seven others was one on a hundredth, and the table said a tenth."""
+
     async def sail():
         async with cpu_share(0.4) as share:
             if share.cgroup is None:
@@ -70,7 +72,7 @@ def test_what_is_under_a_share_and_the_boat_beside_it_go_before_other_load(crowd
             return await part_of_a_core(share), await part_of_a_core(None)
 
     companion, boat = asyncio.run(sail())
-    assert companion > 0.3   # a fifth of the core without
+    assert companion > 0.3  # a fifth of the core without
     assert boat > 0.6
 
 
@@ -100,27 +102,54 @@ def test_with_a_tenth_of_a_core_she_arrives_clean(tmp_path):
     verdict = run_live(load_scenario(path), path, 0, tmp_path, autopilot="embedded", program=None, speedup=3.0, cpu=0.3)
     assert verdict.figures["arrived"]
     assert verdict.figures["contacts"] == 0
-    assert verdict.figures["min_clearance_m"] >= 6.0   # the floor of its margin
+    assert verdict.figures["min_clearance_m"] >= 6.0  # the floor of its margin
     assert plans_of(tmp_path / "decisions.jsonl").first_s is not None
 
 
 def voyage(share, seed, time_s, **more):
-    return {"water": "pond", "share": share, "seed": seed, "passed": True, "arrived": True, "time_s": time_s,
-            "kills": 0, "min_clearance_m": 5.0 + seed, "took_s": [1.0, 2.0, 4.0 / share], "budgets_s": [2.0, 1.0],
-            "first_s": 1.5, **more}
+    return {
+        "water": "pond",
+        "share": share,
+        "seed": seed,
+        "passed": True,
+        "arrived": True,
+        "time_s": time_s,
+        "kills": 0,
+        "min_clearance_m": 5.0 + seed,
+        "took_s": [1.0, 2.0, 4.0 / share],
+        "budgets_s": [2.0, 1.0],
+        "first_s": 1.5,
+        **more,
+    }
 
 
 def test_times_are_held_against_the_full_cores_of_the_same_seed():
     """The mean of all voyages at each share was another's: a seed that did not arrive made a computer seem faster."""
-    records = [voyage(1.0, 0, 100.0), voyage(1.0, 1, 300.0), voyage(0.25, 0, 110.0),
-               {"water": "pond", "share": 0.25, "seed": 1, "passed": False, "arrived": False, "kills": 3, "checks": []}]
+    records = [
+        voyage(1.0, 0, 100.0),
+        voyage(1.0, 1, 300.0),
+        voyage(0.25, 0, 110.0),
+        {"water": "pond", "share": 0.25, "seed": 1, "passed": False, "arrived": False, "kills": 3, "checks": []},
+    ]
     row = shares.figures("pond", 0.25, records)
     assert (row["voyages"], row["arrived"], row["kills"]) == (2, 1, 3)
     assert row["of_full"] == pytest.approx(1.1)
     assert (row["median_s"], row["late_s"], row["worst_s"]) == (2.0, 16.0, 16.0)
     assert (row["first_s"], row["budget_s"], row["clearance_m"]) == (1.5, 1.0, 5.0)
-    assert shares.told(row) == ["pond", "0.25", "2", "1", "110", "+10.0 %", "5.0", "3", "2.0 / 16.0 / 16.0", "1.5",
-                                "1.00", "3"]
+    assert shares.told(row) == [
+        "pond",
+        "0.25",
+        "2",
+        "1",
+        "110",
+        "+10.0 %",
+        "5.0",
+        "3",
+        "2.0 / 16.0 / 16.0",
+        "1.5",
+        "1.00",
+        "3",
+    ]
     assert shares.figures("pond", 0.05, records) == {}
 
 
@@ -130,8 +159,15 @@ def test_a_voyage_without_a_verdict_is_told_and_fails_the_run(tmp_path, monkeypa
 
     def sail(job):
         sailed.append(job.case.share)
-        return {"water": "pond", "share": job.case.share, "seed": job.seed, "passed": False, "arrived": False,
-                "kills": 0, "checks": [{"name": "no room", "passed": False}]}
+        return {
+            "water": "pond",
+            "share": job.case.share,
+            "seed": job.seed,
+            "passed": False,
+            "arrived": False,
+            "kills": 0,
+            "checks": [{"name": "no room", "passed": False}],
+        }
 
     monkeypatch.setattr(shares, "sail", sail)
     monkeypatch.setattr(shares, "compile_ahead", lambda: None)

@@ -13,8 +13,8 @@ from sitl.runner import Experiment, Job
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Attempt:
-    folder: Path                # every attempt leaves a line in it
-    deadly: str = ""            # "once" or "always"
+    folder: Path  # every attempt leaves a line in it
+    deadly: str = ""  # "once" or "always"
     work_s: float = 0.0
 
 

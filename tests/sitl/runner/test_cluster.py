@@ -42,9 +42,12 @@ class Cluster:
 
     def process(self, program, *words, root=ROOT):
         return subprocess.Popen(
-            [sys.executable, "-m", f"distributed.cli.{program}", "--no-dashboard", *map(str, words)], cwd=root,
+            [sys.executable, "-m", f"distributed.cli.{program}", "--no-dashboard", *map(str, words)],
+            cwd=root,
             env={**os.environ, "PYTHONPATH": str(root), "DASK_TEMPORARY_DIRECTORY": str(self.folder)},
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
 
     def kill(self):
         for process in (self.scheduler, *self.workers):
@@ -79,14 +82,13 @@ def patiently(check, timeout_s=60.0):
 
 def test_a_killed_worker_and_a_scheduler_that_is_started_again_lose_nothing(cluster, folder, tmp_path, capsys):
     """One job kills its worker, and in the middle of the run the whole cluster is killed and begun anew."""
-    jobs = [Job(seed=n, case=Attempt(folder=folder, work_s=0.02, deadly="once" if n == 4 else ""))
-            for n in range(JOBS)]
+    jobs = [Job(seed=n, case=Attempt(folder=folder, work_s=0.02, deadly="once" if n == 4 else "")) for n in range(JOBS)]
     seen, done = [], {}
 
     def on_record(record):
         seen.append(record["seed"])
         is_one_killed = sum(process.poll() == -signal.SIGKILL for process in cluster.workers) == 1
-        if not done and len(seen) >= JOBS // 2 and is_one_killed:   # on a busy machine its job may come later
+        if not done and len(seen) >= JOBS // 2 and is_one_killed:  # on a busy machine its job may come later
             done.update({seed: count for seed, count in attempts(folder).items() if seed in seen})
             cluster.kill()
             cluster.begin()
@@ -103,15 +105,16 @@ def test_a_killed_worker_and_a_scheduler_that_is_started_again_lose_nothing(clus
     assert out.read_bytes() == here.read_bytes()
     before = [json.loads(line)["key"]["seed"] for line in (tmp_path / "far.facts.jsonl").read_text().splitlines()]
     assert before == seen
-    assert all(attempts(folder)[seed] == count + 1 for seed, count in done.items())   # the one more is here's
+    assert all(attempts(folder)[seed] == count + 1 for seed, count in done.items())  # the one more is here's
 
 
 def test_a_voyage_on_the_cluster_is_the_same_to_the_last_byte(cluster, own, tmp_path, monkeypatch):
     """A user's own scenario: the workers have none of its files."""
-    monkeypatch.chdir(tmp_path)   # the folder of a voyage that failed is left here
+    monkeypatch.chdir(tmp_path)  # the folder of a voyage that failed is left here
     for name, address in (("far", cluster.address), ("here", None)):
         sailed = campaign([own], runs=1, first_seed=3).results(
-            CampaignOptions(workers=1, dask=address, out=tmp_path / f"{name}.jsonl"))
+            CampaignOptions(workers=1, dask=address, out=tmp_path / f"{name}.jsonl")
+        )
         assert sailed.lost == []
     assert (tmp_path / "far.jsonl").read_bytes() == (tmp_path / "here.jsonl").read_bytes()
     assert "arrived" in (tmp_path / "far.jsonl").read_text()
@@ -128,6 +131,7 @@ def test_a_program_of_another_version_is_said_at_once(cluster, folder, tmp_path)
         file.write("# of next year\n")
     stranger = cluster.worker("--name", "stranger", root=other)
     try:
+
         def run():
             list(settled_on(cluster.address, work, dict(enumerate(jobs_in(folder, [0]))), None, say=lambda _: None))
 
@@ -159,11 +163,14 @@ def test_a_worker_that_comes_later_is_asked_too(cluster, folder, monkeypatch):
     assert attempts(folder) == {}
 
 
-@pytest.mark.parametrize(("address", "told"), [
-    ("tcp://127.0.0.1:1", "tcp://127.0.0.1:1: no Dask scheduler answers ("),
-    ("scheduler.json", "scheduler.json: no Dask scheduler answers ("),
-    ("nonsense://x:1", "nonsense://x:1: no Dask scheduler answers ("),
-])
+@pytest.mark.parametrize(
+    ("address", "told"),
+    [
+        ("tcp://127.0.0.1:1", "tcp://127.0.0.1:1: no Dask scheduler answers ("),
+        ("scheduler.json", "scheduler.json: no Dask scheduler answers ("),
+        ("nonsense://x:1", "nonsense://x:1: no Dask scheduler answers ("),
+    ],
+)
 def test_a_cluster_that_is_not_there_is_one_line(tmp_path, monkeypatch, capsys, address, told):
     monkeypatch.setattr("sitl.runner.executors.ANSWER_S", 0.3)
     monkeypatch.chdir(tmp_path)
@@ -173,12 +180,15 @@ def test_a_cluster_that_is_not_there_is_one_line(tmp_path, monkeypatch, capsys, 
     assert read_results(tmp_path / "r.jsonl").results == {}
 
 
-@pytest.mark.parametrize(("words", "told"), [
-    (["--array", "4/3", "--out", "r.jsonl"], "'4/3' is no part; write I/N with I from 1 to N, as 3/100"),
-    (["--array", "1/3"], "says a part, and nothing says where to keep it; add --out FILE.jsonl"),
-    (["--out", "r.json"], "r.json: results are lines of JSON; end the name in .jsonl"),
-    (["--dask", " "], "an empty address; write tcp://HOST:8786, or local"),
-])
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--array", "4/3", "--out", "r.jsonl"], "'4/3' is no part; write I/N with I from 1 to N, as 3/100"),
+        (["--array", "1/3"], "says a part, and nothing says where to keep it; add --out FILE.jsonl"),
+        (["--out", "r.json"], "r.json: results are lines of JSON; end the name in .jsonl"),
+        (["--dask", " "], "an empty address; write tcp://HOST:8786, or local"),
+    ],
+)
 def test_means_that_cannot_be_are_one_line(capsys, words, told):
     assert cli.main(["faults", *words]) == 2
     err = capsys.readouterr().err

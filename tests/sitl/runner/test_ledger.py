@@ -77,6 +77,7 @@ def test_a_run_ends_when_enough_is_known_and_goes_on_when_more_is_wanted(tmp_pat
         def watch(there):
             seen.append(sum(result is not None for result in there))
             return f"{seen[-1]} known", seen[-1] >= count
+
         return watch
 
     for count in (2, 2, 5):
@@ -92,7 +93,8 @@ def test_sigterm_ends_it_as_ctrl_c_does_and_leaves_nobody(tmp_path, folder, work
     out, before = tmp_path / "r.jsonl", signal.getsignal(signal.SIGTERM)
     with pytest.raises(KeyboardInterrupt):
         quick(jobs_in(folder, range(6)), line=lambda _: os.kill(os.getpid(), signal.SIGTERM)).results(
-            CampaignOptions(workers=workers, out=out))
+            CampaignOptions(workers=workers, out=out)
+        )
     assert signal.getsignal(signal.SIGTERM) is before
     assert not multiprocessing.active_children()
     assert len(read_results(out).results) == 1
@@ -157,18 +159,25 @@ sailed(Path(sys.argv[1]), Path(sys.argv[2]), range(40))
 def test_a_full_disk_is_said_and_what_was_done_is_kept(tmp_path, folder):
     """The limit of a file's size stands in for the end of the disk: the same write fails in the same way."""
     out = tmp_path / "r.jsonl"
-    done = subprocess.run([sys.executable, "-c", FULL, folder, out], capture_output=True, text=True, check=False,
-                          preexec_fn=lambda: signal.signal(signal.SIGXFSZ, signal.SIG_IGN))
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, folder, out],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: signal.signal(signal.SIGXFSZ, signal.SIG_IGN),
+    )
     held = read_results(out).results
     assert 3 < len(held) < 40
     assert done.stderr.splitlines()[-1].endswith(
-        f"r.jsonl: File too large; it holds {len(held)} results: make room, and the same command goes on")
+        f"r.jsonl: File too large; it holds {len(held)} results: make room, and the same command goes on"
+    )
     assert sailed(folder, out, range(40)).now == 40 - len(held)
-    assert sum(n == 2 for n in attempts(folder).values()) == 1   # the one whose result found no room
+    assert sum(n == 2 for n in attempts(folder).values()) == 1  # the one whose result found no room
 
 
 def test_no_voyage_is_sailed_on_a_full_disk(tmp_path, folder, monkeypatch):
     """What would be sailed would say more of the disk than of the boat."""
+
     class Full(Disk):
         def room(self, path):
             return replace(super().room(path), free_bytes=0)
@@ -181,4 +190,7 @@ def test_no_voyage_is_sailed_on_a_full_disk(tmp_path, folder, monkeypatch):
 
 def test_keys_are_in_the_order_of_numbers():
     assert sorted(['{"seed":10}', '{"seed":9}', '{"seed":null}'], key=result_store._order) == [
-        '{"seed":null}', '{"seed":9}', '{"seed":10}']
+        '{"seed":null}',
+        '{"seed":9}',
+        '{"seed":10}',
+    ]

@@ -76,8 +76,11 @@ def in_the_narrows(half_m=14.0, tack_fails=0.0):
     sides = [shapely.box(-80.0, 60.0, -half_m, 260.0), shapely.box(half_m, 60.0, 80.0, 260.0)]
     made = voyage(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=sides)
     made = replace(made, boat=replace(made.boat, tack_fails=tack_fails))
-    world = World(skipper=skipper(made, autopilot_beats=False, margin_m=12.0, margin_floor_m=5.0),
-                  wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0), **FAST)
+    world = World(
+        skipper=skipper(made, autopilot_beats=False, margin_m=12.0, margin_floor_m=5.0),
+        wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0),
+        **FAST,
+    )
     assert world.run(44, is_sailing)
     world.run(44 - world.t)
     assert 60.0 < world.position[1] < 150.0
@@ -103,7 +106,7 @@ def test_without_it_the_corridor_would_have_been_too_wide(monkeypatch):
 
 def test_where_tacks_can_fail_there_is_room_for_one_that_does():
     def narrows(tack_fails):
-        world = in_the_narrows(half_m=20.0, tack_fails=tack_fails)    # at the corridor's edge she is 10 m clear
+        world = in_the_narrows(half_m=20.0, tack_fails=tack_fails)  # at the corridor's edge she is 10 m clear
         world.run(60)
         return world
 
@@ -115,15 +118,20 @@ def test_where_tacks_can_fail_there_is_room_for_one_that_does():
 
 def test_a_boat_whose_tacks_have_failed_is_asked_too_for_the_leg_that_she_was_to_gybe_on_has_closed():
     world = in_the_narrows(tack_fails=0.03)
-    world.state = replace(world.state, tacking=replace(world.state.tacking, tried=4, failed=2, in_a_row=2,
-                                                       failed_s=world.t))
+    world.state = replace(
+        world.state, tacking=replace(world.state.tacking, tried=4, failed=2, in_a_row=2, failed_s=world.t)
+    )
     world.run(10)
     assert said(world, "short tack")
 
 
 def test_in_open_water_the_autopilot_beats_as_it_likes():
-    world = make(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(), wind=lambda t: (0.1 * math.sin(t / 20.0), 5.0),
-                 config={"autopilot_beats": True})
+    world = make(
+        Goal(en_m=(0.0, 320.0), radius_m=8.0),
+        obstacles=(),
+        wind=lambda t: (0.1 * math.sin(t / 20.0), 5.0),
+        config={"autopilot_beats": True},
+    )
     assert world.run(900, is_done)
     assert not any(isinstance(a, act.Tack) for _, a in world.actions)
 
@@ -160,7 +168,7 @@ def test_want_of_a_processor_costs_effort_and_neither_margin_nor_mission():
     assert request(ctx, ReplanReason.ORDER)
     pending = ctx.state.pending.plan
     take_plan(ctx, PlanOutcome(request_id=pending.request_id, plan=plan(pending.problem, expansions=500)))
-    assert ctx.state.plans.effort > world.state.plans.effort     # what is answered gives it back
+    assert ctx.state.plans.effort > world.state.plans.effort  # what is answered gives it back
 
 
 def test_an_old_plan_that_the_present_wind_has_closed_is_not_sound():

@@ -20,8 +20,8 @@ from tests.skipper.test_voyage import is_done, make, said
 from tests.skipper.world import restarted, with_parts
 
 CALM_S = 60.0
-ROCK = shapely.box(150.0, -100.0, 190.0, 400.0)     # to leeward of the way, across the whole set of the current
-AHEAD = shapely.box(-20.0, 150.0, 40.0, 170.0)      # between where the current leaves her and the old waypoint
+ROCK = shapely.box(150.0, -100.0, 190.0, 400.0)  # to leeward of the way, across the whole set of the current
+AHEAD = shapely.box(-20.0, 150.0, 40.0, 170.0)  # between where the current leaves her and the old waypoint
 
 
 def dies(back_s=math.inf, tws_mps=0.0):
@@ -36,8 +36,7 @@ def sets(east_mps=0.5, until_s=math.inf):
 def world(*, obstacles=(ROCK,), goal=(0.0, 400.0), has_motor=False, **how):
     made = make(Goal(en_m=goal, radius_m=8.0), obstacles=obstacles, **{"wind": dies(), "current": sets(), **how})
     boat = replace(made.skipper.voyage.boat, has_motor=has_motor)
-    made.skipper = type(made.skipper)(
-        voyage=replace(made.skipper.voyage, boat=boat), config=made.skipper.config)
+    made.skipper = type(made.skipper)(voyage=replace(made.skipper.voyage, boat=boat), config=made.skipper.config)
     return made
 
 
@@ -58,7 +57,7 @@ def test_half_an_hour_without_wind_in_a_current_is_no_silence():
     assert said(w, "drifting")
     calls = said(w, CALL)
     assert "onto o0 in" in calls[0][2]
-    assert "51.1" in calls[0][2]                                     # where, for whoever comes to help
+    assert "51.1" in calls[0][2]  # where, for whoever comes to help
     assert contact_s(w) - calls[0][0] >= 120.0
     assert contact_s(w) - said_at(w, "drifting")[0] >= 180.0
     before = [t for t in said_at(w, CALL) if t < contact_s(w)]
@@ -82,7 +81,7 @@ def test_in_a_calm_she_loiters_and_sails_on_from_where_the_current_has_taken_her
     assert "becalmed" in w.state.why or "adrift" in w.state.why
     asked = w.count(act.RequestPlan)
     w.run(300 - w.t)
-    assert w.count(act.RequestPlan) == asked                          # none for a wind that is not there
+    assert w.count(act.RequestPlan) == asked  # none for a wind that is not there
     assert w.run(200, lambda w: w.mode is Mode.AUTO)
     assert w.count(act.RequestPlan) > asked
     assert not said(w, "operator")
@@ -131,7 +130,8 @@ def test_the_motor_holds_her_and_is_switched_off_when_she_sails():
     w = world(has_motor=True, wind=dies(600.0), current=sets(0.5, 600.0))
     assert w.run(400, lambda w: w.motor)
     assert Persisted.from_dict(w.skipper.persisted(w.state).to_dict()).motor or w.run(
-        3, lambda w: w.skipper.persisted(w.state).motor)
+        3, lambda w: w.skipper.persisted(w.state).motor
+    )
     assert w.run(1200, is_done)
     assert not w.motor
     assert w.clearance() > 0.0
@@ -145,10 +145,17 @@ def test_a_motor_that_runs_is_ours_to_switch_off_after_a_restart():
     assert w.run(900, lambda w: not w.motor)
 
 
-@pytest.mark.parametrize(("tws_mps", "has_motor", "may", "wanted"), [
-    (0.0, False, True, "anchor"), (0.0, True, True, "motor"), (0.0, True, False, "anchor"),
-    (2.0, False, True, "loiter"), (2.0, False, False, "anchor"), (0.3, False, True, "anchor"),
-])
+@pytest.mark.parametrize(
+    ("tws_mps", "has_motor", "may", "wanted"),
+    [
+        (0.0, False, True, "anchor"),
+        (0.0, True, True, "motor"),
+        (0.0, True, False, "anchor"),
+        (2.0, False, True, "loiter"),
+        (2.0, False, False, "anchor"),
+        (0.3, False, True, "anchor"),
+    ],
+)
 def test_the_first_means_that_will_do_is_used(tws_mps, has_motor, may, wanted):
     w = world(has_motor=has_motor)
     w.run(CALM_S)
@@ -168,12 +175,15 @@ def test_loiter_that_does_not_hold_ends_in_the_call():
     assert contact_s(w) - said_at(w, CALL)[0] >= 60.0
 
 
-@pytest.mark.parametrize(("place", "obstacles", "stays"), [
-    ((20.0, 0.0), (), True),                                            # in it
-    ((60.0, 0.0), (), True),                                            # on her clear way to it
-    ((60.0, 0.0), (shapely.box(20.0, -20.0, 30.0, 20.0),), False),      # a rock lies between
-    ((90.0, 0.0), (), False),                                           # too far to be left to it
-])
+@pytest.mark.parametrize(
+    ("place", "obstacles", "stays"),
+    [
+        ((20.0, 0.0), (), True),  # in it
+        ((60.0, 0.0), (), True),  # on her clear way to it
+        ((60.0, 0.0), (shapely.box(20.0, -20.0, 30.0, 20.0),), False),  # a rock lies between
+        ((90.0, 0.0), (), False),  # too far to be left to it
+    ],
+)
 def test_the_mission_s_own_loiter_is_kept_where_she_is_in_it_or_has_a_clear_way_to_it(place, obstacles, stays):
     w = world(obstacles=obstacles)
     w.run(CALM_S)
@@ -187,10 +197,14 @@ def test_the_mission_s_own_loiter_is_kept_where_she_is_in_it_or_has_a_clear_way_
     assert lies_in_loiter(ctx) is stays
 
 
-@pytest.mark.parametrize(("tws_mps", "rock_m", "cramped"), [
-    (5.0, 10.0, True), (5.0, 40.0, False),      # a loiter takes 12 m of room
-    (0.5, 10.0, False),                         # without wind she circles nowhere: LOITER keeps her from her old way
-])
+@pytest.mark.parametrize(
+    ("tws_mps", "rock_m", "cramped"),
+    [
+        (5.0, 10.0, True),
+        (5.0, 40.0, False),  # a loiter takes 12 m of room
+        (0.5, 10.0, False),  # without wind she circles nowhere: LOITER keeps her from her old way
+    ],
+)
 def test_no_loiter_is_begun_beside_a_rock_that_she_would_sail_onto(tws_mps, rock_m, cramped):
     """A boat in irons in a channel was put into one, and touched when she sailed again (sitl mismatch, seed 2)."""
     w = world(obstacles=())

@@ -141,7 +141,7 @@ def test_a_receiver_that_lost_its_transmitter_moves_no_sticks():
 def test_a_person_who_takes_the_sticks_while_she_lies_in_the_failsafes_hold_has_her():
     world = under_way(obstacles=(ISLAND,), goals=(Goal(en_m=(0.0, 300.0), radius_m=8.0),))
     stop(world)
-    world.system_status, world.ekf_ok = 5, False      # nothing is planned before the filter is well
+    world.system_status, world.ekf_ok = 5, False  # nothing is planned before the filter is well
     text(world, "EKF failsafe")
     world.run(10)
     assert world.state.operator.answering == "position"
@@ -230,7 +230,7 @@ def test_what_is_answered_survives_a_kill_of_the_companion():
     restarted(world)
     asked = world.count(act.RequestPlan)
     assert world.run(20, lambda w: w.mode is Mode.AUTO)
-    assert world.count(act.RequestPlan) > asked     # from where she has drifted to, before AUTO
+    assert world.count(act.RequestPlan) > asked  # from where she has drifted to, before AUTO
 
 
 def drifts(world):
@@ -333,13 +333,13 @@ def test_sailed_home_straight_she_is_back_in_auto_before_any_plan(mode, shown):
     assert asked[0].mode is Mode.AUTO
     assert world.run(3, lambda w: w.mode is Mode.AUTO)
     world.run(3)
-    assert any(isinstance(a, act.RequestPlan) for _, a in world.actions[before:])   # and then from where she is
+    assert any(isinstance(a, act.RequestPlan) for _, a in world.actions[before:])  # and then from where she is
 
 
 def test_sailed_home_where_the_way_on_board_is_shut_a_plan_comes_first():
     world = under_way(goals=(Goal(en_m=(0.0, 200.0), radius_m=8.0),), obstacles=(ISLAND,))
-    world.position = (0.0, 70.0)   # swept to where the island stands before her
-    world.state = with_parts(world.state, position={"last_seen": None})   # in time: no jump is meant
+    world.position = (0.0, 70.0)  # swept to where the island stands before her
+    world.state = with_parts(world.state, position={"last_seen": None})  # in time: no jump is meant
     stop(world, Mode.RTL, fence_breached=True)
     before = len(world.actions)
     world.run(2)
@@ -366,9 +366,9 @@ def test_a_loiter_that_cannot_be_sailed_to_any_more_is_laid_anew():
     world = under_way(obstacles=(box(130, -60, 170, 60),))
     stop(world, battery_failed=True)
     assert world.run(8, lambda w: w.mode is Mode.AUTO)
-    world.position = (195.0, 0.0)   # set behind the island, and held there once more
+    world.position = (195.0, 0.0)  # set behind the island, and held there once more
     world.heading = math.pi / 2.0
-    world.state = with_parts(world.state, position={"last_seen": None})   # a position that leapt would not be believed
+    world.state = with_parts(world.state, position={"last_seen": None})  # a position that leapt would not be believed
     before = len(world.actions)
     stop(world)
     text(world, "Battery 1 is critical 9.10V used 0 mAh")
@@ -376,9 +376,10 @@ def test_a_loiter_that_cannot_be_sailed_to_any_more_is_laid_anew():
     assert any(isinstance(a, act.UploadMission) for _, a in world.actions[before:])
 
 
-@pytest.mark.parametrize(("name", "words", "is_over"), [
-    ("battery", "", False), ("shore link", "Radio Failsafe", True), ("position", "EKF failsafe", False),
-])
+@pytest.mark.parametrize(
+    ("name", "words", "is_over"),
+    [("battery", "", False), ("shore link", "Radio Failsafe", True), ("position", "EKF failsafe", False)],
+)
 @pytest.mark.parametrize("answer", list(Recovery))
 def test_the_mission_says_what_is_done_about_each(name, words, is_over, answer):
     """``[safety] ..._failsafe``: left alone, sailed on, stayed near by, or to the refuge; the end of a sign."""
@@ -428,7 +429,7 @@ def test_a_mission_of_somebody_else_s_that_leads_over_something_is_loitered_befo
     assert float(world.skipper.voyage.area.clearance_m([world.position])[0]) > 15.0
     assert "which is not ours, leads over" in said(world, "kept off")[0][2]
     uploads = world.count(act.UploadMission)
-    world.set_mode(Mode.AUTO)      # told, he means it
+    world.set_mode(Mode.AUTO)  # told, he means it
     world.run(60)
     assert world.mode is Mode.AUTO
     assert world.count(act.UploadMission) == uploads

@@ -21,13 +21,19 @@ from companion.traffic import Targets
 from tests.skipper.world import FRAME, World, restarted, skipper, voyage
 from tests.traffic.conftest import report
 
-GOAL = Goal(en_m=(900.0, 0.0), radius_m=6.0, name="the goal")     # a reach: the wind is from the north
+GOAL = Goal(en_m=(900.0, 0.0), radius_m=6.0, name="the goal")  # a reach: the wind is from the north
 HALF_M = 4.0
 
 
 def make(*obstacles, goals=(GOAL,), permissions=ALL_PERMITTED, config=None, **world):
-    made = World(skipper=skipper(voyage(*goals, obstacles=obstacles), **(config or {"traffic_clearance_m": 30.0})),
-                 expansions=1500, sigma=0.05, heading=math.pi / 2, permissions=permissions, **world)
+    made = World(
+        skipper=skipper(voyage(*goals, obstacles=obstacles), **(config or {"traffic_clearance_m": 30.0})),
+        expansions=1500,
+        sigma=0.05,
+        heading=math.pi / 2,
+        permissions=permissions,
+        **world,
+    )
     made.heard = Targets.empty(FRAME)
     return made
 
@@ -52,8 +58,18 @@ class Intruder:
         return self.en[0] + run * math.sin(self.course), self.en[1] + run * math.cos(self.course)
 
     def heard(self, t):
-        return report(t, self.at(t), name="Nellie", course_rad=self.course, speed_mps=self.speed,
-                      heading_rad=self.course, bow_m=HALF_M, stern_m=HALF_M, port_m=1.5, starboard_m=1.5)
+        return report(
+            t,
+            self.at(t),
+            name="Nellie",
+            course_rad=self.course,
+            speed_mps=self.speed,
+            heading_rad=self.course,
+            bow_m=HALF_M,
+            stern_m=HALF_M,
+            port_m=1.5,
+            starboard_m=1.5,
+        )
 
 
 def step(world, intruder):
@@ -91,12 +107,12 @@ def test_an_intruder_too_near_to_plan_for_is_kept_clear_of_and_the_plan_sails_on
     assert said(world).count("last resort over") == 1
     assert world.mode is Mode.AUTO
     headings = steered(world)
-    assert all(b[0] - a[0] <= 1.0 for a, b in pairwise(headings))     # ArduRover forgets one that is 3 s old
+    assert all(b[0] - a[0] <= 1.0 for a, b in pairwise(headings))  # ArduRover forgets one that is 3 s old
     assert all(abs(difference_rad(a.heading_rad, 0.0)) >= world.no_go - 1e-9 for _, a in headings)
     begun, ended = headings[0][0], headings[-1][0]
     back = [t for t, a in world.actions if isinstance(a, act.SetMode) and a.mode is Mode.AUTO and t > begun]
     planned = [t for t, a in world.actions if isinstance(a, act.RequestPlan) and begun <= t <= ended]
-    assert planned                                                     # from where the field brought it, first
+    assert planned  # from where the field brought it, first
     assert min(back) >= max(planned)
     assert world.run(900, lambda w: w.state.phase is Phase.DONE)
 
@@ -104,7 +120,7 @@ def test_an_intruder_too_near_to_plan_for_is_kept_clear_of_and_the_plan_sails_on
 def test_the_same_intruder_comes_nearer_without_permission_to_steer_and_it_is_said():
     world = make(permissions=replace(ALL_PERMITTED, may_steer=False))
     world.run(100)
-    assert meet(world, Intruder(world, 90.0, 45.0)) < HALF_M     # no plan found in time helps
+    assert meet(world, Intruder(world, 90.0, 45.0)) < HALF_M  # no plan found in time helps
     assert "no last resort" in said(world)
     assert NAME in said(world)
     assert not steered(world)
@@ -205,11 +221,15 @@ def test_a_saved_state_without_the_mode_is_read_too():
 BY_FIELD = {"guidance": Guidance.FIELD}
 
 
-@pytest.mark.parametrize("goals", [
-    (Goal(en_m=(200.0, 0.0), radius_m=8.0),),
-    (Goal(en_m=(0.0, 200.0), radius_m=8.0),),                                              # dead to windward
-    (Goal(en_m=(120.0, 60.0), radius_m=8.0), Goal(en_m=(0.0, -80.0), radius_m=8.0)),
-], ids=["reach", "beat", "two goals"])
+@pytest.mark.parametrize(
+    "goals",
+    [
+        (Goal(en_m=(200.0, 0.0), radius_m=8.0),),
+        (Goal(en_m=(0.0, 200.0), radius_m=8.0),),  # dead to windward
+        (Goal(en_m=(120.0, 60.0), radius_m=8.0), Goal(en_m=(0.0, -80.0), radius_m=8.0)),
+    ],
+    ids=["reach", "beat", "two goals"],
+)
 def test_a_voyage_by_field_alone(goals):
     world = make(goals=goals, config=BY_FIELD)
     assert world.run(900, lambda w: w.state.phase is Phase.DONE)
@@ -217,14 +237,18 @@ def test_a_voyage_by_field_alone(goals):
     headings = steered(world)
     assert len(headings) > 60
     assert all(abs(difference_rad(a.heading_rad, 0.0)) >= world.no_go - 1e-9 for _, a in headings)
-    assert world.run(20, lambda w: w.mode is Mode.AUTO)      # left in the mission's safe end
+    assert world.run(20, lambda w: w.mode is Mode.AUTO)  # left in the mission's safe end
     assert not [a for t, a in world.actions if isinstance(a, act.UploadMission)][5:]
 
 
-@pytest.mark.parametrize(("rock", "goal"), [
-    (box(80.0, -12.0, 110.0, 25.0), (200.0, 0.0)),
-    (box(-25.0, 60.0, 25.0, 100.0), (0.0, 200.0)),      # dead to windward; one as wide as the zone of 50 m is a trap
-], ids=["reach", "beat"])
+@pytest.mark.parametrize(
+    ("rock", "goal"),
+    [
+        (box(80.0, -12.0, 110.0, 25.0), (200.0, 0.0)),
+        (box(-25.0, 60.0, 25.0, 100.0), (0.0, 200.0)),  # dead to windward; one as wide as the zone of 50 m is a trap
+    ],
+    ids=["reach", "beat"],
+)
 def test_a_voyage_by_field_goes_round_a_rock(rock, goal):
     world = make(rock, goals=(Goal(en_m=goal, radius_m=8.0),), config=BY_FIELD)
     assert world.run(600, lambda w: w.state.phase is Phase.DONE)

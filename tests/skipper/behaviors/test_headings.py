@@ -90,7 +90,7 @@ def test_at_a_buoy_no_manoeuvre_leads_to_its_side_of_the_wanted_heading(side, ha
 @BUOYS
 def test_at_a_buoy_she_goes_about_to_get_clear_and_not_to_get_nearer(side, hand):
     wanted = hand * 0.1
-    assert sailable_rad(wanted, -hand * 0.8, 0.0, 0.785) == pytest.approx(hand * 0.785)   # nearer by 11 degrees
+    assert sailable_rad(wanted, -hand * 0.8, 0.0, 0.785) == pytest.approx(hand * 0.785)  # nearer by 11 degrees
     assert sailable_rad(-wanted, -hand * 0.8, 0.0, 0.785) == pytest.approx(-hand * 0.785)
     assert sailable_rad(-wanted, -hand * 0.8, 0.0, 0.785, side) == pytest.approx(hand * 0.785)
     assert sailable_rad(-hand * 0.5, hand * 0.8, 0.0, 0.785) == pytest.approx(-hand * 0.785)
@@ -146,7 +146,7 @@ def test_a_leg_is_made_good_across_a_current_and_leeway_by_equation_3(across_mps
     """Led back to her line alone she comes to lie where that balances the drift: two metres and more to lee of it."""
     world = by_heading(Goal(en_m=(0.0, 400.0)), obstacles=(), wind=BEAM)
 
-    def pushed(t):   # the wind is from port: leeway is to starboard
+    def pushed(t):  # the wind is from port: leeway is to starboard
         aside = leeway_rad * world.speed
         return across_mps + aside * math.cos(world.heading), -aside * math.sin(world.heading)
 
@@ -182,7 +182,7 @@ def test_no_beat_is_left_to_an_autopilot_that_does_not_sail_the_mission():
         beats = [a.problem.beat for _, a in world.actions if isinstance(a, act.RequestPlan)]
         assert (beats[0] is None) == (guidance is not Guidance.PLAN), guidance
         assert (room_m(turn_of(world)) is None) == (guidance is not Guidance.PLAN), guidance
-        permitted = replace(world.permissions, may_steer=False)   # then the autopilot sails what was planned
+        permitted = replace(world.permissions, may_steer=False)  # then the autopilot sails what was planned
         assert room_m(turn_of(world, permissions=permitted)) is not None
 
 
@@ -221,9 +221,12 @@ def test_too_near_to_plan_round_she_is_stopped_in_guided_too(away_m):
 def test_a_closed_leg_is_followed_no_farther_than_to_the_loiter():
     """The wind comes ahead and no plan is found: close-hauled she makes for a bank, and nothing tacks her there."""
     bank = shapely.box(-100.0, 60.0, -16.0, 400.0)
-    world = by_heading(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(bank, shapely.box(16.0, 60.0, 100.0, 400.0)),
-                       wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0),
-                       config={"margin_m": 12.0, "margin_floor_m": 5.0})
+    world = by_heading(
+        Goal(en_m=(0.0, 320.0), radius_m=8.0),
+        obstacles=(bank, shapely.box(16.0, 60.0, 100.0, 400.0)),
+        wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0),
+        config={"margin_m": 12.0, "margin_floor_m": 5.0},
+    )
     assert world.run(44, is_steered)
     world.run(44 - world.t)
     assert 40.0 < world.position[1] < 150.0
@@ -236,9 +239,12 @@ def test_a_closed_leg_is_followed_no_farther_than_to_the_loiter():
 
 def test_a_loiter_that_is_refused_leaves_her_steered():
     bank = shapely.box(-100.0, 60.0, -16.0, 400.0)
-    world = by_heading(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(bank, shapely.box(16.0, 60.0, 100.0, 400.0)),
-                       wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0),
-                       config={"margin_m": 12.0, "margin_floor_m": 5.0})
+    world = by_heading(
+        Goal(en_m=(0.0, 320.0), radius_m=8.0),
+        obstacles=(bank, shapely.box(16.0, 60.0, 100.0, 400.0)),
+        wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0),
+        config={"margin_m": 12.0, "margin_floor_m": 5.0},
+    )
     answer = world._answer
 
     def refuse(kind, action):
@@ -258,9 +264,12 @@ def test_a_loiter_that_is_refused_leaves_her_steered():
 
 def test_becalmed_by_headings_she_is_held_and_the_crew_called():
     rock = shapely.box(60.0, -100.0, 90.0, 400.0)
-    world = by_heading(Goal(en_m=(0.0, 400.0)), obstacles=(rock,),
-                       wind=lambda t: (-1.5, 0.0 if t >= 60.0 else 4.0),
-                       current=lambda t: (0.5 if t >= 60.0 else 0.0, 0.0))
+    world = by_heading(
+        Goal(en_m=(0.0, 400.0)),
+        obstacles=(rock,),
+        wind=lambda t: (-1.5, 0.0 if t >= 60.0 else 4.0),
+        current=lambda t: (0.5 if t >= 60.0 else 0.0, 0.0),
+    )
     assert world.run(180, lambda w: w.mode is Mode.LOITER)
     assert world.run(120, lambda w: bool(said(w, CALL)))
 
@@ -278,8 +287,9 @@ def test_out_of_irons_she_is_steered_on_and_not_given_to_auto():
         sail(dt)
 
     world.sail = held
-    assert world.run(30, lambda w: any(isinstance(a, act.SteerHeading) and a.text == "out of irons"
-                                       for _, a in w.actions[before:]))
+    assert world.run(
+        30, lambda w: any(isinstance(a, act.SteerHeading) and a.text == "out of irons" for _, a in w.actions[before:])
+    )
     world.run(40)
     assert not any(isinstance(a, act.SetMode) and a.mode is Mode.AUTO for _, a in world.actions[before:])
     assert world.speed > 1.0
@@ -287,15 +297,21 @@ def test_out_of_irons_she_is_steered_on_and_not_given_to_auto():
 
 def test_a_tack_behind_a_waypoint_is_told_as_about():
     """At each waypoint a new plan is asked for: "next tack 44 s" was 86 s away, for it made the board longer."""
+
     def told(*points):
-        route = SimpleNamespace(items=[SimpleNamespace(command=Command.NAV_WAYPOINT)] * len(points),
-                                leg_from_en_m=[(0.0, 0.0), *points[:-1]], points_en_m=list(points))
+        route = SimpleNamespace(
+            items=[SimpleNamespace(command=Command.NAV_WAYPOINT)] * len(points),
+            leg_from_en_m=[(0.0, 0.0), *points[:-1]],
+            points_en_m=list(points),
+        )
         vehicle = SimpleNamespace(speed_mps=2.0, heading_rad=math.radians(60.0), velocity_en_mps=(1.7, 1.0))
         wind = SimpleNamespace(mean_twd_from_rad=0.0, present_twd_from_rad=0.0, mean_tws_mps=5.0, present_tws_mps=5.0)
         snapshot = SimpleNamespace(vehicle=vehicle, position_en_m=(0.0, 0.0), wind=wind, limits=None, autopilot=None)
-        return next_tack(SimpleNamespace(snapshot=snapshot, state=SimpleNamespace(
-            mission=SimpleNamespace(route=route, index=0))), constant(2.0))
+        return next_tack(
+            SimpleNamespace(snapshot=snapshot, state=SimpleNamespace(mission=SimpleNamespace(route=route, index=0))),
+            constant(2.0),
+        )
 
     east, on, back = (86.6, 50.0), (173.2, 100.0), (86.6, 150.0)
-    assert told(east, (0.0, 100.0)) == pytest.approx((50.0, True), abs=0.1)    # at the end of this leg
+    assert told(east, (0.0, 100.0)) == pytest.approx((50.0, True), abs=0.1)  # at the end of this leg
     assert told(east, on, back) == pytest.approx((100.0, False), abs=0.1)

@@ -78,7 +78,7 @@ def test_hold_on_the_way_to_the_loiter_that_ends_the_mission_is_here_too():
     world = sailing(A)
     world.run(600, is_done)
     place = world.state.mission.route.points_en_m[-1]
-    for off_m in range(0, 95, 5):      # carried off
+    for off_m in range(0, 95, 5):  # carried off
         world.position = (place[0] + off_m, place[1])
         world.step()
     here = world.position
@@ -100,7 +100,7 @@ def test_what_stands_survives_a_restart_with_its_age(verb):
     assert (after.verb, after.by, after.name, after.en_m) == (stood.verb, stood.by, stood.name, stood.en_m)
     assert 120.0 <= after.age_s(world.t) <= 195.0
     assert any("since before this start she is under an order" in text for text in said(world))
-    if verb != "home":      # which she may still be sailing to
+    if verb != "home":  # which she may still be sailing to
         assert world.count(act.UploadMission) == uploads, "what she holds by is on board already"
     world.run(120)
     assert world.state.phase in {Phase.HOLDING, Phase.STANDARD, Phase.WAITING, Phase.OPERATOR}
@@ -116,11 +116,17 @@ def test_a_state_of_before_there_were_orders_still_loads():
     assert (old.standing, old.skipped) == (None, 0)
 
 
-@pytest.mark.parametrize("standing", [
-    {"verb": "replan", "by": "x", "name": "", "before_s": 0.0, "en_m": None},
-    {"verb": "goal", "by": "x", "name": "", "before_s": 0.0, "en_m": None},
-    {"verb": "goal", "by": "x", "name": "", "before_s": 0.0, "en_m": [1e99, 0.0]},
-    {"verb": "nonsense", "by": "x", "name": "", "before_s": 0.0, "en_m": None}, {}, 7])
+@pytest.mark.parametrize(
+    "standing",
+    [
+        {"verb": "replan", "by": "x", "name": "", "before_s": 0.0, "en_m": None},
+        {"verb": "goal", "by": "x", "name": "", "before_s": 0.0, "en_m": None},
+        {"verb": "goal", "by": "x", "name": "", "before_s": 0.0, "en_m": [1e99, 0.0]},
+        {"verb": "nonsense", "by": "x", "name": "", "before_s": 0.0, "en_m": None},
+        {},
+        7,
+    ],
+)
 def test_a_saved_order_that_cannot_be_is_refused(standing):
     data = sailing().skipper.persisted(sailing().state).to_dict() | {"standing": standing}
     with pytest.raises(ValueError, match=r"damaged|not a valid"):
@@ -185,13 +191,16 @@ def test_a_second_place_takes_the_place_of_the_first():
     assert distance_m(world.position, (150.0, 100.0)) <= 12.0
 
 
-@pytest.mark.parametrize(("words", "reason"), [
-    (geo(0.0, 150.0), "not in free water"),
-    (geo(0.0, 172.0), "m from o0: the margin's floor is"),
-    (geo(60_000.0, 0.0), "60 km from this water"),
-    ("goal -1.3 51.1", "latitude and longitude are swapped?"),
-    ("refuge", "the mission has no refuge"),
-])
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (geo(0.0, 150.0), "not in free water"),
+        (geo(0.0, 172.0), "m from o0: the margin's floor is"),
+        (geo(60_000.0, 0.0), "60 km from this water"),
+        ("goal -1.3 51.1", "latitude and longitude are swapped?"),
+        ("refuge", "the mission has no refuge"),
+    ],
+)
 def test_a_place_that_cannot_be_is_refused_before_anything_moves(words, reason):
     from shapely.geometry import box
 
@@ -314,14 +323,16 @@ def test_why_says_what_she_does_and_moves_nothing():
 
 # ----------------------------------------------------------------------------------------- who, when, twice
 @pytest.mark.parametrize("verb", [v for v in Verb if v not in {Verb.WHY, Verb.GOAL}])
-@pytest.mark.parametrize("permissions", [replace(ALL_PERMITTED, orders=()), replace(ALL_PERMITTED, orders=("why",)),
-                                         DRY_RUN])
+@pytest.mark.parametrize(
+    "permissions", [replace(ALL_PERMITTED, orders=()), replace(ALL_PERMITTED, orders=("why",)), DRY_RUN]
+)
 def test_what_is_not_permitted_is_refused_and_changes_nothing(verb, permissions):
     world = permitted_world()
     world.permissions = permissions
     before = world.state
-    state, actions = world.skipper.step(before, replace(
-        world.snapshot(), permissions=permissions, events=(order(str(verb), world.t),), outcomes=()))
+    state, actions = world.skipper.step(
+        before, replace(world.snapshot(), permissions=permissions, events=(order(str(verb), world.t),), outcomes=())
+    )
     given = next(a for a in actions if isinstance(a, act.Acknowledge))
     assert given.result is Result.REFUSED
     assert "not permitted" in given.text
@@ -342,8 +353,9 @@ def test_a_verb_that_is_named_is_permitted_and_no_other():
     snapshot = world.snapshot()
     may = replace(ALL_PERMITTED, orders=("hold",))
     for verb, result in (("hold", Result.DONE), ("home", Result.REFUSED), ("why", Result.DONE)):
-        _, actions = world.skipper.step(world.state, replace(
-            snapshot, permissions=may, events=(order(verb, world.t),), outcomes=()))
+        _, actions = world.skipper.step(
+            world.state, replace(snapshot, permissions=may, events=(order(verb, world.t),), outcomes=())
+        )
         assert next(a for a in actions if isinstance(a, act.Acknowledge)).result is result
 
 

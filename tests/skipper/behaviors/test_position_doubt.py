@@ -92,12 +92,12 @@ def test_it_loiters_while_the_other_place_is_not_clear_ahead_and_sails_on_when_t
     assert world.run(6, lambda w: w.mode is Mode.LOITER)
     assert said(world, "standing off")
     world.run(30)
-    assert world.mode is Mode.LOITER                    # longer than the 20 s of a jump in clear water
+    assert world.mode is Mode.LOITER  # longer than the 20 s of a jump in clear water
     assert world.state.phase is Phase.HOLDING
     asked = world.count(act.RequestPlan)
     world.position_offset = (0.0, 0.0)
     assert world.run(12, lambda w: w.mode is Mode.AUTO)
-    assert world.count(act.RequestPlan) > asked         # from where it is
+    assert world.count(act.RequestPlan) > asked  # from where it is
     assert not said(world, "operator")
     assert world.run(1500, is_done)
     assert distance_m(world.position, GOAL.en_m) < 25.0
@@ -156,7 +156,7 @@ def test_a_loiter_in_doubt_is_kept_whatever_way_its_circle_goes_just_now():
     assert world.run(6, lambda w: w.mode is Mode.LOITER)
     since = len(world.actions)
     for n in range(240):
-        world.heading, world.speed = 0.6 * n, 2.0     # as LOITER turns
+        world.heading, world.speed = 0.6 * n, 2.0  # as LOITER turns
         world.step()
     assert not asked(world, since)
     assert world.mode is Mode.LOITER
@@ -188,7 +188,7 @@ def test_before_a_loiter_is_begun_anew_hold_waits_until_loiter_has_turned_her_aw
     world.position_offset = (world.position_offset[0] + 70.0, world.position_offset[1])
     since = len(world.actions)
     for _ in range(2):
-        world.heading, world.speed = onto, away_m / 5.0    # ashore in less than 7 s
+        world.heading, world.speed = onto, away_m / 5.0  # ashore in less than 7 s
         world.step()
     assert (not asked(world, since)) is is_turning
     world.heading = onto + math.pi
@@ -234,7 +234,7 @@ def test_a_position_that_jumped_while_the_companion_was_dead_is_doubted_by_who_c
     world = make(shown={"utc_at_boot_s": UTC_S})
     assert world.run(600, is_near_an_island)
     restarted(world)
-    world.position_offset = (70.0, -40.0)    # farther than she sails in the seconds since her place was saved
+    world.position_offset = (70.0, -40.0)  # farther than she sails in the seconds since her place was saved
     assert world.run(10, lambda w: w.state.position.doubt is not None)
     assert "before this start" in world.state.position.doubt.why
     world.position_offset = (0.0, 0.0)
@@ -311,12 +311,12 @@ def geo(en_m):
 def test_of_two_receivers_that_differ_the_other_one_may_be_right():
     world = make()
     assert world.run(600, is_near_an_island)
-    for n in range(12):     # the one that is sailed by creeps away, slower than a jump is seen by
+    for n in range(12):  # the one that is sailed by creeps away, slower than a jump is seen by
         world.shown = {"gps2": geo(world.position)}
         world.position_offset = (3.0 * n, 0.0)
         world.step()
     assert world.state.position.doubt is not None
     assert "second receiver" in world.state.position.doubt.why
-    world.shown = {}       # a forger's, or it has fallen silent: nothing has jumped
+    world.shown = {}  # a forger's, or it has fallen silent: nothing has jumped
     world.run(3)
     assert world.state.position.doubt is None

@@ -15,8 +15,14 @@ SPREAD_DEG = 12.0
 
 
 def beating(seed=0, *, shifts=True, wind=None, corridor=50.0, spread_deg=SPREAD_DEG, obstacles=(), **config):
-    return make(GOAL, obstacles=obstacles, wind=wind or ar1(seed, spread_deg), sigma=math.radians(spread_deg),
-                corridor=corridor, config={"autopilot_beats": True, "shifts": shifts, **config})
+    return make(
+        GOAL,
+        obstacles=obstacles,
+        wind=wind or ar1(seed, spread_deg),
+        sigma=math.radians(spread_deg),
+        corridor=corridor,
+        config={"autopilot_beats": True, "shifts": shifts, **config},
+    )
 
 
 def tacks(world):
@@ -30,10 +36,16 @@ def test_headers_are_tacked_and_said():
     assert any(a.text.startswith("headed ") and "expected gain" in a.text for a in tacks(world))
 
 
-@pytest.mark.parametrize("how", [
-    {"shifts": False}, {"corridor": 10.0}, {"wind": lambda t: (0.0, 5.0), "spread_deg": 1.0},
-    {"autopilot_beats": False},
-], ids=["off", "narrow", "steady", "planned"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"shifts": False},
+        {"corridor": 10.0},
+        {"wind": lambda t: (0.0, 5.0), "spread_deg": 1.0},
+        {"autopilot_beats": False},
+    ],
+    ids=["off", "narrow", "steady", "planned"],
+)
 def test_elsewhere_the_autopilot_tacks_as_it_does(how):
     world = beating(**how)
     assert world.run(1500, is_done)
@@ -64,7 +76,7 @@ def test_a_corridor_that_is_too_wide_without_them_is_sailed_in_by_the_shifts(shi
     world = beating(shifts=shifts, corridor=200.0)
     world.run(100, lambda w: w.armed)
     places = {(item.lat_e7, item.lon_e7) for item in world.mission}
-    assert (len(places) == 1) == shifts      # without them each board is planned
+    assert (len(places) == 1) == shifts  # without them each board is planned
     assert world.run(1500, is_done)
     assert bool(tacks(world)) == shifts
 

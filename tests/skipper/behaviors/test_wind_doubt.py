@@ -87,7 +87,7 @@ def test_a_parameter_that_somebody_set_is_said(name):
 
 
 # ------------------------------------------------------------------------------------------ sea room
-ROCK = box(30.0, -60.0, 90.0, -40.0)      # to leeward of a boat that reaches east in a wind from the north
+ROCK = box(30.0, -60.0, 90.0, -40.0)  # to leeward of a boat that reaches east in a wind from the north
 TURNED = WindBefore(twd_from_rad=0.0, tws_mps=5.0, turned_rad=math.radians(90.0))
 
 
@@ -129,8 +129,10 @@ def test_a_place_has_room_to_circle_in_and_is_reached_from_all_of_the_loiter():
     found = sea_room(area(lee), boat, starts, wind, no_go_half_rad=half_rad, clear_m=(15.0, 8.0))
     assert found is not None
     east, north = found[0]
-    for islet in (box(east - 2.0, north + 18.0, east + 2.0, north + 22.0),
-                  box(0.5 * east - 1.0, 0.5 * north + 16.0, 0.5 * east + 1.0, 0.5 * north + 18.0)):
+    for islet in (
+        box(east - 2.0, north + 18.0, east + 2.0, north + 22.0),
+        box(0.5 * east - 1.0, 0.5 * north + 16.0, 0.5 * east + 1.0, 0.5 * north + 18.0),
+    ):
         water = area(lee, islet)
         other = sea_room(water, boat, starts, wind, no_go_half_rad=half_rad, clear_m=(15.0, 8.0))
         assert other is not None
@@ -188,7 +190,7 @@ def test_after_a_restart_the_wind_of_the_plan_on_board_is_the_true_one():
 def test_a_sternway_that_meets_something_is_a_drift_at_once():
     """Not when it has carried the boat 25 m from the loiter's point: by then there is no time for the anchor."""
     world = north_of_the_rock()
-    world.permissions = Permissions(may_set_mode=True)   # what stops it is left: sea room takes an upload
+    world.permissions = Permissions(may_set_mode=True)  # what stops it is left: sea room takes an upload
     doubted(world)
     assert world.run(5, lambda w: w.mode is Mode.LOITER)
     world.heading, world.speed, world.current = 0.0, 0.0, lambda t: (0.0, -0.8)

@@ -18,11 +18,14 @@ from sitl.ardurover.simulation import ArduRover, find
 from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.world.environment import Constant
 
-PLACES = st.builds(
-    GeoPoint, lat_deg=st.floats(-89.0, 89.0), lon_deg=st.floats(-179.0, 179.0))
+PLACES = st.builds(GeoPoint, lat_deg=st.floats(-89.0, 89.0), lon_deg=st.floats(-179.0, 179.0))
 ITEMS = st.lists(
-    st.builds(lambda p, c: waypoint(p, command=c), PLACES,
-              st.sampled_from([Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM])), min_size=1, max_size=8)
+    st.builds(
+        lambda p, c: waypoint(p, command=c), PLACES, st.sampled_from([Command.NAV_WAYPOINT, Command.NAV_LOITER_UNLIM])
+    ),
+    min_size=1,
+    max_size=8,
+)
 CHECK = settings(max_examples=200)
 
 
@@ -52,7 +55,7 @@ def test_an_item_that_was_moved_or_changed_is_nobodys(items, which, by):
     which %= len(ours)
     changed = [*marked(ours)]
     changed[which] = replace(changed[which], lat_e7=changed[which].lat_e7 + by)
-    if marked(changed)[which].alt_m != changed[which].alt_m:   # one in 4096 has the mark of its new place
+    if marked(changed)[which].alt_m != changed[which].alt_m:  # one in 4096 has the mark of its new place
         assert not are_marked(changed)
 
 
@@ -61,15 +64,21 @@ def test_nobody_elses_lists_bear_it():
     assert not are_marked([MissionItem(command=Command.NAV_RETURN_TO_LAUNCH)])
     there = GeoPoint(lat_deg=50.8, lon_deg=-1.3)
     for alt_m in (0.0, 1.0, 2.5, 10.0, 15.0, 20.0, 30.5, 40.0, 100.0):
-        assert not any(are_marked([replace(waypoint(GeoPoint(lat_deg=50.8 + k / 1e5, lon_deg=-1.3)), alt_m=alt_m)])
-                       for k in range(500))
+        assert not any(
+            are_marked([replace(waypoint(GeoPoint(lat_deg=50.8 + k / 1e5, lon_deg=-1.3)), alt_m=alt_m)])
+            for k in range(500)
+        )
     assert not are_marked([*marked([waypoint(there)]), waypoint(there)])
 
 
 # All that a mission of ours is made of, over the whole range of marks.
-OURS = marked([*(waypoint(GeoPoint(lat_deg=50.81 + k / 1e4, lon_deg=-1.31)) for k in range(40)),
-               waypoint(GeoPoint(lat_deg=50.82, lon_deg=-1.31), command=Command.NAV_LOITER_UNLIM),
-               MissionItem(command=Command.NAV_RETURN_TO_LAUNCH)])
+OURS = marked(
+    [
+        *(waypoint(GeoPoint(lat_deg=50.81 + k / 1e4, lon_deg=-1.31)) for k in range(40)),
+        waypoint(GeoPoint(lat_deg=50.82, lon_deg=-1.31), command=Command.NAV_LOITER_UNLIM),
+        MissionItem(command=Command.NAV_RETURN_TO_LAUNCH),
+    ]
+)
 
 
 async def stored(link, pilot, method):
@@ -96,8 +105,11 @@ def test_it_outlives_an_autopilots_storage(method):
 @pytest.mark.parametrize("method", ["ftp", "items"])
 def test_it_outlives_the_real_ones_storage_and_a_reboot(method, tmp_path):
     async def voyage():
-        async with ArduRover(find(), HOME, Constant(0.0, 5.0), speedup=8.0, folder=tmp_path) as boat, \
-                Link(open_link(boat.link)) as link, Autopilot(link) as pilot:
+        async with (
+            ArduRover(find(), HOME, Constant(0.0, 5.0), speedup=8.0, folder=tmp_path) as boat,
+            Link(open_link(boat.link)) as link,
+            Autopilot(link) as pilot,
+        ):
             before = await stored(link, pilot, method)
             await asyncio.sleep(10.0)
             boat.reboot()

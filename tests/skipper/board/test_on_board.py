@@ -47,11 +47,15 @@ def test_an_earlier_mission_on_a_boat_that_lies_still_is_replaced(how):
     assert world.run(1500, is_done)
     saved = world.skipper.persisted(world.state)
     plain = tuple(replace(item, alt_m=0.0) for item in world.mission)
-    world.mission = world.mission if how == "by its mark" else plain    # an autopilot without room for a mark
+    world.mission = world.mission if how == "by its mark" else plain  # an autopilot without room for a mark
     world.armed, world.mode, world.pending = False, Mode.MANUAL, []
     moved = skipper(voyage(Goal(en_m=(-250.0, 60.0)), obstacles=ISLANDS))
-    world.skipper, world.state = moved, moved.initial(
-        stranger(saved) if how == "from its state" else None, saved.names if how == "by its name" else ())
+    world.skipper, world.state = (
+        moved,
+        moved.initial(
+            stranger(saved) if how == "from its state" else None, saved.names if how == "by its name" else ()
+        ),
+    )
     world.run(5)
     assert said(world, "earlier mission")
     assert world.run(1500, is_done)

@@ -26,15 +26,29 @@ from companion.skipper.step.saved import Persisted
 from tests.skipper.world import voyage
 
 CONFIG = SkipperConfig()
-FACTS = Route(plan_id=1, plan_t_s=0.0, plan_twd_from_rad=0.0, plan_tws_mps=5.0, plan_half_width_rad=0.1, margin_m=15.0,
-              delta_s=0.95)
+FACTS = Route(
+    plan_id=1,
+    plan_t_s=0.0,
+    plan_twd_from_rad=0.0,
+    plan_tws_mps=5.0,
+    plan_half_width_rad=0.1,
+    margin_m=15.0,
+    delta_s=0.95,
+)
 POINTS = st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), min_size=1, max_size=8)
 CHECK = settings(max_examples=60)
 
 
 def route(points, old=None, keep=0, gate=0, made=None, config=CONFIG):
-    return splice(made or voyage(), config, old, keep=keep, tail=Tail(start_en=(0.0, 0.0), points_en=tuple(points),
-                  gate=gate), twd_from_rad=0.3, facts=FACTS)
+    return splice(
+        made or voyage(),
+        config,
+        old,
+        keep=keep,
+        tail=Tail(start_en=(0.0, 0.0), points_en=tuple(points), gate=gate),
+        twd_from_rad=0.3,
+        facts=FACTS,
+    )
 
 
 @CHECK
@@ -59,7 +73,7 @@ def test_splice_keeps_the_prefix_and_ends_safely(first, second, keep):
 def test_a_mixture_is_ours_and_no_other_mission_is(first, second, cut):
     old, new = route(first).items, route(second).items
     cut = min(cut, len(new))
-    mixed = (*new[:cut], *old[cut:len(new)])
+    mixed = (*new[:cut], *old[cut : len(new)])
     assert is_mixture(mixed, old, new)
     stranger = MissionItem(command=16, lat_e7=123, lon_e7=456)
     assert not is_mixture((*mixed[:-1], stranger), old, new)
@@ -94,7 +108,7 @@ def test_the_loiter_has_room_all_round_and_to_leeward():
 def test_a_roomier_place_is_taken_where_there_is_one_near_by():
     near_a_rock = voyage(obstacles=(box(-10, 116, 10, 130),))
     spot, _ = loiter_place(near_a_rock, CONFIG, (0.0, 100.0), 0.0)
-    assert spot == (0.0, 100.0)     # 16 m will do for the end of a mission: that is where its sailor wants her
+    assert spot == (0.0, 100.0)  # 16 m will do for the end of a mission: that is where its sailor wants her
     wanted_m = 2.0 * CONFIG.loiter_radius_m
     roomy, room = loiter_place(near_a_rock, CONFIG, (0.0, 100.0), 0.0, wanted_m=wanted_m)
     assert room >= wanted_m
@@ -114,11 +128,17 @@ def test_persisted_survives_json(first, second, gate, sailing):
     assert Persisted.from_dict(json.loads(json.dumps(saved.to_dict()))) == saved
 
 
-@pytest.mark.parametrize("damage", [
-    {}, {"format": 1}, {"format": 99}, {"format": 1, "voyage": "x", "gate": "many", "sailing": 1, "route": None},
-    {"format": 1, "voyage": "x", "gate": 0, "sailing": True, "route": {"items": [[1]]}, "pending": None},
-    {"format": 1, "voyage": "x", "gate": 0, "sailing": True, "route": 7, "pending": None},
-])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {},
+        {"format": 1},
+        {"format": 99},
+        {"format": 1, "voyage": "x", "gate": "many", "sailing": 1, "route": None},
+        {"format": 1, "voyage": "x", "gate": 0, "sailing": True, "route": {"items": [[1]]}, "pending": None},
+        {"format": 1, "voyage": "x", "gate": 0, "sailing": True, "route": 7, "pending": None},
+    ],
+)
 def test_damaged_state_is_refused_in_one_way(damage):
     with pytest.raises(ValueError, match=r"."):
         Persisted.from_dict(damage)

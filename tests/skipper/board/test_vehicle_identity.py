@@ -23,14 +23,17 @@ def orders(world):
     return sum(world.count(kind) for kind in ORDERS)
 
 
-@pytest.mark.parametrize(("change", "words"), [
-    ({"is_confirmed": False}, "waiting for the autopilot to tell who it is"),
-    ({"frame_class": None}, "waiting for the autopilot to tell its frame"),
-    ({"frame_class": 1}, "FRAME_CLASS is 1, not a boat's: set it to 2"),
-    ({"sails": False}, 'SAIL_ENABLE is 0, the boat does not sail: set it to 1, or write frame = "motor"'),
-    ({"vehicle_type": 2}, "the vehicle is a quadrotor, not a rover"),
-    ({"is_contested": True}, "two autopilots speak with one system id"),
-])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"is_confirmed": False}, "waiting for the autopilot to tell who it is"),
+        ({"frame_class": None}, "waiting for the autopilot to tell its frame"),
+        ({"frame_class": 1}, "FRAME_CLASS is 1, not a boat's: set it to 2"),
+        ({"sails": False}, 'SAIL_ENABLE is 0, the boat does not sail: set it to 1, or write frame = "motor"'),
+        ({"vehicle_type": 2}, "the vehicle is a quadrotor, not a rover"),
+        ({"is_contested": True}, "two autopilots speak with one system id"),
+    ],
+)
 def test_nothing_is_asked_of_an_autopilot_that_is_not_known_to_be_ours(change, words):
     world = make()
     ours = world.identity

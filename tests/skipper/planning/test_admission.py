@@ -24,22 +24,38 @@ from tests.skipper.test_voyage import make
 from tests.skipper.world import with_parts
 
 GOAL = (0.0, 220.0)
-ROCK = shapely.box(-30.0, 80.0, -10.0, 120.0)   # its eastern side is 10 m west of the straight way
+ROCK = shapely.box(-30.0, 80.0, -10.0, 120.0)  # its eastern side is 10 m west of the straight way
 MARGIN_M, FLOOR_M = 14.0, 4.0
 
 
 def sailing(way=((0.0, 60.0), GOAL), *, rock=ROCK, **config):
     """Return a boat under way to the north on a beam reach, past a rock to port, on ``way``."""
-    world = make(Goal(en_m=GOAL, radius_m=6.0, name="the goal"), obstacles=(rock,), wind=lambda t: (math.pi / 2, 5.0),
-                 config={"margin_m": MARGIN_M, "margin_floor_m": FLOOR_M, **config})
+    world = make(
+        Goal(en_m=GOAL, radius_m=6.0, name="the goal"),
+        obstacles=(rock,),
+        wind=lambda t: (math.pi / 2, 5.0),
+        config={"margin_m": MARGIN_M, "margin_floor_m": FLOOR_M, **config},
+    )
     assert world.run(150, lambda w: w.state.voyage.sailing and w.position[1] > 10.0)
     route, boat = world.state.mission.route, world.position
     end = route.points_en_m[-1]
     points = (*way, end)
-    world.state = with_parts(world.state, mission={"index": 0, "own_index": 0, "route": replace(
-        route, items=(*route.items[:1] * len(way), route.items[-1]), points_en_m=points,
-        leg_from_en_m=(boat, *points[:-1]), gate_of=(*(-1,) * (len(way) - 1), 0, -1), margin_m=MARGIN_M)},
-        pending={"plan": None, "upload": None})
+    world.state = with_parts(
+        world.state,
+        mission={
+            "index": 0,
+            "own_index": 0,
+            "route": replace(
+                route,
+                items=(*route.items[:1] * len(way), route.items[-1]),
+                points_en_m=points,
+                leg_from_en_m=(boat, *points[:-1]),
+                gate_of=(*(-1,) * (len(way) - 1), 0, -1),
+                margin_m=MARGIN_M,
+            ),
+        },
+        pending={"plan": None, "upload": None},
+    )
     return world
 
 
@@ -81,7 +97,7 @@ def test_a_smaller_margin_goes_on_board_only_where_what_is_there_is_closed(way, 
     actions = offered(ctx, [(3.0, 100.0), GOAL], rung=1)
     assert bool(uploads(actions)) is not is_open
     if is_open:
-        assert not any(isinstance(a, RequestPlan) for a in actions)   # it stays: no further step down the ladder
+        assert not any(isinstance(a, RequestPlan) for a in actions)  # it stays: no further step down the ladder
         assert ctx.state.mission.route.points_en_m[:2] == way
 
 
@@ -98,7 +114,7 @@ def test_a_way_that_lacks_less_than_the_predictions_error_stays_when_nothing_bet
 
 def test_from_below_the_floor_only_what_comes_no_nearer_goes_on_board():
     world = sailing()
-    beside = (-7.0, 100.0)   # 3 m from the rock, on its eastern side, heading along it
+    beside = (-7.0, 100.0)  # 3 m from the rock, on its eastern side, heading along it
     world.position, world.state = beside, with_parts(world.state, position={"last_seen": None})
     ctx = turn_of(world)
     assert request(ctx, ReplanReason.OFF_LEG)
@@ -106,9 +122,13 @@ def test_from_below_the_floor_only_what_comes_no_nearer_goes_on_board():
 
     def refused(*points):
         ways = (*points, GOAL, ctx.state.mission.route.points_en_m[-1])
-        route = replace(ctx.state.mission.route, points_en_m=ways,
+        route = replace(
+            ctx.state.mission.route,
+            points_en_m=ways,
             items=ctx.state.mission.route.items[:1] * len(ways),
-                        leg_from_en_m=(beside, *ways[:-1]), gate_of=(*(-1,) * len(points), 0, -1))
+            leg_from_en_m=(beside, *ways[:-1]),
+            gate_of=(*(-1,) * len(points), 0, -1),
+        )
         return refusal(ctx, route, 1, replace(pending, start_en_m=beside))
 
     assert refused((20.0, 120.0)) == ""
@@ -124,8 +144,13 @@ def test_what_is_on_board_and_not_sailed_excuses_no_way_onto_a_rock(mode, is_adm
     ctx = turn_of(world)
     assert request(ctx, ReplanReason.OFF_LEG)
     ways = ((-11.0, 115.0), GOAL, ctx.state.mission.route.points_en_m[-1])
-    route = replace(ctx.state.mission.route, points_en_m=ways, items=ctx.state.mission.route.items[:1] * 3,
-                    leg_from_en_m=(beside, *ways[:-1]), gate_of=(-1, 0, -1))
+    route = replace(
+        ctx.state.mission.route,
+        points_en_m=ways,
+        items=ctx.state.mission.route.items[:1] * 3,
+        leg_from_en_m=(beside, *ways[:-1]),
+        gate_of=(-1, 0, -1),
+    )
     assert (refusal(ctx, route, 1, replace(ctx.state.pending.plan, start_en_m=beside)) == "") is is_admitted
 
 

@@ -9,12 +9,7 @@ import pytest
 from shapely.geometry import box
 
 from companion.boat.tracking import GuidanceModel, beat_band_m
-from companion.skipper.planning.autopilot_beats import (
-    is_left_to_beat,
-    may_restart_leg,
-    problem_beat,
-    room_m,
-)
+from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg, problem_beat, room_m
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Route
 from companion.skipper.step.state import Phase
@@ -30,8 +25,16 @@ def ctx(*obstacles, at=(0.0, 0.0), xtrack_m=10.0, irons=(), **config) -> StepCon
     made = voyage(GOAL, obstacles=obstacles)
     world = World(skipper=skipper(made, **config), position=at, corridor=xtrack_m)
     route = Route(
-        items=(), points_en_m=(), plan_id=1, plan_t_s=0.0, plan_twd_from_rad=0.0, plan_tws_mps=5.0,
-        plan_half_width_rad=0.0, margin_m=15.0, delta_s=0.9)
+        items=(),
+        points_en_m=(),
+        plan_id=1,
+        plan_t_s=0.0,
+        plan_twd_from_rad=0.0,
+        plan_tws_mps=5.0,
+        plan_half_width_rad=0.0,
+        margin_m=15.0,
+        delta_s=0.9,
+    )
     state = with_parts(world.state, mission={"route": route}, steering={"irons_s": irons})
     out = StepContext(world.skipper.voyage, world.skipper.config, state, world.snapshot())
     out.leg = lambda: NORTH  # type: ignore[method-assign]
@@ -81,16 +84,20 @@ def test_an_upload_waits_while_the_corridor_would_move_onto_a_rock():
     need = room_m(ctx())
     assert need is not None
     rock = box(need + 1.0, 100, need + 20.0, 120)
-    assert may_restart_leg(ctx(rock, at=(0.0, 90.0)))          # on the line: the leg stays what it was
-    assert not may_restart_leg(ctx(rock, at=(8.0, 90.0)))      # from here the corridor would reach the rock
-    assert may_restart_leg(ctx(rock, at=(-8.0, 90.0)))         # and here it moves away from it
+    assert may_restart_leg(ctx(rock, at=(0.0, 90.0)))  # on the line: the leg stays what it was
+    assert not may_restart_leg(ctx(rock, at=(8.0, 90.0)))  # from here the corridor would reach the rock
+    assert may_restart_leg(ctx(rock, at=(-8.0, 90.0)))  # and here it moves away from it
     assert may_restart_leg(ctx(at=(8.0, 90.0)))
 
 
 def sailed_s(beats: bool) -> float:
     """Return how long a voyage upwind in open water takes."""
-    world = World(skipper=skipper(voyage(GOAL), autopilot_beats=beats), expansions=1500, sigma=0.12,
-                  wind=lambda t: (0.15 * math.sin(t / 40.0), 5.0))
+    world = World(
+        skipper=skipper(voyage(GOAL), autopilot_beats=beats),
+        expansions=1500,
+        sigma=0.12,
+        wind=lambda t: (0.15 * math.sin(t / 40.0), 5.0),
+    )
     assert world.run(1500, lambda w: w.state.phase is Phase.DONE)
     return world.t
 

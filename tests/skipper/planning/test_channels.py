@@ -12,8 +12,8 @@ from companion.skipper.step.state import Phase
 from companion.skipper.way.voyage import Goal
 from tests.skipper.world import World, skipper, voyage
 
-FROM_RAD = math.radians(-34.0)   # the right-hand channel can just be laid, with the margin kept
-RHO_HZ = 0.036                   # equation 17
+FROM_RAD = math.radians(-34.0)  # the right-hand channel can just be laid, with the margin kept
+RHO_HZ = 0.036  # equation 17
 START = (0.0, -20.0)
 
 
@@ -29,8 +29,9 @@ def sail(seed, sigma_deg, **config):
     made = voyage(Goal(en_m=(10.0, 420.0), radius_m=4.0), obstacles=[shapely.from_wkt(w) for w in CHANNELS], home=START)
     rules = {"autopilot_beats": False, "delta_s": 0.75, "margin_m": 6.0, "margin_floor_m": 4.0, **config}
     sigma_rad = math.radians(sigma_deg)
-    world = World(skipper=skipper(made, **rules), wind=unsteady(seed, sigma_rad), sigma=sigma_rad, position=START,
-                  expansions=3000)
+    world = World(
+        skipper=skipper(made, **rules), wind=unsteady(seed, sigma_rad), sigma=sigma_rad, position=START, expansions=3000
+    )
     assert world.run(1500, lambda w: w.state.phase is Phase.DONE)
     assert world.clearance() > 4.0
     return world
@@ -49,5 +50,5 @@ def test_figure_7_the_track_under_noise_takes_the_other_channel(seed):
     for sigma_deg in (9.0, 14.0):
         noisy = sail(seed, sigma_deg)
         assert not is_east_of_the_island(noisy)
-        assert noisy.count(act.RequestPlan) >= 2   # under way too
-        assert noisy.t > steady.t - 5.0            # it is no short cut
+        assert noisy.count(act.RequestPlan) >= 2  # under way too
+        assert noisy.t > steady.t - 5.0  # it is no short cut

@@ -58,8 +58,15 @@ def turn_with(kind, *, away_m=400.0, course_deg=0.0, policy=Policy.RULES):
     world.run(60)
     here, speed = world.position, 3.0
     mps = max(0.1, world.snapshot().vehicle.speed_mps)
-    other = vessel((here[0] + mps * away_m / speed, here[1] - away_m), course_deg, speed, size=(10.0, 10.0, 3.0, 3.0),
-                   t_s=world.t, heard_s=world.t, **kind)
+    other = vessel(
+        (here[0] + mps * away_m / speed, here[1] - away_m),
+        course_deg,
+        speed,
+        size=(10.0, 10.0, 3.0, 3.0),
+        t_s=world.t,
+        heard_s=world.t,
+        **kind,
+    )
     world.extra = {"traffic": TrafficPicture(t_s=world.t, vessels=(other,))}
     ctx = StepContext(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
     look_out(ctx)
@@ -87,8 +94,16 @@ def test_who_gives_way_to_one_keeps_clear_of_the_other_too():
     ctx = turn_with(POWER)
     here = ctx.boat_en
     [ship] = ctx.snapshot.traffic.vessels
-    fisher = vessel((ship.antenna_en_m[0], 2.0 * here[1] - ship.antenna_en_m[1]), 180.0, 3.0, mmsi=7, t_s=ctx.t_s,
-                    heard_s=ctx.t_s, size=(10.0, 10.0, 3.0, 3.0), **FISHING)
+    fisher = vessel(
+        (ship.antenna_en_m[0], 2.0 * here[1] - ship.antenna_en_m[1]),
+        180.0,
+        3.0,
+        mmsi=7,
+        t_s=ctx.t_s,
+        heard_s=ctx.t_s,
+        size=(10.0, 10.0, 3.0, 3.0),
+        **FISHING,
+    )
     both = replace(ctx.snapshot, traffic=TrafficPicture(t_s=ctx.t_s, vessels=(ship, fisher)))
     ctx = StepContext(ctx.voyage, ctx.config, with_parts(ctx.state, traffic={"encounters": ()}), both)
     look_out(ctx)
@@ -126,7 +141,8 @@ def test_giving_way_closes_the_water_ahead_of_her_bow_and_our_old_course():
 def test_when_the_change_of_course_has_shown_the_old_course_is_free_again():
     ctx = turn_with(FISHING)
     ctx.state = with_parts(
-        ctx.state, traffic={"encounters": tuple(replace(h, altered=True) for h in ctx.state.traffic.encounters)})
+        ctx.state, traffic={"encounters": tuple(replace(h, altered=True) for h in ctx.state.traffic.encounters)}
+    )
     names = {t.name.partition(" ")[0] for t in regions(ctx, near(ctx), ctx.boat_en, 0.0, is_met=True)}
     assert names == {"ahead"}
 
@@ -141,8 +157,9 @@ def test_a_region_that_the_boat_is_in_is_left_out():
 def test_a_vessel_that_comes_from_astern_has_no_closed_bow():
     ctx = turn_with(FISHING)
     ctx.state = with_parts(
-        ctx.state,   # as if alike
-        traffic={"encounters": tuple(replace(h, course_rad=0.0) for h in ctx.state.traffic.encounters)})
+        ctx.state,  # as if alike
+        traffic={"encounters": tuple(replace(h, course_rad=0.0) for h in ctx.state.traffic.encounters)},
+    )
     assert bow_discs(ctx, near(ctx), ctx.t_s) == ()
 
 
@@ -150,8 +167,9 @@ def test_under_power_the_port_side_is_closed_end_on():
     world = ruled()
     world.run(60)
     here = world.position
-    ship = vessel((here[0] + 500.0, here[1]), 270.0, 4.0, size=(10.0, 10.0, 3.0, 3.0), t_s=world.t, heard_s=world.t,
-                  **POWER)
+    ship = vessel(
+        (here[0] + 500.0, here[1]), 270.0, 4.0, size=(10.0, 10.0, 3.0, 3.0), t_s=world.t, heard_s=world.t, **POWER
+    )
     world.extra = {"traffic": TrafficPicture(t_s=world.t, vessels=(ship,))}
     config = replace(world.skipper.config, sails=False)
     ctx = StepContext(world.skipper.voyage, config, world.state, world.snapshot())
@@ -160,7 +178,7 @@ def test_under_power_the_port_side_is_closed_end_on():
     assert held.encounter.role is Role.BOTH_ALTER
     closed = [t for t in regions(ctx, near(ctx), ctx.boat_en, 0.0, is_met=True) if t.name.startswith("apparent")]
     assert len(closed) == 3
-    assert all(t.y_m > ctx.boat_en[1] - 10.0 for t in closed)     # ahead and to port, which is north
+    assert all(t.y_m > ctx.boat_en[1] - 10.0 for t in closed)  # ahead and to port, which is north
     assert sum(t.y_m > ctx.boat_en[1] + 30.0 for t in closed) == 2
 
 

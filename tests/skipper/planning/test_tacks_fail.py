@@ -39,8 +39,12 @@ def fallen_back(world, **seen):
     off = math.radians(50.0)
     vehicle = replace(snapshot.vehicle, heading_rad=off)
     tacking = Tacking(side=-1, settled_rad=off, settled_s=world.t - 7.0, began_s=world.t - 6.0, **seen)
-    ctx = StepContext(world.skipper.voyage, world.skipper.config, replace(world.state, tacking=tacking),
-                replace(snapshot, vehicle=vehicle))
+    ctx = StepContext(
+        world.skipper.voyage,
+        world.skipper.config,
+        replace(world.state, tacking=tacking),
+        replace(snapshot, vehicle=vehicle),
+    )
     watch_tacks(ctx)
     return ctx
 
@@ -50,7 +54,7 @@ def test_a_failure_is_said_with_what_it_taught_and_asks_for_a_plan_near_somethin
     assert ctx.state.tacking.failed == ctx.state.tacking.tried == 1
     [text] = [a.text for a in ctx.actions if getattr(a, "code", "") == "tack failed"]
     assert "1 of 1" in text
-    assert "25 %" in text                  # (0.1 * 5 + 1) / 6
+    assert "25 %" in text  # (0.1 * 5 + 1) / 6
     assert ctx.state.plans.asked == TACK_FAILED
 
 

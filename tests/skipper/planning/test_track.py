@@ -26,13 +26,16 @@ WALL = box(-4.0, 60.0, 60.0, 61.0)
 
 
 def tracking(now, **more):
-    return problem_tracking(now, Start(en_m=(0.0, 0.0), heading_rad=0.0), None, floor_m=6.0,
-                            forecast=now.snapshot.wind.forecast, **more)
+    return problem_tracking(
+        now, Start(en_m=(0.0, 0.0), heading_rad=0.0), None, floor_m=6.0, forecast=now.snapshot.wind.forecast, **more
+    )
 
 
 def test_the_ladder_ends_where_the_floor_is_left_beside_the_track():
-    plain, track = rungs(SkipperConfig(margin_m=12.0, margin_floor_m=6.0)), rungs(
-        SkipperConfig(margin_m=12.0, margin_floor_m=6.0), track_m=2.5)
+    plain, track = (
+        rungs(SkipperConfig(margin_m=12.0, margin_floor_m=6.0)),
+        rungs(SkipperConfig(margin_m=12.0, margin_floor_m=6.0), track_m=2.5),
+    )
     assert min(step.margin_m for step in plain) == 6.0
     assert min(step.margin_m for step in track) == 8.5
     assert track[0] == plain[0]
@@ -70,10 +73,19 @@ def test_a_problem_says_how_it_is_sailed_and_what_is_solid_as_it_is():
 
 def test_a_way_whose_track_comes_too_near_is_seen():
     now = ctx(WALL)
-    problem = Problem.from_json(problem_dict(
-        now.voyage, now.gates[0], start=Start(en_m=(0.0, 0.0), heading_rad=0.0),
-        aim=_aim(), forecast=now.snapshot.wind.forecast, margin_m=12.0, delta_s=0.9, no_go_half_rad=0.8,
-        tracking=tracking(now)))
+    problem = Problem.from_json(
+        problem_dict(
+            now.voyage,
+            now.gates[0],
+            start=Start(en_m=(0.0, 0.0), heading_rad=0.0),
+            aim=_aim(),
+            forecast=now.snapshot.wind.forecast,
+            margin_m=12.0,
+            delta_s=0.9,
+            no_go_half_rad=0.8,
+            tracking=tracking(now),
+        )
+    )
     wide = of_way(problem, [(-60.0, 40.0), (-25.0, 60.0), (40.0, 110.0)], heading_rad=1.0, before_en=None)
     near = of_way(problem, [(-60.0, 40.0), (-8.0, 62.0), (40.0, 110.0)], heading_rad=1.0, before_en=None)
     assert wide.is_kept
@@ -87,18 +99,26 @@ def _aim():
     return Aim(en_m=(0.0, 400.0), radius_m=6.0, gate=0)
 
 
-@pytest.mark.parametrize(("clearance", "words"), [
-    (None, ""), (8.44, "; passes 8.4 m clear or more (floor 6 m)")])
+@pytest.mark.parametrize(("clearance", "words"), [(None, ""), (8.44, "; passes 8.4 m clear or more (floor 6 m)")])
 def test_what_is_expected_is_said(clearance, words):
     assert said(clearance, 6.0) == words
 
 
 def test_what_is_left_of_a_leg_is_no_short_leg_while_it_is_sailed():
     now = ctx(WALL)
-    problem = Problem.from_json(problem_dict(
-        now.voyage, now.gates[0], start=Start(en_m=(0.0, 0.0), heading_rad=0.0),
-        aim=_aim(), forecast=now.snapshot.wind.forecast, margin_m=12.0, delta_s=0.9, no_go_half_rad=0.8,
-        tracking={**tracking(now), "known": True}))
+    problem = Problem.from_json(
+        problem_dict(
+            now.voyage,
+            now.gates[0],
+            start=Start(en_m=(0.0, 0.0), heading_rad=0.0),
+            aim=_aim(),
+            forecast=now.snapshot.wind.forecast,
+            margin_m=12.0,
+            delta_s=0.9,
+            no_go_half_rad=0.8,
+            tracking={**tracking(now), "known": True},
+        )
+    )
     left = [(-60.0, 44.0), (-54.0, 46.0), (80.0, 46.0)]
     whole, rest = (of_way(problem, left, heading_rad=1.25, before_en=None, sailed_m=m) for m in (40.0, 0.0))
     assert whole.is_kept

@@ -21,7 +21,7 @@ from companion.traffic import Targets, TrafficPicture
 from tests.skipper.world import FRAME, World, skipper, voyage
 from tests.traffic.conftest import report, vessel
 
-GOAL = Goal(en_m=(900.0, 0.0), radius_m=6.0, name="the goal")     # a reach: the wind is from the north
+GOAL = Goal(en_m=(900.0, 0.0), radius_m=6.0, name="the goal")  # a reach: the wind is from the north
 HALF_M = 20.0
 
 
@@ -41,8 +41,9 @@ class Ship:
 
     def heard(self, t, **more):
         values = {"course_rad": self.course, "speed_mps": self.speed, "heading_rad": self.course}
-        return report(t, self.at(t), name=self.name, bow_m=HALF_M, stern_m=HALF_M, port_m=3.0, starboard_m=3.0,
-                      **(values | more))
+        return report(
+            t, self.at(t), name=self.name, bow_m=HALF_M, stern_m=HALF_M, port_m=3.0, starboard_m=3.0, **(values | more)
+        )
 
 
 def sail(world, ship, seconds=900.0, every_s=10.0):
@@ -113,20 +114,26 @@ def test_a_ship_that_passes_clear_changes_nothing():
     assert np.allclose(world.position, alone.position)
 
 
-@pytest.mark.parametrize(("faster", "north_m", "is_replaced"), [
-    (0.05, 60.0, False), (0.10, 250.0, False),    # clear of everyone: not for so little
-    (0.25, 60.0, True),                           # clearly faster, and it looks alike
-    (0.25, 250.0, False), (0.45, 250.0, True),    # far apart: only for twice as much
-])
+@pytest.mark.parametrize(
+    ("faster", "north_m", "is_replaced"),
+    [
+        (0.05, 60.0, False),
+        (0.10, 250.0, False),  # clear of everyone: not for so little
+        (0.25, 60.0, True),  # clearly faster, and it looks alike
+        (0.25, 250.0, False),
+        (0.45, 250.0, True),  # far apart: only for twice as much
+    ],
+)
 def test_among_ships_a_safe_route_is_replaced_by_a_clearly_faster_one_only(faster, north_m, is_replaced):
     """A ship passes clear; the planner is made to answer with a path ``north_m`` aside that claims to be faster."""
+
     def planner(p, seed):
         found = plan(p, expansions=1500, seed=seed)
         if not p.targets or not armed:
             return found
         start, goal = found.waypoints_en[0], found.waypoints_en[-1]
         middle = np.array([0.5 * (start[0] + goal[0]), north_m])
-        half = np.linspace(0.0, 1.0, 40)[:, None]         # more waypoints than are simplified away
+        half = np.linspace(0.0, 1.0, 40)[:, None]  # more waypoints than are simplified away
         aside = np.vstack([start + half * (middle - start), middle + half[1:] * (goal - middle)])
         return replace(found, waypoints_en=aside, cost_s=(1.0 - faster) * found.cost_s)
 
@@ -151,8 +158,11 @@ def test_among_ships_a_safe_route_is_replaced_by_a_clearly_faster_one_only(faste
 
 
 def test_without_a_way_clear_the_old_plan_stays_and_the_operator_is_told():
-    world = make(planner=lambda p, seed: failed("none", seed=seed, algorithm="auto") if p.targets else plan(
-        p, expansions=1500, seed=seed))
+    world = make(
+        planner=lambda p, seed: (
+            failed("none", seed=seed, algorithm="auto") if p.targets else plan(p, expansions=1500, seed=seed)
+        )
+    )
     world.run(60)
     before = world.mission
     sail(world, Ship((world.position[0] + 400.0 + 3.0 * 60.0, 0.0), 270.0, 3.0, name="Nellie"), seconds=140.0)
@@ -223,8 +233,10 @@ def test_later_rungs_risk_more_for_vessels_and_say_so():
     assert later.part > first.part
     assert later.wind_delta_s == first.wind_delta_s
     assert later.delta_s < first.delta_s
-    assert all(a.radius_m + a.growth_mps * a.from_s > b.radius_m + b.growth_mps * b.from_s
-               for a, b in zip(shared_discs(first), shared_discs(later), strict=True))
+    assert all(
+        a.radius_m + a.growth_mps * a.from_s > b.radius_m + b.growth_mps * b.from_s
+        for a, b in zip(shared_discs(first), shared_discs(later), strict=True)
+    )
 
 
 @pytest.mark.parametrize("comes_from", ["ahead", "abeam"])
@@ -232,11 +244,18 @@ def test_of_too_many_a_plan_is_told_of_the_ship_on_collision_course(comes_from):
     """Two dozen at their moorings near by were told of, and she was not (issue 43, point 9)."""
     ctx = turn_among()
     here, (ve, vn) = ctx.boat_en, ctx.snapshot.vehicle.velocity_en_mps
-    moored = [vessel((here[0] - 60.0 - 5.0 * k, here[1] + 80.0), None, 0.0, mmsi=1000 + k, nav_status=5, t_s=60.0,
-                     heard_s=60.0) for k in range(24)]
-    met = here[0] + 400.0 * ve, here[1] + 400.0 * vn   # where we are in 400 s
-    ship = (vessel((met[0] + 2000.0, met[1]), 270.0, 5.0, mmsi=77, t_s=60.0, heard_s=60.0) if comes_from == "ahead" else
-            vessel((met[0], met[1] - 2000.0), 0.0, 5.0, mmsi=77, t_s=60.0, heard_s=60.0))
+    moored = [
+        vessel(
+            (here[0] - 60.0 - 5.0 * k, here[1] + 80.0), None, 0.0, mmsi=1000 + k, nav_status=5, t_s=60.0, heard_s=60.0
+        )
+        for k in range(24)
+    ]
+    met = here[0] + 400.0 * ve, here[1] + 400.0 * vn  # where we are in 400 s
+    ship = (
+        vessel((met[0] + 2000.0, met[1]), 270.0, 5.0, mmsi=77, t_s=60.0, heard_s=60.0)
+        if comes_from == "ahead"
+        else vessel((met[0], met[1] - 2000.0), 0.0, 5.0, mmsi=77, t_s=60.0, heard_s=60.0)
+    )
     told = [v.mmsi for v in near(turn_among(*moored, ship))]
     assert len(told) == NEAREST
     assert 77 in told

@@ -50,7 +50,7 @@ def test_it_survives_a_kill():
     saved = Persisted(voyage="v", gate=0, sailing=True, route=None, pending=None, latency=latency)
     assert Persisted.from_dict(saved.to_dict()).latency == latency
     without = saved.to_dict()
-    del without["latency"]   # as it was saved before
+    del without["latency"]  # as it was saved before
     assert Persisted.from_dict(without).latency == NO_ANSWERS
     for damaged in ([], [["x"], 2.0, None], [[math.nan], 2.0, None], 3):
         with pytest.raises(ValueError, match=r"damaged|not"):
@@ -80,6 +80,7 @@ def test_where_plans_are_late_they_are_asked_for_earlier_it_is_said_once_and_rem
 
 def test_what_the_first_plan_was_given_beyond_what_was_asked_is_not_late():
     """On a quarter of a core it is given 4 s in place of 2: every later plan was then asked for a second earlier."""
+
     def planned(problem, seed):
         return replace(plan(problem, expansions=4_000, seed=seed), elapsed_s=4.5, speed=0.2)
 

@@ -35,15 +35,18 @@ def falls(world, share_per_s, first=0.9, for_s=900):
 def test_it_is_critical_while_it_still_covers_the_way_to_the_refuge():
     world = sailing(voyage={"refuges": ((0.0, 0.0),)})
     falls(world, 0.9 / 1500.0)
-    assert world.state.alarms.charge.last > 0.2                    # long before the 10 % that are always critical
+    assert world.state.alarms.charge.last > 0.2  # long before the 10 % that are always critical
     assert "the way to where she can wait" in said(world, "charge")[0][2]
     assert world.run(60, lambda w: w.state.mission.route.bound_for == "the refuge 1")
 
 
-@pytest.mark.parametrize("made", [
-    {"voyage": {"refuges": ((0.0, 0.0),)}, "config": {"ends": Ends.of(battery_reserve=0.0)}},   # not asked for
-    {"voyage": {"refuges": ((1400.0, 100.0),)}},                                             # near by
-])
+@pytest.mark.parametrize(
+    "made",
+    [
+        {"voyage": {"refuges": ((0.0, 0.0),)}, "config": {"ends": Ends.of(battery_reserve=0.0)}},  # not asked for
+        {"voyage": {"refuges": ((1400.0, 100.0),)}},  # near by
+    ],
+)
 def test_it_is_not_where_it_is_not_asked_for_or_the_refuge_is_near(made):
     world = sailing(**made)
     falls(world, 0.5 / 1500.0, for_s=700)
@@ -71,4 +74,4 @@ def test_what_is_left_at_the_mean_rate(first, fallen, after_s):
         assert left is None
     else:
         assert left == pytest.approx((first - fallen) * after_s / fallen, rel=1e-6)
-    assert DETOUR >= 2.0 ** 0.5
+    assert DETOUR >= 2.0**0.5

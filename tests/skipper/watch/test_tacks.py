@@ -26,12 +26,23 @@ GOOD = [45, 45, 45, 25, -5, -35, -45, -45]
 FAILED = [45, 45, 45, 25, 12, 14, 15, 15, 15, 30, 50, 50]
 
 
-@pytest.mark.parametrize(("headings", "tried", "failed"), [
-    (GOOD, 1, 0), ([45, 45, -45, -45], 1, 0), ([45, 20, -40], 1, 0), (FAILED, 1, 1),
-    (FAILED + GOOD, 2, 1), ([45, 45, 12] + [14] * 15 + [50, 50], 1, 1), ([45, 45, 12] + [14] * 15 + [-40, -45], 1, 1),
-    ([45, 45, 45, 25, 12, 10, 30, 45], 0, 0),
-    ([150, 150, 180, -150, -150], 0, 0), ([45, 60, 90, 120, 150], 0, 0), ([90, 60, 45, 60], 0, 0), ([], 0, 0),
-])
+@pytest.mark.parametrize(
+    ("headings", "tried", "failed"),
+    [
+        (GOOD, 1, 0),
+        ([45, 45, -45, -45], 1, 0),
+        ([45, 20, -40], 1, 0),
+        (FAILED, 1, 1),
+        (FAILED + GOOD, 2, 1),
+        ([45, 45, 12] + [14] * 15 + [50, 50], 1, 1),
+        ([45, 45, 12] + [14] * 15 + [-40, -45], 1, 1),
+        ([45, 45, 45, 25, 12, 10, 30, 45], 0, 0),
+        ([150, 150, 180, -150, -150], 0, 0),
+        ([45, 60, 90, 120, 150], 0, 0),
+        ([90, 60, 45, 60], 0, 0),
+        ([], 0, 0),
+    ],
+)
 def test_each_tack_is_counted_once_and_gybes_and_bearing_away_are_none(headings, tried, failed):
     for side in (1, -1):
         now = seen([side * h for h in headings])
@@ -47,7 +58,7 @@ def test_who_is_back_soon_was_told_otherwise_unless_she_had_stopped(least_mps, f
 
 @pytest.mark.parametrize(("lain_mps", "failed"), [(1.2, 0), (0.5, 1)])
 def test_who_stops_short_of_the_wind_has_failed_as_a_turned_vane_has_it(lain_mps, failed):
-    headings = [45, 45, 45, 30, 24, 24, 24, 24, 45, 45]     # never within 20 degrees of the wind that is measured
+    headings = [45, 45, 45, 30, 24, 24, 24, 24, 45, 45]  # never within 20 degrees of the wind that is measured
     now = seen(headings, speeds_mps=[2.0, 2.0, 2.0, 1.3, lain_mps, lain_mps, lain_mps, lain_mps, 1.3, 2.0])
     assert (now.tried, now.failed) == (failed, failed)
 
@@ -65,10 +76,17 @@ def test_what_is_counted_does_not_hang_on_where_the_wind_is_from(turn, headings)
     assert seen([h + turn for h in headings], turn).failed == seen(headings).failed
 
 
-@given(twd=st.floats(-math.pi, math.pi), is_starboard=st.booleans(), span_s=st.floats(LIES_S, 30.0),
-       lee_mps=st.floats(0.0, 0.9), east_mps=st.floats(-0.5, 0.5), north_mps=st.floats(-0.5, 0.5))
+@given(
+    twd=st.floats(-math.pi, math.pi),
+    is_starboard=st.booleans(),
+    span_s=st.floats(LIES_S, 30.0),
+    lee_mps=st.floats(0.0, 0.9),
+    east_mps=st.floats(-0.5, 0.5),
+    north_mps=st.floats(-0.5, 0.5),
+)
 def test_a_failure_tells_how_long_she_lay_and_how_she_was_set_beside_the_current_and_her_way(
-        twd, is_starboard, span_s, lee_mps, east_mps, north_mps):
+    twd, is_starboard, span_s, lee_mps, east_mps, north_mps
+):
     side = 1 if is_starboard else -1
     course, way_mps = twd - side * D(45.0), 2.0
     up, abeam = course + side * D(22.5), twd - side * D(90.0)
@@ -85,12 +103,15 @@ def test_a_failure_tells_how_long_she_lay_and_how_she_was_set_beside_the_current
     assert now.irons_s == pytest.approx(span_s)
     assert told == pytest.approx(lee_mps, abs=1e-9)
     assert other == 0.0
-    assert ended(None).irons_s == now.irons_s                      # no position: how long, and nothing more
-    assert ended((1e6, 1e6)).starboard_lee_mps <= MOST_LEE_MPS     # it jumped
-    assert lain(began, NO_TACKS, 1000.0, None, twd, (0.0, 0.0)).irons_s == MOST_IRONS_S    # a lull
+    assert ended(None).irons_s == now.irons_s  # no position: how long, and nothing more
+    assert ended((1e6, 1e6)).starboard_lee_mps <= MOST_LEE_MPS  # it jumped
+    assert lain(began, NO_TACKS, 1000.0, None, twd, (0.0, 0.0)).irons_s == MOST_IRONS_S  # a lull
     shorter = lain(began, now, 101.0, (7.0, -3.0), twd, (0.0, 0.0))
     assert (shorter.irons_s, shorter.starboard_lee_mps, shorter.port_lee_mps) == (
-        now.irons_s, now.starboard_lee_mps, now.port_lee_mps)      # the longest and the fastest of the voyage
+        now.irons_s,
+        now.starboard_lee_mps,
+        now.port_lee_mps,
+    )  # the longest and the fastest of the voyage
 
 
 def test_a_row_of_failures_ends_with_a_tack_that_comes_off():

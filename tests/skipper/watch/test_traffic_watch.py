@@ -50,10 +50,15 @@ def test_the_missions_safe_distance_and_time_are_the_limits(tmp_path):
     assert (found.warn_cpa_m, found.warn_tcpa_s) == (80.0, 200.0)
 
 
-@pytest.mark.parametrize(("away_m", "alarm", "severity"), [
-    (1500.0, Alarm.NONE, None), (500.0, Alarm.WARN, Severity.WARNING), (200.0, Alarm.ACT, Severity.CRITICAL),
-    (0.0, Alarm.TOUCH, Severity.CRITICAL),
-])
+@pytest.mark.parametrize(
+    ("away_m", "alarm", "severity"),
+    [
+        (1500.0, Alarm.NONE, None),
+        (500.0, Alarm.WARN, Severity.WARNING),
+        (200.0, Alarm.ACT, Severity.CRITICAL),
+        (0.0, Alarm.TOUCH, Severity.CRITICAL),
+    ],
+)
 def test_an_alarm_needs_both_limits_and_is_said_with_the_rule(away_m, alarm, severity):
     ctx = turn_among()
     ctx = turn_among(coming(ctx, away_m=away_m))
@@ -132,7 +137,7 @@ def test_crossing_ahead_costs_more_than_crossing_astern(meets_s):
         before = world.position[0]
         step()
         if before < 450.0 <= world.position[0]:
-            crossed.append(ship.at(world.t)[1] - world.position[1])   # it sails south: below 0 it has gone by
+            crossed.append(ship.at(world.t)[1] - world.position[1])  # it sails south: below 0 it has gone by
 
     world.step = watched
     sail(world, ship)

@@ -24,8 +24,10 @@ def limited(tws_mps, ends=None, **boat):
     return world
 
 
-@pytest.mark.parametrize(("tws", "boat", "words"), [
-    (9.0, {"max_tws_mps": 8.0}, "less wind: above 8 m/s"), (1.5, {"min_tws_mps": 2.0}, "more wind: below 2 m/s")])
+@pytest.mark.parametrize(
+    ("tws", "boat", "words"),
+    [(9.0, {"max_tws_mps": 8.0}, "less wind: above 8 m/s"), (1.5, {"min_tws_mps": 2.0}, "more wind: below 2 m/s")],
+)
 def test_she_does_not_set_sail_in_a_wind_that_is_not_hers_and_does_when_it_is(tws, boat, words):
     world = limited(tws, **boat)
     world.run(120)

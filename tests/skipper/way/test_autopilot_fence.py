@@ -29,14 +29,17 @@ def status(**shown):
     return AutopilotStatus(t_s=0.0, home=HOME, **shown)
 
 
-@pytest.mark.parametrize(("params", "shown", "counts"), [
-    ({}, {}, True),
-    ({}, {"fence_breached": False}, True),
-    ({"FENCE_ENABLE": 0.0}, {"fence_breached": False}, True),   # switched on until the next reboot
-    ({"FENCE_ENABLE": 0.0}, {}, False),
-    ({"FENCE_TYPE": 4.0}, {}, False),
-    ({"FENCE_ACTION": 0.0}, {}, False),                          # only a report
-])
+@pytest.mark.parametrize(
+    ("params", "shown", "counts"),
+    [
+        ({}, {}, True),
+        ({}, {"fence_breached": False}, True),
+        ({"FENCE_ENABLE": 0.0}, {"fence_breached": False}, True),  # switched on until the next reboot
+        ({"FENCE_ENABLE": 0.0}, {}, False),
+        ({"FENCE_TYPE": 4.0}, {}, False),
+        ({"FENCE_ACTION": 0.0}, {}, False),  # only a report
+    ],
+)
 def test_it_counts_where_the_autopilot_would_act(params, shown, counts):
     limits = AutopilotLimits.from_params({**ON, **params})
     assert (circle_of(voyage(), limits, status(**shown), (0.0, 0.0)) is not None) is counts
@@ -68,7 +71,7 @@ def test_the_mission_s_own_fence_and_obstacles_still_count():
     assert float(both.clearance_m([(95.0, 0.0)])[0]) == pytest.approx(5.0)
     assert float(both.clearance_m([(0.0, 145.0)])[0]) == pytest.approx(5.0, abs=0.3)
     assert both.nearest_name((0.0, 145.0)) == "the fence or the circle"
-    assert both.buffered(5.0) is plain.buffered(5.0)   # what was computed of a coast is not computed again
+    assert both.buffered(5.0) is plain.buffered(5.0)  # what was computed of a coast is not computed again
     assert plain.within((0.0, 0.0), 150.0, "the circle") is both
 
 
@@ -143,17 +146,20 @@ BAY = {"limits": shapely.box(-200.0, -200.0, 200.0, 400.0)}
 ROCK = shapely.box(-10.0, 190.0, 10.0, 210.0)
 
 
-@pytest.mark.parametrize(("zones", "takes"), [
-    ((square(IN, -200, -200, 200, 400),), False),                                # the mission's own edge ...
-    ((square(IN, -190, -190, 190, 390),), False),                                # ... or within the margin of it
-    ((square(IN, -200, -200, 200, 400), square(OUT, -20, 180, 20, 220)), False),  # and round its rock
-    ((square(IN, -900, -900, 900, 900),), False),
-    ((square(IN, -170, -190, 190, 390),), True),
-    ((square(IN, -200, -200, 200, 100),), True),
-    ((square(IN, -200, -200, 200, 400), square(OUT, -60, 180, 20, 220)), True),
-    ((square(OUT, 100, 100, 120, 120),), True),
-    ((Zone(kind=IN, shape=Ring(HOME, 100.0)),), True),
-])
+@pytest.mark.parametrize(
+    ("zones", "takes"),
+    [
+        ((square(IN, -200, -200, 200, 400),), False),  # the mission's own edge ...
+        ((square(IN, -190, -190, 190, 390),), False),  # ... or within the margin of it
+        ((square(IN, -200, -200, 200, 400), square(OUT, -20, 180, 20, 220)), False),  # and round its rock
+        ((square(IN, -900, -900, 900, 900),), False),
+        ((square(IN, -170, -190, 190, 390),), True),
+        ((square(IN, -200, -200, 200, 100),), True),
+        ((square(IN, -200, -200, 200, 400), square(OUT, -60, 180, 20, 220)), True),
+        ((square(OUT, 100, 100, 120, 120),), True),
+        ((Zone(kind=IN, shape=Ring(HOME, 100.0)),), True),
+    ],
+)
 def test_only_what_takes_water_that_the_margin_leaves_counts(zones, takes):
     drawn = drawn_of(area(ROCK, **BAY), zones, None, MARGIN_M, is_off=False)
     assert (drawn is not None) is takes
@@ -179,7 +185,7 @@ def test_what_it_leaves_keeps_inside_of_it_and_all_else_as_it_was(limits):
     east, north = drawn.place_inside(drawn.left, (0.0, 160.0), 30.0)
     assert (east, north) == pytest.approx((0.0, 118.0), abs=4.0)
     assert drawn_of(plain, (square(IN, -300, -300, 300, 150),), None, MARGIN_M, is_off=False) is not drawn
-    assert plain.without(drawn.taken, Drawn.words) is drawn.left   # which is worked out once
+    assert plain.without(drawn.taken, Drawn.words) is drawn.left  # which is worked out once
 
 
 def test_she_does_not_set_sail_for_a_goal_outside_of_what_is_drawn():

@@ -41,8 +41,7 @@ def test_beyond_the_horizon_and_away_it_is_clear():
     assert drift_ahead(area(), (0.0, 0.0), (1.0, 0.0), floor_m=8.0).sentence() == "drifting 1 m/s towards 090°, clear"
 
 
-@given(x=st.floats(-60.0, 160.0), y=st.floats(-60.0, 60.0), east=SPEEDS, north=SPEEDS,
-       floor_m=st.floats(0.0, 15.0))
+@given(x=st.floats(-60.0, 160.0), y=st.floats(-60.0, 60.0), east=SPEEDS, north=SPEEDS, floor_m=st.floats(0.0, 15.0))
 def test_the_floor_is_met_when_the_looks_along_the_whole_way_say(x, y, east, north, floor_m):
     water = area(ROCK, limits=shapely.box(-80.0, -80.0, 180.0, 80.0))
     ahead = drift_ahead(water, (x, y), (east, north), floor_m=floor_m)

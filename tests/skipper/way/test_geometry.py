@@ -55,13 +55,16 @@ def test_moved_goes_where_bearing_says(a, heading, by):
     assert abs(difference_rad(bearing_rad(a, b), heading)) < 1e-6
 
 
-@pytest.mark.parametrize(("boat", "after", "done"), [
-    ((0.0, 101.0), None, True),               # past the perpendicular, within the grid size
-    ((0.0, 99.0), None, False),               # before it, no next leg to be near to
-    ((30.0, 101.0), None, False),             # past, but farther than the grid size
-    ((2.0, 98.0), (100.0, 95.0), True),       # within 3 m of the next leg
-    ((-8.0, 95.0), (100.0, 100.0), False),    # far from the next leg
-])
+@pytest.mark.parametrize(
+    ("boat", "after", "done"),
+    [
+        ((0.0, 101.0), None, True),  # past the perpendicular, within the grid size
+        ((0.0, 99.0), None, False),  # before it, no next leg to be near to
+        ((30.0, 101.0), None, False),  # past, but farther than the grid size
+        ((2.0, 98.0), (100.0, 95.0), True),  # within 3 m of the next leg
+        ((-8.0, 95.0), (100.0, 100.0), False),  # far from the next leg
+    ],
+)
 def test_double_conditions(boat, after, done):
     assert waypoint_done(boat, (0.0, 0.0), (0.0, 100.0), after, grid_m=20.0, manoeuvre_m=3.0) is done
     assert is_past(boat, (0.0, 0.0), (0.0, 100.0)) is (boat[1] > 100.0)
@@ -123,7 +126,7 @@ def test_gates_go_round_each_buoy_on_the_right_hand(side, turned):
             assert is_on_wrong_side(gate, bearing + hand * 2.0 * math.pi)
         if goal < 5:
             turn = -hand * turned_round(place, before, *(g.en_m for g in mine), (places * 2)[goal + 1])
-            assert math.pi / 2.0 < turn < 2.0 * math.pi   # a string along this track touches the buoy
+            assert math.pi / 2.0 < turn < 2.0 * math.pi  # a string along this track touches the buoy
 
 
 @pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
@@ -140,7 +143,7 @@ def test_a_buoy_left_on_the_wrong_side_is_rounded_from_there(side, out, at):
     second = [g for g in gates_of(made, (again(first[at], first[at].en_m, wrong),)) if g.goal == 0]
     gone = wrong + turned_round(buoy, first[at].en_m, *(g.en_m for g in second))
     want = first[-1].bearing_rad
-    if len(first) == 1:   # passed in the middle of its small bend; a round from there ends at the bend's end
+    if len(first) == 1:  # passed in the middle of its small bend; a round from there ends at the bend's end
         want -= hand * 0.5 * first[0].turn_rad
     assert gone == pytest.approx(want)
     bearing = 0.0
@@ -163,5 +166,5 @@ def test_barrier_closes_the_wrong_side():
     made = voyage(Goal(en_m=(0.0, 200.0), side=Side.PORT), Goal(en_m=(-150.0, 100.0)))
     gate = gates_of(made, (Approach(goal=0, en_m=(0.0, 0.0)),))[0]
     closed = shapely.union_all([shapely.from_wkt(w) for w in gate.keep_out])
-    assert closed.intersects(LineString([(0.0, 0.0), (-40.0, 200.0), (0.0, 240.0)]))   # leaves it to starboard
+    assert closed.intersects(LineString([(0.0, 0.0), (-40.0, 200.0), (0.0, 240.0)]))  # leaves it to starboard
     assert not closed.intersects(LineString([(0.0, 0.0), (40.0, 200.0), (0.0, 240.0)]))

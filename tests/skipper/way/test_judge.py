@@ -26,8 +26,9 @@ CHECK = settings(max_examples=60)
 
 
 def verdict(path, twd=0.0, **more):
-    return judge(path, boat=BOAT, no_go_half_rad=NO_GO, twd_from_rad=twd, tws_mps=5.0, area=more.pop("area", area()),
-                 **more)
+    return judge(
+        path, boat=BOAT, no_go_half_rad=NO_GO, twd_from_rad=twd, tws_mps=5.0, area=more.pop("area", area()), **more
+    )
 
 
 def test_a_leg_into_the_wind_is_not_sound_and_a_reach_is():
@@ -38,7 +39,7 @@ def test_a_leg_into_the_wind_is_not_sound_and_a_reach_is():
 
 
 def test_a_forecast_narrows_what_is_sound():
-    path = [(0, 0), (100, 80)]     # TWA 51 degrees
+    path = [(0, 0), (100, 80)]  # TWA 51 degrees
     assert verdict(path).is_sound(0.0)
     wide = forecast(0.0, 0.0, sigma_rad=0.2)
     assert not verdict(path, forecast=wide, level=0.9).is_sound(0.0)
@@ -55,8 +56,9 @@ def test_clearance_counts():
 def test_predicted_beat_stays_off_the_wind_and_turns_with_it(twd, off, length):
     target = (length * math.sin(twd + off), length * math.cos(twd + off))
     heading = twd - NO_GO
-    drift = predicted_beat((0.0, 0.0), heading, (0.0, 0.0), target, twd_from_rad=twd, no_go_half_rad=NO_GO,
-                           corridor_m=10.0, area=area())
+    drift = predicted_beat(
+        (0.0, 0.0), heading, (0.0, 0.0), target, twd_from_rad=twd, no_go_half_rad=NO_GO, corridor_m=10.0, area=area()
+    )
     first, second = drift.path[0], drift.path[1]
     course = math.atan2(second[0] - first[0], second[1] - first[1])
     assert math.isclose(abs(math.remainder(course - twd, 2 * math.pi)), NO_GO, abs_tol=1e-6)
@@ -85,12 +87,22 @@ def test_wind_part_carries_a_swing_as_width():
 
 @pytest.mark.parametrize("after", [0.0, 7.0, 45.0, 5000.0])
 def test_problem_is_one_that_the_planner_reads(after):
-    made = voyage(Goal(en_m=(0.0, 400.0), radius_m=6.0, bandwidth_m=80.0), obstacles=(box(-40, 120, 30, 160),),
-                  limits=box(-300, -100, 300, 600))
+    made = voyage(
+        Goal(en_m=(0.0, 400.0), radius_m=6.0, bandwidth_m=80.0),
+        obstacles=(box(-40, 120, 30, 160),),
+        limits=box(-300, -100, 300, 600),
+    )
     gate = gates_of(made)[0]
-    data = problem_dict(made, gate, start=Start(en_m=(0.0, 0.0), heading_rad=1.0, after_s=after),
-                        aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0), forecast=forecast(0.0, 0.2), margin_m=15.0,
-                        delta_s=0.95, no_go_half_rad=math.radians(47.0))
+    data = problem_dict(
+        made,
+        gate,
+        start=Start(en_m=(0.0, 0.0), heading_rad=1.0, after_s=after),
+        aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0),
+        forecast=forecast(0.0, 0.2),
+        margin_m=15.0,
+        delta_s=0.95,
+        no_go_half_rad=math.radians(47.0),
+    )
     problem = Problem.from_json(data)
     assert defect_of(problem) is None
     assert problem.boat.no_go_half_rad == pytest.approx(math.radians(47.0))
@@ -120,9 +132,19 @@ def test_a_start_between_floor_and_margin_gets_a_notch(limits):
     assert not out.lead_in
     assert out.notch_m > 5.0
     gate = gates_of(made)[0]
-    problem = Problem.from_json(problem_dict(
-        made, gate, start=out, aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0), forecast=forecast(0.0, math.pi),
-        margin_m=15.0, delta_s=0.95, no_go_half_rad=math.radians(47.0), floor_m=8.0))
+    problem = Problem.from_json(
+        problem_dict(
+            made,
+            gate,
+            start=out,
+            aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0),
+            forecast=forecast(0.0, math.pi),
+            margin_m=15.0,
+            delta_s=0.95,
+            no_go_half_rad=math.radians(47.0),
+            floor_m=8.0,
+        )
+    )
     answer = plan(problem, expansions=500)
     assert answer.has_path
     assert made.area.path_clearance_m(answer.waypoints_en) >= 8.0
@@ -130,8 +152,7 @@ def test_a_start_between_floor_and_margin_gets_a_notch(limits):
 
 def test_a_start_inside_the_obstacle_is_led_out_too():
     made = voyage(obstacles=(box(-50, -50, 50, 10),))
-    out = repaired(
-        made, Start(en_m=(0.0, 0.0), heading_rad=0.0), margin_m=15.0, floor_m=8.0, twd_from_rad=math.pi)
+    out = repaired(made, Start(en_m=(0.0, 0.0), heading_rad=0.0), margin_m=15.0, floor_m=8.0, twd_from_rad=math.pi)
     assert made.area.clearance_m([out.en_m])[0] >= 15.0
 
 
@@ -174,9 +195,19 @@ def test_a_limit_on_the_paths_risk_reaches_the_problem_and_is_given_up_before_de
     config = SkipperConfig(max_path_risk=0.2)
     start, gates = Start(en_m=(0.0, 0.0), heading_rad=0.8), gates_of(made)
     aim = aim_at(made, config, gates, 0, start.en_m)
-    problem = Problem.from_json(problem_dict(
-        made, gates[0], start=start, aim=aim, forecast=forecast(0.0, 0.0, sigma_rad=0.1), margin_m=15.0, delta_s=0.9,
-        no_go_half_rad=NO_GO, max_path_risk=0.2))
+    problem = Problem.from_json(
+        problem_dict(
+            made,
+            gates[0],
+            start=start,
+            aim=aim,
+            forecast=forecast(0.0, 0.0, sigma_rad=0.1),
+            margin_m=15.0,
+            delta_s=0.9,
+            no_go_half_rad=NO_GO,
+            max_path_risk=0.2,
+        )
+    )
     assert problem.risk is not None
     answer = plan(problem, expansions=8000)
     assert answer.has_path

@@ -39,11 +39,14 @@ def test_with_the_port_mark_to_the_west_it_is_crossed_northward():
     assert crossing(NORTHWARD, (5.0, 95.0), (5.0, 105.0)).from_port_m == pytest.approx(25.0)
 
 
-@pytest.mark.parametrize(("a", "b"), [
-    ((25.0, 95.0), (25.0, 105.0)),       # outside of the starboard mark
-    ((-25.0, 95.0), (-21.0, 105.0)),     # outside of the port mark
-    ((0.0, 90.0), (0.0, 99.0)),          # not over it
-])
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        ((25.0, 95.0), (25.0, 105.0)),  # outside of the starboard mark
+        ((-25.0, 95.0), (-21.0, 105.0)),  # outside of the port mark
+        ((0.0, 90.0), (0.0, 99.0)),  # not over it
+    ],
+)
 def test_what_does_not_cross(a, b):
     assert crossing(NORTHWARD, a, b) is None
 
@@ -56,8 +59,9 @@ def test_a_track_sailed_back_crosses_the_other_way(a, b, port, starboard):
     assume(min(abs(ahead_m(line, a)), abs(ahead_m(line, b))) > 1e-6)
     there, back = crossing(line, a, b), crossing(line, b, a)
     assert (there is None) == (back is None)
-    assert there is None or (there.is_forward != back.is_forward
-                             and there.from_port_m == pytest.approx(back.from_port_m, abs=1e-6))
+    assert there is None or (
+        there.is_forward != back.is_forward and there.from_port_m == pytest.approx(back.from_port_m, abs=1e-6)
+    )
 
 
 @given(a=place, b=place, port=place, starboard=place)

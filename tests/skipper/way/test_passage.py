@@ -17,7 +17,7 @@ from companion.skipper.way.gates import Gate
 from tests.skipper.world import voyage
 
 EARTH = Geod(ellps="WGS84")
-A, B = GeoPoint(lat_deg=52.0, lon_deg=177.3), GeoPoint(lat_deg=52.35, lon_deg=-178.6)   # 281 km over the date line
+A, B = GeoPoint(lat_deg=52.0, lon_deg=177.3), GeoPoint(lat_deg=52.35, lon_deg=-178.6)  # 281 km over the date line
 AZIMUTH_DEG, _, LENGTH_M = EARTH.inv(A.lon_deg, A.lat_deg, B.lon_deg, B.lat_deg)
 REACH_M, BAND_M, HORIZON_M = 60_000.0, 5000.0, 30_000.0
 
@@ -35,8 +35,15 @@ def sailing(here, shift_m=(0.0, 0.0)):
     made = voyage()
     area = replace(made.area, reach_m=REACH_M) if hasattr(made.area, "reach_m") else made.area
     made = replace(made, frame=frame, recentre_m=10_000.0, area=area)
-    gate = Gate(en_m=frame.en_from_geo(B), radius_m=100.0, goal=0, ends_goal=True, name="B",
-                from_en_m=frame.en_from_geo(A), bandwidth_m=BAND_M)
+    gate = Gate(
+        en_m=frame.en_from_geo(B),
+        radius_m=100.0,
+        goal=0,
+        ends_goal=True,
+        name="B",
+        from_en_m=frame.en_from_geo(A),
+        bandwidth_m=BAND_M,
+    )
     return made, gate, frame.en_from_geo(here)
 
 

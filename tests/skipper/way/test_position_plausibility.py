@@ -22,10 +22,18 @@ HERE = Evidence(t_s=0.0, en_m=(500.0, 0.0), velocity_en_mps=(0.0, 2.0), room_m=4
 
 
 def doubt(**changes):
-    return PositionDoubt(**{
-        "since_s": 0.0, "t_s": 0.0, "reckoned_en_m": (0.0, 0.0), "velocity_en_mps": HERE.velocity_en_mps,
-        "farthest_m": 500.0, "settled_s": 0.0,
-        "why": "it jumped 500 m", **changes})
+    return PositionDoubt(
+        **{
+            "since_s": 0.0,
+            "t_s": 0.0,
+            "reckoned_en_m": (0.0, 0.0),
+            "velocity_en_mps": HERE.velocity_en_mps,
+            "farthest_m": 500.0,
+            "settled_s": 0.0,
+            "why": "it jumped 500 m",
+            **changes,
+        }
+    )
 
 
 def lasting(begun, seconds, **changes):
@@ -53,8 +61,9 @@ def test_a_position_that_only_stays_is_believed_after_ten_minutes_and_no_sooner(
     assert seen.t_s == pytest.approx(LASTS_S, abs=1.0)
 
 
-@pytest.mark.parametrize("against", [
-    {"is_jump": True}, {"is_possible": False}, {"is_well": False}, {"second_en_m": (0.0, 0.0)}])
+@pytest.mark.parametrize(
+    "against", [{"is_jump": True}, {"is_possible": False}, {"is_well": False}, {"second_en_m": (0.0, 0.0)}]
+)
 def test_what_speaks_against_itself_is_not_believed_however_long_it_stays(against):
     after, seen = lasting(doubt(), 1000, **against)
     assert not after.believed_for(seen)
@@ -84,12 +93,16 @@ def test_a_second_receiver_is_evidence_and_its_place_is_better_than_what_is_reck
     assert "second receiver" in agreed.believed_for(seen)
 
 
-@pytest.mark.parametrize(("changes", "seen", "after_s"), [
-    ({"lost_m": 600.0}, {}, QUIET_S),            # the filter had lost it: the earlier place was the guess
-    ({"lost_m": 100.0}, {}, LASTS_S),            # ... which cannot have been so far off
-    ({}, {"is_other_possible": False}, QUIET_S),
-    ({}, {"is_given": True}, QUIET_S),
-    ({}, {"room_m": math.inf}, QUIET_S)])        # whatever is true, nothing is met
+@pytest.mark.parametrize(
+    ("changes", "seen", "after_s"),
+    [
+        ({"lost_m": 600.0}, {}, QUIET_S),  # the filter had lost it: the earlier place was the guess
+        ({"lost_m": 100.0}, {}, LASTS_S),  # ... which cannot have been so far off
+        ({}, {"is_other_possible": False}, QUIET_S),
+        ({}, {"is_given": True}, QUIET_S),
+        ({}, {"room_m": math.inf}, QUIET_S),
+    ],
+)  # whatever is true, nothing is met
 def test_what_is_evidence_enough_after_some_quiet_fixes(changes, seen, after_s):
     _, last = lasting(doubt(**changes), 700, **seen)
     assert last.t_s == pytest.approx(after_s, abs=1.0)
@@ -100,29 +113,35 @@ def test_a_place_is_impossible_only_deeper_in_something_solid_than_margin_and_er
     assert is_impossible(water, (100.0, 100.0), margin_m=15.0)
     assert not is_impossible(water, (15.0 + ERROR_M - 1.0, 100.0), margin_m=15.0)
     assert not is_impossible(water, (-50.0, 0.0), margin_m=15.0)
-    assert not is_impossible(water, (600.0, 0.0), margin_m=15.0)      # outside the fence there is water
+    assert not is_impossible(water, (600.0, 0.0), margin_m=15.0)  # outside the fence there is water
 
 
 AHEAD, BACK, RIGHT, STILL = (0.0, 2.0), (0.0, -2.0), (2.0, 0.0), (0.0, 0.2)
 
 
-@pytest.mark.parametrize(("way_en_m", "dt_s", "before_mps", "now_mps"), [
-    ((0.0, 20.0), 10.0, AHEAD, AHEAD),       # sailed on
-    ((20.0, 0.0), 20.0, AHEAD, BACK),        # turned round, and abeam of where she was
-    ((18.0, 20.0), 20.0, AHEAD, RIGHT),
-    ((0.0, 40.0), 60.0, RIGHT, RIGHT),       # beaten across: two tacks on end
-    ((0.0, 100.0), 40.0, STILL, STILL),      # in irons at both ends, and sailed between them
-])
+@pytest.mark.parametrize(
+    ("way_en_m", "dt_s", "before_mps", "now_mps"),
+    [
+        ((0.0, 20.0), 10.0, AHEAD, AHEAD),  # sailed on
+        ((20.0, 0.0), 20.0, AHEAD, BACK),  # turned round, and abeam of where she was
+        ((18.0, 20.0), 20.0, AHEAD, RIGHT),
+        ((0.0, 40.0), 60.0, RIGHT, RIGHT),  # beaten across: two tacks on end
+        ((0.0, 100.0), 40.0, STILL, STILL),  # in irons at both ends, and sailed between them
+    ],
+)
 def test_what_she_can_have_sailed_in_a_silence_is_no_jump(way_en_m, dt_s, before_mps, now_mps):
     assert innovation_m(way_en_m, dt_s, before_mps, now_mps, fastest_mps=5.0) == 0.0
 
 
-@pytest.mark.parametrize(("way_en_m", "dt_s", "is_held"), [
-    ((70.0, 0.0), 15.0, False),              # across her way, 70 m in 15 s
-    ((0.0, 80.0), 20.0, False),              # along it, at 4 m/s
-    ((0.0, -40.0), 15.0, False),             # back, and still under way ahead
-    ((60.0, 0.0), 40.0, True),               # a loiter does not go so far in any time
-])
+@pytest.mark.parametrize(
+    ("way_en_m", "dt_s", "is_held"),
+    [
+        ((70.0, 0.0), 15.0, False),  # across her way, 70 m in 15 s
+        ((0.0, 80.0), 20.0, False),  # along it, at 4 m/s
+        ((0.0, -40.0), 15.0, False),  # back, and still under way ahead
+        ((60.0, 0.0), 40.0, True),  # a loiter does not go so far in any time
+    ],
+)
 def test_what_she_cannot_have_sailed_in_a_silence_is_a_jump(way_en_m, dt_s, is_held):
     assert innovation_m(way_en_m, dt_s, AHEAD, AHEAD, fastest_mps=5.0, is_held=is_held) >= 10.0
 

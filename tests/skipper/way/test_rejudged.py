@@ -21,7 +21,7 @@ from tests.skipper.test_voyage import make
 from tests.skipper.world import with_parts
 
 WALLS = (shapely.box(-90.0, -80.0, -46.0, 500.0), shapely.box(46.0, -80.0, 90.0, 500.0))
-LEARNED = {"tried": 10, "failed": 9}     # 47 % from now on
+LEARNED = {"tried": 10, "failed": 9}  # 47 % from now on
 
 
 def careless(fails=0.3):
@@ -34,16 +34,17 @@ def test_old_legs_stay_no_longer_when_tacks_fail_and_new_ones_have_room_for_it()
     new = plan(problem, expansions=20_000).legs
     assert is_riskier(problem, old, new)
     assert not is_riskier(problem, new, old)
-    assert not is_riskier(problem, old, old)            # no better: no reason to change
-    assert not is_riskier(channel(0.0), old, new)       # nobody knew of it when they were planned
+    assert not is_riskier(problem, old, old)  # no better: no reason to change
+    assert not is_riskier(channel(0.0), old, new)  # nobody knew of it when they were planned
 
 
 def test_a_limit_on_the_risk_of_a_path_holds_for_what_is_there():
     problem, old = careless()
     limited = replace(problem, risk=RiskLimit(max_path_risk=0.01))
     assert is_riskier(limited, old, old)
-    assert "above the limit" in too_risky(limited, [old[0].from_en, *(leg.to_en for leg in old)],
-                                          heading_rad=problem.start_heading_rad)
+    assert "above the limit" in too_risky(
+        limited, [old[0].from_en, *(leg.to_en for leg in old)], heading_rad=problem.start_heading_rad
+    )
     assert not is_riskier(replace(problem, risk=RiskLimit(max_path_risk=1.0)), old, old)
 
 
@@ -63,15 +64,29 @@ def test_only_the_turn_that_begins_a_plan_begins_it():
 
 def sailing(obstacles=WALLS):
     """Return a boat under way between walls, on a mission whose one tack is 10 m from a wall."""
-    world = make(Goal(en_m=(0.0, 50.0), radius_m=5.0), obstacles=obstacles, wind=lambda t: (0.0, 5.0),
-                 config={"margin_m": 6.0, "margin_floor_m": 3.0})
+    world = make(
+        Goal(en_m=(0.0, 50.0), radius_m=5.0),
+        obstacles=obstacles,
+        wind=lambda t: (0.0, 5.0),
+        config={"margin_m": 6.0, "margin_floor_m": 3.0},
+    )
     voyage = world.skipper.voyage
     world.skipper = replace(world.skipper, voyage=replace(voyage, boat=replace(voyage.boat, tack_fails=0.001)))
     assert world.run(120, lambda w: w.state.voyage.sailing)
     route, corner, goal = world.state.mission.route, (36.0, 26.0), (0.0, 50.0)
-    world.state = with_parts(world.state, mission={"index": 0, "route": replace(
-        route, items=(*route.items[:1] * 2, route.items[-1]), points_en_m=(corner, goal, route.points_en_m[-1]),
-        leg_from_en_m=((0.0, 0.0), corner, goal), gate_of=(-1, 0, -1))})
+    world.state = with_parts(
+        world.state,
+        mission={
+            "index": 0,
+            "route": replace(
+                route,
+                items=(*route.items[:1] * 2, route.items[-1]),
+                points_en_m=(corner, goal, route.points_en_m[-1]),
+                leg_from_en_m=((0.0, 0.0), corner, goal),
+                gate_of=(-1, 0, -1),
+            ),
+        },
+    )
     return world
 
 
@@ -96,8 +111,9 @@ def test_the_skipper_takes_the_new_plan_when_a_tack_of_the_old_one_has_become_to
         before, after = (of_risky(tacks_at_risk(problem, legs)) for legs in (old.legs, found.legs))
         assert (before > after) == bool(tacking)
         # as fast as the old one, so that nothing else speaks for it
-        take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id,
-                                    plan=replace(found, cost_s=old.time_s)))
+        take_plan(
+            ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id, plan=replace(found, cost_s=old.time_s))
+        )
         taken.append(any(isinstance(a, UploadMission) for a in ctx.actions))
     assert taken == [False, True]
 
@@ -121,8 +137,7 @@ def test_a_tack_at_the_next_waypoint_that_has_become_too_risky_is_planned_away_f
     for tacking, from_seq in (({}, []), (LEARNED, [None])):
         ctx = turn_of(world, tacking=replace(world.state.tacking, **tacking))
         problem = asked(ctx, ReplanReason.WAYPOINT, from_index=ctx.state.mission.index)
-        take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id,
-                                    plan=plan(problem, expansions=8000)))
+        take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id, plan=plan(problem, expansions=8000)))
         assert [a.from_seq for a in ctx.actions if isinstance(a, RequestPlan)] == from_seq
 
 
@@ -132,8 +147,7 @@ def test_so_near_that_waypoint_no_plan_is_made_from_the_boat_for_it_would_turn_b
         world.skipper = replace(world.skipper, config=replace(world.skipper.config, plan_budget_s=budget_s))
         ctx = turn_of(world, tacking=replace(world.state.tacking, **LEARNED))
         problem = asked(ctx, ReplanReason.WAYPOINT, from_index=ctx.state.mission.index)
-        take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id,
-                                    plan=plan(problem, expansions=8000)))
+        take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id, plan=plan(problem, expansions=8000)))
         assert [a.from_seq for a in ctx.actions if isinstance(a, RequestPlan)] == from_seq
 
 
@@ -144,7 +158,8 @@ def test_the_tack_that_begins_a_plan_is_gybed_round_too_after_two_that_failed():
     found = plan(problem, expansions=8000)
     came_from_the_other_side = replace(problem, start_heading_rad=-problem.start_heading_rad)
     ctx.state = with_parts(
-        ctx.state, pending={"plan": replace(ctx.state.pending.plan, problem=came_from_the_other_side)})
+        ctx.state, pending={"plan": replace(ctx.state.pending.plan, problem=came_from_the_other_side)}
+    )
     take_plan(ctx, PlanOutcome(request_id=ctx.state.pending.plan.request_id, plan=found))
     loop = ctx.state.pending.upload.route.points_en_m[:2]
-    assert all(point[1] < problem.start_en[1] for point in loop)     # to leeward, before anything else
+    assert all(point[1] < problem.start_en[1] for point in loop)  # to leeward, before anything else

@@ -13,8 +13,15 @@ HALF_RAD = math.radians(45.0)
 
 
 def table(corridor_m=50.0, spread_deg=10.0, tau_s=30.0, leg_deg=0.0, tack_s=1.0):
-    return shift_table(corridor_m=corridor_m, spread_rad=math.radians(spread_deg), tau_s=tau_s, speed_mps=2.0,
-                       half_rad=HALF_RAD, leg_rad=math.radians(leg_deg), tack_s=tack_s)
+    return shift_table(
+        corridor_m=corridor_m,
+        spread_rad=math.radians(spread_deg),
+        tau_s=tau_s,
+        speed_mps=2.0,
+        half_rad=HALF_RAD,
+        leg_rad=math.radians(leg_deg),
+        tack_s=tack_s,
+    )
 
 
 def beat(choose, corridor_m=50.0, spread_deg=10.0, tau_s=30.0, tack_s=1.0, until_s=20_000):
@@ -61,8 +68,12 @@ def test_in_a_steady_wind_it_is_not_worth_its_name():
 
 
 @settings(max_examples=15)
-@given(spread_deg=st.sampled_from([4.0, 8.0, 16.0]), tau_s=st.sampled_from([15.0, 60.0, 300.0]),
-       leg_deg=st.sampled_from([0.0, 10.0, 25.0]), corridor_m=st.sampled_from([20.0, 50.0]))
+@given(
+    spread_deg=st.sampled_from([4.0, 8.0, 16.0]),
+    tau_s=st.sampled_from([15.0, 60.0, 300.0]),
+    leg_deg=st.sampled_from([0.0, 10.0, 25.0]),
+    corridor_m=st.sampled_from([20.0, 50.0]),
+)
 def test_a_mirrored_leg_has_the_mirrored_table(spread_deg, tau_s, leg_deg, corridor_m):
     one = table(corridor_m, spread_deg, tau_s, leg_deg)
     other = table(corridor_m, spread_deg, tau_s, -leg_deg)

@@ -18,7 +18,10 @@ ROCK = shapely.box(90.0, 40.0, 110.0, 60.0)
 twd = st.floats(-math.pi, math.pi)
 shapes = st.builds(
     lambda w, h, turn: affinity.rotate(shapely.box(0.0, 0.0, w, h), turn, use_radians=True),
-    st.floats(60.0, 400.0), st.floats(60.0, 400.0), st.floats(0.0, 3.0))
+    st.floats(60.0, 400.0),
+    st.floats(60.0, 400.0),
+    st.floats(0.0, 3.0),
+)
 
 
 def sailed(sweeps):
@@ -34,7 +37,7 @@ def test_every_sweep_is_a_beam_reach(area, wind, swath):
 @given(area=shapes, wind=twd, swath=st.floats(12.0, 50.0))
 def test_sailed_as_they_are_laid_they_cover_most_and_lie_in_it(area, wind, swath):
     sweeps = sweeps_over(area, swath, wind, (0.0, 0.0))
-    assert coverage(area, sailed(sweeps), swath) > 0.9   # corners beside a slanting edge are laid again
+    assert coverage(area, sailed(sweeps), swath) > 0.9  # corners beside a slanting edge are laid again
     assert all(area.buffer(0.1).covers(shapely.LineString(sweep)) for sweep in sweeps)
 
 
@@ -65,8 +68,9 @@ def test_what_is_left_is_what_the_track_did_not_see():
     rest = left_over(FIELD, track, 20.0)
     assert rest.area == pytest.approx(12000.0, rel=0.02)
     assert length_m(sweeps_over(rest, 20.0, 0.0, (0.0, 30.0))) == pytest.approx(800.0, rel=0.02)
-    assert left_over(FIELD, (*track, (0.0, 50.0), (200.0, 50.0), (200.0, 70.0), (0.0, 70.0), (0.0, 90.0),
-                             (200.0, 90.0)), 20.0).is_empty
+    assert left_over(
+        FIELD, (*track, (0.0, 50.0), (200.0, 50.0), (200.0, 70.0), (0.0, 70.0), (0.0, 90.0), (200.0, 90.0)), 20.0
+    ).is_empty
 
 
 def test_a_gap_between_two_sweeps_is_found_and_a_sliver_is_none():
@@ -96,8 +100,38 @@ def test_a_track_grows_by_a_quarter_of_the_swath_and_keeps_its_corners():
     assert grown(track, (54.0, 8.0), 20.0) == (*track, (54.0, 8.0))
 
 
-WINDING = [0, 0, 0, 0, -0.25, 0, -0.34375, 0.3125, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.25, 0, 0, 0, 0,
-           0]   # its end was counted against it
+WINDING = [
+    0,
+    0,
+    0,
+    0,
+    -0.25,
+    0,
+    -0.34375,
+    0.3125,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    0.25,
+    0,
+    0,
+    0,
+    0,
+    0,
+]  # its end was counted against it
 
 
 @given(st.lists(st.floats(-0.4, 0.4), min_size=30, max_size=120))

@@ -28,8 +28,8 @@ from sitl.scenario.scenario import EventSpec, load_scenario
 
 FOLDER = Path("sitl/scenarios")
 EARTH = Geod(ellps="WGS84")
-KILLS_S = (340.0, 640.0, 1275.0)      # a few seconds after a frame was replaced, twice; and on the last leg
-STEP_M = 12.0                         # farther than she sails in a step, the longest with a kill's silence left out
+KILLS_S = (340.0, 640.0, 1275.0)  # a few seconds after a frame was replaced, twice; and on the last leg
+STEP_M = 12.0  # farther than she sails in a step, the longest with a kill's silence left out
 
 
 def apart_m(a, b):
@@ -47,8 +47,11 @@ class Watched:
         self.mission = load_mission(scenario.mission_path(path))
         self.fold = ViewFold(voyage_of(self.mission), config_of(self.mission))
         self.live = LiveSource(name="date-line", area=self.fold.area)
-        scenario = msgspec.structs.replace(scenario, events=(*scenario.events, *kills), expect=msgspec.structs.replace(
-            scenario.expect, max_silence_s=30.0))
+        scenario = msgspec.structs.replace(
+            scenario,
+            events=(*scenario.events, *kills),
+            expect=msgspec.structs.replace(scenario.expect, max_silence_s=30.0),
+        )
         self.verdict = run_virtual(run_embedded(scenario, path, 0, folder, on_status=self.look))
 
     def look(self, status, step):
@@ -60,8 +63,9 @@ class Watched:
     @property
     def changes(self):
         """The numbers of the steps before which the frame was another's."""
-        return [n for n in range(1, len(self.steps))
-                if self.steps[n][1].voyage.frame != self.steps[n - 1][1].voyage.frame]
+        return [
+            n for n in range(1, len(self.steps)) if self.steps[n][1].voyage.frame != self.steps[n - 1][1].voyage.frame
+        ]
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +79,7 @@ def test_it_arrives_over_the_date_line_with_three_restarts(watched):
     lon_deg = [s.snapshot.vehicle.position.lon_deg for _, s in watched.steps if s.snapshot.vehicle is not None]
     assert (lon_deg[0] > 179.0, lon_deg[-1] < -179.0) == (True, True)
     near_m = [math.hypot(*s.snapshot.position_en_m) for _, s in watched.steps if s.snapshot.position_en_m]
-    assert max(near_m) < 1500.0 + 60.0      # a plan that is being made is waited for
+    assert max(near_m) < 1500.0 + 60.0  # a plan that is being made is waited for
 
 
 def test_a_replay_gives_the_same_actions_over_frames_and_restarts(watched):
@@ -99,7 +103,7 @@ def test_the_state_is_where_it_was(watched):
 
 def test_the_status_has_no_seam(watched):
     for n in range(1, len(watched.steps)):
-        (before, a), (after, b) = watched.steps[n - 1:n + 1]
+        (before, a), (after, b) = watched.steps[n - 1 : n + 1]
         if b.snapshot.t_s - a.snapshot.t_s > 1.5 or before.goal_index != after.goal_index:
             continue
         if before.goal_distance_m is not None and after.goal_distance_m is not None:
@@ -112,14 +116,18 @@ def test_the_vessel_is_where_it_was(watched):
     """A report that was heard in one frame is of the same place in the next."""
     compared = 0
     for n in watched.changes:
-        (_, a), (_, b) = watched.steps[n - 1:n + 1]
+        (_, a), (_, b) = watched.steps[n - 1 : n + 1]
         seen = {(v.mmsi, v.t_s): v for v in (a.snapshot.traffic.vessels if a.snapshot.traffic else ())}
         for vessel in b.snapshot.traffic.vessels if b.snapshot.traffic else ():
             old = seen.get((vessel.mmsi, vessel.t_s))
             if old is not None:
                 compared += 1
-                assert apart_m(a.voyage.frame.geo_from_en(*old.antenna_en_m),
-                               b.voyage.frame.geo_from_en(*vessel.antenna_en_m)) < 0.01
+                assert (
+                    apart_m(
+                        a.voyage.frame.geo_from_en(*old.antenna_en_m), b.voyage.frame.geo_from_en(*vessel.antenna_en_m)
+                    )
+                    < 0.01
+                )
     assert compared >= 2
 
 
@@ -178,7 +186,7 @@ def test_the_record_is_in_the_chart_s_metres(watched):
             assert EARTH.inv(there.lon_deg, there.lat_deg, lon, lat)[2] < 0.1
     ways = [(p.t_s, p.plan.waypoints[0]) for p in record.plans if p.plan is not None and p.plan.waypoints]
     assert len(ways) >= 4
-    for t_s, start in ways:                                     # a plan begins near where she was
+    for t_s, start in ways:  # a plan begins near where she was
         n = int(np.argmin(np.abs(columns["t_s"] - t_s)))
         assert math.dist(start, (columns["east_m"][n], columns["north_m"][n])) < 600.0
     views = recorded_views(watched.folder)
@@ -211,4 +219,4 @@ def test_ocean_four_hundred_kilometres_with_ten_restarts(tmp_path):
     assert drift_m < 0.1
     assert (told.restarts, told.differences) == (10, ())
     assert all(far_m < goal.bandwidth_m + 500.0 for far_m, goal in zip(off, mission.goals, strict=True))
-    assert max(resident) < 400e6     # companion, simulator and judge; 278 MB were measured
+    assert max(resident) < 400e6  # companion, simulator and judge; 278 MB were measured

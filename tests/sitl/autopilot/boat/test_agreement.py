@@ -55,10 +55,13 @@ def boat(tws: float, heading_deg: float, **parameters: float) -> Vehicle:
 
 def track(client: Client) -> np.ndarray:
     """Columns: t, east, north, speed."""
-    return np.array([
-        (t, *en(m.lat, m.lon), math.hypot(m.vx, m.vy) / 100.0)
-        for t, m in client.heard if m.get_type() == "GLOBAL_POSITION_INT"
-    ])
+    return np.array(
+        [
+            (t, *en(m.lat, m.lon), math.hypot(m.vx, m.vy) / 100.0)
+            for t, m in client.heard
+            if m.get_type() == "GLOBAL_POSITION_INT"
+        ]
+    )
 
 
 def at(rows: np.ndarray, t: float) -> np.ndarray:
@@ -68,10 +71,21 @@ def at(rows: np.ndarray, t: float) -> np.ndarray:
 # --------------------------------------------------------------------------------------------------- the hull
 # TWA [deg] -> measured steady speed [m/s] at 3, 6 and 12 m/s of wind, heading held, sail trimmed
 POLAR = {
-    0: (-0.69, -1.01, -1.46), 30: (1.15, 1.60, 2.26), 35: (1.20, 1.80, 2.65), 40: (1.37, 2.05, 3.00),
-    45: (1.52, 2.26, 3.31), 50: (1.65, 2.44, 3.57), 60: (1.86, 2.75, 4.00), 75: (2.06, 3.04, 4.42),
-    90: (2.20, 3.23, 4.69), 105: (2.25, 3.30, 4.79), 120: (2.25, 3.28, 4.75), 135: (2.12, 3.11, 4.52),
-    150: (1.91, 3.00, 4.65), 165: (1.91, 3.14, 4.95), 180: (1.96, 3.24, 5.13),
+    0: (-0.69, -1.01, -1.46),
+    30: (1.15, 1.60, 2.26),
+    35: (1.20, 1.80, 2.65),
+    40: (1.37, 2.05, 3.00),
+    45: (1.52, 2.26, 3.31),
+    50: (1.65, 2.44, 3.57),
+    60: (1.86, 2.75, 4.00),
+    75: (2.06, 3.04, 4.42),
+    90: (2.20, 3.23, 4.69),
+    105: (2.25, 3.30, 4.79),
+    120: (2.25, 3.28, 4.75),
+    135: (2.12, 3.11, 4.52),
+    150: (1.91, 3.00, 4.65),
+    165: (1.91, 3.14, 4.95),
+    180: (1.96, 3.24, 5.13),
 }
 
 
@@ -107,6 +121,7 @@ def test_disarmed_boat_drifts_with_the_wind() -> None:
 @cache
 def beat() -> dict[str, Any]:
     """300 m dead upwind, XTRACK_MAX 30, TWS 5 from north: beat_mission.tlog."""
+
     async def job(c: Client) -> Client:
         c.rate(mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5)
         c.rate(mav.MAVLINK_MSG_ID_ATTITUDE, 10)
@@ -166,6 +181,7 @@ def test_apparent_wind_while_beating() -> None:
 @cache
 def reach() -> dict[str, Any]:
     """Six legs at TWA 90, 151, 90, 63, 90, 65: reach_mission.tlog."""
+
     async def job(c: Client) -> Client:
         c.rate(mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5)
         c.rate(mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT, 2)
@@ -190,9 +206,10 @@ def test_waypoints_are_reached_when_and_where_they_were() -> None:
     assert r["client"].last("MISSION_CURRENT").mission_state == 5
 
 
-@pytest.mark.parametrize(("from_end_s", "leg", "measured_mps"), [
-    (8.0, 0, 2.92), (12.0, 1, 2.63), (15.0, 2, 2.93), (15.0, 3, 2.52), (15.0, 4, 2.92), (10.0, 5, 2.56),
-])
+@pytest.mark.parametrize(
+    ("from_end_s", "leg", "measured_mps"),
+    [(8.0, 0, 2.92), (12.0, 1, 2.63), (15.0, 2, 2.93), (15.0, 3, 2.52), (15.0, 4, 2.92), (10.0, 5, 2.56)],
+)
 def test_steady_speed_by_leg(from_end_s: float, leg: int, measured_mps: float) -> None:
     r = reach()
     assert at(r["rows"], r["times"][leg] - from_end_s)[3] == pytest.approx(measured_mps, abs=0.06)
@@ -271,6 +288,7 @@ def test_boot() -> None:
 @cache
 def guided() -> dict[str, Any]:
     """The heading part of guided.tlog: 60, then 300 through the wind, sheet eased, sheet in, silence."""
+
     async def job(c: Client) -> dict[str, Any]:
         c.rate(mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 10)
         c.rate(mav.MAVLINK_MSG_ID_ATTITUDE, 10)
@@ -281,8 +299,11 @@ def guided() -> dict[str, Any]:
         async def steer(heading_deg: float, thrust: float, seconds: float) -> None:
             half = math.radians(heading_deg) / 2.0
             for _ in range(round(seconds * 2)):
-                c.send(mav.MAVLink_set_attitude_target_message(
-                    0, 1, 1, 7, [math.cos(half), 0, 0, math.sin(half)], 0, 0, 0, thrust))
+                c.send(
+                    mav.MAVLink_set_attitude_target_message(
+                        0, 1, 1, 7, [math.cos(half), 0, 0, math.sin(half)], 0, 0, 0, thrust
+                    )
+                )
                 out["last"] = c.autopilot.t_s
                 await asyncio.sleep(0.5)
 
@@ -343,8 +364,11 @@ def test_guided_position_tacks_by_itself() -> None:
         from tests.sitl.boats import e7
 
         lat, lon = e7(0.0, 120.0)
-        c.send(mav.MAVLink_set_position_target_global_int_message(
-            0, 1, 1, 6, 0b110111111000, lat, lon, 0, 0, 0, 0, 0, 0, 0, 0, 0))
+        c.send(
+            mav.MAVLink_set_position_target_global_int_message(
+                0, 1, 1, 6, 0b110111111000, lat, lon, 0, 0, 0, 0, 0, 0, 0, 0, 0
+            )
+        )
         reached = await c.wait("MISSION_ITEM_REACHED", 200.0)
         assert reached.seq == 0
         # 16.80 -> 103.99 s, three tacks
@@ -422,13 +446,16 @@ def figures() -> str:
     distance = [math.dist(at(r["rows"], t)[1:3], wp) for t, wp in zip(r["times"], REACH, strict=True)]
     rows = r["rows"][r["rows"][:, 0] > r["end"]]
     away = np.hypot(rows[:, 1] - REACH[-1][0], rows[:, 2] - REACH[-1][1]).max()
-    return "\n".join([
-        f"300 m beat [s]: 216.7 | {b['end'] - start:.1f}", f"tacks: 5 | {len(tacks)}",
-        f"lowest speed in a tack [m/s]: 1.28-1.30 | {min(lows):.2f}-{max(lows):.2f}",
-        f"marks [s]: 43.8 73.0 119.5 162.8 196.2 222.9 | {' '.join(f'{t - begin:.1f}' for t in r['times'])}",
-        f"distance when reached [m]: 3.8 3.1 2.2 2.7 2.9 1.9 | {' '.join(f'{d:.1f}' for d in distance)}",
-        f"loiter, farthest [m] and mean speed [m/s]: 12.3 2.4 | {away:.1f} {rows[:, 3].mean():.2f}",
-    ])
+    return "\n".join(
+        [
+            f"300 m beat [s]: 216.7 | {b['end'] - start:.1f}",
+            f"tacks: 5 | {len(tacks)}",
+            f"lowest speed in a tack [m/s]: 1.28-1.30 | {min(lows):.2f}-{max(lows):.2f}",
+            f"marks [s]: 43.8 73.0 119.5 162.8 196.2 222.9 | {' '.join(f'{t - begin:.1f}' for t in r['times'])}",
+            f"distance when reached [m]: 3.8 3.1 2.2 2.7 2.9 1.9 | {' '.join(f'{d:.1f}' for d in distance)}",
+            f"loiter, farthest [m] and mean speed [m/s]: 12.3 2.4 | {away:.1f} {rows[:, 3].mean():.2f}",
+        ]
+    )
 
 
 if __name__ == "__main__":

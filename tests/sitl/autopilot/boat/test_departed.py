@@ -24,8 +24,15 @@ AS_PLANNED = Departures()
 
 def boat(departures, heading_deg, *, waters=None, seed=0, polar=None):
     about = None if departures is None else Surroundings(WIND, departures, waters, seed)
-    vehicle = Vehicle(WIND, Parameters({}), heading_rad=math.radians(heading_deg), is_moored=False, seed=seed,
-                      polar=polar, surroundings=about)
+    vehicle = Vehicle(
+        WIND,
+        Parameters({}),
+        heading_rad=math.radians(heading_deg),
+        is_moored=False,
+        seed=seed,
+        polar=polar,
+        surroundings=about,
+    )
     vehicle.settle()
     vehicle.set_armed(armed=True)
     vehicle.steer_heading(math.radians(heading_deg), 1.0)
@@ -56,8 +63,11 @@ def test_a_boat_as_planned_sails_as_one_of_whom_nothing_is_said():
 
 
 def test_pieces_of_any_length_make_the_same_voyage():
-    strange = Departures(leeway_rad=0.1, waves=Waves(loss=0.2, yaw_rad=0.1),
-                         sensors=Sensors(gps_noise_m=2.0, gps_lag_s=0.5, deviation_rad=0.1))
+    strange = Departures(
+        leeway_rad=0.1,
+        waves=Waves(loss=0.2, yaw_rad=0.1),
+        sensors=Sensors(gps_noise_m=2.0, gps_lag_s=0.5, deviation_rad=0.1),
+    )
     waters = Waters(wind=WIND, stream=CurrentModel(drift_mps=0.3, shear_per_km=2.0, shear_to_rad=1.0))
     whole, pieces = (boat(strange, 60, waters=waters) for _ in range(2))
     advance(whole, 700)
@@ -174,7 +184,8 @@ def test_sensors_err_and_the_boat_does_not():
     assert math.degrees(vehicle.heading) == pytest.approx(90.0, abs=0.5)
     assert math.degrees(vehicle.state[k.S_YAW]) == pytest.approx(81.0, abs=1.0)
     off = math.degrees(vehicle.apparent[0]) - math.degrees(
-        math.atan2(vehicle.state[k.S_VE], 5.0 + vehicle.state[k.S_VN]) - vehicle.state[k.S_YAW])
+        math.atan2(vehicle.state[k.S_VE], 5.0 + vehicle.state[k.S_VN]) - vehicle.state[k.S_YAW]
+    )
     assert off == pytest.approx(10.0, abs=0.5)
 
 

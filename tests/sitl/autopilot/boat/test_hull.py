@@ -17,14 +17,30 @@ from sitl.world.environment import Constant
 SLOW = Polar(
     twa_rad=np.radians([30.0, 45.0, 60.0, 90.0, 120.0, 150.0, 180.0]),
     tws_mps=MPS_PER_KNOT * np.array([6.0, 10.0, 16.0]),
-    speed_mps_table=MPS_PER_KNOT * np.array([
-        [1.0, 1.4, 1.8], [2.4, 3.2, 3.6], [2.9, 3.8, 4.3], [3.2, 4.2, 4.9], [3.1, 4.3, 5.2], [2.6, 3.7, 4.8],
-        [2.2, 3.2, 4.3]]))
+    speed_mps_table=MPS_PER_KNOT
+    * np.array(
+        [
+            [1.0, 1.4, 1.8],
+            [2.4, 3.2, 3.6],
+            [2.9, 3.8, 4.3],
+            [3.2, 4.2, 4.9],
+            [3.1, 4.3, 5.2],
+            [2.6, 3.7, 4.8],
+            [2.2, 3.2, 4.3],
+        ]
+    ),
+)
 
 
 def boat(polar, tws_mps, heading_deg, current_en=(0.0, 0.0)):
-    vehicle = Vehicle(Constant(0.0, tws_mps), Parameters({}), heading_rad=math.radians(heading_deg), is_moored=False,
-                      seed=0, polar=polar)
+    vehicle = Vehicle(
+        Constant(0.0, tws_mps),
+        Parameters({}),
+        heading_rad=math.radians(heading_deg),
+        is_moored=False,
+        seed=0,
+        polar=polar,
+    )
     vehicle.settle()
     vehicle.set_armed(armed=True)
     vehicle.state[k.S_CURRENT_E], vehicle.state[k.S_CURRENT_N] = current_en

@@ -9,7 +9,7 @@ from sitl.autopilot import no_go_half_rad, settled_polar, tack_loss_s
 
 def test_the_settled_speeds_are_those_that_were_measured_on_the_real_program():
     measured, settled = ardurover_sitl(), settled_polar({})
-    for tws in (3.0, 6.0, 12.0):   # between these winds the measured one is straight, and too slow
+    for tws in (3.0, 6.0, 12.0):  # between these winds the measured one is straight, and too slow
         for twa in np.radians([45.0, 60.0, 90.0, 120.0, 150.0, 180.0]):
             assert settled.speed_mps(twa, tws) == pytest.approx(measured.speed_mps(twa, tws), rel=0.03)
 

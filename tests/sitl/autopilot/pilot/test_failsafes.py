@@ -21,6 +21,7 @@ def status(c: Client) -> int:
 
 def test_hold_is_standby_and_a_change_of_mode_is_told_at_once() -> None:
     """The recordings: HEARTBEAT 4 in every mode but HOLD, where it is 3, armed or not; one more at the change."""
+
     async def job(c: Client) -> None:
         await c.set_sail(EAST)
         await asyncio.sleep(2.4)
@@ -34,13 +35,16 @@ def test_hold_is_standby_and_a_change_of_mode_is_told_at_once() -> None:
     sail(job, is_moored=True)
 
 
-@pytest.mark.parametrize(("parameters", "mode", "texts"), [
-    ({"FS_THR_ENABLE": 0.0}, Mode.AUTO, []),
-    ({}, Mode.HOLD, ["Radio Failsafe"]),
-    ({"FS_ACTION": 1.0}, Mode.RTL, ["Radio Failsafe"]),
-    ({"FS_ACTION": 6.0}, Mode.LOITER, ["Radio Failsafe"]),
-    ({"FS_THR_ENABLE": 2.0}, Mode.AUTO, ["Radio Failsafe", "Failsafe - Continuing Auto Mode"]),
-])
+@pytest.mark.parametrize(
+    ("parameters", "mode", "texts"),
+    [
+        ({"FS_THR_ENABLE": 0.0}, Mode.AUTO, []),
+        ({}, Mode.HOLD, ["Radio Failsafe"]),
+        ({"FS_ACTION": 1.0}, Mode.RTL, ["Radio Failsafe"]),
+        ({"FS_ACTION": 6.0}, Mode.LOITER, ["Radio Failsafe"]),
+        ({"FS_THR_ENABLE": 2.0}, Mode.AUTO, ["Radio Failsafe", "Failsafe - Continuing Auto Mode"]),
+    ],
+)
 def test_the_transmitter_out_of_range(parameters: dict[str, float], mode: Mode, texts: list[str]) -> None:
     async def job(c: Client) -> None:
         await c.set_sail(EAST)
@@ -57,7 +61,7 @@ def test_the_transmitter_out_of_range(parameters: dict[str, float], mode: Mode, 
             c.autopilot.pilot.radio.switch(is_on=True)
             await asyncio.sleep(1.2)
             assert c.texts()[-1] == "Radio Failsafe Cleared"
-            assert c.autopilot.truth.mode is mode   # not restored
+            assert c.autopilot.truth.mode is mode  # not restored
 
     sail(job, is_moored=True, **parameters)
 
@@ -88,20 +92,23 @@ def test_the_mode_switch_moves_its_channel() -> None:
         await asyncio.sleep(1.2)
         assert c.last("RC_CHANNELS").chan8_raw == 1425
         assert c.autopilot.truth.mode is Mode.RTL
-        assert not c.autopilot.pilot.radio.select(Mode.GUIDED)   # no place of the switch has it
+        assert not c.autopilot.pilot.radio.select(Mode.GUIDED)  # no place of the switch has it
         c.autopilot.pilot.radio.switch(is_on=False)
         assert not c.autopilot.pilot.radio.select(Mode.MANUAL)
 
     sail(job, is_moored=True)
 
 
-@pytest.mark.parametrize(("volts", "parameters", "mode", "texts"), [
-    (10.0, {}, Mode.AUTO, ["Battery 1 is low 10.00V used 0 mAh"]),
-    (10.0, {"BATT_FS_LOW_ACT": 2.0}, Mode.HOLD, ["Battery 1 is low 10.00V used 0 mAh"]),
-    (10.0, {"BATT_FS_LOW_ACT": 1.0}, Mode.RTL, ["Battery 1 is low 10.00V used 0 mAh"]),
-    # below both limits the worse is said and done alone
-    (9.7, {"BATT_FS_LOW_ACT": 2.0, "BATT_FS_CRT_ACT": 1.0}, Mode.RTL, ["Battery 1 is critical 9.70V used 0 mAh"]),
-])
+@pytest.mark.parametrize(
+    ("volts", "parameters", "mode", "texts"),
+    [
+        (10.0, {}, Mode.AUTO, ["Battery 1 is low 10.00V used 0 mAh"]),
+        (10.0, {"BATT_FS_LOW_ACT": 2.0}, Mode.HOLD, ["Battery 1 is low 10.00V used 0 mAh"]),
+        (10.0, {"BATT_FS_LOW_ACT": 1.0}, Mode.RTL, ["Battery 1 is low 10.00V used 0 mAh"]),
+        # below both limits the worse is said and done alone
+        (9.7, {"BATT_FS_LOW_ACT": 2.0, "BATT_FS_CRT_ACT": 1.0}, Mode.RTL, ["Battery 1 is critical 9.70V used 0 mAh"]),
+    ],
+)
 def test_the_battery(volts: float, parameters: dict[str, float], mode: Mode, texts: list[str]) -> None:
     async def job(c: Client) -> None:
         await c.set_sail(EAST)
@@ -111,7 +118,7 @@ def test_the_battery(volts: float, parameters: dict[str, float], mode: Mode, tex
         await asyncio.sleep(12.0)
         assert [t for t in c.texts() if t.startswith("Battery")] == texts
         assert c.autopilot.truth.mode is mode
-        assert status(c) == (3 if mode is Mode.HOLD else 4)   # never critical: that is for links and position
+        assert status(c) == (3 if mode is Mode.HOLD else 4)  # never critical: that is for links and position
         assert c.last("SYS_STATUS").onboard_control_sensors_health & BATTERY_BIT == 0
 
     sail(job, is_moored=True, BATT_LOW_VOLT=10.5, BATT_CRT_VOLT=9.8, **parameters)
@@ -125,7 +132,9 @@ def test_a_battery_that_falls_on_keeps_the_action_that_stands_first_in_the_order
         c.autopilot.set_battery(9.7)
         await asyncio.sleep(12.0)
         assert [t[:21] for t in c.texts() if t.startswith("Battery")] == [
-            "Battery 1 is low 10.0", "Battery 1 is critical"]
+            "Battery 1 is low 10.0",
+            "Battery 1 is critical",
+        ]
         assert c.autopilot.truth.mode is Mode.HOLD
 
     sail(job, is_moored=True, BATT_LOW_VOLT=10.5, BATT_CRT_VOLT=9.8, BATT_FS_LOW_ACT=2.0, BATT_FS_CRT_ACT=1.0)
@@ -141,9 +150,10 @@ def test_a_battery_that_ends_it() -> None:
     sail(job, is_moored=True, BATT_CRT_VOLT=9.8, BATT_FS_CRT_ACT=5.0)
 
 
-@pytest.mark.parametrize(("check", "angle_deg", "mode", "armed"), [
-    (0, 30, Mode.AUTO, True), (1, 0, Mode.AUTO, True), (1, 30, Mode.HOLD, True), (2, 30, Mode.HOLD, False),
-])
+@pytest.mark.parametrize(
+    ("check", "angle_deg", "mode", "armed"),
+    [(0, 30, Mode.AUTO, True), (1, 0, Mode.AUTO, True), (1, 30, Mode.HOLD, True), (2, 30, Mode.HOLD, False)],
+)
 def test_a_knock_down(check: int, angle_deg: int, mode: Mode, armed: bool) -> None:
     async def job(c: Client) -> None:
         await c.set_sail(EAST)
@@ -162,7 +172,7 @@ def test_a_change_of_mode_outside_the_fence_starts_the_recovery_whoever_made_it(
         assert await c.ask(mav.MAV_CMD_DO_FENCE_ENABLE, 1) == 0
         await c.set_sail([(200.0, 0.0)])
         await c.wait("FENCE_STATUS", 60.0, lambda m: m.breach_status == 1)
-        assert "Manual recovery started" not in c.texts()   # it was only reported
+        assert "Manual recovery started" not in c.texts()  # it was only reported
         c.autopilot.set_mode(Mode.LOITER)
         await asyncio.sleep(0.5)
         assert c.texts()[-1] == "Manual recovery started"
@@ -185,6 +195,7 @@ def test_a_breach_is_told_at_once() -> None:
 
 def test_outside_the_home_circle_there_is_a_new_breach_every_20_m() -> None:
     """Measured on 4.5.2: FENCE_STATUS stays breached, its count rises, and the action is taken again."""
+
     async def job(c: Client) -> None:
         assert await c.ask(mav.MAV_CMD_DO_FENCE_ENABLE, 1) == 0
         await c.set_sail([(500.0, 0.0)])

@@ -94,10 +94,16 @@ def test_an_item_out_of_turn_is_refused_and_the_upload_goes_on() -> None:
     sail(job)
 
 
-@pytest.mark.parametrize(("bad", "ack"), [
-    ({"en": (1.0, 1.0), "command": 9999}, 3), ({"en": (1.0, 1.0), "frame": 99}, 2),
-    ({"e7": (1_200_000_000, 0)}, 10), ({"e7": (0, 1_900_000_000)}, 11), ({"en": (1.0, 1.0), "p1": math.nan}, 6),
-])
+@pytest.mark.parametrize(
+    ("bad", "ack"),
+    [
+        ({"en": (1.0, 1.0), "command": 9999}, 3),
+        ({"en": (1.0, 1.0), "frame": 99}, 2),
+        ({"e7": (1_200_000_000, 0)}, 10),
+        ({"e7": (0, 1_900_000_000)}, 11),
+        ({"en": (1.0, 1.0), "p1": math.nan}, 6),
+    ],
+)
 def test_a_bad_item_ends_the_upload_with_the_mission_cut(bad: dict[str, Any], ack: int) -> None:
     async def job(c: Client) -> None:
         assert await c.upload(SEVEN) == 0
@@ -333,12 +339,12 @@ class Ftp:
             "FILE_TRANSFER_PROTOCOL", 1.0, lambda m: struct.unpack_from("<H", bytes(m.payload))[0] == want
         )
         raw = bytes(m.payload)
-        return raw[3], raw[12:12 + raw[4]]
+        return raw[3], raw[12 : 12 + raw[4]]
 
     async def write(self, path: str, data: bytes) -> int:
         assert (await self.ask(6, path.encode()))[0] == 128
         for start in range(0, len(data), 239):
-            assert (await self.ask(7, data[start:start + 239], start))[0] == 128
+            assert (await self.ask(7, data[start : start + 239], start))[0] == 128
         return (await self.ask(1))[0]
 
     async def read(self, path: str) -> bytes:
@@ -377,7 +383,7 @@ def test_ftp_upload_is_one_restart_and_leaves_an_old_tail() -> None:
         raw = await ftp.read("@MISSION/mission.dat")
         assert len(raw) == 1150
         assert raw[:10] == struct.pack("<HHHHH", 0x763D, 0, 0, 0, 30)
-        assert raw[10 + 38:] == mission_file(thirty)[10 + 38:]
+        assert raw[10 + 38 :] == mission_file(thirty)[10 + 38 :]
         # while it runs it is not cleared: a shorter file leaves the tail
         twelve = [(0.0, 0.0), *[(45.0 * n, 0.0) for n in range(1, 12)]]
         assert await ftp.write("@MISSION/mission.dat", mission_file(twelve)) == 128
@@ -461,7 +467,7 @@ def test_a_reset_outside_auto_after_the_first_auto_runs_the_mission_and_sails_no
         assert (current.seq, current.mission_state, current.mission_mode) == (1, 3, 0)
         assert await c.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 1) == 0
         await asyncio.sleep(30.0)
-        assert abs(c.autopilot.truth.east_m) < 1.0   # it drifts with the wind, to the south
+        assert abs(c.autopilot.truth.east_m) < 1.0  # it drifts with the wind, to the south
         assert await c.ask(mav.MAV_CMD_DO_SET_MODE, 1, 10) == 0
         await c.wait("MISSION_ITEM_REACHED", 90.0, lambda m: m.seq == 2)
 
