@@ -24,6 +24,7 @@ from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import PlanStatus
 from companion.planner.problem.evaluate import Evaluation, evaluate, shore_of
 from companion.planner.problem.value import Problem, resolved
+from companion.planner.risk.tacks import of_risky, tacks_at_risk
 from companion.planner.track.expected import ExpectedTrack, curve_mps, expected
 
 Path = list[tuple[float, float]]
@@ -45,6 +46,10 @@ BEYOND_M = (0.0, 3.0, 6.0)  # an arc's ends, on along the legs around it, before
 SPARE = 1.001  # of that length
 NARROWER_M = (0.0, 4.0, 2.0)  # the water of another search, where the track of the first does not keep the floor
 NARROWER_SHARE, NARROWER_TIME_SHARE = 0.15, 0.06  # of the expansions, or of the seconds, for each
+BEND_RAD = math.radians(4.0)  # a corner that turns by less is a bend of one leg
+MANY_BENDS = 3  # in a path: then it is looked for again, with a zone that is wider by ...
+SPARE_RAD = (math.radians(0.5), math.radians(1.0))
+SPARE_SHARE, SPARE_TIME_SHARE = 0.3, 0.08  # of the expansions, or of the seconds, for each
 DEAR = 1.3  # times the time of the path that cannot be sailed: what takes longer is another way
 
 
@@ -72,13 +77,51 @@ def with_track(search: Search, judge: Judge | None = None) -> Search:
                 outcome = again
                 path, seen = laid(problem, [(float(x), float(y)) for x, y in again.waypoints_en], judge, effort)
         if seen.is_kept:
-            return replace(outcome, waypoints_en=np.asarray(path))
+            return replace(outcome, waypoints_en=np.asarray(_straighter(search, problem, path, effort, seed, judge)))
         other = roomier(search, problem, path, effort, seed, judge)
         if other is not None:
             return replace(outcome, waypoints_en=np.asarray(other))
         return replace(outcome, waypoints_en=None, status=PlanStatus.NOT_FOUND, reason=lacking(problem, seen))
 
     return tracked
+
+
+def _straighter(
+    search: Search, problem: Problem, path: Path, effort: Effort, seed: int, judge: Judge | None = None
+) -> Path:
+    """Return the path, or one with half of its bends at the most that takes little longer.
+
+    Where the wind's spread grows on the way, the path along the no-go zone is a curve. The search cuts it into ever
+    shorter legs, and none of them can be left out: any two in one are inside the zone by a fraction of a degree. What
+    is found in a zone that is wider by more than that has few legs in the problem itself.
+    """
+    bends = _bends(path)
+    if bends < MANY_BENDS:
+        return path
+    exact = _scorer(problem) if judge is None else judge
+    was = exact(path)
+    limit_s, risk = was.time_s * (1.0 + SHORT_SHARE) + SHORT_EXTRA_S, of_risky(tacks_at_risk(problem, was.legs))
+    for spare_rad in SPARE_RAD:
+        again = effort.again(SPARE_SHARE, SPARE_TIME_SHARE)
+        if not effort.has_time(AGAIN_S if math.isinf(again.budget_s) else again.budget_s):
+            break
+        wider = replace(problem, boat=replace(problem.boat, no_go_half_rad=problem.boat.no_go_half_rad + spare_rad))
+        found = search(wider, again, seed)
+        effort.spend(again.used)
+        if found.waypoints_en is None:
+            continue
+        other, seen = laid(problem, [(float(x), float(y)) for x, y in found.waypoints_en], judge, effort, limit_s)
+        judged = exact(other)
+        is_fit = seen.is_kept and judged.is_feasible and judged.time_s <= limit_s and 2 * _bends(other) <= bends
+        if is_fit and of_risky(tacks_at_risk(problem, judged.legs)) <= risk:
+            return other
+    return path
+
+
+def _bends(path: Path) -> int:
+    """Return how many of a path's corners are hardly turns."""
+    courses = [math.atan2(b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(path)]
+    return sum(abs(wrap_pi(after - before)) < BEND_RAD for before, after in itertools.pairwise(courses))
 
 
 def roomier(
@@ -142,21 +185,21 @@ def lacking(problem: Problem, seen: ExpectedTrack) -> str:
 
 
 def laid(
-    problem: Problem, path: Path, judge: Judge | None = None, effort: Effort | None = None
+    problem: Problem, path: Path, judge: Judge | None = None, effort: Effort | None = None, within_s: float = math.inf
 ) -> tuple[Path, ExpectedTrack]:
     """Return the path with few corners, all of which can be followed and keep the floor, as far as that is possible.
 
-    Of an ``effort`` in seconds changes are tried while there is time.
+    Of an ``effort`` in seconds changes are tried while there is time. None makes the path longer than ``within_s``.
     """
     effort = effort or Effort(None, None)
     judge = _scorer(problem) if judge is None else judge
     judged = judge(path)
     if not judged.is_feasible:
         return path, expected(problem, path, judged.legs)
-    path, judged = _fewer(problem, judge, path, judged, effort)
+    path, judged = _fewer(problem, judge, path, judged, effort, within_s)
     pushed, seen = _pushed(problem, judge, path, expected(problem, path, judged.legs), effort)
     if pushed is not path:  # a corner that was put into a leg may have made two of it that are too short
-        pushed, judged = _fewer(problem, judge, pushed, judge(pushed), effort)
+        pushed, judged = _fewer(problem, judge, pushed, judge(pushed), effort, within_s)
         seen = expected(problem, pushed, judged.legs)
     return pushed, seen
 
@@ -166,7 +209,9 @@ def _scorer(problem: Problem) -> Judge:
     return lambda path: evaluate(exact, np.asarray(path))
 
 
-def _fewer(problem: Problem, judge: Judge, path: Path, judged: Evaluation, effort: Effort) -> tuple[Path, Evaluation]:
+def _fewer(
+    problem: Problem, judge: Judge, path: Path, judged: Evaluation, effort: Effort, within_s: float
+) -> tuple[Path, Evaluation]:
     """Leave out corners and short legs, the shortest first, while it costs little and brings it nearer to nothing.
 
     A change is judged where it is made: what has been tried there is not tried again for a change elsewhere.
@@ -175,7 +220,7 @@ def _fewer(problem: Problem, judge: Judge, path: Path, judged: Evaluation, effor
     least_m = SHORT_S * float(np.max(curve_mps(problem)))
     lengths = _lengths_m(path)
     arcs = sum(length < least_m and not (n and lengths[n - 1] < least_m) for n, length in enumerate(lengths))
-    limit_s = judged.time_s * (1.0 + SHORT_SHARE) + max(arcs, 1) * SHORT_EXTRA_S
+    limit_s = min(within_s, judged.time_s * (1.0 + SHORT_SHARE) + max(arcs, 1) * SHORT_EXTRA_S)
     count, most = 0, AT_MOST + arcs * FOR_AN_ARC
     while count < most:
         best: tuple[float, float, Path, Evaluation] | None = None

@@ -126,6 +126,18 @@ def test_legs_in_which_ardurover_looped_onto_a_walls_end_are_no_plan():
     assert seen.clearance_m < shapely.distance(wall, shapely.LineString(short["sailed_en_m"])) < FLOOR_M
 
 
+@pytest.mark.parametrize(("bearing_deg", "far_m"), [(52.0, 80.0), (54.0, 140.0)])
+def test_along_a_zone_that_widens_on_the_way_a_leg_is_no_chain_of_short_ones(bearing_deg, far_m):
+    to = math.radians(bearing_deg)
+    close = problem([], wind_deg=0.0, goal=(far_m * math.sin(to), far_m * math.cos(to)))
+    lines = plan(replace(close, tracking=None), expansions=8_000, seed=1)
+    found = plan(close, expansions=8_000, seed=1)
+    assert len(lines.legs) > 12
+    assert len(found.legs) <= 6
+    assert found.cost_s <= 1.03 * lines.cost_s + 2.0
+    assert evaluate(close, found.waypoints_en).is_feasible
+
+
 def test_a_part_of_a_path_is_judged_as_in_the_whole():
     tracked = problem()
     path = [
