@@ -687,7 +687,7 @@ def test_after_two_failed_tacks_it_gybes_round():
     world.run(3)
     points = world.state.mission.route.points_en_m[world.state.mission.index : -1]
     courses = [bearing_rad(a, b) for a, b in pairwise([world.position, *points])]
-    assert len(points) >= 5
+    assert len(points) >= 4  # the corner, two about the loop, the goal
     assert not any(is_tack(a, b, 0.0) for a, b in pairwise(courses[1:]))
     tacks = world.tacks
     assert world.run(1500, is_done)

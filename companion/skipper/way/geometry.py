@@ -13,6 +13,7 @@ from companion.skipper.way.voyage import AreaLike, PointEn
 
 BEAR_AWAY_RAD = math.radians(100.0)  # a beam reach with a little to spare: every boat gathers way on it
 LOOK_M = 40.0  # water looked at on either side before bearing away
+LOOP_SHARE = 0.6  # of the way round from the course before a loop to that away from the leg after it
 
 
 def distance_m(a: PointEn, b: PointEn) -> float:
@@ -137,7 +138,8 @@ def gybe_round(
 ) -> tuple[PointEn, ...]:
     """Return the waypoints with each tack replaced by a turn the other way round, where there is room for it.
 
-    The loop lies to leeward of the corner, ``radius_m`` in radius, in three waypoints a quarter turn apart.
+    The loop lies to leeward of the corner, two waypoints about a circle of ``radius_m``. The second is on the leg that
+    follows, sailed back: so that leg is sailed on its own course however short it is.
     """
     out: list[PointEn] = []
     before = start_en
@@ -146,12 +148,11 @@ def gybe_round(
         if n + 1 < len(points) and distance_m(before, corner) > 1e-6 and distance_m(corner, points[n + 1]) > 1e-6:
             course, following = bearing_rad(before, corner), bearing_rad(corner, points[n + 1])
             if is_tack(course, following, twd_from_rad):
-                side = -1.0 if difference_rad(following, course) > 0.0 else 1.0  # the other way round
-                center = moved(corner, course + side * math.pi / 2.0, radius_m)
-                total = 2.0 * math.pi - abs(difference_rad(following, course))
+                turn = difference_rad(following, course)
+                off = math.copysign(LOOP_SHARE * (math.pi - abs(turn)), -turn)  # the other way round
                 loop = [
-                    moved(center, course + side * (total * share - math.pi / 2.0), radius_m)
-                    for share in (1.0 / 3.0, 2.0 / 3.0, 1.0)
+                    moved(corner, course + off, math.sqrt(2.0) * radius_m),
+                    moved(corner, following + math.pi, 2.0 * radius_m),
                 ]
                 if area.path_clearance_m([corner, *loop, points[n + 1]]) >= floor_m:
                     out.extend(loop)

@@ -71,19 +71,21 @@ def test_double_conditions(boat, after, done):
 
 
 @CHECK
-@given(ANGLE, st.floats(0.9, 1.5), st.booleans())
-def test_gybe_round_turns_the_other_way_and_never_through_the_wind(twd, twa, port):
+@given(ANGLE, st.floats(0.75, 1.5), st.floats(4.0, 100.0), st.booleans())
+def test_gybe_round_turns_the_other_way_never_through_the_wind_and_ends_on_the_next_leg(twd, twa, next_m, port):
     side = 1.0 if port else -1.0
     before, after = twd - side * twa, twd + side * twa
     assert is_tack(before, after, twd)
     start = (0.0, 0.0)
     corner = moved(start, before, 100.0)
-    end = moved(corner, after, 100.0)
+    end = moved(corner, after, next_m)
     path = [start, *gybe_round(start, [corner, end], twd_from_rad=twd, radius_m=8.0, area=area(), floor_m=5.0)]
-    assert len(path) == 6
+    assert len(path) == 5
     courses = [bearing_rad(a, b) for a, b in pairwise(path)]
     for one, two in pairwise(courses):
         assert not is_tack(one, two, twd)
+        assert side * difference_rad(two, one) < 0.0 or one == two
+    assert difference_rad(courses[-1], after) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_gybe_round_needs_room():
