@@ -198,7 +198,9 @@ def shares_of(
             if not r["passed"]
         ]
         return ExperimentSummary(
-            lines=[markdown(HEADS, [told(row) for row in rows]), *failed, sailed.took], figures=rows, is_good=not failed
+            lines=[markdown(HEADS, [as_cells(row) for row in rows]), *failed, sailed.took],
+            figures=rows,
+            is_good=not failed,
         )
 
     return Experiment(
@@ -259,7 +261,7 @@ def figures(water: str, share: float, records: Sequence[dict[str, Any]]) -> dict
     }
 
 
-def told(row: dict[str, Any]) -> list[str]:
+def as_cells(row: dict[str, Any]) -> list[str]:
     """Return a row's cells."""
 
     def cell(key: str, kind: str = ".1f") -> str:

@@ -49,7 +49,7 @@ BY_NAME = {figure.name: figure for figure in FIGURES}
 _UNITS = {"speed": " m/s", "distance": " m", "time": " s", "bearing": "°", "angle": "°", "share": " %", "number": ""}
 
 
-def told(step: Step, where: str) -> dict[str, float]:
+def figure_values(step: Step, where: str) -> dict[str, float]:
     """Return by name what can be told now of the figures that are shown there: page, line, watch, radio or report.
 
     Bearings are in degrees from 0 to 360, angles in degrees from -180 to 180, the rest as the rows compute it.
@@ -94,7 +94,7 @@ class Ranges:
 
     def take(self, step: Step) -> None:
         """Take one step."""
-        for name, value in told(step, "report").items():
+        for name, value in figure_values(step, "report").items():
             least, most, total, count = self.by_name.get(name, (math.inf, -math.inf, 0.0, 0.0))
             self.by_name[name] = [min(least, value), max(most, value), total + value, count + 1.0]
 

@@ -330,7 +330,7 @@ class VoyageFold:
                 )
             elif kind == "AUTOPILOT_VERSION":
                 self._uid_s = t_s
-                self._identity = self._identity.told(message.get_srcSystem(), autopilot_version(message).uid)
+                self._identity = self._identity.with_uid(message.get_srcSystem(), autopilot_version(message).uid)
         reboots = self.assembler.reboots
         values = self.assembler.take(t_s, message)
         if self.assembler.reboots != reboots:

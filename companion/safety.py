@@ -367,7 +367,7 @@ STANDING: dict[str, Callable[[AutopilotStatus], bool]] = {
 }
 
 
-def told_by(text: StatusText) -> str:
+def failsafe_named_by(text: StatusText) -> str:
     """Return the name of the cause that a text is a sign of, empty when of none."""
     if text.source_component != AUTOPILOT or OVER in text.text.lower():
         return ""

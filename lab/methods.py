@@ -101,7 +101,7 @@ class Method:
     planner: str | None = None
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """The method in words, empty where the mission's own is sailed."""
         guidance = "" if self.guidance is None else "in AUTO" if self.guidance == "plan" else f"by {self.guidance}"
         return ", ".join(part for part in (guidance, f"planner {self.planner}" if self.planner else "") if part)

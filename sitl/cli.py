@@ -8,9 +8,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from companion.program import Annex, Program
+from companion.program import ExtraCommands, Program
 
-LABORATORY = Annex(
+LABORATORY = ExtraCommands(
     name="the laboratory",
     package="lab.commands",
     remedy="in the clone of this project: pip install ./lab",

@@ -290,12 +290,12 @@ def _judged(change: FigureChange, level: float) -> FigureChange:
     return replace(change, is_worse=bool(measure.worse) and change.p_worse <= level and moved > measure.least)
 
 
-def told_by(by: MadeBy) -> str:
+def made_by_text(by: MadeBy) -> str:
     """Return what made results."""
     return f"{by.version}, commit {by.commit or 'unknown'}, source {by.source}, Python {by.python} on {by.machine}"
 
 
-def told_table(table: Table) -> str:
+def table_text(table: Table) -> str:
     """Return what a table holds: who made it, and each group's figures."""
     names = [name for name in table.keys if name not in UNPAIRED and name != "seed"]
     groups: dict[str, list[Row]] = {}
@@ -304,7 +304,7 @@ def told_table(table: Table) -> str:
     rows = [("", "voyages", *(m.name + (f" {m.unit}" if m.unit else "") for m in MEASURES))]
     for name, found in groups.items():
         rows.append((name, str(len(found)), *(_figure(measure, found) for measure in MEASURES)))
-    head = f"sitl {table.campaign}: {counted(len(table.rows), 'result')} by {told_by(table.by)}"
+    head = f"sitl {table.campaign}: {counted(len(table.rows), 'result')} by {made_by_text(table.by)}"
     return "\n".join([head, *columns(rows, left=2)]) + "\n"
 
 
@@ -317,7 +317,7 @@ def _figure(measure: Measure, rows: Sequence[Row]) -> str:
     return f"{statistics.median(values):.1f}"
 
 
-def told(comparison: Comparison, *, most: int = 10) -> str:
+def comparison_text(comparison: Comparison, *, most: int = 10) -> str:
     """Return a comparison: what was worse first, then the table of changes, then the seeds."""
     lines = [
         f"{counted(len(comparison.pairs), 'pair')}, {comparison.same} of them the same in every figure"

@@ -18,7 +18,7 @@ from pathlib import Path
 from companion.disk import Disk, read_regular, reason
 from companion.errors import CompanionError, InputError, TransferError, UnreadableError
 from companion.geofence import Document
-from companion.geofence.mission import DrawnMission, MissionOptions, drawing_of, drawn_mission, kept, read_kept
+from companion.geofence.mission import DrawnMission, MissionOptions, drawing_of, drawn_mission, read_stored, stored_text
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.mission_lists import ReadResult
@@ -188,7 +188,7 @@ def _names(state_path: Path) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def _kept_before(plan: Path) -> Document | None:
     try:
-        return read_kept(read_regular(plan).decode("utf-8"), str(plan))
+        return read_stored(read_regular(plan).decode("utf-8"), str(plan))
     except (OSError, ValueError, InputError):
         return None
 
@@ -201,7 +201,7 @@ def keep(document: Document, plan: Path, disk: Disk, *, is_durable: bool = True)
     """
     try:
         disk.make_folder(plan.parent)
-        disk.replace(plan, kept(document).data, is_durable=is_durable)
+        disk.replace(plan, stored_text(document).data, is_durable=is_durable)
     except OSError as error:
         raise UnreadableError(
             str(plan),

@@ -105,7 +105,7 @@ def compile_listed(packages: Sequence[str]) -> int:
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["companion.kernels.cache"])  # so that a process begins with numba loaded
     while left:
-        at_once = hands()
+        at_once = process_count()
         try:
             # anew for each batch: what compiles grows
             with ProcessPoolExecutor(at_once, context, initializer=leave_with_parent) as pool:
@@ -147,7 +147,7 @@ def _compile(entry: Entry) -> None:
     entry.kernel().compile(from_text(entry.signature))
 
 
-def hands() -> int:
+def process_count() -> int:
     """Return how many processes compile at once: one a core, as far as there is memory for them."""
     cores = len(os.sched_getaffinity(0))
     with contextlib.suppress(OSError, ValueError, StopIteration):

@@ -227,7 +227,7 @@ class Identity:
     sails: bool | None = None
     other_uid: str | None = None  # a UID that differs, told once
 
-    def told(self, system: int, uid: str) -> Identity:
+    def with_uid(self, system: int, uid: str) -> Identity:
         """Take an AUTOPILOT_VERSION. One that differs is believed when it is told twice running."""
         if self.uid is None or uid in {self.uid, self.other_uid}:
             return replace(self, system=system, uid=uid, is_confirmed=True, other_uid=None)

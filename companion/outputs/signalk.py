@@ -65,7 +65,7 @@ def delta(values: Values, told: Mapping[str, Any]) -> dict[str, Any]:
     return {"context": "vessels.self", "updates": [{"$source": LABEL, "values": news}]}
 
 
-def told_after(values: Values, told: Mapping[str, Any]) -> Values:
+def sent_after(values: Values, told: Mapping[str, Any]) -> Values:
     """Return what the server has been told behind an update; None: that it is over."""
     return {**dict.fromkeys(told), **values}
 
@@ -222,7 +222,7 @@ class TcpSignalK(Outlet[Values]):
                 writer.write(json.dumps(delta(values, told)).encode() + b"\r\n")
                 async with asyncio.timeout(STUCK_S):
                     await writer.drain()
-                told = told_after(values, told)
+                told = sent_after(values, told)
                 self.sent += 1
         finally:
             heard.cancel()
@@ -289,7 +289,7 @@ class WebSocketSignalK(Outlet[Values]):
                     break
                 async with asyncio.timeout(STUCK_S):
                     await socket.send(json.dumps(delta(values, told)))
-                told = told_after(values, told)
+                told = sent_after(values, told)
                 self.sent += 1
                 if asked_s is None and ECHO in told:
                     asked_s = effort_s()  # of the server's time: beside a hurried simulator it is not ours

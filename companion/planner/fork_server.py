@@ -62,7 +62,7 @@ class ForkServer:
         from companion.planner.solve import warm
 
         warm()
-        settle()
+        share_memory()
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(AttributeError, OSError, ValueError):
                 stream.flush()
@@ -170,7 +170,7 @@ class ForkServer:
             self._serve(source, sink)
 
 
-def settle() -> None:
+def share_memory() -> None:
     """Make the memory of a process that has loaded all what its forks will share, and give back the rest."""
     gc.collect()
     gc.freeze()  # what is there now is never looked at again, so its pages stay shared

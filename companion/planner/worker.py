@@ -32,7 +32,7 @@ from companion.errors import JobError
 from companion.kernels.build import prepare
 from companion.kernels.memory import trim
 from companion.planner.child import Child, Forked, Started
-from companion.planner.fork_server import FORK_SERVER, FORK_SERVER_READY, ForkServer, call_process, settle
+from companion.planner.fork_server import FORK_SERVER, FORK_SERVER_READY, ForkServer, call_process, share_memory
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
 from companion.planner.solve import DEFAULT_BUDGET_S, plan
@@ -484,7 +484,7 @@ def be_fork_server(fd: int) -> None:
 
     control = socket.socket(fileno=fd)
     warm()
-    settle()
+    share_memory()
     with contextlib.suppress(OSError):  # who began it has gone: the fork server sees it, and ends
         control.sendall(FORK_SERVER_READY)
     ForkServer(control, answer_requests).tend()

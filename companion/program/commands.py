@@ -161,7 +161,7 @@ class Parser(argparse.ArgumentParser):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Annex:
+class ExtraCommands:
     """Commands in the package of another distribution, which need not be installed; ``remedy`` is what brings it."""
 
     name: str
@@ -191,7 +191,7 @@ class Program:
     description: str
     package: str
     commands: Mapping[str, str]
-    annex: Annex | None = None
+    annex: ExtraCommands | None = None
     guests: str = ""
 
     @property

@@ -22,7 +22,7 @@ from datetime import UTC, datetime
 from types import TracebackType
 from typing import Protocol, Self, TextIO
 
-from companion.figures import in_words, told
+from companion.figures import figure_values, in_words
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.messages import CompanionStatus, Mode, Severity
@@ -293,7 +293,7 @@ def progress_text(step: Step) -> str:
             late = "" if eta.there_late_s is None else f" (90 %: {eta.there_late_s:.0f} s)"
             parts.append(f"there in {eta.there_s:.0f} s{late}")
         parts.append(f"replans {state.plans.replans}")
-    parts += in_words(told(step, "line"))
+    parts += in_words(figure_values(step, "line"))
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)
     return " | ".join(parts)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from companion.clock import now_s
-from companion.figures import told
+from companion.figures import figure_values
 from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.mavlink.autopilot import Autopilot
@@ -61,7 +61,7 @@ def companion_status(
         current_set_rad=snapshot.current.set_rad if snapshot.current.is_significant else None,
         current_drift_mps=snapshot.current.drift_mps if snapshot.current.is_significant else None,
         next_tack_s=next_tack_s(step, voyage.boat.polar),
-        figures=tuple(told(step, "radio").items()),
+        figures=tuple(figure_values(step, "radio").items()),
         promised_risk=None if route is None else risk_of(route),
         plan_id=None if route is None else route.plan_id,
         plan_age_s=None if route is None else max(0.0, snapshot.t_s - route.plan_t_s),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import replace
 
-from companion.figures import told as figures_now
+from companion.figures import figure_values as figures_now
 from companion.fold import Step
 from companion.geo.shift import Shift, carried
 from companion.messages import CompanionStatus

@@ -15,7 +15,7 @@ from companion.errors import InputError
 from companion.words import file_name
 from lab.methods import AS_IT_SAYS, Method, can_be_sailed
 from sitl.results import columns, compare
-from sitl.results import told as told_pairs
+from sitl.results import comparison_text as told_pairs
 from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key, Table
 from sitl.scenario import verdict_line
 
@@ -59,12 +59,12 @@ def sail(job: Job[Method]) -> dict[str, Any]:
 def _name(scenario: str, path: Path, method: Method) -> str:
     """Return what a setting is called: by its file, too, where that is a copy whose scenario kept its name."""
     name = scenario if scenario == path.stem else f"{scenario} ({path.stem})"
-    return f"{name}, {method.told}" if method.told else name
+    return f"{name}, {method.description}" if method.description else name
 
 
 def key_of(job: Job[Method]) -> Key:
     """Return what a run is known by."""
-    return job.key(**({"method": job.case.told} if job.case.told else {}))
+    return job.key(**({"method": job.case.description} if job.case.description else {}))
 
 
 def campaign(
@@ -103,7 +103,7 @@ def campaign(
         by_name = {name: [r for r in records if r["scenario"] == name] for name in names}
         table = [figures(name, found) for name, found in by_name.items()]
         rate = sum(t["sailed_s"] for t in table) / sailed.cpu_s if sailed.now == len(records) and sailed.cpu_s else None
-        lines = [*told(table), sailed.took + (f"; {rate:.0f} times real time per core" if rate else "")]
+        lines = [*as_lines(table), sailed.took + (f"; {rate:.0f} times real time per core" if rate else "")]
         if len(names) == 2:
             first, second = (
                 Table(
@@ -175,7 +175,7 @@ def _median(values: Iterable[float]) -> float | None:
     return statistics.median(values) if values else None
 
 
-def told(rows: Sequence[dict[str, Any]]) -> list[str]:
+def as_lines(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Return the rows under each other."""
     heads = {
         "scenario": "scenario",

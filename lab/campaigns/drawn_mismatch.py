@@ -63,7 +63,7 @@ class SampledMismatch:
     scenario: Scenario
     kinds: tuple[str, ...]
 
-    def told(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """Return the tables that were drawn, in plain values that are not the default."""
         made = {name: getattr(self.scenario, name) for name in ("wind", "current", "waves", "boat", "sensors")}
         return {name: _differing(spec) for name, spec in made.items() if spec is not None}

@@ -207,7 +207,7 @@ def encounters(
             if not r["passed"]
         ]
         return ExperimentSummary(
-            lines=[*map(told, rows), sailed.took, *again],
+            lines=[*map(as_text, rows), sailed.took, *again],
             is_good=not again,
             figures={"table": rows, "voyages": records},
         )
@@ -257,7 +257,7 @@ def row(kind: str, policy: str, records: Sequence[dict[str, Any]]) -> dict[str, 
     }
 
 
-def told(r: dict[str, Any]) -> str:
+def as_text(r: dict[str, Any]) -> str:
     """Return a row of the table as text."""
     return (
         f"{r['kind']}, {r['policy']}: {r['passed']} of {r['voyages']} passed; rules kept {r['rules kept']}, "

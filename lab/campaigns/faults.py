@@ -184,7 +184,7 @@ def sail_jump(drawn: Jump, job: Job[FaultCase]) -> dict[str, Any]:
         "size": drawn.size_class,
         "size_m": drawn.size_m,
         "for_s": drawn.for_s,
-        "events": [told(e) for e in drawn.scenario.events],
+        "events": [event_text(e) for e in drawn.scenario.events],
         "parameters": {},
         "touched_s": touched[:1],
         "held_touched_s": held_touched[:1],
@@ -235,13 +235,13 @@ def sail_faults(scenario: Scenario, job: Job[FaultCase]) -> dict[str, Any]:
         "seed": job.seed,
         "passed": not faults,
         "faults": faults,
-        "events": [told(e) for e in scenario.events],
+        "events": [event_text(e) for e in scenario.events],
         "parameters": dict(scenario.parameters),
         "wind": f"{scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:g}",
         "limit_s": scenario.limit_s,
         "set_auto": scenario.set_auto,
         "system": scenario.system,
-        "method": method.told,
+        "method": method.description,
         "broken": list(scenario.broken),
         "kinds": sorted({e.kind for e in scenario.events}),
         "arrived": bool(figures.get("arrived")),
@@ -328,7 +328,7 @@ def _sail(scenario: Scenario, job: Job[FaultCase], method: Method, variation: Va
     )
 
 
-def told(event: EventSpec) -> str:
+def event_text(event: EventSpec) -> str:
     """Return an event in short, with what was drawn for it."""
     plain = msgspec.to_builtins(EventSpec(at_s=0.0, kind=event.kind))
     drawn = [
@@ -357,7 +357,7 @@ def faults(case: FaultCase, *, runs: int, first_seed: int = 0) -> Experiment[Fau
     def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = sailed.records
         table = jump_figures(records) if trouble == "jumps" else figures_of(records)
-        lines = jumps_told(table) if trouble == "jumps" else figures_told(table)
+        lines = jumps_text(table) if trouble == "jumps" else figures_text(table)
         lines.append(f"{table['simulated_s'] / 3600.0:.1f} h simulated; {sailed.took}")
         option = ("" if trouble == "all" else f" --{trouble}") + (f" --draw {','.join(draws)}" if draws else "")
         for record in records:
@@ -414,7 +414,7 @@ def figures_of(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def figures_told(table: dict[str, Any]) -> list[str]:
+def figures_text(table: dict[str, Any]) -> list[str]:
     """Return what was counted, in lines."""
     return [
         f"{table['voyages']} voyages, {table['passed']} passed, {table['arrived']} arrived in time",
@@ -463,7 +463,7 @@ def jump_figures(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def jumps_told(table: dict[str, Any]) -> list[str]:
+def jumps_text(table: dict[str, Any]) -> list[str]:
     """Return the classes of false positions under each other."""
     return [
         f"{'false position':<24} voyages  touched  held in LOITER  arrived",

@@ -254,7 +254,7 @@ def _row(records: Sequence[dict[str, Any]]) -> dict[str, Any]:
     }
 
 
-def told(table: dict[str, Any]) -> str:
+def as_text(table: dict[str, Any]) -> str:
     """Return what was counted, for a terminal."""
     low, high = share_interval(table["below_floor"], table["with_solids"])
     lines = [
@@ -339,8 +339,8 @@ def sail_drawn(drawn: SampledMismatch, job: Job[MismatchCase]) -> dict[str, Any]
         "planned": case.planned,
         "as_planned": case.only == (),
         "kinds": list(drawn.kinds),
-        "drawn": drawn.told(),
-        "method": method.told,
+        "drawn": drawn.to_dict(),
+        "method": method.description,
         "floor_m": mission.margin_floor_m,
     }
     with job.folder() as folder:
@@ -424,7 +424,7 @@ def mismatch(case: MismatchCase, *, runs: int, first_seed: int) -> Experiment[Mi
             if not r["passed"] or r.get("below_floor")
         ]
         return ExperimentSummary(
-            lines=[told(table), sailed.took, *again],
+            lines=[as_text(table), sailed.took, *again],
             figures={"figures": table, "voyages": records},
             is_good=all(r["passed"] for r in records),
         )

@@ -77,7 +77,7 @@ def _figures(name: str, who: str, rows: Sequence[dict[str, Any]]) -> dict[str, A
     }
 
 
-def told(records: Sequence[dict[str, Any]]) -> str:
+def as_text(records: Sequence[dict[str, Any]]) -> str:
     """Return the figures as a Markdown table."""
     return markdown(
         HEADS,
@@ -194,7 +194,7 @@ def regret(jobs: Sequence[Job[Sailor]], *, against: str | None) -> Experiment[Sa
     def sum_up(sailed: CampaignResults) -> ExperimentSummary:
         records = latest([result for _, result in sailed.held.pairs()])
         return ExperimentSummary(
-            lines=[told(records), *([] if against is None else [pairs(records, NAMES[against])])],
+            lines=[as_text(records), *([] if against is None else [pairs(records, NAMES[against])])],
             figures=figures_of(records),
         )
 

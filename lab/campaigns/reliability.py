@@ -148,7 +148,7 @@ def time_shares(records: Sequence[Mapping[str, Any]]) -> list[float]:
     return sorted(r["time_s"] / r["promised_s"] for r in records if r.get("arrived") and r.get("promised_s"))
 
 
-def told(records: Sequence[Mapping[str, Any]]) -> str:
+def as_text(records: Sequence[Mapping[str, Any]]) -> str:
     """Return the curves as text."""
     lines = [f"{len(records)} voyages"]
     for title, bins in (

@@ -268,7 +268,7 @@ def table_of(records: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         rows.append(
             {
                 **_row(name, [], [not came for _, came in chances]),
-                "median_share": statistics.mean(told - came for told, came in chances) if chances else None,
+                "median_share": statistics.mean(chance - came for chance, came in chances) if chances else None,
             }
         )
     polar = [share - 1.0 for record in records for share in record["polar"]]
@@ -301,7 +301,7 @@ def _row(name: str, errors: Sequence[float], held: Sequence[bool], share: Sequen
     }
 
 
-def told(rows: Sequence[dict[str, Any]]) -> str:
+def as_text(rows: Sequence[dict[str, Any]]) -> str:
     """Return the table as text."""
 
     def cell(value: float | None, form: str) -> str:
@@ -330,7 +330,7 @@ def shown(scenarios: Sequence[Path], *, seeds: int, first_seed: int, mismatch: b
         if len(names) > 1:
             tables["all"] = table_of(sailed.records)
         return ExperimentSummary(
-            lines=[*(f"{name}\n{told(rows)}\n" for name, rows in tables.items()), sailed.took], figures=tables
+            lines=[*(f"{name}\n{as_text(rows)}\n" for name, rows in tables.items()), sailed.took], figures=tables
         )
 
     def key(job: Job[bool]) -> Key:

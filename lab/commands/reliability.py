@@ -31,7 +31,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from lab.campaigns.mismatch import CAMPAIGN
-    from lab.campaigns.reliability import to_dict, told
+    from lab.campaigns.reliability import as_text, to_dict
     from sitl.runner import read_results
 
     held = [read_results(path) for path in args.files]
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
     for name, is_control in (("as planned", True), ("another boat and water", False)):
         mine = [r for r in records if bool(r.get("as_planned")) == is_control]
         if mine:
-            print(f"{name}: {told(mine)}")
+            print(f"{name}: {as_text(mine)}")
     if args.json is not None:
         args.json.write_text(json.dumps(to_dict(records), indent=1) + "\n", encoding="utf-8")
     if args.plot is not None:

@@ -49,11 +49,11 @@ def add_parser(subparsers: Any, summary: str) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
-    from sitl.results import compare, told, told_table
+    from sitl.results import compare, comparison_text, table_text
     from sitl.runner import joined, read_table, table_of, write_table
 
     if args.verb == "show":
-        sys.stdout.write(told_table(read_table(args.file)))
+        sys.stdout.write(table_text(read_table(args.file)))
         return 0
     if args.verb == "join":
         whole_file = joined(args.parts)
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(f"{args.out}: {len(whole_file.results)} results\n")
         return 0
     found = compare(read_table(args.first), read_table(args.second))
-    sys.stdout.write(told(found, most=args.most))
+    sys.stdout.write(comparison_text(found, most=args.most))
     if args.json is not None:
         _write(args.json, (json.dumps(found.to_dict(), indent=1) + "\n").encode())
     return 1 if args.fail_on_worse and found.worse else 0

@@ -117,7 +117,7 @@ def scaled(change: Difference) -> tuple[float, float, float]:
     return low, middle, high
 
 
-def told_of(change: Difference) -> str:
+def difference_text(change: Difference) -> str:
     """Return a difference with its interval."""
     low, middle, high = scaled(change)
     unit = "%" if change.measure.kind in {"ratio", "share"} else change.measure.unit
@@ -137,10 +137,10 @@ class Tried:
     change: MissionChange
     comparison: Comparison
 
-    def told(self) -> str:
+    def as_text(self) -> str:
         """Return it in a line."""
         words = [
-            f"{change.measure.name} {told_of(change)}{'' if is_sure(change) else ', unsure'}"
+            f"{change.measure.name} {difference_text(change)}{'' if is_sure(change) else ', unsure'}"
             for change in self.comparison.changes
             if change.measure.name in TOLD and change.change != (change.measure.kind == "ratio")
         ]

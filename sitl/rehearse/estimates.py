@@ -235,7 +235,7 @@ def reached(time: Quantile) -> str:
     )
 
 
-def told(known: Estimates) -> list[str]:
+def as_lines(known: Estimates) -> list[str]:
     """Return what is known, a line for each thing."""
     lines = [f"{counted(len(known.records), 'voyage')}; in brackets what is 95 % sure, at whichever voyage one stops"]
     for words, share in (

@@ -21,7 +21,7 @@ from companion.program.commands import missing
 from companion.words import counted
 from sitl.options import CampaignOptions
 from sitl.rehearse.changes import MissionChange, Tried, tried
-from sitl.rehearse.estimates import Estimates, estimates_of, share_of, told, why_bad
+from sitl.rehearse.estimates import Estimates, as_lines, estimates_of, share_of, why_bad
 from sitl.rehearse.prepared import PreparedRehearsal
 from sitl.rehearse.report import FIGURES, PAGE, PICTURE, RESULTS, WORST, RehearsalOutcome, page_of
 from sitl.rehearse.voyage import RehearsalCase, rehearsal, sail
@@ -121,14 +121,14 @@ def rehearse(
     try:
         sailed = rehearsal(jobs).results(options, watch=follower)
     except KeyboardInterrupt:
-        sys.stdout.write("\n" + "\n".join(told(follower.known)) + "\nended by hand: the same command goes on\n")
+        sys.stdout.write("\n" + "\n".join(as_lines(follower.known)) + "\nended by hand: the same command goes on\n")
         raise
     code = sailed.exit_code(is_good=True)
     count = min(pairs, len(follower.known.records))
     found: list[Tried] = []
     voyage_s = sailed.wall_s / sailed.now * (options.workers or os.cpu_count() or 1) if sailed.now else 0.0
     if changes and count:
-        sys.stdout.write("\n".join(told(follower.known)) + "\n")  # the chances are known: nobody waits for the rest
+        sys.stdout.write("\n".join(as_lines(follower.known)) + "\n")  # the chances are known: nobody waits for the rest
         sys.stderr.write(f"{counted(len(changes), 'change')}, each for the first {counted(count, 'seed')}\n")
 
         def so_far(records: Sequence[dict[str, Any]]) -> list[Tried]:
@@ -213,7 +213,7 @@ def _words(outcome: RehearsalOutcome, sailed: CampaignResults, *, is_told: bool)
     if not outcome.known.records:
         return [*lines, "no chances yet, for the first seed is not done: more --minutes, and the same command goes on"]
     if not is_told:
-        lines = [*told(outcome.known), *lines]
+        lines = [*as_lines(outcome.known), *lines]
     if is_told and not outcome.changes:
         lines.append("what changes are worth: there was no time for it; more --minutes, and the same command goes on")
     if outcome.changes:
@@ -221,7 +221,7 @@ def _words(outcome: RehearsalOutcome, sailed: CampaignResults, *, is_told: bool)
             "what to change, by pairs of voyages with the same seed (the difference and its 95 % interval; of "
             "twenty such intervals one is wrong):"
         )
-        lines += [f"  {change.told()}" for change in outcome.changes]
+        lines += [f"  {change.as_text()}" for change in outcome.changes]
     if outcome.folders:
         lines.append("the worst:")
         lines += [

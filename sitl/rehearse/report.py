@@ -18,7 +18,7 @@ from companion.commands.view import read_record
 from companion.disk import Disk
 from companion.page import export
 from companion.program import control
-from sitl.rehearse.changes import TOLD, Tried, is_sure, scaled, told_of
+from sitl.rehearse.changes import TOLD, Tried, difference_text, is_sure, scaled
 from sitl.rehearse.estimates import Estimates, Share, clock, percent, reached, why_bad
 from sitl.rehearse.prepared import PreparedRehearsal
 from sitl.results import FigureChange as Difference
@@ -161,7 +161,7 @@ def _difference(change: Difference) -> str:
     kind = "quiet"
     if is_sure(change):
         kind = "bad" if (scaled(change)[1] > 0.0) == (change.measure.worse > 0) else "good"
-    return f"<span class={kind}>{told_of(change)}</span>"
+    return f"<span class={kind}>{difference_text(change)}</span>"
 
 
 def _worst(outcome: RehearsalOutcome, folder: Path) -> Iterable[str]:

@@ -51,7 +51,7 @@ class RehearsalCase:
     change: MissionChange | None = None
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Return the change in words; "": none."""
         return "" if self.change is None else self.change.told
 
@@ -123,7 +123,7 @@ def sail(job: Job[RehearsalCase]) -> dict[str, Any]:
 
     record: dict[str, Any] = {
         "seed": job.seed,
-        "change": job.case.told,
+        "change": job.case.description,
         "kinds": list(kinds),
         "wind_from_deg": scenario.wind.from_deg,
         "tws_mps": scenario.wind.tws_mps,
@@ -178,6 +178,6 @@ def key_of(job: Job[RehearsalCase]) -> Key:
         "wind": doubts.wind.told,
         "doubt": doubts.boat,
         "faults": doubts.faults,
-        "change": job.case.told,
+        "change": job.case.description,
         "seed": job.seed,
     }

@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion import figures
-from companion.figures import BY_NAME, FIGURES, Figure, in_words, ranges_in_words, told
+from companion.figures import BY_NAME, FIGURES, Figure, figure_values, in_words, ranges_in_words
 from companion.fold import Step
 from companion.mavlink.wire.companion_status import FLOATS, SLOW, StatusReader, status_messages
 from companion.mavlink.wire.frames import Codec
@@ -43,13 +43,13 @@ def test_what_cannot_be_told_is_left_out(step, monkeypatch):
     for value in (None, math.nan):
         row = Figure(name="co_test", label="x", kind="number", of=lambda step, value=value: value)
         monkeypatch.setattr(figures, "FIGURES", (row,))
-        assert told(step, "line") == {}
+        assert figure_values(step, "line") == {}
 
 
 def test_vmg_is_the_speed_against_the_wind(step):
     vehicle, wind = step.snapshot.vehicle, step.snapshot.wind.present_twd_from_rad
     east, north = vehicle.velocity_en_mps
-    assert told(step, "page")["co_vmg"] == pytest.approx(east * math.sin(wind) + north * math.cos(wind))
+    assert figure_values(step, "page")["co_vmg"] == pytest.approx(east * math.sin(wind) + north * math.cos(wind))
 
 
 @pytest.mark.parametrize(
@@ -65,10 +65,10 @@ def test_a_row_is_on_the_line_and_over_the_radio_on_page_and_watch(step, monkeyp
     row = Figure(name="co_test", label="test way", kind=kind, of=lambda step: math.radians(of_deg), hint="why")
     monkeypatch.setattr(figures, "FIGURES", (*FIGURES, row))
     monkeypatch.setitem(BY_NAME, row.name, row)
-    assert in_words(told(step, "line"))[-1] == f"test way {line}"
+    assert in_words(figure_values(step, "line"))[-1] == f"test way {line}"
     assert f"test way {line}" in progress_text(step)
-    assert told(step, "radio")["co_test"] == page
-    status = CompanionStatus(t_s=1.0, state="standard", figures=tuple(told(step, "radio").items()))
+    assert figure_values(step, "radio")["co_test"] == page
+    status = CompanionStatus(t_s=1.0, state="standard", figures=tuple(figure_values(step, "radio").items()))
     sender, receiver, reader = Codec(1, 191), Codec(254, 25), StatusReader()
     for turn in range(4):
         for sent in status_messages(status, 50.0, turn):

@@ -15,11 +15,11 @@ from companion.geofence.mission import (
     MissionOptions,
     drawing_of,
     drawn_mission,
-    kept,
     load_settings,
     mission_files,
     offer,
-    read_kept,
+    read_stored,
+    stored_text,
 )
 from companion.geofence.mission.autopilot_mission import MAX_GOALS, course_of, tag
 from companion.messages import Command, GeoPoint, MissionItem
@@ -275,8 +275,8 @@ def test_what_is_kept_is_the_drawing_and_two_drawings_are_two_voyages(tmp_path):
     document = drawing_of(
         [A, B, order(177, 1, 2), C, RTL], [*RING, ROCK], [item(0.05, command=5100)], GeoPoint(lat_deg=LAT, lon_deg=LON)
     )
-    written = kept(document)
-    back = read_kept(written.data.decode(), "kept.plan")
+    written = stored_text(document)
+    back = read_stored(written.data.decode(), "kept.plan")
     assert back.items == document.items
     assert back.home == document.home
     assert tag(back) == tag(document)

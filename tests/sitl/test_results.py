@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from companion.errors import InputError, JobError
 from sitl import cli
 from sitl.options import CampaignOptions
-from sitl.results import LEVEL, compare, told, told_table
+from sitl.results import LEVEL, compare, comparison_text, table_text
 from sitl.runner import ResultStore, Table, made_by, read_results, read_table, write_table
 from tests.sitl.runner.jobs import jobs_in, quick
 
@@ -49,7 +49,7 @@ def test_the_same_is_the_same():
     assert (found.same, len(found.pairs), found.worse) == (8, 8, ())
     assert compare(table(noisy(range(8), 1)), table(noisy(range(8), 1, gybes=3))).same == 8  # counted since
     assert compare(table(noisy(range(8), 1, gybes=2)), table(noisy(range(8), 1, gybes=3))).same == 0
-    text = told(found)
+    text = comparison_text(found)
     assert "8 pairs, 8 of them the same in every figure\nno figure that is measured here changed\nnot worse" in text
 
 
@@ -97,7 +97,7 @@ def test_the_worst_seeds_come_first_and_are_told():
     after = [row(0), row(1, 310.0), row(2, 400.0), row(3, passed=False, contacts=2), row(4, 290.0)]
     found = compare(table(before), table(after))
     assert [p.name for p in found.pairs[:3]] == ["demo seed 3", "demo seed 2", "demo seed 1"]
-    text = told(found, most=2)
+    text = comparison_text(found, most=2)
     assert "demo seed 3: passed yes -> no, touched no -> yes\n  demo seed 2: time 300.0 -> 400.0\n" in text
     assert "demo seed 1" not in text
 
@@ -105,7 +105,9 @@ def test_the_worst_seeds_come_first_and_are_told():
 def test_only_pairs_count_and_what_has_none_is_said():
     found = compare(table([row(n) for n in range(5)]), table([row(n, water="other") for n in range(3, 9)]))
     assert (len(found.pairs), found.only, found.other_water) == (2, (3, 4), ("demo",))
-    assert "; 3 only in the first; 4 only in the second\nthe files of demo are not the same in both" in told(found)
+    assert "; 3 only in the first; 4 only in the second\nthe files of demo are not the same in both" in comparison_text(
+        found
+    )
     with pytest.raises(InputError, match="no job is in both files"):
         compare(table([row(1)]), table([row(2)]))
     with pytest.raises(InputError, match="sitl campaign and sitl faults have no pairs"):
@@ -238,7 +240,7 @@ def test_a_disk_that_takes_no_table_says_so(tmp_path):
 
 
 def test_a_table_in_words_counts_by_scenario():
-    text = told_table(table([row(0), row(1, passed=False, contacts=1), row(2, scenario="upwind")]))
+    text = table_text(table([row(0), row(1, passed=False, contacts=1), row(2, scenario="upwind")]))
     lines = {line.split()[0]: line.split() for line in text.splitlines()[2:]}
     assert lines["demo"][1:5] == ["2", "1/2", "1/2", "-"]
     assert lines["upwind"][1] == "1"

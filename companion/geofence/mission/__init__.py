@@ -6,9 +6,9 @@ from companion.geofence.mission.autopilot_mission import (
     drawing_of,
     drawn_mission,
     hindrance,
-    kept,
     offer,
-    read_kept,
+    read_stored,
+    stored_text,
 )
 from companion.geofence.mission.boat_file import BoatFile, parse_boat_file, read_boat_file
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
@@ -80,7 +80,6 @@ __all__ = [
     "goal_losses",
     "hindrance",
     "is_file",
-    "kept",
     "kind_of",
     "load_area",
     "load_mission",
@@ -91,9 +90,10 @@ __all__ = [
     "parse_options",
     "place_troubles",
     "read_boat_file",
-    "read_kept",
     "read_mission",
     "read_options",
+    "read_stored",
+    "stored_text",
     "toml",
     "without_defaults",
     "zones_only",

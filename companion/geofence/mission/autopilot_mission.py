@@ -293,12 +293,12 @@ def drawing_of(
     )
 
 
-def kept(document: Document) -> Written:
+def stored_text(document: Document) -> Written:
     """Return a drawing as the file that is kept of it: a .plan, which QGroundControl opens again."""
     return write_plan(document)
 
 
-def read_kept(text: str, source: str) -> Document:
+def read_stored(text: str, source: str) -> Document:
     """Return a drawing that was kept. Raises InputError when it is none any more."""
     return read_plan(text, source).require_clean()
 

@@ -24,8 +24,8 @@ from companion.safety import (
     SHORE,
     STOPPING,
     Recovery,
+    failsafe_named_by,
     standing,
-    told_by,
 )
 from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.step import CancelPlan, Phase, StepContext
@@ -50,7 +50,7 @@ SAILED = frozenset({Mode.AUTO, Mode.GUIDED, *STOPPING}) - {Mode.HOLD}
 
 def note(ctx: StepContext, text: StatusText) -> None:
     """Remember a text that is a sign."""
-    cause = told_by(text)
+    cause = failsafe_named_by(text)
     if cause:
         ctx.set(operator=changed(ctx.state.operator, signs=_seen(ctx.state.operator.signs, cause, ctx.t_s)))
     if cause == "battery" and EMPTY in text.text:

@@ -19,7 +19,7 @@ from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.not_found import MORE, asks_again, not_found
-from companion.skipper.planning.track import of_way, said
+from companion.skipper.planning.track import clearance_text, of_way
 from companion.skipper.planning.uploads import is_begun_risky, is_riskier, upload
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step import DiversionKind, Phase, PlanOutcome, ReplanReason, Route, StepContext
@@ -287,7 +287,7 @@ def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, 
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
     change = Change(apart_m=apart_m(ctx, way), unsafe=unsafe) if ctx.state.mission.route is not None else Change()
     _look_at_time(ctx, route)
-    clear = said(expected_m, ctx.config.margin_floor_m)
+    clear = clearance_text(expected_m, ctx.config.margin_floor_m)
     return upload(
         ctx, route, set_current, f"{pending.reason.words}: {facts.why}{clear}", change=change, planned=pending
     )

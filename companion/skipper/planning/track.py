@@ -93,6 +93,6 @@ def of_way(
     return expected(from_here, np.asarray(way), has_boards=False, has_loops=has_loops, sailed_m=sailed_m)
 
 
-def said(clearance_m: float | None, floor_m: float) -> str:
+def clearance_text(clearance_m: float | None, floor_m: float) -> str:
     """Return an expected clearance in words, behind a plan's reason."""
     return "" if clearance_m is None else f"; passes {clearance_m:.1f} m clear or more (floor {floor_m:g} m)"

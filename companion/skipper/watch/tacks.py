@@ -53,7 +53,7 @@ def watch_tacks(ctx: StepContext) -> None:
     if then.began_s is not None and now.began_s is None:
         then = replace(then, began_en_m=ctx.boat_en)
     elif now.began_s is not None and then.began_s is None and (now.is_counted or then.failed > now.failed):
-        then = lain(now, then, ctx.t_s, ctx.boat_en, wind[0], ctx.snapshot.current.en_mps)
+        then = after_failure(now, then, ctx.t_s, ctx.boat_en, wind[0], ctx.snapshot.current.en_mps)
     if then != now:
         ctx.set(tacking=then)
     if then.failed > now.failed:
@@ -93,7 +93,7 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, 
     return replace(now, slowest_mps=min(now.slowest_mps, speed_mps)) if now.began_s is not None else now
 
 
-def lain(
+def after_failure(
     now: Tacking, then: Tacking, t_s: float, boat_en_m: PointEn | None, twd_from_rad: float, current_en_mps: PointEn
 ) -> Tacking:
     """Return ``then`` with what the failure that it ends has told: how long it lay, how fast it was set to lee.

@@ -7,7 +7,7 @@ import pytest
 
 from lab.campaigns.campaign import campaign
 from lab.campaigns.drawn_faults import draw
-from lab.campaigns.faults import BASE, FaultCase, faults, job_of, method_of, sail, told
+from lab.campaigns.faults import BASE, FaultCase, event_text, faults, job_of, method_of, sail
 from lab.campaigns.mismatch import MismatchCase, mismatch
 from lab.methods import DRAWABLE, GUIDANCES, PLANNERS, Method, can_be_sailed
 from lab.options import add_draw, add_methods, methods_of
@@ -79,7 +79,7 @@ def test_a_faulty_voyage_is_the_same_but_for_what_is_drawn_of_the_boat(methods):
     seed = next(n for n, m in enumerate(methods) if m.guidance == "heading" and m.planner == "auto")
     record, plain = sail(job_of(seed, FaultCase(draws=DRAWABLE))), draw(seed, load_scenario(BASE))
     assert record["method"] == "by heading, planner auto"
-    assert record["events"] == [told(event) for event in plain.events]
+    assert record["events"] == [event_text(event) for event in plain.events]
     assert (record["parameters"], record["limit_s"]) == (plain.parameters, plain.limit_s)
     assert record["passed"], record
 
@@ -106,7 +106,7 @@ def test_the_options():
     assert parser.parse_args(["--draw", "all"]).draw == DRAWABLE
     assert methods_of(None, None) == [Method()]
     args = parser.parse_args(["--guidance", "plan", "heading", "--planner", "astar"])
-    told = [m.told for m in methods_of(args.guidance, args.planner)]
+    told = [m.description for m in methods_of(args.guidance, args.planner)]
     assert told == ["in AUTO, planner astar", "by heading, planner astar"]
 
 

@@ -11,6 +11,7 @@ from lab.campaigns.drawn_mismatch import KINDS, LIMIT_S, WATERS, draw
 from lab.campaigns.mismatch import (
     SailedSpan,
     arrival_promised,
+    as_text,
     bow_rad,
     chance_of_no_go,
     figures_of,
@@ -20,7 +21,6 @@ from lab.campaigns.mismatch import (
     promised_s,
     sail,
     share_interval,
-    told,
 )
 from sitl import cli
 from sitl.runner import ResultStore
@@ -36,7 +36,7 @@ def drawn():
 
 def test_a_seed_is_one_boat(drawn):
     assert [draw(seed) for seed in range(5)] == drawn[:5]
-    assert len({str(d.told()) for d in drawn}) == len(drawn)
+    assert len({str(d.to_dict()) for d in drawn}) == len(drawn)
 
 
 def test_all_waters_take_turns_and_every_kind_comes(drawn):
@@ -76,7 +76,7 @@ def test_one_kind_alone_is_in_every_voyage_of_the_same_water_and_wind(drawn, kin
         alone = draw(seed, only=(kind,))
         assert (alone.source, alone.kinds) == (other.source, (kind,))
         assert alone.scenario.wind.tws_mps == other.scenario.wind.tws_mps
-        assert alone.told() != draw(seed, only=()).told()
+        assert alone.to_dict() != draw(seed, only=()).to_dict()
 
 
 def test_a_kind_that_is_not_drawn_is_refused_and_the_others_are_named(capsys):
@@ -156,9 +156,9 @@ def test_the_table_counts_losses_too():
     assert table["waters"]["gates"]["passed"] == 0
     assert (table["legs"], table["legs_in_no_go"]) == (1, 1)
     assert table["later_than_promised"] == 1
-    text = told(table)
+    text = as_text(table)
     assert "4 voyages: 2 passed, 2 arrived in time, 1 touched" in text
-    assert told(figures_of([]))
+    assert as_text(figures_of([]))
 
 
 def test_what_a_file_holds_is_not_sailed_again(tmp_path, capsys):

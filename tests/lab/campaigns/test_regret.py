@@ -6,7 +6,7 @@ import pytest
 
 from companion.errors import InputError
 from lab.campaigns.baselines import SCENARIOS
-from lab.campaigns.regret import figures_of, require_judged, told
+from lab.campaigns.regret import as_text, figures_of, require_judged
 from sitl import cli
 from sitl.runner import SCENARIO_FOLDER
 
@@ -35,7 +35,7 @@ def test_only_clean_arrivals_count():
     assert rows[0]["regret"] == pytest.approx(0.15)
     assert (rows[0]["regret_10"], rows[0]["regret_90"]) == pytest.approx((0.1, 0.2))
     assert rows[0]["gap"] == pytest.approx(100.0 / 98.0 - 1.0)
-    assert "| demo | companion | 4 | 2 | 115 | 3 | 100 | 2 | 15.0 | 10.0 | 20.0 | 2.0 | 1.00 |" in told(records)
+    assert "| demo | companion | 4 | 2 | 115 | 3 | 100 | 2 | 15.0 | 10.0 | 20.0 | 2.0 | 1.00 |" in as_text(records)
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from lab.campaigns.reliability import coverage, floor_curve, late_curve, no_go_curve, time_shares, told, where_begun
+from lab.campaigns.reliability import as_text, coverage, floor_curve, late_curve, no_go_curve, time_shares, where_begun
 from sitl import cli
 from sitl.runner import ResultStore
 
@@ -76,7 +76,7 @@ def test_a_leg_that_was_begun_elsewhere_is_no_promise_of_the_wind():
     on, elsewhere = where_begun(kept + strays)
     assert (on.of, elsewhere.of, elsewhere.came) == (3000, 100, 100)
     assert on.interval[0] <= on.promised <= on.interval[1]
-    assert "begun elsewhere: promised   5.0 %, came 100.0 %" in told(strays)
+    assert "begun elsewhere: promised   5.0 %, came 100.0 %" in as_text(strays)
 
 
 def test_the_floor_is_counted_by_how_much_differs():
@@ -96,7 +96,7 @@ def test_times_are_of_arrivals_only():
     assert time_shares(
         [voyage(0, []), voyage(1, [], time_s=90.0), voyage(2, [], arrived=False), voyage(3, [], promised_s=None)]
     ) == [0.9, 1.1]
-    assert "later than the expected time: 1 of 2" in told([voyage(0, []), voyage(1, [], time_s=90.0)])
+    assert "later than the expected time: 1 of 2" in as_text([voyage(0, []), voyage(1, [], time_s=90.0)])
 
 
 def test_arrivals_are_held_against_each_quantile_that_was_stated():
@@ -109,7 +109,7 @@ def test_arrivals_are_held_against_each_quantile_that_was_stated():
         ("after 50 %", 0.5, 1, 3),
         ("after 90 %", pytest.approx(0.1), 0, 3),
     ]
-    assert "later than the plan's quantiles of arrival" in told(records)
+    assert "later than the plan's quantiles of arrival" in as_text(records)
 
 
 def test_the_command_tells_draws_and_writes(tmp_path, capsys):

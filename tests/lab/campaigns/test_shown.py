@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from lab.campaigns.shown import AHEAD_S, _leg_risks, _plan_risks, _way_m, sail, shown, table_of, tacked_s, told
+from lab.campaigns.shown import AHEAD_S, _leg_risks, _plan_risks, _way_m, as_text, sail, shown, table_of, tacked_s
 from sitl.runner import Job
 
 DEMO = Path("sitl/scenarios/demo.toml")
@@ -61,8 +61,8 @@ def test_places_winds_and_clearances_are_counted_by_their_own_bands():
     )
     for figure in ("place in 60 s", "wind in 60 s", "clearance expected"):
         assert row(rows, figure)["held"] == 0.5
-    assert len(told(rows).splitlines()) == 4
-    assert "nan" not in told(rows)
+    assert len(as_text(rows).splitlines()) == 4
+    assert "nan" not in as_text(rows)
 
 
 def test_a_chance_is_held_against_how_often_it_came():

@@ -18,7 +18,7 @@ from companion import cli
 from companion.disk import Disk
 from sitl import cli as sitl_cli
 from sitl.rehearse import rehearsal
-from sitl.rehearse.estimates import clock, estimates_of, told, why_bad
+from sitl.rehearse.estimates import as_lines, clock, estimates_of, why_bad
 from sitl.rehearse.picture import shares_of
 from sitl.rehearse.prepared import prepared
 from sitl.rehearse.rehearsal import Follower, Limits, RehearsalOutcome, _words
@@ -112,7 +112,7 @@ def test_watchdogs_are_counted_by_voyages_and_times_by_all():
     )
     assert {name: share.came for name, share in known.watchdogs.items()} == {"in irons": 2}
     assert [q.value for q in known.times] == [200.0, 201.0, math.inf]
-    assert "fewer than 90 % arrive (3:20 to never)" in "\n".join(told(known))
+    assert "fewer than 90 % arrive (3:20 to never)" in "\n".join(as_lines(known))
     assert known.to_dict()["time_s"][2]["value"] is None
     assert json.loads(json.dumps(known.to_dict(), allow_nan=False))["voyages"] == 3
     assert clock(59.6) == "1:00"

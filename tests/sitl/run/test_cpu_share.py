@@ -136,7 +136,7 @@ def test_times_are_held_against_the_full_cores_of_the_same_seed():
     assert row["of_full"] == pytest.approx(1.1)
     assert (row["median_s"], row["late_s"], row["worst_s"]) == (2.0, 16.0, 16.0)
     assert (row["first_s"], row["budget_s"], row["clearance_m"]) == (1.5, 1.0, 5.0)
-    assert shares.told(row) == [
+    assert shares.as_cells(row) == [
         "pond",
         "0.25",
         "2",

@@ -166,12 +166,12 @@ def test_what_was_ours_is_given_up_when_the_strangers_mission_is_replaced():
 
 
 def test_an_identity_that_differs_counts_when_it_is_told_twice():
-    told = Identity().told(1, "5a")
+    told = Identity().with_uid(1, "5a")
     assert (told.uid, told.is_confirmed) == ("5a", True)
-    once = told.told(1, "77")
+    once = told.with_uid(1, "77")
     assert (once.uid, once.is_confirmed) == ("5a", False)
-    assert once.told(1, "5a") == told
-    assert once.told(1, "77").uid == "77"
-    assert once.told(1, "88").told(1, "77").uid == "5a", "twice running"
+    assert once.with_uid(1, "5a") == told
+    assert once.with_uid(1, "77").uid == "77"
+    assert once.with_uid(1, "88").with_uid(1, "77").uid == "5a", "twice running"
     assert not told.doubted().is_confirmed
-    assert told.doubted().told(1, "5a") == told
+    assert told.doubted().with_uid(1, "5a") == told

@@ -13,7 +13,7 @@ from companion.planner import Problem, plan
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.statement import Start, problem_dict
-from companion.skipper.planning.track import of_way, problem_tracking, said, steps
+from companion.skipper.planning.track import clearance_text, of_way, problem_tracking, steps
 from companion.skipper.step.actions import Announce, ReplanReason
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import PlanOutcome
@@ -101,7 +101,7 @@ def _aim():
 
 @pytest.mark.parametrize(("clearance", "words"), [(None, ""), (8.44, "; passes 8.4 m clear or more (floor 6 m)")])
 def test_what_is_expected_is_said(clearance, words):
-    assert said(clearance, 6.0) == words
+    assert clearance_text(clearance, 6.0) == words
 
 
 def test_what_is_left_of_a_leg_is_no_short_leg_while_it_is_sailed():

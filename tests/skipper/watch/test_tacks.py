@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from companion.boat.failed_tack import SHOOT_S
 from companion.skipper.step.state import NO_TACKS, PRIOR_TACKS, Tacking
-from companion.skipper.watch.tacks import LIES_S, MOST_IRONS_S, MOST_LEE_MPS, followed, lain
+from companion.skipper.watch.tacks import LIES_S, MOST_IRONS_S, MOST_LEE_MPS, after_failure, followed
 
 D = math.radians
 
@@ -96,7 +96,7 @@ def test_a_failure_tells_how_long_she_lay_and_how_she_was_set_beside_the_current
     began = Tacking(side=side, settled_rad=course, settled_mps=way_mps, began_s=100.0, began_en_m=(7.0, -3.0))
 
     def ended(boat_en_m):
-        return lain(began, NO_TACKS, 100.0 + span_s, boat_en_m, twd, (east_mps, north_mps))
+        return after_failure(began, NO_TACKS, 100.0 + span_s, boat_en_m, twd, (east_mps, north_mps))
 
     now = ended((east_m, north_m))
     told, other = (now.starboard_lee_mps, now.port_lee_mps)[::side]
@@ -105,8 +105,8 @@ def test_a_failure_tells_how_long_she_lay_and_how_she_was_set_beside_the_current
     assert other == 0.0
     assert ended(None).irons_s == now.irons_s  # no position: how long, and nothing more
     assert ended((1e6, 1e6)).starboard_lee_mps <= MOST_LEE_MPS  # it jumped
-    assert lain(began, NO_TACKS, 1000.0, None, twd, (0.0, 0.0)).irons_s == MOST_IRONS_S  # a lull
-    shorter = lain(began, now, 101.0, (7.0, -3.0), twd, (0.0, 0.0))
+    assert after_failure(began, NO_TACKS, 1000.0, None, twd, (0.0, 0.0)).irons_s == MOST_IRONS_S  # a lull
+    shorter = after_failure(began, now, 101.0, (7.0, -3.0), twd, (0.0, 0.0))
     assert (shorter.irons_s, shorter.starboard_lee_mps, shorter.port_lee_mps) == (
         now.irons_s,
         now.starboard_lee_mps,
