@@ -7,6 +7,9 @@
 
 from companion.boat.boat import Boat, Hull, can_hold, made_good_mps, outline_en_m, slowest_en_mps
 from companion.boat.guess import GuessedBoat, Sizes, guessed, guessed_text
+from companion.boat.learned_file import learned_text
+from companion.boat.lesson import Lesson, lesson_of
+from companion.boat.log import BoatLog
 from companion.boat.margins import (
     AutopilotLimits,
     ProposedMargin,
@@ -29,8 +32,10 @@ from companion.boat.polar import (
 __all__ = [
     "AutopilotLimits",
     "Boat",
+    "BoatLog",
     "GuessedBoat",
     "Hull",
+    "Lesson",
     "Polar",
     "ProposedMargin",
     "Sizes",
@@ -40,6 +45,8 @@ __all__ = [
     "constant",
     "guessed",
     "guessed_text",
+    "learned_text",
+    "lesson_of",
     "made_good_mps",
     "narrowest_corridor_m",
     "outline_en_m",

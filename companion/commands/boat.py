@@ -1,39 +1,44 @@
-"""``companion boat``: a file that says what one boat can do: guessed before the first log, shown, compared."""
+"""``companion boat``: a file that says what one boat can do: guessed, learned from its logs, shown, compared."""
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.errors import InputError
-from companion.program.arguments import add_command, number, out_file, picture
+from companion.program.arguments import add_command, number, out_file, picture, whole
+from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.boat import Polar
-    from companion.geofence.mission import BoatFile
+    from companion.boat_logs import ReadLog
+    from companion.geofence.mission import BoatFile, LearnedTable
 
 _EPILOG = """\
 examples:
   companion boat guess --length 1.5 --displacement 20 --sail-area 0.9 --out pepper.toml
+  companion boat learn voyages/ flights/*.BIN --from pepper.toml --out pepper-learned.toml
   companion boat show pepper.toml --plot pepper.png
   companion boat show pepper.toml --pol pepper.pol            (for OpenCPN and qtVlm)
   companion boat compare pepper.toml ardurover
 
 A mission names the file: file = "pepper.toml" in its [boat].
-Exit codes: 0 written or told, 2 a file or a number cannot be believed.
+Exit codes: 0 written or told, 1 the logs hold too little sailing, 2 a file or a number cannot be believed.
 """
 TWA_DEG = (40.0, 45.0, 52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0, 165.0, 180.0)
 MOST_WINDS = 7  # columns of a table
+UNSAID_ERROR = 0.35  # of a file that says none: as of one that is guessed
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
-    """Add the command with its three verbs."""
+    """Add the command with its verbs."""
     parser = add_command(subparsers, "boat", summary, _EPILOG)
-    verbs = parser.add_subparsers(dest="verb", metavar="guess|show|compare", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="guess|learn|show|compare", required=True)
     guess = verbs.add_parser("guess", help="a boat file from three sizes, for a boat that nobody has sailed yet")
     guess.add_argument(
         "--length", type=number("m", above=0.0, at_most=100.0), required=True, metavar="M", help="over all [m]"
@@ -59,6 +64,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     guess.add_argument("--out", type=out_file, metavar="FILE.toml", help="write it there (default: print it)")
     guess.add_argument("--force", action="store_true", help="take the place of a file that is there")
     guess.set_defaults(run=_guess)
+    learn = verbs.add_parser("learn", help="a boat file from logs: voyage folders, .tlog, .BIN, CSV, NMEA 0183")
+    learn.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="files, or folders of them")
+    learn.add_argument(
+        "--from",
+        dest="prior",
+        required=True,
+        metavar="FILE.toml",
+        help="what was believed of her: the file of `companion boat guess`",
+    )
+    learn.add_argument("--out", type=out_file, required=True, metavar="FILE.toml", help="write it there")
+    learn.add_argument("--name", help="what she is called (default: as in --from)")
+    learn.add_argument("--seed", type=whole(), default=0, metavar="N", help="of the draws (default: 0)")
+    learn.add_argument("--force", action="store_true", help="take the place of a file, which is kept as FILE.vN.toml")
+    learn.set_defaults(run=_learn)
     show = verbs.add_parser("show", help="her speeds, best angles and what is not known of her")
     show.add_argument("file", metavar="FILE", help="a boat file, a polar file, ardurover or avalon")
     show.add_argument("--plot", type=picture, metavar="P.png", help="draw the polar, with its band")
@@ -94,6 +113,98 @@ def _guess(args: argparse.Namespace) -> int:
     write_files({str(args.out): text.encode()}, force=args.force)
     print(f'{args.out}: written; a mission beside it names it: [boat] file = "{args.out.name}"')
     return 0
+
+
+def _learn(args: argparse.Namespace) -> int:
+    from companion.boat import learned_text, lesson_of
+    from companion.boat_logs import Skipped, logs_under, read_logs
+    from companion.commands.output import refuse_existing, write_files
+    from companion.compose import polar_of_file
+    from companion.errors import JobError
+    from companion.geofence.mission import read_boat_file
+
+    believed = read_boat_file(Path(args.prior))
+    refuse_existing([str(args.out)], force=args.force)
+    paths = logs_under(args.logs)
+
+    def tell(count: int, name: str) -> None:
+        print(f"reading {count + 1} of {len(paths)}: {name}", file=sys.stderr)
+
+    read, skipped = read_logs(paths, tell)
+    known = {} if believed.learned is None else {log.digest: log.name for log in believed.learned.logs}
+    old = f"{args.prior} was learned from it already"
+    skipped += [Skipped(name=one.log.name, why=old) for one in read if one.digest in known]
+    read = [one for one in read if one.digest not in known]
+    for left in skipped:
+        print(f"skipped {left.name}: {left.why}")
+    for one in read:
+        for note in one.log.notes:
+            print(f"{one.log.name}: {note}")
+    if not read:
+        raise JobError(
+            f"none of {counted(len(paths), 'log')} can be learned from" if paths else "there is no log in there"
+        )
+    print(f"learning from {counted(len(read), 'log')}", file=sys.stderr)
+    try:
+        lesson = lesson_of(
+            [one.log for one in read],
+            polar_of_file(believed, args.prior),
+            believed.boat.speed_error_percent / 100.0 or UNSAID_ERROR,
+            no_go_half_rad=math.radians(believed.boat.no_go_half_deg),
+            seed=args.seed,
+        )
+    except ValueError as error:
+        raise JobError(f"too little to learn from: {error}; {_left_out(read, believed, args.prior)}") from None
+    version = 1 + max((_version(path) for path in (Path(args.prior), args.out)), default=0)
+    name = args.name or believed.name
+    text = learned_text(
+        name,
+        lesson,
+        kept=_said(believed),
+        made=f"learned on {datetime.now(UTC):%Y-%m-%d} from {lesson.hours:.1f} h of steady sailing in "
+        f"{counted(len(read), 'log')}, about {args.prior}",
+        version=version,
+        logs=[(one.log.name, one.digest) for one in read],
+        skipped=[(left.name, left.why) for left in skipped],
+    )
+    files = {str(args.out): text.encode()}
+    if args.out.exists():
+        kept = args.out.with_suffix(f".v{_version(args.out)}{args.out.suffix}")
+        files[str(kept)] = args.out.read_bytes()
+        print(f"{kept}: what stood in {args.out}")
+    write_files(files, force=True)
+    print("\n".join(_words(str(args.out), read_boat_file(args.out))))
+    print(f"{args.out}: written, version {version}")
+    return 0
+
+
+def _said(boat: BoatFile) -> dict[str, object]:
+    import msgspec
+
+    plain = type(boat.boat)()
+    return {
+        field: getattr(boat.boat, field)
+        for field in msgspec.structs.asdict(plain)
+        if getattr(boat.boat, field) != getattr(plain, field)
+    }
+
+
+def _version(path: Path) -> int:
+    from companion.geofence.mission import read_boat_file
+
+    try:
+        learned = read_boat_file(path).learned
+    except InputError:
+        return 0
+    return 0 if learned is None else learned.version
+
+
+def _left_out(read: list[ReadLog], believed: BoatFile, source: str) -> str:
+    from companion.boat.log import stretches_of
+    from companion.compose import polar_of_file
+
+    found = stretches_of([one.log for one in read], polar_of_file(believed, source), UNSAID_ERROR)
+    return "left out: " + (", ".join(f"{n} ({why.value})" for why, n in found.left_out.most_common()) or "nothing")
 
 
 def _show(args: argparse.Namespace) -> int:
@@ -158,7 +269,24 @@ def _words(name: str, boat: BoatFile | None) -> list[str]:
         "her speeds are taken to be as they stand here"
         if o.speed_error_percent == 0.0
         else f"her speeds may all be off by {o.speed_error_percent:g} % (standard deviation): arrivals spread by it",
+        *([] if boat.learned is None else _learned_words(boat.learned)),
     ]
+
+
+def _learned_words(told: LearnedTable) -> list[str]:
+    out = [f"{told.stretches} stretches of steady sailing; left out: {_counts(told.left_out)}"]
+    for what, pair in (("vane", told.vane_deg), ("compass", told.compass_deg), ("leeway", told.leeway_deg)):
+        out.append(f"  {what:<8}{pair[0]:+6.1f} degrees, deviation {pair[1]:.1f}")
+    if told.tacks:
+        out += ["", _row("tacks, wind [m/s]", [f"{t.tws_mps:g}" for t in told.tacks])]
+        out.append(_row("  tried", [str(t.tried) for t in told.tacks]))
+        out.append(_row("  failed", [str(t.failed) for t in told.tacks]))
+        out.append(_row("  cost [s]", ["-" if t.loss_s is None else f"{t.loss_s:.1f}" for t in told.tacks]))
+    return [*out, *(["", "still open, or to be mended:"] if told.findings else []), *(f"- {f}" for f in told.findings)]
+
+
+def _counts(left_out: dict[str, int]) -> str:
+    return ", ".join(f"{n} ({why})" for why, n in left_out.items()) or "none"
 
 
 def _winds(polar: Polar) -> list[float]:

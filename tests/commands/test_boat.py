@@ -1,12 +1,15 @@
 """``companion boat``: guessed, shown, compared, exported, and sailed by a mission."""
 
+import math
 import tomllib
 
 import pytest
 
-from companion.boat import read_polar
+from companion.boat import Sizes, guessed, read_polar
 from companion.cli import main
+from companion.compose import polar_of_file
 from companion.geofence.mission import read_boat_file
+from tests.boat.sailed import Truth, sailed
 
 SIZES = ["--length", "1.5", "--displacement", "20", "--sail-area", "0.9"]
 
@@ -53,3 +56,64 @@ def test_two_boats_are_compared_in_the_winds_of_the_first(tmp_path, capsys):
 def test_what_cannot_be_is_one_line(words, capsys):
     assert main(["boat", *words]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def season(folder, days=2):
+    """Write logs of a boat that is three tenths slower than its guess, as CSV; one without wind beside them."""
+    folder.mkdir()
+    for day in range(days):
+        log = sailed(Truth(scale=0.7), hours=0.5, seed=day, t0_s=1.75e9 + 86_400.0 * day)
+        rows = [
+            f"{t:.0f},{math.degrees(h):.2f},{math.degrees(math.atan2(*v)):.2f},{math.hypot(*v):.3f},"
+            f"{math.degrees(a):.2f},{s:.3f}"
+            for t, h, v, a, s in zip(
+                log.t_s, log.heading_rad, log.velocity_en_mps.tolist(), log.awa_rad, log.aws_mps, strict=True
+            )
+        ]
+        (folder / f"day{day}.csv").write_text("t_s,heading_deg,cog_deg,sog_mps,awa_deg,aws_mps\n" + "\n".join(rows))
+    (folder / "calm.csv").write_text("t_s,heading_deg,cog_deg,sog_mps\n" + "\n".join(f"{t},9,8,1.0" for t in range(99)))
+    return folder
+
+
+def test_a_boat_is_learned_from_its_logs_and_sailed_by_a_mission(tmp_path, capsys):
+    guess, out = tmp_path / "pepper.toml", tmp_path / "learned.toml"
+    assert main(["boat", "guess", *SIZES, "--out", str(guess)]) == 0
+    logs = season(tmp_path / "logs")
+    assert main(["boat", "learn", str(logs), "--from", str(guess), "--out", str(out)]) == 0
+    said = capsys.readouterr()
+    assert "calm.csv: it tells the wind in 0 of 99 samples" in said.out
+    assert "reading 3 of 3" in said.err
+    boat = read_boat_file(out)
+    assert (boat.name, boat.learned.version, len(boat.learned.logs), len(boat.learned.skipped)) == ("pepper", 1, 2, 1)
+    assert boat.boat.length_m == 1.5
+    assert boat.boat.speed_error_percent < 12.0
+    true = 0.7 * guessed(Sizes(length_m=1.5, displacement_kg=20.0, sail_area_m2=0.9)).polar.speed_mps(1.57, 4.0)
+    assert polar_of_file(boat, "").speed_mps(1.57, 4.0) == pytest.approx(true, rel=0.08)
+    assert main(["boat", "show", str(out), "--plot", str(tmp_path / "p.png")]) == 0
+    said = capsys.readouterr().out
+    assert "stretches of steady sailing; left out:" in said
+    assert "tacks, wind [m/s]" in said
+    # Learned once more it is a new version, and the old one is kept; what it was learned from counts no second time.
+    assert main(["boat", "learn", str(logs), "--from", str(guess), "--out", str(out)]) == 2
+    assert main(["boat", "learn", str(logs), "--from", str(guess), "--out", str(out), "--force"]) == 0
+    assert read_boat_file(out).learned.version == 2
+    assert read_boat_file(tmp_path / "learned.v1.toml") == boat
+    assert main(["boat", "learn", str(logs), "--from", str(out), "--out", str(tmp_path / "x.toml")]) == 1
+    assert "was learned from it already" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("what", ["nothing", "nowhere", "little"])
+def test_logs_that_teach_nothing_are_one_line(tmp_path, capsys, what):
+    guess = tmp_path / "pepper.toml"
+    assert main(["boat", "guess", *SIZES, "--out", str(guess)]) == 0
+    folder = tmp_path / "logs"
+    if what != "nowhere":
+        folder.mkdir()
+    if what == "little":
+        lines = [f"{t},90,90,1.0,80,4.0" for t in range(120)]
+        (folder / "a.csv").write_text("t_s,heading_deg,cog_deg,sog_mps,awa_deg,aws_mps\n" + "\n".join(lines))
+    code = main(["boat", "learn", str(folder), "--from", str(guess), "--out", str(tmp_path / "o.toml")])
+    assert code == (2 if what == "nowhere" else 1)
+    told = [line for line in capsys.readouterr().err.splitlines() if "reading" not in line and "learning" not in line]
+    assert len(told) == 1
+    assert not (tmp_path / "o.toml").exists()

@@ -10,7 +10,7 @@ from companion.geofence.mission.autopilot_mission import (
     read_stored,
     stored_text,
 )
-from companion.geofence.mission.boat_file import BoatFile, parse_boat_file, read_boat_file
+from companion.geofence.mission.boat_file import BoatFile, LearnedTable, parse_boat_file, read_boat_file
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
 from companion.geofence.mission.goals import GoalField, GoalGate, free_water, is_file
 from companion.geofence.mission.mission import load_area, load_mission, load_settings, place_troubles, read_mission
@@ -58,6 +58,7 @@ __all__ = [
     "GoalOptions",
     "HeadingAtomOptions",
     "Latitude",
+    "LearnedTable",
     "LeaveAtomOptions",
     "LineAtomOptions",
     "Longitude",

@@ -28,6 +28,70 @@ class PolarTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     tws_mps: tuple[float, ...]
     twa_deg: tuple[float, ...]
     speed_mps: tuple[tuple[float, ...], ...]
+    error_percent: tuple[tuple[float, ...], ...] = ()
+    """How far each speed may be off [%, standard deviation of the logarithm]; empty: nobody says."""
+    stretches: tuple[tuple[int, ...], ...] = ()
+    """Of how many stretches of steady sailing each speed is."""
+
+
+Pair = tuple[float, float]
+"""A figure and its standard deviation."""
+
+
+class Angles(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Best angles in one wind: low, middle and high [deg], and what they make good [m/s]."""
+
+    tws_mps: float
+    beat_deg: tuple[float, float, float]
+    beat_mps: float
+    run_deg: tuple[float, float, float]
+    run_mps: float
+
+
+class Tacks(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Tacks in one wind: what one costs [s] and by how much that differs (deviation of its logarithm)."""
+
+    tws_mps: float
+    tried: int
+    failed: int
+    loss_s: float | None = None
+    spread: float | None = None
+
+
+class LearnedLog(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A log that was learned from."""
+
+    name: str
+    digest: str
+
+
+class SkippedLog(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A log that was not."""
+
+    name: str
+    why: str
+
+
+class LearnedTable(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[learned]``: of a boat that was learned from its logs, from what and how well."""
+
+    version: int
+    stretches: int
+    left_out: dict[str, int] = {}
+    no_go_deg: Pair
+    vane_deg: Pair
+    compass_deg: Pair
+    leeway_deg: Pair
+    starboard_percent: Pair = (0.0, 0.0)
+    vane_width_deg: Pair | None = None
+    currents_mps: tuple[tuple[float, float, float, float], ...] = ()
+    """For each outing: east, its deviation, north, its deviation."""
+    log_factors: tuple[Pair, ...] = ()
+    angles: tuple[Angles, ...] = ()
+    tacks: tuple[Tacks, ...] = ()
+    findings: tuple[str, ...] = ()
+    logs: tuple[LearnedLog, ...] = ()
+    skipped: tuple[SkippedLog, ...] = ()
 
 
 class BoatFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -38,6 +102,7 @@ class BoatFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     made: str = ""
     """How, of what and when, in words."""
     boat: BoatOptions = msgspec.field(default_factory=BoatOptions)
+    learned: LearnedTable | None = None
 
 
 def read_boat_file(path: Path) -> BoatFile:

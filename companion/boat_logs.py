@@ -1,0 +1,499 @@
+"""Logs of a boat as one value each: voyage folders, .tlog, .BIN, CSV and NMEA 0183.
+
+What cannot be used is said and skipped: a log without wind, one of two boats, one that another program cut off. Time
+is the autopilot's own where there is one, because the clock of whoever wrote the log may jump.
+"""
+
+from __future__ import annotations
+
+import csv
+import datetime as dt
+import gzip
+import hashlib
+import io
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
+from companion.boat.log import BoatLog
+from companion.errors import InputError, unreadable
+from companion.geo import MPS_PER_KNOT
+from companion.mavlink.tlog import read_tlog
+from companion.mavlink.wire import Dialect
+from companion.messages import Mode
+from companion.telemetry.folder import TLOG, TRACK, parts
+
+LEAST_SAMPLES = 60
+STEP_S = 0.95  # samples are so far apart at least
+STALE_S = 2.5  # a reading older than this is none
+REBOOT_BACK_S = 5.0
+JUMP_S = 5.0  # the logger's clock against the autopilot's
+MOTOR_PERCENT = 5.0
+DEGREE_M = 111_195.0
+# The sheets are eased, the boat lies or is not a boat yet.
+AT_REST = frozenset({Mode.HOLD, Mode.LOITER, Mode.INITIALISING, Mode.DOCK})
+ENDINGS = (".tlog", ".bin", ".csv", ".nmea", ".txt", ".log")
+_NAN = math.nan
+_BIN_HEAD = bytes([0xA3, 0x95, 0x80])  # a log describes its own format first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadLog:
+    """A log as it was read: ``digest`` is of its bytes, ``system`` the autopilot's (None: it says none)."""
+
+    log: BoatLog
+    digest: str
+    system: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Skipped:
+    """A log that is of no use, and why."""
+
+    name: str
+    why: str
+
+
+@dataclass(slots=True)
+class _Rows:
+    """Samples in the making: what was read last of everything, and when [s]."""
+
+    rows: list[tuple[float, ...]] = field(default_factory=list)
+    now: dict[str, tuple[float, float]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    last_s: float = -math.inf
+    shift_s: float = 0.0
+
+    def take(self, t_s: float, **values: float) -> None:
+        for name, value in values.items():
+            self.now[name] = (t_s, float(value))
+
+    def of(self, t_s: float, name: str, stale_s: float = STALE_S) -> float:
+        at_s, value = self.now.get(name, (-math.inf, _NAN))
+        return value if abs(t_s - at_s) <= stale_s else _NAN
+
+    def sample(self, t_s: float) -> None:
+        """Keep what is known at ``t_s``, unless the last sample is hardly older."""
+        if t_s < self.last_s - REBOOT_BACK_S:
+            self.notes.append(f"its time steps back by {self.last_s - t_s:.0f} s: what follows is another outing")
+            self.last_s = -math.inf
+            if self.rows:
+                self.shift_s = self.rows[-1][0] - t_s + 3600.0
+        if t_s - self.last_s < STEP_S:
+            return
+        self.last_s = t_s
+        heading, ve, vn = self.of(t_s, "heading"), self.of(t_s, "ve"), self.of(t_s, "vn")
+        awa, aws = self.of(t_s, "awa"), self.of(t_s, "aws")
+        if not math.isfinite(awa + aws):
+            awa, aws = _apparent(heading, ve, vn, self.of(t_s, "twd"), self.of(t_s, "tws"))
+        self.rows.append(
+            (
+                t_s + self.shift_s,
+                ve,
+                vn,
+                heading,
+                awa,
+                aws,
+                self.of(t_s, "lon"),
+                self.of(t_s, "lat"),
+                self.of(t_s, "stw"),
+                self.of(t_s, "rest", 1e9),
+                self.of(t_s, "motor", 5.0),
+            )
+        )
+
+    def log(self, name: str) -> BoatLog:
+        """Return the log. Raises _Useless: it is none to learn from."""
+        table = np.array(self.rows, dtype=np.float64).reshape(len(self.rows), 11)
+        for what, column, remedy in (
+            ("the boat's speed", 1, "GLOBAL_POSITION_INT, or RMC"),
+            ("the heading", 3, "ATTITUDE, or HDG"),
+            ("the wind", 5, "WIND or the apparent wind (AppWndDir), or MWV"),
+        ):
+            known = int(np.sum(np.isfinite(table[:, column])))
+            if known < LEAST_SAMPLES:
+                raise _Useless(f"it tells {what} in {known} of {len(table)} samples ({remedy})")
+        lon, lat = table[:, 6], table[:, 7]
+        lat0 = float(np.nanmean(lat)) if bool(np.any(np.isfinite(lat))) else 0.0
+        lon0 = float(lon[np.isfinite(lon)][0]) if bool(np.any(np.isfinite(lon))) else 0.0
+        east = ((lon - lon0 + 180.0) % 360.0 - 180.0) * DEGREE_M * math.cos(math.radians(lat0))
+        return BoatLog(
+            name=name,
+            t_s=table[:, 0],
+            velocity_en_mps=table[:, 1:3],
+            heading_rad=table[:, 3],
+            awa_rad=table[:, 4],
+            aws_mps=table[:, 5],
+            position_en_m=np.column_stack([east, (lat - lat0) * DEGREE_M]),
+            stw_mps=table[:, 8],
+            is_sailed=~(table[:, 9] > 0.0),
+            has_motor_on=table[:, 10] > MOTOR_PERCENT,
+            notes=tuple(self.notes),
+        )
+
+
+class _Useless(Exception):  # noqa: N818 - it never leaves this module
+    pass
+
+
+def _apparent(heading: float, ve: float, vn: float, twd: float, tws: float) -> tuple[float, float]:
+    east, north = tws * math.sin(twd) + ve, tws * math.cos(twd) + vn
+    return math.remainder(math.atan2(east, north) - heading, 2.0 * math.pi), math.hypot(east, north)
+
+
+def logs_under(names: list[Path]) -> list[Path]:
+    """Return the logs among files and folders: a folder is a voyage's, or holds voyages and logs.
+
+    Raises:
+        InputError: there is none of that name.
+    """
+    found: list[Path] = []
+    for name in names:
+        if not name.exists():
+            raise InputError(str(name), "", "no such file or folder", "give voyage folders, .tlog, .BIN, CSV or NMEA")
+        found += [name] if name.is_file() else _in_folder(name)
+    return found
+
+
+def _in_folder(folder: Path) -> list[Path]:
+    if _is_voyage(folder):
+        return [folder]
+    inside = sorted(folder.iterdir())
+    found = [p for p in inside if p.is_file() and p.suffix.lower() in ENDINGS]
+    for path in inside:
+        if path.is_dir() and not path.is_symlink():
+            found += _in_folder(path)
+    return found
+
+
+def _is_voyage(folder: Path) -> bool:
+    return bool(parts(folder / TLOG)) or (folder / TRACK).is_file()
+
+
+def read_logs(
+    paths: list[Path], tell: Callable[[int, str], None] = lambda _count, _name: None
+) -> tuple[list[ReadLog], list[Skipped]]:
+    """Return the logs that can be read, each one once, and those that cannot; ``tell`` hears of each before it."""
+    read: list[ReadLog] = []
+    skipped: list[Skipped] = []
+    digests: dict[str, str] = {}
+    system: int | None = None
+    for count, path in enumerate(paths):
+        tell(count, str(path))
+        try:
+            one = _read(path)
+        except _Useless as why:
+            skipped.append(Skipped(name=str(path), why=str(why)))
+            continue
+        except InputError as error:
+            skipped.append(Skipped(name=str(path), why=error.problem))
+            continue
+        if one.digest in digests:
+            skipped.append(Skipped(name=str(path), why=f"it is the same as {digests[one.digest]}"))
+        elif system is not None and one.system is not None and one.system != system:
+            skipped.append(
+                Skipped(name=str(path), why=f"it is of system {one.system}, and those before it are of system {system}")
+            )
+        else:
+            digests[one.digest] = str(path)
+            system = one.system if system is None else system
+            read.append(one)
+    return read, skipped
+
+
+def _read(path: Path) -> ReadLog:
+    if path.is_dir():
+        heard = [p for p in parts(path / TLOG) if p.stat().st_size > 0]
+        files = heard or [path / TRACK]
+    else:
+        files = [path]
+    data = [_bytes(p) for p in files]
+    digest = hashlib.sha256(b"".join(data)).hexdigest()[:16]
+    rows, system = _Rows(), None
+    ending = files[0].name.lower().removesuffix(".gz").rpartition(".")[2]
+    if ending == "tlog" or TLOG in files[0].name:
+        system = _tlog(files, rows)
+    elif ending == "bin":
+        _bin(files[0], data[0], rows)
+    elif ending == "csv":
+        _csv(data[0], rows)
+    else:
+        _nmea(data[0], rows)
+    return ReadLog(log=rows.log(str(path)), digest=digest, system=system)
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise unreadable(str(path), error) from error
+
+
+# ------------------------------------------------------------------------------------------ MAVLink
+_WANTED = frozenset(
+    {
+        wire.MAVLINK_MSG_ID_HEARTBEAT,
+        wire.MAVLINK_MSG_ID_ATTITUDE,
+        wire.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+        wire.MAVLINK_MSG_ID_WIND,
+        wire.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT,
+        wire.MAVLINK_MSG_ID_VFR_HUD,
+    }
+)
+
+
+def _tlog(files: list[Path], rows: _Rows) -> int | None:
+    dialect = Dialect(None)
+    systems: set[int] = set()
+    offset_s: float | None = None
+    last_boot_s, jumps, most_s = -math.inf, 0, 0.0
+    for record in (r for file in files for r in read_tlog(file)):
+        frame = record.frame
+        number = frame[5] if frame[0] == 0xFE else frame[7] | frame[8] << 8 | frame[9] << 16
+        if number not in _WANTED:
+            continue
+        try:
+            message = dialect.decode(bytearray(frame))
+        except wire.MAVError:
+            continue
+        if message.get_srcComponent() != 1:
+            continue
+        kind = message.get_type()
+        if kind == "HEARTBEAT" and message.autopilot != wire.MAV_AUTOPILOT_INVALID:
+            systems.add(message.get_srcSystem())
+            if len(systems) > 1:
+                said = " and ".join(str(s) for s in sorted(systems))
+                raise _Useless(f"it tells of two boats, systems {said}: record them apart")
+        heard_s = record.unix_us / 1e6
+        boot_ms = getattr(message, "time_boot_ms", None)
+        if boot_ms is not None:
+            boot_s = boot_ms / 1e3
+            if offset_s is None or boot_s < last_boot_s - REBOOT_BACK_S:
+                offset_s = heard_s - boot_s
+            elif kind == "GLOBAL_POSITION_INT" and abs(heard_s - boot_s - offset_s) > JUMP_S:
+                jumps, most_s = jumps + 1, max(most_s, abs(heard_s - boot_s - offset_s))
+            last_boot_s = boot_s
+        t_s = heard_s if offset_s is None else last_boot_s + offset_s
+        _message(t_s, kind, message, rows)
+    if jumps:
+        rows.notes.append(f"the logger's clock jumps, by up to {most_s:.0f} s: the autopilot's own is taken")
+    return next(iter(systems), None)
+
+
+def _message(t_s: float, kind: str, message: Any, rows: _Rows) -> None:
+    if kind == "ATTITUDE":
+        rows.take(t_s, heading=message.yaw)
+    elif kind == "WIND":
+        rows.take(t_s, twd=math.radians(message.direction), tws=message.speed)
+    elif kind == "NAMED_VALUE_FLOAT":
+        if message.name == "AppWndDir":
+            rows.take(t_s, awa=math.radians(message.value))
+        elif message.name == "AppWndSpd":
+            rows.take(t_s, aws=message.value)
+    elif kind == "VFR_HUD":
+        rows.take(t_s, motor=message.throttle)
+    elif kind == "HEARTBEAT":
+        armed = bool(message.base_mode & wire.MAV_MODE_FLAG_SAFETY_ARMED)
+        rows.take(t_s, rest=float(not armed or message.custom_mode in AT_REST))
+    elif kind == "GLOBAL_POSITION_INT":
+        if message.lat or message.lon:
+            rows.take(t_s, lat=message.lat / 1e7, lon=message.lon / 1e7)
+        rows.take(t_s, ve=message.vy / 100.0, vn=message.vx / 100.0)
+        rows.sample(t_s)
+
+
+def _bin(path: Path, data: bytes, rows: _Rows) -> None:
+    """Read an autopilot's own log. What is cut off at its end is left out, and said."""
+    from pymavlink import DFReader
+
+    if data[:3] != _BIN_HEAD:
+        raise _Useless("it is no .BIN log: it does not begin as one")
+    try:
+        log = DFReader.DFReader_binary(str(path))
+    except Exception as error:  # it raises what its parsing happens to meet
+        raise _Useless(f"it is no .BIN log ({str(error)[:60] or type(error).__name__})") from None
+    try:
+        _bin_messages(log, rows)
+    finally:
+        log.close()
+
+
+def _bin_messages(log: Any, rows: _Rows) -> None:
+    armed, mode = True, -1
+    offset_s: float | None = None
+    while True:
+        try:
+            m = log.recv_match(type=["ATT", "XKF1", "POS", "GPS", "WIND", "MODE", "ARM", "THR"])
+        except Exception:
+            rows.notes.append("it is cut off or damaged: what is before that is used")
+            break
+        if m is None:
+            break
+        kind, t_s = m.get_type(), m.TimeUS / 1e6
+        if kind == "GPS":
+            if offset_s is None and m.Status >= 3 and m.GWk > 0:
+                offset_s = 315_964_800.0 + m.GWk * 604_800.0 + m.GMS / 1e3 - 18.0 - t_s
+            if m.Status >= 3:
+                course = math.radians(m.GCrs)
+                rows.take(t_s, gps_ve=m.Spd * math.sin(course), gps_vn=m.Spd * math.cos(course))
+        elif kind == "ATT":
+            rows.take(t_s, heading=math.radians(m.Yaw))
+            if not math.isfinite(rows.of(t_s, "ve")):
+                rows.take(t_s, ve=rows.of(t_s, "gps_ve"), vn=rows.of(t_s, "gps_vn"))
+            rows.sample(t_s)
+        elif kind == "XKF1":
+            if getattr(m, "C", 0) == 0:
+                rows.take(t_s, ve=m.VE, vn=m.VN)
+        elif kind == "POS":
+            rows.take(t_s, lat=m.Lat, lon=m.Lng)
+        elif kind == "WIND":
+            rows.take(t_s, awa=math.radians(m.DirApp), aws=m.SpdApp)
+        elif kind == "THR":
+            rows.take(t_s, motor=abs(m.ThrOut))
+        else:
+            armed = bool(m.ArmState) if kind == "ARM" else armed
+            mode = int(m.ModeNum) if kind == "MODE" else mode
+            rows.take(t_s, rest=float(not armed or mode in AT_REST))
+    if offset_s is not None:
+        rows.rows = [(row[0] + offset_s, *row[1:]) for row in rows.rows]
+
+
+# ---------------------------------------------------------------------------------------------- CSV
+# A column's name without its unit, and the unit's factor.
+_UNITS = {"mps": 1.0, "kn": MPS_PER_KNOT, "kt": MPS_PER_KNOT, "kts": MPS_PER_KNOT, "kmh": 1.0 / 3.6}
+_SPEEDS = ("sog", "aws", "tws", "stw")
+_ANGLES = ("heading", "cog", "awa", "twd")
+
+
+def _csv(data: bytes, rows: _Rows) -> None:
+    """Read columns ``t_s`` (or ``time``, ISO 8601), ``heading_deg, cog_deg, sog_mps`` or ``sog_kn`` and their like."""
+    text = (
+        gzip.decompress(data).decode("utf-8", "replace") if data[:2] == b"\x1f\x8b" else data.decode("utf-8", "replace")
+    )
+    reader = csv.DictReader(io.StringIO(text.lstrip("\ufeff")))
+    names = {(n or "").strip().lower(): n for n in reader.fieldnames or []}
+    if not {"t_s", "time"} & set(names):
+        raise _Useless("its first line names no column t_s or time")
+    for row in reader:
+        t_s = _time(row.get(names["t_s"]) if "t_s" in names else row.get(names["time"]))
+        if t_s is None:
+            continue
+        found: dict[str, float] = {}
+        for name, column in names.items():
+            what, _, unit = name.rpartition("_")
+            value = _number(row.get(column))
+            if value is None:
+                continue
+            if what in _SPEEDS and unit in _UNITS:
+                found[what] = value * _UNITS[unit]
+            elif what in _ANGLES and unit == "deg":
+                found[what] = math.radians(value)
+            elif what in {"lat", "lon"} and unit == "deg":
+                found[what] = value
+        mode = (row.get(names.get("mode", "")) or "").strip().upper()
+        if mode:
+            found["rest"] = float(mode in {m.name for m in AT_REST})
+        if "sog" in found and "cog" in found:
+            sog, cog = found.pop("sog"), found.pop("cog")
+            found |= {"ve": sog * math.sin(cog), "vn": sog * math.cos(cog)}
+        rows.take(t_s, **found)
+        rows.sample(t_s)
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        value = float(text or "")
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _time(text: str | None) -> float | None:
+    value = _number(text)
+    if value is not None or not text:
+        return value
+    try:
+        at = dt.datetime.fromisoformat(text.strip())
+    except ValueError:
+        return None
+    return (at if at.tzinfo else at.replace(tzinfo=dt.UTC)).timestamp()
+
+
+# --------------------------------------------------------------------------------------------- NMEA
+def _sentences(text: str) -> Iterator[list[str]]:
+    for line in text.splitlines():
+        start = line.find("$")
+        body, star, told = line[start + 1 :].partition("*") if start >= 0 else ("", "", "")
+        if not body or len(body) < 6:
+            continue
+        if star:
+            wanted = 0
+            for character in body:
+                wanted ^= ord(character) & 0xFF
+            try:
+                if int(told.strip()[:2], 16) != wanted:
+                    continue
+            except ValueError:
+                continue
+        yield body.split(",")
+
+
+def _nmea(data: bytes, rows: _Rows) -> None:
+    t_s: float | None = None
+    for cells in _sentences(data.decode("latin-1")):
+        kind = cells[0][-3:]
+        value = [_number(c) for c in cells]
+        n = len(cells)
+        if kind == "RMC" and n > 9:
+            t_s = _rmc_time(cells) if cells[2] == "A" else None
+            if t_s is None or value[7] is None:
+                continue
+            rows.sample(t_s)
+            course = math.radians(value[8] or 0.0)
+            sog = value[7] * MPS_PER_KNOT
+            rows.take(t_s, ve=sog * math.sin(course), vn=sog * math.cos(course))
+            lat, lon = _degrees(cells[3], cells[4]), _degrees(cells[5], cells[6])
+            if lat is not None and lon is not None:
+                rows.take(t_s, lat=lat, lon=lon)
+            if n > 11 and value[10] is not None and "variation" not in rows.now:
+                rows.take(t_s, variation=math.radians(value[10] * (-1.0 if cells[11] == "W" else 1.0)))
+        elif t_s is None:
+            continue
+        elif kind == "HDT" and n > 1 and value[1] is not None:
+            rows.take(t_s, heading=math.radians(value[1]))
+        elif kind in {"HDG", "HDM"} and n > 1 and value[1] is not None:
+            variation = rows.now.get("variation", (0.0, 0.0))[1]
+            if kind == "HDG" and n > 5 and value[4] is not None:
+                variation = math.radians(value[4] * (-1.0 if cells[5] == "W" else 1.0))
+            rows.take(t_s, heading=math.radians(value[1]) + variation)
+        elif kind == "VHW" and n > 6 and value[5] is not None:
+            rows.take(t_s, stw=value[5] * MPS_PER_KNOT)
+        elif kind == "MWV" and n > 5 and cells[2] == "R" and value[1] is not None and value[3] is not None:
+            unit = {"N": MPS_PER_KNOT, "M": 1.0, "K": 1.0 / 3.6}.get(cells[4], _NAN)
+            rows.take(t_s, awa=math.radians(math.remainder(value[1], 360.0)), aws=value[3] * unit)
+        elif kind == "RPM" and n > 3 and cells[1] == "E" and value[3] is not None:
+            rows.take(t_s, motor=100.0 if value[3] > 300.0 else 0.0)
+    if t_s is not None:
+        rows.sample(t_s)
+
+
+def _rmc_time(cells: list[str]) -> float | None:
+    try:
+        at = dt.datetime.strptime(cells[9] + cells[1].partition(".")[0], "%d%m%y%H%M%S").replace(tzinfo=dt.UTC)
+    except ValueError:
+        return None
+    fraction = _number("0." + cells[1].partition(".")[2]) if "." in cells[1] else 0.0
+    return at.timestamp() + (fraction or 0.0)
+
+
+def _degrees(text: str, side: str) -> float | None:
+    value = _number(text)
+    if value is None:
+        return None
+    whole = math.floor(value / 100.0)
+    return (whole + (value - 100.0 * whole) / 60.0) * (-1.0 if side in {"S", "W"} else 1.0)

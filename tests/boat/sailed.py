@@ -1,0 +1,108 @@
+"""A boat that is simulated second by second for its logs: the truth is known, and the model is not the learner's."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from companion.boat import Polar, Sizes
+from companion.boat.boat import coefficient_of, leeway_at
+from companion.boat.guess import guessed_polar
+from companion.boat.log import BoatLog
+
+SIZES = Sizes(length_m=1.5, displacement_kg=20.0, sail_area_m2=0.9)
+TAU_S = 5.0  # she gathers way so
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """What the boat is that the learner does not know; angles in degrees, speeds in m/s."""
+
+    scale: float = 1.0
+    beat: float = 1.0  # of the polar, at 45 degrees; 1 at 90
+    run: float = 1.0  # at 150
+    leeway_deg: float = 0.0
+    vane_deg: float = 0.0
+    compass_deg: float = 0.0
+    current_en_mps: tuple[float, float] = (0.0, 0.0)
+    tack_s: float = 3.0
+    tack_speed: float = 0.5  # what is left of the speed when she is through
+    fails: float = 0.0
+
+    def speed_mps(self, polar: Polar, twa_rad: float, tws_mps: float) -> float:
+        """Return how fast she really is."""
+        shape = float(np.interp(abs(math.degrees(twa_rad)), [45.0, 90.0, 150.0], [self.beat, 1.0, self.run]))
+        return self.scale * shape * polar.speed_mps(twa_rad, tws_mps)
+
+
+def sailed(
+    truth: Truth,
+    *,
+    hours: float,
+    seed: int,
+    tws_mps: float = 4.0,
+    angles_deg: tuple[float, ...] = (46.0, -46.0, 46.0, -46.0, 90.0, -90.0, 150.0, -150.0, 120.0, -120.0, 65.0, -65.0),
+    leg_s: float = 120.0,
+    t0_s: float = 1.75e9,
+    name: str = "sailed",
+) -> BoatLog:
+    """Return the log of an outing: legs of ``leg_s`` at these angles, by the vane as it is, in a wandering wind."""
+    rng = np.random.default_rng(seed)
+    polar = guessed_polar(SIZES)
+    n = int(hours * 3600.0)
+    k = coefficient_of(math.radians(truth.leeway_deg))
+    shift = gust = 0.0
+    bow, speed, place = 0.0, 0.0, np.zeros(2)
+    irons_until, last = -1.0, 1.0
+    rows = np.zeros((n, 9))
+    for i in range(n):
+        shift += -shift / 300.0 + math.radians(6.0) * math.sqrt(2.0 / 300.0) * rng.standard_normal()
+        gust += -gust / 60.0 + 0.10 * math.sqrt(2.0 / 60.0) * rng.standard_normal()
+        twd, tws = shift, tws_mps * math.exp(gust)
+        wanted = math.radians(angles_deg[int(i / leg_s) % len(angles_deg)])
+        target = twd - wanted  # bow so that the wind is at ``wanted`` to starboard
+        off = (target - bow + math.pi) % (2.0 * math.pi) - math.pi
+        rate = 0.5 * math.pi / truth.tack_s
+        turn = float(np.clip(off + math.radians(1.5) * rng.standard_normal(), -rate, rate))
+        if i < irons_until:
+            turn = 0.0
+        bow += turn
+        twa = (twd - bow + math.pi) % (2.0 * math.pi) - math.pi
+        if twa * last < 0.0 and abs(twa) < 1.0:
+            if truth.fails and rng.random() < truth.fails:
+                bow, twa, irons_until = twd - 0.15 * last, 0.15 * last, i + 10.0
+            else:
+                speed *= truth.tack_speed
+        last = math.copysign(1.0, twa)
+        aim = truth.speed_mps(polar, twa, tws)
+        speed += (aim * math.exp(0.03 * rng.standard_normal()) - speed) / TAU_S
+        slip = math.copysign(leeway_at(k, twa, tws, max(speed, 0.1)), -twa)
+        over = speed / math.cos(slip) * np.array([math.sin(bow + slip), math.cos(bow + slip)])
+        ground = over + np.array(truth.current_en_mps)
+        place = place + ground
+        # the air moves with the ground's wind less the stream: ``tws`` is over the water, as the polar's
+        felt = tws * np.array([math.sin(twd), math.cos(twd)]) + over
+        aws, awd = float(np.hypot(*felt)), math.atan2(felt[0], felt[1])
+        rows[i] = (
+            t0_s + i,
+            *(ground + 0.03 * rng.standard_normal(2)),
+            bow + math.radians(truth.compass_deg + rng.standard_normal()),
+            awd - bow + math.radians(truth.vane_deg + 2.0 * rng.standard_normal()),
+            aws * (1.0 + 0.03 * rng.standard_normal()),
+            *place,
+            speed,
+        )
+    return BoatLog(
+        name=name,
+        t_s=rows[:, 0],
+        velocity_en_mps=rows[:, 1:3],
+        heading_rad=rows[:, 3],
+        awa_rad=(rows[:, 4] + math.pi) % (2.0 * math.pi) - math.pi,
+        aws_mps=rows[:, 5],
+        position_en_m=rows[:, 6:8],
+        stw_mps=np.full(n, math.nan),
+        is_sailed=np.ones(n, dtype=np.bool_),
+        has_motor_on=np.zeros(n, dtype=np.bool_),
+    )
