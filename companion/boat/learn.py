@@ -45,7 +45,9 @@ BLOCK_S = 1200.0
 # Noise of one stretch; speeds below ``SLOW_MPS`` are worth less. The shares are then scaled to what is seen.
 SPEED_NOISE, COURSE_NOISE, SLOW_MPS = 0.06, math.radians(2.5), 0.06
 FREEDOM = 4.0  # of Student's distribution
-ROUNDS = 12
+ROUNDS, CLOSE = 24, 1e-4
+EASED = (8.0, 8.0, 4.0, 4.0, 2.0, 2.0)  # times the noise, in the first rounds
+LEAST_AHEAD = 0.3  # of the speed: more leeway than that is no leeway
 STEP = 1e-4  # of numerical derivatives: radians, m/s
 OWN = 4  # unknowns of the boat beside the field
 LEAST_STRETCHES = 6
@@ -232,24 +234,25 @@ class _Solver:
             + nuisance[3] * 0.5 * np.sign(twa) * (1.0 + np.cos(twa))
         )
         compass, leeway = nuisance[1], nuisance[2]
-        side = np.sign(twa) * _leeway(
-            coefficient_of(max(leeway, 0.0)), self.s.aws_mps, self.s.awa_rad - nuisance[0], np.exp(log_speed)
-        )
-        if leeway < 0.0:
-            side = side + leeway * np.sign(twa)
-        off = wrapped(np.arctan2(u[:, 0], u[:, 1]) - self.s.heading_rad + compass) + side
+        course = wrapped(np.arctan2(u[:, 0], u[:, 1]) - self.s.heading_rad + compass)
+        # Leeway by the speed ahead that is seen: by what is expected of it the solution would chase its own tail.
+        ahead = speed * np.maximum(np.cos(course), LEAST_AHEAD)
+        lee = _leeway_at(coefficient_of(max(leeway, 0.0)), twa, tws, ahead)
+        off = course + np.sign(twa) * (lee + min(leeway, 0.0))
         log = np.log(np.maximum(self.s.stw_mps, 1e-3)) - x.factor[self.s.outing] - log_speed
         # The polar's speed is along the bow; a boat that slips goes a little faster than that over the water.
-        return np.column_stack([np.log(speed) + np.log(np.maximum(np.cos(side), 0.3)) - log_speed, off, log])
+        return np.column_stack([np.log(speed) + np.log(np.maximum(np.cos(lee), LEAST_AHEAD)) - log_speed, off, log])
 
     def solve(self) -> tuple[_State, Floats, tuple[float, float]]:
         """Return the unknowns, their covariance and the noise of a stretch."""
         x, noise = self.start(), (SPEED_NOISE, COURSE_NOISE)
-        for _ in range(ROUNDS):
-            normal, right, noise = self._normal(x, noise)
+        for turn in range(ROUNDS):
+            # Loose at first: a boat far from its guess, in a stream, has a second solution nearby, of a false stream.
+            eased = noise if turn >= len(EASED) else (EASED[turn] * SPEED_NOISE, EASED[turn] * COURSE_NOISE)
+            normal, right, noise = self._normal(x, eased)
             step = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
             x = self._moved(x, step)
-            if float(np.max(np.abs(step))) < 1e-5:
+            if turn >= len(EASED) and float(np.max(np.abs(step))) < CLOSE:
                 break
         normal, _, noise = self._normal(x, noise)
         return x, np.asarray(np.linalg.inv(normal), dtype=np.float64), noise
@@ -343,11 +346,12 @@ class _Solver:
 _FINE_TWA, _FINE_TWS = np.arange(0.0, 181.0, 2.0), np.arange(0.25, 30.1, 0.25)
 
 
-def _leeway(coefficient: float, aws_mps: Floats, awa_rad: Floats, speed_mps: Floats) -> Floats:
-    """Return ``companion.boat.boat.leeway_rad`` of arrays."""
-    push = coefficient * aws_mps**2 * np.abs(np.sin(awa_rad))
-    side = 2.0 * push / (np.sqrt(speed_mps**2 + 4.0 * CROSS_FLOW * push) + speed_mps + 1e-9)
-    return np.arctan2(side, speed_mps)
+def _leeway_at(coefficient: float, twa_rad: Floats, tws_mps: Floats, ahead_mps: Floats) -> Floats:
+    """Return ``companion.boat.boat.leeway_at`` of arrays."""
+    across, along = tws_mps * np.sin(twa_rad), tws_mps * np.cos(twa_rad) + ahead_mps
+    push = coefficient * np.hypot(across, along) * np.abs(across)
+    side = 2.0 * push / (np.sqrt(ahead_mps**2 + 4.0 * CROSS_FLOW * push) + ahead_mps + 1e-9)
+    return np.arctan2(side, ahead_mps)
 
 
 def _scatter(r: Floats, slow: Floats, least: float, now: float) -> float:

@@ -54,7 +54,7 @@ def test_the_error_is_halved_within_ten_minutes_and_again_by_an_hour():
 
 
 def test_what_is_promised_of_the_error_holds():
-    """Over boats that differ in everything: the 80 % band of the speeds holds 80 % of the truth, or more."""
+    """Over boats that differ in everything: the bands hold the truth, and no boat is taken for another one in a stream."""
     rng = np.random.default_rng(5)
     inside, wide, z = [], [], []
     for seed in range(24):
@@ -67,11 +67,17 @@ def test_what_is_promised_of_the_error_holds():
             compass_deg=float(rng.uniform(-5.0, 5.0)),
             current_en_mps=tuple(rng.uniform(-0.3, 0.3, 2)),
         )
-        boat = learned(truth, 0.75, 100 + seed)
+        boat = learned(truth, 0.75, seed)
         error, promised = off(boat, truth)
         inside += (np.abs(error) < 1.2816 * promised).tolist()
         wide += (np.abs(error) < 1.96 * promised).tolist()
-        for known, true in ((boat.vane, truth.vane_deg), (boat.compass, truth.compass_deg)):
+        # Reckoned by the speed that was expected, not seen, one boat in forty ended in a stream of 1 m/s and leeway of 30.
+        assert np.abs(error).max() < 0.1
+        for known, true in (
+            (boat.vane, truth.vane_deg),
+            (boat.compass, truth.compass_deg),
+            (boat.leeway, truth.leeway_deg),
+        ):
             z.append((math.degrees(known.mean) - true) / math.degrees(known.sd))
     assert np.mean(inside) > 0.78
     assert np.mean(wide) > 0.92
