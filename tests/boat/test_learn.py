@@ -54,7 +54,7 @@ def test_the_error_is_halved_within_ten_minutes_and_again_by_an_hour():
 
 
 def test_what_is_promised_of_the_error_holds():
-    """Over boats that differ in everything: the bands hold the truth, and no boat is taken for another one in a stream."""
+    """Over boats that differ in everything: the bands hold, and none is taken for another in a stream."""
     rng = np.random.default_rng(5)
     inside, wide, z = [], [], []
     for seed in range(24):
@@ -71,7 +71,7 @@ def test_what_is_promised_of_the_error_holds():
         error, promised = off(boat, truth)
         inside += (np.abs(error) < 1.2816 * promised).tolist()
         wide += (np.abs(error) < 1.96 * promised).tolist()
-        # Reckoned by the speed that was expected, not seen, one boat in forty ended in a stream of 1 m/s and leeway of 30.
+        # With leeway by the expected speed one of these ended in a stream of 1 m/s, her leeway 30 degrees.
         assert np.abs(error).max() < 0.1
         for known, true in (
             (boat.vane, truth.vane_deg),
