@@ -1,7 +1,7 @@
 """What a boat can probably do that nobody has sailed yet, from its length, displacement and sail area.
 
 Speeds are those of rated yachts, by Froude's law: two boats of one shape are as fast for the root of their length in a
-wind that is as strong for it. On rated boats of 5.5 to 28 m, half of them fitted and half tested, that leaves 6.3 % of
+wind that is as strong for it. On rated boats of 5.5 to 28 m, half of them fitted and half tested, that leaves 6.2 % of
 error (root mean square of the logarithm) and next to no trend with length. A robot of a metre or two is outside that
 range, has no crew and no clean bottom, and its vane is low: ``SPEED_ERROR_PERCENT`` stands for that.
 
