@@ -300,11 +300,14 @@ class AssumedWind:
     speed_mps: float
     spread_deg: float = 0.0
 
-    def sigma(self) -> dict[str, object]:
-        """Return its uncertainty as a planning problem has it."""
-        if self.spread_deg <= 0.0:
+    def sigma(self, no_go_error_rad: float = 0.0) -> dict[str, object]:
+        """Return its uncertainty as a planning problem has it, and with it that of the boat's no-go zone."""
+        spread_deg = self.spread_deg
+        if no_go_error_rad > 0.0:
+            spread_deg = math.hypot(spread_deg, math.degrees(no_go_error_rad))
+        if spread_deg <= 0.0:
             return {"model": "none"}
-        return {"model": "kalman", "sigma0_deg": self.spread_deg, "growth_deg_per_sqrt_s": 0.0}
+        return {"model": "kalman", "sigma0_deg": spread_deg, "growth_deg_per_sqrt_s": 0.0}
 
 
 def leg_problem(
@@ -342,7 +345,7 @@ def leg_problem(
             "wind": {
                 "from_deg": wind.from_deg,
                 "speed_mps": wind.speed_mps,
-                "sigma": wind.sigma(),
+                "sigma": wind.sigma(boat.no_go_error_rad),
                 **({"strength": assumed(wind.speed_mps).to_dict()} if sails else {}),
             },
             "boat": {**boat.problem_boat(wind.speed_mps), **({"speeds": boat.problem_speeds()} if sails else {})},

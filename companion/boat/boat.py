@@ -53,6 +53,7 @@ class Boat:
         max_tws_mps: More wind than this the boat is not to be out in [m/s]; None: there is no such limit.
         min_tws_mps: In less than this the boat makes no way [m/s].
         tack_fails: The chance that a tack fails [0..1), before any was seen; 0: they are not reckoned to fail.
+        no_go_error_rad: How far ``no_go_half_rad`` may be off, as a deviation [rad, 0..0.5].
         speed_error: How far all speeds of the polar may be off together, as the deviation of the logarithm [0..1].
         leeway_rad: On a beat, the apparent wind 30 degrees off its bow and three times as fast as it; see ``leeway``.
     """
@@ -72,6 +73,7 @@ class Boat:
     min_tws_mps: float | None = None
     tack_fails: float = 0.0
     speed_error: float = 0.0
+    no_go_error_rad: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.no_go_half_rad < math.pi:
@@ -86,6 +88,8 @@ class Boat:
                 raise ValueError(f"{name} is {value}; it must be 0 s or more")
         if not 0.0 <= self.leeway_rad < math.pi / 4.0:
             raise ValueError(f"leeway of {math.degrees(self.leeway_rad):.1f}° is outside 0..45°")
+        if not 0.0 <= self.no_go_error_rad <= 0.5:
+            raise ValueError(f"no_go_error_rad is {self.no_go_error_rad}; it must be from 0 to 0.5")
         if not 0.0 <= self.speed_error <= 1.0:
             raise ValueError(f"speed_error is {self.speed_error}; it must be from 0 to 1")
         if not 0.0 <= self.tack_fails < 1.0:

@@ -48,6 +48,7 @@ def learned_text(
         round(deg(lesson.no_go.mean), 1),
         f"deviation {deg(lesson.no_go.sd):.1f}" + ("" if lesson.no_go_is_sailed else ", as it was believed"),
     )
+    learned("no_go_error_deg", round(deg(lesson.no_go.sd), 1), "its share of the risk that a plan may take")
     if lesson.turn_rate is not None:
         rate = min(max(deg(lesson.turn_rate.mean), LEAST_TURN_DEG_S), MOST_TURN_DEG_S)
         learned("turn_rate_deg_s", round(rate, 1), f"deviation {deg(lesson.turn_rate.sd):.1f}")

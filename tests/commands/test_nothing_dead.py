@@ -165,6 +165,7 @@ OTHER = {
         "speed_error_percent": 20.0,
         "polar": 2.0,
         "no_go_half_deg": 50.0,
+        "no_go_error_deg": 3.0,
         "max_twa_deg": 170.0,
         "turn_rate_deg_s": 20.0,
         "tack_loss_s": 6.0,

@@ -269,6 +269,8 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     speed_error_percent: Annotated[float, Meta(ge=0.0, le=60.0)] = 0.0
     """How far all speeds of the polar may be off together [%, standard deviation]: arrivals spread by it."""
     no_go_half_deg: Annotated[float, Meta(ge=0.0, lt=90.0)] = 47.0
+    no_go_error_deg: Annotated[float, Meta(ge=0.0, le=15.0)] = 0.0
+    """How far that half angle may be off [standard deviation]: it has its share in ``[risk]``, beside the wind's."""
     max_twa_deg: Annotated[float, Meta(gt=90.0, le=180.0)] = 180.0
     turn_rate_deg_s: Annotated[float, Meta(gt=0.0, le=360.0)] = 30.0
     tack_loss_s: NonNegative = 4.0

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -50,6 +51,7 @@ NOTCH = 2.0  # radius of the notch as a multiple of what the start lacks: room t
 LEG_SAVING = 8e-5  # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
 HAIR_M = 0.2  # a repaired point stands this far clear of the margin it was repaired for
 PIECE_M = 2000.0  # a geodesic is off a chord of this length by 8 cm at most, at 75 degrees of latitude too
+MOST_LEVEL = 0.9999  # of an interval: beyond it no normal distribution tells
 _EARTH = Geod(ellps="WGS84")
 
 
@@ -107,6 +109,20 @@ def wind_part(
         },
         "strength": strength_of(forecast, after_s=after_s, is_known=is_known).to_dict(),
     }
+
+
+def with_no_go_error(forecast: WindForecast, error_rad: float) -> WindForecast:
+    """Return the forecast with the doubt of the no-go zone's half angle in its direction's spread.
+
+    What the boat's zone may be wider by keeps it out of the wind no less than a shift does, and has nothing to do with
+    one: deviations add by their squares, and so do the half widths that they keep within a probability.
+    """
+    z = np.array([NormalDist().inv_cdf(0.5 + 0.5 * min(float(level), MOST_LEVEL)) for level in forecast.level])
+    return replace(
+        forecast,
+        sigma_twd_rad=np.minimum(np.hypot(forecast.sigma_twd_rad, error_rad), math.pi),
+        half_width_rad=np.minimum(np.hypot(forecast.half_width_rad, z * error_rad), math.pi),
+    )
 
 
 def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, twd_from_rad: float | None) -> Start:
@@ -256,6 +272,8 @@ def problem_dict(
             speed_mps=voyage.boat.polar.speed_mps(half_rad, speed),
             leeway_rad=voyage.boat.made_good_rad(half_rad, speed) - half_rad,
         )
+    if voyage.boat.no_go_error_rad > 0.0:
+        forecast = with_no_go_error(forecast, voyage.boat.no_go_error_rad)
     wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s, is_known=is_wind_known)
     water: dict[str, Any] = {}
     if current.is_significant:
