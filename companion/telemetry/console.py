@@ -28,8 +28,9 @@ from companion.geo.angles import wrap_two_pi
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.program import control
 from companion.skipper.planning import next_tack
-from companion.skipper.step import Announce, Phase
+from companion.skipper.step import Announce, Phase, Snapshot
 from companion.telemetry.folder.records import sigma_ahead_rad
+from companion.telemetry.status import CLOCK_OFF_S, unix_of_boat
 from companion.words import one_line, printable
 
 MOST_WAITING = 64  # lines; a reader that is this far behind misses the next
@@ -223,9 +224,7 @@ class ProgressLine:
         if status.alert_code in {DISK, GONE}:
             text += f" | {status.alert_text}"
         said, self._notes = self._notes, []
-        said += [
-            self._said(step.snapshot.t_s, a) for a in step.actions if isinstance(a, Announce) and a.severity <= LOUD
-        ]
+        said += [self._said(step.snapshot, a) for a in step.actions if isinstance(a, Announce) and a.severity <= LOUD]
         t_s, phase = step.snapshot.t_s, step.state.phase.value
         if self._is_terminal:
             columns = min(COLUMNS_MOST, shutil.get_terminal_size((COLUMNS_MOST, 24)).columns) - 1
@@ -245,8 +244,11 @@ class ProgressLine:
             self._stream.write("".join(f"{line}\n" for line in said))
             self._stream.flush()
 
-    def _said(self, t_s: float, announced: Announce) -> str:
-        clock = datetime.fromtimestamp(self._epoch_s + t_s, UTC).strftime("%H:%M:%S")
+    def _said(self, snapshot: Snapshot, announced: Announce) -> str:
+        unix_s, boat_s = self._epoch_s + snapshot.t_s, unix_of_boat(snapshot, snapshot.t_s)
+        if boat_s is not None and abs(boat_s - unix_s) >= CLOCK_OFF_S:  # as the page's time of day
+            unix_s = boat_s
+        clock = datetime.fromtimestamp(unix_s, UTC).strftime("%H:%M:%S")
         loud = f"{announced.severity.name}: " if announced.severity <= Severity.WARNING else ""
         return f"{clock} {loud}{one_line(announced.text)}"
 

@@ -85,6 +85,22 @@ def test_the_voyages_picture(sailed, drawn, tmp_path):
     assert "50°49.02' N 1°18.60' W" in title
 
 
+def test_a_voyage_is_told_by_the_autopilots_clock_where_the_computers_was_another(sailed, tmp_path, capsys):
+    folder = tmp_path / "v"
+    shutil.copytree(sailed, folder)
+    decisions = folder / "decisions.jsonl"
+    first, rest = decisions.read_text().split("\n", 1)
+    clock = {"t_s": json.loads(first)["t_s"], "kind": "clock", "behind_s": 86_400.0, "text": ""}
+    assert json.loads(first)["kind"] == "start"
+    decisions.write_text("\n".join((first, json.dumps(clock), rest)))
+    assert cli.main(["report", str(folder)]) == 0
+    assert "10 June 2026, 10:13 UTC" in capsys.readouterr().out
+    assert read_voyage(folder).epoch_s == read_voyage(sailed).epoch_s + 86_400.0
+    # of a companion that was started again the later clock says nothing of the first
+    decisions.write_text("\n".join((first, first, json.dumps(clock), rest)))
+    assert read_voyage(folder).epoch_s == read_voyage(sailed).epoch_s
+
+
 def test_no_legend_lies_over_a_curve(sailed, drawn, tmp_path):
     voyage.plot_voyage(read_voyage(sailed), tmp_path / "v.png")
     problem = Problem.from_json(str(ROOT / "bench" / "problems" / "four-beat-60.json"))

@@ -105,6 +105,18 @@ def test_without_a_terminal_what_is_said_is_a_line_at_once(steps):
     assert len(lines) == 2
 
 
+@pytest.mark.parametrize(("off_s", "hour"), [(7_200.0, "03"), (3.0, "01")])
+def test_what_is_said_has_the_autopilots_time_where_this_computers_is_another(steps, off_s, hour):
+    """A demonstration that began on 9 June, 10:13, told its goal by the hour at the desk."""
+    stream = io.StringIO()
+    with ProgressLine(stream, epoch_s=3600.0) as progress:
+        for step in steps:
+            t_s = step.snapshot.t_s
+            autopilot = replace(step.snapshot.autopilot, t_s=t_s, boot_s=t_s, utc_at_boot_s=3600.0 + off_s)
+            progress.show(STATUS, replace(step, snapshot=replace(step.snapshot, autopilot=autopilot)))
+    assert re.search(rf"^{hour}:00:\d\d WARNING: the fence", stream.getvalue(), re.MULTILINE)
+
+
 def test_what_is_left_behind_is_said_with_where_she_will_end():
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
     made = world.skipper.voyage

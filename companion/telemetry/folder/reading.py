@@ -10,6 +10,7 @@ import math
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -144,7 +145,8 @@ class VoyageRecord:
     """What a voyage folder holds; columns are float arrays with NaN for what is unknown.
 
     ``figures`` is summary.json as it stands, ``summary`` what of it is put into words; ``began_utc`` and ``epoch_s``
-    (Unix time of t_s = 0) are from voyage.toml, "" and None without one.
+    (Unix time of t_s = 0) are from voyage.toml, "" and None without one, by the autopilot's clock where the record says
+    that it was another.
     """
 
     folder: Path
@@ -177,6 +179,8 @@ def read_voyage(folder: Path) -> VoyageRecord:
         raise InputError(str(folder / SUMMARY), "", "is no table of figures", DAMAGED)
     description = read_description(folder) if (folder / VOYAGE).is_file() else {}
     run = _converted(description.get("run", {}), _Run, folder / VOYAGE, "[run] ")
+    decisions = read_decisions(folder)
+    behind_s = _behind_s(decisions)
     chart = _converted(_read_json(folder / AREA), RecordedChart, folder / AREA)
     for wkt in (*chart.obstacles, *chart.grown, *([chart.fence] if chart.fence else [])):
         with believed(folder / AREA, f"{wkt[:30]!r}"):
@@ -189,12 +193,12 @@ def read_voyage(folder: Path) -> VoyageRecord:
             if name not in _WORDS
         },
         texts={name: [row[name] for row in rows] for name in _WORDS},
-        plans=_plans(read_decisions(folder), folder / DECISIONS, chart.origin),
+        plans=_plans(decisions, folder / DECISIONS, chart.origin),
         chart=chart,
         figures=figures,
         summary=_converted(figures, Summary, folder / SUMMARY),
-        began_utc=run.started_utc,
-        epoch_s=run.epoch_s,
+        began_utc=_later(run.started_utc, behind_s),
+        epoch_s=None if run.epoch_s is None else run.epoch_s + behind_s,
     )
 
 
@@ -271,6 +275,26 @@ def _number(cell: str) -> float:
     if cell and not math.isfinite(value):
         raise ValueError(f"{cell[:30]!r} is no finite number")
     return value
+
+
+def _behind_s(decisions: list[dict[str, Any]]) -> float:
+    """Return how far [s] the clock that stamped the first start was behind the autopilot's, 0.0 unless it was told."""
+    starts = 0
+    for decision in decisions:
+        starts += decision["kind"] == "start"
+        if starts > 1:
+            break  # a later start had a clock of its own
+        if decision["kind"] == "clock" and isinstance(decision.get("behind_s"), int | float):
+            return float(decision["behind_s"])
+    return 0.0
+
+
+def _later(utc: str, by_s: float) -> str:
+    """Return an ISO time moved by ``by_s``; text that is none, or would leave the calendar, as it stands."""
+    try:
+        return (datetime.fromisoformat(utc) + timedelta(seconds=by_s)).isoformat() if by_s else utc
+    except (ValueError, OverflowError):
+        return utc
 
 
 def _plans(decisions: list[dict[str, Any]], path: Path, origin: Origin) -> tuple[RecordedPlan, ...]:
