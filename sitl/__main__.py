@@ -5,10 +5,13 @@ import sys
 # Built into the interpreter, as nothing else that could come first: while a file is read Ctrl-C would be a traceback.
 from _signal import SIG_DFL, SIGINT, signal  # type: ignore[import-not-found]
 
+# Until a command runs, which may have something to put in order. Here, not in main: what pip writes to call that
+# compiles a regular expression first.
+signal(SIGINT, SIG_DFL)
+
 
 def main() -> int:
     """Run one command of this process and return its exit code."""
-    signal(SIGINT, SIG_DFL)  # until a command runs, which may have something to put in order
     from sitl.cli import main as run
 
     return run()

@@ -282,7 +282,8 @@ class Program:
         if said:
             sys.stderr.write(f"{self.name} {args.command}: {said}\n")
         try:
-            return int(args.run(args))
+            with _interrupts_kept():
+                return int(args.run(args))
         except CompanionError as error:
             sys.stderr.write(f"{self.name} {args.command}: {error}\n")
             return error.exit_code
@@ -293,6 +294,10 @@ class Program:
             sys.stderr.write(f"{self.name} {args.command}: {refusal}\n")
             return refusal.exit_code
         except KeyboardInterrupt:
+            return INTERRUPTED
+        except SystemError as error:
+            if not _is_interrupt(error):
+                raise
             return INTERRUPTED
         except BrokenPipeError:
             sys.stderr.close()
@@ -315,6 +320,36 @@ class Program:
         if meant:
             remedy = f"did you mean {' or '.join(f'`{self.name} {words}`' for words in meant)}?"
         return InputError(self.name, "", f"there is no command {word[:40]!r}", remedy)
+
+
+AGAIN_S = 0.05  # after which an interrupt that was swallowed comes again
+
+
+@contextlib.contextmanager
+def _interrupts_kept() -> Iterator[None]:
+    """Bring an interrupt again that fell into a finalizer or a callback, where nothing can be raised."""
+    before = sys.unraisablehook
+
+    def hook(unraisable: sys.UnraisableHookArgs) -> None:
+        if issubclass(unraisable.exc_type, KeyboardInterrupt):
+            # from a thread: raised here it would be lost once more; as a signal: what waits in the system is woken
+            main = threading.main_thread().ident or threading.get_ident()
+            threading.Timer(AGAIN_S, lambda: signal.pthread_kill(main, signal.SIGINT)).start()
+        else:
+            before(unraisable)
+
+    sys.unraisablehook = hook
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Return whether an error came of an interrupt: numba raises another where one falls into a kernel's return."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def with_negative_values(argv: Sequence[str]) -> list[str]:

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -15,6 +16,7 @@ from companion.app.sail import sail
 from companion.clock import now_s, run_virtual
 from companion.commands.run import SignalEnding
 from companion.geofence import load_mission
+from companion.program import INTERRUPTED
 from companion.program.arguments import absent_device
 from sitl.autopilot import MemoryLink
 from sitl.faults.computer_faults import FaultyPlanner
@@ -126,6 +128,60 @@ runpy.run_module("companion", run_name="__main__")
     finally:
         run.kill()
     assert (run.returncode, err) == (-signal.SIGINT, "")
+
+
+@pytest.mark.parametrize("program", ["companion", "sitl"])
+def test_ctrl_c_before_main_is_called_leaves_no_traceback(program):
+    """What pip installs compiles a regular expression between import and call."""
+    begin = f"import {program}.__main__, time; print('here', flush=True); time.sleep(60)"
+    run = subprocess.Popen(
+        [sys.executable, "-c", begin], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=HERE
+    )
+    try:
+        assert run.stdout.readline() == "here\n"
+        run.send_signal(signal.SIGINT)
+        _, err = run.communicate(timeout=30.0)
+    finally:
+        run.kill()
+    assert (run.returncode, err) == (-signal.SIGINT, "")
+
+
+def test_an_interrupt_of_which_a_kernel_makes_an_error_of_its_own_is_one(monkeypatch, capsys):
+    """`companion plan` told of it in forty lines: numba calls Python while it returns."""
+
+    def returns(*_, **__):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr("companion.planner.plan", returns)
+    assert cli.main(["plan", "bench/problems/four-beat-60.json"]) == INTERRUPTED
+    assert capsys.readouterr().err == ""
+
+    def fails(*_, **__):
+        raise SystemError
+
+    monkeypatch.setattr("companion.planner.plan", fails)
+    with pytest.raises(SystemError):
+        cli.main(["plan", "bench/problems/four-beat-60.json"])
+
+
+def test_an_interrupt_that_falls_into_a_finalizer_comes_again(monkeypatch, capsys):
+    """`companion rehearse` told that it was ignored, and went on for the forty seconds that it was watched."""
+
+    monkeypatch.setattr(sys, "unraisablehook", sys.__unraisablehook__)  # not pytest's, which would be told
+
+    class Leaves:
+        def __del__(self):
+            raise KeyboardInterrupt
+
+    def plans(*_, **__):
+        Leaves()
+        time.sleep(30.0)
+
+    monkeypatch.setattr("companion.planner.plan", plans)
+    began_s = time.monotonic()
+    assert cli.main(["plan", "bench/problems/four-beat-60.json"]) == INTERRUPTED
+    assert time.monotonic() - began_s < 20.0
+    assert "ignored" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("program", ["companion", "sitl"])
