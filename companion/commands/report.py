@@ -137,15 +137,18 @@ def in_words(record: VoyageRecord) -> list[str]:
         promised = "" if s.promised_clearance_m is None else f" (plans expected {s.promised_clearance_m:.1f} m or more)"
         lines.append(f"Nearest to an obstacle or the fence: {s.min_clearance_m:.1f} m{promised}, {touched}.")
     if s.promised_risk is not None:
-        whole = "" if s.path_risk is None else f"Off the plan: up to {100.0 * s.path_risk:.0f} % was told. "
+        whole = (
+            "" if s.path_risk is None else f"Off the plan: {100.0 * s.path_risk:.0f} % was the highest chance told. "
+        )
+        entered = f"entered it {_times(s.no_go_entries)}" if s.no_go_entries else "never entered it"
         lines.append(
-            f"{whole}At each instant the wind had up to {100.0 * s.promised_risk:.0f} % to force her into "
-            f"the no-go zone; entered {_times(s.no_go_entries)}."
+            f"{whole}At each instant the chance that the wind would force her into the no-go zone was at most "
+            f"{100.0 * s.promised_risk:.0f} %; she {entered}."
         )
     lines += ranges_in_words(s.figures)
     if s.servos:
         moved = "; ".join(
-            f"output {number} {_times(servo.movements)}, {servo.travel_us} us in all"
+            f"output {number}, {_times(servo.movements)} by {servo.travel_us} us in all"
             for number, servo in s.servos.items()
         )
         lines.append(f"Servos moved: {moved}. SERVOn_FUNCTION says what they are (26 rudder, 89 sheet).")
@@ -175,7 +178,9 @@ def _plans(record: VoyageRecord) -> list[str]:
         reasons[plan.reason or "unknown"] = reasons.get(plan.reason or "unknown", 0) + 1
     if not reasons:
         return ["No plan was made."]
-    why = ", ".join(f"{reason} {number}" for reason, number in sorted(reasons.items(), key=lambda r: -r[1]))
+    why = ", ".join(
+        f"{reason.replace('_', ' ')} {number}" for reason, number in sorted(reasons.items(), key=lambda r: -r[1])
+    )
     return [f"{counted(len(record.plans), 'plan')} made, by reason: {why}."]
 
 

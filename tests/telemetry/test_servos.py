@@ -43,5 +43,5 @@ def test_a_voyage_tells_rudder_and_sheet_in_its_summary_and_in_words(tmp_path, c
     assert all(servo["movements"] > 0 and servo["travel_us"] >= 10 for servo in servos.values())
     assert cli.main(["report", str(tmp_path)]) == 0
     told = capsys.readouterr().out
-    assert "Servos moved: output 1 " in told
+    assert "Servos moved: output 1, " in told
     assert "\nVMG: " in told

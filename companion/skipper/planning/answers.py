@@ -102,10 +102,12 @@ def _note_latency(ctx: StepContext, pending: PendingPlan, outcome: PlanOutcome) 
     )
     ctx.set(plans=changed(ctx.state.plans, latency=latency))
     if latency.is_slow:
-        earlier = f"; it is asked {ctx.late_s:.0f} s earlier" if ctx.late_s > 0.0 else ""
-        ctx.say(Severity.NOTICE, SLOW, f"a slow computer plans such water: {latency.words}{earlier}", every_s=math.inf)
+        earlier = f"; plans are asked for {ctx.late_s:.0f} s earlier" if ctx.late_s > 0.0 else ""
+        ctx.say(
+            Severity.NOTICE, SLOW, f"this computer is slow for this water: {latency.words}{earlier}", every_s=math.inf
+        )
     elif latency.speed is not None:  # measured: in real time
-        ctx.say(Severity.INFO, "planner", f"this computer plans such water: {latency.words}", every_s=math.inf)
+        ctx.say(Severity.INFO, "planner", f"the planner {latency.words}", every_s=math.inf)
 
 
 def _may_still_turn_before(ctx: StepContext, waypoint_en: PointEn) -> bool:

@@ -81,8 +81,8 @@ class PlannerLatency:
         """It in words, empty: nothing is known."""
         if self.median_s is None or self.p90_s is None:
             return ""
-        share = "" if self.speed is None else f", {100.0 * self.speed:.0f} % of the reference core"
-        return f"answers in {self.median_s:.1f} s, nine of ten in {self.p90_s:.1f} s{share}"
+        share = "" if self.speed is None else f", at {100.0 * self.speed:.0f} % of the reference core's speed"
+        return f"answers in {self.median_s:.1f} s (nine of ten within {self.p90_s:.1f} s){share}"
 
     def _beyond_s(self, took_s: float | None) -> float:
         return 0.0 if took_s is None else min(max(0.0, took_s - self.room_s), LONGEST_S)
