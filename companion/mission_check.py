@@ -393,7 +393,7 @@ def legs(
     frame = mission.frame()
     here, local = frame.en_from_geo(mission.start), mission.water()
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
-    targets = [(goal.point, goal.radius_m, goal.name) for goal in mission.goals]
+    targets = [(goal.point, goal.radius_m, goal.name or f"goal {n}") for n, goal in enumerate(mission.goals, start=1)]
     if goes_home and mission.skipper.end == "home":
         targets.append((mission.start, HOME_RADIUS_M, "home"))
     for point, radius_m, title in targets:

@@ -123,6 +123,16 @@ def test_a_missions_obstacles_keep_their_names_in_its_problem():
     assert "Middle bank and East bank" in names(30.0)  # grown together
 
 
+def test_the_plans_of_goals_without_a_name_have_their_numbers(capsys, tmp_path):
+    """Two plans were both called by the mission alone."""
+    path = tmp_path / "two.toml"
+    goal = "[[goal]]\nlat = {}\nlon = -1.31\n"
+    path.write_text(f'name = "two"\n[start]\nlat = 50.817\nlon = -1.31\n{goal.format(50.8176)}{goal.format(50.8182)}')
+    code, out, _ = run(capsys, path, "--expansions", "1500")
+    assert code == 0
+    assert [line for line in out.splitlines() if line.startswith("two")] == ["two: goal 1", "two: goal 2"]
+
+
 def test_no_plan_is_exit_1_with_the_reason(capsys, file, tmp_path):
     ring = "POLYGON((-40 160,40 160,40 240,-40 240,-40 160),(-20 180,20 180,20 220,-20 220,-20 180))"
     picture = tmp_path / "none.png"
