@@ -251,9 +251,14 @@ def home_of(step: Step, voyage: Voyage) -> values.PlaceView | None:
 
 
 def refuges_of(voyage: Voyage) -> tuple[values.PlaceView, ...]:
-    """Return the refuges."""
+    """Return the refuges; one whose name is its number alone is called so."""
     return tuple(
-        values.PlaceView(name=r.name, at_en_m=place(r.en_m), radius_m=rounded(r.radius_m, 1)) for r in voyage.refuges
+        values.PlaceView(
+            name=f"refuge {r.name}" if r.name.isdecimal() else r.name,
+            at_en_m=place(r.en_m),
+            radius_m=rounded(r.radius_m, 1),
+        )
+        for r in voyage.refuges
     )
 
 

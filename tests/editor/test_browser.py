@@ -267,6 +267,11 @@ def test_by_day_and_by_night_on_a_phone_and_exported(archipelago, tmp_path):
         assert board.js("return document.documentElement.scrollWidth") <= 390
         assert board.barriers() == []
         keep(board, "editor-phone")
+        board.js("document.getElementById('name').textContent = 'wanaka.toml'")
+        board.js("const kept = document.getElementById('kept'); kept.textContent = 'not saved'")
+        # a name of a file is in one line: it was broken, and its last letter alone in the next
+        assert board.js("return document.getElementById('name').getClientRects().length") == 1
+        assert board.js("return document.getElementById('name').clientHeight") < 30
         board.js("document.getElementById('pick-goal-0').click()")
         board.js("document.getElementById('course').scrollIntoView()")
         keep(board, "editor-phone-tables")

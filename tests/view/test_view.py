@@ -17,9 +17,10 @@ from companion.geo.angles import difference_rad
 from companion.messages import AutopilotStatus, CompanionStatus, GeoPoint, VehicleState, WindForecast
 from companion.page.sources import LiveSource
 from companion.skipper.step import PlanOutcome, SkipperConfig, SkipperState, Snapshot, WindEstimate, WindHealth
+from companion.skipper.way import Refuge
 from companion.telemetry.folder import TLOG, VoyageFigures
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
-from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of, polar_of
+from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of, polar_of, refuges_of
 from tests.view.conftest import write_mission
 
 RULES = {
@@ -232,6 +233,14 @@ def test_the_time_of_day_is_the_autopilots_where_this_computers_is_another(tmp_p
     live = LiveSource(name="test", unix_s=1_000.0)
     live.show(view, (), None)
     assert live.unix_s == epoch_s  # the strips' clock is the page's
+
+
+def test_a_refuge_without_a_name_is_called_a_refuge_and_its_number(tmp_path):
+    """On the chart it was "1", as the first goal's number is; in the editor it was "Refuge 1"."""
+    made = replace(
+        fold_of(tmp_path)._voyage, refuges=(Refuge(name="1", en_m=(1.0, 2.0)), Refuge(name="Bay", en_m=(0, 0)))
+    )
+    assert [refuge.name for refuge in refuges_of(made)] == ["refuge 1", "Bay"]
 
 
 def test_what_is_not_known_is_null_and_never_nought(tmp_path):
