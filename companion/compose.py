@@ -161,7 +161,7 @@ def planner_of(mission: Mission) -> PlannerChoice:
     """Return the mission's planner and its numbers.
 
     Raises:
-        InputError: a number is another planner's, or a tunnel has no width.
+        InputError: a number is another planner's, a tunnel has no width, or a goal has a heading for another planner.
     """
     options, algorithm = mission.options.planner, mission.skipper.planner
     given = {key: value for key in options.__struct_fields__ if (value := getattr(options, key)) is not None}
@@ -183,6 +183,14 @@ def planner_of(mission: Mission) -> PlannerChoice:
             )
     if "tunnel" in given and "tunnel_width_m" not in given:
         raise InputError(str(mission.path), "[planner] tunnel", "a tunnel has a width", "add tunnel_width_m")
+    headed = next((n for n, goal in enumerate(mission.goals, start=1) if goal.heading_deg is not None), None)
+    if headed is not None and algorithm != "astar":
+        raise InputError(
+            str(mission.path),
+            f"[[goal]] {headed} heading_deg",
+            f"is for 'astar', and this mission plans by {algorithm!r}",
+            'write [skipper] planner = "astar", or leave it out',
+        )
     if algorithm == AUTO.algorithm:
         return AUTO
     return PlannerChoice(algorithm=algorithm, settings=ALGORITHMS[algorithm].settings_of(given), expansions=expansions)
@@ -400,6 +408,7 @@ def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
             side=_SIDES[g.rounding],
             rounding_m=max(g.radius_m, mission.margin_m) if g.rounding else 12.0,
             bandwidth_m=mission.skipper.bandwidth_m if g.bandwidth_m is None else g.bandwidth_m,
+            heading_rad=None if g.heading_deg is None else math.radians(g.heading_deg),
             line=_line(g.gate, frame),
             box=None if g.box is None else Box(area_en=polygon_en(g.box.shape, frame, cover=False), for_s=g.box.for_s),
             search=None

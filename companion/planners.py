@@ -59,8 +59,9 @@ class AstarSettings:
         turn_s_per_rad: f of eq. 4.4 [s/rad]; 0 for Figure 5.1.
         tack_s, gybe_s: Added cost of a manoeuvre [s].
         tunnel_width_m: TUNNEL WIDTH of eq. 4.6 [m]; None for no tunnel.
-        is_tunnel_abrupt: No cost within half the width of the direct line, ``BORDER_S`` a step beyond it (4.3.2,
-            the third form), in place of one that grows with the distance (eq. 4.6, the first).
+        tunnel: ``linear``: a cost that grows with the distance from the direct line (eq. 4.6, the first form of 4.3.2);
+            ``abrupt``: none within half the width, ``BORDER_S`` a step beyond it (the third); ``convex``: little in the
+            middle and rising to that at the borders (2.V.F.5).
         heuristic_mps: Speed of the estimate [m/s]; None for Dijkstra.
         min_twa_rad, max_twa_rad: The sailable range of headings off the wind.
         max_turn_rad: The greatest heading change from step to step (4.1.1). With his 90 degrees there is no tack
@@ -69,6 +70,8 @@ class AstarSettings:
         memory_bytes: What the grid may take.
         projection: ``local``: planned in the problem's metres; ``flat``: in those of eq. 4.2 (docs/lab/frames.md).
         origin: Where the problem's metres count from; the flat projection needs it (``PlannerChoice.about``).
+        goal_heading_rad: The heading at the goal where it is set by hand (4.1.4): the sailable one nearest to it is
+            taken; None: nearest to the bearing from start to goal.
 
     """
 
@@ -77,7 +80,7 @@ class AstarSettings:
     tack_s: float = _set_by("tack_s", 0.0, least=0.0)
     gybe_s: float = _set_by("gybe_s", 0.0, least=0.0)
     tunnel_width_m: float | None = _set_by("tunnel_width_m", None, above=0.0)
-    is_tunnel_abrupt: bool = _set_by("tunnel", False, words=("linear", "abrupt"))
+    tunnel: str = _set_by("tunnel", "linear", words=("linear", "abrupt", "convex"))
     heuristic_mps: float | None = _set_by("heuristic_kn", 7.0 * MPS_PER_KNOT, least=0.0)
     min_twa_rad: float = _set_by("min_twa_deg", math.radians(45.0), least=0.0, below=90.0)
     max_twa_rad: float = _set_by("max_twa_deg", math.radians(160.0), above=90.0, most=180.0)
@@ -86,6 +89,7 @@ class AstarSettings:
     memory_bytes: int = 256_000_000
     projection: str = _set_by("projection", "local", words=("local", "flat"))
     origin: GeoPoint | None = None
+    goal_heading_rad: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,11 +164,13 @@ class PlannerChoice:
     settings: Settings | None = None
     expansions: int | None = None
 
-    def about(self, origin: GeoPoint) -> PlannerChoice:
-        """Return the same for a problem whose metres count from there: a projection of somebody's choice needs it."""
-        if not isinstance(self.settings, AstarSettings) or self.settings.projection == "local":
+    def about(self, origin: GeoPoint, goal_heading_rad: float | None = None) -> PlannerChoice:
+        """Return the same for a problem whose metres count from there and whose goal has that heading set by hand."""
+        if not isinstance(self.settings, AstarSettings):
             return self
-        return replace(self, settings=replace(self.settings, origin=origin))
+        if self.settings.projection == "local" and goal_heading_rad is None:
+            return self
+        return replace(self, settings=replace(self.settings, origin=origin, goal_heading_rad=goal_heading_rad))
 
 
 AUTO = PlannerChoice()

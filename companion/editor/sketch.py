@@ -242,6 +242,7 @@ def _goal(goal: SketchedGoal, number: int, before: MissionOptions) -> GoalOption
             name=goal.name,
             rounding=goal.rounding,
             bandwidth_m=old.bandwidth_m if isinstance(old, PointOptions) else None,
+            heading_deg=old.heading_deg if isinstance(old, PointOptions) else None,
         )
         return _with(made, radius_m=goal.radius_m)
     if goal.kind == "gate":

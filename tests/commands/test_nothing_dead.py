@@ -134,6 +134,7 @@ OTHER = {
         "rounding": "starboard",
         "name": "other",
         "bandwidth_m": 200.0,
+        "heading_deg": 40.0,
         **TASK_KEYS,
     },
     "field": {
@@ -298,6 +299,8 @@ def mission(path, table="", key="", value=None):
             raw["passage"] = {"leg_m": 60_000.0}
         if key == "tunnel":
             raw["planner"] = {"tunnel_width_m": 60.0}
+        if (table, key) == ("goal", "heading_deg"):
+            raw["skipper"] = {"planner": "astar"}
         if (table, key) == ("autopilot", "frame"):
             raw["boat"] = {"polar": 2.0}
         place = raw[table][0] if table in {"goal", "refuge"} else raw.setdefault(table, {})
@@ -331,6 +334,8 @@ def base_for(path, table, key):
         return mission(path, "planner", "tunnel_width_m", 60.0)
     if (table, key) == ("autopilot", "frame"):
         return mission(path, "boat", "polar", 2.0)
+    if (table, key) == ("goal", "heading_deg"):
+        return mission(path, "skipper", "planner", "astar")
     if table == "planner":
         return mission(path, "skipper", "planner", "rrtstar" if key in RRTSTAR else "astar")
     if key in KALMAN:

@@ -45,6 +45,11 @@ BAD = [
         "[planner] tunnel: a tunnel has a width",
     ),
     (
+        "goal heading",
+        "[[goal]]\nheading_deg = 40.0\n",
+        "[[goal]] 1 heading_deg: is for 'astar', and this mission plans by",
+    ),
+    (
         "projection",
         '[planner]\nprojection = "flat"\n',
         "[planner] projection: is a number of 'astar', and this mission plans by 'auto'",

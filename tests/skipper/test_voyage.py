@@ -14,6 +14,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, Mode, StatusText
 from companion.planner import PlanStatus
 from companion.planner.worker import failed
+from companion.planners import AstarSettings, PlannerChoice
 from companion.skipper.planning.triggers import board_end
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
@@ -377,6 +378,18 @@ def test_a_band_bounds_the_way():
     world = make(made, obstacles=(), wind=lambda t: (0.0, 5.0))
     assert world.run(1200, is_done)
     assert max(abs(p[0]) for p in world.track) < 48.0
+
+
+def test_a_goal_heading_set_by_hand_is_what_his_planner_is_asked_for():
+    by = PlannerChoice(algorithm="astar", settings=AstarSettings(grid_m=10.0))
+    places = [(0.0, 300.0), (200.0, 300.0)]
+    goals = [Goal(en_m=places[0], radius_m=8.0, heading_rad=1.2), Goal(en_m=places[1], radius_m=8.0)]
+    world = make(*goals, obstacles=(), wind=lambda t: (math.radians(200.0), 5.0), config={"planner": by})
+    assert world.run(1200, is_done)
+    asked = [a for _, a in world.actions if isinstance(a, act.RequestPlan) and a.planner.algorithm == "astar"]
+    wanted = {a.problem.goal_en: a.planner.settings.goal_heading_rad for a in asked}
+    assert wanted[places[0]] == 1.2
+    assert wanted[places[1]] is None
 
 
 def test_a_long_voyage_starts_its_numbering_again():

@@ -83,7 +83,8 @@ class MissionGoal:
     With ``gate`` two marks to pass between: ``point`` is the middle, and ``radius_m`` about it is for previews alone.
     With ``box`` or ``search`` some water: ``point`` is the place with the most room in it, and ``radius_m`` that room.
     With ``field`` it is steered by that, and ``point`` is where the mission on board leads meanwhile.
-    ``bandwidth_m`` is half the width of the lane that leads here, None: as the mission has it.
+    ``bandwidth_m`` is half the width of the lane that leads here, None: as the mission has it; ``heading_deg`` the
+    heading that A* arrives with, None: its own choice.
     """
 
     point: GeoPoint
@@ -91,6 +92,7 @@ class MissionGoal:
     rounding: str | None = None
     name: str = ""
     bandwidth_m: float | None = None
+    heading_deg: float | None = None
     gate: GoalGate | None = None
     box: GoalBox | None = None
     search: GoalSearch | None = None
@@ -134,7 +136,12 @@ class GoalReader:
         if isinstance(goal, FieldOptions):
             return MissionGoal(point=point, radius_m=goal.radius_m, name=goal.name, field=self._by_field(goal, place))
         return MissionGoal(
-            point=point, radius_m=goal.radius_m, rounding=goal.rounding, name=goal.name, bandwidth_m=goal.bandwidth_m
+            point=point,
+            radius_m=goal.radius_m,
+            rounding=goal.rounding,
+            name=goal.name,
+            bandwidth_m=goal.bandwidth_m,
+            heading_deg=goal.heading_deg,
         )
 
     def waters_of(self, options: MissionOptions) -> dict[str, Shape]:

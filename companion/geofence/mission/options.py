@@ -37,6 +37,8 @@ class PointOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Leave the mark to this side of the boat; None: just come within the radius."""
     bandwidth_m: Annotated[float, Meta(gt=0.0)] | None = None
     """Half width of the lane that leads here; None: as ``[skipper] bandwidth_m`` has it."""
+    heading_deg: Annotated[float, Meta(ge=0.0, le=360.0)] | None = None
+    """``planner = "astar"``: the heading that plans arrive here with; None: nearest to the bearing from their start."""
     name: str = ""
 
 

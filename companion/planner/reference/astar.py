@@ -4,7 +4,8 @@ A* over a grid of places and 16 headings. From a node the boat steps to one of 2
 it), turning at most 90 degrees, on headings 45 to 160 degrees off the wind. The cost is sailing time, plus
 ``turn_s_per_rad`` (f = 8) per radian of heading change, plus costs of a tack and a gybe, plus the tunnel cost of
 eq. 4.6. The remaining time is estimated at 7 knots. The goal is a place and a heading: the bearing from start to
-goal, turned away from the wind until it can be sailed. Ships become fixed discs where they would be met (eq. 4.7).
+goal or, for short courses, one set by hand, turned away from the wind until it can be sailed.
+Ships become fixed discs where they would be met (eq. 4.7).
 
 What the thesis leaves open: the grid is stretched so that start and goal are both nodes (a goal less than a quarter
 of a cell off the start's row or column counts as on it, and the last leg makes up for it);
@@ -174,7 +175,8 @@ def _room_m(p: Problem) -> float:
 CELLS_ACROSS = 40  # of the default grid, start to goal: 20 m for the 800 m legs that AVALON was tested on
 STATE_BYTES = 8 + 8 + 4 + 1 + 2 * 12  # cost, clock, parent, closed, and room for two heap entries
 CHUNK = 2000
-BORDER_S = 60.0  # of each step outside an abrupt tunnel: a tack is worth it, a long board is not
+BORDER_S = 60.0  # of each step outside a tunnel with borders: a tack is worth it, a long board is not
+CONVEX = 4.0  # power of a convex tunnel's rise: half-way to the border a sixteenth of what a step there costs
 LEAST_SHARE = 0.25  # of the spacing: a goal nearer to the start's row or column than this counts as on it
 
 DEFAULTS = AstarSettings()
@@ -247,7 +249,7 @@ def _course(i: int, j: int, grid: NodeGrid) -> float:
 
 
 def target_heading(courses: NDArray[np.float64], sailable: NDArray[np.bool_], bearing_rad: float) -> int:
-    """Return the number of the sailable course nearest to the direct bearing (4.1.4); -1 when there is none."""
+    """Return the number of the sailable course nearest to the bearing or what is set by hand (4.1.4); -1: none."""
     if not bool(np.any(sailable)):
         return -1
     off = np.array([abs(difference_rad(float(c), bearing_rad)) for c in courses])
@@ -356,7 +358,8 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
         )
         way[k] = wrap_pi(heading), speed if is_sailable else 0.0, twa
     (sx, sy), (gx, gy) = problem.start_en, problem.goal_en
-    goal_heading = target_heading(courses, way[:, 1] > 0.0, heading_of(gx - sx, gy - sy))
+    wanted_rad = heading_of(gx - sx, gy - sy) if settings.goal_heading_rad is None else settings.goal_heading_rad
+    goal_heading = target_heading(courses, way[:, 1] > 0.0, wanted_rad)
     if goal_heading < 0:
         reason = "none of the 16 headings can be sailed in this wind"
         return Outcome(waypoints_en=None, status=PlanStatus.NOT_FOUND, reason=reason, trace=trace)
@@ -370,13 +373,14 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
     if settings.heuristic_mps is not None:
         fast = max(settings.heuristic_mps, max(problem.boat.polar_mps) + problem.current.drift_mps)
     # Eq. 4.6: 10 d GRID SIZE / TUNNEL WIDTH, with d counted in cells, is 10 s a step at one tunnel width off the line.
-    tunnel, border_m = 0.0, 0.0
+    tunnel, border_m, rise = 0.0, 0.0, 0.0
     if settings.tunnel_width_m is not None:
         tunnel, border_m = 10.0 / settings.tunnel_width_m, 0.0
-        if settings.is_tunnel_abrupt:
+        if settings.tunnel != "linear":
             tunnel, border_m = BORDER_S, 0.5 * settings.tunnel_width_m
+            rise = CONVEX if settings.tunnel == "convex" else 0.0
     weight = np.array(
-        [settings.turn_s_per_rad, settings.tack_s, settings.gybe_s, tunnel, fast, border_m, settings.max_turn_rad]
+        [settings.turn_s_per_rad, settings.tack_s, settings.gybe_s, tunnel, fast, border_m, settings.max_turn_rad, rise]
     )
     frame = np.array([grid.x0_m, grid.y0_m, grid.dx_m, grid.dy_m, problem.start_heading_rad])
     disc, w = ship_discs(problem, settings), world_of(problem)

@@ -277,9 +277,9 @@ def steer(  # type: ignore[no-untyped-def]
 # The kernel of Büsser's A*: a heap, 16 headings, 24 neighbours.
 
 # Places in ``weight``: turning [s/rad], tack [s], gybe [s], tunnel [s per metre off the line], heuristic speed [m/s],
-# half the width of an abrupt tunnel [m] (then TUNNEL is what a step beyond it costs [s]; 0: eq. 4.6),
-# the greatest turn from step to step [rad].
-TURN, TACK_COST, GYBE_COST, TUNNEL, FAST, BORDER, MAX_TURN = range(7)
+# half the width of a tunnel with borders [m] (then TUNNEL is what a step beyond it costs [s]; 0: eq. 4.6),
+# the greatest turn from step to step [rad], the power by which the cost rises to a border (0: not at all inside).
+TURN, TACK_COST, GYBE_COST, TUNNEL, FAST, BORDER, MAX_TURN, RISE = range(8)
 # Places in ``count``: heap size, states expanded, goal reached (0, 1), states seen.
 HEAP, EXPANDED, REACHED, SEEN = range(4)
 HEADINGS = 16
@@ -390,6 +390,8 @@ def expand(  # type: ignore[no-untyped-def]
                     cost += weight[TUNNEL] * off  # eq. 4.6
                 elif off > weight[BORDER]:
                     cost += weight[TUNNEL]
+                elif weight[RISE] > 0.0:
+                    cost += weight[TUNNEL] * (off / weight[BORDER]) ** weight[RISE]  # 2.V.F.5
             if cost >= g[next_state]:
                 continue
             t0 = clock[state] + (turn_time(before, heading, number) if turn > 1e-9 else 0.0)

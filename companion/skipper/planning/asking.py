@@ -122,7 +122,7 @@ def request(
             budget_s=ctx.state.plans.effort * budget,
             seed=number,
             from_seq=None if from_index is None else from_index + 1,
-            planner=step.planner.about(ctx.voyage.frame.origin),
+            planner=step.planner.about(ctx.voyage.frame.origin, target.heading_rad if aim.gate >= 0 else None),
             rung=name,
             text=why,
         )

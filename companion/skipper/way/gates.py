@@ -77,6 +77,7 @@ class Gate:
     name: str
     from_en_m: PointEn | None
     bandwidth_m: float | None = None
+    heading_rad: float | None = None
     buoy_en_m: PointEn | None = None
     approach_en_m: PointEn | None = None
     side: Side = Side.NONE
@@ -134,6 +135,7 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
                     name=name,
                     from_en_m=before,
                     bandwidth_m=goal.bandwidth_m,
+                    heading_rad=goal.heading_rad,
                     keep_out=discs,
                     box=goal.box,
                     search=goal.search,
@@ -262,6 +264,7 @@ def _round(
                 name=name,
                 from_en_m=before if n == 0 else None,
                 bandwidth_m=goal.bandwidth_m if n == 0 else None,
+                heading_rad=goal.heading_rad if n == 0 else None,
                 buoy_en_m=buoy,
                 approach_en_m=before,
                 side=goal.side,

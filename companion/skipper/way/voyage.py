@@ -115,7 +115,8 @@ class Goal:
     With ``side`` the position is the buoy's, which the boat rounds at ``rounding_m``; with ``line`` it is the middle
     between the marks, with ``box`` the roomiest place in it, with
     ``search`` one inside. ``bandwidth_m`` bounds the way from the goal before (or
-    the start) to this one: half the width of Büsser's band (section 4.2). With ``field`` it is steered by that, and
+    the start) to this one: half the width of Büsser's band (section 4.2). ``heading_rad`` is the one that his A*
+    arrives with, where it is set by hand (4.1.4). With ``field`` it is steered by that, and
     the position is where the mission on board leads meanwhile.
     """
 
@@ -125,6 +126,7 @@ class Goal:
     side: Side = Side.NONE
     rounding_m: float = 12.0
     bandwidth_m: float | None = None
+    heading_rad: float | None = None
     line: Line | None = None
     box: Box | None = None
     search: Search | None = None

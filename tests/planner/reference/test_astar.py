@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
+from companion.geo.angles import difference_rad
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
@@ -121,12 +122,42 @@ def test_an_abrupt_tunnel_costs_nothing_inside_and_keeps_within_its_borders():
     def widest(judged):
         return max(abs(leg.to_en[0]) for leg in judged.legs)
 
-    free, wide = run(p, turn_s_per_rad=8.0), run(p, tunnel_width_m=2000.0, is_tunnel_abrupt=True)
+    free, wide = run(p, turn_s_per_rad=8.0), run(p, tunnel_width_m=2000.0, tunnel="abrupt")
     assert wide[0].trace["objective"] == free[0].trace["objective"]
     narrow_m = 0.8 * widest(free[1])
-    narrow, judged = run(p, tunnel_width_m=2.0 * narrow_m, is_tunnel_abrupt=True)
+    narrow, judged = run(p, tunnel_width_m=2.0 * narrow_m, tunnel="abrupt")
     assert narrow.trace["objective"] > free[0].trace["objective"]
     assert widest(judged) <= narrow_m + 1e-6
+
+
+def test_a_convex_tunnel_costs_little_in_the_middle_and_as_much_as_an_abrupt_one_at_its_borders():
+    p = problem()
+    way, judged = run(p, turn_s_per_rad=8.0)
+    widest_m = max(abs(leg.to_en[0]) for leg in judged.legs)
+
+    def dearer_s(tunnel, width_m):
+        return run(p, tunnel_width_m=width_m, tunnel=tunnel)[0].trace["objective"] - way.trace["objective"]
+
+    # The same path in two widths, half-way to the borders and a quarter of it.
+    half, quarter = dearer_s("convex", 4.0 * widest_m), dearer_s("convex", 8.0 * widest_m)
+    assert half == pytest.approx(16.0 * quarter)
+    assert dearer_s("linear", 8.0 * widest_m) > 10.0 * quarter > 0.0
+    narrow_m = 0.8 * widest_m
+    assert dearer_s("convex", 2.0 * narrow_m) > dearer_s("abrupt", 2.0 * narrow_m) > 0.0
+    _, kept = run(p, tunnel_width_m=2.0 * narrow_m, tunnel="convex")
+    assert max(abs(leg.to_en[0]) for leg in kept.legs) <= narrow_m + 1e-6
+
+
+def test_the_goal_heading_is_set_by_hand_for_short_courses():
+    p = problem(wind={"from_deg": 90, "speed_mps": 5, "sigma": {"model": "none"}})
+    _, own = run(p)
+    assert own.legs[-1].heading_rad == pytest.approx(0.0, abs=1e-9)
+    for wanted_deg in (-40.0, 200.0):
+        _, judged = run(p, goal_heading_rad=math.radians(wanted_deg))
+        off_rad = difference_rad(judged.legs[-1].heading_rad, math.radians(wanted_deg))
+        assert abs(math.degrees(off_rad)) < 15.0  # of sixteen
+    _, judged = run(p, goal_heading_rad=math.radians(90.0))  # into the wind: turned until it can be sailed
+    assert abs(math.degrees(judged.legs[-1].twa_rad)) == pytest.approx(45.0, abs=1.0)
 
 
 def test_with_his_largest_turn_of_90_degrees_it_gybes_round_where_the_wind_blows_across_the_grid():
