@@ -27,6 +27,7 @@ from companion.boat.polar import (
     pol_text,
     polar_of_table,
     read_polar,
+    signalk_text,
 )
 
 __all__ = [
@@ -56,6 +57,7 @@ __all__ = [
     "proposed_margin",
     "read_polar",
     "required_margin",
+    "signalk_text",
     "slowest_en_mps",
     "widest_corridor_m",
 ]

@@ -29,6 +29,7 @@ SPEED_ERROR_PERCENT = 35.0
 NEAR_WIND_DEG = 4.0  # an autopilot by a vane sails so much less near to the wind than a crew by telltales
 BEAT_TWS_MPS = 5.0
 LEAST_NO_GO_DEG = 45.0  # ArduRover's own default
+NO_GO_ERROR_DEG = 4.0  # a judgement: that of small robots that were published is 40 to 60
 # Of a boat of a metre; by Froude's law a time grows as the root of the length.
 TURN_RATE_DEG_S, TACK_LOSS_S = 30.0, 4.0
 TACK_FAILS = 0.05  # one in twenty, until some were seen
@@ -73,6 +74,7 @@ class GuessedBoat:
     tack_fails: float = TACK_FAILS
     leeway_deg: float = LEEWAY_DEG
     speed_error_percent: float = SPEED_ERROR_PERCENT
+    no_go_error_deg: float = NO_GO_ERROR_DEG
 
 
 def guessed(sizes: Sizes) -> GuessedBoat:
@@ -127,6 +129,7 @@ def guessed_text(name: str, sizes: Sizes, boat: GuessedBoat, when: str, beam_m: 
         ("length_m", sizes.length_m, ""),
         ("beam_m", round(BEAM * sizes.length_m, 2) if beam_m is None else beam_m, ""),
         ("no_go_half_deg", boat.no_go_half_deg, "40 to 60: a rated yacht's beat and 4, at least ArduRover's 45"),
+        ("no_go_error_deg", boat.no_go_error_deg, "standard deviation: it has its share in the risk of a plan"),
         ("turn_rate_deg_s", boat.turn_rate_deg_s, f"{share(boat.turn_rate_deg_s, 2.0)}: in a tack"),
         ("tack_loss_s", boat.tack_loss_s, f"{share(boat.tack_loss_s, 3.0)}: what a tack costs beside the turn"),
         ("tack_fails", boat.tack_fails, "0 to 0.15: the share of tacks that end where they began"),

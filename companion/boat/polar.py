@@ -14,8 +14,10 @@ from __future__ import annotations
 
 import bisect
 import csv
+import json
 import math
 import re
+import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -325,6 +327,25 @@ def pol_text(polar: Polar, share: float = 1.0) -> str:
         speeds = (share * polar.speed_mps(angle, w) / MPS_PER_KNOT for w in winds)
         lines.append(f"{math.degrees(angle):g};" + ";".join(f"{v:.2f}" for v in speeds))
     return "\n".join(lines) + "\n"
+
+
+def signalk_text(polar: Polar, share: float = 1.0) -> str:
+    """Return a polar as Signal K has one (``performance/polars``: radians, m/s), its speeds times ``share``."""
+    winds = []
+    for tws_mps in [w for w in polar.tws_mps.tolist() if w > 0.0] or [5.0]:
+        beat, run = polar.best_beat(tws_mps), polar.best_run(tws_mps)
+        winds.append(
+            {
+                "trueWindSpeed": tws_mps,
+                "optimalBeats": [[round(beat.twa_rad, 4), round(share * beat.speed_mps, 3)]],
+                "optimalGybes": [[round(run.twa_rad, 4), round(share * run.speed_mps, 3)]],
+                "angleData": [
+                    [round(a, 4), round(share * polar.speed_mps(a, tws_mps), 3)] for a in polar.twa_rad.tolist()
+                ],
+            }
+        )
+    number = str(uuid.uuid5(uuid.NAMESPACE_OID, polar.name))
+    return json.dumps({number: {"id": number, "name": polar.name, "windData": winds}}, indent=1) + "\n"
 
 
 # ------------------------------------------------------------------------------------------- cells

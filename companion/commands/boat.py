@@ -83,13 +83,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     show.add_argument("--plot", type=picture, metavar="P.png", help="draw the polar, with its band")
     show.add_argument("--pol", type=out_file, metavar="FILE.pol", help="write the polar in knots, as OpenCPN reads it")
     show.add_argument(
+        "--signalk", type=out_file, metavar="FILE.json", help="write the polar as Signal K has one (performance/polars)"
+    )
+    show.add_argument(
         "--quantile",
         type=number(above=0.0, at_most=0.5),
         default=0.5,
         metavar="P",
-        help="of the speeds in --pol, below which she is with this chance (default: 0.5; careful: 0.1)",
+        help="of the speeds in these files, below which she is with this chance (default: 0.5; careful: 0.1)",
     )
-    show.add_argument("--force", action="store_true", help="take the place of a .pol that is there")
+    show.add_argument("--force", action="store_true", help="take the place of such a file that is there")
     show.set_defaults(run=_show)
     compare = verbs.add_parser("compare", help="how much faster one is than the other")
     for name in ("first", "second"):
@@ -211,23 +214,40 @@ def _show(args: argparse.Namespace) -> int:
     polar, boat = _boat(args.file)
     error = 0.0 if boat is None else boat.boat.speed_error_percent / 100.0
     print("\n".join([*_words(args.file, boat), *_angles(polar), *_table("boat speed [m/s]", polar, _speeds)]))
-    if args.pol is not None:
-        from statistics import NormalDist
+    for file, is_pol in ((args.pol, True), (args.signalk, False)):
+        if file is not None:
+            from statistics import NormalDist
 
-        from companion.boat import pol_text
-        from companion.commands.output import write_files
+            from companion.boat import pol_text, signalk_text
+            from companion.commands.output import write_files
 
-        slower = math.exp(error * NormalDist().inv_cdf(args.quantile))
-        write_files({str(args.pol): pol_text(polar, slower).encode()}, force=args.force)
-        print(f"{args.pol}: written")
+            slower = math.exp(error * NormalDist().inv_cdf(args.quantile))
+            text = pol_text(polar, slower) if is_pol else signalk_text(polar, slower)
+            write_files({str(file): text.encode()}, force=args.force)
+            print(f"{file}: written")
     if args.plot is not None:
         from companion.commands.output import patience
         from companion.plots.polar import save_polar
 
         with patience("drawing"):
-            save_polar(polar, error, args.plot, title=polar.name)
+            save_polar(
+                polar, _errors(boat), args.plot, title=polar.name, stretches=boat.polar.stretches if boat else ()
+            )
         print(f"{args.plot}: drawn")
     return 0
+
+
+def _errors(boat: BoatFile | None) -> Polar | float:
+    """Return the deviation of the logarithm of the speeds, by angle and wind where the file has it so."""
+    from companion.boat import polar_of_table
+
+    if boat is None:
+        return 0.0
+    table = boat.polar
+    if not table.error_percent:
+        return boat.boat.speed_error_percent / 100.0
+    shares = [[0.01 * e for e in row] for row in table.error_percent]
+    return polar_of_table(table.twa_deg, table.tws_mps, shares, name="error", source=boat.name)
 
 
 def _compare(args: argparse.Namespace) -> int:

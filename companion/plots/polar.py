@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib as mpl
@@ -21,13 +22,23 @@ NINETY = 1.645  # standard deviations to either side that nine in ten lie in
 MOST_CURVES = 4
 
 
-def save_polar(polar: Polar, speed_error: float, path: str | Path, *, title: str) -> None:
-    """Draw a polar; ``speed_error`` is the deviation of the logarithm of all its speeds."""
-    save(polar_figure(polar, speed_error, title=title), path)
+def save_polar(
+    polar: Polar, error: Polar | float, path: str | Path, *, title: str, stretches: Sequence[Sequence[int]] = ()
+) -> None:
+    """Draw a polar; see ``polar_figure``."""
+    save(polar_figure(polar, error, title=title, stretches=stretches), path)
 
 
-def polar_figure(polar: Polar, speed_error: float, *, title: str) -> Figure:
-    """Return the picture: the wind comes from above, boat speed [m/s] outward, starboard tack on the right."""
+def polar_figure(polar: Polar, error: Polar | float, *, title: str, stretches: Sequence[Sequence[int]] = ()) -> Figure:
+    """Return the picture: the wind comes from above, boat speed [m/s] outward, starboard tack on the right.
+
+    Args:
+        polar: the speeds.
+        error: deviation of their logarithm, of all of them, or by angle and wind as a polar's table has speeds.
+        title: of the picture.
+        stretches: (angles, winds) of how many stretches of sailing each speed is; a dot, the larger the more.
+
+    """
     figure = plt.figure(figsize=(6.4, 7.6))
     axes = figure.add_subplot(projection="polar")
     assert isinstance(axes, PolarAxes)
@@ -38,10 +49,16 @@ def polar_figure(polar: Polar, speed_error: float, *, title: str) -> Figure:
     angles = np.radians(np.arange(0.0, 181.0, 1.0))
     for n, tws_mps in enumerate(winds[::-1][:: math.ceil(len(winds) / MOST_CURVES)]):
         speeds, colour = polar.speeds_mps(angles, tws_mps), plt.get_cmap("viridis")(0.2 + 0.22 * n)
+        doubt = np.full(angles.shape, error) if isinstance(error, float) else error.speeds_mps(angles, tws_mps)
         axes.plot(angles, speeds, color=colour, label=f"{tws_mps:.1f} m/s of wind")
-        if speed_error > 0.0 and n == 0:
-            low, high = (speeds * math.exp(sign * NINETY * speed_error) for sign in (-1.0, 1.0))
+        if float(doubt.max()) > 0.0 and (n == 0 or not isinstance(error, float)):
+            low, high = (speeds * np.exp(sign * NINETY * doubt) for sign in (-1.0, 1.0))
             axes.fill_between(angles, low, high, color=colour, alpha=0.15, label="nine in ten, of that wind")
+        if stretches:
+            j = int(np.argmin(np.abs(polar.tws_mps - tws_mps)))
+            many = np.array(stretches)[:, j]
+            at = np.flatnonzero(many)
+            axes.scatter(polar.twa_rad[at], polar.speed_mps_table[at, j], s=8.0 * np.sqrt(many[at]) + 6.0, color=colour)
     axes.set_title(f"{title}: boat speed [m/s]")
     axes.legend(loc="center right", bbox_to_anchor=(0.36, 0.93), fontsize=8, framealpha=1.0)
     return figure

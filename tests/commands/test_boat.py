@@ -1,5 +1,6 @@
 """``companion boat``: guessed, shown, compared, exported, and sailed by a mission."""
 
+import json
 import math
 import tomllib
 
@@ -25,6 +26,15 @@ def test_what_is_guessed_is_shown_drawn_and_written_for_opencpn(tmp_path, capsys
     said = capsys.readouterr().out
     assert "best beat [deg]" in said
     assert "35 %" in said
+    assert main(["boat", "show", str(file), "--signalk", str(tmp_path / "p.json")]) == 0
+    (told,) = json.loads((tmp_path / "p.json").read_text()).values()
+    winds = {w["trueWindSpeed"]: dict(w["angleData"]) for w in told["windData"]}
+    polar = polar_of_file(read_boat_file(file), "")
+    assert told["name"] == "pepper"
+    for wind, speeds in winds.items():
+        assert speeds == pytest.approx({round(a, 4): polar.speed_mps(a, wind) for a in polar.twa_rad}, abs=0.001)
+        best = next(w for w in told["windData"] if w["trueWindSpeed"] == wind)["optimalBeats"][0]
+        assert best[1] * math.cos(best[0]) == pytest.approx(polar.best_beat(wind).vmg_mps, abs=0.002)
     middle = read_polar(tmp_path / "p.pol").polar.speed_mps(1.5, 3.0)
     assert main(["boat", "show", str(file), "--pol", str(tmp_path / "p.pol"), "--quantile", "0.1", "--force"]) == 0
     assert read_polar(tmp_path / "p.pol").polar.speed_mps(1.5, 3.0) == pytest.approx(0.639 * middle, rel=0.02)
