@@ -12,6 +12,7 @@ import gzip
 import hashlib
 import io
 import math
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -212,18 +213,23 @@ def _read(path: Path) -> ReadLog:
         files = heard or [path / TRACK]
     else:
         files = [path]
+    if not files[0].is_file():
+        raise _Useless("it is no file")
     data = [_bytes(p) for p in files]
     digest = hashlib.sha256(b"".join(data)).hexdigest()[:16]
     rows, system = _Rows(), None
     ending = files[0].name.lower().removesuffix(".gz").rpartition(".")[2]
-    if ending == "tlog" or TLOG in files[0].name:
-        system = _tlog(files, rows)
-    elif ending == "bin":
-        _bin(files[0], data[0], rows)
-    elif ending == "csv":
-        _csv(data[0], rows)
-    else:
-        _nmea(data[0], rows)
+    try:
+        if ending == "tlog" or TLOG in files[0].name:
+            system = _tlog(files, rows)
+        elif ending == "bin":
+            _bin(files[0], data[0], rows)
+        elif ending == "csv":
+            _csv(data[0], rows)
+        else:
+            _nmea(data[0], rows)
+    except (zlib.error, EOFError, gzip.BadGzipFile, csv.Error) as error:
+        raise _Useless(f"it is damaged ({str(error)[:60]})") from None
     return ReadLog(log=rows.log(str(path)), digest=digest, system=system)
 
 

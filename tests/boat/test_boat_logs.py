@@ -1,6 +1,7 @@
 """Logs of every kind are read to the same sailing; what is of no use is said, skipped and counted."""
 
 import csv
+import gzip
 import io
 import math
 import struct
@@ -253,3 +254,22 @@ def test_who_lies_still_does_not_sail(tmp_path):
 def test_what_is_not_there_is_refused(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         logs_under([tmp_path / "nowhere"])
+
+
+@pytest.mark.parametrize("ending", ["tlog", "tlog.gz", "BIN", "csv", "csv.gz", "nmea"])
+@pytest.mark.parametrize("what", ["nothing", "noise", "half"])
+def test_what_is_damaged_is_skipped_or_read_to_there(tmp_path, ending, what):
+    """Nothing that lies in a folder of logs ends the reading of the others."""
+    makers = {"tlog": tlog, "csv": table, "nmea": nmea, "BIN": lambda path: bin_log(path)[0]}
+    whole = makers[ending.removesuffix(".gz")](tmp_path / f"whole.{ending.removesuffix('.gz')}").read_bytes()
+    if ending.endswith(".gz"):
+        whole = gzip.compress(whole)
+    noise = np.random.default_rng(1).integers(0, 256, 5000, dtype=np.uint8).tobytes()
+    path = tmp_path / f"a.{ending}"
+    spoiled = {"nothing": b"", "noise": noise, "half": whole[: len(whole) // 2] + noise + whole[len(whole) // 2 :]}
+    path.write_bytes(spoiled[what])
+    read, skipped = read_logs([path, tlog(tmp_path / "good.tlog")])
+    assert str(tmp_path / "good.tlog") in [one.log.name for one in read]
+    assert len(read) + len(skipped) == 2
+    if what != "half":
+        assert len(skipped) == 1
