@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 _EPILOG = """\
 examples:
+  companion plan missions/archipelago.toml --explain --wind 5@20
   companion plan lake.json
   companion plan lake.json --budget 10 --out path.json --plot path.png
   companion plan lake.json --algorithm rrtstar --expansions 20000 --seed 7   (the same path on every machine)
   companion plan lake.json --explain
-  companion plan archipelago.toml --explain --wind 5@20
 
 The problem's format is described in docs/reference/problem-format.md. PLAN.json holds "waypoints" as [[x, y], ...] in
 metres; of a mission with several goals it is a list of plans.

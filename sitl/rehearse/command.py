@@ -19,13 +19,13 @@ SUMMARY = "sail a mission a thousand times before it is sailed"
 FOLDER = Path("rehearsals")
 _EPILOG = """\
 examples:
-  companion rehearse archipelago.toml                         until chances are known within 10 %
-  companion rehearse archipelago.toml --wind 6@240 --sure 5   the forecast, and an answer twice as sharp
-  companion rehearse archipelago.toml --wind yesterday.csv    a measured record (t_s,wind_from_deg,wind_speed_ms)
-  companion rehearse archipelago.toml --wind july.csv         a climate (wind_from_deg,wind_speed_ms,share)
-  companion rehearse archipelago.toml --faults --minutes 10   with trouble; what is known after ten minutes
-  companion rehearse archipelago.toml --try margin_m=20 --try later=2h --pairs 50
-  companion rehearse archipelago.toml --runs 5000 --sure 1 --dask tcp://HOST:8786
+  companion rehearse missions/archipelago.toml                         until chances are known within 10 %
+  companion rehearse missions/archipelago.toml --wind 6@240 --sure 5   the forecast, and an answer twice as sharp
+  companion rehearse missions/archipelago.toml --wind yesterday.csv    measured (t_s,wind_from_deg,wind_speed_ms)
+  companion rehearse missions/archipelago.toml --wind july.csv         a climate (wind_from_deg,wind_speed_ms,share)
+  companion rehearse missions/archipelago.toml --faults --minutes 10   with trouble; what is known after ten minutes
+  companion rehearse missions/archipelago.toml --try margin_m=20 --try later=2h --pairs 50
+  companion rehearse missions/archipelago.toml --runs 5000 --sure 1 --dask tcp://HOST:8786
 
 The answer stands on the terminal and, with a map of the tracks and of the trouble, in rehearsal.html, .png and .json of
 the folder; the folders of the worst voyages are there for 'companion view' and 'companion replay'. The same command

@@ -141,7 +141,9 @@ def rehearse(
         def is_time(there: Sequence[dict[str, Any] | None]) -> tuple[str, bool]:
             records = [record for record in there if record]
             page.fill(RehearsalOutcome(known=follower.known, ends="more to come", changes=tuple(so_far(records))))
-            return "", limits.left_s() <= voyage_s  # of the worst, once again
+            left_s = limits.left_s()
+            words = "" if math.isinf(left_s) else f"at most {max(0.0, left_s):.0f} s left"
+            return words, left_s <= voyage_s  # of the worst, once again
 
         # seed by seed: when the time is over, all changes have been tried alike
         again = rehearsal(changed(jobs[:count], changes)).results(options, watch=is_time)

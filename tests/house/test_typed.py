@@ -109,6 +109,7 @@ def test_the_examples_of_a_help_are_understood_and_name_what_an_installed_progra
     text = helps(PROGRAMS[program].parser(command))
     assert "sitl/scenarios" not in text
     assert [file for file in re.findall(r"missions/[\w.-]+", text) if not Path(file).exists()] == []
+    assert not re.search(r"(?<!/)\barchipelago\.toml", text)  # where it is written, and not where the reader stands
     for line in re.findall(r"^  ((?:companion|sitl) [a-z].*?)(?:\s{2,}.*)?$", text, re.MULTILINE):
         try:
             words = words_of(line)[1:]

@@ -172,10 +172,11 @@ def test_a_user_rehearses_a_mission_goes_on_and_looks_at_the_worst(sailed, monke
     folder = sailed / "rehearsals" / "rocks"
     whole = (folder / "results.jsonl").read_bytes()
 
-    code, out, _ = run(
-        sailed, monkeypatch, capsys, "--runs", "2", "--pairs", "1", "--try", "margin_m=15", "--json", "figures.json"
-    )
+    words = ("--runs", "2", "--pairs", "1", "--try", "margin_m=15", "--minutes", "90", "--json", "figures.json")
+    code, out, err = run(sailed, monkeypatch, capsys, *words)
     assert code == 0
+    # of six minutes it told "1040 s left", which was how long all pairs would have taken
+    assert re.search(r"1 sailed, 0 at most to come; at most \d+ s left", err)
     assert "1 in the file before" in out
     assert "margin_m 15, 1 pair: " in out
     lines = (folder / "results.jsonl").read_bytes()
