@@ -15,6 +15,7 @@ import contextlib
 import difflib
 import importlib
 import importlib.util
+import os
 import re
 import signal
 import sys
@@ -283,7 +284,10 @@ class Program:
             sys.stderr.write(f"{self.name} {args.command}: {said}\n")
         try:
             with _interrupts_kept():
-                return int(args.run(args))
+                code = int(args.run(args))
+                if sys.stdout is not None and not sys.stdout.closed:
+                    sys.stdout.flush()  # a reader that has gone is met here, and not where nobody answers for it
+                return code
         except CompanionError as error:
             sys.stderr.write(f"{self.name} {args.command}: {error}\n")
             return error.exit_code
@@ -300,7 +304,8 @@ class Program:
                 raise
             return INTERRUPTED
         except BrokenPipeError:
-            sys.stderr.close()
+            with contextlib.suppress(OSError, ValueError):  # what is still to be written goes nowhere
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
         except OSError as error:
             if error.filename is None:

@@ -184,6 +184,36 @@ def test_an_interrupt_that_falls_into_a_finalizer_comes_again(monkeypatch, capsy
     assert "ignored" not in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("lines", [1, 100_000])  # read to the end of the buffer, and not
+def test_a_reader_that_has_gone_ends_a_command_quietly(lines):
+    """`companion report VOYAGE | head -3` told of a broken pipe that was ignored."""
+    begin = f"""
+import sys, time
+import companion.commands.field as command
+def run(args):
+    print("first", flush=True)
+    time.sleep(0.4)
+    for _ in range({lines}):
+        print("what nobody reads")
+    return 0
+command.run = run
+from companion.cli import main
+sys.exit(main(["field", "missions/field-ring.toml"]))
+"""
+    env = {**HERE, "PYTHONUNBUFFERED": ""}  # else each line is met by the pipe as it is printed
+    run = subprocess.Popen(
+        [sys.executable, "-c", begin], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env
+    )
+    try:
+        assert run.stdout.readline() == "first\n"
+        run.stdout.close()
+        with run.stderr:
+            err = run.stderr.read()
+    finally:
+        run.wait(30.0)
+    assert (run.returncode, err) == (0, "")
+
+
 @pytest.mark.parametrize("program", ["companion", "sitl"])
 def test_nothing_is_read_from_a_file_before_ctrl_c_is_provided_for(program):
     """``signal`` and ``__future__`` are files: some of them printed the traceback of an import."""
