@@ -56,6 +56,8 @@ class AstarSettings:
 
     Attributes:
         grid_m: GRID SIZE [m]; None: a fortieth of the distance.
+        room_m: How far beyond start and goal the grid reaches at the least [m], where no fence ends it; None: half
+            the distance, in which a boat between two gates of a buoy has no room to tack.
         turn_s_per_rad: f of eq. 4.4 [s/rad]; 0 for Figure 5.1.
         tack_s, gybe_s: Added cost of a manoeuvre [s].
         tunnel_width_m: TUNNEL WIDTH of eq. 4.6 [m]; None for no tunnel.
@@ -70,12 +72,15 @@ class AstarSettings:
         memory_bytes: What the grid may take.
         projection: ``local``: planned in the problem's metres; ``flat``: in those of eq. 4.2 (docs/lab/frames.md).
         origin: Where the problem's metres count from; the flat projection needs it (``PlannerChoice.about``).
+        goal_heading: ``bearing``: the goal is a place and a heading, nearest to the bearing from start to goal;
+            ``any``: the place alone, the other way that 4.1.4 names, where the bearing's heading cannot arrive.
         goal_heading_rad: The heading at the goal where it is set by hand (4.1.4): the sailable one nearest to it is
-            taken; None: nearest to the bearing from start to goal.
+            taken; None: as ``goal_heading`` says.
 
     """
 
     grid_m: float | None = _set_by("grid_m", None, above=0.0)
+    room_m: float | None = _set_by("room_m", None, above=0.0)
     turn_s_per_rad: float = _set_by("turn_s_per_rad", 8.0, least=0.0)
     tack_s: float = _set_by("tack_s", 0.0, least=0.0)
     gybe_s: float = _set_by("gybe_s", 0.0, least=0.0)
@@ -86,6 +91,7 @@ class AstarSettings:
     max_twa_rad: float = _set_by("max_twa_deg", math.radians(160.0), above=90.0, most=180.0)
     max_turn_rad: float = _set_by("max_turn_deg", 0.5 * math.pi, above=0.0, most=180.0)
     ship_match_s: float = _set_by("ship_match_s", 20.0, above=0.0)
+    goal_heading: str = _set_by("goal_heading", "bearing", words=("bearing", "any"))
     memory_bytes: int = 256_000_000
     projection: str = _set_by("projection", "local", words=("local", "flat"))
     origin: GeoPoint | None = None

@@ -110,6 +110,8 @@ TASK_KEYS = {
 ASTAR = {
     "expansions": 5000,
     "grid_m": 5.0,
+    "room_m": 50.0,
+    "goal_heading": "any",
     "turn_s_per_rad": 4.0,
     "tack_s": 9.0,
     "gybe_s": 9.0,

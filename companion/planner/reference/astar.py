@@ -205,10 +205,13 @@ class NodeGrid:
         return self.x0_m + (node % self.columns) * self.dx_m, self.y0_m + (node // self.columns) * self.dy_m
 
 
-def grid_of(problem: Problem, grid_m: float) -> NodeGrid:
-    """Return the grid of about that spacing [m] on which start and goal are nodes."""
+def grid_of(problem: Problem, grid_m: float, room_m: float | None = None) -> NodeGrid:
+    """Return the grid of about that spacing [m] on which start and goal are nodes, with ``room_m`` about both."""
     x0, y0, x1, y1 = bounds_of(problem)
     (sx, sy), (gx, gy) = problem.start_en, problem.goal_en
+    if room_m is not None and problem.fence is None:
+        x0, y0 = min(x0, min(sx, gx) - room_m), min(y0, min(sy, gy) - room_m)
+        x1, y1 = max(x1, max(sx, gx) + room_m), max(y1, max(sy, gy) + room_m)
 
     def fit(low: float, high: float, start: float, goal: float) -> tuple[float, float, int, int, int]:
         apart = abs(goal - start)
@@ -312,7 +315,7 @@ def search(
         effort.found()
         return Outcome(waypoints_en=np.array([problem.start_en]))
     grid_m = settings.grid_m if settings.grid_m is not None else distance_m / CELLS_ACROSS
-    grid = grid_of(problem, grid_m)
+    grid = grid_of(problem, grid_m, settings.room_m)
     trace: dict[str, Any] = {"grid_m": grid_m, "columns": grid.columns, "rows": grid.rows}
     if grid.memory_bytes > settings.memory_bytes:
         fits = grid_m * math.sqrt(grid.memory_bytes / settings.memory_bytes)
@@ -358,6 +361,7 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
         )
         way[k] = wrap_pi(heading), speed if is_sailable else 0.0, twa
     (sx, sy), (gx, gy) = problem.start_en, problem.goal_en
+    is_any = settings.goal_heading == "any" and settings.goal_heading_rad is None
     wanted_rad = heading_of(gx - sx, gy - sy) if settings.goal_heading_rad is None else settings.goal_heading_rad
     goal_heading = target_heading(courses, way[:, 1] > 0.0, wanted_rad)
     if goal_heading < 0:
@@ -367,7 +371,7 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
     g, clock = np.full(states, np.inf), np.zeros(states)
     parent, closed = np.full(states, -1, dtype=np.int32), np.zeros(states, dtype=np.bool_)
     heap_f, heap_state = np.zeros(2 * states), np.zeros(2 * states, dtype=np.int32)
-    count = np.zeros(4, dtype=np.int64)
+    count = np.zeros(5, dtype=np.int64)
     g[states - 1], heap_state[0], count[kernels.HEAP] = 0.0, states - 1, 1
     fast = 0.0
     if settings.heuristic_mps is not None:
@@ -403,7 +407,7 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
                     np.array([grid.columns, grid.rows]),
                     grid.start,
                     grid.goal,
-                    goal_heading,
+                    -1 if is_any else goal_heading,
                     step,
                     way,
                     weight,
@@ -430,7 +434,7 @@ def _run(problem: Problem, effort: Effort, settings: AstarSettings, grid: NodeGr
         reason = f"{why}: {grid.columns} x {grid.rows} nodes of {trace['grid_m']:.3g} m, {trace['expanded']} expanded"
         return Outcome(waypoints_en=None, status=status, reason=reason, trace=trace)
     effort.found()
-    goal_state = grid.goal * kernels.HEADINGS + goal_heading
+    goal_state = int(count[kernels.LAST])
     trace["objective"] = float(g[goal_state])
     way_en = _path(problem, grid, parent, goal_state)
     return Outcome(waypoints_en=way_en, lower_bound_s=simple_bound_s(problem), trace=trace)

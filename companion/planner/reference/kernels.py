@@ -280,8 +280,8 @@ def steer(  # type: ignore[no-untyped-def]
 # half the width of a tunnel with borders [m] (then TUNNEL is what a step beyond it costs [s]; 0: eq. 4.6),
 # the greatest turn from step to step [rad], the power by which the cost rises to a border (0: not at all inside).
 TURN, TACK_COST, GYBE_COST, TUNNEL, FAST, BORDER, MAX_TURN, RISE = range(8)
-# Places in ``count``: heap size, states expanded, goal reached (0, 1), states seen.
-HEAP, EXPANDED, REACHED, SEEN = range(4)
+# Places in ``count``: heap size, states expanded, goal reached (0, 1), states seen, the goal state that was reached.
+HEAP, EXPANDED, REACHED, SEEN, LAST = range(5)
 HEADINGS = 16
 
 
@@ -331,7 +331,8 @@ def expand(  # type: ignore[no-untyped-def]
     """Expand up to ``most`` states; count[REACHED] tells when the goal state was taken from the heap.
 
     frame: x0, y0 of node (0, 0), spacing east, spacing north, start heading. shape: columns, rows. start, goal:
-    node numbers. step (24, 4): columns, rows, heading number, length [m]. way (16, 3): heading [rad], speed over
+    node numbers; goal_heading -1: any.
+    step (24, 4): columns, rows, heading number, length [m]. way (16, 3): heading [rad], speed over
     ground [m/s] (0: not sailable), |TWA| [rad]. A state is node x 16 + heading; the start's own heading has the
     extra state columns x rows x 16. Returns the states expanded.
     """
@@ -356,8 +357,8 @@ def expand(  # type: ignore[no-untyped-def]
             at, before = start, frame[4]
         else:
             at, before = state // HEADINGS, way[state % HEADINGS, 0]
-            if at == goal and state % HEADINGS == goal_heading:
-                count[REACHED] = 1
+            if at == goal and (goal_heading < 0 or state % HEADINGS == goal_heading):
+                count[REACHED], count[LAST] = 1, state
                 return done
         column, row = at % columns, at // columns
         x, y = frame[0] + column * frame[2], frame[1] + row * frame[3]

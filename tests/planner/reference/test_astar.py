@@ -160,6 +160,29 @@ def test_the_goal_heading_is_set_by_hand_for_short_courses():
     assert abs(math.degrees(judged.legs[-1].twa_rad)) == pytest.approx(45.0, abs=1.0)
 
 
+def test_any_heading_at_the_goal_arrives_where_that_of_the_bearing_cannot():
+    # The mark lies behind a wall to its south: whoever heads north at it comes through the wall.
+    p = problem(
+        wind={"from_deg": 90, "speed_mps": 5, "sigma": {"model": "none"}},
+        obstacles=["POLYGON((-400 740,400 740,400 790,-400 790,-400 740))"],
+    )
+    fixed, _ = run(p)
+    free, judged = run(p, goal_heading="any")
+    assert fixed.waypoints_en is None or fixed.trace["objective"] > free.trace["objective"]
+    assert judged.is_feasible
+    assert abs(math.degrees(judged.legs[-1].heading_rad)) > 80.0
+    _, set_by_hand = run(p, goal_heading="any", goal_heading_rad=math.pi)
+    assert abs(math.degrees(set_by_hand.legs[-1].heading_rad)) == pytest.approx(180.0)
+
+
+def test_a_short_leg_has_the_room_to_tack_that_it_is_given():
+    p = problem(goal={"x": 5, "y": 10, "radius": 3})
+    settings = {"grid_m": 5.0, "min_twa_rad": math.radians(50.0), "max_turn_rad": math.radians(150.0)}
+    _, cramped = run(p, **settings)
+    _, roomy = run(p, **settings, room_m=60.0)
+    assert roomy.time_s < 0.8 * cramped.time_s
+
+
 def test_with_his_largest_turn_of_90_degrees_it_gybes_round_where_the_wind_blows_across_the_grid():
     across = problem(wind={"from_deg": 5, "speed_mps": 5, "sigma": {"model": "none"}})
     _, his = run(across)
