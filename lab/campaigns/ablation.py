@@ -139,7 +139,9 @@ def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
             "least clearance m",
             "median m",
             "tacks",
-            "time, share of as it is",
+            "replans",
+            "time s",
+            "share of as it is",
         )
     ]
     for name in names:
@@ -153,6 +155,7 @@ def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
             if r["arrived"] and r["seed"] in reference and reference[r["seed"]]["arrived"]
         ]
         middle, low, high = interval(shares)
+        times = [r["time_s"] for r in mine if r["arrived"]]
         rows.append(
             (
                 name,
@@ -163,6 +166,8 @@ def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
                 f"{min(clear):.1f}" if clear else "-",
                 f"{np.median(clear):.1f}" if clear else "-",
                 f"{np.median([r['tacks'] for r in mine]):.0f}",
+                f"{np.median([r['replans'] for r in mine]):g}",
+                f"{np.median(times):.0f}" if times else "-",
                 "1" if name == AS_IT_IS else f"{middle:.3f} ({low:.3f} to {high:.3f})" if shares else "-",
             )
         )

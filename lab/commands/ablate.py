@@ -19,7 +19,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         description="Sail the same weather, seed for seed, with one thing taken away or another in its place: the "
         "wind's spread, the forecaster, the probability of staying out of the no-go zone, beats left to the autopilot, "
         "the planner. Prints for each scenario arrivals, contacts, voyages below the floor, times in the no-go "
-        "zone, clearance, and the time as a share of the same seed's with everything, with its 95 % interval.",
+        "zone, clearance, replans, time, and that as a share of the same seed's with everything, with its interval.",
         epilog='Example: sitl ablate two-channels --runs 20 --only "no spread" --only kalman',
     )
     parser.add_argument(

@@ -87,6 +87,7 @@ def record(variation, seed, time_s, **more):
         "arrived": True,
         "contacts": 0,
         "time_s": time_s,
+        "replans": 7,
         "tacks": 3,
         "min_clearance_m": 12.0,
         "no_go_entries": 0,
@@ -106,7 +107,7 @@ def test_times_are_paired_and_only_of_those_that_both_arrived():
     ]
     kalman = table(records, [AS_IT_IS, "kalman"]).splitlines()[2].split()
     assert kalman[:4] == ["kalman", "3/3", "1", "1"]
-    assert " ".join(kalman[-4:]) == "1.100 (1.100 to 1.100)"
+    assert " ".join(kalman[-6:]) == "7 220 1.100 (1.100 to 1.100)"
 
 
 @given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=30))
