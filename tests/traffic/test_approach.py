@@ -80,7 +80,7 @@ def test_cpa_is_the_least_sampled_distance(
     right, ahead = dx * math.cos(c) - dy * math.sin(c), dx * math.sin(c) + dy * math.cos(c)
     gap = np.hypot(np.maximum(0.0, np.abs(right) - 7.5), np.maximum(0.0, np.abs(ahead) - 0.5 * (bow + 20.0))) - 1.0
     least = max(0.0, float(gap.min()))
-    assert a.distance_m <= least + 1e-6
+    assert a.distance_m <= least + 1e-6 * (1.0 + float(t[-1]))  # slower than a micrometre a second is at rest
     step = float(t[1]) * (speed + v)
     assert a.distance_m >= least - step
     assert a.time_s >= 0.0
