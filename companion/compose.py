@@ -44,6 +44,7 @@ from companion.geofence import Code, Finding, FindingLevel, LocalArea, Mission
 from companion.geofence.mission import (
     AtomOptions,
     BoatFile,
+    BoatOptions,
     CircleAtomOptions,
     GoalField,
     GoalGate,
@@ -81,12 +82,15 @@ __all__ = [
     "planner_of",
     "polar_of",
     "polar_of_file",
+    "speed_error_of",
     "target_limits_of",
     "voyage_of",
     "water_of",
     "waters_of",
 ]
 
+# What a guess at a polar, waves, leeway and tacks that fail take of the speeds: arrivals of `sitl mismatch` spread so.
+UNSAID_ERROR_PERCENT = 30.0
 POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
 
 
@@ -118,6 +122,12 @@ def polar_of_file(file: BoatFile, source: str) -> Polar:
     """Return the polar of a boat file that came from ``source``. Raises InputError."""
     table = file.polar
     return polar_of_table(table.twa_deg, table.tws_mps, table.speed_mps, name=file.name, source=source)
+
+
+def speed_error_of(boat: BoatOptions) -> float:
+    """Return how far a boat's speeds may be off together, as the deviation of the logarithm."""
+    said = boat.speed_error_percent
+    return (UNSAID_ERROR_PERCENT if said is None else said) / 100.0
 
 
 def boat_of(mission: Mission) -> Boat:
@@ -152,7 +162,7 @@ def boat_of(mission: Mission) -> Boat:
         max_tws_mps=mission.boat.max_tws_mps,
         min_tws_mps=mission.boat.min_tws_mps,
         tack_fails=mission.boat.tack_fails if mission.boat.can_tack else 0.0,
-        speed_error=mission.boat.speed_error_percent / 100.0,
+        speed_error=speed_error_of(mission.boat),
         no_go_error_rad=math.radians(mission.boat.no_go_error_deg),
     )
 

@@ -17,7 +17,7 @@ from companion.boat import AutopilotLimits, Boat
 from companion.current import over_water
 from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.messages import Command, Mode
-from companion.skipper.step import Route, SkipperState, Snapshot, WindEstimate
+from companion.skipper.step import SkipperState, Snapshot, SpeedSeen, WindEstimate
 from companion.skipper.way import PointEn, Voyage, cross_track_m, gates_of, moved
 
 Winds = tuple[tuple[float, float], ...]  # from [rad] and speed [m/s], for WIND_S each
@@ -36,8 +36,9 @@ SLOWEST, FASTEST = 0.25, 1.6  # of the polar: what is outside says something els
 SPREAD, SPREAD_TRIES = 0.15, 2.0  # standard deviation of what tries make of a walk, and how many it counts as at first
 HERE_M, STRAYS = 2.5, 2.2  # nine in ten are within so much of a place, and of the pace's doubt of the way (sitl shown)
 ELSEWHERE = 1.5  # of how far a boat is from her polar here: how far she may be from that in what comes
-UNTRIED = 0.25  # likewise of a boat that has shown nothing yet; a try halves it (sitl shown)
-SHIFTS = 0.3  # of the spread of a plan's time: the boat sees how the wind begins, which the plan did not
+SHOWN = (
+    4.0  # a boat that has sailed a fifth of the time that is left has shown half of what it makes of it (sitl shown)
+)
 EVENS_OUT = 0.45  # of a try's scatter, with the root of the time: what one loses the next one gains
 LATE_LEAST_S = 1.0  # standard deviation of any time
 LATE_SIGMAS = 1.28  # of a normal: nine in ten are below
@@ -104,6 +105,16 @@ class Pace:
         """
         return math.hypot(self.spread, 1.0 - self.share)
 
+    @property
+    def seen_speed(self) -> SpeedSeen:
+        """Return what plans are told of it: the boat's share of its speeds, and how far that may be off later."""
+        return SpeedSeen(share=self.share, error=self._error() if self.tries else 0.0, tries=self.tries)
+
+    def _error(self) -> float:
+        """Return how far the pace may be off in what comes, as a share of the time, beside what is untried."""
+        each = self.spread / self.share
+        return math.hypot(each / math.sqrt(max(1.0, self.tries + self.prior)), ELSEWHERE * (1.0 - self.share))
+
     def is_due(self, t_s: float, plan_id: int) -> bool:
         """Return whether a walk is to be begun: the last one is over, or was of another plan."""
         return self.tried is None or self.tried.plan_id != plan_id or t_s - self.tried.t_s >= TRIED_S
@@ -130,21 +141,16 @@ class Pace:
         """Return how long a walk of ``walk_s`` will take [s]: half of the boats are there."""
         return walk_s / self.share
 
-    def late_s(self, walk_s: float, spread: float) -> float:
-        """Return by when nine boats in ten have made a walk [s]; ``spread``: that of a plan's time in the wind, of it.
+    def late_s(self, walk_s: float, speed_error: float) -> float:
+        """Return by when nine boats in ten have made a walk [s]; ``speed_error``: what is not known of their speeds.
 
         What is not known of the pace itself goes with the time, what tacks and gusts do with its root.
         """
         time_s = self.left_s(walk_s)
         each = self.spread / self.share
-        known = math.hypot(
-            each / math.sqrt(max(1.0, self.tries + self.prior)),
-            ELSEWHERE * (1.0 - self.share),
-            UNTRIED / (1.0 + self.tries),
-        )
-        sigma_s = math.hypot(
-            time_s * math.hypot(SHIFTS * spread, known), EVENS_OUT * each * math.sqrt(TRIED_S * time_s), LATE_LEAST_S
-        )
+        untried = speed_error / (1.0 + SHOWN * self.tries * TRIED_S / max(time_s, TRIED_S))
+        known = math.hypot(self._error(), untried)
+        sigma_s = math.hypot(time_s * known, EVENS_OUT * each * math.sqrt(TRIED_S * time_s), LATE_LEAST_S)
         return time_s + LATE_SIGMAS * sigma_s
 
 
@@ -181,8 +187,9 @@ def eta_of(snapshot: Snapshot, state: SkipperState, voyage: Voyage, pace: Pace) 
     )
     if walk.goal_s is None:
         return Eta(points=points)
-    spread = _wind_spread(state.mission.route)
-    return Eta(points=points, there_s=pace.left_s(walk.goal_s), there_late_s=pace.late_s(walk.goal_s, spread))
+    return Eta(
+        points=points, there_s=pace.left_s(walk.goal_s), there_late_s=pace.late_s(walk.goal_s, voyage.boat.speed_error)
+    )
 
 
 def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -> Pace:
@@ -205,13 +212,6 @@ def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -
     if tried is not None and tried.plan_id == route.plan_id and state.mission.index <= tried.until:
         left = _walk(snapshot, state, voyage, until=tried.until, winds=tried.winds)
     return pace.seen(snapshot.t_s, None if left is None else left.points[-1].in_s, fresh)
-
-
-def _wind_spread(route: Route) -> float:
-    """Return the standard deviation of a plan's time that the wind's spread makes, as a share of the time."""
-    if route.median_s is None or route.late_s is None or route.median_s <= 0.0:
-        return 0.0
-    return max(0.0, route.late_s / route.median_s - 1.0) / LATE_SIGMAS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -493,6 +493,7 @@ class VoyageFold:
             wind=wind,
             current=self.current.view(),
             doubt=self.current.doubt(),
+            speed_seen=self._pace.seen_speed,
             unsure=unsure,
             wind_before=self._wind_before(wind, unsure=unsure),
             mission=self._mission,

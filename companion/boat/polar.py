@@ -155,7 +155,7 @@ class Polar:
 
     def max_speed_mps(self, tws_mps: float) -> float:
         """Return the highest speed [m/s] at any angle."""
-        return float(np.max(self.column_mps(tws_mps)))
+        return max(self._curve_of(tws_mps)[1])
 
     # ------------------------------------------------------------------------------------ best angles
     def vmg_mps(self, twa_rad: float, tws_mps: float) -> float:

@@ -32,7 +32,6 @@ Exit codes: 0 written or told, 1 the logs hold too little sailing, 2 a file or a
 """
 TWA_DEG = (40.0, 45.0, 52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0, 165.0, 180.0)
 MOST_WINDS = 7  # columns of a table
-UNSAID_ERROR = 0.35  # of a file that says none: as of one that is guessed
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
@@ -122,7 +121,7 @@ def _learn(args: argparse.Namespace) -> int:
     from companion.boat import learned_text, lesson_of
     from companion.boat_logs import Skipped, logs_under, read_logs
     from companion.commands.output import refuse_existing, write_files
-    from companion.compose import polar_of_file
+    from companion.compose import polar_of_file, speed_error_of
     from companion.errors import JobError
     from companion.geofence.mission import read_boat_file
 
@@ -152,7 +151,7 @@ def _learn(args: argparse.Namespace) -> int:
         lesson = lesson_of(
             [one.log for one in read],
             polar_of_file(believed, args.prior),
-            believed.boat.speed_error_percent / 100.0 or UNSAID_ERROR,
+            speed_error_of(believed.boat),
             no_go_half_rad=math.radians(believed.boat.no_go_half_deg),
             seed=args.seed,
         )
@@ -204,15 +203,17 @@ def _version(path: Path) -> int:
 
 def _left_out(read: list[ReadLog], believed: BoatFile, source: str) -> str:
     from companion.boat.log import stretches_of
-    from companion.compose import polar_of_file
+    from companion.compose import polar_of_file, speed_error_of
 
-    found = stretches_of([one.log for one in read], polar_of_file(believed, source), UNSAID_ERROR)
+    found = stretches_of([one.log for one in read], polar_of_file(believed, source), speed_error_of(believed.boat))
     return "left out: " + (", ".join(f"{n} ({why.value})" for why, n in found.left_out.most_common()) or "nothing")
 
 
 def _show(args: argparse.Namespace) -> int:
+    from companion.compose import speed_error_of
+
     polar, boat = _boat(args.file)
-    error = 0.0 if boat is None else boat.boat.speed_error_percent / 100.0
+    error = 0.0 if boat is None else speed_error_of(boat.boat)
     print("\n".join([*_words(args.file, boat), *_angles(polar), *_table("boat speed [m/s]", polar, _speeds)]))
     for file, is_pol in ((args.pol, True), (args.signalk, False)):
         if file is not None:
@@ -240,12 +241,13 @@ def _show(args: argparse.Namespace) -> int:
 def _errors(boat: BoatFile | None) -> Polar | float:
     """Return the deviation of the logarithm of the speeds, by angle and wind where the file has it so."""
     from companion.boat import polar_of_table
+    from companion.compose import speed_error_of
 
     if boat is None:
         return 0.0
     table = boat.polar
     if not table.error_percent:
-        return boat.boat.speed_error_percent / 100.0
+        return speed_error_of(boat.boat)
     shares = [[0.01 * e for e in row] for row in table.error_percent]
     return polar_of_table(table.twa_deg, table.tws_mps, shares, name="error", source=boat.name)
 
@@ -276,9 +278,11 @@ def _boat(name: str) -> tuple[Polar, BoatFile | None]:
 
 
 def _words(name: str, boat: BoatFile | None) -> list[str]:
+    from companion.compose import speed_error_of
+
     if boat is None:
         return [f"{name}: speeds alone; `companion boat guess` writes a file that says more"]
-    o = boat.boat
+    o, error = boat.boat, 100.0 * speed_error_of(boat.boat)
     tacks = (
         f"turns {o.turn_rate_deg_s:g} degrees/s; a tack costs {o.tack_loss_s:g} s and fails in "
         f"{100.0 * o.tack_fails:g} %; leeway {o.leeway_deg:g} degrees"
@@ -287,8 +291,8 @@ def _words(name: str, boat: BoatFile | None) -> list[str]:
         f"{boat.name}: {boat.made or 'nobody says how it was made'}",
         f"{o.length_m:g} x {o.beam_m:g} m; not nearer to the wind than {o.no_go_half_deg:g} degrees; {tacks}",
         "her speeds are taken to be as they stand here"
-        if o.speed_error_percent == 0.0
-        else f"her speeds may all be off by {o.speed_error_percent:g} % (standard deviation): arrivals spread by it",
+        if error == 0.0
+        else f"her speeds may all be off by {error:g} % (standard deviation): arrivals spread by it",
         *([] if boat.learned is None else _learned_words(boat.learned)),
     ]
 

@@ -254,7 +254,7 @@ class RecordedSource:
 def plan_figures(plan: Plan) -> dict[str, Any]:
     """Return time [s], length and clearance [m], risks and manoeuvres of a plan that has a path.
 
-    ``late_s``: there by then in nine winds of ten; None: it does not say, or not in any time.
+    ``late_s``: there by then in nine cases of ten; None: it does not say, or not in any time.
     """
     clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
     late_s = None if plan.arrival is None or not math.isfinite(plan.arrival.late_s) else round(plan.arrival.late_s)

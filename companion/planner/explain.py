@@ -86,11 +86,13 @@ def _clearance_in_words(problem: Problem, plan: Plan) -> tuple[str, dict[str, An
 
 
 def _arrival_in_words(problem: Problem, plan: Plan) -> tuple[str, dict[str, Any]]:
-    """Return when the plan arrives in the wind's spread, and which of the boat's limits of wind it breaks."""
+    """Return when the plan arrives as wind and boat may be, and which of the boat's limits of wind it breaks."""
     if plan.arrival is None:
         return "", {}
     broken = limits_in_words(problem, plan.arrival)
-    text = in_words(plan.arrival, plan.cost_s) + (f" Not to be sailed: {broken}." if broken else "")
+    text = in_words(plan.arrival, plan.cost_s, is_boat_sure=problem.boat.speed_error == 0.0) + (
+        f" Not to be sailed: {broken}." if broken else ""
+    )
     return text, {"arrival": plan.arrival.to_dict()}
 
 

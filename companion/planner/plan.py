@@ -79,10 +79,10 @@ class Why:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrival:
-    """When a plan arrives in the wind's spread [s]; inf: not within five times its own time.
+    """When a plan arrives as wind and boat may be [s]; inf: not within five times its own time.
 
     Attributes:
-        early_s, median_s, late_s: it arrives so early in one wind of ten, in half of them, in nine of ten.
+        early_s, median_s, late_s: it arrives so early in one case of ten, in half of them, in nine of ten.
         over_max, under_min: the chance of more wind than the boat's limit, and of less, at the worst instant until
             then; None: the boat has no such limit.
         doubts: what is not known of it, in words.

@@ -132,7 +132,7 @@ def _plan(outcome: PlanOutcome, why: str) -> Happening:
     facts = [("time", f"{plan.cost_s:.0f} s")]
     if plan.arrival is not None and math.isfinite(plan.arrival.late_s):
         facts.append(
-            ("in the wind's spread", f"{plan.arrival.median_s:.0f} s, nine of ten {plan.arrival.late_s:.0f} s")
+            ("as wind and boat may be", f"{plan.arrival.median_s:.0f} s, nine of ten {plan.arrival.late_s:.0f} s")
         )
     if math.isfinite(plan.lower_bound_s) and plan.lower_bound_s > 0.0:
         facts.append(("no faster than", f"{plan.lower_bound_s:.0f} s"))

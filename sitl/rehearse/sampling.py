@@ -215,7 +215,7 @@ def drawn(seed: int, base: Scenario, mission: Mission, doubts: Doubts) -> tuple[
 def _nearer(scenario: Scenario, mission: Mission, share: float) -> Scenario:
     """Return a scenario whose boat, sea and sensors are nearer to the plan's, or farther from it."""
     polar = share * (OF_ONES_OWN if mission.polar_path is not None else 1.0)
-    if mission.boat.speed_error_percent > 0.0:
+    if mission.boat.speed_error_percent is not None:
         polar = share * mission.boat.speed_error_percent / DRAWN_PERCENT
     wind = scenario.wind
     wind = msgspec.structs.replace(

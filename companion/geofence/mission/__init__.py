@@ -17,6 +17,7 @@ from companion.geofence.mission.mission import load_area, load_mission, load_set
 from companion.geofence.mission.options import (
     AreaOptions,
     AtomOptions,
+    BoatOptions,
     BoxOptions,
     CircleAtomOptions,
     FieldOptions,
@@ -48,6 +49,7 @@ __all__ = [
     "AreaOptions",
     "AtomOptions",
     "BoatFile",
+    "BoatOptions",
     "BoxOptions",
     "CircleAtomOptions",
     "DrawnMission",

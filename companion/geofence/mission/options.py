@@ -268,8 +268,9 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     polar: str | Positive = "ardurover"
     """``ardurover`` (the simulator's), ``avalon`` (Büsser's eq. 4.1), a polar file beside the mission, or a constant
     speed [m/s]."""
-    speed_error_percent: Annotated[float, Meta(ge=0.0, le=60.0)] = 0.0
-    """How far all speeds of the polar may be off together [%, standard deviation]: arrivals spread by it."""
+    speed_error_percent: Annotated[float, Meta(ge=0.0, le=60.0)] | None = None
+    """How far all speeds of the polar may be off together [%, standard deviation]: arrivals spread by it; None: nobody
+    says, and they are taken to be 30 % off."""
     no_go_half_deg: Annotated[float, Meta(ge=0.0, lt=90.0)] = 47.0
     no_go_error_deg: Annotated[float, Meta(ge=0.0, le=15.0)] = 0.0
     """How far that half angle may be off [standard deviation]: it has its share in ``[risk]``, beside the wind's."""

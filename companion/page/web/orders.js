@@ -107,7 +107,7 @@ async function confirm(verb, words, where) {
     if (found.error?.includes("again in a moment")) { await new Promise((resolve) => setTimeout(resolve, 1200)); continue; }
     if (found.error) return preview.replaceChildren(el("p", { class: "warn" }, found.error));
     showPreview({ way: found.way_en_m ?? [], risks: found.risks ?? [] });
-    const facts = [["way", distance(found.length_m)], ["time", `${duration(found.time_s)}${found.late_s ? `, nine winds of ten ${duration(found.late_s)}` : ""}`], ["tacks, gybes", `${found.tacks}, ${found.gybes}`], ["off the plan", percent(found.risk)], ["beyond the margin", distance(found.clearance_m)]];
+    const facts = [["way", distance(found.length_m)], ["time", `${duration(found.time_s)}${found.late_s ? `, nine of ten ${duration(found.late_s)}` : ""}`], ["tacks, gybes", `${found.tacks}, ${found.gybes}`], ["off the plan", percent(found.risk)], ["beyond the margin", distance(found.clearance_m)]];
     preview.replaceChildren(el("dl", { class: "facts" }, ...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? "")))));
     set(give, { disabled: null });
     give.focus();

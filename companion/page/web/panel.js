@@ -99,7 +99,7 @@ function plan(view) {
     ["plan", `${p.number ?? NONE}${p.reason ? `, for ${p.reason.replaceAll("_", " ")}` : ""}`], ["judged", p.age_s === null ? NONE : `${duration(p.age_s)} ago`, JUDGED],
     ["in a wind of", p.twd_from_deg === null ? NONE : `${bearing(p.twd_from_deg)} ${speed(p.tws_mps)} ${speedUnit()}`],
     ["time from then", p.cost_s === null ? NONE : `${duration(p.cost_s)}${p.bound_s ? `, no less than ${duration(p.bound_s)}` : ""}`],
-    ["in the wind's spread", p.median_s === null ? NONE : `${duration(p.median_s)}, nine of ten ${p.late_s === null ? "not in any time" : duration(p.late_s)}`],
+    ["as wind and boat may be", p.median_s === null ? NONE : `${duration(p.median_s)}, nine of ten ${p.late_s === null ? "not in any time" : duration(p.late_s)}`],
     ["there in", p.there_s === null ? NONE : `${duration(p.there_s)}, nine of ten ${duration(p.there_late_s)}`, THERE], ["off the plan", percent(p.path_risk), OFF_PLAN],
     ["margin", distance(p.margin_m)], ["clearance expected", distance(p.expected_clearance_m)], ["leg", `${p.leg ?? NONE} of ${p.count ?? NONE}`],
     ...(p.rung ? [["found by", p.rung]] : []), ...(p.bound_for ? [["bound for", p.bound_for]] : [])];

@@ -96,7 +96,8 @@ class BoatLimits:
     More wind than ``max_tws_mps``, or less than ``min_tws_mps``, it is not to be out in (None: no limit).
     ``tack_fails`` is the chance that a tack fails, below 1; 0: what then comes is not looked at. It then lies for
     ``irons_s``, set to lee at ``lee_mps`` (on starboard tack, on port) beside what the water does. ``speed_error`` is
-    how far all its speeds may be off together: the standard deviation of the logarithm.
+    how far all its speeds may be off together: the standard deviation of the logarithm; ``speed_share`` what it is
+    seen to make of them. Both move when it arrives, not what it is planned to do.
     """
 
     no_go_half_rad: float
@@ -115,6 +116,7 @@ class BoatLimits:
     irons_s: float = IRONS_S
     lee_mps: tuple[float, ...] = (0.0, 0.0)
     speed_error: float = 0.0
+    speed_share: float = 1.0
 
     @property
     def room_m(self) -> float:

@@ -270,6 +270,7 @@ def defect_of(p: Problem) -> str | None:
         ((b.gybe_room_m or 0.0) >= 0.0, "gybe_room_m is negative"),
         (0.0 <= b.tack_fails < 1.0, f"tack_fails {b.tack_fails:g} is outside 0 <= tack_fails < 1"),
         (0.0 <= b.speed_error <= 1.0, f"speed_error {b.speed_error:g} is outside 0 to 1"),
+        (0.1 <= b.speed_share <= 10.0, f"speed_share {b.speed_share:g} is outside 0.1 to 10"),
         (0.0 <= b.irons_s < math.inf, "irons_s is no time of 0 s or more"),
         (
             len(b.lee_mps) == 2 and all(0.0 <= lee < math.inf for lee in b.lee_mps),

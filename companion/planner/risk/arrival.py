@@ -5,7 +5,7 @@ symmetric, and its median is later than the plan's own time. The plan is sailed 
 Strength and direction are independent Gauss-Markov processes of the problem's own spreads. In each, a leg's progress at
 an instant is its planned one times the ratio of its speeds in that wind and in the plan's; where the wind has closed a
 leg it beats along it. Turns take their time in any wind, and a tack that fails takes ``FAILED_S`` more. A boat whose
-speeds may all be off together takes a drawn factor longer.
+speeds may all be off together takes a drawn factor longer, and one that is seen to make a share of them as much.
 
 Where a step is long against the correlation time, the mean over a step has less spread than an instant: the
 remainder is averaged over within the step.
@@ -37,6 +37,7 @@ NODES_MPS, NODES_RAD, NODES_TWA = 33, 17, 361  # of the tables of progress: wind
 REACH = 3.5  # standard deviations that they reach to
 FAILED_S = IRONS_S + 4.0  # head to wind, and until the boat has way on again
 MOST_FAILURES = 20
+FASTER = 0.5  # of how much slower than its polar a boat may be: how much faster
 
 Floats = NDArray[np.float64]
 
@@ -167,14 +168,18 @@ def _times_s(problem: Problem, legs: Sequence[Leg], strength: Strength, speeds: 
     at_turn = np.clip(np.rint((turn - turns[0]) / (turns[1] - turns[0])), 0, NODES_RAD - 1).astype(np.int64)
     edges = np.array([t for leg in legs for t in (leg.start_s, leg.end_s)])
     times = np.asarray(_sailed(edges, np.ascontiguousarray(table), at_wind, at_turn, step_s))
-    return (times + _lost_s(problem, legs, noise[2])) * _slower(problem.boat.speed_error)
+    return (times + _lost_s(problem, legs, noise[2])) * _slower(problem.boat.speed_error) / problem.boat.speed_share
 
 
 @functools.lru_cache(maxsize=4)
 def _slower(speed_error: float) -> Floats:
-    """Return how much longer a boat whose speeds are all off by one factor takes in each wind: its even quantiles."""
+    """Return how much longer a boat whose speeds are all off by one factor takes in each wind: its even quantiles.
+
+    What a polar leaves out (waves, growth, a slow crew) takes speed: a boat is faster than it by half as much.
+    """
     ranks = (np.random.default_rng(SEED).permutation(WINDS) + 0.5) / WINDS
-    return np.exp(speed_error * np.array([NormalDist().inv_cdf(float(p)) for p in ranks]))
+    z = np.array([NormalDist().inv_cdf(float(p)) for p in ranks])
+    return np.exp(speed_error * np.where(z > 0.0, z, FASTER * z))
 
 
 def _progress(problem: Problem, legs: Sequence[Leg], speeds: Speeds, winds: Floats, turns: Floats) -> Floats:
@@ -236,15 +241,16 @@ def _quantile(times_s: Floats, p: float) -> float:
     return float(ranked[min(math.ceil(p * len(ranked)) - 1, len(ranked) - 1)])
 
 
-def in_words(found: Arrival, cost_s: float) -> str:
-    """Return when a plan arrives, for a person."""
+def in_words(found: Arrival, cost_s: float, *, is_boat_sure: bool = True) -> str:
+    """Return when a plan arrives, for a person; ``is_boat_sure``: its speeds are taken to be as they stand."""
 
     def by(t_s: float) -> str:
         return f"{t_s:.0f} s" if math.isfinite(t_s) else f"later than {LONGEST * cost_s:.0f} s"
 
+    where, case = ("In the wind's spread", "wind") if is_boat_sure else ("As wind and boat may be,", "case")
     text = (
-        f"In the wind's spread it arrives after {by(found.median_s)} (median), {by(found.early_s)} in one wind of "
-        f"ten, {by(found.late_s)} at the latest in nine of ten."
+        f"{where} it arrives after {by(found.median_s)} (median), {by(found.early_s)} in one {case} of ten, "
+        f"{by(found.late_s)} at the latest in nine of ten."
     )
     return text + "".join(f" {doubt[0].upper()}{doubt[1:]}." for doubt in found.doubts)
 

@@ -322,7 +322,7 @@ def _look_at_time(ctx: StepContext, route: Route) -> None:
             Severity.WARNING,
             "may be late",
             f"{left_s:.0f} s are left of the voyage's time, and she is there in {route.cost_s:.0f} s; in nine "
-            f"winds of ten: {late}",
+            f"cases of ten: {late}",
         )
 
 

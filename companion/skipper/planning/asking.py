@@ -68,6 +68,7 @@ def request(
                 max_path_risk=step.max_path_risk,
                 current=current,
                 failing=_failing(ctx),
+                seen=ctx.snapshot.speed_seen,
                 is_wind_known=ctx.snapshot.wind.health is not WindHealth.UNTRUSTED,
                 doubt=ctx.snapshot.doubt if ctx.config.sails else None,
                 zone_half_rad=ctx.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),

@@ -22,6 +22,7 @@ from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import WindForecast
 from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.snapshot import SpeedSeen
 from companion.skipper.step.wind_limits import strength_of
 from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m, half_width_rad, mean_twd_rad, moved
 
@@ -239,13 +240,14 @@ def problem_dict(
     zone_half_rad: float = 0.0,
     doubt: WindAngleUncertainty | None = None,
     failing: dict[str, Any] | None = None,
+    seen: SpeedSeen | None = None,
     is_wind_known: bool = True,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
 
     A ``current`` that is significant is planned with: the wind is then that over the water. ``zone_half_rad`` is how
     far off the wind over the ground, which is the autopilot's, a course must be there for it to be followed.
-    ``failing`` is what is known of tacks that fail, as the problem's boat has it.
+    ``failing`` is what is known of tacks that fail, as the problem's boat has it, ``seen`` what it makes of its speeds.
 
     Raises:
         ValueError: when no water is left inside the fence at this margin.
@@ -289,6 +291,10 @@ def problem_dict(
     boat = dict(voyage.boat.problem_boat(wind["speed_mps"]))
     boat["speeds"] = voyage.boat.problem_speeds()
     boat.update(failing or {})
+    if seen is None:
+        seen = SpeedSeen()
+    boat["speed_share"] = seen.share
+    boat["speed_error"] = min(math.hypot(voyage.boat.speed_error / (1.0 + seen.tries), seen.error), 1.0)
     if not current.is_significant and failing and failing["tack_fails"] > 0.0:
         water["adrift"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
     boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(half_rad, wind["speed_mps"]))

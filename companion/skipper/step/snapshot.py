@@ -174,6 +174,19 @@ class WindBefore:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedSeen:
+    """What the boat was lately seen to make of the speeds that its plans are of.
+
+    ``share`` of them, which may be off by ``error`` (standard deviation of the logarithm) in what comes, rests on
+    ``tries`` of its way; 0: nothing was seen.
+    """
+
+    share: float = 1.0
+    error: float = 0.0
+    tries: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
     """All that is known at ``t_s``. Ages are seconds since the part was heard; None: never."""
 
@@ -187,6 +200,7 @@ class Snapshot:
     wind: WindEstimate = WindEstimate()
     current: WaterCurrent = STILL_WATER
     doubt: WindAngleUncertainty | None = None
+    speed_seen: SpeedSeen = SpeedSeen()
     unsure: str = ""  # why no plan may be made for wind and water now, in words; empty: it may
     wind_before: WindBefore | None = None  # while the wind is doubted: what it was; None: not known, or believed
     mission: MissionOnBoard = MissionOnBoard()

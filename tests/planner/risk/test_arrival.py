@@ -14,7 +14,7 @@ from companion.planner import Problem, plan
 from companion.planner.explain import explain
 from companion.planner.plan import Plan
 from companion.planner.problem import defect_of, evaluate
-from companion.planner.risk.arrival import arrival, in_words, limits_in_words
+from companion.planner.risk.arrival import FASTER, arrival, in_words, limits_in_words
 from tests.planner.problem_json import to_dict
 
 BOAT = Boat(polar=ardurover_sitl())
@@ -75,8 +75,15 @@ def test_a_boat_whose_speeds_may_be_off_spreads_its_arrivals_by_that():
     p = problem(sigma=1e-3, boat=replace(BOAT, speed_error=0.35))
     planned_s = reach(p)[-1].end_s
     found = arrival(p, reach(p))
-    for quantile, z in ((found.early_s, -1.2816), (found.median_s, 0.0), (found.late_s, 1.2816)):
+    for quantile, z in ((found.early_s, -1.2816 * FASTER), (found.median_s, 0.0), (found.late_s, 1.2816)):
         assert quantile == pytest.approx(planned_s * math.exp(0.35 * z), rel=0.02)
+
+
+def test_a_boat_that_is_seen_to_make_half_of_its_speeds_takes_twice_the_time():
+    p = problem()
+    seen = replace(p, boat=replace(p.boat, speed_share=0.5))
+    for name in ("early_s", "median_s", "late_s"):
+        assert getattr(arrival(seen, reach(p)), name) == pytest.approx(2.0 * getattr(arrival(p, reach(p)), name))
 
 
 @pytest.mark.parametrize(
