@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from companion.boat.polar import Polar
 
+Floats = NDArray[np.float64]
+
 SPEED_ANGLES = 73  # of ``Boat.problem_speeds``: 2.5 degrees apart
 
 
@@ -102,7 +104,7 @@ class Boat:
         if self.leeway_rad == 0.0:
             return twa_rad
         speed = self.polar.speed_mps(twa_rad, tws_mps)
-        return min(twa_rad + leeway_at(coefficient_of(self.leeway_rad), twa_rad, tws_mps, speed), math.pi)
+        return min(twa_rad + float(leeway_at(coefficient_of(self.leeway_rad), twa_rad, tws_mps, speed)), math.pi)
 
     def _made_good(
         self, twa_rad: NDArray[np.float64], speed_mps: NDArray[np.float64], tws_mps: float
@@ -111,7 +113,7 @@ class Boat:
         k = coefficient_of(self.leeway_rad)
         bows = np.unique(np.concatenate([twa_rad, np.radians(np.arange(0.0, 181.0, 5.0))]))
         speeds = np.interp(bows, twa_rad, speed_mps)
-        slips = np.array([leeway_at(k, float(b), tws_mps, float(v)) for b, v in zip(bows, speeds, strict=True)])
+        slips = leeway_at(k, bows, tws_mps, speeds)
         courses = np.minimum(bows + slips, math.pi)
         # Nearer to the wind than where its course comes nearest to it the boat only drifts more: not sailed by anybody.
         later = np.append(np.minimum.accumulate(courses[::-1])[::-1][1:], math.inf)
@@ -195,23 +197,26 @@ def coefficient_of(beat_rad: float) -> float:
     return (slope + CROSS_FLOW * slope * slope) / (STATED_RATIO**2 * math.sin(STATED_AWA_RAD))
 
 
-def leeway_rad(coefficient: float, aws_mps: float, awa_rad: float, speed_mps: float) -> float:
-    """Return the angle from bow to course through the water [rad, 0 or more], sheeted as for full speed.
+def leeway_rad(
+    coefficient: float, aws_mps: float | Floats, awa_rad: float | Floats, speed_mps: float | Floats
+) -> Floats:
+    """Return the angle from bow to course through the water [rad, 0 or more], sheeted as for full speed; of each.
 
     >>> round(math.degrees(leeway_rad(coefficient_of(math.radians(5.0)), 6.0, math.radians(30.0), 2.0)), 6)
     5.0
     """
-    push = coefficient * aws_mps * aws_mps * abs(math.sin(awa_rad))
-    if push == 0.0:
-        return 0.0
-    side_mps = 2.0 * push / (math.sqrt(speed_mps * speed_mps + 4.0 * CROSS_FLOW * push) + abs(speed_mps))
-    return math.atan2(side_mps, abs(speed_mps))
+    v = np.abs(speed_mps)
+    push = coefficient * np.square(aws_mps) * np.abs(np.sin(awa_rad))
+    flow = np.sqrt(v * v + 4.0 * CROSS_FLOW * push) + v
+    return np.asarray(np.arctan2(2.0 * push / np.maximum(flow, 1e-12), v))  # neither wind nor way: no leeway
 
 
-def leeway_at(coefficient: float, twa_rad: float, tws_mps: float, speed_mps: float) -> float:
-    """Return the same for a heading at ``twa_rad`` to the true wind."""
-    across, ahead = tws_mps * math.sin(twa_rad), tws_mps * math.cos(twa_rad) + speed_mps
-    return leeway_rad(coefficient, math.hypot(across, ahead), math.atan2(across, ahead), speed_mps)
+def leeway_at(
+    coefficient: float, twa_rad: float | Floats, tws_mps: float | Floats, speed_mps: float | Floats
+) -> Floats:
+    """Return the same for headings at ``twa_rad`` to the true wind."""
+    across, ahead = tws_mps * np.sin(twa_rad), tws_mps * np.cos(twa_rad) + speed_mps
+    return leeway_rad(coefficient, np.hypot(across, ahead), np.arctan2(across, ahead), speed_mps)
 
 
 def outline_en_m(hull: Hull, en_m: ArrayLike, heading_rad: ArrayLike) -> NDArray[np.float64]:

@@ -20,9 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat.boat import CROSS_FLOW, coefficient_of
-from companion.boat.log import SHORT_S, STRETCH_S, Stretches, wrapped
+from companion.boat.boat import coefficient_of, leeway_at
+from companion.boat.log import SHORT_S, STRETCH_S, Stretches
 from companion.boat.polar import Polar
+from companion.geo.angles import wrap_pi_array
 
 Floats = NDArray[np.float64]
 
@@ -220,7 +221,7 @@ class _Solver:
         bow = self.s.heading_rad - compass
         angle = bow + self.s.awa_rad - vane
         wind = self.s.aws_mps[:, None] * np.column_stack([np.sin(angle), np.cos(angle)]) - u
-        return u, wrapped(np.arctan2(wind[:, 0], wind[:, 1]) - bow), np.hypot(wind[:, 0], wind[:, 1])
+        return u, wrap_pi_array(np.arctan2(wind[:, 0], wind[:, 1]) - bow), np.hypot(wind[:, 0], wind[:, 1])
 
     def residuals(self, x: _State, nuisance: Floats, stream: Floats) -> Floats:
         """Return (n, 3) observed less expected: logarithm of the speed, course, logarithm of the log's reading."""
@@ -234,10 +235,10 @@ class _Solver:
             + nuisance[3] * 0.5 * np.sign(twa) * (1.0 + np.cos(twa))
         )
         compass, leeway = nuisance[1], nuisance[2]
-        course = wrapped(np.arctan2(u[:, 0], u[:, 1]) - self.s.heading_rad + compass)
+        course = wrap_pi_array(np.arctan2(u[:, 0], u[:, 1]) - self.s.heading_rad + compass)
         # Leeway by the speed ahead that is seen: by what is expected of it the solution would chase its own tail.
         ahead = speed * np.maximum(np.cos(course), LEAST_AHEAD)
-        lee = _leeway_at(coefficient_of(max(leeway, 0.0)), twa, tws, ahead)
+        lee = leeway_at(coefficient_of(max(leeway, 0.0)), twa, tws, ahead)
         off = course + np.sign(twa) * (lee + min(leeway, 0.0))
         log = np.log(np.maximum(self.s.stw_mps, 1e-3)) - x.factor[self.s.outing] - log_speed
         # The polar's speed is along the bow; a boat that slips goes a little faster than that over the water.
@@ -344,14 +345,6 @@ class _Solver:
 
 
 _FINE_TWA, _FINE_TWS = np.arange(0.0, 181.0, 2.0), np.arange(0.25, 30.1, 0.25)
-
-
-def _leeway_at(coefficient: float, twa_rad: Floats, tws_mps: Floats, ahead_mps: Floats) -> Floats:
-    """Return ``companion.boat.boat.leeway_at`` of arrays."""
-    across, along = tws_mps * np.sin(twa_rad), tws_mps * np.cos(twa_rad) + ahead_mps
-    push = coefficient * np.hypot(across, along) * np.abs(across)
-    side = 2.0 * push / (np.sqrt(ahead_mps**2 + 4.0 * CROSS_FLOW * push) + ahead_mps + 1e-9)
-    return np.arctan2(side, ahead_mps)
 
 
 def _scatter(r: Floats, slow: Floats, least: float, now: float) -> float:

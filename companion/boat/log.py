@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.boat.polar import Polar
+from companion.geo.angles import wrap_pi, wrap_pi_array
 
 Floats = NDArray[np.float64]
 
@@ -106,16 +107,11 @@ class BoatLog:
     def twa_rad(self) -> Floats:
         """The true wind's angle over the ground (n,), starboard positive, by the sensor as it is."""
         wind = self.wind_en_mps
-        return wrapped(np.arctan2(wind[:, 0], wind[:, 1]) - self.heading_rad)
+        return wrap_pi_array(np.arctan2(wind[:, 0], wind[:, 1]) - self.heading_rad)
 
     def pieces(self) -> list[slice]:
         """Return what is without a gap."""
         return _cut(self.t_s, GAP_S)
-
-
-def wrapped(angle_rad: Floats) -> Floats:
-    """Return angles in -π..π."""
-    return np.asarray((angle_rad + math.pi) % (2.0 * math.pi) - math.pi, dtype=np.float64)
 
 
 def _cut(t_s: Floats, gap_s: float) -> list[slice]:
@@ -213,7 +209,7 @@ def _mean_angle(angle_rad: Floats) -> float:
 
 
 def _spread(angle_rad: Floats) -> float:
-    away = wrapped(angle_rad - _mean_angle(angle_rad))
+    away = wrap_pi_array(angle_rad - _mean_angle(angle_rad))
     return float(np.sqrt(np.nanmean(away * away)))
 
 
@@ -231,7 +227,7 @@ def _steady(
     if _has_leapt(log, window):
         return Why.RESET
     swing = _spread(heading)
-    still = np.nanmax(np.abs(wrapped(log.awa_rad[window] - log.awa_rad[window.start]))) < 1e-5
+    still = np.nanmax(np.abs(wrap_pi_array(log.awa_rad[window] - log.awa_rad[window.start]))) < 1e-5
     if swing > math.radians(0.5) and still and window.stop - window.start >= FROZEN_S:
         return Why.FROZEN_VANE
     course = np.arctan2(velocity[:, 0], velocity[:, 1])
@@ -251,7 +247,7 @@ def _steady(
     bow = _mean_angle(heading)
     mean = np.nanmean(velocity, axis=0)
     made = float(np.hypot(*mean))
-    twa = float(wrapped(np.array([math.atan2(*mean_wind) - bow]))[0])
+    twa = wrap_pi(math.atan2(*mean_wind) - bow)
     expected = prior.speed_mps(twa, tws_mps)
     ahead = float(mean @ [math.sin(bow), math.cos(bow)])
     beat = prior.speed_mps(math.radians(50.0), tws_mps)
@@ -259,9 +255,7 @@ def _steady(
     most = math.exp(TOO_FAST * prior_error)
     if driven or ahead > max(TOO_FAST_LEAST, most) * max(expected, beat) + 0.3:
         return Why.DRIVEN
-    if made < 0.15 * expected or abs(math.atan2(*mean) - bow + math.pi) % (2.0 * math.pi) - math.pi > math.radians(
-        ASIDE_DEG
-    ):
+    if made < 0.15 * expected or abs(wrap_pi(math.atan2(*mean) - bow)) > math.radians(ASIDE_DEG):
         return Why.DRIFT
     half = (window.stop - window.start) // 2
     first, second = float(np.nanmean(speed[:half])), float(np.nanmean(speed[half:]))
@@ -275,7 +269,7 @@ def _steady(
         float(mean[0]),
         float(mean[1]),
         bow,
-        float(wrapped(np.array([math.atan2(*felt) - bow]))[0]),
+        wrap_pi(math.atan2(*felt) - bow),
         float(np.hypot(*felt)),
         float(np.nanmean(stw)) if bool(np.any(np.isfinite(stw))) else math.nan,
         float(log.t_s[window.stop - 1] - log.t_s[window.start]),

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat.log import BoatLog, wrapped
+from companion.boat.log import BoatLog
+from companion.geo.angles import wrap_pi, wrap_pi_array
 
 Floats = NDArray[np.float64]
 
@@ -87,7 +88,7 @@ def _of_piece(log: BoatLog, piece: slice, vane_rad: float, compass_rad: float) -
         return []
     sailed = np.interp(t, log.t_s[piece], log.is_sailed[piece].astype(float)) > 0.5
     mean_wind = np.column_stack([_smooth(wind[:, i], 4 * SMOOTH_S) for i in (0, 1)])
-    twa = wrapped(np.arctan2(mean_wind[:, 0], mean_wind[:, 1]) - bow)
+    twa = wrap_pi_array(np.arctan2(mean_wind[:, 0], mean_wind[:, 1]) - bow)
     tws = np.hypot(mean_wind[:, 0], mean_wind[:, 1])
     crossings = np.flatnonzero(twa[1:] * twa[:-1] < 0.0)
     failed = _failures(t, twa, tws, sailed)
@@ -161,7 +162,7 @@ def _changes(
                 is_tack=is_tack,
                 loss_s=loss,
                 rate_radps=rate,
-                shift_rad=math.copysign(1.0, new) * float(wrapped(np.array([shift]))[0]),
+                shift_rad=math.copysign(1.0, new) * wrap_pi(shift),
             )
         )
     return out

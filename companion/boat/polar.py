@@ -30,6 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from companion.disk import read_regular
 from companion.errors import InputError, unreadable
 from companion.geo import MPS_PER_KNOT
+from companion.geo.angles import wrap_pi_array
 
 _SEARCH_STEP_RAD = math.radians(0.05)  # of the best angles; VMG is flat there, finer changes nothing
 
@@ -149,7 +150,7 @@ class Polar:
         angle = np.asarray(twa_rad, dtype=np.float64)
         if not bool(np.all(np.isfinite(angle))):
             raise ValueError("a true wind angle is not a finite number")
-        folded = np.abs((angle + math.pi) % (2.0 * math.pi) - math.pi)
+        folded = np.abs(wrap_pi_array(angle))
         nodes, speed = self.curve(tws_mps)
         return np.asarray(np.interp(folded, nodes, speed), dtype=np.float64)
 

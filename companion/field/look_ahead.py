@@ -17,7 +17,7 @@ from shapely.geometry import Polygon
 
 from companion.field.values import Clearance, GuidanceSettings, GuidanceState, Intent, MovingObstacle, Situation
 from companion.field.vector_fields import NOMINAL, Field, Vectors
-from companion.geo.angles import wrap_pi
+from companion.geo.angles import wrap_pi, wrap_pi_array
 
 OTHER_SIDE_COST = 2.0  # of changing one's mind about the side on which to pass what stands in the way
 _FAN_TWA = np.radians(np.arange(0.0, 181.0, 6.0))
@@ -58,7 +58,7 @@ def choose(
         # headings[0] is the field's own. On a beat the tack the boat is on is the side that is kept, by q.
         beats = twd is not None and abs(wrap_pi(wanted_rad - twd)) < habits.no_go_half_rad + 1e-6
         blocked = bool(ashore[0] > 0.0) and not beats
-        side = _wrap(headings - wanted_rad) * state.round_side
+        side = wrap_pi_array(headings - wanted_rad) * state.round_side
         cost += ashore + np.where(blocked & (side < 0.0), OTHER_SIDE_COST, 0.0)
     best = int(np.argmin(cost))
     round_side = state.round_side
@@ -79,10 +79,10 @@ def foresee(
     t = np.arange(0.0, habits.horizon_s + 1e-9, _STEP_S)
     if twd is None:
         speed = np.full(len(headings), habits.polar_mps[-1])
-        lost = np.abs(_wrap(headings - situation.heading_rad)) / habits.turn_rate_radps
+        lost = np.abs(wrap_pi_array(headings - situation.heading_rad)) / habits.turn_rate_radps
         leeway = np.zeros(2)
     else:
-        twa = _wrap(twd - headings)
+        twa = wrap_pi_array(twd - headings)
         now = wrap_pi(twd - situation.heading_rad)
         speed = np.interp(np.abs(twa), habits.polar_twa_rad, habits.polar_mps)
         turn = np.abs(twa - now)
@@ -168,10 +168,6 @@ def _ashore(track: NDArray[np.float64], clearance: Clearance, habits: GuidanceSe
     return cost
 
 
-def _wrap(angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    return (angles + math.pi) % (2.0 * math.pi) - math.pi
-
-
 # Out of some water: the heading by which a boat is soonest outside, clear of who is in the way (WRSC 2013).
 
 AHEAD_S = 25.0  # what crossing ahead of a vessel is held to cost, at its bow
@@ -190,7 +186,7 @@ def way_out_rad(seen: Situation, water: Polygon, habits: GuidanceSettings, last_
     """
     fan: NDArray[np.float64] = FAN_RAD
     if habits.is_sailing and seen.twd_from_rad is not None:
-        twa = np.abs((seen.twd_from_rad - fan + math.pi) % (2.0 * math.pi) - math.pi)
+        twa = np.abs(wrap_pi_array(seen.twd_from_rad - fan))
         fan = fan[twa > habits.no_go_half_rad + PINCH_RAD]
     size_m = math.hypot(water.bounds[2] - water.bounds[0], water.bounds[3] - water.bounds[1])
     look_s = min(MOST_LOOK_S, max(LOOK_S, 1.5 * size_m / max(*habits.polar_mps, 0.3)))

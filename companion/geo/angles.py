@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 TWO_PI = 2.0 * math.pi
 
@@ -22,6 +22,15 @@ def wrap_pi(angle_rad: float) -> float:
     """
     wrapped = (angle_rad + math.pi) % TWO_PI - math.pi
     return wrapped if wrapped < math.pi else -math.pi
+
+
+def wrap_pi_array(angle_rad: ArrayLike) -> NDArray[np.float64]:
+    """Return ``wrap_pi`` of each.
+
+    >>> np.degrees(wrap_pi_array(np.radians([190.0, -190.0]))).round(6).tolist()
+    [-170.0, 170.0]
+    """
+    return np.asarray((np.asarray(angle_rad, dtype=np.float64) + math.pi) % TWO_PI - math.pi)
 
 
 def wrap_two_pi(angle_rad: float) -> float:

@@ -25,7 +25,7 @@ import numpy as np
 from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
-from companion.geo.angles import mean_direction_rad
+from companion.geo.angles import mean_direction_rad, wrap_pi_array
 from companion.plots.chart import save
 from companion.wind import NAMES
 
@@ -103,7 +103,7 @@ def _centre(record: Record) -> float:
 
 def _about(angle_rad: Array, centre_rad: float) -> Array:
     """Return degrees on the branch within half a turn of the centre, the centre itself in 0..360."""
-    off = (angle_rad - centre_rad + math.pi) % (2.0 * math.pi) - math.pi
+    off = wrap_pi_array(angle_rad - centre_rad)
     return np.asarray(np.degrees(off) + math.degrees(centre_rad) % 360.0)
 
 
@@ -269,7 +269,7 @@ def draw_crps(axes: Axes, scores: Sequence[Score]) -> None:
 
 def draw_histogram(axes: Axes, record: Record, centre_rad: float) -> None:
     """Draw the distribution of direction about its mean with the normal of the same spread (Figure 4)."""
-    off = np.degrees((record.twd_from_rad - centre_rad + math.pi) % (2.0 * math.pi) - math.pi)
+    off = np.degrees(wrap_pi_array(record.twd_from_rad - centre_rad))
     spread = float(np.std(off))
     reach = min(180.0, max(15.0, 3.5 * spread))
     axes.hist(off, bins=60, range=(-reach, reach), density=True, color=TRUE, alpha=0.6)
@@ -330,7 +330,7 @@ def autocorrelation(record: Record, centre_rad: float) -> tuple[Array, Array]:
     """Return lags [s] to ten minutes and the correlation of the direction at each, on the record's usual step."""
     step = max(1.0, float(np.median(np.diff(record.t_s))))
     grid = np.arange(record.t_s[0], record.t_s[-1], step, dtype=np.float64)
-    off = (record.twd_from_rad - centre_rad + math.pi) % (2.0 * math.pi) - math.pi
+    off = wrap_pi_array(record.twd_from_rad - centre_rad)
     x = off[np.clip(np.searchsorted(record.t_s, grid, side="right") - 1, 0, None)]
     x -= np.mean(x)
     most = min(int(_LAG_S / step), x.size // 2)

@@ -78,7 +78,7 @@ def sailed(
         last = math.copysign(1.0, twa)
         aim = truth.speed_mps(polar, twa, tws)
         speed += (aim * math.exp(0.03 * rng.standard_normal()) - speed) / TAU_S
-        slip = math.copysign(leeway_at(k, twa, tws, max(speed, 0.1)), -twa)
+        slip = math.copysign(float(leeway_at(k, twa, tws, max(speed, 0.1))), -twa)
         over = speed / math.cos(slip) * np.array([math.sin(bow + slip), math.cos(bow + slip)])
         ground = over + np.array(truth.current_en_mps)
         place = place + ground

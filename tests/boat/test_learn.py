@@ -163,6 +163,17 @@ def test_what_poisons_a_log_is_left_out_by_name_and_counted(why):
     assert len(found) >= 0.4 * len(whole)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_drift_to_either_side_is_one(side):
+    log = sailed(SLOW, hours=0.3, seed=7)
+    course, speed = log.heading_rad + side * math.radians(65.0), np.hypot(*log.velocity_en_mps.T)
+    velocity = speed[:, None] * np.column_stack([np.sin(course), np.cos(course)])
+    drifting = replace(log, velocity_en_mps=velocity, position_en_m=np.full(velocity.shape, np.nan))
+    found = stretches_of([drifting], PRIOR, ERROR)
+    assert found.left_out[Why.DRIFT] >= 6
+    assert len(found) == 0
+
+
 def test_a_gap_parts_outings_and_short_ones_only_stretches():
     log = sailed(SLOW, hours=0.2, seed=3)
     later = replace(log, t_s=log.t_s + 86_400.0, name="next day")

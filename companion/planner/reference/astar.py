@@ -28,7 +28,7 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from companion.geo.angles import difference_rad, heading_of, wrap_pi
+from companion.geo.angles import difference_rad, heading_of, wrap_pi, wrap_pi_array
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint, Target
 from companion.planner.effort import Effort, Outcome
@@ -102,7 +102,7 @@ class FlatPlane:
             step = STEP_M * np.array([math.sin(course), math.cos(course)])
             moved = self.back(here + step) - place
             off = np.arctan2(moved[:, 0], moved[:, 1]) - course
-            worst = max(worst, float(np.max(np.abs((off + math.pi) % (2.0 * math.pi) - math.pi))))
+            worst = max(worst, float(np.max(np.abs(wrap_pi_array(off)))))
         return SAFETY * worst
 
     def bend_m(self, length_m: float, off_m: float) -> float:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from companion.errors import InputError
-from companion.geo.angles import mean_direction_rad, wrap_pi
+from companion.geo.angles import mean_direction_rad, wrap_pi, wrap_pi_array
 
 Array = NDArray[np.float64]
 
@@ -153,7 +153,7 @@ def fit_ar1(record: Record) -> Ar1Fit:
         raise InputError(record.name, "", f"{len(record)} readings", "the AR(1) fit needs at least 100")
     centre = mean_direction_rad(record.twd_from_rad)
     centre = 0.0 if math.isnan(centre) else centre
-    y = (record.twd_from_rad - centre + math.pi) % (2.0 * math.pi) - math.pi
+    y = wrap_pi_array(record.twd_from_rad - centre)
     d = np.diff(record.t_s)
     step = float(np.median(d))
 
