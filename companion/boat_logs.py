@@ -19,15 +19,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.boat.log import BoatLog
 from companion.errors import InputError, unreadable
 from companion.geo import MPS_PER_KNOT
+from companion.geo.frame import LocalFrame
 from companion.mavlink.tlog import read_tlog
 from companion.mavlink.wire import Dialect
-from companion.messages import Mode
+from companion.messages import GeoPoint, Mode, VehicleState, WindSample
 from companion.telemetry.folder import TLOG, TRACK, parts
+from companion.wind import apparent_wind
 
 LEAST_SAMPLES = 60
 STEP_S = 0.95  # samples are so far apart at least
@@ -35,11 +38,12 @@ STALE_S = 2.5  # a reading older than this is none
 REBOOT_BACK_S = 5.0
 JUMP_S = 5.0  # the logger's clock against the autopilot's
 MOTOR_PERCENT = 5.0
-DEGREE_M = 111_195.0
+MOST_WIND_MPS = 100.0  # more is no reading
 # The sheets are eased, the boat lies or is not a boat yet.
 AT_REST = frozenset({Mode.HOLD, Mode.LOITER, Mode.INITIALISING, Mode.DOCK})
 ENDINGS = (".tlog", ".bin", ".csv", ".nmea", ".txt", ".log")
 _NAN = math.nan
+_NOWHERE = GeoPoint(lat_deg=0.0, lon_deg=0.0)  # what the wind on board does not depend on
 _BIN_HEAD = bytes([0xA3, 0x95, 0x80])  # a log describes its own format first
 
 
@@ -91,7 +95,7 @@ class _Rows:
         heading, ve, vn = self.of(t_s, "heading"), self.of(t_s, "ve"), self.of(t_s, "vn")
         awa, aws = self.of(t_s, "awa"), self.of(t_s, "aws")
         if not math.isfinite(awa + aws):
-            awa, aws = _apparent(heading, ve, vn, self.of(t_s, "twd"), self.of(t_s, "tws"))
+            awa, aws = self._felt(t_s, heading, ve, vn)
         self.rows.append(
             (
                 t_s + self.shift_s,
@@ -108,6 +112,15 @@ class _Rows:
             )
         )
 
+    def _felt(self, t_s: float, heading: float, ve: float, vn: float) -> tuple[float, float]:
+        """Return the apparent wind's angle and speed by the true wind that was told; NaN where one is unknown."""
+        twd, tws = self.of(t_s, "twd"), self.of(t_s, "tws")
+        if not (math.isfinite(heading + ve + vn + twd) and 0.0 <= tws <= MOST_WIND_MPS):
+            return _NAN, _NAN
+        boat = VehicleState(t_s=t_s, boot_s=0.0, position=_NOWHERE, velocity_en_mps=(ve, vn), heading_rad=heading)
+        felt = apparent_wind(WindSample(t_s=t_s, twd_from_rad=twd, tws_mps=tws), boat)
+        return felt.awa_rad, felt.aws_mps
+
     def log(self, name: str) -> BoatLog:
         """Return the log. Raises _Useless: it is none to learn from."""
         table = np.array(self.rows, dtype=np.float64).reshape(len(self.rows), 11)
@@ -119,10 +132,6 @@ class _Rows:
             known = int(np.sum(np.isfinite(table[:, column])))
             if known < LEAST_SAMPLES:
                 raise _Useless(f"it tells {what} in {known} of {len(table)} samples ({remedy})")
-        lon, lat = table[:, 6], table[:, 7]
-        lat0 = float(np.nanmean(lat)) if bool(np.any(np.isfinite(lat))) else 0.0
-        lon0 = float(lon[np.isfinite(lon)][0]) if bool(np.any(np.isfinite(lon))) else 0.0
-        east = ((lon - lon0 + 180.0) % 360.0 - 180.0) * DEGREE_M * math.cos(math.radians(lat0))
         return BoatLog(
             name=name,
             t_s=table[:, 0],
@@ -130,7 +139,7 @@ class _Rows:
             heading_rad=table[:, 3],
             awa_rad=table[:, 4],
             aws_mps=table[:, 5],
-            position_en_m=np.column_stack([east, (lat - lat0) * DEGREE_M]),
+            position_en_m=_places(table[:, 6:8]),
             stw_mps=table[:, 8],
             is_sailed=~(table[:, 9] > 0.0),
             has_motor_on=table[:, 10] > MOTOR_PERCENT,
@@ -142,9 +151,15 @@ class _Useless(Exception):  # noqa: N818 - it never leaves this module
     pass
 
 
-def _apparent(heading: float, ve: float, vn: float, twd: float, tws: float) -> tuple[float, float]:
-    east, north = tws * math.sin(twd) + ve, tws * math.cos(twd) + vn
-    return math.remainder(math.atan2(east, north) - heading, 2.0 * math.pi), math.hypot(east, north)
+def _places(lonlat_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return places (n, 2) east and north of the first that is known [m]; NaN unknown."""
+    known = np.isfinite(lonlat_deg).all(axis=1) & (np.abs(lonlat_deg[:, 1]) <= 90.0)
+    out = np.full(lonlat_deg.shape, _NAN)
+    if bool(np.any(known)):
+        lon_deg, lat_deg = lonlat_deg[known][0].tolist()
+        frame = LocalFrame(GeoPoint(lat_deg=lat_deg, lon_deg=math.remainder(lon_deg, 360.0)))
+        out[known] = frame.array_en_from_lonlat(lonlat_deg[known])
+    return out
 
 
 def logs_under(names: list[Path]) -> list[Path]:
