@@ -25,17 +25,20 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.boat.log import BoatLog
 from companion.errors import InputError, unreadable
 from companion.geo import MPS_PER_KNOT
+from companion.geo.angles import wrap_pi_array
 from companion.geo.frame import LocalFrame
 from companion.mavlink.tlog import read_tlog
 from companion.mavlink.wire import Dialect
 from companion.messages import GeoPoint, Mode, VehicleState, WindSample
 from companion.telemetry.folder import TLOG, TRACK, parts
 from companion.wind import apparent_wind
+from companion.wind.study import Record
 
 LEAST_SAMPLES = 60
 STEP_S = 0.95  # samples are so far apart at least
 STALE_S = 2.5  # a reading older than this is none
 REBOOT_BACK_S = 5.0
+TURN_S, TURN_RAD = 10.0, math.radians(25.0)  # the bow so far round within it: vane and compass lag
 JUMP_S = 5.0  # the logger's clock against the autopilot's
 MOTOR_PERCENT = 5.0
 MOST_WIND_MPS = 100.0  # more is no reading
@@ -147,6 +150,47 @@ class _Rows:
         )
 
 
+@dataclass(slots=True)
+class _Winds(_Rows):
+    """Every reading of the true wind, in place of a sample a second; the bow is then what it was last."""
+
+    winds: list[tuple[float, float, float, float, float]] = field(default_factory=list)
+    bows: list[tuple[float, float]] = field(default_factory=list)
+
+    def take(self, t_s: float, **values: float) -> None:
+        super(_Winds, self).take(t_s, **values)  # slots make the class anew, and super() forgets it
+        if "heading" in values:
+            self.bows.append((t_s, values["heading"]))
+        if "twd" in values and (not self.winds or t_s > self.winds[-1][0]):
+            last = self.of(t_s, "heading", math.inf), self.of(t_s, "awa", math.inf)
+            self.winds.append((t_s, values["twd"], values["tws"], *last))
+
+    def sample(self, t_s: float) -> None:
+        """Keep nothing: the wind's own readings are kept."""
+
+    def record(self, name: str) -> Record:
+        """Return the record. Raises _Useless: there is no wind in it."""
+        known = [row for row in self.winds if all(math.isfinite(v) for v in row[:3]) and row[2] >= 0.0]
+        if len(known) < 2:
+            raise _Useless(f"{len(known)} WIND messages")
+        t, twd, tws, heading, awa = np.array(known, dtype=np.float64).T
+        turning = np.zeros(t.shape, dtype=np.bool_)
+        if self.bows:
+            at, bow = np.array(self.bows).T
+            before = np.searchsorted(at, at - TURN_S)
+            for moment in at[np.abs(wrap_pi_array(bow - bow[before])) > TURN_RAD]:
+                turning[np.searchsorted(t, moment - TURN_S) : np.searchsorted(t, moment + TURN_S)] = True
+        return Record(
+            name=name,
+            t_s=t - t[0],
+            twd_from_rad=twd,
+            tws_mps=tws,
+            turning=turning,
+            heading_rad=heading if bool(np.all(np.isfinite(heading))) else None,
+            awa_rad=awa if bool(np.all(np.isfinite(awa))) else None,
+        )
+
+
 class _Useless(Exception):  # noqa: N818 - it never leaves this module
     pass
 
@@ -222,6 +266,23 @@ def read_logs(
     return read, skipped
 
 
+def read_wind(path: Path) -> Record:
+    """Return every reading of the true wind in a .tlog or .BIN; those within 10 s of a turn are marked.
+
+    Raises:
+        InputError: it cannot be read, or holds no wind.
+    """
+    rows = _Winds()
+    try:
+        data = _bytes(path)
+        if not data:
+            raise _Useless("is empty")
+        _fill([path], [data], rows)
+        return rows.record(path.name)
+    except _Useless as why:
+        raise InputError(str(path), "", str(why), "log or request WIND (message 168)") from None
+
+
 def _read(path: Path) -> ReadLog:
     if path.is_dir():
         heard = [p for p in parts(path / TLOG) if p.stat().st_size > 0]
@@ -232,12 +293,18 @@ def _read(path: Path) -> ReadLog:
         raise _Useless("it is no file")
     data = [_bytes(p) for p in files]
     digest = hashlib.sha256(b"".join(data)).hexdigest()[:16]
-    rows, system = _Rows(), None
+    rows = _Rows()
+    system = _fill(files, data, rows)
+    return ReadLog(log=rows.log(str(path)), digest=digest, system=system)
+
+
+def _fill(files: list[Path], data: list[bytes], rows: _Rows) -> int | None:
+    """Read what the files of one log hold into ``rows``; return the autopilot's system number, None: it says none."""
     ending = files[0].name.lower().removesuffix(".gz").rpartition(".")[2]
     try:
         if ending == "tlog" or TLOG in files[0].name:
-            system = _tlog(files, rows)
-        elif ending == "bin":
+            return _tlog(files, rows)
+        if ending == "bin":
             _bin(files[0], data[0], rows)
         elif ending == "csv":
             _csv(data[0], rows)
@@ -245,7 +312,7 @@ def _read(path: Path) -> ReadLog:
             _nmea(data[0], rows)
     except (zlib.error, EOFError, gzip.BadGzipFile, csv.Error) as error:
         raise _Useless(f"it is damaged ({str(error)[:60]})") from None
-    return ReadLog(log=rows.log(str(path)), digest=digest, system=system)
+    return None
 
 
 def _bytes(path: Path) -> bytes:
@@ -340,6 +407,8 @@ def _bin(path: Path, data: bytes, rows: _Rows) -> None:
         raise _Useless(f"it is no .BIN log ({str(error)[:60] or type(error).__name__})") from None
     try:
         _bin_messages(log, rows)
+    except AttributeError as missing:
+        raise _Useless(f"its messages are another release's: they have no column {missing}") from None
     finally:
         log.close()
 
@@ -373,7 +442,9 @@ def _bin_messages(log: Any, rows: _Rows) -> None:
         elif kind == "POS":
             rows.take(t_s, lat=m.Lat, lon=m.Lng)
         elif kind == "WIND":
-            rows.take(t_s, awa=math.radians(m.DirApp), aws=m.SpdApp)
+            rows.take(t_s, awa=math.radians(m.DrApp), aws=m.SpdApp)
+            if hasattr(m, "DrTru"):
+                rows.take(t_s, twd=math.radians(m.DrTru), tws=m.SpdTru)
         elif kind == "THR":
             rows.take(t_s, motor=abs(m.ThrOut))
         else:

@@ -170,83 +170,14 @@ def read_record(path: Path) -> Record:
     if not path.is_file():
         raise InputError(str(path), "", "no such file", "name a CSV, tlog or .bin")
     if path.suffix.lower() in {".tlog", ".bin"}:
-        return _read_log(path)
+        from companion.boat_logs import read_wind
+
+        return read_wind(path)
     try:
         with path.open(newline="", encoding="utf-8") as lines:
             return parse_csv(lines, path.name)
     except UnicodeDecodeError as error:
         raise InputError(str(path), "", f"is not text ({error.reason})", "name a CSV, tlog or .bin") from error
-
-
-def _read_log(path: Path) -> Record:
-    """Return WIND of a tlog or .bin; a reading is ``turning`` within 10 s of a heading change of 25 deg in 10 s."""
-    from pymavlink import mavutil
-
-    from companion.wind.study import Record
-
-    rows: list[tuple[float, float, float]] = []
-    headings: list[tuple[float, float]] = []
-    felt: list[tuple[float, float]] = []
-    if path.stat().st_size == 0:
-        raise InputError(str(path), "", "is empty", "name a tlog or .bin")
-    log = None
-    try:
-        log = mavutil.mavlink_connection(str(path))
-        while (message := log.recv_match(type=["WIND", "ATTITUDE", "ATT", "NAMED_VALUE_FLOAT"])) is not None:
-            t_s, kind = float(message._timestamp), message.get_type()  # noqa: SLF001 pymavlink's only clock
-            if kind == "ATTITUDE":
-                headings.append((t_s, float(message.yaw)))
-            elif kind == "ATT":
-                headings.append((t_s, math.radians(float(message.Yaw))))
-            elif kind == "NAMED_VALUE_FLOAT":
-                if message.name == "AppWndDir":
-                    felt.append((t_s, math.radians(float(message.value))))
-            elif hasattr(message, "DrTru"):
-                rows.append((t_s, float(message.DrTru), float(message.SpdTru)))
-                felt.append((t_s, math.radians(float(message.DrApp))))
-            else:
-                rows.append((t_s, float(message.direction), float(message.speed)))
-    except (OSError, ValueError, IndexError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(str(path), "", f"cannot be read as a log ({error})", "name a tlog or .bin") from error
-    finally:
-        for part in ("data_map", "filehandle", "f"):  # DFReader keeps a map and a file, mavlogfile a file
-            if (opened := getattr(log, part, None)) is not None:
-                opened.close()
-    kept = [r for i, r in enumerate(rows) if i == 0 or r[0] > rows[i - 1][0]]
-    kept = [r for r in kept if all(math.isfinite(v) for v in r) and r[2] >= 0.0]
-    if len(kept) < 2:
-        raise InputError(str(path), "", f"{len(kept)} WIND messages", "log or request WIND (message 168)")
-    table = np.array(kept, dtype=np.float64)
-    t = table[:, 0]
-    heading = _at(t, headings)
-    return Record(
-        name=path.name,
-        t_s=t - t[0],
-        twd_from_rad=np.radians(table[:, 1]),
-        tws_mps=table[:, 2],
-        turning=_turning(t, headings),
-        heading_rad=heading,
-        awa_rad=_at(t, felt),
-    )
-
-
-def _at(t: np.ndarray[Any, Any], series: list[tuple[float, float]]) -> np.ndarray[Any, Any] | None:
-    """Return the latest value of ``series`` at each time, None without one."""
-    if not series:
-        return None
-    times, values = np.array(series).T
-    return np.asarray(values[np.clip(np.searchsorted(times, t, side="right") - 1, 0, None)])
-
-
-def _turning(t: np.ndarray[Any, Any], headings: list[tuple[float, float]]) -> np.ndarray[Any, Any]:
-    marked = np.zeros(t.size, dtype=np.bool_)
-    if headings:
-        times, values = np.array(headings).T
-        before = np.clip(np.searchsorted(times, times - 10.0), 0, None)
-        change = np.abs((values - values[before] + math.pi) % (2.0 * math.pi) - math.pi)
-        for moment in times[change > math.radians(25.0)]:
-            marked[np.searchsorted(t, moment - 10.0) : np.searchsorted(t, moment + 10.0)] = True
-    return marked
 
 
 # ---------------------------------------------------------------------------------------------- printing

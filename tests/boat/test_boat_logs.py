@@ -104,7 +104,7 @@ FORMATS = {  # name: id, format, labels
     "ATT": (131, "Qf", "TimeUS,Yaw"),
     "XKF1": (132, "QBff", "TimeUS,C,VN,VE"),
     "POS": (133, "QLL", "TimeUS,Lat,Lng"),
-    "WIND": (134, "Qff", "TimeUS,DirApp,SpdApp"),
+    "WIND": (134, "Qffff", "TimeUS,DrApp,SpdApp,DrTru,SpdTru"),
     "MODE": (135, "QMB", "TimeUS,Mode,ModeNum"),
     "GPS": (136, "QBIHff", "TimeUS,Status,GMS,GWk,Spd,GCrs"),
 }
@@ -139,7 +139,7 @@ def bin_log(path, *, cut=0):
         say("POS", int(lat * 1e7), int(lon * 1e7))
         say("XKF1", 0, vn, ve)
         say("XKF1", 1, 9.0, 9.0)
-        say("WIND", math.degrees(LOG.awa_rad[i]), LOG.aws_mps[i])
+        say("WIND", math.degrees(LOG.awa_rad[i]), LOG.aws_mps[i], 0.0, 5.0)
         say("ATT", math.degrees(LOG.heading_rad[i]) % 360.0)
     path.write_bytes(out[: len(out) - cut])
     return path, week_s
@@ -201,6 +201,13 @@ def test_an_autopilot_s_own_log_is_read(tmp_path):
     log = only(path)
     same(log)
     assert log.t_s[5] == pytest.approx(epoch_s + 5.0, abs=1.1)
+
+
+def test_one_of_another_release_is_skipped_with_its_column(tmp_path, monkeypatch):
+    monkeypatch.setitem(FORMATS, "WIND", (134, "Qffff", "TimeUS,Dir,SpdApp,DrTru,SpdTru"))
+    read, skipped = read_logs([bin_log(tmp_path / "1.BIN")[0], tlog(tmp_path / "good.tlog")])
+    assert [one.log.name for one in read] == [str(tmp_path / "good.tlog")]
+    assert "no column DrApp" in skipped[0].why
 
 
 def test_one_that_is_cut_off_is_read_to_there(tmp_path):

@@ -5,6 +5,7 @@ import math
 import struct
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.cli import main
 from companion.commands.wind import read_record
@@ -96,8 +97,6 @@ def test_a_short_record_is_told_apart_from_a_bad_one(tmp_path, capsys):
 
 
 def test_a_tlog_is_read(tmp_path):
-    from pymavlink.dialects.v20 import ardupilotmega as dialect
-
     mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
     path = tmp_path / "v.tlog"
     with path.open("wb") as log:
@@ -151,5 +150,9 @@ def test_a_log_without_wind_is_refused(tmp_path):
     with pytest.raises(InputError, match="is empty"):
         read_record(path)
     path.write_bytes(stamp(1_790_000_000_000_000, b""))
+    with pytest.raises(InputError, match="no MAVLink frame"):
+        read_record(path)
+    mav = dialect.MAVLink(None, srcSystem=1, srcComponent=1)
+    path.write_bytes(stamp(1_790_000_000_000_000, mav.attitude_encode(0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0).pack(mav)))
     with pytest.raises(InputError, match="0 WIND messages"):
         read_record(path)
