@@ -272,11 +272,10 @@ def read_wind(path: Path) -> Record:
     Raises:
         InputError: it cannot be read, or holds no wind.
     """
-    rows = _Winds()
+    rows, data = _Winds(), _bytes(path)
+    if not data:
+        raise InputError(str(path), "", "is empty", "name a tlog or .bin")
     try:
-        data = _bytes(path)
-        if not data:
-            raise _Useless("is empty")
         _fill([path], [data], rows)
         return rows.record(path.name)
     except _Useless as why:
