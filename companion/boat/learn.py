@@ -41,6 +41,7 @@ CURRENT_SD, WANDER_SD = 0.4, 0.08
 # trimmed by the vane. Four degrees of its offset are 15 % of the simulator's drive, and hide half of what shows it.
 LEAN_SD = 0.06
 DAY_SD = 0.05  # of one outing: sea, growth, the wind's gradient
+DAY_WEIGHT = 4.0  # as so many outings that were seen
 LOG_SD = 0.10  # of a log's factor, an outing's
 BLOCK_S = 1200.0
 # Noise of one stretch; speeds below ``SLOW_MPS`` are worth less. The shares are then scaled to what is seen.
@@ -370,8 +371,10 @@ def _told(
     part = covariance[:k, :k]
     factor = basis @ x.shape
     spread = np.sqrt(np.einsum("ij,jk,ik->i", basis, part, basis))
-    outing_sd = float(np.sqrt(np.mean(x.day**2))) if solver.outings > 2 else 0.0
-    day = max(outing_sd, 0.5 * DAY_SD)
+    # What days differ by: what is believed of it, and what the outings show. A day that is not sailed yet is another.
+    days = slice(solver.at_day, solver.at_factor)
+    seen_days = float(np.sum(x.day**2 + np.diag(covariance)[days]))
+    day = math.sqrt((DAY_WEIGHT * DAY_SD**2 + seen_days) / (DAY_WEIGHT + solver.outings))
     _, twa, tws = solver.wind(x.nuisance, x.stream[solver.block])
     seen = np.zeros((angles, winds), dtype=np.int64)
     near_a = np.argmin(np.abs(np.degrees(np.abs(twa))[:, None] - TWA_DEG), axis=1)

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.boat_logs import logs_under, read_logs
 from companion.errors import InputError
 from companion.mavlink.tlog import stamp
-from tests.boat.sailed import Truth, sailed
+from lab.simulated_logs import Truth, sailed
 
 LOG = sailed(Truth(scale=0.7), hours=0.1, seed=1)
 EPOCH_S = 1_750_000_000

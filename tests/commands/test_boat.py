@@ -10,7 +10,7 @@ from companion.boat import Sizes, guessed, read_polar
 from companion.cli import main
 from companion.compose import polar_of_file
 from companion.geofence.mission import read_boat_file
-from tests.boat.sailed import Truth, sailed
+from lab.simulated_logs import Truth, sailed
 
 SIZES = ["--length", "1.5", "--displacement", "20", "--sail-area", "0.9"]
 

@@ -9,10 +9,10 @@ import pytest
 from companion.boat import ardurover_sitl, guessed, lesson_of
 from companion.boat_logs import logs_under, read_logs
 from companion.clock import run_virtual
+from lab.simulated_logs import SIZES
 from sitl.autopilot import tack_loss_s
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import CurrentSpec, HullSpec, load_scenario
-from tests.boat.sailed import SIZES
 
 # Recorded from ArduRover SITL 4.7.0-dev, 5 m/s of wind from north; what learning reads of it, once a second.
 RECORDED = [Path(f"tests/boat/data/ardurover-{name}.tlog.gz") for name in ("beat", "reach")]

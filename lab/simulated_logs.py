@@ -1,4 +1,8 @@
-"""A boat that is simulated second by second for its logs: the truth is known, and the model is not the learner's."""
+"""Logs of simulated boats, to judge learning by: the truth is known, and the model is not the learner's.
+
+A boat is sailed second by second; what spoils her log (a vane that widens, a compass that swings, a lag, a tow) is then
+done to it.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,8 @@ from companion.boat.log import BoatLog
 
 SIZES = Sizes(length_m=1.5, displacement_kg=20.0, sail_area_m2=0.9)
 TAU_S = 5.0  # she gathers way so
+TIDE_S = 12.4 * 3600.0
+TOWED_MPS = 2.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,11 +36,22 @@ class Truth:
     tack_s: float = 3.0
     tack_speed: float = 0.5  # what is left of the speed when she is through
     fails: float = 0.0
+    lean: float = 0.0  # faster with the wind from starboard, close-hauled (logarithm)
+    day_sd: float = 0.0  # of an outing's factor (logarithm): sea, growth
+    tide_mps: float = 0.0  # of a stream that turns once in 12.4 h, beside the steady one
+    waves: float = 0.0  # of the speed, come and gone within 20 s (deviation of the logarithm)
+    vane_width_deg: float = 0.0  # to starboard with the wind from there, to port likewise
+    vane_scale: float = 1.0  # what the vane tells of the wind's speed
+    swing_deg: float = 0.0  # of the compass, round the circle
+    lag_s: int = 0  # of the position's velocity behind the rest
+    stuck_share: float = 0.0  # of the outing, at its end, the vane has stopped
+    towed_share: float = 0.0  # likewise, towed at 2.5 m/s wherever the wind is
 
     def speed_mps(self, polar: Polar, twa_rad: float, tws_mps: float) -> float:
         """Return how fast she really is."""
         shape = float(np.interp(abs(math.degrees(twa_rad)), [45.0, 90.0, 150.0], [self.beat, 1.0, self.run]))
-        return self.scale * shape * polar.speed_mps(twa_rad, tws_mps)
+        lean = math.exp(0.5 * self.lean * math.copysign(1.0 + math.cos(twa_rad), twa_rad))
+        return self.scale * shape * lean * polar.speed_mps(twa_rad, tws_mps)
 
 
 def sailed(
@@ -53,7 +70,9 @@ def sailed(
     polar = guessed_polar(SIZES)
     n = int(hours * 3600.0)
     k = coefficient_of(math.radians(truth.leeway_deg))
-    shift = gust = 0.0
+    day = math.exp(truth.day_sd * rng.standard_normal()) if truth.day_sd else 1.0
+    phase = rng.uniform(0.0, 2.0 * math.pi) if truth.tide_mps else 0.0
+    shift = gust = wave = 0.0
     bow, speed, place = 0.0, 0.0, np.zeros(2)
     irons_until, last = -1.0, 1.0
     rows = np.zeros((n, 9))
@@ -76,11 +95,16 @@ def sailed(
             else:
                 speed *= truth.tack_speed
         last = math.copysign(1.0, twa)
-        aim = truth.speed_mps(polar, twa, tws)
+        if truth.waves:
+            wave += -wave / 20.0 + truth.waves * math.sqrt(2.0 / 20.0) * rng.standard_normal()
+        aim = day * truth.speed_mps(polar, twa, tws) * math.exp(wave)
         speed += (aim * math.exp(0.03 * rng.standard_normal()) - speed) / TAU_S
         slip = math.copysign(float(leeway_at(k, twa, tws, max(speed, 0.1))), -twa)
         over = speed / math.cos(slip) * np.array([math.sin(bow + slip), math.cos(bow + slip)])
-        ground = over + np.array(truth.current_en_mps)
+        if i >= (1.0 - truth.towed_share) * n:
+            over = TOWED_MPS * np.array([math.sin(bow), math.cos(bow)])
+        tide = phase + 2.0 * math.pi * i / TIDE_S
+        ground = over + np.array(truth.current_en_mps) + truth.tide_mps * np.array([math.sin(tide), math.cos(tide)])
         place = place + ground
         # the air moves with the ground's wind less the stream: ``tws`` is over the water, as the polar's
         felt = tws * np.array([math.sin(twd), math.cos(twd)]) + over
@@ -94,6 +118,13 @@ def sailed(
             *place,
             speed,
         )
+    starboard = np.sign(np.sin(rows[:, 4]))
+    rows[:, 4] += math.radians(truth.vane_width_deg) * starboard
+    rows[:, 3] += math.radians(truth.swing_deg) * np.sin(rows[:, 3])
+    rows[:, 5] *= truth.vane_scale
+    rows[truth.lag_s :, 1:3] = rows[: n - truth.lag_s, 1:3].copy()
+    stuck = int((1.0 - truth.stuck_share) * n)
+    rows[stuck:, 4] = rows[min(stuck, n - 1), 4]
     return BoatLog(
         name=name,
         t_s=rows[:, 0],
