@@ -103,6 +103,8 @@ EXTRAS = {
     "distributed": "cluster",
     "bokeh": "cluster",
     "pyarrow": "results",
+    "pyogrio": "chart",
+    "rasterio": "chart",
     "filterpy": "shore",
 }
 

@@ -13,7 +13,14 @@ from companion.geofence.mission.autopilot_mission import (
 from companion.geofence.mission.boat_file import BoatFile, LearnedTable, parse_boat_file, read_boat_file
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
 from companion.geofence.mission.goals import GoalField, GoalGate, free_water, is_file
-from companion.geofence.mission.mission import load_area, load_mission, load_settings, place_troubles, read_mission
+from companion.geofence.mission.mission import (
+    load_area,
+    load_mission,
+    load_settings,
+    place_troubles,
+    read_course,
+    read_mission,
+)
 from companion.geofence.mission.options import (
     AreaOptions,
     AtomOptions,
@@ -93,6 +100,7 @@ __all__ = [
     "parse_options",
     "place_troubles",
     "read_boat_file",
+    "read_course",
     "read_mission",
     "read_options",
     "read_stored",

@@ -223,6 +223,15 @@ def read_mission(path: Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
     return assembled(options, path, given=given)
 
 
+def read_course(path: Path) -> Mission:
+    """Read a mission's goals and settings without its area, whose files may still have to be made."""
+    options = _options_of(path, AS_IT_IS)
+    if not options.goal:
+        raise InputError(str(path), "goal", "is missing", GOAL_MISSING)
+    bare = msgspec.structs.replace(options.area, obstacles=(), fence=None)
+    return assembled(msgspec.structs.replace(options, area=bare), path)
+
+
 def _options_of(path: Path, given: Mapping[Path, bytes]) -> MissionOptions:
     """Return the options of a mission with what its boat's file says."""
     text = decode(given[path] if path in given else read_bytes(path, max_bytes=MAX_TOML_BYTES), str(path))

@@ -249,6 +249,8 @@ class AreaOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """What it may be reduced to, step by step, when there is no way at the full margin."""
     point_radius_m: Annotated[float, Meta(gt=0.0, le=5000.0)] = 10.0
     """The radius of an obstacle that is only a point or a line."""
+    under_keel_m: Annotated[float, Meta(ge=0.0, le=50.0)] = 0.5
+    """Water that ``companion chart import`` leaves free has so much room under the keel."""
 
 
 class RiskOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -285,6 +287,8 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     length_m: Annotated[float, Meta(gt=0.0, le=100.0)] = 1.0
     beam_m: Annotated[float, Meta(gt=0.0, le=30.0)] = 0.3
     """The hull: what touches, and what vessels are kept clear of. The position is taken to be amidships."""
+    draft_m: Annotated[float, Meta(gt=0.0, le=20.0)] | None = None
+    """How deep the keel is: what of a chart is too shallow."""
     leeway_deg: Annotated[float, Meta(ge=0.0, le=30.0)] = 0.0
     """How far to leeward of the bow a beat goes: apparent wind 30 degrees off it, three times the boat's speed."""
     max_tws_mps: Positive | None = None

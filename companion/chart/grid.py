@@ -1,0 +1,151 @@
+"""Grids of depths: where the water is too shallow between the middles of their cells, as areas."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from companion.chart.features import Chart, Danger, Source, Wanted
+from companion.errors import InputError
+
+MOST_CELLS = 25_000_000
+DEGREE_M = 111_200.0
+COARSE_M = 100.0  # from here on a harbour is a cell or two
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Grid:
+    """Heights above the grid's datum [m], negative under water, NaN where nothing is known.
+
+    ``heights_m`` has a row for each of ``y`` and a column for each of ``x``: the middles of the cells, in either order,
+    evenly spaced.
+    """
+
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    heights_m: NDArray[np.float64]
+
+    def northwards(self) -> Grid:
+        """Return the grid with x and y ascending, whichever way it was written."""
+        across, up = np.argsort(self.x), np.argsort(self.y)
+        return Grid(x=self.x[across], y=self.y[up], heights_m=self.heights_m[np.ix_(up, across)])
+
+
+def parse_ascii_grid(text: str, source: str) -> Grid:
+    """Return an Esri ASCII grid (.asc), as GEBCO and EMODnet hand out. Raises InputError naming the line."""
+    lines = text.splitlines()
+    header: dict[str, float] = {}
+    first = 0
+    for first, line in enumerate(lines):
+        words = line.split()
+        if len(words) != 2 or not words[0][:1].isalpha():
+            break
+        try:
+            header[words[0].lower()] = float(words[1])
+        except ValueError:
+            raise InputError(source, f"line {first + 1}", f"{words[1][:20]!r} is not a number") from None
+    missing = [k for k in ("ncols", "nrows", "cellsize") if k not in header]
+    if missing:
+        raise InputError(source, "line 1", f"an ASCII grid has no {missing[0]}", "save it as Esri ASCII (.asc)")
+    columns, rows, cell = int(header["ncols"]), int(header["nrows"]), header["cellsize"]
+    if not (1 < columns * rows <= MOST_CELLS and columns > 1 and rows > 1 and cell > 0.0):
+        raise InputError(source, "line 1", f"{columns} x {rows} cells of {cell:g} are no grid", "cut it to the area")
+    if not {"xllcorner", "xllcenter"} & set(header) or not {"yllcorner", "yllcenter"} & set(header):
+        raise InputError(source, "line 1", "does not say where it lies (xllcorner, yllcorner)", "save it again")
+    west = header.get("xllcenter", header.get("xllcorner", 0.0) + 0.5 * cell)
+    south = header.get("yllcenter", header.get("yllcorner", 0.0) + 0.5 * cell)
+    values = np.empty(columns * rows)
+    count = 0
+    for number, line in enumerate(lines[first:], start=first + 1):
+        try:
+            row = np.array(line.split(), dtype=np.float64)
+        except ValueError:
+            raise InputError(source, f"line {number}", "holds what is not a number", "save it again") from None
+        if count + row.size > values.size:
+            raise InputError(source, f"line {number}", f"has more than {columns} x {rows} heights", "save it again")
+        values[count : count + row.size] = row
+        count += row.size
+    if count < values.size:
+        raise InputError(source, f"line {len(lines)}", f"ends after {count} of {values.size} heights", "fetch it again")
+    values[values == header.get("nodata_value", -9999.0)] = np.nan
+    return Grid(
+        x=west + cell * np.arange(columns, dtype=np.float64),
+        y=south + cell * np.arange(rows, dtype=np.float64)[::-1],  # its first line is the northernmost
+        heights_m=values.reshape(rows, columns),
+    )
+
+
+def signed(grid: Grid, source: str, positive: str) -> Grid:
+    """Return the grid as heights. ``positive`` is what its numbers above zero are: ``up``, ``down`` or ``auto``.
+
+    Raises InputError where ``auto`` finds nothing below zero: a grid of depths, or one of land.
+    """
+    known = grid.heights_m[np.isfinite(grid.heights_m)]
+    if known.size == 0:
+        raise InputError(source, "", "holds no height at all", "fetch it again, for the water of the mission")
+    if positive == "down":
+        return Grid(x=grid.x, y=grid.y, heights_m=-grid.heights_m)
+    if positive == "auto" and not (known < 0.0).any():
+        raise InputError(
+            source,
+            f"cell of {known.max():g} m",
+            "no cell is below zero: depths written as positive numbers, or a grid of land alone",
+            "say --positive down for depths, --positive up for heights",
+        )
+    return grid
+
+
+def chart_of(
+    grid: Grid,
+    source: Source,
+    wanted: Wanted,
+    to_lonlat: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+    *,
+    cell_m: float | None = None,
+) -> Chart:
+    """Return what a grid says: where the depth between its middles, drawn straight, is less than the safety depth.
+
+    A square of four middles is solid when one of them is, so what is drawn straight between them lies within.
+    ``to_lonlat`` brings (n, 2) of its x and y to longitude and latitude.
+    """
+    grid = grid.northwards()
+    solid = ~(grid.heights_m <= -wanted.safety_depth_m)
+    shapes = [_shape(grid, solid), _shape(grid, np.ones_like(solid))]
+    if to_lonlat is not None:
+        shapes = [shapely.transform(shape, to_lonlat) for shape in shapes]
+    heights = grid.heights_m[solid]
+    shoalest = float(np.nanmax(heights)) if np.isfinite(heights).any() else None
+    dangers = (
+        ()
+        if shapes[0].is_empty
+        else (Danger(reason="shallow or land", geometry=shapes[0], depth_m=None if shoalest is None else -shoalest),)
+    )
+    step = float(grid.y[1] - grid.y[0])
+    return Chart(
+        source=source,
+        dangers=dangers,
+        coverage=shapes[1],
+        resolution_m=cell_m if cell_m is not None else step * DEGREE_M,
+        knows_depths=True,
+    )
+
+
+def _shape(grid: Grid, solid: NDArray[np.bool_]) -> BaseGeometry:
+    """Return the squares between four middles of which one is ``solid``, as one area."""
+    square = solid[:-1, :-1] | solid[:-1, 1:] | solid[1:, :-1] | solid[1:, 1:]
+    padded = np.pad(square, 1)
+    # an edge stands between two squares of which one is solid; each is a step of the grid, so they meet at its nodes
+    row, column = np.nonzero(padded[1:-1, 1:] != padded[1:-1, :-1])
+    upright = np.stack([np.stack([column, row], axis=1), np.stack([column, row + 1], axis=1)], axis=1)
+    row, column = np.nonzero(padded[1:, 1:-1] != padded[:-1, 1:-1])
+    level = np.stack([np.stack([column, row], axis=1), np.stack([column + 1, row], axis=1)], axis=1)
+    edges = np.concatenate([upright, level])
+    if not len(edges):
+        return shapely.Polygon()
+    ends = np.stack([grid.x[edges[..., 0]], grid.y[edges[..., 1]]], axis=-1)
+    return shapely.build_area(shapely.multilinestrings(shapely.linestrings(ends)))

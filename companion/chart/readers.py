@@ -1,0 +1,383 @@
+"""Chart files read: S-57 cells, shapefiles, GeoPackages, GeoJSON, OSM extracts, and grids of depths.
+
+Only here are files of charts opened. What GDAL reads (by pyogrio and rasterio) needs the extra
+``chart``; GeoJSON, WKT and ASCII grids do not.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from companion.chart import grid as grids
+from companion.chart import s57, tags
+from companion.chart.features import Chart, Danger, Row, Source, Wanted
+from companion.disk import read_regular
+from companion.errors import InputError, unreadable
+from companion.geofence import Code, Finding, FindingLevel, read
+from companion.geofence.formats import decode
+
+Box = tuple[float, float, float, float]
+"""West, south, east, north [deg]; west and east may lie beyond the date line."""
+
+TEXT_BYTES = 512 * 1024 * 1024  # of an ASCII grid or a GeoJSON: a coast of a country
+LEADER = re.compile(rb"\d{5}[ 1-3][LD ]")  # how ISO 8211 begins, which S-57 is written in
+GRIDS = frozenset({".tif", ".tiff", ".nc", ".asc", ".grd", ".bag"})
+OSM = frozenset({".osm", ".pbf"})
+GEOGRAPHIC = re.compile(r"EPSG:(4326|4979)|OGC:CRS84|WGS[ _]?(19)?84", re.IGNORECASE)
+WATER = re.compile(r"water[-_ ]?polygons|ocean|seas?\b", re.IGNORECASE)
+S57_OPTIONS = {"UPDATES": "APPLY", "LIST_AS_STRING": "ON", "RETURN_PRIMITIVES": "OFF", "LNAM_REFS": "OFF"}
+LINE_M = 3.0
+POINT_M = 10.0
+
+
+def read_chart(path: Path, box: Box, wanted: Wanted, *, positive: str = "auto", without_depths: bool = False) -> Chart:
+    """Return what of a file lies in the box. Raises InputError: one line with file, place and remedy."""
+    ending = path.suffix.lower()
+    if not path.is_file():
+        raise unreadable(str(path), FileNotFoundError())
+    if re.fullmatch(r"\.\d{3}", ending):
+        return _read_cell(path, box, wanted, without_depths=without_depths)
+    if ending == ".asc":
+        return _read_ascii(path, box, wanted, positive)
+    if ending in GRIDS:
+        return _read_raster(path, box, wanted, positive)
+    if WATER.search(path.stem):
+        raise InputError(
+            str(path), "", "holds the water, by its name, and not the land", "take the land polygons of the same place"
+        )
+    if ending in {".geojson", ".json"}:
+        return _of_rows(_rows_of_geojson(path, box), path, wanted, without_depths=without_depths)
+    if ending in {".wkt", ".kml", ".kmz", ".gpx"}:
+        return _of_document(path)
+    return _of_rows(_rows_of_layers(path, box), path, wanted, without_depths=without_depths)
+
+
+# ---------------------------------------------------------------------------------- S-57
+def _read_cell(path: Path, box: Box, wanted: Wanted, *, without_depths: bool) -> Chart:
+    if path.suffix != ".000":
+        raise InputError(str(path), "", "is an update of a cell", f"name {path.stem}.000: its updates are read with it")
+    try:
+        head = read_regular(path, 24)
+    except OSError as error:
+        raise unreadable(str(path), error) from None
+    if not LEADER.match(head):
+        raise InputError(
+            str(path),
+            "byte 0",
+            "is no S-57 cell: it is encrypted (S-63), or damaged",
+            "ask for the cell unencrypted (S-57), as NOAA's and many inland authorities' are",
+        )
+    numbers = sorted(int(p.suffix[1:]) for p in path.parent.glob(f"{path.stem}.[0-9][0-9][0-9]"))
+    for expected, number in enumerate(numbers):
+        if number != expected:
+            raise InputError(
+                str(path),
+                f"update {expected:03}",
+                f"is missing, and {number:03} is there",
+                "fetch it, or remove the later ones",
+            )
+    rows = list(_rows_of_layers(path, None, is_read=s57.is_read, options=S57_OPTIONS))
+    if not (s57.has_depths(rows) or without_depths):
+        raise s57.no_depths(str(path))
+    return s57.chart_of([r for r in rows if r.geometry.is_empty or _touches(r.geometry, box)], str(path), wanted)
+
+
+# ---------------------------------------------------------------------------------- vectors
+def _of_rows(rows: Iterator[Row], path: Path, wanted: Wanted, *, without_depths: bool) -> Chart:
+    """Return what features say: by S-57's classes where layers are called so, by tags, else areas are land."""
+    found: list[Danger] = []
+    cell: list[Row] = []
+    is_osm = path.suffix.lower() in OSM
+    for row in rows:
+        if row.geometry is None or row.geometry.is_empty:
+            continue
+        if s57.is_read(row.layer.upper()):
+            cell.append(Row(layer=row.layer.upper(), place=row.place, geometry=row.geometry, attributes=row.attributes))
+        elif is_osm or tags.is_tagged(row):
+            found += tags.dangers_of(row, wanted)
+        else:
+            found.append(_plain(row))
+    if cell:
+        if not (s57.has_depths(cell) or without_depths):
+            raise s57.no_depths(str(path))
+        chart = s57.chart_of(cell, str(path), wanted)
+        return Chart(
+            source=Source(name=path.name),
+            dangers=(*chart.dangers, *found),
+            coverage=chart.coverage,
+            knows_depths=chart.knows_depths,
+        )
+    findings: tuple[Finding, ...] = ()
+    if not found:
+        findings = (
+            Finding(
+                severity=FindingLevel.NOTE, code=Code.EMPTY, place="", text="holds nothing solid here", source=str(path)
+            ),
+        )
+    return Chart(source=Source(name=path.name), dangers=tuple(found), findings=findings)
+
+
+def _plain(row: Row) -> Danger:
+    kind = row.geometry.geom_type
+    name = row.text("name")
+    if kind.endswith("Polygon"):
+        return Danger(reason="land", geometry=row.geometry, name=name)
+    if kind.endswith("LineString"):
+        return Danger(reason="shore", geometry=row.geometry, name=name, radius_m=LINE_M)
+    return Danger(reason="danger", geometry=row.geometry, name=name, radius_m=POINT_M)
+
+
+def _of_document(path: Path) -> Chart:
+    """Return what a file of drawings holds: its zones and marks to keep out of."""
+    document = read(path, areas=True).require_clean()
+    found = [
+        Danger(reason="drawn", geometry=z.shape, name=z.name)
+        for z in document.zones
+        if isinstance(z.shape, shapely.Polygon)
+    ]
+    found += [Danger(reason="drawn", geometry=m.geometry, name=m.name, radius_m=POINT_M) for m in document.marks]
+    return Chart(source=Source(name=path.name), dangers=tuple(found))
+
+
+def _rows_of_geojson(path: Path, box: Box) -> Iterator[Row]:
+    try:
+        root = json.loads(decode(read_regular(path, TEXT_BYTES), str(path)))
+    except OSError as error:
+        raise unreadable(str(path), error) from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(str(path), "", f"is no JSON ({error})", "fetch it again") from None
+    features = root.get("features") if isinstance(root, dict) else None
+    if not isinstance(features, list):
+        raise InputError(str(path), "", "is no FeatureCollection", "export it as GeoJSON (RFC 7946)")
+    crs = json.dumps(root.get("crs"))
+    if root.get("crs") is not None and not GEOGRAPHIC.search(crs.replace("::", ":")):
+        raise InputError(str(path), "crs", f"{crs[:60]} is not WGS 84", "export it as WGS 84 (RFC 7946)")
+    for n, feature in enumerate(features):
+        place = f"features[{n}]"
+        try:
+            shape = shapely.from_geojson(json.dumps(feature["geometry"]))
+        except (KeyError, TypeError, shapely.errors.GEOSException) as error:
+            raise InputError(str(path), place, f"has no geometry ({error})", "draw it or remove it") from None
+        if shape is None:
+            continue
+        properties = feature.get("properties") or {}
+        _require_on_globe(shape, path, place)
+        if shape.is_empty or _touches(shape, box):
+            yield Row(layer=str(properties.get("layer", "")), place=place, geometry=shape, attributes=properties)
+
+
+def _rows_of_layers(
+    path: Path,
+    box: Box | None,
+    *,
+    is_read: Callable[[str], bool] = lambda _: True,
+    options: dict[str, str] | None = None,
+) -> Iterator[Row]:
+    """Yield the features of every layer, in longitude and latitude."""
+    from pyogrio import list_layers
+    from pyogrio.errors import DataSourceError
+    from pyogrio.raw import read as read_layer
+
+    try:
+        layers = [str(name) for name, _ in list_layers(path)]
+        for layer in layers:
+            if not is_read(layer.upper()):
+                continue
+            meta, _, geometries, fields = read_layer(path, layer=layer, **(options or {}))
+            if geometries is None:  # a table
+                geometries = [None] * (len(fields[0]) if fields else 0)
+            has_shapes = any(data is not None for data in geometries)
+            to_lonlat = _to_lonlat(meta.get("crs"), path, layer) if has_shapes else None
+            names = [str(name) for name in meta["fields"]]
+            for n, data in enumerate(geometries):
+                shape = shapely.Point() if data is None else shapely.from_wkb(data)
+                if to_lonlat is not None:
+                    shape = shapely.transform(shape, to_lonlat, include_z=False)
+                place = f"{layer} feature {n + 1}"
+                _require_on_globe(shape, path, place)
+                attributes = {name: _value(column[n]) for name, column in zip(names, fields, strict=True)}
+                if box is None or shape.is_empty or _touches(shape, box):
+                    yield Row(layer=layer, place=place, geometry=shape, attributes=attributes)
+    except DataSourceError as error:
+        raise InputError(
+            str(path), "", f"cannot be read ({str(error).splitlines()[0][:100]})", "is it a chart, and whole?"
+        ) from None
+
+
+def _value(value: object) -> object:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _touches(shape: BaseGeometry, box: Box) -> bool:
+    west, south, east, north = shapely.bounds(shape)
+    return bool(
+        south <= box[3]
+        and north >= box[1]
+        and any(west + turn <= box[2] and east + turn >= box[0] for turn in (-360.0, 0.0, 360.0))
+    )
+
+
+def _require_on_globe(shape: BaseGeometry, path: Path, place: str) -> None:
+    if shape.is_empty:
+        return
+    west, south, east, north = shapely.bounds(shape)
+    if not (south >= -90.0 and north <= 90.0 and west >= -360.0 and east <= 360.0):
+        raise InputError(
+            str(path),
+            place,
+            f"lies at {west:.6g}, {south:.6g}, which is no longitude and latitude",
+            "export it as WGS 84, longitude first",
+        )
+
+
+Transform = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def _to_lonlat(crs: str | None, path: Path, place: str) -> Transform | None:
+    """Return what brings positions of a reference system to longitude and latitude; None where they are that."""
+    from pyproj import CRS, Transformer
+    from pyproj.exceptions import CRSError
+
+    if not crs:
+        raise InputError(
+            str(path), place, "does not say its reference system", "put its .prj beside it, or export it as WGS 84"
+        )
+    if re.fullmatch(r"EPSG:4326|OGC:CRS84", crs):
+        return None
+    try:
+        transformer = Transformer.from_crs(CRS.from_user_input(crs), "EPSG:4326", always_xy=True)
+    except CRSError as error:
+        raise InputError(
+            str(path), place, f"its reference system is not known ({str(error)[:80]})", "export it as WGS 84"
+        ) from None
+    return lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1]))
+
+
+# ---------------------------------------------------------------------------------- grids
+def _read_ascii(path: Path, box: Box, wanted: Wanted, positive: str) -> Chart:
+    try:
+        text = decode(read_regular(path, TEXT_BYTES), str(path))
+    except OSError as error:
+        raise unreadable(str(path), error) from None
+    grid = grids.parse_ascii_grid(text, str(path))
+    beside = path.with_suffix(".prj")
+    if beside.is_file():
+        crs: str | None = beside.read_text(encoding="utf-8", errors="replace")
+    else:
+        crs = "EPSG:4326" if _is_lonlat(grid) else None
+    to_lonlat = _to_lonlat(crs, path, "header")
+    if to_lonlat is None or _is_lonlat(grid):
+        grid, to_lonlat = _cut(grid, box, path), None
+    cell_m = None if to_lonlat is None else float(abs(grid.y[1] - grid.y[0]))
+    return grids.chart_of(
+        grids.signed(grid, str(path), positive), Source(name=path.name), wanted, to_lonlat, cell_m=cell_m
+    )
+
+
+def _is_lonlat(grid: grids.Grid) -> bool:
+    return bool(np.abs(grid.x).max() <= 360.0 and np.abs(grid.y).max() <= 90.0)
+
+
+def _cut(grid: grids.Grid, box: Box, path: Path) -> grids.Grid:
+    """Return the part of a grid in longitude and latitude that holds the box."""
+    step_x, step_y = abs(grid.x[1] - grid.x[0]), abs(grid.y[1] - grid.y[0])
+    rows = (grid.y >= box[1] - step_y) & (grid.y <= box[3] + step_y)
+    columns = np.zeros(grid.x.shape, dtype=bool)
+    for turn in (-360.0, 0.0, 360.0):
+        columns |= (grid.x + turn >= box[0] - step_x) & (grid.x + turn <= box[2] + step_x)
+    if rows.sum() < 2 or columns.sum() < 2:
+        raise InputError(
+            str(path),
+            "",
+            f"reaches from {grid.y.min():.4f}, {grid.x.min():.4f} to {grid.y.max():.4f}, {grid.x.max():.4f} "
+            "and holds nothing of the place that is asked for",
+            "fetch it for the mission's water",
+        )
+    if rows.sum() * columns.sum() > grids.MOST_CELLS:
+        raise InputError(str(path), "", "has too many cells in reach", "say a smaller --radius")
+    return grids.Grid(x=grid.x[columns], y=grid.y[rows], heights_m=grid.heights_m[np.ix_(rows, columns)])
+
+
+def _read_raster(path: Path, box: Box, wanted: Wanted, positive: str) -> Chart:
+    import rasterio
+    from rasterio.errors import RasterioError
+    from rasterio.windows import Window
+
+    try:
+        with rasterio.open(_subdataset(path)) as raster:
+            affine = raster.transform
+            if raster.crs is None and affine.is_identity:
+                raise InputError(str(path), "", "does not say where it lies", "export it with its reference system")
+            if affine.b or affine.d:
+                raise InputError(str(path), "", "is a turned grid", "export it north up")
+            x = affine.c + affine.a * (np.arange(raster.width) + 0.5)
+            y = affine.f + affine.e * (np.arange(raster.height) + 0.5)
+            crs = "EPSG:4326" if raster.crs is None else raster.crs.to_wkt()
+            is_lonlat = raster.crs is None or raster.crs.is_geographic
+            rows, columns = _within(x, y, box, None if is_lonlat else _from_lonlat(crs), path)
+            window = Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
+            band = raster.read(1, window=window, masked=True)
+            heights = np.ma.filled(band.astype(np.float64), np.nan)
+            heights = heights * raster.scales[0] + raster.offsets[0]
+            said = {**raster.tags(), **raster.tags(1)}
+    except RasterioError as error:
+        raise InputError(str(path), "", f"cannot be read ({str(error)[:100]})", "is it a grid, and whole?") from None
+    grid = grids.Grid(x=x[columns], y=y[rows], heights_m=heights)
+    heading = " ".join(str(v).lower() for k, v in said.items() if k.rpartition("#")[2] in {"positive", "standard_name"})
+    if positive == "auto" and ("down" in heading.split() or "depth" in heading):
+        positive = "down"
+    return grids.chart_of(
+        grids.signed(grid, str(path), positive),
+        Source(name=path.name, edition=said.get("TIFFTAG_SOFTWARE", ""), date=said.get("TIFFTAG_DATETIME", "")[:10]),
+        wanted,
+        None if is_lonlat else _to_lonlat(crs, path, "header"),
+        cell_m=None if is_lonlat else float(abs(affine.e)),
+    )
+
+
+def _subdataset(path: Path) -> str:
+    """Return what of a netCDF file is the depths: its only variable, or the one of a name that says so."""
+    import rasterio
+
+    with rasterio.open(path) as raster:
+        inside = [str(name) for name in raster.subdatasets]
+    for wanted in ("elevation", "depth", "z", "band1", "altitude", "topo"):
+        for name in inside:
+            if name.rpartition(":")[2].lower() == wanted:
+                return name
+    if inside:
+        raise InputError(str(path), "", f"holds {len(inside)} grids and none by the name elevation or depth")
+    return str(path)
+
+
+def _from_lonlat(crs: str) -> Any:
+    from pyproj import Transformer
+
+    return Transformer.from_crs("EPSG:4326", crs, always_xy=True)
+
+
+def _within(
+    x: NDArray[np.float64], y: NDArray[np.float64], box: Box, from_lonlat: Any, path: Path
+) -> tuple[slice, slice]:
+    """Return which rows and columns hold the box, with one more to each side."""
+    if from_lonlat is not None:
+        box = from_lonlat.transform_bounds(*box)
+    found = []
+    for at, low, high in ((y, box[1], box[3]), (x, box[0], box[2])):
+        step = abs(at[1] - at[0])
+        inside = np.nonzero((at >= low - step) & (at <= high + step))[0]
+        if inside.size < 2:
+            raise InputError(
+                str(path), "", "holds nothing of the place that is asked for", "fetch it for the mission's water"
+            )
+        found.append(slice(int(inside[0]), int(inside[-1]) + 1))
+    return found[0], found[1]

@@ -1,0 +1,214 @@
+"""``companion chart``: charts become the obstacles and the fence of a mission."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from companion.commands.output import force_option, refuse_existing, write_files
+from companion.errors import InputError, JobError
+from companion.program.arguments import add_command, number, place
+from companion.words import counted, listed
+
+if TYPE_CHECKING:
+    from companion.chart import Box, Chart, ChartArea
+    from companion.geofence.mission import MissionOptions
+    from companion.messages import GeoPoint
+
+_EPILOG = """\
+examples:
+  companion chart import US4MD81M.000 --mission missions/bay.toml
+  companion chart import cells/*.000 land.gpkg --around 38.97,-76.47 --radius 3000 --depth 1.5
+  companion chart import gebco.nc emodnet.asc --mission passage.toml --out chart
+
+Reads S-57 cells (.000, with the updates .001 ... beside them), shapefiles, GeoPackages, GeoJSON and FlatGeobuf of land,
+OSM extracts with seamarks (.osm, .pbf), grids of depths (GeoTIFF, netCDF, .asc). What it writes is what [area] of a
+mission and `companion fence` read; each obstacle says why it is one, and what chart says so.
+
+Nothing that it writes is fit for navigation.
+Exit codes: 0 written, 1 written but a place of the mission is not in free water, 2 a file that cannot be believed.
+"""
+WITHIN_M = 2000.0  # beyond a mission's farthest place
+MOST_M = 50_000.0
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
+    """Add the command with its verb."""
+    parser = add_command(subparsers, "chart", summary, _EPILOG)
+    verbs = parser.add_subparsers(dest="verb", metavar="import", required=True)
+    load = verbs.add_parser("import", help="make obstacles and a fence of charts")
+    load.add_argument("files", metavar="FILE", nargs="+")
+    where = load.add_mutually_exclusive_group(required=True)
+    where.add_argument("--mission", metavar="M", help="the mission whose water it is, and whose boat")
+    where.add_argument("--around", type=place, metavar="LAT,LON", help="the middle of the water")
+    load.add_argument(
+        "--radius",
+        type=number("m", at_least=50.0, at_most=MOST_M),
+        metavar="M",
+        help=f"how far from there; of a mission from its origin ({WITHIN_M:g} m beyond its farthest place)",
+    )
+    load.add_argument("--out", metavar="NAME", help="writes NAME.geojson and NAME-fence.geojson (MISSION-chart)")
+    load.add_argument(
+        "--depth",
+        type=number("m", at_least=0.0, at_most=100.0),
+        metavar="M",
+        help="water less deep than this below the chart's datum is solid (the mission's draft_m and under_keel_m)",
+    )
+    load.add_argument(
+        "--air-draft",
+        type=number("m", above=0.0, at_most=100.0),
+        metavar="M",
+        help="bridges and cables with more room than this are passed under (none is)",
+    )
+    load.add_argument(
+        "--buoy-radius",
+        type=number("m", above=0.0, at_most=500.0),
+        default=10.0,
+        metavar="M",
+        help="of buoys and beacons (10)",
+    )
+    load.add_argument(
+        "--restricted",
+        choices=("none", "prohibited", "all"),
+        default="prohibited",
+        help="which restricted areas are solid (prohibited: where entry is)",
+    )
+    load.add_argument(
+        "--most-doubt",
+        type=number("m", at_least=0.0, at_most=1000.0),
+        default=50.0,
+        metavar="M",
+        help="the quality of a survey (CATZOC) widens a margin to no more than this (50)",
+    )
+    load.add_argument(
+        "--tolerance",
+        type=number("m", at_least=0.1, at_most=500.0),
+        metavar="M",
+        help="shapes may be up to twice this too large, with fewer corners (3)",
+    )
+    load.add_argument(
+        "--positive",
+        choices=("auto", "up", "down"),
+        default="auto",
+        help="what numbers above zero are in a grid: heights (up) or depths (down)",
+    )
+    load.add_argument("--without-depths", action="store_true", help="take a cell that says nothing of depths")
+    force_option(load)
+    load.set_defaults(run=_import)
+
+
+def _import(args: argparse.Namespace) -> int:
+    from companion.chart import TOLERANCE_M, Wanted, area_of, read_chart, told_of
+
+    center, reach_m, places, options = _water(args)
+    out = args.out or (Path(args.mission).stem + "-chart" if args.mission else "chart")
+    folder = Path(args.mission).parent if args.mission and not args.out else Path()
+    obstacles, fence = folder / f"{out}.geojson", folder / f"{out}-fence.geojson"
+    refuse_existing([str(obstacles), str(fence)], force=args.force)
+    depth_m = _depth_m(args, options)
+    wanted = Wanted(
+        safety_depth_m=depth_m,
+        air_draft_m=math.inf if args.air_draft is None else args.air_draft,
+        buoy_radius_m=args.buoy_radius,
+        most_doubt_m=args.most_doubt,
+        restricted=args.restricted,
+    )
+    charts: list[Chart] = []
+    for name in args.files:
+        chart = read_chart(
+            Path(name), _box(center, reach_m), wanted, positive=args.positive, without_depths=args.without_depths
+        )
+        charts.append(chart)
+        for finding in chart.findings:
+            print(finding.line(name))
+        print(f"{name}: {chart.source}: {told_of(chart)}" + ("" if chart.knows_depths else "; it tells no depths"))
+    area = area_of(charts, center, reach_m, args.tolerance or TOLERANCE_M)
+    if area.is_too_much:
+        raise JobError(
+            f"{obstacles}: not written: it would hold {area.positions()} positions, more than a mission reads; "
+            "say a smaller --radius or a larger --tolerance"
+        )
+    write_files({str(obstacles): area.obstacles_json(), str(fence): area.fence_json()}, force=args.force)
+    print(
+        f"{obstacles}: written: {counted(len(area.solids), 'obstacle')} ({counted(area.positions(), 'position')}) "
+        f"within {reach_m:g} m of {center.lat_deg:.5f}, {center.lon_deg:.5f}; solid is what is less deep than "
+        f"{depth_m:g} m"
+    )
+    print(f"{fence}: written: the edge of it")
+    if any(s.doubt_m >= args.most_doubt > 0.0 for s in area.solids):
+        print(f"surveys here are so doubtful that margins would be wider: cut at {args.most_doubt:g} m (--most-doubt)")
+    print(f'in the mission: [area] obstacles = ["{obstacles.name}"], fence = "{fence.name}"')
+    bad = _troubles(area, places)
+    for line in bad:
+        print(line)
+    print("not fit for navigation: look at it before it is sailed by")
+    return int(bool(bad))
+
+
+def _water(args: argparse.Namespace) -> tuple[GeoPoint, float, list[tuple[str, GeoPoint]], MissionOptions | None]:
+    """Return the middle of the water, how far it reaches [m], and the places and settings of the mission."""
+    from companion.geo.frame import LocalFrame
+    from companion.geofence.mission import read_course
+
+    if args.mission is None:
+        if args.radius is None:
+            raise InputError("companion chart import", "--around", "has no --radius", "say how far, in metres")
+        return args.around, args.radius, [], None
+    mission = read_course(Path(args.mission))
+    frame = LocalFrame(mission.origin)
+    places = [(g.name or f"[[goal]] {n}", g.point) for n, g in enumerate(mission.goals, start=1)]
+    places += [(r.name or f"[[refuge]] {n}", r.point) for n, r in enumerate(mission.refuges, start=1)]
+    if mission.start is not None:
+        places.insert(0, ("[start]", mission.start))
+    farthest_m = max(math.hypot(*frame.en_from_geo(point)) for _, point in places)
+    reach_m = args.radius or farthest_m + WITHIN_M
+    if reach_m > MOST_M:
+        raise InputError(
+            args.mission,
+            "",
+            f"reaches {farthest_m / 1000.0:.0f} km from its origin",
+            f"say --radius, of at most {MOST_M:g} m, and import a passage in parts",
+        )
+    return mission.origin, reach_m, places, mission.options
+
+
+def _depth_m(args: argparse.Namespace, options: MissionOptions | None) -> float:
+    """Return the depth below the chart's datum from which on water is free [m]."""
+    if args.depth is not None:
+        return float(args.depth)
+    if options is None:
+        raise InputError(
+            "companion chart import", "--depth", "is missing", "say the least depth that is free, in metres"
+        )
+    if options.boat.draft_m is None:
+        raise InputError(args.mission, "[boat] draft_m", "is missing", "say how deep the keel is, or --depth M")
+    return options.boat.draft_m + options.area.under_keel_m
+
+
+def _box(center: GeoPoint, reach_m: float) -> Box:
+    """Return the box of longitude and latitude that holds the water."""
+    tall = reach_m / 110_500.0
+    most = min(89.0, abs(center.lat_deg) + tall)
+    wide = min(180.0, tall / math.cos(math.radians(most)))
+    return (center.lon_deg - wide, center.lat_deg - tall, center.lon_deg + wide, center.lat_deg + tall)
+
+
+def _troubles(area: ChartArea, places: list[tuple[str, GeoPoint]]) -> list[str]:
+    """Return a line for each place of a mission that is not in free water, and what to look at."""
+    import shapely
+
+    from companion.geofence.shapes import polygon_en
+
+    solids = [(s, polygon_en(s.shape, area.frame)) for s in area.solids]
+    out = []
+    for name, point in places:
+        here = shapely.points(area.frame.en_from_geo(point))
+        why = [f"{s.title} of {s.source}" if s.source else s.title for s, p in solids if shapely.covers(p, here)]
+        if why:
+            out.append(
+                f"{name}: {point.lat_deg:.6f}, {point.lon_deg:.6f} is inside {listed(why[:3])}; "
+                "move it, or say --depth or --positive where depths were misread"
+            )
+    return out

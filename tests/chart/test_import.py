@@ -1,0 +1,278 @@
+"""``companion chart import``: what it writes is what missions read; what cannot be believed is refused in one line."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import LineString, Point, box
+
+from companion import cli
+from companion.geofence import load_mission
+
+AROUND = ["--around", "50.82,-1.31", "--radius", "1500"]
+ISLAND = box(-1.312, 50.8210, -1.308, 50.8230)
+MISSION = """name = "m"
+[start]
+lat = 50.8150
+lon = -1.3100
+[[goal]]
+lat = 50.8250
+lon = -1.3100
+[area]
+obstacles = ["m-chart.geojson"]
+fence = "m-chart-fence.geojson"
+[boat]
+draft_m = 1.2
+"""
+
+
+def collection(*features):
+    rows = [
+        {"type": "Feature", "geometry": json.loads(shapely.to_geojson(shape)), "properties": properties}
+        for shape, properties in features
+    ]
+    return json.dumps({"type": "FeatureCollection", "features": rows})
+
+
+@pytest.fixture
+def shell(tmp_path, monkeypatch, capsys):
+    """A folder to work in, and what a command answers: exit code, standard output, standard error."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words):
+        code = cli.main(["chart", "import", *map(str, words)])
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    run.folder = tmp_path
+    return run
+
+
+def refusal(shell, *words):
+    code, out, err = shell(*words)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1
+    assert list(shell.folder.glob("chart*.geojson")) == []
+    return err.removeprefix("companion chart: ").rstrip()
+
+
+def test_a_coast_becomes_the_area_of_a_mission_and_needs_no_extra(shell, monkeypatch):
+    """A mission may name the files before they are there."""
+    for name in ("pyogrio", "rasterio"):
+        monkeypatch.setitem(sys.modules, name, None)
+    (shell.folder / "coast.geojson").write_text(
+        collection((ISLAND, {}), (Point(-1.305, 50.82), {"seamark:type": "rock", "name": "Hat"}))
+    )
+    (shell.folder / "m.toml").write_text(MISSION)
+    code, out, err = shell("coast.geojson", "--mission", "m.toml")
+    assert (code, err) == (0, "")
+    assert "solid is what is less deep than 1.7 m" in out
+    assert "it tells no depths" in out
+    assert "not fit for navigation" in out
+    area = load_mission("m.toml").area
+    assert [o.name for o in area.obstacles] == ["land", "Hat (rock)"]
+    assert shapely.covers(area.obstacles[0].shape, ISLAND)
+    assert len(area.fence.inclusions) == 1
+    code, _, err = shell("coast.geojson", "--mission", "m.toml")
+    assert code == 2
+    assert "m-chart.geojson: exists; say --force" in err
+
+
+def test_the_keel_of_the_mission_says_what_is_too_shallow(shell):
+    row = "-9 -9 -9 -9 -9\n"
+    header = "ncols 5\nnrows 5\nxllcorner -1.33\nyllcorner 50.80\ncellsize 0.01\n"
+    grid = header + 2 * row + "-9 -9 -9 -9 -1.8\n" + 2 * row
+    (shell.folder / "g.asc").write_text(grid)
+    told = {}
+    for draft, under in (("1.2", "0.5"), ("1.4", "0.5"), ("1.2", "0.7")):
+        text = MISSION.replace("[boat]\ndraft_m = 1.2", f"under_keel_m = {under}\n[boat]\ndraft_m = {draft}")
+        (shell.folder / "m.toml").write_text(text)
+        assert shell("g.asc", "--mission", "m.toml", "--radius", "1500", "--force")[0] == 0
+        told[draft, under] = "shallow or land" in obstacles(shell.folder, "m-chart")
+    assert told == {("1.2", "0.5"): False, ("1.4", "0.5"): True, ("1.2", "0.7"): True}
+    (shell.folder / "m.toml").write_text(MISSION.replace("draft_m = 1.2", ""))
+    assert refusal(shell, "g.asc", "--mission", "m.toml", "--force") == (
+        "m.toml: [boat] draft_m: is missing; say how deep the keel is, or --depth M"
+    )
+
+
+def test_a_place_of_the_mission_that_is_not_in_free_water_is_told(shell):
+    (shell.folder / "coast.geojson").write_text(collection((box(-1.312, 50.824, -1.308, 50.826), {})))
+    (shell.folder / "m.toml").write_text(MISSION)
+    code, out, _ = shell("coast.geojson", "--mission", "m.toml")
+    assert code == 1
+    assert "[[goal]] 1: 50.825000, -1.310000 is inside land of coast.geojson; move it" in out
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        ("X.000", "not a cell at all, 24 bytes", "X.000: byte 0: is no S-57 cell: it is encrypted (S-63), or damaged"),
+        ("X.001", "", "X.001: is an update of a cell; name X.000: its updates are read with it"),
+        ("a.geojson", "{", "a.geojson: is no JSON"),
+        ("a.geojson", "{}", "a.geojson: is no FeatureCollection; export it as GeoJSON (RFC 7946)"),
+        (
+            "a.geojson",
+            collection((Point(437000, 5630000), {})),
+            "a.geojson: features[0]: lies at 437000, 5.63e+06, which is no longitude and latitude",
+        ),
+        (
+            "a.geojson",
+            '{"type": "FeatureCollection", "crs": {"properties": {"name": "EPSG:27700"}}, "features": []}',
+            'a.geojson: crs: {"properties": {"name": "EPSG:27700"}} is not WGS 84',
+        ),
+        ("a.geojson", '{"features": [{}]}', "a.geojson: features[0]: has no geometry"),
+        ("water-polygons.geojson", collection(), "water-polygons.geojson: holds the water, by its name"),
+        (
+            "g.asc",
+            "ncols 2\nnrows 2\nxllcorner -1.9\nyllcorner 50\ncellsize 1\n1 2\n3 4\n",
+            "g.asc: cell of 4 m: no cell is below zero: depths written as positive numbers, or a grid of land alone",
+        ),
+        (
+            "g.asc",
+            "ncols 2\nnrows 2\nxllcorner 10\nyllcorner 50\ncellsize 1\n-1 2\n3 4\n",
+            "g.asc: reaches from 50.5000, 10.5000 to 51.5000, 11.5000 and holds nothing of the place that is asked for",
+        ),
+        (
+            "g.asc",
+            "ncols 2\nnrows 2\nxllcorner 437000\nyllcorner 5630000\ncellsize 100\n-1 2\n3 4\n",
+            "g.asc: header: does not say its reference system; put its .prj beside it",
+        ),
+    ],
+)
+def test_what_cannot_be_believed_is_refused_in_one_line(shell, name, text, told):
+    (shell.folder / name).write_text(text)
+    assert refusal(shell, name, *AROUND, "--depth", "2").startswith(told)
+
+
+def test_what_is_missing_is_said(shell):
+    (shell.folder / "a.geojson").write_text(collection())
+    assert refusal(shell, "b.geojson", *AROUND, "--depth", "2") == "b.geojson: no such file; check the path"
+    assert "--depth: is missing" in refusal(shell, "a.geojson", *AROUND)
+    assert "--around: has no --radius" in refusal(shell, "a.geojson", *AROUND[:2])
+
+
+# ---------------------------------------------------------------------------------- what GDAL reads
+
+
+def layer(path, shapes, name, driver="GPKG", crs="EPSG:4326", **fields):
+    """Write a layer of shapes as a chart program would."""
+    write = pytest.importorskip("pyogrio.raw").write
+    write(
+        path,
+        geometry=np.array([shapely.to_wkb(s) for s in shapes], dtype=object),
+        field_data=[np.array(values) for values in fields.values()],
+        fields=list(fields),
+        layer=name,
+        driver=driver,
+        crs=crs,
+        geometry_type=shapes[0].geom_type,
+        append=path.exists(),
+    )
+
+
+def obstacles(folder, name="chart"):
+    features = json.loads((folder / f"{name}.geojson").read_text())["features"]
+    return {f["properties"]["reason"] for f in features}
+
+
+def test_layers_called_as_s57_calls_its_classes_are_read_as_those(shell):
+    path = shell.folder / "cell.gpkg"
+    west, east = box(-1.34, 50.79, -1.31, 50.85), box(-1.31, 50.79, -1.28, 50.85)
+    layer(path, [west, east], "DEPARE", DRVAL1=np.array([0.5, 5.0]))
+    layer(path, [Point(-1.305, 50.82), Point(-1.30, 50.82)], "WRECKS", VALSOU=np.array([1.0, 9.0]))
+    code, out, err = shell(path, *AROUND, "--depth", "2")
+    assert (code, err) == (0, "")
+    assert "1 shallow, 1 wreck" in out
+    assert obstacles(shell.folder) == {"shallow", "wreck"}
+
+
+def test_a_cell_without_depths_is_refused_unless_that_is_known(shell):
+    path = shell.folder / "cell.gpkg"
+    layer(path, [ISLAND], "LNDARE", OBJNAM=np.array(["Hat"]))
+    assert refusal(shell, path, *AROUND, "--depth", "2").endswith(
+        "holds no depth area and no sounding: nothing is known of its water's depth; take another cell, or say "
+        "--without-depths"
+    )
+    assert shell(path, *AROUND, "--depth", "2", "--without-depths")[0] == 0
+
+
+def test_a_shapefile_in_metres_of_a_country_is_brought_to_where_it_lies(shell):
+    from pyproj import Transformer
+
+    path = shell.folder / "coast.shp"
+    to_grid = Transformer.from_crs("EPSG:4326", "EPSG:32630", always_xy=True)
+    there = shapely.transform(ISLAND, lambda p: np.column_stack(to_grid.transform(p[:, 0], p[:, 1])))
+    layer(path, [there], "coast", driver="ESRI Shapefile", crs="EPSG:32630", called=np.array(["Hat"]))
+    assert shell(path, *AROUND, "--depth", "2")[0] == 0
+    (feature,) = json.loads((shell.folder / "chart.geojson").read_text())["features"]
+    assert shapely.covers(shapely.from_geojson(json.dumps(feature["geometry"])), ISLAND)
+    path.with_suffix(".prj").unlink()
+    assert (
+        "coast.shp: coast: does not say its reference system; put its .prj beside it"
+        in shell(path, *AROUND, "--depth", "2", "--force")[2]
+    )
+
+
+def test_an_osm_extract_has_shores_and_seamarks(shell):
+    pytest.importorskip("pyogrio")
+    (shell.folder / "a.osm").write_text(
+        """<osm version="0.6">
+<node id="1" lat="50.821" lon="-1.312"><tag k="seamark:type" v="rock"/><tag k="name" v="Hat"/></node>
+<node id="2" lat="50.822" lon="-1.310"/><node id="3" lat="50.823" lon="-1.308"/>
+<way id="4"><nd ref="2"/><nd ref="3"/><tag k="natural" v="coastline"/></way>
+<way id="5"><nd ref="2"/><nd ref="1"/><tag k="highway" v="path"/></way>
+</osm>"""
+    )
+    code, _, err = shell("a.osm", *AROUND, "--depth", "2")
+    assert (code, err) == (0, "")
+    features = json.loads((shell.folder / "chart.geojson").read_text())["features"]
+    assert sorted(f["properties"]["name"] for f in features) == ["Hat (rock)", "shore"]
+    (shore,) = (f for f in features if f["properties"]["name"] == "shore")
+    line = LineString([(-1.310, 50.822), (-1.308, 50.823)])
+    assert shapely.covers(shapely.from_geojson(json.dumps(shore["geometry"])), line)
+
+
+@pytest.mark.parametrize("up", [True, False])
+@pytest.mark.parametrize("positive", ["up", "down"])
+def test_a_geotiff_is_the_same_water_whichever_way_it_is_written(shell, up, positive):
+    rasterio = pytest.importorskip("rasterio")
+    heights = np.full((20, 20), -9.0, dtype=np.float32)
+    heights[4, 12] = 1.0  # row 4 from the north
+    north, south = 50.83, 50.81
+    affine = (
+        rasterio.Affine(0.001, 0, -1.32, 0, -0.001, north) if up else rasterio.Affine(0.001, 0, -1.32, 0, 0.001, south)
+    )
+    data = heights if up else heights[::-1]
+    with rasterio.open(
+        "g.tif", "w", driver="GTiff", width=20, height=20, count=1, dtype="float32", crs="EPSG:4326", transform=affine
+    ) as out:
+        out.write(data if positive == "up" else -data, 1)
+        out.update_tags(1, positive=positive)
+    code, _, err = shell("g.tif", "--around", "50.82,-1.31", "--radius", "800", "--depth", "2")
+    assert (code, err) == (0, "")
+    shoals = [
+        shapely.from_geojson(json.dumps(f["geometry"]))
+        for f in json.loads((shell.folder / "chart.geojson").read_text())["features"]
+        if f["properties"]["reason"] != "no chart"
+    ]
+    (shoal,) = shoals
+    assert shapely.covers(shoal, Point(-1.3075, 50.8255))
+    assert not shapely.covers(shoal, Point(-1.3075, 50.8145))
+
+
+def test_a_chart_that_gdal_cannot_read_is_told_in_one_line(shell):
+    pytest.importorskip("pyogrio")
+    (shell.folder / "a.gpkg").write_bytes(b"SQLite format 3\x00 and no more")
+    assert "a.gpkg: cannot be read (" in refusal(shell, "a.gpkg", *AROUND, "--depth", "2")
+
+
+def test_without_the_extra_it_is_one_line(shell, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyogrio", None)
+    (shell.folder / "a.gpkg").write_bytes(b"x")
+    assert shell("a.gpkg", *AROUND, "--depth", "2")[2] == (
+        "companion chart: pyogrio is not installed, which this needs; in the clone of this project: "
+        "pip install '.[chart]'\n"
+    )
