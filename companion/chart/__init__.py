@@ -7,6 +7,7 @@ from companion.chart.compile import TOLERANCE_M, ChartArea, Solid, area_of, cont
 from companion.chart.features import Chart, Danger, Row, Source, Wanted
 from companion.chart.readers import Box, read_chart
 from companion.chart.s57 import told_of
+from companion.chart.tide import lowest_m, read_tide
 
 __all__ = [
     "TOLERANCE_M",
@@ -20,6 +21,8 @@ __all__ = [
     "Wanted",
     "area_of",
     "containing",
+    "lowest_m",
     "read_chart",
+    "read_tide",
     "told_of",
 ]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from companion.commands.output import force_option, refuse_existing, write_files
 from companion.errors import InputError, JobError
-from companion.program.arguments import add_command, number, place
+from companion.program.arguments import add_command, moment, number, place
 from companion.words import counted, listed
 
 if TYPE_CHECKING:
@@ -56,6 +56,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         metavar="M",
         help="water less deep than this below the chart's datum is solid (the mission's draft_m and under_keel_m)",
     )
+    load.add_argument(
+        "--tide",
+        metavar="TABLE",
+        help="lines of time, height above the chart's datum [m]: the lowest of --from to --to is added to every depth",
+    )
+    load.add_argument("--from", dest="begins", type=moment, metavar="TIME", help="2026-11-24T08:00Z, with --tide")
+    load.add_argument("--to", dest="ends", type=moment, metavar="TIME", help="the same, of the voyage's end")
     load.add_argument(
         "--air-draft",
         type=number("m", above=0.0, at_most=100.0),
@@ -107,7 +114,8 @@ def _import(args: argparse.Namespace) -> int:
     folder = Path(args.mission).parent if args.mission and not args.out else Path()
     obstacles, fence = folder / f"{out}.geojson", folder / f"{out}-fence.geojson"
     refuse_existing([str(obstacles), str(fence)], force=args.force)
-    depth_m = _depth_m(args, options)
+    tide_m = _tide_m(args)
+    depth_m = _depth_m(args, options) - tide_m
     wanted = Wanted(
         safety_depth_m=depth_m,
         air_draft_m=math.inf if args.air_draft is None else args.air_draft,
@@ -134,7 +142,7 @@ def _import(args: argparse.Namespace) -> int:
     print(
         f"{obstacles}: written: {counted(len(area.solids), 'obstacle')} ({counted(area.positions(), 'position')}) "
         f"within {reach_m:g} m of {center.lat_deg:.5f}, {center.lon_deg:.5f}; solid is what is less deep than "
-        f"{depth_m:g} m"
+        f"{depth_m:g} m" + (f" with {tide_m:g} m of tide" if args.tide else "")
     )
     print(f"{fence}: written: the edge of it")
     if any(s.doubt_m >= args.most_doubt > 0.0 for s in area.solids):
@@ -185,6 +193,30 @@ def _depth_m(args: argparse.Namespace, options: MissionOptions | None) -> float:
     if options.boat.draft_m is None:
         raise InputError(args.mission, "[boat] draft_m", "is missing", "say how deep the keel is, or --depth M")
     return options.boat.draft_m + options.area.under_keel_m
+
+
+def _tide_m(args: argparse.Namespace) -> float:
+    """Return the lowest height of tide in the voyage's hours [m]: 0, the chart's datum, without a table."""
+    from companion.chart import lowest_m, read_tide
+    from companion.current.prior import table_lines
+    from companion.geofence.formats import decode, read_bytes
+
+    if args.tide is None and args.begins is None and args.ends is None:
+        return 0.0
+    if args.tide is None or args.begins is None or args.ends is None or args.begins >= args.ends:
+        raise InputError(
+            "companion chart import", "--tide", "goes with --from and a later --to", "say all three, or none"
+        )
+    text = decode(read_bytes(Path(args.tide)), args.tide)
+    rows = read_tide(text, args.tide, tuple(_utc_s(line.split(",")[0].strip()) for _, line in table_lines(text)))
+    return lowest_m(rows, args.begins.timestamp(), args.ends.timestamp(), args.tide)
+
+
+def _utc_s(text: str) -> float | None:
+    try:
+        return moment(text).timestamp()
+    except argparse.ArgumentTypeError:
+        return None
 
 
 def _box(center: GeoPoint, reach_m: float) -> Box:

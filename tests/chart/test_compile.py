@@ -32,7 +32,7 @@ def shores(draw):
     return shape
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(shores(), st.sampled_from([0.5, 3.0, 40.0]))
 def test_what_is_simplified_contains_what_is_true(shore, tolerance_m):
     simple = containing(shore, tolerance_m)

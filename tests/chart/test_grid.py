@@ -20,7 +20,7 @@ def solid_of(grid, depth_m=2.0):
     return shapely.union_all([d.geometry for d in dangers]) if dangers else shapely.Polygon()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 9), st.integers(2, 9))
 def test_what_lies_between_the_middles_is_contained(seed, rows, columns):
     rng = np.random.default_rng(seed)

@@ -98,6 +98,40 @@ def test_the_keel_of_the_mission_says_what_is_too_shallow(shell):
     )
 
 
+TIDE = "time, height_m\n2026-11-24T06:00Z, 1.0\n2026-11-24T12:00Z, 4.0\n2026-11-24T18:00Z, 0.4\n"
+
+
+@pytest.mark.parametrize(
+    ("begins", "ends", "depth_m"),
+    [("06:00", "11:00", 1.0), ("07:00", "12:00", 1.0), ("11:00", "12:30", 1.6), ("12:00", "12:30", 1.6)],
+)
+def test_the_lowest_tide_of_the_hours_is_added_to_every_depth(shell, begins, ends, depth_m):
+    (shell.folder / "a.geojson").write_text(collection((ISLAND, {})))
+    (shell.folder / "t.csv").write_text(TIDE)
+    hours = ["--from", f"2026-11-24T{begins}Z", "--to", f"2026-11-24T{ends}Z"]
+    code, out, _ = shell("a.geojson", *AROUND, "--depth", "2", "--tide", "t.csv", *hours)
+    assert code == 0
+    assert f"less deep than {depth_m:g} m with {2.0 - depth_m:g} m of tide" in out
+
+
+@pytest.mark.parametrize(
+    ("text", "begins", "told"),
+    [
+        (TIDE, "05:00", "t.csv: does not hold for all of --from to --to; take a table of those hours"),
+        (TIDE.replace("4.0", "4 ft"), "06:00", "t.csv: line 3: is not a time and one height in metres"),
+        (TIDE.replace("4.0", "40"), "06:00", "t.csv: line 3: a tide of 40 m cannot be"),
+        (TIDE.replace("12:00Z", "12:00"), "06:00", "t.csv: line 3: '2026-11-24T12:00' is no time with its zone"),
+        (TIDE.replace("12:00Z", "05:00Z"), "06:00", "t.csv: line 3: is not a minute or more after the line before"),
+        (TIDE, "19:00", "companion chart import: --tide: goes with --from and a later --to; say all three, or none"),
+    ],
+)
+def test_a_tide_that_cannot_be_believed_is_refused(shell, text, begins, told):
+    (shell.folder / "a.geojson").write_text(collection((ISLAND, {})))
+    (shell.folder / "t.csv").write_text(text)
+    hours = ["--from", f"2026-11-24T{begins}Z", "--to", "2026-11-24T17:00Z"]
+    assert refusal(shell, "a.geojson", *AROUND, "--depth", "2", "--tide", "t.csv", *hours).startswith(told)
+
+
 def test_a_place_of_the_mission_that_is_not_in_free_water_is_told(shell):
     (shell.folder / "coast.geojson").write_text(collection((box(-1.312, 50.824, -1.308, 50.826), {})))
     (shell.folder / "m.toml").write_text(MISSION)
