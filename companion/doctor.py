@@ -107,7 +107,7 @@ class Report:
 FENCE_ITEMS = 84  # what every board holds (672 bytes of storage, 8 each)
 POLYGON_BIT = 4
 RATES_HZ = {"WIND": 0.9, "GLOBAL_POSITION_INT": 0.9, "ATTITUDE": 0.9, "MISSION_CURRENT": 0.4, "EKF_STATUS_REPORT": 0.4}
-OLDEST = (4, 2)  # before it the boat is steered by L1 and the upwind corridor differs
+OLDEST = (4, 3)  # before it the boat is steered by L1
 MODES_FS = {
     0: "nothing",
     1: "RTL",
@@ -333,10 +333,10 @@ def signing(report: Report, seen: Examined) -> None:
 def version(report: Report, seen: Examined) -> None:
     """Look at the version."""
     if seen.version is None:
-        report.add(Level.INFO, "version", "the version was not told", "behaviour is assumed as in 4.2 to 4.7")
+        report.add(Level.INFO, "version", "the version was not told", "behaviour is assumed as in 4.3 to 4.7")
     elif seen.version[:2] < OLDEST:
         text = ".".join(map(str, seen.version))
-        report.add(Level.WARNING, "version", f"ArduRover {text}", "older than 4.2: steered by L1, other waypoint rules")
+        report.add(Level.WARNING, "version", f"ArduRover {text}", "older than 4.3: steered by L1, other waypoint rules")
 
 
 def mission(report: Report, seen: Examined) -> None:

@@ -22,6 +22,8 @@ from companion.mavlink.reception import PlausibilityFilter
 from companion.mavlink.vehicle_identity import GAP_S, UID_EVERY_S, Identity
 from companion.mavlink.wire import (
     AUTOPILOT_COMPONENT,
+    BY_L1,
+    L1_RANGES,
     RANGES,
     Drop,
     Effect,
@@ -179,6 +181,7 @@ class ParameterStore:
         self.limits: AutopilotLimits | None = None
         self._in_doubt: dict[str, float] = {}
         self._answered: set[str] = set()
+        self._by_l1 = False
 
     def take(
         self, values: Mapping[str, float], *, is_set: bool = False
@@ -205,14 +208,21 @@ class ParameterStore:
                     changes.append(ParameterChange(name=name, before=known, after=value, effect=effect))
         self.values.update(good)
         if self._answered >= _LIMITS:
-            self.limits = AutopilotLimits.from_params(self.values)
+            self.limits = AutopilotLimits.from_params(
+                {name: value for name, value in self.values.items() if self._by_l1 or name not in L1_RANGES}
+            )
         return good, refused, tuple(changes)
 
     @property
     def unread(self) -> tuple[str, ...]:
         """The parameters that were not told yet, or once with another value: to be asked for."""
-        others = tuple(name for name in self._in_doubt if name not in RANGES)
-        return tuple(name for name in RANGES if name not in self._answered or name in self._in_doubt) + others
+        others = tuple(name for name in self._in_doubt if name not in RANGES and name not in L1_RANGES)
+        asked = (*RANGES, *L1_RANGES) if self._by_l1 else RANGES
+        return tuple(name for name in asked if name not in self._answered or name in self._in_doubt) + others
+
+    def tell_version(self, version: tuple[int, int, int]) -> None:
+        """Take the autopilot's version: an old one steers by L1, and has parameters of it. (0, 0, 0) is none."""
+        self._by_l1 = (0, 0) < version[:2] <= BY_L1
 
     def doubt(self) -> None:
         """Ask for all of them again: the autopilot was begun anew."""
@@ -330,7 +340,9 @@ class VoyageFold:
                 )
             elif kind == "AUTOPILOT_VERSION":
                 self._uid_s = t_s
-                self._identity = self._identity.with_uid(message.get_srcSystem(), autopilot_version(message).uid)
+                told = autopilot_version(message)
+                self._parameters.tell_version(told.version)
+                self._identity = self._identity.with_uid(message.get_srcSystem(), told.uid)
         reboots = self.assembler.reboots
         values = self.assembler.take(t_s, message)
         if self.assembler.reboots != reboots:

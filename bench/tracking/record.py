@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,14 +78,18 @@ def sail_ardurover(trial: Trial, speedup: float) -> Track:
     return run(voyage(), speedup=speedup)
 
 
-def sail_simulated(trial: Trial) -> Track:
-    """Sail a trial on the simulated autopilot."""
+def sail_simulated(trial: Trial, parameters: Mapping[str, float] | None = None) -> Track:
+    """Sail a trial on the simulated autopilot, with ``parameters`` beside the trial's own."""
 
     async def voyage() -> Track:
         wind = _wind(trial)
         autopilot = SimulatedAutopilot(
             AutopilotConfig(
-                home=HOME, heading_rad=trial.first_rad, is_warm=True, is_moored=True, parameters=_parameters(trial)
+                home=HOME,
+                heading_rad=trial.first_rad,
+                is_warm=True,
+                is_moored=True,
+                parameters={**_parameters(trial), **(parameters or {})},
             ),
             wind,
             seed=trial.seed,

@@ -49,25 +49,27 @@ def curve_mps(tws_mps: float) -> NDArray[np.float64]:
     return np.interp(np.linspace(0.0, math.pi, 91), angles, speeds)
 
 
-def helm_of(trial: Trial) -> GuidanceModel:
-    """Return the helm of a trial's autopilot."""
-    return GuidanceModel(wp_radius_m=trial.wp_radius_m, corridor_m=trial.corridor_m, wp_speed_mps=WP_SPEED_MPS)
+def helm_of(trial: Trial, l1_period_s: float = 0.0) -> GuidanceModel:
+    """Return the helm of a trial's autopilot; with a period that of one that steers by L1."""
+    return GuidanceModel(
+        wp_radius_m=trial.wp_radius_m, corridor_m=trial.corridor_m, wp_speed_mps=WP_SPEED_MPS, l1_period_s=l1_period_s
+    )
 
 
-def predicted(trial: Trial) -> PredictedTrack:
+def predicted(trial: Trial, l1_period_s: float = 0.0) -> PredictedTrack:
     """Return the prediction for a trial of corners: from rest, in its steady wind."""
     return predict(
         [(0.0, 0.0), *trial.points_en_m],
-        helm_of(trial),
+        helm_of(trial, l1_period_s),
         curve_mps=curve_mps(trial.tws_mps),
         twd_from_rad=0.0,
         speed_mps=0.0,
     )
 
 
-def residuals(trial: Trial, sailed: Track) -> Residuals:
-    """Return the residuals of one trial."""
-    track = predicted(trial)
+def residuals(trial: Trial, sailed: Track, l1_period_s: float = 0.0) -> Residuals:
+    """Return the residuals of one trial, as ``predicted`` is told."""
+    track = predicted(trial, l1_period_s)
     points = shapely.points(sailed[:, 1:3])
     path = np.asarray([(0.0, 0.0), *trial.points_en_m])
     nearest = shapely.STRtree(shapely.points(track.en_m)).nearest(points)
@@ -96,6 +98,24 @@ def table(sailed: dict[str, Track]) -> Iterator[str]:
                     f"{np.max(curve_mps(tws)):.1f} m/s | {name} | {len(track)} | {figures} | "
                     f"{np.quantile(legs, 0.99):.2f}"
                 )
+
+
+def l1_table(sailed: dict[str, Track], l1_period_s: float) -> Iterator[str]:
+    """Yield the rows of an autopilot that steers by L1: by its own prediction, and by that of position control."""
+    yield "best speed | legs | sailed m | by L1 m: 50 %, 99 %, greatest | by position control m | off the legs m: 99 %"
+    for tws in WINDS_MPS:
+        trials = [t for t in corners() if t.tws_mps == tws]
+        by_l1, by_position = ([residuals(t, sailed[t.name], s) for t in trials] for s in (l1_period_s, 0.0))
+        for name, want in (("long", False), ("short", True)):
+            own, other = (
+                np.concatenate([r.track_m[r.is_short == want] for r in rows]) for rows in (by_l1, by_position)
+            )
+            legs = np.concatenate([r.legs_m[r.is_short == want] for r in by_l1])
+            told = (", ".join(f"{q:.2f}" for q in np.quantile(off, (0.5, 0.99, 1.0))) for off in (own, other))
+            yield (
+                f"{np.max(curve_mps(tws)):.1f} m/s | {name} | {len(own)} | {' | '.join(told)} | "
+                f"{np.quantile(legs, 0.99):.2f}"
+            )
 
 
 def beyond_m(across_m: NDArray[np.float64], corridor_m: float) -> list[float]:

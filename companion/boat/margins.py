@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from companion.boat import l1
 from companion.boat.boat import Hull
 
 TRACK_S = 0.85  # |cross-track| <= 2.4 m at 2.93 m/s on reaches and close-hauled legs
@@ -55,6 +56,8 @@ class AutopilotLimits:
     wp_speed_mps: float | None = None  # of the point that the boat follows, not the boat's; None: it was not read
     wp_accel_mps2: float = 1.0  # of that point
     wp_jerk_mps3: float = 1.0
+    l1_period_s: float = 0.0  # of ArduRover up to 4.2, which steers by L1; 0: a later one
+    l1_damping: float = l1.DAMPING
     fence_action: int | None = None  # None: no fence guards this obstacle; 0 report .. 4, see FENCE_ACTION
     fence_circle_m: float | None = None  # radius of the fence around home, if something would be done about it
     fence_polygons: bool = True  # what is drawn on the autopilot is kept, too
@@ -90,6 +93,8 @@ class AutopilotLimits:
             wp_speed_mps=params.get("WP_SPEED", 0.0) or None,
             wp_accel_mps2=accel,
             wp_jerk_mps3=params.get("WP_JERK", 0.0) or accel,
+            l1_period_s=params.get("NAVL1_PERIOD", default.l1_period_s),
+            l1_damping=params.get("NAVL1_DAMPING", default.l1_damping),
             fence_action=action if fenced else None,
             fence_circle_m=params.get("FENCE_RADIUS") if is_circled else None,
             fence_polygons=bool(int(params.get("FENCE_TYPE", cls.POLYGON_BIT)) & cls.POLYGON_BIT),

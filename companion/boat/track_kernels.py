@@ -3,8 +3,9 @@
 The guidance is ArduRover's since 4.3, restated: AR_WPNav's point on the legs, which waits for the boat and rounds each
 corner in a curve of its own acceleration; AR_PosControl, which turns the boat by what its velocity lacks; and
 sailboat.cpp, which holds the edge of the no-go zone on a leg that is inside it and tacks where it is a corridor off
-the line. The boat is a speed that follows the polar and a yaw rate that follows what is asked: no more is known of most
-boats. What it leaves out is in the stated error (``companion.boat.tracking``).
+the line. With ``H_L1_PERIOD`` it is that of 4.2 and before: ``companion.boat.l1`` in place of the point and of
+AR_PosControl. The boat is a speed that follows the polar and a yaw rate that follows what is asked: no more is known of
+most boats. What it leaves out is in the stated error (``companion.boat.tracking``).
 
 Frame: east, north [m]; headings [rad] clockwise from north; the wind's direction is where it comes from.
 """
@@ -16,6 +17,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.boat.l1 import STEERS_FROM_MPS, lateral_mps2
 from companion.kernels.jit import kernel
 
 # AR_WPNav's point on one leg, compiled: from rest to rest under a greatest speed, acceleration and jerk.
@@ -107,8 +109,11 @@ KEEP_STEPS = 4  # of the track every fifth of a second is kept
     H_WIND_LAG_S,
     H_LATENCY_S,
     H_JERK,
-) = range(17)
-H_SIZE = 17
+    H_L1_PERIOD,  # 0: position control
+    H_L1_DAMPING,
+    H_L1_XTRACK_I,
+) = range(20)
+H_SIZE = 20
 
 # --- columns of the track
 T_E, T_N, T_LEG, T_BEATS, T_SIDE, T_SIZE = 0, 1, 2, 3, 4, 5
@@ -186,6 +191,7 @@ def sail(
     scale, pace = 0.0, 0.0
     he, hn, te, tn = 0.0, 0.0, points[0, 0], points[0, 1]
     want_speed = 0.0
+    by_l1, l1_angle, l1_nudge = h[H_L1_PERIOD] > 0.0, 0.0, 0.0
     tacking, tack_yaw, tack_start, tack_end = False, 0.0, 0.0, -TACK_RETRY_S
     heard = wind_rad[0]
     rows, step = 0, 0
@@ -253,7 +259,8 @@ def sail(
         # --- reached?
         xtrack = (bn - on) * ue - (be - oe) * un  # to the left of the leg
         past = (be - oe) * ue + (bn - on) * un >= length
-        reached = arrived and (leg < last or math.hypot(de - be, dn - bn) <= h[H_WP_RADIUS] or past)
+        arrived = arrived or by_l1
+        reached = arrived and ((leg < last and not by_l1) or math.hypot(de - be, dn - bn) <= h[H_WP_RADIUS] or past)
         # --- what is steered
         bearing = math.atan2(de - be, dn - bn)
         beats = tacking or abs(turn_to(heard - bearing)) <= h[H_NO_GO] + NO_GO_PAD_RAD
@@ -278,6 +285,17 @@ def sail(
             asked = h[H_ANGLE_P] * turn_to(heading - yaw)
             if tacking and h[H_PIVOT_RATE] > 0.0:
                 asked = min(max(asked, -h[H_PIVOT_RATE]), h[H_PIVOT_RATE])
+        elif by_l1:
+            lateral, l1_angle, l1_nudge = lateral_mps2(
+                (be, bn),
+                (ve, vn),
+                yaw,
+                (oe, on, de, dn),
+                (h[H_L1_PERIOD], h[H_L1_DAMPING], h[H_L1_XTRACK_I], h[H_WP_RADIUS]),
+                (l1_angle, l1_nudge),
+                dt,
+            )
+            asked = min(max(lateral, -h[H_LATERAL]), h[H_LATERAL]) / max(v, STEERS_FROM_MPS)
         else:
             le, ln = h[H_POS_P] * (te - be) + he, h[H_POS_P] * (tn - bn) + hn
             wanted = math.hypot(le, ln)

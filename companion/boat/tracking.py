@@ -17,6 +17,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from companion.boat import l1
 from companion.boat import track_kernels as k
 from companion.boat.margins import AutopilotLimits
 from companion.boat.polar import Polar
@@ -47,6 +48,9 @@ class GuidanceModel:
         angle_p: ATC_STR_ANG_P [1/s].
         wind_lag_s: Time constant of the autopilot's true wind [s]: WNDVN_TRUE_FILT 0.05 Hz.
         latency_s: How old the autopilot's position is when it steers by it [s].
+        l1_period_s: NAVL1_PERIOD of ArduRover up to 4.2, which steers by L1; 0: by position control, as since 4.3.
+        l1_damping: NAVL1_DAMPING.
+        l1_xtrack_i: NAVL1_XTRACK_I.
 
     """
 
@@ -67,9 +71,12 @@ class GuidanceModel:
     angle_p: float = 2.0
     wind_lag_s: float = 3.2
     latency_s: float = 0.2
+    l1_period_s: float = 0.0
+    l1_damping: float = l1.DAMPING
+    l1_xtrack_i: float = l1.XTRACK_I
 
     def __post_init__(self) -> None:
-        for name in ("wp_radius_m", "turn_radius_m", "corridor_m", "latency_s", "pivot_rate_radps"):
+        for name in ("wp_radius_m", "turn_radius_m", "corridor_m", "latency_s", "pivot_rate_radps", "l1_period_s"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be 0 or more")
         for name in (
@@ -81,6 +88,7 @@ class GuidanceModel:
             "lateral_mps2",
             "gather_m",
             "rate_max_radps",
+            "l1_damping",
         ):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be above 0")
@@ -97,6 +105,8 @@ class GuidanceModel:
             jerk_mps3=limits.wp_jerk_mps3,
             no_go_half_rad=limits.sail_no_go_angle_rad,
             corridor_m=limits.sail_xtrack_max_m,
+            l1_period_s=limits.l1_period_s,
+            l1_damping=limits.l1_damping,
         )
 
     def settings(self) -> NDArray[np.float64]:
@@ -114,6 +124,7 @@ class GuidanceModel:
         )
         h[k.H_ANGLE_P], h[k.H_WIND_LAG_S], h[k.H_LATENCY_S] = self.angle_p, self.wind_lag_s, self.latency_s
         h[k.H_JERK] = self.jerk_mps3
+        h[k.H_L1_PERIOD], h[k.H_L1_DAMPING], h[k.H_L1_XTRACK_I] = self.l1_period_s, self.l1_damping, self.l1_xtrack_i
         return h
 
 

@@ -176,6 +176,7 @@ def test_a_boat_that_is_set_up_has_nothing_in_its_way():
         ({"SYSID_MYGCS": 1.0}, {}, "system id", Level.ERROR, "SYSID_MYGCS", 255.0),
         ({"system_id": 2}, {}, "system id", Level.WARNING, "SYSID_THISMAV", None),
         ({"version": (4, 0, 0)}, {}, "version", Level.WARNING, None, None),
+        ({"version": (4, 2, 3)}, {}, "version", Level.WARNING, None, None),
         ({"mission": None}, {}, "mission", Level.WARNING, None, None),
         ({"mission": (MissionItem(command=16, lat_e7=1, lon_e7=1),)}, {}, "mission end", Level.WARNING, None, None),
         ({"fence": (MissionItem(command=5001),) * 90}, {}, "fence size", Level.ERROR, None, None),

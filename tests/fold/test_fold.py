@@ -214,6 +214,28 @@ def test_parameters_and_versions_of_other_components_are_none():
     assert identity.uid is None
 
 
+def version(fold, number, *, component=1):
+    message = wire.MAVLink_autopilot_version_message(0, number, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0, [5] * 18)
+    [heard] = Codec(9, 9).feed(Codec(1, component).pack(message))
+    fold.message(1.0, heard)
+
+
+@pytest.mark.parametrize(
+    ("number", "is_old"), [(0x04020300, True), (0x04030000, False), (0x04070000, False), (0, False)]
+)
+def test_an_autopilot_that_steers_by_l1_is_asked_for_its_parameters_and_no_other_believed_in_them(number, is_old):
+    fold = fresh()
+    for name, value in {"SAIL_NO_GO_ANGLE": 45.0, "SAIL_XTRACK_MAX": 10.0, "WP_RADIUS": 3.0}.items():
+        told(fold, name, value)
+    version(fold, number)
+    assert ({"NAVL1_PERIOD", "NAVL1_DAMPING"} <= set(fold.unread)) is is_old
+    told(fold, "NAVL1_DAMPING", 0.0)
+    told(fold, "NAVL1_PERIOD", 11.0)
+    limits = fold.tick(2.0).snapshot.limits
+    assert (limits.l1_period_s, limits.l1_damping) == ((11.0, 0.75) if is_old else (0.0, 0.75))
+    assert not {"NAVL1_PERIOD", "NAVL1_DAMPING"} & set(fold.unread)
+
+
 def test_a_fault_of_its_own_is_said_once_and_ends_nothing(monkeypatch):
     fold = fresh()
 

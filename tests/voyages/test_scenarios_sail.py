@@ -7,6 +7,8 @@ More seeds with ``-m campaign``; the day of ``endurance``, the hours of ``far-aw
 import csv
 import json
 import math
+import re
+import struct
 from itertools import pairwise
 from pathlib import Path
 
@@ -120,12 +122,20 @@ def is_steered_and_plans_its_tacks(folder):
     assert not any(leg.get("is_beat") for leg in legs)
 
 
+def is_steered_by_l1_and_known_to_be(folder):
+    """The companion asked for what only an old ArduRover has, and was told."""
+    log = (folder / "telemetry.tlog").read_bytes()
+    for name, value in ((b"NAVL1_PERIOD", 8.0), (b"NAVL1_DAMPING", 0.75)):
+        assert re.search(re.escape(struct.pack("<f", value)) + b".{4}" + name, log, re.DOTALL)
+
+
 # What the record of one must show besides.
 RECORDED = {
     "field-ring": goes_round,
     "field-square": leaves_when_entered,
     "foreign-mission": is_said_once_in_a_while,
     "out-of-time": ends_by_itself,
+    "by-l1": is_steered_by_l1_and_known_to_be,
     "by-heading": is_steered_and_plans_its_tacks,
     "by-astar": plans_by("astar"),
     "by-astar-flat": plans_by("astar"),

@@ -5,13 +5,15 @@ from companion.mavlink.wire.codec import AUTOPILOT_COMPONENT, autopilot_version,
 from companion.mavlink.wire.companion_status import CONTROL_COMMAND, HIGH_LATENCY_S, StatusReader, StatusReport
 from companion.mavlink.wire.frames import Codec, Dialect, Drop, Message
 from companion.mavlink.wire.items import first_difference, mission_hash
-from companion.mavlink.wire.parameter_ranges import RANGES, Effect, believable, effect_of
+from companion.mavlink.wire.parameter_ranges import BY_L1, L1_RANGES, RANGES, Effect, believable, effect_of
 from companion.mavlink.wire.streams import Stream
 
 __all__ = [
     "AUTOPILOT_COMPONENT",
+    "BY_L1",
     "CONTROL_COMMAND",
     "HIGH_LATENCY_S",
+    "L1_RANGES",
     "MEMORY_S",
     "RANGES",
     "Codec",

@@ -43,6 +43,10 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "RCMAP_THROTTLE": (1.0, 16.0),
 }
 
+# What ArduRover up to 4.2 has beside them, which steers by L1, and no later one: asked of a boat that says it is one.
+BY_L1: tuple[int, int] = (4, 2)
+L1_RANGES: Mapping[str, tuple[float, float]] = {"NAVL1_PERIOD": (1.0, 60.0), "NAVL1_DAMPING": (0.1, 10.0)}
+
 
 def refusal(name: str, value: float) -> str:
     """Return why ``value`` cannot be parameter ``name``'s, "" when it can; names not in the table are anybody's.
@@ -50,7 +54,7 @@ def refusal(name: str, value: float) -> str:
     >>> refusal("SAIL_NO_GO_ANGLE", 90.0)
     'SAIL_NO_GO_ANGLE 90 cannot be (0 to 89)'
     """
-    low, high = RANGES.get(name, (float("-inf"), float("inf")))
+    low, high = RANGES.get(name) or L1_RANGES.get(name, (float("-inf"), float("inf")))
     if low <= value <= high:  # false for NaN too
         return ""
     return f"{name} {value:g} cannot be ({low:g} to {high:g})"

@@ -33,7 +33,16 @@ if TYPE_CHECKING:
     from companion.planner.problem.tracking import Tracking
 
 T = TypeVar("T")
-HELM_KEYS = ("wp_radius_m", "turn_radius_m", "wp_speed_mps", "accel_mps2", "jerk_mps3", "corridor_m")
+HELM_KEYS = (
+    "wp_radius_m",
+    "turn_radius_m",
+    "wp_speed_mps",
+    "accel_mps2",
+    "jerk_mps3",
+    "corridor_m",
+    "l1_period_s",
+    "l1_damping",
+)
 _NAN = re.compile(r"\bnan\b", re.IGNORECASE)
 
 

@@ -40,6 +40,7 @@ def problem_tracking(
         "accel_mps2": helm.accel_mps2,
         "jerk_mps3": helm.jerk_mps3,
         "corridor_m": helm.corridor_m,
+        **({} if helm.l1_period_s == 0.0 else {"l1_period_s": helm.l1_period_s, "l1_damping": helm.l1_damping}),
         "no_go_half_deg": float(np.degrees(ctx.no_go_half_rad)),
         "floor_m": floor_m,
         "reach_m": ctx.voyage.boat.hull.reach_m,

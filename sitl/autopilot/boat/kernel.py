@@ -3,7 +3,8 @@
 ``advance`` moves one state vector through whole loops of 20 ms and stops early when something happened that
 the mission logic must see. The equations are those of ArduPilot's SIM_Sailboat (hull), AP_WindVane (filters),
 sailboat.cpp (tacking), AR_WPNav and AR_PosControl (legs) and AR_AttitudeControl (rudder), restated; what the legs
-and the corners do was fitted to recordings of the real program.
+and the corners do was fitted to recordings of the real program. With P_L1_PERIOD the legs are followed as ArduRover up
+to 4.2 did it (``companion.boat.l1``).
 
 Frame: east, north [m] from the boat's home; headings [rad] clockwise from north. Indices of the state (``S_``),
 of the settings (``P_``) and the codes below are the interface.
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from companion.boat import Polar
 from companion.boat.boat import CROSS_FLOW
+from companion.boat.l1 import STEERS_FROM_MPS, lateral_mps2
 from companion.kernels.jit import kernel
 
 
@@ -177,6 +179,7 @@ S_MOORED, S_MOTOR, S_THROTTLE = 63, 64, 65
 S_INDIRECT = 66
 S_WANT_SPEED = 69  # desired speed, accelerated at P_ACCEL
 S_GPS_E, S_GPS_N = 67, 68  # error of the position that the autopilot believes
+S_L1_ANGLE, S_L1_NUDGE = 53, 71  # what the L1 law remembers
 S_COMPASS = 70  # error of the heading that it believes [rad]
 # of a boat that is not the plan's (``P_OTHER``): leeway to starboard [m/s], the share of its speed that waves leave,
 # the turn that they give it [rad/s], a number on 0..1 for the next tack, tacks tried and failed, the tack that it was
@@ -218,6 +221,8 @@ S_SIZE = 82
 ) = range(29)
 # of a boat that is not the plan's; none of them counts without the first
 P_OTHER, P_LEEWAY, P_BEAT, P_REACH, P_RUN, P_TACK_FAILS, P_IRONS_S = range(32, 39)
+# of ArduRover up to 4.2; without the first it steers by position control
+P_L1_PERIOD, P_L1_DAMPING, P_L1_XTRACK_I = range(29, 32)
 P_SIZE = 40
 
 STEER_OFF, STEER_HOLD, STEER_LEG, STEER_LOITER, STEER_HEADING, STEER_RATE = range(6)
@@ -501,7 +506,8 @@ def _target(s: Vector, p: Vector) -> tuple[float, float, float, float, bool]:
 def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     """Follow the leg: return (heading, turn rate, heading is meant, events)."""
     events = 0
-    he, hn, a_e, a_n, arrived = _target(s, p)
+    by_l1 = p[P_L1_PERIOD] > 0.0
+    he, hn, a_e, a_n, arrived = (0.0, 0.0, 0.0, 0.0, True) if by_l1 else _target(s, p)
     le, ln = s[S_DE] - s[S_OE], s[S_DN] - s[S_ON]
     length = math.hypot(le, ln)
     de, dn = s[S_DE] - (s[S_E] + s[S_GPS_E]), s[S_DN] - (s[S_N] + s[S_GPS_N])
@@ -512,7 +518,7 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
         past = ((s[S_E] + s[S_GPS_E]) - s[S_OE]) * le + ((s[S_N] + s[S_GPS_N]) - s[S_ON]) * ln >= length * length
     else:
         s[S_XTRACK], past = 0.0, True
-    if arrived and (s[S_FAST] or s[S_DIST] <= p[P_WP_RADIUS] or past):
+    if arrived and ((s[S_FAST] and not by_l1) or s[S_DIST] <= p[P_WP_RADIUS] or past):
         events |= REACHED
     if s[S_AVOID] and not s[S_TACKING]:
         s[S_TACK_ASKED] = s[S_TICK] * LOOP_S  # avoidance asks for a tack; it is heard only on an upwind route
@@ -521,6 +527,18 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
         heading, more = _upwind_heading(s, p, s[S_BEARING])
         return heading, 0.0, True, events | more
     s[S_INDIRECT] = 0.0
+    limit = p[P_TURN_MAX_G] * 9.80665
+    if by_l1:
+        lateral, s[S_L1_ANGLE], s[S_L1_NUDGE] = lateral_mps2(
+            (s[S_E] + s[S_GPS_E], s[S_N] + s[S_GPS_N]),
+            (s[S_VE], s[S_VN]),
+            s[S_YAW] + s[S_COMPASS],
+            (s[S_OE], s[S_ON], s[S_DE], s[S_DN]),
+            (p[P_L1_PERIOD], p[P_L1_DAMPING], p[P_L1_XTRACK_I], p[P_WP_RADIUS]),
+            (s[S_L1_ANGLE], s[S_L1_NUDGE]),
+            LOOP_S,
+        )
+        return 0.0, clip(lateral, -limit, limit) / max(abs(s[S_V]), STEERS_FROM_MPS), False, events
     # AR_PosControl: velocity wanted, the acceleration across the bow that it takes, the turn rate for that
     ve, vn = p[P_POS_P] * (s[S_TE] - (s[S_E] + s[S_GPS_E])) + he, p[P_POS_P] * (s[S_TN] - (s[S_N] + s[S_GPS_N])) + hn
     v = math.hypot(ve, vn)
@@ -529,7 +547,6 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
     sin, cos = math.sin(s[S_YAW] + s[S_COMPASS]), math.cos(s[S_YAW] + s[S_COMPASS])
     forward = ve * sin + vn * cos
     lateral = p[P_VEL_P] * ((ve - s[S_VE]) * cos - (vn - s[S_VN]) * sin) + a_e * cos - a_n * sin
-    limit = p[P_TURN_MAX_G] * 9.80665
     slowest = min(v, math.sqrt(limit * p[P_TURN_RADIUS]))
     # the desired speed changes no faster than P_ACCEL; it starts at 0 when avoidance had eased the sheet
     step = p[P_ACCEL] * LOOP_S

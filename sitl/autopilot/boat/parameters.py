@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.boat import l1
 from companion.errors import InputError
 from sitl.autopilot.boat import kernel as k
 
@@ -314,6 +315,9 @@ NEW_NAMES = {
 }
 
 
+# What ArduRover up to 4.2 has beside them, which steers by L1. A boat that is given one of them is such a boat.
+L1_NAMES = {"NAVL1_PERIOD": l1.PERIOD_S, "NAVL1_DAMPING": l1.DAMPING, "NAVL1_XTRACK_I": l1.XTRACK_I}
+
 _TYPES = {"INT8": 2, "INT16": 4, "INT32": 6, "REAL32": 9}
 _LIMITS = {2: (-128, 127), 4: (-32768, 32767), 6: (-(2**31), 2**31 - 1)}
 # Counted by the autopilot, not set by anybody.
@@ -340,6 +344,8 @@ class Parameters:
                 self._types[name] = _TYPES[kind[0] if kind else "REAL32"]
         self._outside = {old: new for old, new in NEW_NAMES.items() if new_names and old in self._values}
         self._inside = {new: old for old, new in self._outside.items()}
+        if not L1_NAMES.keys().isdisjoint(overrides):
+            overrides = {**L1_NAMES, **overrides}
         for given, number in overrides.items():
             inside = self._inside.get(given, given)
             if inside not in self._values:
@@ -406,7 +412,7 @@ def check_parameters(overrides: Mapping[str, float]) -> None:
         InputError: naming the parameter.
     """
     known = {line.split()[0] for line in TABLE.splitlines() if line and not line.startswith("#")}
-    known |= set(NEW_NAMES.values())
+    known |= {*NEW_NAMES.values(), *L1_NAMES}
     for name, value in overrides.items():
         if name not in known:
             near = difflib.get_close_matches(name.upper(), known, n=1)
@@ -455,10 +461,15 @@ _SETTINGS: tuple[tuple[int, str, float], ...] = (
 
 
 def fill(settings: NDArray[np.float64], get: Callable[[str], float]) -> None:
-    """Set all settings from the parameters, which ``get`` returns by name."""
+    """Set all settings from the parameters, which ``get`` returns by name; a KeyError is one that it does not have."""
     for index, name, factor in _SETTINGS:
         settings[index] = get(name) * factor
     if get("WP_ACCEL") > 0.0:
         settings[k.P_ACCEL] = get("WP_ACCEL")
     settings[k.P_ACCEL] = max(settings[k.P_ACCEL], 0.1)
     settings[k.P_WP_SPEED] = max(settings[k.P_WP_SPEED], 0.5)
+    for index, name in zip((k.P_L1_PERIOD, k.P_L1_DAMPING, k.P_L1_XTRACK_I), L1_NAMES, strict=True):
+        try:
+            settings[index] = get(name)
+        except KeyError:
+            settings[index] = 0.0

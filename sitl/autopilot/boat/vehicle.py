@@ -391,6 +391,7 @@ class Vehicle:
             s[k.S_WANT_SPEED] = abs(s[k.S_V])
             s[k.S_WANT_RATE] = s[k.S_RATE]
             s[k.S_XTRACK] = 0.0
+            s[k.S_L1_ANGLE] = s[k.S_L1_NUDGE] = 0.0
         s[k.S_STEER] = how
 
     def _measure(self, goal: tuple[float, float]) -> None:

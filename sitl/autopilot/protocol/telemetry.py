@@ -119,7 +119,7 @@ _FENCE_BIT = 0x100000
 _SENSORS_ENABLED = 304185391
 _SENSORS_HEALTHY = 322011439
 _CAPABILITIES = 0xF1EF
-_VERSION = 0x04070000
+_VERSION, _VERSION_BY_L1 = 0x04070000, 0x04020300
 _NAN = (math.nan,) * 4
 
 
@@ -360,11 +360,12 @@ def _quaternion(p: Pilot) -> Any:
 
 
 def autopilot_version(p: Pilot) -> Any:
-    """AUTOPILOT_VERSION of 4.7."""
+    """AUTOPILOT_VERSION of 4.7, or of 4.2 where the boat steers by L1."""
     custom = b"simulate"
     capabilities = _CAPABILITIES if p.core.config.has_ftp else _CAPABILITIES & ~mav.MAV_PROTOCOL_CAPABILITY_FTP
+    version = _VERSION if p.core.parameters.entry("NAVL1_PERIOD") is None else _VERSION_BY_L1
     return mav.MAVLink_autopilot_version_message(
-        capabilities, _VERSION, 0, 0, 0, custom, custom, custom, 0, 0, 0, p.core.config.uid.ljust(18, b"\x00")
+        capabilities, version, 0, 0, 0, custom, custom, custom, 0, 0, 0, p.core.config.uid.ljust(18, b"\x00")
     )
 
 

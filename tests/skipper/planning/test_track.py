@@ -67,6 +67,10 @@ def test_a_problem_says_how_it_is_sailed_and_what_is_solid_as_it_is():
     assert part["known"] is True
     assert len(part["solids"]) == 1
     assert part["reach_m"] == now.voyage.boat.hull.reach_m
+    assert "l1_period_s" not in part
+    old = AutopilotLimits.from_params({"NAVL1_PERIOD": 12.0, "NAVL1_DAMPING": 0.8})
+    now.snapshot = replace(now.snapshot, limits=old)
+    assert (tracking(now)["l1_period_s"], tracking(now)["l1_damping"]) == (12.0, 0.8)
     now.snapshot = replace(now.snapshot, limits=None)
     assert tracking(now)["known"] is False
 
