@@ -10,6 +10,7 @@ is bounded); a minute or two, by emulation half an hour.
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import json
 import sys
@@ -66,5 +67,7 @@ def _flags(of_numba: Any) -> Any:
 
 
 if __name__ == "__main__":
-    made = carry(*map(Path, sys.argv[1:2]))
+    arguments = argparse.ArgumentParser(prog="python -m companion.kernels.carry", description=__doc__)
+    arguments.add_argument("folder", nargs="?", type=Path, default=places.CARRIED, help="(default: the package's own)")
+    made = carry(arguments.parse_args().folder)
     sys.stdout.write(f"{made}: {made.stat().st_size / 1e6:.1f} MB\n")
