@@ -6,8 +6,10 @@ Only here are files of charts opened. What GDAL reads (by pyogrio and rasterio) 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -86,6 +88,9 @@ def _read_cell(path: Path, box: Box, wanted: Wanted, *, without_depths: bool) ->
                 "fetch it, or remove the later ones",
             )
     rows = list(_rows_of_layers(path, None, is_read=s57.is_read, options=S57_OPTIONS))
+    lost = next((r for r in rows if r.geometry.is_empty and r.number("PRIM") in s57.DRAWN), None)
+    if lost is not None:
+        raise InputError(str(path), lost.place, "has lost its shape", "fetch it again")
     if not (s57.has_depths(rows) or without_depths):
         raise s57.no_depths(str(path))
     return s57.chart_of([r for r in rows if r.geometry.is_empty or _touches(r.geometry, box)], str(path), wanted)
@@ -184,15 +189,15 @@ def _rows_of_layers(
 ) -> Iterator[Row]:
     """Yield the features of every layer, in longitude and latitude."""
     from pyogrio import list_layers
-    from pyogrio.errors import DataSourceError
+    from pyogrio.errors import DataLayerError, DataSourceError
     from pyogrio.raw import read as read_layer
 
     try:
-        layers = [str(name) for name, _ in list_layers(path)]
+        with _whole(path) if options else contextlib.nullcontext():
+            layers = [str(name) for name, _ in list_layers(path) if is_read(str(name).upper())]
         for layer in layers:
-            if not is_read(layer.upper()):
-                continue
-            meta, _, geometries, fields = read_layer(path, layer=layer, **(options or {}))
+            with _whole(path) if options else contextlib.nullcontext():
+                meta, _, geometries, fields = read_layer(path, layer=layer, **(options or {}))
             if geometries is None:  # a table
                 geometries = [None] * (len(fields[0]) if fields else 0)
             has_shapes = any(data is not None for data in geometries)
@@ -207,10 +212,22 @@ def _rows_of_layers(
                 attributes = {name: _value(column[n]) for name, column in zip(names, fields, strict=True)}
                 if box is None or shape.is_empty or _touches(shape, box):
                     yield Row(layer=layer, place=place, geometry=shape, attributes=attributes)
-    except DataSourceError as error:
-        raise InputError(
-            str(path), "", f"cannot be read ({str(error).splitlines()[0][:100]})", "is it a chart, and whole?"
-        ) from None
+    except (DataLayerError, DataSourceError, shapely.errors.GEOSException) as error:
+        raise _damaged(path, str(error)) from None
+
+
+@contextlib.contextmanager
+def _whole(path: Path) -> Iterator[None]:
+    """Refuse a cell that GDAL reads with a warning: it goes on without what it did not understand, perhaps a rock."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        yield
+    if told:
+        raise _damaged(path, str(told[0].message))
+
+
+def _damaged(path: Path, why: str) -> InputError:
+    return InputError(str(path), "", f"cannot be read whole ({' '.join(why.split())[:100]})", "fetch it again")
 
 
 def _value(value: object) -> object:

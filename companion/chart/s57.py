@@ -63,6 +63,7 @@ UNASSESSED_M = 1000.0
 
 LAYERS = frozenset({*SKIN, *SOLID, *OVERHEAD, *SUBMERGED, *RESTRICTED, "SOUNDG", "M_COVR", "M_QUAL", "DSID"})
 WGS_84, METRES = 2, 1
+DRAWN = frozenset({1, 2, 3})  # of PRIM: what is a point, a line or an area
 
 
 def is_read(layer: str) -> bool:

@@ -300,7 +300,7 @@ def test_a_geotiff_is_the_same_water_whichever_way_it_is_written(shell, up, posi
 def test_a_chart_that_gdal_cannot_read_is_told_in_one_line(shell):
     pytest.importorskip("pyogrio")
     (shell.folder / "a.gpkg").write_bytes(b"SQLite format 3\x00 and no more")
-    assert "a.gpkg: cannot be read (" in refusal(shell, "a.gpkg", *AROUND, "--depth", "2")
+    assert "a.gpkg: cannot be read whole (" in refusal(shell, "a.gpkg", *AROUND, "--depth", "2")
 
 
 def test_without_the_extra_it_is_one_line(shell, monkeypatch):
