@@ -2,10 +2,11 @@
 
 Beside the companion: ``fixed``: its first plan, after whose upload it dies. ``alone``: ArduRover with nothing but
 a waypoint at each goal, in AUTO. ``dijkstra``: the same with ArduRover's own path planning round the obstacles as
-exclusion fences, set at boot as well as we know how. The companion sails on the embedded autopilot and the real
-ArduRover, and so does ``alone``; ``dijkstra`` on the real one alone, for the embedded one has no path planning, and the
-fixed plan on the embedded one. On the real one a disarmed boat drifts while the companion watches the wind, so the
-others begin where the companion set sail, if it has sailed that seed into the same file.
+exclusion fences, set at boot as well as we know how. ``greedy``: the heading that makes most way to the next goal now,
+in GUIDED (``lab.greedy``). The companion sails on the embedded autopilot and the real ArduRover, and so does ``alone``;
+``dijkstra`` on the real one alone, for the embedded one has no path planning, and the fixed plan and the greedy sailor
+on the embedded one. On the real one a disarmed boat drifts while the companion watches the wind, so the others begin
+where the companion set sail, if it has sailed that seed into the same file.
 
 Everybody is timed alike, on the true track: from sailing in AUTO to being within the radius of the last goal, all
 goals reached in order; a contact is an entry into an obstacle or over the limits.
@@ -36,7 +37,9 @@ from companion.mavlink.microservices import TransferOutcome
 from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.transports import open_link
 from companion.messages import Command, GeoPoint, MissionItem, Mode, waypoint
+from companion.wind import make
 from lab.campaigns.ablation import interval
+from lab.greedy import best_heading
 from sitl.ardurover import ArduRover, require
 from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot import Truth as Now
@@ -83,6 +86,7 @@ FENCE_PLAYS_M = (4.0, 6.0, 8.0)
 DIES_S = 45.0
 # The companion has watched the wind for about this long when it sets sail: everybody meets the same weather [s].
 WEATHER_FROM_S = 35.0
+GREEDY_EVERY_S = 1.0
 
 
 class HeldWind:
@@ -248,8 +252,8 @@ def _promises(verdict: ScenarioVerdict) -> dict[str, Any]:
     return {key: verdict.figures.get(key) for key in ("promised_risk", "no_go_entries", "replans")}
 
 
-def sail_alone(scenario: Scenario, path: Path, seed: int) -> BaselineVoyage:
-    """Sail with one waypoint per goal on the embedded autopilot."""
+def sail_alone(scenario: Scenario, path: Path, seed: int, who: str = "alone") -> BaselineVoyage:
+    """Sail with one waypoint per goal on the embedded autopilot, or ``greedy`` to each of them."""
     track = BaselineTrack(load_mission(scenario.mission_path(path)))
 
     async def voyage() -> None:
@@ -273,10 +277,13 @@ def sail_alone(scenario: Scenario, path: Path, seed: int) -> BaselineVoyage:
             Autopilot(link) as pilot,
         ):
             wind.release()
-            await _sail(pilot, track, lambda: autopilot.truth, scenario.limit_s)
+            if who == "greedy":
+                await _sail_greedily(pilot, track, lambda: autopilot.truth, scenario.limit_s)
+            else:
+                await _sail(pilot, track, lambda: autopilot.truth, scenario.limit_s)
 
     run_virtual(voyage())
-    return BaselineVoyage(track=track, record=track.record("alone, embedded", scenario.name, seed))
+    return BaselineVoyage(track=track, record=track.record(f"{who}, embedded", scenario.name, seed))
 
 
 def sail_ardurover(
@@ -364,6 +371,38 @@ async def _sail(pilot: Autopilot, track: BaselineTrack, now: Callable[[], Now | 
         raise JobError("it never sailed in AUTO")
 
 
+async def _sail_greedily(pilot: Autopilot, track: BaselineTrack, now: Callable[[], Now], limit_s: float) -> None:
+    """Arm, set GUIDED, and steer the best heading of each second, by the mean wind of 5 s, until the last goal."""
+    mission, polar, mean = track.mission, boat_of(track.mission).polar, make("mean5")
+    for _ in range(30):
+        await pilot.arm()
+        await pilot.set_mode(Mode.GUIDED)
+        if now().is_armed and now().mode is Mode.GUIDED:
+            break
+        await asyncio.sleep(1.0)
+    until_s = now_s() + limit_s
+    while now_s() < until_s:
+        look = now()
+        track.add(look.t_s, look)
+        if track.is_done:
+            break
+        mean.update(look.t_s, look.twd_from_rad, look.tws_mps)
+        twd_from_rad, _, tws_mps, _ = mean.forecast(0.0)
+        here = mission.frame().en_from_geo(look.position)
+        goal = mission.frame().en_from_geo(mission.goals[len(track.goals_s)].point)
+        heading_rad = best_heading(
+            polar,
+            twd_from_rad=twd_from_rad,
+            tws_mps=tws_mps,
+            way_en_m=(goal[0] - here[0], goal[1] - here[1]),
+            heading_rad=look.heading_rad,
+        )
+        pilot.steer_heading(heading_rad)
+        await asyncio.sleep(GREEDY_EVERY_S)
+    if not track.truth.t_s:
+        raise JobError("it never sailed in GUIDED")
+
+
 HEADS = (
     "scenario",
     "sailor",
@@ -432,6 +471,7 @@ NAMES = {
     "no-shifts": "companion, no shifts",
     "fixed": "fixed plan",
     "companion-ardurover": "companion, ArduRover",
+    "greedy": "greedy, embedded",
     "alone-embedded": "alone, embedded",
     "alone": "alone, ArduRover",
     "dijkstra": "dijkstra, ArduRover",
@@ -483,8 +523,8 @@ def voyage_of(job: Job[Sailor]) -> BaselineVoyage:
         return sail_companion_ardurover(*what, sailor.speedup)
     if sailor.who == "fixed":
         return sail_fixed(*what)
-    if sailor.who == "alone-embedded":
-        return sail_alone(*what)
+    if sailor.who in {"alone-embedded", "greedy"}:
+        return sail_alone(*what, who=sailor.who.removesuffix("-embedded"))
     return sail_ardurover(*what, sailor.who, sailor.speedup, sailor.set_sail)
 
 

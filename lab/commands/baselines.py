@@ -10,7 +10,7 @@ from companion.program.arguments import number, whole
 from sitl.commands.run import scenario_file
 from sitl.options import add_options, options_of
 
-USUAL = ("companion", "fixed", "companion-ardurover", "alone-embedded", "alone", "dijkstra")
+USUAL = ("companion", "fixed", "companion-ardurover", "greedy", "alone-embedded", "alone", "dijkstra")
 SAILORS = (*USUAL, "shifts", "no-shifts")
 STEADY = (0.0, 60.0)
 
@@ -46,7 +46,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         help=summary,
         description="Sail six scenarios with the companion and with ArduRover alone, in the same weather, and print "
         "the table of arrivals, contacts, times, tacks and clearances. 'companion', 'fixed' (its first plan, never "
-        "another) and 'alone-embedded' use the embedded autopilot; 'companion-ardurover', 'alone' (a waypoint per "
+        "another), 'greedy' (the heading that makes most way now, Stelzer and Pröll 2008) and 'alone-embedded' use the "
+        "embedded autopilot; 'companion-ardurover', 'alone' (a waypoint per "
         "goal) and 'dijkstra' (its own path planning) the real ArduRover; 'shifts' and 'no-shifts' are the companion "
         "with and without tacks on the wind's shifts, whatever the mission says. "
         "Voyages are appended to FILE, and the table is of everything in it.",
