@@ -301,7 +301,6 @@ NONE_YET = {
     "Büsser 2.IV.E",
     "Büsser 2.V.C",
     "Büsser 2.V.G",
-    "Büsser 2.V.H",
     "Büsser 2.VI",
     "Büsser 5.1",
     "Büsser 5.3",
