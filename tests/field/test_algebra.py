@@ -132,7 +132,11 @@ def test_a_line_between_two_points_runs_from_one_to_the_other() -> None:
 def test_figure_4_1() -> None:
     """F1 = circle enlarged ten times + repulsive point at (15, 5)."""
     f1 = AttractiveCircle().enlarged(10.0) + RepulsivePoint().shifted(15.0, 5.0)
-    there = AttractiveCircle()((0.0, 10.0))[0]
+    there = (10.0, 0.0)  # on the circle: along it, clockwise
+    inward = f1((0.0, 300.0))[0] - RepulsivePoint().shifted(15.0, 5.0)((0.0, 300.0))[0]
+    # 30 m of the atom's own: v0 along, vr atan(0.1 (10 - 30)) outwards, brought to length 10
+    pull = 10.0 * math.atan(0.1 * (10.0 - 30.0))
+    assert inward == pytest.approx(10.0 * np.array([10.0, pull]) / math.hypot(10.0, pull))
     d = np.array([0.0 - 15.0, 100.0 - 5.0])
     away = 20.0 * math.exp(-float(d @ d) / 1e4) * d / np.hypot(*d)
     assert f1((0.0, 100.0))[0] == pytest.approx(there + away)

@@ -172,6 +172,25 @@ def test_beating_to_a_point_dead_upwind(look: bool) -> None:
     assert np.abs(track[:, 1]).max() < 110.0
 
 
+# Course off the wind [deg] -> where she settles beside her line, from 20 m to leeward of it [m, to leeward].
+ACROSS_M = {60.0: 13.0, 90.0: 7.2, 120.0: 4.9, 150.0: 0.7, 180.0: -3.2}
+
+
+@pytest.mark.parametrize("course_deg", ACROSS_M)
+def test_beside_a_line_she_settles_where_the_field_makes_up_for_her_leeway(course_deg: float) -> None:
+    """Schmitt's line has no memory: what the wind sets her to leeward is made up for by being off the line."""
+    east, north = math.sin(math.radians(course_deg)), math.cos(math.radians(course_deg))
+    begin = (-20.0 * north, -150.0 + 20.0 * east)
+    line = follow_line(begin, (begin[0] + 900.0 * east, begin[1] + 900.0 * north))
+    boat, _, _ = sail(line, habits_for(6.0), None, 400)
+    track = boat.positions()
+    across = (track[:, 1] - begin[0]) * north - (track[:, 2] - begin[1]) * east
+    settled = across[track[:, 0] - track[0, 0] > 150.0]
+    assert across[0] == pytest.approx(20.0, abs=0.5)
+    assert np.median(settled) == pytest.approx(ACROSS_M[course_deg], abs=1.0)
+    assert np.max(np.abs(settled - np.median(settled))) < 4.0
+
+
 def test_following_a_line_past_a_boat_that_lies_on_it() -> None:
     line = follow_line((0.0, -100.0), (300.0, -100.0))
     lying = MovingObstacle(en_m=(120.0, -100.0), keep_m=15.0)

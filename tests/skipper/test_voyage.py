@@ -12,7 +12,7 @@ from shapely.geometry import box
 from companion.boat import AutopilotLimits
 from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, Mode, StatusText
-from companion.planner import PlanStatus
+from companion.planner import PlanStatus, plan
 from companion.planner.worker import failed
 from companion.planners import AstarSettings, PlannerChoice
 from companion.skipper.planning.triggers import board_end
@@ -643,6 +643,25 @@ def test_an_old_plan_that_is_sound_stays_when_nothing_better_is_found():
     assert world.run(1500, is_done)
     assert said(world, "no plan")
     assert world.count(act.UploadMission) == 1
+
+
+def test_an_old_plan_that_is_as_good_as_a_new_one_stays():
+    """A new plan for the old one's age goes another way and is no faster: the one on board is sailed on."""
+    world = make(
+        Goal(en_m=(700.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0), config={"plan_age_s": 90.0}
+    )
+
+    def beside(problem, seed):
+        found = plan(problem, expansions=world.expansions, seed=seed)
+        start, goal = found.waypoints_en[0], found.waypoints_en[-1]
+        return replace(found, waypoints_en=np.array([start, 0.5 * (start + goal) + (0.0, 8.0), goal]))
+
+    world.planner = beside
+    assert world.run(600, is_done)
+    asked = [t for t, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.PLAN_AGE]
+    assert asked
+    assert said(world, "plan kept")
+    assert not [t for t, a in world.actions if isinstance(a, act.UploadMission) and t > asked[0]]
 
 
 def test_a_closed_way_ends_in_a_named_hold():
