@@ -60,6 +60,12 @@ MUTATIONS = (
         "tests/wind/test_time_series.py::test_arma_tells_the_spread_of_the_process_that_it_sees",
     ),
     Mutation(
+        "companion/wind/estimators/time_series.py",
+        "_GRID[best][1], self._next[best] - self._variance",
+        "_GRID[best][1], 0.0",
+        "tests/wind/test_time_series.py::test_garch_tells_a_restless_wind_from_a_quiet_one",
+    ),
+    Mutation(
         "companion/wind/estimators/kalman.py",
         "len(self._window)) @ kf.K.T",
         "len(self._window))",
