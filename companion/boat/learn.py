@@ -73,7 +73,7 @@ class LearnedBoat:
         common: What all speeds may be off by together, likewise.
         vane, compass, leeway: Offsets to starboard; leeway as ``Boat.leeway_rad`` states it.
         lean: How much faster it is close-hauled with the wind from starboard than in the mean of both (logarithm).
-        currents: For each outing, its mean stream east and north.
+        currents: For each outing, the stream east and north in the mean of the time that was sailed.
         log_factors: For each outing, what its log's reading is to be divided by; only where there is a log.
         draws: (k, angles, winds) speeds that are as likely as the mean.
         seen: (angles, winds) how many stretches lie nearest to each node.
@@ -392,6 +392,14 @@ def _told(
     def known(i: int, value: float) -> Known:
         return Known(mean=value, sd=float(math.sqrt(max(covariance[i, i], 0.0))))
 
+    def stream(outing: int, axis: int) -> Known:
+        """Return the stream of the time that was sailed: what it was before and after is nobody's question."""
+        of = np.flatnonzero(solver.block_outing == outing)
+        if of.shape[0] == 0:
+            return known(solver.at_mean + 2 * outing + axis, float(x.mean[outing, axis]))
+        i = solver.at_stream + 2 * of + axis
+        return Known(mean=float(np.mean(x.stream[of, axis])), sd=math.sqrt(float(np.mean(covariance[np.ix_(i, i)]))))
+
     table = base * np.exp(factor.reshape(angles, winds))
     table = np.maximum.accumulate(table, axis=1)  # more wind makes no boat slower
     return LearnedBoat(
@@ -402,10 +410,7 @@ def _told(
         compass=known(a + 1, float(x.nuisance[1])),
         leeway=known(a + 2, max(0.0, float(x.nuisance[2]))),
         lean=known(a + 3, float(x.nuisance[3])),
-        currents=tuple(
-            (known(solver.at_mean + 2 * o, float(x.mean[o, 0])), known(solver.at_mean + 2 * o + 1, float(x.mean[o, 1])))
-            for o in range(solver.outings)
-        ),
+        currents=tuple((stream(o, 0), stream(o, 1)) for o in range(solver.outings)),
         log_factors=tuple(
             known(solver.at_factor + o, math.exp(float(x.factor[o]))) for o in range(solver.outings) if solver.has_log
         ),

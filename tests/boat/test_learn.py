@@ -224,3 +224,12 @@ def test_the_same_logs_and_seed_give_the_same_boat():
     one, two = (lesson_of([log], PRIOR, ERROR, no_go_half_rad=0.8, seed=4) for _ in range(2))
     assert one.boat.polar == two.boat.polar
     assert one.angles == two.angles
+
+
+def test_a_stream_that_four_headings_told_within_a_quarter_of_an_hour_is_known():
+    """The stream of another hour may be another: that was the doubt, and no circle settled what a circle settles."""
+    one = sailed(SLOW, hours=0.25, seed=3, angles_deg=(60.0, -60.0, 90.0, -90.0, 150.0, -150.0), leg_s=75.0)
+    lesson = lesson_of([one], PRIOR, ERROR, no_go_half_rad=math.radians(45.0))
+    assert "a circle" not in " ".join(lesson.findings)
+    for known, true in zip(lesson.boat.currents[0], SLOW.current_en_mps, strict=True):
+        assert abs(known.mean - true) < 2.5 * known.sd < 0.2
