@@ -29,6 +29,7 @@ from companion.boat.polar import (
     read_polar,
     signalk_text,
 )
+from companion.boat.trial import Trial, trial_in
 
 __all__ = [
     "AutopilotLimits",
@@ -40,6 +41,7 @@ __all__ = [
     "Polar",
     "ProposedMargin",
     "Sizes",
+    "Trial",
     "ardurover_sitl",
     "avalon",
     "can_hold",
@@ -59,5 +61,6 @@ __all__ = [
     "required_margin",
     "signalk_text",
     "slowest_en_mps",
+    "trial_in",
     "widest_corridor_m",
 ]

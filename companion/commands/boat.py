@@ -15,14 +15,19 @@ from companion.program.arguments import add_command, number, out_file, picture, 
 from companion.words import counted
 
 if TYPE_CHECKING:
-    from companion.boat import Polar
+    from shapely.geometry.base import BaseGeometry
+
+    from companion.boat import Polar, Trial
     from companion.boat_logs import ReadLog
-    from companion.geofence.mission import BoatFile, LearnedTable
+    from companion.geo.frame import LocalFrame
+    from companion.geofence import Mission
+    from companion.geofence.mission import BoatFile, LearnedTable, MissionOptions
 
 _EPILOG = """\
 examples:
   companion boat guess --length 1.5 --displacement 20 --sail-area 0.9 --out pepper.toml
   companion boat learn voyages/ flights/*.BIN --from pepper.toml --out pepper-learned.toml
+  companion boat trial lake.toml --from-deg 240               (writes lake-trial.toml: sail it, then learn from it)
   companion boat show pepper.toml --plot pepper.png
   companion boat show pepper.toml --pol pepper.pol            (for OpenCPN and qtVlm)
   companion boat compare pepper.toml ardurover
@@ -31,13 +36,15 @@ A mission names the file: file = "pepper.toml" in its [boat].
 Exit codes: 0 written or told, 1 the logs hold too little sailing, 2 a file or a number cannot be believed.
 """
 TWA_DEG = (40.0, 45.0, 52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0, 165.0, 180.0)
+TRIAL_M = 1000.0  # from the start: nobody sails an hour to a trial
+MARK_M, MARK_SHARE = 10.0, 0.15  # a mark's radius, and the share of a board that it is at most
 MOST_WINDS = 7  # columns of a table
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command with its verbs."""
     parser = add_command(subparsers, "boat", summary, _EPILOG)
-    verbs = parser.add_subparsers(dest="verb", metavar="guess|learn|show|compare", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="guess|learn|trial|show|compare", required=True)
     guess = verbs.add_parser("guess", help="a boat file from three sizes, for a boat that nobody has sailed yet")
     guess.add_argument(
         "--length", type=number("m", above=0.0, at_most=100.0), required=True, metavar="M", help="over all [m]"
@@ -77,6 +84,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     learn.add_argument("--seed", type=whole(), default=0, metavar="N", help="of the draws (default: 0)")
     learn.add_argument("--force", action="store_true", help="take the place of a file, which is kept as FILE.vN.toml")
     learn.set_defaults(run=_learn)
+    trial = verbs.add_parser("trial", help="a short mission in a mission's water that settles what logs leave open")
+    trial.add_argument("mission", type=Path, metavar="MISSION.toml", help="whose water, boat and permissions it takes")
+    trial.add_argument(
+        "--from-deg",
+        type=number("deg", at_least=0.0, at_most=360.0),
+        metavar="DEG",
+        help="where the wind comes from (default: the mission's [wind])",
+    )
+    trial.add_argument("--out", metavar="FILE.toml", help="beside the mission (default: MISSION-trial.toml)")
+    trial.add_argument("--force", action="store_true", help="take the place of a file that is there")
+    trial.set_defaults(run=_trial)
     show = verbs.add_parser("show", help="her speeds, best angles and what is not known of her")
     show.add_argument("file", metavar="FILE", help="a boat file, a polar file, ardurover or avalon")
     show.add_argument("--plot", type=picture, metavar="P.png", help="draw the polar, with its band")
@@ -178,6 +196,78 @@ def _learn(args: argparse.Namespace) -> int:
     print("\n".join(_words(str(args.out), read_boat_file(args.out))))
     print(f"{args.out}: written, version {version}")
     return 0
+
+
+def _trial(args: argparse.Namespace) -> int:
+    from companion.boat import trial_in
+    from companion.commands.output import print_findings, write_files
+    from companion.compose import polar_of
+    from companion.errors import JobError
+    from companion.geofence.mission import dump_options, load_mission, read_options
+    from companion.mission_check import check_mission
+
+    mission = load_mission(args.mission)
+    out = args.mission.with_name(args.out or f"{args.mission.stem}-trial.toml")
+    wind = mission.wind.preview_from_deg if args.from_deg is None else args.from_deg
+    frame = mission.frame()
+    tws_mps = mission.wind.preview_speed_mps
+    no_go_rad = math.radians(mission.boat.no_go_half_deg)
+    polar = polar_of(mission)
+    found = trial_in(
+        _water(mission, frame),
+        frame.en_from_geo(mission.origin),
+        twd_from_rad=math.radians(wind),
+        no_go_half_rad=no_go_rad,
+        speed_mps=polar.best_beat(tws_mps).vmg_mps / math.cos(no_go_rad),
+    )
+    if found is None:
+        raise JobError(f"{args.mission}: there is no room in its water for six tacks, a reach there and back and a run")
+    options = _trial_options(read_options(args.mission), mission.name, found, frame, wind)
+    text = dump_options(options)
+    checked = check_mission(out, from_deg=wind, given={out: text.encode()})
+    if checked.refusals:
+        raise checked.refusals[0]
+    print_findings(checked.findings, str(out))
+    write_files({str(out): text.encode()}, force=args.force)
+    print(
+        f"{out}: written for wind from {wind:.0f} degrees: {counted(len(found.names), 'mark')}, boards of "
+        f"{found.board_m:.0f} m. Plan it: companion mission check {out} --plot; sail it; then companion boat learn"
+    )
+    return 0
+
+
+def _water(mission: Mission, frame: LocalFrame) -> BaseGeometry:
+    """Return where plans of a mission may be [m]: its limits without what is kept clear of, at most ``TRIAL_M`` off."""
+    import shapely
+
+    local = mission.area.local(frame)
+    water = shapely.Point(frame.en_from_geo(mission.origin)).buffer(TRIAL_M)
+    if local.limits is not None:
+        water = shapely.intersection(water, shapely.buffer(local.limits, -mission.margin_m))
+    if local.polygons:
+        water = shapely.difference(water, shapely.buffer(local.solid, mission.margin_m))
+    return water
+
+
+def _trial_options(
+    options: MissionOptions, name: str, trial: Trial, frame: LocalFrame, wind_deg: float
+) -> MissionOptions:
+    import msgspec
+
+    from companion.geofence.mission import PointOptions
+
+    radius_m = round(min(MARK_M, MARK_SHARE * trial.board_m), 1)
+    goals = []
+    for place, what in zip(trial.marks_en_m.tolist(), trial.names, strict=True):
+        at = frame.geo_from_en(*place)
+        goals.append(PointOptions(lat=round(at.lat_deg, 7), lon=round(at.lon_deg, 7), radius_m=radius_m, name=what))
+    return msgspec.structs.replace(
+        options,
+        name=f"{name}-trial",
+        description=f"Trial for wind from {wind_deg:.0f} degrees: six tacks, a reach there and back, a run.",
+        goal=tuple(goals),
+        field={},
+    )
 
 
 def _said(boat: BoatFile) -> dict[str, object]:

@@ -8,6 +8,7 @@ import pytest
 
 from companion.boat import ardurover_sitl, guessed, lesson_of
 from companion.boat_logs import logs_under, read_logs
+from companion.cli import main
 from companion.clock import run_virtual
 from lab.simulated_logs import SIZES
 from sitl.autopilot import tack_loss_s
@@ -80,3 +81,59 @@ def test_real_ardurover_is_learned_from_five_minutes_of_beat_and_five_of_reach()
     # It makes no leeway, its vane and compass are right, and there is no stream.
     for known in (lesson.boat.vane, lesson.boat.compass, lesson.boat.leeway):
         assert abs(known.mean) < 2.0 * known.sd
+
+
+SLOW_LAKE = """\
+name = "lake"
+[start]
+lat = 50.8170000
+lon = -1.3100000
+[[goal]]
+lat = 50.8200563
+lon = -1.3094324
+[area]
+fence = "lake.wkt"
+margin_m = 15.0
+margin_floor_m = 8.0
+[operator]
+arm = true
+set_auto = true
+"""
+
+
+def sailed_in(mission, from_deg, folder, seeds):
+    path = Path("sitl/scenarios/demo.toml")
+    scene = load_scenario(path)
+    scene = msgspec.structs.replace(
+        scene,
+        mission=str(mission),
+        limit_s=1800.0,
+        wind=msgspec.structs.replace(scene.wind, from_deg=from_deg),
+        boat=HULL,
+        current=CurrentSpec(set_deg=120.0, drift_mps=0.15),
+        parameters={"FENCE_TYPE": 4.0},
+    )
+    for seed in seeds:
+        run_virtual(run_embedded(scene, path, seed, folder / f"{seed}"))
+    read, skipped = read_logs(logs_under([folder]))
+    assert skipped == []
+    return lesson_of([one.log for one in read], ardurover_sitl(), 0.35, no_go_half_rad=math.radians(47.0))
+
+
+def test_a_trial_settles_what_a_reach_leaves_open(tmp_path, capsys):
+    """Sailed like any mission: what the first voyage could not tell apart, ten minutes of trial do."""
+    (tmp_path / "lake.wkt").write_bytes(Path("missions/lake.wkt").read_bytes())
+    (tmp_path / "lake.toml").write_text(SLOW_LAKE)
+    before = sailed_in(tmp_path / "lake.toml", 90.0, tmp_path / "reach", (3, 4))
+    assert main(["boat", "trial", str(tmp_path / "lake.toml"), "--from-deg", "0"]) == 0
+    capsys.readouterr()
+    after = sailed_in(tmp_path / "lake-trial.toml", 0.0, tmp_path / "trial", (3,))
+    opened = ("reciprocal reach", "tacks were seen", "nobody sailed a beat", "close-hauled on each tack", "a circle")
+    said = " ".join(before.findings)
+    assert [what for what in opened if what not in said] == []
+    said = " ".join(after.findings)
+    assert [what for what in opened if what in said] == []
+    assert "nobody sailed" not in said
+    assert after.tacks.tried >= 6
+    assert after.tacks.loss_s is not None
+    assert after.boat.common < 0.6 * before.boat.common

@@ -48,7 +48,7 @@ from companion.geofence.mission.options import (
     WindOptions,
     kind_of,
 )
-from companion.geofence.mission.text import parse_options, read_options, toml, without_defaults
+from companion.geofence.mission.text import dump_options, parse_options, read_options, toml, without_defaults
 
 __all__ = [
     "NO_NAME",
@@ -86,6 +86,7 @@ __all__ = [
     "document_of",
     "drawing_of",
     "drawn_mission",
+    "dump_options",
     "free_water",
     "goal_losses",
     "hindrance",
