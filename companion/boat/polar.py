@@ -330,6 +330,35 @@ def pol_text(polar: Polar, share: float = 1.0) -> str:
     return "\n".join(lines) + "\n"
 
 
+# The winds [kn] and angles [deg] of an ORC certificate.
+ORC_KN = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 20.0, 24.0)
+ORC_DEG = (52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0)
+
+
+def orc_text(polar: Polar, share: float = 1.0) -> str:
+    """Return a polar as an ORC certificate tells one, in knots and degrees; its speeds times ``share``.
+
+    A wind that the polar does not reach is left out: a speed there would be a guess that looks like a rating.
+    """
+    least, most = float(np.min(polar.tws_mps)), float(np.max(polar.tws_mps))
+    winds = [w for w in ORC_KN if least - 1e-9 <= w * MPS_PER_KNOT <= most + 1e-9 or least == most]
+    beats, runs = ([best(w * MPS_PER_KNOT) for w in winds] for best in (polar.best_beat, polar.best_run))
+    rows = [
+        ("beat angle", [f"{math.degrees(b.twa_rad):.1f}" for b in beats]),
+        ("beat VMG", [f"{share * b.vmg_mps / MPS_PER_KNOT:.2f}" for b in beats]),
+        *(
+            (
+                f"{a:g}",
+                [f"{share * polar.speed_mps(math.radians(a), w * MPS_PER_KNOT) / MPS_PER_KNOT:.2f}" for w in winds],
+            )
+            for a in ORC_DEG
+        ),
+        ("run VMG", [f"{share * r.vmg_mps / MPS_PER_KNOT:.2f}" for r in runs]),
+        ("run angle", [f"{math.degrees(r.twa_rad):.1f}" for r in runs]),
+    ]
+    return "\n".join(["TWA/TWS," + ",".join(f"{w:g}" for w in winds), *(",".join([n, *c]) for n, c in rows)]) + "\n"
+
+
 def signalk_text(polar: Polar, share: float = 1.0) -> str:
     """Return a polar as Signal K has one (``performance/polars``: radians, m/s), its speeds times ``share``."""
     winds = []

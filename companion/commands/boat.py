@@ -103,6 +103,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         "--signalk", type=out_file, metavar="FILE.json", help="write the polar as Signal K has one (performance/polars)"
     )
     show.add_argument(
+        "--orc",
+        type=out_file,
+        metavar="FILE.csv",
+        help="write the polar as an ORC certificate has it, winds in its range",
+    )
+    show.add_argument(
         "--quantile",
         type=number(above=0.0, at_most=0.5),
         default=0.5,
@@ -305,16 +311,16 @@ def _show(args: argparse.Namespace) -> int:
     polar, boat = _boat(args.file)
     error = 0.0 if boat is None else speed_error_of(boat.boat)
     print("\n".join([*_words(args.file, boat), *_angles(polar), *_table("boat speed [m/s]", polar, _speeds)]))
-    for file, is_pol in ((args.pol, True), (args.signalk, False)):
+    from companion.boat import orc_text, pol_text, signalk_text
+
+    for file, text_of in ((args.pol, pol_text), (args.signalk, signalk_text), (args.orc, orc_text)):
         if file is not None:
             from statistics import NormalDist
 
-            from companion.boat import pol_text, signalk_text
             from companion.commands.output import write_files
 
             slower = math.exp(error * NormalDist().inv_cdf(args.quantile))
-            text = pol_text(polar, slower) if is_pol else signalk_text(polar, slower)
-            write_files({str(file): text.encode()}, force=args.force)
+            write_files({str(file): text_of(polar, slower).encode()}, force=args.force)
             print(f"{file}: written")
     if args.plot is not None:
         from companion.commands.output import patience

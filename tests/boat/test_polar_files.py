@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.boat import parse_polar, read_polar
+from companion.boat import ardurover_sitl, orc_text, parse_polar, read_polar
 from companion.errors import InputError
 from companion.geo import MPS_PER_KNOT
 
@@ -160,3 +160,20 @@ def test_a_bare_zero_between_speeds_is_still_a_gap():
     file = parse_polar("TWA\\TWS;6;10\n0;0;0\n45;3.0;4.0\n90;0;5.0\n150;3.5;4.5\n")
     assert len(file.warnings) == 1
     assert "line 4, column 2" in file.warnings[0]
+
+
+def test_an_orc_table_is_in_knots_and_holds_no_wind_that_the_polar_does_not_reach():
+    polar = ardurover_sitl()
+    rows = [line.split(",") for line in orc_text(polar, 0.9).splitlines()]
+    winds = [float(w) for w in rows[0][1:]]
+    reached = polar.tws_mps / MPS_PER_KNOT
+    assert winds == [w for w in (4, 6, 8, 10, 12, 14, 16, 20, 24) if reached.min() <= w <= reached.max()]
+    table = {row[0]: [float(v) for v in row[1:]] for row in rows[1:]}
+    assert next(iter(table)) == "beat angle"
+    for j, wind in enumerate(winds):
+        mps = wind * MPS_PER_KNOT
+        assert table["90"][j] == pytest.approx(0.9 * polar.speed_mps(math.radians(90.0), mps) / MPS_PER_KNOT, abs=0.01)
+        beat, run = polar.best_beat(mps), polar.best_run(mps)
+        assert table["beat angle"][j] == pytest.approx(math.degrees(beat.twa_rad), abs=0.06)
+        assert table["beat VMG"][j] == pytest.approx(0.9 * beat.vmg_mps / MPS_PER_KNOT, abs=0.01)
+        assert table["run VMG"][j] == pytest.approx(0.9 * run.vmg_mps / MPS_PER_KNOT, abs=0.01)

@@ -27,6 +27,8 @@ def test_what_is_guessed_is_shown_drawn_and_written_for_opencpn(tmp_path, capsys
     assert "best beat [deg]" in said
     assert "35 %" in said
     assert main(["boat", "show", str(file), "--signalk", str(tmp_path / "p.json")]) == 0
+    assert main(["boat", "show", str(file), "--orc", str(tmp_path / "p.csv")]) == 0
+    assert (tmp_path / "p.csv").read_text().startswith("TWA/TWS,4,6,")
     (told,) = json.loads((tmp_path / "p.json").read_text()).values()
     winds = {w["trueWindSpeed"]: dict(w["angleData"]) for w in told["windData"]}
     polar = polar_of_file(read_boat_file(file), "")
