@@ -469,6 +469,9 @@ def config_of(mission: Mission) -> SkipperConfig:
         delta_s_ladder=tuple(d for d in default.delta_s_ladder if d < mission.risk.delta_s),
         margin_m=mission.margin_m,
         margin_floor_m=mission.margin_floor_m,
+        least_depth_m=None
+        if mission.boat.draft_m is None
+        else mission.boat.draft_m + mission.options.area.under_keel_m,
         planner=planner_of(mission),
         plan_budget_s=options.planning_budget_s,
         first_plan_budget_s=options.planning_budget_s,

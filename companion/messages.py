@@ -132,6 +132,9 @@ class AutopilotStatus:
     servo_us: tuple[int, ...] = ()  # what its servo outputs are told, by number from 1 [us]; 0: nothing
     home: GeoPoint | None = None
     utc_at_boot_s: float | None = None  # Unix time of its start, once it knows the time
+    sounds: bool | None = None  # its sounder has told of the bottom, and does; None: never
+    depth_m: float | None = None  # of the water below the sounder, by several pings; None: not told, or out of reach
+    depth_rate_mps: float | None = None  # how that changes, negative where it shoals
     sensors: tuple[tuple[str, float], ...] = ()  # told now by a script on it, by name (``companion.safety.SENSORS``)
 
     def sensor(self, name: str) -> float | None:

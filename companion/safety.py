@@ -249,6 +249,14 @@ TABLE: tuple[Watchdog, ...] = (
       why="what does not make way is carried by the water",
       ends=Ending(key="light_wind", default=End.SAY, rank=7, asked_by="min_tws_mps",
                   because="less wind is forecast than she makes way in", until="until more wind is forecast")),
+    W(name="shoaling", number=29, notification="grounding",
+      watches="the depth by the sounder in 20 s at its rate, over the mission's `draft_m` and `under_keel_m`",
+      enter=0.0, exit=0.5, unit="m", enter_s=2.0, exit_s=10.0, severity=S.CRITICAL, response=Response.SAY,
+      loitering=True,
+      why="what no chart has is found by the keel; 20 s are for a person to turn her, or for a tack"),
+    W(name="depth lost", number=30, watches="the sounder tells of the bottom no more", enter=1.0, exit=0.5, unit="",
+      enter_s=5.0, exit_s=2.0, severity=S.WARNING, response=Response.SAY, loitering=True,
+      why="from now on a shoal is not seen; water that is deeper than the sounder reaches is no loss"),
 )
 # fmt: on
 

@@ -41,8 +41,9 @@ from sitl.scenario import TRAFFIC, EventSpec, Motion, Others, TrueTrack
 from sitl.world import WindModel
 
 BEAT_S = 1.0
+PING_S = 0.5
 PERSONS = frozenset({"mode", "arm", "disarm", "set_current"})
-FAILURES = frozenset({"radio_lost", "station", "knockdown", "battery", "leak", "sensor"})
+FAILURES = frozenset({"radio_lost", "station", "knockdown", "battery", "leak", "sensor", "sounder"})
 
 
 async def play(event: EventSpec, autopilot: SimulatedAutopilot, station: MemoryEnd) -> None:
@@ -74,6 +75,16 @@ async def play(event: EventSpec, autopilot: SimulatedAutopilot, station: MemoryE
         autopilot.set_sensor(event.sensor, event.value)
         await asyncio.sleep(lasts_s)
         autopilot.set_sensor(event.sensor, before)
+    elif event.kind == "sounder":
+        began_s, core = now_s(), autopilot.core
+        before_m = event.value if core.depth_m is None else core.depth_m
+        while (share := (now_s() - began_s) / event.over_s if event.over_s else 1.0) < 1.0:
+            core.depth_m = before_m + share * (event.value - before_m)
+            await asyncio.sleep(PING_S)
+        core.depth_m = event.value
+        if event.for_s is not None:
+            await asyncio.sleep(began_s + event.for_s - now_s())
+            core.depth_m = None
     elif event.kind == "radio_lost":
         autopilot.pilot.radio.switch(is_on=False)
         await asyncio.sleep(lasts_s)

@@ -187,6 +187,7 @@ EventKind = Literal[
     "battery",  # volts
     "leak",  # for_s: the bilge's switch is wet
     "sensor",  # sensor, value, for_s: a script of the boat's tells it (NAMED_VALUE_FLOAT)
+    "sounder",  # value, over_s, for_s: it tells this depth [m], reached so slowly from the last; then it is silent
     "radio_lost",  # for_s: the transmitter is out of range
     "station",  # for_s: a ground station is heard, from then on no more
     "knockdown",  # roll_deg, for_s
@@ -311,6 +312,7 @@ ORDINARY = frozenset(
         "battery",
         "leak",
         "sensor",
+        "sounder",
         "vessel",
         "neighbour",
         "disk",

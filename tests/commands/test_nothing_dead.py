@@ -248,8 +248,6 @@ tws_mps = [5.0]
 twa_deg = [60, 180]
 speed_mps = [[1.0], [1.5]]
 """
-# What charts are made into an area by: tests/chart/test_import.py.
-CHARTED = {("boat", "draft_m"), ("area", "under_keel_m")}
 # What does not sail: pictures and previews, and what `companion run` itself takes. Tried below.
 DRAWN = {("start", "heading_deg"), ("wind", "preview_from_deg")}
 RUN = {("skipper", "expansions"), ("skipper", "seed"), ("autopilot", "system")}  # the last: test_whose
@@ -273,6 +271,8 @@ def mission(path, table="", key="", value=None):
         (path / "tide.csv").write_text("2026-11-21T12:00:00Z,90,0.6\n2026-11-21T13:00:00Z,90,0.2\n")
     if table == "area" and key in {"axis", "point_radius_m"}:
         raw["area"]["obstacles"] = ["point.wkt"]
+    if key == "under_keel_m":
+        raw["boat"] = {"draft_m": 1.0}
     if (table, key) == ("area", "axis"):
         (path / "point.wkt").write_text("POINT (50.8175 -1.3060)")
     if table == "field":
@@ -340,6 +340,8 @@ def base_for(path, table, key):
         return mission(path, "planner", "tunnel_width_m", 60.0)
     if (table, key) == ("autopilot", "frame"):
         return mission(path, "boat", "polar", 2.0)
+    if key == "under_keel_m":
+        return mission(path, "boat", "draft_m", 1.0)
     if (table, key) == ("goal", "heading_deg"):
         return mission(path, "skipper", "planner", "astar")
     if table == "planner":
@@ -394,7 +396,7 @@ def test_every_key_has_another_value_here():
 
 
 @pytest.mark.parametrize(
-    ("table", "key"), sorted({(table, key) for table, keys in OTHER.items() for key in keys} - DRAWN - RUN - CHARTED)
+    ("table", "key"), sorted({(table, key) for table, keys in OTHER.items() for key in keys} - DRAWN - RUN)
 )
 def test_every_key_changes_what_is_sailed(table, key, tmp_path):
     folder_with(tmp_path)

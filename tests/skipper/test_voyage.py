@@ -58,7 +58,8 @@ def make(*goals, config=None, obstacles=ISLANDS, **world):
     """Return a world whose plans have every tack as a waypoint: much to upload that can go wrong."""
     made = voyage(*(goals or (GOAL,)), obstacles=obstacles, **world.pop("voyage", {}))
     return World(
-        skipper=skipper(made, **{"autopilot_beats": False, **(config or {})}), **{"wind": swinging, **FAST, **world}
+        skipper=skipper(made, **{"autopilot_beats": False, "least_depth_m": 2.0, **(config or {})}),
+        **{"wind": swinging, **FAST, **world},
     )
 
 

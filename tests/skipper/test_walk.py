@@ -254,6 +254,8 @@ EVENTS = {
     "leaking": status(sensors=(("LEAK", 1.0),)),
     "dark": status(utc_at_boot_s=MIDNIGHT_S),
     "shore lost": lambda s: replace(s, shore_age_s=700.0),
+    "shoaling": status(sounds=True, depth_m=1.0, depth_rate_mps=-0.1),
+    "depth lost": status(sounds=False),
     "planner dead": lambda s: replace(s, planner_alive=False),
     "out of time": lambda s: replace(s, t_s=s.t_s + 7300.0),
     "dragged off": lambda s: replace(s, position_en_m=(s.position_en_m[0] + 60.0, s.position_en_m[1])),
@@ -527,6 +529,8 @@ NUMBERS = {
     "light wind": (26, "light_wind", "say"),
     "fence off": (27,),
     "wind contradicted": (28,),
+    "shoaling": (29,),
+    "depth lost": (30,),
 }
 # The figures of [safety]: default, more than, at least, at most.
 FIGURES = {

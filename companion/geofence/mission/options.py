@@ -250,7 +250,7 @@ class AreaOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     point_radius_m: Annotated[float, Meta(gt=0.0, le=5000.0)] = 10.0
     """The radius of an obstacle that is only a point or a line."""
     under_keel_m: Annotated[float, Meta(ge=0.0, le=50.0)] = 0.5
-    """Water that ``companion chart import`` leaves free has so much room under the keel."""
+    """Room under the keel that ``companion chart import`` leaves; less than it by the sounder is told."""
 
 
 class RiskOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -288,7 +288,7 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     beam_m: Annotated[float, Meta(gt=0.0, le=30.0)] = 0.3
     """The hull: what touches, and what vessels are kept clear of. The position is taken to be amidships."""
     draft_m: Annotated[float, Meta(gt=0.0, le=20.0)] | None = None
-    """How deep the keel is: what of a chart is too shallow."""
+    """How deep the keel is: what of a chart is too shallow, and what a sounder warns of."""
     leeway_deg: Annotated[float, Meta(ge=0.0, le=30.0)] = 0.0
     """How far to leeward of the bow a beat goes: apparent wind 30 degrees off it, three times the boat's speed."""
     max_tws_mps: Positive | None = None

@@ -17,6 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.frozen import changed
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.frames import Message
+from companion.mavlink.wire.sounder import Sounder
 from companion.messages import (
     AisReport,
     ApparentWind,
@@ -109,6 +110,9 @@ _TELLING = frozenset(
         "SYSTEM_TIME",
         "NAMED_VALUE_FLOAT",
         "FENCE_STATUS",
+        "DISTANCE_SENSOR",
+        "WATER_DEPTH",
+        "RANGEFINDER",
     }
 )
 _APPARENT = ("AppWndSpd", "AppWndDir")
@@ -160,6 +164,9 @@ class VehicleAssembler:
         self._nav_s: float | None = None
         self._fence_s: float | None = None
         self._gps2_s: float | None = None
+        self._sounder = Sounder()
+        self._sounded_s: float | None = None
+        self._ranged_s = -math.inf  # when the message came that says how far the sounder reaches
         self._fenced_s = 0.0  # since when it tells of a fence without a gap
         self._fence_told = (False, -1)
         # Of each sensor: whether it was told beyond its entry, when, and what is believed.
@@ -327,6 +334,8 @@ class VehicleAssembler:
         if kind == "NAMED_VALUE_FLOAT":
             # Twice in a row, as the fence: nothing true would ever contradict one that was forged.
             return self._sensor(t_s, message.name, float(message.value))
+        if kind in {"DISTANCE_SENSOR", "WATER_DEPTH", "RANGEFINDER"}:
+            return self._sounding(t_s, kind, message)
         if kind == "FENCE_STATUS":
             # Two in a row that say the same: one alone may be damaged or forged.
             fence = bool(message.breach_status), int(message.breach_count)
@@ -352,6 +361,9 @@ class VehicleAssembler:
             old |= {"fence_breached": None, "fence_breaches": None}
             if self._status is not None and self._status.fence_on:
                 old["fence_on"] = False
+        if self._sounded_s is not None and t_s - self._sounded_s > QUIET_S:
+            self._sounded_s = None
+            old |= {"sounds": False, "depth_m": None, "depth_rate_mps": None}
         if self._gps2_s is not None and t_s - self._gps2_s > QUIET_S:
             self._gps2_s = None
             old |= {"gps2": None}
@@ -359,6 +371,23 @@ class VehicleAssembler:
             self._sensed = {name: told for name, told in self._sensed.items() if t_s - told[1] <= QUIET_S}
             old |= {"sensors": self._believed()}
         return old
+
+    def _sounding(self, t_s: float, kind: str, message: Message) -> dict[str, Any] | None:
+        """Take what an instrument that looks down tells; the same ping may come in more than one of the messages."""
+        if kind == "DISTANCE_SENSOR":
+            if message.orientation != wire.MAV_SENSOR_ROTATION_PITCH_270:
+                return None
+            ping_m, least_m, most_m = (
+                cm / 100.0 for cm in (message.current_distance, message.min_distance, message.max_distance)
+            )
+            self._ranged_s = t_s
+        elif t_s - self._ranged_s <= QUIET_S:
+            return None
+        else:
+            ping_m, least_m, most_m = float(message.distance), 0.0, math.inf
+        self._sounded_s = t_s
+        self._sounder.take(t_s, ping_m, least_m, most_m)
+        return {"sounds": True, "depth_m": self._sounder.depth_m(t_s), "depth_rate_mps": self._sounder.rate_mps(t_s)}
 
     def _sensor(self, t_s: float, name: str, value: float) -> dict[str, Any] | None:
         """Take what a script tells: believed when this and the value before are on one side of the row's entry."""

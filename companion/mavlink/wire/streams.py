@@ -46,6 +46,7 @@ DEFAULT_STREAMS = (
     Stream("SYS_STATUS", 0.5, 10.0, is_vital=True),
     Stream("SYSTEM_TIME", 0.5, 10.0),
     Stream("FENCE_STATUS", 1.0, 10.0),
+    Stream("DISTANCE_SENSOR", 2.0, 5.0),
     Stream("RC_CHANNELS", 1.0, 10.0),
     Stream("SERVO_OUTPUT_RAW", 1.0, 10.0),
     Stream("AIS_VESSEL", 5.0, 60.0),

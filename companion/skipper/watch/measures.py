@@ -52,6 +52,7 @@ FALL = 0.05  # the rate is told when the charge has fallen by this much ...
 LOOK_S = 300.0  # ... and for this long
 DETOUR = 2.0  # a beat is 1.4 times its straight way, and something lies between
 LEAST_MPS = 0.5
+TURN_S = 20.0  # from the alarm until she goes the other way: a person, or a tack of 7 s and its mission
 
 
 def measure(ctx: StepContext, name: str) -> float | None:
@@ -245,6 +246,19 @@ def _fence_off(ctx: StepContext) -> float | None:
     return None if ctx.autopilot is None else float(ctx.autopilot.fence_on is False)
 
 
+def _shoaling(ctx: StepContext) -> float | None:
+    status, least_m = ctx.autopilot, ctx.config.least_depth_m
+    if status is None or status.depth_m is None or least_m is None:
+        return None
+    return status.depth_m + min(0.0, status.depth_rate_mps or 0.0) * TURN_S - least_m
+
+
+def _depth_lost(ctx: StepContext) -> float | None:
+    if ctx.autopilot is None or ctx.config.least_depth_m is None:
+        return None
+    return float(ctx.autopilot.sounds is False)
+
+
 _MEASURES: dict[str, Callable[[StepContext], float | None]] = {
     "link silent": _link,
     "position lost": _position_lost,
@@ -273,6 +287,8 @@ _MEASURES: dict[str, Callable[[StepContext], float | None]] = {
     "planner dead": _planner,
     "dark": _dark,
     "shore lost": _shore,
+    "shoaling": _shoaling,
+    "depth lost": _depth_lost,
 }
 
 

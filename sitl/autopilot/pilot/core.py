@@ -67,6 +67,7 @@ class Core:
         self.run_motor(on=False)
         self._told = (self.vehicle.position, self.chart.to_e7(self.vehicle.position))
         self.battery_v = config.battery_v
+        self.depth_m: float | None = None  # what its sounder tells; None: it has none, or it is silent
         self.sensors: dict[str, float] = {}  # what a script of the boat's tells, by name
         self.roll_rad = 0.0
         self.power_up(-WARM_BOOT_S if config.is_warm else 0.0)

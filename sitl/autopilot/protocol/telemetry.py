@@ -213,6 +213,24 @@ def _gps(p: Pilot) -> Any:
     )
 
 
+SOUNDER_CM = (30, 5000)  # what it reaches
+
+
+def _sounding(p: Pilot) -> Any:
+    """DISTANCE_SENSOR of a sounder that looks down, None of one that is silent."""
+    if p.core.depth_m is None:
+        return None
+    return mav.MAVLink_distance_sensor_message(
+        p.core.boot_ms,
+        *SOUNDER_CM,
+        max(0, min(SOUNDER_CM[1], round(100.0 * p.core.depth_m))),
+        mav.MAV_DISTANCE_SENSOR_ULTRASOUND,
+        1,
+        mav.MAV_SENSOR_ROTATION_PITCH_270,
+        255,
+    )
+
+
 def _gps2(p: Pilot) -> Any:
     if not p.ekf.has_second or p.core.boot_s < 9.95:
         return None
@@ -432,6 +450,7 @@ BUILDERS: dict[int, Callable[[Pilot], Any]] = {
     mav.MAVLINK_MSG_ID_VFR_HUD: _vfr_hud,
     mav.MAVLINK_MSG_ID_GPS_RAW_INT: _gps,
     mav.MAVLINK_MSG_ID_GPS2_RAW: _gps2,
+    mav.MAVLINK_MSG_ID_DISTANCE_SENSOR: _sounding,
     mav.MAVLINK_MSG_ID_SYSTEM_TIME: _system_time,
     mav.MAVLINK_MSG_ID_WIND: _wind,
     mav.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: _nav,

@@ -1,0 +1,47 @@
+"""The sounder: the water's depth and how it changes, from pings of which some are wrong.
+
+Weed, air and a fish give one ping or two that no other agrees with: the middle one of the last few is believed. A ping
+that is zero, or at the end of what the sounder reaches, tells no depth.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from statistics import median
+
+PINGS = 5  # of which the middle one is believed: two in a row may be wrong
+FRESH_S = 5.0  # older pings are of other water
+WINDOW_S = 20.0  # over which the change is told ...
+LEAST_S = 5.0  # ... once there is so much of it
+
+
+class Sounder:
+    """Pings as they come: the depth below the sounder, and its change, negative where it shoals."""
+
+    def __init__(self) -> None:
+        self._pings: deque[tuple[float, float]] = deque(maxlen=PINGS)
+        self._depths: deque[tuple[float, float]] = deque(maxlen=256)
+
+    def take(self, t_s: float, depth_m: float, least_m: float, most_m: float) -> None:
+        """Take a ping; the sounder tells depths between ``least_m`` and ``most_m``."""
+        if not (math.isfinite(depth_m) and max(0.0, least_m) < depth_m < most_m):
+            return
+        self._pings.append((t_s, depth_m))
+        depth = self.depth_m(t_s)
+        if depth is not None:
+            self._depths.append((t_s, depth))
+        while self._depths and t_s - self._depths[0][0] > WINDOW_S:
+            self._depths.popleft()
+
+    def depth_m(self, t_s: float) -> float | None:
+        """Return the depth [m], None where fewer than three pings of the last seconds tell one."""
+        fresh = [depth for at_s, depth in self._pings if t_s - at_s <= FRESH_S]
+        return median(fresh) if len(fresh) >= 3 else None
+
+    def rate_mps(self, t_s: float) -> float | None:
+        """Return how the depth changes [m/s], None while too little of it is known."""
+        if self.depth_m(t_s) is None or len(self._depths) < 2:
+            return None
+        (from_s, first_m), (to_s, last_m) = self._depths[0], self._depths[-1]
+        return None if to_s - from_s < LEAST_S else (last_m - first_m) / (to_s - from_s)

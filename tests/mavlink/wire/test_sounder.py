@@ -1,0 +1,74 @@
+"""The sounder: what several pings agree on is the depth, and what is no bottom is none."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
+from companion.mavlink.wire.assembler import VehicleAssembler
+from tests.mavlink.wire.test_codec import heard
+
+DOWN = wire.MAV_SENSOR_ROTATION_PITCH_270
+
+
+def ping(depth_m, orientation=DOWN, most_cm=5000):
+    return wire.MAVLink_distance_sensor_message(1000, 30, most_cm, round(100 * depth_m), 1, 1, orientation, 255)
+
+
+def told(pings, every_s=0.5):
+    """Return the status after pings that come so far apart; a number is a depth, None a silence."""
+    assembler = VehicleAssembler()
+    beat(assembler, 0.0)
+    for n, sounding in enumerate(pings):
+        if sounding is not None:
+            message = ping(sounding) if isinstance(sounding, int | float) else sounding
+            assembler.take(every_s * n, heard(message))
+    return assembler
+
+
+def beat(assembler, t_s):
+    assembler.take(t_s, heard(wire.MAVLink_heartbeat_message(11, 3, 65, 10, 4, 3)))
+    return assembler.status
+
+
+@pytest.mark.parametrize("spike_m", [0.4, 1.0, 45.0, 0.0, 50.0, 655.0])
+@pytest.mark.parametrize("count", [1, 2])
+def test_weed_air_and_fish_are_no_bottom(spike_m, count):
+    status = told([6.0] * 10 + [spike_m] * count + [6.0]).status
+    assert (status.sounds, status.depth_m) == (True, 6.0)
+
+
+def test_a_shoal_is_told_and_how_fast_it_comes():
+    status = told([10.0 - 0.05 * n for n in range(60)]).status
+    assert status.depth_m == pytest.approx(7.15)
+    assert status.depth_rate_mps == pytest.approx(-0.1, abs=0.01)
+
+
+def test_one_ping_is_no_depth_and_one_that_is_silent_is_forgotten():
+    assembler = told([6.0])
+    assert (assembler.status.sounds, assembler.status.depth_m) == (True, None)
+    assembler = told([6.0] * 5)
+    assert assembler.status.depth_m == 6.0
+    assert (beat(assembler, 6.0).sounds, assembler.status.depth_m) == (True, 6.0)
+    assert (beat(assembler, 8.0).sounds, assembler.status.depth_m) == (False, None)
+
+
+def test_water_that_is_deeper_than_it_reaches_is_no_loss():
+    status = told([6.0] * 5 + [50.0] * 20).status
+    assert (status.sounds, status.depth_m, status.depth_rate_mps) == (True, None, None)
+
+
+def test_one_that_looks_ahead_is_none():
+    assert told([ping(3.0, orientation=wire.MAV_SENSOR_ROTATION_NONE)] * 5).status.sounds is None
+
+
+def test_the_other_messages_of_the_same_ping_are_not_counted_twice():
+    water = wire.MAVLink_water_depth_message(0, 0, 1, 0, 0, 0.0, 0.0, 0.0, 0.0, 9.0, 0.0)
+    ranged = wire.MAVLink_rangefinder_message(4.0, 0.0)
+    assert told([water] * 5).status.depth_m == 9.0
+    assert told([ranged] * 5).status.depth_m == 4.0
+    assert told([6.0, ranged, 6.0, ranged, 6.0, ranged]).status.depth_m == 6.0
+
+
+def test_what_is_no_number_is_no_depth():
+    assert told([wire.MAVLink_rangefinder_message(math.nan, 0.0)] * 5).status.depth_m is None
