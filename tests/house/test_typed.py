@@ -39,7 +39,7 @@ NOT_RUN = {
 }
 # What a page says that is run as it stands, in one folder, and what lies there for the reader's own files.
 CHEAP = re.compile(
-    r"(companion (--version|mission (example|check|convert) |fence (check|convert) |plan |field "
+    r"(companion (--version|mission (example|check|convert) |boat trial |fence (check|convert) |plan |field "
     r"|key new |far (order|begin) |order --qgc |report |view .* --export |wind RECORD)|sitl example )"
 )
 OWN = {
