@@ -20,6 +20,7 @@ examples:
   companion field missions/field-ring.toml --goal 1 --plot ring.png
   companion field missions/field-ring.toml --wind 5@40 --fans --plot fans.png
   companion field missions/field-ring.toml --page ring.html      (turn the wind, drag the boat)
+  companion field missions/field-ring.toml --page ring.html --other avalon      (and switch to her)
 
 FILE is a mission with a goal of kind = "field", or one of [skipper] guidance = "field". The wind is steady, there
 are no vessels and no current; the boat is at the start, or where the goal before was.
@@ -43,6 +44,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         metavar="P.html",
         help="write one file for a browser: turn the wind, drag the boat; it asks for nothing",
     )
+    parser.add_argument(
+        "--other", metavar="BOAT", help="in the page: a boat to switch to, a boat file or ardurover or avalon"
+    )
     parser.set_defaults(run=run)
 
 
@@ -54,6 +58,7 @@ def run(args: argparse.Namespace) -> int:
     mission = require_sailable(load_mission(args.file))
     seen = field_preview(mission, number=args.goal, wind=args.wind)
     fan, track = heading_fan(seen), field_track(seen)
+    other = None if args.other is None else (Path(args.other).stem, _with_boat(mission, args.other))
     print("\n".join([*_words(mission, seen), *_in_the_wind(seen)]))
     end = math.dist(track[-1, 1:3], seen.place_en)
     print(
@@ -75,17 +80,33 @@ def run(args: argparse.Namespace) -> int:
             )
         print(f"{args.plot}: written")
     if args.page:
-        _write_page(args.page, mission, seen)
+        _write_page(args.page, mission, seen, other)
     return 0
 
 
-def _write_page(path: Path, mission: Mission, seen: FieldPreview) -> None:
+def _with_boat(mission: Mission, name: str) -> Mission:
+    """Return the mission, sailed by a boat of a file or of a polar's name."""
+    from dataclasses import replace
+
+    from msgspec.structs import replace as changed
+
+    from companion.compose import POLARS
+    from companion.geofence.mission import read_boat_file
+
+    if name in POLARS:
+        boat = changed(mission.boat, polar=name)
+    else:
+        boat = changed(read_boat_file(Path(name)).boat, polar=str(Path(name).absolute()))
+    return replace(mission, options=changed(mission.options, boat=boat))
+
+
+def _write_page(path: Path, mission: Mission, seen: FieldPreview, other: tuple[str, Mission] | None) -> None:
     from companion.disk import Disk, reason
     from companion.errors import InputError
     from companion.page.fields import field_page
 
     try:
-        Disk().replace(path, field_page(mission, seen, _words(mission, seen)))
+        Disk().replace(path, field_page(mission, seen, _words(mission, seen), other))
     except OSError as error:
         raise InputError("--page", str(path), f"cannot be written ({reason(error)})", "name another place") from error
     print(f"{path}: written; open it in a browser, no server is needed")

@@ -6,13 +6,16 @@ import math
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
 from companion.cli import main
 from companion.geofence import load_mission
+from companion.geofence.mission import BoatOptions
 from companion.mission_check import field_preview, heading_fan
 from companion.page.fields import field_page, page_data
 from tests.page.browsing import Window, needs_browser
@@ -161,6 +164,34 @@ def test_in_a_browser_the_wind_is_turned_and_the_boat_dragged(tmp_path):
         x, y = map(float, re.findall(r"translate\(([\d.]+) ([\d.]+)\)", here)[0])
         assert (x, y) == pytest.approx((550.0, 200.0), abs=5.0)
         done(window, out)
+
+
+@needs_browser
+def test_a_button_switches_to_the_field_of_another_boat(tmp_path):
+    out = tmp_path / "ring.html"
+    assert main(["field", "missions/field-ring.toml", "--page", str(out), "--other", "avalon"]) == 0
+    mission, seen = seen_of("ring", tmp_path)
+    other = replace(mission, options=msgspec.structs.replace(mission.options, boat=BoatOptions(polar="avalon")))
+    hers = field_preview(other, number=seen.number, wind=CASES["ring"][2])
+    with Window() as window:
+        window.open(out.as_uri())
+        data = page_data(mission, seen, [], ("avalon", other))
+        compare(window.js(ASK, {**data, "field": data["other"]["field"]}, points_of(hers).tolist()), hers)
+        mine = window.text("told")
+        window.js("document.getElementById('other').click()")
+        window.until("return document.getElementById('told').textContent !== arguments[0]", 5.0, mine)
+        fastest = max(heading_fan(hers).speeds_mps)
+        assert f"Outer ring {fastest:.1f} m/s" in window.text("told")
+        window.js("document.getElementById('other').click()")
+        window.until("return document.getElementById('told').textContent === arguments[0]", 5.0, mine)
+        done(window, out)
+
+
+def test_another_boat_that_is_not_there_is_one_line_and_no_page(tmp_path, capsys):
+    out = tmp_path / "ring.html"
+    assert main(["field", "missions/field-ring.toml", "--page", str(out), "--other", str(tmp_path / "no.toml")]) == 2
+    assert "no such file" in capsys.readouterr().err
+    assert not out.exists()
 
 
 def drag(window, name, begin, end):

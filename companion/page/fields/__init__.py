@@ -1,7 +1,8 @@
 """The page of a composed field: Schmitt's interactive picture in one file that asks for nothing.
 
-The wind is turned by a slider, the boat is dragged, and the fan of possible directions can be shown (section
-4.1.3). What is computed in the browser is what the companion computes: a test holds the two together.
+The wind is turned by a slider, the boat is dragged, the fan of possible directions can be shown, and a button switches
+to the field of another boat (section 4.1.3). What is computed in the browser is what the companion computes: a test
+holds the two together.
 """
 
 from __future__ import annotations
@@ -33,15 +34,17 @@ from companion.field.tree import (
     Weighed,
 )
 from companion.geofence import Mission
-from companion.mission_check import FieldPreview
+from companion.mission_check import FieldPreview, field_preview
 
 WINDS_MPS = [0.5 * n for n in range(2, 31)]  # what the slider stops at
 
 
-def field_page(mission: Mission, seen: FieldPreview, words: list[str]) -> bytes:
-    """Return the page of a goal's field as one HTML file."""
+def field_page(
+    mission: Mission, seen: FieldPreview, words: list[str], other: tuple[str, Mission] | None = None
+) -> bytes:
+    """Return the page of a goal's field as one HTML file; see ``page_data``."""
     web = resources.files("companion.page.fields").joinpath("web")
-    data = msgspec.json.encode(page_data(mission, seen, words)).replace(b"<", b"\\u003c").decode()
+    data = msgspec.json.encode(page_data(mission, seen, words, other)).replace(b"<", b"\\u003c").decode()
     page = web.joinpath("page.html").read_text()
     for name, text in (
         ("CALC", web.joinpath("calc.js").read_text()),
@@ -52,13 +55,11 @@ def field_page(mission: Mission, seen: FieldPreview, words: list[str]) -> bytes:
     return page.encode()
 
 
-def page_data(mission: Mission, seen: FieldPreview, words: list[str]) -> dict[str, Any]:
-    """Return what the page is made of."""
-    habits, polar = seen.conditions.habits, boat_of(mission).polar
+def page_data(
+    mission: Mission, seen: FieldPreview, words: list[str], other: tuple[str, Mission] | None = None
+) -> dict[str, Any]:
+    """Return what the page is made of; ``other`` is another boat by its name, and the same mission sailed by it."""
     tws = min(WINDS_MPS, key=lambda w: abs(w - seen.conditions.seen.tws_mps))
-    twa = [float(a) for a in polar.curve(WINDS_MPS[0])[0]]
-    speeds = [[float(v) for v in polar.curve(w)[1]] for w in WINDS_MPS]
-    look_s = max(habits.polar_mps)
     area = seen.area
     return {
         "title": f"{mission.name}, goal {seen.number}: {seen.tree.text}",
@@ -72,19 +73,31 @@ def page_data(mission: Mission, seen: FieldPreview, words: list[str]) -> dict[st
         "half": seen.half_m,
         "wind": {"twd": seen.conditions.seen.twd_from_rad or 0.0, "tws": tws},
         "marks": [_mark(name, atom) for name, atom in seen.tree.atoms if not isinstance(atom, Heading)],
-        "field": {
-            "tree": _node(seen.tree.expression),
-            "atoms": {name: _atom(atom, look_s) for name, atom in seen.tree.atoms},
-            "sails": habits.is_sailing,
-            "noGo": habits.no_go_half_rad,
-            "turnRate": habits.turn_rate_radps,
-            "tackS": habits.tack_s,
-            "lagS": max(habits.lag_s, 0.1),
-            "leeway": habits.leeway_share,
-            "winds": WINDS_MPS,
-            "twa": twa,
-            "speeds": speeds,
-        },
+        "field": _field(mission, seen),
+        "other": None if other is None else {"name": other[0], "field": _field(other[1], _sailed_by(other[1], seen))},
+    }
+
+
+def _sailed_by(mission: Mission, seen: FieldPreview) -> FieldPreview:
+    wind = seen.conditions.seen
+    return field_preview(mission, number=seen.number, wind=(wind.tws_mps, math.degrees(wind.twd_from_rad or 0.0)))
+
+
+def _field(mission: Mission, seen: FieldPreview) -> dict[str, Any]:
+    habits, polar = seen.conditions.habits, boat_of(mission).polar
+    look_s = max(habits.polar_mps)
+    return {
+        "tree": _node(seen.tree.expression),
+        "atoms": {name: _atom(atom, look_s) for name, atom in seen.tree.atoms},
+        "sails": habits.is_sailing,
+        "noGo": habits.no_go_half_rad,
+        "turnRate": habits.turn_rate_radps,
+        "tackS": habits.tack_s,
+        "lagS": max(habits.lag_s, 0.1),
+        "leeway": habits.leeway_share,
+        "winds": WINDS_MPS,
+        "twa": [float(a) for a in polar.curve(WINDS_MPS[0])[0]],
+        "speeds": [[float(v) for v in polar.curve(w)[1]] for w in WINDS_MPS],
     }
 
 

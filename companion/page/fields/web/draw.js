@@ -1,14 +1,14 @@
 "use strict";
 // The picture: arrows, fans, the band of the trajectory, the boat that is dragged, the wind that is turned.
 (() => {
-  /** @typedef {{field: Field, title: string, words: string[], solid: Vec[][], fence: Vec[][], boat: Vec, place: Vec, radius: number, centre: Vec, half: number, wind: Wind, marks: {kind: string, name: string, at: Vec, to?: Vec, radius?: number, rings?: Vec[][]}[]}} Page */
+  /** @typedef {{field: Field, other: {name: string, field: Field} | null, title: string, words: string[], solid: Vec[][], fence: Vec[][], boat: Vec, place: Vec, radius: number, centre: Vec, half: number, wind: Wind, marks: {kind: string, name: string, at: Vec, to?: Vec, radius?: number, rings?: Vec[][]}[]}} Page */
   /** @param {string} id */
   const get = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
   const page = /** @type {Page} */ (JSON.parse(get("data").textContent ?? "{}"));
-  const { field, half, centre } = page, SVG = "http://www.w3.org/2000/svg", COUNT = 23, SIZE = 1000;
+  const { half, centre } = page, SVG = "http://www.w3.org/2000/svg", COUNT = 23, SIZE = 1000;
   const chart = /** @type {SVGSVGElement} */ (/** @type {unknown} */ (get("chart"))), rose = /** @type {SVGSVGElement} */ (/** @type {unknown} */ (get("rose")));
   const input = (/** @type {string} */ id) => /** @type {HTMLInputElement} */ (get(id));
-  let wind = page.wind, boat = page.boat, q = 1;
+  let field = page.field, wind = page.wind, boat = page.boat, q = 1;
 
   /** @param {Vec} p @returns {Vec} */
   const on = (p) => [(p[0] - centre[0] + half) / (2 * half) * SIZE, (centre[1] + half - p[1]) / (2 * half) * SIZE];
@@ -125,6 +125,13 @@
   input("speed").addEventListener("input", () => { wind = { ...wind, tws: input("speed").valueAsNumber }; draw(); });
   input("fans").addEventListener("input", draw);
   get("side").addEventListener("click", () => { q = -q; draw(); });
+  const other = page.other;
+  if (other) {
+    const name = () => { get("other").textContent = field === page.field ? `Sailed by ${other.name}` : "Sailed by the mission's boat"; };
+    get("other").hidden = false;
+    get("other").addEventListener("click", () => { field = field === page.field ? other.field : page.field; name(); draw(); });
+    name();
+  }
   input("from").value = String(Math.round(wind.twd * 180 / Math.PI));
   input("speed").value = String(wind.tws);
   document.title = page.title;
