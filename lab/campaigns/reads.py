@@ -14,10 +14,10 @@ _LISTS = ("mission", "mavsdk_session")
 # Name -> the modules that read it.
 READS: Mapping[str, tuple[str, ...]] = {
     "HEARTBEAT": ("vehicle_identity", "reception", "link", "assembler", "fold", "mavsdk_session"),
-    "ATTITUDE": ("assembler", "wind"),
+    "ATTITUDE": ("assembler",),
     "GLOBAL_POSITION_INT": ("assembler",),
-    "WIND": ("assembler", "wind"),
-    "NAMED_VALUE_FLOAT": ("assembler", "link", "companion_status", "wind"),
+    "WIND": ("assembler",),
+    "NAMED_VALUE_FLOAT": ("assembler", "link", "companion_status"),
     "MISSION_CURRENT": ("assembler",),
     "MISSION_ITEM_REACHED": ("assembler", "fold"),
     "NAV_CONTROLLER_OUTPUT": ("assembler",),
@@ -27,6 +27,9 @@ READS: Mapping[str, tuple[str, ...]] = {
     "SYS_STATUS": ("assembler",),
     "SYSTEM_TIME": ("assembler",),
     "FENCE_STATUS": ("assembler",),
+    "DISTANCE_SENSOR": ("assembler",),
+    "WATER_DEPTH": ("assembler",),
+    "RANGEFINDER": ("assembler",),
     "RC_CHANNELS": ("assembler",),
     "SERVO_OUTPUT_RAW": ("assembler",),
     "STATUSTEXT": ("assembler", "command", "mavsdk_session", "mavlink_commands"),

@@ -173,6 +173,23 @@ FORGERIES: tuple[Forgery, ...] = (
         build=lambda _: wire.MAVLink_fence_status_message(1, 1, 3, 0),
     ),
     Forgery(
+        message="DISTANCE_SENSOR",
+        says="the bottom is 0.4 m below",
+        build=lambda k: wire.MAVLink_distance_sensor_message(
+            k.boot_ms, 20, 5000, 40, 2, 0, wire.MAV_SENSOR_ROTATION_PITCH_270, 0
+        ),
+    ),
+    Forgery(
+        message="WATER_DEPTH",
+        says="the bottom is 0.4 m below",
+        build=lambda k: wire.MAVLink_water_depth_message(k.boot_ms, 0, 1, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.4, 15.0),
+    ),
+    Forgery(
+        message="RANGEFINDER",
+        says="the bottom is 0.4 m below",
+        build=lambda _: wire.MAVLink_rangefinder_message(0.4, 0.0),
+    ),
+    Forgery(
         message="RC_CHANNELS",
         says="a person moves the sticks",
         build=lambda k: wire.MAVLink_rc_channels_message(

@@ -19,8 +19,9 @@ from sitl.faults import FORGERIES
 from sitl.scenario import EventSpec, Scenario
 
 FIRST_S = 0.1  # of what is so from the start
-# That of a second receiver is none of them: seeds are known by their numbers, and it came after them.
-_FORGED = tuple(forgery for forgery in FORGERIES if forgery.message != "GPS2_RAW")
+# Seeds are known by their numbers: what came after them is none of these.
+_LATER = {"GPS2_RAW", "DISTANCE_SENSOR", "WATER_DEPTH", "RANGEFINDER"}
+_FORGED = tuple(forgery for forgery in FORGERIES if forgery.message not in _LATER)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
