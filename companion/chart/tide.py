@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from companion.current.prior import MOST_ROWS, SPAN_S, table_lines
+from companion.current.prior import timed_rows
 from companion.errors import InputError
 
 MOST_M = 20.0  # the highest tides reach 17
@@ -22,29 +22,17 @@ def read_tide(text: str, source: str, times: tuple[float | None, ...]) -> tuple[
     """Return the rows of lines ``time, height_m``; ``times`` are those of its lines, None where one names no time.
 
     Raises:
-        InputError: a line is no row, times do not increase, or there are fewer than two.
+        InputError: a line is no row, or as of ``timed_rows``.
     """
     rows: list[TideRow] = []
-    for (number, line), utc_s in zip(table_lines(text), times, strict=True):
-        place = f"line {number}"
-        parts = [part.strip() for part in line.split(",")]
-        if utc_s is None:
-            raise InputError(
-                source, place, f"{parts[0][:40]!r} is no time with its zone", "write 2026-11-21T12:00:00Z, height_m"
-            )
+    for place, utc_s, cells in timed_rows(text, source, times, "height_m"):
         try:
-            (height_m,) = (float(part) for part in parts[1:])
+            (height_m,) = map(float, cells)
         except ValueError:
             raise InputError(source, place, "is not a time and one height in metres", "write time, height_m") from None
         if not -MOST_M <= height_m <= MOST_M:
             raise InputError(source, place, f"a tide of {height_m:g} m cannot be", "write metres above chart datum")
-        if rows and utc_s - rows[-1].utc_s < SPAN_S:
-            raise InputError(source, place, "is not a minute or more after the line before", "sort the table by time")
         rows.append(TideRow(utc_s=utc_s, height_m=height_m))
-        if len(rows) > MOST_ROWS:
-            raise InputError(source, place, f"has more than {MOST_ROWS} rows", "leave out what is past")
-    if len(rows) < 2:
-        raise InputError(source, "", "has fewer than two rows", "a tide table needs the times between which it holds")
     return tuple(rows)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import bisect
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from companion.errors import InputError
@@ -100,52 +101,65 @@ def _span(seconds: float) -> str:
     return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.0f} h"
 
 
-def read_table(text: str, source: str, times: tuple[float | None, ...]) -> tuple[TableRow, ...]:
-    """Return the rows of a tide table: lines of time, set [deg, towards], drift [m/s], separated by commas.
+def timed_rows(
+    text: str, source: str, times: tuple[float | None, ...], columns: str
+) -> Iterator[tuple[str, float, list[str]]]:
+    """Yield place, Unix time [s] and the other cells of each line of a table over time.
 
     Args:
         text: its content. Empty lines, lines that begin with # and one line of headings are passed over.
         source: what a complaint names.
         times: the Unix time [s] of each line that is left, None where the line names no time.
+        columns: what stands behind the time, as a complaint has it.
 
     Raises:
-        InputError: a line is no row, times do not increase, or there are fewer than two.
+        InputError: a line has no time, times do not increase, or there are fewer than two.
+    """
+    before_s: float | None = None
+    count = 0
+    for (number, line), utc_s in zip(table_lines(text), times, strict=True):
+        place = f"line {number}"
+        first, *cells = (part.strip() for part in line.split(","))
+        if utc_s is None:
+            raise InputError(
+                source, place, f"{first[:40]!r} is no time with its zone", f"write 2026-11-21T12:00:00Z, {columns}"
+            )
+        if before_s is not None and utc_s - before_s < SPAN_S:
+            raise InputError(source, place, "is not a minute or more after the line before", "sort the table by time")
+        before_s, count = utc_s, count + 1
+        if count > MOST_ROWS:
+            raise InputError(source, place, f"has more than {MOST_ROWS} rows", "leave out what is past")
+        yield place, utc_s, cells
+    if count < 2:
+        raise InputError(source, "", "has fewer than two rows", "a tide table needs the times between which it holds")
+
+
+def read_table(text: str, source: str, times: tuple[float | None, ...]) -> tuple[TableRow, ...]:
+    """Return the rows of a tide table: lines of time, set [deg, towards], drift [m/s], separated by commas.
+
+    Raises:
+        InputError: a line is no row, or as of ``timed_rows``.
 
     """
     rows: list[TableRow] = []
-    for (number, line), utc_s in zip(table_lines(text), times, strict=True):
-        place = f"line {number}"
-        parts = [part.strip() for part in line.split(",")]
-        if utc_s is None:
-            raise InputError(
-                source,
-                place,
-                f"{parts[0][:40]!r} is no time with its zone",
-                "write 2026-11-21T12:00:00Z, set_deg, drift_mps",
-            )
+    for place, utc_s, cells in timed_rows(text, source, times, "set_deg, drift_mps"):
         try:
-            set_deg, drift_mps = float(parts[1]), float(parts[2])
+            set_deg, drift_mps = float(cells[0]), float(cells[1])
         except (IndexError, ValueError):
             raise InputError(
                 source, place, "a set in degrees and a drift in m/s are missing", "write time, set_deg, drift_mps"
             ) from None
-        if len(parts) > 3 or not (0.0 <= set_deg <= 360.0 and 0.0 <= drift_mps <= MOST_MPS):
+        if len(cells) > 2 or not (0.0 <= set_deg <= 360.0 and 0.0 <= drift_mps <= MOST_MPS):
             raise InputError(
                 source,
                 place,
                 f"set {set_deg:g}, drift {drift_mps:g} cannot be",
                 f"write 0..360 degrees towards which it sets and 0..{MOST_MPS:g} m/s",
             )
-        if rows and utc_s - rows[-1].utc_s < SPAN_S:
-            raise InputError(source, place, "is not a minute or more after the line before", "sort the table by time")
         set_rad = wrap_two_pi(math.radians(set_deg))
         rows.append(
             TableRow(utc_s=utc_s, east_mps=drift_mps * math.sin(set_rad), north_mps=drift_mps * math.cos(set_rad))
         )
-        if len(rows) > MOST_ROWS:
-            raise InputError(source, place, f"has more than {MOST_ROWS} rows", "leave out what is past")
-    if len(rows) < 2:
-        raise InputError(source, "", "has fewer than two rows", "a tide table needs the times between which it holds")
     return tuple(rows)
 
 

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from companion.clock import run_virtual
-from companion.compose import UNSAID_ERROR_PERCENT, boat_of
+from companion.compose import boat_of
 from companion.geofence import load_mission
 from companion.skipper.planning.statement import Aim, Start, problem_dict
 from companion.skipper.step import SpeedSeen
@@ -46,7 +46,7 @@ def test_what_is_believed_before_fades_with_what_is_seen():
     assert rest == {k: v for k, v in stated(0.25, None).items() if not k.startswith("speed_")}
 
 
-@pytest.mark.parametrize(("said", "error"), [("", UNSAID_ERROR_PERCENT / 100.0), ("speed_error_percent = 0", 0.0)])
+@pytest.mark.parametrize(("said", "error"), [("", 0.3), ("speed_error_percent = 0", 0.0)])
 def test_a_boat_of_which_nobody_says_how_far_off_its_speeds_are_is_taken_to_be_as_others_are(tmp_path, said, error):
     path = tmp_path / "m.toml"
     path.write_text(f"[[goal]]\nlat = 50.83\nlon = -1.3\n[boat]\npolar = 2.0\n{said}\n", encoding="utf-8")
