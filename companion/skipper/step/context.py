@@ -471,8 +471,13 @@ class StepContext:
 
     @property
     def steers(self) -> bool:
-        """Whether the boat is steered by headings, a plan's or a field's (and may be)."""
-        return self.guidance is not Guidance.PLAN and self._may_guide
+        """Whether the boat is steered by headings, a plan's or a field's (and may be).
+
+        The loiter that ends a mission has no heading: it is the autopilot's.
+        """
+        if self.guidance is Guidance.PLAN or (self.guidance is Guidance.HEADING and self._is_at_safe_end):
+            return False
+        return self._may_guide
 
     @property
     def steers_plans(self) -> bool:
@@ -481,6 +486,10 @@ class StepContext:
         A goal's own field ends there: what is planned from it on is sailed as the mission says.
         """
         return self.config.guidance is not Guidance.PLAN and self._may_guide
+
+    @property
+    def _is_at_safe_end(self) -> bool:
+        return self.state.mission.route is not None and not self.ahead()
 
     @property
     def _may_guide(self) -> bool:

@@ -28,6 +28,7 @@ from companion.skipper.step.snapshot import CommandOutcome, CommandResult
 from companion.skipper.way.geometry import bearing_rad, cross_track_m
 from companion.skipper.way.voyage import Goal, Side
 from tests.skipper.test_voyage import is_done, is_sailing, make, said
+from tests.skipper.world import with_parts
 
 ANGLE = st.floats(-math.pi, math.pi)
 CHECK = settings(max_examples=100)
@@ -235,6 +236,21 @@ def test_a_closed_leg_is_followed_no_farther_than_to_the_loiter():
     assert world.run(30, lambda w: w.mode is Mode.LOITER)
     assert world.clearance() > 0.5
     assert not any(phase == "operator" for _, phase, _ in world.log)
+
+
+def test_the_loiter_that_ends_a_mission_is_sailed_by_the_autopilot():
+    """No heading leads to a loiter: in GUIDED she was left to herself for 154 s, in circles onto a rock."""
+    world = by_heading(Goal(en_m=(0.0, 300.0), radius_m=8.0), obstacles=(), wind=BEAM)
+    assert world.run(60, is_steered)
+    world.run(5)
+    last = len(world.state.mission.route.items) - 1
+    world.planner = lambda problem, seed: None
+    world.state, world.seq = with_parts(world.state, mission={"index": last, "own_index": last}), last + 1
+    since = len(world.actions)
+    assert world.run(5, lambda w: w.mode is Mode.AUTO)
+    world.run(20)
+    assert world.mode is Mode.AUTO
+    assert not any(isinstance(a, act.SteerHeading) for _, a in world.actions[since:])
 
 
 def test_a_loiter_that_is_refused_leaves_her_steered():
