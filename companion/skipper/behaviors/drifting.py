@@ -23,7 +23,7 @@ from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import ROOMIER_M
 from companion.skipper.step.state import Fix, Phase
 from companion.skipper.way import PointEn, distance_m, water_at
-from companion.skipper.way.drift import DriftAhead, drift_ahead
+from companion.skipper.way.drift import DriftAhead, drift_ahead, floor_from_m
 
 STEERAGE_MPS = 0.4  # less wind than this moves no boat that could be steered
 DRIFT_MPS = 0.15  # a slower velocity is a receiver's noise
@@ -41,7 +41,6 @@ CALL = "anchor"  # the code under which the crew is called
 CALL_S = 60.0  # between two calls to the anchor
 NEAR_S = 120.0  # the anchor is called for beside every other means when there is no more time than this
 CLEAR_S = 600.0  # what the watchdog is told where nothing is met
-HAIR_M = 0.5
 
 
 # ---------------------------------------------------------------------------------------- seen
@@ -135,10 +134,9 @@ def drift(ctx: StepContext) -> DriftAhead | None:
         return None
     if not (wind[1] < STEERAGE_MPS or _is_carried(ctx, boat, ground)):
         return None
-    # What the boat is too near to already counts when it comes nearer still.
     water = water_at(ctx.voyage.area, boat)
     here_m = float(water.clearance_m([boat])[0])
-    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m, max(0.0, here_m - HAIR_M))
+    floor_m = floor_from_m(here_m, min(ctx.config.margin_floor_m, ctx.config.margin_m))
     return drift_ahead(water, boat, ground, floor_m=floor_m)
 
 

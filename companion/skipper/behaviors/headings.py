@@ -21,7 +21,7 @@ from companion.messages import Mode, Severity
 from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.step import Phase, StepContext
 from companion.skipper.way import Gate, PointEn, Side, bearing_rad, cross_track_m, distance_m, water_at
-from companion.skipper.way.drift import DriftAhead, drift_ahead
+from companion.skipper.way.drift import DriftAhead, drift_ahead, floor_from_m
 
 DRIFT_LIMIT_RAD = math.radians(20.0)  # more is not leeway but a current or a compass error
 STEERAGE_MPS = 0.5  # slower than this the drift angle means nothing
@@ -131,7 +131,6 @@ def _is_at_buoy(gate: Gate | None, boat: PointEn) -> bool:
 REACT_S = 8.0  # a step to see it, a plan, its upload and reading back, the turn: six seconds; and two to spare
 OFF_LINE_M = 2.0  # how far the autopilot wanders off its line
 SLOW_MPS = 0.5  # slower the boat does not come far in that time
-HAIR_M = 0.5
 
 
 def ahead_of(ctx: StepContext) -> DriftAhead | None:
@@ -156,7 +155,7 @@ def ahead_of(ctx: StepContext) -> DriftAhead | None:
         water,
         boat,
         (speed * math.sin(course), speed * math.cos(course)),
-        floor_m=max(0.0, min(hull_m + OFF_LINE_M, here_m - HAIR_M)),
+        floor_m=floor_from_m(here_m, hull_m + OFF_LINE_M),
         horizon_s=min(REACT_S, left_m / speed),
     )
     return None if found.is_clear else found

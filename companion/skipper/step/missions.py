@@ -19,7 +19,9 @@ from companion.messages import Command, MissionItem, waypoint
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.route import Route
 from companion.skipper.way import PointEn, Voyage, bearing_rad, distance_m, moved
+from companion.skipper.way.drift import floor_from_m
 
+LOOKS = 41  # places looked at along a line that leads through something
 ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
 
 
@@ -75,13 +77,15 @@ def loiter_place(
 
     The first place with ``loiter_radius_m`` all round and to leeward, looked for in growing rings that a straight
     line reaches; without one, the roomiest found. A line that the wind has closed is one that the autopilot beats
-    about: it needs the room of that corridor as well. With ``wanted_m`` of room to be had within ``ROOMIER_M``, the
-    first place with that comes before the nearest that will do.
+    about: it needs the room of that corridor as well. From below the floor a line comes no nearer than it begins. With
+    ``wanted_m`` of room to be had within ``ROOMIER_M``, the first place with that comes before the nearest that will
+    do.
     """
     corridor_m = config.tack_corridor_m if config.tack_corridor_m > 0.0 else math.inf
     best, best_room = end_en, -math.inf
     will_do: tuple[PointEn, float] | None = None
     leeward = twd_from_rad + math.pi
+    floor_m = floor_from_m(float(voyage.area.clearance_m([end_en])[0]), config.margin_floor_m)
     for ring_m in RINGS_M:
         if will_do is not None and ring_m > ROOMIER_M:
             return will_do
@@ -90,8 +94,8 @@ def loiter_place(
             place = moved(end_en, 2.0 * math.pi * n / DIRECTIONS, ring_m)
             if ring_m > 0.0:
                 closed = abs(difference_rad(twd_from_rad, bearing_rad(end_en, place))) < config.no_go_half_rad
-                needed_m = config.margin_floor_m + (corridor_m if closed else 0.0)
-                if voyage.area.path_clearance_m([end_en, place]) < needed_m:
+                needed_m = floor_m + (corridor_m if closed else 0.0)
+                if _line_clearance_m(voyage, end_en, place) < needed_m:
                     continue
             down = [moved(place, leeward, s * LEEWARD_ROOM_M) for s in (0.0, 0.25, 0.5, 0.75, 1.0)]
             clearance = voyage.area.clearance_m(np.asarray(down))
@@ -104,6 +108,14 @@ def loiter_place(
             if room > best_room + 1.0:
                 best, best_room = place, room
     return will_do or (best, best_room)
+
+
+def _line_clearance_m(voyage: Voyage, from_en: PointEn, to_en: PointEn) -> float:
+    """Return the least clearance of a straight line [m], below 0 how deep inside something it leads."""
+    clear_m = voyage.area.path_clearance_m([from_en, to_en])
+    if clear_m > 0.0:
+        return clear_m
+    return float(np.min(voyage.area.clearance_m(np.linspace(from_en, to_en, LOOKS))))
 
 
 def end_item(

@@ -18,6 +18,7 @@ from companion.skipper.way.voyage import AreaLike, PointEn
 
 HORIZON_S = 300.0  # time to wake a crew, clear an anchor and let it go
 HAIR_M = 1e-6  # what rounding may make of a distance
+NEARER_M = 0.5  # what a boat that is too near already may come nearer still, for rounding and the turn away
 LOOKS = 241  # places looked at on the way; a dip between two of them still counts, at the nearest
 
 
@@ -80,23 +81,23 @@ def drift_ahead(
         here_en_m: Where the boat is.
         velocity_en_mps: Its drift over ground [m/s, east north]; 0 is allowed, a boat that lies still meets what it
             is too near to already.
-        floor_m: What to keep clear of everything [m, 0 or more].
+        floor_m: What to keep clear of everything [m]; below 0 from inside something: how deep it may lead.
         horizon_s: How far ahead to look [s, above 0].
 
     Raises:
-        ValueError: when the floor or the horizon is out of range.
+        ValueError: when the floor is not a number, or the horizon is out of range.
 
     """
-    if not (floor_m >= 0.0 and horizon_s > 0.0):
-        raise ValueError(f"floor {floor_m} m must be 0 or more, horizon {horizon_s} s above 0")
+    if not (math.isfinite(floor_m) and horizon_s > 0.0):
+        raise ValueError(f"floor {floor_m} m must be finite, horizon {horizon_s} s above 0")
     end = (here_en_m[0] + horizon_s * velocity_en_mps[0], here_en_m[1] + horizon_s * velocity_en_mps[1])
     path_m = area.path_clearance_m([here_en_m, end])
-    if path_m > floor_m + HAIR_M:  # no place on the way is nearer than the way: there is nothing to look at
+    if floor_m >= 0.0 and path_m > floor_m + HAIR_M:  # no place on it is nearer
         return DriftAhead(velocity_en_mps=velocity_en_mps, end_en_m=end, clearance_m=path_m)
     t_s = np.linspace(0.0, horizon_s, LOOKS)
     places = np.asarray(here_en_m) + t_s[:, None] * np.asarray(velocity_en_mps)
     clear_m = area.clearance_m(places)
-    least_m = min(path_m, float(clear_m.min()))
+    least_m = float(clear_m.min()) if floor_m < 0.0 else min(path_m, float(clear_m.min()))
     if least_m > floor_m:
         return DriftAhead(velocity_en_mps=velocity_en_mps, end_en_m=end, clearance_m=least_m)
     floor_s = _first_s(t_s, clear_m, floor_m)
@@ -110,6 +111,15 @@ def drift_ahead(
         at_en_m=at,
         name=area.nearest_name(places[int(np.argmin(clear_m))]),
     )
+
+
+def floor_from_m(here_m: float, floor_m: float) -> float:
+    """Return the floor that a way keeps from a place ``here_m`` clear: from below the floor it comes no nearer.
+
+    >>> floor_from_m(9.0, 6.0), floor_from_m(3.0, 6.0), floor_from_m(0.2, 6.0), floor_from_m(-4.0, 6.0)
+    (6.0, 2.5, 0.0, -4.5)
+    """
+    return min(floor_m, here_m - NEARER_M if here_m <= 0.0 else max(0.0, here_m - NEARER_M))
 
 
 def floor_after_s(

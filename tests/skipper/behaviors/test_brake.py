@@ -8,6 +8,7 @@ import shapely
 
 from companion.messages import Mode
 from companion.planner import plan
+from companion.skipper.behaviors.headings import ahead_of
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.step import actions as act
@@ -16,7 +17,7 @@ from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.way.voyage import Goal
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import FAST, is_done, is_sailing, make, nothing, said
-from tests.skipper.world import World, skipper, voyage
+from tests.skipper.world import World, skipper, voyage, with_parts
 
 ISLAND = shapely.box(-60.0, 100.0, 60.0, 130.0)
 GOAL = Goal(en_m=(0.0, 300.0), radius_m=8.0)
@@ -54,6 +55,26 @@ def test_farther_away_a_plan_is_enough():
     assert not said(world, "too near")
     assert world.run(900, is_done)
     assert world.clearance() > 0.0
+
+
+@pytest.mark.parametrize(("towards", "is_braked"), [(1.0, False), (-1.0, True)])
+def test_inside_of_what_is_drawn_the_way_out_is_not_braked(towards, is_braked):
+    """A shore that was drawn too wide, or a position put right: LOITER was asked for whenever a plan led out."""
+    world = make(GOAL, obstacles=(ISLAND,), wind=BEAM)
+    assert world.run(60, is_sailing)
+    world.position, world.speed = (0.0, 126.0), 2.0  # 4 m inside
+    ctx = turn_of(world)
+    route = ctx.state.mission.route
+    ends = ((0.0, 128.0 + 60.0 * towards), *route.points_en_m[-1:])
+    route = replace(
+        route,
+        items=(route.items[0], route.items[-1]),
+        points_en_m=ends,
+        leg_from_en_m=(ends[0], ends[0]),
+        gate_of=(0, -1),
+    )
+    ctx.state = with_parts(ctx.state, mission={"route": route, "index": 0})
+    assert (ahead_of(ctx) is not None) is is_braked
 
 
 def test_without_permission_the_plan_is_all_there_is():

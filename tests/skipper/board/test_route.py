@@ -105,6 +105,17 @@ def test_the_loiter_has_room_all_round_and_to_leeward():
     assert there == (0.0, 100.0)
 
 
+def test_from_below_the_floor_a_loiter_is_found_away_from_what_is_near():
+    """Every line begins below the floor there: none kept it, and she loitered where she was, 2 m off a wall."""
+    made = voyage(obstacles=(box(-500, 102, 500, 140),))
+    place, room = loiter_place(made, CONFIG, (0.0, 100.0), math.pi)
+    assert room >= CONFIG.loiter_radius_m
+    assert place[1] < 90.0
+    inside, room = loiter_place(made, CONFIG, (0.0, 103.0), math.pi)
+    assert room >= CONFIG.loiter_radius_m
+    assert inside[1] < 90.0
+
+
 def test_a_roomier_place_is_taken_where_there_is_one_near_by():
     near_a_rock = voyage(obstacles=(box(-10, 116, 10, 130),))
     spot, _ = loiter_place(near_a_rock, CONFIG, (0.0, 100.0), 0.0)

@@ -7,7 +7,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.skipper.way.drift import HORIZON_S, drift_ahead, floor_after_s
+from companion.skipper.way.drift import HORIZON_S, drift_ahead, floor_after_s, floor_from_m
 from tests.skipper.world import area
 
 ROCK = shapely.box(100.0, -20.0, 140.0, 20.0)
@@ -71,6 +71,14 @@ def test_a_point_too_thin_for_the_looks_is_met_all_the_same():
     assert ahead.contact_s == pytest.approx(100.0 / 3.0, abs=1.0)
 
 
+@pytest.mark.parametrize(("north_mps", "is_clear"), [(0.5, True), (-0.5, False)])
+def test_from_inside_something_only_what_leads_deeper_is_met(north_mps, is_clear):
+    shore = area(shapely.box(-100.0, -100.0, 100.0, 4.0))
+    floor_m = floor_from_m(-4.0, 6.0)
+    ahead = drift_ahead(shore, (0.0, 0.0), (0.0, north_mps), floor_m=floor_m, horizon_s=60.0)
+    assert ahead.is_clear is is_clear
+
+
 @settings(max_examples=60)
 @given(st.floats(-math.pi, math.pi), st.floats(0.05, 2.0), st.floats(0.0, 15.0))
 def test_before_it_is_said_to_come_near_it_is_not_near(set_rad, speed, floor_m):
@@ -81,7 +89,7 @@ def test_before_it_is_said_to_come_near_it_is_not_near(set_rad, speed, floor_m):
     assert water.path_clearance_m([(20.0, 5.0), there]) >= floor_m - 0.1
 
 
-@pytest.mark.parametrize(("floor_m", "horizon_s"), [(-1.0, 300.0), (math.nan, 300.0), (5.0, 0.0)])
+@pytest.mark.parametrize(("floor_m", "horizon_s"), [(-math.inf, 300.0), (math.nan, 300.0), (5.0, 0.0)])
 def test_what_is_out_of_range_is_refused(floor_m, horizon_s):
     with pytest.raises(ValueError, match="floor"):
         drift_ahead(area(ROCK), (0.0, 0.0), (0.5, 0.0), floor_m=floor_m, horizon_s=horizon_s)
