@@ -55,15 +55,7 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
             return
         not_found(ctx, pending, reason)
         return
-    ctx.set(
-        plans=changed(
-            ctx.state.plans,
-            unanswered=0,
-            effort=min(1.0, MORE * ctx.state.plans.effort),
-            rung=0,
-            retry=ctx.failed(ctx.state.plans.retry) if pending.rung > 0 else Retry(),
-        )
-    )
+    ctx.set(plans=changed(ctx.state.plans, unanswered=0, effort=min(1.0, MORE * ctx.state.plans.effort), rung=0))
     keep, set_current = _place(ctx, pending)
     if keep is None:
         ctx.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
@@ -79,11 +71,12 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
         )
     ):
         return  # no plan from that waypoint takes its tack away
-    if _keep_old(ctx, pending, plan):
-        return
-    refused = put_in_place(ctx, pending, plan, keep, set_current)
+    refused = "" if _keep_old(ctx, pending, plan) else put_in_place(ctx, pending, plan, keep, set_current)
     if refused:
         not_found(ctx, pending, refused)
+        return
+    patience = ctx.failed(ctx.state.plans.retry) if pending.rung > 0 else Retry()
+    ctx.set(plans=changed(ctx.state.plans, retry=patience))
 
 
 def _note_latency(ctx: StepContext, pending: PendingPlan, outcome: PlanOutcome) -> None:
@@ -225,6 +218,10 @@ def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, 
     if pending.lead_in and ctx.boat_en is not None:
         start = ctx.boat_en
     expected_m = plan.expected_clearance_m
+    if pending.lead_in and ctx.snapshot.vehicle is not None:  # the plan's own begins where she is led to
+        heading_rad = ctx.snapshot.vehicle.heading_rad
+        seen = of_way(pending.problem, [start, *points], heading_rad=heading_rad, before_en=None)
+        expected_m = seen.clearance_m if math.isfinite(seen.clearance_m) else None
     if tacks_fail(ctx):
         # Tacks have failed: turn the other way round where there is room.
         points = list(_gybed_round(ctx, pending, start, points))

@@ -176,11 +176,12 @@ def _over_limit(problem: Problem, legs: Sequence[Leg]) -> float:
 # rules:
 #
 # 1. **Not below the floor.** The hull keeps the margin's floor all along the predicted track. From a place that is
-# below    it already, the way comes no nearer to anything solid than the boat is, or than the way on board would
-# bring it. 2. **Not less than what is on board**: not a smaller margin or delta_s, not tacks whose failure is
-# likelier to end in a    contact, not a risk above the mission's limit and above that of the way on board. Unless
-# what is on board is closed:    it leads elsewhere, meets a vessel, does not keep the floor within the prediction's
-# own error, or the wind of now or    the forecast's has shut it.
+#    below it already, the way comes no nearer to anything solid than the boat is, or than the way on board would
+#    bring it.
+# 2. **Not less than what is on board**: not a smaller margin or delta_s, not tacks whose failure is likelier to end in
+#    a contact, not a risk above the mission's limit and above that of the way on board. Unless what is on board is
+#    closed: it leads elsewhere, meets a vessel, does not keep the floor within the prediction's own error, or the wind
+#    of now or the forecast's has shut it.
 
 
 def refusal(ctx: StepContext, route: Route, set_current: int | None, pending: PendingPlan) -> str:

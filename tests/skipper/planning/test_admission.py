@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -89,6 +90,21 @@ def test_nothing_below_the_floor_goes_on_board_from_a_place_that_is_not():
     assert any(isinstance(a, RequestPlan) for a in actions)
 
 
+def test_plans_that_are_refused_on_one_ladder_are_one_failure():
+    """Each of five was counted, and the next plan was asked for 160 s later, beside a rock."""
+    ctx = turn_of(sailing(way=((-20.0, 100.0), GOAL)))
+    offered(ctx, [(-9.0, 100.0), GOAL])
+    for _ in range(20):
+        pending = ctx.state.pending.plan
+        if pending is None:
+            break
+        found = plan(pending.problem, expansions=4000)
+        points = np.asarray([pending.problem.start_en, (-9.0, 100.0), GOAL])
+        take_plan(ctx, PlanOutcome(request_id=pending.request_id, plan=replace(found, waypoints_en=points, cost_s=1.0)))
+    assert [a for a in ctx.actions if isinstance(a, Announce) and a.code == "no plan at all"]
+    assert ctx.state.plans.retry.failures == 1
+
+
 @pytest.mark.parametrize(("way", "is_open"), [(((12.0, 100.0), GOAL), True), (((-20.0, 100.0), GOAL), False)])
 def test_a_smaller_margin_goes_on_board_only_where_what_is_there_is_closed(way, is_open):
     ctx = turn_of(sailing(way=way))
@@ -133,6 +149,21 @@ def test_from_below_the_floor_only_what_comes_no_nearer_goes_on_board():
 
     assert refused((20.0, 120.0)) == ""
     assert "the boat is" in refused((-14.0, 115.0))
+
+
+def test_a_plan_from_a_place_that_she_is_led_to_tells_the_clearance_of_the_way_there_too():
+    """ "Passes -7.1 m clear or more": the planner's figure begins where she is led to, on another heading."""
+    world = sailing()
+    world.position, world.state = (-7.0, 100.0), with_parts(world.state, position={"last_seen": None})
+    ctx = turn_of(world)
+    assert request(ctx, ReplanReason.OFF_LEG)
+    pending = ctx.state.pending.plan
+    assert pending.lead_in
+    found = replace(plan(pending.problem, expansions=4000), expected_clearance_m=-7.1)
+    take_plan(ctx, PlanOutcome(request_id=pending.request_id, plan=found))
+    [told] = uploads(ctx.actions)
+    passes_m = float(re.search(r"passes (-?[\d.]+) m clear", told.text)[1])
+    assert 0.0 < passes_m <= 3.0
 
 
 @pytest.mark.parametrize(("mode", "is_admitted"), [(Mode.AUTO, True), (Mode.LOITER, False)])
