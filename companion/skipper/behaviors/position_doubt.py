@@ -342,7 +342,8 @@ def _is_point_shut(ctx: StepContext) -> bool:
 def _begin_anew(ctx: StepContext) -> None:
     """Begin a LOITER anew whose point is not to be made for: HOLD, then LOITER, then it is over.
 
-    A position that is believed is planned from meanwhile: with a plan on its way HOLD is left for that.
+    A position that is believed is planned from meanwhile: with a plan on its way HOLD is left for that, unless the boat
+    runs on onto something before the plan is on board.
     """
     status, state = ctx.autopilot, ctx.state
     shown = None if status is None else status.mode
@@ -353,7 +354,9 @@ def _begin_anew(ctx: StepContext) -> None:
             return
         set_mode(ctx, Mode.HOLD, f"{POINT_SHUT}: loitering anew")
     elif shown is Mode.LOITER or (
-        state.position.doubt is None and (state.pending.plan is not None or state.pending.upload is not None)
+        state.position.doubt is None
+        and (state.pending.plan is not None or state.pending.upload is not None)
+        and not _is_run_on_shut(ctx)
     ):
         ctx.set(position=changed(ctx.state.position, anew=None))
     elif set_mode(ctx, Mode.LOITER, "loitering anew where she is"):
@@ -362,12 +365,26 @@ def _begin_anew(ctx: StepContext) -> None:
 
 def _turns_away(ctx: StepContext) -> bool:
     """Return whether LOITER is turning the boat away from something that it would run onto in HOLD."""
-    status, vehicle, place = ctx.autopilot, ctx.snapshot.vehicle, ctx.reckoned_en
-    if status is None or vehicle is None or place is None or status.target_bearing_rad is None:
+    status, place = ctx.autopilot, ctx.reckoned_en
+    if status is None or place is None or status.target_bearing_rad is None or not _is_run_on_shut(ctx):
         return False
-    area, run_m = ctx.voyage.area, RUNS_S * vehicle.speed_mps
-    runs_on = moved(place, heading_of(*vehicle.velocity_en_mps), run_m)
-    on_m = area.path_clearance_m([place, runs_on])
-    if on_m >= min(ctx.voyage.boat.hull.reach_m + BESIDE_HULL_M, float(area.clearance_m([place])[0])):
+    return _run_m(ctx, place, status.target_bearing_rad) > _run_m(ctx, place, _course_rad(ctx))
+
+
+def _is_run_on_shut(ctx: StepContext) -> bool:
+    """Return whether the boat, its sails eased, would run on onto something."""
+    place = ctx.reckoned_en
+    if place is None or ctx.snapshot.vehicle is None:
         return False
-    return area.path_clearance_m([place, moved(place, status.target_bearing_rad, run_m)]) > on_m
+    near_m = min(ctx.voyage.boat.hull.reach_m + BESIDE_HULL_M, float(ctx.voyage.area.clearance_m([place])[0]))
+    return _run_m(ctx, place, _course_rad(ctx)) < near_m
+
+
+def _course_rad(ctx: StepContext) -> float:
+    return 0.0 if ctx.snapshot.vehicle is None else heading_of(*ctx.snapshot.vehicle.velocity_en_mps)
+
+
+def _run_m(ctx: StepContext, place: PointEn, course_rad: float) -> float:
+    """Return how clear the water is that the boat runs on through on a course [m]."""
+    speed_mps = 0.0 if ctx.snapshot.vehicle is None else ctx.snapshot.vehicle.speed_mps
+    return ctx.voyage.area.path_clearance_m([place, moved(place, course_rad, RUNS_S * speed_mps)])

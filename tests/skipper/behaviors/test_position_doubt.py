@@ -196,6 +196,26 @@ def test_before_a_loiter_is_begun_anew_hold_waits_until_loiter_has_turned_her_aw
     assert [a.mode for a in asked(world, since)] == [Mode.HOLD, Mode.LOITER]
 
 
+def test_a_loiter_is_begun_anew_at_once_where_hold_runs_on_onto_something():
+    """A plan is asked for meanwhile, and takes the seconds that there are: she ran on in HOLD and touched."""
+    world = on_land()
+    world.run(10)
+    since = len(world.actions)
+    rock = min(world.skipper.voyage.area.polygons, key=lambda p: p.distance(shapely.Point(world.position)))
+    near = shapely.ops.nearest_points(rock, shapely.Point(world.position))[0]
+    onto, away_m = bearing_rad(world.position, (near.x, near.y)), distance_m(world.position, (near.x, near.y))
+    world.shown = {"waypoint_distance_m": away_m + 60.0, "target_bearing_rad": onto}
+    world.plan_s = 8.0
+    world.position_offset = (0.0, 0.0)  # it is where she is again, and the loiter's point is not
+    for _ in range(5):
+        world.heading, world.speed = onto, away_m / 6.0
+        world.position = moved((near.x, near.y), onto + math.pi, away_m)
+        world.step()
+    assert any(isinstance(a, act.RequestPlan) for _, a in world.actions[since:])
+    modes = [a.mode for a in asked(world, since) if isinstance(a, act.SetMode)]
+    assert modes[:2] == [Mode.HOLD, Mode.LOITER]
+
+
 def test_a_start_in_the_middle_of_an_island_is_none():
     world = make(obstacles=(shapely.box(-100.0, 100.0, 100.0, 300.0),))
     world.position = (-5.0, 200.0)
