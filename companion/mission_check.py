@@ -50,7 +50,7 @@ from companion.field.tree import (
     zone_of,
 )
 from companion.field.values import Clearance, GuidanceSettings, GuidanceState, Intent, Situation
-from companion.geo.angles import difference_rad, wrap_pi
+from companion.geo.angles import difference_rad, direction, heading_of, wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence import Code, Finding, FindingLevel, LocalArea, Mission
 from companion.geofence.check import AreaConditions, check_area
@@ -87,7 +87,7 @@ def current_words_of(mission: Mission, unix_s: float) -> tuple[str, ...]:
     if not prior.rows:
         lines = [
             (
-                f"current: sets {math.degrees(math.atan2(prior.east_mps, prior.north_mps)) % 360.0:03.0f}° "
+                f"current: sets {direction(heading_of(prior.east_mps, prior.north_mps))}° "
                 f"{strongest:.2f} m/s, give or take {prior.sigma_mps:.2f} m/s"
             )
         ]
@@ -106,7 +106,8 @@ def current_words_of(mission: Mission, unix_s: float) -> tuple[str, ...]:
     if not _holds(mission, prior):
         tws_mps = mission.wind.preview_speed_mps
         lines.append(
-            f"current: in {tws_mps:g} m/s of wind from {mission.wind.preview_from_deg:03.0f}° she cannot make "
+            f"current: in {tws_mps:g} m/s of wind "
+            f"from {direction(math.radians(mission.wind.preview_from_deg))}° she cannot make "
             f"way against {strongest:.2f} m/s in every direction"
         )
     return tuple(lines)

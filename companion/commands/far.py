@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from companion.commands.output import force_option, refuse_existing, write_files
 from companion.errors import InputError, JobError, unreadable
+from companion.geo.angles import direction
 from companion.program.arguments import add_command, duration, system_id, whole
 
 if TYPE_CHECKING:
@@ -269,7 +270,8 @@ def lines_of(status: FarStatus, unix_s: float) -> list[str]:
     place = "-" if s.position is None else f"{s.position.lat_deg:.5f} {s.position.lon_deg:.5f}"
     standing = "" if s.standing is None else f"; under the order {s.standing}"
     goal = f"goal {_figure(s.goal)} of {_figure(s.goals)}, {_figure(s.goal_m)} m to it"
-    wind = f"wind from {_degrees(s.twd_from_rad, '03.0f')} ± {_degrees(s.twd_sigma_rad, '.0f')} deg, "
+    twd = "-" if s.twd_from_rad is None else direction(s.twd_from_rad)
+    wind = f"wind from {twd} ± {_degrees(s.twd_sigma_rad, '.0f')} deg, "
     safe = None if s.promised_risk is None else 1.0 - s.promised_risk
     plan = f"plan {_figure(s.plan_age_s, '.0f', 1.0 / 60.0)} min old, outside no-go {_figure(safe, '.2f')}"
     vessels = f"; vessels: {s.alarm}, CPA {_figure(s.cpa_m)} m" if s.alarm else ""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.commands.output import patience
+from companion.geo.angles import direction
 from companion.program.arguments import add_command, out_file, picture, whole, wind
 
 if TYPE_CHECKING:
@@ -164,4 +165,4 @@ def _in_the_wind(seen: FieldPreview) -> list[str]:
 
 
 def _heading(heading_rad: float) -> str:
-    return f"{math.degrees(heading_rad) % 360.0:03.0f}°"
+    return f"{direction(heading_rad)}°"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from companion.commands.output import patience
 from companion.errors import InputError
+from companion.geo.angles import direction
 from companion.planner.courses import courses
 from companion.planner.problem import evaluate
 from companion.planners import ALGORITHMS
@@ -231,11 +232,11 @@ def _current_text(problem: Problem) -> list[str]:
     drift_mps = problem.current.drift_mps
     if drift_mps == 0.0:
         return []
-    set_deg, from_deg = math.degrees(problem.current.set_rad), math.degrees(problem.wind.twd_from_rad) % 360.0
     return [
         (
-            f"current: sets {set_deg:03.0f}° {drift_mps:.2f} m/s; headings and angles are through the water, the wind "
-            f"over it is from {from_deg:03.0f}°"
+            f"current: sets {direction(problem.current.set_rad)}° {drift_mps:.2f} m/s; "
+            "headings and angles are through the water, the wind "
+            f"over it is from {direction(problem.wind.twd_from_rad)}°"
         )
     ]
 

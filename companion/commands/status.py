@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from companion.geo.angles import direction
 from companion.program.arguments import number, system_id
 from companion.words import counted
 
@@ -232,7 +233,8 @@ def traffic_line(seen: dict[str, Any]) -> str:
     if worst is not None:
         when = "opening" if worst["tcpa_s"] is None else f"in {worst['tcpa_s']:.0f} s"
         parts.append(
-            f"{worst['name']}: {worst['alarm'].upper()}, {worst['range_m']:.0f} m at {worst['bearing_deg']:03.0f}°, "
+            f"{worst['name']}: {worst['alarm'].upper()}, {worst['range_m']:.0f} m "
+            f"at {direction(math.radians(worst['bearing_deg']))}°, "
             f"CPA {worst['cpa_m']:.0f} m {when}, {worst['role']} (rule {worst['rule']})"
         )
     if seen["promised_risk"]:
@@ -269,6 +271,9 @@ def _write_text(d: dict[str, Any], units: str) -> None:
     def show(value: float | None, form: str = ".0f", scale: float = 1.0) -> str:
         return "-" if value is None else format(value * scale, form)
 
+    def toward(angle_deg: float | None) -> str:
+        return "-" if angle_deg is None else direction(math.radians(angle_deg))
+
     w, wind, plan, goal, pilot = d["waypoint"], d["wind"], d["plan"], d["goal"], d["autopilot"]
     state = d["state"].upper() or "state not heard yet"
     helm = (
@@ -285,15 +290,14 @@ def _write_text(d: dict[str, Any], units: str) -> None:
         f"  ({(goal['index'] or 0) + 1} of {show(goal['count'])})"
     )
     print(
-        f"  TWD {show(wind['twd_deg'], '03.0f')}±{show(wind['sigma_deg'])}°"
+        f"  TWD {toward(wind['twd_deg'])}±{show(wind['sigma_deg'])}°"
         f"  TWS {show(wind['tws_mps'], '.1f', factor)} {unit}  (age {show(wind['age_s'], '.1f')} s)"
         f" | outside no-go {show(safe, '.2f')}  clearance {show(plan['clearance_m'])} m"
         f"  plan #{show(plan['id'])} {show(plan['plan_age_s'])} s old, {replans}"
     )
     if d["current"] is not None:
         print(
-            f"  current sets {show(d['current']['set_deg'], '03.0f')}°"
-            f" {show(d['current']['drift_mps'], '.2f', factor)} {unit}"
+            f"  current sets {toward(d['current']['set_deg'])}° {show(d['current']['drift_mps'], '.2f', factor)} {unit}"
         )
     if d["slow_computer"] is not None:
         print(f"  slow computer: nine plans of ten within {show(d['slow_computer']['plan_answer_s'])} s")

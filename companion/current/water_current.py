@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.geo.angles import heading_of, wrap_two_pi
+from companion.geo.angles import direction, heading_of, wrap_two_pi
 from companion.messages import WindForecast
 
 # A weaker one turns the heading of a boat of 2 m/s by less than 3 degrees: less than it wanders about its line.
@@ -97,10 +97,7 @@ class WaterCurrent:
         remarks = [self.verdict] if self.verdict else []
         if self.samples_s > 0.0 and self.headings_rad < BOTH_RAD:
             remarks.append("told on one heading, where a polar's error or leeway looks the same")
-        text = (
-            f"current {math.degrees(self.set_rad):03.0f}° {self.drift_mps:.2f} m/s, "
-            f"give or take {self.sigma_mps:.2f} m/s"
-        )
+        text = f"current {direction(self.set_rad)}° {self.drift_mps:.2f} m/s, give or take {self.sigma_mps:.2f} m/s"
         return f"{text} ({'; '.join(remarks)})" if remarks else text
 
 

@@ -39,6 +39,15 @@ def wrap_two_pi(angle_rad: float) -> float:
     return wrapped if wrapped < TWO_PI else 0.0
 
 
+def direction(angle_rad: float) -> str:
+    """Return a direction in degrees, in three digits.
+
+    >>> direction(math.radians(7.2)), direction(math.radians(-90.0)), direction(math.radians(359.6))
+    ('007', '270', '000')
+    """
+    return f"{round(math.degrees(angle_rad)) % 360:03d}"
+
+
 def difference_rad(a_rad: float, b_rad: float) -> float:
     """Return a - b the shorter way round, on [-π, π); positive when a is clockwise of b.
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from companion.field.projection import HysteresisRing, HysteresisZone
 from companion.field.tree import LEAST, Along, AwayFrom, AwayFromLine, OutOf, PointTo, Round, StayAt
+from companion.geo.angles import direction
 from companion.mission_check import FieldPreview, HeadingFan
 from companion.plots.chart import save, scale_bar
 from companion.plots.mission import draw_area, outline
@@ -275,16 +276,11 @@ def _draw_rose(rose: Axes, seen: FieldPreview, fan: HeadingFan) -> None:
             xytext=(0.0, 0.0),
             arrowprops={"arrowstyle": "-|>", "lw": 1.8, "color": colour, "ls": style},
         )
-    wind = (
-        "no wind needed"
-        if twd is None
-        else (f"wind {seen.conditions.seen.tws_mps:g} m/s from {math.degrees(twd) % 360.0:03.0f}°")
-    )
+    wind = "no wind needed" if twd is None else (f"wind {seen.conditions.seen.tws_mps:g} m/s from {direction(twd)}°")
     for knot in (0.5, 1.0):
         rose.add_patch(Disc((0.0, 0.0), knot, fc="none", ec=GREY, lw=0.6, ls=":"))
     told = ", ".join(
-        f"{word} {math.degrees(angle) % 360.0:03.0f}°"
-        for word, angle in (("wanted", fan.wanted_rad), ("steered", fan.chosen_rad))
+        f"{word} {direction(angle)}°" for word, angle in (("wanted", fan.wanted_rad), ("steered", fan.chosen_rad))
     )
     rose.set_title(f"the boat's fan, {wind}\nouter ring {fastest:.1f} m/s; {told}", fontsize=9)
 

@@ -24,7 +24,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.errors import InputError
-from companion.geo.angles import difference_rad, heading_of, unit_en
+from companion.geo.angles import difference_rad, direction, heading_of, unit_en
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, LocalArea, Mission, ZoneKind
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
@@ -383,7 +383,7 @@ def _finish(
         axes.text(
             cx,
             cy - 0.075,
-            f"from {math.degrees(twd_from_rad) % 360.0:03.0f}°{speed}",
+            f"from {direction(twd_from_rad)}°{speed}",
             transform=axes.transAxes,
             ha="center",
             va="top",

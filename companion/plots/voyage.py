@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from companion.geo.angles import direction
 from companion.plots.chart import date_words, legend_above, legend_below, place_words, save, scale_bar
 from companion.plots.mission import TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
 from companion.telemetry.folder import RecordedChart, RecordedPlan, VoyageRecord
@@ -233,7 +234,7 @@ def _wind_arrow(axes: Any, c: dict[str, NDArray[np.float64]]) -> None:
     axes.text(
         x,
         y - 0.075,
-        f"mean wind\n{math.degrees(mean) % 360.0:03.0f}°",
+        f"mean wind\n{direction(mean)}°",
         transform=axes.transAxes,
         color=WIND_BLUE,
         ha="center",

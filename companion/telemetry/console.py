@@ -24,7 +24,7 @@ from typing import Protocol, Self, TextIO
 
 from companion.figures import figure_values, in_words
 from companion.fold import Step
-from companion.geo.angles import wrap_two_pi
+from companion.geo.angles import direction
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.program import control
 from companion.skipper.planning import next_tack
@@ -272,8 +272,9 @@ def progress_text(step: Step) -> str:
         parts.append(f"wp {state.mission.index + 1}/{len(route.items)}{at}")
     if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
         sigma_rad = sigma_ahead_rad(snapshot) or 0.0
-        twd_deg = math.degrees(wrap_two_pi(wind.mean_twd_from_rad))
-        parts.append(f"wind {twd_deg:03.0f}±{math.degrees(sigma_rad):.0f}° {wind.mean_tws_mps:.1f} m/s")
+        parts.append(
+            f"wind {direction(wind.mean_twd_from_rad)}±{math.degrees(sigma_rad):.0f}° {wind.mean_tws_mps:.1f} m/s"
+        )
     if snapshot.vehicle is not None:
         parts.append(f"{snapshot.vehicle.speed_mps:.1f} m/s")
     if under_way:

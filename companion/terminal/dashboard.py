@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 
 from companion.figures import BY_NAME
 from companion.geo import MPS_PER_KNOT
-from companion.geo.angles import wrap_pi, wrap_two_pi
+from companion.geo.angles import direction, wrap_pi, wrap_two_pi
 from companion.terminal.keys import KEYS, KeyCommands, shown
 from companion.terminal.screen import Frame, Style
 from companion.view import Event, FigureView, View
@@ -51,7 +51,7 @@ def direction_text(angle_deg: float | None) -> str:
     >>> direction_text(7.2), direction_text(359.8)
     ('007°', '000°')
     """
-    return "-" if angle_deg is None else f"{round(angle_deg) % 360:03d}°"
+    return "-" if angle_deg is None else f"{direction(math.radians(angle_deg))}°"
 
 
 def side_text(angle_deg: float | None) -> str:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from companion.geo.angles import difference_rad, wrap_pi
+from companion.geo.angles import difference_rad, direction, wrap_pi
 from companion.traffic.approach import Alarm, AlarmLimits, ClosestApproach, OwnShip, alarm_of, cpa
 from companion.traffic.predict import MotionUncertainty, motion_of
 from companion.traffic.targets import TrafficPicture
@@ -195,7 +195,7 @@ class Assessment:
         kind = self.alarm.name.lower() if self.alarm is not Alarm.NONE else "clear"
         when = f"in {a.time_s:.0f} s" if a.is_closing else "opening"
         return (
-            f"{self.vessel.label}: {kind}, {a.now_m:.0f} m at {math.degrees(a.bearing_rad):03.0f}°, "
+            f"{self.vessel.label}: {kind}, {a.now_m:.0f} m at {direction(a.bearing_rad)}°, "
             f"CPA {a.distance_m:.0f} m {when}, "
             f"{self.encounter.role.value} (rule {self.encounter.rule.value}: {self.encounter.reason}), "
             f"report {self.age_s:.0f} s old"

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from companion.fold import Step
+from companion.geo.angles import direction
 from companion.messages import Severity
 from companion.orders import Order
 from companion.planner import Plan
@@ -23,7 +24,7 @@ from companion.skipper.step import (
     UploadResult,
 )
 from companion.view.parts import level_of
-from companion.view.values import Level, compass
+from companion.view.values import Level
 from companion.words import counted
 
 LOUD = Severity.INFO
@@ -112,7 +113,7 @@ def happenings(step: Step, phase: str, why: dict[int, str]) -> Iterable[Happenin
 def _facts(action: RequestPlan) -> Facts:
     problem = action.problem
     facts = [
-        ("wind", f"{compass(problem.wind.twd_from_rad):03.0f}° {problem.wind.tws_mps:.1f} m/s"),
+        ("wind", f"{direction(problem.wind.twd_from_rad)}° {problem.wind.tws_mps:.1f} m/s"),
         ("no-go half angle now", f"{math.degrees(problem.no_go_half_rad(0.0)):.0f}°"),
         ("in 1 min", f"{math.degrees(problem.no_go_half_rad(60.0)):.0f}°"),
         ("in 5 min", f"{math.degrees(problem.no_go_half_rad(300.0)):.0f}°"),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.frozen import changed
-from companion.geo.angles import wrap_two_pi
+from companion.geo.angles import direction, heading_of
 from companion.messages import Mode, Severity
 from companion.safety import BY_NAME, CAUSES, HOMEWARD, PERSON, TABLE, Response, Watchdog
 from companion.skipper.behaviors.drifting import STEERAGE_MPS, is_driven_astern
@@ -181,8 +181,7 @@ def _where(ctx: StepContext, here: PointEn, ahead: DriftAhead) -> str:
     place = "" if vehicle is None else f" at {vehicle.position.lat_deg:.5f}, {vehicle.position.lon_deg:.5f}"
     fence = f", {far_m:.0f} m outside the fence" if far_m > 0.0 else ""
     if ctx.autopilot is not None and ctx.autopilot.mode in HOMEWARD and ahead.speed_mps > 0.0:
-        course = math.degrees(wrap_two_pi(math.atan2(*ahead.velocity_en_mps)))
-        way = f"sailing straight home, {course:03.0f}°"
+        way = f"sailing straight home, {direction(heading_of(*ahead.velocity_en_mps))}°"
         if ahead.floor_s is not None:
             meets = f"onto {ahead.name}" if ahead.contact_s is not None else f"past {ahead.name}"
             way += f", {meets} in {ahead.contact_s if ahead.contact_s is not None else ahead.floor_s:.0f} s"

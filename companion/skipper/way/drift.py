@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.geo.angles import wrap_two_pi
-from companion.skipper.way.geometry import bearing_rad
+from companion.geo.angles import direction, heading_of
 from companion.skipper.way.voyage import AreaLike, PointEn
 
 HORIZON_S = 300.0  # time to wake a crew, clear an anchor and let it go
@@ -57,8 +56,7 @@ class DriftAhead:
 
     def sentence(self) -> str:
         """Return one line: how fast, where to, what it meets."""
-        set_rad = wrap_two_pi(bearing_rad((0.0, 0.0), self.velocity_en_mps))
-        text = f"drifting {self.speed_mps:.2g} m/s towards {math.degrees(set_rad):03.0f}°"
+        text = f"drifting {self.speed_mps:.2g} m/s towards {direction(heading_of(*self.velocity_en_mps))}°"
         if self.floor_s is None:
             return f"{text}, {self.clearance_m:.0f} m clear" if math.isfinite(self.clearance_m) else f"{text}, clear"
         if self.contact_s is not None:
