@@ -88,6 +88,37 @@ def test_quality():
     assert true_wind(light, boat(0, 0)).quality is WindQuality.LIGHT
 
 
+@pytest.mark.parametrize("older", ["vane", "boat"])
+def test_readings_a_second_apart_are_one_instant_and_later_ones_are_not(older):
+    for apart_s, quality in ((0.9, WindQuality.GOOD), (1.1, WindQuality.SUSPECT)):
+        vane_s, boat_s = (100.0, 100.0 + apart_s) if older == "vane" else (100.0 + apart_s, 100.0)
+        felt = ApparentWind(t_s=vane_s, awa_rad=0.5, aws_mps=6.0)
+        assert true_wind(felt, boat(0, 2, t_s=boat_s)).quality is quality
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_wave_yaws_the_boat_by_less_than_ten_degrees_a_second_and_a_tack_by_more(side):
+    felt = ApparentWind(t_s=0.0, awa_rad=0.5, aws_mps=6.0)
+    assert true_wind(felt, boat(0, 2, yaw_rate=side * math.radians(9.0))).quality is WindQuality.GOOD
+    assert true_wind(felt, boat(0, 2, yaw_rate=side * math.radians(11.0))).quality is WindQuality.TURNING
+
+
+def test_below_one_metre_a_second_a_wind_is_light():
+    for tws_mps, quality in ((0.95, WindQuality.LIGHT), (1.05, WindQuality.GOOD)):
+        assert true_wind(ApparentWind(t_s=0.0, awa_rad=0.5, aws_mps=tws_mps), boat(0, 0)).quality is quality
+
+
+def test_in_no_wind_at_all_the_direction_is_where_the_vane_points():
+    calm = true_wind(ApparentWind(t_s=0.0, awa_rad=math.radians(-30.0), aws_mps=0.0), boat(120, 0))
+    assert (math.degrees(calm.twd_from_rad), calm.tws_mps) == (pytest.approx(90.0), 0.0)
+
+
+def test_no_wind_is_above_a_hundred_metres_a_second_however_it_is_reckoned():
+    """An anemometer gone wild, and the boat's own way on top: more would not be taken for a reading."""
+    assert true_wind(ApparentWind(t_s=0.0, awa_rad=0.0, aws_mps=99.0), boat(0, 3, course_deg=180)).tws_mps == 100.0
+    assert apparent_wind(WindSample(t_s=0.0, twd_from_rad=0.0, tws_mps=99.0), boat(0, 3)).aws_mps == 100.0
+
+
 def test_parameters_are_read():
     found = VaneParameters.from_mapping(
         {"WNDVN_TYPE": 4.0, "WNDVN_SPEED_TYPE": 0.0, "WNDVN_SPEED_MIN": 0.5, "WNDVN_TRUE_FILT": -1.0, "OTHER": 1.0}

@@ -238,6 +238,81 @@ def test_the_low_pass_is_accounted_for():
     assert a.sigma_twd_rad[8] < 1.1 * b.sigma_twd_rad[8]  # at two minutes it hardly matters
 
 
+def rough(*, minutes, tws_mps=6.0, swing_deg=10.0, true_filter_hz=0.05):
+    """Return the sigma [deg] that is added to a WIND which swings about north, a reading a second, for so long."""
+    room = WindTracker(VaneParameters(true_filter_hz=true_filter_hz))
+    for t in range(60 * minutes):
+        wind = math.radians(swing_deg) * (-1) ** t
+        status = room.update(WindSample(t_s=float(t), twd_from_rad=wind, tws_mps=tws_mps + 1e-3 * (t % 7)))
+    return math.degrees(status.extra_sigma_rad)
+
+
+def test_the_low_pass_took_0_45_of_what_the_wind_departs_from_its_mean():
+    """The measured share, at the firmware's 3.2 s; a slower filter took more, up to half as much again."""
+    assert rough(minutes=45) == pytest.approx(0.45 * 10.0, rel=0.02)
+    assert rough(minutes=45, swing_deg=5.0) == pytest.approx(0.45 * 5.0, rel=0.02)
+    twice_as_fast, twice_as_slow = 1.0 / (2.0 * math.pi * 1.6), 1.0 / (2.0 * math.pi * 6.4)
+    assert rough(minutes=45, true_filter_hz=twice_as_fast) == pytest.approx(0.45 * 10.0 / 2**0.5, rel=0.02)
+    assert rough(minutes=45, true_filter_hz=twice_as_slow) == pytest.approx(0.45 * 10.0 * 2**0.5, rel=0.02)
+    assert rough(minutes=45, true_filter_hz=twice_as_slow / 4.0) == pytest.approx(0.45 * 10.0 * 1.5, rel=0.02)
+
+
+def test_how_rough_the_wind_is_is_learned_in_ten_minutes_from_four_degrees():
+    assert rough(minutes=10) == pytest.approx(0.45 * (10.0 - 6.0 / math.e), rel=0.02)
+    assert rough(minutes=10, tws_mps=0.9) == pytest.approx(
+        0.45 * 4.0, rel=0.02
+    )  # a light wind's direction says nothing
+
+
+def test_a_shift_is_a_departure_until_the_mean_has_followed_it_within_minutes():
+    room, extra = WindTracker(), {}
+    for t in range(2400):
+        wind = 0.0 if t < 1800 else math.radians(40.0)
+        status = room.update(WindSample(t_s=float(t), twd_from_rad=wind, tws_mps=6.0 + 1e-3 * (t % 7)))
+        extra[t] = math.degrees(status.extra_sigma_rad)
+    assert extra[1799] < 0.15  # four degrees, forgotten for half an hour
+    # of the departure from the 90 s mean, 40 deg at first: what its integral comes to in memory of 600 s
+    assert extra[1890] == pytest.approx(0.45 * 40.0 * 90.0 / 600.0 * (1.0 - 1.0 / math.e), rel=0.15)
+
+
+def test_a_wind_is_silent_when_nothing_has_come_for_more_than_five_seconds():
+    log, room = sail(seconds=300.0)
+    last_s = log[-1][0]
+    in_time, late = room.status(last_s + 5.0), room.status(last_s + 5.5)
+    assert (in_time.age_s, WindVerdict.SILENT in in_time.verdicts) == (5.0, False)
+    assert late.age_s == 5.5
+    assert late.verdicts == (*(v for v in log[-1][1].verdicts if v is not WindVerdict.GOOD), WindVerdict.SILENT)
+    assert late.reason == "no wind for 6 s"
+    assert room.status(last_s - 1.0).age_s == 0.0  # a clock that was set back
+
+
+def test_nothing_but_good_is_not_said_beside_silent():
+    room = WindTracker()
+    room.update(WindSample(t_s=0.0, twd_from_rad=1.0, tws_mps=6.0))
+    room.update(WindSample(t_s=1.0, twd_from_rad=1.01, tws_mps=6.1))
+    assert room.status(1.0).verdicts == (WindVerdict.GOOD,)
+    assert room.status(60.0).verdicts == (WindVerdict.SILENT,)
+
+
+@pytest.mark.parametrize(("after_s", "source"), [(9.5, WindSource.AUTOPILOT_TRUE), (10.5, WindSource.APPARENT)])
+def test_the_vane_is_asked_when_no_wind_came_for_ten_seconds(after_s, source):
+    room = WindTracker()
+    room.update(WindSample(t_s=100.0, twd_from_rad=2.0, tws_mps=5.0))
+    now_s = 100.0 + after_s
+    room.update(VehicleState(t_s=now_s, boot_s=now_s, position=HERE, velocity_en_mps=(0.0, 1.0), heading_rad=0.0))
+    assert room.update(ApparentWind(t_s=now_s, awa_rad=0.5, aws_mps=6.0)).sample.source is source
+
+
+def test_a_band_widens_as_its_sigma_does_and_is_never_more_than_the_circle():
+    filtered, plain = WindTracker(), WindTracker(VaneParameters(true_filter_hz=-1.0))
+    wind_of_the_autopilot(filtered)
+    wind_of_the_autopilot(plain)
+    a, b = filtered.forecast_table(900.0), plain.forecast_table(900.0)
+    wider = a.sigma_twd_rad / b.sigma_twd_rad
+    assert wider[0] > 1.05
+    assert a.half_width_rad == pytest.approx(np.minimum(b.half_width_rad * wider[:, None], math.pi))
+
+
 def test_no_forecast_before_wind_and_the_planner_gets_a_table_after():
     room = WindTracker()
     assert room.status(0.0) is None
