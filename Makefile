@@ -9,7 +9,7 @@ STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: env demo test test-long test-faults draws check format docs slowest campaign nightly nightly-reference bench measured figures deb release clean
+.PHONY: env demo test test-long test-faults draws mutants mutants-sample check format docs slowest campaign nightly nightly-reference bench measured figures deb release clean
 env: $(ENV)
 
 # What can be asked for with EXTRAS: what requirements-NAME.lock adds to the environment, besides dev, which is always in it.
@@ -71,6 +71,16 @@ draws: $(ENV)
 	@$(KERNELS)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not campaign" --hypothesis-profile=new \
 	  $$(grep -rlE "^ *@given|StateMachine" tests)
+
+# Whether the tests would notice: one place of the code after the other changed, in memory, and the tests that run it asked.
+# All of them are a day of two cores (it goes on where it was ended); a sample is another each night, 20 minutes of it.
+mutants: $(ENV)
+	@$(KERNELS)
+	nice $(BIN)/python -m bench.mutants --jobs 2
+
+mutants-sample: $(ENV)
+	@$(KERNELS)
+	nice $(BIN)/python -m bench.mutants --jobs 2 --sample 25 --seed $$(date +%j) --minutes 20
 
 check: $(ENV)
 	$(BIN)/ruff format --check -q .

@@ -1,0 +1,106 @@
+"""The mutants: each is one place of the code and nothing else, what is no code is left alone, and a child sees it."""
+
+import ast
+import json
+import subprocess
+import sys
+
+import pytest
+
+from bench import mutants
+from bench.mutants import ROOMS, changes, codes, drawn, equivalents, mutated, places
+
+
+def told(text):
+    return {
+        f"{ast.unparse(node)} -> {ast.unparse(other)}"
+        for node, _, _ in places(ast.parse(text))
+        for other in changes(node)
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "changed"),
+    [
+        ("x = a < b", {"a < b -> a <= b", "a < b -> a >= b"}),
+        ("x = a - 1", {"a - 1 -> a + 1", "1 -> 2"}),
+        ("x = -a if b else a", {"-a if b else a -> a if b else -a", "-a -> a"}),
+        (
+            "x = math.sin(min(a, 0.0))",
+            {"math.sin(min(a, 0.0)) -> math.cos(min(a, 0.0))", "min(a, 0.0) -> max(a, 0.0)", "0.0 -> 1.0"},
+        ),
+        ("watch(ctx)", {"watch(ctx) -> pass"}),
+        ("x = a and not b", {"a and (not b) -> a or not b", "not b -> b"}),
+        ("def f(a: Array[3] = 2) -> Row[4]:\n  'Say.'\n  assert a > 1\n  raise E(a + 1)", {"2 -> 3"}),
+        ("@kernel\ndef f(a):\n  return a + 1", set()),
+        ("__all__ = [1]\nif TYPE_CHECKING:\n  x = 1", set()),
+    ],
+)
+def test_what_is_put_in_a_place(text, changed):
+    assert told(text) == changed
+
+
+def test_a_mutant_is_one_place_of_one_function():
+    (sign,) = [
+        m for m in drawn(["true wind"], None, 0) if m.told == "apparent.t_s - vehicle.t_s -> apparent.t_s + vehicle.t_s"
+    ]
+    sound = codes(
+        compile((mutants.ROOT / sign.file).read_text(), str(mutants.ROOT / sign.file), "exec", dont_inherit=True)
+    )
+    other = [c.co_qualname for was, c in zip(sound, codes(mutated(sign)), strict=True) if was.co_code != c.co_code]
+    assert other == ["true_wind"]
+    assert sign.where == "true_wind"
+
+
+def test_rooms_have_files_and_tests_and_samples_are_by_seed():
+    assert all(list(mutants.ROOT.glob(glob)) for files, _ in ROOMS.values() for glob in files)
+    assert all((mutants.ROOT / top).is_dir() for _, tops in ROOMS.values() for top in tops)
+    assert drawn(["signing"], 5, 1) == drawn(["signing"], 5, 1) != drawn(["signing"], 5, 2)
+
+
+def test_what_is_said_to_be_equivalent_is_a_mutant_of_today():
+    said = equivalents()
+    there = {(m.file, m.where, m.told) for file in {file for file, _, _ in said} for m in mutants.mutants("", file)}
+    assert said - there == set()
+    assert (mutants.EQUIVALENT.read_text().count("  equivalent, because ")) == len(said) > 0
+
+
+SAIL = """
+import json, sys
+from bench import mutants
+mutants.KEPT = mutants.Path(sys.argv[1])
+mutants.ROOMS = {"true wind": (("companion/wind/true_wind.py",), ("tests/wind/test_true_wind.py",))}
+mutants.tests_below = lambda tops: list(tops)
+wanted = json.loads(sys.argv[2])
+whole = mutants.drawn
+mutants.drawn = lambda *asked: [m for m in whole(*asked) if m.told in wanted]
+raise SystemExit(mutants.main([]))
+"""
+
+
+def test_a_child_meets_the_mutant_at_run_and_at_import_and_the_tree_does_not(tmp_path):
+    pytest.importorskip("coverage")
+    wanted = [
+        "math.sin(angle) -> math.cos(angle)",
+        "10.0 -> 15.0",  # carried out at import: the rate of a turn
+        "speed < LIGHT_MPS -> speed <= LIGHT_MPS",  # a speed that no reading has
+    ]
+    path = mutants.ROOT / "companion/wind/true_wind.py"
+    before = path.stat().st_mtime_ns
+    for expected in (3, 3):  # what is known is not asked again
+        done = subprocess.run(
+            [sys.executable, "-c", SAIL, str(tmp_path), json.dumps(wanted)],
+            cwd=mutants.ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        verdicts = [json.loads(line) for line in (tmp_path / "mutants.jsonl").read_text().splitlines()]
+        assert len(verdicts) == expected
+        assert "| true wind | 3 | 3 | 2 | 0 | 1 | 67 % |" in done.stdout
+    killed = {v["told"]: v["by"].partition("[")[0].rpartition("::")[2] for v in verdicts if v["verdict"] == "killed"}
+    assert killed == {
+        wanted[0]: "test_worked_examples",
+        wanted[1]: "test_a_wave_yaws_the_boat_by_less_than_ten_degrees_a_second_and_a_tack_by_more",
+    }
+    assert path.stat().st_mtime_ns == before
