@@ -79,7 +79,7 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("companion/skipper/way/position_plausibility.py", "companion/wind/sensor_faults.py"),
         ("tests/skipper/way", "tests/wind"),
     ),
-    "signing": (("companion/mavlink/signing.py",), ("tests/mavlink",)),
+    "signing": (("companion/mavlink/signing.py",), ("tests/mavlink", "tests/commands/test_key.py")),
     "far codec": (("companion/orders/far/*.py",), ("tests/orders/far",)),
     "uploads": (
         (
@@ -410,8 +410,9 @@ class Coverage:
 
 
 def tests_below(tops: Sequence[str]) -> set[str]:
-    """Return the files of tests in these folders."""
-    return {str(p.relative_to(ROOT)) for top in tops for p in ROOT.glob(f"{top}/**/test_*.py")}
+    """Return the files of tests in these folders, and those that are named."""
+    inside = {str(p.relative_to(ROOT)) for top in tops for p in ROOT.glob(f"{top}/**/test_*.py")}
+    return inside | {top for top in tops if top.endswith(".py")}
 
 
 def file_of(test: str) -> str:

@@ -54,7 +54,7 @@ def test_a_mutant_is_one_place_of_one_function():
 
 def test_rooms_have_files_and_tests_and_samples_are_by_seed():
     assert all(list(mutants.ROOT.glob(glob)) for files, _ in ROOMS.values() for glob in files)
-    assert all((mutants.ROOT / top).is_dir() for _, tops in ROOMS.values() for top in tops)
+    assert all((mutants.ROOT / top).exists() for _, tops in ROOMS.values() for top in tops)
     assert drawn(["signing"], 5, 1) == drawn(["signing"], 5, 1) != drawn(["signing"], 5, 2)
 
 
@@ -70,7 +70,6 @@ import json, sys
 from bench import mutants
 mutants.KEPT = mutants.Path(sys.argv[1])
 mutants.ROOMS = {"true wind": (("companion/wind/true_wind.py",), ("tests/wind/test_true_wind.py",))}
-mutants.tests_below = lambda tops: list(tops)
 wanted = json.loads(sys.argv[2])
 whole = mutants.drawn
 mutants.drawn = lambda *asked: [m for m in whole(*asked) if m.told in wanted]

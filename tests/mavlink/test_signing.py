@@ -1,0 +1,80 @@
+"""The stamps of signed frames on disk: their clock, how far ahead they are kept, what is damage."""
+
+import math
+from datetime import UTC, datetime
+
+import pytest
+
+from companion.mavlink.signing import SigningStore, read_key
+
+TICKS = 100_000  # of 10 µs in a second
+YEAR = 366 * 86_400 * TICKS
+NOW_S = datetime(2026, 6, 1, tzinfo=UTC).timestamp()
+
+
+@pytest.fixture
+def key(tmp_path):
+    path = tmp_path / "key"
+    path.write_text("ab" * 32)
+    path.chmod(0o600)
+    return path
+
+
+def kept(key):
+    return int(key.with_name("key.timestamp").read_text())
+
+
+@pytest.mark.parametrize(("day", "seconds"), [((2015, 1, 1), 0), ((2015, 1, 2), 86_400), ((2014, 6, 1), 0)])
+def test_stamps_count_ten_microseconds_from_new_year_2015_and_never_below(key, day, seconds):
+    """MAVLink's own zero: another would have every frame refused, or be years ahead of everybody."""
+    store = SigningStore(key, datetime(*day, tzinfo=UTC).timestamp())
+    assert store.state.timestamp == seconds * TICKS
+    assert store.state.key == read_key(key) == bytes.fromhex("ab" * 32)
+
+
+def test_what_is_kept_is_ahead_of_use_by_less_than_the_minute_that_shuts_others_out(key):
+    store = SigningStore(key, NOW_S)
+    assert 20 * TICKS < kept(key) - store.state.timestamp < 60 * TICKS
+    assert SigningStore(key, NOW_S + 5.0).state.timestamp - int((NOW_S + 5.0 - 1_420_070_400) * TICKS) < 60 * TICKS
+
+
+def test_it_is_kept_anew_when_half_of_the_lead_is_used_and_not_at_every_frame(key):
+    store = SigningStore(key, NOW_S)
+    first = kept(key)
+    store.state.timestamp += 19 * TICKS
+    store.save()
+    assert kept(key) == first
+    store.state.timestamp += 2 * TICKS
+    store.save()
+    assert kept(key) - first == 21 * TICKS
+
+
+def test_a_stamp_in_the_last_year_of_its_48_bits_is_damage_and_one_before_is_believed(key, caplog):
+    last = 2**48 - 1 - YEAR
+    stamps = key.with_name("key.timestamp")
+    stamps.write_text(str(last))
+    assert SigningStore(key, NOW_S).state.timestamp == last
+    assert not caplog.text
+    stamps.write_text(str(last + 1))
+    assert SigningStore(key, NOW_S).state.timestamp == math.floor((NOW_S - 1_420_070_400) * TICKS)
+    assert "no timestamp of a signature" in caplog.text
+
+
+def test_a_clock_out_of_its_mind_leaves_a_year_of_stamps(key):
+    assert SigningStore(key, 1e11).state.timestamp == 2**48 - 1 - YEAR
+
+
+@pytest.mark.parametrize("damage", ["torn", "directory", "link"])
+def test_on_a_board_without_a_clock_damage_is_the_beginning_of_time(key, caplog, damage):
+    """A link is somebody else's file: neither read nor written through."""
+    stamps, other = key.with_name("key.timestamp"), key.with_name("other")
+    other.write_text(str(500 * TICKS))
+    if damage == "torn":
+        stamps.write_text("12x")
+    elif damage == "directory":
+        stamps.mkdir()
+    else:
+        stamps.symlink_to(other)
+    assert SigningStore(key, 0.0).state.timestamp == 0
+    assert "written anew" in caplog.text
+    assert other.read_text() == str(500 * TICKS)
