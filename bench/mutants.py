@@ -49,24 +49,24 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "scorer": (("companion/planner/problem/*.py",), ("tests/planner/problem",)),
     "risk": (("companion/planner/risk/*.py",), ("tests/planner/risk",)),
     "track": (("companion/planner/track/*.py",), ("tests/planner/track",)),
-    "triggers": (("companion/skipper/planning/t*.py", "companion/skipper/planning/w*.py"), ("tests/skipper/planning",)),
+    "triggers": (("companion/skipper/planning/t*.py", "companion/skipper/planning/w*.py"), ("tests/skipper",)),
     "behaviors": (
         tuple(
             f"companion/skipper/behaviors/{name}.py"
             for name in ("headings", "helm", "launch", "operator_orders", "rest", "sailing", "drifting")
         ),
-        ("tests/skipper/behaviors",),
+        ("tests/skipper",),
     ),
     "failsafes": (
         tuple(f"companion/skipper/behaviors/{name}.py" for name in ("failsafe", "position_doubt", "wind_doubt")),
-        ("tests/skipper/behaviors",),
+        ("tests/skipper",),
     ),
     "safety": (
         ("companion/safety.py", "companion/skipper/rules.py", "companion/skipper/priorities.py"),
         ("tests/skipper",),
     ),
-    "custody": (("companion/skipper/board/*.py",), ("tests/skipper/board",)),
-    "watchdogs": (("companion/skipper/watch/*.py",), ("tests/skipper/watch",)),
+    "custody": (("companion/skipper/board/*.py",), ("tests/skipper",)),
+    "watchdogs": (("companion/skipper/watch/*.py",), ("tests/skipper",)),
     "fence proof": (
         (
             "companion/geofence/autopilot_fence.py",

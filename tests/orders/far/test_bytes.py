@@ -150,6 +150,24 @@ def test_what_does_not_fit_is_the_nearest_that_does_and_never_unknown(name, valu
     ) == pytest.approx(shown)
 
 
+@pytest.mark.parametrize(
+    ("name", "last", "says"),
+    [
+        ("phase", len(status.PHASES) - 1, lambda told: told.phase == status.PHASES[-1]),
+        ("reply", len(status.REPLIES), lambda told: told.reply == status.REPLIES[-1]),
+        ("reply", (len(status.ALARMS) - 1) << 4, lambda told: told.alarm == status.ALARMS[-1]),
+        ("reply", 15 << 4, lambda told: not told.alarm),  # no vessel was ever heard
+    ],
+)
+def test_the_last_word_of_a_list_is_read_and_the_one_behind_it_is_another_release_s(name, last, says):
+    """One more than this release knows is refused in a line: shown, it would be another phase, or end the display."""
+    assert says(unpack_status(by_the_page.write(STATUS, KEY.key, 1, **{"reply": 15 << 4, name: last}), KEY))
+    behind = last + 1 if last < 16 else last + (1 << 4)
+    if behind < 256:
+        with pytest.raises(ValueError, match="another release made it"):
+            unpack_status(by_the_page.write(STATUS, KEY.key, 1, **{"reply": 15 << 4, name: behind}), KEY)
+
+
 GOOD_ORDER = pack_order(
     FarOrder(wanted=Wanted(verb=Verb.GOAL, place=Place(lat_deg=50.8, lon_deg=-1.3)), counter=7, expires_min=3_600_000),
     KEY,

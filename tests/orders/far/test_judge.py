@@ -28,6 +28,8 @@ def order(counter, left_min=30, mark=""):
         (-1, Reply.EXPIRED),
         (-600, Reply.EXPIRED),
         (7 * 1440, None),
+        (7 * 1440 + 60, None),  # a week, and an hour for a clock that is wrong
+        (7 * 1440 + 61, Reply.TOO_LONG),
         (7 * 1440 + 120, Reply.TOO_LONG),
         (10**7, Reply.TOO_LONG),
     ],
@@ -117,6 +119,12 @@ def test_with_another_key_the_counters_begin_anew():
     assert Taken.from_dict(taken.to_dict("old"), "new") == Taken()
 
 
+def test_a_memory_at_its_limits_is_believed():
+    """The last counter that two bytes hold, a whole window, the first moment and the last."""
+    whole = Taken(dict.fromkeys(range(65535 - WINDOW + 1, 65536), ("m", Reply.DONE)), (1 << 24) - 1)
+    assert Taken.from_dict(json.loads(json.dumps(whole.to_dict("k"))), "k") == whole
+
+
 @pytest.mark.parametrize(
     "data",
     [
@@ -130,6 +138,8 @@ def test_with_another_key_the_counters_begin_anew():
         {"format": 1, "key": "k", "replies": {"1": "done"}},
         {"format": 1, "key": "k", "replies": {"1": ["m", "sunk"]}},
         {"format": 1, "key": "k", "replies": {"0": ["m", "done"]}},
+        {"format": 1, "key": "k", "replies": {"1": ["m", "done"], "0": ["m", "done"]}},
+        {"format": 1, "key": "k", "replies": {"1": ["m", "done"], "65536": ["m", "done"]}},
         {"format": 2, "key": "k", "replies": {}},
         {"format": 2, "key": "k", "began": -1, "replies": {}},
         {"format": 2, "key": "k", "began": "1", "replies": {}},
