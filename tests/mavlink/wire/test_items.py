@@ -138,6 +138,62 @@ def test_what_the_real_autopilot_returns_is_the_same_item(written, read):
     assert mission_hash([sent]) == mission_hash([back])
 
 
+@pytest.mark.parametrize(
+    ("command", "params", "kept"),
+    [
+        (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, (5.0, 1.0, 2.0, 3.0), (5.0, 0.0, 0.0, 0.0)),  # vertices
+        (Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION, (4.0, 1.0, 2.0, 3.0), (4.0, 0.0, 0.0, 0.0)),
+        (Command.NAV_FENCE_CIRCLE_INCLUSION, (250.5, 1.0, 2.0, 3.0), (250.5, 0.0, 0.0, 0.0)),  # metres
+        (Command.NAV_FENCE_CIRCLE_EXCLUSION, (12.0, 1.0, 2.0, 3.0), (12.0, 0.0, 0.0, 0.0)),
+        (Command.NAV_RALLY_POINT, (1.0, 2.0, 3.0, 4.0), (0.0, 0.0, 0.0, 0.0)),
+        (Command.NAV_FENCE_RETURN_POINT, (1.0, 2.0, 3.0, 4.0), (0.0, 0.0, 0.0, 0.0)),
+    ],
+)
+def test_of_a_fence_only_count_or_radius_is_kept_and_its_place(command, params, kept):
+    """ArduPilot's fence has no frame of its own, a rally point always the relative one."""
+    item = canonical(MissionItem(command=command, lat_e7=1, lon_e7=-2, frame=5, params=params))
+    assert (item.params, item.lat_e7, item.lon_e7) == (kept, 1, -2)
+    assert item.frame == (3 if command in {Command.NAV_RALLY_POINT, Command.NAV_FENCE_RETURN_POINT} else 0)
+
+
+@pytest.mark.parametrize(("side", "kept"), [(-12.0, -1.0), (0.0, 1.0), (20.0, 1.0)])
+@pytest.mark.parametrize(("exits", "exit_kept"), [(0.0, 0.0), (0.5, 1.0), (-1.0, 0.0)])
+def test_of_a_timed_loiter_whole_seconds_the_side_and_the_way_out_are_kept(side, kept, exits, exit_kept):
+    item = canonical(MissionItem(command=Command.NAV_LOITER_TIME, params=(30.9, 7.0, side, exits)))
+    assert item.params == (30.0, 0.0, kept, exit_kept)
+
+
+def test_what_is_no_number_is_0_and_what_is_too_great_for_four_bytes_too():
+    item = canonical(MissionItem(command=Command.DO_CHANGE_SPEED, params=(1.0, math.nan, 1e300, 0.1)))
+    assert item.params == (1.0, 0.0, 0.0, pytest.approx(0.1, rel=1e-7))
+    assert item.params[3] != 0.1  # as four bytes hold it
+
+
+def test_a_mission_dat_that_skips_a_number_is_torn():
+    data = bytearray(pack_mission_dat([MissionItem(command=16)] * 3, MissionType.MISSION, start=2))
+    assert unpack_mission_dat(bytes(data))[1] == 2
+    second = 10 + 38 + 28  # header, an item, and what is before the number
+    assert data[second : second + 2] == b"\3\0"
+    data[second] = 7
+    with pytest.raises(ValueError, match=r"item 3 of mission\.dat says it is number 7"):
+        unpack_mission_dat(bytes(data))
+
+
+def test_padding_repeats_the_last_item_and_the_name_ends_with_the_mission():
+    way, end = MissionItem(command=16, lat_e7=5), MissionItem(command=Command.NAV_LOITER_UNLIM, lat_e7=9)
+    assert padded([way, end], 4) == (way, end, end, end)
+    assert padded([], 3) == ()
+    assert sailed([way, end, way]) == (way, end)
+    assert sailed([way, way]) == (way, way)
+    home = MissionItem(command=Command.NAV_RETURN_TO_LAUNCH)
+    assert mission_hash([way, home, way]) == mission_hash([way, home]) != mission_hash([way, way, home])
+
+
+def test_an_item_that_differs_is_named_by_its_number_and_place():
+    one, other = MissionItem(command=16, lat_e7=511000000), MissionItem(command=16, lat_e7=511000001)
+    assert first_difference([one, one], [one, other]).startswith("item 2 written command 16 at 51.1000000, 0.0000000")
+
+
 def test_lengths_differ_in_words():
     one = MissionItem(command=16)
     assert first_difference([one, one], [one]) == "2 items written, 1 read back"
