@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import contextlib
 import gc
 import hashlib
 import importlib.abc
@@ -533,8 +534,9 @@ class Judge:
             if not running:
                 break
             pid, _ = os.waitpid(-1, os.WNOHANG)
-            for late in [p for p, (*_, until) in running.items() if until < time.monotonic()]:
-                os.killpg(late, signal.SIGKILL)
+            for late in [p for p, (*_, until) in running.items() if p != pid and until < time.monotonic()]:
+                with contextlib.suppress(ProcessLookupError):  # its group is made by itself, and may have ended
+                    os.killpg(late, signal.SIGKILL)
             if not pid:
                 time.sleep(0.02)
                 continue
