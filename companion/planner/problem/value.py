@@ -179,7 +179,9 @@ class Problem:
         """Obstacles and everything outside the fence."""
         solid, fence = self.obstacle_union, self.fence_polygon
         if fence is not None:
-            x0, y0, x1, y1 = fence.bounds if not fence.is_empty else (0.0, 0.0, 0.0, 0.0)
+            # as wide as whatever a path begins and ends at: one that lies wholly outside would meet nothing
+            shapes = [shapely.Point(self.start_en), shapely.Point(self.goal_en), fence]
+            x0, y0, x1, y1 = shapely.total_bounds([s for s in shapes if not s.is_empty])
             margin = 0.5 * max(x1 - x0, y1 - y0)
             frame = shapely.box(x0 - margin, y0 - margin, x1 + margin, y1 + margin)
             solid = shapely.union(solid, frame.difference(fence))

@@ -111,6 +111,8 @@ def test_the_zone_widens_with_probability_and_time():
         ({"obstacles": [box(-10, -10, 10, 10)]}, "start is inside"),
         ({"obstacles": [box(-10, 90, 10, 110)]}, "goal is inside"),
         ({"fence": box(-10, 5, 10, 110)}, "start is inside an obstacle or outside"),
+        ({"fence": box(-60, -5060, 60, -5000)}, "start is inside an obstacle or outside"),  # of another lake
+        ({"fence": box(-60, -60, 60, 60), "goal": {"x": 0, "y": 900, "radius": 2}}, "goal is inside"),
     ],
 )
 def test_what_cannot_be_planned_is_invalid_with_the_reason(change, words):
