@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.boat.polar import Polar
+from companion.boat.towed import driven
 from companion.geo.angles import wrap_pi, wrap_pi_array
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,7 @@ class Why(enum.Enum):
     NOT_SAILED = "disarmed, or a mode in which the sheets are eased"
     UNKNOWN = "wind, heading or speed not known"
     MOTOR = "the motor runs"
-    DRIVEN = "head to wind with way on, or far too fast: a motor or a tow"
+    DRIVEN = "no wind explains the speed: a motor or a tow"
     FROZEN_VANE = "the vane has stopped"
     FROZEN_COMPASS = "the compass has stopped"
     RESET = "the position was set anew"
@@ -164,6 +165,10 @@ def stretches_of(logs: list[BoatLog], prior: Polar, prior_error: float) -> Stret
                 else:
                     rows.append((float(len(names) - 1), *found))
     table = np.array(rows, dtype=np.float64).reshape(len(rows), 9)
+    by_motor = _driven(table, prior, prior_error)
+    if bool(np.any(by_motor)):
+        left_out[Why.DRIVEN] += int(np.sum(by_motor))
+        table = table[~by_motor]
     return Stretches(
         outing=table[:, 0].astype(np.int64),
         t_s=table[:, 1],
@@ -175,6 +180,22 @@ def stretches_of(logs: list[BoatLog], prior: Polar, prior_error: float) -> Stret
         length_s=table[:, 8],
         outing_names=tuple(names),
         left_out=left_out,
+    )
+
+
+def _driven(table: Floats, prior: Polar, prior_error: float) -> NDArray[np.bool_]:
+    velocity, heading, awa, aws = table[:, 2:4], table[:, 4], table[:, 5], table[:, 6]
+    bow = np.column_stack([np.sin(heading), np.cos(heading)])
+    wind = aws[:, None] * np.column_stack([np.sin(heading + awa), np.cos(heading + awa)]) - velocity
+    twa, tws = wrap_pi_array(np.arctan2(wind[:, 0], wind[:, 1]) - heading), np.hypot(wind[:, 0], wind[:, 1])
+    return driven(
+        outing=table[:, 0].astype(np.int64),
+        ahead_mps=np.sum(velocity * bow, axis=1),
+        heading_rad=heading,
+        twa_rad=twa,
+        tws_mps=tws,
+        expected_mps=np.array([prior.speed_mps(a, w) for a, w in zip(twa.tolist(), tws.tolist(), strict=True)]),
+        prior_error=prior_error,
     )
 
 
