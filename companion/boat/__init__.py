@@ -30,6 +30,7 @@ from companion.boat.polar import (
     read_polar,
     signalk_text,
 )
+from companion.boat.steering import Steering, SteeringBand, SteeringLog, steering_of
 from companion.boat.trial import Trial, trial_in
 
 __all__ = [
@@ -42,6 +43,9 @@ __all__ = [
     "Polar",
     "ProposedMargin",
     "Sizes",
+    "Steering",
+    "SteeringBand",
+    "SteeringLog",
     "Trial",
     "ardurover_sitl",
     "avalon",
@@ -63,6 +67,7 @@ __all__ = [
     "required_margin",
     "signalk_text",
     "slowest_en_mps",
+    "steering_of",
     "trial_in",
     "widest_corridor_m",
 ]

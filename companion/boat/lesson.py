@@ -187,7 +187,8 @@ def _findings(lesson: Lesson) -> list[str]:
     if abs(vane.mean) > max(CERTAIN * vane.sd, TELLING):
         out.append(
             f"the vane points {abs(math.degrees(vane.mean)):.1f} degrees too far to "
-            f"{'starboard' if vane.mean > 0.0 else 'port'} (deviation {vane_sd}): turn it, and learn from later logs"
+            f"{'starboard' if vane.mean > 0.0 else 'port'} (deviation {vane_sd}): turn it, or change WNDVN_DIR_OFS by "
+            f"{-math.degrees(vane.mean):+.1f}, in steps of 5 at most, and learn from later logs"
         )
     elif not settled(vane, OPEN_VANE):
         out.append(

@@ -19,7 +19,7 @@ from companion.program.arguments import number, system_id
 from companion.words import counted
 
 if TYPE_CHECKING:
-    from companion.boat import AutopilotLimits
+    from companion.boat import AutopilotLimits, Steering
     from companion.doctor import DoctorFinding, Examined, Needs
     from companion.geofence import Mission
     from companion.mavlink.autopilot import Autopilot
@@ -34,9 +34,10 @@ examples:
   companion doctor --link /dev/serial0:921600 --mission missions/lake.toml
   companion doctor --link udpin:127.0.0.1:14551 --mission missions/lake.toml --apply
   companion doctor --link /dev/ttyACM0 --signing-key boat.key --set-key
+  companion doctor --log voyages/lake flights/*.BIN            (how it steered, and what of its tuning to change)
 
 With --mission the parameters are held against that voyage's margins, distances and boat. --apply sets what the
-warnings and errors name (never what is only good to know), one parameter at a time, and reads each back.
+warnings and errors name (never what is only good to know, or of tuning), one parameter at a time, and reads each back.
 Exit codes: 0 nothing in the way, 1 an error was found or the autopilot did not answer, 2 bad usage or input.
 """
 
@@ -68,10 +69,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "voyage and what to set.",
     )
     parser.add_argument(
-        "--link",
-        required=True,
-        metavar="LINK",
-        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
+        "--link", metavar="LINK", help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT"
     )
     parser.add_argument(
         "--system",
@@ -80,6 +78,15 @@ def add_parser(subparsers: Any, summary: str) -> None:
         help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)",
     )
     parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="hold the settings against this voyage")
+    parser.add_argument(
+        "--log",
+        nargs="+",
+        default=[],
+        type=Path,
+        metavar="LOG",
+        help="how it steered in these (.BIN, .tlog, voyage folders), and what of its tuning to change; with --link "
+        "against what is set now; never applied",
+    )
     parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (mode 0600)")
     parser.add_argument(
         "--set-key",
@@ -99,12 +106,26 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
     from companion.commands.key import put_on
-    from companion.doctor import Level
+    from companion.doctor import Level, examine_steering
     from companion.geofence import load_mission
     from companion.mavlink.signing import SigningStore
     from companion.mavlink.transports import open_link
     from companion.mission_check import require_sailable
 
+    if args.link is None and not args.log:
+        raise InputError(
+            "--link", "", "there is neither an autopilot nor a log to look at", "give --link, --log or both"
+        )
+    steering = steering_in(args.log) if args.log else None
+    if args.link is None:
+        for name in ("mission", "apply", "set_key"):
+            if getattr(args, name):
+                word = f"--{name.replace('_', '-')}"
+                raise InputError(
+                    "companion doctor", word, "it is about an autopilot on a link", "give --link LINK, too"
+                )
+        _print(() if steering is None else examine_steering(steering), (), args)
+        return 0
     mission = require_sailable(load_mission(args.mission)) if args.mission is not None else None
     signing = SigningStore(args.signing_key, time.time()) if args.signing_key is not None else None
     system = args.system or (mission.autopilot.system if mission is not None else None)
@@ -128,14 +149,33 @@ def run(args: argparse.Namespace) -> int:
             signing=signing,
             system=system,
             speed=planner_speed(),
+            steering=steering,
         )
     )
+    _print(findings, changes, args)
+    left = [f for f in findings if f.level is Level.ERROR and not _is_cured(f, changes)]
+    return 1 if left or any(not change.is_done for change in changes) else 0
+
+
+def _print(findings: Sequence[DoctorFinding], changes: Sequence[ParameterFix], args: argparse.Namespace) -> None:
     if args.json:
         print(json.dumps(as_json(findings, changes), indent=1))
     else:
         sys.stdout.write(as_text(findings, changes, applied=args.apply))
-    left = [f for f in findings if f.level is Level.ERROR and not _is_cured(f, changes)]
-    return 1 if left or any(not change.is_done for change in changes) else 0
+
+
+def steering_in(paths: Sequence[Path]) -> Steering:
+    """Return how the autopilot steered in all logs under these paths; say which tell nothing of it. Raises JobError."""
+    from companion.boat import steering_of
+    from companion.boat_logs import logs_under, read_steering
+    from companion.errors import JobError
+
+    logs, skipped = read_steering(logs_under(list(paths)))
+    for left in skipped:
+        print(f"skipped {left.name}: {left.why}", file=sys.stderr)
+    if not logs:
+        raise JobError("none of the logs tells how the autopilot steered")
+    return steering_of(logs)
 
 
 def planner_speed() -> float | None:
@@ -203,13 +243,14 @@ async def diagnose(
     signing: SigningStore | None = None,
     system: int | None = None,
     speed: float | None = None,
+    steering: Steering | None = None,
 ) -> tuple[tuple[DoctorFinding, ...], tuple[ParameterFix, ...]]:
-    """Read everything, judge it, and set what is to be set if ``apply``.
+    """Read everything, judge it, and set what is to be set if ``apply``; of tuning by logs (``steering``) nothing is.
 
     Raises:
         LinkError: no autopilot was heard, none whose signatures fit the key, several and none named, or no rover.
     """
-    from companion.doctor import examine
+    from companion.doctor import examine, examine_steering
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
     from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
@@ -222,7 +263,8 @@ async def diagnose(
             seen = await read(autopilot, has_key=signing is not None)
             findings = examine(replace(seen, planner_speed=speed), needs)
             changes = await _apply(autopilot, findings) if apply else ()
-            return findings, changes
+            tuning = () if steering is None else examine_steering(steering, seen.parameters)
+            return (*findings, *tuning), changes
 
 
 async def read(autopilot: Autopilot, *, has_key: bool = False) -> Examined:
