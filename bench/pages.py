@@ -89,6 +89,8 @@ _TABLES = {
     "WavesSpec": "`[waves]`",
     "HullSpec": "`[boat]`",
     "SensorsSpec": "`[sensors]`",
+    "BottomSpec": "`[bottom]`",
+    "BankSpec": "`[[bottom.banks]]`",
     "SatelliteSpec": "`[satellite]`",
     "ExpectSpec": "`[expect]`",
     "HeldSpec": "`[expect.held]`",

@@ -5,6 +5,7 @@
 
 from companion.chart.compile import TOLERANCE_M, ChartArea, Solid, area_of, containing
 from companion.chart.features import Chart, Danger, Row, Source, Wanted
+from companion.chart.grid import Grid, parse_ascii_grid, signed
 from companion.chart.readers import Box, read_chart
 from companion.chart.s57 import told_of
 from companion.chart.tide import lowest_m, read_tide
@@ -15,6 +16,7 @@ __all__ = [
     "Chart",
     "ChartArea",
     "Danger",
+    "Grid",
     "Row",
     "Solid",
     "Source",
@@ -22,7 +24,9 @@ __all__ = [
     "area_of",
     "containing",
     "lowest_m",
+    "parse_ascii_grid",
     "read_chart",
     "read_tide",
+    "signed",
     "told_of",
 ]

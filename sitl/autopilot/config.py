@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from companion.boat import Polar
 from companion.messages import GeoPoint, Mode
-from sitl.world import Waters
+from sitl.world import SimulatedSounder, Waters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,6 +120,7 @@ class AutopilotConfig:
         epoch_s: Unix time of the start, as its GPS tells it.
         departures: what the boat is that is not the plan's; None: nothing.
         waters: wind and stream by place, in metres from home; None: the wind alone, everywhere the same.
+        sounder: of the bottom under it; None: none but what a scenario's events tell.
         new_parameter_names: answer to ArduPilot 4.7's names (MAV_SYSID) instead of the older ones.
     """
 
@@ -141,6 +142,7 @@ class AutopilotConfig:
     epoch_s: float = EPOCH_S
     departures: Departures | None = None
     waters: Waters | None = None
+    sounder: SimulatedSounder | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

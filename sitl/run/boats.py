@@ -155,8 +155,9 @@ class SimulatedBoat:
 
     @staticmethod
     def cannot_be(scenario: Scenario) -> list[str]:
-        """Return what it cannot be: a boat whose sensors err, for they are what the judge listens to."""
-        return [] if scenario.sensors is None else ["[sensors]"]
+        """Return what it cannot be: a boat with a sounder, or whose sensors err, which its judge listens to."""
+        tables = {"[sensors]": scenario.sensors is not None, "[bottom]": scenario.bottom is not None}
+        return [name for name, asked in tables.items() if asked]
 
     def fix(self) -> LiveFix | None:
         """Return what the simulated autopilot tells, whose sensors do not err unless a scenario says so."""
@@ -218,10 +219,11 @@ class RealBoat:
 
     @staticmethod
     def cannot_be(scenario: Scenario) -> list[str]:
-        """Return what it cannot be: its hull has no leeway and no waves, and of its sensors only the position's age."""
+        """Return what it cannot be: no leeway, no waves, no sounder, and of its sensors only the position's age."""
         told = SensorsSpec() if scenario.sensors is None else scenario.sensors
         errs = msgspec.structs.replace(told, gps_lag_s=0.0) != SensorsSpec()
         tables = {"[boat]": scenario.boat is not None, "[waves]": scenario.waves is not None, "[sensors]": errs}
+        tables["[bottom]"] = scenario.bottom is not None
         return [name for name, asked in tables.items() if asked]
 
     def fix(self) -> LiveFix | None:

@@ -24,7 +24,7 @@ from companion.app.sail import OnStatus, sail
 from companion.clock import now_s
 from companion.compose import boat_of
 from companion.disk import Disk
-from companion.errors import LinkError
+from companion.errors import InputError, LinkError
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.geofence import LocalArea, Mission, load_mission
@@ -60,9 +60,12 @@ from sitl.scenario import (
     own_polar,
     recentre_m,
     scenario_departures,
+    scenario_seabed,
+    scenario_sounder,
     scenario_waters,
     scenario_wind,
     tasks_of,
+    under_keel_m,
 )
 
 TRUTH_EVERY_S = 0.25
@@ -115,7 +118,15 @@ def permitted(mission: Mission, scenario: Scenario) -> Mission:
 
 def mission_of(scenario: Scenario, source: Path) -> Mission:
     """Return the mission that a scenario sails, with what a harness allows. Raises InputError: it cannot be sailed."""
-    return require_sailable(permitted(load_mission(scenario.mission_path(source)), scenario))
+    mission = load_mission(scenario.mission_path(source))
+    if scenario.bottom is not None and mission.boat.draft_m is None:
+        raise InputError(
+            str(source),
+            "bottom",
+            f"{scenario.mission} says no draft_m, so nothing could ground",
+            "add it to its [boat]",
+        )
+    return require_sailable(permitted(mission, scenario))
 
 
 def replace_struct(struct: Any, **changes: Any) -> Any:
@@ -166,6 +177,7 @@ async def run_embedded(
         mission = require_sailable(variation.mission(mission))
         room = None if variation.room is None else partial(variation.room, wind)
     start = mission.start or mission.origin
+    seabed = scenario_seabed(scenario, source, mission.frame())
     heading_deg = scenario.start_heading_deg
     if heading_deg is None:
         heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
@@ -184,6 +196,7 @@ async def run_embedded(
             departures=scenario_departures(scenario),
             waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(start)),
             recentre_m=recentre_m(mission),
+            sounder=scenario_sounder(scenario, seabed, seed),
         ),
         wind,
         seed=seed,
@@ -238,6 +251,9 @@ async def run_embedded(
         marks=marks_of(mission),
         tasks=tasks_of(mission, scenario.epoch_s),
         keep_m=mission.traffic.safe_distance_m,
+        keel_m=None
+        if seabed is None or mission.boat.draft_m is None
+        else under_keel_m(world.truth, seabed, mission.boat.draft_m),
         **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())

@@ -2,6 +2,8 @@
 
 from sitl.scenario.colregs import CLOSE_HAULED_DEG, Craft, Manner, Mover, duty, met_by
 from sitl.scenario.scenario import (
+    BankSpec,
+    BottomSpec,
     CurrentSpec,
     EventSpec,
     ExpectSpec,
@@ -19,6 +21,8 @@ from sitl.scenario.scenario import (
     own_polar,
     recentre_m,
     scenario_departures,
+    scenario_seabed,
+    scenario_sounder,
     scenario_text,
     scenario_waters,
     scenario_wind,
@@ -35,6 +39,7 @@ from sitl.scenario.verdict import (
     count_tacks,
     judge,
     station_score,
+    under_keel_m,
     verdict_line,
 )
 
@@ -43,6 +48,8 @@ __all__ = [
     "CLOSE_HAULED_DEG",
     "TASK_S",
     "TRAFFIC",
+    "BankSpec",
+    "BottomSpec",
     "Craft",
     "CurrentSpec",
     "EventSpec",
@@ -74,10 +81,13 @@ __all__ = [
     "own_polar",
     "recentre_m",
     "scenario_departures",
+    "scenario_seabed",
+    "scenario_sounder",
     "scenario_text",
     "scenario_waters",
     "scenario_wind",
     "station_score",
     "tasks_of",
+    "under_keel_m",
     "verdict_line",
 ]

@@ -21,21 +21,41 @@ import tomli_w
 
 from companion import examples
 from companion.boat import Polar
+from companion.chart import parse_ascii_grid, signed
 from companion.compose import RECENTRE_M, polar_of
 from companion.errors import InputError
+from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
 from companion.geofence.mission import without_defaults
 from companion.messages import Mode
 from companion.words import choices, expected
 from sitl.autopilot import EPOCH_S, FRAME_M, Departures, Sensors, VaneState, Waves
 from sitl.scenario.colregs import Craft, Manner
-from sitl.world import AR1, Constant, CurrentModel, Gusty, Later, Lee, Recorded, Scripted, Waters, WindEvent, WindModel
+from sitl.world import (
+    AR1,
+    Bank,
+    Constant,
+    CurrentModel,
+    Gusty,
+    Later,
+    Lee,
+    Recorded,
+    Scripted,
+    Seabed,
+    SimulatedSounder,
+    Tide,
+    Waters,
+    WindEvent,
+    WindModel,
+)
 
 # What a number may be. No comparison holds for a number that is none (nan), so that is refused, too.
 Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
 Speed = Annotated[float, msgspec.Meta(ge=0.0, le=10.0)]
 Degrees = Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)]
+Depth = Annotated[float, msgspec.Meta(ge=-100.0, le=1e4)]
+Rise = Annotated[float, msgspec.Meta(ge=-1000.0, le=1000.0)]
 Slope = Annotated[float, msgspec.Meta(ge=-10.0, le=10.0)]
 Metres = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
 Turns = Annotated[float, msgspec.Meta(ge=-1.0, le=1.0)]
@@ -100,6 +120,37 @@ class SensorsSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     gps_noise_m: Annotated[float, msgspec.Meta(ge=0.0, le=100.0)] = 0.0  # spread, east and north each, wandering ...
     gps_noise_s: Positive = 30.0  # ... with this correlation time
     gps_lag_s: Seconds = 0.0  # the position is so old
+
+
+class BankSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A shoal or a bar on the bottom: an ellipse that rises smoothly to its middle."""
+
+    east_m: Metres  # its middle, from the mission's origin
+    north_m: Metres  # the same
+    top_m: Depth  # the depth there, below the chart's datum; negative: it dries
+    along_m: Positive = 60.0  # its longer half axis, to where nothing of it is left ...
+    across_m: Positive = 60.0  # ... and the other
+    bearing_deg: Degrees = 0.0  # of the longer one
+
+
+class BottomSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The bottom, the tide over it, and the boat's sounder; the mission says `draft_m`."""
+
+    depth_m: Depth = 20.0  # below the chart's datum, at the mission's origin
+    file: str | None = None  # a grid of heights (Esri ASCII, degrees), relative to this one; beyond it `depth_m` holds
+    rises_per_km: Rise = 0.0  # the bottom is so much higher for each km ...
+    rises_to_deg: Degrees = 0.0  # ... in this direction
+    banks: tuple[BankSpec, ...] = ()  # what stands on it
+    tide_m: Depth = 0.0  # the water's mean height above the datum
+    tide_range_m: Depth = 0.0  # from low to high water
+    tide_s: Positive = 44_712.0  # from one high water to the next: 12.42 hours, the moon's
+    tide_high_s: Metres = 0.0  # the first of them, after the start
+    sounder: bool = True  # the boat has one
+    below_m: Annotated[float, msgspec.Meta(ge=0.0, le=20.0)] = 0.0  # its transducer, below the water's surface
+    noise_m: Annotated[float, msgspec.Meta(ge=0.0, le=20.0)] = 0.0  # standard deviation of a ping
+    dropouts: Share = 0.0  # the share of pings without an echo
+    false_bottoms: Share = 0.0  # the share of time in which weed, air or fish is told in the bottom's place ...
+    false_s: Positive = 0.5  # ... for so long each
 
 
 def stream_of(spec: CurrentSpec) -> CurrentModel:
@@ -187,7 +238,7 @@ EventKind = Literal[
     "battery",  # volts
     "leak",  # for_s: the bilge's switch is wet
     "sensor",  # sensor, value, for_s: a script of the boat's tells it (NAMED_VALUE_FLOAT)
-    "sounder",  # value, over_s, for_s: it tells this depth [m], reached so slowly from the last; then it is silent
+    "sounder",  # value, over_s, for_s: it tells this depth [m], reached so slowly from the last; then `[bottom]`
     "radio_lost",  # for_s: the transmitter is out of range
     "station",  # for_s: a ground station is heard, from then on no more
     "knockdown",  # roll_deg, for_s
@@ -366,6 +417,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     arrived: bool | None = True  # at the last goal
     contacts: int | None = 0  # of the hull with what is solid, by the true track
+    groundings: int | None = 0  # of the keel on `[bottom]`: water less deep than the mission's `draft_m`
     within_m: float | None = None  # last position to the last goal, or to what ``ends_at`` names
     ends_at: Literal["goal", "home", "refuge"] = "goal"  # home: where the boat was armed; the nearest refuge
     refuge_within_m: float | None = None  # of a refuge, at some moment
@@ -415,6 +467,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     waves: WavesSpec | None = None  # a seaway
     boat: HullSpec | None = None  # a boat that is not the polar's
     sensors: SensorsSpec | None = None  # sensors that err
+    bottom: BottomSpec | None = None  # how deep the water is, which no plan knows of
     parameters: dict[str, float] = {}  # of the autopilot, by name, from its start
     without_shifts: dict[str, float] = {}  # beside those, of who does not tack on the shifts (sitl baselines)
     events: tuple[EventSpec, ...] = ()  # what befalls the boat, in any number
@@ -507,6 +560,8 @@ def _suggestion(error: msgspec.ValidationError) -> str:
         "waves": WavesSpec,
         "boat": HullSpec,
         "sensors": SensorsSpec,
+        "bottom": BottomSpec,
+        "bottom.banks": BankSpec,
     }
     table = tables.get(_place(error).split("[")[0], Scenario)
     close = difflib.get_close_matches(word, table.__struct_fields__, n=1)
@@ -572,6 +627,59 @@ def scenario_waters(scenario: Scenario, wind: WindModel, home_en_m: tuple[float,
 def scenario_departures(scenario: Scenario) -> Departures | None:
     """Return what the boat of a scenario is that is not the plan's; None: nothing."""
     return departures_of(scenario.boat, scenario.waves, scenario.sensors, scenario.wind.from_deg)
+
+
+def scenario_seabed(scenario: Scenario, source: Path, frame: LocalFrame) -> Seabed | None:
+    """Return the bottom of ``scenario``, read from ``source``, in the metres of its mission's frame; None: none.
+
+    Raises:
+        InputError: its grid cannot be read.
+    """
+    spec = scenario.bottom
+    if spec is None:
+        return None
+    grid = None
+    if spec.file is not None:
+        path = str(source.parent / spec.file)
+        try:
+            text = (source.parent / spec.file).read_text(encoding="ascii")
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(path, "", f"cannot be read ({error})", "name an Esri ASCII grid (.asc)") from error
+        grid = signed(parse_ascii_grid(text, path), path, "auto").northwards()
+    return Seabed(
+        frame=frame,
+        level_m=spec.depth_m,
+        grid=grid,
+        rises_per_km=spec.rises_per_km,
+        rises_to_rad=math.radians(spec.rises_to_deg),
+        banks=tuple(
+            Bank(
+                en_m=(bank.east_m, bank.north_m),
+                along_m=bank.along_m,
+                across_m=bank.across_m,
+                bearing_rad=math.radians(bank.bearing_deg),
+                top_m=bank.top_m,
+            )
+            for bank in spec.banks
+        ),
+        tide=Tide(mean_m=spec.tide_m, range_m=spec.tide_range_m, period_s=spec.tide_s, high_s=spec.tide_high_s),
+    )
+
+
+def scenario_sounder(scenario: Scenario, seabed: Seabed | None, seed: int) -> SimulatedSounder | None:
+    """Return the sounder of a scenario's boat; None: it has none, or no bottom is said."""
+    spec = scenario.bottom
+    if spec is None or seabed is None or not spec.sounder:
+        return None
+    return SimulatedSounder(
+        seabed=seabed,
+        seed=seed,
+        below_m=spec.below_m,
+        noise_m=spec.noise_m,
+        dropouts=spec.dropouts,
+        false_bottoms=spec.false_bottoms,
+        false_s=spec.false_s,
+    )
 
 
 OWN = "ardurover"  # [boat] polar: the simulator's own hull, by its equations

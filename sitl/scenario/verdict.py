@@ -30,6 +30,7 @@ from sitl.scenario.colregs import Met, judge_encounter
 from sitl.scenario.scenario import ExpectSpec
 from sitl.scenario.tasks import Tasks
 from sitl.scenario.tasks import findings as task_findings
+from sitl.world import Seabed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -306,6 +307,26 @@ def longest_silence_s(status_times_s: Sequence[float], start_s: float, end_s: fl
     return max((b - a for a, b in itertools.pairwise(times)), default=0.0)
 
 
+FINE_M = 1.0  # between two looks at the bottom
+
+
+def under_keel_m(truth: TrueTrack, seabed: Seabed, draft_m: float, began_s: float = 0.0) -> NDArray[np.float64]:
+    """Return the room under a keel amidships all along a track, between its samples too [m]; negative: aground.
+
+    The scenario, whose tide it is, began at ``began_s`` of the track's time.
+    """
+    places, t_s = truth.positions_m(), np.asarray(truth.t_s, dtype=np.float64)
+    if len(places) == 0:
+        return np.zeros(0)
+    pieces = np.maximum(1, np.ceil(np.hypot(*np.diff(places, axis=0).T) / FINE_M)).astype(np.intp)
+    first = np.repeat(np.arange(len(pieces)), pieces)
+    share = np.arange(len(first)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    at = np.append(first + share / pieces[first], len(places) - 1.0)
+    samples = np.arange(len(places))
+    fine = np.column_stack([np.interp(at, samples, places[:, axis]) for axis in (0, 1)])
+    return seabed.depth_m(fine, np.interp(at, samples, t_s) - began_s) - draft_m
+
+
 def judge(
     *,
     scenario: str,
@@ -327,6 +348,7 @@ def judge(
     began_s: float = 0.0,
     tasks: Tasks | None = None,
     keep_m: float = 0.0,
+    keel_m: NDArray[np.float64] | None = None,
 ) -> ScenarioVerdict:
     """Hold a run against what its scenario expects.
 
@@ -334,7 +356,7 @@ def judge(
     asked for. ``called_at_s`` is when the companion called its crew to the anchor, None where that is not known.
     ``ordered`` are the systems of other autopilots that were given orders, None where there was no other. The
     scenario's beginning is ``began_s`` in the track's time; ``tasks`` are the mission's, ``keep_m`` what it keeps from
-    vessels.
+    vessels. ``keel_m`` is the room under the keel along the track, None where no bottom is known.
     """
     ends = {"goal": [goal_en_m], "home": truth.en_m[:1], "refuge": refuges_en_m}[expect.ends_at]
     positions = truth.positions_m()
@@ -364,6 +386,14 @@ def judge(
             bool(truth.t_s) and contacts <= expect.contacts,
             contacts if truth.t_s else None,
             f"at most {expect.contacts}",
+        )
+    aground = 0 if keel_m is None else int(np.sum(np.diff(keel_m < 0.0, prepend=False) & (keel_m < 0.0)))
+    if expect.groundings is not None and keel_m is not None:
+        check(
+            "groundings",
+            bool(truth.t_s) and aground <= expect.groundings,
+            aground if truth.t_s else None,
+            f"at most {expect.groundings}",
         )
     if expect.within_m is not None:
         check(
@@ -487,6 +517,11 @@ def judge(
             "promised_risk": summary.get("promised_risk"),
             "no_go_entries": summary.get("no_go_entries"),
             "end_reason": summary.get("end_reason"),
+            **(
+                {}
+                if keel_m is None
+                else {"groundings": aground, "min_under_keel_m": float(keel_m.min(initial=math.inf))}
+            ),
         },
     )
 
@@ -502,6 +537,9 @@ def verdict_line(record: Mapping[str, Any]) -> str:
         words += "nothing to be clear of" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"
         if f["min_clearance_m"] is not None and f.get("promised_clearance_m") is not None:
             words += f" (promised {f['promised_clearance_m']:.1f} m)"
+        if f.get("min_under_keel_m") is not None:
+            aground = f", {counted(f['groundings'], 'grounding')}" if f["groundings"] else ""
+            words += f", {f['min_under_keel_m']:.1f} m under the keel{aground}"
     else:
         words = "; ".join(f"{check['name']}: {check['figure']}" for check in record["checks"] if not check["passed"])
     outcome = "PASSED" if record["passed"] else "FAILED"

@@ -16,10 +16,14 @@ from sitl.world.environment import (
     WindModel,
     parse_wind,
 )
+from sitl.world.seabed import LEAST_M, MOST_M, Bank, Seabed, SimulatedSounder, Tide
 
 __all__ = [
     "AR1",
+    "LEAST_M",
     "LENGTH_M",
+    "MOST_M",
+    "Bank",
     "Constant",
     "CurrentModel",
     "Gusty",
@@ -28,7 +32,10 @@ __all__ = [
     "Process",
     "Recorded",
     "Scripted",
+    "Seabed",
+    "SimulatedSounder",
     "SimulatedVaimos",
+    "Tide",
     "Waters",
     "WindEvent",
     "WindModel",

@@ -67,7 +67,7 @@ class Core:
         self.run_motor(on=False)
         self._told = (self.vehicle.position, self.chart.to_e7(self.vehicle.position))
         self.battery_v = config.battery_v
-        self.depth_m: float | None = None  # what its sounder tells; None: it has none, or it is silent
+        self.depth_m: float | None = None  # what an event has its sounder tell; None: what it hears of the bottom
         self.sensors: dict[str, float] = {}  # what a script of the boat's tells, by name
         self.roll_rad = 0.0
         self.power_up(-WARM_BOOT_S if config.is_warm else 0.0)
@@ -126,6 +126,14 @@ class Core:
         if self._told[0] != here:  # several messages of one loop tell it
             self._told = (here, self.chart.to_e7(here))
         return self._told[1]
+
+    @property
+    def sounding_m(self) -> float | None:
+        """What its sounder tells of the depth now [m]; None: it has none, is silent, or hears no echo."""
+        sounder = self.config.sounder
+        if self.depth_m is not None or sounder is None:
+            return self.depth_m
+        return sounder.ping_m(self.chart.point(self.vehicle.true_position), self.t_s)
 
     def follow(self) -> bool:
         """Let all metres count from the boat when it is far from where they do; True: places must be taken anew."""

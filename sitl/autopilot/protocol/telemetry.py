@@ -16,6 +16,7 @@ from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.link import MavlinkPort
 from sitl.autopilot.pilot.core import INVALID_RESULT, POSITION_MODES
 from sitl.autopilot.pilot.pilot import Pilot
+from sitl.world import LEAST_M, MOST_M
 
 LIST_MAX = 25
 TIMEOUT_S = 600.0
@@ -213,17 +214,18 @@ def _gps(p: Pilot) -> Any:
     )
 
 
-SOUNDER_CM = (30, 5000)  # what it reaches
+SOUNDER_CM = (round(100.0 * LEAST_M), round(100.0 * MOST_M))
 
 
 def _sounding(p: Pilot) -> Any:
     """DISTANCE_SENSOR of a sounder that looks down, None of one that is silent."""
-    if p.core.depth_m is None:
+    depth_m = p.core.sounding_m
+    if depth_m is None:
         return None
     return mav.MAVLink_distance_sensor_message(
         p.core.boot_ms,
         *SOUNDER_CM,
-        max(0, min(SOUNDER_CM[1], round(100.0 * p.core.depth_m))),
+        max(0, min(SOUNDER_CM[1], round(100.0 * depth_m))),
         mav.MAV_DISTANCE_SENSOR_ULTRASOUND,
         1,
         mav.MAV_SENSOR_ROTATION_PITCH_270,
