@@ -278,7 +278,7 @@ def progress_text(step: Step) -> str:
     if snapshot.vehicle is not None:
         parts.append(f"{snapshot.vehicle.speed_mps:.1f} m/s")
     if under_way:
-        tack = next_tack(step, step.voyage.boat.polar)
+        tack = next_tack(step, step.voyage.boat)
         if tack is not None:
             parts.append(f"next tack {'' if tack.is_planned else 'about '}{tack.in_s:.0f} s")
         if autopilot is not None and autopilot.cross_track_m is not None:

@@ -60,7 +60,7 @@ def companion_status(
         tws_sigma_mps=tws_sigma,
         current_set_rad=snapshot.current.set_rad if snapshot.current.is_significant else None,
         current_drift_mps=snapshot.current.drift_mps if snapshot.current.is_significant else None,
-        next_tack_s=next_tack_s(step, voyage.boat.polar),
+        next_tack_s=next_tack_s(step, voyage.boat),
         figures=tuple(figure_values(step, "radio").items()),
         promised_risk=None if route is None else risk_of(route),
         plan_id=None if route is None else route.plan_id,

@@ -650,7 +650,7 @@ def plan_of(
         return None
     begin, count = min(state.mission.index, len(route.items)), len(route.items)
     left = tuple(_leg(route, n, legs) for n in range(begin, count))
-    tack = next_tack(step, voyage.boat.polar)
+    tack = next_tack(step, voyage.boat)
     return values.PlanView(
         number=route.plan_id,
         age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),

@@ -67,7 +67,7 @@ def test_the_line_tells_the_clearance_and_when_she_is_there():
     step = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
     route = world.state.mission.route
     assert f"clearance expected {route.expected_clearance_m:.1f} m" in progress_text(step)
-    tack = next_tack(step, step.voyage.boat.polar)
+    tack = next_tack(step, step.voyage.boat)
     assert ("next tack" in progress_text(step)) == (tack is not None)
     assert ("next tack about" in progress_text(step)) == (tack is not None and not tack.is_planned)
     left = re.search(r"there in (\d+) s \(90 %: (\d+) s\)", progress_text(step))

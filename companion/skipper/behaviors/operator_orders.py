@@ -292,7 +292,7 @@ def _replace(ctx: StepContext, _: Order) -> Answer:
 
 def _say_why(ctx: StepContext, _: Order) -> Answer:
     state = ctx.state
-    tack_s = next_tack_s(ctx, ctx.voyage.boat.polar) if ctx.config.sails else None
+    tack_s = next_tack_s(ctx, ctx.voyage.boat) if ctx.config.sails else None
     tack = "" if tack_s is None else f"; next tack in {tack_s:.0f} s"
     order = state.orders.standing
     under = "" if order is None else f"; {order.words} for {order.age_s(ctx.t_s) / 60.0:.0f} min, {order.why}"

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
-from companion.boat import AutopilotLimits, Polar
+from companion.boat import AutopilotLimits, Boat
 from companion.boat.failed_tack import TRIES
 from companion.boat.tracking import GuidanceModel, beat_band_m
 from companion.geo.angles import difference_rad, heading_of
@@ -28,6 +28,8 @@ TACKING_S = 4.0
 MIN_SPEED_MPS = 0.2
 # A boat that makes less than this part of its polar's speed is gathering way, out of a tack: it will soon make it.
 GATHERING_WAY = 0.8
+LOSING_WAY = 0.4  # ... and in a tack, with less than this, it may fail
+MANY_FAIL = 0.1  # of the tacks of a voyage: of the next nothing is promised
 
 
 def tacks_fail(ctx: StepContext) -> bool:
@@ -139,28 +141,29 @@ class Seen(Protocol):
 
 
 class NextTack(NamedTuple):
-    """The next tack: when [s], and whether it is the plan's, at the end of the leg that is sailed.
+    """The next tack: when she is through the wind [s], and whether it is the plan's and stays so.
 
-    Else it is the autopilot's own, or behind a waypoint at which a new plan is asked for.
+    Else it is the autopilot's own, at or behind a waypoint for which a new plan is asked for on the way there, or one
+    that may fail.
     """
 
     in_s: float
     is_planned: bool
 
 
-def next_tack_s(seen: Seen, polar: Polar) -> float | None:
+def next_tack_s(seen: Seen, boat: Boat) -> float | None:
     """Return the time until the next tack [s]; None: there is none, or no way on."""
-    found = next_tack(seen, polar)
+    found = next_tack(seen, boat)
     return None if found is None else found.in_s
 
 
-def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
+def next_tack(seen: Seen, boat: Boat) -> NextTack | None:
     """Return the next tack, planned or the autopilot's own; None: there is none, or no way on.
 
     On a leg inside its no-go zone the autopilot beats: it keeps the tack that it comes on until the edge of its
     corridor, or until the other tack fetches the waypoint; in GUIDED it does not beat, and such a leg is planned anew.
-    The end of a mission, a loiter, is no course. Legs ahead are sailed at the polar's speed, this one at the boat's
-    own, once it has way on.
+    The end of a mission, a loiter, is no course. Legs ahead are sailed at what the boat has shown of the polar's speed,
+    this one at its own, once it has way on.
     """
     route, snapshot = seen.state.mission.route, seen.snapshot
     vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
@@ -184,16 +187,23 @@ def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
         )
         if item.command == Command.NAV_WAYPOINT
     ]
-    side = difference_rad(wind_rad, vehicle.heading_rad) > 0.0
+    tack_rad = difference_rad(wind_rad, vehicle.heading_rad)
+    side = tack_rad > 0.0
     time_s = 0.0
     for number, leg in enumerate(legs):
         start, end = (here, leg[1]) if number == 0 else leg
         off_rad = difference_rad(wind_rad, heading_of(end[0] - start[0], end[1] - start[1]))
         is_closed = abs(off_rad) < no_go_rad
+        expected_mps = snapshot.speed_seen.share * boat.polar.speed_mps(max(abs(off_rad), no_go_rad), tws_mps)
         if not is_closed and (off_rad > 0.0) != side and abs(off_rad) < math.pi / 2.0:
             # Of the leg that is sailed, too: the boat is turning to it.
-            return NextTack(time_s, is_planned=number <= 1)
-        speed_mps = max(MIN_SPEED_MPS, polar.speed_mps(max(abs(off_rad), no_go_rad), tws_mps))
+            is_planned = _tacks_come_off(seen.state) and (
+                vehicle.speed_mps > LOSING_WAY * expected_mps
+                if number == 0
+                else number == 1 and not _is_to_be_planned(seen.state)
+            )
+            return NextTack(time_s + abs(tack_rad) / boat.turn_rate_radps, is_planned)
+        speed_mps = max(MIN_SPEED_MPS, expected_mps)
         has_way = number == 0 and vehicle.speed_mps > GATHERING_WAY * speed_mps
         if is_closed:
             if snapshot.autopilot is not None and snapshot.autopilot.mode is Mode.GUIDED:
@@ -201,10 +211,24 @@ def next_tack(seen: Seen, polar: Polar) -> NextTack | None:
             close_rad = wind_rad - no_go_rad if side else wind_rad + no_go_rad
             velocity_en = vehicle.velocity_en_mps if has_way else moved((0.0, 0.0), close_rad, speed_mps)
             own_s = _own_tack_s(start, velocity_en, leg, wind_rad, side=side, limits=limits)
-            return None if own_s is None else NextTack(time_s + own_s, is_planned=False)
-        side = off_rad > 0.0
+            turn_s = no_go_rad / boat.turn_rate_radps
+            return None if own_s is None else NextTack(time_s + own_s + turn_s, is_planned=False)
+        side, tack_rad = off_rad > 0.0, off_rad
         time_s += math.dist(start, end) / (vehicle.speed_mps if has_way else speed_mps)
     return None
+
+
+def _is_to_be_planned(state: SkipperState) -> bool:
+    """Return whether what follows the present waypoint is being planned, or will be on the way there."""
+    route, index = state.mission.route, state.mission.index
+    is_asked = state.plans.replanned_index >= index
+    return state.pending.plan is not None or (route is not None and route.is_planned_from(index) and not is_asked)
+
+
+def _tacks_come_off(state: SkipperState) -> bool:
+    """Return whether the next tack will come off, by what those of this voyage have told."""
+    tacking = state.tacking
+    return not tacking.is_counted and tacking.failed <= MANY_FAIL * tacking.tried
 
 
 def _own_tack_s(

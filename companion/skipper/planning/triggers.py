@@ -321,9 +321,7 @@ def _waypoint(ctx: StepContext) -> Trigger | None:
     state, route, boat, leg = ctx.state, ctx.state.mission.route, ctx.boat_en, ctx.leg()
     if route is None or boat is None or leg is None or state.plans.replanned_index >= state.mission.index:
         return None
-    last = ctx.last_waypoint()
-    passes = any(g >= 0 for g in route.gate_of[state.mission.index : last])
-    if state.mission.index >= last or passes or is_buoy(ctx.gate):
+    if not route.is_planned_from(state.mission.index) or is_buoy(ctx.gate):
         return None  # the tail to the next goal is there already: see _extension
     left_s = distance_m(boat, leg[1]) / max(ctx.speed_mps, 0.3)
     if not TOO_LATE_S + ctx.late_s < left_s <= ctx.config.lead_s + ctx.late_s or ctx.is_raised("wind untrusted"):

@@ -43,6 +43,14 @@ class Route:
     why: str = ""
     bound_for: str = ""  # the diversion that its end serves; empty: the goals
 
+    def is_planned_from(self, index: int) -> bool:
+        """Return whether a plan is asked for from item ``index`` on before the boat is there.
+
+        Not where what follows it is there already: the last waypoint of a plan, and the way to the gate after next.
+        """
+        last = len(self.items) - 2
+        return index < last and all(gate < 0 for gate in self.gate_of[index:last])
+
 
 class DiversionKind(enum.Enum):
     """What kind of diversion."""

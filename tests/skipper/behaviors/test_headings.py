@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from companion.boat import constant
 from companion.geo.angles import difference_rad
-from companion.messages import Command, Mode
+from companion.messages import Command, MissionItem, Mode
 from companion.skipper.behaviors.drifting import CALL
 from companion.skipper.behaviors.headings import (
     back_to_line_rad,
@@ -24,11 +24,13 @@ from companion.skipper.planning.autopilot_beats import next_tack, next_tack_s, r
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.snapshot import CommandOutcome, CommandResult
+from companion.skipper.step.route import Route
+from companion.skipper.step.snapshot import CommandOutcome, CommandResult, SpeedSeen
+from companion.skipper.step.state import NO_TACKS
 from companion.skipper.way.geometry import bearing_rad, cross_track_m
 from companion.skipper.way.voyage import Goal, Side
 from tests.skipper.test_voyage import is_done, is_sailing, make, said
-from tests.skipper.world import with_parts
+from tests.skipper.world import voyage, with_parts
 
 ANGLE = st.floats(-math.pi, math.pi)
 CHECK = settings(max_examples=100)
@@ -201,7 +203,7 @@ def test_on_a_leg_that_the_wind_has_closed_no_tack_of_the_autopilots_is_told():
     world.winds = []
     ctx = turn_of(world)
     assert ctx.is_closed(*ctx.leg(), ctx.wind_now)
-    assert next_tack_s(ctx, ctx.voyage.boat.polar) is None
+    assert next_tack_s(ctx, ctx.voyage.boat) is None
 
 
 @pytest.mark.parametrize("away_m", [9.0, 14.0])
@@ -311,23 +313,53 @@ def test_out_of_irons_she_is_steered_on_and_not_given_to_auto():
     assert world.speed > 1.0
 
 
-def test_a_tack_behind_a_waypoint_is_told_as_about():
+def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
     """At each waypoint a new plan is asked for: "next tack 44 s" was 86 s away, for it made the board longer."""
+    boat = replace(voyage().boat, polar=constant(2.0), turn_rate_radps=math.radians(30.0))
 
-    def told(*points):
-        route = SimpleNamespace(
-            items=[SimpleNamespace(command=Command.NAV_WAYPOINT)] * len(points),
-            leg_from_en_m=[(0.0, 0.0), *points[:-1]],
-            points_en_m=list(points),
+    def told(*points, asked=-1, pending=None, share=1.0, heading_deg=60.0, speed_mps=2.0, tacking=NO_TACKS):
+        route = Route(
+            items=(MissionItem(command=Command.NAV_WAYPOINT),) * len(points)
+            + (MissionItem(command=Command.NAV_LOITER_UNLIM),),
+            leg_from_en_m=((0.0, 0.0), *points),
+            points_en_m=(*points, points[-1]),
+            gate_of=(*(-1,) * (len(points) - 1), 0, -1),
+            plan_id=1,
+            plan_t_s=0.0,
+            plan_twd_from_rad=0.0,
+            plan_tws_mps=5.0,
+            plan_half_width_rad=0.0,
+            margin_m=8.0,
+            delta_s=0.9,
         )
-        vehicle = SimpleNamespace(speed_mps=2.0, heading_rad=math.radians(60.0), velocity_en_mps=(1.7, 1.0))
+        heading_rad = math.radians(heading_deg)
+        vehicle = SimpleNamespace(speed_mps=speed_mps, heading_rad=heading_rad, velocity_en_mps=(1.7, 1.0))
         wind = SimpleNamespace(mean_twd_from_rad=0.0, present_twd_from_rad=0.0, mean_tws_mps=5.0, present_tws_mps=5.0)
-        snapshot = SimpleNamespace(vehicle=vehicle, position_en_m=(0.0, 0.0), wind=wind, limits=None, autopilot=None)
-        return next_tack(
-            SimpleNamespace(snapshot=snapshot, state=SimpleNamespace(mission=SimpleNamespace(route=route, index=0))),
-            constant(2.0),
+        snapshot = SimpleNamespace(
+            vehicle=vehicle,
+            position_en_m=(0.0, 0.0),
+            wind=wind,
+            limits=None,
+            autopilot=None,
+            speed_seen=SpeedSeen(share=share),
         )
+        state = SimpleNamespace(
+            mission=SimpleNamespace(route=route, index=0),
+            plans=SimpleNamespace(replanned_index=asked),
+            pending=SimpleNamespace(plan=pending),
+            tacking=tacking,
+        )
+        return next_tack(SimpleNamespace(snapshot=snapshot, state=state), boat)
 
     east, on, back = (86.6, 50.0), (173.2, 100.0), (86.6, 150.0)
-    assert told(east, (0.0, 100.0)) == pytest.approx((50.0, True), abs=0.1)  # at the end of this leg
-    assert told(east, on, back) == pytest.approx((100.0, False), abs=0.1)
+    turn_s = 2.0  # 60 degrees at 30 degrees a second
+    assert told(east, (0.0, 100.0)) == pytest.approx((50.0 + turn_s, False), abs=0.1)  # at the end of this leg
+    assert told(east, (0.0, 100.0), asked=0) == pytest.approx((50.0 + turn_s, True), abs=0.1)
+    assert not told(east, (0.0, 100.0), asked=0, pending="a plan").is_planned
+    assert told(east, on, back, asked=0) == pytest.approx((100.0 + turn_s, False), abs=0.1)
+    failing = replace(NO_TACKS, tried=8, failed=1)
+    assert not told(east, (0.0, 100.0), asked=0, tacking=failing).is_planned
+    assert told(east, on, heading_deg=-30.0) == pytest.approx((1.0, True), abs=0.1)  # she is turning to this leg
+    assert not told(east, on, heading_deg=-30.0, speed_mps=0.5).is_planned  # and may not come through the wind
+    assert not told(east, on, heading_deg=-30.0, tacking=replace(NO_TACKS, is_counted=True)).is_planned
+    assert told(east, on, back, share=0.8) == pytest.approx((50.0 + 50.0 / 0.8 + turn_s, False), abs=0.1)
