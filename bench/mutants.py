@@ -35,6 +35,7 @@ import tempfile
 import time
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -356,43 +357,64 @@ class Covering:
             self.bad.add(report.nodeid)
 
     def ran(self) -> dict[str, dict[str, str]]:
-        """Return, for each test and file of tests, the lines of each file of code: bits, in hexadecimal."""
+        """Return, for each test and file of tests, the lines of each file of code: its text's digest, bits in hex."""
         self.cover.stop()
         masks: dict[str, Counter[str]] = defaultdict(Counter)
         for file in self.files:
             for line, contexts in self.cover.get_data().contexts_by_lineno(str(ROOT / file)).items():
                 for context in contexts:
                     masks[context][file] += 1 << line
-        return {context: {file: hex(mask) for file, mask in of.items()} for context, of in masks.items() if context}
+        texts = {file: text_of(file) for file in self.files}
+        return {
+            context: {file: f"{texts[file]}:{mask:x}" for file, mask in of.items()}
+            for context, of in masks.items()
+            if context
+        }
 
 
 class Coverage:
     """Which tests run a line, kept in a file: what a changed test or a changed file of code asks for is run again."""
 
-    def __init__(self, path: Path, files: Sequence[str]) -> None:
-        self.path, self.files = path, files
-        kept = json.loads(path.read_text()) if path.exists() else {"texts": {}, "took": {}, "ran": {}}
-        self.texts, self.took, self.ran = kept["texts"], kept["took"], kept["ran"]
+    def __init__(self, path: Path, files: Sequence[str], asked: AbstractSet[str]) -> None:
+        self.path, self.files, self.asked = path, files, asked
+        self.texts: dict[str, str] = {}
+        self.took: dict[str, float] = {}
+        self.ran: dict[str, dict[str, str]] = {}
+        self._read()
+
+    def _read(self) -> None:
+        """Read what is known and forget the tests that are of another text, or ran another of what is asked for."""
+        if self.path.exists():
+            kept = json.loads(self.path.read_text())
+            self.texts, self.took, self.ran = kept["texts"], kept["took"], kept["ran"]
+        now = {file: text_of(file) for file in self.asked}
+        other = {
+            file_of(ran)
+            for ran, of in self.ran.items()
+            if any(lines.partition(":")[0] != now[file] for file, lines in of.items() if file in now)
+        }
+        self._forget(other | {test for test, text in self.texts.items() if text != text_of(test)})
+
+    def _forget(self, tests: AbstractSet[str]) -> None:
+        self.took = {t: s for t, s in self.took.items() if file_of(t) not in tests}
+        self.ran = {r: of for r, of in self.ran.items() if file_of(r) not in tests}
+        self.texts = {t: text for t, text in self.texts.items() if t not in tests}
 
     def renew(self, tops: Sequence[str]) -> None:
         """Run what of the tests below ``tops`` is new or changed, or runs code which is."""
-        tests = tests_below(tops)
-        code = {file: text_of(file) for file in self.files}
-        changed = {file for file, text in code.items() if self.texts.get(file) != text}
-        old = {file_of(ran) for ran, of in self.ran.items() if changed & set(of)}
-        old |= {t for t in self.texts if t.startswith("tests/") and self.texts[t] != text_of(t)}
-        stale = sorted(t for t in tests if t in old or t not in self.texts)
-        self.took = {t: s for t, s in self.took.items() if file_of(t) not in old}
-        self.ran = {r: of for r, of in self.ran.items() if file_of(r) not in old}
-        self.texts = {t: text for t, text in self.texts.items() if t not in old} | code
+        stale = sorted(t for t in tests_below(tops) if t not in self.texts)
         if stale:
             texts = {t: text_of(t) for t in stale}
             plugin = Covering(self.files)
             pytest.main([*PYTEST, *stale], plugins=[plugin])
+            self._read()  # another run may have written meanwhile
+            self._forget(set(stale))
             self.took |= {t: s for t, s in plugin.took.items() if t not in plugin.bad}
             self.ran |= plugin.ran()
             self.texts |= texts
-        self.path.write_text(json.dumps({"texts": self.texts, "took": self.took, "ran": self.ran}))
+        part = self.path.with_suffix(f".{os.getpid()}")
+        part.write_text(json.dumps({"texts": self.texts, "took": self.took, "ran": self.ran}))
+        part.replace(self.path)
 
     def of(self, file: str) -> dict[int, set[str]]:
         """Return the tests of each line of a file."""
@@ -401,7 +423,7 @@ class Coverage:
             in_file[file_of(test)].append(test)
         lines: dict[int, set[str]] = defaultdict(set)
         for ran, of in self.ran.items():
-            mask, line = int(of.get(file, "0"), 16), 0
+            mask, line = int(of.get(file, ":0").partition(":")[2], 16), 0
             tests = [ran] if ran in self.took else in_file[ran]
             while mask:
                 if mask & 1:
@@ -659,16 +681,16 @@ def main(argv: Sequence[str] | None = None) -> int:
             wanted = [m for m in wanted if last.get(m.key, {}).get("verdict") == "survived"]
         else:
             wanted = [m for m in wanted if m.key not in last]
-        files = sorted({m.file for m in drawn(list(ROOMS), None, 0)})
+        files, asked = sorted({m.file for m in drawn(list(ROOMS), None, 0)}), {m.file for m in wanted}
         known = KEPT / "mutants.coverage.json"
         tops = sorted({top for room in rooms for top in ROOMS[room][1]})
         if wanted:
             if not (pid := os.fork()):  # a process of its own: nothing that the tests leave stays in those that judge
-                Coverage(known, files).renew(tops)
+                Coverage(known, files, asked).renew(tops)
                 os._exit(0)
             if os.waitpid(pid, 0)[1]:
                 return 1
-            judge = Judge(wanted, Coverage(known, files), args.jobs, verdicts, until_s)
+            judge = Judge(wanted, Coverage(known, files, asked), args.jobs, verdicts, until_s)
             pytest.main([*PYTEST, *tops], plugins=[judge])
         last = known_verdicts(verdicts)
     table(last, sys.stdout)
