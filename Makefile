@@ -66,7 +66,8 @@ test-long: $(ENV)
 test-faults: $(ENV)
 	$(BIN)/sitl faults --runs 300
 
-# The tests that draw their examples, on new draws each time: what it finds is a defect, with the example that shows it.
+# The tests that draw their examples, on new draws each time (every night): what it finds is a defect, and a patch that keeps the
+# draw as an @example of its test (git apply .hypothesis/patches/...; it wants "example" imported).
 draws: $(ENV)
 	@$(KERNELS)
 	$(BIN)/python -m pytest -n 3 --dist worksteal -m "not campaign" --hypothesis-profile=new \

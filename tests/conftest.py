@@ -14,9 +14,10 @@ from hypothesis import settings
 from companion.kernels import places
 
 # How long an example takes is the machine's business, which others share. What lands is tried on the same draws each
-# time: a rare find must not stop another's change. `make draws` looks for new ones.
+# time: a rare find must not stop another's change. `make draws` looks for new ones; what it finds is written as an
+# @example, which is drawn from then on whatever the profile.
 settings.register_profile("same", deadline=None, derandomize=True)
-settings.register_profile("new", deadline=None)
+settings.register_profile("new", deadline=None, print_blob=True)
 settings.load_profile("same")
 
 # A minute of each worker's time in tests of seconds: begun first, or one worker would end with them while others wait.
