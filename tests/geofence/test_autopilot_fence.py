@@ -215,6 +215,92 @@ def test_the_proof_finds_what_is_wrong():
         assert words in prove(area, items, 10.0, inside=[ORIGIN])
 
 
+def keep_in(shape, margin_m=None):
+    return Zone(kind=ZoneKind.INCLUSION, shape=shape, margin_m=margin_m)
+
+
+def square(half_m, east_m=0.0):
+    e, h = east_m, half_m
+    return Polygon(
+        LocalFrame(ORIGIN).array_lonlat_from_en(np.array([(e - h, -h), (e + h, -h), (e + h, h), (e - h, h)]))
+    )
+
+
+@pytest.mark.parametrize(
+    ("half_m", "says"), [(200.5, "is not inside"), (199.5, ""), (190.5, ""), (189.0, "shuts out water")]
+)
+def test_a_keep_in_zone_is_inside_the_limits_by_no_more_than_the_margin(half_m, says):
+    area = Area(fence=Fence(zones=(keep_in(square(200.0)),)))
+    items, _ = zones_to_items((keep_in(square(half_m)),))
+    assert says in (told := prove(area, items, 10.0, inside=[ORIGIN]))
+    assert bool(told) == bool(says)
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "off_m", "says"),
+    [
+        (200.0, 0.0, ""),  # the rim itself: both radii are drawn on one sphere
+        (201.0, 0.0, "is not inside"),
+        (190.0, 0.0, ""),
+        (188.0, 0.0, "shuts out water"),
+        (195.0, 4.0, ""),
+        (198.0, 4.0, "is not inside"),
+        (192.0, 6.0, "shuts out water"),
+    ],
+)
+def test_a_circle_to_keep_in_is_held_by_the_circle_of_the_limits(radius_m, off_m, says):
+    rim, frame = Circle(ORIGIN, 200.0), LocalFrame(ORIGIN)
+    area = Area(fence=Fence(zones=(keep_in(rim),)))
+    items, _ = zones_to_items((keep_in(Circle(frame.geo_from_en(off_m, 0.0), radius_m)),))
+    assert says in (told := prove(area, items, 10.0, inside=[ORIGIN]))
+    assert bool(told) == bool(says)
+
+
+def test_limits_without_a_keep_in_zone_are_no_fence_and_each_of_two_limits_counts():
+    both = Area(fence=Fence(zones=(keep_in(square(200.0)), keep_in(square(200.0, east_m=100.0)))))
+    assert "is not inside" in prove(both, (), 10.0, inside=[ORIGIN])
+    whole, _ = zones_to_items((keep_in(square(199.9)),))
+    assert "is not inside" in prove(both, whole, 10.0, inside=[ORIGIN])
+    fitted, _ = zones_to_items((keep_in(square(199.9)), keep_in(square(199.9, east_m=100.0))))
+    assert prove(both, fitted, 10.0, inside=[ORIGIN]) == ""
+
+
+def test_a_limit_with_a_margin_of_its_own_is_narrower_by_it():
+    area = Area(fence=Fence(zones=(keep_in(square(200.0), margin_m=30.0),)))
+    assert prove(area, zones_to_items((keep_in(square(165.0)),))[0], 10.0, inside=[ORIGIN]) == ""
+    assert "shuts out water" in prove(area, zones_to_items((keep_in(square(155.0)),))[0], 10.0, inside=[ORIGIN])
+
+
+@pytest.mark.parametrize(("goal_m", "says"), [(150.0, ""), (195.0, ""), (205.0, "goal 1 would be outside")])
+def test_a_goal_outside_of_the_fence_is_named(goal_m, says):
+    area = Area(fence=Fence(zones=(keep_in(square(200.0)),)))
+    items, _ = zones_to_items((keep_in(square(199.9)),))
+    goal = LocalFrame(ORIGIN).geo_from_en(0.0, goal_m)
+    assert says in (told := prove(area, items, 10.0, inside=[ORIGIN, goal]))
+    assert bool(told) == bool(says)
+
+
+def test_a_goal_on_a_keep_out_zone_is_named_and_a_rock_outside_of_the_keep_in_zones_needs_none():
+    rock, far = island(0.0, 150.0, [20.0] * 12, "rock"), island(0.0, 400.0, [20.0] * 12, "far")
+    area = Area(obstacles=(rock, far), fence=Fence(zones=(keep_in(square(200.0)),)))
+    result = fence_for_autopilot(area, 10.0, inside=[ORIGIN])
+    assert result.status is FenceStatus.OK
+    assert [z.kind for z in result.zones].count(ZoneKind.EXCLUSION) == 1
+    goal = LocalFrame(ORIGIN).geo_from_en(0.0, 150.0)
+    assert "goal 1 would be outside" in prove(area, result.items, 10.0, inside=[ORIGIN, goal])
+    only_in = tuple(z for z in result.zones if z.kind is ZoneKind.INCLUSION)
+    assert "do not hold rock" in prove(area, zones_to_items(only_in)[0], 10.0, inside=[ORIGIN])
+
+
+def test_a_keep_out_zone_may_reach_as_far_as_the_rocks_own_margin():
+    rock = island(0.0, 150.0, [20.0] * 24, "rock")
+    wide = Obstacle(shape=rock.shape, name="rock", margin_m=25.0)
+    around = LocalFrame(ORIGIN).geo_from_en(0.0, 150.0)
+    items, _ = zones_to_items((Zone(kind=ZoneKind.EXCLUSION, shape=Circle(around, 38.0)),))
+    assert "beyond the planner's margin" in prove(Area(obstacles=(rock,)), items, 10.0, inside=[ORIGIN])
+    assert prove(Area(obstacles=(wide,)), items, 10.0, inside=[ORIGIN]) == ""
+
+
 def _scaled(shape, factor):
     if isinstance(shape, Circle):
         return Circle(shape.center, shape.radius_m * factor)
