@@ -1,11 +1,13 @@
 """The stamps of signed frames on disk: their clock, how far ahead they are kept, what is damage."""
 
 import math
+import os
 from datetime import UTC, datetime
+from pathlib import Path
 
 import pytest
 
-from companion.mavlink.signing import SigningStore, read_key
+from companion.mavlink.signing import SigningStore, make_key, read_key
 
 TICKS = 100_000  # of 10 µs in a second
 YEAR = 366 * 86_400 * TICKS
@@ -78,3 +80,13 @@ def test_on_a_board_without_a_clock_damage_is_the_beginning_of_time(key, caplog,
     assert SigningStore(key, 0.0).state.timestamp == 0
     assert "written anew" in caplog.text
     assert other.read_text() == str(500 * TICKS)
+
+
+def test_a_key_is_whole_on_the_disk_when_it_is_said_to_be_there(tmp_path, monkeypatch):
+    """A power cut behind it leaves the key that the autopilot was given: else she can be signed to no more."""
+    synced, path, fds = [], tmp_path / "boat.key", len([*Path("/proc/self/fd").iterdir()])
+    sync = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda fd: (synced.append(str(Path(f"/proc/self/fd/{fd}").readlink())), sync(fd)))
+    make_key(path)
+    assert synced == [str(path), str(tmp_path)]
+    assert len([*Path("/proc/self/fd").iterdir()]) == fds

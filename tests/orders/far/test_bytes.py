@@ -1,6 +1,7 @@
 """Orders and statuses as bytes: what is packed is read, by ours and by the page; what anybody else sends is refused."""
 
 import math
+from datetime import UTC, datetime
 
 import pytest
 from hypothesis import example, given, settings
@@ -23,6 +24,7 @@ from companion.orders.far import (
     unpack_order,
     unpack_status,
 )
+from companion.orders.far.order import BitField
 from companion.safety import TABLE
 from companion.skipper.step import Phase
 from companion.traffic import Alarm
@@ -291,3 +293,30 @@ def test_the_numbers_are_those_of_the_rooms_that_own_the_words():
 
 def test_the_sizes_are_those_that_are_paid_for():
     assert (order.SIZE, order.BEGINNING_SIZE, status.SIZE) == (24, 15, 42)
+
+
+@pytest.mark.parametrize(
+    ("field", "least", "most"),
+    [
+        (BitField(name="x", size=1, says=""), 0, 255),
+        (BitField(name="x", size=1, unknown=255, says=""), 0, 254),
+        (BitField(name="x", size=1, unknown=0, says=""), 1, 255),
+        (BitField(name="x", size=2, step=0.5, unknown=0xFFFF, says=""), 0, 65_534),
+        (BitField(name="x", size=1, is_signed=True, says=""), -128, 127),
+        (BitField(name="x", size=4, is_signed=True, unknown=-(2**31), says=""), -(2**31) + 1, 2**31 - 1),
+        (BitField(name="x", size=1, is_signed=True, unknown=127, says=""), -128, 126),
+    ],
+)
+def test_a_field_holds_what_its_bytes_do_but_for_what_says_unknown(field, least, most):
+    assert (field.count(-1e12), field.count(1e12)) == (least, most)
+    assert field.value(most) == most * field.step
+    layout = order.Layout((field, field))
+    assert layout.size == 2 * field.size
+    for counts in ({"x": least}, {"x": most}):
+        assert layout.unpack(layout.pack(counts)) == counts
+
+
+def test_minutes_count_from_new_year_2020_and_a_moment_is_in_the_one_that_has_begun():
+    new_year = datetime(2020, 1, 1, tzinfo=UTC).timestamp()
+    assert [order.minutes_of(new_year + s) for s in (0.0, 59.9, 60.0, -0.1)] == [0, 0, 1, -1]
+    assert order.unix_of(3) == new_year + 180.0

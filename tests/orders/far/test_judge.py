@@ -150,3 +150,29 @@ def test_a_memory_at_its_limits_is_believed():
 def test_a_damaged_memory_is_not_believed(data):
     with pytest.raises(ValueError, match=r"."):
         Taken.from_dict(data, "k")
+
+
+def test_a_voyage_of_two_hundred_orders_is_remembered_over_every_restart():
+    """One counter more than the window in its memory, and the next start would not believe it."""
+    taken = Taken()
+    for counter in range(1, 201):
+        reply, taken = judged(order(counter), taken, NOW_S)
+        assert reply is None
+        taken = Taken.from_dict(json.loads(json.dumps(taken.to_dict("k"))), "k")
+    assert sorted(taken.replies) == list(range(201 - WINDOW, 201))
+    assert judged(order(200 - WINDOW), taken, NOW_S)[0] is Reply.OVERTAKEN
+    assert judged(order(201 - WINDOW), taken, NOW_S)[0] is Reply.TAKEN
+
+
+def test_the_memory_of_an_earlier_release_is_believed():
+    earlier = {"format": 1, "key": "k", "replies": {"7": ["m", "done"]}}
+    assert Taken.from_dict(earlier, "k") == Taken({7: ("m", Reply.DONE)}, 0)
+
+
+def test_a_thousand_and_twenty_four_orders_may_be_lost_in_a_row():
+    assert judged(order(1024), Taken(), NOW_S)[0] is None
+    assert judged(order(1025), Taken(), NOW_S)[0] is Reply.AHEAD
+
+
+def test_an_order_is_the_same_order_whatever_bytes_it_came_in():
+    assert order(5, mark="a") == order(5, mark="b") != order(6, mark="a")
