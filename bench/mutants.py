@@ -48,7 +48,10 @@ KEPT = ROOT / "build"
 EQUIVALENT = ROOT / "bench/equivalent_mutants.txt"
 # What is run for a room: its files, and the tests that are to hold them.
 ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "scorer": (("companion/planner/problem/*.py",), ("tests/planner/problem",)),
+    "scorer": (
+        ("companion/planner/problem/*.py",),
+        ("tests/planner/problem", "tests/planner/risk", "tests/planner/track", "tests/planner/test_bad_input.py"),
+    ),
     "risk": (("companion/planner/risk/*.py",), ("tests/planner/risk",)),
     "track": (("companion/planner/track/*.py",), ("tests/planner/track",)),
     "triggers": (("companion/skipper/planning/t*.py", "companion/skipper/planning/w*.py"), ("tests/skipper",)),

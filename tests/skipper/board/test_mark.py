@@ -13,7 +13,7 @@ from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.transports import open_link
 from companion.messages import Command, GeoPoint, MissionItem, waypoint
-from companion.skipper.board.mark import are_marked, marked
+from companion.skipper.board.mark import are_marked, is_remnant, marked
 from sitl.ardurover.simulation import ArduRover, find
 from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.world.environment import Constant
@@ -120,3 +120,35 @@ def test_it_outlives_the_real_ones_storage_and_a_reboot(method, tmp_path):
     for items in run(voyage(), speedup=8.0):
         assert len(items) == len(OURS)
         assert are_marked(items)
+
+
+def test_a_mission_that_an_earlier_release_put_there_is_known():
+    """The mark is on autopilots by now: another arithmetic would make strangers' missions of them."""
+    ours = [
+        waypoint(GeoPoint(lat_deg=50.8, lon_deg=-1.3)),
+        waypoint(GeoPoint(lat_deg=-33.85, lon_deg=151.2), command=Command.NAV_LOITER_UNLIM),
+    ]
+    assert [item.alt_m for item in marked(ours)] == pytest.approx([3.084, 12.154], abs=1e-9)
+
+
+DRAWN = [waypoint(GeoPoint(lat_deg=50.8 + 0.001 * n, lon_deg=-1.3)) for n in range(4)]
+RETURN = MissionItem(command=Command.NAV_RETURN_TO_LAUNCH)
+OURS = marked([waypoint(GeoPoint(lat_deg=50.9 + 0.001 * n, lon_deg=-1.2)) for n in range(4)])
+
+
+@pytest.mark.parametrize("cut", [1, 2, 3, 4])
+def test_an_upload_over_a_drawing_that_was_cut_short_is_ours_in_part(cut):
+    """Its first items are written and the rest still stands: not a stranger's, for nobody drew that."""
+    there = [*OURS[:cut], *DRAWN[cut:], RETURN]
+    assert is_remnant(there, [*DRAWN, RETURN])
+    kept = [replace(item, alt_m=12.0) for item in DRAWN]  # an altitude is no part of a drawing
+    assert is_remnant([*OURS[:cut], *kept[cut:], RETURN], [*DRAWN, RETURN])
+
+
+def test_a_drawing_itself_and_one_that_somebody_has_gone_on_with_are_no_remnant():
+    moved = replace(DRAWN[3], lat_e7=DRAWN[3].lat_e7 + 10)
+    assert not is_remnant([*DRAWN, RETURN], [*DRAWN, RETURN])
+    assert not is_remnant([], DRAWN)
+    assert not is_remnant([*OURS[:2], DRAWN[2], moved], DRAWN)
+    assert not is_remnant([*OURS[:2], DRAWN[2], RETURN], DRAWN)  # home was not drawn
+    assert not is_remnant([RETURN], [RETURN])
