@@ -8,7 +8,7 @@ import pytest
 
 from companion.geo.angles import wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
-from companion.wind import VaneParameters, WindTracker, WindVerdict, apparent_wind
+from companion.wind import Forecaster, VaneParameters, WindTracker, WindVerdict, apparent_wind
 from tests.wind.boat import HERE, sail, turned, voyage
 
 QUIET = {WindVerdict.GOOD, WindVerdict.TURNING}
@@ -238,11 +238,11 @@ def test_the_low_pass_is_accounted_for():
     assert a.sigma_twd_rad[8] < 1.1 * b.sigma_twd_rad[8]  # at two minutes it hardly matters
 
 
-def rough(*, minutes, tws_mps=6.0, swing_deg=10.0, true_filter_hz=0.05):
-    """Return the sigma [deg] that is added to a WIND which swings about north, a reading a second, for so long."""
+def rough(*, minutes, tws_mps=6.0, swing_deg=10.0, true_filter_hz=0.05, from_deg=0.0):
+    """Return the sigma [deg] that is added to a WIND which swings about ``from_deg`` each second, after so long."""
     room = WindTracker(VaneParameters(true_filter_hz=true_filter_hz))
     for t in range(60 * minutes):
-        wind = math.radians(swing_deg) * (-1) ** t
+        wind = wrap_pi(math.radians(from_deg + swing_deg * (-1) ** t))
         status = room.update(WindSample(t_s=float(t), twd_from_rad=wind, tws_mps=tws_mps + 1e-3 * (t % 7)))
     return math.degrees(status.extra_sigma_rad)
 
@@ -250,7 +250,7 @@ def rough(*, minutes, tws_mps=6.0, swing_deg=10.0, true_filter_hz=0.05):
 def test_the_low_pass_took_0_45_of_what_the_wind_departs_from_its_mean():
     """The measured share, at the firmware's 3.2 s; a slower filter took more, up to half as much again."""
     assert rough(minutes=45) == pytest.approx(0.45 * 10.0, rel=0.02)
-    assert rough(minutes=45, swing_deg=5.0) == pytest.approx(0.45 * 5.0, rel=0.02)
+    assert rough(minutes=45, swing_deg=5.0, from_deg=60.0) == pytest.approx(0.45 * 5.0, rel=0.02)
     twice_as_fast, twice_as_slow = 1.0 / (2.0 * math.pi * 1.6), 1.0 / (2.0 * math.pi * 6.4)
     assert rough(minutes=45, true_filter_hz=twice_as_fast) == pytest.approx(0.45 * 10.0 / 2**0.5, rel=0.02)
     assert rough(minutes=45, true_filter_hz=twice_as_slow) == pytest.approx(0.45 * 10.0 * 2**0.5, rel=0.02)
@@ -311,6 +311,35 @@ def test_a_band_widens_as_its_sigma_does_and_is_never_more_than_the_circle():
     wider = a.sigma_twd_rad / b.sigma_twd_rad
     assert wider[0] > 1.05
     assert a.half_width_rad == pytest.approx(np.minimum(b.half_width_rad * wider[:, None], math.pi))
+    assert b.half_width_rad == pytest.approx(plain.estimator.table(900.0).half_width_rad)  # nothing is added
+
+
+class Listens(Forecaster):
+    """The forecaster, and when it was told of a wind."""
+
+    def __init__(self):
+        super().__init__()
+        self.told_s = []
+
+    def update(self, t_s, direction_rad, speed_mps, **weights):
+        self.told_s.append(t_s)
+        super().update(t_s, direction_rad, speed_mps, **weights)
+
+
+def test_a_reading_that_is_not_believed_is_not_told_to_the_forecast_which_ages():
+    ears = Listens()
+    room = WindTracker(estimator=ears)
+    room.contradict("the vane was turned")
+    for t in range(5):
+        room.update(WindSample(t_s=float(t), twd_from_rad=1.0 + 0.01 * t, tws_mps=6.0))
+    assert ears.told_s == []
+    assert room.status(4.0) is not None
+    assert room.forecast_table(4.0) is None  # a wind is heard, and none is known
+    room.contradict("")
+    for t in range(5, 10):
+        room.update(WindSample(t_s=float(t), twd_from_rad=1.0 + 0.01 * t, tws_mps=6.0))
+    assert ears.told_s == [5.0, 6.0, 7.0, 8.0, 9.0]
+    assert room.forecast_table(9.0) is not None
 
 
 def test_no_forecast_before_wind_and_the_planner_gets_a_table_after():

@@ -60,7 +60,8 @@ def test_a_vessel_is_met_where_a_boat_in_small_steps_meets_it(target, a, b, t0, 
 def test_a_boat_that_lies_still_is_met_while_the_vessel_is_in_force(t0, t1, met):
     target = Target(x_m=0.0, y_m=0.0, vx_mps=0.0, vy_mps=0.0, radius_m=5.0, from_s=10.0, until_s=20.0)
     problem = replace(Problem.from_json(simple()), targets=(target,))
-    assert target_hit(problem, (1.0, 0.0), (1.0, 0.0), t0, t1) == met
+    assert target_hit(problem, (4.9, 0.0), (4.9, 0.0), t0, t1) == met
+    assert target_hit(problem, (5.1, 0.0), (5.1, 0.0), t0, t1) is None
 
 
 def test_of_two_vessels_the_first_that_is_met_is_named_and_a_turn_in_place_takes_time_to_be_met_in():

@@ -10,6 +10,7 @@ import shapely
 from companion.messages import Target
 from companion.planner import Problem
 from companion.planner.problem.parts import BoatLimits, Sigma, Speeds, Strength, assumed
+from companion.planner.problem.tracking import Tracking
 from companion.planner.problem.value import defect_of
 from tests.planner.problems import box, simple
 
@@ -173,3 +174,29 @@ def test_the_floor_grows_rocks_and_shrinks_the_fence_and_what_is_outside_is_soli
         "Rock",
     ]
     assert np.isfinite(problem.no_go_max_rad)
+
+
+def test_a_tracks_distance_is_to_rocks_and_to_the_line_of_its_limits():
+    """Inside a rock it is 0, and from the limits' line it counts on either side: both are no water."""
+    bow_tie = shapely.Polygon([(60, 0), (70, 10), (60, 10), (70, 0)])  # drawn across itself, it is solid all the same
+    track = Tracking(
+        helm=None,
+        floor_m=1.0,
+        solids=(shapely.box(20, 0, 30, 10), shapely.Polygon(), bow_tie),
+        limits=shapely.box(-100, -100, 100, 100),
+    )
+    places = np.array([(10.0, 5.0), (25.0, 5.0), (0.0, 97.0), (0.0, 104.0), (65.0, 12.0)])
+    assert track.distance_m(places).tolist() == pytest.approx([10.0, 0.0, 3.0, 4.0, 2.0])
+    assert [float(track.tree.geometries.take(0).distance(shapely.Point(10, 5))), len(track.tree)] == [10.0, 3]
+    open_water = replace(track, solids=(), limits=None)
+    assert open_water.distance_m(places).tolist() == [math.inf] * 5
+    assert len(replace(track, limits=shapely.Polygon()).tree) == 2
+
+
+@pytest.mark.parametrize(
+    "bad", [{"floor_m": -0.1}, {"reach_m": math.nan}, {"correlation_s": -1.0}, {"before_en": (0.0, math.inf)}]
+)
+def test_a_track_of_numbers_that_are_none_is_refused(bad):
+    track = Tracking(helm=None, floor_m=0.0, before_en=(1.0, 2.0))
+    assert track.is_finite
+    assert not replace(track, **bad).is_finite

@@ -34,6 +34,13 @@ from tests.planner.problems import box, random_problems, simple
             "wind.sigma.horizon_s",
         ),
         ({"start": 3}, "start"),
+        (
+            {
+                "boat": simple()["boat"]
+                | {"speed": {"model": "polar", "twa_deg": [0, 90, 60, 180], "v_mps": [0, 1, 2, 3]}}
+            },
+            "boat.speed.twa_deg",
+        ),
     ],
 )
 def test_what_cannot_be_read_names_the_place(change, place):
