@@ -38,6 +38,7 @@ from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType
 
@@ -85,7 +86,7 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("tests/skipper/way", "tests/wind"),
     ),
     "signing": (("companion/mavlink/signing.py",), ("tests/mavlink", "tests/commands/test_key.py")),
-    "far codec": (("companion/orders/far/*.py",), ("tests/orders/far",)),
+    "far codec": (("companion/orders/far/*.py",), ("tests/orders/far", "tests/house/test_documents.py")),
     "uploads": (
         (
             "companion/skipper/planning/uploads.py",
@@ -120,6 +121,18 @@ class Mutant:
     def key(self) -> str:
         """What it is known by, as long as its file is as it is."""
         return f"{self.file}:{self.line}:{self.column}:{self.number}"
+
+    @property
+    def row(self) -> str:
+        """What it is named by in the list of those that change nothing, wherever its line may move to."""
+        line = source(self.file)[self.line - 1].strip()
+        return f"{self.file} | {self.where} | {self.told} | {line}"
+
+
+@cache
+def source(file: str) -> list[str]:
+    """Return the lines of a file."""
+    return (ROOT / file).read_text(encoding="utf-8").splitlines()
 
 
 COMPARISONS: dict[type[ast.cmpop], tuple[type[ast.cmpop], ...]] = {
@@ -624,12 +637,9 @@ def known_verdicts(path: Path) -> dict[str, dict[str, str]]:
     return last
 
 
-def equivalents() -> set[tuple[str, str, str]]:
-    """Return the file, function and change of each mutant that changes nothing."""
-    if not EQUIVALENT.exists():
-        return set()
-    rows = [r for r in EQUIVALENT.read_text().splitlines() if r and not r.startswith(("#", " "))]
-    return {(file, where, told) for file, where, told in (r.split(" | ") for r in rows)}
+def equivalents() -> set[str]:
+    """Return the rows of those that change nothing."""
+    return {r for r in EQUIVALENT.read_text(encoding="utf-8").splitlines() if r and not r.startswith(("#", " "))}
 
 
 def drawn(rooms: Sequence[str], sample: int | None, seed: int) -> list[Mutant]:
@@ -654,14 +664,14 @@ def table(last: dict[str, dict[str, str]], out) -> None:
         tried = [(of_room[k], r) for k, r in last.items() if k in of_room]
         killed = sum(r["verdict"] == "killed" for _, r in tried)
         survivors = [m for m, r in tried if r["verdict"] == "survived"]
-        true = [m for m in survivors if (m.file, m.where, m.told) not in same]
+        true = [m for m in survivors if m.row not in same]
         left += true
         held = killed + len(true)
         share = f"{100.0 * killed / held:.0f} %" if held else "–"
         figures = len(of_room), len(tried), killed, len(survivors) - len(true), len(true), share
         out.write(f"| {' | '.join(map(str, (room, *figures)))} |\n")
     for mutant in left:
-        out.write(f"{mutant.key} | {mutant.where} | {mutant.told}\n")
+        out.write(f"{mutant.row}\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
