@@ -130,6 +130,25 @@ def speed_error_of(boat: BoatOptions) -> float:
     return (UNSAID_ERROR_PERCENT if said is None else said) / 100.0
 
 
+def shape_error_of(mission: Mission) -> Polar | None:
+    """Return how far each speed of a learned boat may be off beside all of them; None: its file does not say."""
+    path = mission.polar_path
+    if path is None or path.suffix != ".toml":
+        return None
+    file = read_boat_file(path)
+    table, common = file.polar, speed_error_of(file.boat)
+    if not table.error_percent:
+        return None
+    rest = [[min(math.sqrt(max((0.01 * e) ** 2 - common**2, 0.0)), 1.0) for e in row] for row in table.error_percent]
+    # Nearer to the wind and in less of it than the table says it is no better known: a polar goes to zero there.
+    twa_deg, tws_mps = [*table.twa_deg], [*table.tws_mps]
+    if twa_deg[0] > 0.0:
+        twa_deg, rest = [0.0, *twa_deg], [rest[0], *rest]
+    if tws_mps[0] > 0.0:
+        tws_mps, rest = [0.0, *tws_mps], [[row[0], *row] for row in rest]
+    return polar_of_table(twa_deg, tws_mps, rest, name="error", source=str(path))
+
+
 def boat_of(mission: Mission) -> Boat:
     """Return the mission's boat; one that does not sail has no no-go zone, and tacks cost it nothing."""
     if mission.autopilot.frame == "motor":
@@ -164,6 +183,7 @@ def boat_of(mission: Mission) -> Boat:
         tack_fails=mission.boat.tack_fails if mission.boat.can_tack else 0.0,
         speed_error=speed_error_of(mission.boat),
         no_go_error_rad=math.radians(mission.boat.no_go_error_deg),
+        shape_error=shape_error_of(mission),
     )
 
 

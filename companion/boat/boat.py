@@ -14,6 +14,7 @@ from companion.boat.polar import Polar
 
 Floats = NDArray[np.float64]
 
+SHAPE_TWA_RAD = tuple(math.radians(a) for a in range(0, 181, 30))  # of a problem's ``shape_error``
 SPEED_ANGLES = 73  # of ``Boat.problem_speeds``: 2.5 degrees apart
 
 
@@ -57,6 +58,7 @@ class Boat:
         tack_fails: The chance that a tack fails [0..1), before any was seen; 0: they are not reckoned to fail.
         no_go_error_rad: How far ``no_go_half_rad`` may be off, as a deviation [rad, 0..0.5].
         speed_error: How far all speeds of the polar may be off together, as the deviation of the logarithm [0..1].
+        shape_error: How far each speed may be off beside that, as deviations of the logarithm; None: nobody says.
         leeway_rad: On a beat, the apparent wind 30 degrees off its bow and three times as fast as it; see ``leeway``.
     """
 
@@ -76,6 +78,7 @@ class Boat:
     tack_fails: float = 0.0
     speed_error: float = 0.0
     no_go_error_rad: float = 0.0
+    shape_error: Polar | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.no_go_half_rad < math.pi:
@@ -148,6 +151,8 @@ class Boat:
             out["gybe_loss_s"] = self.gybe_loss_s
         if self.speed_error > 0.0:
             out["speed_error"] = self.speed_error
+        if self.shape_error is not None:
+            out["shape_error"] = [round(float(e), 4) for e in self.shape_error.speeds_mps(SHAPE_TWA_RAD, tws_mps)]
         if not self.can_tack:
             out["can_tack"] = False
         for name in ("gybe_room_m", "max_tws_mps", "min_tws_mps"):

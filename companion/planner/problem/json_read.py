@@ -243,6 +243,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
             lee_mps=boat.numbers("lee_mps", (0.0, 0.0)),
             speed_error=boat.number("speed_error", 0.0),
             speed_share=boat.number("speed_share", 1.0),
+            shape_error=boat.numbers("shape_error", ()),
         ),
         delta_s=top.number("delta_s"),
         current=_parse_current(_JsonReader(raw.get("current") or {}, source, "current")),

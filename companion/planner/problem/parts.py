@@ -97,7 +97,8 @@ class BoatLimits:
     ``tack_fails`` is the chance that a tack fails, below 1; 0: what then comes is not looked at. It then lies for
     ``irons_s``, set to lee at ``lee_mps`` (on starboard tack, on port) beside what the water does. ``speed_error`` is
     how far all its speeds may be off together: the standard deviation of the logarithm; ``speed_share`` what it is
-    seen to make of them. Both move when it arrives, not what it is planned to do.
+    seen to make of them, and ``shape_error`` how far each may be off beside that, at the angles of
+    ``SHAPE_TWA_RAD``. All of it moves when it arrives, not what it is planned to do.
     """
 
     no_go_half_rad: float
@@ -117,6 +118,7 @@ class BoatLimits:
     lee_mps: tuple[float, ...] = (0.0, 0.0)
     speed_error: float = 0.0
     speed_share: float = 1.0
+    shape_error: tuple[float, ...] = ()
 
     @property
     def room_m(self) -> float:

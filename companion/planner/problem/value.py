@@ -20,6 +20,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from companion.boat.boat import SHAPE_TWA_RAD
 from companion.messages import Spread, Target
 from companion.planner.problem.json_read import read_fields
 from companion.planner.problem.parts import (
@@ -273,6 +274,10 @@ def defect_of(p: Problem) -> str | None:
         (0.0 <= b.tack_fails < 1.0, f"tack_fails {b.tack_fails:g} is outside 0 <= tack_fails < 1"),
         (0.0 <= b.speed_error <= 1.0, f"speed_error {b.speed_error:g} is outside 0 to 1"),
         (0.1 <= b.speed_share <= 10.0, f"speed_share {b.speed_share:g} is outside 0.1 to 10"),
+        (
+            len(b.shape_error) in {0, len(SHAPE_TWA_RAD)} and all(0.0 <= e <= 1.0 for e in b.shape_error),
+            f"shape_error is not {len(SHAPE_TWA_RAD)} numbers from 0 to 1, every 30 degrees from 0 to 180",
+        ),
         (0.0 <= b.irons_s < math.inf, "irons_s is no time of 0 s or more"),
         (
             len(b.lee_mps) == 2 and all(0.0 <= lee < math.inf for lee in b.lee_mps),

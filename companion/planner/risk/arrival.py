@@ -5,7 +5,8 @@ symmetric, and its median is later than the plan's own time. The plan is sailed 
 Strength and direction are independent Gauss-Markov processes of the problem's own spreads. In each, a leg's progress at
 an instant is its planned one times the ratio of its speeds in that wind and in the plan's; where the wind has closed a
 leg it beats along it. Turns take their time in any wind, and a tack that fails takes ``FAILED_S`` more. A boat whose
-speeds may all be off together takes a drawn factor longer, and one that is seen to make a share of them as much.
+speeds may all be off together takes a drawn factor longer, and one that is seen to make a share of them as much. What
+each speed may be off by beside that is drawn alike at like angles.
 
 Where a step is long against the correlation time, the mean over a step has less spread than an instant: the
 remainder is averaged over within the step.
@@ -22,6 +23,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.boat.boat import SHAPE_TWA_RAD
 from companion.boat.failed_tack import IRONS_S
 from companion.kernels.jit import kernel
 from companion.planner.plan import Arrival, Leg
@@ -37,6 +39,7 @@ NODES_MPS, NODES_RAD, NODES_TWA = 33, 17, 361  # of the tables of progress: wind
 REACH = 3.5  # standard deviations that they reach to
 FAILED_S = IRONS_S + 4.0  # head to wind, and until the boat has way on again
 MOST_FAILURES = 20
+SHAPE_REACH_DEG, SHAPE_STEP_DEG = 35.0, 5.0  # over which speeds are off alike, as they are learned
 FASTER = 0.5  # of how much slower than its polar a boat may be: how much faster
 
 Floats = NDArray[np.float64]
@@ -168,7 +171,8 @@ def _times_s(problem: Problem, legs: Sequence[Leg], strength: Strength, speeds: 
     at_turn = np.clip(np.rint((turn - turns[0]) / (turns[1] - turns[0])), 0, NODES_RAD - 1).astype(np.int64)
     edges = np.array([t for leg in legs for t in (leg.start_s, leg.end_s)])
     times = np.asarray(_sailed(edges, np.ascontiguousarray(table), at_wind, at_turn, step_s))
-    return (times + _lost_s(problem, legs, noise[2])) * _slower(problem.boat.speed_error) / problem.boat.speed_share
+    slower = _slower(problem.boat.speed_error) * _otherwise(problem, legs) / problem.boat.speed_share
+    return (times + _lost_s(problem, legs, noise[2])) * slower
 
 
 @functools.lru_cache(maxsize=4)
@@ -180,6 +184,35 @@ def _slower(speed_error: float) -> Floats:
     ranks = (np.random.default_rng(SEED).permutation(WINDS) + 0.5) / WINDS
     z = np.array([NormalDist().inv_cdf(float(p)) for p in ranks])
     return np.exp(speed_error * np.where(z > 0.0, z, FASTER * z))
+
+
+def _otherwise(problem: Problem, legs: Sequence[Leg]) -> Floats | float:
+    """Return how much longer a boat takes whose speeds are off by another factor at another angle, in each wind.
+
+    What is off at one angle is nearly as much at the next, and something else a right angle away: a path of many angles
+    has less of it than one long leg. Each leg weighs by its time.
+    """
+    errors = problem.boat.shape_error
+    if not any(errors):
+        return 1.0
+    half = problem.boat.no_go_half_rad
+    twa = np.array([half if leg.is_beat else max(abs(leg.twa_rad), half) for leg in legs])
+    share = np.array([leg.end_s - leg.start_s for leg in legs])
+    deviation = np.interp(twa, SHAPE_TWA_RAD, errors)
+    off = np.exp(deviation[:, None] * _shapes(tuple(np.round(np.degrees(twa)).astype(int).tolist())))
+    return np.asarray(share @ off / share.sum())
+
+
+@functools.lru_cache(maxsize=16)
+def _shapes(twa_deg: tuple[int, ...]) -> Floats:
+    """Return what speeds at these angles are off by (angles, winds), of unit deviation, alike at like angles."""
+    nodes = np.arange(0.0, 181.0, SHAPE_STEP_DEG)
+    apart = (nodes[:, None] - nodes) / SHAPE_REACH_DEG
+    root = np.linalg.cholesky(np.exp(-0.5 * apart**2) + 1e-6 * np.eye(nodes.shape[0]))
+    fields = root @ np.random.default_rng(SEED + 1).standard_normal((nodes.shape[0], WINDS))
+    at = np.clip(np.rint(np.array(twa_deg) / SHAPE_STEP_DEG).astype(np.int64), 0, nodes.shape[0] - 1)
+    drawn = fields[at]
+    return np.asarray((drawn - drawn.mean(axis=1, keepdims=True)) / drawn.std(axis=1, keepdims=True))
 
 
 def _progress(problem: Problem, legs: Sequence[Leg], speeds: Speeds, winds: Floats, turns: Floats) -> Floats:

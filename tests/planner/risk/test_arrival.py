@@ -206,3 +206,44 @@ def test_a_table_of_the_wrong_shape_is_one_clear_line():
     raw["boat"]["speeds"]["v_mps"] = [[1.0, 2.0]]
     with pytest.raises(InputError, match=r"boat.speeds"):
         Problem.from_json(raw)
+
+
+def lasting(p, *shares):
+    """Return the legs of a straight reach as those of a path with these angles to the wind, of equal times."""
+    (leg,) = reach(p)
+    part_s = leg.end_s / len(shares)
+    return [
+        replace(leg, twa_rad=math.radians(twa_deg), start_s=i * part_s, end_s=(i + 1) * part_s)
+        for i, twa_deg in enumerate(shares)
+    ]
+
+
+def test_what_one_speed_may_be_off_by_spreads_a_leg_and_less_of_a_path_of_many_angles():
+    def spread(error, *angles_deg):
+        p = problem(sigma=1e-3, boat=BOAT)
+        p = replace(p, boat=replace(p.boat, shape_error=(error,) * 7))
+        found = arrival(p, lasting(p, *angles_deg))
+        return math.log(found.late_s / found.early_s) / (2.0 * 1.2816)
+
+    one, alike, apart = spread(0.2, 90.0), spread(0.2, 90.0, 100.0), spread(0.2, 45.0, 90.0, 135.0, 180.0)
+    assert one == pytest.approx(0.2, rel=0.1)
+    assert alike == pytest.approx(0.2, rel=0.12)
+    # Five-and-thirty degrees are what speeds are off alike over: of four angles a right angle or half of one apart.
+    nodes = np.radians([45.0, 90.0, 135.0, 180.0])
+    like = np.exp(-0.5 * (np.subtract.outer(nodes, nodes) / math.radians(35.0)) ** 2)
+    assert apart == pytest.approx(0.2 * math.sqrt(like.mean()), rel=0.2)
+    assert spread(0.0, 90.0) < 0.01
+
+
+def test_a_leg_has_the_doubt_of_its_own_angle():
+    p = problem(sigma=1e-3)
+    p = replace(p, boat=replace(p.boat, shape_error=(0.0, 0.0, 0.0, 0.3, 0.0, 0.0, 0.0)))
+    wide, narrow = (arrival(p, lasting(p, twa_deg)) for twa_deg in (90.0, 150.0))
+    assert wide.late_s > 1.3 * narrow.late_s
+
+
+def test_a_shape_error_of_another_length_is_refused():
+    p = problem()
+    for wrong in ((0.1,), (0.1,) * 6 + (1.5,), (-0.1,) * 7):
+        assert "shape_error is not 7 numbers" in defect_of(replace(p, boat=replace(p.boat, shape_error=wrong)))
+    assert defect_of(replace(p, boat=replace(p.boat, shape_error=(0.1,) * 7))) == defect_of(p)
