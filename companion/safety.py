@@ -43,6 +43,7 @@ class Response(enum.Enum):
     ADVANCE = "make the next item current"
     BY_FIELD = "steer by field under GUIDED, plan again from there, back to AUTO when the way is clear"
     AS_SET = "what the mission's `[safety]` says of it"
+    TURN_BACK = "back over water that she has sounded to a loiter in it; then a plan, with the shoal in the area"
     BACK = "say so; where the straight way back is not clear, plan one"
 
 
@@ -251,9 +252,9 @@ TABLE: tuple[Watchdog, ...] = (
                   because="less wind is forecast than she makes way in", until="until more wind is forecast")),
     W(name="shoaling", number=29, notification="grounding",
       watches="the depth by the sounder in 20 s at its rate, over the mission's `draft_m` and `under_keel_m`",
-      enter=0.0, exit=0.5, unit="m", enter_s=2.0, exit_s=10.0, severity=S.CRITICAL, response=Response.SAY,
+      enter=0.0, exit=0.5, unit="m", enter_s=2.0, exit_s=10.0, severity=S.CRITICAL, response=Response.TURN_BACK,
       loitering=True,
-      why="what no chart has is found by the keel; 20 s are for a person to turn her, or for a tack"),
+      why="what no chart has is found by the keel; 20 s are for an upload and the turn, or for a person"),
     W(name="depth lost", number=30, watches="the sounder tells of the bottom no more", enter=1.0, exit=0.5, unit="",
       enter_s=5.0, exit_s=2.0, severity=S.WARNING, response=Response.SAY, loitering=True,
       why="from now on a shoal is not seen; water that is deeper than the sounder reaches is no loss"),

@@ -21,6 +21,7 @@ from companion.skipper.behaviors.sailing import (
     stand_off,
     stop_drift,
 )
+from companion.skipper.behaviors.shoaling import turns_back
 from companion.skipper.behaviors.wind_doubt import holds, seeks_sea_room
 from companion.skipper.board.on_board import mission_is_known
 from companion.skipper.board.vehicle_identity import stand_by
@@ -154,6 +155,12 @@ BEHAVIORS: tuple[Behavior, ...] = (
         does="loiters, and is watched",
     ),
     Behavior(name="hold", act=holds, when="the wind cannot be planned with", does="asks for LOITER until it is known"),
+    Behavior(
+        name="turn back",
+        act=turns_back,
+        when="the sounder tells that it shoals",
+        does="uploads a loiter on her own track, where the water is known to be deep; then plans with what was found",
+    ),
     Behavior(name="brake", act=brakes, when="the leg meets something within 8 s", does="asks for LOITER, then plans"),
     Behavior(
         name="sail on",

@@ -17,6 +17,7 @@ from companion.skipper.behaviors.failsafe import begin_again, follow_answer, fol
 from companion.skipper.behaviors.field_guidance import follow_field
 from companion.skipper.behaviors.operator_orders import preview, take_orders
 from companion.skipper.behaviors.position_doubt import follow
+from companion.skipper.behaviors.shoaling import follow_soundings
 from companion.skipper.board.vehicle_identity import judge
 from companion.skipper.intake import count_time, locate, remember_fix, take_events, take_outcomes
 from companion.skipper.planning.diversions import speak_of_fence
@@ -29,6 +30,7 @@ from companion.skipper.step.state import (
     Orders,
     Planning,
     PositionState,
+    Soundings,
     Tacking,
     VehicleIdentity,
     VoyageState,
@@ -71,6 +73,7 @@ class Skipper:
             position=PositionState(place=persisted.place, restored=persisted.place),
             tacking=Tacking(tried=persisted.tacks[0], failed=persisted.tacks[1]),
             plans=Planning(latency=persisted.latency),
+            soundings=Soundings(shoals=persisted.shoals),
         )
 
     def fits(self, persisted: Persisted) -> bool:
@@ -152,6 +155,7 @@ def observe(ctx: StepContext) -> None:
     watch_water(ctx)
     watch_tacks(ctx)
     watch(ctx)
+    follow_soundings(ctx)
     take_orders(ctx)
     if ctx.state.vehicle.rebooted:
         begin_again(ctx)

@@ -10,6 +10,7 @@ import shapely
 
 from companion.messages import Mode
 from companion.orders import Verb
+from companion.skipper.behaviors.shoaling import BACK
 from companion.skipper.priorities import BEHAVIORS, act
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import Standing
@@ -95,6 +96,15 @@ def homeward_over_island(s, state):
     )
 
 
+def going_back(state):
+    """Be on the way back from water that shoals."""
+    return {
+        "mission": {"route": replace(state.mission.route, rung=BACK)},
+        "soundings": {"turned_en_m": (0.0, 0.0), "turned_s": 1e9},
+        "position": {"last_seen": None},
+    }
+
+
 # (first, second) -> the state of tests.skipper.test_walk, the parts that are changed in it, what is seen
 SITUATIONS = {
     ("await autopilot", "stand by"): ("standard", STRANGE, silent),
@@ -121,7 +131,8 @@ SITUATIONS = {
     ),
     ("stop a drift", "rest"): ("done", IN_LOITER | DRIFTS, showing(mode=Mode.LOITER)),
     ("rest", "hold"): ("done", {}, unsure),
-    ("hold", "brake"): ("standard", {"position": {"last_seen": None}}, before_island),
+    ("hold", "turn back"): ("standard", going_back, unsure),
+    ("turn back", "brake"): ("standard", going_back, lambda s, state: replace(before_island(s, state), unsure="")),
     ("sail on", "last resort"): ("last resort", IN_LOITER, showing(mode=Mode.LOITER)),
     ("last resort", "lie at diversion"): (
         "holding",

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from statistics import median
+from statistics import fmean, median
 
 PINGS = 5  # of which the middle one is believed: two in a row may be wrong
 FRESH_S = 5.0  # older pings are of other water
-WINDOW_S = 20.0  # over which the change is told ...
+WINDOW_S = 8.0  # over which the change is told: longer, and a slope that begins is told too late ...
 LEAST_S = 5.0  # ... once there is so much of it
 
 
@@ -40,8 +40,9 @@ class Sounder:
         return median(fresh) if len(fresh) >= 3 else None
 
     def rate_mps(self, t_s: float) -> float | None:
-        """Return how the depth changes [m/s], None while too little of it is known."""
-        if self.depth_m(t_s) is None or len(self._depths) < 2:
+        """Return how the depth changes [m/s], straight through what was told; None while that is too little."""
+        if self.depth_m(t_s) is None or self._depths[-1][0] - self._depths[0][0] < LEAST_S:
             return None
-        (from_s, first_m), (to_s, last_m) = self._depths[0], self._depths[-1]
-        return None if to_s - from_s < LEAST_S else (last_m - first_m) / (to_s - from_s)
+        mean_s, mean_m = (fmean(column) for column in zip(*self._depths, strict=True))
+        spread = sum((at_s - mean_s) ** 2 for at_s, _ in self._depths)
+        return sum((at_s - mean_s) * (depth - mean_m) for at_s, depth in self._depths) / spread

@@ -45,6 +45,7 @@ from companion.skipper.step.state import (
     PositionState,
     Retry,
     SkipperState,
+    Soundings,
     SteeringState,
     Tacking,
     TrafficState,
@@ -55,6 +56,7 @@ from companion.skipper.step.state import (
 from companion.skipper.way import Approach, Gate, PointEn, Voyage, bearing_rad, gates_of
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle, circle_of, drawn_of
 from companion.skipper.way.position_plausibility import innovation_m
+from companion.skipper.way.shoals import Shoal, shoaled
 from companion.skipper.way.stemming import Water
 
 FRESH_S = 3.0  # a part older than this is not acted upon
@@ -91,6 +93,12 @@ def _kept_in(voyage: Voyage, drawn: Drawn | None, circle: HomeCircle | None) -> 
     return replace(voyage, area=voyage.area.within(circle.en_m, circle.radius_m, circle.words))
 
 
+def _with_shoals(voyage: Voyage, state: SkipperState) -> Voyage:
+    """Return the voyage in what the shoals that were sounded leave of its water."""
+    shoals = state.soundings.shoals
+    return replace(voyage, area=shoaled(voyage.area, shoals)) if shoals else voyage
+
+
 def _is_fence_off(state: SkipperState, snapshot: Snapshot) -> bool:
     """Return whether the autopilot keeps a fence no more: under way not for a moment's silence, but by the watchdog."""
     if state.voyage.sailing:
@@ -102,6 +110,8 @@ class StepContext:
     """The work of one step. ``voyage`` is in the water that the autopilot's fences leave: ``circle`` and ``drawn``."""
 
     def __init__(self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot) -> None:
+        self._charted = voyage
+        voyage = _with_shoals(voyage, state)
         self.circle = circle_of(voyage, snapshot.limits, snapshot.autopilot, snapshot.position_en_m)
         self.drawn = drawn_of(
             voyage.area, snapshot.fence, snapshot.limits, config.margin_m, is_off=_is_fence_off(state, snapshot)
@@ -129,6 +139,7 @@ class StepContext:
         steering: SteeringState | None = None,
         by_field: FieldSteering | None = None,
         adrift: Adrift | None = None,
+        soundings: Soundings | None = None,
         tacking: Tacking | None = None,
         position: PositionState | None = None,
         orders: Orders | None = None,
@@ -160,6 +171,8 @@ class StepContext:
             state = changed(state, by_field=by_field)
         if adrift is not None:
             state = changed(state, adrift=adrift)
+        if soundings is not None:
+            state = changed(state, soundings=soundings)
         if tacking is not None:
             state = changed(state, tacking=tacking)
         if position is not None:
@@ -173,6 +186,15 @@ class StepContext:
         if announced is not None:
             state = changed(state, announced=announced)
         self.state = state
+
+    def learn_shoals(self, shoals: tuple[Shoal, ...]) -> None:
+        """Let these be the shoals that were sounded: from now on they are no water."""
+        self.set(soundings=replace(self.state.soundings, shoals=shoals))
+        self.voyage = _kept_in(_with_shoals(self._charted, self.state), None, self.circle)
+        if self.drawn is not None:
+            drawn = self.drawn.taken
+            self.drawn = Drawn(taken=drawn, left=self.voyage.area.without(drawn, Drawn.words))
+            self.voyage = replace(self.voyage, area=self.drawn.left)
 
     def new_id(self) -> int:
         """Return a number not used before in this voyage."""

@@ -12,6 +12,7 @@ from companion.orders import BY_VERB, Verb
 from companion.skipper.step.latency import KEPT, NO_ANSWERS, PlannerLatency
 from companion.skipper.step.route import Route
 from companion.skipper.way import Approach, PointEn
+from companion.skipper.way.shoals import MOST_RADIUS_M, MOST_SHOALS, Shoal
 
 FORMAT = 1
 MAX_ITEMS = 2000  # no autopilot holds more
@@ -130,6 +131,7 @@ class Persisted:
     tacks: tuple[int, int] = (0, 0)  # tried, and of these failed
     place: SavedPlace | None = None  # where the boat was
     latency: PlannerLatency = NO_ANSWERS  # of the planner on this computer
+    shoals: tuple[Shoal, ...] = ()  # that were sounded
     water: GeoPoint | None = None  # the origin of all metres here; None: the mission's
 
     @property
@@ -169,6 +171,7 @@ class Persisted:
             "tacks": list(self.tacks),
             "place": _place_to_list(self.place),
             "latency": [list(self.latency.answers_s), self.latency.room_s, self.latency.speed],
+            **({"shoals": [_shoal_to_list(s) for s in self.shoals]} if self.shoals else {}),
             **({} if self.water is None else {"water": [self.water.lat_deg, self.water.lon_deg]}),
         }
 
@@ -208,6 +211,7 @@ class Persisted:
                 tacks=_tacks(data.get("tacks", (0, 0))),
                 place=_place_from_list(data.get("place")),
                 latency=_latency(data.get("latency")),
+                shoals=tuple(_shoal_from_list(s) for s in data.get("shoals", ())[-MOST_SHOALS:]),
                 water=None
                 if data.get("water") is None
                 else GeoPoint(lat_deg=_number(data["water"][0]), lon_deg=_number(data["water"][1])),
@@ -245,6 +249,17 @@ def _place_from_list(data: Any) -> SavedPlace | None:
         farthest_m=abs(farthest_m),
         velocity_en_mps=(east_mps, north_mps),
     )
+
+
+def _shoal_to_list(shoal: Shoal) -> list[float]:
+    return [*shoal.en_m, shoal.radius_m, shoal.doubt_m, shoal.depth_m]
+
+
+def _shoal_from_list(data: Any) -> Shoal:
+    east, north, radius_m, doubt_m, depth_m = (_number(value) for value in data)
+    if not (0.0 < radius_m <= MOST_RADIUS_M and 0.0 <= doubt_m <= MOST_RADIUS_M):
+        raise ValueError("it is damaged: a shoal of no size")
+    return Shoal(en_m=(east, north), radius_m=radius_m, doubt_m=doubt_m, depth_m=depth_m)
 
 
 def _approach_to_list(approach: Approach) -> list[Any]:

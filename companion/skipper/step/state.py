@@ -20,6 +20,7 @@ from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted, SavedPlace, Standing
 from companion.skipper.way import Approach, PointEn
 from companion.skipper.way.position_plausibility import PositionDoubt
+from companion.skipper.way.shoals import Shoal
 from companion.traffic import Assessment
 from companion.traffic.colregs import OngoingEncounter
 
@@ -193,6 +194,24 @@ class Adrift:
     loiter_s: float = float("inf")  # ... and when, of a wind that is doubted
     motor: bool = False  # the autopilot has accepted to run it
     looked_s: float = float("-inf")  # when sea room was looked for last
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sounded:
+    """A sounding on the boat's own track."""
+
+    en_m: PointEn
+    depth_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Soundings:
+    """What the sounder told of the water (``companion.skipper.behaviors.shoaling``)."""
+
+    track: tuple[Sounded, ...] = ()  # the last of it, some metres apart
+    shoals: tuple[Shoal, ...] = ()  # found on this voyage; they survive a restart
+    turned_en_m: PointEn | None = None  # where she turned back, until a plan is asked for ...
+    turned_s: float = float("-inf")  # ... and when
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -448,6 +467,7 @@ class SkipperState:
     steering: SteeringState = SteeringState()
     by_field: FieldSteering = FieldSteering()
     adrift: Adrift = Adrift()
+    soundings: Soundings = Soundings()
     tacking: Tacking = NO_TACKS  # what the boat's tacks have told
     position: PositionState = PositionState()
     orders: Orders = Orders()
@@ -497,6 +517,7 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         tacks=(state.tacking.tried, state.tacking.failed),
         place=state.position.place,
         latency=state.plans.latency,
+        shoals=state.soundings.shoals,
     )
 
 

@@ -12,6 +12,7 @@ from companion.messages import Severity
 from companion.safety import BY_NAME, JUMP_M, STOPPING
 from companion.skipper.behaviors.drifting import meets_in_s, sails
 from companion.skipper.behaviors.field_guidance import meets_in
+from companion.skipper.behaviors.shoaling import depth_ahead_m
 from companion.skipper.planning.autopilot_beats import beaten_within_m
 from companion.skipper.planning.diversions import diversion, home_trouble, is_composed
 from companion.skipper.step import DiversionKind, StepContext, WindHealth
@@ -52,7 +53,6 @@ FALL = 0.05  # the rate is told when the charge has fallen by this much ...
 LOOK_S = 300.0  # ... and for this long
 DETOUR = 2.0  # a beat is 1.4 times its straight way, and something lies between
 LEAST_MPS = 0.5
-TURN_S = 20.0  # from the alarm until she goes the other way: a person, or a tack of 7 s and its mission
 
 
 def measure(ctx: StepContext, name: str) -> float | None:
@@ -247,10 +247,7 @@ def _fence_off(ctx: StepContext) -> float | None:
 
 
 def _shoaling(ctx: StepContext) -> float | None:
-    status, least_m = ctx.autopilot, ctx.config.least_depth_m
-    if status is None or status.depth_m is None or least_m is None:
-        return None
-    return status.depth_m + min(0.0, status.depth_rate_mps or 0.0) * TURN_S - least_m
+    return depth_ahead_m(ctx)
 
 
 def _depth_lost(ctx: StepContext) -> float | None:
