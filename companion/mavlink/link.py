@@ -32,7 +32,7 @@ from companion.mavlink.microservices.command import (
     TransferOutcome,
 )
 from companion.mavlink.reception import Heard, LinkIdentity, LinkStats, Objection, Reception, Throughput
-from companion.mavlink.signing import TICKS_PER_S, SigningStore
+from companion.mavlink.signing import SigningStore
 from companion.mavlink.transports import Transport, TransportState
 from companion.mavlink.vehicle_identity import GAP_S, LISTEN_S, OtherCompanion, Speaker, listed
 from companion.mavlink.wire import codec
@@ -157,7 +157,6 @@ class Link:
         self._group = asyncio.TaskGroup()
         self._tasks: list[asyncio.Task[None]] = []
         self._system_status = wire.MAV_STATE_BOOT if is_starting else wire.MAV_STATE_ACTIVE
-        self._signing_zero_s: float | None = None
         self._turned_s, self._doubt_until_s = math.inf, -math.inf
 
     # -------------------------------------------------------------------------------------------- life
@@ -501,10 +500,7 @@ class Link:
     def _advance_signing(self) -> None:
         """Let the signing timestamp follow the clock since the start, so that replayed frames grow old."""
         assert self._signing is not None
-        now = now_s()
-        if self._signing_zero_s is None:
-            self._signing_zero_s = now - self._signing.state.timestamp / TICKS_PER_S
-        self._codec.set_signing_time(int((now - self._signing_zero_s) * TICKS_PER_S))
+        self._codec.set_signing_time(self._signing.follow(now_s()))
         self._signing.save()
 
     def _diagnosis(self) -> str:

@@ -25,6 +25,11 @@ TICKS_PER_S = 100_000
 # Stored this far ahead, so that a power cut between two stores cannot repeat a timestamp [s]. An autopilot refuses a
 # newcomer that is more than 60 s behind the newest stamp it has seen, so we must not run that far ahead of others.
 AHEAD_S = 40.0
+# What begins ahead of the clock, because it was stored ahead, waits for it, and is stored this far ahead meanwhile:
+# frames count on by a tick each. Else each restart would lead by a lead more, and never by less again.
+SPARE_S = 1.0
+# A clock that is farther behind what is stored is none (a board that boots in 1970): stamps go on from there with time.
+NO_CLOCK_S = 3600.0
 # A stored timestamp beyond this is damage: of the 48 bits of a timestamp the last year is left to be signed in.
 _MOST_STORED = MOST_TIMESTAMP - 366 * 86_400 * TICKS_PER_S
 _MOST_BYTES = 64  # of the file: 15 digits are needed
@@ -75,6 +80,8 @@ class SigningStore:
         stored, damage = _stored(self._path)
         clock = min(max(0, int((unix_s - EPOCH_S) * TICKS_PER_S)), _MOST_STORED)
         self.state = SigningState(key=read_key(key_file), link_id=0, timestamp=max(clock, stored))
+        self._clock = clock if stored - clock < int(NO_CLOCK_S * TICKS_PER_S) else stored
+        self._zero_s: float | None = None
         self._stored = 0
         self.save()
         if damage:
@@ -86,11 +93,19 @@ class SigningStore:
                 damage,
             )
 
+    def follow(self, now_s: float) -> int:
+        """Return the clock's timestamp at ``now_s``, of whatever clock runs on since the first call [s]."""
+        if self._zero_s is None:
+            self._zero_s = now_s - self._clock / TICKS_PER_S
+        self._clock = max(self._clock, int((now_s - self._zero_s) * TICKS_PER_S))
+        return self._clock
+
     def save(self) -> None:
-        """Store the timestamp if what is stored is about to be reached."""
-        if self.state.timestamp + int(AHEAD_S * TICKS_PER_S) // 2 < self._stored:
+        """Store the timestamp if what is stored is about to be reached, by the clock or by frames."""
+        clock, used = self._clock + int(AHEAD_S * TICKS_PER_S), self.state.timestamp + int(SPARE_S * TICKS_PER_S)
+        if max(clock - int(AHEAD_S * TICKS_PER_S) // 2, used - int(SPARE_S * TICKS_PER_S) // 2) < self._stored:
             return
-        ahead = self.state.timestamp + int(AHEAD_S * TICKS_PER_S)
+        ahead = max(clock, used)
         # A disk that cannot keep it must not end a voyage: frames are signed all the same, and it is tried again.
         with contextlib.suppress(OSError):
             Disk().replace(self._path, str(ahead).encode("ascii"))

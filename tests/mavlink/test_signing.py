@@ -42,11 +42,12 @@ def test_what_is_kept_is_ahead_of_use_by_less_than_the_minute_that_shuts_others_
 
 def test_it_is_kept_anew_when_half_of_the_lead_is_used_and_not_at_every_frame(key):
     store = SigningStore(key, NOW_S)
+    store.follow(1000.0)
     first = kept(key)
-    store.state.timestamp += 19 * TICKS
+    store.state.timestamp = store.follow(1019.0)
     store.save()
     assert kept(key) == first
-    store.state.timestamp += 2 * TICKS
+    store.state.timestamp = store.follow(1021.0)
     store.save()
     assert kept(key) - first == 21 * TICKS
 
@@ -90,3 +91,50 @@ def test_a_key_is_whole_on_the_disk_when_it_is_said_to_be_there(tmp_path, monkey
     make_key(path)
     assert synced == [str(path), str(tmp_path)]
     assert len([*Path("/proc/self/fd").iterdir()]) == fds
+
+
+def of_clock(unix_s):
+    return int((unix_s - 1_420_070_400) * TICKS)
+
+
+def test_restarts_do_not_add_up_to_the_minute_that_shuts_others_out(key):
+    """Each began where the last had stored, 40 s ahead, and went on from there: after two no station could join."""
+    last = 0
+    for n in range(12):
+        now_s = NOW_S + 5.0 * n
+        store = SigningStore(key, now_s)
+        assert store.state.timestamp > last, "never twice, never back"
+        assert store.state.timestamp - of_clock(now_s) < 60 * TICKS
+        for second in range(4):
+            store.state.timestamp = max(store.state.timestamp + 50, store.follow(1000.0 + second))  # fifty frames
+            store.save()
+        last = store.state.timestamp
+        assert last < kept(key)
+
+
+def test_what_began_ahead_of_the_clock_waits_for_it(key):
+    SigningStore(key, NOW_S)
+    store = SigningStore(key, NOW_S + 5.0)
+    assert store.state.timestamp == of_clock(NOW_S + 40.0)
+    assert store.follow(1000.0) == of_clock(NOW_S + 5.0)
+    assert store.follow(1034.0) < store.state.timestamp < store.follow(1036.0) == of_clock(NOW_S + 41.0)
+    store.state.timestamp = store.follow(4600.0)
+    store.save()
+    assert kept(key) == of_clock(NOW_S + 3605.0) + 40 * TICKS
+    assert store.follow(4500.0) == store.follow(4600.0)  # a clock that was set back
+
+
+def test_a_board_without_a_clock_goes_on_in_time_from_what_is_stored(key):
+    """It must not fall behind the autopilot's clock: a newcomer a minute behind is refused."""
+    SigningStore(key, NOW_S)
+    store = SigningStore(key, 0.0)
+    assert store.state.timestamp == store.follow(10.0) == of_clock(NOW_S + 40.0)
+    assert store.follow(3610.0) == of_clock(NOW_S + 3640.0)
+
+
+def test_frames_that_outrun_the_clock_are_kept_ahead_of_too(key):
+    """An autopilot whose clock is ahead moves ours."""
+    store = SigningStore(key, NOW_S)
+    store.state.timestamp = of_clock(NOW_S + 500.0)
+    store.save()
+    assert of_clock(NOW_S + 500.0) < kept(key) <= of_clock(NOW_S + 501.0)
