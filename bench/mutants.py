@@ -101,7 +101,7 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 }
 # Tests of seconds are not asked (tests/long.txt).
 PYTEST = ("-q", "-s", "-n0", "-p", "no:cacheprovider", "-m", "not campaign and not long")
-MOST_TESTS_S = 60.0  # for one mutant: a line that a thousand tests run is judged by those that say most of it
+TESTS_S = 60.0  # for one mutant: a line that a thousand tests run is judged by the quickest of them
 
 
 @dataclass(frozen=True, slots=True)
@@ -466,7 +466,10 @@ def file_of(test: str) -> str:
 class Judge:
     """A pytest plugin in place of its loop: a forked child for each mutant."""
 
-    def __init__(self, wanted: Sequence[Mutant], known: Coverage, jobs: int, verdicts: Path, until_s: float) -> None:
+    def __init__(
+        self, wanted: Sequence[Mutant], known: Coverage, jobs: int, tests_s: float, verdicts: Path, until_s: float
+    ) -> None:
+        self.tests_s = tests_s
         self.lines: dict[str, dict[int, set[str]]] = {}
         self.wanted, self.known, self.jobs, self.verdicts, self.until_s = wanted, known, jobs, verdicts, until_s
         self.sound: dict[tuple[str, bool], bool] = {}
@@ -482,7 +485,7 @@ class Judge:
         tests = set().union(*lines.values()) if mutant.is_at_import else lines.get(mutant.line, set())
         own = ROOMS[mutant.room][1]
         tests = {test for test in tests if test.startswith(own)}
-        kept, left_s = [], MOST_TESTS_S
+        kept, left_s = [], self.tests_s
         for test in sorted(tests, key=lambda t: (took[t], t)):
             left_s -= took[test]
             if left_s < 0.0:
@@ -681,6 +684,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--sample", type=int, metavar="N", help="so many of each room, drawn by --seed")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
+    parser.add_argument(
+        "--tests-s", type=float, default=TESTS_S, metavar="S", help="of tests for one mutant (default 60)"
+    )
     parser.add_argument("--minutes", type=float, default=1e6, help="begin no mutant after them")
     parser.add_argument("--again", action="store_true", help="judge once more what survived")
     parser.add_argument("--table", action="store_true", help="only the table of what is known")
@@ -707,7 +713,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 os._exit(0)
             if os.waitpid(pid, 0)[1]:
                 return 1
-            judge = Judge(wanted, Coverage(known, files, asked), args.jobs, verdicts, until_s)
+            judge = Judge(wanted, Coverage(known, files, asked), args.jobs, args.tests_s, verdicts, until_s)
             pytest.main([*PYTEST, *tops], plugins=[judge])
         last = known_verdicts(verdicts)
     table(last, sys.stdout)
