@@ -1,5 +1,7 @@
 """The charge against the way to where she can wait, and a battery that is critical by it."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -8,7 +10,8 @@ from companion.safety import BATTERY
 from companion.skipper.step.config import Ends
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import Alarms, Charge, SkipperState
-from companion.skipper.watch.measures import DETOUR, FALL, LOOK_S, lasts_s
+from companion.skipper.watch.measures import DETOUR, FALL, LOOK_S, lasts_s, way_s
+from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from tests.skipper.test_voyage import make, said
 from tests.skipper.world import FRAME, voyage
@@ -75,3 +78,29 @@ def test_what_is_left_at_the_mean_rate(first, fallen, after_s):
     else:
         assert left == pytest.approx((first - fallen) * after_s / fallen, rel=1e-6)
     assert DETOUR >= 2.0**0.5
+
+
+@pytest.mark.parametrize(
+    ("refuges", "home", "is_known"),
+    [
+        (((600.0, 0.0), (-300.0, 0.0)), True, True),  # the nearest refuge, though home is nearer still
+        ((), True, True),  # without one home
+        ((), False, False),  # and where there is neither nothing is reckoned
+    ],
+)
+def test_the_way_to_where_she_can_wait(refuges, home, is_known):
+    world = sailing(voyage={"refuges": refuges})
+    world.run(60)
+    if not home:
+        world.shown = {}
+    snapshot = world.snapshot()
+    here = StepContext(world.skipper.voyage, world.skipper.config, world.state, snapshot)
+    if not is_known:
+        assert way_s(here) is None
+        return
+    boat = here.boat_en
+    place = min(refuges or ((0.0, 0.0),), key=lambda p: distance_m(boat, p))
+    fastest = world.skipper.voyage.boat.polar.max_speed_mps(here.wind_mean[1])
+    assert way_s(here) == pytest.approx(DETOUR * distance_m(boat, place) / fastest)
+    no_boat = replace(snapshot, vehicle=None)
+    assert way_s(StepContext(world.skipper.voyage, world.skipper.config, world.state, no_boat)) is None

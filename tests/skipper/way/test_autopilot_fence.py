@@ -224,3 +224,28 @@ def test_drawn_across_her_way_she_goes_round_and_a_fence_that_is_switched_off_is
     assert "Far is outside" in world.state.why
     world.shown |= {"fence_breached": None, "fence_on": False}
     assert world.run(60, lambda w: w.state.voyage.sailing)
+
+
+@pytest.mark.parametrize(
+    ("rocks", "east_m"),
+    [
+        ((), 130.0),  # as far out as there is room of 20 m within a circle of 150
+        ((shapely.box(100.0, -50.0, 300.0, 50.0),), 80.0),  # by steps of 5 m on the way home until a rock is 20 m off
+        ((shapely.box(1.0, -50.0, 300.0, 50.0),), 0.0),  # no such place: home itself
+    ],
+)
+def test_the_place_inside_is_on_the_way_home_with_room_about_it(rocks, east_m):
+    circle = HomeCircle(en_m=(0.0, 0.0), radius_m=150.0)
+    place = circle.place_inside(area(*rocks), (400.0, 0.0), 20.0)
+    assert place == (pytest.approx(east_m, abs=1e-6), pytest.approx(0.0, abs=1e-6))
+    assert circle.place_inside(area(*rocks), (30.0, 0.0), 20.0)[0] <= 10.0 + 1e-6  # not beyond where the boat is
+
+
+@pytest.mark.parametrize(
+    ("east_m", "says"), [(140.0, ""), (141.0, "less than 10 m inside"), (151.0, "151 m from home, outside")]
+)
+def test_a_place_too_near_to_the_circle_is_named_with_its_remedy(east_m, says):
+    told = HomeCircle(en_m=(0.0, 0.0), radius_m=150.0).trouble("goal 1", (east_m, 0.0), 10.0)
+    assert says in told
+    assert bool(told) == bool(says)
+    assert not told or "FENCE_RADIUS widens it" in told
