@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from companion.geo.angles import wrap_pi
 from companion.messages import Target
 from companion.planner import Problem
-from companion.planner.problem.evaluate import SolidObstacles, clearances, evaluate, ground_track, target_hit
-from companion.planner.problem.parts import Current
+from companion.planner.problem.evaluate import SolidObstacles, beat_s, clearances, evaluate, ground_track, target_hit
+from companion.planner.problem.parts import Beat, Current
 from tests.planner.problems import POLAR, box, simple
 
 SPEEDS = st.floats(-2.0, 2.0)
@@ -201,3 +201,19 @@ def test_a_boat_that_cannot_tack_gybes_round_by_a_leg_with_room():
     assert not any("cannot tack" in reason for reason in round_by.reasons)
     short = evaluate(problem, [[0, 0], [50, 50], [55, 45], [52, 42], [0, 100]])
     assert any("has turned" in reason for reason in short.reasons)
+
+
+@pytest.mark.parametrize(("set_deg", "along"), [(0.0, 1.0), (180.0, -1.0)])
+def test_a_beat_in_a_current_is_sailed_through_the_water_and_carried_over_the_ground(set_deg, along):
+    """Dead to windward: the way made good is the boat's and the water's, the tacks are those of the way through it."""
+    beat = Beat(no_go_half_rad=math.radians(45.0), corridor_m=20.0, clearance_m=5.0, tack_s=6.0)
+    still = Problem.from_json(simple(boat=simple()["boat"] | {"speed": POLAR}))
+    in_still_s, tacks = beat_s(still, beat, 0.0, 400.0)
+    windward_mps = 400.0 / (in_still_s - 6.0 * tacks)
+    current = Current(set_rad=math.radians(set_deg), drift_mps=0.3)
+    took_s, crossings = beat_s(replace(still, current=current), beat, 0.0, 400.0)
+    made_mps = windward_mps + along * 0.3
+    assert took_s - 6.0 * crossings == pytest.approx(400.0 / made_mps, rel=1e-3)
+    assert crossings == pytest.approx(tacks * windward_mps / made_mps, rel=1e-3)
+    against = Current(set_rad=math.pi, drift_mps=3.0)
+    assert beat_s(replace(still, current=against), beat, 0.0, 400.0) == (math.inf, 0.0)
