@@ -252,7 +252,7 @@ TABLE: tuple[Watchdog, ...] = (
                   because="less wind is forecast than she makes way in", until="until more wind is forecast")),
     W(name="shoaling", number=29, notification="grounding",
       watches="the depth by the sounder in 20 s at its rate, over the mission's `draft_m` and `under_keel_m`",
-      enter=0.0, exit=0.5, unit="m", enter_s=2.0, exit_s=10.0, severity=S.CRITICAL, response=Response.TURN_BACK,
+      enter=0.0, exit=0.5, unit="m", enter_s=1.0, exit_s=10.0, severity=S.CRITICAL, response=Response.TURN_BACK,
       loitering=True,
       why="what no chart has is found by the keel; 20 s are for an upload and the turn, or for a person"),
     W(name="depth lost", number=30, watches="the sounder tells of the bottom no more", enter=1.0, exit=0.5, unit="",

@@ -18,6 +18,7 @@ LABORATORY = ExtraCommands(
         "campaign": "a scenario over many seeds: success, risk, time",
         "faults": "a short voyage a thousand times, each with trouble of its own",
         "encounters": "vessels that would hit the boat, by the hundred: the rules of the road",
+        "shoals": "banks on no chart that a sounder finds, and hours of good water, by the hundred",
         "mismatch": "boats, seas and sensors that are not the plan's, by the hundred",
         "search": "draws that are moved towards contact until one touches",
         "shown": "every figure that a screen shows, against what came",

@@ -6,6 +6,7 @@ from companion.mavlink.wire.companion_status import CONTROL_COMMAND, HIGH_LATENC
 from companion.mavlink.wire.frames import Codec, Dialect, Drop, Message
 from companion.mavlink.wire.items import first_difference, mission_hash
 from companion.mavlink.wire.parameter_ranges import BY_L1, L1_RANGES, RANGES, Effect, believable, effect_of
+from companion.mavlink.wire.sounder import Sounder
 from companion.mavlink.wire.streams import Stream
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "Drop",
     "Effect",
     "Message",
+    "Sounder",
     "StatusReader",
     "StatusReport",
     "Stream",

@@ -11,9 +11,11 @@ from collections import deque
 from statistics import fmean, median
 
 PINGS = 5  # of which the middle one is believed: two in a row may be wrong
+AGREE = 3  # so many must be within these of the middle one, or nothing is believed
+NEAR_M, NEAR_SHARE = 0.4, 0.1
 FRESH_S = 5.0  # older pings are of other water
-WINDOW_S = 8.0  # over which the change is told: longer, and a slope that begins is told too late ...
-LEAST_S = 5.0  # ... once there is so much of it
+WINDOW_S = 6.0  # over which the change is told: longer, and a slope that begins is told too late ...
+LEAST_S = 4.0  # ... once there is so much of it
 
 
 class Sounder:
@@ -35,14 +37,27 @@ class Sounder:
             self._depths.popleft()
 
     def depth_m(self, t_s: float) -> float | None:
-        """Return the depth [m], None where fewer than three pings of the last seconds tell one."""
+        """Return the depth [m], None where no three pings of the last seconds agree on one.
+
+        What is between the sounder and the bottom is told now here, now there; the bottom is where it was.
+        """
         fresh = [depth for at_s, depth in self._pings if t_s - at_s <= FRESH_S]
-        return median(fresh) if len(fresh) >= 3 else None
+        if len(fresh) < AGREE:
+            return None
+        middle = median(fresh)
+        near = sum(abs(depth - middle) <= NEAR_M + NEAR_SHARE * middle for depth in fresh)
+        return middle if near >= AGREE else None
 
     def rate_mps(self, t_s: float) -> float | None:
-        """Return how the depth changes [m/s], straight through what was told; None while that is too little."""
+        """Return how the depth changes at least [m/s]: straight through what was told, less the standard error of that.
+
+        None while too little is told.
+        """
         if self.depth_m(t_s) is None or self._depths[-1][0] - self._depths[0][0] < LEAST_S:
             return None
         mean_s, mean_m = (fmean(column) for column in zip(*self._depths, strict=True))
         spread = sum((at_s - mean_s) ** 2 for at_s, _ in self._depths)
-        return sum((at_s - mean_s) * (depth - mean_m) for at_s, depth in self._depths) / spread
+        rate = sum((at_s - mean_s) * (depth - mean_m) for at_s, depth in self._depths) / spread
+        left = sum((depth - mean_m - rate * (at_s - mean_s)) ** 2 for at_s, depth in self._depths)
+        error = math.sqrt(left / (spread * max(1, len(self._depths) - 2)))
+        return math.copysign(max(0.0, abs(rate) - error), rate)

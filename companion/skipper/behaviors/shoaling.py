@@ -29,7 +29,7 @@ BACK = "back to deep water"  # the rung of a route that leads there
 TURN_S = 20.0  # from the alarm until she goes the other way: a person, or a tack of 7 s and its mission
 STEP_M = 4.0  # between two soundings that are kept ...
 KEPT = 150  # ... of her track
-LEAST_BACK_M, BACK_M = 30.0, 80.0  # how far back along it she goes
+LEAST_BACK_M, BACK_M = 25.0, 80.0  # how far back along it she goes
 BESIDE_M = 12.0  # of her own track: there the water is as deep as on it
 SPARE_M = 0.5  # more than the least depth, where she loiters
 RUNS_S = 3.0  # what she sails on until she turns
@@ -39,6 +39,7 @@ ABEAM_RAD, ABEAM_M = math.radians(110.0), 25.0  # where she turns to first
 ROOMY_M = 60.0  # more clearance is no better
 WAY_MPS = 0.3  # made good towards it: slower she has not turned yet
 GIVES_UP_S = 90.0  # of a leg back that comes to nothing: the plan must do
+AGAIN_S = 10.0  # between two shoals that are found ahead
 APART_M = 12.0  # between the middles of two shoals: nearer they are the same
 
 
@@ -63,7 +64,8 @@ def follow_soundings(ctx: StepContext) -> None:
     if not ctx.is_raised(SHOALING) or ahead_m is None or ahead_m > 0.0:
         return
     known = ctx.state.soundings.shoals
-    if SHOALING in ctx.fresh or not (_is_on_board(ctx) or _is_coming(ctx)):
+    is_sailing_on = not (_is_on_board(ctx) or _is_coming(ctx)) and ctx.t_s - ctx.state.soundings.found_s > AGAIN_S
+    if SHOALING in ctx.fresh or is_sailing_on:
         shoal = found(
             known,
             boat,
@@ -75,6 +77,7 @@ def follow_soundings(ctx: StepContext) -> None:
         )
         if all(distance_m(each.en_m, shoal.en_m) >= APART_M for each in known):
             ctx.learn_shoals((*known, shoal)[-MOST_SHOALS:])
+            ctx.set(soundings=changed(ctx.state.soundings, found_s=ctx.t_s))
             ctx.say(Severity.WARNING, "shoal", _words(ctx, boat, shoal, status.depth_m), every_s=0.0)
     elif status.depth_m <= least_m and all(distance_m(each.en_m, boat) >= APART_M for each in known):
         ctx.learn_shoals((*known, over(boat, status.depth_m))[-MOST_SHOALS:])
@@ -207,22 +210,22 @@ def _goes_back(ctx: StepContext, boat: PointEn, velocity_en_mps: tuple[float, fl
 
 
 def deep_place(track: tuple[Sounded, ...], boat_en: PointEn, least_m: float) -> PointEn | None:
-    """Return where to on her own track: the deepest place that is straight behind her; None: there is none.
+    """Return where to on her own track: the deepest place that water known to be deep leads to; None: there is none.
 
-    Straight behind is what lies so near to her track all the way that its depths are the track's.
+    Known is what lies near to soundings of the track, in whatever order they were taken: she may have turned since.
     """
+    deep = [s for s in track if s.depth_m >= least_m]
+    if not deep:
+        return None
+    known = shapely.multipoints(np.array([s.en_m for s in deep]))
     best: Sounded | None = None
-    way = [boat_en]
-    for sounded in reversed(track):
-        way.append(sounded.en_m)
+    for sounded in reversed(deep):
         far_m = distance_m(boat_en, sounded.en_m)
-        if far_m > BACK_M:
-            break
-        if far_m < LEAST_BACK_M or sounded.depth_m < least_m + SPARE_M:
+        if not LEAST_BACK_M <= far_m <= BACK_M or sounded.depth_m < least_m + SPARE_M:
             continue
-        chord = shapely.linestrings(np.array([boat_en, sounded.en_m]))
-        if shapely.hausdorff_distance(chord, shapely.linestrings(np.array(way)), densify=0.1) > BESIDE_M:
-            break
-        if best is None or sounded.depth_m >= best.depth_m - SPARE_M:
+        if best is not None and sounded.depth_m < best.depth_m + (SPARE_M if far_m > LEAST_BACK_M else 0.0):
+            continue
+        way = np.linspace(boat_en, sounded.en_m, max(2, math.ceil(far_m / STEP_M)))
+        if float(shapely.distance(known, shapely.points(way)).max()) <= BESIDE_M:
             best = sounded
     return None if best is None else best.en_m

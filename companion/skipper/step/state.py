@@ -210,6 +210,7 @@ class Soundings:
 
     track: tuple[Sounded, ...] = ()  # the last of it, some metres apart
     shoals: tuple[Shoal, ...] = ()  # found on this voyage; they survive a restart
+    found_s: float = float("-inf")  # when the last of them was found ahead
     turned_en_m: PointEn | None = None  # where she turned back, until a plan is asked for ...
     turned_s: float = float("-inf")  # ... and when
 

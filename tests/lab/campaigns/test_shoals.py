@@ -1,0 +1,65 @@
+"""Shoals drawn from seeds: repeatable, the judge of a turn, and false bottoms that are none."""
+
+import numpy as np
+
+from companion.geo.frame import LocalFrame
+from companion.mavlink.wire import Sounder
+from companion.messages import GeoPoint
+from lab.campaigns.shoals import DRAFT_M, GOAL_M, as_text, could_have_turned, draw, good_hour, job_of, sail
+from sitl.scenario import scenario_seabed
+from sitl.world import Bank, Seabed
+
+FRAME = LocalFrame(GeoPoint(lat_deg=50.817, lon_deg=-1.31))
+
+
+def over(level_m, across_m, *, mps=3.0):
+    """Return a bar right across a straight track north, and the track until the keel strikes."""
+    bar = Bank(en_m=(0.0, 300.0), along_m=5000.0, across_m=across_m, bearing_rad=np.pi / 2.0, top_m=0.0)
+    seabed = Seabed(frame=FRAME, level_m=level_m, banks=(bar,))
+    t_s = np.arange(0.0, 300.0 / mps)
+    places = np.column_stack([np.zeros(len(t_s)), mps * t_s])
+    end = int(np.argmax(seabed.depth_m(places, t_s) < DRAFT_M))
+    return seabed, t_s[: end + 1].tolist(), [tuple(p) for p in places[: end + 1].tolist()]
+
+
+def test_a_seed_draws_the_same_bank_which_is_on_the_way_and_strikes():
+    assert draw(3) == draw(3) != draw(4)
+    for seed in range(50):
+        seabed = scenario_seabed(draw(seed), job_of("bank", seed).scenario, FRAME)
+        bank = seabed.banks[0]
+        assert float(seabed.depth_m([bank.en_m], 0.0)[0]) < DRAFT_M
+        ends = seabed.depth_m([(0.0, 0.0), (0.0, GOAL_M)], 0.0)
+        assert ends.min() > 5.0
+
+
+def test_of_a_gentle_slope_there_was_time_to_turn_and_of_a_wall_none():
+    turned, warning_s = could_have_turned(*over(9.0, 150.0))
+    assert turned
+    assert warning_s > 15.0
+    turned, warning_s = could_have_turned(*over(9.0, 15.0))
+    assert not turned
+    assert warning_s < 6.0
+
+
+def test_false_bottoms_and_noise_over_good_water_are_no_shoals(monkeypatch):
+    """Seeds 7 and 10 were, when the middle of five pings was believed whatever the others said."""
+    assert [good_hour(seed)["alarms"] for seed in (7, 10)] == [0, 0]
+    monkeypatch.setattr("companion.mavlink.wire.sounder.AGREE", 1)
+    assert sum(good_hour(seed)["alarms"] for seed in (7, 10)) > 0
+
+
+def test_five_pings_that_agree_on_nothing_tell_no_depth():
+    sounder = Sounder()
+    for n, depth_m in enumerate((8.0, 1.0, 3.0, 5.0, 9.5)):
+        sounder.take(float(n), depth_m, 0.3, 50.0)
+    assert sounder.depth_m(4.0) is None
+    for n, depth_m in enumerate((8.0, 1.0, 7.9, 5.0, 8.1)):
+        sounder.take(5.0 + n, depth_m, 0.3, 50.0)
+    assert sounder.depth_m(9.0) == 7.9
+
+
+def test_a_voyage_over_a_bank_is_judged_by_the_true_depth():
+    record = sail(job_of("bank", 0))
+    assert record["passed"], record
+    assert record["keel_m"] > 0.0
+    assert as_text("bank", [record]).startswith("banks: 1 voyage, ")
