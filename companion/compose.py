@@ -491,7 +491,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         margin_floor_m=mission.margin_floor_m,
         least_depth_m=None
         if mission.boat.draft_m is None
-        else mission.boat.draft_m + mission.options.area.under_keel_m,
+        else mission.boat.draft_m + mission.options.area.under_keel_m - mission.options.boat.transducer_m,
         planner=planner_of(mission),
         plan_budget_s=options.planning_budget_s,
         first_plan_budget_s=options.planning_budget_s,

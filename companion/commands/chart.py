@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from companion.commands.output import force_option, refuse_existing, write_files
-from companion.errors import InputError, JobError
+from companion.errors import InputError, JobError, unreadable
 from companion.program.arguments import add_command, moment, number, place
 from companion.words import counted, listed
 
@@ -21,6 +21,7 @@ _EPILOG = """\
 examples:
   companion chart import US4MD81M.000 --mission missions/bay.toml
   companion chart import cells/*.000 land.gpkg --around 38.97,-76.47 --radius 3000 --depth 1.5
+  companion chart shoals voyages/today found.geojson --mission missions/bay.toml
   companion chart import gebco.nc emodnet.asc --mission passage.toml --out chart
 
 Reads S-57 cells (.000, with the updates .001 ... beside them), shapefiles, GeoPackages, GeoJSON and FlatGeobuf of land,
@@ -37,7 +38,7 @@ MOST_M = 50_000.0
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command with its verb."""
     parser = add_command(subparsers, "chart", summary, _EPILOG)
-    verbs = parser.add_subparsers(dest="verb", metavar="import", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="import|shoals", required=True)
     load = verbs.add_parser("import", help="make obstacles and a fence of charts")
     load.add_argument("files", metavar="FILE", nargs="+")
     where = load.add_mutually_exclusive_group(required=True)
@@ -104,6 +105,46 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     load.add_argument("--without-depths", action="store_true", help="take a cell that says nothing of depths")
     force_option(load)
     load.set_defaults(run=_import)
+    found = verbs.add_parser("shoals", help="write the shoals that the sounder found on a voyage")
+    found.add_argument("state", metavar="STATE", help="the saved state of the voyage (state.json), or its folder")
+    found.add_argument("out", metavar="OUT", help="its extension is the format: .geojson, .wkt, ...")
+    found.add_argument("--mission", metavar="M", required=True, help="the mission that was sailed")
+    force_option(found)
+    found.set_defaults(run=_shoals)
+
+
+def _shoals(args: argparse.Namespace) -> int:
+    from companion.commands.fence import write_out
+    from companion.geo.frame import LocalFrame
+    from companion.geofence import Circle, Document, Zone, ZoneKind, load_mission
+    from companion.geofence.formats import write
+    from companion.telemetry.folder import STATE
+    from companion.telemetry.state_file import read_state
+
+    path = Path(args.state)
+    path = path / STATE if path.is_dir() else path
+    frame = load_mission(Path(args.mission)).frame()
+    try:
+        saved = read_state(path)
+    except OSError as error:
+        raise unreadable(str(path), error) from None
+    except (ValueError, TypeError) as error:
+        raise InputError(str(path), "", f"is no saved state ({error})", "name state.json of a voyage") from None
+    if not saved.shoals:
+        raise JobError(f"{path}: no shoal was found on this voyage")
+    frame = frame if saved.water is None else LocalFrame(saved.water)
+    zones = tuple(
+        Zone(
+            kind=ZoneKind.EXCLUSION,
+            shape=Circle(center=frame.geo_from_en(*shoal.en_m), radius_m=shoal.radius_m + shoal.doubt_m),
+            name=f"shoal {n}: {shoal.depth_m:.1f} m sounded",
+        )
+        for n, shoal in enumerate(saved.shoals, start=1)
+    )
+    document = Document(source=str(path), format="shoals", zones=zones)
+    write_out(write(document, args.out, part="fence"), args.out, lossy=False, force=args.force)
+    print(f"{args.out}: {counted(len(zones), 'shoal')}, drawn with the doubt about each. Not fit for navigation.")
+    return 0
 
 
 def _import(args: argparse.Namespace) -> int:

@@ -180,6 +180,7 @@ OTHER = {
         "beam_m": 1.5,
         "motor": True,
         "draft_m": 0.8,
+        "transducer_m": 0.3,
         "leeway_deg": 4.0,
         "max_tws_mps": 11.0,
         "min_tws_mps": 1.5,
@@ -271,7 +272,7 @@ def mission(path, table="", key="", value=None):
         (path / "tide.csv").write_text("2026-11-21T12:00:00Z,90,0.6\n2026-11-21T13:00:00Z,90,0.2\n")
     if table == "area" and key in {"axis", "point_radius_m"}:
         raw["area"]["obstacles"] = ["point.wkt"]
-    if key == "under_keel_m":
+    if key in {"under_keel_m", "transducer_m"}:
         raw["boat"] = {"draft_m": 1.0}
     if (table, key) == ("area", "axis"):
         (path / "point.wkt").write_text("POINT (50.8175 -1.3060)")
@@ -340,7 +341,7 @@ def base_for(path, table, key):
         return mission(path, "planner", "tunnel_width_m", 60.0)
     if (table, key) == ("autopilot", "frame"):
         return mission(path, "boat", "polar", 2.0)
-    if key == "under_keel_m":
+    if key in {"under_keel_m", "transducer_m"}:
         return mission(path, "boat", "draft_m", 1.0)
     if (table, key) == ("goal", "heading_deg"):
         return mission(path, "skipper", "planner", "astar")

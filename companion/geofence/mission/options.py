@@ -289,6 +289,8 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """The hull: what touches, and what vessels are kept clear of. The position is taken to be amidships."""
     draft_m: Annotated[float, Meta(gt=0.0, le=20.0)] | None = None
     """How deep the keel is: what of a chart is too shallow, and what a sounder warns of."""
+    transducer_m: Annotated[float, Meta(ge=0.0, le=20.0)] = 0.0
+    """The sounder's transducer lies so deep below the water's surface: it tells the depth from there."""
     leeway_deg: Annotated[float, Meta(ge=0.0, le=30.0)] = 0.0
     """How far to leeward of the bow a beat goes: apparent wind 30 degrees off it, three times the boat's speed."""
     max_tws_mps: Positive | None = None

@@ -1,0 +1,45 @@
+"""Shoals that a voyage found, written as obstacles."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from companion.cli import main
+from companion.geofence import Circle, load_mission, read
+from companion.skipper.step import Persisted
+from companion.skipper.way.shoals import Shoal
+from companion.telemetry.folder import STATE
+
+MISSION = "sitl/missions/shoaling.toml"
+FOUND = Shoal(en_m=(10.0, 200.0), radius_m=20.0, doubt_m=7.0, depth_m=1.8)
+
+
+def voyage(folder, *shoals):
+    saved = Persisted(voyage="x", gate=0, sailing=True, route=None, pending=None, shoals=shoals)
+    (folder / STATE).write_text(json.dumps(saved.to_dict()))
+    return str(folder)
+
+
+@pytest.mark.parametrize("ending", ["geojson", "wkt"])
+def test_each_is_an_obstacle_with_the_doubt_about_it(tmp_path, ending, capsys):
+    out = tmp_path / f"found.{ending}"
+    assert main(["chart", "shoals", voyage(tmp_path, FOUND), str(out), "--mission", MISSION]) == 0
+    assert "1 shoal, drawn with the doubt" in capsys.readouterr().out
+    (zone,) = read(out).zones
+    frame = load_mission(Path(MISSION)).frame()
+    if isinstance(zone.shape, Circle):
+        assert zone.shape.radius_m == pytest.approx(27.0, abs=0.01)
+        assert frame.en_from_geo(zone.shape.center) == pytest.approx((10.0, 200.0), abs=0.01)
+    assert "1.8 m" in zone.name
+
+
+def test_what_holds_none_or_is_no_state_is_one_line(tmp_path, capsys):
+    out = tmp_path / "found.geojson"
+    assert main(["chart", "shoals", voyage(tmp_path), str(out), "--mission", MISSION]) != 0
+    assert "no shoal was found" in capsys.readouterr().err
+    (tmp_path / STATE).write_text("{")
+    assert main(["chart", "shoals", str(tmp_path), str(out), "--mission", MISSION]) == 2
+    assert "is no saved state" in capsys.readouterr().err
+    assert main(["chart", "shoals", str(tmp_path / "none"), str(out), "--mission", MISSION]) == 2
+    assert not out.exists()
