@@ -114,7 +114,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 
 def _shoals(args: argparse.Namespace) -> int:
-    from companion.commands.fence import write_out
+    from companion.commands.output import write_out
     from companion.geo.frame import LocalFrame
     from companion.geofence import Circle, Document, Zone, ZoneKind, load_mission
     from companion.geofence.formats import write
