@@ -9,6 +9,7 @@ import pytest
 from companion.geo.angles import wrap_pi
 from companion.messages import ApparentWind, VehicleState, WindQuality, WindSample, WindSource
 from companion.wind import Forecaster, VaneParameters, WindTracker, WindVerdict, apparent_wind
+from companion.wind.sensor_faults import Spikes
 from tests.wind.boat import HERE, sail, turned, voyage
 
 QUIET = {WindVerdict.GOOD, WindVerdict.TURNING}
@@ -431,3 +432,37 @@ def test_what_was_read_by_another_offset_is_forgotten():
     assert room.forecast_table(at_s + 30.0).mean_twd_from_rad[0] == pytest.approx(-2.0, abs=0.05)
     room.set_parameters({"WNDVN_TYPE": 0.0})
     assert WindVerdict.SYNTHESISED not in status.verdicts
+
+
+@pytest.mark.parametrize(
+    ("tws_mps", "widening", "weight"),
+    [
+        (1.5, 1.0, 1.0),  # a wind
+        (0.75, 1.5, 0.8),  # a quarter of what is lacking to 1 m/s: half as wide again, four fifths of a reading
+        (0.5, 2.0, 0.6),
+        (0.2, 2.6, 0.0),  # no direction at all
+    ],
+)
+def test_the_lighter_a_wind_the_wider_it_is_believed_and_the_less_its_direction(tws_mps, widening, weight):
+    room = WindTracker(VaneParameters(true_filter_hz=-1.0))
+    for t in range(8):
+        status = room.update(WindSample(t_s=float(t), twd_from_rad=1.0 + 0.01 * (-1) ** t, tws_mps=tws_mps))
+    assert (status.widening, status.weight) == (pytest.approx(widening), pytest.approx(weight))
+    assert (WindVerdict.CALM in status.verdicts) == (tws_mps < 1.0)
+
+
+def test_a_gust_front_is_a_calm_no_more_within_ten_seconds():
+    room = WindTracker(VaneParameters(true_filter_hz=-1.0))
+    heard = []
+    for t in range(30):
+        wind = WindSample(t_s=float(t), twd_from_rad=1.0 + 0.01 * (-1) ** t, tws_mps=0.4 if t < 10 else 1.4)
+        heard.append(WindVerdict.CALM in room.update(wind).verdicts)
+    assert heard[:10] == [True] * 10
+    assert 7 <= heard.count(True) - 10 <= 11  # the mean of ten seconds is above 1 m/s when 0.4 of 1 are left: 9 s
+
+
+@pytest.mark.parametrize("twd_deg", [0, 90, 180, -90])
+def test_a_steady_wind_from_anywhere_has_no_spikes_from_its_first_reading_on(twd_deg):
+    spikes = Spikes()
+    assert not any(spikes.update(float(t), math.radians(twd_deg)) for t in range(20))
+    assert spikes.share == 0.0
