@@ -138,3 +138,11 @@ def test_frames_that_outrun_the_clock_are_kept_ahead_of_too(key):
     store.state.timestamp = of_clock(NOW_S + 500.0)
     store.save()
     assert of_clock(NOW_S + 500.0) < kept(key) <= of_clock(NOW_S + 501.0)
+
+
+@pytest.mark.parametrize(("behind_s", "waits"), [(3500.0, True), (3700.0, False)])
+def test_a_clock_more_than_an_hour_behind_what_is_kept_is_none(key, behind_s, waits):
+    key.with_name("key.timestamp").write_text(str(of_clock(NOW_S)))
+    store = SigningStore(key, NOW_S - behind_s)
+    assert store.state.timestamp == of_clock(NOW_S)
+    assert store.follow(0.0) == of_clock(NOW_S - behind_s if waits else NOW_S)
