@@ -268,7 +268,7 @@ def mutants(room: str, file: str) -> Iterator[Mutant]:
         for other in changes(node):
             place = node.lineno, node.col_offset
             seen[place] += 1
-            was, now = (ast.unparse(ast.fix_missing_locations(n)).splitlines()[0][:90] for n in (node, deepcopy(other)))
+            was, now = (ast.unparse(ast.fix_missing_locations(n)).splitlines()[0] for n in (node, deepcopy(other)))
             yield Mutant(room, file, where, *place, seen[place], f"{was} -> {now}", is_at_import)
 
 

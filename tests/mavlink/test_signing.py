@@ -146,3 +146,15 @@ def test_a_clock_more_than_an_hour_behind_what_is_kept_is_none(key, behind_s, wa
     store = SigningStore(key, NOW_S - behind_s)
     assert store.state.timestamp == of_clock(NOW_S)
     assert store.follow(0.0) == of_clock(NOW_S - behind_s if waits else NOW_S)
+
+
+def test_ahead_of_the_clock_it_is_kept_anew_when_frames_have_used_half_a_second_of_what_is_spared(key):
+    SigningStore(key, NOW_S)
+    store = SigningStore(key, NOW_S + 5.0)  # begins at 40 s, keeps 45
+    assert kept(key) == of_clock(NOW_S + 45.0)
+    store.state.timestamp = of_clock(NOW_S + 44.4)
+    store.save()
+    assert kept(key) == of_clock(NOW_S + 45.0)
+    store.state.timestamp = of_clock(NOW_S + 44.6)
+    store.save()
+    assert kept(key) == store.state.timestamp + TICKS
