@@ -36,6 +36,7 @@ FROZEN_S = 20  # a vane or compass that gives one value for so long while the bo
 LEAP_MPS = 4.0  # a position that moves so much faster than the velocity says was set anew
 ASIDE_DEG = 50.0  # a course so far from the bow is a drift
 HEAD_TO_WIND_DEG = 25.0  # nobody sails there: whoever makes way there is driven
+NEAR_RAD = math.radians(45.0)  # nearer to the wind no guess says how fast a boat is
 TOO_FAST = 3.0  # times the prior's error above what it says (logarithm), and at least so many times as fast:
 TOO_FAST_LEAST = 2.0
 
@@ -194,7 +195,10 @@ def _driven(table: Floats, prior: Polar, prior_error: float) -> NDArray[np.bool_
         heading_rad=heading,
         twa_rad=twa,
         tws_mps=tws,
-        expected_mps=np.array([prior.speed_mps(a, w) for a, w in zip(twa.tolist(), tws.tolist(), strict=True)]),
+        # Nearer to the wind a guess is steep, and a vane's error or a high pointer is no motor.
+        expected_mps=np.array(
+            [prior.speed_mps(max(abs(a), NEAR_RAD), w) for a, w in zip(twa.tolist(), tws.tolist(), strict=True)]
+        ),
         prior_error=prior_error,
     )
 

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from companion.boat.guess import guessed_polar
+from companion.boat.guess import Sizes, guessed_polar
 from companion.boat.learn import TWA_DEG, TWS_MPS, learn
 from companion.boat.lesson import lesson_of
-from companion.boat.log import Why, stretches_of
+from companion.boat.log import NEAR_RAD, Why, stretches_of
 from companion.boat.manoeuvres import chances, manoeuvres_of
+from companion.boat.towed import driven
 from lab.boat_learning import _quickest, _time, inside, marks_of, time_lost
 from lab.simulated_logs import SIZES, Truth, sailed
 
@@ -247,6 +248,29 @@ def test_a_boat_that_is_as_fast_on_a_beat_as_on_a_run_is_sailed():
     found = stretches_of(logs, PRIOR, ERROR)
     assert found.left_out[Why.DRIVEN] <= 2
     assert len(found) > 80
+
+
+def test_a_yacht_at_her_hull_s_speed_in_a_fresh_wind_is_sailed():
+    """Of a season of a keelboat's races half was taken for driven: fast at every angle in a fresh wind alone."""
+    rng, polar = (
+        np.random.default_rng(4),
+        guessed_polar(Sizes(length_m=10.0, displacement_kg=3500.0, sail_area_m2=65.0)),
+    )
+    n = 600
+    outing = np.repeat(np.arange(6), n // 6)
+    fresh = outing % 2 == 1
+    tws = np.where(fresh, 8.0, 2.3) * np.exp(0.15 * rng.standard_normal(n))
+    twa = np.radians(rng.choice([33.0, 38.0, 45.0, 100.0, 150.0, 168.0], n)) * rng.choice([-1.0, 1.0], n)
+    expected = np.array([polar.speed_mps(max(abs(a), NEAR_RAD), w) for a, w in zip(twa, tws, strict=True)])
+    made = np.where(fresh, 3.25, 0.6 * expected) * np.exp(np.where(fresh, 0.1, 0.25) * rng.standard_normal(n))
+    wind = {"heading_rad": -twa, "twa_rad": twa, "tws_mps": tws, "expected_mps": expected}
+    assert np.sum(driven(outing=outing, ahead_mps=made, prior_error=ERROR, **wind)) < 10
+    # At one speed whatever the wind, and faster than by it, she is towed for a third of one of them.
+    towed = (outing == 2) & (np.arange(n) % 100 >= 60)
+    by_tug = np.where(towed, 2.6 * np.exp(0.02 * rng.standard_normal(n)), made)
+    found = driven(outing=outing, ahead_mps=by_tug, prior_error=ERROR, **wind)
+    assert np.sum(found & towed) >= 36
+    assert np.sum(found & ~towed) < 10
 
 
 def test_a_log_of_one_speed_alone_is_not_said_to_be_a_tow():
