@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from companion.boat import BoatLog, Polar
 from companion.boat.guess import guessed_polar
-from companion.boat.learn import TWA_DEG, TWS_MPS, learn
+from companion.boat.learn import LEAST_STRETCHES, TWA_DEG, TWS_MPS, learn
 from companion.boat.log import stretches_of
 from lab.simulated_logs import SIZES, Truth, sailed
 
@@ -47,6 +47,9 @@ DISTURBED: dict[str, dict[str, float | int]] = {
     "compass swings by 5 degrees": {"swing_deg": 5.0},
     "velocity 2 s late": {"lag_s": 2},
     "vane tells 10 % more": {"vane_scale": 1.1},
+    "vane tells 10 % less": {"vane_scale": 0.9},
+    "leeway of 15 degrees": {"leeway_deg": 15.0},
+    "log tells 20 % less by half": {"log_step": 0.2},
     "vane sticks for a third": {"stuck_share": 0.33},
     "towed for a third": {"towed_share": 0.33},
 }
@@ -104,14 +107,17 @@ def outings(truth: Truth, hours: float, rng: np.random.Generator) -> list[BoatLo
     return logs
 
 
-def marks_of(seed: int, disturbed: str, hours: float) -> Marks:
-    """Return how well boat ``seed`` is learned from so many hours."""
+def marks_of(seed: int, disturbed: str, hours: float) -> Marks | None:
+    """Return how well boat ``seed`` is learned from so many hours; None: she hardly sails, and nothing is."""
     rng = np.random.default_rng([seed, 38])
     truth = replace(drawn(rng), **DISTURBED[disturbed])  # type: ignore[arg-type]
     prior, wind = guessed_polar(SIZES), float(TWS_MPS[NODE])
     # Speeds are told in the wind of the boat's own vane.
     real_wind = wind / truth.vane_scale
-    boat = learn(stretches_of(outings(truth, hours, rng), prior, PRIOR_ERROR), prior, PRIOR_ERROR)
+    stretches = stretches_of(outings(truth, hours, rng), prior, PRIOR_ERROR)
+    if len(stretches) < LEAST_STRETCHES:
+        return None
+    boat = learn(stretches, prior, PRIOR_ERROR)
     day = truth.day_sd * rng.standard_normal()
     even = replace(truth, lean=0.0)
     true = np.array([even.speed_mps(prior, math.radians(a), real_wind) for a in ANGLES_DEG])
@@ -208,7 +214,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name in DISTURBED if args.only is None else [args.only]:
             for hours in args.hours:
                 found = list(pool.map(partial(marks_of, disturbed=name, hours=hours), range(args.boats)))
-                say(_row(name, hours, found) + "\n")
+                marks = [m for m in found if m is not None]
+                absent = len(found) - len(marks)
+                say(_row(name, hours, marks) + (f"   {absent} not learned" if absent else "") + "\n")
                 sys.stdout.flush()
     return 0
 

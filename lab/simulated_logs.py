@@ -10,11 +10,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.boat import Polar, Sizes
 from companion.boat.boat import coefficient_of, leeway_at
 from companion.boat.guess import guessed_polar
 from companion.boat.log import BoatLog
+
+Floats = NDArray[np.float64]
 
 SIZES = Sizes(length_m=1.5, displacement_kg=20.0, sail_area_m2=0.9)
 TAU_S = 5.0  # she gathers way so
@@ -45,6 +48,7 @@ class Truth:
     swing_deg: float = 0.0  # of the compass, round the circle
     lag_s: int = 0  # of the position's velocity behind the rest
     stuck_share: float = 0.0  # of the outing, at its end, the vane has stopped
+    log_step: float | None = None  # she has a log, which tells so much less from the middle of the outing on
     towed_share: float = 0.0  # likewise, towed at 2.5 m/s wherever the wind is
 
     def speed_mps(self, polar: Polar, twa_rad: float, tws_mps: float) -> float:
@@ -52,6 +56,14 @@ class Truth:
         shape = float(np.interp(abs(math.degrees(twa_rad)), [45.0, 90.0, 150.0], [self.beat, 1.0, self.run]))
         lean = math.exp(0.5 * self.lean * math.copysign(1.0 + math.cos(twa_rad), twa_rad))
         return self.scale * shape * lean * polar.speed_mps(twa_rad, tws_mps)
+
+
+def _by_log(speed_mps: Floats, step: float | None) -> Floats:
+    """Return what a log tells of the speed through the water; NaN: there is none."""
+    if step is None:
+        return np.full(speed_mps.shape, math.nan)
+    half = np.arange(speed_mps.shape[0]) >= speed_mps.shape[0] // 2
+    return np.asarray(speed_mps * np.where(half, 1.0 - step, 1.0))
 
 
 def sailed(
@@ -133,7 +145,7 @@ def sailed(
         awa_rad=(rows[:, 4] + math.pi) % (2.0 * math.pi) - math.pi,
         aws_mps=rows[:, 5],
         position_en_m=rows[:, 6:8],
-        stw_mps=np.full(n, math.nan),
+        stw_mps=_by_log(rows[:, 8], truth.log_step),
         is_sailed=np.ones(n, dtype=np.bool_),
         has_motor_on=np.zeros(n, dtype=np.bool_),
     )
