@@ -15,6 +15,7 @@ from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.shoals import MOST_RADIUS_M, NAME, Shoal, found, over, shoaled
 from companion.skipper.way.voyage import Goal
 from tests.skipper.test_voyage import is_done, make, said
+from tests.skipper.world import with_parts
 
 EAST = math.radians(90.0)
 GOAL = Goal(en_m=(0.0, 300.0), radius_m=6.0, name="the goal")
@@ -159,6 +160,19 @@ def test_after_a_turn_the_water_that_is_known_is_beside_the_track_not_behind_on_
     north = track(*((0.0, 4.0 * n) for n in range(30)))
     loop = track((6.0, 118.0), (10.0, 114.0), (8.0, 110.0), (4.0, 112.0))
     assert deep_place((*north, *loop), (4.0, 114.0), 2.0) is not None
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_she_turns_away_from_the_shoal_that_was_found_before(side):
+    world = make(GOAL, obstacles=(), wind=lambda t: (math.pi, 5.0))
+    tell, _ = sounded(world)
+    world.run(20, lambda w: tell(w) or w.state.voyage.sailing)
+    beside = Shoal(en_m=(side * 75.0, 90.0), radius_m=30.0, doubt_m=5.0, depth_m=1.0)
+    world.state = with_parts(world.state, soundings={"shoals": (beside,)})
+    assert world.run(400, lambda w: tell(w) or said(w, "turning back"))
+    route = world.state.pending.upload.route
+    assert len(route.points_en_m) >= 2
+    assert side * (route.points_en_m[-2][0] - world.position[0]) < 0.0
 
 
 def test_where_no_deep_water_is_known_behind_her_she_is_planned_for():

@@ -21,7 +21,7 @@ from companion.skipper.planning.uploads import upload
 from companion.skipper.step import CancelPlan, Phase, StepContext
 from companion.skipper.step.state import Sounded
 from companion.skipper.way.geometry import distance_m, is_tack, moved
-from companion.skipper.way.shoals import MOST_SHOALS, Shoal, found, over
+from companion.skipper.way.shoals import MOST_SHOALS, Shoal, found, over, water_taken
 from companion.skipper.way.voyage import PointEn
 
 SHOALING = "shoaling"  # the watchdog
@@ -35,8 +35,10 @@ SPARE_M = 0.5  # more than the least depth, where she loiters
 RUNS_S = 3.0  # what she sails on until she turns
 THERE_M = 20.0  # from the loiter's point
 OPENED_M = 25.0  # away from where she turned: then a plan is made
-ABEAM_RAD, ABEAM_M = math.radians(110.0), 25.0  # where she turns to first
+ABEAM_RAD = (math.radians(110.0), math.radians(80.0))  # where she turns to first: what the wind leaves of these ...
+ABEAM_M = 25.0  # ... so far off
 ROOMY_M = 60.0  # more clearance is no better
+ALIKE_M = 5.0  # a difference that is none
 WAY_MPS = 0.3  # made good towards it: slower she has not turned yet
 GIVES_UP_S = 90.0  # of a leg back that comes to nothing: the plan must do
 AGAIN_S = 10.0  # between two shoals that are found ahead
@@ -163,21 +165,24 @@ def turns_back(ctx: StepContext) -> bool:
 
 
 def _aside(ctx: StepContext, boat: PointEn, course_rad: float, place: PointEn) -> tuple[PointEn, ...]:
-    """Return the place abeam that turns her at once, on the side that is clear and needs no tack; none: there is none.
+    """Return the place abeam that turns her at once, off shoals found before, clear, no tack; none: there is none.
 
     ArduRover begins a leg to what lies straight behind where it could stop, and has turned six seconds later; to what
     is abeam it turns within a second.
     """
     water, wind = ctx.voyage.area.unfenced, ctx.wind_now
     floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
-    best: tuple[tuple[bool, float], PointEn] | None = None
-    for side in (1.0, -1.0):
-        abeam = moved(boat, course_rad + side * ABEAM_RAD, ABEAM_M)
+    before = ctx.state.soundings.shoals[:-1]  # the last is right ahead
+    shoal = water_taken(before) if before else None
+    best: tuple[tuple[float, bool, float], PointEn] | None = None
+    for turn_rad in (side * off_rad for off_rad in ABEAM_RAD for side in (1.0, -1.0)):
+        abeam = moved(boat, course_rad + turn_rad, ABEAM_M)
         clear_m = water.path_clearance_m([boat, abeam, place])
         if clear_m < floor_m or ctx.is_closed(boat, abeam, wind):
             continue
-        tacks = wind is not None and is_tack(course_rad, course_rad + side * ABEAM_RAD, wind[0])
-        rank = (tacks, -min(clear_m, ROOMY_M))
+        tacks = wind is not None and is_tack(course_rad, course_rad + turn_rad, wind[0])
+        off_m = ROOMY_M if shoal is None else float(shapely.distance(shoal, shapely.linestrings([boat, abeam, place])))
+        rank = (-round(min(off_m, ROOMY_M) / ALIKE_M), tacks, -min(clear_m, ROOMY_M))
         if best is None or rank < best[0]:
             best = rank, abeam
     return () if best is None else (best[1],)
