@@ -40,9 +40,16 @@ def vmg_mps(step: Step) -> float | None:
     return vehicle.speed_mps * math.cos(twd_rad - heading_of(*vehicle.velocity_en_mps))
 
 
+def pace_share(step: Step) -> float | None:
+    """Return what the boat lately made of the speeds that were predicted, 1: all of them; None: nothing was seen."""
+    return step.pace.share if step.pace.tries > 0.0 else None
+
+
 # fmt: off
 FIGURES: tuple[Figure, ...] = (
     Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page", "report"})),
+    Figure(name="co_pace", label="of her polar", kind="share", of=pace_share, shown=frozenset({"page", "report"}),
+           hint="what she made of the predicted speeds in the last minutes"),
 )
 # fmt: on
 BY_NAME = {figure.name: figure for figure in FIGURES}

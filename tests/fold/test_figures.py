@@ -1,11 +1,13 @@
 """The table of figures: what of a step it tells, and that each row is shown wherever it says."""
 
+import dataclasses
 import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion import figures
+from companion.eta import Pace
 from companion.figures import BY_NAME, FIGURES, Figure, figure_values, in_words, ranges_in_words
 from companion.fold import Step
 from companion.mavlink.wire.companion_status import FLOATS, SLOW, StatusReader, status_messages
@@ -50,6 +52,13 @@ def test_vmg_is_the_speed_against_the_wind(step):
     vehicle, wind = step.snapshot.vehicle, step.snapshot.wind.present_twd_from_rad
     east, north = vehicle.velocity_en_mps
     assert figure_values(step, "page")["co_vmg"] == pytest.approx(east * math.sin(wind) + north * math.cos(wind))
+
+
+def test_the_speed_that_was_predicted_is_told_against_what_was_sailed(step):
+    assert "co_pace" not in figure_values(step, "page")  # nothing was seen yet
+    slow = dataclasses.replace(step, pace=Pace(tries=5.0, prior=0.0, took_s=100.0, made_s=70.0))
+    assert figure_values(slow, "page")["co_pace"] == pytest.approx(0.7)
+    assert "of her polar 70 %" in in_words(figure_values(slow, "page"))
 
 
 @pytest.mark.parametrize(
