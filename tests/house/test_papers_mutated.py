@@ -444,8 +444,8 @@ MUTATIONS = (
     ),
     Mutation(
         "companion/skipper/planning/answers.py",
-        "    if _keep_old(ctx, pending, plan):\n        return\n",
-        "",
+        'refused = "" if _keep_old(ctx, pending, plan) else',
+        "refused =",
         "tests/skipper/test_voyage.py::test_an_old_plan_that_is_as_good_as_a_new_one_stays",
     ),
     Mutation(
