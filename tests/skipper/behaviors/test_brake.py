@@ -63,6 +63,7 @@ def test_inside_of_what_is_drawn_the_way_out_is_not_braked(towards, is_braked):
     world = make(GOAL, obstacles=(ISLAND,), wind=BEAM)
     assert world.run(60, is_sailing)
     world.position, world.speed = (0.0, 126.0), 2.0  # 4 m inside
+    world.state = with_parts(world.state, position={"last_seen": None})
     ctx = turn_of(world)
     route = ctx.state.mission.route
     ends = ((0.0, 128.0 + 60.0 * towards), *route.points_en_m[-1:])
