@@ -74,7 +74,7 @@ draws: $(ENV)
 	  $$(grep -rlE "^ *@given|StateMachine" tests)
 
 # Whether the tests would notice: one place of the code after the other changed, in memory, and the tests that run it asked.
-# All of them are a day of two cores (it goes on where it was ended); a sample is another each night, 20 minutes of it.
+# All of them would be about a day of two cores (it goes on where it was ended); a sample is another each night, 20 minutes of it.
 mutants: $(ENV)
 	@$(KERNELS)
 	nice $(BIN)/python -m bench.mutants --jobs 2
