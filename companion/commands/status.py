@@ -286,7 +286,7 @@ def _write_text(d: dict[str, Any], units: str) -> None:
     print(f"{state}  {helm}  (age {d['age_s']:.1f} s)  {d['alert']['text']}")
     print(
         f"  WP {show(w['seq'])}/{show(w['count'])} {show(w['distance_m'])} m  xt {show(w['cross_track_m'], '+.1f')} m"
-        f"  next tack {show(w['next_tack_s'])} s | goal {show(goal['distance_m'])} m"
+        f"  next tack about {show(w['next_tack_s'])} s | goal {show(goal['distance_m'])} m"
         f"  ({(goal['index'] or 0) + 1} of {show(goal['count'])})"
     )
     print(

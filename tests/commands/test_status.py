@@ -1,5 +1,6 @@
 """``companion status`` on a link: what it waits for before it speaks, and what it says is not heard."""
 
+import math
 import socket
 import threading
 import time
@@ -16,7 +17,7 @@ from sitl.scenario.traffic import free_port
 
 MANUAL, DISARMED, STANDBY = 0, wire.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, wire.MAV_STATE_STANDBY
 
-STATUS = CompanionStatus(t_s=1.0, state="standard", tws_mps=5.0, twd_from_rad=0.0)
+STATUS = CompanionStatus(t_s=1.0, state="standard", tws_mps=5.0, twd_from_rad=math.radians(359.8), next_tack_s=44.0)
 
 
 @pytest.fixture
@@ -59,9 +60,12 @@ def _once(port, timeout="4"):
 
 
 def test_one_status_waits_for_the_autopilots_mode(air, capsys):
-    """It printed "STANDARD  ? ?" (issue 13, what still made him stop)."""
+    """It printed "STANDARD  ? ?"."""
     assert _once(air([0.1, 0.7], None)) == 0
-    assert capsys.readouterr().out.startswith("STANDARD  MANUAL disarmed  (age ")
+    told = capsys.readouterr().out
+    assert told.startswith("STANDARD  MANUAL disarmed  (age ")
+    assert "TWD 000±" in told  # not 360
+    assert "next tack about 44 s" in told  # whether it is the plan's is not heard
 
 
 def test_what_was_not_heard_in_time_is_said(air, capsys):
