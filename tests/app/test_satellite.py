@@ -228,7 +228,7 @@ def unreadable(kind, path):
 
 @pytest.mark.parametrize("kind", ["loop", "pipe", "sick"])
 def test_a_message_that_cannot_be_read_is_put_aside_and_keeps_no_other_out(tmp_path, monkeypatch, kind):
-    """One unreadable file stood in the way of every order behind it (issue 43, point 7)."""
+    """One unreadable file stood in the way of every order behind it."""
 
     def sick(path, most_bytes, read=satellite.read_regular, **how):
         if path.name == "000000\x1b[2J.sbd" and kind == "sick":
@@ -274,7 +274,7 @@ def test_what_cannot_even_be_put_aside_is_looked_at_no_more_and_what_is_kept_is_
 
 
 def test_a_counter_far_ahead_closes_no_door(tmp_path):
-    """After order 65535 no other was taken for ever (issue 43, point 7)."""
+    """After order 65535 no other was taken for ever."""
     voyage = Voyage(tmp_path)
     status = voyage.sail(voyage.put(sealed(65535)))
     assert (status.order, status.reply, voyage.orders) == (65535, Reply.AHEAD, [])

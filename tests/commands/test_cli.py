@@ -294,7 +294,7 @@ NASTY = "Nab\x1b]0;owned\x07\x1b[2J\x9b2J\u202egnp\r\nerror: all is well"
 
 
 def test_no_name_of_a_chart_reaches_the_terminal_as_more_than_a_name(tmp_path, capsys):
-    """An island's name cleared the screen of who checked the file (issue 43, point 9)."""
+    """An island's name cleared the screen of who checked the file."""
     lat, lon = 50.8203440, -1.3101419  # of the mission's goal
     ring = [[lon + e * 1e-4, lat + n * 1e-4] for e, n in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
     island = {

@@ -167,7 +167,7 @@ def test_orders_are_taken_from_on_board_as_the_mission_permits(first, folder):
 
 
 def test_neither_a_closed_pipe_nor_a_hangup_ends_a_voyage(first):
-    """Both did: the one with a traceback, the other without a summary, as a clean end (issues 12.15 and 13.3)."""
+    """Both did: the one with a traceback, the other without a summary, as a clean end."""
     code, voyage, _, _ = first
     assert code == 0
     summary = json.loads((voyage / "summary.json").read_bytes())
@@ -176,7 +176,7 @@ def test_neither_a_closed_pipe_nor_a_hangup_ends_a_voyage(first):
 
 
 def test_a_second_companion_is_refused_in_one_line(first):
-    """Two companions commanded one boat (issue 13, point 2)."""
+    """Two companions commanded one boat."""
     _, _, second, _ = first
     assert second.returncode == 1
     assert re.fullmatch(
@@ -185,7 +185,7 @@ def test_a_second_companion_is_refused_in_one_line(first):
 
 
 def test_a_real_full_disk_under_way_costs_records_only(first):
-    """The companion ended with exit code 1, and so did its restart (issue 12, point 13)."""
+    """The companion ended with exit code 1, and so did its restart."""
     _, voyage, _, is_small = first
     if not is_small:
         pytest.skip("no file system can be mounted here")
@@ -196,7 +196,7 @@ def test_a_real_full_disk_under_way_costs_records_only(first):
 
 
 def test_the_second_mission_sails_from_wherever_it_is_started(first, link, folder, tmp_path):
-    """It met the first one's list as foreign, and waited for ever (issue 13, point 1)."""
+    """It met the first one's list as foreign, and waited for ever."""
     assert first[0] == 0
     (tmp_path / "second.toml").write_text((folder / "second.toml").read_text())
     run = subprocess.run(

@@ -273,7 +273,7 @@ def test_who_may_not_is_told_so_before_the_four_megabytes_that_he_sends(bay):
 
 
 def test_a_body_in_chunks_of_a_byte_does_not_hold_the_loop(bay):
-    """Each was put behind all before it: 20 ms of the sender's were seconds of the loop's (issue 43, point 9)."""
+    """Each was put behind all before it: 20 ms of the sender's were seconds of the loop's."""
 
     async def talk(asker):
         head = (

@@ -56,7 +56,7 @@ def found(area, **conditions):
     ],
 )
 def test_a_shore_that_is_drawn_round_the_water_is_mentioned(area, conditions, why):
-    """It was "1 keep-out zone: in order" (issue 13, what still made him stop)."""
+    """It was "1 keep-out zone: in order"."""
     finding = found(area, **conditions).get((Code.ROUND_THE_WATER, FindingLevel.NOTE))
     assert (finding is None) == (why is None)
     if why is not None:

@@ -162,7 +162,7 @@ def test_convert_simplify_writes_the_autopilots_fence(capsys, tmp_path):
 
 
 def test_rally_points_go_from_format_to_format(capsys, tmp_path):
-    """They were dropped (issue 13, point 7); what a format does not carry is said, in a whole sentence."""
+    """They were dropped; what a format does not carry is said, in a whole sentence."""
     plan, rally, again = (str(tmp_path / name) for name in ("a.plan", "r.waypoints", "b.plan"))
     (tmp_path / "a.plan").write_text(json.dumps(PLAN), encoding="utf-8")
     assert main(["mission", "convert", plan, rally, "--part", "rally"]) == 0

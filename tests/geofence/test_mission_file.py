@@ -64,7 +64,7 @@ def test_options_there_and_back(path):
     ],
 )
 def test_a_name_that_names_nothing_is_found(tmp_path, name, called, words):
-    """An empty one, or one with a slash in it, was "in order" (issue 13, what still made him stop)."""
+    """An empty one, or one with a slash in it, was "in order"."""
     mission = load(tmp_path, GOOD if name is None else f'name = "{name}"\n{GOOD}')
     assert mission.name == called
     assert [f.place for f in mission.findings] == ([] if words is None else ["name"])

@@ -178,7 +178,7 @@ def test_whoever_compiles_ahead_ends_with_the_program_that_asked(number, empty):
 
 @pytest.mark.campaign
 def test_the_first_start_on_a_busy_machine(empty, tmp_path):
-    """It ended after a fixed 180 s of compiling: a clone made on a busy machine did not sail (issue 12, point 18)."""
+    """It ended after a fixed 180 s of compiling: a clone made on a busy machine did not sail."""
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(8)]
     try:
         done = subprocess.run(

@@ -88,7 +88,7 @@ def test_the_same_content_is_not_compiled_again(load):
     ],
 )
 def test_an_edit_is_seen_in_the_callee_too(load, changed, answer):
-    """Numba's own cache does not see an edit of a callee in another file: stale code sailed (issue 14, point 4)."""
+    """Numba's own cache does not see an edit of a callee in another file: stale code sailed."""
     assert load()(3.0) == 7.0
     assert load(**changed)(3.0) == answer
     assert load()(3.0) == 7.0
@@ -125,7 +125,7 @@ def is_compiled_anew_after(load):
 
 
 def test_where_nothing_can_be_written_it_is_kept_in_memory(load, monkeypatch, tmp_path):
-    """A card that fails is mounted read-only; numba then did not load what was there either (issue 12, point 13)."""
+    """A card that fails is mounted read-only; numba then did not load what was there either."""
     monkeypatch.setenv("COMPANION_KERNELS", "/proc/none")
     load()(3.0)
     place = tmp_path / "memory" / f"companion-kernels-{os.getuid()}"
@@ -149,7 +149,7 @@ def test_what_others_can_write_is_not_run(load, monkeypatch, tmp_path, caplog):
 def test_kernels_that_others_may_have_written_are_not_run_and_that_is_said_once(
     load, kept, monkeypatch, caplog, mode, uid
 ):
-    """They were unpickled and run from any folder that was named (issue 43, point 9)."""
+    """They were unpickled and run from any folder that was named."""
     places.refuse.cache_clear()
     load()(3.0)
     kept.chmod(mode)

@@ -374,7 +374,7 @@ def posting(browser, size=1000, host=None, origin=None, token=TOKEN, more=""):
     ],
 )
 def test_who_may_not_is_told_so_before_a_byte_of_the_body_is_read(wrong, status):
-    """A body was read to its end, four megabytes of the editor's, before it was looked at who sends it (issue 43)."""
+    """A body was read to its end, four megabytes of the editor's, before it was looked at who sends it."""
 
     async def talk(browser, *_):
         return await browser.raw(posting(browser, **wrong), at_most_s=2.0)

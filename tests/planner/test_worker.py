@@ -164,7 +164,7 @@ worker.serve()
 
 
 def test_a_child_that_compiles_is_alive_however_long_it_takes(monkeypatch):
-    """It was given 180 s, and taken for hung: the first start on a slow or busy machine failed (issue 12, point 18)."""
+    """It was given 180 s, and taken for hung: the first start on a slow or busy machine failed."""
     monkeypatch.setattr(worker, "_SILENCE_S", 3.0)  # a busy machine has paused a child for one
 
     async def main():
@@ -242,7 +242,7 @@ worker.answer_requests(sys.stdin.buffer, sys.stdout.buffer)
     [("os._exit(9)", "died", 1), ("time.sleep(99.0)", "did not answer in time", 1), ("raise MemoryError", "failed", 0)],
 )
 def test_a_child_that_is_killed_or_too_slow_leaves_the_best_that_it_had_found(end, said, restarts):
-    """It left nothing, however good its path was: on a slow computer the boat never set sail (issue 33)."""
+    """It left nothing, however good its path was: on a slow computer the boat never set sail."""
 
     async def main():
         async with PlannerWorker(command=[sys.executable, "-c", ENDS.format(end=end)]) as planner:

@@ -27,7 +27,7 @@ def hulls(en_m, heading_deg=0.0, hull=DOT):
 
 
 def test_a_verdict_is_printed_in_words(capsys):
-    """It printed "pass  no unhandled error: [] ([])" (issue 13, what still made him stop)."""
+    """It printed "pass  no unhandled error: [] ([])"."""
     print_verdict(
         judge(
             scenario="x",

@@ -1009,7 +1009,7 @@ def test_by_headings_nothing_is_steered_to_the_buoys_side_of_what_is_wanted(side
     [((0.0, -267.0), "she is 167 m outside the fence"), ((0.0, -111_000.0), "she is 111 km from the first goal")],
 )
 def test_a_boat_that_lies_elsewhere_is_told_so(place, words):
-    """It said "next try in 10 s" and nothing else (issue 13, point 6)."""
+    """It said "next try in 10 s" and nothing else."""
     world = make(voyage={"limits": shapely.box(-200.0, -100.0, 200.0, 400.0)})
     world.position = place
     assert world.run(60, lambda w: words in w.state.why), world.state.why

@@ -68,7 +68,7 @@ def test_for_a_disk_that_something_else_has_filled_only_telemetry_is_given(voyag
 
 
 def test_a_voyage_keeps_the_budget_from_its_start_and_says_what_it_dropped(voyages):
-    """Each restart made a folder with 3 GB of its own (issue 12, point 13)."""
+    """Each restart made a folder with 3 GB of its own."""
     with Recorder(voyages / "now", archive=VoyageArchive(folder=voyages, budget_bytes=2600)) as recorder:
         assert VoyageArchive(folder=voyages).used_bytes() <= 2600 + 300  # its own header has come since
         recorder.decision({"kind": "start"})

@@ -80,7 +80,7 @@ def _with(state, **changes):
 
 
 def test_at_80_columns_the_sentence_is_whole_and_what_was_said_stays(steps, monkeypatch):
-    """It was cut to "waiting for permissi", and announcements were never printed (issue 13, point 6)."""
+    """It was cut to "waiting for permissi", and announcements were never printed."""
     monkeypatch.setattr(shutil, "get_terminal_size", lambda fallback: os.terminal_size((80, 24)))
     terminal = Terminal()
     with ProgressLine(terminal) as progress:

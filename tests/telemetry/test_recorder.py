@@ -114,7 +114,7 @@ def test_a_failed_whole_file_leaves_the_old_one_and_no_rubbish(small):
 
 @pytest.mark.parametrize("is_there", [True, False])
 def test_what_lies_beside_a_file_is_no_way_to_another(tmp_path, is_there):
-    """A link of the name under which the new file is written: what it led to was written over (issue 43, point 9)."""
+    """A link of the name under which the new file is written: what it led to was written over."""
     path, victim = tmp_path / "state.json", tmp_path / "another's"
     if is_there:
         victim.write_bytes(b"theirs")

@@ -138,7 +138,7 @@ def test_the_unit_file_starts_the_program_as_it_is():
 
 @pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="needs systemd-analyze")
 def test_the_unit_is_exposed_little(tmp_path):
-    """It was 8.3, exposed (issue 12, point 17)."""
+    """It was 8.3, exposed."""
     said = subprocess.run(
         ["systemd-analyze", "security", "--offline=true", "--no-pager", "--threshold=20", str(UNIT)],
         capture_output=True,
@@ -157,7 +157,7 @@ def test_the_unit_is_exposed_little(tmp_path):
 @pytest.mark.parametrize("number", [errno.ENOENT, errno.EIO, errno.ESTALE, errno.ENODEV, errno.ENOMEM])
 @pytest.mark.parametrize("name", ["lake.toml", "rocks.wkt", "boat.pol", "key"])
 def test_a_file_that_is_not_there_for_a_moment_is_no_reason_to_give_up(tmp_path, monkeypatch, capfd, name, number):
-    """Exit code 2 was final for the unit: a card mounted a second late ended the voyage (issue 12, point 15)."""
+    """Exit code 2 was final for the unit: a card mounted a second late ended the voyage."""
     assert leave(tmp_path, monkeypatch, name, number) == 66
     assert re.fullmatch(
         rf"companion run: .*{re.escape(name)}.*: (no such file|cannot be read \(.*\)); .*\n", capfd.readouterr().err

@@ -72,7 +72,7 @@ DAMAGE = {
 
 @pytest.mark.parametrize("name", DAMAGE)
 def test_a_damaged_state_is_refused_in_one_line_and_kept_aside(name, tmp_path):
-    """RecursionError and OverflowError ended the restart (issue 12, point 15)."""
+    """RecursionError and OverflowError ended the restart."""
     path = tmp_path / "a.state.json"
     path.write_bytes(DAMAGE[name])
     state = file(path)

@@ -124,7 +124,7 @@ def test_far_from_the_start_it_is_the_boats_own_surroundings_that_stay() -> None
 
 @pytest.mark.parametrize("comes_first", [True, False])
 def test_four_hundred_at_their_moorings_do_not_push_out_a_ship_on_collision_course(comes_first: bool) -> None:
-    """The farthest went, and she was the farthest (issue 43, point 9). She comes at 8 m/s, we go north at 2."""
+    """The farthest went, and she was the farthest. She comes at 8 m/s, we go north at 2."""
     t, here, going = Targets.empty(FRAME), (0.0, 0.0), (0.0, 2.0)
     ship = report(0.0, (0.0, 3000.0), mmsi=77, course_rad=math.pi, speed_mps=8.0)
     if comes_first:

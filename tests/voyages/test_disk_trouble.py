@@ -77,7 +77,7 @@ def sail(short, out, *events, limit_s=600.0, exit_on_arrival=True):
 
 @pytest.mark.parametrize("state", ["full", "sick", "read_only"])
 def test_a_voyage_outlives_its_disk_and_is_recorded_again_when_it_is_well(state, short, tmp_path):
-    """The state's OSError ended the companion, the boat under way (issue 12, point 13)."""
+    """The state's OSError ended the companion, the boat under way."""
     verdict, shore = sail(short, tmp_path, EventSpec(at_s=40.5, kind="disk", state=state, for_s=30.0))
     assert verdict.passed, verdict.checks
     summary = json.loads((tmp_path / "summary.json").read_bytes())
@@ -99,7 +99,7 @@ def test_a_voyage_outlives_its_disk_and_is_recorded_again_when_it_is_well(state,
 
 
 def test_started_again_on_a_full_disk_it_takes_over_by_the_mark_in_its_mission(short, tmp_path):
-    """Not even the restart got through: exit code 1, again and again (issue 12, point 13)."""
+    """Not even the restart got through: exit code 1, again and again."""
     verdict, _ = sail(
         short,
         tmp_path,
@@ -119,7 +119,7 @@ def test_a_disk_that_is_never_well_from_the_beginning(short, tmp_path):
 
 
 def test_a_mission_that_has_arrived_says_what_would_sail_it_again(short, tmp_path):
-    """It ended with "arrived; 0 s" (issue 13, point 1)."""
+    """It ended with "arrived; 0 s"."""
     assert sail(short, tmp_path)[0].passed
     first = json.loads((tmp_path / "summary.json").read_bytes())
     assert outcome_of("reach", first)[0] == 0
@@ -162,7 +162,7 @@ def test_a_dry_run_leaves_the_state_of_a_voyage_that_is_interrupted(short, tmp_p
 
 
 def test_a_voyage_is_replayed_where_its_mission_is_no_more(short, tmp_path, monkeypatch):
-    """It could be replayed only in the folder that it was sailed from (issue 13, point 12)."""
+    """It could be replayed only in the folder that it was sailed from."""
     there = tmp_path / "there"
     shutil.copytree(short, there / "missions")
     (there / "missions/shore").mkdir()

@@ -170,7 +170,7 @@ def whose(skipper, saved, aboard):
 
 
 def test_after_a_power_cut_at_any_write_the_mission_on_board_is_known(durable, monkeypatch, tmp_path):
-    """Renames were not synced: a state one upload older ended as "foreign", without control (issue 12, point 14)."""
+    """Renames were not synced: a state one upload older ended as "foreign", without control."""
     disk = ForgetfulDisk()
     witness = Witness(disk)
     monkeypatch.setattr(runner, "SimulatedWorld", functools.partial(runner.SimulatedWorld, disk=disk))

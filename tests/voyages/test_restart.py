@@ -1,4 +1,4 @@
-"""The companion killed at seeded moments of one voyage, uploads included, and started again (issue 5, point 5).
+"""The companion killed at seeded moments of one voyage, uploads included, and started again.
 
 Two kills in three are a power cut as well: the last lines of decisions.jsonl and track.csv are torn, and half a
 state.json.new is left over. ``pytest -m campaign tests/voyages/test_restart.py`` kills at all 200 moments.
@@ -204,7 +204,7 @@ def lose(folder):
 def test_a_state_that_does_not_fit_is_reported_and_the_boat_is_sailed_on_by_the_mark_in_her_mission(
     change, refusal, tmp_path
 ):
-    """It ended as "foreign" and without control (issue 12, points 14 and 15)."""
+    """It ended as "foreign" and without control."""
     verdict, _ = sail(tmp_path, kill_at_s=70.0, change=change)
     assert verdict.passed, verdict.checks
     records = decisions(tmp_path)

@@ -201,7 +201,7 @@ def test_scenario_over_seeds(name, seed, tmp_path):
 
 @pytest.mark.campaign
 def test_a_buoy_that_was_missed_is_not_reached_a_second_later(tmp_path):
-    """Seeds 0 and 3 sailed 14 of 15 marks; seed 0 is among the scenarios above (issue 12, point 21)."""
+    """Seeds 0 and 3 sailed 14 of 15 marks; seed 0 is among the scenarios above."""
     sail("buoy-course", 3, tmp_path)
 
 

@@ -103,7 +103,7 @@ def test_a_changed_record_does_not_replay(voyage, tmp_path):
 
 
 def test_an_empty_telemetry_log_is_called_one_and_a_short_one_is_mentioned(voyage, tmp_path, capsys):
-    """Every step differed, and nothing said why (issue 13, what still made him stop)."""
+    """Every step differed, and nothing said why."""
     folder, log = tmp_path / "v", tmp_path / "v" / "telemetry.tlog"
     shutil.copytree(voyage[1], folder)
     whole = log.read_bytes()
@@ -153,7 +153,7 @@ def test_a_killed_companion_takes_its_mission_over(short, tmp_path):
 
 @pytest.mark.parametrize("allowed", [False, True])
 def test_a_strangers_mission_at_the_start_is_replaced_where_the_mission_file_allows_it(allowed, short, tmp_path):
-    """The permission existed, and no key of the mission gave it (issue 13, point 1)."""
+    """The permission existed, and no key of the mission gave it."""
     (tmp_path / "rock.wkt").write_text(ROCK)
     (tmp_path / "mission.toml").write_text(SHORT_MISSION + f"replace_foreign = {str(allowed).lower()}\n")
     verdict = sail(

@@ -385,7 +385,7 @@ def test_widening_reaches_the_table():
 
 
 def test_a_steady_wind_over_a_drifting_boat_is_a_wind():
-    """On the bench it was "an old true wind", for ever (issue 13, point 5): vane and anemometer make the same one."""
+    """On the bench it was "an old true wind", for ever: vane and anemometer make the same one."""
     room = WindTracker()
     true = WindSample(t_s=0.0, twd_from_rad=0.0, tws_mps=5.0)
     for t in range(180):

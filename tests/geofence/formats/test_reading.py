@@ -49,7 +49,7 @@ def work(format_name, text):
 
 @pytest.mark.parametrize(("format_name", "way"), WAYS)
 def test_reading_is_linear(format_name, way):
-    """WKT with a vertex a line took 7.7 s for 80,000 points (issue 12, point 16): see `python -m bench.reading`."""
+    """WKT with a vertex a line took 7.7 s for 80,000 points: see `python -m bench.reading`."""
     make = FILES[format_name][way]
     ratio = work(format_name, make(MANY)) / work(format_name, make(FEW))
     assert ratio < 1.25 * MANY / FEW

@@ -207,7 +207,7 @@ def test_a_stream_is_below_its_rate_when_it_is_slow_or_stale():
 
 
 def test_a_signing_timestamp_that_cannot_be_stored_ends_nothing(tmp_path):
-    """It raised in the link's heartbeat, on a full disk (issue 13, point 3)."""
+    """It raised in the link's heartbeat, on a full disk."""
     key = tmp_path / "key"
     key.write_text("ab" * 32)
     key.chmod(0o600)
@@ -222,7 +222,7 @@ def test_a_signing_timestamp_that_cannot_be_stored_ends_nothing(tmp_path):
 
 @pytest.mark.parametrize("stored", ["9" * 20, "9" * 5000, str(2**48 - 1), "-5", "torn", b"\xff\xfe"])
 def test_a_damaged_signing_timestamp_is_said_and_repaired_and_frames_are_signed(tmp_path, caplog, stored):
-    """With 20 digits in the file every frame raised (issue 43, point 7)."""
+    """With 20 digits in the file every frame raised."""
     key = tmp_path / "key"
     key.write_text("ab" * 32)
     key.chmod(0o600)

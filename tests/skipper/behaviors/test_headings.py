@@ -178,7 +178,7 @@ def test_close_hauled_she_comes_back_on_the_legs_own_tack(off_m):
 
 # ------------------------------------------------------------------------- what the autopilot does not do in GUIDED
 def test_no_beat_is_left_to_an_autopilot_that_does_not_sail_the_mission():
-    """There is no corridor in GUIDED: she sailed such a leg close-hauled, as far as it was long (issue 43)."""
+    """There is no corridor in GUIDED: she sailed such a leg close-hauled, as far as it was long."""
     for guidance in Guidance:
         world = make(obstacles=(), config={"autopilot_beats": True, "guidance": guidance}, wind=lambda t: (0.0, 5.0))
         assert world.run(60, is_sailing)

@@ -22,7 +22,7 @@ def stranger(saved, **changes):
 
 
 def test_a_state_of_another_voyage_is_not_used_but_its_mission_is_known_and_replaced():
-    """A second mission met the first one's list as foreign and waited for ever (issue 13, point 1)."""
+    """A second mission met the first one's list as foreign and waited for ever."""
     world = make()
     world.run(30)
     there = world.mission
@@ -101,7 +101,7 @@ def test_the_permission_to_replace_does_not_hold_for_what_somebody_brings_under_
 
 
 def test_a_mission_that_has_arrived_is_not_sailed_again_by_itself():
-    """It asked for a plan without a goal, for ever (issue 12, point 8)."""
+    """It asked for a plan without a goal, for ever."""
     world = make()
     assert world.run(1500, is_done)
     saved = world.skipper.persisted(world.state)
@@ -120,7 +120,7 @@ def test_a_mission_that_has_arrived_is_not_sailed_again_by_itself():
 
 
 def test_a_failed_upload_is_remembered_beside_the_next():
-    """A kill then left a mixture that the saved state could not explain (issue 12, point 14)."""
+    """A kill then left a mixture that the saved state could not explain."""
     world = make(uploads_fail=lambda n: UploadResult.TIMEOUT if n == 2 else UploadResult.OK)
     world.run(400, lambda w: w.state.mission.unsure_route is not None and w.state.pending.upload is not None)
     saved = world.skipper.persisted(world.state)

@@ -241,7 +241,7 @@ def test_later_rungs_risk_more_for_vessels_and_say_so():
 
 @pytest.mark.parametrize("comes_from", ["ahead", "abeam"])
 def test_of_too_many_a_plan_is_told_of_the_ship_on_collision_course(comes_from):
-    """Two dozen at their moorings near by were told of, and she was not (issue 43, point 9)."""
+    """Two dozen at their moorings near by were told of, and she was not."""
     ctx = turn_among()
     here, (ve, vn) = ctx.boat_en, ctx.snapshot.vehicle.velocity_en_mps
     moored = [

@@ -1,4 +1,4 @@
-"""The simulated boat sails by the mission's polar, not only the planner (issue 13, point 12)."""
+"""The simulated boat sails by the mission's polar, not only the planner."""
 
 import math
 
