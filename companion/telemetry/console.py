@@ -27,7 +27,7 @@ from companion.fold import Step
 from companion.geo.angles import direction
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.program import control
-from companion.skipper.planning import next_tack
+from companion.skipper.planning import next_tack, on_leg
 from companion.skipper.step import Announce, Phase, Snapshot
 from companion.telemetry.folder.records import sigma_ahead_rad
 from companion.telemetry.status import CLOCK_OFF_S, unix_of_boat
@@ -267,7 +267,7 @@ def progress_text(step: Step) -> str:
         parts.append(f"autopilot silent for {snapshot.heartbeat_age_s:.0f} s: what follows is old")
     under_way = route is not None and state.voyage.sailing and state.phase is not Phase.DONE
     if under_way and route is not None and autopilot is not None:
-        distance = autopilot.waypoint_distance_m
+        distance = on_leg(step).left_m
         at = "" if distance is None else f" {distance:.0f} m"
         parts.append(f"wp {state.mission.index + 1}/{len(route.items)}{at}")
     if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
@@ -281,8 +281,9 @@ def progress_text(step: Step) -> str:
         tack = next_tack(step, step.voyage.boat)
         if tack is not None:
             parts.append(f"next tack {'' if tack.is_planned else 'about '}{tack.in_s:.0f} s")
-        if autopilot is not None and autopilot.cross_track_m is not None:
-            parts.append(f"xt {autopilot.cross_track_m:+.1f} m")
+        off_m = on_leg(step).off_m
+        if off_m is not None:
+            parts.append(f"xt {off_m:+.1f} m")
     if state.progress.task:
         parts.append(state.progress.task)
     if state.orders.standing is not None:

@@ -16,7 +16,7 @@ from companion.mavlink.wire import HIGH_LATENCY_S
 from companion.messages import CompanionStatus, Severity, TrafficStatus
 from companion.orders.far import FarStatus, Reply, minutes_of
 from companion.safety import BY_NAME
-from companion.skipper.planning import next_tack_s
+from companion.skipper.planning import next_tack_s, on_leg
 from companion.skipper.step import Announce, Phase, Route, Snapshot
 from companion.skipper.way import Voyage, gates_of
 from companion.telemetry.folder.logbook import Logbook
@@ -50,9 +50,9 @@ def companion_status(
         goal_count=len(legs),
         waypoint_seq=state.mission.index + 1 if route is not None else None,
         waypoint_count=None if route is None else len(route.items),
-        waypoint_distance_m=None if autopilot is None else autopilot.waypoint_distance_m,
+        waypoint_distance_m=on_leg(step).left_m,
         goal_distance_m=None if here is None else math.dist(here, legs[goal].en_m),
-        cross_track_m=None if autopilot is None else autopilot.cross_track_m,
+        cross_track_m=on_leg(step).off_m,
         clearance_m=clearance_m,
         twd_from_rad=None if wind.mean_twd_from_rad is None else wrap_two_pi(wind.mean_twd_from_rad),
         twd_sigma_rad=sigma_ahead_rad(snapshot),

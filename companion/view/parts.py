@@ -18,7 +18,7 @@ from companion.messages import Command, CompanionStatus, TrafficStatus, VehicleS
 from companion.orders import Verb, permitted
 from companion.planner import Leg, Plan
 from companion.safety import BY_NAME
-from companion.skipper.planning import next_tack
+from companion.skipper.planning import next_tack, on_leg
 from companion.skipper.step import Route, SkipperConfig, WindHealth
 from companion.skipper.way import Goal, PointEn, Side, Voyage, gates_of, half_width_rad, mean_twd_rad
 from companion.telemetry.console import DISK, GONE
@@ -199,8 +199,8 @@ def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatV
         vmg_mps=rounded(vmg_mps(step)),
         vmc_mps=rounded(vehicle.speed_mps * math.cos(to_goal_rad - cog_rad)),
         clearance_m=rounded(status.clearance_m, 1),
-        cross_track_m=None if autopilot is None else rounded(autopilot.cross_track_m, 1),
-        waypoint_m=None if autopilot is None else rounded(autopilot.waypoint_distance_m, 1),
+        cross_track_m=rounded(on_leg(step).off_m, 1),
+        waypoint_m=rounded(on_leg(step).left_m, 1),
         goal_m=rounded(math.dist(here, goal), 1),
     )
 

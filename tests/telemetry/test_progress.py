@@ -1,6 +1,7 @@
 """What a voyage shows on a console: nothing that was said is lost, nothing that stands is cut."""
 
 import io
+import math
 import os
 import re
 import shutil
@@ -14,7 +15,7 @@ from companion.messages import CompanionStatus, Mode, Severity
 from companion.skipper import Skipper
 from companion.skipper.planning import next_tack
 from companion.skipper.step.actions import Announce
-from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.config import Guidance, SkipperConfig
 from companion.telemetry.console import ProgressLine, left_behind, progress_text
 from tests.skipper.world import World, voyage, with_parts
 
@@ -73,6 +74,21 @@ def test_the_line_tells_the_clearance_and_when_she_is_there():
     left = re.search(r"there in (\d+) s \(90 %: (\d+) s\)", progress_text(step))
     assert (float(left[1]), float(left[2])) == pytest.approx((step.eta().there_s, step.eta().there_late_s), abs=0.6)
     assert "there in" not in progress_text(replace(step, state=with_parts(step.state, mission={"route": None})))
+
+
+def test_steered_by_headings_the_way_to_the_waypoint_is_her_own():
+    """ArduRover knows of none then: "wp 60/62 0 m" and "xt -0.0 m" stood there all the way."""
+    config = SkipperConfig(guidance=Guidance.HEADING)
+    world = World(Skipper(voyage=voyage(), config=config), shown={"waypoint_distance_m": 0.0, "cross_track_m": 0.0})
+    assert world.run(120, lambda w: w.mode is Mode.GUIDED and w.speed > 1.0)
+    world.run(5)
+    step = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
+    left_m = math.dist(world.position, world.state.mission.route.points_en_m[world.state.mission.index])
+    assert left_m > 10.0
+    assert re.search(r"wp \d+/\d+ (\d+) m", progress_text(step))[1] == f"{left_m:.0f}"
+    world.set_mode(Mode.AUTO)
+    by_autopilot = replace(step, snapshot=world.snapshot())
+    assert re.search(r"wp \d+/\d+ (\d+) m", progress_text(by_autopilot))[1] == "0"
 
 
 def _with(state, **changes):

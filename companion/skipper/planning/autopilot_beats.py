@@ -140,6 +140,29 @@ class Seen(Protocol):
         ...
 
 
+class OnLeg(NamedTuple):
+    """How far it is to the present waypoint [m], and how far off its leg, to the right of it [m]; None: not known."""
+
+    left_m: float | None
+    off_m: float | None
+
+
+def on_leg(seen: Seen) -> OnLeg:
+    """Return where the boat is on its leg: as the autopilot tells, in GUIDED by her own position.
+
+    Steered by headings ArduRover knows of no waypoint, and tells 0 of both.
+    """
+    status, here, mission = seen.snapshot.autopilot, seen.snapshot.position_en_m, seen.state.mission
+    if status is None:
+        return OnLeg(None, None)
+    if status.mode is not Mode.GUIDED or seen.state.steering.own_mode is not Mode.GUIDED:
+        return OnLeg(status.waypoint_distance_m, status.cross_track_m)
+    if here is None or mission.route is None or mission.index >= len(mission.route.points_en_m):
+        return OnLeg(None, None)
+    leg = mission.route.leg_from_en_m[mission.index], mission.route.points_en_m[mission.index]
+    return OnLeg(math.dist(here, leg[1]), cross_track_m(here, *leg) if math.dist(*leg) > 0.0 else None)
+
+
 class NextTack(NamedTuple):
     """The next tack: when she is through the wind [s], and whether it is the plan's and stays so.
 
