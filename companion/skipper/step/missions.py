@@ -18,8 +18,9 @@ from companion.geo.angles import difference_rad
 from companion.messages import Command, MissionItem, waypoint
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.route import Route
-from companion.skipper.way import PointEn, Voyage, bearing_rad, distance_m, moved
+from companion.skipper.way import PointEn, Voyage, bearing_rad, distance_m, moved, water_at
 from companion.skipper.way.drift import floor_from_m
+from companion.skipper.way.voyage import AreaLike
 
 LOOKS = 41  # places looked at along a line that leads through something
 ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
@@ -85,7 +86,8 @@ def loiter_place(
     best, best_room = end_en, -math.inf
     will_do: tuple[PointEn, float] | None = None
     leeward = twd_from_rad + math.pi
-    floor_m = floor_from_m(float(voyage.area.clearance_m([end_en])[0]), config.margin_floor_m)
+    water = water_at(voyage.area, end_en)
+    floor_m = floor_from_m(float(water.clearance_m([end_en])[0]), config.margin_floor_m)
     for ring_m in RINGS_M:
         if will_do is not None and ring_m > ROOMIER_M:
             return will_do
@@ -95,7 +97,7 @@ def loiter_place(
             if ring_m > 0.0:
                 closed = abs(difference_rad(twd_from_rad, bearing_rad(end_en, place))) < config.no_go_half_rad
                 needed_m = floor_m + (corridor_m if closed else 0.0)
-                if _line_clearance_m(voyage, end_en, place) < needed_m:
+                if _line_clearance_m(water, end_en, place) < needed_m:
                     continue
             down = [moved(place, leeward, s * LEEWARD_ROOM_M) for s in (0.0, 0.25, 0.5, 0.75, 1.0)]
             clearance = voyage.area.clearance_m(np.asarray(down))
@@ -110,12 +112,18 @@ def loiter_place(
     return will_do or (best, best_room)
 
 
-def _line_clearance_m(voyage: Voyage, from_en: PointEn, to_en: PointEn) -> float:
-    """Return the least clearance of a straight line [m], below 0 how deep inside something it leads."""
-    clear_m = voyage.area.path_clearance_m([from_en, to_en])
+def _line_clearance_m(water: AreaLike, from_en: PointEn, to_en: PointEn) -> float:
+    """Return the least clearance of a straight line [m], from inside something of the way out of it, below 0.
+
+    A line that leads into anything has none, -inf, but what it begins in.
+    """
+    clear_m = water.path_clearance_m([from_en, to_en])
     if clear_m > 0.0:
         return clear_m
-    return float(np.min(voyage.area.clearance_m(np.linspace(from_en, to_en, LOOKS))))
+    along_m = water.clearance_m(np.linspace(from_en, to_en, LOOKS))
+    outside = np.flatnonzero(along_m > 0.0)
+    is_out = bool(outside.size) and bool(np.all(along_m[outside[0] :] > 0.0))
+    return float(np.min(along_m)) if along_m[0] <= 0.0 and is_out else -math.inf
 
 
 def end_item(

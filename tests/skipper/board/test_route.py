@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely.geometry import box
+from shapely.geometry import LineString, box
 
 from companion.messages import Command, MissionItem
 from companion.skipper.step.config import SafeEnd, SkipperConfig
@@ -114,6 +114,14 @@ def test_from_below_the_floor_a_loiter_is_found_away_from_what_is_near():
     inside, room = loiter_place(made, CONFIG, (0.0, 103.0), math.pi)
     assert room >= CONFIG.loiter_radius_m
     assert inside[1] < 90.0
+
+
+def test_from_outside_of_the_fence_no_loiter_lies_beyond_an_obstacle():
+    """A circle that was drawn round home left her 110 m outside, and any rock was shallower than that."""
+    rock = box(-200, 60, 200, 80)
+    made = voyage(obstacles=(rock,), limits=box(-200, -100, 200, 60))
+    place, _ = loiter_place(made, CONFIG, (0.0, 120.0), 0.0)
+    assert LineString([(0.0, 120.0), place]).distance(rock) >= CONFIG.margin_floor_m
 
 
 def test_a_roomier_place_is_taken_where_there_is_one_near_by():
