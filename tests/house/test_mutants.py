@@ -97,9 +97,7 @@ def test_a_child_meets_the_mutant_at_run_and_at_import_and_the_tree_does_not(tmp
         verdicts = [json.loads(line) for line in (tmp_path / "mutants.jsonl").read_text().splitlines()]
         assert len(verdicts) == expected
         assert "| true wind | 3 | 3 | 2 | 1 | 0 | 100 % |" in done.stdout  # one changes nothing, and is listed
-    killed = {v["told"]: v["by"].partition("[")[0].rpartition("::")[2] for v in verdicts if v["verdict"] == "killed"}
-    assert killed == {
-        wanted[0]: "test_worked_examples",
-        wanted[1]: "test_a_wave_yaws_the_boat_by_less_than_ten_degrees_a_second_and_a_tack_by_more",
-    }
+    killed = {v["told"]: v["by"] for v in verdicts if v["verdict"] == "killed"}
+    assert set(killed) == set(wanted[:2])  # by whom goes with how quick each test was
+    assert all(by.startswith("tests/wind/test_true_wind.py::") for by in killed.values())
     assert path.stat().st_mtime_ns == before
