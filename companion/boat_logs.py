@@ -14,6 +14,7 @@ import io
 import math
 import zlib
 from collections.abc import Callable, Iterator
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -336,29 +337,33 @@ _WANTED = frozenset(
 )
 
 
-def _tlog(files: list[Path], rows: _Rows) -> int | None:
+def _autopilots(files: list[Path], numbers: AbstractSet[int]) -> Iterator[tuple[float, Any]]:
+    """Yield when each message of the autopilot with one of these numbers was heard [Unix s], and the message."""
     dialect = Dialect(None)
-    systems: set[int] = set()
-    offset_s: float | None = None
-    last_boot_s, jumps, most_s = -math.inf, 0, 0.0
     for record in (r for file in files for r in read_tlog(file)):
         frame = record.frame
         number = frame[5] if frame[0] == 0xFE else frame[7] | frame[8] << 8 | frame[9] << 16
-        if number not in _WANTED:
+        if number not in numbers:
             continue
         try:
             message = dialect.decode(bytearray(frame))
         except wire.MAVError:
             continue
-        if message.get_srcComponent() != 1:
-            continue
+        if message.get_srcComponent() == 1:
+            yield record.unix_us / 1e6, message
+
+
+def _tlog(files: list[Path], rows: _Rows) -> int | None:
+    systems: set[int] = set()
+    offset_s: float | None = None
+    last_boot_s, jumps, most_s = -math.inf, 0, 0.0
+    for heard_s, message in _autopilots(files, _WANTED):
         kind = message.get_type()
         if kind == "HEARTBEAT" and message.autopilot != wire.MAV_AUTOPILOT_INVALID:
             systems.add(message.get_srcSystem())
             if len(systems) > 1:
                 said = " and ".join(str(s) for s in sorted(systems))
                 raise _Useless(f"it tells of two boats, systems {said}: record them apart")
-        heard_s = record.unix_us / 1e6
         boot_ms = getattr(message, "time_boot_ms", None)
         if boot_ms is not None:
             boot_s = boot_ms / 1e3
@@ -725,19 +730,8 @@ def _steering(path: Path) -> SteeringLog:
 
 
 def _steering_of_tlog(files: list[Path], series: _Series) -> None:
-    dialect = Dialect(None)
-    for record in (r for file in files for r in read_tlog(file)):
-        frame = record.frame
-        number = frame[5] if frame[0] == 0xFE else frame[7] | frame[8] << 8 | frame[9] << 16
-        if number not in _STEERING:
-            continue
-        try:
-            m = dialect.decode(bytearray(frame))
-        except wire.MAVError:
-            continue
-        if m.get_srcComponent() != 1:
-            continue
-        t_s, kind = record.unix_us / 1e6, m.get_type()
+    for t_s, m in _autopilots(files, _STEERING):
+        kind = m.get_type()
         if kind == "ATTITUDE":
             series.take(t_s, heading=m.yaw, rate=m.yawspeed, heel=m.roll)
         elif kind == "GLOBAL_POSITION_INT":
