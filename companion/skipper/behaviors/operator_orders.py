@@ -16,8 +16,8 @@ from companion.orders import FAR, LOCAL, MAVLINK, Answer, Order, Place, Result, 
 from companion.skipper.behaviors.rest import UNTIL_TOLD
 from companion.skipper.board.on_board import adopt
 from companion.skipper.planning.asking import lacks, request
-from companion.skipper.planning.autopilot_beats import next_tack_s
 from companion.skipper.planning.diversions import diversion, home_trouble, is_at_rest, place_trouble, pressing
+from companion.skipper.planning.next_tack import next_tack_s
 from companion.skipper.planning.not_found import hold
 from companion.skipper.step.actions import Acknowledge, CancelPlan, ReplanReason, RequestPlan, StopOrders
 from companion.skipper.step.context import StepContext

@@ -1,6 +1,6 @@
 """Planning under way: why, from where, with which step of the ladder, and what is done with the answer."""
 
-from companion.skipper.planning.autopilot_beats import next_tack, next_tack_s, on_leg
+from companion.skipper.planning.next_tack import next_tack, next_tack_s, on_leg
 from companion.skipper.planning.vessels import (
     ALIKE_S,
     GIVE_UP_RISK,

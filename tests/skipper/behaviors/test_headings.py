@@ -20,7 +20,8 @@ from companion.skipper.behaviors.headings import (
     drift_correction_rad,
     sailable_rad,
 )
-from companion.skipper.planning.autopilot_beats import next_tack, next_tack_s, room_m
+from companion.skipper.planning.autopilot_beats import room_m
+from companion.skipper.planning.next_tack import next_tack, next_tack_s
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import StepContext
