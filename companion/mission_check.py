@@ -349,7 +349,10 @@ def leg_problem(
                 "sigma": wind.sigma(boat.no_go_error_rad),
                 **({"strength": assumed(wind.speed_mps).to_dict()} if sails else {}),
             },
-            "boat": {**boat.problem_boat(wind.speed_mps), **({"speeds": boat.problem_speeds()} if sails else {})},
+            "boat": {
+                **boat.problem_boat(wind.speed_mps),
+                **({"speeds": boat.problem_speeds(), "tack_fails": boat.tack_fails} if sails else {}),
+            },
             "delta_s": mission.risk.delta_s,
             **water,
         }
