@@ -64,6 +64,8 @@ def test_the_upload_that_turns_her_ends_in_a_loiter_on_her_own_track():
     assert upload not in uploads
     route = world.state.pending.upload.route
     assert route.rung == BACK
+    assert world.state.mission.route.cost_s is not None
+    assert route.cost_s is None, "the old plan's"
     assert min(distance_m(s.en_m, route.points_en_m[-1]) for s in world.state.soundings.track) == 0.0
     assert distance_m(world.position, route.points_en_m[-1]) >= 25.0
 

@@ -863,6 +863,7 @@ def test_a_mission_held_back_by_an_upload_cut_short_is_ours_and_planned_on_from(
     assert action.stopgap is not None
     world.install((*world.mission[: action.keep_first], action.stopgap, *action.items[action.keep_first + 1 :]))
     assert world.run(10, lambda w: said(w, "held back"))
+    assert world.state.mission.route.expected_clearance_m is None, "no plan was judged that ends there"
     assert not said(world, "foreign mission")
     assert is_same_mission(world.state.mission.route.items, world.mission)
     world.uploads_fail = lambda n: UploadResult.OK

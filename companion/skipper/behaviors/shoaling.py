@@ -9,7 +9,6 @@ once she is on her way back a plan is made in what is left.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -135,26 +134,10 @@ def turns_back(ctx: StepContext) -> bool:
         ctx.set(pending=changed(ctx.state.pending, plan=None))
     keep = min(state.mission.index, len(route.items) - 1)
     text = f"it shoals: back {distance_m(boat, place):.0f} m over water that she has sounded, waiting for a plan there"
-    aside, frame = _aside(ctx, boat, course_rad, place), ctx.voyage.frame
-    away = replace(
-        route,
-        items=(
-            *route.items[:keep],
-            *(waypoint(frame.geo_from_en(*abeam)) for abeam in aside),
-            waypoint(frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM),
-        ),
-        points_en_m=(*route.points_en_m[:keep], *aside, place),
-        leg_from_en_m=(*route.leg_from_en_m[:keep], boat, *aside),
-        gate_of=(*route.gate_of[:keep], -1, *(-1 for _ in aside)),
-        rung=BACK,
-        risk=None,
-        cost_s=None,
-        median_s=None,
-        late_s=None,
-        bound_for="",
-        why=text,
-    )
-    upload(ctx, away, keep + 1, text)
+    frame = ctx.voyage.frame
+    way = [(waypoint(frame.geo_from_en(*abeam)), abeam) for abeam in _aside(ctx, boat, course_rad, place)]
+    way.append((waypoint(frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM), place))
+    upload(ctx, route.led_aside(keep, boat, way, rung=BACK, why=text), keep + 1, text)
     ctx.set(
         soundings=changed(ctx.state.soundings, turned_en_m=boat, turned_s=ctx.t_s),
         plans=changed(ctx.state.plans, rung=0, asked=""),

@@ -148,21 +148,8 @@ def seeks_sea_room(ctx: StepContext) -> bool:
         f"{ctx.snapshot.unsure}: a loiter here would drift onto {onto} in {left_s:.0f} s; waiting until there is "
         f"{'sea room' if gained_s >= HORIZON_S else f'room for {gained_s:.0f} s'}"
     )
-    away = replace(
-        route,
-        items=(*route.items[:keep], waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)),
-        points_en_m=(*route.points_en_m[:keep], place),
-        leg_from_en_m=(*route.leg_from_en_m[:keep], boat),
-        gate_of=(*route.gate_of[:keep], -1),
-        rung=SEA_ROOM,
-        risk=None,
-        cost_s=None,
-        median_s=None,
-        late_s=None,
-        bound_for="",
-        why=text,
-    )
-    upload(ctx, away, keep + 1, text)
+    end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
+    upload(ctx, route.led_aside(keep, boat, [(end, place)], rung=SEA_ROOM, why=text), keep + 1, text)
     if not state.adrift.loitered:
         ctx.set(adrift=replace(ctx.state.adrift, loiter_en_m=None))  # the next LOITER begins elsewhere
     ctx.say(Severity.WARNING, SEA_ROOM, text, every_s=0.0)

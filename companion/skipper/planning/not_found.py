@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.planners import AUTO
@@ -183,18 +181,5 @@ def hold(ctx: StepContext, why: str, *, anew: bool = False) -> None:
     )
     keep = state.mission.index
     end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
-    route = replace(
-        state.mission.route,
-        items=(*state.mission.route.items[:keep], end),
-        points_en_m=(*state.mission.route.points_en_m[:keep], place),
-        leg_from_en_m=(*state.mission.route.leg_from_en_m[:keep], boat),
-        gate_of=(*state.mission.route.gate_of[:keep], -1),
-        rung="hold",
-        risk=None,
-        cost_s=None,
-        median_s=None,
-        late_s=None,
-        bound_for="",
-        why=f"{why}; loitering with {room:.0f} m of room",
-    )
-    upload(ctx, route, keep + 1, route.why)
+    why = f"{why}; loitering with {room:.0f} m of room"
+    upload(ctx, state.mission.route.led_aside(keep, boat, [(end, place)], rung="hold", why=why), keep + 1, why)

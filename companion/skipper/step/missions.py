@@ -215,20 +215,9 @@ def held_back(items: Sequence[MissionItem], route: Route) -> Route | None:
         return None
     for item, point in zip(route.items, route.points_en_m, strict=True):
         if (item.lat_e7, item.lon_e7) == whole[-1][1:]:
-            return replace(
-                route,
-                items=(*route.items[:n], items[n]),
-                points_en_m=(*route.points_en_m[:n], point),
-                leg_from_en_m=(*route.leg_from_en_m[:n], route.leg_from_en_m[min(n, len(route.items) - 1)]),
-                gate_of=(*route.gate_of[:n], -1),
-                rung=HELD_BACK,
-                risk=None,
-                cost_s=None,
-                median_s=None,
-                late_s=None,
-                bound_for="",
-                why="an upload was cut short: the mission ends in a loiter on the way",
-            )
+            begin = route.leg_from_en_m[min(n, len(route.items) - 1)]
+            why = "an upload was cut short: the mission ends in a loiter on the way"
+            return route.led_aside(n, begin, [(items[n], point)], rung=HELD_BACK, why=why)
     return None
 
 

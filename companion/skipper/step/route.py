@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from companion.messages import MissionItem
 from companion.skipper.way.voyage import PointEn
@@ -50,6 +51,31 @@ class Route:
         """
         last = len(self.items) - 2
         return index < last and all(gate < 0 for gate in self.gate_of[index:last])
+
+    def led_aside(
+        self, keep: int, from_en_m: PointEn, way: Sequence[tuple[MissionItem, PointEn]], *, rung: str, why: str
+    ) -> Route:
+        """Return the route that keeps ``keep`` items and goes on by a way that no plan is behind, to its safe end.
+
+        Nothing that was promised of the old way is promised of this one: neither time nor risk nor clearance.
+        """
+        points = [point for _, point in way]
+        return replace(
+            self,
+            items=(*self.items[:keep], *(item for item, _ in way)),
+            points_en_m=(*self.points_en_m[:keep], *points),
+            leg_from_en_m=(*self.leg_from_en_m[:keep], from_en_m, *points[:-1]),
+            gate_of=(*self.gate_of[:keep], *(-1 for _ in way)),
+            rung=rung,
+            risk=None,
+            vessel_risk=0.0,
+            expected_clearance_m=None,
+            cost_s=None,
+            median_s=None,
+            late_s=None,
+            bound_for="",
+            why=why,
+        )
 
 
 class DiversionKind(enum.Enum):

@@ -106,7 +106,9 @@ def doubted(world, before=TURNED):
 def test_a_loiter_that_would_be_driven_onto_a_rock_waits_for_sea_room():
     world = north_of_the_rock()
     begins = doubted(world)
+    assert world.state.mission.route.expected_clearance_m is not None
     assert world.run(10, lambda w: w.state.mission.route.rung == SEA_ROOM)
+    assert world.state.mission.route.expected_clearance_m is None, "the old plan's"
     [item] = world.mission[-1:]
     place = world.state.mission.route.points_en_m[-1]
     assert item.command == Command.NAV_LOITER_UNLIM

@@ -39,6 +39,24 @@ POINTS = st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), min_siz
 CHECK = settings(max_examples=60)
 
 
+def test_of_a_way_that_no_plan_is_behind_nothing_is_promised():
+    planned = replace(
+        FACTS, risk=0.2, vessel_risk=0.1, expected_clearance_m=9.5, cost_s=300.0, median_s=310.0, late_s=350.0
+    )
+    items = tuple(MissionItem(command=Command.NAV_WAYPOINT, lat_e7=n, lon_e7=n) for n in range(4))
+    points = tuple((10.0 * n, 0.0) for n in range(4))
+    planned = replace(planned, items=items, points_en_m=points, leg_from_en_m=points, gate_of=(-1, 0, -1, 1))
+    aside = planned.led_aside(
+        2, (15.0, 5.0), [(items[3], (0.0, 9.0)), (items[2], (0.0, 20.0))], rung="hold", why="no way"
+    )
+    assert aside.items == (*items[:2], items[3], items[2])
+    assert aside.points_en_m == (*points[:2], (0.0, 9.0), (0.0, 20.0))
+    assert aside.leg_from_en_m == (*points[:2], (15.0, 5.0), (0.0, 9.0))
+    assert aside.gate_of == (-1, 0, -1, -1)
+    assert (aside.risk, aside.cost_s, aside.median_s, aside.late_s, aside.expected_clearance_m) == (None,) * 5
+    assert (aside.vessel_risk, aside.rung, aside.why, aside.plan_id) == (0.0, "hold", "no way", planned.plan_id)
+
+
 def route(points, old=None, keep=0, gate=0, made=None, config=CONFIG):
     return splice(
         made or voyage(),
