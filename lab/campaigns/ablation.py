@@ -21,7 +21,14 @@ from sitl.run.variation import Variation
 from sitl.runner import SCENARIO_FOLDER, CampaignResults, Experiment, ExperimentSummary, Job
 
 SCENARIOS = tuple(
-    SCENARIO_FOLDER / f"{name}.toml" for name in ("two-channels", "figures/two-channels-rough", "narrow-channel")
+    SCENARIO_FOLDER / f"{name}.toml"
+    for name in (
+        "two-channels",
+        "figures/two-channels-rough",
+        "narrow-channel",
+        "four-ships",
+        "figures/ships-to-windward",
+    )
 )
 AS_IT_IS = "as it is"
 PLANNED = {"skipper": {"autopilot_beats": False}}
@@ -32,10 +39,13 @@ VARIATIONS: Mapping[str, Variation] = {
     "wind foreknown": Variation(room=foreknown),
     "kalman": Variation(tables={"wind": {"estimator": "kalman"}}),
     "by forecast": Variation(tables={"skipper": {"replan": "forecast"}}),
+    "by shifts": Variation(tables={"skipper": {"shifts": True}}),
+    "rules of the road": Variation(tables={"traffic": {"policy": "rules"}}),
     "beats planned": Variation(tables=PLANNED),
     "planned, no spread": Variation(tables=PLANNED, room=unspread),
     "planned, foreknown": Variation(tables=PLANNED, room=foreknown),
     "planned, kalman": Variation(tables={**PLANNED, "wind": {"estimator": "kalman"}}),
+    "planned, by forecast": Variation(tables={"skipper": {"autopilot_beats": False, "replan": "forecast"}}),
     "planned, delta_s 0.6": Variation(tables={**PLANNED, "risk": {"delta_s": 0.6}}),
     "planned, delta_s 0.8": Variation(tables={**PLANNED, "risk": {"delta_s": 0.8}}),
     "planned, delta_s 0.98": Variation(tables={**PLANNED, "risk": {"delta_s": 0.98}}),
@@ -63,12 +73,15 @@ def sail(job: Job[str]) -> dict[str, Any]:
             )
         except Exception as error:
             return {**said, "error": repr(error)}
+    mission = _mission(job.scenario)
     names = ("arrived", "contacts", "time_s", "tacks", "min_clearance_m", "no_go_entries", "replans", "promised_risk")
     return {
         **said,
         "error": "",
         **{name: verdict.figures[name] for name in names},
-        "floor_m": _mission(job.scenario).margin_floor_m,
+        "vessel_m": min(verdict.figures["vessel_distances_m"].values(), default=None),
+        "floor_m": mission.margin_floor_m,
+        "safe_m": mission.traffic.safe_distance_m,
     }
 
 
@@ -138,6 +151,8 @@ def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
             "in no-go, per voyage",
             "least clearance m",
             "median m",
+            "too near a vessel",
+            "least m",
             "tacks",
             "replans",
             "time s",
@@ -149,6 +164,7 @@ def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
         if not mine:
             continue
         clear = [r["min_clearance_m"] for r in mine if r["min_clearance_m"] is not None]
+        vessels = [(r["vessel_m"], r["safe_m"]) for r in mine if r["vessel_m"] is not None]
         shares = [
             r["time_s"] / reference[r["seed"]]["time_s"]
             for r in mine
@@ -165,6 +181,8 @@ def table(records: Sequence[Mapping[str, Any]], names: Sequence[str]) -> str:
                 f"{np.mean([r['no_go_entries'] or 0 for r in mine]):.2f}",
                 f"{min(clear):.1f}" if clear else "-",
                 f"{np.median(clear):.1f}" if clear else "-",
+                str(sum(m < safe_m for m, safe_m in vessels)) if vessels else "-",
+                f"{min(m for m, _ in vessels):.1f}" if vessels else "-",
                 f"{np.median([r['tacks'] for r in mine]):.0f}",
                 f"{np.median([r['replans'] for r in mine]):g}",
                 f"{np.median(times):.0f}" if times else "-",

@@ -17,9 +17,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "ablate",
         help=summary,
         description="Sail the same weather, seed for seed, with one thing taken away or another in its place: the "
-        "wind's spread, the forecaster, the probability of staying out of the no-go zone, beats left to the autopilot, "
-        "the planner. Prints for each scenario arrivals, contacts, voyages below the floor, times in the no-go "
-        "zone, clearance, replans, time, and that as a share of the same seed's with everything, with its interval.",
+        "wind's spread, the forecaster, when it is planned again, the probability of staying out of the no-go zone, "
+        "beats left to the autopilot, the planner. Prints for each scenario arrivals, contacts, voyages below the floor, "
+        "times in the no-go zone, clearance, voyages that came nearer to a vessel than the mission's safe distance, replans, "
+        "time, and that as a share of the same seed's with everything, with its interval.",
         epilog='Example: sitl ablate two-channels --runs 20 --only "no spread" --only kalman',
     )
     parser.add_argument(
@@ -27,7 +28,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         type=scenario_file,
         nargs="*",
         metavar="SCENARIO",
-        help="(default: Wolsieffer's two channels in two winds, and a narrow one)",
+        help="(default: Wolsieffer's two channels in two winds, a narrow one, and two waters with ships)",
     )
     parser.add_argument(
         "--only",

@@ -91,7 +91,9 @@ def record(variation, seed, time_s, **more):
         "tacks": 3,
         "min_clearance_m": 12.0,
         "no_go_entries": 0,
+        "vessel_m": None,
         "floor_m": 6.0,
+        "safe_m": 50.0,
         **more,
     }
 
@@ -108,6 +110,14 @@ def test_times_are_paired_and_only_of_those_that_both_arrived():
     kalman = table(records, [AS_IT_IS, "kalman"]).splitlines()[2].split()
     assert kalman[:4] == ["kalman", "3/3", "1", "1"]
     assert " ".join(kalman[-6:]) == "7 220 1.100 (1.100 to 1.100)"
+
+
+def test_who_came_nearer_to_a_vessel_than_the_mission_allows_is_counted():
+    records = [record(AS_IT_IS, seed, 100.0, vessel_m=m) for seed, m in enumerate((49.9, 50.0, 80.0, None))]
+    head, row = (line.split() for line in table(records, [AS_IT_IS]).splitlines())
+    assert " ".join(head[-15:-5]) == "too near a vessel least m tacks replans time s"
+    assert row[-6:-4] == ["1", "49.9"]
+    assert "- - 3 7 100 1" in " ".join(table([records[3]], [AS_IT_IS]).split())
 
 
 @given(st.lists(st.floats(0.5, 2.0), min_size=1, max_size=30))
