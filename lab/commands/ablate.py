@@ -18,9 +18,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
         help=summary,
         description="Sail the same weather, seed for seed, with one thing taken away or another in its place: the "
         "wind's spread, the forecaster, when it is planned again, the probability of staying out of the no-go zone, "
-        "beats left to the autopilot, the planner. Prints for each scenario arrivals, contacts, voyages below the floor, "
-        "times in the no-go zone, clearance, voyages that came nearer to a vessel than the mission's safe distance, replans, "
-        "time, and that as a share of the same seed's with everything, with its interval.",
+        "beats left to the autopilot, the planner. Prints for each scenario arrivals, contacts, voyages below the "
+        "floor, times in the no-go zone, clearance, voyages that came nearer to a vessel than the mission's safe "
+        "distance, replans, time, and that as a share of the same seed's with everything, with its interval.",
         epilog='Example: sitl ablate two-channels --runs 20 --only "no spread" --only kalman',
     )
     parser.add_argument(
