@@ -307,6 +307,24 @@ def test_a_state_s_cost_is_its_time_and_its_two_risks():
     assert tree.count[kernels.REWIRED] > 0
 
 
+def test_a_later_state_becomes_the_parent_of_an_earlier_one_where_that_makes_it_cheaper():
+    p = problem()
+    tree = RrtTree(p, world_of(p), seed=1)
+    tree.grow(800)
+    n = tree.size
+    cost, parent = tree.node[:n, kernels.C].copy(), tree.link[:n, kernels.PARENT].copy()
+    tree.grow(2000)
+    fell = tree.node[1:n, kernels.C] < cost[1:]
+    moved = tree.link[1:n, kernels.PARENT] != parent[1:]
+    assert moved.mean() > 0.2
+    assert (moved & ~fell).sum() == 0  # none is moved for nothing
+    assert fell.sum() > moved.sum()  # what hangs below one that moved is cheaper, too
+    to_later = moved & (tree.link[1:n, kernels.PARENT] >= n)
+    assert to_later.sum() > 0
+    for state in 1 + np.flatnonzero(to_later):
+        assert evaluate(p, tree.path_to(state)).time_s == pytest.approx(tree.node[state, kernels.C], rel=1e-9)
+
+
 def test_without_rewiring_no_state_is_given_another_parent_and_the_path_is_no_better():
     p = problem()
     plain, star = (RrtTree(p, world_of(p), 1, RrtstarSettings(is_rewired=rewired)) for rewired in (False, True))
