@@ -312,6 +312,12 @@ MUTATIONS = (
     ),
     Mutation(
         "companion/planner/reference/rrtstar_kernels.py",
+        "            if keep <= 0.0:\n",
+        "            if True:\n",
+        T_RRT + "test_where_a_leg_would_hit_something_its_last_valid_state_is_taken",
+    ),
+    Mutation(
+        "companion/planner/reference/rrtstar_kernels.py",
         "for m in range(found if risk_number[REWIRES] > 0.5 else 0):",
         "for m in range(0):",
         T_RRT + "test_a_later_state_becomes_the_parent_of_an_earlier_one_where_that_makes_it_cheaper",

@@ -307,6 +307,14 @@ def test_a_state_s_cost_is_its_time_and_its_two_risks():
     assert tree.count[kernels.REWIRED] > 0
 
 
+def test_where_a_leg_would_hit_something_its_last_valid_state_is_taken():
+    """Section 3.2: "the last valid state is added to the tree instead of the randomly sampled state"."""
+    p = problem(obstacles=["POLYGON((-300 90,300 90,300 110,-300 110,-300 90))"], wind=wind(180.0))
+    tree = RrtTree(p, world_of(p), seed=1, settings=RrtstarSettings(range_m=200.0, goal_bias=0.9))
+    tree.grow(3)  # the goal is drawn: dead before the wind, behind the wall
+    assert tree.node[1:2, :2] == pytest.approx(np.array([[0.0, 88.0]]), abs=1e-6)  # in steps of a fiftieth of the range
+
+
 def test_a_later_state_becomes_the_parent_of_an_earlier_one_where_that_makes_it_cheaper():
     p = problem()
     tree = RrtTree(p, world_of(p), seed=1)
