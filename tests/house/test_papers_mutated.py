@@ -72,6 +72,12 @@ MUTATIONS = (
         "tests/wind/test_papers.py::test_the_kalman_filter_is_equations_1_to_8",
     ),
     Mutation(
+        "companion/wind/estimators/kalman.py",
+        "wrap_pi(x_rad - kf.x[1, 0])",
+        "(x_rad - kf.x[1, 0])",
+        "tests/wind/test_papers.py::test_the_kalman_filter_is_equations_1_to_8",
+    ),
+    Mutation(
         VALUE,
         "return self.boat.no_go_half_rad + self.widening_rad(t_s)",
         "return self.boat.no_go_half_rad - self.widening_rad(t_s)",

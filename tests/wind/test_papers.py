@@ -14,15 +14,18 @@ from companion.wind.study.score import crps_circular, crps_normal, score
 from lab.simulated_wind import NOISE_RADPS, RHO_HZ, equation_17, weather
 
 
-def test_the_kalman_filter_is_equations_1_to_8():
+@pytest.mark.parametrize("veers_rad", [0.0, 4.0])
+def test_the_kalman_filter_is_equations_1_to_8(veers_rad):
+    """With (8)'s window full for long, in a wind that stays and in one that goes round more than half the circle."""
     n, r = 20, np.diag([0.5**2, math.radians(3.0) ** 2])
     record = weather(9, seconds=200.0, mean_rad=0.0)
     kalman = make("kalman", n=n, r_deg=3.0)
     w = p = q = None
     window = []
-    for t, d, s in zip(record.t_s.tolist(), record.twd_from_rad.tolist(), record.tws_mps.tolist(), strict=True):
+    wind = record.twd_from_rad + veers_rad * record.t_s / 200.0
+    for t, d, s in zip(record.t_s.tolist(), wind.tolist(), record.tws_mps.tolist(), strict=True):
         kalman.update(t, d, s)
-        z = np.array([s, (d + math.pi) % (2 * math.pi) - math.pi])
+        z = np.array([s, d if w is None else w[1] + math.remainder(d - w[1], 2.0 * math.pi)])
         if w is None:
             w, p, q = z, r.copy(), np.zeros((2, 2))
             continue
@@ -35,8 +38,8 @@ def test_the_kalman_filter_is_equations_1_to_8():
         q = gain @ (sum(window) / len(window)) @ gain.T  # (8), (7)
     mean, sigma, speed, sigma_speed = kalman.forecast(100.0)
     ahead = p + 100.0 * q
-    assert mean == pytest.approx(w[1], abs=1e-6)
-    assert speed == pytest.approx(w[0], abs=1e-9)
+    assert math.remainder(mean - w[1], 2.0 * math.pi) == pytest.approx(0.0, abs=1e-6)
+    assert speed == pytest.approx(w[0], abs=1e-6)
     assert sigma == pytest.approx(math.sqrt(ahead[1, 1]), rel=1e-6)
     assert sigma_speed == pytest.approx(math.sqrt(ahead[0, 0]), rel=1e-6)
 
