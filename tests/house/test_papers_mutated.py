@@ -133,6 +133,18 @@ MUTATIONS = (
         T_HEADINGS + "test_the_buoy_is_left_on_its_side",
     ),
     Mutation(
+        HEADINGS,
+        "    if is_last or distance_m(*leg) < 1.0",
+        "    if distance_m(*leg) < 1.0",
+        T_HEADINGS + "test_near_the_destination_she_is_steered_at_it_and_before_that_along_her_leg",
+    ),
+    Mutation(
+        HEADINGS,
+        "along = wrap_pi(bearing_rad(*leg) + drift)",
+        "along = wrap_pi(bearing_rad(boat, leg[1]) + drift)",
+        T_HEADINGS + "test_near_the_destination_she_is_steered_at_it_and_before_that_along_her_leg",
+    ),
+    Mutation(
         TRIGGERS,
         "turned > config.wind_change_rad and",
         "turned > 3.0 * config.wind_change_rad and",

@@ -144,6 +144,25 @@ def test_a_boat_set_off_her_leg_comes_back_to_it():
     assert abs(cross_track_m(world.position, *leg)) < 1.0
 
 
+@pytest.mark.parametrize(("left_m", "is_direct"), [(19.0, True), (21.0, False)])
+def test_near_the_destination_she_is_steered_at_it_and_before_that_along_her_leg(left_m, is_direct):
+    """Büsser 3.2.3: "the true course from present boat position to target position", within GRID SIZE; 3.1 before."""
+    world = by_heading(Goal(en_m=(0.0, 300.0), radius_m=5.0), obstacles=(), wind=BEAM)
+    assert world.run(60, is_steered)
+    end = turn_of(world).leg()[1]
+    assert world.run(200, lambda w: end[1] - w.position[1] < 24.0)
+    assert world.skipper.config.grid_size_m == 20.0
+    off = math.asin(6.0 / left_m)
+    world.position = (end[0] + 6.0, end[1] - left_m * math.cos(off))
+    ctx = turn_of(world)
+    drift = drift_correction_rad(ctx.snapshot.vehicle.velocity_en_mps, ctx.snapshot.vehicle.heading_rad)
+    course = difference_rad(desired_heading_rad(ctx), drift)
+    back = back_to_line_rad(cross_track_m(world.position, *ctx.leg()), ctx.speed_mps)
+    along = bearing_rad(*ctx.leg()) + back
+    assert difference_rad(course, -off if is_direct else along) == pytest.approx(0.0, abs=1e-6)
+    assert abs(difference_rad(along, -off)) > math.radians(5.0)
+
+
 @pytest.mark.parametrize("across_mps", [0.7, -0.7])
 @pytest.mark.parametrize("leeway_rad", [0.0, 0.1])
 def test_a_leg_is_made_good_across_a_current_and_leeway_by_equation_3(across_mps, leeway_rad):
