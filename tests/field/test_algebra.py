@@ -57,7 +57,8 @@ def test_circle_is_tangent_at_ten_metres_clockwise_and_leads_there() -> None:
     v = AttractiveCircle()([(0.0, 10.0), (10.0, 0.0), (0.0, 100.0), (0.0, 1.0)])
     assert v[0] == pytest.approx((10.0, 0.0))
     assert v[1] == pytest.approx((0.0, -10.0))
-    assert v[2, 1] < -7.0
+    pull = math.atan(0.1 * (10.0 - 100.0))  # his equation, v0 = vr = 10 and rho = 0.1, brought to length 10
+    assert v[2] == pytest.approx(10.0 * np.array([1.0, pull]) / math.hypot(1.0, pull))
     assert v[3, 1] > 0.0
 
 

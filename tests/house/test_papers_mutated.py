@@ -189,6 +189,24 @@ MUTATIONS = (
         "np.abs(times) < match_s",
         T_ASTAR + "test_a_ship_is_a_disc_where_it_would_be_met",
     ),
+    Mutation(
+        KERNELS,
+        "            if a * b < 0.0:  # eq. 4.5",
+        "            if False:",
+        T_ASTAR + "test_the_tack_cost_makes_fewer_tacks_and_the_tunnel_keeps_to_the_line",
+    ),
+    Mutation(
+        ASTAR,
+        "tunnel, border_m = 10.0 / settings.tunnel_width_m, 0.0",
+        "tunnel, border_m = 5.0 / settings.tunnel_width_m, 0.0",
+        T_ASTAR + "test_each_tack_and_each_gybe_costs_what_is_set_and_a_step_beside_the_line_what_equation_4_6_says",
+    ),
+    Mutation(
+        "companion/planners.py",
+        '_set_by("heuristic_kn", 7.0 * MPS_PER_KNOT',
+        '_set_by("heuristic_kn", 6.0 * MPS_PER_KNOT',
+        T_ASTAR + "test_the_numbers_are_those_that_he_ends_with_and_seven_knots_are_what_is_estimated",
+    ),
     Mutation(KERNELS, "seconds + weight[TURN] * turn", "seconds", T_ASTAR + "test_the_turning_cost_makes_fewer_turns"),
     Mutation(
         "companion/boat/polar.py",
@@ -280,6 +298,12 @@ MUTATIONS = (
         "force = REPULSIVE * np.exp(-(p[:, 0] ** 2 + p[:, 1] ** 2) / self.sigma_m**2)",
         "force = REPULSIVE * np.exp(-np.hypot(p[:, 0], p[:, 1]) / self.sigma_m)",
         T_ALGEBRA + "test_repulsive_atoms_are_gaussians_of_a_hundred_metres",
+    ),
+    Mutation(
+        FIELDS,
+        "rho: float = 0.1",
+        "rho: float = 0.3",
+        T_ALGEBRA + "test_circle_is_tangent_at_ten_metres_clockwise_and_leads_there",
     ),
     Mutation(
         PROJECTION,

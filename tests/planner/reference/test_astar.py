@@ -106,7 +106,7 @@ def test_the_tack_cost_makes_fewer_tacks_and_the_tunnel_keeps_to_the_line():
     p = problem()
     _, plain = run(p, turn_s_per_rad=0.0)
     _, tacks = run(p, turn_s_per_rad=0.0, tack_s=60.0, gybe_s=60.0)
-    assert tacks.tacks + tacks.gybes <= plain.tacks + plain.gybes
+    assert tacks.tacks + tacks.gybes < plain.tacks + plain.gybes
 
     def widest(judged):
         return max(abs(leg.to_en[0]) for leg in judged.legs)
@@ -114,6 +114,42 @@ def test_the_tack_cost_makes_fewer_tacks_and_the_tunnel_keeps_to_the_line():
     _, tunnel = run(p, turn_s_per_rad=8.0, tunnel_width_m=40.0)
     _, free = run(p, turn_s_per_rad=8.0)
     assert widest(tunnel) < widest(free)
+
+
+@pytest.mark.parametrize("from_deg", [0, 20, 180])
+def test_each_tack_and_each_gybe_costs_what_is_set_and_a_step_beside_the_line_what_equation_4_6_says(from_deg):
+    p = problem(wind={"from_deg": from_deg, "speed_mps": 5, "sigma": {"model": "none"}})
+    free, way = run(p, grid_m=20.0)
+    dearer, same = run(p, grid_m=20.0, tack_s=0.01, gybe_s=0.03)
+    assert [leg.to_en for leg in same.legs] == [leg.to_en for leg in way.legs]
+    spent = dearer.trace["objective"] - free.trace["objective"]
+    assert spent == pytest.approx(0.01 * way.tacks + 0.03 * way.gybes, abs=1e-9)
+    assert spent > 0.0
+    if from_deg == 0:  # one board of twenty cells out, one back, in steps of two: at 40, 80 ... 400 ... 40, 0 m
+        width_m = 1e6
+        tunnel, same = run(p, grid_m=20.0, tunnel_width_m=width_m)
+        assert [leg.to_en for leg in same.legs] == [(400.0, 400.0), (0.0, 800.0)]
+        beside_m = sum(40.0 * (n if n <= 10 else 20 - n) for n in range(1, 21))
+        assert tunnel.trace["objective"] - free.trace["objective"] == pytest.approx(10.0 * beside_m / width_m)
+
+
+def test_the_numbers_are_those_that_he_ends_with_and_seven_knots_are_what_is_estimated():
+    own = AstarSettings()
+    assert (own.turn_s_per_rad, own.tack_s, own.gybe_s, own.tunnel_width_m, own.ship_match_s) == (
+        8.0,
+        0.0,
+        0.0,
+        None,
+        20.0,
+    )
+    assert np.degrees([own.min_twa_rad, own.max_twa_rad, own.max_turn_rad]) == pytest.approx([45.0, 160.0, 90.0])
+    speed = {"model": "polar", "twa_deg": AVALON_TWA, "v_mps": [0.3 * v for v in AVALON_MPS]}
+    slow = problem(boat={"no_go_half_deg": 45, "max_twa_deg": 160, "turn_rate_rad_s": 0.5, "speed": speed})
+    usual, _ = run(slow)
+    for knots, is_usual in ((7.0, True), (6.0, False), (1.0, False)):  # of 1: her own top speed
+        other, _ = run(slow, heuristic_mps=knots * 1852.0 / 3600.0)
+        assert other.trace["objective"] == pytest.approx(usual.trace["objective"])
+        assert (other.trace["expanded"] == usual.trace["expanded"]) == is_usual
 
 
 def test_an_abrupt_tunnel_costs_nothing_inside_and_keeps_within_its_borders():
