@@ -71,7 +71,13 @@ class Skipper:
             ),
             orders=Orders(standing=persisted.standing, skipped=persisted.skipped),
             position=PositionState(place=persisted.place, restored=persisted.place),
-            tacking=Tacking(tried=persisted.tacks[0], failed=persisted.tacks[1]),
+            tacking=Tacking(
+                tried=persisted.tacks[0],
+                failed=persisted.tacks[1],
+                irons_s=persisted.irons_s,
+                starboard_lee_mps=persisted.lee_mps[0],
+                port_lee_mps=persisted.lee_mps[1],
+            ),
             plans=Planning(latency=persisted.latency),
             soundings=Soundings(shoals=persisted.shoals),
         )

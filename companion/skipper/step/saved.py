@@ -20,6 +20,9 @@ MAX_GOALS = 10**6
 MAX_POINTS = 20_000  # of the track of a search
 MAX_TACKS = 10**6
 MAX_QUARTERS = 10**6  # turns round one buoy
+MOST_IRONS_S = 60.0  # more is a lull that the boat waited in: no room of a tack would be enough ever after
+MOST_LEE_MPS = 1.0  # more is a position that has jumped
+NO_FAILED_TACK = (0.0, 0.0, 0.0)
 _NUMBERS = (
     "plan_t_s",
     "plan_twd_from_rad",
@@ -129,6 +132,8 @@ class Persisted:
     searched: tuple[tuple[float, float], ...] = ()  # the track of the search that is next
     covered: tuple[tuple[int, float], ...] = ()  # goals searched, and the share that was seen
     tacks: tuple[int, int] = (0, 0)  # tried, and of these failed
+    irons_s: float = 0.0  # the longest that she has lain in one that failed, and ...
+    lee_mps: tuple[float, float] = (0.0, 0.0)  # ... the fastest that she was set then, on starboard tack and on port
     place: SavedPlace | None = None  # where the boat was
     latency: PlannerLatency = NO_ANSWERS  # of the planner on this computer
     shoals: tuple[Shoal, ...] = ()  # that were sounded
@@ -169,6 +174,7 @@ class Persisted:
             "searched": [list(p) for p in self.searched],
             "covered": [list(c) for c in self.covered],
             "tacks": list(self.tacks),
+            "failed_tack": [self.irons_s, *self.lee_mps],
             "place": _place_to_list(self.place),
             "latency": [list(self.latency.answers_s), self.latency.room_s, self.latency.speed],
             **({"shoals": [_shoal_to_list(s) for s in self.shoals]} if self.shoals else {}),
@@ -209,6 +215,8 @@ class Persisted:
                 searched=tuple((_number(e), _number(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
                 covered=tuple((_whole(g, 0, MAX_GOALS), _number(s)) for g, s in data.get("covered", ())[:MAX_GOALS]),
                 tacks=_tacks(data.get("tacks", (0, 0))),
+                irons_s=_within(data.get("failed_tack", NO_FAILED_TACK)[0], MOST_IRONS_S),
+                lee_mps=_lee(data.get("failed_tack", NO_FAILED_TACK)),
                 place=_place_from_list(data.get("place")),
                 latency=_latency(data.get("latency")),
                 shoals=tuple(_shoal_from_list(s) for s in data.get("shoals", ())[-MOST_SHOALS:]),
@@ -360,6 +368,14 @@ def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
 def _tacks(data: Any) -> tuple[int, int]:
     tried = _whole(data[0], 0, MAX_TACKS)
     return tried, _whole(data[1], 0, tried)
+
+
+def _lee(data: Any) -> tuple[float, float]:
+    return _within(data[1], MOST_LEE_MPS), _within(data[2], MOST_LEE_MPS)
+
+
+def _within(value: Any, most: float) -> float:
+    return min(max(_number(value), 0.0), most)
 
 
 def _number(value: Any) -> float:

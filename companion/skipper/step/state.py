@@ -516,6 +516,8 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         searched=state.progress.searched[:-1],
         covered=state.progress.covered,  # the last point moves with the boat
         tacks=(state.tacking.tried, state.tacking.failed),
+        irons_s=state.tacking.irons_s,
+        lee_mps=(state.tacking.starboard_lee_mps, state.tacking.port_lee_mps),
         place=state.position.place,
         latency=state.plans.latency,
         shoals=state.soundings.shoals,

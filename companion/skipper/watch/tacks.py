@@ -18,6 +18,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import Mode, Severity
 from companion.skipper.planning.autopilot_beats import TACKS_FAIL_AFTER
 from companion.skipper.step.context import StepContext
+from companion.skipper.step.saved import MOST_IRONS_S, MOST_LEE_MPS
 from companion.skipper.step.state import Tacking
 from companion.skipper.way.voyage import PointEn
 
@@ -30,8 +31,6 @@ LIES_S = 8.0  # as the watchdog "in irons" has it
 FORGET_S = 20.0  # settled longer ago than this, whatever follows is no tack from there
 LEAST_TWS_MPS = 1.5  # in less the boat does as it likes
 NEAR_SOLID_M = 60.0  # a tack that failed so near something asks for a new plan
-MOST_IRONS_S = 60.0  # more is a lull that it waited in: no room of a tack would be enough ever after
-MOST_LEE_MPS = 1.0  # more is a position that has jumped
 TACK_FAILED = "a tack failed"
 
 

@@ -11,7 +11,7 @@ from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import tacks_fail
 from companion.skipper.step.actions import ReplanReason, RequestPlan
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.saved import Persisted
+from companion.skipper.step.saved import MOST_IRONS_S, MOST_LEE_MPS, Persisted
 from companion.skipper.step.state import Tacking
 from companion.skipper.watch.tacks import TACK_FAILED, watch_tacks
 from tests.skipper.test_voyage import make
@@ -117,3 +117,17 @@ def test_what_was_counted_survives_a_restart_and_nonsense_does_not():
     for wrong in ([2, 3], [-1, 0], [1], "ab", [1.5, 1]):
         with pytest.raises(ValueError, match="damaged"):
             Persisted.from_dict(data | {"tacks": wrong})
+
+
+def test_how_she_lay_and_was_set_survives_a_restart_and_nonsense_does_not():
+    world = under_way(tried=2, failed=1, irons_s=17.5, starboard_lee_mps=0.3, port_lee_mps=0.1)
+    data = world.skipper.persisted(world.state).to_dict()
+    again = world.skipper.initial(Persisted.from_dict(data)).tacking
+    assert (again.irons_s, again.starboard_lee_mps, again.port_lee_mps) == (17.5, 0.3, 0.1)
+    old = Persisted.from_dict({k: v for k, v in data.items() if k != "failed_tack"})
+    assert (old.irons_s, old.lee_mps) == (0.0, (0.0, 0.0))
+    most = Persisted.from_dict(data | {"failed_tack": [1e6, -1.0, 9.0]})
+    assert (most.irons_s, most.lee_mps) == (MOST_IRONS_S, (0.0, MOST_LEE_MPS))
+    for wrong in ([1.0], [math.nan, 0.0, 0.0], "abc", [1.0, True, 0.0], None):
+        with pytest.raises(ValueError, match="damaged"):
+            Persisted.from_dict(data | {"failed_tack": wrong})

@@ -7,8 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.boat.failed_tack import SHOOT_S
+from companion.skipper.step.saved import MOST_IRONS_S, MOST_LEE_MPS
 from companion.skipper.step.state import NO_TACKS, PRIOR_TACKS, Tacking
-from companion.skipper.watch.tacks import LIES_S, MOST_IRONS_S, MOST_LEE_MPS, after_failure, followed
+from companion.skipper.watch.tacks import LIES_S, after_failure, followed
 
 D = math.radians
 
