@@ -28,6 +28,7 @@ NO_PLACES = {
     ("Signs", "seen_s"),
     ("Persisted", "inside"),
     ("Persisted", "covered"),
+    ("Persisted", "lee_mps"),  # speeds, on either tack
     ("AutopilotStatus", "servo_us"),
 }
 
