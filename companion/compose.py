@@ -63,7 +63,7 @@ from companion.geofence.shapes import polygon_en
 from companion.messages import GeoPoint
 from companion.orders import ALL, Verb, unknown
 from companion.planners import ALGORITHMS, AUTO, PlannerChoice
-from companion.skipper.step import Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.step import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.way import FAR_M, Box, Composed, Goal, Line, Refuge, Search, Side, Until, Voyage
 from companion.traffic import Policy, TargetLimits
 from companion.traffic.feeds import parse_feed
@@ -500,6 +500,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         shift_tacks_apart_s=60.0 / options.tacks_per_minute,
         replan_policy=ReplanPolicy(options.replan),
         guidance=Guidance(options.guidance),
+        learn=Learning(mission.boat.learn),
         station_s=options.station_s,
         adopts=mission.options.from_autopilot,
         ends=Ends.of(**msgspec.structs.asdict(mission.safety)),

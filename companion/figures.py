@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from companion.boat import factor
+from companion.current import over_water
 from companion.fold import Step
 from companion.geo.angles import heading_of, wrap_pi
 
@@ -45,11 +47,49 @@ def pace_share(step: Step) -> float | None:
     return step.pace.share if step.pace.tries > 0.0 else None
 
 
+def _through_water(step: Step) -> tuple[float, float, float] | None:
+    """Return the speed through the water along the bow [m/s], the true wind's angle [rad] and its speed over it."""
+    vehicle, wind, (east, north) = step.snapshot.vehicle, step.snapshot.wind, step.snapshot.current.en_mps
+    if vehicle is None or wind.present_twd_from_rad is None or wind.present_tws_mps is None:
+        return None
+    ahead_mps = (vehicle.velocity_en_mps[0] - east) * math.sin(vehicle.heading_rad) + (
+        vehicle.velocity_en_mps[1] - north
+    ) * math.cos(vehicle.heading_rad)
+    from_rad, tws_mps = over_water(wind.present_twd_from_rad, wind.present_tws_mps, (east, north))
+    return ahead_mps, wrap_pi(from_rad - vehicle.heading_rad), tws_mps
+
+
+def sailed_mps(step: Step) -> float | None:
+    """Return the speed through the water along the bow [m/s]; None: not known, or she does not sail."""
+    seen = _through_water(step)
+    return None if seen is None or not step.state.voyage.sailing else seen[0]
+
+
+def predicted_mps(step: Step) -> float | None:
+    """Return what the boat that plans are of would make in this wind on this heading [m/s]; None: as ``sailed_mps``."""
+    seen = _through_water(step)
+    return None if seen is None or not step.state.voyage.sailing else step.voyage.boat.polar.speed_mps(*seen[1:])
+
+
+def learned_share(step: Step) -> float | None:
+    """Return what of her file's speed here plans are told, 1: all of it; None: nothing that was learned is used."""
+    seen, known = _through_water(step), step.state.afloat.known
+    if seen is None or not known.is_used:
+        return None
+    return float(factor(known.told.x, seen[1], seen[2]))
+
+
 # fmt: off
 FIGURES: tuple[Figure, ...] = (
     Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page", "report"})),
     Figure(name="co_pace", label="of her polar", kind="share", of=pace_share, shown=frozenset({"page", "report"}),
            hint="what she made of the predicted speeds in the last minutes"),
+    Figure(name="co_sailed", label="sailed", kind="speed", of=sailed_mps, shown=frozenset({"page", "radio", "report"}),
+           hint="through the water"),
+    Figure(name="co_predict", label="predicted", kind="speed", of=predicted_mps,
+           shown=frozenset({"page", "radio", "report"}), hint="by the boat that plans are of, in this wind"),
+    Figure(name="co_learned", label="learned, of her file", kind="share", of=learned_share,
+           shown=frozenset({"page", "radio", "report"}), hint="what of her file's speed here plans are told"),
 )
 # fmt: on
 BY_NAME = {figure.name: figure for figure in FIGURES}

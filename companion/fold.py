@@ -465,16 +465,13 @@ class VoyageFold:
         shift = self._follow()
         snapshot = self._snapshot(t_s)
         self._events, self._outcomes = [], []
+        was_used = self.state.afloat.known.is_used
         self.state, actions = self.skipper.step(self.state, snapshot)
-        self._pace = paced(self._pace, snapshot, self.state, self.skipper.voyage)
-        return Step(
-            snapshot=snapshot,
-            state=self.state,
-            actions=actions,
-            voyage=self.skipper.voyage,
-            shift=shift,
-            pace=self._pace,
-        )
+        voyage = self.skipper.sailed(self.state)
+        if self.state.afloat.known.is_used != was_used:
+            self._pace = PRIOR_PACE  # it is a share of the speeds of another boat
+        self._pace = paced(self._pace, snapshot, self.state, voyage)
+        return Step(snapshot=snapshot, state=self.state, actions=actions, voyage=voyage, shift=shift, pace=self._pace)
 
     def _follow(self) -> Shift | None:
         """Replace the frame by one about the boat when it has left its water; None: it has not."""

@@ -5,11 +5,12 @@
 45.0
 """
 
+from companion.boat.afloat import Afloat, LearnedAfloat, Look, as_learned, factor, followed, mark_of
 from companion.boat.boat import Boat, Hull, can_hold, made_good_mps, outline_en_m, slowest_en_mps
 from companion.boat.guess import GuessedBoat, Sizes, guessed, guessed_text
 from companion.boat.learned_file import learned_text
 from companion.boat.lesson import Lesson, lesson_of
-from companion.boat.log import BoatLog
+from companion.boat.log import BoatLog, Why
 from companion.boat.margins import (
     AutopilotLimits,
     ProposedMargin,
@@ -34,12 +35,15 @@ from companion.boat.steering import Steering, SteeringBand, SteeringLog, steerin
 from companion.boat.trial import Trial, trial_in
 
 __all__ = [
+    "Afloat",
     "AutopilotLimits",
     "Boat",
     "BoatLog",
     "GuessedBoat",
     "Hull",
+    "LearnedAfloat",
     "Lesson",
+    "Look",
     "Polar",
     "ProposedMargin",
     "Sizes",
@@ -47,15 +51,20 @@ __all__ = [
     "SteeringBand",
     "SteeringLog",
     "Trial",
+    "Why",
     "ardurover_sitl",
+    "as_learned",
     "avalon",
     "can_hold",
     "constant",
+    "factor",
+    "followed",
     "guessed",
     "guessed_text",
     "learned_text",
     "lesson_of",
     "made_good_mps",
+    "mark_of",
     "narrowest_corridor_m",
     "orc_text",
     "outline_en_m",

@@ -56,6 +56,8 @@ class Why(enum.Enum):
     GUSTY = "the wind is not steady"
     UNSTEADY = "she gathers way or loses it"
     DRIFT = "she drifts"
+    DOUBTED = "wind or water are in doubt"  # under way alone
+    UNLIKE = "unlike all that was sailed before"  # likewise
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,15 +160,15 @@ def stretches_of(logs: list[BoatLog], prior: Polar, prior_error: float) -> Stret
             if last_s is None or log.t_s[piece.start] - last_s > OUTING_GAP_S:
                 names.append(log.name)
             last_s = float(log.t_s[piece.stop - 1])
-            turning = _turning(log, piece)
+            turning = turning_of(log, piece)
             for window in _windows(log.t_s, piece, turning):
-                found = _steady(log, window, turning, prior, prior_error)
+                found = steady(log, window, turning, prior, prior_error)
                 if isinstance(found, Why):
                     left_out[found] += 1
                 else:
                     rows.append((float(len(names) - 1), *found))
     table = np.array(rows, dtype=np.float64).reshape(len(rows), 9)
-    by_motor = _driven(table, prior, prior_error)
+    by_motor = driven_rows(table, prior, prior_error)
     if bool(np.any(by_motor)):
         left_out[Why.DRIVEN] += int(np.sum(by_motor))
         table = table[~by_motor]
@@ -184,7 +186,8 @@ def stretches_of(logs: list[BoatLog], prior: Polar, prior_error: float) -> Stret
     )
 
 
-def _driven(table: Floats, prior: Polar, prior_error: float) -> NDArray[np.bool_]:
+def driven_rows(table: Floats, prior: Polar, prior_error: float) -> NDArray[np.bool_]:
+    """Return (n,) which rows of stretches, each behind the number of its outing, no wind explains."""
     velocity, heading, awa, aws = table[:, 2:4], table[:, 4], table[:, 5], table[:, 6]
     bow = np.column_stack([np.sin(heading), np.cos(heading)])
     wind = aws[:, None] * np.column_stack([np.sin(heading + awa), np.cos(heading + awa)]) - velocity
@@ -217,7 +220,7 @@ def _windows(t_s: Floats, piece: slice, turning: NDArray[np.bool_]) -> list[slic
     return out
 
 
-def _turning(log: BoatLog, piece: slice) -> NDArray[np.bool_]:
+def turning_of(log: BoatLog, piece: slice) -> NDArray[np.bool_]:
     """Return (n,) whether the boat manoeuvres then, or has just done so."""
     out = np.zeros(log.t_s.shape[0], dtype=np.bool_)
     t = log.t_s[piece]
@@ -238,9 +241,10 @@ def _spread(angle_rad: Floats) -> float:
     return float(np.sqrt(np.nanmean(away * away)))
 
 
-def _steady(
+def steady(
     log: BoatLog, window: slice, turning: NDArray[np.bool_], prior: Polar, prior_error: float
 ) -> Why | tuple[float, ...]:
+    """Return the means of a stretch, as ``Stretches`` has them in a row, or why nothing is learned from it."""
     if not bool(np.all(log.is_sailed[window])):
         return Why.NOT_SAILED
     if bool(np.any(log.has_motor_on[window])):

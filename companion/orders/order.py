@@ -32,6 +32,8 @@ class Verb(enum.StrEnum):
     ADOPT = "adopt"
     REPLACE = "replace"
     WHY = "why"
+    FREEZE = "freeze"
+    LEARN = "learn"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,6 +135,14 @@ TABLE: tuple[VerbRow, ...] = (
         means="say what she does and why, and when she tacks next",
         refused="never: reading is always permitted",
     ),
+    VerbRow(
+        verb=Verb.FREEZE,
+        number=12,
+        button="Learn no more of the boat",
+        means="nothing more is learned of the boat; what plans are told of her stays as it is, over restarts, too",
+        refused="the mission's `[boat] learn` is off",
+    ),
+    VerbRow(verb=Verb.LEARN, number=13, button="Learn the boat", means="the end of `freeze`", refused="as `freeze`"),
 )
 BY_VERB = {row.verb: row for row in TABLE}
 _BY_NUMBER = {row.number: row.verb for row in TABLE}

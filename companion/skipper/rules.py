@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from companion.boat import Afloat
 from companion.geo.shift import Shift
 from companion.messages import GeoPoint
 from companion.orders import Wanted
@@ -25,6 +26,7 @@ from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.priorities import act
 from companion.skipper.step import Action, Persisted, RequestPlan, SkipperConfig, SkipperState, Snapshot, StepContext
+from companion.skipper.step.context import with_learned_boat
 from companion.skipper.step.state import (
     LoadedMission,
     Orders,
@@ -38,6 +40,7 @@ from companion.skipper.step.state import (
     saved_of,
     standing_saved,
 )
+from companion.skipper.watch.boat_learning import learn_boat
 from companion.skipper.watch.measures import follow_charge
 from companion.skipper.watch.tacks import watch_tacks
 from companion.skipper.watch.watch import look_out, speak_of_stop, watch, watch_water
@@ -80,6 +83,7 @@ class Skipper:
             ),
             plans=Planning(latency=persisted.latency),
             soundings=Soundings(shoals=persisted.shoals),
+            afloat=Afloat.of(persisted.afloat),
         )
 
     def fits(self, persisted: Persisted) -> bool:
@@ -100,6 +104,10 @@ class Skipper:
         speak_of_fence(ctx)
         remember_fix(ctx)
         return ctx.state, tuple(ctx.actions)
+
+    def sailed(self, state: SkipperState) -> Voyage:
+        """Return the voyage with the boat that plans are of: her file's, or as she was found to sail."""
+        return with_learned_boat(self.voyage, self.config, state)
 
     def preview(self, state: SkipperState, snapshot: Snapshot, wanted: Wanted) -> RequestPlan | str:
         """Return the plan that an order to sail somewhere would ask for, or why it would ask for none."""
@@ -160,6 +168,7 @@ def observe(ctx: StepContext) -> None:
     follow_charge(ctx)
     watch_water(ctx)
     watch_tacks(ctx)
+    learn_boat(ctx)
     watch(ctx)
     follow_soundings(ctx)
     take_orders(ctx)

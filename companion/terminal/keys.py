@@ -36,6 +36,8 @@ KEYS = (
     Key(key="s", verb=Verb.STOP, label="stop", asks="nothing more is asked of her: she sails on as she is"),
     Key(key="a", verb=Verb.ADOPT, label="adopt", asks="this voyage ends, what was drawn is sailed"),
     Key(key="x", verb=Verb.REPLACE, label="replace", asks="the mission on board is overwritten"),
+    Key(key="f", verb=Verb.FREEZE, label="freeze"),
+    Key(key="l", verb=Verb.LEARN, label="learn"),
 )
 BY_KEY = {key.key: key for key in KEYS}
 

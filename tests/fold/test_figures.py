@@ -7,6 +7,9 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion import figures
+from companion.boat import Afloat, LearnedAfloat, mark_of
+from companion.boat.afloat import Told
+from companion.current import WaterCurrent
 from companion.eta import Pace
 from companion.figures import BY_NAME, FIGURES, Figure, figure_values, in_words, ranges_in_words
 from companion.fold import Step
@@ -19,7 +22,7 @@ from companion.telemetry.console import progress_text
 from companion.telemetry.folder import VoyageFigures
 from companion.terminal.dashboard import body_of
 from companion.view import HeardFold
-from tests.skipper.world import FRAME, World, voyage
+from tests.skipper.world import FRAME, World, voyage, with_parts
 
 
 @pytest.fixture
@@ -59,6 +62,28 @@ def test_the_speed_that_was_predicted_is_told_against_what_was_sailed(step):
     slow = dataclasses.replace(step, pace=Pace(tries=5.0, prior=0.0, took_s=100.0, made_s=70.0))
     assert figure_values(slow, "page")["co_pace"] == pytest.approx(0.7)
     assert "of her polar 70 %" in in_words(figure_values(slow, "page"))
+
+
+def test_the_speed_through_the_water_is_told_beside_what_the_boat_of_the_plans_makes_there(step):
+    vehicle = step.snapshot.vehicle
+    water = WaterCurrent(east_mps=0.3 * math.sin(vehicle.heading_rad), north_mps=0.3 * math.cos(vehicle.heading_rad))
+    there = dataclasses.replace(step, snapshot=dataclasses.replace(step.snapshot, current=water))
+    for where in ("page", "radio", "report"):
+        values, now = figure_values(there, where), figure_values(step, where)
+        assert values["co_sailed"] == pytest.approx(vehicle.speed_mps - 0.3, abs=0.02)
+        assert now["co_sailed"] == pytest.approx(vehicle.speed_mps, abs=0.02)
+        assert now["co_predict"] == pytest.approx(vehicle.speed_mps, rel=0.2)
+        assert values["co_predict"] != pytest.approx(now["co_predict"], rel=0.005)  # the wind over the water is another
+        assert "co_learned" not in now
+    ashore = dataclasses.replace(step, state=with_parts(step.state, voyage={"sailing": False}))
+    assert not {"co_sailed", "co_predict"} & figure_values(ashore, "radio").keys()
+
+
+def test_what_was_learned_is_told_once_plans_are_of_it(step):
+    known = LearnedAfloat(of=mark_of(step.voyage.boat), told=Told(x=(-0.3, 0.0, 0.0, 0.0)), is_used=True)
+    learned = dataclasses.replace(step, state=dataclasses.replace(step.state, afloat=Afloat.of(known)))
+    assert figure_values(learned, "radio")["co_learned"] == pytest.approx(math.exp(-0.3))
+    assert "learned, of her file 74.1 %" in in_words(figure_values(learned, "radio"))
 
 
 @pytest.mark.parametrize(

@@ -5,15 +5,18 @@ from __future__ import annotations
 import asyncio
 import math
 import socket
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.boat import AutopilotLimits
+from companion.boat import Afloat, AutopilotLimits, LearnedAfloat, as_learned, mark_of
+from companion.boat.afloat import Told
 from companion.clock import run
 from companion.compose import config_of, estimator_of, voyage_of
+from companion.eta import Pace
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.autopilot import Autopilot
@@ -23,7 +26,7 @@ from companion.mavlink.wire.frames import Codec
 from companion.mavlink.wire.parameter_ranges import RANGES, believable, effect_of, refusal
 from companion.messages import GeoPoint, VehicleState, WindQuality, WindSample, WindSource
 from companion.skipper import Skipper
-from companion.skipper.step.config import Permissions
+from companion.skipper.step.config import Learning, Permissions
 from companion.skipper.step.snapshot import Disbelieved, ParameterChanged, WindHealth
 from companion.wind import WindTracker
 from companion.wind.parameters import VaneParameters
@@ -284,3 +287,35 @@ def test_over_tcp_an_impossible_parameter_costs_no_connection():
     assert connections == 1
     assert not faults
     assert fold.tick(1e6).snapshot.limits == AutopilotLimits(sail_xtrack_max_m=10.0, wp_radius_m=3.0)
+
+
+def test_once_plans_are_of_the_learned_boat_so_is_the_rest_and_the_pace_begins_anew():
+    fold = fresh()
+    paced_before = Pace(tries=5.0, prior=0.0, took_s=100.0, made_s=70.0)
+    told = Told(x=(-0.3, 0.0, 0.0, 0.0))
+    boat = fold.skipper.voyage.boat
+    known = LearnedAfloat(of=mark_of(boat), told=told, sailed_s=4000.0, file_error=2.0, own_error=1.0)
+    for is_used in (False, True):
+        fold._pace = paced_before
+        fold.state = replace(fold.state, afloat=Afloat.of(replace(known, is_used=is_used)))
+        step = fold.tick(1.0)
+        assert step.voyage.boat == (as_learned(boat, told) if is_used else boat)
+        assert step.pace.share == pytest.approx(0.7)
+    skipper_step = Skipper.step
+
+    def begins(skipper, state, snapshot):
+        state, actions = skipper_step(skipper, state, snapshot)
+        return replace(state, afloat=Afloat.of(replace(known, is_used=True))), actions
+
+    fold.state = replace(fold.state, afloat=Afloat.of(known))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Skipper, "step", begins)
+        assert fold.tick(2.0).pace.tries == 0.0
+
+
+@pytest.mark.parametrize("word", ["use", "shadow", "off"])
+def test_a_mission_says_whether_the_boat_is_learned(tmp_path, word):
+    path = tmp_path / "m.toml"
+    path.write_text(f'[[goal]]\nlat = 50.83\nlon = -1.3\n[boat]\nlearn = "{word}"\n', encoding="utf-8")
+    assert config_of(load_mission(path)).learn is Learning(word)
+    assert config_of(load_mission(DEMO)).learn is Learning.USE

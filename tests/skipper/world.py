@@ -157,6 +157,7 @@ class World:
         )
     )
     drift_mps: float = 0.0  # along the heading, while nobody sails
+    share: float = 1.0  # of her file's speed that she sails at
     current: Callable[[float], tuple[float, float]] = lambda t: (0.0, 0.0)  # of the water, east north
     motor: bool = False  # it runs
     tack_asked: bool = False  # heard on a leg that is beaten
@@ -211,7 +212,7 @@ class World:
         rate = 1.0 * dt
         self.heading = wrap_pi(self.heading + max(-rate, min(rate, turn)))
         twa = abs(difference_rad(twd, self.heading))
-        drive = self.skipper.voyage.boat.polar.speed_mps(twa, tws)
+        drive = self.share * self.skipper.voyage.boat.polar.speed_mps(twa, tws)
         self.speed += (drive - self.speed) * min(1.0, dt / 1.5)
         self.position = moved(self.position, self.heading, self.speed * dt)
 

@@ -299,6 +299,8 @@ class BoatOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """In less wind than this the boat makes no way; with the same probability."""
     tack_fails: Annotated[float, Meta(ge=0.0, le=0.9)] = 0.03
     """The chance that a tack fails; the voyage's own tacks add to it. 0: tacks are not reckoned to fail."""
+    learn: Literal["use", "shadow", "off"] = "use"
+    """Whether she is learned under way: plans are of what was learned once it predicts her better than her file."""
     motor: bool = False
     """The boat has an auxiliary motor that the autopilot can run: used when it drifts onto something."""
 

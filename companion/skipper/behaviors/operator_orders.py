@@ -20,6 +20,7 @@ from companion.skipper.planning.diversions import diversion, home_trouble, is_at
 from companion.skipper.planning.next_tack import next_tack_s
 from companion.skipper.planning.not_found import hold
 from companion.skipper.step.actions import Acknowledge, CancelPlan, ReplanReason, RequestPlan, StopOrders
+from companion.skipper.step.config import Learning
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.saved import Standing
@@ -290,6 +291,24 @@ def _replace(ctx: StepContext, _: Order) -> Answer:
     return _done(f"it is replaced: {text}")
 
 
+def _freeze(ctx: StepContext, _: Order) -> Answer:
+    return _learning(ctx, is_frozen=True)
+
+
+def _learn(ctx: StepContext, _: Order) -> Answer:
+    return _learning(ctx, is_frozen=False)
+
+
+def _learning(ctx: StepContext, *, is_frozen: bool) -> Answer:
+    if ctx.config.learn is Learning.OFF or not ctx.config.sails:
+        return Answer(result=Result.REFUSED, text="the boat is not learned: the mission's [boat] learn is off")
+    afloat = ctx.state.afloat
+    ctx.set(afloat=afloat.with_known(replace(afloat.known, is_frozen=is_frozen)))
+    is_used = afloat.known.is_used and ctx.config.learn is Learning.USE
+    plans = f"plans are of {'the boat as she was found to sail' if is_used else 'her file'}"
+    return _done(f"nothing more is learned of the boat until {Verb.LEARN}: {plans}" if is_frozen else "she is learned")
+
+
 def _say_why(ctx: StepContext, _: Order) -> Answer:
     state = ctx.state
     tack_s = next_tack_s(ctx, ctx.voyage.boat) if ctx.config.sails else None
@@ -311,6 +330,8 @@ _DEEDS: dict[Verb, Callable[[StepContext, Order], Answer]] = {
     Verb.ADOPT: _adopt,
     Verb.REPLACE: _replace,
     Verb.WHY: _say_why,
+    Verb.FREEZE: _freeze,
+    Verb.LEARN: _learn,
 }
 
 

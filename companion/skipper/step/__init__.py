@@ -19,7 +19,7 @@ from companion.skipper.step.actions import (
     UploadFence,
     UploadMission,
 )
-from companion.skipper.step.config import Ends, Guidance, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
+from companion.skipper.step.config import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Diversion, DiversionKind, Route
@@ -63,6 +63,7 @@ __all__ = [
     "Ends",
     "Event",
     "Guidance",
+    "Learning",
     "MissionOnBoard",
     "ModeChanged",
     "Outcome",

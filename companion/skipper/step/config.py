@@ -30,6 +30,14 @@ class Guidance(enum.Enum):
     FIELD = "field"  # vector fields, in GUIDED; the mission on board is what is left when we are gone
 
 
+class Learning(enum.Enum):
+    """Whether the boat is learned under way (``companion.boat.afloat``)."""
+
+    USE = "use"  # and plans are of what was learned, once it has predicted her better than her file for an hour
+    SHADOW = "shadow"  # it is told and kept, and plans are of her file
+    OFF = "off"
+
+
 class SafeEnd(enum.Enum):
     """How the voyage ends. Every mission ends in a NAV_LOITER_UNLIM; none in RTL, whose way nobody looks at."""
 
@@ -152,6 +160,7 @@ class SkipperConfig:
     # Steered in GUIDED the mission is on board all the same, its count kept in step; but a companion that dies leaves a
     # boat that loiters where it is.
     guidance: Guidance = Guidance.PLAN
+    learn: Learning = Learning.USE
     station_s: float = 0.0  # how long to stay at the last goal
     adopts: bool = False  # the goals were drawn on the autopilot: others may be, under way
     ends: Ends = Ends()

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from companion.boat import Afloat, as_learned, mark_of
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import AutopilotStatus, Mode, Severity
@@ -25,7 +26,7 @@ from companion.skipper.step.actions import (
     UploadFence,
     UploadMission,
 )
-from companion.skipper.step.config import Guidance, Permissions, SkipperConfig
+from companion.skipper.step.config import Guidance, Learning, Permissions, SkipperConfig
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Diversion, Route
 from companion.skipper.step.snapshot import Snapshot, still_air, wind_mean, wind_now
@@ -106,11 +107,23 @@ def _is_fence_off(state: SkipperState, snapshot: Snapshot) -> bool:
     return snapshot.autopilot is not None and snapshot.autopilot.fence_on is False
 
 
+def with_learned_boat(voyage: Voyage, config: SkipperConfig, state: SkipperState) -> Voyage:
+    """Return the voyage with its boat as she was found to sail, where plans are to be told of that."""
+    known = state.afloat.known
+    if not known.is_used or config.learn is not Learning.USE or known.of != mark_of(voyage.boat):
+        return voyage
+    return replace(voyage, boat=as_learned(voyage.boat, known.told))
+
+
 class StepContext:
-    """The work of one step. ``voyage`` is in the water that the autopilot's fences leave: ``circle`` and ``drawn``."""
+    """The work of one step. ``voyage`` is in the water that the autopilot's fences leave: ``circle`` and ``drawn``.
+
+    Its boat is the one that plans are of, ``boat_of_file`` as the mission has her.
+    """
 
     def __init__(self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot) -> None:
-        self._charted = voyage
+        self.boat_of_file = voyage.boat
+        voyage = self._charted = with_learned_boat(voyage, config, state)
         voyage = _with_shoals(voyage, state)
         self.circle = circle_of(voyage, snapshot.limits, snapshot.autopilot, snapshot.position_en_m)
         self.drawn = drawn_of(
@@ -141,6 +154,7 @@ class StepContext:
         adrift: Adrift | None = None,
         soundings: Soundings | None = None,
         tacking: Tacking | None = None,
+        afloat: Afloat | None = None,
         position: PositionState | None = None,
         orders: Orders | None = None,
         alarms: Alarms | None = None,
@@ -175,6 +189,8 @@ class StepContext:
             state = changed(state, soundings=soundings)
         if tacking is not None:
             state = changed(state, tacking=tacking)
+        if afloat is not None:
+            state = changed(state, afloat=afloat)
         if position is not None:
             state = changed(state, position=position)
         if orders is not None:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+from companion.boat import LearnedAfloat
 from companion.mavlink.wire import mission_hash
 from companion.messages import GeoPoint, MissionItem, Mode
 from companion.orders import BY_VERB, Verb
@@ -23,6 +24,7 @@ MAX_QUARTERS = 10**6  # turns round one buoy
 MOST_IRONS_S = 60.0  # more is a lull that the boat waited in: no room of a tack would be enough ever after
 MOST_LEE_MPS = 1.0  # more is a position that has jumped
 NO_FAILED_TACK = (0.0, 0.0, 0.0)
+NOTHING_LEARNED = LearnedAfloat()
 _NUMBERS = (
     "plan_t_s",
     "plan_twd_from_rad",
@@ -137,6 +139,7 @@ class Persisted:
     place: SavedPlace | None = None  # where the boat was
     latency: PlannerLatency = NO_ANSWERS  # of the planner on this computer
     shoals: tuple[Shoal, ...] = ()  # that were sounded
+    afloat: LearnedAfloat = NOTHING_LEARNED  # what is known of the boat from this voyage
     water: GeoPoint | None = None  # the origin of all metres here; None: the mission's
 
     @property
@@ -178,6 +181,7 @@ class Persisted:
             "place": _place_to_list(self.place),
             "latency": [list(self.latency.answers_s), self.latency.room_s, self.latency.speed],
             **({"shoals": [_shoal_to_list(s) for s in self.shoals]} if self.shoals else {}),
+            **({} if self.afloat == NOTHING_LEARNED else {"afloat": self.afloat.to_dict()}),
             **({} if self.water is None else {"water": [self.water.lat_deg, self.water.lon_deg]}),
         }
 
@@ -220,6 +224,7 @@ class Persisted:
                 place=_place_from_list(data.get("place")),
                 latency=_latency(data.get("latency")),
                 shoals=tuple(_shoal_from_list(s) for s in data.get("shoals", ())[-MOST_SHOALS:]),
+                afloat=NOTHING_LEARNED if data.get("afloat") is None else LearnedAfloat.from_dict(data["afloat"]),
                 water=None
                 if data.get("water") is None
                 else GeoPoint(lat_deg=_number(data["water"][0]), lon_deg=_number(data["water"][1])),

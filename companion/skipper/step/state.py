@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from companion.boat import Afloat
 from companion.field.guidance import LastResort
 from companion.field.station import StationState
 from companion.field.values import GuidanceState
@@ -81,6 +82,7 @@ class Tacking:
 
 
 NO_TACKS = Tacking()
+NOTHING_LEARNED = Afloat()
 
 
 class Phase(enum.Enum):
@@ -470,6 +472,7 @@ class SkipperState:
     adrift: Adrift = Adrift()
     soundings: Soundings = Soundings()
     tacking: Tacking = NO_TACKS  # what the boat's tacks have told
+    afloat: Afloat = NOTHING_LEARNED  # what her sailing has, of her speeds
     position: PositionState = PositionState()
     orders: Orders = Orders()
     alarms: Alarms = Alarms()
@@ -521,6 +524,7 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         place=state.position.place,
         latency=state.plans.latency,
         shoals=state.soundings.shoals,
+        afloat=state.afloat.saved,
     )
 
 
