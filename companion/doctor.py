@@ -666,6 +666,14 @@ def examine_steering(steering: Steering, parameters: Mapping[str, float] | None 
     _rate_control(report, steering)
     _turns(report, steering)
     _steady(report, steering)
+    report.add(
+        Level.INFO,
+        "tuning sails",
+        "SAIL_ANGLE_IDEAL, _MIN and _MAX cannot be judged by these logs",
+        "the sheet follows the apparent wind by them, so that each wind was sailed with one trim: sail a reach there "
+        "and back with SAIL_ANGLE_IDEAL 5 more, and again with 5 less, and compare what is learned from each",
+        name="SAIL_ANGLE_IDEAL",
+    )
     first: DoctorFinding | None = None
     findings = []
     for f in report.findings:

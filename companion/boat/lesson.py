@@ -176,6 +176,15 @@ def _by_wind(tacks: list[Manoeuvre]) -> tuple[tuple[float, Chances], ...]:
     return tuple(((n + 0.5) * WIND_BIN_MPS, chances(bins[n])) for n in sorted(bins))
 
 
+def offset_step_deg(vane: Known) -> float:
+    """Return what WNDVN_DIR_OFS is to be changed by [deg].
+
+    ArduPilot adds it to what an analog vane (WNDVN_TYPE 3) or an NMEA one (4) says, clockwise from the bow, and to no
+    other's (AP_WindVane_Analog.cpp, AP_WindVane_NMEA.cpp; master of 2025).
+    """
+    return -math.degrees(vane.mean)
+
+
 def _with_findings(lesson: Lesson) -> Lesson:
     return replace(lesson, findings=tuple(_findings(lesson)))
 
@@ -187,8 +196,9 @@ def _findings(lesson: Lesson) -> list[str]:
     if abs(vane.mean) > max(CERTAIN * vane.sd, TELLING):
         out.append(
             f"the vane points {abs(math.degrees(vane.mean)):.1f} degrees too far to "
-            f"{'starboard' if vane.mean > 0.0 else 'port'} (deviation {vane_sd}): turn it, or change WNDVN_DIR_OFS by "
-            f"{-math.degrees(vane.mean):+.1f}, in steps of 5 at most, and learn from later logs"
+            f"{'starboard' if vane.mean > 0.0 else 'port'} (deviation {vane_sd}): turn it back, or change "
+            f"WNDVN_DIR_OFS (of an analog or NMEA vane) by {offset_step_deg(vane):+.1f}, in steps of 5 at most, "
+            "and learn from later logs"
         )
     elif not settled(vane, OPEN_VANE):
         out.append(

@@ -8,7 +8,7 @@ import pytest
 
 from companion.boat.guess import Sizes, guessed_polar
 from companion.boat.learn import TWA_DEG, TWS_MPS, learn
-from companion.boat.lesson import lesson_of
+from companion.boat.lesson import lesson_of, offset_step_deg
 from companion.boat.log import NEAR_RAD, Why, stretches_of
 from companion.boat.manoeuvres import chances, manoeuvres_of
 from companion.boat.towed import driven
@@ -323,3 +323,22 @@ def test_a_stream_that_four_headings_told_within_a_quarter_of_an_hour_is_known()
     assert "a circle" not in " ".join(lesson.findings)
     for known, true in zip(lesson.boat.currents[0], SLOW.current_en_mps, strict=True):
         assert abs(known.mean - true) < 2.5 * known.sd < 0.2
+
+
+@pytest.mark.parametrize("vane_deg", [7.0, -7.0])
+def test_the_step_of_the_offset_that_is_told_brings_the_vane_back(vane_deg):
+    """ArduPilot tells what the vane says and WNDVN_DIR_OFS together."""
+
+    def told(offset_deg, seed):
+        log = sailed(replace(SLOW, vane_deg=vane_deg), hours=1.0, seed=seed)
+        log = replace(log, awa_rad=log.awa_rad + math.radians(offset_deg))
+        return lesson_of([log], PRIOR, ERROR, no_go_half_rad=math.radians(45.0))
+
+    first = told(0.0, 3)
+    [finding] = [f for f in first.findings if "WNDVN_DIR_OFS" in f]
+    step = offset_step_deg(first.boat.vane)
+    assert f"by {step:+.1f}" in finding
+    assert ("to starboard" in finding) is (vane_deg > 0.0)
+    after = told(step, 4)
+    assert abs(after.boat.vane.mean) < math.radians(3.0)
+    assert not [f for f in after.findings if "WNDVN_DIR_OFS" in f]

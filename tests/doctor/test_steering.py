@@ -186,7 +186,9 @@ def test_what_the_autopilot_has_now_counts_before_what_the_log_says():
 
 
 def test_where_nothing_was_turned_it_is_said():
-    (finding,) = examine_steering(steering_of([steered(tack_s=1e9, minutes=3.0)]))
+    finding, sails = examine_steering(steering_of([steered(tack_s=1e9, minutes=3.0)]))
+    assert (sails.code, sails.level, sails.wanted) == ("tuning sails", Level.INFO, None)
+    assert "one trim" in sails.why
     assert "too few turns" in finding.what
 
 
