@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from companion.boat import BoatLog, Polar
 from companion.boat.guess import guessed_polar
 from companion.boat.learn import LEAST_STRETCHES, TWA_DEG, TWS_MPS, learn
-from companion.boat.log import stretches_of
+from companion.boat.log import Why, stretches_of
 from lab.simulated_logs import SIZES, Truth, sailed
 
 Floats = NDArray[np.float64]
@@ -39,6 +39,7 @@ NODE = 3  # of the learner's winds: outings are sailed in it
 NO_GO_DEG = 45.0
 LEVELS = (0.80, 0.95)
 SPREAD = {"scale": 0.3, "shape": 0.1, "lean": 0.04, "day": 0.05}  # logarithms
+TOWED_SHARE = 0.33
 DISTURBED: dict[str, dict[str, float | int]] = {
     "nothing": {},
     "tide of 0.4 m/s": {"tide_mps": 0.4},
@@ -51,7 +52,7 @@ DISTURBED: dict[str, dict[str, float | int]] = {
     "leeway of 15 degrees": {"leeway_deg": 15.0},
     "log tells 20 % less by half": {"log_step": 0.2},
     "vane sticks for a third": {"stuck_share": 0.33},
-    "towed for a third": {"towed_share": 0.33},
+    "towed for a third": {"towed_share": TOWED_SHARE},
 }
 
 
@@ -178,6 +179,19 @@ def _time(velocity: Floats, i: int, j: int, course: Floats) -> float:
     return float(np.sum(np.maximum(shares, 0.0)))
 
 
+def tows_told(seed: int, share: float, hours: float) -> tuple[int, int, int]:
+    """Return of boat ``seed``, towed for the last ``share`` of each outing, how many stretches are taken for driven.
+
+    And how many are not: of those that were towed, and of those that were sailed.
+    """
+    rng = np.random.default_rng([seed, 38])
+    logs = outings(replace(drawn(rng), towed_share=share), hours, rng)
+    found = stretches_of(logs, guessed_polar(SIZES), PRIOR_ERROR)
+    begins = {log.name: (1.0 - share) * (log.t_s[-1] - log.t_s[0]) + log.t_s[0] for log in logs}
+    towed = np.array([t > begins[found.outing_names[o]] for t, o in zip(found.t_s, found.outing, strict=True)])
+    return found.left_out[Why.DRIVEN], int(np.sum(towed)), int(np.sum(~towed))
+
+
 def inside(marks: Sequence[Marks], level: float) -> float:
     """Return the share of speeds that are within the band of this level."""
     z = np.concatenate([m.error / m.promised for m in marks])
@@ -201,10 +215,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m lab.boat_learning", description="How well boats are learned.")
     parser.add_argument("--boats", type=int, default=24, metavar="N", help="of each row (default: 24)")
     parser.add_argument("--hours", type=float, nargs="+", default=[0.5, 2.0], metavar="H", help="(default: 0.5 2)")
+    parser.add_argument("--first", type=int, default=0, metavar="SEED", help="of the boats (default: 0)")
+    parser.add_argument(
+        "--tows", action="store_true", help="how many stretches are taken for a tow, of boats with and without"
+    )
     parser.add_argument("--only", choices=DISTURBED, metavar="ROW", help="one row, by its name")
     parser.add_argument("--workers", type=int, default=1, metavar="W", help="processes (default: 1)")
     args = parser.parse_args(arguments)
-    say = sys.stdout.write
+    say, seeds = sys.stdout.write, range(args.first, args.first + args.boats)
+    if args.tows:
+        with ProcessPoolExecutor(args.workers) as pool:
+            for share in (0.0, TOWED_SHARE):
+                for hours in args.hours:
+                    told = np.array(list(pool.map(partial(tows_told, share=share, hours=hours), seeds)))
+                    driven, towed, sailed_ = told.sum(axis=0).tolist()
+                    any_told = int(np.sum(told[:, 0] > 0))
+                    say(
+                        f"towed for {share:.2f}, {hours:g} h: {driven} stretches taken for driven, of {any_told} of "
+                        f"{args.boats} boats; {towed} towed ones are kept, {sailed_} sailed ones\n"
+                    )
+        return 0
     say(
         f"{'not as believed':<28}{'hours':>6}{'guessed':>9}{'learned':>9}{'in 80':>8}{'in 95':>8}{'offsets':>9}"
         f"{'guessed':>9}{'learned':>8}{'worst':>8}\n"
@@ -213,7 +243,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with ProcessPoolExecutor(args.workers) as pool:
         for name in DISTURBED if args.only is None else [args.only]:
             for hours in args.hours:
-                found = list(pool.map(partial(marks_of, disturbed=name, hours=hours), range(args.boats)))
+                found = list(pool.map(partial(marks_of, disturbed=name, hours=hours), seeds))
                 marks = [m for m in found if m is not None]
                 absent = len(found) - len(marks)
                 say(_row(name, hours, marks) + (f"   {absent} not learned" if absent else "") + "\n")

@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 
-from companion.boat import AutopilotLimits
+from companion.boat import AutopilotLimits, steering_of
 from companion.cli import main
 from companion.clock import run_virtual
 from companion.commands.doctor import as_json, as_text, diagnose, limits_at, needs_of
@@ -20,6 +20,7 @@ from lab.campaigns.signed_link import Signer
 from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot.memory_link import frames
 from sitl.world.environment import parse_wind
+from tests.doctor.test_steering import RIGHT_FF, steered
 from tests.sitl.boats import boat_process
 
 # ArduRover's sailboat as `sim_vehicle.py -f sailboat` starts it.
@@ -273,7 +274,7 @@ def test_a_new_mission_has_the_margin_that_the_doctor_finds_enough(tmp_path, cap
     assert load_mission(tmp_path / "asked.toml").margin_m > load_mission(tmp_path / "default.toml").margin_m
 
 
-def doctor(parameters, *, apply=False, prepare=None, signing=None):
+def doctor(parameters, *, apply=False, prepare=None, signing=None, steering=None):
     """Run the doctor against the simulated autopilot over a link in memory."""
 
     async def consult():
@@ -292,7 +293,9 @@ def doctor(parameters, *, apply=False, prepare=None, signing=None):
         if prepare is not None:
             prepare(link)
         async with serve(autopilot, [link.far]):
-            return await diagnose(link.near, Needs(speed_mps=2.5), apply=apply, signing=signing, wait_s=5.0)
+            return await diagnose(
+                link.near, Needs(speed_mps=2.5), apply=apply, signing=signing, wait_s=5.0, steering=steering
+            )
 
     return run_virtual(consult())
 
@@ -320,6 +323,23 @@ def test_apply_sets_and_reads_back(consulted):
     data = as_json(findings, changes)
     assert {c["parameter"] for c in data["changes"]} == set(done)
     assert all(math.isfinite(c["wanted"]) for c in data["changes"])
+
+
+@pytest.mark.parametrize(("now", "wanted"), [(0.4, 0.52), (RIGHT_FF, None)])
+def test_beside_a_living_autopilot_logs_are_held_against_what_it_has_and_of_them_nothing_is_set(now, wanted):
+    """The log was sailed by 0.4, whatever is set since."""
+    steering = steering_of([steered(ATC_STR_RAT_FF=0.4)])
+    findings, changes = doctor({"OA_TYPE": 2.0, "ATC_STR_RAT_FF": now}, apply=True, steering=steering)
+    tuning = {f.code: f for f in findings}["tuning FF"]
+    assert tuning.value == pytest.approx(now)
+    assert tuning.wanted == wanted
+    assert "OA_TYPE" in {c.name for c in changes}
+    assert not {"ATC_STR_RAT_FF", "SAIL_ANGLE_IDEAL"} & {c.name for c in changes}
+    text = as_text(findings, changes, applied=True)
+    assert ("set ATC_STR_RAT_FF 0.52 (now 0.4)" in text) is (wanted is not None)
+    assert "apply   ATC_STR_RAT_FF" not in text
+    data = as_json(findings, changes)
+    assert "ATC_STR_RAT_FF" not in {c["parameter"] for c in data["changes"]}
 
 
 KEY = bytes(range(32))
