@@ -139,7 +139,7 @@ async def _place_fence(fold: VoyageFold, autopilot: Autopilot, mission: Mission,
 
 async def _upload_fence(autopilot: Autopilot, mission: Mission, record: Record) -> None:
     """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
-    places = [*mission.places, *([mission.start] if mission.start else [])]
+    places = [*([mission.start] if mission.start else []), *mission.places]
     fence = fence_for_autopilot(mission.area, mission.margin_m, inside=places)
     done: dict[str, Any] = {"kind": "fence", "status": fence.status.name, "text": fence.reason}
     trouble = "" if fence.items or fence.status is FenceStatus.EMPTY else fence.reason
@@ -151,8 +151,12 @@ async def _upload_fence(autopilot: Autopilot, mission: Mission, record: Record) 
             enabled = await _enable_fence(autopilot)
             done["enabled"] = enabled.outcome.value
             trouble = "" if enabled.is_ok else enabled.text or enabled.outcome.value
+    if fence.left_out:
+        done["reach_m"] = round(fence.reach_m, 1)
     if trouble:
         autopilot.say(int(Severity.ERROR), f"the fence is not in force: {trouble}")
+    elif fence.left_out:
+        autopilot.say(int(Severity.WARNING), f"the autopilot's fence: {fence.left_out}")
     record(done)
 
 

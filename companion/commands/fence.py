@@ -270,6 +270,8 @@ def simplified(args: argparse.Namespace, document: Document) -> AutopilotFence:
         raise JobError(f"{args.file}: no fence for the autopilot: {result.reason}")
     for note in result.notes:
         print(f"{args.file}: note: {note}")
+    if result.left_out:
+        print(f"{args.file}: warning: {result.left_out}")
     print(f"{args.file}: {len(result.items)} fence items, which use {result.used_m:.1f} m of the {margin_m:g} m margin")
     return result
 

@@ -5,6 +5,9 @@ inside the limits and holds all water that the planner may use. So the fence nev
 forbid, and never stops a boat that is where its plan may put it. Both halves are proved on the items' own integers
 (``prove``), in the plane of longitude and latitude in which ArduPilot draws its polygons.
 
+Of a chart's obstacles there may be more than that holds: then it is what lies within some distance of the straight way
+through the places (``reach_m``), as far as the items suffice, and land is cut there. What lies farther off is not held.
+
 Rings are reduced by two moves that each only add area on the outer side: drop a vertex that points inward, or drop
 an edge and let its neighbours meet. A move is taken if the triangle that it adds is allowed, cheapest first, so
 the result contains the ring by construction.
@@ -15,7 +18,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -23,7 +26,7 @@ from numpy.typing import NDArray
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from companion.geofence.area import Area, parts
+from companion.geofence.area import Area, buffer_out, parts
 from companion.geofence.document import FindingLevel
 from companion.geofence.formats.fence_items import (
     MAX_FENCE_ITEMS,
@@ -293,11 +296,14 @@ def cut_by_rings(
 # The proof that fence items are a proper fence for an area, from the items' own integers.
 
 
-def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: Sequence[GeoPoint]) -> str:
+def prove(
+    area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: Sequence[GeoPoint], reach_m: float = math.inf
+) -> str:
     """Return why the items are not a proper fence for the area, "" when they are. Independent of how they were made.
 
     Checked with shapely on the items as they go to the autopilot: every obstacle that the keep-in zones leave in
-    reach is covered by the keep-out zones; the keep-in zones lie inside the limits; no keep-out zone reaches water
+    reach, and what of it lies within ``reach_m`` of the straight way through ``inside``, is covered by the keep-out
+    zones; the keep-in zones lie inside the limits (with their holes as far as that); no keep-out zone reaches water
     farther than ``margin_m`` from every obstacle; all water of the start's piece that is ``margin_m`` inside the
     limits stays inside the keep-in zones; no place is shut out.
     """
@@ -316,8 +322,12 @@ def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: 
         [_inner(z.shape, plane) for z in zones if z.kind is ZoneKind.EXCLUSION] or [Polygon()]
     )
     obstacles = [(o, shape_in(o.shape, plane, cover=True)[0]) for o in area.solids]
+    near: BaseGeometry | None = None
+    if math.isfinite(reach_m):
+        near = shapely.buffer(_way(plane, inside), reach_m * (1.0 + plane.error) * BAND_SPARE, quad_segs=32)
     for obstacle, polygon in obstacles:
         reach = polygon if keep_in is None else shapely.intersection(polygon, keep_in)
+        reach = reach if near is None else shapely.intersection(reach, near)
         left = shapely.difference(reach, shapely.buffer(out_small, slack_m))
         if shapely.area(left) > slack_m * max(1.0, float(polygon.length)):
             return f"the keep-out zones do not hold {obstacle.name or 'an obstacle'}"
@@ -325,6 +335,8 @@ def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: 
         polygon, _ = shape_in(zone.shape, plane, cover=False)
         if any(_within_rim(z, zone, margin_m, plane) for z in zones):
             continue
+        if near is not None:
+            polygon = shapely.union(polygon, shapely.difference(Polygon(polygon.exterior), near))
         reach = shapely.difference(keep_in, out_small) if keep_in is not None else None
         if reach is None or not shapely.covers(shapely.buffer(polygon, slack_m), reach):
             return f"the keep-in zone is not inside {zone.name or 'the limits'}"
@@ -359,6 +371,12 @@ def prove(area: Area, items: Sequence[MissionItem], margin_m: float, *, inside: 
     return ""
 
 
+def _way(plane: Plane, places: Sequence[GeoPoint]) -> BaseGeometry:
+    """Return the straight way through the places, a point where there is one only."""
+    points = [plane.point(p) for p in places]
+    return shapely.Point(points[0]) if len(points) == 1 else shapely.LineString(points)
+
+
 def _within_rim(zone: Zone, rim: Zone, margin_m: float, plane: Plane) -> bool:
     """Whether a circle lies inside another by no more than the margin: their radii share one scale."""
     if not (isinstance(zone.shape, Circle) and isinstance(rim.shape, Circle)) or rim.margin_m:
@@ -381,6 +399,8 @@ def _inner(shape: Shape, plane: Plane) -> Polygon:
 
 # How much of the margin a simplification may use: the least that fits leaves the most room between plan and fence.
 STEPS = (0.25, 0.4, 0.55, 0.7, 0.85, 1.0)
+REFINED = 4  # halvings of the span in which the largest reach lies
+BAND_SPARE = 1.001  # a band that is drawn with 128 corners holds all that is so near
 RESERVE_M = 0.03  # rounding to 1e-7 degrees moves a vertex by at most 8 mm; the rest is for edges
 
 
@@ -401,16 +421,25 @@ class AutopilotFence:
     """The outcome: ``items`` for upload when ``status`` is OK, otherwise the ``reason``.
 
     ``used_m`` is how much of ``margin_m`` the zones stick out at most: a boat on its plan is at least
-    ``margin_m - used_m`` from the fence.
+    ``margin_m - used_m`` from the fence. Obstacles are held as far as ``reach_m`` from the straight way through the
+    places: all of them, or what the autopilot has room for.
     """
 
     status: FenceStatus
     reason: str
     margin_m: float
     used_m: float = 0.0
+    reach_m: float = math.inf
     zones: tuple[Zone, ...] = ()
     items: tuple[MissionItem, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def left_out(self) -> str:
+        """What the fence does not hold, in words; "" where it holds all."""
+        if math.isinf(self.reach_m):
+            return ""
+        return f"only what lies within {self.reach_m:.0f} m of the straight way is in it: there is no room for more"
 
 
 @dataclass(frozen=True)
@@ -422,10 +451,11 @@ class _Solid:
 
 
 def fence_for_autopilot(area: Area, margin_m: float, *, inside: Sequence[GeoPoint]) -> AutopilotFence:
-    """Return the area as at most MAX_FENCE_ITEMS fence items.
+    """Return the area as at most MAX_FENCE_ITEMS fence items, all of it or what lies nearest to the way.
 
     ``margin_m`` is what the planner keeps clear of obstacles and limits; ``inside`` are the places (start, goals)
-    that the boat must be able to sail to, the first of them in the water that counts. Same input, same output.
+    that the boat must be able to sail to, in their order, the first of them in the water that counts. Same input, same
+    output.
     """
 
     def refuse(status: FenceStatus, reason: str) -> AutopilotFence:
@@ -445,39 +475,95 @@ def fence_for_autopilot(area: Area, margin_m: float, *, inside: Sequence[GeoPoin
     limits = cut_by_rings(area, plane, places, limits, notes)
     if limits is not None and limits.is_empty:
         return refuse(FenceStatus.NO_WATER, "the start is not inside the fence")
-    status, last = FenceStatus.NO_MARGIN, ""
-    for step in STEPS:
-        zones, last = _attempt(plane, solids, limits, rim, usable_m * step, usable_m)
-        if zones is None:
-            status = FenceStatus.NO_MARGIN
-            continue
-        items, _ = zones_to_items(zones)
-        stored = storage_bytes(items)
-        if len(items) > MAX_FENCE_ITEMS or stored > STORAGE_BYTES or any(_sides(z) > MAX_RING for z in zones):
-            status = FenceStatus.TOO_MANY_ITEMS
-            worst = sorted(((_sides(z), z.name or z.kind.value) for z in zones), reverse=True)[:3]
-            last = (
-                f"{len(items)} items of {stored} bytes are needed where the autopilot holds {MAX_FENCE_ITEMS} items in "
-                f"{STORAGE_BYTES} bytes, even with "
-                f"{step * margin_m:.1f} m of the {margin_m:g} m margin used; most go to "
-                + ", ".join(f"{name} ({n})" for n, name in worst)
-                + "; raise margin_m, merge or drop obstacles"
+    way = _way(plane, inside)
+
+    def made(reach_m: float, steps: Sequence[float]) -> AutopilotFence:
+        """Return the fence of what lies so near to the way, with the least of the margin that is enough for it."""
+        around, held = _near(solids, way, reach_m * (1.0 + plane.error))
+        status, last = FenceStatus.NO_MARGIN, ""
+        for step in steps:
+            zones, last = _attempt(plane, around, held, limits, rim, usable_m * step, usable_m)
+            if zones is None:
+                status = FenceStatus.NO_MARGIN
+                continue
+            items, _ = zones_to_items(zones)
+            last = _too_many(zones, items, step * margin_m, margin_m)
+            if last:
+                status = FenceStatus.TOO_MANY_ITEMS
+                continue
+            fault = prove(area, items, margin_m, inside=inside, reach_m=reach_m)
+            if fault:
+                status, last = (
+                    FenceStatus.START_ENCLOSED if "would be outside" in fault else FenceStatus.NO_MARGIN,
+                    fault,
+                )
+                continue
+            return AutopilotFence(
+                status=FenceStatus.OK,
+                reason="",
+                margin_m=margin_m,
+                used_m=step * margin_m,
+                reach_m=reach_m,
+                zones=tuple(zones),
+                items=items,
+                notes=tuple(notes),
             )
-            continue
-        fault = prove(area, items, margin_m, inside=inside)
-        if fault:
-            status, last = FenceStatus.START_ENCLOSED if "would be outside" in fault else FenceStatus.NO_MARGIN, fault
-            continue
-        return AutopilotFence(
-            status=FenceStatus.OK,
-            reason="",
-            margin_m=margin_m,
-            used_m=step * margin_m,
-            zones=tuple(zones),
-            items=items,
-            notes=tuple(notes),
-        )
-    return refuse(status, last)
+        return refuse(status, last)
+
+    whole = made(math.inf, STEPS)
+    if whole.status not in (FenceStatus.TOO_MANY_ITEMS, FenceStatus.NO_MARGIN):
+        return whole
+    reach_m = _largest_reach_m(
+        margin_m,
+        max((float(shapely.hausdorff_distance(s.polygon, way)) for s in solids), default=0.0),
+        lambda reach_m: made(reach_m, STEPS[-1:]).status is FenceStatus.OK,
+    )
+    return whole if reach_m is None else made(reach_m, STEPS)
+
+
+def _largest_reach_m(least_m: float, most_m: float, fits: Callable[[float], bool]) -> float | None:
+    """Return how far from the way the obstacles fit, within a twentieth; None where not even the nearest do."""
+    low_m: float | None = None
+    high_m = least_m
+    while high_m < most_m and fits(high_m):
+        low_m, high_m = high_m, 2.0 * high_m
+    if low_m is None:
+        return None
+    for _ in range(REFINED):
+        middle_m = math.sqrt(low_m * high_m)
+        low_m, high_m = (middle_m, high_m) if fits(middle_m) else (low_m, middle_m)
+    return low_m
+
+
+def _near(solids: list[_Solid], way: BaseGeometry, reach_m: float) -> tuple[list[_Solid], list[_Solid]]:
+    """Return the obstacles that come within ``reach_m`` of the way, and what of them lies there; circles stay whole."""
+    if math.isinf(reach_m):
+        return solids, solids
+    band = buffer_out(way, reach_m * BAND_SPARE**2)
+    shapely.prepare(band)
+    around = [s for s in solids if shapely.intersects(band, s.polygon)]
+    held: list[_Solid] = []
+    for solid in around:
+        if solid.circle is not None or shapely.covers(band, solid.polygon):
+            held.append(solid)
+        else:
+            pieces = parts(shapely.intersection(band, solid.polygon))
+            held += [replace(solid, polygon=Polygon(piece.exterior)) for piece in pieces]
+    return around, held
+
+
+def _too_many(zones: Sequence[Zone], items: Sequence[MissionItem], used_m: float, margin_m: float) -> str:
+    """Return why the autopilot has no room for the items; "" where it has."""
+    stored = storage_bytes(items)
+    if len(items) <= MAX_FENCE_ITEMS and stored <= STORAGE_BYTES and all(_sides(z) <= MAX_RING for z in zones):
+        return ""
+    worst = sorted(((_sides(z), z.name or z.kind.value) for z in zones), reverse=True)[:3]
+    return (
+        f"{len(items)} items of {stored} bytes are needed where the autopilot holds {MAX_FENCE_ITEMS} items in "
+        f"{STORAGE_BYTES} bytes, even with {used_m:.1f} m of the {margin_m:g} m margin used; most go to "
+        + ", ".join(f"{name} ({n})" for n, name in worst)
+        + "; raise margin_m, merge or drop obstacles"
+    )
 
 
 def _sides(zone: Zone) -> int:
@@ -518,15 +604,16 @@ def _island(ring: BaseGeometry, plane: Plane, index: int) -> Obstacle:
 
 def _attempt(
     plane: Plane,
-    solids: list[_Solid],
+    around: list[_Solid],
+    held: list[_Solid],
     limits: BaseGeometry | None,
     rim: Circle | None,
     tolerance_m: float,
     usable_m: float,
 ) -> tuple[list[Zone] | None, str]:
-    """Return zones that stick out by at most ``tolerance_m``, or why there are none."""
+    """Return zones round all that is ``held``, within ``tolerance_m`` of what is ``around``, or why there are none."""
     zones: list[Zone] = []
-    reserve_m = RESERVE_M + _bulge_m(solids, limits, plane)
+    reserve_m = RESERVE_M + _bulge_m(held, limits, plane)
     if limits is not None:
         zone = _keep_in(plane, limits, rim, tolerance_m, reserve_m)
         if zone is None:
@@ -537,17 +624,17 @@ def _attempt(
         shapely.union_all(
             [
                 shapely.buffer(s.polygon, max(tolerance_m, share * s.margin_m / (1.0 + plane.error)), quad_segs=16)
-                for s in solids
+                for s in around
             ]
         )
-        if solids
+        if around
         else MultiPolygon()
     )
     if limits is not None:
         beyond = shapely.difference(shapely.box(*limits.buffer(1e4).bounds), shapely.buffer(limits, -tolerance_m))
         allowed = shapely.union(allowed, beyond)
     shapely.prepare(allowed)
-    for group in _groups(solids, allowed):
+    for group in _groups(held, allowed):
         zone = _keep_out(plane, group, allowed, tolerance_m, reserve_m)
         if zone is None:
             return None, f"{group[0].name} does not fit into {tolerance_m:.2f} m of margin"

@@ -325,11 +325,11 @@ def _items(area: Area, conditions: AreaConditions, findings: Findings) -> None:
     result = fence_for_autopilot(area, conditions.margin_m, inside=[conditions.start, *conditions.goals])
     if result.status is FenceStatus.OK:
         findings.add(
-            FindingLevel.NOTE,
+            FindingLevel.WARNING if result.left_out else FindingLevel.NOTE,
             Code.TOO_MANY_ITEMS,
             "",
             f"{text}; simplified it takes {len(result.items)} and uses {result.used_m:.1f} m of the "
-            f"{conditions.margin_m:g} m margin",
+            f"{conditions.margin_m:g} m margin" + (f"; {result.left_out}" if result.left_out else ""),
         )
     else:
         findings.add(

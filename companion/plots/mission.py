@@ -276,11 +276,9 @@ def _draw_autopilot(axes: Axes, mission: Mission, frame: LocalFrame) -> list[Han
     for zone in result.zones:
         ring = polygon_en(zone.shape, frame, cover=zone.kind is ZoneKind.EXCLUSION)
         axes.add_patch(PathPatch(outline(ring), fc="none", ec=AUTOPILOT, lw=0.9, ls=(0, (3, 2)), zorder=4))
-    return [
-        Line2D(
-            [], [], color=AUTOPILOT, lw=0.9, ls=(0, (3, 2)), label=f"fence on the autopilot ({len(result.items)} items)"
-        )
-    ]
+    held = f", {result.reach_m:.0f} m about the straight way" if result.left_out else ""
+    label = f"fence on the autopilot ({len(result.items)} items{held})"
+    return [Line2D([], [], color=AUTOPILOT, lw=0.9, ls=(0, (3, 2)), label=label)]
 
 
 def _draw_laylines(

@@ -3,11 +3,15 @@
 import asyncio
 from types import SimpleNamespace
 
+import pytest
+
 from companion.app.autopilot_upkeep import FENCE_EVERY_S, FENCE_READ_S, keep_fence, keep_parameters
 from companion.clock import now_s, run_virtual
 from companion.fold import ParameterStore
+from companion.geo.frame import LocalFrame
+from companion.geofence import Area, Circle, Obstacle
 from companion.mavlink.wire import RANGES
-from companion.messages import MissionItem
+from companion.messages import GeoPoint, MissionItem, Severity
 
 
 def test_a_parameter_that_seems_to_have_been_set_is_asked_for_again_whether_a_voyage_reads_it_or_not():
@@ -81,3 +85,50 @@ def test_what_is_drawn_on_the_autopilot_is_read_while_a_fence_is_in_force_and_no
         task.cancel()
 
     run_virtual(lived())
+
+
+@pytest.mark.parametrize("apart_m", [40.0, 400.0])
+def test_what_the_autopilots_fence_has_no_room_for_is_said_and_recorded(apart_m):
+    """A chart has more rocks than 84: the nearest go up, and nobody is left to believe that all of them did."""
+    start = GeoPoint(lat_deg=50.8, lon_deg=-1.3)
+    frame = LocalFrame(start)
+    rocks = tuple(
+        Obstacle(shape=Circle(frame.geo_from_en(100.0 + apart_m * (n % 10), apart_m * (n // 10)), 5.0))
+        for n in range(70)
+    )
+    area = Area(obstacles=rocks[:20] if apart_m == 40.0 else rocks)
+    mission = SimpleNamespace(start=start, places=(frame.geo_from_en(0.0, 300.0),), area=area, margin_m=5.0)
+    state = SimpleNamespace(vehicle=SimpleNamespace(is_ours=True), orders=SimpleNamespace(standing=None))
+    fold = SimpleNamespace(state=state, permissions=SimpleNamespace(may_upload_fence=True))
+    said, uploaded, records = [], [], []
+    done = SimpleNamespace(is_ok=True, outcome=SimpleNamespace(value="accepted"), text="")
+
+    async def upload_fence(items):
+        uploaded.append(items)
+        return done
+
+    async def enable_fence():
+        return done
+
+    autopilot = SimpleNamespace(
+        link=SimpleNamespace(is_alive=False),
+        status=None,
+        upload_fence=upload_fence,
+        enable_fence=enable_fence,
+        say=lambda *words: said.append(words),
+    )
+
+    async def lived():
+        task = asyncio.create_task(keep_fence(fold, autopilot, mission, records.append, None))
+        await asyncio.sleep(5.0)
+        task.cancel()
+
+    run_virtual(lived())
+    assert records[0]["count"] == len(uploaded[0]) > 10
+    if apart_m == 40.0:
+        assert (said, "reach_m" in records[0]) == ([], False)
+    else:
+        assert len(uploaded[0]) < len(rocks)
+        (severity, text), reach_m = said[0], records[0]["reach_m"]
+        assert severity == Severity.WARNING
+        assert f"only what lies within {reach_m:.0f} m of the straight way" in text

@@ -8,7 +8,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely.geometry import Polygon
+from shapely.geometry import LineString, Point, Polygon
 
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, Circle, Fence, Obstacle, Zone, ZoneKind, load_mission
@@ -33,9 +33,13 @@ def ground(shape, frame: LocalFrame, sides: int = 360) -> Polygon:
     return Polygon(frame.array_en_from_lonlat(unwrapped(np.asarray(fine.exterior.coords)[:, :2])))
 
 
-def check(result: AutopilotFence, area: Area, margin_m: float, origin: GeoPoint) -> None:
+def check(result: AutopilotFence, area: Area, margin_m: float, inside: list[GeoPoint]) -> None:
     """The promise, checked in another frame than the code's: azimuthal equidistant metres."""
-    frame = LocalFrame(origin)
+    frame = LocalFrame(inside[0])
+    way = [frame.en_from_geo(p) for p in inside]
+    band = shapely.box(-1e6, -1e6, 1e6, 1e6)
+    if math.isfinite(result.reach_m):
+        band = shapely.buffer(LineString(way) if len(way) > 1 else Point(way[0]), result.reach_m, quad_segs=90)
     zones, _ = items_to_zones(result.items, Findings())
     assert len(result.items) <= MAX_FENCE_ITEMS
     out = [ground(z.shape, frame) for z in zones if z.kind is ZoneKind.EXCLUSION]
@@ -45,7 +49,8 @@ def check(result: AutopilotFence, area: Area, margin_m: float, origin: GeoPoint)
     keep_in = inside[0] if inside else None
     closed = shapely.buffer(shapely.union_all(out) if out else Polygon(), 0.02)
     for obstacle in obstacles:
-        reach = obstacle if keep_in is None else shapely.intersection(obstacle, keep_in)
+        reach = shapely.intersection(obstacle, band)
+        reach = reach if keep_in is None else shapely.intersection(reach, keep_in)
         assert shapely.difference(reach, closed).area < 0.02
     for limit in limits:
         assert shapely.covers(shapely.buffer(limit, 0.02), shapely.difference(keep_in, closed))
@@ -70,7 +75,8 @@ def test_every_example_fits(path):
         assert result.status is FenceStatus.EMPTY
         return
     assert result.status is FenceStatus.OK, result.reason
-    check(result, mission.area, mission.margin_m, mission.origin)
+    assert result.reach_m == math.inf
+    check(result, mission.area, mission.margin_m, inside)
 
 
 @st.composite
@@ -118,7 +124,7 @@ def test_simplified_zones_hold_the_true_ones_within_the_margin(case):
             margin_m
             if not any(o.margin_m for o in area.solids)
             else max(margin_m, *(o.margin_m or 0.0 for o in area.solids)),
-            origin,
+            [origin],
         )
         assert 0.0 < result.used_m <= margin_m
         assert result == fence_for_autopilot(area, margin_m, inside=[origin])
@@ -165,20 +171,73 @@ def test_thousands_of_vertices_fit():
     result = fence_for_autopilot(Area(obstacles=(island(0.0, 1200.0, radii),)), 15.0, inside=[ORIGIN])
     assert result.status is FenceStatus.OK, result.reason
     assert len(result.items) < 40
-    check(result, Area(obstacles=(island(0.0, 1200.0, radii),)), 15.0, ORIGIN)
+    check(result, Area(obstacles=(island(0.0, 1200.0, radii),)), 15.0, [ORIGIN])
+
+
+def stars(count, of=(80.0, 20.0)):
+    """Obstacles that no circle holds: each takes ten items."""
+    return tuple(
+        island(300.0 * (i % 6) - 700.0, 300.0 * (i // 6) + 200.0, list(of) * 5, f"star {i}") for i in range(count)
+    )
+
+
+def test_of_more_than_fits_the_nearest_to_the_way_are_held():
+    """A chart has more rocks than the autopilot has room for: those at the way come first, the rest is told."""
+    many = Area(obstacles=stars(30))
+    inside = [ORIGIN, LocalFrame(ORIGIN).geo_from_en(50.0, 650.0)]  # between four of them
+    result = fence_for_autopilot(many, 5.0, inside=inside)
+    assert result.status is FenceStatus.OK, result.reason
+    check(result, many, 5.0, inside)
+    assert 100.0 < result.reach_m < 1000.0
+    assert f"within {result.reach_m:.0f} m of the straight way" in result.left_out
+    assert len(result.items) > MAX_FENCE_ITEMS / 2, "there is room for more"
+    elsewhere = [LocalFrame(ORIGIN).geo_from_en(-550.0, 1250.0), LocalFrame(ORIGIN).geo_from_en(-250.0, 1550.0)]
+    other = fence_for_autopilot(many, 5.0, inside=elsewhere)
+    check(other, many, 5.0, elsewhere)
+    assert {z.name for z in other.zones}.isdisjoint({"star 2", "star 3"})
+    wider = fence_for_autopilot(many, 60.0, inside=inside)
+    assert (wider.status, wider.reach_m, wider.left_out) == (FenceStatus.OK, math.inf, "")
+
+
+def test_of_a_coast_that_is_too_long_the_part_at_the_way_is_held():
+    """A cell's land is one polygon of miles: it is cut where the items end, inside of the land."""
+    rng = np.random.default_rng(5)
+    x = np.arange(-6000.0, 6000.0, 40.0)
+    shore = np.column_stack([x, 150.0 + 90.0 * (np.arange(len(x)) % 2) + rng.uniform(0.0, 20.0, len(x))])
+    ring = np.vstack([shore, [(6000.0, 4000.0), (-6000.0, 4000.0)]])
+    land = Obstacle(shape=Polygon(unwrapped(LocalFrame(ORIGIN).array_lonlat_from_en(ring))), name="land")
+    rim = Zone(kind=ZoneKind.INCLUSION, shape=Circle(ORIGIN, 6500.0))
+    area = Area(obstacles=(land,), fence=Fence(zones=(rim,)))
+    inside = [ORIGIN, LocalFrame(ORIGIN).geo_from_en(400.0, 0.0)]
+    result = fence_for_autopilot(area, 15.0, inside=inside)
+    assert result.status is FenceStatus.OK, result.reason
+    check(result, area, 15.0, inside)
+    assert 300.0 < result.reach_m < 5000.0
+    assert prove(area, result.items, 15.0, inside=inside, reach_m=result.reach_m) == ""
+    assert "do not hold land" in prove(area, result.items, 15.0, inside=inside, reach_m=2.0 * result.reach_m)
+    assert "do not hold land" in prove(area, result.items, 15.0, inside=inside)
+
+
+def test_a_hole_of_the_limits_that_is_too_far_off_is_let_go():
+    holes = [np.asarray(s.shape.exterior.coords) for s in stars(30)]
+    rim = island(0.0, 900.0, [3000.0] * 60).shape
+    area = Area(fence=Fence(zones=(keep_in(Polygon(rim.exterior, holes)),)))
+    result = fence_for_autopilot(area, 5.0, inside=[ORIGIN])
+    assert result.status is FenceStatus.OK, result.reason
+    assert 200.0 < result.reach_m < 1500.0
+    nearer = [z for z in result.zones if z.kind is ZoneKind.INCLUSION]
+    items, _ = zones_to_items(nearer)
+    assert "is not inside" in prove(area, items, 5.0, inside=[ORIGIN], reach_m=result.reach_m)
+    assert prove(area, items, 5.0, inside=[ORIGIN], reach_m=100.0) == ""
 
 
 def test_refusals_say_why():
-    stars = [
-        island(300.0 * (i % 6) - 700.0, 300.0 * (i // 6) + 200.0, [80.0, 20.0] * 5, f"star {i}") for i in range(30)
-    ]
-    many = fence_for_autopilot(Area(obstacles=tuple(stars)), 5.0, inside=[ORIGIN])
+    lake = Area(fence=Fence(zones=(keep_in(island(0.0, 0.0, [500.0, 440.0] * 60).shape),)))
+    many = fence_for_autopilot(lake, 5.0, inside=[ORIGIN])
     assert many.status is FenceStatus.TOO_MANY_ITEMS
     assert "autopilot holds 84" in many.reason
-    assert "star" in many.reason
-    wider = fence_for_autopilot(Area(obstacles=tuple(stars)), 60.0, inside=[ORIGIN])
-    assert wider.status is FenceStatus.OK, wider.reason
-    none = fence_for_autopilot(Area(obstacles=tuple(stars)), 0.05, inside=[ORIGIN])
+    assert "limits" in many.reason
+    none = fence_for_autopilot(Area(obstacles=stars(30)), 0.05, inside=[ORIGIN])
     assert none.status is FenceStatus.NO_MARGIN
     on_the_rock = fence_for_autopilot(Area(obstacles=(island(0.0, 0.0, [30.0] * 8),)), 10.0, inside=[ORIGIN])
     assert on_the_rock.status is FenceStatus.START_ENCLOSED

@@ -140,6 +140,10 @@ def test_more_vertices_than_the_autopilot_holds():
     assert "simplified it takes 1" in simpler.text
     tight = found(area, start=ORIGIN, margin_m=0.05)
     assert "cannot be simplified" in tight[Code.TOO_MANY_ITEMS, FindingLevel.WARNING].text
+    comb = [(x, 60.0 + 40.0 * (n % 2)) for n, x in enumerate(range(-2000, 2000, 25))]
+    land = Polygon(FRAME.array_lonlat_from_en(np.array([*comb, (2000.0, 900.0), (-2000.0, 900.0)])))
+    coast = found(Area(obstacles=(Obstacle(shape=land, name="coast"),)), start=ORIGIN, margin_m=3.0)
+    assert "of the straight way is in it" in coast[Code.TOO_MANY_ITEMS, FindingLevel.WARNING].text
 
 
 @pytest.mark.parametrize("radius_m", [30.0])
