@@ -1,12 +1,14 @@
 """Charts: what cells, coastlines and grids say of the water, made into obstacles and a fence.
 
-``read_chart`` reads one file, ``area_of`` makes the area of several. No area of it is fit for navigation.
+``read_chart`` reads one file, ``area_of`` makes the area of several, ``read_picture`` what is drawn of one. No area of
+it is fit for navigation.
 """
 
 from companion.chart.compile import TOLERANCE_M, ChartArea, Solid, area_of, containing
 from companion.chart.features import Chart, Danger, Row, Source, Wanted
 from companion.chart.grid import Grid, parse_ascii_grid, signed
-from companion.chart.readers import Box, read_chart
+from companion.chart.picture import ChartPicture
+from companion.chart.readers import Box, box_about, read_chart, read_picture
 from companion.chart.s57 import told_of
 from companion.chart.tide import lowest_m, read_tide
 
@@ -15,6 +17,7 @@ __all__ = [
     "Box",
     "Chart",
     "ChartArea",
+    "ChartPicture",
     "Danger",
     "Grid",
     "Row",
@@ -22,10 +25,12 @@ __all__ = [
     "Source",
     "Wanted",
     "area_of",
+    "box_about",
     "containing",
     "lowest_m",
     "parse_ascii_grid",
     "read_chart",
+    "read_picture",
     "read_tide",
     "signed",
     "told_of",

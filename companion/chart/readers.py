@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import re
 import warnings
 from collections.abc import Callable, Iterator
@@ -22,10 +23,12 @@ from shapely.geometry.base import BaseGeometry
 from companion.chart import grid as grids
 from companion.chart import s57, tags
 from companion.chart.features import Chart, Danger, Row, Source, Wanted
+from companion.chart.picture import DRAWN, ChartPicture, Mark, marks_of_chart, marks_of_rows
 from companion.disk import read_regular
 from companion.errors import InputError, unreadable
 from companion.geofence import Code, Finding, FindingLevel, read
 from companion.geofence.formats import decode
+from companion.messages import GeoPoint
 
 Box = tuple[float, float, float, float]
 """West, south, east, north [deg]; west and east may lie beyond the date line."""
@@ -39,6 +42,14 @@ WATER = re.compile(r"water[-_ ]?polygons|ocean|seas?\b", re.IGNORECASE)
 S57_OPTIONS = {"UPDATES": "APPLY", "LIST_AS_STRING": "ON", "RETURN_PRIMITIVES": "OFF", "LNAM_REFS": "OFF"}
 LINE_M = 3.0
 POINT_M = 10.0
+
+
+def box_about(center: GeoPoint, reach_m: float) -> Box:
+    """Return the box of longitude and latitude that holds the water."""
+    tall = reach_m / 110_500.0
+    most = min(89.0, abs(center.lat_deg) + tall)
+    wide = min(180.0, tall / math.cos(math.radians(most)))
+    return (center.lon_deg - wide, center.lat_deg - tall, center.lon_deg + wide, center.lat_deg + tall)
 
 
 def read_chart(path: Path, box: Box, wanted: Wanted, *, positive: str = "auto", without_depths: bool = False) -> Chart:
@@ -63,8 +74,39 @@ def read_chart(path: Path, box: Box, wanted: Wanted, *, positive: str = "auto", 
     return _of_rows(_rows_of_layers(path, box), path, wanted, without_depths=without_depths)
 
 
+EVERYWHERE: Box = (-180.0, -90.0, 180.0, 90.0)
+BANDS_M = (0.0, 2.0, 5.0, 10.0, 20.0, 50.0)  # of a grid's picture
+
+
+def read_picture(path: Path) -> ChartPicture:
+    """Return what a file shows of the water, to be drawn. Raises InputError as ``read_chart`` does."""
+    if re.fullmatch(r"\.\d{3}", path.suffix):
+        rows = _rows_of_cell(path, lambda layer: s57.is_read(layer) or layer in DRAWN)
+        source, scale = s57.source_of(next((r for r in rows if r.layer == "DSID"), None), str(path))
+        return ChartPicture(source, marks_of_rows(rows), s57.resolution_m(scale))
+    if path.suffix.lower() not in GRIDS:
+        chart = read_chart(path, EVERYWHERE, Wanted(safety_depth_m=math.inf), without_depths=True)
+        return ChartPicture(chart.source, marks_of_chart(chart), chart.resolution_m)
+    marks: list[Mark] = []
+    for least_m, depth_m in zip((None, *BANDS_M), BANDS_M, strict=False):
+        chart = read_chart(path, EVERYWHERE, Wanted(safety_depth_m=depth_m))
+        kind = "land" if least_m is None else "depth"
+        marks += [Mark(kind=kind, geometry=danger.geometry, depth_m=least_m) for danger in chart.dangers]
+    if chart.coverage is not None:
+        marks.append(Mark(kind="depth", geometry=chart.coverage, depth_m=BANDS_M[-1]))
+    return ChartPicture(chart.source, marks, chart.resolution_m)
+
+
 # ---------------------------------------------------------------------------------- S-57
 def _read_cell(path: Path, box: Box, wanted: Wanted, *, without_depths: bool) -> Chart:
+    rows = _rows_of_cell(path, s57.is_read)
+    if not (s57.has_depths(rows) or without_depths):
+        raise s57.no_depths(str(path))
+    return s57.chart_of([r for r in rows if r.geometry.is_empty or _touches(r.geometry, box)], str(path), wanted)
+
+
+def _rows_of_cell(path: Path, is_read: Callable[[str], bool]) -> list[Row]:
+    """Return the features of a cell with its updates, whole. Raises InputError."""
     if path.suffix != ".000":
         raise InputError(str(path), "", "is an update of a cell", f"name {path.stem}.000: its updates are read with it")
     try:
@@ -87,13 +129,11 @@ def _read_cell(path: Path, box: Box, wanted: Wanted, *, without_depths: bool) ->
                 f"is missing, and {number:03} is there",
                 "fetch it, or remove the later ones",
             )
-    rows = list(_rows_of_layers(path, None, is_read=s57.is_read, options=S57_OPTIONS))
+    rows = list(_rows_of_layers(path, None, is_read=is_read, options=S57_OPTIONS))
     lost = next((r for r in rows if r.geometry.is_empty and r.number("PRIM") in s57.DRAWN), None)
     if lost is not None:
         raise InputError(str(path), lost.place, "has lost its shape", "fetch it again")
-    if not (s57.has_depths(rows) or without_depths):
-        raise s57.no_depths(str(path))
-    return s57.chart_of([r for r in rows if r.geometry.is_empty or _touches(r.geometry, box)], str(path), wanted)
+    return rows
 
 
 # ---------------------------------------------------------------------------------- vectors

@@ -94,6 +94,11 @@ def source_of(row: Row | None, path: str) -> tuple[Source, float]:
     ) or 0.0
 
 
+def resolution_m(scale: float) -> float:
+    """Return how fine a chart is drawn [m], of its scale's denominator: half a millimetre; 0 is not told."""
+    return 0.0005 * scale if scale else math.inf
+
+
 def has_depths(rows: Iterable[Row]) -> bool:
     """Return whether a cell says anything of its water's depth."""
     return any(r.layer in DEPTH_AREAS or r.layer == "SOUNDG" for r in rows)
@@ -132,7 +137,7 @@ def chart_of(rows: Sequence[Row], path: str, wanted: Wanted) -> Chart:
         source=source,
         dangers=dangers,
         coverage=coverage_of(rows),
-        resolution_m=0.0005 * scale if scale else math.inf,
+        resolution_m=resolution_m(scale),
         supersedes=scale > 0.0,
         knows_depths=has_depths(rows),
     )

@@ -13,7 +13,7 @@ from companion.program.arguments import add_command, moment, number, place
 from companion.words import counted, listed
 
 if TYPE_CHECKING:
-    from companion.chart import Box, Chart, ChartArea
+    from companion.chart import Chart, ChartArea
     from companion.geofence.mission import MissionOptions
     from companion.messages import GeoPoint
 
@@ -148,7 +148,7 @@ def _shoals(args: argparse.Namespace) -> int:
 
 
 def _import(args: argparse.Namespace) -> int:
-    from companion.chart import TOLERANCE_M, Wanted, area_of, read_chart, told_of
+    from companion.chart import TOLERANCE_M, Wanted, area_of, box_about, read_chart, told_of
 
     center, reach_m, places, options = _water(args)
     out = args.out or (Path(args.mission).stem + "-chart" if args.mission else "chart")
@@ -167,7 +167,7 @@ def _import(args: argparse.Namespace) -> int:
     charts: list[Chart] = []
     for name in args.files:
         chart = read_chart(
-            Path(name), _box(center, reach_m), wanted, positive=args.positive, without_depths=args.without_depths
+            Path(name), box_about(center, reach_m), wanted, positive=args.positive, without_depths=args.without_depths
         )
         charts.append(chart)
         for finding in chart.findings:
@@ -258,14 +258,6 @@ def _utc_s(text: str) -> float | None:
         return moment(text).timestamp()
     except argparse.ArgumentTypeError:
         return None
-
-
-def _box(center: GeoPoint, reach_m: float) -> Box:
-    """Return the box of longitude and latitude that holds the water."""
-    tall = reach_m / 110_500.0
-    most = min(89.0, abs(center.lat_deg) + tall)
-    wide = min(180.0, tall / math.cos(math.radians(most)))
-    return (center.lon_deg - wide, center.lat_deg - tall, center.lon_deg + wide, center.lat_deg + tall)
 
 
 def _troubles(area: ChartArea, places: list[tuple[str, GeoPoint]]) -> list[str]:

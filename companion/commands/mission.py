@@ -22,17 +22,7 @@ from companion.commands.output import (
     write_out,
 )
 from companion.errors import InputError, JobError
-from companion.program.arguments import (
-    add_command,
-    chart_option,
-    host_name,
-    http_address,
-    number,
-    picture,
-    place,
-    system_id,
-    wind,
-)
+from companion.program.arguments import add_command, host_name, http_address, number, picture, place, system_id, wind
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -414,6 +404,7 @@ _EDIT_EPILOG = """\
 examples:
   companion mission edit missions/bay.toml
   companion mission edit new.toml --http 8765 --chart solent.mbtiles
+  companion mission edit new.toml --chart US4MD81M.000      (drawn by it, and its water made the mission's)
   companion mission edit new.toml --http 0.0.0.0:8765       (for who is on the network and has the whole address)
 
 The address that is printed ends in a token of this run: who has it may edit this file, nobody else. Nothing is written
@@ -449,15 +440,23 @@ def add_edit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         metavar="NAME",
         help="a further name under which this machine's page may be asked for",
     )
-    chart_option(edit)
+    edit.add_argument(
+        "--chart",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a chart under the drawing: raster tiles (MBTiles, PMTiles), or what `companion chart import` reads (S-57 "
+        "cells, coastlines, grids), of which obstacles and fence can be made; may be given more than once",
+    )
     edit.set_defaults(run=run_edit)
 
 
 def run_edit(args: argparse.Namespace) -> int:
     """Serve the editor until it is ended; return the exit code."""
     from companion.clock import run as run_loop
-    from companion.editor import SourceFiles, editing, read_base
-    from companion.page import Address, open_charts
+    from companion.editor import SourceFiles, editing, open_waters, read_base
+    from companion.page import Address, is_tiles, open_charts
 
     path = Path(args.file)
     if path.suffix.lower() != ".toml":
@@ -471,13 +470,15 @@ def run_edit(args: argparse.Namespace) -> int:
 
     base: SourceFiles = read_base(path)
     host, port = args.http
-    charts = open_charts(args.chart)
+    charts = open_charts([path for path in args.chart if is_tiles(path)])
+    waters = open_waters([path for path in args.chart if not is_tiles(path)])
 
     async def whole() -> None:
         from companion.commands.view import stopping
 
         stop = stopping()
-        async with editing(base, Address(host=host, port=port, names=tuple(args.http_name)), charts) as place:
+        at = Address(host=host, port=port, names=tuple(args.http_name))
+        async with editing(base, at, charts, waters) as place:
             print(f"{place.url}  (Ctrl-C ends it)", flush=True)
             await stop.wait()
 

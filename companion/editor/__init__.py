@@ -2,5 +2,6 @@
 
 from companion.editor.base import SourceFiles, read_base
 from companion.editor.desk import editing
+from companion.editor.waters import Water, open_waters
 
-__all__ = ["SourceFiles", "editing", "read_base"]
+__all__ = ["SourceFiles", "Water", "editing", "open_waters", "read_base"]

@@ -8,6 +8,7 @@ import contextlib
 import logging
 import math
 import secrets
+import tempfile
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,7 +26,17 @@ from companion.compose import planner_of
 from companion.disk import Disk, reason
 from companion.editor.base import SourceFiles, area_files, read_base
 from companion.editor.draft import Draft, draft_of, looked_at
-from companion.editor.sketch import Sketch
+from companion.editor.sketch import Place, Sketch
+from companion.editor.waters import (
+    MOST_OPEN,
+    MOST_OPENED,
+    MOST_REACH_M,
+    Water,
+    charted,
+    laid_down,
+    open_waters,
+    tile_of,
+)
 from companion.errors import CompanionError, InputError, JobError
 from companion.geofence import Circle, Document, Mission, Zone
 from companion.geofence.formats import FORMATS
@@ -97,6 +108,7 @@ def state_of(base: SourceFiles) -> dict[str, Any]:
             if t not in _DRAWN and getattr(base.options, t) != getattr(MissionOptions(), t)
         ],
         "said": "",
+        "free_m": base.options.boat.draft_m + base.options.area.under_keel_m if base.options.boat.draft_m else None,
     }
 
 
@@ -278,8 +290,26 @@ class _Asked(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     part: str = ""
 
 
+class _AskedWater(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The water of a chart that is to be the mission's: about a place, free where it is so deep."""
+
+    sketch: Sketch
+    at: Place
+    reach_m: Annotated[float, Meta(ge=50.0, le=MOST_REACH_M)]
+    depth_m: Annotated[float, Meta(ge=0.0, le=100.0)]
+
+
+class _Opened(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Files of charts from the browser: name and base64 of each."""
+
+    files: Annotated[list[tuple[str, str]], Meta(min_length=1, max_length=200)]
+
+
 class EditorApi:
-    """Serves the editor of one mission file; see ``companion.page.connections.App``."""
+    """Serves the editor of one mission file; see ``companion.page.connections.App``.
+
+    ``folder`` is where charts are laid down that come from the browser; None: none are taken.
+    """
 
     def __init__(
         self,
@@ -288,8 +318,12 @@ class EditorApi:
         previews: PlanPreviews,
         charts: Sequence[TileChart] = (),
         disk: Disk | None = None,
+        *,
+        waters: Sequence[Water] = (),
+        folder: Path | None = None,
     ) -> None:
         self._path, self._token, self._previews, self._disk = base.path, token, previews, disk or Disk()
+        self._waters, self._folder = tuple(waters), folder
         self._files = {**files(), **files("companion.editor")}
         self._charts = {chart.tag: chart for chart in charts}
         self._bases: dict[str, SourceFiles] = {}
@@ -300,11 +334,13 @@ class EditorApi:
     def admit(self, request: h11.Request, path: str) -> int:
         """Let in who may ask for it; return how many bytes are read. Raises Refused."""
         if request.method != b"POST":
+            if path.startswith("/water/"):
+                require_token(request, self._token)
             return 0
-        if path != "/api/mission" and path not in self._acts():
+        if path not in {"/api/mission", "/api/open", "/api/water"} and path not in self._acts():
             raise HttpRefusal(404, "there is nothing to post to here")
         require_token(request, self._token)
-        return MOST_BODY
+        return MOST_OPENED if path == "/api/open" else MOST_BODY
 
     async def reply(self, request: h11.Request, path: str, body: bytes) -> HttpReply | Stream:
         """Answer a request. Raises Refused."""
@@ -312,11 +348,18 @@ class EditorApi:
             file, tile = self._files.get(path), await tile_at(self._charts, path)
             if tile is not None:
                 return tile
+            if path.startswith("/water/"):
+                return await self._water_tile(path)
             if file is None:
                 raise HttpRefusal(404, "there is nothing here")
             return HttpReply(kind=file.kind, data=file.data, tag=file.tag, packed=file.packed)
         act = self._acts().get(path)
         try:
+            if path == "/api/open":
+                return HttpReply(data=msgspec.json.encode(await self._open(msgspec.json.decode(body, type=_Opened))))
+            if path == "/api/water":
+                asked_water = msgspec.json.decode(body, type=_AskedWater)
+                return HttpReply(data=msgspec.json.encode(await self._charted(asked_water)))
             if act is None:
                 return HttpReply(data=msgspec.json.encode(await self._load()))
             asked = msgspec.json.decode(body, type=_Asked)
@@ -329,6 +372,10 @@ class EditorApi:
             raise HttpRefusal(422, str(error)) from None
         except HttpRefusal:
             raise
+        except ModuleNotFoundError as error:
+            raise HttpRefusal(
+                422, f"{error.name} is missing, which reads such charts: pip install '.[chart]'"
+            ) from None
         except Exception as error:
             _LOG.exception("%s failed", path)
             raise HttpRefusal(500, f"the editor failed at this: {type(error).__name__}; nothing is written") from None
@@ -365,7 +412,44 @@ class EditorApi:
 
     async def _state(self, base: SourceFiles) -> dict[str, Any]:
         charts = [chart.facts() for chart in self._charts.values()]
-        return {**await asyncio.to_thread(state_of, base), "charts": charts}
+        waters = [water.facts() for water in self._waters]
+        return {**await asyncio.to_thread(state_of, base), "charts": charts, "waters": waters}
+
+    async def _water_tile(self, path: str) -> HttpReply:
+        data = await asyncio.to_thread(tile_of, self._waters, path)
+        if data is None:
+            raise HttpRefusal(404, "there is no such chart, or no such tile")
+        return HttpReply(data=data, is_fixed=True)
+
+    async def _open(self, asked: _Opened) -> dict[str, Any]:
+        """Take charts from the browser; they are gone when the editor ends."""
+        if self._folder is None:
+            raise HttpRefusal(403, "no charts are taken here")
+        folder = self._folder / secrets.token_hex(4)
+
+        def work(folder: Path) -> tuple[Water, ...]:
+            folder.mkdir()
+            return open_waters(laid_down(asked.files, folder))
+
+        async with self._turn:
+            opened = await asyncio.to_thread(work, folder)
+            waters = tuple(sorted((*self._waters, *opened), key=lambda w: -w.picture.resolution_m))
+            if len(waters) > MOST_OPEN:
+                raise HttpRefusal(413, f"at most {MOST_OPEN} charts are open at once")
+            self._waters = waters
+        return {"waters": [water.facts() for water in self._waters]}
+
+    async def _charted(self, asked: _AskedWater) -> dict[str, Any]:
+        """Return the sketch with what the charts say of the water; nothing is written."""
+        if not self._waters:
+            raise HttpRefusal(409, "no chart is open")
+        base, center = self._base(asked.sketch.revision), GeoPoint(lat_deg=asked.at[0], lon_deg=asked.at[1])
+        async with self._turn:
+            base, sketch, words = await asyncio.to_thread(
+                charted, base, asked.sketch, self._waters, center, asked.reach_m, asked.depth_m, frozenset(self._own)
+            )
+        self._keep(base)
+        return {"sketch": sketch, "said": words}
 
     async def _check(self, asked: _Asked) -> dict[str, Any]:
         self._newest += 1
@@ -451,18 +535,21 @@ class EditorAddress:
 
 @contextlib.asynccontextmanager
 async def editing(
-    base: SourceFiles, address: Address, charts: Sequence[TileChart] = ()
+    base: SourceFiles, address: Address, charts: Sequence[TileChart] = (), waters: Sequence[Water] = ()
 ) -> AsyncIterator[EditorAddress]:
     """Serve the editor of a mission while the body runs. An address without a token gets one.
 
-    ``charts`` lie under the drawing, the lowest first.
+    ``charts`` lie under the drawing, the lowest first; ``waters`` are those that obstacles can be made of.
 
     Raises:
         JobError: the port is in use, or it cannot be listened there.
     """
     token = address.token or secrets.token_urlsafe(24)
-    async with (
-        PlannerWorker(algorithm=base.options.skipper.planner) as worker,
-        listening(address, EditorApi(base, token, PlanPreviews(worker), charts)) as server,
-    ):
-        yield EditorAddress(url=f"{server.address.url}#{token}", token=token)
+    with tempfile.TemporaryDirectory(prefix="companion-charts-") as folder:
+        async with (
+            PlannerWorker(algorithm=base.options.skipper.planner) as worker,
+            listening(
+                address, EditorApi(base, token, PlanPreviews(worker), charts, waters=waters, folder=Path(folder))
+            ) as server,
+        ):
+            yield EditorAddress(url=f"{server.address.url}#{token}", token=token)

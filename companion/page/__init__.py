@@ -1,6 +1,6 @@
 """The page: a voyage in a browser, served by the companion itself, and the files that it is made of."""
 
-from companion.page.charts import TileChart, open_charts
+from companion.page.charts import TileChart, is_tiles, open_charts
 from companion.page.connections import (
     Address,
     Guests,
@@ -25,6 +25,7 @@ __all__ = [
     "TileChart",
     "export",
     "files",
+    "is_tiles",
     "listening",
     "open_charts",
     "plan_figures",

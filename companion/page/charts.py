@@ -92,6 +92,11 @@ def open_charts(paths: Sequence[Path]) -> tuple[TileChart, ...]:
     return tuple(open_chart(path) for path in paths)
 
 
+def is_tiles(path: Path) -> bool:
+    """Return whether a file is called as tiles are; what is in it is another question."""
+    return path.suffix.lower() in {".mbtiles", ".pmtiles"}
+
+
 def open_chart(path: Path) -> TileChart:
     """Open a chart. Raises InputError: it is not a chart, cannot be read, or has no pictures in it."""
     try:

@@ -38,25 +38,25 @@ class Asker(Browser):
         return status, json.loads(answer) if answer else None
 
 
-def with_editor(path, talk):
+def with_editor(path, talk, waters=()):
     """Return what ``talk(asker)`` returns while the editor of a file is served."""
 
     async def whole():
-        async with editing(read_base(path), Address(host="127.0.0.1", port=0, token=TOKEN)) as place:
+        async with editing(read_base(path), Address(host="127.0.0.1", port=0, token=TOKEN), (), waters) as place:
             return await talk(Asker(int(place.url.split(":")[2].split("/")[0])))
 
     return run(whole())
 
 
 @contextlib.contextmanager
-def edited(path, port=0, charts=()):
+def edited(path, port=0, charts=(), waters=()):
     """Serve the editor of a file from a thread; yields its address with its token."""
     ready, found = threading.Event(), []
 
     async def whole():
         over = asyncio.Event()
         found.extend([asyncio.get_running_loop(), over])
-        async with editing(read_base(path), Address(host="127.0.0.1", port=port, token=TOKEN), charts) as place:
+        async with editing(read_base(path), Address(host="127.0.0.1", port=port, token=TOKEN), charts, waters) as place:
             found.append(place.url)
             ready.set()
             await over.wait()

@@ -11,10 +11,12 @@ import pytest
 
 from companion import cli
 from companion.commands.view import read_record
+from companion.editor import open_waters
 from companion.geofence import load_mission
 from companion.page import open_charts
 from sitl.cli import main as sitl
 from tests.editor.asking import edited
+from tests.editor.test_water import features
 from tests.page.browsing import Window, needs_browser
 from tests.page.charting import mbtiles
 from tests.page.test_browser import is_own, keep
@@ -307,3 +309,67 @@ def test_a_chart_lies_under_the_drawing_and_an_empty_mission_begins_on_it(tmp_pa
         assert board.barriers() == []
         assert board.complaints() == []
         assert is_own(board, url.split("#")[0])
+
+
+# Pan by so many pixels a frame, and tell what each frame cost [ms] and what was painted.
+PAN = """
+const [scale, steps, done] = arguments, m = editing.map, w = editing.water, before = w.figures.paintings;
+m.zoom(scale / m.middle().scale);
+const from = m.middle().en, took = [];
+let n = 0, corners = 0;
+function step() {
+  const now = performance.now();
+  corners = Math.max(corners, w.figures.corners);
+  if (n++ >= steps) return done({ took: took.sort((a, b) => a - b), corners, paintings: w.figures.paintings - before });
+  m.centre([from[0] + 100 * Math.sin(n / 12) / scale, from[1] + 100 * Math.sin(n / 19) / scale]);
+  took.push(performance.now() - now);
+  requestAnimationFrame(step);
+}
+requestAnimationFrame(step);
+"""
+PIXEL = (
+    "const c = document.getElementById('water'), d = c.getContext('2d'); "
+    "return [...d.getImageData(Math.round(c.width * arguments[0]), Math.round(c.height * arguments[1]), 1, 1).data]"
+)
+
+
+def test_a_new_mission_on_a_phone_draws_nothing_and_has_its_water_from_the_chart(tmp_path):
+    """The chart lies below in its own colours, and is moved with the water at what a phone has for a frame."""
+    (tmp_path / "bay.geojson").write_text(features())
+    waters = open_waters([tmp_path / "bay.geojson"])
+    with edited(tmp_path / "m.toml", waters=waters) as url, Board(390, 844, phone=True) as board:
+        board.driver.set_script_timeout(60)
+        board.open(url)
+        first = board.js("return document.querySelector('#dialog button').textContent")
+        assert first == "Draw nothing: use the chart"
+        for name, value in (("wherelat", "50.82"), ("wherelon", "-1.31"), ("chartreach", "1500"), ("chartfree", "2")):
+            board.type_in(name, value)
+        assert board.barriers() == []
+        board.click("#takechart")
+        board.until("return !document.getElementById('dialog').open")
+        board.until("return !editing.water.isBusy()")
+        assert "3 obstacles of bay.geojson" in board.text("hint")
+        assert board.js("return editing.now().shapes.length") == 4
+        keep(board, "editor-water")
+        day = board.js(PIXEL, 0.5, 0.42)
+        board.js(
+            "const f = document.getElementById('palette'); f.value = 'night'; f.dispatchEvent(new Event('change'))"
+        )
+        board.until("return !editing.water.isBusy()")
+        night = board.js(PIXEL, 0.5, 0.42)
+        assert sum(day[:3]) > 300 > 120 > sum(night[:3])
+        assert night[0] > 2 * night[2], "red alone"
+        told = board.driver.execute_async_script(PAN, 0.5, 120)
+        # Of 16.7 ms: what the page itself spends on a frame in which the water moves. Most frames paint nothing anew.
+        assert told["took"][60] < 8.0
+        assert told["paintings"] < 40
+        assert told["corners"] < 50_000
+        board.click("#whole")
+        board.draw("start", (50.8150, -1.3110))
+        board.draw("goal", (50.8250, -1.3150))
+        board.until("return editing.now().goals.length === 1 && editing.found().is_in_order")
+        board.saved()
+        assert board.barriers() == []
+        assert [line for line in board.complaints() if "getImageData" not in line] == []  # of this test's own looking
+        assert is_own(board, url.split("#")[0])
+    assert len(load_mission(tmp_path / "m.toml").area.obstacles) == 3

@@ -3,15 +3,16 @@ import * as chart from "./chart.js";
 import { el, get, set, table } from "./dom.js";
 import { bearing, distance, duration, percent, speedUnit, units } from "./format.js";
 import * as map from "./map.js";
-import { called, History, middle, placeOf, places, removed, toEn } from "./sketch.js";
+import { called, degrees, History, middle, placeOf, places, removed, toEn } from "./sketch.js";
 import * as tables from "./tables.js";
+import * as water from "./water.js";
 
 /** @typedef {import("./sketch.js").Sketch} Sketch @typedef {import("./sketch.js").Ref} Ref @typedef {import("./sketch.js").Place} Place @typedef {import("./sketch.js").Point} Point @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Area} Area */
 /** @typedef {{severity: string, place: string, text: string, remedy: string, at: Place | null, of: "start" | "goal" | "refuge" | null, number: number | null}} Finding */
 /** @typedef {{findings: Finding[], is_in_order: boolean, grown: Place[][][]}} Found */
 /** @typedef {{to: string, why: string, way: Place[], time_s: number, late_s: number | null, length_m: number, risk: number | null, risks: (number | null)[], tacks: number, gybes: number, clearance_m: number | null}} Leg */
 /** @typedef {{error: string, legs: Leg[], time_s: number, length_m: number, tacks: number, gybes: number, clearance_m: number | null}} Plan */
-/** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string, charts: import("./charts.js").Chart[]}} State */
+/** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string, charts: import("./charts.js").Chart[], waters: import("./water.js").Water[], free_m: number | null}} State */
 
 const KNOT_MPS = 1852 / 3600, CHECK_MS = 180, PLAN_MS = 350, SIDES = 48;
 let token = "";
@@ -254,12 +255,114 @@ async function load() {
   history = new History(told.sketch);
   draft = null;
   selected = null;
-  if (isFirst) { windMps = told.wind.speed_mps; input("windfrom").value = String(told.wind.from_deg); typedWind(); shownWind(); tables.build(editor); chart.build(editor); map.lay(told.charts); }
+  if (isFirst) { windMps = told.wind.speed_mps; input("windfrom").value = String(told.wind.from_deg); typedWind(); shownWind(); tables.build(editor); chart.build(editor); map.lay(told.charts); water.build(/** @type {HTMLCanvasElement} */ (get("water")), () => state.frame, tile); map.drawUnder(water.draw); useChart(); }
+  waters(told.waters);
   take(told, true);
   changed();
   whole();
-  if (isFirst && !told.is_placed) { if (told.charts[0]) begin(onChart(told.charts[0])); else where(); }
+  if (isFirst && !told.is_placed) { if (told.waters.length) { begin(water.middle() ?? [0, 0]); charting(true); } else if (told.charts[0]) begin(onChart(told.charts[0])); else where(); }
   return true;
+}
+
+// ------------------------------------------------------------------------------------------------------ charts
+const REACH_M = 2000, FREE_M = 2;
+let isChartShown = true;
+
+/** A tile of a chart; null: it has not come. @param {string} path @returns {Promise<any>} */
+async function tile(path) {
+  try {
+    const answer = await fetch(path, { headers: { "Content-Type": "application/json", "X-Companion": "1", Authorization: `Bearer ${token}` } });
+    return answer.ok ? await answer.json() : null;
+  } catch { return null; }
+}
+
+/** @param {import("./water.js").Water[]} given */
+function waters(given) {
+  state.waters = given;
+  water.lay(given, state.free_m ?? FREE_M);
+  get("waters").hidden = given.length === 0;
+  for (const old of document.querySelectorAll("#key .water")) old.remove();
+  for (const one of given) get("key").append(el("li", { class: "credit water" }, `chart: ${one.name}, not fit for navigation`));
+  map.again();
+}
+
+/** The first of the tools: the chart instead of drawing. */
+function useChart() {
+  const button = el("button", { type: "button", id: "usechart", title: "Obstacles and fence of a chart" }, chart.sign("obstacle"), "Use the chart…");
+  button.addEventListener("click", () => charting(false));
+  get("tools").prepend(button);
+  get("waters").addEventListener("click", () => {
+    isChartShown = !isChartShown;
+    set(get("waters"), { "aria-pressed": isChartShown ? "true" : "false" });
+    water.show(isChartShown);
+    map.again();
+  });
+}
+
+/** Files of charts, to be opened; the rest of the dialog waits for them. @param {(told: string) => void} say */
+function opener(say) {
+  const files = /** @type {HTMLInputElement} */ (el("input", { type: "file", id: "chartfiles", multiple: true, "aria-label": "chart files" }));
+  files.addEventListener("change", async () => {
+    say("Being read…");
+    const read = await Promise.all([...files.files ?? []].map(async (file) => {
+      const bytes = new Uint8Array(await file.arrayBuffer());
+      let text = "";
+      for (let n = 0; n < bytes.length; n += 32768) text += String.fromCharCode(...bytes.subarray(n, n + 32768));
+      return [file.name, btoa(text)];
+    }));
+    const { status, found: told } = await post("/api/open", { files: read });
+    if (status !== 200) return say(told.error ?? "It is not taken.");
+    waters(told.waters);
+    say(`Open: ${state.waters.map((one) => one.name).join(", ")}.`);
+    const middle = water.middle();
+    if (middle && places(history.now).length === 0) { begin(middle); fields(middle); }
+  });
+  return el("label", {}, "chart files (S-57 cells with their updates, coastlines, grids)", files);
+}
+
+/** @param {Place} at */
+function fields(at) {
+  for (const [name, value] of /** @type {[string, number][]} */ ([["wherelat", at[0]], ["wherelon", at[1]]])) {
+    const field = document.getElementById(name);
+    if (field instanceof HTMLInputElement) field.value = value.toFixed(5);
+  }
+}
+
+/** Where obstacles and fence come from. @param {boolean} isNew */
+function charting(isNew) {
+  const all = places(history.now).map(en), own = water.middle();
+  const mid = all.length ? /** @type {Point} */ ([(Math.min(...all.map((p) => p[0])) + Math.max(...all.map((p) => p[0]))) / 2, (Math.min(...all.map((p) => p[1])) + Math.max(...all.map((p) => p[1]))) / 2]) : null;
+  const seen = mid ?? (isNew ? null : map.middle().en), at = seen ? /** @type {Place} */ ([state.frame.lat + seen[1] / state.frame.lat_m, state.frame.lon + seen[0] / state.frame.lon_m]) : own ?? [state.frame.lat, state.frame.lon];
+  const reach = mid ? Math.ceil((REACH_M + Math.max(...all.map((p) => Math.hypot(p[0] - mid[0], p[1] - mid[1])))) / 100) * 100 : REACH_M;
+  const field = (/** @type {string} */ name, /** @type {string} */ words, /** @type {string} */ value) => el("label", {}, words, el("input", { type: "text", id: name, inputmode: "decimal", value }));
+  const told = el("p", { id: "charttold", role: "status" }), say = (/** @type {string} */ words) => { told.textContent = words; };
+  const use = el("button", { type: "submit", class: "primary", id: "takechart" }, "Draw nothing: use the chart"), hand = el("button", { type: "button", id: "byhand" }, isNew ? "Draw it by hand" : "Cancel");
+  const form = el("form", { method: "dialog" }, el("h2", { id: "dialogtitle" }, "Use the chart"), el("div", { class: "buttons column" }, use, hand),
+    el("p", {}, "Obstacles and the fence of what the chart says. It may be old, coarse or wrong: look at it before it is sailed by."), opener(say),
+    field("wherelat", "middle: latitude", at[0].toFixed(5)), field("wherelon", "longitude", at[1].toFixed(5)), field("chartreach", "how far from there, m", String(reach)), field("chartfree", "water is free from, m below the chart's datum (draught and what is kept below it)", String(state.free_m ?? FREE_M)), told);
+  hand.addEventListener("click", () => { dialog.close(); if (isNew) begin(at); });
+  form.addEventListener("submit", (event) => { event.preventDefault(); void taken(say); });
+  dialog.replaceChildren(form);
+  dialog.showModal();
+}
+
+/** @param {(told: string) => void} say */
+async function taken(say) {
+  if (water.isEmpty()) return say("No chart is open yet: choose its files.");
+  const place = [degrees(input("wherelat").value, "lat"), degrees(input("wherelon").value, "lon")];
+  const reach = Number(input("chartreach").value), free = Number(input("chartfree").value);
+  if (!place.every(Number.isFinite)) return say("These are no degrees.");
+  if (!(reach >= 50 && reach <= 20000 && free >= 0 && free <= 100)) return say("From 50 to 20,000 m, and a depth of 0 to 100 m.");
+  say("Being made…");
+  const { status, found: answer } = await post("/api/water", { sketch: history.now, at: place, reach_m: reach, depth_m: free });
+  if (status !== 200) return say(answer.error ?? "It could not be made.");
+  dialog.close();
+  if (places(history.now).length === 0) begin(/** @type {Place} */ (place));
+  state.free_m = free;
+  waters(state.waters);
+  editor.commit(answer.sketch, null);
+  whole();
+  chart.hint(`${answer.said}.`);
 }
 
 /** The middle of a chart. @param {import("./charts.js").Chart} given @returns {Place} */
@@ -279,18 +382,17 @@ function begin(place) {
 function where() {
   const lat = /** @type {HTMLInputElement} */ (el("input", { type: "text", id: "wherelat", inputmode: "decimal", value: state.frame.lat.toFixed(4), "aria-label": "latitude" }));
   const lon = /** @type {HTMLInputElement} */ (el("input", { type: "text", id: "wherelon", inputmode: "decimal", value: state.frame.lon.toFixed(4), "aria-label": "longitude" }));
-  const go = el("button", { type: "submit", class: "primary" }, "Begin there");
-  const form = el("form", { method: "dialog" }, el("h2", { id: "dialogtitle" }, "Where is the water?"), el("p", {}, "A place in the middle of it, in degrees: 50.8203, or 50 49.218 N."), el("label", {}, "latitude", lat), el("label", {}, "longitude", lon), el("p", { class: "warn", id: "wherewrong" }), el("div", { class: "buttons" }, go));
+  const go = el("button", { type: "submit", class: "primary" }, "Begin there"), use = el("button", { type: "button", id: "fromchart" }, "Draw nothing: use the chart…");
+  use.addEventListener("click", () => { dialog.close(); charting(true); });
+  const form = el("form", { method: "dialog" }, el("h2", { id: "dialogtitle" }, "Where is the water?"), el("div", { class: "buttons" }, use), el("p", {}, "A place in the middle of it, in degrees: 50.8203, or 50 49.218 N."), el("label", {}, "latitude", lat), el("label", {}, "longitude", lon), el("p", { class: "warn", id: "wherewrong" }), el("div", { class: "buttons" }, go));
   dialog.replaceChildren(form);
   dialog.showModal();
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    void import("./sketch.js").then(({ degrees }) => {
-      const place = [degrees(lat.value, "lat"), degrees(lon.value, "lon")];
-      if (!place.every(Number.isFinite)) { get("wherewrong").textContent = "These are no degrees."; return; }
-      dialog.close();
-      begin([place[0] ?? 0, place[1] ?? 0]);
-    });
+    const place = [degrees(lat.value, "lat"), degrees(lon.value, "lon")];
+    if (!place.every(Number.isFinite)) { get("wherewrong").textContent = "These are no degrees."; return; }
+    dialog.close();
+    begin([place[0] ?? 0, place[1] ?? 0]);
   });
 }
 
@@ -447,4 +549,4 @@ map.follow(false);
 settings();
 void load().then(() => { document.body.dataset.ready = "1"; });
 // for tests, and for who is curious
-Object.assign(window, { editing: { now: () => history.now, found: () => found, plan: () => plan, selected: () => selected, isAsking: () => Object.values(asking).some((one) => one.isOpen), screen: (/** @type {Place} */ place) => map.onScreen(en(place)), bearing } });
+Object.assign(window, { editing: { now: () => history.now, found: () => found, plan: () => plan, selected: () => selected, water, map, isAsking: () => Object.values(asking).some((one) => one.isOpen), screen: (/** @type {Place} */ place) => map.onScreen(en(place)), bearing } });

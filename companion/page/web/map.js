@@ -16,8 +16,8 @@ const camera = { centre: [0, 0], scale: 1, up: 0, width: 600, height: 400 };
 /** @type {{up: string, follow: boolean, fitted: boolean, view: View | null, area: Area | null, past: Past | null, preview: Preview | null, picks: ((en: Point) => void) | null, other: Other | null}} */
 const state = { up: "north", follow: true, fitted: false, view: null, area: null, past: null, preview: null, picks: null, other: null };
 /** @typedef {{down: (at: Point, en: Point, event: PointerEvent) => boolean, move: (at: Point, en: Point, event: PointerEvent) => void, up: (at: Point, en: Point, event: PointerEvent) => void, tap: (at: Point, en: Point, event: PointerEvent) => void, hover: (at: Point, en: Point, event: PointerEvent) => void}} Hand  who draws on the chart: what ``down`` takes is not panned */
-/** @type {{hand: Hand | null, held: number | null, over: ((at: (en: Point) => Point, camera: Camera) => Element[]) | null}} */
-const drawing = { hand: null, held: null, over: null };
+/** @type {{hand: Hand | null, held: number | null, over: ((at: (en: Point) => Point, camera: Camera) => Element[]) | null, under: ((camera: Camera) => void) | null}} */
+const drawing = { hand: null, held: null, over: null, under: null };
 /** @type {Record<string, SVGElement>} */
 const layers = {};
 const root = picture("map");
@@ -148,6 +148,11 @@ export function drawOn(hand, over) {
   drawing.over = over;
 }
 
+/** Let somebody draw below it all, each time. @param {(camera: Camera) => void} under */
+export function drawUnder(under) {
+  drawing.under = under;
+}
+
 /** Draw again. */
 export function again() {
   draw();
@@ -176,6 +181,7 @@ function draw() {
   set(/** @type {SVGElement} */ (layers.world), { transform: matrix(camera) });
   set(/** @type {Element} */ (root.querySelector("#hatch")), { patternTransform: `rotate(45) scale(${1 / camera.scale})` });
   charts.draw(camera, state.area);
+  drawing.under?.(camera);
   const at = (/** @type {Point} */ en) => project(camera, en);
   grid(at);
   track();
