@@ -67,6 +67,7 @@ class Needs:
     has_refuge: bool = False  # the mission names a place for a critical battery
     sails: bool = True  # False: a motor boat
     can_tack: bool = True  # False: it gybes round, and no corridor of tacks is of use
+    least_depth_m: float | None = None  # that a sounder may tell: her keel and the room under it; None: not watched
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -287,6 +288,93 @@ def _battery(report: Report, needs: Needs) -> None:
         )
 
 
+DOWN = 25.0  # of RNGFNDn_ORIENT
+NMEA_SOUNDER = 17.0  # of RNGFNDn_TYPE: DBT, DPT and HDED
+RANGEFINDER_PORT = 9.0  # of SERIALn_PROTOCOL
+RANGEFINDERS = "123456789A"
+SEEN_BELOW_M = 5.0  # beyond the least depth: a slope of 1 in 12 at 3 m/s is then told 20 s before
+SHOALEST_M = 0.2
+
+
+def sounder(report: Report, needs: Needs) -> None:
+    """Look at the rangefinders of a boat whose depth is watched: one that looks down, and how far it reaches."""
+    if needs.least_depth_m is None:
+        return
+    report.add(
+        Level.INFO,
+        "depth failsafe",
+        "ArduRover has no depth failsafe of its own: no depth makes it change its mode or its way",
+        "it is the companion alone that turns her back where it shoals; the autopilot's fence holds what a chart knows",
+    )
+    kinds = {n: kind for n in RANGEFINDERS if (kind := report.get(f"RNGFND{n}_TYPE"))}
+    down = [n for n in kinds if report.get(f"RNGFND{n}_ORIENT") == DOWN]
+    if not kinds:
+        if report.get("RNGFND1_TYPE") is not None:
+            report.add(
+                Level.INFO,
+                "sounder",
+                "RNGFND1_TYPE is 0: the autopilot has no sounder",
+                f"nothing tells it of a depth; for one that speaks NMEA 0183 it is {NMEA_SOUNDER:g}, RNGFND1_ORIENT "
+                f"{DOWN:g}, and SERIALn_PROTOCOL {RANGEFINDER_PORT:g} of its port",
+                name="RNGFND1_TYPE",
+            )
+        return
+    if not down:
+        first = next((n for n, kind in kinds.items() if kind == NMEA_SOUNDER), None)
+        name = None if first is None else f"RNGFND{first}_ORIENT"
+        report.add(
+            Level.WARNING,
+            "sounder",
+            "no rangefinder looks down" + (f": {name} is {report.get(name):g}" if name else ""),
+            "depths are told of one that does, and of no other",
+            name=name,
+            wanted=DOWN if name else None,
+        )
+        return
+    ports = [report.get(f"SERIAL{n}_PROTOCOL") for n in range(1, 10)]
+    if any(kinds[n] == NMEA_SOUNDER for n in down) and any(ports) and RANGEFINDER_PORT not in ports:
+        report.add(
+            Level.WARNING,
+            "sounder",
+            f"no SERIALn_PROTOCOL is {RANGEFINDER_PORT:g}: no port listens to the sounder",
+            "its depths do not come: set it on the port that it is wired to",
+        )
+    for n in down:
+        _reach(report, f"RNGFND{n}_", needs.least_depth_m)
+
+
+def _reach(report: Report, prefix: str, least_m: float) -> None:
+    """Look at between which depths a sounder tells."""
+    name, reach_m, unit_m = _metres(report, f"{prefix}MAX")
+    if reach_m is not None and reach_m < least_m + SEEN_BELOW_M:
+        report.add(
+            Level.WARNING,
+            "sounder",
+            f"{name} is {reach_m / unit_m:g}: depths beyond {reach_m:g} m are not told",
+            f"a slope towards the {least_m:g} m that she needs is seen late; what is deeper counts as deep",
+            name=name,
+            wanted=math.ceil(least_m + 2.0 * SEEN_BELOW_M) / unit_m,
+        )
+    name, nearest_m, unit_m = _metres(report, f"{prefix}MIN")
+    if nearest_m is not None and nearest_m > max(SHOALEST_M, least_m):
+        report.add(
+            Level.WARNING,
+            "sounder",
+            f"{name} is {nearest_m / unit_m:g}: depths below {nearest_m:g} m are not told",
+            f"water that is less deep than the {least_m:g} m that she needs tells no depth at all",
+            name=name,
+            wanted=SHOALEST_M / unit_m,
+        )
+
+
+def _metres(report: Report, name: str) -> tuple[str, float | None, float]:
+    """Return a distance's name, value [m] and unit [m]; before 4.7 it is in centimetres, and called so."""
+    value, old = report.get(name), report.get(f"{name}_CM")
+    if value is None and old is not None:
+        return f"{name}_CM", old * 0.01, 0.01
+    return name, value, 1.0
+
+
 def identity(report: Report, seen: Examined) -> None:
     """Look at the system ids."""
     own, station = report.get("SYSID_THISMAV"), report.get("SYSID_MYGCS")
@@ -419,6 +507,7 @@ def examine(seen: Examined, needs: Needs) -> tuple[DoctorFinding, ...]:
         _navigation(report, needs)
         fence(report, seen, needs)
         failsafes(report, needs)
+        sounder(report, needs)
         identity(report, seen)
     signing(report, seen)
     version(report, seen)

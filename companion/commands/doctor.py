@@ -209,6 +209,7 @@ def needs_of(mission: Mission | None) -> Needs:
         can_tack=boat.can_tack,
         has_refuge=bool(mission.refuges),
         sails=mission.autopilot.frame == "sailboat",
+        least_depth_m=config.least_depth_m,
     )
 
 

@@ -86,6 +86,54 @@ def test_a_boat_that_is_set_up_has_nothing_in_its_way():
     assert codes(findings, Level.WARNING) == set()
 
 
+# An NMEA sounder on a port of its own, as 4.6 and before call its reach; 4.7 has metres.
+NMEA = {"RNGFND1_TYPE": 17.0, "RNGFND1_ORIENT": 25.0, "SERIAL1_PROTOCOL": 2.0, "SERIAL4_PROTOCOL": 9.0}
+REACH = {"RNGFND1_MIN_CM": 20.0, "RNGFND1_MAX_CM": 10000.0}
+KEEL = {"least_depth_m": 1.5}
+
+
+@pytest.mark.parametrize(
+    ("changes", "needs", "level", "name", "wanted"),
+    [
+        ({"RNGFND1_TYPE": 0.0}, KEEL, Level.INFO, "RNGFND1_TYPE", None),
+        ({**NMEA, **REACH, "RNGFND1_ORIENT": 0.0}, KEEL, Level.WARNING, "RNGFND1_ORIENT", 25.0),
+        ({"RNGFND1_TYPE": 20.0, "RNGFND1_ORIENT": 0.0}, KEEL, Level.WARNING, None, None),
+        ({**NMEA, **REACH, "SERIAL4_PROTOCOL": 5.0}, KEEL, Level.WARNING, None, None),
+        ({**NMEA, **REACH, "RNGFND1_MAX_CM": 600.0}, KEEL, Level.WARNING, "RNGFND1_MAX_CM", 1200.0),
+        ({**NMEA, "RNGFND1_MIN": 0.2, "RNGFND1_MAX": 6.0}, KEEL, Level.WARNING, "RNGFND1_MAX", 12.0),
+        ({**NMEA, **REACH, "RNGFND1_MIN_CM": 200.0}, KEEL, Level.WARNING, "RNGFND1_MIN_CM", 20.0),
+        ({**NMEA, "RNGFND1_MIN": 1.6, "RNGFND1_MAX": 50.0}, KEEL, Level.WARNING, "RNGFND1_MIN", 0.2),
+        (
+            {"RNGFND1_TYPE": 20.0, "RNGFND1_ORIENT": 0.0, "RNGFND3_TYPE": 17.0, "RNGFND3_ORIENT": 25.0}
+            | {"SERIAL4_PROTOCOL": 9.0, "RNGFND3_MAX_CM": 300.0},
+            KEEL,
+            Level.WARNING,
+            "RNGFND3_MAX_CM",
+            1200.0,
+        ),
+    ],
+)
+def test_what_a_boat_whose_depth_is_watched_needs_of_a_rangefinder(changes, needs, level, name, wanted):
+    found = [f for f in examine(seen(**changes), Needs(speed_mps=2.5, **needs)) if f.code == "sounder"]
+    assert [(f.level, f.parameter, f.wanted) for f in found] == [(level, name, wanted)]
+    assert [f for f in examine(seen(**changes), Needs(speed_mps=2.5)) if f.code == "sounder"] == [], "not watched"
+
+
+@pytest.mark.parametrize("reach", [REACH, {"RNGFND1_MIN": 0.2, "RNGFND1_MAX": 100.0}, {}])
+def test_a_sounder_that_is_set_up_is_not_complained_of_and_that_the_autopilot_does_nothing_by_it_is_said(reach):
+    findings = examine(seen(**NMEA, **reach), Needs(speed_mps=2.5, **KEEL))
+    assert [f for f in findings if f.code == "sounder"] == []
+    (none,) = [f for f in findings if f.code == "depth failsafe"]
+    assert none.level is Level.INFO
+    assert "no depth failsafe of its own" in none.what
+    assert "depth failsafe" not in {f.code for f in examine(seen(**NMEA), Needs(speed_mps=2.5))}
+
+
+def test_the_depth_that_the_doctor_asks_for_is_the_missions():
+    assert needs_of(load_mission("sitl/missions/shoaling.toml")).least_depth_m == pytest.approx(2.5)
+    assert needs_of(load_mission("missions/bay.toml")).least_depth_m is None
+
+
 @pytest.mark.parametrize(
     ("changes", "needs", "code", "level", "name", "wanted"),
     [
