@@ -66,7 +66,7 @@ from companion.planners import ALGORITHMS, AUTO, PlannerChoice
 from companion.skipper.step import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.way import FAR_M, Box, Composed, Goal, Line, Refuge, Search, Side, Until, Voyage
 from companion.traffic import Policy, TargetLimits
-from companion.traffic.feeds import parse_feed
+from companion.traffic.feeds import FeedName, parse_feed
 from companion.wind import Estimator, make
 from companion.words import listed
 
@@ -82,6 +82,7 @@ __all__ = [
     "planner_of",
     "polar_of",
     "polar_of_file",
+    "sounder_of",
     "speed_error_of",
     "target_limits_of",
     "voyage_of",
@@ -626,19 +627,32 @@ def target_limits_of(mission: Mission) -> TargetLimits:
     return TargetLimits(expire_s=mission.traffic.drop_after_s, own_mmsi=mission.traffic.own_mmsi)
 
 
-def feeds_of(mission: Mission) -> tuple[str, ...]:
+SOUNDER_BAUD = 4800  # NMEA 0183
+
+
+def sounder_of(mission: Mission) -> tuple[FeedName, ...]:
+    """Return the feed of the companion's own sounder, none without one. Raises InputError: its name is no feed."""
+    name = mission.options.sounder.feed
+    try:
+        return () if name is None else (parse_feed(name, baud=SOUNDER_BAUD),)
+    except InputError as error:
+        raise InputError(str(mission.path), "[sounder] feed", f"{name!r} is not a feed", error.remedy) from error
+
+
+def feeds_of(mission: Mission) -> tuple[FeedName, ...]:
     """Return the names of the AIS feeds to open; the autopilot's own AIS ("mavlink") needs none.
 
     Raises:
         InputError: a name is not a feed.
     """
     names = tuple(name for name in mission.traffic.feeds if name != "mavlink")
+    parsed = []
     for name in names:
         try:
-            parse_feed(name)
+            parsed.append(parse_feed(name))
         except InputError as error:
             raise InputError(str(mission.path), "[traffic] feeds", f"{name!r} is not a feed", error.remedy) from error
-    return names
+    return tuple(parsed)
 
 
 def displays_of(mission: Mission) -> Displays:

@@ -390,6 +390,11 @@ class VoyageFold:
         for finding in findings:
             self._disbelieve(f"fence {finding.place}", f"the fence on the autopilot, {finding.place}: {finding.text}")
 
+    def sounded(self, t_s: float, ping_m: float | None, most_m: float) -> None:
+        """Take a ping of a sounder that the companion hears itself: below its transducer [m], None without an echo."""
+        for value in self.assembler.sounded(t_s, ping_m, most_m):
+            self.take(value)
+
     def event(self, event: Event) -> None:
         """Take something that happened outside the autopilot's messages: an order of the crew."""
         self._events.append(event)

@@ -162,6 +162,19 @@ class StatusText:
     source_component: int = 1
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sounding:
+    """A ping of a sounder that the companion itself hears: the depth below its transducer [m], None without an echo.
+
+    ``offset_m`` is what the instrument says of where that lies: positive to the water's surface, negative to the keel.
+    """
+
+    t_s: float
+    depth_m: float | None = None
+    offset_m: float | None = None
+    most_m: float = math.inf  # it reaches no farther
+
+
 # ---------------------------------------------------------------------------------------------- wind
 class WindSource(enum.Enum):
     """Who made the sample."""

@@ -24,6 +24,7 @@ from companion.compose import (
     field_findings_of,
     permissions_of,
     require_fields,
+    sounder_of,
     target_limits_of,
     voyage_of,
     water_of,
@@ -197,6 +198,7 @@ def require_sailable(mission: Mission) -> Mission:
     try:
         estimator_of(mission)
         feeds_of(mission)
+        sounder_of(mission)
         displays_of(mission)
         permissions_of(mission)
         target_limits_of(mission)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -333,6 +334,7 @@ def _items(rows: list[list[Any]]) -> tuple[MissionItem, ...]:
 # What the fold is told between messages and outcomes, by the kind of record that says so.
 _FED: dict[str, Callable[[VoyageFold, dict[str, Any]], None]] = {
     "ais": lambda fold, record: fold.take(ais_of(record)),
+    "sounding": lambda fold, record: fold.sounded(record["t_s"], record["ping_m"], record.get("most_m", math.inf)),
     "order": lambda fold, record: fold.event(Order.from_dict(record["order"])),
     "fence read": lambda fold, record: fold.fence(_items(record["items"])),
     "planner process": lambda fold, record: fold.planner_alive(bool(record["alive"])),

@@ -28,6 +28,7 @@ from companion.compose import (
     estimator_of,
     feeds_of,
     permissions_of,
+    sounder_of,
     target_limits_of,
     voyage_of,
     water_of,
@@ -45,10 +46,21 @@ from companion.messages import CompanionStatus, MissionItem, Severity
 from companion.skipper import Skipper
 from companion.skipper.step import Phase, Snapshot
 from companion.telemetry.console import DISK, GONE, left_behind
-from companion.telemetry.folder import STATE, Logbook, Recorder, ais_record, fence_record, order_record, outcome_record
+from companion.telemetry.folder import (
+    STATE,
+    Logbook,
+    Recorder,
+    ais_record,
+    fence_record,
+    order_record,
+    outcome_record,
+    sounding_record,
+)
 from companion.telemetry.state_file import StateFile
 from companion.telemetry.status import CLOCK_OFF_S, TelemetrySender, companion_status, speak_high_latency, unix_of_boat
 from companion.traffic.feeds import Feeds
+from companion.traffic.nmea import NmeaDecoder
+from companion.traffic.soundings import SoundingDecoder, below_transducer_m
 
 STEP_S = 1.0
 TEND_EVERY_S = 5.0  # records are synced, and taken up again after trouble
@@ -127,7 +139,8 @@ class _Shell:
         self._arrived_before = False
         self._named = mission.autopilot.system  # of our autopilot: as named, or as of the voyage that goes on
         self._refusals: list[str] = []
-        self.feeds = Feeds()
+        self.feeds = Feeds("AIS feed", NmeaDecoder)
+        self.depths = Feeds("sounder", SoundingDecoder)
         self._fences: list[tuple[MissionItem, ...]] = []  # that were read of the autopilot since the last step
         self._system: int | None = None  # of our autopilot, as heard
         self._others = NOBODY
@@ -178,14 +191,13 @@ class _Shell:
                 autopilot = self._autopilot = await stack.enter_async_context(
                     Autopilot(link, assembler=self.fold.assembler)
                 )
-                for text in (
-                    await self.guard.wait(
-                        Auxiliary.FEEDS,
-                        functools.partial(self.feeds.open, stack, feeds_of(self.mission), self.options.seed),
-                    )
-                    or ()
+                for feeds, names, what in (
+                    (self.feeds, feeds_of(self.mission), "AIS feed"),
+                    (self.depths, sounder_of(self.mission), "sounder"),
                 ):
-                    self._refuse("AIS feed", text)
+                    opening = functools.partial(feeds.open, stack, names, self.options.seed)
+                    for text in await self.guard.wait(Auxiliary.FEEDS, opening) or ():
+                        self._refuse(what, text)
                 for text in self._refusals:
                     autopilot.say(int(Severity.WARNING), text)
                 adoption = Adoption(autopilot, self.options.settings, self._adopted.set)
@@ -366,6 +378,11 @@ class _Shell:
         for report in self.feeds.take():
             self._note(t_s, ais_record(report))
             self.fold.take(report)
+        for ping in self.depths.take():
+            boat = self.mission.options.boat
+            below_m = below_transducer_m(ping, boat.draft_m, boat.transducer_m)
+            self._note(t_s, sounding_record(below_m, ping.most_m))
+            self.fold.sounded(t_s, below_m, ping.most_m)
         for items in self._fences:
             self._note(t_s, fence_record(items))
             self.fold.fence(items)

@@ -13,7 +13,7 @@ from companion.fold import Step
 from companion.geo.angles import wrap_two_pi
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.wire import HIGH_LATENCY_S
-from companion.messages import CompanionStatus, Severity, TrafficStatus
+from companion.messages import AisReport, CompanionStatus, Severity, TrafficStatus
 from companion.orders.far import FarStatus, Reply, minutes_of
 from companion.safety import BY_NAME
 from companion.skipper.planning import next_tack_s, on_leg
@@ -22,7 +22,7 @@ from companion.skipper.way import Voyage, gates_of
 from companion.telemetry.folder.logbook import Logbook
 from companion.telemetry.folder.records import VoyageFigures, sigma_ahead_rad
 from companion.traffic import TrafficCounts
-from companion.traffic.feeds import AisFeed, Feeds
+from companion.traffic.feeds import Feed, Feeds
 
 
 def companion_status(
@@ -31,7 +31,7 @@ def companion_status(
     figures: VoyageFigures,
     clearance_m: float | None,
     bytes_out_per_s: float | None,
-    feeds: Sequence[AisFeed] = (),
+    feeds: Sequence[Feed[AisReport]] = (),
     ais_dropped: int = 0,
 ) -> CompanionStatus:
     """Return the status at ``step``. The wind's spread is that of a minute ahead, which the plan lives on."""
@@ -79,7 +79,7 @@ def companion_status(
     )
 
 
-def traffic_status(step: Step, feeds: Sequence[AisFeed], dropped: int) -> TrafficStatus | None:
+def traffic_status(step: Step, feeds: Sequence[Feed[AisReport]], dropped: int) -> TrafficStatus | None:
     """Return what is seen of other vessels, the worst one's figures; None when nobody was heard and no feed is open."""
     picture = step.snapshot.traffic
     if picture is None and not feeds:
@@ -219,7 +219,7 @@ class TelemetrySender:
     def __init__(
         self,
         autopilot: Autopilot,
-        feeds: Feeds,
+        feeds: Feeds[AisReport],
         log: Logbook,
         *,
         status: Callable[[], CompanionStatus | None],

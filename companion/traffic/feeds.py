@@ -1,4 +1,4 @@
-"""AIS receivers and event feeds: the shell that reads them (serial, UDP, TCP) and hands over reports.
+"""AIS receivers, event feeds and depth sounders: the shell that reads them (serial, UDP, TCP) and hands over reports.
 
 The one module of this room with sockets. A feed is named like a link::
 
@@ -16,15 +16,27 @@ import contextlib
 import re
 from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 from companion.clock import ended, now_s
 from companion.errors import InputError, LinkError
 from companion.guard import kept
-from companion.messages import AisReport
-from companion.traffic.nmea import DecodeCounts, NmeaDecoder, decode_json
+from companion.traffic.nmea import DecodeCounts
 
-OnReport = Callable[[AisReport], None]
+Report = TypeVar("Report", covariant=True)  # noqa: PLC0105 - what a feed tells of
+
+
+class Decoder(Protocol[Report]):
+    """Sentences, and datagrams of JSON, to reports; neither raises."""
+
+    counts: DecodeCounts
+
+    def feed(self, line: str | bytes, t_s: float) -> Report | None:
+        """Return the report that a sentence completes."""
+
+    def json(self, data: bytes, t_s: float) -> Report | None:
+        """Return the report in a datagram of JSON."""
+
 
 DEFAULT_BAUD = 38400  # ITU-R M.1371 receivers: NMEA 0183-HS
 MAX_PARTIAL = 1024  # bytes without a line end: noise, dropped
@@ -42,8 +54,8 @@ class FeedName:
     baud: int = DEFAULT_BAUD
 
 
-def parse_feed(text: str) -> FeedName:
-    """Parse a feed name.
+def parse_feed(text: str, *, baud: int = DEFAULT_BAUD) -> FeedName:
+    """Parse a feed name; ``baud``: of a serial port that names none.
 
     Raises:
         InputError: it is not one.
@@ -54,17 +66,19 @@ def parse_feed(text: str) -> FeedName:
         return FeedName(text=text, kind=match[1], host=match[2], port=int(match[3]))
     match = re.fullmatch(r"(/[^\s:]+)(?::(\d{3,7}))?", text)
     if match:
-        return FeedName(text=text, kind="serial", host=match[1], baud=int(match[2] or DEFAULT_BAUD))
+        return FeedName(text=text, kind="serial", host=match[1], baud=int(match[2] or baud))
     raise InputError("AIS feed", text, "is not a feed", "write udpin:HOST:PORT, tcp:HOST:PORT or /dev/NAME:BAUD")
 
 
-class AisFeed:
+class Feed(Generic[Report]):
     """One feed in its life; make it with ``open_feed``."""
 
-    def __init__(self, name: FeedName, on_report: OnReport, *, seed: int = 0) -> None:
+    def __init__(
+        self, name: FeedName, on_report: Callable[[Report], None], decoder: Decoder[Report], *, seed: int = 0
+    ) -> None:
         self.name = name
         self._on_report = on_report
-        self._decoder = NmeaDecoder()
+        self._decoder = decoder
         self._seed = seed
         self._partial = b""
         self.connections = 0
@@ -96,7 +110,7 @@ class AisFeed:
         self.last_heard_s = t_s
         if data.lstrip()[:1] == b"{":
             self.counts.lines += 1
-            report = decode_json(data, t_s)
+            report = self._decoder.json(data, t_s)
             if report is None:
                 self.counts.bad_form += 1
             else:
@@ -155,8 +169,8 @@ class AisFeed:
         )
 
 
-class _AisDatagrams(asyncio.DatagramProtocol):
-    def __init__(self, feed: AisFeed) -> None:
+class _Datagrams(asyncio.DatagramProtocol):
+    def __init__(self, feed: Feed[Any]) -> None:
         self._feed = feed
 
     def datagram_received(self, data: bytes, addr: Any) -> None:  # noqa: ARG002 - asyncio's signature
@@ -167,75 +181,79 @@ class _AisDatagrams(asyncio.DatagramProtocol):
 
 
 @contextlib.asynccontextmanager
-async def open_feed(name: str, on_report: OnReport, *, seed: int = 0) -> AsyncIterator[AisFeed]:
-    """Run a feed while the block runs; ``on_report`` is called in the loop with each report.
+async def open_feed(
+    name: FeedName, on_report: Callable[[Report], None], decoder: Decoder[Report], what: str, *, seed: int = 0
+) -> AsyncIterator[Feed[Report]]:
+    """Run a feed while the block runs; ``on_report`` is called in the loop with each report; ``what`` is for words.
 
     Raises:
-        InputError: the name is not a feed.
         LinkError: the local UDP port cannot be bound.
 
     """
-    feed = AisFeed(parse_feed(name), on_report, seed=seed)
+    feed = Feed(name, on_report, decoder, seed=seed)
     loop = asyncio.get_running_loop()
     if feed.name.kind == "udpin":
         try:
             wire, _ = await loop.create_datagram_endpoint(
-                lambda: _AisDatagrams(feed), local_addr=(feed.name.host, feed.name.port)
+                lambda: _Datagrams(feed), local_addr=(feed.name.host, feed.name.port)
             )
         except OSError as error:
-            raise LinkError(f"AIS feed {name}: {error}") from error
+            raise LinkError(f"{what} {name.text}: {error}") from error
         feed.connections = 1
         try:
             yield feed
         finally:
             wire.close()
         return
-    task = loop.create_task(feed.run_stream(), name=f"AIS feed {name}")
+    task = loop.create_task(feed.run_stream(), name=f"{what} {name.text}")
     try:
         yield feed
     finally:
         await ended(task)
 
 
-# The AIS feeds of a voyage: opened, listened to, and told of when they fall silent.
+# The feeds of a voyage: opened, listened to, and told of when they fall silent.
 
-# More AIS reports than this between two steps are noise or an attack: the rest of them is dropped.
+# More reports than this between two steps are noise or an attack: the rest of them is dropped.
 FED_AT_MOST = 500
 
 
-class Feeds:
-    """The feeds that are open, and what they heard since it was last asked for."""
+class Feeds(Generic[Report]):
+    """The feeds of a kind that are open, and what they heard since it was last asked for."""
 
-    def __init__(self) -> None:
-        self.open_feeds: list[AisFeed] = []
+    def __init__(self, what: str, decoder: Callable[[], Decoder[Report]]) -> None:
+        self._what, self._decoder = what, decoder
+        self.open_feeds: list[Feed[Report]] = []
         self.dropped = 0
-        self._heard: list[AisReport] = []
+        self._heard: list[Report] = []
         self._silent: set[str] = set()  # feeds of which it was said
 
-    async def open(self, stack: contextlib.AsyncExitStack, names: Sequence[str], seed: int) -> list[str]:
+    async def open(self, stack: contextlib.AsyncExitStack, names: Sequence[FeedName], seed: int) -> list[str]:
         """Listen to the feeds for as long as ``stack`` lives; return why any of them could not be opened."""
         refusals = []
         for number, name in enumerate(names):
             try:
-                feed = await stack.enter_async_context(open_feed(name, self._on_report, seed=seed + number))
+                feed = await stack.enter_async_context(
+                    open_feed(name, self._on_report, self._decoder(), self._what, seed=seed + number)
+                )
             except LinkError as error:
                 refusals.append(str(error))
             else:
                 self.open_feeds.append(feed)
         return refusals
 
-    def take(self) -> list[AisReport]:
+    def take(self) -> list[Report]:
         """Return what was heard since the last call."""
         heard, self._heard = self._heard, []
         return heard
 
-    def changed(self) -> list[AisFeed]:
+    def changed(self) -> list[Feed[Report]]:
         """Return the feeds that fell silent or are heard again since the last call."""
         changed = [feed for feed in self.open_feeds if feed.is_silent != (feed.name.text in self._silent)]
         self._silent ^= {feed.name.text for feed in changed}
         return changed
 
-    def _on_report(self, report: AisReport) -> None:
+    def _on_report(self, report: Report) -> None:  # type: ignore[misc]
         if len(self._heard) < FED_AT_MOST:
             self._heard.append(report)
         else:

@@ -57,6 +57,10 @@ class NmeaDecoder:
         self.counts = DecodeCounts()
         self._pending: OrderedDict[tuple[str, int, str, str], tuple[float, dict[int, str]]] = OrderedDict()
 
+    def json(self, data: bytes, t_s: float) -> AisReport | None:
+        """Return the report in a datagram of JSON, None when there is none in it."""
+        return decode_json(data, t_s)
+
     def feed(self, line: str | bytes, t_s: float) -> AisReport | None:
         """Return the report that this sentence completes, or None. Never raises.
 

@@ -121,6 +121,7 @@ class AutopilotConfig:
         departures: what the boat is that is not the plan's; None: nothing.
         waters: wind and stream by place, in metres from home; None: the wind alone, everywhere the same.
         sounder: of the bottom under it; None: none but what a scenario's events tell.
+        hears_sounder: whether it is wired to the autopilot; False: somebody else hears it.
         new_parameter_names: answer to ArduPilot 4.7's names (MAV_SYSID) instead of the older ones.
     """
 
@@ -143,6 +144,7 @@ class AutopilotConfig:
     departures: Departures | None = None
     waters: Waters | None = None
     sounder: SimulatedSounder | None = None
+    hears_sounder: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -145,7 +145,8 @@ class BottomSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     tide_range_m: Depth = 0.0  # from low to high water
     tide_s: Positive = 44_712.0  # from one high water to the next: 12.42 hours, the moon's
     tide_high_s: Metres = 0.0  # the first of them, after the start
-    sounder: bool = True  # the boat has one
+    sounder: bool = True  # the boat has one ...
+    nmea: bool = False  # ... and speaks NMEA 0183 to the companion's `[sounder]` by UDP, not to the autopilot
     below_m: Annotated[float, msgspec.Meta(ge=0.0, le=20.0)] = 0.0  # its transducer, below the water's surface
     noise_m: Annotated[float, msgspec.Meta(ge=0.0, le=20.0)] = 0.0  # standard deviation of a ping
     dropouts: Share = 0.0  # the share of pings without an echo

@@ -23,6 +23,7 @@ from companion.compose import (
     estimator_of,
     feeds_of,
     permissions_of,
+    sounder_of,
     target_limits_of,
     voyage_of,
     water_of,
@@ -239,6 +240,7 @@ OTHER = {
         "drop_after_s": 300.0,
         "policy": "rules",
     },
+    "sounder": {"feed": "udpin:127.0.0.1:10110"},
     "output": {"nmea": ["udp:127.0.0.1:10110"], "signalk": ["tcp:127.0.0.1:8375"], "signalk_token": "token"},
 }
 BOAT = """name = "b"
@@ -381,6 +383,7 @@ def sailed(m):
             permissions_of(m),
             target_limits_of(m),
             feeds_of(m),
+            sounder_of(m),
             displays_of(m),
             type(estimator).__name__,
             wind,

@@ -18,7 +18,7 @@ from companion.geo.angles import difference_rad
 from companion.geo.frame import LocalFrame
 from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint
-from companion.traffic.feeds import open_feed
+from companion.traffic.feeds import open_feed, parse_feed
 from companion.traffic.nmea import NmeaDecoder
 from sitl.ardurover.simulation import find
 from sitl.autopilot import AisVessel, VaneFault, VaneState
@@ -101,7 +101,7 @@ async def heard_for(seconds, event, began_s):
     """Play ``event`` and return what a companion's feed hears, and the judge's truth."""
     port, reports, truth = free_port(), [], TrueTrack()
     others = Others(FRAME, Constant(0.0, 5.0), 0, port=port)
-    async with open_feed(f"udpin:127.0.0.1:{port}", reports.append):
+    async with open_feed(parse_feed(f"udpin:127.0.0.1:{port}"), reports.append, NmeaDecoder(), "AIS feed"):
         playing = asyncio.create_task(others.play(event, began_s, lambda: (((0.0, 0.0), (0.0, 0.0)), 0.0)))
         for _ in range(seconds):
             await asyncio.sleep(1.0)

@@ -10,8 +10,10 @@ import msgspec
 import pytest
 
 from companion.errors import InputError
+from companion.geofence import load_mission
 from sitl import cli
 from sitl.autopilot import EPOCH_S
+from sitl.run.embedded import mission_of, with_sounder
 from sitl.scenario import scenario as scenario_module
 from sitl.scenario.scenario import beginning, load_scenario, scenario_wind
 from sitl.scenario.traffic import PORTS, free_port
@@ -120,3 +122,14 @@ def test_a_mission_begins_now_a_scenario_when_it_says_and_either_when_it_is_told
     assert beginning(load_scenario(named), named).timestamp() == EPOCH_S
     at = dt.datetime(2026, 12, 24, 3, 0, tzinfo=dt.UTC)
     assert beginning(load_scenario(mission), mission, at) == beginning(load_scenario(named), named, at) == at
+
+
+def test_a_sounder_that_speaks_nmea_is_refused_where_the_mission_listens_to_none():
+    source = Path("sitl/scenarios/nmea-sounder.toml")
+    scenario = load_scenario(source)
+    mission, port = with_sounder(mission_of(scenario, source), scenario)
+    assert mission.options.sounder.feed == f"udpin:127.0.0.1:{port}"
+    silent = load_mission("sitl/missions/shoaling.toml")
+    with pytest.raises(InputError, match="hears no sounder by UDP"):
+        with_sounder(silent, scenario)
+    assert with_sounder(silent, load_scenario(Path("sitl/scenarios/sandbank.toml"))) == (silent, 0)

@@ -19,7 +19,8 @@ from pyais.encode import encode_dict
 from companion.clock import now_s, run, run_virtual
 from companion.errors import InputError, LinkError
 from companion.messages import AisReport
-from companion.traffic.feeds import MAX_PARTIAL, SILENT_S, AisFeed, open_feed, parse_feed
+from companion.traffic.feeds import MAX_PARTIAL, SILENT_S, Feed, open_feed, parse_feed
+from companion.traffic.nmea import NmeaDecoder
 
 SPEEDUP = 20.0
 PATIENCE_S = 400.0  # hurried seconds: an answer that does not come is a failure, not a wait for ever
@@ -51,7 +52,7 @@ def test_udp_takes_sentences_and_json_and_counts_the_rest() -> None:
     async def listen() -> None:
         heard: list[AisReport] = []
         port = free_port(socket.SOCK_DGRAM)
-        async with open_feed(f"udpin:127.0.0.1:{port}", heard.append) as feed:
+        async with open_feed(parse_feed(f"udpin:127.0.0.1:{port}"), heard.append, NmeaDecoder(), "AIS feed") as feed:
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
                 for data in (
                     sentence(211000001) + sentence(211000002),
@@ -75,7 +76,9 @@ def test_a_udp_port_that_is_taken_is_a_dead_link() -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
             taken.bind(("127.0.0.1", 0))
             with pytest.raises(LinkError, match="AIS feed"):
-                async with open_feed(f"udpin:127.0.0.1:{taken.getsockname()[1]}", lambda _: None):
+                async with open_feed(
+                    parse_feed(f"udpin:127.0.0.1:{taken.getsockname()[1]}"), lambda _: None, NmeaDecoder(), "AIS feed"
+                ):
                     pass
 
     hurried(listen())
@@ -106,7 +109,7 @@ def test_tcp_connects_again_when_the_receiver_restarts() -> None:
     async def listen() -> None:
         heard: list[AisReport] = []
         port = free_port(socket.SOCK_STREAM)
-        async with open_feed(f"tcp:127.0.0.1:{port}", heard.append) as feed:
+        async with open_feed(parse_feed(f"tcp:127.0.0.1:{port}"), heard.append, NmeaDecoder(), "AIS feed") as feed:
             await until(lambda: bool(feed.last_error))  # nobody is there yet
             line = sentence(211000001)
             async with receiver(port, line[:20], line[20:], sentence(211000002)[:11]):
@@ -128,7 +131,9 @@ def test_a_feed_that_is_left_leaves_no_task_and_no_socket() -> None:
     async def listen() -> None:
         port = free_port(socket.SOCK_STREAM)
         async with receiver(port, sentence(211000001)):
-            async with open_feed(f"tcp:127.0.0.1:{port}", lambda _: None) as feed:
+            async with open_feed(
+                parse_feed(f"tcp:127.0.0.1:{port}"), lambda _: None, NmeaDecoder(), "AIS feed"
+            ) as feed:
                 await until(lambda: feed.counts.reports == 1)
             assert not [t for t in asyncio.all_tasks() if t.get_name().startswith("AIS feed")]
 
@@ -162,7 +167,7 @@ def test_serial_is_read_and_found_again_after_it_was_unplugged(tmp_path: Path) -
     async def listen() -> None:
         heard: list[AisReport] = []
         port = Port(tmp_path / "ttyAIS")
-        async with open_feed(f"{port.name}:38400", heard.append) as feed:
+        async with open_feed(parse_feed(f"{port.name}:38400"), heard.append, NmeaDecoder(), "AIS feed") as feed:
             await until(lambda: feed.connections == 1)
             port.say(sentence(211000001))
             await until(lambda: len(heard) == 1)
@@ -184,7 +189,7 @@ def test_a_name_that_is_no_serial_port_is_tried_again_and_told(tmp_path: Path) -
     (tmp_path / "notes").write_text("no port")
 
     async def listen() -> None:
-        async with open_feed(f"{tmp_path}/notes:38400", lambda _: None) as feed:
+        async with open_feed(parse_feed(f"{tmp_path}/notes:38400"), lambda _: None, NmeaDecoder(), "AIS feed") as feed:
             await until(lambda: bool(feed.last_error))
             await asyncio.sleep(20.0)
             assert feed.connections == 0
@@ -196,7 +201,7 @@ def test_a_name_that_is_no_serial_port_is_tried_again_and_told(tmp_path: Path) -
 # ----------------------------------------------------------------------------------------- silence
 def test_a_feed_that_stops_is_silent_after_a_minute_and_heard_again() -> None:
     async def listen() -> None:
-        feed = AisFeed(parse_feed("tcp:127.0.0.1:10110"), lambda _: None)
+        feed = Feed(parse_feed("tcp:127.0.0.1:10110"), lambda _: None, NmeaDecoder())
         assert not feed.is_silent  # it was opened just now
         await asyncio.sleep(SILENT_S + 1.0)
         assert feed.is_silent
@@ -221,7 +226,7 @@ def test_a_feed_that_stops_is_silent_after_a_minute_and_heard_again() -> None:
 def test_noise_on_a_stream_is_counted_and_the_next_line_is_read(noise: list[bytes], cuts: list[int]) -> None:
     async def listen() -> None:
         heard: list[AisReport] = []
-        feed = AisFeed(parse_feed("tcp:127.0.0.1:10110"), heard.append)
+        feed = Feed(parse_feed("tcp:127.0.0.1:10110"), heard.append, NmeaDecoder())
         data = b"".join(noise)
         at = 0
         while at < len(data):
@@ -240,7 +245,7 @@ def test_noise_on_a_stream_is_counted_and_the_next_line_is_read(noise: list[byte
 
 def test_a_stream_without_a_line_end_is_bounded() -> None:
     async def listen() -> None:
-        feed = AisFeed(parse_feed("tcp:127.0.0.1:10110"), lambda _: None)
+        feed = Feed(parse_feed("tcp:127.0.0.1:10110"), lambda _: None, NmeaDecoder())
         for _ in range(100):
             feed.stream(b"x" * 1000)
         assert len(feed._partial) <= MAX_PARTIAL
@@ -252,7 +257,7 @@ def test_a_stream_without_a_line_end_is_bounded() -> None:
 def test_a_report_is_stamped_with_its_arrival() -> None:
     async def listen() -> None:
         heard: list[AisReport] = []
-        feed = AisFeed(parse_feed("udpin:127.0.0.1:10110"), heard.append)
+        feed = Feed(parse_feed("udpin:127.0.0.1:10110"), heard.append, NmeaDecoder())
         await asyncio.sleep(12.5)
         feed.datagram(sentence(211000001))
         assert heard[0].t_s == now_s() == 12.5

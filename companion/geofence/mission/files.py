@@ -52,11 +52,8 @@ def goal_losses(mission: Mission) -> Losses:
 def replace_defaults(options: MissionOptions) -> list[str]:
     """Return the names of the tables that differ from their defaults."""
     default = MissionOptions(goal=options.goal)
-    return [
-        t
-        for t in ("field", "risk", "boat", "wind", "operator", "skipper", "planner", "passage", "safety", "traffic")
-        if getattr(options, t) != getattr(default, t)
-    ]
+    own = "field risk boat wind operator skipper planner passage safety traffic sounder"
+    return [t for t in own.split() if getattr(options, t) != getattr(default, t)]
 
 
 # Nothing is permitted by default; a new file names what could be.

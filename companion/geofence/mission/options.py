@@ -495,6 +495,13 @@ class TrafficOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Our own transponder's: what is heard of it, by a receiver on board or by way of a server, is no other vessel."""
 
 
+class SounderOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[sounder]``: a depth sounder that the companion hears itself, not the autopilot."""
+
+    feed: str | None = None
+    """NMEA 0183 with DPT or DBT sentences: ``udpin:HOST:PORT``, ``tcp:HOST:PORT``, ``/dev/NAME:BAUD`` (4800)."""
+
+
 class OutputOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """``[output]``: other displays that are told of the voyage under way (docs/guides/displays.md)."""
 
@@ -530,6 +537,7 @@ class MissionOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     passage: PassageOptions = PassageOptions()
     safety: SafetyOptions = SafetyOptions()
     traffic: TrafficOptions = TrafficOptions()
+    sounder: SounderOptions = SounderOptions()
     output: OutputOptions = OutputOptions()
 
 

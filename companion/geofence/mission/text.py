@@ -80,6 +80,7 @@ def dump_options(options: MissionOptions) -> str:
         "passage",
         "safety",
         "traffic",
+        "sounder",
         "output",
     ]
     # whatever has no place in the order yet comes last, and is not lost

@@ -166,6 +166,7 @@ class VehicleAssembler:
         self._gps2_s: float | None = None
         self._sounder = Sounder()
         self._sounded_s: float | None = None
+        self._own_s = -math.inf  # when the companion's own sounder was heard
         self._ranged_s = -math.inf  # when the message came that says how far the sounder reaches
         self._fenced_s = 0.0  # since when it tells of a fence without a gap
         self._fence_told = (False, -1)
@@ -385,6 +386,21 @@ class VehicleAssembler:
             return None
         else:
             ping_m, least_m, most_m = float(message.distance), 0.0, math.inf
+        return None if t_s - self._own_s <= QUIET_S else self._pinged(t_s, ping_m, least_m, most_m)
+
+    def sounded(self, t_s: float, ping_m: float | None, most_m: float) -> list[Value]:
+        """Take a ping of a sounder that the companion hears itself, None without an echo.
+
+        While there is one it counts alone. ``most_m``: it reaches no farther.
+        """
+        self._own_s = t_s
+        if self._status is None:
+            return []
+        told = self._pinged(t_s, math.inf if ping_m is None else ping_m, 0.0, most_m)
+        self._status = changed(self._status, **told, t_s=t_s)
+        return [self._status]
+
+    def _pinged(self, t_s: float, ping_m: float, least_m: float, most_m: float) -> dict[str, Any]:
         self._sounded_s = t_s
         self._sounder.take(t_s, ping_m, least_m, most_m)
         return {"sounds": True, "depth_m": self._sounder.depth_m(t_s), "depth_rate_mps": self._sounder.rate_mps(t_s)}

@@ -36,6 +36,7 @@ from companion.telemetry.folder.records import (
     fence_record,
     order_record,
     outcome_record,
+    sounding_record,
 )
 
 __all__ = [
@@ -70,4 +71,5 @@ __all__ = [
     "read_rows",
     "read_voyage",
     "require_files",
+    "sounding_record",
 ]

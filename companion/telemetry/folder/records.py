@@ -111,6 +111,12 @@ def _vessels(problem: Any) -> dict[str, Any]:
     }
 
 
+def sounding_record(ping_m: float | None, most_m: float) -> dict[str, Any]:
+    """Return a ping of a sounder that the companion hears itself."""
+    reach = {} if math.isinf(most_m) else {"most_m": most_m}
+    return {"kind": "sounding", "ping_m": ping_m, **reach}
+
+
 def ais_record(report: AisReport) -> dict[str, Any]:
     """Return a report of a feed as it is, in the units of AisReport: a replay takes it back with ``ais_of``."""
     return {"kind": "ais", "report": {k: v for k, v in dataclasses.asdict(report).items() if v is not None}}

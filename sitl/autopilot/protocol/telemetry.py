@@ -220,7 +220,7 @@ SOUNDER_CM = (round(100.0 * LEAST_M), round(100.0 * MOST_M))
 def _sounding(p: Pilot) -> Any:
     """DISTANCE_SENSOR of a sounder that looks down, None of one that is silent."""
     depth_m = p.core.sounding_m
-    if depth_m is None:
+    if depth_m is None or not p.core.config.hears_sounder:
         return None
     return mav.MAVLink_distance_sensor_message(
         p.core.boot_ms,
