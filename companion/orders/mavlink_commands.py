@@ -15,7 +15,7 @@ from companion.mavlink.microservices import Machine, Party
 from companion.mavlink.reception import OWN_COMPONENT
 from companion.mavlink.wire import Message, VehicleAssembler
 from companion.messages import StatusText
-from companion.orders.order import BY_VERB, TABLE, Answer, Place, Result, Verb, Wanted, mark_of, verb_of
+from companion.orders.order import BY_VERB, NUMBERED, TABLE, Answer, Place, Result, Verb, Wanted, mark_of, verb_of
 
 VERB_COMMAND, PLACE_COMMAND = int(wire.MAV_CMD_USER_1), int(wire.MAV_CMD_USER_2)
 COMMANDS = frozenset({VERB_COMMAND, PLACE_COMMAND})
@@ -49,11 +49,12 @@ def wanted_of(message: Any) -> Wanted:
         return Wanted(verb=None, fault=f"there is no order {number:g}; param1 is one of {known}")
     if verb is Verb.GOAL:
         return Wanted(verb=verb, fault="a goal needs a position: send MAV_CMD_USER_2 as COMMAND_INT")
-    if verb is not Verb.REFUGE:
+    if verb not in NUMBERED:
         return Wanted(verb=verb)
-    count, mark = _whole(message.param2), _whole(message.param3)
+    count, mark = _whole(message.param2), _whole(message.param3) if verb is Verb.REFUGE else 0
     if count is None or mark is None:
-        return Wanted(verb=verb, fault="the refuge's number (param2; 0: the nearest) is a whole number")
+        what = "refuge" if verb is Verb.REFUGE else "shoal"
+        return Wanted(verb=verb, fault=f"the {what}'s number (param2; 0: the nearest) is a whole number")
     return Wanted(verb=verb, number=count, mark=mark)
 
 

@@ -34,6 +34,7 @@ class Verb(enum.StrEnum):
     WHY = "why"
     FREEZE = "freeze"
     LEARN = "learn"
+    FORGET_SHOAL = "forget_shoal"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -143,8 +144,17 @@ TABLE: tuple[VerbRow, ...] = (
         refused="the mission's `[boat] learn` is off",
     ),
     VerbRow(verb=Verb.LEARN, number=13, button="Learn the boat", means="the end of `freeze`", refused="as `freeze`"),
+    VerbRow(
+        verb=Verb.FORGET_SHOAL,
+        number=14,
+        takes="[NUMBER]",
+        button="Forget the nearest shoal",
+        means="the shoal of that number, or the nearest, that the sounder found is water again: it was none",
+        refused="no shoal was sounded, or none of that number; not while it shoals or she is on her way back",
+    ),
 )
 BY_VERB = {row.verb: row for row in TABLE}
+NUMBERED = frozenset({Verb.REFUGE, Verb.FORGET_SHOAL})  # which of them, by number; 0: the nearest
 _BY_NUMBER = {row.number: row.verb for row in TABLE}
 
 
@@ -217,7 +227,7 @@ class Wanted:
     Attributes:
         verb: what.
         name: of a refuge, as a person wrote it.
-        number: of a refuge in the mission's order, 0: the nearest.
+        number: of a refuge in the mission's order, of a shoal in the order in which they were found, 0: the nearest.
         mark: of a refuge's name (``mark_of``), where only a number travels; 0: none.
         place: where to, for ``goal``.
         fault: why it cannot be done whatever else is true, in words.
@@ -370,6 +380,12 @@ def phrase(words: Sequence[str]) -> Wanted:
         return Wanted(verb=verb, number=number, name="" if number else " ".join(rest))
     if verb is Verb.GOAL:
         return Wanted(verb=verb, place=_place(rest))
+    if verb is Verb.FORGET_SHOAL and rest:
+        if len(rest) > 1 or not rest[0].isdecimal() or not 0 < len(rest[0]) < 4:
+            raise InputError(
+                str(verb), "", f"{' '.join(rest)[:40]!r} is no number of a shoal", "leave it out, or write 3"
+            )
+        return Wanted(verb=verb, number=int(rest[0]))
     if rest:
         raise InputError(str(verb), "", f"takes nothing, and was given {' '.join(rest)[:40]!r}")
     return Wanted(verb=verb)

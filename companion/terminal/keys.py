@@ -38,6 +38,13 @@ KEYS = (
     Key(key="x", verb=Verb.REPLACE, label="replace", asks="the mission on board is overwritten"),
     Key(key="f", verb=Verb.FREEZE, label="freeze"),
     Key(key="l", verb=Verb.LEARN, label="learn"),
+    Key(
+        key="d",
+        verb=Verb.FORGET_SHOAL,
+        label="forget shoal",
+        asks="plans lead over it again",
+        takes="which (empty: the nearest)",
+    ),
 )
 BY_KEY = {key.key: key for key in KEYS}
 

@@ -67,6 +67,14 @@ def test_a_refuges_name_travels_as_a_number(names, data):
     assert mark_of(" mill BAY ") == mark_of("Mill Bay")
 
 
+@pytest.mark.parametrize("number", [0, 1, 200])
+def test_which_shoal_travels_as_a_number(number):
+    wanted = Wanted(verb=Verb.FORGET_SHOAL, number=number)
+    assert wanted_of(on_the_wire(message_of(wanted, 1))) == wanted
+    odd = wire.MAVLink_command_long_message(1, 191, VERB_COMMAND, 0, 12.0, 1.5, 0, 0, 0, 0, 0)
+    assert "the shoal's number" in wanted_of(on_the_wire(odd)).fault
+
+
 @settings(max_examples=300)
 @given(st.sampled_from(sorted(COMMANDS)), st.lists(FLOAT32, min_size=7, max_size=7))
 @example(VERB_COMMAND, [math.nan] * 7)
@@ -76,7 +84,7 @@ def test_a_refuges_name_travels_as_a_number(names, data):
 def test_any_command_long_is_read_or_says_why_not(command, params):
     wanted = wanted_of(on_the_wire(wire.MAVLink_command_long_message(1, 191, command, 0, *params)))
     assert wanted.verb is not None or wanted.fault
-    if command == PLACE_COMMAND or (math.isfinite(params[0]) and params[0] not in range(1, 12)):
+    if command == PLACE_COMMAND or (math.isfinite(params[0]) and params[0] not in range(1, len(TABLE) + 1)):
         assert wanted.fault
     assert wanted.words
 

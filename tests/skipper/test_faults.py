@@ -13,7 +13,7 @@ from companion.skipper.way.geometry import moved
 from tests.skipper.test_voyage import ar1, is_done, make
 from tests.skipper.world import restarted
 
-ORDERS = ("replan", "hold", "go_on", "stop", "skip_goal", "home", "goal 51.1020 -1.3000")
+ORDERS = ("replan", "hold", "go_on", "stop", "skip_goal", "home", "goal 51.1020 -1.3000", "forget_shoal")
 
 
 def trouble(world, rng):

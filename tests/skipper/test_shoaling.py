@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from companion.orders import Result
 from companion.skipper.behaviors.shoaling import BACK, deep_place
 from companion.skipper.step import Persisted
 from companion.skipper.step import actions as act
@@ -100,6 +101,46 @@ def test_shoals_are_kept_over_a_restart():
     assert again.shoals == shoals
     assert world.skipper.initial(again).soundings.shoals == shoals
     assert "shoals" not in replace(persisted, shoals=()).to_dict()
+
+
+def answer(world, words):
+    """Give an order and return how it is answered; its own station each time, so that it is no repetition."""
+    world.order(words, by=(255, 1 + len(world.actions) % 200))
+    world.step()
+    return [a for _, a in world.actions if isinstance(a, act.Acknowledge)][-1]
+
+
+def test_a_shoal_is_forgotten_by_order_and_a_plan_leads_over_it_again():
+    """Weed or a wreck's mast that is gone closed a channel for good: no order could open it."""
+    world = voyage_over_a_bank()
+    assert world.run(60, lambda w: w.state.voyage.sailing)
+    assert (answer(world, "forget_shoal").result, answer(world, "forget_shoal 3").result) == (
+        Result.NOT_NOW,
+        Result.NOT_NOW,
+    )
+    near = Shoal(en_m=(30.0, 80.0), radius_m=20.0, doubt_m=3.0, depth_m=1.0)
+    far = Shoal(en_m=(0.0, 200.0), radius_m=30.0, doubt_m=3.0, depth_m=1.5)
+    world.state = with_parts(world.state, soundings=replace(world.state.soundings, shoals=(far, near)))
+    assert not answer(world, "forget_shoal 3").text.startswith("the shoal")
+    assert world.state.soundings.shoals == (far, near)
+    plans = len([a for _, a in world.actions if isinstance(a, act.RequestPlan)])
+    done = answer(world, "forget_shoal")
+    assert (done.result, world.state.soundings.shoals) == (Result.DONE, (far,))
+    assert "the shoal 2 of 20 m about" in done.text
+    assert done.text.endswith("1 left")
+    assert world.run(10, lambda w: len([a for _, a in w.actions if isinstance(a, act.RequestPlan)]) > plans)
+    assert world.skipper.persisted(world.state).shoals == (far,), "over a restart, too"
+    assert answer(world, "forget_shoal 1").result is Result.DONE
+    assert world.state.soundings.shoals == ()
+
+
+def test_while_it_shoals_no_shoal_is_forgotten():
+    world = voyage_over_a_bank()
+    tell, _ = sounded(world)
+    assert world.run(400, lambda w: tell(w) or said(w, "turning back"))
+    known = world.state.soundings.shoals
+    assert answer(world, "forget_shoal").result is Result.NOT_NOW
+    assert world.state.soundings.shoals == known
 
 
 @pytest.mark.parametrize("bad", [[1.0, 2.0], [0.0, 0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 5.0, 1e9, 1.0], "shoal"])

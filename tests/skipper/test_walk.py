@@ -53,6 +53,8 @@ ORDERS = (
     "adopt",
     "replace",
     "why",
+    "forget_shoal",
+    "forget_shoal 7",
 )
 
 

@@ -10,7 +10,17 @@ from companion.orders import BY_VERB, Verb, phrase
 from companion.terminal import KeyCommands, words_of
 from companion.terminal.keys import KEYS
 
-ASKED = {Verb.GO_ON, Verb.REFUGE, Verb.HOME, Verb.GOAL, Verb.SKIP_GOAL, Verb.STOP, Verb.ADOPT, Verb.REPLACE}
+ASKED = {
+    Verb.GO_ON,
+    Verb.REFUGE,
+    Verb.HOME,
+    Verb.GOAL,
+    Verb.SKIP_GOAL,
+    Verb.STOP,
+    Verb.ADOPT,
+    Verb.REPLACE,
+    Verb.FORGET_SHOAL,
+}
 
 
 def typed(keys, orders=None):

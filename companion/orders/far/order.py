@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from companion.orders.order import BY_VERB, Place, Result, Verb, Wanted, mark_of, verb_of
+from companion.orders.order import BY_VERB, NUMBERED, Place, Result, Verb, Wanted, mark_of, verb_of
 
 # Fields of a message of a few bytes: where each is, its step, and what says that it is not known.
 #
@@ -168,7 +168,9 @@ LAYOUT = Layout(
     (
         BitField(name="version", size=1, says=f"{VERSION}"),
         BitField(name="verb", size=1, says="its number, as in [orders](../guides/orders.md)"),
-        BitField(name="number", size=1, says="of a refuge in the mission, 0: the nearest, or by `lat`; else 0"),
+        BitField(
+            name="number", size=1, says="of a refuge in the mission, or of a shoal; 0: the nearest, or by `lat`; else 0"
+        ),
         BitField(
             name="expires", size=3, unit="min since 2020-01-01 UTC", says="from this moment on it counts for nothing"
         ),
@@ -267,7 +269,7 @@ def pack_order(order: FarOrder, key: FarKey) -> bytes:
         if wanted.place is None or wanted.place.trouble:
             raise ValueError("a goal needs a position" if wanted.place is None else wanted.place.trouble)
         counts |= {"lat": round(wanted.place.lat_deg * 1e7), "lon": round(wanted.place.lon_deg * 1e7)}
-    elif wanted.verb is Verb.REFUGE:
+    elif wanted.verb in NUMBERED:
         counts |= {"number": wanted.number, "lat": mark_of(wanted.name) if wanted.name else wanted.mark}
     try:
         return key.sealed(ORDER, LAYOUT.pack(counts))
@@ -291,7 +293,7 @@ def unpack_order(data: bytes, key: FarKey) -> FarOrder:
     if counts["counter"] == 0:
         raise ValueError("its counter is 0")
     if (
-        (number and verb is not Verb.REFUGE)
+        (number and verb not in NUMBERED)
         or (lat and verb not in {Verb.REFUGE, Verb.GOAL})
         or (lon and verb is not Verb.GOAL)
         or (verb is Verb.REFUGE and lat < 0)

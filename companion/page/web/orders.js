@@ -6,11 +6,11 @@ import { onGlobe, pick, showPreview } from "./map.js";
 /** @typedef {import("../../view/view").View} View @typedef {import("./geometry.js").Point} Point */
 /** @typedef {{error: string | null, order?: string, way_en_m?: Point[], risks?: (number | null)[], time_s?: number, late_s?: number | null, length_m?: number, risk?: number | null, tacks?: number, gybes?: number, clearance_m?: number | null}} Preview */
 
-const WORDS = /** @type {Record<string, string>} */ ({ hold: "Hold here", go_on: "Go on", goal: "Sail to…", refuge: "Refuge", home: "Home", replan: "Plan again", skip_goal: "Skip goal", stop: "Give up", why: "Why?" });
+const WORDS = /** @type {Record<string, string>} */ ({ hold: "Hold here", go_on: "Go on", goal: "Sail to…", refuge: "Refuge", home: "Home", replan: "Plan again", skip_goal: "Skip goal", stop: "Give up", why: "Why?", forget_shoal: "Forget shoal" });
 const MEANS = /** @type {Record<string, string>} */ ({
   hold: "She loiters here, where there is room near by, until told to go on.", go_on: "The order that stands ends: on to the next goal.", skip_goal: "The goal that is next is given up for the one behind it.",
   stop: "Nothing more is asked of the boat until told to go on: what is on board the autopilot sails on.", replan: "A new plan is made from where she is.", refuge: "She sails to the refuge and stays there until told to go on.",
-  home: "She sails to where she was armed and stays there until told to go on.", goal: "She sails to that place, then on to the goals that are left." });
+  home: "She sails to where she was armed and stays there until told to go on.", goal: "She sails to that place, then on to the goals that are left.", forget_shoal: "The nearest shoal that the sounder found is water again." });
 const SHOWN = ["hold", "go_on", "goal", "refuge", "home", "replan", "stop"];
 const PLANNED = new Set(["goal", "refuge", "home"]);
 

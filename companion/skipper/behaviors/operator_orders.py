@@ -14,6 +14,7 @@ from companion.frozen import changed
 from companion.messages import Mode, Severity
 from companion.orders import FAR, LOCAL, MAVLINK, Answer, Order, Place, Result, Verb, Wanted, lead_in, permitted, which
 from companion.skipper.behaviors.rest import UNTIL_TOLD
+from companion.skipper.behaviors.shoaling import SHOALING
 from companion.skipper.board.on_board import adopt
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.diversions import diversion, home_trouble, is_at_rest, place_trouble, pressing
@@ -26,6 +27,7 @@ from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.saved import Standing
 from companion.skipper.step.state import PATIENT, Answered, FieldSteering, Phase
 from companion.skipper.way import Approach, PointEn, distance_m
+from companion.words import counted
 
 REMEMBERED_S = 10.0  # longer than any station repeats a command that is not answered
 STATIONS = 8  # whose last order is remembered
@@ -309,6 +311,32 @@ def _learning(ctx: StepContext, *, is_frozen: bool) -> Answer:
     return _done(f"nothing more is learned of the boat until {Verb.LEARN}: {plans}" if is_frozen else "she is learned")
 
 
+def _forget_shoal(ctx: StepContext, order: Order) -> Answer:
+    """Give a shoal back to the water; what the sounder tells there is believed again."""
+    shoals, here, number = ctx.state.soundings.shoals, ctx.boat_en or ctx.snapshot.position_en_m, order.wanted.number
+    if not shoals:
+        return _not_now("no shoal was sounded on this voyage")
+    if number > len(shoals):
+        return Answer(
+            result=Result.REFUSED, text=f"there is no shoal {number}: {counted(len(shoals), 'shoal')} are known"
+        )
+    if ctx.is_raised(SHOALING) or ctx.state.soundings.turned_en_m is not None:
+        return _not_now("it shoals now: once she has turned back")
+    if number == 0 and here is None:
+        return _not_now("her position is not known: name the shoal's number")
+    if number == 0 and here is not None:
+        number = 1 + min(range(len(shoals)), key=lambda n: distance_m(here, shoals[n].en_m) - shoals[n].radius_m)
+    gone = shoals[number - 1]
+    place = ctx.voyage.frame.geo_from_en(*gone.en_m)
+    ctx.learn_shoals(shoals[: number - 1] + shoals[number:])
+    text = f"the shoal {number} of {gone.radius_m:.0f} m about {place.lat_deg:.5f} {place.lon_deg:.5f} is forgotten"
+    bound = diversion(ctx)
+    is_bound = not ctx.state.voyage.over if bound is None else bound.has_place and not is_at_rest(ctx)
+    if is_bound and not _hindrance(ctx):
+        ctx.set(plans=changed(ctx.state.plans, asked=text, retry=PATIENT))
+    return _done(f"{text}, {len(shoals) - 1} left")
+
+
 def _say_why(ctx: StepContext, _: Order) -> Answer:
     state = ctx.state
     tack_s = next_tack_s(ctx, ctx.voyage.boat) if ctx.config.sails else None
@@ -332,6 +360,7 @@ _DEEDS: dict[Verb, Callable[[StepContext, Order], Answer]] = {
     Verb.WHY: _say_why,
     Verb.FREEZE: _freeze,
     Verb.LEARN: _learn,
+    Verb.FORGET_SHOAL: _forget_shoal,
 }
 
 

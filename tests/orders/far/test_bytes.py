@@ -247,6 +247,11 @@ def test_an_order_of_a_beginning_is_none_of_another(given_order, began, other):
     assert by_the_page.read("The beginning", sealed, KEY.key) == {"version": 1, "began": began, "expires": other}
 
 
+def test_a_shoals_number_travels_far():
+    wanted = Wanted(verb=Verb.FORGET_SHOAL, number=7)
+    assert unpack_order(pack_order(FarOrder(wanted=wanted, counter=9, expires_min=5), KEY), KEY).wanted == wanted
+
+
 def test_a_status_is_no_order_and_an_order_no_status():
     assert KEY.sealed("status", GOOD_ORDER[:16]) != GOOD_ORDER
     with pytest.raises(ValueError, match="its code is wrong"):
