@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -12,7 +13,7 @@ import numpy as np
 
 from companion.addresses import Displays, OutputName, parse_nmea, parse_signalk
 from companion.boat import Boat, Hull, Polar, ardurover_sitl, avalon, constant, polar_of_table, read_polar
-from companion.current import STILL, Prior, read_table
+from companion.current import STILL, Prior, TideTable, read_table, read_tide
 from companion.current.prior import table_lines
 from companion.disk import read_regular
 from companion.errors import InputError, unreadable
@@ -493,6 +494,7 @@ def config_of(mission: Mission) -> SkipperConfig:
         least_depth_m=None
         if mission.boat.draft_m is None
         else mission.boat.draft_m + mission.options.area.under_keel_m - mission.options.boat.transducer_m,
+        tide=tide_of(mission),
         planner=planner_of(mission),
         plan_budget_s=options.planning_budget_s,
         first_plan_budget_s=options.planning_budget_s,
@@ -572,6 +574,26 @@ def _kalman(mission: Mission) -> dict[str, Any]:
     return {_KALMAN[key]: value for key, value in given.items()}
 
 
+def tide_of(mission: Mission) -> TideTable | None:
+    """Return the tide's heights, None without a table. Raises InputError: the file is no such table."""
+    path = mission.heights_path
+    if path is None:
+        return None
+    text, times = _timed(path, str(mission.path), "[area] tide")
+    return TideTable(rows=read_tide(text, str(path), times))
+
+
+def _timed(path: Path, source: str, key: str) -> tuple[str, tuple[float | None, ...]]:
+    """Return the text of a table over time, and the times of its lines. Raises InputError: it cannot be read."""
+    try:
+        text = read_regular(path).decode("utf-8-sig")
+    except OSError as error:
+        raise unreadable(source, error, f"{key} {path}", "write a tide table beside the mission") from None
+    except UnicodeDecodeError as error:
+        raise InputError(str(path), "", "is no text in UTF-8", "save the tide table as text") from error
+    return text, tuple(_unix_s(line.split(",")[0].strip()) for _, line in table_lines(text))
+
+
 def water_of(mission: Mission) -> Prior:
     """Return what the mission expects of the current.
 
@@ -603,13 +625,7 @@ def water_of(mission: Mission) -> Prior:
             "a table and a constant current exclude one another",
             "leave out set_deg and drift_mps, or the table",
         )
-    try:
-        text = read_regular(path).decode("utf-8-sig")
-    except OSError as error:
-        raise unreadable(source, error, f"[current] table {path}", "write a tide table beside the mission") from None
-    except UnicodeDecodeError as error:
-        raise InputError(str(path), "", "is no text in UTF-8", "save the tide table as text") from error
-    times = tuple(_unix_s(line.split(",")[0].strip()) for _, line in table_lines(text))
+    text, times = _timed(path, source, "[current] table")
     return Prior(rows=read_table(text, str(path), times), sigma_mps=current.sigma_mps, name=path.name)
 
 

@@ -10,7 +10,6 @@ from companion.chart.grid import Grid, parse_ascii_grid, signed
 from companion.chart.picture import ChartPicture
 from companion.chart.readers import Box, box_about, read_chart, read_picture
 from companion.chart.s57 import told_of
-from companion.chart.tide import lowest_m, read_tide
 
 __all__ = [
     "TOLERANCE_M",
@@ -27,11 +26,9 @@ __all__ = [
     "area_of",
     "box_about",
     "containing",
-    "lowest_m",
     "parse_ascii_grid",
     "read_chart",
     "read_picture",
-    "read_tide",
     "signed",
     "told_of",
 ]

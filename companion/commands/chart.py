@@ -123,7 +123,8 @@ def _shoals(args: argparse.Namespace) -> int:
 
     path = Path(args.state)
     path = path / STATE if path.is_dir() else path
-    frame = load_mission(Path(args.mission)).frame()
+    mission = load_mission(Path(args.mission))
+    frame, transducer_m = mission.frame(), mission.boat.transducer_m
     try:
         saved = read_state(path)
     except OSError as error:
@@ -137,7 +138,10 @@ def _shoals(args: argparse.Namespace) -> int:
         Zone(
             kind=ZoneKind.EXCLUSION,
             shape=Circle(center=frame.geo_from_en(*shoal.en_m), radius_m=shoal.radius_m + shoal.doubt_m),
-            name=f"shoal {n}: {shoal.depth_m:.1f} m sounded",
+            name=f"shoal {n}: {shoal.depth_m:.1f} m sounded"
+            + (
+                "" if (deep := shoal.below_datum_m(transducer_m)) is None else f", {deep:.1f} m below the chart's datum"
+            ),
         )
         for n, shoal in enumerate(saved.shoals, start=1)
     )
@@ -238,7 +242,7 @@ def _depth_m(args: argparse.Namespace, options: MissionOptions | None) -> float:
 
 def _tide_m(args: argparse.Namespace) -> float:
     """Return the lowest height of tide in the voyage's hours [m]: 0, the chart's datum, without a table."""
-    from companion.chart import lowest_m, read_tide
+    from companion.current import lowest_m, read_tide
     from companion.current.prior import table_lines
     from companion.geofence.formats import decode, read_bytes
 

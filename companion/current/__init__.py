@@ -1,8 +1,9 @@
-"""The current: what the mission expects of it, what the boat's own track tells of it, and the wind over the water."""
+"""The current: what the mission expects of it and of the tide, what the boat's track tells, the wind over the water."""
 
 from companion.current.estimator import UNTOLD_MPS, CurrentEstimator, Sailing, WindAngleUncertainty, plain
 from companion.current.motion import FITS_S, MotionCheck, MotionSample
 from companion.current.prior import STILL, Prior, TableRow, read_table
+from companion.current.tide import TideRow, TideTable, lowest_m, read_tide
 from companion.current.water_current import STILL_WATER, WaterCurrent, forecast_over_water, over_ground, over_water
 
 __all__ = [
@@ -16,11 +17,15 @@ __all__ = [
     "Prior",
     "Sailing",
     "TableRow",
+    "TideRow",
+    "TideTable",
     "WaterCurrent",
     "WindAngleUncertainty",
     "forecast_over_water",
+    "lowest_m",
     "over_ground",
     "over_water",
     "plain",
     "read_table",
+    "read_tide",
 ]

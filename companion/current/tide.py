@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bisect
+import math
 from dataclasses import dataclass
 
 from companion.current.prior import timed_rows
@@ -16,6 +18,25 @@ class TideRow:
 
     utc_s: float
     height_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TideTable:
+    """Heights over a span of time: each high and low water, or each hour."""
+
+    rows: tuple[TideRow, ...]
+
+    def height_m(self, utc_s: float | None) -> float | None:
+        """Return the height above the chart's datum at a Unix time, a half wave from row to row; None: not in it."""
+        rows = self.rows
+        if utc_s is None or not rows or not rows[0].utc_s <= utc_s <= rows[-1].utc_s:
+            return None
+        after = min(bisect.bisect_right([row.utc_s for row in rows], utc_s), len(rows) - 1)
+        a, b = rows[max(0, after - 1)], rows[after]
+        if a is b:
+            return a.height_m
+        share = (utc_s - a.utc_s) / (b.utc_s - a.utc_s)
+        return a.height_m + (b.height_m - a.height_m) * (1.0 - math.cos(math.pi * share)) / 2.0
 
 
 def read_tide(text: str, source: str, times: tuple[float | None, ...]) -> tuple[TideRow, ...]:

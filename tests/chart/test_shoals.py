@@ -1,6 +1,7 @@
 """Shoals that a voyage found, written as obstacles."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -32,6 +33,15 @@ def test_each_is_an_obstacle_with_the_doubt_about_it(tmp_path, ending, capsys):
         assert zone.shape.radius_m == pytest.approx(27.0, abs=0.01)
         assert frame.en_from_geo(zone.shape.center) == pytest.approx((10.0, 200.0), abs=0.01)
     assert "1.8 m" in zone.name
+
+
+@pytest.mark.parametrize(("tide_m", "told"), [(1.5, "0.3 m below the chart"), (2.2, "-0.4 m below"), (None, "")])
+def test_where_a_table_told_the_tide_its_depth_is_that_below_the_datum(tmp_path, tide_m, told):
+    out = tmp_path / "found.geojson"
+    shoal = replace(FOUND, tide_m=tide_m)
+    assert main(["chart", "shoals", voyage(tmp_path, shoal), str(out), "--mission", MISSION]) == 0
+    (zone,) = read(out).zones
+    assert zone.name == "shoal 1: 1.8 m sounded" if not told else told in zone.name
 
 
 def test_what_holds_none_or_is_no_state_is_one_line(tmp_path, capsys):

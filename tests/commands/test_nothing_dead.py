@@ -163,6 +163,7 @@ OTHER = {
         "margin_floor_m": 7.0,
         "point_radius_m": 15.0,
         "under_keel_m": 1.0,
+        "tide": "heights.csv",
     },
     "risk": {"delta_s": 0.8, "max_path_risk": 0.3},
     "boat": {
@@ -272,6 +273,8 @@ def mission(path, table="", key="", value=None):
     if table == "current":
         raw["current"] = {} if key == "table" else {"set_deg": 10.0, "drift_mps": 0.2}
         (path / "tide.csv").write_text("2026-11-21T12:00:00Z,90,0.6\n2026-11-21T13:00:00Z,90,0.2\n")
+    if key == "tide":
+        (path / "heights.csv").write_text("2026-11-21T12:00:00Z, 3.1\n2026-11-21T18:00:00Z, 0.4\n")
     if table == "area" and key in {"axis", "point_radius_m"}:
         raw["area"]["obstacles"] = ["point.wkt"]
     if key in {"under_keel_m", "transducer_m"}:

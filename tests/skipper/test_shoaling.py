@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from companion.current import TideRow, TideTable
 from companion.orders import Result
 from companion.skipper.behaviors.shoaling import BACK, deep_place
 from companion.skipper.step import Persisted
@@ -141,6 +142,22 @@ def test_while_it_shoals_no_shoal_is_forgotten():
     known = world.state.soundings.shoals
     assert answer(world, "forget_shoal").result is Result.NOT_NOW
     assert world.state.soundings.shoals == known
+
+
+def test_what_is_sounded_is_told_with_the_height_of_the_tide_where_a_table_tells_it():
+    rows = (TideRow(utc_s=-1e9, height_m=1.2), TideRow(utc_s=1e10, height_m=1.2))
+    world = voyage_over_a_bank(config={"tide": TideTable(rows=rows)})
+    tell, _ = sounded(world)
+    world.shown |= {"utc_at_boot_s": 1.8e9}
+    assert world.run(400, lambda w: tell(w) or said(w, "turning back"))
+    known = world.state.soundings.shoals
+    assert {shoal.tide_m for shoal in known} == {1.2}
+    saved = Persisted.from_dict(json.loads(json.dumps(world.skipper.persisted(world.state).to_dict())))
+    assert saved.shoals == known
+    with_tide = replace(known[0], tide_m=1.2)
+    assert with_tide.below_datum_m(0.4) == pytest.approx(known[0].depth_m - 0.8)
+    again = replace(saved, shoals=(with_tide,))
+    assert Persisted.from_dict(json.loads(json.dumps(again.to_dict()))).shoals == (with_tide,)
 
 
 @pytest.mark.parametrize("bad", [[1.0, 2.0], [0.0, 0.0, -1.0, 0.0, 1.0], [0.0, 0.0, 5.0, 1e9, 1.0], "shoal"])

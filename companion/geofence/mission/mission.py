@@ -115,6 +115,12 @@ class Mission:
         return None if current is None or current.table is None else self.path.parent / current.table
 
     @property
+    def heights_path(self) -> Path | None:
+        """The file of the tide's heights, None without one."""
+        table = self.options.area.tide
+        return None if table is None else self.path.parent / table
+
+    @property
     def autopilot(self) -> AutopilotOptions:
         """The ``[autopilot]`` table."""
         return self.options.autopilot
@@ -291,6 +297,8 @@ def assembled(
             "[boat] polar",
             'write a file beside the mission, "ardurover" or a speed in m/s',
         )
+    if mission.heights_path is not None:
+        _require(mission.heights_path, str(path), "[area] tide", "write a table of heights beside the mission")
     if mission.tide_path is not None:
         _require(mission.tide_path, str(path), "[current] table", "write a tide table beside the mission")
     return mission

@@ -251,6 +251,9 @@ class AreaOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     """The radius of an obstacle that is only a point or a line."""
     under_keel_m: Annotated[float, Meta(ge=0.0, le=50.0)] = 0.5
     """Room under the keel that ``companion chart import`` leaves; less than it by the sounder is told."""
+    tide: str | None = None
+    """A table of the tide's heights beside the mission: lines of time, metres above the chart's datum; by it what was
+    sounded is told below the datum."""
 
 
 class RiskOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -17,6 +17,7 @@ from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.skipper.behaviors.helm import hand_back
 from companion.skipper.planning.uploads import upload
+from companion.skipper.planning.waits import utc_s
 from companion.skipper.step import CancelPlan, Phase, StepContext
 from companion.skipper.step.state import Sounded
 from companion.skipper.way.geometry import distance_m, is_tack, moved
@@ -65,6 +66,7 @@ def follow_soundings(ctx: StepContext) -> None:
     if not ctx.is_raised(SHOALING) or ahead_m is None or ahead_m > 0.0:
         return
     known = ctx.state.soundings.shoals
+    tide_m = None if ctx.config.tide is None else ctx.config.tide.height_m(utc_s(ctx))
     is_sailing_on = not (_is_on_board(ctx) or _is_coming(ctx)) and ctx.t_s - ctx.state.soundings.found_s > AGAIN_S
     if SHOALING in ctx.fresh or is_sailing_on:
         shoal = found(
@@ -75,13 +77,14 @@ def follow_soundings(ctx: StepContext) -> None:
             depth_m=status.depth_m,
             rate_mps=status.depth_rate_mps or 0.0,
             least_m=least_m,
+            tide_m=tide_m,
         )
         if all(distance_m(each.en_m, shoal.en_m) >= APART_M for each in known):
             ctx.learn_shoals((*known, shoal)[-MOST_SHOALS:])
             ctx.set(soundings=changed(ctx.state.soundings, found_s=ctx.t_s))
             ctx.say(Severity.WARNING, "shoal", _words(ctx, boat, shoal, status.depth_m), every_s=0.0)
     elif status.depth_m <= least_m and all(distance_m(each.en_m, boat) >= APART_M for each in known):
-        ctx.learn_shoals((*known, over(boat, status.depth_m))[-MOST_SHOALS:])
+        ctx.learn_shoals((*known, over(boat, status.depth_m, tide_m))[-MOST_SHOALS:])
 
 
 def _words(ctx: StepContext, boat: PointEn, shoal: Shoal, depth_m: float) -> str:

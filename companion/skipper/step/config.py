@@ -9,6 +9,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from companion.current import TideTable
 from companion.orders import ALL
 from companion.planners import AUTO, PlannerChoice
 from companion.safety import CAUSES, CHOICES, ENDINGS, SETTINGS, End, Recovery
@@ -108,6 +109,7 @@ class SkipperConfig:
     delta_s_ladder: tuple[float, ...] = (0.90, 0.80, 0.66)  # tried in this order when nothing is found
     margin_m: float = 15.0  # >= 15 m at 3 m/s: a breach coasts 6 to 10 m (ardurover notes, fence)
     margin_floor_m: float = 8.0  # never planned closer than this, whatever the ladder
+    tide: TideTable | None = None  # of the water, where the mission has a table
     least_depth_m: float | None = None  # that a sounder may tell: the keel and the room under it; None: not watched
     margin_ladder: tuple[float, ...] = (0.75, 0.5)  # share of margin - floor that is left
     planner: PlannerChoice = AUTO  # by which algorithm; what it does not find is planned by ``auto``

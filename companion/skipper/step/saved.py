@@ -265,14 +265,18 @@ def _place_from_list(data: Any) -> SavedPlace | None:
 
 
 def _shoal_to_list(shoal: Shoal) -> list[float]:
-    return [*shoal.en_m, shoal.radius_m, shoal.doubt_m, shoal.depth_m]
+    tide = [] if shoal.tide_m is None else [shoal.tide_m]
+    return [*shoal.en_m, shoal.radius_m, shoal.doubt_m, shoal.depth_m, *tide]
 
 
 def _shoal_from_list(data: Any) -> Shoal:
-    east, north, radius_m, doubt_m, depth_m = (_number(value) for value in data)
+    east, north, radius_m, doubt_m, depth_m, *tide = (_number(value) for value in data)
+    if len(tide) > 1:
+        raise ValueError("it is damaged: a shoal with two tides")
     if not (0.0 < radius_m <= MOST_RADIUS_M and 0.0 <= doubt_m <= MOST_RADIUS_M):
         raise ValueError("it is damaged: a shoal of no size")
-    return Shoal(en_m=(east, north), radius_m=radius_m, doubt_m=doubt_m, depth_m=depth_m)
+    tide_m = tide[0] if tide else None
+    return Shoal(en_m=(east, north), radius_m=radius_m, doubt_m=doubt_m, depth_m=depth_m, tide_m=tide_m)
 
 
 def _approach_to_list(approach: Approach) -> list[Any]:

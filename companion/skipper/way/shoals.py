@@ -40,12 +40,18 @@ class Shoal:
         radius_m: of what is taken to be shoal.
         doubt_m: how far beyond that it may reach.
         depth_m: what was sounded on the way to it, or over it.
+        tide_m: how high the tide stood above the chart's datum then, where a table tells it.
     """
 
     en_m: PointEn
     radius_m: float
     doubt_m: float
     depth_m: float
+    tide_m: float | None = None
+
+    def below_datum_m(self, transducer_m: float) -> float | None:
+        """Return what was sounded as charts have it: below their datum [m]; None where no table told the tide."""
+        return None if self.tide_m is None else self.depth_m + transducer_m - self.tide_m
 
 
 def found(
@@ -57,6 +63,7 @@ def found(
     depth_m: float,
     rate_mps: float,
     least_m: float,
+    tide_m: float | None = None,
 ) -> Shoal:
     """Return the shoal that a boat is about to come onto, where ``depth_m`` changes by ``rate_mps``."""
     left_m = max(0.0, depth_m - least_m)
@@ -66,13 +73,17 @@ def found(
     radius_m = min(MOST_RADIUS_M, RADIUS_M + GROWS_M * beside)
     doubt_m = min(DOUBT_M + DOUBT_SHARE * way_m, max(0.0, way_m - KEPT_M))
     return Shoal(
-        en_m=moved(edge_en, course_rad, radius_m), radius_m=radius_m, doubt_m=doubt_m, depth_m=min(depth_m, least_m)
+        en_m=moved(edge_en, course_rad, radius_m),
+        radius_m=radius_m,
+        doubt_m=doubt_m,
+        depth_m=min(depth_m, least_m),
+        tide_m=tide_m,
     )
 
 
-def over(boat_en: PointEn, depth_m: float) -> Shoal:
+def over(boat_en: PointEn, depth_m: float, tide_m: float | None = None) -> Shoal:
     """Return the shoal that a boat is over: nothing is known of it but where she is."""
-    return Shoal(en_m=boat_en, radius_m=SOUNDED_M, doubt_m=DOUBT_M, depth_m=depth_m)
+    return Shoal(en_m=boat_en, radius_m=SOUNDED_M, doubt_m=DOUBT_M, depth_m=depth_m, tide_m=tide_m)
 
 
 @functools.lru_cache(maxsize=8)
