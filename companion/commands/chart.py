@@ -60,7 +60,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     load.add_argument(
         "--tide",
         metavar="TABLE",
-        help="lines of time, height above the chart's datum [m]: the lowest of --from to --to is added to every depth",
+        help="lines of time, height above the chart's datum [m]: the lowest of --from to --to is added to every depth "
+        "(the mission's [area] tide)",
     )
     load.add_argument("--from", dest="begins", type=moment, metavar="TIME", help="2026-11-24T08:00Z, with --tide")
     load.add_argument("--to", dest="ends", type=moment, metavar="TIME", help="the same, of the voyage's end")
@@ -159,7 +160,8 @@ def _import(args: argparse.Namespace) -> int:
     folder = Path(args.mission).parent if args.mission and not args.out else Path()
     obstacles, fence = folder / f"{out}.geojson", folder / f"{out}-fence.geojson"
     refuse_existing([str(obstacles), str(fence)], force=args.force)
-    tide_m = _tide_m(args)
+    table = _tide_table(args, options)
+    tide_m = _tide_m(args, table)
     depth_m = _depth_m(args, options) - tide_m
     wanted = Wanted(
         safety_depth_m=depth_m,
@@ -187,7 +189,7 @@ def _import(args: argparse.Namespace) -> int:
     print(
         f"{obstacles}: written: {counted(len(area.solids), 'obstacle')} ({counted(area.positions(), 'position')}) "
         f"within {reach_m:g} m of {center.lat_deg:.5f}, {center.lon_deg:.5f}; solid is what is less deep than "
-        f"{depth_m:g} m" + (f" with {tide_m:g} m of tide" if args.tide else "")
+        f"{depth_m:g} m" + (f" with {tide_m:g} m of tide" if table else "")
     )
     print(f"{fence}: written: the edge of it")
     if any(s.doubt_m >= args.most_doubt > 0.0 for s in area.solids):
@@ -240,21 +242,28 @@ def _depth_m(args: argparse.Namespace, options: MissionOptions | None) -> float:
     return options.boat.draft_m + options.area.under_keel_m
 
 
-def _tide_m(args: argparse.Namespace) -> float:
+def _tide_table(args: argparse.Namespace, options: MissionOptions | None) -> str | None:
+    """Return the table of the tide: that of the command, or the mission's where hours are asked for."""
+    if args.tide is not None or options is None or options.area.tide is None:
+        return args.tide if args.tide is None else str(args.tide)
+    return None if args.begins is None and args.ends is None else str(Path(args.mission).parent / options.area.tide)
+
+
+def _tide_m(args: argparse.Namespace, table: str | None) -> float:
     """Return the lowest height of tide in the voyage's hours [m]: 0, the chart's datum, without a table."""
     from companion.current import lowest_m, read_tide
     from companion.current.prior import table_lines
     from companion.geofence.formats import decode, read_bytes
 
-    if args.tide is None and args.begins is None and args.ends is None:
+    if table is None and args.begins is None and args.ends is None:
         return 0.0
-    if args.tide is None or args.begins is None or args.ends is None or args.begins >= args.ends:
+    if table is None or args.begins is None or args.ends is None or args.begins >= args.ends:
         raise InputError(
             "companion chart import", "--tide", "goes with --from and a later --to", "say all three, or none"
         )
-    text = decode(read_bytes(Path(args.tide)), args.tide)
-    rows = read_tide(text, args.tide, tuple(_utc_s(line.split(",")[0].strip()) for _, line in table_lines(text)))
-    return lowest_m(rows, args.begins.timestamp(), args.ends.timestamp(), args.tide)
+    text = decode(read_bytes(Path(table)), table)
+    rows = read_tide(text, table, tuple(_utc_s(line.split(",")[0].strip()) for _, line in table_lines(text)))
+    return lowest_m(rows, args.begins.timestamp(), args.ends.timestamp(), table)
 
 
 def _utc_s(text: str) -> float | None:

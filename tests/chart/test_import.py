@@ -114,6 +114,17 @@ def test_the_lowest_tide_of_the_hours_is_added_to_every_depth(shell, begins, end
     assert f"less deep than {depth_m:g} m with {2.0 - depth_m:g} m of tide" in out
 
 
+def test_the_missions_table_of_the_tide_is_taken_where_hours_are_asked_for(shell):
+    (shell.folder / "a.geojson").write_text(collection((ISLAND, {})))
+    (shell.folder / "t.csv").write_text(TIDE)
+    (shell.folder / "m.toml").write_text(MISSION.replace("[area]\n", '[area]\ntide = "t.csv"\n'))
+    hours = ["--from", "2026-11-24T07:00Z", "--to", "2026-11-24T11:00Z"]
+    code, out, _ = shell("a.geojson", "--mission", "m.toml", *hours)
+    assert (code, "less deep than 0.7 m with 1 m of tide" in out) == (0, True), out
+    code, out, _ = shell("a.geojson", "--mission", "m.toml", "--force")
+    assert (code, "less deep than 1.7 m\n" in out) == (0, True), out
+
+
 @pytest.mark.parametrize(
     ("text", "begins", "told"),
     [
