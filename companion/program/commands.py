@@ -105,6 +105,7 @@ EXTRAS = {
     "pyarrow": "results",
     "pyogrio": "chart",
     "rasterio": "chart",
+    "gribberish": "weather",
     "filterpy": "shore",
 }
 

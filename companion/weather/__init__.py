@@ -1,0 +1,28 @@
+"""Weather: forecasts of wind, gusts and currents over time and place, read from GRIB files as one value.
+
+``read_weather`` reads files, ``Weather`` is asked for a time and place; what lies beyond its edges is unknown.
+"""
+
+from companion.weather.assemble import Box, assemble
+from companion.weather.grib import GribField, Grid, Quantity, walk
+from companion.weather.packing import values_of
+from companion.weather.readers import read_weather
+from companion.weather.told import told_at, told_of
+from companion.weather.weather import Cube, Weather, holes_of, iso
+
+__all__ = [
+    "Box",
+    "Cube",
+    "GribField",
+    "Grid",
+    "Quantity",
+    "Weather",
+    "assemble",
+    "holes_of",
+    "iso",
+    "read_weather",
+    "told_at",
+    "told_of",
+    "values_of",
+    "walk",
+]

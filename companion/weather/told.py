@@ -1,0 +1,107 @@
+"""A forecast in words: what, where, when, members, holes; and what it says of one place."""
+
+from __future__ import annotations
+
+import math
+from itertools import groupby
+
+import numpy as np
+
+from companion.weather.weather import Cube, Floats, Weather, holes_of, iso
+from companion.words import counted
+
+
+def told_of(weather: Weather) -> tuple[str, ...]:
+    """Return lines that say what a forecast holds."""
+    lines: list[str] = []
+    for name, cubes in (("wind of 10 m", weather.wind), ("gust", weather.gust), ("current", weather.current)):
+        for cube in cubes:
+            lines += _told_of_cube(name, cube)
+    return (*lines, *weather.notes)
+
+
+def _told_of_cube(name: str, cube: Cube) -> list[str]:
+    members = len(cube.members)
+    lines = [f"{name}: {_when(cube)}" + (f", {members} members" if members > 1 else ""), f"  {_where(cube)}"]
+    if cube.interval_s:
+        lines.append(f"  the strongest of {_hours(cube.interval_s)} before each time")
+    for base, group in groupby(zip(cube.base_utc_s, cube.utc_s, strict=True), key=lambda pair: pair[0]):
+        times = [t for _, t in group]
+        lines.append(f"  run of {iso(base)}: {iso(times[0])} to {iso(times[-1])}")
+    lines += [f"  hole: nothing between {iso(a)} and {iso(b)}, {_hours(b - a)}" for a, b in cube.holes_s()]
+    lacking = np.isnan(cube.values).all(axis=(2, 3, 4)).sum()
+    if lacking:
+        lines.append(f"  hole: {counted(int(lacking), 'time')} of single members missing")
+    share = cube.unknown_share()
+    if share > 0.0:
+        lines.append(f"  not known: {100.0 * share:.2g} % of it")
+    return lines
+
+
+def _hours(seconds: float) -> str:
+    return f"{seconds / 3600.0:.3g} h"
+
+
+def _when(cube: Cube) -> str:
+    if cube.utc_s.size == 1:
+        return iso(cube.utc_s[0])
+    holes = {a for a, _ in holes_of(cube.utc_s)}
+    steps = [b - a for a, b in zip(cube.utc_s[:-1], cube.utc_s[1:], strict=True) if a not in holes]
+    every = ", then ".join(_hours(step) for step, _ in groupby(steps))
+    count = counted(int(cube.utc_s.size), "time")
+    return f"{iso(cube.utc_s[0])} to {iso(cube.utc_s[-1])}, {count}" + (f" every {every}" if steps else "")
+
+
+def _where(cube: Cube) -> str:
+    lat, lon = cube.lat_deg, cube.lon_deg
+    rows = f"{_degrees(lat[0], 'NS')} to {_degrees(lat[-1], 'NS')}"
+    columns = "all round" if cube.is_round else f"{_degrees(lon[0], 'EW')} to {_degrees(lon[-1], 'EW')}"
+    tall, wide = ((axis[-1] - axis[0]) / max(1, axis.size - 1) for axis in (lat, lon))
+    return f"{rows}, {columns}; a value every {tall:.3g} x {wide:.3g} degrees ({lat.size} x {lon.size})"
+
+
+def _degrees(value: float, letters: str) -> str:
+    value = math.remainder(value, 360.0)
+    return f"{abs(value):.2f} {letters[int(value < 0.0)]}"
+
+
+def told_at(weather: Weather, lat_deg: float, lon_deg: float) -> tuple[str, ...]:
+    """Return a table of what is said of one place: a line for each time of the wind there, and of the gusts."""
+    cubes = [cube for cube in (weather.wind or weather.gust) if cube.covers(lat_deg, lon_deg)]
+    utc = np.unique(np.concatenate([cube.utc_s for cube in cubes])) if cubes else np.zeros(0)
+    wind = weather.wind_en_mps(utc, lat_deg, lon_deg)
+    speed = np.hypot(wind[..., 0], wind[..., 1])
+    gust = weather.gust_mps(utc, lat_deg, lon_deg)
+    current = weather.current_en_mps(utc, lat_deg, lon_deg) if weather.current else np.full((utc.size, 2), math.nan)
+    many = len(weather.members) > 1 or gust.shape[0] > 1
+    spread = " (a tenth of the members below, a tenth above)" if many else ""
+    lines = [f"time, wind [m/s] from, gust [m/s], current [m/s] towards{spread}"]
+    for i, t in enumerate(utc):
+        east, north = (_mean(wind[:, i, k]) for k in (0, 1))
+        blows = f"{_spread(speed[:, i])} from {_compass(-east, -north)}" if weather.wind else "-"
+        words = [iso(t), blows, _spread(gust[:, i])]
+        words.append(f"{math.hypot(*current[i]):.2f} to {_compass(*current[i])}" if weather.current else "-")
+        lines.append("  ".join(words))
+    return tuple(lines)
+
+
+def _mean(values: Floats) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if known.size else math.nan
+
+
+def _spread(values: Floats) -> str:
+    known = values[~np.isnan(values)]
+    if known.size == 0:
+        return "?" if values.size else "-"
+    middle = f"{float(known.mean()):.1f}"
+    if known.size == 1:
+        return middle
+    low, high = np.quantile(known, (0.1, 0.9))
+    return f"{middle} ({low:.1f}-{high:.1f})"
+
+
+def _compass(east: float, north: float) -> str:
+    if math.isnan(east) or math.hypot(east, north) < 1e-9:
+        return "?"
+    return f"{round(math.degrees(math.atan2(east, north))) % 360:03d}"
