@@ -24,6 +24,7 @@ PROGRAM = Program(
         "field": "what a field that a mission composes would do",
         "chart": "charts become the obstacles and the fence of a mission",
         "weather": "what a forecast holds: where, when, members, holes",
+        "passage": "where to go in a forecast, and when",
         "boat": "what a boat can do: guess it from her sizes, show it, compare it",
         "setup": "write a mission and the settings of its service",
         "doctor": "is this autopilot set up to be sailed?",

@@ -58,6 +58,7 @@ from companion.geofence.mission import (
     RepulsivePointAtomOptions,
     StationAtomOptions,
     free_water,
+    polar_path,
     read_boat_file,
 )
 from companion.geofence.shapes import polygon_en
@@ -98,7 +99,12 @@ POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon":
 
 def polar_of(mission: Mission) -> Polar:
     """Return the mission's polar."""
-    path = mission.polar_path
+    return polar_named(mission.boat, mission.path)
+
+
+def polar_named(boat: BoatOptions, source: Path) -> Polar:
+    """Return the polar that ``[boat]`` of a file names. Raises InputError."""
+    path = polar_path(boat, source)
     if path is not None and path.suffix == ".toml":
         return polar_of_file(read_boat_file(path), str(path))
     if path is not None:
@@ -106,12 +112,12 @@ def polar_of(mission: Mission) -> Polar:
         if file.warnings:
             raise InputError(str(path), "", file.warnings[0], "fill it in: a guessed polar is not sailed")
         return file.polar
-    polar = mission.boat.polar
+    polar = boat.polar
     if isinstance(polar, str):
         maker = POLARS.get(polar)
         if maker is None:
             raise InputError(
-                str(mission.path),
+                str(source),
                 "[boat] polar",
                 f"there is no polar {polar!r}",
                 'write "ardurover", "avalon", a polar file beside the mission, or a speed in m/s',

@@ -10,7 +10,7 @@ from companion.geofence.mission.autopilot_mission import (
     read_stored,
     stored_text,
 )
-from companion.geofence.mission.boat_file import BoatFile, LearnedTable, parse_boat_file, read_boat_file
+from companion.geofence.mission.boat_file import BoatFile, LearnedTable, parse_boat_file, read_boat_file, with_boat_file
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
 from companion.geofence.mission.goals import GoalField, GoalGate, free_water, is_file
 from companion.geofence.mission.mission import (
@@ -18,6 +18,7 @@ from companion.geofence.mission.mission import (
     load_mission,
     load_settings,
     place_troubles,
+    polar_path,
     read_course,
     read_mission,
 )
@@ -100,6 +101,7 @@ __all__ = [
     "parse_boat_file",
     "parse_options",
     "place_troubles",
+    "polar_path",
     "read_boat_file",
     "read_course",
     "read_mission",
@@ -107,6 +109,7 @@ __all__ = [
     "read_stored",
     "stored_text",
     "toml",
+    "with_boat_file",
     "without_defaults",
     "zones_only",
 ]

@@ -196,10 +196,15 @@ class Mission:
     @property
     def polar_path(self) -> Path | None:
         """The polar file, None for a built-in polar or a constant speed."""
-        polar = self.options.boat.polar
-        if isinstance(polar, str) and ("." in polar or "/" in polar):
-            return self.path.parent / polar
-        return None
+        return polar_path(self.options.boat, self.path)
+
+
+def polar_path(boat: BoatOptions, source: Path) -> Path | None:
+    """Return the polar file that ``[boat]`` of a file names, None for a built-in polar or a constant speed."""
+    polar = boat.polar
+    if isinstance(polar, str) and ("." in polar or "/" in polar):
+        return source.parent / polar
+    return None
 
 
 def load_mission(path: str | Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:

@@ -1,0 +1,205 @@
+"""``companion passage``: where to go in a forecast, and when."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from companion.commands.output import force_option, patience, refuse_existing, write_files
+from companion.errors import InputError, JobError
+from companion.program.arguments import add_command, out_file, picture
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from companion.passage import Passage, Route
+    from companion.passage.file import PassageFile
+    from companion.weather import Weather
+
+_EPILOG = """\
+examples:
+  companion passage plan biscay.toml
+  companion passage plan biscay.toml --plot biscay.png --out mission.toml
+
+PASSAGE.toml names start, goal, departure, forecasts in GRIB, boat and land; its keys are in docs/reference/formats.md.
+The route is the fastest in the forecast's first member, with a time that no way can be faster than. Ashore, before she
+sails.
+
+Exit codes: 0 planned, 1 no way was found, 2 a file that cannot be believed.
+"""
+
+
+NODES = 120  # from start to goal, of the first search
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
+    """Add the command with its verb."""
+    parser = add_command(subparsers, "passage", summary, _EPILOG)
+    verbs = parser.add_subparsers(dest="verb", metavar="plan", required=True)
+    plan = verbs.add_parser("plan", help="the fastest way through a forecast, with a bound below every way")
+    plan.add_argument("file", metavar="PASSAGE.toml", type=Path)
+    plan.add_argument(
+        "--out", metavar="M", type=out_file, help="write the route as a mission with a band about each leg"
+    )
+    plan.add_argument(
+        "--plot", metavar="FILE", type=picture, help="draw the route, isochrones and the wind as she meets it"
+    )
+    force_option(plan)
+    plan.set_defaults(run=_plan)
+
+
+def _plan(args: argparse.Namespace) -> int:
+    from companion.passage import plan
+    from companion.passage.told import told_of
+
+    if args.out is not None:
+        refuse_existing([str(args.out)], force=args.force)
+    asked, passage = _read(args.file)
+    with patience("planning"):
+        route = plan(passage, asked.depart.at.timestamp(), nodes=NODES)
+    for line in told_of(route):
+        print(line)
+    if args.plot is not None and route.waypoints:
+        from companion.plots.passage import save_passage
+
+        with patience("drawing"):
+            save_passage(passage, route, asked.name or args.file.stem, args.plot)
+        print(f"{args.plot}: written")
+    if not math.isfinite(route.time_s):
+        return JobError.exit_code
+    if args.out is not None:
+        write_files({str(args.out): _mission_text(asked, passage, route, args.file, args.out)}, force=args.force)
+        print(f"{args.out}: written: companion mission check {args.out}")
+    return 0
+
+
+def _read(path: Path) -> tuple[PassageFile, Passage]:
+    """Return what a file asks, with the boat, forecasts and land that it names."""
+    import msgspec
+
+    from companion.compose import polar_named
+    from companion.geofence.formats import decode, read_bytes
+    from companion.geofence.mission import with_boat_file
+    from companion.messages import GeoPoint
+    from companion.passage import Passage, PassageFrame, craft_of, land_of
+    from companion.passage.file import parse_passage
+    from companion.weather import read_weather
+
+    source = str(path)
+    text = decode(read_bytes(path, max_bytes=1 << 20), source)
+    asked = parse_passage(text, source)
+    asked = msgspec.structs.replace(asked, boat=with_boat_file(asked.boat, text, path))
+    start, goal = (GeoPoint(lat_deg=p.lat, lon_deg=p.lon) for p in (asked.start, asked.goal))
+    try:
+        frame = PassageFrame(start, goal)
+    except ValueError as error:
+        raise InputError(source, "[goal]", str(error), "look at both") from None
+    if frame.length_m < 2.0 * asked.goal.radius_m:
+        raise InputError(source, "[goal] radius_m", "reaches to the start", "say a smaller one")
+    box = _box(frame)
+    weather = read_weather([path.parent / name for name in asked.weather.files], box)
+    _check_weather(asked, weather, source)
+    boat = asked.boat
+    craft = craft_of(
+        polar_named(boat, path),
+        no_go_half_rad=math.radians(boat.no_go_half_deg),
+        max_twa_rad=math.radians(boat.max_twa_deg),
+        tack_loss_s=boat.tack_loss_s,
+        board_m=asked.sailing.board_m,
+        night_share=asked.sailing.night_share,
+        max_tws_mps=math.inf if boat.max_tws_mps is None else boat.max_tws_mps,
+    )
+    land = land_of(frame, _solids(asked, path), box, asked.area.margin_m)
+    for place, point in (("[start]", start), ("[goal]", goal)):
+        if float(land.distance_m(frame.xy_from_geo([point.lat_deg], [point.lon_deg]))[0]) <= 0.0:
+            raise InputError(
+                source, place, "is on land, in closed water or within [area] margin_m of it", "move it out to sea"
+            )
+    return asked, Passage(
+        start=start, goal=goal, radius_m=asked.goal.radius_m, craft=craft, weather=weather, land=land, frame=frame
+    )
+
+
+def _box(frame: Any) -> tuple[float, float, float, float]:
+    """Return the box (west, south, east, north) of the widest search, a little more."""
+    import numpy as np
+
+    from companion.passage.plan import widest_room_m
+
+    room = widest_room_m(frame.length_m)
+    edge = np.linspace(0.0, 1.0, 60)
+    x = -0.5 * room + edge * (frame.length_m + room)
+    y = -room + edge * 2.0 * room
+    ring = np.concatenate(
+        [
+            np.stack(np.broadcast_arrays(a, b), axis=-1)
+            for a, b in ((x, y[0]), (x, y[-1]), (x[0], y), (x[-1], y), (x, 0.0))
+        ]
+    )
+    lat, lon = frame.geo_from_xy(ring)
+    lon = frame.start.lon_deg + np.mod(lon - frame.start.lon_deg + 180.0, 360.0) - 180.0
+    return (
+        float(lon.min()) - 0.5,
+        max(-90.0, float(lat.min()) - 0.5),
+        float(lon.max()) + 0.5,
+        min(90.0, float(lat.max()) + 0.5),
+    )
+
+
+def _check_weather(asked: PassageFile, weather: Weather, source: str) -> None:
+    """Raise InputError where the forecast knows no wind at the start when she departs."""
+    from companion.weather import iso
+
+    names = ", ".join(asked.weather.files)
+    if not weather.wind:
+        raise InputError(source, f"[weather] {names}", "holds no wind of 10 m here", "ask for 10u and 10v of the area")
+    depart = asked.depart.at.timestamp()
+    for place, point in (("[start]", asked.start), ("[goal]", asked.goal)):
+        if not any(cube.covers(point.lat, point.lon) for cube in weather.wind):
+            raise InputError(source, place, f"is outside the area of {names}", "ask for a larger area")
+    why = weather.why_unknown(depart, asked.start.lat, asked.start.lon)
+    if why:
+        said = f"{iso(depart)} is {why}" if why[:5] in {"after", "befor"} else f"the wind there is {why}"
+        raise InputError(source, "[depart] at", said, "say another time, or give a forecast of it")
+
+
+def _solids(asked: PassageFile, path: Path) -> list[BaseGeometry]:
+    """Return the polygons (lon, lat) of the files that ``[area] obstacles`` names."""
+    from companion.geofence import ZoneKind, read
+    from companion.geofence.shapes import drawn
+
+    out: list[BaseGeometry] = []
+    for name in asked.area.obstacles:
+        file = path.parent / name
+        if not file.is_file():
+            raise InputError(str(path), f"[area] obstacles {name}", "no such file", "paths are relative to this file")
+        document = read(file, kind=ZoneKind.EXCLUSION, axis=asked.area.axis, areas=True, far_m=math.inf).require_clean()
+        zones = [z for z in document.zones if z.kind is ZoneKind.EXCLUSION]
+        if not zones:
+            raise InputError(str(file), "", "holds no polygon", "give land or closed water as areas")
+        out += [drawn(zone) for zone in zones]
+    return out
+
+
+def _mission_text(asked: PassageFile, passage: Passage, route: Route, path: Path, out: Path) -> bytes:
+    """Return the mission file of a route; what it names lies where the passage's file has it."""
+    import os
+
+    from companion.geofence.mission import toml, without_defaults
+    from companion.passage.mission import mission_of
+
+    def named(name: str) -> str:
+        return Path(os.path.relpath(path.parent / name, out.parent)).as_posix()
+
+    tables = mission_of(route, passage, asked.name or path.stem)
+    boat = without_defaults(asked.boat)
+    for key in ("file", "polar"):
+        if isinstance(boat.get(key), str) and ("." in boat[key] or "/" in boat[key]):
+            boat[key] = named(boat[key])
+    area = without_defaults(asked.area)
+    if asked.area.obstacles:
+        area["obstacles"] = [named(name) for name in asked.area.obstacles]
+    tables |= {key: table for key, table in (("boat", boat), ("area", area)) if table}
+    return toml(tables).encode()

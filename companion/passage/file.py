@@ -1,0 +1,103 @@
+"""A passage's file: what is asked, as TOML. Its ``[boat]`` and ``[area]`` are those of a mission."""
+
+from __future__ import annotations
+
+import datetime as dt
+import difflib
+import math
+import re
+import tomllib
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct
+
+from companion.errors import InputError
+from companion.geofence.mission import AreaOptions, BoatOptions, Latitude, Longitude
+from companion.words import expected
+
+
+class PlaceOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[start]``: where she is."""
+
+    lat: Latitude
+    lon: Longitude
+
+
+class GoalOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[goal]``: where she is to be."""
+
+    lat: Latitude
+    lon: Longitude
+    radius_m: Annotated[float, Meta(ge=1.0, le=100_000.0)] = 1000.0
+    """She is there within so far of it."""
+    name: str = "goal"
+
+
+class DepartOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[depart]``: when she sets sail."""
+
+    at: Annotated[dt.datetime, Meta(tz=True)]
+
+
+class WeatherOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[weather]``: the forecasts, beside the passage's file; wind and, where they have it, the current."""
+
+    files: Annotated[tuple[str, ...], Meta(min_length=1)]
+
+
+class SailingOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[sailing]``: how she is sailed over days."""
+
+    board_m: Annotated[float, Meta(ge=100.0, le=1e6)] = 10_000.0
+    """The length of a board of a beat, after which a tack costs ``[boat] tack_loss_s``."""
+    night_share: Annotated[float, Meta(ge=0.0, le=1.0)] = 1.0
+    """Of her speed, how much she sails at when the sun is more than 6 degrees down; 0: she heaves to."""
+
+
+class PassageFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A file of ``companion passage``."""
+
+    name: str = ""
+    start: PlaceOptions
+    goal: GoalOptions
+    depart: DepartOptions
+    weather: WeatherOptions
+    boat: BoatOptions = BoatOptions()
+    area: AreaOptions = AreaOptions(margin_m=0.0)
+    sailing: SailingOptions = SailingOptions()
+
+
+def parse_passage(text: str, source: str) -> PassageFile:
+    """Return the passage of a TOML text. Raises InputError: the key, what is wrong with it, and the nearest known."""
+    try:
+        raw = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise InputError(source, "", f"is not TOML: {str(error)[:80]}") from None
+    for table, keys in raw.items():
+        for key, value in keys.items() if isinstance(keys, dict) else ():
+            if isinstance(value, float) and not math.isfinite(value):
+                raise InputError(source, f"[{table}] {key}", f"{value} is not a finite number")
+    try:
+        return msgspec.convert(raw, PassageFile)
+    except msgspec.ValidationError as error:
+        raise _refusal(str(error), source) from None
+
+
+def _refusal(message: str, source: str) -> InputError:
+    problem, _, path = message.partition(" - at `$.")
+    table, _, key = path.rstrip("`").partition(".")
+    place = f"[{table}] {key}".strip() if table else ""
+    unknown = re.search(r"unknown field `(.+)`", problem)
+    if unknown:
+        kind: Any = {field.name: field.type for field in msgspec.structs.fields(PassageFile)}.get(table, PassageFile)
+        known = kind.__struct_fields__
+        near = difflib.get_close_matches(unknown[1], known, n=1, cutoff=0.5)
+        remedy = f"did you mean {near[0]!r}?" if near else "known keys: " + ", ".join(known)
+        return InputError(source, f"{place} {unknown[1]}".strip(), "unknown key", remedy)
+    missing = re.search(r"missing required field `(.+)`", problem)
+    if missing:
+        return InputError(
+            source, f"{place} {missing[1]}".strip() if table else f"[{missing[1]}]", "is missing", "add it"
+        )
+    return InputError(source, place, expected(problem))

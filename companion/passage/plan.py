@@ -1,0 +1,319 @@
+"""A passage planned: the fastest way through a forecast, refined, made a few waypoints, judged by replay."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.messages import GeoPoint
+from companion.passage.frame import GEOD, Floats, PassageFrame, up_of
+from companion.passage.kernels import SLACK, STENCIL, Craft, Waters, arrivals, least_left, polyline
+from companion.passage.land import Land
+from companion.passage.replay import Sailed, sail
+from companion.weather import Weather
+
+COARSE = 120  # nodes from start to goal
+FINER = 4  # times, in the corridor
+CORRIDOR = 3.0  # coarse nodes to each side
+ROOM = 0.45  # of the length, to each side and beyond the ends half of it: the first search
+_LEAST_ROOM_M = 15_000.0
+_MOST_WIDENINGS = 2
+_STEPS_AN_EDGE = 2
+
+
+class Outcome(enum.Enum):
+    """How a search for a way ended."""
+
+    FOUND = "found"
+    NO_WATER = "no way by water leads there"
+    NO_WEATHER = "the forecast ends before she is there, or does not reach so far"
+    TOO_MUCH_WIND = "every way leads through more wind than she is to be out in"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Passage:
+    """What is asked: from where, to where, when, with which boat, in which water and weather."""
+
+    start: GeoPoint
+    goal: GeoPoint
+    radius_m: float
+    craft: Craft
+    weather: Weather
+    land: Land
+    frame: PassageFrame
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Route:
+    """What was found for one departure and member: places, the replay that judges it, the bound below every way.
+
+    ``waypoints`` begin at the start; empty without a way. ``searched`` are the search's (x, y, arrivals [Unix s]).
+    """
+
+    outcome: Outcome
+    depart_utc_s: float
+    waypoints: tuple[GeoPoint, ...] = ()
+    sailed: Sailed | None = None
+    bound_s: float = 0.0
+    searched: tuple[Floats, Floats, Floats] | None = None
+
+    @property
+    def time_s(self) -> float:
+        """How long it takes by the replay [s]; inf without a way."""
+        return self.sailed.time_s if self.sailed is not None and self.sailed.arrived else math.inf
+
+
+def widest_room_m(length_m: float) -> float:
+    """Return how far to each side of the way the widest search looks [m]."""
+    return max(ROOM * length_m, _LEAST_ROOM_M) * 2.0**_MOST_WIDENINGS
+
+
+def waters_of(
+    passage: Passage,
+    x_m: Floats,
+    y_m: Floats,
+    member: int,
+    from_s: float,
+    to_s: float,
+    mask: NDArray[np.bool_] | None = None,
+) -> Waters:
+    """Return a member's wind and stream on a grid of the frame; the grid is even and its step the same in x and y."""
+    grid = np.stack(np.meshgrid(x_m, y_m), axis=-1)
+    lat, lon = passage.frame.geo_from_xy(grid)
+    times = times_of(passage.weather, from_s, to_s)
+    shape = (times.size, y_m.size, x_m.size, 2)
+    wind = np.full(shape, np.nan, dtype=np.float32)
+    stream = np.full(shape if passage.weather.current else (1, 1, 1, 2), np.nan, dtype=np.float32)
+    here = np.ones(lat.shape, dtype=bool) if mask is None else mask
+    row = passage.weather.members.index(member)
+    for k, t in enumerate(times):
+        blows = passage.weather.wind_en_mps(t, lat[here], lon[here])[row]
+        wind[k][here] = np.stack(passage.frame.turned(blows[:, 0], blows[:, 1], lat[here], lon[here]), axis=-1)
+        if passage.weather.current:
+            flows = passage.weather.current_en_mps(t, lat[here], lon[here])
+            stream[k][here] = np.stack(passage.frame.turned(flows[:, 0], flows[:, 1], lat[here], lon[here]), axis=-1)
+    return Waters(
+        t_s=times,
+        wind=wind,
+        stream=stream,
+        has_stream=bool(passage.weather.current),
+        up=up_of(lat, lon),
+        first_x_m=float(x_m[0]),
+        first_y_m=float(y_m[0]),
+        step_m=float(x_m[1] - x_m[0]),
+        radius_m=passage.frame.radius_m,
+    )
+
+
+def times_of(weather: Weather, from_s: float, to_s: float) -> Floats:
+    """Return the times of wind and current between two, with both ends where the wind reaches so far."""
+    known = np.concatenate([cube.utc_s for cube in (*weather.wind, *weather.current)])
+    first = min(float(cube.utc_s[0]) for cube in weather.wind)
+    last = max(float(cube.utc_s[-1]) for cube in weather.wind)
+    begin, end = max(from_s, first), min(to_s, last)
+    return np.unique(np.concatenate([[begin, end], known[(known > begin) & (known < end)]]))
+
+
+def plan(passage: Passage, depart_utc_s: float, member: int | None = None, *, nodes: int = COARSE) -> Route:
+    """Return the fastest way for a departure in one member (the first), by so many nodes from start to goal."""
+    member = passage.weather.members[0] if member is None else member
+    frame, length_m = passage.frame, passage.frame.length_m
+    step_m = length_m / nodes
+    last_s = max(float(cube.utc_s[-1]) for cube in passage.weather.wind)
+    room_m = max(ROOM * length_m, _LEAST_ROOM_M)
+    for widening in range(_MOST_WIDENINGS + 1):
+        x_m, y_m = _axes(length_m, step_m, room_m)
+        waters = waters_of(passage, x_m, y_m, member, depart_utc_s, last_s)
+        found = _search(passage, waters, x_m, y_m, depart_utc_s, None)
+        if found.path is None:
+            if widening < _MOST_WIDENINGS and found.outcome is not Outcome.NO_WEATHER:
+                room_m *= 2.0
+                continue
+            return Route(outcome=found.outcome, depart_utc_s=depart_utc_s)
+        edge_m = 2.0 * step_m
+        if widening == _MOST_WIDENINGS or not (
+            (found.path[:, 1] > y_m[-1] - edge_m).any()
+            or (found.path[:, 1] < y_m[0] + edge_m).any()
+            or (found.path[:, 0] > x_m[-1] - edge_m).any()
+            or (found.path[:, 0] < x_m[0] + edge_m).any()
+        ):
+            break
+        room_m *= 2.0
+    assert found.path is not None
+    coarse, path = found, found.path
+    fine_m = step_m / FINER
+    low, high = path.min(axis=0) - (CORRIDOR + 1) * step_m, path.max(axis=0) + (CORRIDOR + 1) * step_m
+    fx = fine_m * np.arange(math.floor(low[0] / fine_m), math.ceil(high[0] / fine_m) + 1)
+    fy = fine_m * np.arange(math.floor(low[1] / fine_m), math.ceil(high[1] / fine_m) + 1)
+    mask = _corridor(fx, fy, path, CORRIDOR * step_m)
+    arrive_s = float(found.arrive_s)
+    wide = mask | _grown(mask)
+    fine_waters = waters_of(passage, fx, fy, member, depart_utc_s, min(last_s, arrive_s + 6 * 3600.0), wide)
+    refined = _search(passage, fine_waters, fx, fy, depart_utc_s, mask)
+    if refined.path is not None and refined.arrive_s < arrive_s:
+        path = refined.path
+    points = _straightened(passage, fine_waters, path, depart_utc_s, _step_s(fine_m))
+    lat, lon = frame.geo_from_xy(points)
+    waypoints = (
+        passage.start,
+        *(GeoPoint(lat_deg=float(a), lon_deg=float(o)) for a, o in zip(lat[1:-1], lon[1:-1], strict=True)),
+        passage.goal,
+    )
+    sailed = sail(passage.weather, passage.craft, waypoints, depart_utc_s, passage.radius_m, (member,))[0]
+    ends = _ends(passage, x_m, y_m)
+    bound = SLACK * least_left(waters, passage.craft, coarse.table.ravel(), *ends, depart_utc_s, sailed.time_s)
+    return Route(
+        outcome=Outcome.FOUND,
+        depart_utc_s=depart_utc_s,
+        waypoints=waypoints,
+        sailed=sailed,
+        bound_s=min(bound * (1.0 - passage.radius_m / length_m), sailed.time_s),
+        searched=(x_m, y_m, coarse.table),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Found:
+    outcome: Outcome
+    path: Floats | None
+    arrive_s: float
+    table: Floats
+
+
+def _axes(length_m: float, step_m: float, room_m: float) -> tuple[Floats, Floats]:
+    side = math.ceil(room_m / step_m)
+    ends = math.ceil(0.5 * room_m / step_m)
+    count = round(length_m / step_m)
+    return step_m * np.arange(-ends, count + ends + 1.0), step_m * np.arange(-side, side + 1.0)
+
+
+def _ends(passage: Passage, x_m: Floats, y_m: Floats) -> tuple[int, int]:
+    """Return the nodes of start and goal."""
+    row = int(np.argmin(np.abs(y_m))) * x_m.size
+    return row + int(np.argmin(np.abs(x_m))), row + int(np.argmin(np.abs(x_m - passage.frame.length_m)))
+
+
+def _step_s(step_m: float) -> float:
+    """Return the longest step of time that an edge of the grid is crossed by [s]."""
+    return min(3600.0, max(300.0, step_m / 2.0 / _STEPS_AN_EDGE))
+
+
+def _search(
+    passage: Passage, waters: Waters, x_m: Floats, y_m: Floats, depart_s: float, mask: NDArray[np.bool_] | None
+) -> _Found:
+    blocked = passage.land.blocked(x_m, y_m)
+    ny, nx = y_m.size, x_m.size
+    start, goal = _ends(passage, x_m, y_m)
+    allowed = np.ones(ny * nx, dtype=np.bool_) if mask is None else mask.ravel()
+    arrive, before, unknown, strong = arrivals(
+        waters, passage.craft, allowed, blocked, start, goal, depart_s, _step_s(waters.step_m)
+    )
+    table = arrive.reshape(ny, nx)
+    if not math.isfinite(arrive[goal]):
+        if not _is_joined(blocked, allowed, nx, start, goal):
+            outcome = Outcome.NO_WATER
+        else:
+            outcome = Outcome.TOO_MUCH_WIND if strong and not unknown else Outcome.NO_WEATHER
+        return _Found(outcome=outcome, path=None, arrive_s=math.inf, table=table)
+    nodes = [goal]
+    while nodes[-1] != start:
+        nodes.append(int(before[nodes[-1]]))
+    path = np.array([(x_m[n % nx], y_m[n // nx]) for n in nodes[::-1]])
+    return _Found(outcome=Outcome.FOUND, path=path, arrive_s=float(arrive[goal]), table=table)
+
+
+def _is_joined(blocked: NDArray[np.uint64], allowed: NDArray[np.bool_], columns: int, start: int, goal: int) -> bool:
+    """Return whether water leads from start to goal at all."""
+    seen = np.zeros(blocked.size, dtype=bool)
+    seen[start] = True
+    front = np.array([start])
+    while front.size and not seen[goal]:
+        reached = []
+        for d, (i, j) in enumerate(STENCIL.tolist()):
+            open_way = front[((blocked[front] >> np.uint64(d)) & np.uint64(1)) == 0]
+            column, row = open_way % columns + i, open_way // columns + j
+            inside = (column >= 0) & (column < columns) & (row >= 0) & (row < blocked.size // columns)
+            reached.append((row * columns + column)[inside])
+        front = np.unique(np.concatenate(reached))
+        front = front[~seen[front] & allowed[front]]
+        seen[front] = True
+    return bool(seen[goal])
+
+
+def _corridor(x_m: Floats, y_m: Floats, path: Floats, half_m: float) -> NDArray[np.bool_]:
+    """Return (y, x) which nodes are within ``half_m`` of a path."""
+    import shapely
+
+    grid = np.stack(np.meshgrid(x_m, y_m), axis=-1).reshape(-1, 2)
+    line = shapely.linestrings(path)
+    shapely.prepare(line)
+    return np.asarray(shapely.dwithin(line, shapely.points(grid), half_m)).reshape(y_m.size, x_m.size)
+
+
+def _grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the mask and the nodes beside it, whose wind its edges are interpolated from."""
+    out = mask.copy()
+    out[1:] |= mask[:-1]
+    out[:-1] |= mask[1:]
+    out[:, 1:] |= out[:, :-1].copy()
+    out[:, :-1] |= out[:, 1:].copy()
+    return out
+
+
+def _straightened(passage: Passage, waters: Waters, path: Floats, depart_s: float, step_s: float) -> Floats:
+    """Return fewer points that are reached no later: left out where they can be, moved across the way where it pays."""
+    points = path
+
+    def time(of: Floats) -> float:
+        return polyline(waters, passage.craft, of, depart_s, step_s)
+
+    best = time(points)
+    reach_m = 4.0 * waters.step_m
+    for sweep in range(10):
+        for leave_out in (True, False):
+            i = 1
+            while i < len(points) - 1:
+                tries = [np.delete(points, i, axis=0)] if leave_out else _moved(points, i, reach_m)
+                for tried in tries:
+                    around = tried[max(0, i - 1) : i + 2]
+                    when = time(tried)
+                    slack = 1e-5 * (best - depart_s) if leave_out else -1e-7 * (best - depart_s)
+                    if when <= best + slack and passage.land.is_free(_bent(passage.frame, around)):
+                        points, best = tried, min(best, when) if not leave_out else when
+                        break
+                else:
+                    i += 1
+                    continue
+                i += 0 if leave_out else 1
+        reach_m *= 0.5
+        if sweep > 2 and reach_m < 0.02 * waters.step_m:
+            break
+    return points
+
+
+def _moved(points: Floats, i: int, reach_m: float) -> list[Floats]:
+    along = points[i + 1] - points[i - 1]
+    normal = np.array([-along[1], along[0]]) / max(1e-9, float(np.hypot(*along)))
+    out = []
+    for side in (1.0, -1.0):
+        tried = points.copy()
+        tried[i] += side * reach_m * normal
+        out.append(tried)
+    return out
+
+
+def _bent(frame: PassageFrame, points: Floats) -> Floats:
+    """Return the shortest ways between points in the frame, as they are sailed: bent, for the frame is a chart."""
+    lat, lon = frame.geo_from_xy(points)
+    out = [points[:1]]
+    for k in range(len(points) - 1):
+        count = max(1, int(np.hypot(*(points[k + 1] - points[k])) / 5000.0))
+        if count > 1:
+            middle = np.array(GEOD.npts(lon[k], lat[k], lon[k + 1], lat[k + 1], count - 1))
+            out.append(frame.xy_from_geo(middle[:, 1], middle[:, 0]))
+        out.append(points[k + 1 : k + 2])
+    return np.concatenate(out)

@@ -1,0 +1,96 @@
+"""The picture of a passage: route, land, isochrones of the search, the wind as she meets it; below, its hours."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib.pyplot as plt
+import numpy as np
+import shapely
+
+from companion.geo import MPS_PER_KNOT
+from companion.passage import Passage, Route
+from companion.plots.chart import legend_above, save
+from companion.weather import iso
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_BARBS = 28
+_LINES = 16
+
+
+def save_passage(passage: Passage, route: Route, name: str, path: Path) -> None:
+    """Write the picture; see ``passage_figure``. Raises InputError where it cannot be written."""
+    save(passage_figure(passage, route, name), path)
+
+
+def passage_figure(passage: Passage, route: Route, name: str) -> Figure:
+    """Return a route that was found, drawn in longitudes that run on over the date line."""
+    figure, (chart, hours) = plt.subplots(2, 1, figsize=(11.0, 11.0), height_ratios=(3.0, 1.0), layout="constrained")
+    _draw_chart(chart, passage, route)
+    _draw_hours(hours, route)
+    sailed = route.sailed
+    assert sailed is not None
+    figure.suptitle(
+        f"{name}: {iso(route.depart_utc_s)} to {iso(route.depart_utc_s + sailed.time_s)}, "
+        f"{sailed.time_s / 3600.0:.1f} h; no way under about {route.bound_s / 3600.0:.1f} h"
+    )
+    return figure
+
+
+def _lon(passage: Passage, lon_deg: object) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    first = passage.start.lon_deg
+    return np.asarray(first + np.mod(np.asarray(lon_deg, dtype=np.float64) - first + 180.0, 360.0) - 180.0)
+
+
+def _draw_chart(axes: Axes, passage: Passage, route: Route) -> None:
+    sailed = route.sailed
+    assert sailed is not None
+    lat, lon = sailed.places[:, 0], _lon(passage, sailed.places[:, 1])
+    if route.searched is not None:
+        x, y, arrive = route.searched
+        places = passage.frame.geo_from_xy(np.stack(np.meshgrid(x, y), axis=-1))
+        hours = np.ma.masked_invalid((arrive - route.depart_utc_s) / 3600.0)
+        every = max(1.0, round(sailed.time_s / 3600.0 / _LINES))
+        levels = np.arange(every, sailed.time_s / 3600.0 + every, every)
+        axes.contour(_lon(passage, places[1]), places[0], hours, levels=levels, cmap="viridis", linewidths=0.7)
+    shape = passage.land.shape
+    if not shape.is_empty:
+        for part in shapely.get_parts(shape):
+            if part.geom_type != "Polygon":
+                continue
+            there = passage.frame.geo_from_xy(np.asarray(part.exterior.coords))
+            axes.fill(_lon(passage, there[1]), there[0], color="0.75", ec="0.4", lw=0.6, zorder=3)
+    axes.plot(lon, lat, color="tab:red", lw=2.0, zorder=4, label="route")
+    ends = _lon(passage, [p.lon_deg for p in route.waypoints])
+    axes.plot(ends, [p.lat_deg for p in route.waypoints], "o", color="k", ms=4, zorder=5, label="waypoints")
+    chosen = np.unique(np.linspace(0, len(lat) - 1, _BARBS).astype(int))
+    row = passage.weather.members.index(sailed.member)
+    wind = passage.weather.wind_en_mps(sailed.rows[chosen, 0], lat[chosen], lon[chosen])[row] / MPS_PER_KNOT
+    axes.barbs(lon[chosen], lat[chosen], wind[:, 0], wind[:, 1], length=6, lw=0.8, color="tab:blue", zorder=6)
+    room = 0.15 * max(np.ptp(lat), np.ptp(lon), 0.2)
+    axes.set_xlim(lon.min() - room, lon.max() + room)
+    axes.set_ylim(lat.min() - room, lat.max() + room)
+    axes.set_aspect(1.0 / max(0.1, math.cos(math.radians(float(lat.mean())))))
+    axes.set_xlabel("longitude [deg]")
+    axes.set_ylabel("latitude [deg]")
+    legend_above(axes)
+
+
+def _draw_hours(axes: Axes, route: Route) -> None:
+    sailed = route.sailed
+    assert sailed is not None
+    hours = (sailed.rows[:, 0] - route.depart_utc_s) / 3600.0
+    axes.plot(hours, sailed.rows[:, 3], label="wind")
+    axes.plot(hours, sailed.rows[:, 2], label="speed made good")
+    axes.fill_between(hours, 0, 1, where=sailed.rows[:, 5] > 0.5, color="0.5", alpha=0.2, lw=0, label="night",
+                      transform=axes.get_xaxis_transform())  # fmt: skip
+    axes.set_xlabel("hours from departure")
+    axes.set_ylabel("m/s")
+    axes.set_ylim(bottom=0.0)
+    axes.grid(alpha=0.3)
+    legend_above(axes)

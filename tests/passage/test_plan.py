@@ -1,0 +1,114 @@
+"""``companion passage plan``: a file asks, a route answers in lines; what cannot be believed is refused in one."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from companion import cli
+from companion.geofence import load_mission
+from tests.weather.grib_file import wind_2
+
+LAT, LON = np.linspace(48.0, 52.0, 9), np.linspace(-8.0, -2.0, 13)
+ASKED = """name = "across"
+[start]
+lat = 50.0
+lon = -6.0
+[goal]
+lat = 50.0
+lon = -5.0
+[depart]
+at = 2026-04-20T06:00:00Z
+[weather]
+files = ["f.grb2"]
+[boat]
+polar = "avalon"
+[area]
+obstacles = ["rock.wkt"]
+margin_m = 500.0
+"""
+A_POLAR = 'write "ardurover", "avalon", a polar file beside the mission, or a speed in m/s'
+ANOTHER = "say another time, or give a forecast of it"
+ROCK = "POLYGON ((-5.6 49.98, -5.5 49.98, -5.5 50.05, -5.6 50.05, -5.6 49.98))"
+
+
+@pytest.fixture
+def shell(tmp_path, monkeypatch, capsys):
+    """A folder with a passage round a rock in a northerly of 7 m/s for two days; and what the command answers."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("companion.commands.passage.NODES", 30)
+    (tmp_path / "f.grb2").write_bytes(b"".join(wind_2(LAT, LON, h, 0.0, -7.0) for h in range(0, 49, 6)))
+    (tmp_path / "rock.wkt").write_text(ROCK)
+
+    def run(*words, text=ASKED, **changes):
+        for old, new in changes.values():
+            assert old in text
+            text = text.replace(old, new)
+        (tmp_path / "p.toml").write_text(text)
+        code = cli.main(["passage", "plan", "p.toml", *map(str, words)])
+        said = capsys.readouterr()
+        lines = said.err.splitlines(keepends=True)
+        return code, said.out, "".join(line for line in lines if not line.startswith("note: "))  # a loaded machine
+
+    return run
+
+
+def test_a_route_is_told_drawn_and_written_as_a_mission(shell, tmp_path):
+    code, out, err = shell("--out", "m.toml", "--plot", "p.png")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0].startswith("departs 2026-04-20T06:00Z, arrives 2026-04-20T1")
+    assert lines[1].startswith("no way is faster than about ")
+    assert lines[2] == "wind 7.0 to 7.0 m/s, mean 7.0; 0 h by night, 0 h beating, 0 h waiting"
+    assert (tmp_path / "p.png").stat().st_size > 20_000
+    mission = load_mission(tmp_path / "m.toml")
+    assert mission.is_passage
+    assert (mission.goals[-1].point.lat_deg, mission.goals[-1].point.lon_deg) == (50.0, -5.0)
+    assert len(mission.goals) > 1
+    tables = tomllib.loads((tmp_path / "m.toml").read_text())
+    assert tables["boat"]["polar"] == "avalon"
+    assert all(200.0 <= goal["bandwidth_m"] < 10_000.0 for goal in tables["goal"])
+    assert shell("--out", "m.toml")[2] == "companion passage: m.toml: exists; say --force to overwrite it\n"
+
+
+def test_a_forecast_that_ends_too_soon_is_no_way(shell):
+    code, out, err = shell(at=("2026-04-20T06", "2026-04-21T23"))
+    assert (code, err) == (1, "")
+    assert out == "no way: the forecast ends before she is there, or does not reach so far\n"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (
+            ("at = 2026-04-20T06", "at = 2026-04-19T06"),
+            "p.toml: [depart] at: 2026-04-19T06:00Z is before the forecast's begin, 2026-04-20T00:00Z; " + ANOTHER,
+        ),
+        (
+            ("at = 2026-04-20T06:00:00Z", "at = 2026-04-20T06:00:00"),
+            "p.toml: [depart] at: expected a date with its time with a timezone component",
+        ),
+        (("lon = -6.0", "lon = -9.0"), "p.toml: [start]: is outside the area of f.grb2; ask for a larger area"),
+        (
+            ("lon = -6.0", "lon = -5.55"),
+            "p.toml: [start]: is on land, in closed water or within [area] margin_m of it; move it out to sea",
+        ),
+        (
+            ("lon = -6.0", "lon = -5.0"),
+            "p.toml: [goal]: start and goal are one place, or lie opposite each other; look at both",
+        ),
+        (("lat = 50.0", "lat = 95.0"), "p.toml: [start] lat: expected a number of at most 90.0"),
+        (("lat = 50.0", "lat = nan"), "p.toml: [start] lat: nan is not a finite number"),
+        (("files =", "file ="), "p.toml: [weather] file: unknown key; did you mean 'files'?"),
+        (("[goal]", "[gaol]"), "p.toml: gaol: unknown key; did you mean 'goal'?"),
+        (
+            ('"rock.wkt"', '"rocks.wkt"'),
+            "p.toml: [area] obstacles rocks.wkt: no such file; paths are relative to this file",
+        ),
+        (('"f.grb2"', '"g.grb2"'), "g.grb2: no such file; check the path"),
+        (('"avalon"', '"avalanche"'), f"p.toml: [boat] polar: there is no polar 'avalanche'; {A_POLAR}"),
+        (("margin_m = 500.0", "margin_m = 500.0\n]"), "p.toml: is not TOML: Invalid statement (at line 17, column 1)"),
+    ],
+)
+def test_what_is_wrong_is_one_line(shell, change, said):
+    assert shell(change=change)[::2] == (2, f"companion passage: {said}\n")
