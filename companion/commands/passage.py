@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from companion.commands.output import force_option, patience, refuse_existing, write_files
 from companion.errors import InputError, JobError
-from companion.program.arguments import add_command, out_file, picture
+from companion.program.arguments import add_command, duration, moment, out_file, picture
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
@@ -22,6 +22,7 @@ _EPILOG = """\
 examples:
   companion passage plan biscay.toml
   companion passage plan biscay.toml --plot biscay.png --out mission.toml
+  companion passage plan biscay.toml --depart 2026-04-20T00:00Z..2026-04-22T00:00Z --every 6h --explain
 
 PASSAGE.toml names start, goal, departure, forecasts in GRIB, boat and land; its keys are in docs/reference/formats.md.
 The route is the fastest in the forecast's first member, with a time that no way can be faster than. Ashore, before she
@@ -46,14 +47,73 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     plan.add_argument(
         "--plot", metavar="FILE", type=picture, help="draw the route, isochrones and the wind as she meets it"
     )
+    plan.add_argument(
+        "--depart",
+        type=_window,
+        metavar="FROM..TO",
+        help="compare departures: 2026-04-20T00:00Z..2026-04-22T00:00Z, sailed in every member of the forecast",
+    )
+    plan.add_argument("--every", type=duration, default=21_600.0, metavar="6h", help="of --depart (6h)")
+    plan.add_argument("--by", type=moment, metavar="TIME", help="with --depart, the chance to be there by a time")
+    plan.add_argument("--explain", action="store_true", help="with --depart, what waiting costs and what is against it")
     force_option(plan)
     plan.set_defaults(run=_plan)
+
+
+MOST_DEPARTURES = 200
+
+
+def _window(text: str) -> tuple[float, float]:
+    first, dots, last = text.partition("..")
+    if not dots:
+        raise argparse.ArgumentTypeError(f"{text[:50]!r} is no span; write FROM..TO, both as 2026-04-20T00:00Z")
+    begins, ends = moment(first).timestamp(), moment(last).timestamp()
+    if ends <= begins:
+        raise argparse.ArgumentTypeError(f"{text[:50]} ends before it begins; write the earlier time first")
+    return begins, ends
+
+
+def _sweep(args: argparse.Namespace) -> int:
+    """Compare departures, print what each comes to."""
+    import numpy as np
+
+    from companion.compose import speed_error_of
+    from companion.passage import best, sweep
+    from companion.passage.told import explained, told_of_departures
+
+    begins, ends = args.depart
+    count = int((ends - begins) / args.every) + 1
+    if count > MOST_DEPARTURES:
+        raise InputError("companion passage plan", "--every", f"makes {count} departures of it", "say a longer time")
+    asked, passage = _read(args.file, departs_utc_s=begins)
+    by = None if args.by is None else args.by.timestamp()
+    with patience("planning"):
+        departures = sweep(
+            passage, (begins + args.every * np.arange(count)).tolist(), speed_error_of(asked.boat), nodes=NODES // 2
+        )
+    for line in told_of_departures(departures, by):
+        print(line)
+    if args.explain:
+        for line in explained(departures, by):
+            print(line)
+    return 0 if best(departures, math.inf if by is None else by) is not None else JobError.exit_code
 
 
 def _plan(args: argparse.Namespace) -> int:
     from companion.passage import plan
     from companion.passage.told import told_of
 
+    if args.depart is not None:
+        if args.out is not None or args.plot is not None:
+            raise InputError(
+                "companion passage plan",
+                "--depart",
+                "compares departures and writes nothing",
+                "leave out --out and --plot",
+            )
+        return _sweep(args)
+    if args.explain or args.by is not None:
+        raise InputError("companion passage plan", "--explain and --by", "are of a --depart FROM..TO", "say it, too")
     if args.out is not None:
         refuse_existing([str(args.out)], force=args.force)
     asked, passage = _read(args.file)
@@ -75,7 +135,7 @@ def _plan(args: argparse.Namespace) -> int:
     return 0
 
 
-def _read(path: Path) -> tuple[PassageFile, Passage]:
+def _read(path: Path, departs_utc_s: float | None = None) -> tuple[PassageFile, Passage]:
     """Return what a file asks, with the boat, forecasts and land that it names."""
     import msgspec
 
@@ -100,7 +160,8 @@ def _read(path: Path) -> tuple[PassageFile, Passage]:
         raise InputError(source, "[goal] radius_m", "reaches to the start", "say a smaller one")
     box = _box(frame)
     weather = read_weather([path.parent / name for name in asked.weather.files], box)
-    _check_weather(asked, weather, source)
+    depart = asked.depart.at.timestamp() if departs_utc_s is None else departs_utc_s
+    _check_weather(asked, weather, source, depart)
     boat = asked.boat
     craft = craft_of(
         polar_named(boat, path),
@@ -148,14 +209,13 @@ def _box(frame: Any) -> tuple[float, float, float, float]:
     )
 
 
-def _check_weather(asked: PassageFile, weather: Weather, source: str) -> None:
+def _check_weather(asked: PassageFile, weather: Weather, source: str, depart: float) -> None:
     """Raise InputError where the forecast knows no wind at the start when she departs."""
     from companion.weather import iso
 
     names = ", ".join(asked.weather.files)
     if not weather.wind:
         raise InputError(source, f"[weather] {names}", "holds no wind of 10 m here", "ask for 10u and 10v of the area")
-    depart = asked.depart.at.timestamp()
     for place, point in (("[start]", asked.start), ("[goal]", asked.goal)):
         if not any(cube.covers(point.lat, point.lon) for cube in weather.wind):
             raise InputError(source, place, f"is outside the area of {names}", "ask for a larger area")

@@ -12,17 +12,22 @@ from companion.passage.kernels import Craft
 from companion.passage.land import Land, land_of
 from companion.passage.plan import Outcome, Passage, Route, plan
 from companion.passage.replay import Sailed, sail
+from companion.passage.sweep import Departure, at_most, best, sweep
 
 __all__ = [
     "Craft",
+    "Departure",
     "Land",
     "Outcome",
     "Passage",
     "PassageFrame",
     "Route",
     "Sailed",
+    "at_most",
+    "best",
     "craft_of",
     "land_of",
     "plan",
     "sail",
+    "sweep",
 ]

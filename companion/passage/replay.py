@@ -32,6 +32,7 @@ class Sailed:
     member: int
     arrived: bool
     why: str
+    is_too_much: bool
     rows: Floats
     places: Floats
     length_m: float
@@ -100,7 +101,13 @@ def sail(
             )
             out.append(
                 Sailed(
-                    member=member, arrived=status == KNOWN, why=why, rows=rows, places=places, length_m=float(way[-1])
+                    member=member,
+                    arrived=status == KNOWN,
+                    why=why,
+                    is_too_much=status == OVER_LIMIT,
+                    rows=rows,
+                    places=places,
+                    length_m=float(way[-1]),
                 )
             )
     return out

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from companion.geo import M_PER_NM
 from companion.passage.frame import GEOD
 from companion.passage.plan import Route
+from companion.passage.sweep import Departure, at_most, best
 from companion.weather import iso
+from companion.words import counted
 
 _HOURS = {"night": "by night", "beating": "beating", "waiting": "waiting"}
 
@@ -34,6 +37,65 @@ def told_of(route: Route) -> tuple[str, ...]:
     ]
     lines += [_leg(route, k) for k in range(1, len(route.waypoints))]
     return tuple(lines)
+
+
+def told_of_departures(departures: Sequence[Departure], by_utc_s: float | None) -> tuple[str, ...]:
+    """Return a table of departures, a line each, and what the figures in it are."""
+    by = math.inf if by_utc_s is None else by_utc_s
+    lines = ["depart                hours (middle 8 of 10)     arrives  too windy  by night"]
+    for d in departures:
+        if not d.runs:
+            lines.append(f"{iso(d.utc_s)}   no way: {d.why}")
+            continue
+        low, middle, high = (_number(d.hours(q)) for q in (0.1, 0.5, 0.9))
+        chances = (d.chance(by), d.chance_of_too_much_wind(), d.chance_of_night())
+        said = f"{iso(d.utc_s)}   {middle:>6} ({low} to {high})"
+        lines.append(said.ljust(47) + "".join(f"{100.0 * p:8.0f} %" for p in chances))
+    count = max((d.members for d in departures), default=0)
+    if count:
+        unseen = f"{100.0 * at_most(0.0, count):.0f} %"
+        lines.append(
+            f"of {counted(count, 'member')} of the forecast: what none of them shows may still come in {unseen}"
+        )
+    return tuple(lines)
+
+
+def explained(departures: Sequence[Departure], by_utc_s: float | None) -> tuple[str, ...]:
+    """Return in words which departure is the best, what waiting costs, and what stands against the others."""
+    by = math.inf if by_utc_s is None else by_utc_s
+    first = best(departures, by)
+    if first is None:
+        return ("none of these departures arrives" + ("" if by_utc_s is None else f" by {iso(by_utc_s)}"),)
+    often = first.hours(0.5)
+    said = f"{often:.1f} h as often as not" if math.isfinite(often) else f"{100.0 * first.chance(by):.0f} % of all"
+    lines = [f"best: {iso(first.utc_s)}, there in {said}"]
+    for d in departures:
+        if d is first or not d.runs:
+            continue
+        later = (d.utc_s - first.utc_s) / 3600.0
+        there = later + d.hours(0.5) - first.hours(0.5)
+        said = f"{abs(later):.3g} h {'later' if later > 0.0 else 'earlier'}"
+        comes = (
+            f"there {abs(there):.1f} h {'later' if there > 0.0 else 'earlier'}" if math.isfinite(there) else "not there"
+        )
+        lines.append(f"{said}: {comes}, {_against(d, by)}")
+    return tuple(lines)
+
+
+def _against(d: Departure, by: float) -> str:
+    """Return what keeps a departure from arriving most often."""
+    failed = [run for run in d.runs if not run.arrived]
+    if d.chance_of_too_much_wind() > 0.0:
+        strongest = max(run.strongest_mps for run in d.runs if run.is_too_much)
+        return f"{strongest:.0f} m/s of wind in {100.0 * d.chance_of_too_much_wind():.0f} %"
+    if failed:
+        return f"{failed[0].why} in {100.0 * len(failed) / len(d.runs):.0f} %"
+    late = 1.0 - d.chance(by)
+    return f"too late in {100.0 * late:.0f} %" if late > 0.0 else "nothing against it"
+
+
+def _number(hours: float) -> str:
+    return f"{hours:.1f}" if math.isfinite(hours) else "never"
 
 
 def _leg(route: Route, k: int) -> str:

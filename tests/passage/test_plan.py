@@ -77,6 +77,33 @@ def test_a_forecast_that_ends_too_soon_is_no_way(shell):
     assert out == "no way: the forecast ends before she is there, or does not reach so far\n"
 
 
+def test_departures_are_compared(shell):
+    code, out, err = shell("--depart", "2026-04-20T00:00Z..2026-04-21T18:00Z", "--every", "18h", "--explain")
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert [line[:17] for line in lines[1:4]] == ["2026-04-20T00:00Z", "2026-04-20T18:00Z", "2026-04-21T12:00Z"]
+    assert lines[4].startswith("of 1 member of the forecast: ")
+    assert lines[5].startswith("best: 2026-04-20T")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--explain"], "companion passage plan: --explain and --by: are of a --depart FROM..TO; say it, too"),
+        (
+            ["--depart", "2026-04-20T00:00Z..2026-04-28T00:00Z", "--every", "10m"],
+            "companion passage plan: --every: makes 1153 departures of it; say a longer time",
+        ),
+        (
+            ["--depart", "2026-04-20T00:00Z..2026-04-21T00:00Z", "--out", "m.toml"],
+            "companion passage plan: --depart: compares departures and writes nothing; leave out --out and --plot",
+        ),
+    ],
+)
+def test_an_option_that_goes_with_another(shell, words, said):
+    assert shell(*words)[::2] == (2, f"companion passage: {said}\n")
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
