@@ -45,7 +45,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         "--out", metavar="M", type=out_file, help="write the route as a mission with a band about each leg"
     )
     plan.add_argument(
-        "--plot", metavar="FILE", type=picture, help="draw the route, isochrones and the wind as she meets it"
+        "--plot", metavar="FILE", type=picture, help="draw the route, isochrones and her wind, or the departures"
     )
     plan.add_argument(
         "--depart",
@@ -96,6 +96,12 @@ def _sweep(args: argparse.Namespace) -> int:
     if args.explain:
         for line in explained(departures, by):
             print(line)
+    if args.plot is not None:
+        from companion.plots.passage import save_departures
+
+        with patience("drawing"):
+            save_departures(departures, by, asked.name or args.file.stem, args.plot)
+        print(f"{args.plot}: written")
     return 0 if best(departures, math.inf if by is None else by) is not None else JobError.exit_code
 
 
@@ -104,12 +110,9 @@ def _plan(args: argparse.Namespace) -> int:
     from companion.passage.told import told_of
 
     if args.depart is not None:
-        if args.out is not None or args.plot is not None:
+        if args.out is not None:
             raise InputError(
-                "companion passage plan",
-                "--depart",
-                "compares departures and writes nothing",
-                "leave out --out and --plot",
+                "companion passage plan", "--depart", "writes no mission", "plan the best of them with --out"
             )
         return _sweep(args)
     if args.explain or args.by is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,9 +12,10 @@ import numpy as np
 import shapely
 
 from companion.geo import MPS_PER_KNOT
-from companion.passage import Passage, Route
+from companion.passage import Departure, Passage, Route, sail
 from companion.plots.chart import legend_above, save
 from companion.weather import iso
+from companion.words import counted
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,13 +34,44 @@ def passage_figure(passage: Passage, route: Route, name: str) -> Figure:
     """Return a route that was found, drawn in longitudes that run on over the date line."""
     figure, (chart, hours) = plt.subplots(2, 1, figsize=(11.0, 11.0), height_ratios=(3.0, 1.0), layout="constrained")
     _draw_chart(chart, passage, route)
-    _draw_hours(hours, route)
+    _draw_hours(hours, passage, route)
     sailed = route.sailed
     assert sailed is not None
     figure.suptitle(
         f"{name}: {iso(route.depart_utc_s)} to {iso(route.depart_utc_s + sailed.time_s)}, "
         f"{sailed.time_s / 3600.0:.1f} h; no way under about {route.bound_s / 3600.0:.1f} h"
     )
+    return figure
+
+
+def save_departures(departures: Sequence[Departure], by_utc_s: float | None, name: str, path: Path) -> None:
+    """Write the picture of departures compared; see ``departures_figure``. Raises InputError."""
+    save(departures_figure(departures, by_utc_s, name), path)
+
+
+def departures_figure(departures: Sequence[Departure], by_utc_s: float | None, name: str) -> Figure:
+    """Return the hours under way of each departure, and the chances of arriving, too much wind, a landfall by night."""
+    figure, (hours, chances) = plt.subplots(2, 1, figsize=(10.0, 8.0), sharex=True, layout="constrained")
+    by = math.inf if by_utc_s is None else by_utc_s
+    since = np.array([(d.utc_s - departures[0].utc_s) / 3600.0 for d in departures])
+    low, middle, high = (np.array([d.hours(q) for d in departures]) for q in (0.1, 0.5, 0.9))
+    hours.vlines(since, low, np.where(np.isfinite(high), high, low), color="tab:blue", lw=5.0, alpha=0.3,
+                 label="eight in ten of all runs")  # fmt: skip
+    hours.plot(since, np.where(np.isfinite(middle), middle, np.nan), "o-", color="tab:blue", label="the middle")
+    hours.set_ylabel("hours under way")
+    hours.set_ylim(bottom=0.0)
+    for words, of in (("arrives" if by_utc_s is None else f"arrives by {iso(by)}", [d.chance(by) for d in departures]),
+                      ("too much wind", [d.chance_of_too_much_wind() for d in departures]),
+                      ("arrives by night", [d.chance_of_night() for d in departures])):  # fmt: skip
+        chances.plot(since, 100.0 * np.array(of), "o-", label=words)
+    chances.set_ylabel("of all runs [%]")
+    chances.set_ylim(-3.0, 103.0)
+    chances.set_xlabel(f"hours of departure after {iso(departures[0].utc_s)}")
+    for axes in (hours, chances):
+        axes.grid(alpha=0.3)
+        legend_above(axes)
+    count = max((d.members for d in departures), default=0)
+    figure.suptitle(f"{name}: departures, in {counted(count, 'member')} of the forecast")
     return figure
 
 
@@ -81,9 +114,22 @@ def _draw_chart(axes: Axes, passage: Passage, route: Route) -> None:
     legend_above(axes)
 
 
-def _draw_hours(axes: Axes, route: Route) -> None:
+def _draw_hours(axes: Axes, passage: Passage, route: Route) -> None:
+    """Draw wind and speed on the way, thin the wind that each member has there, with a tick where it arrives."""
     sailed = route.sailed
     assert sailed is not None
+    members = passage.weather.members
+    if len(members) > 1:
+        fan = sail(passage.weather, passage.craft, route.waypoints, route.depart_utc_s, passage.radius_m, members)
+        for run in fan:
+            since = (run.rows[:, 0] - route.depart_utc_s) / 3600.0
+            axes.plot(since, run.rows[:, 3], color="tab:blue", lw=0.5, alpha=0.5)
+            if run.arrived:
+                axes.axvline(since[-1], ymax=0.06, color="k", lw=1.0)
+        there = sum(run.arrived for run in fan)
+        axes.set_title(
+            f"thin: the wind in {len(members)} members; ticks: the {there} that arrive", fontsize=9, loc="right"
+        )
     hours = (sailed.rows[:, 0] - route.depart_utc_s) / 3600.0
     axes.plot(hours, sailed.rows[:, 3], label="wind")
     axes.plot(hours, sailed.rows[:, 2], label="speed made good")

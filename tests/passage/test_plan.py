@@ -71,6 +71,23 @@ def test_a_route_is_told_drawn_and_written_as_a_mission(shell, tmp_path):
     assert shell("--out", "m.toml")[2] == "companion passage: m.toml: exists; say --force to overwrite it\n"
 
 
+def test_the_members_fan_is_drawn(tmp_path):
+    import matplotlib.pyplot as plt
+
+    from companion.passage import plan
+    from companion.plots.passage import passage_figure
+    from tests.passage.world import HOURS, T0, cube, passage, place, steady
+    from tests.passage.world import LAT as LAT0
+    from tests.passage.world import LON as LON0
+
+    wind = cube(LAT0, LON0, HOURS, [steady(0.0, -5.0), steady(0.0, -6.0), steady(0.0, -7.0)])
+    asked = passage(place(0.0, 0.0), place(0.0, 0.4), wind=wind)
+    figure = passage_figure(asked, plan(asked, T0, nodes=20), "fan")
+    assert figure.axes[1].get_title(loc="right") == "thin: the wind in 3 members; ticks: the 3 that arrive"
+    assert {float(line.get_ydata()[0]) for line in figure.axes[1].lines[::2][:3]} == {5.0, 6.0, 7.0}
+    plt.close(figure)
+
+
 def test_a_forecast_that_ends_too_soon_is_no_way(shell):
     code, out, err = shell(at=("2026-04-20T06", "2026-04-21T23"))
     assert (code, err) == (1, "")
@@ -78,8 +95,11 @@ def test_a_forecast_that_ends_too_soon_is_no_way(shell):
 
 
 def test_departures_are_compared(shell):
-    code, out, err = shell("--depart", "2026-04-20T00:00Z..2026-04-21T18:00Z", "--every", "18h", "--explain")
+    code, out, err = shell(
+        "--depart", "2026-04-20T00:00Z..2026-04-21T18:00Z", "--every", "18h", "--explain", "--plot", "d.png"
+    )
     assert (code, err) == (0, "")
+    assert out.endswith("d.png: written\n")
     lines = out.splitlines()
     assert [line[:17] for line in lines[1:4]] == ["2026-04-20T00:00Z", "2026-04-20T18:00Z", "2026-04-21T12:00Z"]
     assert lines[4].startswith("of 1 member of the forecast: ")
@@ -96,7 +116,7 @@ def test_departures_are_compared(shell):
         ),
         (
             ["--depart", "2026-04-20T00:00Z..2026-04-21T00:00Z", "--out", "m.toml"],
-            "companion passage plan: --depart: compares departures and writes nothing; leave out --out and --plot",
+            "companion passage plan: --depart: writes no mission; plan the best of them with --out",
         ),
     ],
 )
