@@ -64,7 +64,7 @@ class PassageFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     depart: DepartOptions
     weather: WeatherOptions
     boat: BoatOptions = BoatOptions()
-    area: AreaOptions = AreaOptions(margin_m=0.0)
+    area: AreaOptions = AreaOptions()
     sailing: SailingOptions = SailingOptions()
 
 

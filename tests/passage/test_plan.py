@@ -7,7 +7,7 @@ import pytest
 
 from companion import cli
 from companion.geofence import load_mission
-from tests.weather.grib_file import wind_2
+from tests.weather.grib_file import CURRENT_EAST, CURRENT_NORTH, message_2, wind_2
 
 LAT, LON = np.linspace(48.0, 52.0, 9), np.linspace(-8.0, -2.0, 13)
 ASKED = """name = "across"
@@ -86,6 +86,28 @@ def test_the_members_fan_is_drawn(tmp_path):
     assert figure.axes[1].get_title(loc="right") == "thin: the wind in 3 members; ticks: the 3 that arrive"
     assert {float(line.get_ydata()[0]) for line in figure.axes[1].lines[::2][:3]} == {5.0, 6.0, 7.0}
     plt.close(figure)
+
+
+def test_a_current_of_another_file_and_grid_is_sailed_in(shell, tmp_path):
+    """Another program read the second file's current wrong: 0.5 m/s fair, of cells of its own and every three hours."""
+    lat, lon = np.linspace(49.0, 51.0, 21), np.linspace(-7.0, -4.0, 16)
+    flows = (
+        message_2(q, np.full((21, 16), v), lat, lon, h, level=(160, 0))
+        for h in range(0, 31, 3)
+        for q, v in ((CURRENT_EAST, 0.5), (CURRENT_NORTH, 0.0))
+    )
+    (tmp_path / "c.grb2").write_bytes(b"".join(flows))
+
+    def speed(**changes):
+        out = shell(obstacles=('obstacles = ["rock.wkt"]', ""), **changes)[1]
+        return float(out.split(" NM at ")[1].split()[0])
+
+    assert speed(files=('["f.grb2"]', '["f.grb2", "c.grb2"]')) - speed() == pytest.approx(0.5, abs=0.1)
+
+
+def test_the_area_of_a_mission_has_its_margin_and_no_less(shell, tmp_path):
+    assert shell("--out", "m.toml", margin=("margin_m = 500.0\n", ""))[0] == 0
+    assert load_mission(tmp_path / "m.toml").margin_m == 12.0
 
 
 def test_a_forecast_that_ends_too_soon_is_no_way(shell):
