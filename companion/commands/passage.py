@@ -190,12 +190,12 @@ def _box(frame: Any) -> tuple[float, float, float, float]:
     """Return the box (west, south, east, north) of the widest search, a little more."""
     import numpy as np
 
-    from companion.passage.plan import widest_room_m
+    from companion.passage.plan import widest_rooms_m
 
-    room = widest_room_m(frame.length_m)
+    side, ends = widest_rooms_m(frame.length_m)
     edge = np.linspace(0.0, 1.0, 60)
-    x = -0.5 * room + edge * (frame.length_m + room)
-    y = -room + edge * 2.0 * room
+    x = -ends + edge * (frame.length_m + 2.0 * ends)
+    y = -side + edge * 2.0 * side
     ring = np.concatenate(
         [
             np.stack(np.broadcast_arrays(a, b), axis=-1)

@@ -22,6 +22,7 @@ CORRIDOR = 3.0  # coarse nodes to each side
 ROOM = 0.45  # of the length, to each side and beyond the ends half of it: the first search
 _LEAST_ROOM_M = 15_000.0
 _MOST_WIDENINGS = 2
+_MOST_SIDE_M, _MOST_ROUND_M = 8.0e6, 3.6e7  # 72 and 324 degrees
 _STEPS_AN_EDGE = 2
 
 
@@ -67,9 +68,14 @@ class Route:
         return self.sailed.time_s if self.sailed is not None and self.sailed.arrived else math.inf
 
 
-def widest_room_m(length_m: float) -> float:
-    """Return how far to each side of the way the widest search looks [m]."""
-    return max(ROOM * length_m, _LEAST_ROOM_M) * 2.0**_MOST_WIDENINGS
+def widest_rooms_m(length_m: float) -> tuple[float, float]:
+    """Return how far the widest search looks to each side of the way, and beyond its ends [m]."""
+    return _rooms(length_m, max(ROOM * length_m, _LEAST_ROOM_M) * 2.0**_MOST_WIDENINGS)
+
+
+def _rooms(length_m: float, room_m: float) -> tuple[float, float]:
+    """Return the room to each side and beyond the ends [m]: less than to the frame's poles, and than all round."""
+    return min(room_m, _MOST_SIDE_M), min(0.5 * room_m, max(0.0, 0.5 * (_MOST_ROUND_M - length_m)))
 
 
 def waters_of(
@@ -185,8 +191,7 @@ class _Found:
 
 
 def _axes(length_m: float, step_m: float, room_m: float) -> tuple[Floats, Floats]:
-    side = math.ceil(room_m / step_m)
-    ends = math.ceil(0.5 * room_m / step_m)
+    side, ends = (math.ceil(room / step_m) for room in _rooms(length_m, room_m))
     count = round(length_m / step_m)
     return step_m * np.arange(-ends, count + ends + 1.0), step_m * np.arange(-side, side + 1.0)
 

@@ -10,6 +10,7 @@ import shapely
 from companion.boat import Polar, constant
 from companion.passage import Outcome, PassageFrame, plan
 from companion.passage.kernels import made_good
+from companion.passage.plan import widest_rooms_m
 from tests.passage.world import HOURS, LAT, LON, T0, cube, passage, place, steady
 
 WALL = shapely.box(0.45, -3.0, 0.47, 3.0)  # from edge to edge, 2 km thick
@@ -132,6 +133,15 @@ def test_the_frame_is_exact_on_its_way_and_turns_vectors():
     assert (step / np.hypot(*step[0]))[0] == pytest.approx([east[0] / 5.0, north[0] / 5.0], abs=2e-3)
     with pytest.raises(ValueError, match="one place"):
         PassageFrame(A, A)
+
+
+@pytest.mark.parametrize("length_m", [1e4, 1e6, 5.5e6, 1.2e7, 1.88e7])
+def test_the_widest_search_ends_before_the_frames_poles(length_m):
+    """What lies beyond a pole of the frame, or is met again all round, would be two places in one."""
+    side_m, ends_m = widest_rooms_m(length_m)
+    assert 15_000.0 <= side_m < 0.48 * math.pi * 6_371_000.0
+    assert ends_m >= 0.0
+    assert length_m + 2.0 * ends_m < 1.9 * math.pi * 6_371_000.0
 
 
 def test_a_slower_boat_is_later_in_the_same_share():
