@@ -8,11 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from companion.app.options import Offload
 from companion.clock import now_s
 from companion.errors import LinkError
 from companion.fold import VoyageFold
 from companion.geofence import Mission
-from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
+from companion.geofence.autopilot_fence import AutopilotFence, FenceStatus, fence_for_autopilot
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.microservices import CommandAnswer
@@ -68,12 +69,14 @@ async def keep_fence(
     mission: Mission,
     record: Record,
     take: Callable[[tuple[MissionItem, ...]], None],
+    offload: Offload,
 ) -> None:
     """Upload the fence, where it may be, once the autopilot is known to be ours, and read what somebody draws there.
 
-    ``take`` hears what is drawn on the autopilot when that has changed.
+    ``take`` hears what is drawn on the autopilot when that has changed. What a chart has about the boat is made into
+    the autopilot's fence by ``offload``: it takes seconds of a small computer, which the steps must not wait for.
     """
-    await _place_fence(fold, autopilot, mission, record)
+    await _place_fence(fold, autopilot, mission, record, offload)
     await _read_fence(fold, autopilot, take)
 
 
@@ -118,14 +121,16 @@ async def _fence_items(fold: VoyageFold, autopilot: Autopilot) -> tuple[MissionI
         reading.cancel()
 
 
-async def _place_fence(fold: VoyageFold, autopilot: Autopilot, mission: Mission, record: Record) -> None:
+async def _place_fence(
+    fold: VoyageFold, autopilot: Autopilot, mission: Mission, record: Record, offload: Offload
+) -> None:
     """Upload the fence, where it may be, once the autopilot is known to be ours; begun again when that was in doubt."""
     upload: asyncio.Task[None] | None = None
     try:
         while fold.permissions.may_upload_fence:
             is_ours = fold.state.vehicle.is_ours and not is_given_up(fold.state)
             if upload is None and is_ours:
-                upload = asyncio.create_task(_upload_fence(autopilot, mission, record), name="fence upload")
+                upload = asyncio.create_task(_upload_fence(autopilot, mission, record, offload), name="fence upload")
             elif upload is not None and upload.done():
                 return upload.result()
             elif upload is not None and not is_ours:
@@ -137,10 +142,12 @@ async def _place_fence(fold: VoyageFold, autopilot: Autopilot, mission: Mission,
             upload.cancel()
 
 
-async def _upload_fence(autopilot: Autopilot, mission: Mission, record: Record) -> None:
+async def _upload_fence(autopilot: Autopilot, mission: Mission, record: Record, offload: Offload) -> None:
     """Put the fence of the mission's water on the autopilot and switch it on: its last line of defence."""
     places = [*([mission.start] if mission.start else []), *mission.places]
-    fence = fence_for_autopilot(mission.area, mission.margin_m, inside=places)
+    made: list[AutopilotFence] = []
+    await offload(lambda: made.append(fence_for_autopilot(mission.area, mission.margin_m, inside=places)))
+    fence = made[0]
     done: dict[str, Any] = {"kind": "fence", "status": fence.status.name, "text": fence.reason}
     trouble = "" if fence.items or fence.status is FenceStatus.EMPTY else fence.reason
     if fence.items:

@@ -54,7 +54,7 @@ class SailOptions:
         limit_s: end after this long [s].
         exit_on_arrival: end when the voyage is over, for harnesses; on the water the loiter is watched until told.
         wait_s: how long to wait for the autopilot's first heartbeat [s].
-        offload: where disk work is done.
+        offload: where what takes long is done: disk work, the autopilot's fence.
         is_durable: force files to the disk, against power cuts; a simulation has none.
         disk: what is written to.
         archive: the older voyages beside this one and what all may take together; None: they are left alone.

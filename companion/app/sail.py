@@ -239,7 +239,12 @@ class _Shell:
         keep(Auxiliary.ADOPTION, adoption.run)
         keep(Auxiliary.IDENTITY, lambda: keep_identity(self.fold, autopilot))
         keep(Auxiliary.PARAMETERS, lambda: keep_parameters(self.fold, autopilot))
-        keep(Auxiliary.FENCE, lambda: keep_fence(self.fold, autopilot, self.mission, self._record, self._fences.append))
+        keep(
+            Auxiliary.FENCE,
+            lambda: keep_fence(
+                self.fold, autopilot, self.mission, self._record, self._fences.append, self.options.offload
+            ),
+        )
         keep(
             Auxiliary.RADIO,
             TelemetrySender(autopilot, self.feeds, self.log, status=lambda: self.status, trouble=self._trouble).run,

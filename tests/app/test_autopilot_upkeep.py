@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from companion.app.autopilot_upkeep import FENCE_EVERY_S, FENCE_READ_S, keep_fence, keep_parameters
+from companion.app.options import at_once
 from companion.clock import now_s, run_virtual
 from companion.fold import ParameterStore
 from companion.geo.frame import LocalFrame
@@ -58,7 +59,7 @@ def test_what_is_drawn_on_the_autopilot_is_read_while_a_fence_is_in_force_and_no
     autopilot = SimpleNamespace(link=SimpleNamespace(is_alive=True), status=shown, read_fence=read_fence)
 
     async def lived():
-        task = asyncio.create_task(keep_fence(fold, autopilot, None, None, taken.append))
+        task = asyncio.create_task(keep_fence(fold, autopilot, None, None, taken.append, at_once))
         await asyncio.sleep(30.0)
         assert read_s == []  # there is none in force
         shown.fence_breached = False
@@ -119,11 +120,18 @@ def test_what_the_autopilots_fence_has_no_room_for_is_said_and_recorded(apart_m)
     )
 
     async def lived():
-        task = asyncio.create_task(keep_fence(fold, autopilot, mission, records.append, None))
+        task = asyncio.create_task(keep_fence(fold, autopilot, mission, records.append, None, offload))
         await asyncio.sleep(5.0)
         task.cancel()
 
+    offloaded = []
+
+    async def offload(work):
+        offloaded.append(len(uploaded))
+        work()
+
     run_virtual(lived())
+    assert offloaded == [0], "the steps do not wait for it"
     assert records[0]["count"] == len(uploaded[0]) > 10
     if apart_m == 40.0:
         assert (said, "reach_m" in records[0]) == ([], False)
