@@ -17,7 +17,7 @@ from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from lab.tasks.guided import run_station, run_wrsc
 from lab.tasks.station import run as keep_station
-from lab.tasks.wrsc2013 import draw, run, score, table, wrsc2013
+from lab.tasks.wrsc2013 import ENTRY_LIMIT_S, draw, run, score, table, wrsc2013
 from lab.tasks.wrsc2013_skippers import HALF_M
 from sitl.options import CampaignOptions
 from sitl.scenario.verdict import sailbot_points, station_score
@@ -49,6 +49,10 @@ def test_each_fault_is_seen_alone() -> None:
     near = score(*tracks(300.0, miss_m=6.0))
     assert (near.kept_clear, near.left_in_time) == (False, True)
     assert near.least_m == pytest.approx(6.0 - 0.5 * (3.65 + 4.0))
+    # Schmitt 1.1: 5 m between the hulls; out within 15 minutes; a square of 200 m, entered within 45 minutes.
+    assert [score(*tracks(300.0, miss_m=m)).kept_clear for m in (8.8, 8.9)] == [False, True]
+    assert [score(*tracks(leave_s)).left_in_time for leave_s in (948.0, 950.0)] == [True, False]
+    assert (HALF_M, ENTRY_LIMIT_S) == (100.0, 2700.0)
     track, it = tracks(110.0)
     assert not score(track, it + 1000.0).crossed
 
