@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from companion.boat import Polar, Sizes
 from companion.boat.guess import guessed_polar
-from companion.boat.learn import TWA_DEG, TWS_MPS, LearnedBoat, learn
+from companion.boat.learn import STEEPEST, TWA_DEG, TWS_MPS, LearnedBoat, learn
 from companion.boat.log import Stretches, stretches_of
 from companion.boat_logs import logs_under, read_logs
 from companion.geo import MPS_PER_KNOT
@@ -87,7 +87,20 @@ def by_boat(boat: LearnedBoat, s: Stretches) -> Foretold:
     off = np.clip(np.abs(winds.twa_rad), math.radians(TWA_DEG[0]), math.pi)
     strong = np.clip(winds.tws_mps, TWS_MPS[0], TWS_MPS[-1])
     sd = np.array([error.speed_mps(a, w) for a, w in zip(off.tolist(), strong.tolist(), strict=True)])
-    return Foretold(log_mps=by_polar(boat.polar, winds) + lean, sd=np.hypot(sd, boat.noise[0]))
+    # One stretch's wind, as the vane tells it, is not the wind that drives her.
+    pairs = zip(winds.twa_rad.tolist(), strong.tolist(), strict=True)
+    slope = np.array([_steepness(boat.polar, a, w) for a, w in pairs])
+    own = np.hypot(boat.noise[0], boat.wind_mps * slope)
+    # Over the ground, in a stream that nobody knows beforehand: as strong as those of the outings learned from.
+    told = by_polar(boat.polar, winds) + lean
+    stream = math.sqrt(float(np.mean([k.mean**2 for pair in boat.currents for k in pair]))) / np.exp(told)
+    return Foretold(log_mps=told, sd=np.sqrt(sd**2 + own**2 + stream**2))
+
+
+def _steepness(polar: Polar, twa_rad: float, tws_mps: float) -> float:
+    """Return by what share a polar's speed changes with a m/s of wind."""
+    more, less = (max(polar.speed_mps(twa_rad, w), 0.05) for w in (1.1 * tws_mps, tws_mps / 1.1))
+    return min(max(math.log(more / less) / math.log(1.21), 0.0), STEEPEST) / tws_mps
 
 
 def by_cells(train: Winds, asked: Winds, prior: Polar, what: str) -> Foretold:

@@ -47,6 +47,12 @@ BLOCK_S = 1200.0
 # Noise of one stretch; speeds below ``SLOW_MPS`` are worth less. The shares are then scaled to what is seen.
 SPEED_NOISE, COURSE_NOISE, SLOW_MPS = 0.06, math.radians(2.5), 0.06
 FREEDOM = 4.0  # of Student's distribution
+# How far the wind at the vane may be off that which drives the boat, of one stretch [m/s]: the logs say it, where it
+# explains their scatter by so much (logarithm of the likelihood); a keelboat's speeds scatter by half of themselves in
+# light winds. On a day that was not sailed it is ``WIND_LEFT`` of what the residuals show, for streams and days take a
+# share of it up, and a whole day's is so much of that: gradient, patches. Both by one keelboat's days of 2007 to 2013.
+WIND_STEPS_MPS, WIND_GAIN, WIND_LEFT, WIND_OF_DAY = np.arange(0.0, 1.01, 0.05), 6.0, 2.0, 0.9
+STEEPEST = 1.5  # of the speed with the wind, both as logarithms
 ROUNDS, CLOSE = 24, 1e-4
 EASED = (8.0, 8.0, 4.0, 4.0, 2.0, 2.0)  # times the noise, in the first rounds
 LEAST_AHEAD = 0.3  # of the speed: more leeway than that is no leeway
@@ -78,6 +84,7 @@ class LearnedBoat:
         draws: (k, angles, winds) speeds that are as likely as the mean.
         seen: (angles, winds) how many stretches lie nearest to each node.
         noise: Deviation of one stretch's speed (share) and of its course [rad].
+        wind_mps: How far one stretch's wind on another day, as the vane tells it, is off that which drives her.
     """
 
     polar: Polar
@@ -92,6 +99,7 @@ class LearnedBoat:
     draws: Floats
     seen: NDArray[np.int64]
     noise: tuple[float, float]
+    wind_mps: float
     stretches: int
     twa_rad: Floats
     findings: tuple[str, ...] = ()
@@ -189,6 +197,8 @@ class _Solver:
         self.at_mean = self.at_factor + self.outings
         self.at_stream = self.at_mean + 2 * self.outings
         self.size = self.at_stream + 2 * self.blocks
+        self.wind_mps, self.log_noise = 0.0, SPEED_NOISE
+        self.day_sd = np.full(self.outings, DAY_SD)
         self._table = np.log(
             np.maximum(
                 np.array([[prior.speed_mps(math.radians(a), float(w)) for w in _FINE_TWS] for a in _FINE_TWA]), 0.02
@@ -203,6 +213,11 @@ class _Solver:
         low = (1.0 - fa) * t[a, w] + fa * t[a + 1, w]
         high = (1.0 - fa) * t[a, w + 1] + fa * t[a + 1, w + 1]
         return np.asarray((1.0 - fw) * low + fw * high)
+
+    def steepness(self, twa_rad: Floats, tws_mps: Floats) -> Floats:
+        """Return by what share the prior's speed changes with a m/s of wind."""
+        change = self.log_prior(twa_rad, 1.1 * tws_mps) - self.log_prior(twa_rad, tws_mps / 1.1)
+        return np.asarray(np.clip(change / math.log(1.21), 0.0, STEEPEST) / np.maximum(tws_mps, TWS_MPS[0]))
 
     def start(self) -> _State:
         """Return what is believed before any log."""
@@ -282,8 +297,11 @@ class _Solver:
         speed = np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-3)
         # A shorter stretch averages less of what wanders.
         short = np.sqrt(STRETCH_S / np.clip(s.length_s, SHORT_S, STRETCH_S))
-        slow = SLOW_MPS / speed
-        sigma = np.column_stack([np.hypot(noise[0], slow), np.hypot(noise[1], slow), np.full(n, max(noise[0], 0.03))])
+        slow, steep = SLOW_MPS / speed, self.steepness(twa, tws)
+        by_wind = np.hypot(slow, steep * self.wind_mps)
+        sigma = np.column_stack(
+            [np.hypot(noise[0], by_wind), np.hypot(noise[1], slow), np.hypot(self.log_noise, steep * self.wind_mps)]
+        )
         sigma *= short[:, None]
         z = np.where(np.isfinite(r), r, 0.0) / sigma
         weight = np.where(np.isfinite(r), (FREEDOM + 1.0) / (FREEDOM + z * z), 0.0) / sigma**2
@@ -316,14 +334,36 @@ class _Solver:
             )
             normal[np.ix_(index, index)] += j.T @ (w[:, None] * j)
             right[index] += j.T @ (w * r[rows].reshape(-1))
-        seen = (_scatter(r[:, 0], slow, SPEED_NOISE, noise[0]), _scatter(r[:, 1], slow, COURSE_NOISE, noise[1]))
+        self._learn_wind(r[:, 0], slow, steep, short)
+        logged = np.isfinite(s.stw_mps)
+        if bool(np.any(logged)):  # one that fouls in the middle of an outing is no measure of her speed
+            self.log_noise = max(_scatter(r[logged, 2], slow[logged], SPEED_NOISE, self.log_noise), noise[0], 0.03)
+        # What is left by a wind that is not the vane's is no noise of its own.
+        share = noise[0] / np.hypot(noise[0], steep * self.wind_mps)
+        seen = (_scatter(r[:, 0] * share, slow, SPEED_NOISE, noise[0]), _scatter(r[:, 1], slow, COURSE_NOISE, noise[1]))
         return normal, right, seen
+
+    def _learn_wind(self, r: Floats, slow: Floats, steep: Floats, short: Floats) -> None:
+        """Learn how far a stretch's wind is off from how the residuals scatter, more or less in light winds."""
+        own = SPEED_NOISE * np.geomspace(0.4, 5.0, 10)[:, None]  # whatever is left as its own: the best for each wind
+        likelihood = np.empty(WIND_STEPS_MPS.shape)
+        for n, wind_mps in enumerate(WIND_STEPS_MPS.tolist()):
+            sigma = np.hypot(np.hypot(own, slow), steep * wind_mps) * short
+            told = -0.5 * (FREEDOM + 1.0) * np.log1p((r / sigma) ** 2 / FREEDOM) - np.log(sigma)
+            likelihood[n] = float(told.sum(axis=1).max())
+        best = int(np.argmax(likelihood))
+        found = float(WIND_STEPS_MPS[best]) if likelihood[best] > likelihood[0] + WIND_GAIN else 0.0
+        self.wind_mps = 0.5 * (self.wind_mps + found)
+        for o in range(self.outings):
+            of = self.s.outing == o
+            mean = float(np.mean(steep[of])) if bool(np.any(of)) else 0.0
+            self.day_sd[o] = math.hypot(DAY_SD, WIND_OF_DAY * mean * self.wind_mps)
 
     def _prior_terms(self, x: _State) -> tuple[Floats, Floats]:
         sd = np.empty(self.at_mean)
         sd[: self.at_nuisance] = 1.0
         sd[self.at_nuisance : self.at_day] = VANE_SD, COMPASS_SD, LEEWAY_SD, LEAN_SD
-        sd[self.at_day : self.at_factor] = DAY_SD
+        sd[self.at_day : self.at_factor] = self.day_sd
         sd[self.at_factor :] = LOG_SD
         off = np.concatenate([x.shape, x.nuisance - self.start().nuisance, x.day, x.factor])
         normal, right = np.zeros((self.size, self.size)), np.zeros(self.size)
@@ -373,7 +413,8 @@ def _told(
     spread = np.sqrt(np.einsum("ij,jk,ik->i", basis, part, basis))
     # What days differ by: what is believed of it, and what the outings show. A day that is not sailed yet is another.
     days = slice(solver.at_day, solver.at_factor)
-    seen_days = float(np.sum(x.day**2 + np.diag(covariance)[days]))
+    # An outing in light wind tells little of it: there the wind is as much to blame.
+    seen_days = float(np.sum((x.day**2 + np.diag(covariance)[days]) * (DAY_SD / solver.day_sd) ** 2))
     day = math.sqrt((DAY_WEIGHT * DAY_SD**2 + seen_days) / (DAY_WEIGHT + solver.outings))
     _, twa, tws = solver.wind(x.nuisance, x.stream[solver.block])
     seen = np.zeros((angles, winds), dtype=np.int64)
@@ -384,7 +425,10 @@ def _told(
     share = np.maximum(seen.sum(axis=0), 0) / max(1, seen.sum())
     usual = ((TWA_DEG >= 40.0) & (TWA_DEG <= 165.0)).astype(float)
     over = np.outer(usual / usual.sum(), share).ravel() @ basis
-    common = math.sqrt(float(over @ part @ over) + day**2)
+    nodes = np.meshgrid(np.radians(TWA_DEG), TWS_MPS, indexing="ij")
+    of_wind = WIND_OF_DAY * WIND_LEFT * solver.wind_mps * solver.steepness(nodes[0].ravel(), nodes[1].ravel())
+    of_usual = float(np.outer(usual / usual.sum(), share).ravel() @ of_wind)
+    common = math.sqrt(float(over @ part @ over) + day**2 + of_usual**2)
     values, vectors = np.linalg.eigh(part)
     noise_of = (vectors * np.sqrt(np.maximum(values, 0.0))) @ rng.standard_normal((k, draws))
     fields = (basis @ (x.shape[:, None] + noise_of)).T.reshape(draws, angles, winds)
@@ -404,7 +448,7 @@ def _told(
     table = np.maximum.accumulate(table, axis=1)  # more wind makes no boat slower
     return LearnedBoat(
         polar=Polar(twa_rad=np.radians(TWA_DEG), tws_mps=TWS_MPS, speed_mps_table=table, name="learned"),
-        error=np.hypot(spread, day).reshape(angles, winds),
+        error=np.hypot(np.hypot(spread, day), of_wind).reshape(angles, winds),
         common=common,
         vane=known(a, float(x.nuisance[0])),
         compass=known(a + 1, float(x.nuisance[1])),
@@ -417,6 +461,7 @@ def _told(
         draws=base * np.exp(fields),
         seen=seen,
         noise=noise,
+        wind_mps=WIND_LEFT * solver.wind_mps,
         stretches=len(solver.s),
         twa_rad=twa,
     )

@@ -9,10 +9,12 @@ import pytest
 from companion.boat.guess import Sizes, guessed_polar
 from companion.boat.learn import TWA_DEG, TWS_MPS, learn
 from companion.boat.lesson import lesson_of, offset_step_deg
-from companion.boat.log import NEAR_RAD, Why, stretches_of
+from companion.boat.log import NEAR_RAD, Stretches, Why, stretches_of
 from companion.boat.manoeuvres import chances, manoeuvres_of
+from companion.boat.polar import Polar
 from companion.boat.towed import driven
 from lab.boat_learning import _quickest, _time, inside, marks_of, time_lost
+from lab.boat_scores import by_boat, winds_of
 from lab.simulated_logs import SIZES, Truth, sailed
 
 PRIOR = guessed_polar(SIZES)
@@ -342,3 +344,59 @@ def test_the_step_of_the_offset_that_is_told_brings_the_vane_back(vane_deg):
     after = told(step, 4)
     assert abs(after.boat.vane.mean) < math.radians(3.0)
     assert not [f for f in after.findings if "WNDVN_DIR_OFS" in f]
+
+
+def stretches_in(winds, *, stretch_mps, day_mps, seed):
+    """Return stretches of a boat that makes 0.4 of the wind; her vane is in another, by day and by stretch."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for day, tws in enumerate(winds):
+        day_off = day_mps * rng.standard_normal()
+        for n in range(60):
+            heading = math.radians(rng.choice([-140.0, -95.0, -60.0, 60.0, 95.0, 140.0]))
+            true = max(tws * math.exp(0.4 * rng.standard_normal()), 1.5)
+            speed = 0.4 * true * math.exp(0.04 * rng.standard_normal())
+            velocity = speed * np.array([math.sin(heading), math.cos(heading)])
+            told = max(true + day_off + stretch_mps * rng.standard_normal(), 0.5)
+            felt = np.array([0.0, told]) + velocity
+            awa = math.atan2(felt[0], felt[1]) - heading
+            rows.append((86_400.0 * day + 30.0 * n, day, *velocity, heading, awa, math.hypot(*felt)))
+    table = np.array(rows)
+    return Stretches(
+        t_s=table[:, 0],
+        outing=table[:, 1].astype(np.int64),
+        velocity_en_mps=table[:, 2:4],
+        heading_rad=table[:, 4],
+        awa_rad=table[:, 5],
+        aws_mps=table[:, 6],
+        stw_mps=np.full(len(rows), math.nan),
+        length_s=np.full(len(rows), 30.0),
+        outing_names=tuple(str(d) for d in range(len(winds))),
+    )
+
+
+def test_a_wind_that_is_not_the_vanes_is_seen_in_the_residuals_and_widens_the_bands_of_light_winds():
+    winds = np.array([0.0, 20.0])
+    straight = Polar(twa_rad=np.radians([30.0, 180.0]), tws_mps=winds, speed_mps_table=0.4 * np.array([winds, winds]))
+    sailed_in = (2.0, 2.5, 3.5, 5.0, 8.0) * 3
+    still = learn(stretches_in(sailed_in, stretch_mps=0.0, day_mps=0.0, seed=1), straight, ERROR)
+    shifty = learn(stretches_in(sailed_in, stretch_mps=0.3, day_mps=0.2, seed=1), straight, ERROR)
+    assert still.wind_mps == 0.0
+    assert 0.2 < shifty.wind_mps < 0.8
+    light, strong = (int(np.argmin(np.abs(TWS_MPS - w))) for w in (2.25, 7.5))
+    reach = int(np.argmin(np.abs(TWA_DEG - 90.0)))
+    assert shifty.error[reach, light] > 1.5 * still.error[reach, light]
+    assert shifty.error[reach, strong] < 0.6 * shifty.error[reach, light]
+    held = stretches_in(sailed_in, stretch_mps=0.3, day_mps=0.2, seed=2)
+    winds = winds_of(held)
+    in_light = winds.tws_mps < 3.0
+    told, made = by_boat(shifty, held), np.log(winds.made_mps)
+    inside_95 = np.abs(made - told.log_mps) < 1.96 * told.sd
+    assert np.mean(inside_95) > 0.93
+    assert np.mean(inside_95[in_light]) > 0.9
+
+
+def test_a_log_that_fouls_by_half_of_an_outing_counts_for_little():
+    fouled = marks_of(3, "log tells 20 % less by half", 1.0)
+    assert np.abs(fouled.offsets).max() < 3.0  # deviations, of vane, compass and leeway
+    assert np.sqrt(np.mean(fouled.error**2)) < 0.07
