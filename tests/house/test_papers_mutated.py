@@ -528,6 +528,12 @@ MUTATIONS = (
     ),
     Mutation(
         "lab/greedy.py",
+        "return across if other > mine * (1.0 + beating_m / max(distance_m, 1.0)) else steered",
+        "return across if other > mine else steered",
+        "tests/lab/test_greedy.py::test_she_goes_about_when_the_other_side_is_better_by_more_the_nearer_she_is",
+    ),
+    Mutation(
+        "lab/greedy.py",
         "made_good = speeds * np.cos(headings - bearing_rad)",
         "made_good = speeds",
         "tests/lab/test_greedy.py::test_no_heading_makes_more_way_to_the_goal",
