@@ -161,7 +161,8 @@ PRIOR_PACE = Pace()
 class Eta:
     """The way ahead at the boat's pace: places in the order of time, and when the goal that is next is reached.
 
-    ``there_s`` is in half of the cases [s], ``there_late_s`` in nine of ten; None: the way on board does not end there.
+    Or the place that she is bound for in its stead. ``there_s`` is in half of the cases [s], ``there_late_s`` in nine
+    of ten; None: the way on board does not end there.
     """
 
     points: tuple[ExpectedPlace, ...] = ()
@@ -257,6 +258,8 @@ def _walk(
     walker = _Walker(winds, snapshot.current.planned_en_mps, voyage.boat, limits, heading_rad=vehicle.heading_rad)
     gates = gates_of(voyage, state.progress.approaches)
     goal = next((n for n in range(state.progress.gate, len(gates)) if gates[n].ends_goal), None)
+    if route.bound_for:
+        goal = None  # home, a refuge, a place that was named: there at the last waypoint
     mark = None if goal is None else (gates[goal].en_m, gates[goal].radius_m)
     at, time_s, last = here, 0.0, -1
     goal_s: float | None = None
@@ -265,7 +268,7 @@ def _walk(
         if route.items[n].command != Command.NAV_WAYPOINT or time_s >= whole_s or (until is not None and n > until):
             break
         start, end, last = route.leg_from_en_m[n], route.points_en_m[n], n
-        ends_goal = goal is not None and route.gate_of[n] == goal
+        ends_goal = n == len(route.items) - 2 if route.bound_for else goal is not None and route.gate_of[n] == goal
         while time_s < REACH_S:
             to_go_m = math.dist(at, end)
             if to_go_m <= limits.wp_radius_m:

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from companion.errors import InputError
+from companion.errors import CompanionError, InputError
 from companion.guard import Auxiliary
 from companion.program.arguments import chart_option, host_name, http_address, number, out_folder, system_id, whole
 from companion.program.commands import missing
@@ -521,7 +521,9 @@ def _report(folder: Path, err: Console) -> None:
     except KeyboardInterrupt:
         err.write("companion run: the picture is not drawn; companion report draws it\n")
     except Exception as error:
-        refusal = missing(error) if isinstance(error, ModuleNotFoundError) else None
+        refusal: Exception | None = error if isinstance(error, CompanionError) else None
+        if isinstance(error, ModuleNotFoundError):
+            refusal = missing(error)
         err.write(f"companion run: the picture could not be drawn: {refusal or repr(error)}\n")
 
 

@@ -124,7 +124,8 @@ def exit_code(document: dict[str, Any], max_age_s: float) -> int:
         return EXIT_STALE
     worst = None if document["traffic"] is None else document["traffic"]["worst"]
     is_near = worst is not None and worst["alarm"] in ALARMS_OF_VESSELS
-    return EXIT_ALARM if is_near or document["state"] in ALARM_STATES else 0
+    is_ordered = bool(document["order"]["verb"]) if document.get("order") else False
+    return EXIT_ALARM if is_near or (document["state"] in ALARM_STATES and not is_ordered) else 0
 
 
 def status_document(report: Any, autopilot: Any, is_alive: bool, bytes_in: float, loss: float) -> dict[str, Any]:

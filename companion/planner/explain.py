@@ -287,7 +287,8 @@ def _bind_in_words(bind: dict[str, Any]) -> str:
             "leaves it": "from a turn at",
             "brushes it": "brushing",
         }[bind["where"]]
-        return f"{verb} {bind['name']} (around {east:.0f} E, {north:.0f} N)"
+        east_m, north_m = (f"{round(value) + 0:d} m" for value in (east, north))  # no minus before a zero
+        return f"{verb} {bind['name']} (around {east_m} E, {north_m} N)"
     if bind["by"] == "beat":
         return f"beaten by the autopilot, {bind['corridor_m']:.0f} m to either side of its line"
     if bind["by"] == "fence":

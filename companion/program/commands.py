@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import difflib
+import errno
 import importlib
 import importlib.util
 import os
@@ -311,9 +312,14 @@ class Program:
                 os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
         except OSError as error:
-            if error.filename is None:
+            what = error.filename
+            if what is None and error.errno in {errno.ENOSPC, errno.EDQUOT, errno.EIO}:
+                with contextlib.suppress(OSError, ValueError):  # nothing more can be written there
+                    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                what = "standard output"
+            if what is None:
                 raise
-            sys.stderr.write(f"{self.name} {args.command}: {one_line(str(error.filename))}: {reason(error)}\n")
+            sys.stderr.write(f"{self.name} {args.command}: {one_line(str(what))}: {reason(error)}\n")
             return CompanionError.exit_code
 
     def _unknown(self, word: str) -> CompanionError:

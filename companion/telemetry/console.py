@@ -290,8 +290,9 @@ def progress_text(step: Step) -> str:
         minutes = state.orders.standing.age_s(snapshot.t_s) / 60.0
         parts.append(f"order {state.orders.standing.words} of {state.orders.standing.by}, {minutes:.0f} min")
     if route is not None:
-        if route.expected_clearance_m is not None:
-            parts.append(f"clearance expected {route.expected_clearance_m:.1f} m")
+        clearance_m = route.clearance_ahead_m(state.mission.index)
+        if clearance_m is not None:
+            parts.append(f"clearance expected {clearance_m:.1f} m")
         eta = step.eta()
         if under_way and eta.there_s is not None:
             late = "" if eta.there_late_s is None else f" (90 %: {eta.there_late_s:.0f} s)"

@@ -41,6 +41,8 @@ def companion_status(
     gates = gates_of(voyage, state.progress.approaches)
     goal = gates[state.progress.gate].goal if state.progress.gate < len(gates) else len(legs) - 1
     here = snapshot.position_en_m
+    # home, a refuge or a place that was named: how far the last goal is says nothing of that
+    is_elsewhere = state.progress.gate >= len(gates) or (route is not None and bool(route.bound_for))
     code, text = _alert(step)
     tws_sigma = None if wind.forecast is None else float(wind.forecast.sigma_tws_mps[0])
     return CompanionStatus(
@@ -51,7 +53,7 @@ def companion_status(
         waypoint_seq=state.mission.index + 1 if route is not None else None,
         waypoint_count=None if route is None else len(route.items),
         waypoint_distance_m=on_leg(step).left_m,
-        goal_distance_m=None if here is None else math.dist(here, legs[goal].en_m),
+        goal_distance_m=None if here is None or is_elsewhere else math.dist(here, legs[goal].en_m),
         cross_track_m=on_leg(step).off_m,
         clearance_m=clearance_m,
         twd_from_rad=None if wind.mean_twd_from_rad is None else wrap_two_pi(wind.mean_twd_from_rad),

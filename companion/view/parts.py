@@ -20,7 +20,7 @@ from companion.planner import Leg, Plan
 from companion.safety import BY_NAME
 from companion.skipper.planning import next_tack, on_leg
 from companion.skipper.step import Route, SkipperConfig, WindHealth
-from companion.skipper.way import Goal, PointEn, Side, Voyage, gates_of, half_width_rad, mean_twd_rad
+from companion.skipper.way import Goal, PointEn, Side, Voyage, bearing_rad, gates_of, half_width_rad, mean_twd_rad
 from companion.telemetry.console import DISK, GONE
 from companion.telemetry.folder import VoyageFigures
 from companion.traffic import Alarm, Assessment
@@ -170,6 +170,14 @@ def next_goal(step: Step, voyage: Voyage) -> int:
     return gates[step.state.progress.gate].goal if step.state.progress.gate < len(gates) else len(voyage.legs)
 
 
+def mark_en_m(step: Step, voyage: Voyage) -> PointEn | None:
+    """Return what is sailed to: where the way on board leads if that is no goal, else the goal; None: nothing is."""
+    route, number = step.state.mission.route, next_goal(step, voyage)
+    if route is not None and route.bound_for and len(route.points_en_m) > 1:
+        return route.points_en_m[-2]  # behind it is the loiter that ends the mission
+    return voyage.legs[number].en_m if number < len(voyage.legs) else None
+
+
 def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatView:
     """Return where the boat is and how it moves."""
     snapshot, autopilot = step.snapshot, step.snapshot.autopilot
@@ -181,9 +189,8 @@ def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatV
     )
     if vehicle is None or here is None:
         return at_rest
-    goal = voyage.legs[min(next_goal(step, voyage), len(voyage.legs) - 1)].en_m
+    mark = mark_en_m(step, voyage)
     cog_rad, twd_rad = heading_of(*vehicle.velocity_en_mps), wind.present_twd_from_rad
-    to_goal_rad = heading_of(goal[0] - here[0], goal[1] - here[1])
     twa_rad = None if twd_rad is None else difference_rad(twd_rad, vehicle.heading_rad)
     return replace(
         at_rest,
@@ -197,11 +204,11 @@ def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatV
         roll_deg=None if vehicle.roll_rad is None else signed(vehicle.roll_rad),
         tack=None if twa_rad is None else tack_of(twa_rad),
         vmg_mps=rounded(vmg_mps(step)),
-        vmc_mps=rounded(vehicle.speed_mps * math.cos(to_goal_rad - cog_rad)),
+        vmc_mps=None if mark is None else rounded(vehicle.speed_mps * math.cos(bearing_rad(here, mark) - cog_rad)),
         clearance_m=rounded(status.clearance_m, 1),
         cross_track_m=rounded(on_leg(step).off_m, 1),
         waypoint_m=rounded(on_leg(step).left_m, 1),
-        goal_m=rounded(math.dist(here, goal), 1),
+        goal_m=None if mark is None else rounded(math.dist(here, mark), 1),
     )
 
 
@@ -670,7 +677,7 @@ def plan_of(
         late_s=rounded(route.late_s, 0),
         there_s=rounded(eta.there_s, 0),
         there_late_s=rounded(eta.there_late_s, 0),
-        expected_clearance_m=rounded(route.expected_clearance_m, 1),
+        expected_clearance_m=rounded(route.clearance_ahead_m(begin), 1),
         bound_s=_bound_s(route, chosen),
         replans=state.plans.replans,
         next_tack_s=None if tack is None else rounded(tack.in_s, 0),

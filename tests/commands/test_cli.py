@@ -381,3 +381,11 @@ def test_nothing_writes_to_a_terminal_but_through_the_safe_streams():
         if around.search(path.read_text())
     }
     assert found == {"companion/telemetry/console.py", "companion/terminal/screen.py"}
+
+
+def test_standard_output_that_is_full_is_one_line():
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        command = [sys.executable, "-m", "companion", "mission", "check", "missions/rocks.toml"]
+        ended = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines() == ["companion mission: standard output: No space left on device"]

@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion import cli
+from companion.commands.status import EXIT_ALARM, exit_code
 from companion.mavlink import vehicle_identity
 from companion.mavlink.wire.companion_status import status_messages
 from companion.mavlink.wire.frames import Codec
@@ -71,3 +72,9 @@ def test_one_status_waits_for_the_autopilots_mode(air, capsys):
 def test_what_was_not_heard_in_time_is_said(air, capsys):
     assert _once(air([0.1], {"WIND_COV"}), "1.2") == 0
     assert capsys.readouterr().out.startswith("state not heard yet  ")
+
+
+@pytest.mark.parametrize(("order", "code"), [(None, EXIT_ALARM), ({"verb": "hold", "stands_s": 5.0, "age_s": 0.1}, 0)])
+def test_a_hold_that_was_ordered_raises_no_alarm(order, code):
+    document = {"age_s": 0.5, "traffic": None, "state": "holding", "order": order}
+    assert exit_code(document, max_age_s=10.0) == code

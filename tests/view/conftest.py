@@ -18,7 +18,7 @@ MISSION = one_mark(
     "beat",
     (50.8179000, -1.3100000),
     60.0,
-    tables="""orders = ["hold", "go_on"]
+    tables="""orders = ["hold", "go_on", "refuge"]
 local_orders = "all"
 [[refuge]]
 name = "Bay"

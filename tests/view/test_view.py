@@ -14,14 +14,18 @@ from bench.pages import schema
 from companion.current import STILL_WATER, over_water
 from companion.fold import Step
 from companion.geo.angles import difference_rad
+from companion.geo.frame import LocalFrame
+from companion.geofence import load_mission
 from companion.messages import AutopilotStatus, CompanionStatus, GeoPoint, VehicleState, WindForecast
 from companion.page.sources import LiveSource
 from companion.skipper.step import PlanOutcome, SkipperConfig, SkipperState, Snapshot, WindEstimate, WindHealth
+from companion.skipper.step.actions import RequestPlan
 from companion.skipper.way import Refuge
 from companion.telemetry.folder import TLOG, VoyageFigures
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
 from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of, polar_of, refuges_of
-from tests.view.conftest import write_mission
+from sitl.scenario.scenario import EventSpec
+from tests.view.conftest import sail, write_mission
 
 RULES = {
     name: jsonschema.Draft202012Validator({**schema(), "$ref": f"#/$defs/{name}"})
@@ -357,3 +361,27 @@ def test_a_mark_that_is_fetched_on_one_course_has_no_laylines(mark, is_beat, voy
 @pytest.fixture(scope="module")
 def voyage(tmp_path_factory):
     return fold_of(tmp_path_factory.mktemp("voyage"))._voyage
+
+
+# -------------------------------------------------------------------------------- bound for elsewhere
+def test_what_is_told_of_the_way_is_of_where_she_is_bound(tmp_path):
+    """Bound for a refuge the page told how far the goal was, and no time; in a loiter the clearance of the old way."""
+    events = (EventSpec(at_s=60.0, kind="order", order="refuge Bay"),)
+    seen = sail(tmp_path, tmp_path / "voyage", *events, limit_s=200.0)
+    bay = LocalFrame(load_mission(seen.mission).origin).en_from_geo(GeoPoint(lat_deg=50.8172, lon_deg=-1.3085))
+    bound = [v for v in seen.under_way if v.plan is not None and v.plan.bound_for and v.boat.at_en_m is not None]
+    sailed = [v for v in bound if v.plan.leg is not None and v.plan.leg < v.plan.count]
+    assert len(sailed) > 10
+    for view in sailed:
+        assert view.boat.goal_m == pytest.approx(math.dist(view.boat.at_en_m, bay), abs=12.0)  # there within 10 m
+    assert sum(v.plan.there_s is not None for v in sailed) > len(sailed) // 2
+    resting = [v for v in bound if v.plan.leg == v.plan.count]
+    assert resting
+    assert all(v.plan.expected_clearance_m is None for v in resting)
+    assert any(v.plan.expected_clearance_m is not None for v in sailed)
+
+
+def test_a_plans_obstacles_have_the_names_of_the_mission(beat):
+    problems = [a.problem for step in beat.steps for a in step.actions if isinstance(a, RequestPlan)]
+    assert problems
+    assert all(p.obstacle_names[:1] == ("rock",) for p in problems)

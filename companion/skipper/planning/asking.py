@@ -111,7 +111,12 @@ def request(
     )
     ctx.set(
         pending=changed(ctx.state.pending, plan=pending),
-        plans=changed(ctx.state.plans, last_s=ctx.t_s, rung=rung, replans=ctx.state.plans.replans + 1),
+        plans=changed(
+            ctx.state.plans,
+            last_s=ctx.t_s,
+            rung=rung,
+            replans=ctx.state.plans.replans + (ctx.state.mission.route is not None),
+        ),
     )
     budget = ctx.config.first_plan_budget_s if reason is ReplanReason.START else ctx.config.plan_budget_s
     why = "; ".join(part for part in (text, start.text, f"step: {name}" if name else "") if part)

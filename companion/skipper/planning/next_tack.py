@@ -129,8 +129,13 @@ def next_tack(seen: Seen, boat: Boat) -> NextTack | None:
             close_rad = wind_rad - no_go_rad if side else wind_rad + no_go_rad
             velocity_en = vehicle.velocity_en_mps if has_way else moved((0.0, 0.0), close_rad, speed_mps)
             own_s = _own_tack_s(start, velocity_en, leg, wind_rad, side=side, limits=limits)
+            if own_s is None:
+                return None
+            if _is_fetched((start[0] + own_s * velocity_en[0], start[1] + own_s * velocity_en[1]), leg, limits):
+                time_s += own_s
+                continue
             turn_s = no_go_rad / boat.turn_rate_radps
-            return None if own_s is None else NextTack(time_s + own_s + turn_s, is_planned=False)
+            return NextTack(time_s + own_s + turn_s, is_planned=False)
         side, tack_rad = off_rad > 0.0, off_rad
         time_s += math.dist(start, end) / (vehicle.speed_mps if has_way else speed_mps)
     return None
@@ -147,6 +152,19 @@ def _tacks_come_off(state: SkipperState) -> bool:
     """Return whether the next tack will come off, by what those of this voyage have told."""
     tacking = state.tacking
     return not tacking.is_counted and tacking.failed <= MANY_FAIL * tacking.tried
+
+
+def _is_fetched(there: PointEn, leg: tuple[PointEn, PointEn], limits: AutopilotLimits) -> bool:
+    """Return whether a boat that is there has reached the end of a leg: beside it, or beyond.
+
+    On a leg that is closed by a degree or two she fetches the waypoint without a tack.
+    """
+    (east, north), end = leg
+    length_m = math.dist(*leg)
+    if length_m == 0.0:
+        return True
+    along_m = ((there[0] - east) * (end[0] - east) + (there[1] - north) * (end[1] - north)) / length_m
+    return along_m >= length_m - max(limits.wp_radius_m, limits.turn_radius_m)
 
 
 def _own_tack_s(

@@ -253,9 +253,9 @@ def problem_dict(
         ValueError: when no water is left inside the fence at this margin.
     """
     fence = voyage.area.fence_wkt(margin_m, start.en_m)
-    obstacles = [*voyage.area.obstacles_wkt(margin_m)]
+    obstacles, names = voyage.area.obstacles_wkt(margin_m), voyage.area.obstacle_names(margin_m)
     if start.notch_m > 0.0:
-        obstacles, fence = _notched(voyage, start, obstacles, fence, floor_m)
+        obstacles, names, fence = _notched(voyage, start, (obstacles, names), fence, floor_m)
     corridor = band(voyage, gate, start.en_m, aim.en_m)
     if corridor is not None:
         limits = shapely.intersection(corridor, shapely.from_wkt(fence)) if fence is not None else corridor
@@ -304,6 +304,7 @@ def problem_dict(
         "start": {"x": start.en_m[0], "y": start.en_m[1], "heading_deg": math.degrees(wrap_two_pi(start.heading_rad))},
         "goal": {"x": aim.en_m[0], "y": aim.en_m[1], "radius": aim.radius_m},
         "obstacles": [*obstacles, *gate.keep_out],
+        "obstacle_names": [*names, *(f"the wrong side of {gate.name}" for _ in gate.keep_out)],
         "fence": fence,
         "wind": wind,
         "boat": boat,
@@ -319,20 +320,19 @@ def problem_dict(
 
 
 def _notched(
-    voyage: Voyage, start: Start, obstacles: Sequence[str], fence: str | None, floor_m: float
-) -> tuple[list[str], str | None]:
-    """Return obstacles and fence with the notch around the start: there the floor holds instead of the margin."""
+    voyage: Voyage, start: Start, solids: tuple[Sequence[str], Sequence[str]], fence: str | None, floor_m: float
+) -> tuple[list[str], list[str], str | None]:
+    """Return obstacles, their names and the fence with the notch around the start: there the floor holds alone."""
     disc = shapely.buffer(shapely.points(start.en_m), start.notch_m, quad_segs=4)
     core = shapely.union_all([shapely.from_wkt(w) for w in voyage.area.obstacles_wkt(floor_m)])
     opening = shapely.difference(disc, core)
     open_obstacles: list[str] = []
-    for text in obstacles:
+    open_names: list[str] = []
+    for text, name in zip(*solids, strict=True):
         rest = shapely.difference(shapely.from_wkt(text), opening)
-        open_obstacles.extend(
-            shapely.to_wkt(p, rounding_precision=4)
-            for p in shapely.get_parts(rest)
-            if isinstance(p, Polygon) and not p.is_empty
-        )
+        kept = [p for p in shapely.get_parts(rest) if isinstance(p, Polygon) and not p.is_empty]
+        open_obstacles.extend(shapely.to_wkt(p, rounding_precision=4) for p in kept)
+        open_names.extend(name for _ in kept)
     if fence is not None:
         inner = voyage.area.fence_wkt(floor_m, start.en_m)
         if inner is not None:
@@ -340,7 +340,7 @@ def _notched(
             pieces = [p for p in shapely.get_parts(wider) if isinstance(p, Polygon)]
             here = shapely.points(start.en_m)
             fence = shapely.to_wkt(min(pieces, key=lambda p: (float(p.distance(here)), -p.area)), rounding_precision=4)
-    return open_obstacles, fence
+    return open_obstacles, open_names, fence
 
 
 # -------- A leg of a passage: the line between two global waypoints that are farther apart than any frame is flat.

@@ -52,6 +52,10 @@ class Route:
         last = len(self.items) - 2
         return index < last and all(gate < 0 for gate in self.gate_of[index:last])
 
+    def clearance_ahead_m(self, index: int) -> float | None:
+        """Return ``expected_clearance_m`` where item ``index`` is under way; None in the loiter that ends it."""
+        return self.expected_clearance_m if index < len(self.items) - 1 else None
+
     def led_aside(
         self, keep: int, from_en_m: PointEn, way: Sequence[tuple[MissionItem, PointEn]], *, rung: str, why: str
     ) -> Route:

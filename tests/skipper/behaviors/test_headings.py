@@ -337,7 +337,16 @@ def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
     """At each waypoint a new plan is asked for: "next tack 44 s" was 86 s away, for it made the board longer."""
     boat = replace(voyage().boat, polar=constant(2.0), turn_rate_radps=math.radians(30.0))
 
-    def told(*points, asked=-1, pending=None, share=1.0, heading_deg=60.0, speed_mps=2.0, tacking=NO_TACKS):
+    def told(
+        *points,
+        asked=-1,
+        pending=None,
+        share=1.0,
+        heading_deg=60.0,
+        speed_mps=2.0,
+        tacking=NO_TACKS,
+        velocity=(1.7, 1.0),
+    ):
         route = Route(
             items=(MissionItem(command=Command.NAV_WAYPOINT),) * len(points)
             + (MissionItem(command=Command.NAV_LOITER_UNLIM),),
@@ -353,7 +362,7 @@ def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
             delta_s=0.9,
         )
         heading_rad = math.radians(heading_deg)
-        vehicle = SimpleNamespace(speed_mps=speed_mps, heading_rad=heading_rad, velocity_en_mps=(1.7, 1.0))
+        vehicle = SimpleNamespace(speed_mps=speed_mps, heading_rad=heading_rad, velocity_en_mps=velocity)
         wind = SimpleNamespace(mean_twd_from_rad=0.0, present_twd_from_rad=0.0, mean_tws_mps=5.0, present_tws_mps=5.0)
         snapshot = SimpleNamespace(
             vehicle=vehicle,
@@ -382,4 +391,11 @@ def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
     assert told(east, on, heading_deg=-30.0) == pytest.approx((1.0, True), abs=0.1)  # she is turning to this leg
     assert not told(east, on, heading_deg=-30.0, speed_mps=0.5).is_planned  # and may not come through the wind
     assert not told(east, on, heading_deg=-30.0, tacking=replace(NO_TACKS, is_counted=True)).is_planned
+    # closed by two degrees, a leg is fetched by the close-hauled course; from a closed leg dead to windward she tacks
+    closed = (100.0 * math.sin(math.radians(43.0)), 100.0 * math.cos(math.radians(43.0)))
+    further = (2.0 * closed[0] - 20.0, 2.0 * closed[1])
+    close_hauled = {"heading_deg": 45.0, "velocity": (math.sqrt(2.0), math.sqrt(2.0))}
+    beyond = told(closed, further, (0.0, 2.0 * further[1]), **close_hauled)
+    assert beyond.in_s > 75.0, "not at the first waypoint: the second leg is on this tack, too"
+    assert told((0.0, 100.0), **close_hauled).in_s < 50.0
     assert told(east, on, back, share=0.8) == pytest.approx((50.0 + 50.0 / 0.8 + turn_s, False), abs=0.1)
