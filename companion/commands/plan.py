@@ -8,6 +8,7 @@ import json
 import math
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from companion.geo.angles import direction
 from companion.planner.courses import courses
 from companion.planner.problem import evaluate
 from companion.planners import ALGORITHMS
-from companion.program.arguments import add_command, number, out_file, picture, whole, wind
+from companion.program.arguments import add_command, number, out_file, picture, shifts, whole, wind
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ examples:
   companion plan lake.json --budget 10 --out path.json --plot path.png
   companion plan lake.json --algorithm rrtstar --expansions 20000 --seed 7   (the same path on every machine)
   companion plan lake.json --explain
+  companion plan missions/archipelago.toml --policy 9,28 --explain --plot policy.png
 
 The problem's format is described in docs/reference/problem-format.md. PLAN.json holds "waypoints" as [[x, y], ...] in
 metres; of a mission with several goals it is a list of plans.
@@ -65,6 +67,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument("--out", type=out_file, metavar="PLAN.json", help="write the plan")
     parser.add_argument("--plot", type=picture, metavar="P.png", help="draw problem, search, path and bound")
     parser.add_argument("--json", action="store_true", help="print the plan as JSON instead of text")
+    parser.add_argument(
+        "--policy",
+        type=shifts,
+        metavar="DEG,S",
+        help="tell, and with --plot draw, what is best done wherever she comes to be in a wind that shifts by DEG "
+        "(standard deviation) for S seconds",
+    )
     parser.set_defaults(run=run)
 
 
@@ -75,6 +84,8 @@ def run(args: argparse.Namespace) -> int:
     ground: dict[str, Any] = {}
     if Path(args.problem).suffix.lower() == ".toml":
         mission = _mission(args)
+        if args.plot is not None and args.policy is None and len(mission.goals) > 1:
+            raise _several(args)
         answers = _sail_through(mission, args)
         ground = {"area": mission.water(), "margin_m": mission.margin_m}
     elif args.wind is not None:
@@ -85,16 +96,13 @@ def run(args: argparse.Namespace) -> int:
     text = json.dumps(files[0] if len(files) == 1 else files, indent=1) + "\n"
     if args.out is not None:
         args.out.write_text(text, encoding="utf-8")
+    if args.policy is not None:
+        return _policy([problem for problem, _ in answers], args)
     if args.plot is not None:
         from companion.plots.plan import save_plan
 
         if len(answers) > 1:
-            raise InputError(
-                "--plot",
-                str(args.plot),
-                "one plan is drawn, and this mission wants several",
-                "companion mission check --plot draws them all",
-            )
+            raise _several(args)
         with patience("drawing"):
             save_plan(*answers[0], args.plot, **ground)
     if args.json:
@@ -107,6 +115,31 @@ def run(args: argparse.Namespace) -> int:
     if any(answer.status is PlanStatus.INVALID for _, answer in answers):
         return 2
     return 0 if all(answer.has_path and not _broken(problem, answer) for problem, answer in answers) else 1
+
+
+def _several(args: argparse.Namespace) -> InputError:
+    return InputError(
+        "--plot",
+        str(args.plot),
+        "one plan is drawn, and this mission wants several",
+        "companion mission check --plot draws them all",
+    )
+
+
+def _policy(problems: Sequence[Problem], args: argparse.Namespace) -> int:
+    """Tell the policy of each leg, and draw the first's."""
+    from companion.commands.plan_policy import describe, solved
+
+    with patience("solving for the best policy"):
+        legs = solved(problems, args.policy)
+    print("\n\n".join(describe(leg, args.policy, explain=args.explain) for leg in legs))
+    if args.plot is not None:
+        from companion.plots.policy import save_policy
+
+        with patience("drawing"):
+            save_policy(legs[0].problem, legs[0].policy, legs[0].tack, args.plot)
+        print(f"written: {args.plot}")
+    return 0 if all(math.isfinite(leg.time_s) for leg in legs) else 1
 
 
 def _answer(problem: Problem, args: argparse.Namespace) -> tuple[Problem, Plan]:

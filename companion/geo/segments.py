@@ -26,6 +26,10 @@ MAX_CELLS = 1 << 20
 CELLS_PER_EDGE = 4.0
 
 
+EdgeTables = tuple[Floats, Ints, Floats, NDArray[np.bool_]]
+"""What kernels ask of polygons: the cells' edges, where each cell's begin, the grid, which middles are inside."""
+
+
 class PolygonIndex:
     """The union of some polygons [m], ready for many queries. Build it once; it never changes."""
 
@@ -62,10 +66,15 @@ class PolygonIndex:
         """The number of edges."""
         return int(self._edges.shape[0])
 
+    @property
+    def tables(self) -> EdgeTables:
+        """What a kernel asks with: ``meets_any``."""
+        return self._packed, self._start, self._grid, self._middle_inside
+
     def intersects(self, segments: ArrayLike) -> NDArray[np.bool_]:
         """Return which segments, an (n, 4) array of x0, y0, x1, y1 [m], touch or enter a polygon."""
         wanted = np.ascontiguousarray(np.asarray(segments, dtype=np.float64).reshape(-1, 4))
-        return _intersects(wanted, self._packed, self._start, self._grid, self._middle_inside)
+        return _intersects(wanted, self.tables)
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """Return which points, an (n, 2) array [m], lie inside a polygon."""
@@ -178,67 +187,66 @@ def _contains(points: Floats, edges: Floats, start: Ints, grid: Floats, middle: 
 
 
 @kernel
-def _intersects(
-    segments: Floats, edges: Floats, start: Ints, grid: Floats, middle: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    out = np.zeros(segments.shape[0], dtype=np.bool_)
+def meets_any(ax: float, ay: float, bx: float, by: float, tables: EdgeTables) -> bool:
+    """Return whether a segment touches or enters a polygon."""
+    edges, start, grid, middle = tables
     columns, rows, cell_m = int(grid[3]), int(grid[4]), grid[2]
     width, height = columns * cell_m, rows * cell_m
+    # Clip to the grid: outside it there is only water (Liang and Barsky 1984).
+    t0, t1 = 0.0, 1.0
+    dx, dy = bx - ax, by - ay
+    clipped = False
+    for side in range(4):
+        if side == 0:
+            p, q = -dx, ax - grid[0]
+        elif side == 1:
+            p, q = dx, grid[0] + width - ax
+        elif side == 2:
+            p, q = -dy, ay - grid[1]
+        else:
+            p, q = dy, grid[1] + height - ay
+        if p == 0.0:
+            clipped = clipped or q < 0.0
+        elif p < 0.0:
+            t0 = max(t0, q / p)
+        else:
+            t1 = min(t1, q / p)
+    if clipped or t0 > t1:
+        return False
+    sx, sy, ex, ey = ax + t0 * dx, ay + t0 * dy, ax + t1 * dx, ay + t1 * dy
+    c = min(columns - 1, max(0, math.floor((sx - grid[0]) / cell_m)))
+    r = min(rows - 1, max(0, math.floor((sy - grid[1]) / cell_m)))
+    ce = min(columns - 1, max(0, math.floor((ex - grid[0]) / cell_m)))
+    re = min(rows - 1, max(0, math.floor((ey - grid[1]) / cell_m)))
+    step_c, step_r = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
+    next_x = grid[0] + (c + (1 if dx > 0.0 else 0)) * cell_m
+    next_y = grid[1] + (r + (1 if dy > 0.0 else 0)) * cell_m
+    tx = (next_x - ax) / dx if dx != 0.0 else math.inf
+    ty = (next_y - ay) / dy if dy != 0.0 else math.inf
+    jump_x = abs(cell_m / dx) if dx != 0.0 else math.inf
+    jump_y = abs(cell_m / dy) if dy != 0.0 else math.inf
+    for _ in range(abs(ce - c) + abs(re - r) + 1):
+        cell = r * columns + c
+        for k in range(start[cell], start[cell + 1]):
+            if _meet(ax, ay, bx, by, edges, k):
+                return True
+        if tx < ty:
+            c += step_c
+            tx += jump_x
+        else:
+            r += step_r
+            ty += jump_y
+        if c < 0 or r < 0 or c >= columns or r >= rows:
+            break
+    # No edge met: the whole segment is inside or outside.
+    return bool(_inside(ax, ay, edges, start, grid, middle))
+
+
+@kernel
+def _intersects(segments: Floats, tables: EdgeTables) -> NDArray[np.bool_]:
+    out = np.zeros(segments.shape[0], dtype=np.bool_)
     for i in range(segments.shape[0]):
-        ax, ay = segments[i, 0], segments[i, 1]
-        bx, by = segments[i, 2], segments[i, 3]
-        # Clip to the grid: outside it there is only water (Liang and Barsky 1984).
-        t0, t1 = 0.0, 1.0
-        dx, dy = bx - ax, by - ay
-        clipped = False
-        for side in range(4):
-            if side == 0:
-                p, q = -dx, ax - grid[0]
-            elif side == 1:
-                p, q = dx, grid[0] + width - ax
-            elif side == 2:
-                p, q = -dy, ay - grid[1]
-            else:
-                p, q = dy, grid[1] + height - ay
-            if p == 0.0:
-                clipped = clipped or q < 0.0
-            elif p < 0.0:
-                t0 = max(t0, q / p)
-            else:
-                t1 = min(t1, q / p)
-        if clipped or t0 > t1:
-            continue
-        sx, sy, ex, ey = ax + t0 * dx, ay + t0 * dy, ax + t1 * dx, ay + t1 * dy
-        c = min(columns - 1, max(0, math.floor((sx - grid[0]) / cell_m)))
-        r = min(rows - 1, max(0, math.floor((sy - grid[1]) / cell_m)))
-        ce = min(columns - 1, max(0, math.floor((ex - grid[0]) / cell_m)))
-        re = min(rows - 1, max(0, math.floor((ey - grid[1]) / cell_m)))
-        step_c, step_r = (1 if dx > 0.0 else -1), (1 if dy > 0.0 else -1)
-        next_x = grid[0] + (c + (1 if dx > 0.0 else 0)) * cell_m
-        next_y = grid[1] + (r + (1 if dy > 0.0 else 0)) * cell_m
-        tx = (next_x - ax) / dx if dx != 0.0 else math.inf
-        ty = (next_y - ay) / dy if dy != 0.0 else math.inf
-        jump_x = abs(cell_m / dx) if dx != 0.0 else math.inf
-        jump_y = abs(cell_m / dy) if dy != 0.0 else math.inf
-        hit = False
-        for _ in range(abs(ce - c) + abs(re - r) + 1):
-            cell = r * columns + c
-            for k in range(start[cell], start[cell + 1]):
-                if _meet(ax, ay, bx, by, edges, k):
-                    hit = True
-                    break
-            if hit:
-                break
-            if tx < ty:
-                c += step_c
-                tx += jump_x
-            else:
-                r += step_r
-                ty += jump_y
-            if c < 0 or r < 0 or c >= columns or r >= rows:
-                break
-        # No edge met: the whole segment is inside or outside.
-        out[i] = hit or _inside(ax, ay, edges, start, grid, middle)
+        out[i] = meets_any(segments[i, 0], segments[i, 1], segments[i, 2], segments[i, 3], tables)
     return out
 
 

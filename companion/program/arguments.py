@@ -198,6 +198,14 @@ def wind(text: str) -> tuple[float, float]:
     return speed, direction % 360.0
 
 
+def shifts(text: str) -> tuple[float, float]:
+    """Return (standard deviation [deg], how long one lasts [s]) of ``DEG,S``."""
+    spread, comma, lasts = text.partition(",")
+    if not comma:
+        raise ArgumentTypeError(f"{text[:40]!r} is no wind; as 9,28 (degrees, seconds)")
+    return number("degrees", at_least=0.0, at_most=90.0)(spread), number("s", above=0.0, at_most=1e5)(lasts)
+
+
 def out_file(text: str) -> Path:
     """Return a file that can be written as far as can be told beforehand: work is not lost for a slip of the name."""
     path = Path(text)

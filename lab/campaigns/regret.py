@@ -15,6 +15,7 @@ from companion.errors import InputError
 from companion.geofence import Mission, load_mission
 from lab.campaigns.baselines import NAMES, TOLD, BaselineTrack, Sailor, key_of, latest, pairs, scenario_of, voyage_of
 from lab.perfect_information import Best, Race, RaceBoat, RaceMark, Weather, best
+from lab.possible import possible_s
 from sitl.autopilot import TACK_RETRY_S, no_go_half_rad, settled_polar, tack_loss_s
 from sitl.results import markdown
 from sitl.run.embedded import solid_of
@@ -28,6 +29,8 @@ HEADS = (
     "clean",
     "median s",
     "tacks",
+    "possible s",
+    "over possible %",
     "best s",
     "its tacks",
     "over best %",
@@ -67,6 +70,8 @@ def _figures(name: str, who: str, rows: Sequence[dict[str, Any]]) -> dict[str, A
         "clean": len(clean),
         "time_s": median([r["time_s"] for r in clean]),
         "tacks": median([r["tacks"] for r in clean]),
+        "possible_s": median([r["possible_s"] for r in clean if r.get("possible_s")]),
+        "over_possible": median([r["time_s"] / r["possible_s"] - 1.0 for r in clean if r.get("possible_s")]),
         "best_s": median([r["best_s"] for r in clean]),
         "best_tacks": median([r["best_tacks"] for r in clean]),
         "regret": median(regrets),
@@ -89,6 +94,8 @@ def as_text(records: Sequence[dict[str, Any]]) -> str:
                 str(f["clean"]),
                 _number(f["time_s"]),
                 _number(f["tacks"], "g"),
+                _number(f["possible_s"]),
+                _percent(f["over_possible"], 1),
                 _number(f["best_s"]),
                 _number(f["best_tacks"], "g"),
                 *(_percent(f[k], 1) for k in ("regret", "regret_10", "regret_90")),
@@ -176,11 +183,13 @@ def best_of(scenario: Scenario, track: BaselineTrack) -> Best | None:
 def sail(job: Job[Sailor]) -> dict[str, Any]:
     """Sail a job; return what is told of it, and the best."""
     voyage = voyage_of(job)
-    ideal = best_of(scenario_of(job), voyage.track)
-    if ideal is None:
+    if voyage.track.time_s is None:
         return voyage.record
+    race = race_of(scenario_of(job), voyage.track)
+    ideal = best(race, UNTIL * voyage.track.time_s)
     return {
         **voyage.record,
+        "possible_s": possible_s(scenario_of(job), race),
         "best_s": ideal.time_s,
         "bound_s": ideal.bound_s,
         "coarser_s": ideal.coarser_s,

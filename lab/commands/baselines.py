@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from companion.program.arguments import number, whole
+from companion.program.arguments import number, shifts, whole
 from sitl.commands.run import scenario_file
 from sitl.options import add_options, options_of
 
@@ -17,12 +17,7 @@ STEADY = (0.0, 60.0)
 
 def wind_of(text: str) -> tuple[float, float]:
     """Read a wind of ``--winds``: DEG,S, or "steady"."""
-    if text == "steady":
-        return STEADY
-    spread, comma, tau = text.partition(",")
-    if not comma:
-        raise argparse.ArgumentTypeError(f"{text[:40]!r} is no wind; as 9,28 (degrees, seconds), or steady")
-    return number("degrees", at_least=0.0, at_most=90.0)(spread), number("s", above=0.0, at_most=1e5)(tau)
+    return STEADY if text == "steady" else shifts(text)
 
 
 def add_winds(parser: argparse.ArgumentParser) -> None:

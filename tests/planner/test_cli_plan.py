@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import msgspec
@@ -187,3 +188,35 @@ def test_bad_options_are_exit_2(capsys, file, tmp_path):
     code, _, err = run(capsys, file(), "--budget", "0.2", "--plot", tmp_path / "p.nonsense")
     assert code == 2
     assert "p.nonsense" in err
+
+
+# ---------------------------------------------------------------------------------------- the best policy
+def test_the_policy_is_told_explained_and_drawn(capsys, file, tmp_path):
+    picture = tmp_path / "policy.png"
+    options = ("--expansions", "200", "--policy", "9,28", "--explain", "--plot", picture)
+    code, out, _ = run(capsys, file(), *options)
+    assert code == 0
+    told = re.search(r"time to go (\d+) s: begun on port tack (\d+) s, on starboard (\d+) s; (\d+) s if", out)
+    best_s, *each_s, steady_s = (int(n) for n in told.groups())
+    assert best_s == min(each_s)
+    assert best_s == pytest.approx(steady_s, rel=0.1)
+    drawn_s = int(re.search(r"1000 drawn winds sailed by it: (\d+) s, .* 0 touched", out)[1])
+    assert drawn_s == pytest.approx(best_s, rel=0.03)
+    assert (
+        len(re.findall(r"^  (?:backed|veered|at its mean).*(?:stand on, \d{3}°|tack): worth", out, re.MULTILINE)) == 5
+    )
+    assert picture.stat().st_size > 10_000
+
+
+def test_where_no_policy_leads_it_is_exit_1(capsys, file):
+    wall = "POLYGON((-80 150,80 150,80 260,-80 260,-80 150),(-30 170,30 170,30 230,-30 230,-30 170))"
+    code, out, _ = run(capsys, file(obstacles=[wall]), "--expansions", "200", "--policy", "9,28")
+    assert code == 1
+    assert "no way" in out
+
+
+@pytest.mark.parametrize("text", ["9", "9,", "nan,28", "-1,28", "9,0", "91,28"])
+def test_a_wind_that_shifts_by_nonsense_is_exit_2(capsys, file, text):
+    code, _, err = run(capsys, file(), f"--policy={text}")
+    assert code == 2
+    assert "--policy" in err
