@@ -32,7 +32,8 @@ examples:
   companion setup                                     asks
   companion setup lake --yes --start 50.8170,-1.3100 --goal 50.8200,-1.3094
   companion setup pond --link udpin:0.0.0.0:14550 --drawn --yes
-Exit codes: 0 written and nothing in the way, 1 written and the doctor found an error, 2 nothing was written.
+Exit codes: 0 written and nothing in the way, 1 written and the doctor found an error, or no autopilot was heard and
+nothing is written, 2 something asked for is wrong and nothing is written.
 """
 
 

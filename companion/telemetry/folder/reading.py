@@ -206,6 +206,8 @@ def require_files(folder: Path, *names: str) -> None:
     """Raise InputError unless the folder holds all of the named files."""
     for name in names:
         if not (folder / name).is_file():
+            if not folder.is_dir():
+                raise InputError(str(folder), "", "is no folder", "name one that `companion run` left")
             raise InputError(str(folder), name, "is missing", "name a folder that `companion run` left")
 
 
