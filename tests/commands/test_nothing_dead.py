@@ -172,6 +172,7 @@ OTHER = {
         "polar": 2.0,
         "no_go_half_deg": 50.0,
         "no_go_error_deg": 3.0,
+        "learn": "shadow",
         "max_twa_deg": 170.0,
         "turn_rate_deg_s": 20.0,
         "tack_loss_s": 6.0,

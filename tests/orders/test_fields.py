@@ -71,7 +71,7 @@ def test_a_refuges_name_travels_as_a_number(names, data):
 def test_which_shoal_travels_as_a_number(number):
     wanted = Wanted(verb=Verb.FORGET_SHOAL, number=number)
     assert wanted_of(on_the_wire(message_of(wanted, 1))) == wanted
-    odd = wire.MAVLink_command_long_message(1, 191, VERB_COMMAND, 0, 12.0, 1.5, 0, 0, 0, 0, 0)
+    odd = wire.MAVLink_command_long_message(1, 191, VERB_COMMAND, 0, 14.0, 1.5, 0, 0, 0, 0, 0)
     assert "the shoal's number" in wanted_of(on_the_wire(odd)).fault
 
 

@@ -24,8 +24,8 @@ STEP_CELLS = 1.5
 """What a step of the fastest action goes, in cells."""
 TURNS_RAD = tuple(math.radians(d) for d in (0.0, 3.0, 6.0, 10.0, 15.0, 22.0, 30.0, 40.0))
 """Off the no-go zone: the angles that are tried near the wind ..."""
-EVERY_RAD = math.radians(15.0)
-"""... and between those that are deeper."""
+EVERY_RAD = math.radians(10.0)
+"""... and deeper, so far apart: the beam is one of them."""
 SETTLED_S = 0.02
 """The values are settled where no round changes one by more."""
 MOST_ROUNDS = 400
@@ -36,7 +36,7 @@ def angles_of(problem: Problem) -> Floats:
     """Return the wind angles that are tried [rad], from the edge of the no-go zone to the deepest."""
     boat = problem.boat
     near = [boat.no_go_half_rad + turn for turn in TURNS_RAD]
-    deep = np.arange(near[-1] + EVERY_RAD, boat.max_twa_rad, EVERY_RAD)
+    deep = np.arange(math.ceil(near[-1] / EVERY_RAD) * EVERY_RAD, boat.max_twa_rad, EVERY_RAD)
     return np.unique(np.minimum([*near, *deep, boat.max_twa_rad], boat.max_twa_rad))
 
 

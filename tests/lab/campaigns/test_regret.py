@@ -35,7 +35,9 @@ def test_only_clean_arrivals_count():
     assert rows[0]["regret"] == pytest.approx(0.15)
     assert (rows[0]["regret_10"], rows[0]["regret_90"]) == pytest.approx((0.1, 0.2))
     assert rows[0]["gap"] == pytest.approx(100.0 / 98.0 - 1.0)
-    assert "| demo | companion | 4 | 2 | 115 | 3 | 100 | 2 | 15.0 | 10.0 | 20.0 | 2.0 | 1.00 |" in as_text(records)
+    assert "| demo | companion | 4 | 2 | 115 | 3 | - | - | 100 | 2 | 15.0 | 10.0 | 20.0 | 2.0 | 1.00 |" in as_text(
+        records
+    )
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)

@@ -15,7 +15,7 @@ def test_the_water_agrees_with_the_reduced_problem(drift, spread):
     for distance, value, mean, most in rows:
         assert value == pytest.approx((distance - TARGET) / (RIM / 50.0), rel=0.25), "about at the fastest speed's pace"
         assert abs(mean) < 0.03
-        assert most < 0.07
+        assert most < 0.08
 
 
 def test_the_wind_all_round_drifts_and_spreads_as_the_process_does():
