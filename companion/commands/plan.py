@@ -81,6 +81,8 @@ def run(args: argparse.Namespace) -> int:
     """Plan, print, write and draw; return the exit code."""
     from companion.planner import PlanStatus, Problem
 
+    if args.policy is not None and args.json:
+        raise InputError("--policy", "", "is told as text", "leave --json out")
     ground: dict[str, Any] = {}
     if Path(args.problem).suffix.lower() == ".toml":
         mission = _mission(args)
@@ -151,7 +153,7 @@ def _answer(problem: Problem, args: argparse.Namespace) -> tuple[Problem, Plan]:
         answer = plan(
             problem, budget_s=args.budget, expansions=args.expansions, seed=args.seed, algorithm=args.algorithm
         )
-    if args.explain:
+    if args.explain and args.policy is None:  # with one it is the policy that is explained
         from companion.planner.explain import explain
 
         answer = explain(problem, answer, budget_s=args.explain_budget)

@@ -62,7 +62,7 @@ def solved(problems: Sequence[Problem], shifts: tuple[float, float]) -> list[Sol
 
 
 def cell_of(problem: Problem) -> float:
-    """Return the cells' size for a chart of about ``PLACES`` [m], a third of the goal's radius at the most."""
+    """Return the cells' size for a chart of about ``PLACES`` [m], two thirds of the goal's radius at the most."""
     length_m = math.dist(problem.start_en, problem.goal_en)
     side_m = 2.0 * length_m + 2.0 * 60.0
     wide = min(MOST_CELL_M, side_m / math.sqrt(PLACES))

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from companion.geo.angles import direction
+from companion.orders import Verb
 from companion.program.arguments import number, system_id
 from companion.words import counted
 
@@ -124,7 +125,8 @@ def exit_code(document: dict[str, Any], max_age_s: float) -> int:
         return EXIT_STALE
     worst = None if document["traffic"] is None else document["traffic"]["worst"]
     is_near = worst is not None and worst["alarm"] in ALARMS_OF_VESSELS
-    is_ordered = bool(document["order"]["verb"]) if document.get("order") else False
+    # held as she was told to: under another order she holds for a reason of her own
+    is_ordered = document["order"] is not None and document["order"]["verb"] == Verb.HOLD
     return EXIT_ALARM if is_near or (document["state"] in ALARM_STATES and not is_ordered) else 0
 
 

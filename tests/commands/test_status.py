@@ -74,7 +74,9 @@ def test_what_was_not_heard_in_time_is_said(air, capsys):
     assert capsys.readouterr().out.startswith("state not heard yet  ")
 
 
-@pytest.mark.parametrize(("order", "code"), [(None, EXIT_ALARM), ({"verb": "hold", "stands_s": 5.0, "age_s": 0.1}, 0)])
-def test_a_hold_that_was_ordered_raises_no_alarm(order, code):
+@pytest.mark.parametrize(("verb", "code"), [(None, EXIT_ALARM), ("hold", 0), ("home", EXIT_ALARM)])
+def test_a_hold_that_was_ordered_raises_no_alarm(verb, code):
+    """On her way home by order she holds for a reason of her own: no plan, a failsafe."""
+    order = None if verb is None else {"verb": verb, "stands_s": 5.0, "age_s": 0.1}
     document = {"age_s": 0.5, "traffic": None, "state": "holding", "order": order}
     assert exit_code(document, max_age_s=10.0) == code

@@ -220,3 +220,9 @@ def test_a_wind_that_shifts_by_nonsense_is_exit_2(capsys, file, text):
     code, _, err = run(capsys, file(), f"--policy={text}")
     assert code == 2
     assert "--policy" in err
+
+
+def test_a_policy_is_told_as_text_alone(capsys, file):
+    code, out, err = run(capsys, file(), "--policy", "9,28", "--json")
+    assert (code, out) == (2, "")
+    assert "leave --json out" in err
