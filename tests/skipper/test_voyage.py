@@ -1014,3 +1014,23 @@ def test_a_boat_that_lies_elsewhere_is_told_so(place, words):
     world = make(voyage={"limits": shapely.box(-200.0, -100.0, 200.0, 400.0)})
     world.position = place
     assert world.run(60, lambda w: words in w.state.why), world.state.why
+
+
+def test_the_first_plan_is_no_replan():
+    world = make()
+    assert world.run(60, is_sailing)
+    assert world.state.plans.replans == 0
+    assert world.run(600, lambda w: w.state.plans.replans == 1)
+
+
+def test_where_uploading_is_not_permitted_she_waits_for_no_plan():
+    """She told that she was waiting for a plan; one was ready, and might not be uploaded."""
+    world = make()
+    assert world.run(60, is_sailing)
+    world.planner = nothing
+    world.run(5)
+    world.order("hold")
+    assert world.run(60, lambda w: not w.state.pending.upload and w.state.mission.index == len(w.mission) - 1)
+    world.permissions = replace(world.permissions, may_upload=False)
+    world.order("go_on")
+    assert world.run(30, lambda w: "uploading is not permitted" in w.state.why)

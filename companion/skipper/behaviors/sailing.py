@@ -461,7 +461,7 @@ def _name(ctx: StepContext) -> None:
         again = f", trying again in {wait:.0f} s" if wait > 0.0 else ""
         waits = f"waiting for a plan{again}"
         if not ctx.snapshot.permissions.may_upload:
-            waits = "no plan can be sailed, for uploading is not permitted"
+            waits = "waiting, for uploading is not permitted"
         ctx.phase(Phase.HOLDING, f"loitering in the mission's safe end: {waits}{tail}")
     elif bound is not None:
         ctx.phase(Phase.STANDARD, f"item {state.mission.index + 1} of {len(route.items)} {bound.sentence}{step}{tail}")
