@@ -268,7 +268,7 @@ def _walk(
         if route.items[n].command != Command.NAV_WAYPOINT or time_s >= whole_s or (until is not None and n > until):
             break
         start, end, last = route.leg_from_en_m[n], route.points_en_m[n], n
-        ends_goal = n == len(route.items) - 2 if route.bound_for else goal is not None and route.gate_of[n] == goal
+        ends_goal = n == route.bound_at if route.bound_for else goal is not None and route.gate_of[n] == goal
         while time_s < REACH_S:
             to_go_m = math.dist(at, end)
             if to_go_m <= limits.wp_radius_m:

@@ -24,7 +24,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.boat import Polar
 from companion.errors import JobError
-from companion.geo.segments import PolygonIndex
+from companion.geo.segments import PolygonIndex, enters_disc
 from companion.kernels.heap import pop, push
 from companion.kernels.jit import kernel
 
@@ -275,21 +275,6 @@ def _between(table: Floats, corner_e: float, corner_n: float, cell_m: float, e: 
 
 
 @kernel
-def _meets(ae: float, an: float, be: float, bn: float, goal: Floats) -> float:
-    """Return the share of the way from a to b at which a disc (east, north, radius) is entered; 2 where it is not."""
-    de, dn, pe, pn = be - ae, bn - an, ae - goal[0], an - goal[1]
-    out = pe * pe + pn * pn - goal[2] * goal[2]
-    if out <= 0.0:
-        return 0.0
-    a, b = de * de + dn * dn, pe * de + pn * dn
-    under = b * b - a * out
-    if a <= 0.0 or b >= 0.0 or under < 0.0:
-        return 2.0
-    share = (-b - math.sqrt(under)) / a
-    return share if share <= 1.0 else 2.0
-
-
-@kernel
 def _is_late(e: float, n: float, row: int, j: int, stage: int, goals: Floats, units: Floats, most: Floats) -> bool:
     """Whether a goal that is ahead cannot be reached from here by the last step, whatever is done."""
     for i in range(units.shape[0]):
@@ -377,7 +362,7 @@ def march(
                     ):
                         is_over = True
                         break
-                    share = _meets(e, n, e1, n1, goals[into // 2])
+                    share = enters_disc(e, n, e1 - e, n1 - n, goals[into // 2])
                     if share <= 1.0:
                         if into // 2 + 1 == legs:
                             time_s = (k + 1) * part_s - (1.0 - share) * sailed_s

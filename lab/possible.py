@@ -18,7 +18,7 @@ import shapely
 
 from companion.compose import boat_of
 from companion.geo.angles import difference_rad
-from companion.geofence import load_mission
+from companion.geofence import Mission, load_mission
 from companion.planner import Problem
 from companion.planner.policy import Policy, Shifts, solve, steady, wandering
 from lab.perfect_information import Race, RaceBoat, RaceMark, Weather
@@ -97,26 +97,34 @@ def _problem(
     )
 
 
-def costs(path: Path) -> Iterator[tuple[str, float]]:
-    """Yield what is given up, one thing after the other, and the time that is possible with it [s]."""
-    scenario = load_scenario(path)
-    mission, parameters = load_mission(scenario.mission_path(path)), scenario.parameters
-    frame, boat, polar, wind = mission.frame(), boat_of(mission), own_polar(mission), scenario.wind
-    start = frame.en_from_geo(mission.start or mission.origin)
-    race = Race(
+def race_in(scenario: Scenario, mission: Mission, weather: Weather, start_en_m: tuple[float, float]) -> Race:
+    """Return the race of a scenario's boat through a mission's goals, from a place, in a wind."""
+    frame, boat = mission.frame(), boat_of(mission)
+    polar, parameters = own_polar(mission), scenario.parameters
+    return Race(
         craft=RaceBoat(
             polar=settled_polar(parameters) if polar is None else polar,
             no_go_half_rad=no_go_half_rad(parameters),
             max_twa_rad=boat.max_twa_rad,
-            tack_s=tack_loss_s(parameters, polar, wind.tws_mps),
+            tack_s=tack_loss_s(parameters, polar, float(weather.tws_mps.mean())),
             board_s=TACK_RETRY_S,
         ),
-        weather=Weather(t_s=np.zeros(1), twd_from_rad=np.radians([wind.from_deg]), tws_mps=np.full(1, wind.tws_mps)),
-        start_en_m=start,
+        weather=weather,
+        start_en_m=start_en_m,
         goals=tuple(RaceMark(en_m=frame.en_from_geo(goal.point), radius_m=goal.radius_m) for goal in mission.goals),
         clear_m=boat.hull.reach_m,
         solid=solid_of(mission.area.local(frame)),
     )
+
+
+def costs(path: Path) -> Iterator[tuple[str, float]]:
+    """Yield what is given up, one thing after the other, and the time that is possible with it [s]."""
+    scenario = load_scenario(path)
+    mission = load_mission(scenario.mission_path(path))
+    boat, wind = boat_of(mission), scenario.wind
+    start = mission.frame().en_from_geo(mission.start or mission.origin)
+    mean = Weather(t_s=np.zeros(1), twd_from_rad=np.radians([wind.from_deg]), tws_mps=np.full(1, wind.tws_mps))
+    race = race_in(scenario, mission, mean, start)
     shifts = shifts_of(scenario)
     if shifts is None:
         return

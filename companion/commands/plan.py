@@ -53,7 +53,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         "--wind", type=wind, metavar="SPEED@FROM", help="of a mission [m/s, degrees] (else what its previews assume)"
     )
     parser.add_argument(
-        "--budget", type=number("s", above=0.0), metavar="S", help="computing time [s]; 1 unless --expansions is given"
+        "--budget",
+        type=number("s", above=0.0),
+        metavar="S",
+        help="computing time [s]; of a plan 1, unless --expansions is given",
     )
     parser.add_argument(
         "--expansions", type=whole(at_least=1), metavar="N", help="effort in the algorithm's own steps instead"
@@ -133,7 +136,7 @@ def _policy(problems: Sequence[Problem], args: argparse.Namespace) -> int:
     from companion.commands.plan_policy import describe, solved
 
     with patience("solving for the best policy"):
-        legs = solved(problems, args.policy)
+        legs = solved(problems, args.policy, budget_s=math.inf if args.budget is None else args.budget)
     print("\n\n".join(describe(leg, args.policy, explain=args.explain) for leg in legs))
     if args.plot is not None:
         from companion.plots.policy import save_policy

@@ -10,7 +10,7 @@ import numpy as np
 
 from companion.geo.angles import direction
 from companion.planner import Problem
-from companion.planner.policy import PORT, STARBOARD, Decision, Policy, solve, wandering
+from companion.planner.policy import PORT, STARBOARD, Decision, Policy, room_m, solve, wandering
 
 PLACES = 20_000
 """The chart's, about: it takes a few seconds of a processor."""
@@ -39,15 +39,18 @@ class SolvedLeg:
         return PORT if on[PORT] <= on[STARBOARD] else STARBOARD
 
 
-def solved(problems: Sequence[Problem], shifts: tuple[float, float]) -> list[SolvedLeg]:
-    """Return each leg with its policy, which knows what is to go from its goal; shifts: (spread [deg], time [s])."""
+def solved(problems: Sequence[Problem], shifts: tuple[float, float], *, budget_s: float = math.inf) -> list[SolvedLeg]:
+    """Return each leg with its policy, which knows what is to go from its goal.
+
+    ``shifts`` are the spread [deg] and how long one lasts [s]; ``budget_s`` is for the policy of each leg.
+    """
     wind, steady = wandering(math.radians(shifts[0]), shifts[1]), wandering(0.0, 1.0)
     found: list[SolvedLeg] = []
     coarse: Policy | None = None
     still: Policy | None = None
     for problem in reversed(problems):
         cell_m = cell_of(problem)
-        policy = solve(problem, wind, cell_m=cell_m, onward=found[-1].policy if found else None)
+        policy = solve(problem, wind, cell_m=cell_m, onward=found[-1].policy if found else None, budget_s=budget_s)
         coarse = solve(problem, wind, cell_m=2.0 * cell_m, onward=coarse)
         still = solve(problem, steady, cell_m=cell_m, onward=still)
         found.append(
@@ -64,7 +67,7 @@ def solved(problems: Sequence[Problem], shifts: tuple[float, float]) -> list[Sol
 def cell_of(problem: Problem) -> float:
     """Return the cells' size for a chart of about ``PLACES`` [m], two thirds of the goal's radius at the most."""
     length_m = math.dist(problem.start_en, problem.goal_en)
-    side_m = 2.0 * length_m + 2.0 * 60.0
+    side_m = length_m + 2.0 * room_m(length_m)
     wide = min(MOST_CELL_M, side_m / math.sqrt(PLACES))
     return max(LEAST_CELL_M, min(wide, problem.goal_radius_m / 1.5))
 
@@ -80,7 +83,8 @@ def describe(leg: SolvedLeg, shifts: tuple[float, float], *, explain: bool) -> s
         f"that shifts by {shifts[0]:g}° (standard deviation) for {shifts[1]:g} s"
     )
     if math.isinf(leg.time_s):
-        return "\n".join([*lines, "no way: neither tack leads to the goal"])
+        none = "no way: neither tack leads to the goal"
+        return "\n".join([*lines, none if policy.is_settled else "not settled, and no way yet: give a larger --budget"])
     drawn = policy.sailed(problem.start_en, leg.tack, count=DRAWN)
     there = drawn.time_s[np.isfinite(drawn.time_s)]
     low, high = np.quantile(there, (0.1, 0.9)) if len(there) else (math.nan, math.nan)
@@ -101,6 +105,8 @@ def describe(leg: SolvedLeg, shifts: tuple[float, float], *, explain: bool) -> s
             f"{_seconds(leg.coarser_s)}"
         ),
     ]
+    if not policy.is_settled:
+        lines.append(f"not settled: a round still changes a time by {policy.change_s:.1f} s: give a larger --budget")
     if explain:
         lines += ["", *_table(leg)]
     return "\n".join(lines)

@@ -243,6 +243,21 @@ def meets_any(ax: float, ay: float, bx: float, by: float, tables: EdgeTables) ->
 
 
 @kernel
+def enters_disc(x: float, y: float, dx: float, dy: float, disc: Floats) -> float:
+    """Return the share of a move from (x, y) at which it enters a disc (x, y, radius); 2: it does not."""
+    px, py = x - disc[0], y - disc[1]
+    out = px * px + py * py - disc[2] * disc[2]
+    if out <= 0.0:
+        return 0.0
+    a, b = dx * dx + dy * dy, px * dx + py * dy
+    under = b * b - a * out
+    if a <= 0.0 or b >= 0.0 or under < 0.0:
+        return 2.0
+    share = (-b - math.sqrt(under)) / a
+    return share if share <= 1.0 else 2.0
+
+
+@kernel
 def _intersects(segments: Floats, tables: EdgeTables) -> NDArray[np.bool_]:
     out = np.zeros(segments.shape[0], dtype=np.bool_)
     for i in range(segments.shape[0]):

@@ -173,8 +173,8 @@ def next_goal(step: Step, voyage: Voyage) -> int:
 def mark_en_m(step: Step, voyage: Voyage) -> PointEn | None:
     """Return what is sailed to: where the way on board leads if that is no goal, else the goal; None: nothing is."""
     route, number = step.state.mission.route, next_goal(step, voyage)
-    if route is not None and route.bound_for and len(route.points_en_m) > 1:
-        return route.points_en_m[-2]  # behind it is the loiter that ends the mission
+    if route is not None and route.bound_at is not None:
+        return route.points_en_m[route.bound_at]
     return voyage.legs[number].en_m if number < len(voyage.legs) else None
 
 

@@ -10,17 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from companion.compose import boat_of
 from companion.errors import InputError
-from companion.geofence import Mission, load_mission
+from companion.geofence import load_mission
 from lab.campaigns.baselines import NAMES, TOLD, BaselineTrack, Sailor, key_of, latest, pairs, scenario_of, voyage_of
-from lab.perfect_information import Best, Race, RaceBoat, RaceMark, Weather, best
-from lab.possible import possible_s
-from sitl.autopilot import TACK_RETRY_S, no_go_half_rad, settled_polar, tack_loss_s
+from lab.perfect_information import Best, Race, Weather, best
+from lab.possible import possible_s, race_in
 from sitl.results import markdown
-from sitl.run.embedded import solid_of
 from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job
-from sitl.scenario import Scenario, load_scenario, own_polar, scenario_departures, scenario_waters, scenario_wind
+from sitl.scenario import Scenario, load_scenario, scenario_departures, scenario_waters, scenario_wind
 
 HEADS = (
     "scenario",
@@ -150,29 +147,10 @@ def require_judged(path: Path) -> None:
 
 def race_of(scenario: Scenario, track: BaselineTrack) -> Race:
     """Return the race of a voyage: from where the boat set sail, in the wind that it met from then on."""
-    mission, truth = track.mission, track.truth
-    frame, boat = mission.frame(), boat_of(mission)
-    t_s, tws = np.array(truth.t_s), np.array(truth.tws_mps)
-    polar, parameters = own_polar(mission), scenario.parameters
-    return Race(
-        craft=RaceBoat(
-            polar=settled_polar(parameters) if polar is None else polar,
-            no_go_half_rad=no_go_half_rad(parameters),
-            max_twa_rad=boat.max_twa_rad,
-            tack_s=tack_loss_s(parameters, polar, float(tws.mean())),
-            board_s=TACK_RETRY_S,
-        ),
-        weather=Weather(t_s=t_s - t_s[0], twd_from_rad=np.array(truth.twd_from_rad), tws_mps=tws),
-        start_en_m=truth.en_m[0],
-        goals=_goals(mission),
-        clear_m=boat.hull.reach_m,
-        solid=solid_of(mission.area.local(frame)),
-    )
-
-
-def _goals(mission: Mission) -> tuple[RaceMark, ...]:
-    frame = mission.frame()
-    return tuple(RaceMark(en_m=frame.en_from_geo(goal.point), radius_m=goal.radius_m) for goal in mission.goals)
+    truth = track.truth
+    t_s = np.array(truth.t_s)
+    weather = Weather(t_s=t_s - t_s[0], twd_from_rad=np.array(truth.twd_from_rad), tws_mps=np.array(truth.tws_mps))
+    return race_in(scenario, track.mission, weather, truth.en_m[0])
 
 
 def best_of(scenario: Scenario, track: BaselineTrack) -> Best | None:

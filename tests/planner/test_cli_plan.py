@@ -222,6 +222,11 @@ def test_a_wind_that_shifts_by_nonsense_is_exit_2(capsys, file, text):
     assert "--policy" in err
 
 
+def test_a_policy_keeps_to_its_budget_and_says_what_that_left_undone(capsys, file):
+    code, out, _ = run(capsys, file(), "--policy", "9,28", "--budget", "1e-6")
+    assert (code, "give a larger --budget" in out, "no way:" in out) == (1, True, False)
+
+
 def test_a_policy_is_told_as_text_alone(capsys, file):
     code, out, err = run(capsys, file(), "--policy", "9,28", "--json")
     assert (code, out) == (2, "")

@@ -2,6 +2,6 @@
 
 from companion.planner.policy.policy import PORT, STARBOARD, Decision, Policy
 from companion.planner.policy.shifts import Shifts, steady, wandering
-from companion.planner.policy.solver import solve
+from companion.planner.policy.solver import room_m, solve
 
-__all__ = ["PORT", "STARBOARD", "Decision", "Policy", "Shifts", "solve", "steady", "wandering"]
+__all__ = ["PORT", "STARBOARD", "Decision", "Policy", "Shifts", "room_m", "solve", "steady", "wandering"]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.geo.segments import EdgeTables, meets_any
+from companion.geo.segments import EdgeTables, enters_disc, meets_any
 from companion.kernels.jit import kernel
 
 Floats = NDArray[np.float64]
@@ -78,21 +78,6 @@ def between(table: Floats, row: float, column: float, q: int, s: int) -> float:
 
 
 @kernel
-def enters(row: float, column: float, down: float, right: float, goal: Floats) -> float:
-    """Return the share of a move at which it enters the goal's disc (row, column, radius, in cells); 2: it does not."""
-    y, x = row - goal[0], column - goal[1]
-    out = y * y + x * x - goal[2] * goal[2]
-    if out <= 0.0:
-        return 0.0
-    a, b = down * down + right * right, y * down + x * right
-    under = b * b - a * out
-    if a <= 0.0 or b >= 0.0 or under < 0.0:
-        return 2.0
-    share = (-b - math.sqrt(under)) / a
-    return share if share <= 1.0 else 2.0
-
-
-@kernel
 def sweep(
     values: Floats,
     hopes: Floats,
@@ -142,7 +127,7 @@ def sweep(
                     if by >= 0 and shut[by, q, s, a]:
                         continue
                     down, right = moves[q, s, a, 0], moves[q, s, a, 1]
-                    share = enters(r, c, down, right, goal)
+                    share = enters_disc(r, c, down, right, goal)
                     if share <= 1.0:
                         time_s = share * step_s + beyond[q, s]
                     else:
@@ -231,7 +216,7 @@ def looked_ahead(field: Field, east: float, north: float, tack: int, shift_rad: 
         if meets_any(east, north, east + right_m, north + up_m, field.edges):
             continue
         up, right = up_m / field.water[2], right_m / field.water[2]
-        there = enters(row, column, up, right, field.goal)
+        there = enters_disc(row, column, up, right, field.goal)
         if there <= 1.0:
             near, far = field.beyond[tack, low], field.beyond[tack, high]
             time_s = there * field.step_s + (1.0 - share) * near + share * far
@@ -287,7 +272,7 @@ def sail(
             spent_s = field.step_s
             right_m = (speed * math.sin(heading) + field.current[0]) * spent_s
             up_m = (speed * math.cos(heading) + field.current[1]) * spent_s
-            there = enters(row, column, up_m / field.water[2], right_m / field.water[2], field.goal)
+            there = enters_disc(row, column, up_m / field.water[2], right_m / field.water[2], field.goal)
             if there <= 1.0:
                 spent_s, right_m, up_m = there * spent_s, there * right_m, there * up_m
         east, north, time_s = east + right_m, north + up_m, time_s + spent_s

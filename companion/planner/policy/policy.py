@@ -30,6 +30,8 @@ PointEn = tuple[float, float]
 
 PORT, STARBOARD = 0, 1
 """The tacks, by the side that the wind is on."""
+SETTLED_S = 0.02
+"""The values are settled where no round changes one by more."""
 TIMES_OVER = 4.0
 """A drawn voyage is given up after so many times the expected one."""
 
@@ -128,6 +130,11 @@ class Policy:
     rounds: int
     change_s: float
     took_s: float
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether another round would change nothing: not where its budget ended before."""
+        return self.change_s <= SETTLED_S
 
     def time_to_go_s(self, en_m: PointEn, shift_rad: float, tack: int | None = None) -> float:
         """Return the expected time to go from a place, inf where there is no way; on the better tack by default."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from companion.clock import effort_s
 from companion.geo.segments import PolygonIndex
 from companion.planner.policy.kernels import FAR_S, TOUCH_S, sweep
-from companion.planner.policy.policy import Chart, Handling, Policy
+from companion.planner.policy.policy import SETTLED_S, Chart, Handling, Policy
 from companion.planner.policy.shifts import Shifts
 from companion.planner.problem.value import Problem
 
@@ -26,8 +26,6 @@ TURNS_RAD = tuple(math.radians(d) for d in (0.0, 3.0, 6.0, 10.0, 15.0, 22.0, 30.
 """Off the no-go zone: the angles that are tried near the wind ..."""
 EVERY_RAD = math.radians(10.0)
 """... and deeper, so far apart: the beam is one of them."""
-SETTLED_S = 0.02
-"""The values are settled where no round changes one by more."""
 MOST_ROUNDS = 400
 SORTED_EVERY = 4
 
@@ -134,10 +132,15 @@ def handling_of(problem: Problem, angle_rad: Floats) -> Handling:
     )
 
 
+def room_m(length_m: float) -> float:
+    """Return how far the chart of a way of this length reaches beyond start and goal [m]."""
+    return ROOM_M + ROOM_SHARE * length_m
+
+
 def chart_of(problem: Problem, solid: PolygonIndex, cell_m: float) -> Chart:
     """Return the chart about start and goal; the goal's middle is one of its places."""
     ends = np.array([problem.start_en, problem.goal_en])
-    room = ROOM_M + ROOM_SHARE * float(np.hypot(*(ends[1] - ends[0])))
+    room = room_m(math.dist(problem.start_en, problem.goal_en))
     low, high = ends.min(axis=0) - room, ends.max(axis=0) + room
     if problem.fence is not None:
         bounds = np.array(problem.fence.bounds)

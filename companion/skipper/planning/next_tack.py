@@ -9,7 +9,7 @@ from companion.boat import AutopilotLimits, Boat
 from companion.geo.angles import difference_rad, heading_of
 from companion.messages import Command, Mode
 from companion.skipper.step import SkipperState, Snapshot
-from companion.skipper.way import PointEn, cross_track_m, moved
+from companion.skipper.way import PointEn, along_m, cross_track_m, moved
 
 # A tack takes this long: who should have tacked a moment ago is tacking [s].
 TACKING_S = 4.0
@@ -159,12 +159,7 @@ def _is_fetched(there: PointEn, leg: tuple[PointEn, PointEn], limits: AutopilotL
 
     On a leg that is closed by a degree or two she fetches the waypoint without a tack.
     """
-    (east, north), end = leg
-    length_m = math.dist(*leg)
-    if length_m == 0.0:
-        return True
-    along_m = ((there[0] - east) * (end[0] - east) + (there[1] - north) * (end[1] - north)) / length_m
-    return along_m >= length_m - max(limits.wp_radius_m, limits.turn_radius_m)
+    return along_m(there, *leg) >= math.dist(*leg) - max(limits.wp_radius_m, limits.turn_radius_m)
 
 
 def _own_tack_s(

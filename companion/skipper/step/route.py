@@ -44,6 +44,11 @@ class Route:
     why: str = ""
     bound_for: str = ""  # the diversion that its end serves; empty: the goals
 
+    @property
+    def bound_at(self) -> int | None:
+        """The item at which she is where she is bound for; None: she is bound for the goals."""
+        return len(self.items) - 2 if self.bound_for and len(self.items) > 1 else None  # behind it: the loiter
+
     def is_planned_from(self, index: int) -> bool:
         """Return whether a plan is asked for from item ``index`` on before the boat is there.
 

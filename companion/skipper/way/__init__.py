@@ -1,7 +1,7 @@
 """The way: the voyage's goals and gates, legs and points, what a path is worth in a wind. Values and geometry."""
 
 from companion.skipper.way.gates import Approach, Gate, gates_of
-from companion.skipper.way.geometry import bearing_rad, cross_track_m, distance_m, moved
+from companion.skipper.way.geometry import along_m, bearing_rad, cross_track_m, distance_m, moved
 from companion.skipper.way.judge import half_width_rad, mean_twd_rad
 from companion.skipper.way.sweeps import Sweep, length_m, sweeps_over
 from companion.skipper.way.voyage import (
@@ -34,6 +34,7 @@ __all__ = [
     "Sweep",
     "Until",
     "Voyage",
+    "along_m",
     "bearing_rad",
     "cross_track_m",
     "distance_m",

@@ -176,3 +176,11 @@ def test_what_it_takes_ends_with_its_budget_and_it_says_how_far_it_is():
     policy = solve(problem(), WANDERING, cell_m=8.0, budget_s=0.01)
     assert policy.rounds < solve(problem(), WANDERING, cell_m=8.0).rounds
     assert policy.change_s > 1.0
+
+
+def test_a_budget_that_ends_first_is_told():
+    hurried = solve(problem(), WANDERING, cell_m=10.0, budget_s=1e-9)
+    assert hurried.rounds == 0
+    assert not hurried.is_settled
+    assert math.isinf(hurried.time_to_go_s((0.0, 0.0), 0.0))
+    assert solve(problem(), WANDERING, cell_m=10.0).is_settled
