@@ -470,6 +470,8 @@ def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
         refuges=tuple(
             Refuge(name=r.name, en_m=frame.en_from_geo(r.point), radius_m=r.radius_m) for r in mission.refuges
         ),
+        # home is where she is armed, and that is near the start
+        onward_en_m=frame.en_from_geo(mission.start) if mission.start and mission.skipper.end == "home" else None,
         recentre_m=(mission.passage.recentre_m or RECENTRE_M) if mission.is_passage else None,
         far_m=max(FAR_M, mission.passage.leg_m or 0.0),
     )

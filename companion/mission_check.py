@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -61,6 +61,7 @@ from companion.planner.problem import assumed
 from companion.safety import LIGHT_WIND, STRONG_WIND
 from companion.skipper.planning import HOME_RADIUS_M
 from companion.skipper.way import Composed, Until
+from companion.skipper.way.gates import Approach, gates_of
 from companion.words import counted
 
 __all__ = [
@@ -181,10 +182,33 @@ def check_mission(
         refusals=troubles,
         findings=(
             *mission.findings,
-            *(() if troubles else field_findings_of(mission)),
+            *(() if troubles else (*field_findings_of(mission), *_roundings(mission))),
             *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told),
         ),
     )
+
+
+def _roundings(mission: Mission) -> Iterator[Finding]:
+    """Yield the buoys that cannot be rounded with the margin: a place of the circle has no room."""
+    voyage, told = voyage_of(mission), set[int]()
+    begun = (Approach(goal=0, en_m=voyage.frame.en_from_geo(mission.start)),) if mission.start is not None else ()
+    for gate in gates_of(voyage, begun):
+        number = gate.goal % len(voyage.goals) + 1
+        if gate.buoy_en_m is None or number in told:
+            continue
+        clear_m = float(voyage.area.clearance_m([gate.en_m])[0])
+        if clear_m < mission.margin_m:
+            told.add(number)
+            goal = voyage.goals[number - 1]
+            near = voyage.area.nearest_name(gate.en_m) or "something"
+            yield Finding(
+                severity=FindingLevel.WARNING,
+                code=Code.NARROW_GAP,
+                place=f"[[goal]] {number} rounding",
+                text=f"rounded {goal.rounding_m:.0f} m off with {gate.name} to {goal.side.value} she comes to "
+                f"{max(0.0, clear_m):.1f} m from {near}; the margin is {mission.margin_m:g} m",
+                remedy="round it closer (radius_m and [area] margin_m say how far off), or leave it on the other hand",
+            )
 
 
 def require_sailable(mission: Mission) -> Mission:

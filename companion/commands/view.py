@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
     if (args.voyage is None) == (args.link is None):
         raise InputError(
-            "companion view",
+            "VOYAGE",
             "",
             "what to view is not said" if args.link is None else "a folder and a link are two things",
             "name a voyage's folder, or --link LINK",

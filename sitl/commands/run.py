@@ -190,7 +190,11 @@ def draw(folder: Path) -> None:
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
     except Exception as error:
-        refusal = missing(error) if isinstance(error, ModuleNotFoundError) else None
+        from companion.errors import CompanionError
+
+        refusal: Exception | None = error if isinstance(error, CompanionError) else None
+        if isinstance(error, ModuleNotFoundError):
+            refusal = missing(error)
         sys.stderr.write(f"sitl run: the picture could not be drawn: {refusal or repr(error)}\n")
 
 

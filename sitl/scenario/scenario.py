@@ -436,7 +436,7 @@ class ExpectSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     alerts: tuple[str, ...] = ()  # announced at least once, by code
     marks_rounded: int | None = None  # in order, each on its side
     gates_crossed: int | None = None  # in order, each in its direction, laps counted
-    marks_clear_m: float = 1.0  # of the gates: what the boat's position keeps clear of them
+    marks_clear_m: float = 1.0  # of buoys and the gates' marks: what the boat's position keeps clear of them
     start_within_s: float | None = None  # after the gun, and not before it
     inside_s: float | None = None  # each box is not left for so long after the boat came in ...
     inside_share: float = 0.98  # ... but for the rest of this share of the time

@@ -475,6 +475,9 @@ def judge(
         )
     if expect.end_phase is not None:
         check("end phase", summary.get("end_phase") == expect.end_phase, summary.get("end_phase"), expect.end_phase)
+    if marks and len(positions):
+        near_m = min(float(np.min(np.hypot(*(positions - np.asarray(mark)).T))) for mark, _ in marks)
+        check("nearest to a mark, m", near_m > expect.marks_clear_m, near_m, f"more than {expect.marks_clear_m}")
     if expect.marks_rounded is not None:
         rounded = count_roundings(positions, marks)
         check("marks rounded", rounded == expect.marks_rounded, rounded, expect.marks_rounded)

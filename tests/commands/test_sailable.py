@@ -8,7 +8,7 @@ import pytest
 from companion import cli
 from companion.errors import InputError
 from companion.geofence import load_mission
-from companion.mission_check import require_sailable
+from companion.mission_check import check_mission, require_sailable
 from sitl.commands import run as sitl_run
 from sitl.run.embedded import permitted
 from sitl.scenario.scenario import load_scenario
@@ -116,3 +116,36 @@ def test_every_example_can_be_sailed(path):
 def test_every_scenario_can_be_sailed(path):
     scenario = load_scenario(path)
     require_sailable(permitted(load_mission(scenario.mission_path(path)), scenario))
+
+
+# ------------------------------------------------------------------------------------------ buoys without room
+@pytest.mark.parametrize(("hand", "told"), [("port", 1), ("starboard", 0)])
+def test_a_buoy_whose_circle_has_no_room_is_told(tmp_path, hand, told):
+    (tmp_path / "rock.wkt").write_text(
+        "POLYGON ((-1.30975 50.8208, -1.3092 50.8208, -1.3092 50.8210, -1.30975 50.8210, -1.30975 50.8208))"
+    )
+    mission = tmp_path / "m.toml"
+    mission.write_text(
+        f"""
+        [start]
+        lat = 50.8200
+        lon = -1.3103
+        [[goal]]
+        lat = 50.8209
+        lon = -1.3100
+        radius_m = 12
+        rounding = "{hand}"
+        [[goal]]
+        lat = 50.8218
+        lon = -1.3097
+        [area]
+        obstacles = ["rock.wkt"]
+        margin_m = 8
+        margin_floor_m = 4
+        """
+    )
+    checked = check_mission(mission)
+    assert not checked.refusals
+    found = [finding for finding in checked.findings if finding.place == "[[goal]] 1 rounding"]
+    assert len(found) == told
+    assert all("the margin is 8 m" in finding.text for finding in found)

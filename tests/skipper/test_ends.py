@@ -108,6 +108,19 @@ def test_the_nearest_refuge_and_on_when_the_battery_is_charged():
     assert world.state.voyage.arrived
 
 
+def test_the_nearest_refuge_is_the_nearest_by_water():
+    """60 m off across a spit, and 1.2 km round it: the charge would not last for that way."""
+    spit = box(-600, 40, 600, 50)
+    world = make(
+        Goal(en_m=(500.0, 0.0), radius_m=8.0), obstacles=(spit,), voyage={"refuges": ((60.0, 90.0), (60.0, -120.0))}
+    )
+    assert world.run(60, lambda w: w.state.voyage.sailing)
+    world.run(10)
+    charged(world, 0.08)
+    assert world.run(300, lambda w: "at the refuge 2" in w.state.why)
+    assert not any("the refuge 1" in entry[2] for entry in said(world, "diverted"))
+
+
 def test_a_refuge_without_a_way_is_passed_over_for_the_next():
     ring = box(40, 70, 80, 110).difference(box(45, 75, 75, 105))
     world = make(

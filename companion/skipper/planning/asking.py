@@ -22,6 +22,7 @@ from companion.skipper.step import CancelPlan, Diversion, ReplanReason, RequestP
 from companion.skipper.step.missions import path_length_m
 from companion.skipper.step.state import PendingPlan
 from companion.skipper.way import Gate, bearing_rad, distance_m, half_width_rad, moved
+from companion.skipper.way.gates import marks_of
 from companion.skipper.way.position_plausibility import is_impossible
 from companion.skipper.way.stemming import waiting_place
 
@@ -235,6 +236,8 @@ def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung)
         for side in (0.0, 0.35, -0.35, 0.8, -0.8)
     ]
     for place in candidates:
-        if float(ctx.voyage.area.clearance_m([place])[0]) >= step.margin_m + ctx.config.loiter_radius_m:
+        off_marks_m = min((distance_m(place, mark) - keep_m for mark, keep_m in marks_of(ctx.voyage)), default=math.inf)
+        room_m = min(float(ctx.voyage.area.clearance_m([place])[0]) - step.margin_m, off_marks_m)
+        if room_m >= ctx.config.loiter_radius_m:
             return Aim(en_m=place, radius_m=ctx.config.loiter_radius_m, gate=-1)
     return Aim(en_m=target.en_m, radius_m=target.radius_m, gate=gate)

@@ -19,12 +19,14 @@ from companion.skipper.step.route import HOME_RADIUS_M
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
 from companion.skipper.way.gates import Gate, marks_of
 from companion.skipper.way.geometry import disc_wkt, distance_m
+from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import PointEn, Refuge
 from companion.traffic import Policy
 
 DRAGGED = "dragged off"  # a watchdog
 HOME, REST = "home", "the place to rest"
 GOAL_RADIUS_M = 10.0  # a place that is named under way: there within this
+ABOUT_M = 10.0  # how far off a refuge is by water is told from so near
 FENCE_SAID_S = 600.0  # between two words on a fence that is drawn
 
 
@@ -268,7 +270,7 @@ def _stay(ctx: StepContext, why: str) -> Diversion | None:
 
 
 def _refuge(ctx: StepContext, why: str) -> Diversion | None:
-    """Return the refuge that the route is bound for, else the nearest; the next one after each that had no way."""
+    """Return the refuge that the route is bound for, else the nearest by water; the next after each that had no way."""
     refuges = ctx.voyage.refuges
     if not refuges:
         return None
@@ -276,11 +278,20 @@ def _refuge(ctx: StepContext, why: str) -> Diversion | None:
     bound = route.bound_for if route is not None else ""
     chosen = next((r for r in refuges if refuge_name(r) == bound), None)
     if chosen is None:
-        by_distance = sorted(refuges, key=lambda r: distance_m(here, r.en_m) if here is not None else 0.0)
+        by_distance = sorted(refuges, key=lambda r: _off_m(ctx, here, r.en_m))
         chosen = by_distance[ctx.state.plans.retry.failures % len(by_distance)]
     return Diversion(
         kind=DiversionKind.REFUGE, name=refuge_name(chosen), why=why, en_m=chosen.en_m, radius_m=chosen.radius_m
     )
+
+
+def _off_m(ctx: StepContext, here: PointEn | None, place: PointEn) -> tuple[float, float]:
+    """Return how far a place is off by water, and straight [m]: round a spit is farther than across."""
+    if here is None:
+        return 0.0, 0.0
+    clear_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
+    about = (ABOUT_M * round(here[0] / ABOUT_M), ABOUT_M * round(here[1] / ABOUT_M))  # asked for at every step
+    return way_m(ctx.voyage.area, about, place, clear_m), distance_m(here, place)
 
 
 def refuge_name(refuge: Refuge) -> str:

@@ -25,6 +25,7 @@ from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import SpeedSeen
 from companion.skipper.step.wind_limits import strength_of
 from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m, half_width_rad, mean_twd_rad, moved
+from companion.skipper.way.shortest import shortest_way
 
 # The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
 REPAIR_RINGS_M = (
@@ -178,9 +179,10 @@ def aim_at(voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], gate: i
     inner_m = max(target.radius_m - config.announce_m, 0.2 * target.radius_m)
     if left_m <= config.horizon_m:
         return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
-    course = bearing_rad(start_en, target.en_m)
     radius = max(50.0, 0.02 * config.horizon_m)
     line, most_m = _leg(voyage, target, start_en), math.inf
+    towards = target.en_m if line is not None else _seen(voyage, config, start_en, target.en_m)
+    course, reach_m = bearing_rad(start_en, towards), min(config.horizon_m, distance_m(start_en, towards))
     if line is not None and target.bandwidth_m is not None:
         radius = min(radius, 0.25 * target.bandwidth_m)
         most_m = target.bandwidth_m - 2.0 * radius
@@ -191,11 +193,33 @@ def aim_at(voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], gate: i
             if line is not None:
                 place = along(line, start_en, float(share) * config.horizon_m, side * 2.0 * radius)
             else:
-                on_line = moved(start_en, course, float(share) * config.horizon_m)
+                on_line = moved(start_en, course, float(share) * reach_m)
                 place = moved(on_line, course + math.pi / 2.0, side * 2.0 * radius)
             if float(voyage.area.clearance_m([place])[0]) >= config.margin_m + radius:
                 return Aim(en_m=place, radius_m=radius, gate=-1)
     return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
+
+
+def _seen(voyage: Voyage, config: SkipperConfig, start_en: PointEn, target_en: PointEn) -> PointEn:
+    """Return where the shortest way to a target leaves the horizon; the target itself where none was found.
+
+    On the straight line behind which land lies the local goal would be in a bay, or on a lake.
+    """
+    way = shortest_way(voyage.area, start_en, target_en, config.margin_m) or (start_en, target_en)
+    inside, out = start_en, target_en
+    for place in way[1:]:
+        if distance_m(start_en, place) >= config.horizon_m:
+            out = place
+            break
+        inside = place
+    if inside == start_en:
+        return out
+    # from the last corner that is seen on along the way, to where it leaves the horizon
+    for share in np.linspace(1.0, 0.0, 21):
+        place = (inside[0] + float(share) * (out[0] - inside[0]), inside[1] + float(share) * (out[1] - inside[1]))
+        if distance_m(start_en, place) <= config.horizon_m:
+            return place
+    return inside
 
 
 def _leg(voyage: Voyage, gate: Gate, start_en: PointEn) -> LineString | None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.geo.angles import difference_rad
 from companion.messages import Command, MissionItem, waypoint
@@ -20,6 +21,8 @@ from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.route import Route
 from companion.skipper.way import PointEn, Voyage, bearing_rad, distance_m, moved, water_at
 from companion.skipper.way.drift import floor_from_m
+from companion.skipper.way.gates import marks_of
+from companion.skipper.way.geometry import leg_distance_m
 from companion.skipper.way.voyage import AreaLike
 
 LOOKS = 41  # places looked at along a line that leads through something
@@ -87,6 +90,7 @@ def loiter_place(
     will_do: tuple[PointEn, float] | None = None
     leeward = twd_from_rad + math.pi
     water = water_at(voyage.area, end_en)
+    marks = marks_of(voyage)
     floor_m = floor_from_m(float(water.clearance_m([end_en])[0]), config.margin_floor_m)
     for ring_m in RINGS_M:
         if will_do is not None and ring_m > ROOMIER_M:
@@ -97,10 +101,10 @@ def loiter_place(
             if ring_m > 0.0:
                 closed = abs(difference_rad(twd_from_rad, bearing_rad(end_en, place))) < config.no_go_half_rad
                 needed_m = floor_m + (corridor_m if closed else 0.0)
-                if _line_clearance_m(water, end_en, place) < needed_m:
+                if _line_clearance_m(water, end_en, place) < needed_m or _meets_mark(marks, end_en, place):
                     continue
             down = [moved(place, leeward, s * LEEWARD_ROOM_M) for s in (0.0, 0.25, 0.5, 0.75, 1.0)]
-            clearance = voyage.area.clearance_m(np.asarray(down))
+            clearance = np.minimum(voyage.area.clearance_m(np.asarray(down)), _off_marks_m(marks, down))
             # Drifting out of the end of the leeward strip is slow: there half the room is enough.
             room = float(min(clearance[0], np.min(clearance[1:] + 0.5 * config.loiter_radius_m)))
             if room >= max(config.loiter_radius_m, wanted_m):
@@ -110,6 +114,17 @@ def loiter_place(
             if room > best_room + 1.0:
                 best, best_room = place, room
     return will_do or (best, best_room)
+
+
+def _off_marks_m(marks: Sequence[tuple[PointEn, float]], places: Sequence[PointEn]) -> NDArray[np.float64]:
+    """Return how far each place is from what plans keep clear of about the nearest mark [m]; inf without marks."""
+    off = [[distance_m(place, mark) - keep_m for mark, keep_m in marks] for place in places]
+    return np.array([min(row, default=math.inf) for row in off])
+
+
+def _meets_mark(marks: Sequence[tuple[PointEn, float]], from_en: PointEn, to_en: PointEn) -> bool:
+    """Return whether a straight line leads nearer to a mark than plans go, and than it begins."""
+    return any(leg_distance_m(mark, from_en, to_en) < min(keep_m, distance_m(mark, from_en)) for mark, keep_m in marks)
 
 
 def _line_clearance_m(water: AreaLike, from_en: PointEn, to_en: PointEn) -> float:

@@ -117,7 +117,7 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
         elif i > 0 and not is_once_more:
             before = legs[i - 1].en_m
         name = goal.name or f"goal {i + 1}"
-        after = legs[i + 1].en_m if i + 1 < len(legs) else None
+        after = legs[i + 1].en_m if i + 1 < len(legs) else voyage.onward_en_m
         if goal.line is not None:
             out.extend(
                 replace(gate, keep_out=(*discs, *gate.keep_out))

@@ -23,6 +23,7 @@ STRAY_M = 3.0  # what the track strays from its leg: added to what is kept clear
 WING_M = 60.0  # shortest wing ...
 WING_SHARE = 1.5  # ... and this share of the way to the line is added
 STEP_M = 5.0
+LAND_STEPS = 12  # of a wing over what is solid, on end: land
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,13 +92,15 @@ def crossing_en(line: Line, before: PointEn | None, after: PointEn | None) -> Po
 def wings_wkt(line: Line, area: AreaLike, way_m: float) -> tuple[str, ...]:
     """Return a thin wedge from each mark outwards as WKT: what keeps a plan from going round the marks.
 
-    It reaches so far that round its end is no short cut for a way of ``way_m``, or to the first land.
+    It reaches so far that round its end is no short cut for a way of ``way_m``, or to the first land: what is passed
+    behind in a few boat's lengths, a rock, is none.
     """
     out = []
     for mark, other in ((line.port_en_m, line.starboard_en_m), (line.starboard_en_m, line.port_en_m)):
         away = bearing_rad(other, mark)
         steps_m = np.arange(0.0, WING_M + WING_SHARE * way_m, STEP_M)
         ashore = area.clearance_m([moved(mark, away, float(m)) for m in steps_m]) <= 0.0
-        length_m = float(steps_m[int(np.argmax(ashore))] if ashore.any() else steps_m[-1])
+        begins = [n for n in np.flatnonzero(ashore) if ashore[n : n + LAND_STEPS].all()]
+        length_m = float(steps_m[begins[0]] if begins else steps_m[-1])
         out.append(barrier_wkt(mark, away, max(STEP_M, length_m)))
     return tuple(out)

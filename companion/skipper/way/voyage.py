@@ -214,8 +214,10 @@ FAR_M = 50_000.0  # what lies farther off is not of this water; a passage says w
 class Voyage:
     """Goals in their order, sailed ``laps`` times, in ``area``.
 
-    With ``recentre_m`` it is a passage: a frame serves until the boat is so far from its origin, then it is replaced
-    (``companion.fold``), and ``area`` is what lies about the frame's origin. Nothing may be farther off than ``far_m``.
+    ``onward_en_m`` is where she goes behind the last goal, about: a buoy that is the last is rounded to go there; None:
+    she stays. With ``recentre_m`` it is a passage: a frame serves until the boat is so far from its origin, then it is
+    replaced (``companion.fold``), and ``area`` is what lies about the frame's origin. Nothing may be farther off than
+    ``far_m``.
     """
 
     name: str
@@ -226,6 +228,7 @@ class Voyage:
     laps: int = 1
     refuges: tuple[Refuge, ...] = ()
     home_en_m: PointEn | None = None
+    onward_en_m: PointEn | None = None
     recentre_m: float | None = None
     far_m: float = FAR_M
 

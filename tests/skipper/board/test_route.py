@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely.geometry import LineString, box
+from shapely.geometry import LineString, Point, box
 
 from companion.messages import Command, MissionItem
 from companion.skipper.step.config import SafeEnd, SkipperConfig
@@ -23,6 +23,8 @@ from companion.skipper.step.missions import (
 )
 from companion.skipper.step.route import Route
 from companion.skipper.step.saved import Persisted
+from companion.skipper.way.gates import marks_of
+from companion.skipper.way.voyage import Goal, Side
 from tests.skipper.world import voyage
 
 CONFIG = SkipperConfig()
@@ -132,6 +134,28 @@ def test_from_below_the_floor_a_loiter_is_found_away_from_what_is_near():
     inside, room = loiter_place(made, CONFIG, (0.0, 103.0), math.pi)
     assert room >= CONFIG.loiter_radius_m
     assert inside[1] < 90.0
+
+
+def test_the_loiter_swings_clear_of_the_buoy_that_was_rounded_last():
+    buoy = Goal(en_m=(0.0, 100.0), radius_m=10.0, side=Side.STARBOARD, rounding_m=10.0)
+    made = voyage(buoy)
+    ((mark, keep_m),) = marks_of(made)
+    for end in ((-10.0, 100.0), (0.0, 110.0), (7.0, 93.0)):
+        place, room = loiter_place(made, CONFIG, end, 0.0)
+        assert math.dist(place, mark) >= CONFIG.loiter_radius_m + keep_m - 1e-9
+        assert room >= CONFIG.loiter_radius_m
+        passed_m = Point(mark).distance(LineString([end, place])) if place != end else math.dist(end, mark)
+        assert passed_m >= keep_m - 1e-9
+
+
+def test_the_way_to_the_loiter_leads_not_over_the_buoy():
+    """In a channel with its one room behind the buoy."""
+    walls = (box(-500, 116, -2, 300), box(-500, -100, -2, 84), box(-60, 84, -30, 116))
+    made = voyage(Goal(en_m=(0.0, 100.0), radius_m=10.0, side=Side.PORT, rounding_m=10.0), obstacles=walls)
+    ((mark, keep_m),) = marks_of(made)
+    end = (-10.0, 100.0)
+    place, _ = loiter_place(made, CONFIG, end, -math.pi / 2.0)
+    assert place == end or Point(mark).distance(LineString([end, place])) >= keep_m - 1e-9
 
 
 def test_from_outside_of_the_fence_no_loiter_lies_beyond_an_obstacle():

@@ -1,6 +1,7 @@
 """Legs and waypoint advance (Büsser's double conditions), manoeuvres, gates."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -170,3 +171,16 @@ def test_barrier_closes_the_wrong_side():
     closed = shapely.union_all([shapely.from_wkt(w) for w in gate.keep_out])
     assert closed.intersects(LineString([(0.0, 0.0), (-40.0, 200.0), (0.0, 240.0)]))  # leaves it to starboard
     assert not closed.intersects(LineString([(0.0, 0.0), (40.0, 200.0), (0.0, 240.0)]))
+
+
+def test_a_buoy_that_is_the_last_is_rounded_for_the_way_home():
+    """Left behind abeam of it, she turned home short of it, and left it on the wrong hand."""
+    buoy = Goal(en_m=(0.0, 200.0), radius_m=12.0, side=Side.PORT, rounding_m=15.0)
+    made = voyage(Goal(en_m=(0.0, 0.0), radius_m=8.0), buoy)
+    staying = [gate for gate in gates_of(made) if gate.goal == 1]
+    home = [gate for gate in gates_of(replace(made, onward_en_m=(0.0, -50.0))) if gate.goal == 1]
+    assert len(staying) == 1
+    assert len(home) == 3
+    assert home[0].en_m == pytest.approx((15.0, 200.0), abs=1e-6)
+    assert home[1].en_m == pytest.approx((0.0, 215.0), abs=1e-6)
+    assert home[2].en_m == pytest.approx((-15.0, 200.0), abs=1e-6)

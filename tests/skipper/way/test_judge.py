@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely.geometry import box
+from shapely.geometry import Point, box
 
 from companion.boat import Boat, ardurover_sitl
 from companion.planner import Problem, plan
@@ -17,6 +17,7 @@ from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dic
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.judge import half_width_rad, judge, predicted_beat
+from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import Goal
 from tests.skipper.world import area, forecast, voyage
 
@@ -163,6 +164,32 @@ def test_the_local_plan_covers_the_next_miles_only():
     assert aim.gate == -1
     assert math.hypot(*aim.en_m) <= config.horizon_m + 1.0
     assert aim_at(made, config, gates_of(made), 0, (0.0, 46_000.0)).gate == 0
+
+
+def test_the_local_plan_leads_out_of_a_bay_and_round_it_not_deeper_into_it():
+    """The straight line to the goal leads deeper in: planned so, she turns back and forth for ever."""
+    bay = (box(-800, 850, 800, 900), box(-800, 0, -750, 900), box(750, 0, 800, 900))
+    made = voyage(Goal(en_m=(100.0, 1200.0), radius_m=10.0), obstacles=bay)
+    config, gates = SkipperConfig(horizon_m=500.0), gates_of(made)
+    here, left_m = (100.0, 400.0), math.inf
+    for _ in range(10):
+        aim = aim_at(made, config, gates, 0, here)
+        assert made.area.clearance_m([aim.en_m])[0] >= config.margin_m
+        if aim.gate == 0:
+            return
+        assert math.dist(here, aim.en_m) <= 1.1 * config.horizon_m
+        here, before_m = aim.en_m, left_m
+        left_m = way_m(made.area, here, (100.0, 1200.0), config.margin_m)
+        assert left_m < before_m - 200.0, "on the way round, and never back in"
+    raise AssertionError("the goal never came into sight")
+
+
+def test_the_local_plan_leads_to_no_lake():
+    ring = Point(0.0, 700.0).buffer(170.0).difference(Point(0.0, 700.0).buffer(130.0))
+    made = voyage(Goal(en_m=(0.0, 1400.0), radius_m=10.0), obstacles=(ring,))
+    aim = aim_at(made, SkipperConfig(horizon_m=700.0), gates_of(made), 0, (0.0, 0.0))
+    assert aim.gate == -1
+    assert math.dist(aim.en_m, (0.0, 700.0)) > 170.0
 
 
 def test_the_ladder_never_goes_below_the_floor_and_never_repeats_itself():

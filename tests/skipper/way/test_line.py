@@ -96,6 +96,9 @@ def test_the_wings_stand_outwards_and_end_ashore():
     land = shapely.box(60.0, 0.0, 400.0, 400.0)
     _, short = (shapely.from_wkt(w) for w in wings_wkt(NORTHWARD, area(land), 100.0))
     assert 60.0 <= short.bounds[2] <= 66.0
+    rock = shapely.Point(45.0, 100.0).buffer(6.0)
+    _, beyond = (shapely.from_wkt(w) for w in wings_wkt(NORTHWARD, area(rock), 100.0))
+    assert beyond.bounds[2] > 200.0, "round the outside of a rock beside the mark is no way through"
 
 
 def test_from_before_the_line_one_gate_leads_across_from_beyond_it_two():
