@@ -224,9 +224,11 @@ class MissionLists:
             if done.outcome not in {TransferOutcome.OK, TransferOutcome.UNCONFIRMED}:
                 return self._guarded(done.outcome, done.text)
             read = await self._read(kind, "items")
-            difference = first_difference(closed, (read.items or ())[: len(closed)])
-            if read.items is None or difference:
-                return self._guarded(TransferOutcome.MISMATCH if read.items is not None else read.outcome, difference)
+            if read.items is None:
+                return self._guarded(read.outcome, f"written, not read back: {read.text}")
+            difference = first_difference(closed, read.items[: len(closed)])
+            if difference:
+                return self._guarded(TransferOutcome.MISMATCH, difference)
         done = await self._link.perform(ListUpload(party, kind, (items[keep_first],), first=seq, partial=True))
         if done.outcome not in {TransferOutcome.OK, TransferOutcome.UNCONFIRMED}:
             return self._guarded(done.outcome, done.text)

@@ -93,12 +93,11 @@ class Spikes:
 
     def update(self, t_s: float, direction_rad: float) -> bool:
         """Take a direction; return whether this reading is a spike."""
-        dt_s = 1.0 if self._t_s is None else min(30.0, max(1e-3, t_s - self._t_s))
-        begin = self._t_s is None or t_s - self._t_s > 10.0
-        self._t_s = t_s
-        if begin:
+        before_s, self._t_s = self._t_s, t_s
+        if before_s is None or t_s - before_s > _GAP_S:
             self._sin, self._cos = math.sin(direction_rad), math.cos(direction_rad)
             return False
+        dt_s = max(1e-3, t_s - before_s)
         off = abs(wrap_pi(direction_rad - math.atan2(self._sin, self._cos)))
         is_far = off > max(_SPIKE_RAD, _SPIKE_ROUGH * self._rough_rad)
         if is_far and self._away_s == 0.0:

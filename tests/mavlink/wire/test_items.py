@@ -1,10 +1,14 @@
 """Lists as the autopilot keeps them: canonical items, hashes, padding, mission.dat."""
 
+import hashlib
 import math
+import struct
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.mavlink.wire.items import (
     ENDING,
@@ -198,3 +202,73 @@ def test_lengths_differ_in_words():
     one = MissionItem(command=16)
     assert first_difference([one, one], [one]) == "2 items written, 1 read back"
     assert first_difference([one], [one]) == ""
+
+
+def test_mission_dat_is_what_the_protocol_s_own_message_is_made_of():
+    """An item of the file is the payload of a MISSION_ITEM_INT to the autopilot, as pymavlink packs it."""
+    item = MissionItem(
+        command=Command.NAV_LOITER_TIME,
+        lat_e7=511_234_567,
+        lon_e7=-13_456_789,
+        alt_m=12.5,
+        frame=3,
+        params=(1.5, 2.5, 3.5, 4.5),
+        autocontinue=False,
+    )
+    for kind in MissionType:
+        data = pack_mission_dat([item, replace(item, autocontinue=True)], kind, start=3, options=2)
+        assert data[:10] == b"\x3d\x76" + bytes([int(kind), 0, 2, 0, 3, 0, 2, 0])
+        for n in range(2):
+            message = wire.MAVLink_mission_item_int_message(
+                1, 1, 3 + n, 3, item.command, 0, n, *item.params, item.lat_e7, item.lon_e7, item.alt_m, int(kind)
+            )
+            packed = message.pack(wire.MAVLink(None, 1, 1))
+            payload = packed[10 : 10 + packed[1]].ljust(38, b"\0")
+            assert data[10 + 38 * n : 48 + 38 * n] == payload
+        assert unpack_mission_dat(data)[2] == (item, replace(item, autocontinue=True))
+
+
+def test_what_is_no_number_in_a_mission_dat_is_0():
+    data = bytearray(
+        pack_mission_dat([MissionItem(command=16, alt_m=5.0, params=(1.0, 2.0, 3.0, 4.0))], MissionType.FENCE)
+    )
+    nan = struct.pack("<f", math.nan)
+    for at in (10, 14, 18, 22, 34):
+        data[at : at + 4] = nan
+    (item,) = unpack_mission_dat(bytes(data))[2]
+    assert (item.params, item.alt_m) == ((0.0, 0.0, 0.0, 0.0), 0.0)
+
+
+@pytest.mark.parametrize(("frame", "kept"), [(0, 0), (3, 3), (5, 0), (6, 3), (10, 10), (11, 10), (2, 2)])
+def test_of_a_frame_the_plain_one_is_kept(frame, kept):
+    assert canonical(MissionItem(command=Command.NAV_WAYPOINT, frame=frame)).frame == kept
+
+
+@pytest.mark.parametrize(
+    ("command", "params", "kept", "frame"),
+    [
+        (Command.NAV_WAYPOINT, (3.7, 2.0, 3.0, 4.0), (3.0, 0.0, 0.0, 0.0), 3),
+        (Command.NAV_LOITER_UNLIM, (1.0, 2.0, -12.7, 4.0), (0.0, 0.0, -12.0, 0.0), 3),
+        (Command.NAV_RETURN_TO_LAUNCH, (1.0, 2.0, 3.0, 4.0), (0.0, 0.0, 0.0, 0.0), 0),
+        (Command.NAV_DELAY, (1.0, 2.0, 3.0, 4.0), (1.0, 2.0, 3.0, 4.0), 0),
+        (Command.DO_JUMP, (1.0, 2.0, 3.0, 4.0), (1.0, 2.0, 3.0, 4.0), 0),
+        (Command.DO_CHANGE_SPEED, (1.0, 2.0, 3.0, 4.0), (1.0, 2.0, 3.0, 4.0), 0),
+        (Command.DO_FENCE_ENABLE, (1.0, 2.0, 3.0, 4.0), (1.0, 2.0, 3.0, 4.0), 0),
+        (Command.NAV_LOITER_TURNS, (3.0, 2.0, 20.0, 4.0), (3.0, 2.0, 20.0, 4.0), 3),
+    ],
+)
+def test_what_is_kept_of_each_command(command, params, kept, frame):
+    item = canonical(MissionItem(command=command, lat_e7=7, lon_e7=-9, alt_m=3.0, frame=3, params=params))
+    assert (item.params, item.frame, item.alt_m, item.autocontinue) == (kept, frame, 0.0, True)
+    assert (item.lat_e7, item.lon_e7) == ((0, 0) if frame == 0 else (7, -9))
+
+
+def test_the_name_of_a_mission_is_the_digest_of_what_is_kept():
+    """By its own definition, laid out by hand: it is in files that earlier versions wrote."""
+    way = MissionItem(
+        command=16, lat_e7=511_000_000, lon_e7=-13_000_000, alt_m=7.0, frame=6, params=(3.7, 1.0, 1.0, 1.0)
+    )
+    end = MissionItem(command=Command.NAV_LOITER_UNLIM, lat_e7=1, lon_e7=-2, params=(0.0, 0.0, -5.0, 0.0))
+    told = struct.pack("<HBii4f", 16, 3, 511_000_000, -13_000_000, 3.0, 0.0, 0.0, 0.0)
+    told += struct.pack("<HBii4f", 17, 3, 1, -2, 0.0, 0.0, -5.0, 0.0)
+    assert mission_hash([way, end, way]) == hashlib.sha256(told).hexdigest()[:16]
