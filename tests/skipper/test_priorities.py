@@ -10,16 +10,19 @@ import shapely
 
 from companion.messages import Mode
 from companion.orders import Verb
+from companion.skipper import priorities
 from companion.skipper.behaviors.shoaling import BACK
 from companion.skipper.priorities import BEHAVIORS, act
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import Standing
 from companion.skipper.step.snapshot import WindBefore
-from companion.skipper.step.state import PositionDoubt, Raised, Stop
+from companion.skipper.step.state import Phase, PositionDoubt, Raised, Stop
+from tests.skipper.moments import NOW_S, moment, route
 from tests.skipper.test_voyage import ISLANDS
 from tests.skipper.test_walk import on_collision_course, states
 from tests.skipper.world import with_parts
 
+WAY = route((300.0, 0.0), (600.0, 0.0), (600.0, 0.0))
 NAMES = [behavior.name for behavior in BEHAVIORS]
 PAIRS = list(pairwise(NAMES))
 
@@ -179,6 +182,40 @@ def test_of_two_neighbours_that_would_act_the_first_does(pair):
     assert does_second
     assert first != second
     assert after(ctx, act)[1] == first
+
+
+@pytest.mark.parametrize(("sailing", "phase"), [(True, Phase.STANDARD), (False, Phase.WAITING)])
+def test_an_autopilot_that_is_not_heard_is_waited_for_and_what_sails_sails_on(sailing, phase):
+    ctx = moment(WAY, voyage={"sailing": sailing}, seen={"heartbeat_age_s": 9.0})
+    assert BEHAVIORS[0].act(ctx)
+    assert (ctx.state.phase, ctx.actions) == (phase, [])
+    assert "silent for 9 s" in ctx.state.why
+    assert not BEHAVIORS[0].act(moment(WAY))
+
+
+@pytest.mark.parametrize(("is_back", "foreign", "brakes"), [(True, "", 1), (False, "", 0), (True, "theirs", 0)])
+def test_while_the_mission_is_not_known_a_boat_that_was_given_back_is_stopped_before_something(
+    is_back, foreign, brakes, monkeypatch
+):
+    called = []
+    monkeypatch.setattr(priorities, "brakes", called.append)
+    ctx = moment(WAY, mission={"route": WAY, "foreign": foreign}, operator={"is_back": is_back})
+    assert priorities._await_mission(ctx)
+    assert len(called) == brakes
+    known = moment(WAY, mission={"route": WAY, "checked": True, "read_t_s": NOW_S}, operator={"is_back": True})
+    known.snapshot = replace(known.snapshot, autopilot=replace(known.snapshot.autopilot, mission_total=3))
+    assert not priorities._await_mission(known)
+    assert len(called) == brakes
+
+
+def test_each_wait_has_the_step_only_while_it_waits():
+    assert priorities._await_next_start(moment(WAY, voyage={"sailing": False}, progress={"gate": 2}))
+    assert not priorities._await_next_start(moment(WAY, progress={"gate": 2}))
+    assert not priorities._await_next_start(moment(WAY, voyage={"sailing": False}))
+    assert priorities._get_first_plan(moment(None))
+    assert not priorities._get_first_plan(moment(WAY))
+    assert priorities._set_sail(moment(WAY, voyage={"sailing": False}))
+    assert not priorities._set_sail(moment(WAY))
 
 
 def test_the_last_always_acts():

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
 from shapely.geometry import box
 
 from companion.boat import AutopilotLimits
-from companion.boat.tracking import SHORT_S
+from companion.boat.tracking import SHORT_S, GuidanceModel, stated_error_m
 from companion.planner import Problem, plan
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.ladder import rungs
@@ -16,8 +17,9 @@ from companion.skipper.planning.statement import Start, problem_dict
 from companion.skipper.planning.track import clearance_text, of_way, problem_tracking, steps
 from companion.skipper.step.actions import Announce, ReplanReason
 from companion.skipper.step.config import SkipperConfig
-from companion.skipper.step.snapshot import PlanOutcome
+from companion.skipper.step.snapshot import PlanOutcome, WindEstimate
 from companion.skipper.way.geometry import moved
+from tests.skipper.moments import moment, route
 from tests.skipper.planning.test_beating import ctx
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.way.test_rejudged import asked, sailing
@@ -140,3 +142,66 @@ def test_no_upload_begins_a_leg_of_which_too_little_is_left_to_be_followed(left_
     take_plan(now, PlanOutcome(request_id=now.state.pending.plan.request_id, plan=plan(problem, expansions=2000)))
     assert speed > 1.0
     assert any(isinstance(a, Announce) and a.code == "plan late" for a in now.actions) == is_late
+
+
+WAY = route((100.0, 0.0), (200.0, 50.0), (300.0, 50.0), (300.0, 50.0))
+
+
+@pytest.mark.parametrize(
+    ("from_index", "lead_in", "way", "before"),
+    [
+        (None, (), WAY, None),
+        (0, (), WAY, {"x": 0.0, "y": 0.0}),  # where the leg begins that ends at the plan's start
+        (1, (), WAY, {"x": 100.0, "y": 0.0}),
+        (1, (), None, None),
+        (None, ((5.0, 5.0),), WAY, {"x": 7.0, "y": 8.0}),  # a start that was repaired is come to from the boat
+    ],
+)
+def test_a_problem_says_where_the_leg_before_it_begins(from_index, lead_in, way, before):
+    now = moment(way, at=(7.0, 8.0))
+    start = Start(en_m=(0.0, 0.0), heading_rad=0.0, lead_in=lead_in)
+    part = problem_tracking(now, start, from_index, floor_m=6.0, forecast=now.snapshot.wind.forecast)
+    assert part["before"] == before
+
+
+def test_a_problem_says_all_that_shapes_the_track():
+    limits = AutopilotLimits(wp_radius_m=7.0, wp_speed_mps=5.0, sail_no_go_angle_rad=math.radians(50.0))
+    now = moment(WAY, obstacles=(WALL,))
+    now.snapshot = replace(now.snapshot, limits=limits)
+    helm = GuidanceModel.of(limits)
+    assert tracking(now) == {
+        "wp_radius_m": helm.wp_radius_m,
+        "turn_radius_m": helm.turn_radius_m,
+        "wp_speed_mps": helm.wp_speed_mps,
+        "accel_mps2": helm.accel_mps2,
+        "jerk_mps3": helm.jerk_mps3,
+        "corridor_m": helm.corridor_m,
+        "no_go_half_deg": pytest.approx(50.0),
+        "floor_m": 6.0,
+        "reach_m": now.voyage.boat.hull.reach_m,
+        "solids": now.voyage.area.obstacles_wkt(0.0),
+        "limits": None,
+        "before": None,
+        "correlation_s": 30.0,
+        "known": True,
+    }
+    now.snapshot = replace(now.snapshot, limits=None)
+    unread = GuidanceModel.of(AutopilotLimits(sail_xtrack_max_m=now.tack_corridor_m))
+    assert (tracking(now)["corridor_m"], tracking(now)["wp_radius_m"]) == (unread.corridor_m, unread.wp_radius_m)
+
+
+@pytest.mark.parametrize("tws_mps", [1.0, 3.0, 5.0, 8.0, 14.0])
+@pytest.mark.parametrize("wp_speed_mps", [None, 5.0])
+def test_the_ladder_s_track_is_the_next_of_few_steps(tws_mps, wp_speed_mps):
+    now = moment(WAY, tws_mps=tws_mps)
+    now.snapshot = replace(now.snapshot, limits=AutopilotLimits(wp_speed_mps=wp_speed_mps))
+    best = now.voyage.boat.polar.max_speed_mps(tws_mps)
+    need_m = stated_error_m(best, has_short=wp_speed_mps is None) + now.voyage.boat.hull.reach_m
+    track_m = next((step for step in (2.0, 2.5, 4.0, 8.0) if step >= need_m), need_m)
+    assert steps(now) == rungs(now.config, track_m=track_m)
+
+
+def test_without_a_wind_the_ladder_knows_no_track():
+    now = moment(WAY)
+    now.snapshot = replace(now.snapshot, wind=WindEstimate())
+    assert steps(now) == rungs(now.config)

@@ -58,6 +58,32 @@ def test_steady_sailing_is_looked_at_and_no_more_than_three_minutes_are_kept():
     assert math.hypot(*looks[-1].velocity_en_mps) == pytest.approx(world.speed, abs=0.1)
 
 
+def test_a_look_is_of_the_water_s_wind_and_way():
+    """Over the ground the water's own motion is in both: 0.3 m/s to the east, and the wind from south-east."""
+    world = under_way()
+    ctx = turn_of(world)
+    twd = math.radians(130.0)
+    water = replace(ctx.snapshot.current, east_mps=0.3, north_mps=-0.1, var_ee=0.04, var_nn=0.01)
+    wind = replace(ctx.snapshot.wind, present_twd_from_rad=twd, present_tws_mps=6.0)
+    vehicle = replace(ctx.snapshot.vehicle, velocity_en_mps=(1.0, 2.0), heading_rad=0.0)
+    seen = replace(ctx.snapshot, current=water, wind=wind, vehicle=vehicle)
+    look = boat_learning._look(seen)
+    assert look.velocity_en_mps == pytest.approx((0.7, 2.1))
+    assert look.wind_en_mps == pytest.approx((6.0 * math.sin(twd) + 0.3, 6.0 * math.cos(twd) - 0.1))
+    assert look.doubt_mps == pytest.approx(0.1)
+    assert (look.here_en_m, look.heading_rad, look.t_s) == (seen.position_en_m, 0.0, seen.t_s)
+    assert boat_learning._look(replace(seen, vehicle_age_s=1.5)) is not None
+    for lacking in (
+        {"vehicle_age_s": 1.6},
+        {"vehicle_age_s": None},
+        {"vehicle": None},
+        {"position_en_m": None},
+        {"wind": replace(wind, present_twd_from_rad=None)},
+        {"wind": replace(wind, present_tws_mps=None)},
+    ):
+        assert boat_learning._look(replace(seen, **lacking)) is None
+
+
 def with_wind(world, **wind):
     return {"wind": replace(world.snapshot().wind, **wind)}
 

@@ -115,6 +115,19 @@ def test_a_failure_tells_how_long_she_lay_and_how_she_was_set_beside_the_current
     )  # the longest and the fastest of the voyage
 
 
+@pytest.mark.parametrize(("turned_deg", "tried"), [(31.0, 1), (29.0, 0)])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_tack_between_two_looks_is_a_turn_of_30_degrees_of_her_own(turned_deg, tried, side):
+    """The wind has come round as well: on the other side of it she is by her turn, or by the wind's."""
+    now = seen([side * h for h in (45, 45, 45 - turned_deg)], lambda n: 0.0 if n < 2 else side * (77.0 - turned_deg))
+    assert now.tried == tried
+
+
+@pytest.mark.parametrize(("lain_s", "failed"), [(8, 1), (7, 0)])
+def test_who_lies_near_the_wind_for_eight_seconds_has_failed(lain_s, failed):
+    assert seen([45, 45] + [12] * (lain_s + 1)).failed == failed
+
+
 def test_a_row_of_failures_ends_with_a_tack_that_comes_off():
     assert seen(FAILED + FAILED).in_a_row == 2
     assert seen(FAILED + FAILED + GOOD).in_a_row == 0
