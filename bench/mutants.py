@@ -10,7 +10,7 @@ line changes). Then each mutant meets the tests that run its line, the room's ow
 fails. No mutant is ever on the disk: in a forked child of a pytest that has collected everything, the changed code is
 put into the functions in memory; where a change is carried out at import (a constant, a field's default), the child
 forgets the program and imports it again with that one file changed. A test counts as a killer only when it passes in
-such a child without the mutant. What runs longer than five times what its tests take is killed, too.
+such a child without the mutant. What runs longer than a minute and ten times what its tests take is killed, too.
 
 Verdicts stay in ``build/mutants.jsonl`` as they come and are found again by the file's text: the same command goes on.
 ``bench/equivalent_mutants.txt`` names those that change nothing, "equivalent, because". Functions that numba compiles
@@ -29,6 +29,7 @@ import importlib.util
 import json
 import os
 import random
+import re
 import signal
 import sys
 import tempfile
@@ -116,6 +117,7 @@ class Mutant:
     number: int  # of the place's changes
     told: str  # what stands there -> what is put there
     is_at_import: bool
+    last_line: int  # of what is changed: a condition over several lines is not run on its first
 
     @property
     def key(self) -> str:
@@ -224,13 +226,41 @@ def number(node: ast.AST) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, int | float)
 
 
-def places(tree: ast.Module) -> Iterator[tuple[ast.AST, str, bool]]:
-    """Yield each node that may be changed, its function, and whether it is carried out at import.
+# What a keyword of such a name is given, and what a function of such a name returns, is for a person to read.
+SAID = re.compile(r"(^|_)(text|why|words|sentence|because|until|does|when|title|help)$")
+WORDS = re.compile(r"(^|_)(words|sentence)$")
+
+
+def is_sentence(node: ast.AST) -> bool:
+    """Whether it is a text of several words, or made of parts; a single word may be a key."""
+    return isinstance(node, ast.JoinedStr) or (
+        isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value
+    )
+
+
+def is_wording(node: ast.AST) -> bool:
+    """Whether a change there changes but the words of a message."""
+    match node:
+        case ast.IfExp(body=body, orelse=orelse):  # which of two sentences
+            return is_sentence(body) and is_sentence(orelse)
+        case ast.keyword(arg=str(name)):
+            return SAID.search(name) is not None
+        case ast.Call(func=ast.Attribute(attr="debug" | "info" | "warning" | "exception", value=ast.Name(id=log))):
+            return log in {"log", "logger", "LOG", "_log"}
+        case ast.Expr(value=ast.Call() as call):
+            return is_wording(call)
+        case ast.FunctionDef(name=name, returns=ast.Name(id="str")):
+            return WORDS.search(name) is not None
+    return False
+
+
+def places(tree: ast.Module) -> Iterator[tuple[ast.AST, str, bool, bool]]:
+    """Yield each node that may be changed, its function, whether it is carried out at import and is wording only.
 
     Left out are annotations, what an assert or a raise says, ``__all__``, what only a type checker reads, and kernels.
     """
 
-    def walk(node: ast.AST, where: str, inside: bool) -> Iterator[tuple[ast.AST, str, bool]]:
+    def walk(node: ast.AST, where: str, inside: bool, said: bool) -> Iterator[tuple[ast.AST, str, bool, bool]]:
         for name, value in ast.iter_fields(node):
             if name in {"annotation", "returns", "type_params", "ctx", "ops", "op", "decorator_list"}:
                 continue
@@ -247,36 +277,40 @@ def places(tree: ast.Module) -> Iterator[tuple[ast.AST, str, bool]]:
                     if any(getattr(d, "id", "") == "kernel" for d in child.decorator_list):
                         continue
                     here = f"{where}{'.<locals>.' if inside else '.' if where else ''}{child.name}"
-                    yield from walk(child, here, not isinstance(child, ast.ClassDef))
+                    yield from walk(child, here, not isinstance(child, ast.ClassDef), said or is_wording(child))
                     continue
                 if isinstance(child, ast.arguments):  # defaults are reckoned where the function is made
                     for default in (*child.defaults, *(d for d in child.kw_defaults if d is not None)):
-                        yield default, where, ".<locals>." in where
-                        yield from walk(default, where, ".<locals>." in where)
+                        yield default, where, ".<locals>." in where, said
+                        yield from walk(default, where, ".<locals>." in where, said)
                     continue
-                yield child, where, inside
-                yield from walk(child, where, inside)
+                below = said or is_wording(child)
+                yield child, where, inside, below
+                yield from walk(child, where, inside, said or (below and not isinstance(child, ast.IfExp)))
 
-    for node, where, inside in walk(tree, "", False):
-        yield node, where, not inside
+    for node, where, inside, said in walk(tree, "", False, False):
+        yield node, where, not inside, said
 
 
 def mutants(room: str, file: str) -> Iterator[Mutant]:
-    """Yield all mutants of a file."""
+    """Yield all mutants of a file but those that change the words of a message, and nothing else."""
     seen: Counter[tuple[int, int]] = Counter()
-    for node, where, is_at_import in places(ast.parse((ROOT / file).read_text(encoding="utf-8"))):
+    for node, where, is_at_import, is_said in places(ast.parse((ROOT / file).read_text(encoding="utf-8"))):
         for other in changes(node):
             place = node.lineno, node.col_offset
             seen[place] += 1
+            if is_said:
+                continue
             was, now = (ast.unparse(ast.fix_missing_locations(n)).splitlines()[0] for n in (node, deepcopy(other)))
-            yield Mutant(room, file, where, *place, seen[place], f"{was} -> {now}", is_at_import)
+            last_line = (node.test if isinstance(node, ast.If) else node).end_lineno or node.lineno
+            yield Mutant(room, file, where, *place, seen[place], f"{was} -> {now}", is_at_import, last_line)
 
 
 def mutated(mutant: Mutant) -> CodeType:
     """Return the file's code with the one place changed."""
     tree = ast.parse((ROOT / mutant.file).read_text(encoding="utf-8"))
     seen: Counter[tuple[int, int]] = Counter()
-    for node, _, _ in places(tree):
+    for node, *_ in places(tree):
         for other in changes(node):
             place = node.lineno, node.col_offset
             seen[place] += 1
@@ -467,12 +501,20 @@ class Judge:
     """A pytest plugin in place of its loop: a forked child for each mutant."""
 
     def __init__(
-        self, wanted: Sequence[Mutant], known: Coverage, jobs: int, tests_s: float, verdicts: Path, until_s: float
+        self,
+        wanted: Sequence[Mutant],
+        known: Coverage,
+        jobs: int,
+        tests_s: float,
+        verdicts: Path,
+        until_s: float,
+        only: Sequence[str],
     ) -> None:
-        self.tests_s = tests_s
+        self.tests_s, self.only = tests_s, tuple(only)
         self.lines: dict[str, dict[int, set[str]]] = {}
         self.wanted, self.known, self.jobs, self.verdicts, self.until_s = wanted, known, jobs, verdicts, until_s
-        self.sound: dict[tuple[str, bool], bool] = {}
+        self.sound: dict[tuple[tuple[str, ...], bool], bool] = {}
+        self.texts = {mutant.file: text_of(mutant.file) for mutant in wanted}
         self.functions: dict[str, list[FunctionType]] = defaultdict(list)
         self.items: dict[str, pytest.Item] = {}
 
@@ -481,9 +523,11 @@ class Judge:
         if mutant.file not in self.lines:
             self.lines[mutant.file] = self.known.of(mutant.file)
         lines, took = self.lines[mutant.file], self.known.took
-        # what is carried out at import: whatever runs the file
-        tests = set().union(*lines.values()) if mutant.is_at_import else lines.get(mutant.line, set())
-        own = ROOMS[mutant.room][1]
+        own = self.only or ROOMS[mutant.room][1]
+        tests = set().union(*(lines.get(line, set()) for line in range(mutant.line, mutant.last_line + 1)))
+        if mutant.is_at_import:  # whatever runs the file, and the room's files of tests: to read a table runs no line
+            named = {test for test in took if file_of(test) in own}
+            tests = set().union(named, *lines.values())
         tests = {test for test in tests if test.startswith(own)}
         kept, left_s = [], self.tests_s
         for test in sorted(tests, key=lambda t: (took[t], t)):
@@ -499,7 +543,9 @@ class Judge:
         code = mutated(mutant) if mutant is not None else None
         if is_at_import:
             for name in [
-                n for n in sys.modules if n.partition(".")[0] in {"companion", "sitl", "lab", "tests", "conftest"}
+                n
+                for n in sys.modules
+                if n.partition(".")[0] in {"companion", "sitl", "lab", "bench", "tests", "conftest"}
             ]:
                 del sys.modules[name]
             if mutant is not None and code is not None:
@@ -545,14 +591,15 @@ class Judge:
         finally:
             os._exit(status)
 
-    def is_sound(self, test: str, is_at_import: bool) -> bool:
-        """Whether a test passes in such a child without any mutant."""
-        if (test, is_at_import) not in self.sound:
-            pid, answer = self.child([test], None, is_at_import)
+    def is_sound(self, tests: Sequence[str], is_at_import: bool) -> bool:
+        """Whether tests pass in such a child without any mutant."""
+        asked = tuple(tests), is_at_import
+        if asked not in self.sound:
+            pid, answer = self.child(tests, None, is_at_import)
             os.waitpid(pid, 0)
-            self.sound[test, is_at_import] = answer.read_text() == "null"
+            self.sound[asked] = answer.read_text() == "null"
             answer.unlink()
-        return self.sound[test, is_at_import]
+        return self.sound[asked]
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session):
@@ -568,13 +615,15 @@ class Judge:
         while waiting or running:
             while waiting and len(running) < self.jobs and time.monotonic() < self.until_s:
                 mutant, tests = waiting.pop()
+                if text_of(mutant.file) != self.texts[mutant.file]:
+                    continue  # somebody writes in it: what was drawn is another place by now
                 if not tests:
                     done += 1
                     self.keep(mutant, "survived", "no test runs it", done)
                     continue
                 pid, answer = self.child(tests, mutant, mutant.is_at_import)
                 began = time.monotonic()
-                limit_s = 20.0 + 20.0 * mutant.is_at_import + 5.0 * sum(self.known.took[t] for t in tests)
+                limit_s = 60.0 + 60.0 * mutant.is_at_import + 10.0 * sum(self.known.took[t] for t in tests)
                 running[pid] = mutant, tests, answer, began, began + limit_s
             if not running:
                 break
@@ -594,8 +643,13 @@ class Judge:
             if by is None:
                 done += 1
                 self.keep(mutant, "survived", f"{len(tests)} tests", done)
-            elif "::" in by and not self.is_sound(by, mutant.is_at_import):
+            elif text_of(mutant.file) != self.texts[mutant.file]:
+                continue
+            elif "::" in by and not self.is_sound([by], mutant.is_at_import):
                 waiting.append((mutant, [t for t in tests if t != by]))
+            elif "::" not in by and by not in {"time", "died"} and not self.is_sound(tests, mutant.is_at_import):
+                done += 1  # they cannot even be asked here
+                self.keep(mutant, "survived", f"{by} without it, too", done)
             else:
                 done += 1
                 self.keep(mutant, "killed", by, done)
@@ -605,7 +659,7 @@ class Judge:
         """Append a verdict."""
         record = {
             "key": mutant.key,
-            "text": text_of(mutant.file),
+            "text": self.texts[mutant.file],
             "room": mutant.room,
             "where": mutant.where,
             "told": mutant.told,
@@ -689,6 +743,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--minutes", type=float, default=1e6, help="begin no mutant after them")
     parser.add_argument("--again", action="store_true", help="judge once more what survived")
+    parser.add_argument(
+        "--tests", nargs="+", default=[], metavar="PATH", help="ask these alone: what survives them may be killed yet"
+    )
     parser.add_argument("--table", action="store_true", help="only the table of what is known")
     args = parser.parse_args(argv)
     if unknown := set(args.rooms) - set(ROOMS):
@@ -706,14 +763,14 @@ def main(argv: Sequence[str] | None = None) -> int:
             wanted = [m for m in wanted if m.key not in last]
         files, asked = sorted({m.file for m in drawn(list(ROOMS), None, 0)}), {m.file for m in wanted}
         known = KEPT / "mutants.coverage.json"
-        tops = sorted({top for room in rooms for top in ROOMS[room][1]})
+        tops = sorted(args.tests or {top for room in rooms for top in ROOMS[room][1]})
         if wanted:
             if not (pid := os.fork()):  # a process of its own: nothing that the tests leave stays in those that judge
                 Coverage(known, files, asked).renew(tops)
                 os._exit(0)
             if os.waitpid(pid, 0)[1]:
                 return 1
-            judge = Judge(wanted, Coverage(known, files, asked), args.jobs, args.tests_s, verdicts, until_s)
+            judge = Judge(wanted, Coverage(known, files, asked), args.jobs, args.tests_s, verdicts, until_s, args.tests)
             pytest.main([*PYTEST, *tops], plugins=[judge])
         last = known_verdicts(verdicts)
     table(last, sys.stdout)

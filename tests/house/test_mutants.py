@@ -14,8 +14,9 @@ from bench.mutants import ROOMS, changes, codes, drawn, equivalents, mutated, pl
 def told(text):
     return {
         f"{ast.unparse(node)} -> {ast.unparse(other)}"
-        for node, _, _ in places(ast.parse(text))
+        for node, _, _, is_said in places(ast.parse(text))
         for other in changes(node)
+        if not is_said
     }
 
 
@@ -34,6 +35,13 @@ def told(text):
         ("def f(a: Array[3] = 2) -> Row[4]:\n  'Say.'\n  assert a > 1\n  raise E(a + 1)", {"2 -> 3"}),
         ("@kernel\ndef f(a):\n  return a + 1", set()),
         ("__all__ = [1]\nif TYPE_CHECKING:\n  x = 1", set()),
+        # the words of a message: which of two sentences, what a keyword of words is given, a function of words
+        ("x = 'so it is' if a < b else f'{a} not so'", {"a < b -> a <= b", "a < b -> a >= b"}),
+        ("x = 'one' if a else 'other'", {"'one' if a else 'other' -> 'other' if a else 'one'"}),
+        ("x = say(a + 1, text=words(b + 2), every_s=3)", {"a + 1 -> a - 1", "1 -> 2", "3 -> 4"}),
+        ("def in_words(a) -> str:\n  return f(a + 1)", set()),
+        ("def words(a) -> int:\n  return a", {"return a -> return None"}),
+        ("log.warning('%d', a + 1)\nlist.append(a + 1)", {"list.append(a + 1) -> pass", "a + 1 -> a - 1", "1 -> 2"}),
     ],
 )
 def test_what_is_put_in_a_place(text, changed):
