@@ -66,7 +66,20 @@ from companion.messages import GeoPoint
 from companion.orders import ALL, Verb, unknown
 from companion.planners import ALGORITHMS, AUTO, PlannerChoice
 from companion.skipper.step import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
-from companion.skipper.way import FAR_M, Box, Composed, Goal, Line, Refuge, Search, Side, Until, Voyage
+from companion.skipper.way import (
+    FAR_M,
+    TIDE_DOUBT_M,
+    Box,
+    Composed,
+    DryingWater,
+    Goal,
+    Line,
+    Refuge,
+    Search,
+    Side,
+    Until,
+    Voyage,
+)
 from companion.traffic import Policy, TargetLimits
 from companion.traffic.feeds import FeedName, parse_feed
 from companion.wind import Estimator, make
@@ -467,6 +480,7 @@ def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
         area=area,
         boat=boat_of(mission),
         laps=mission.skipper.laps,
+        drying=drying_of(mission, frame),
         refuges=tuple(
             Refuge(name=r.name, en_m=frame.en_from_geo(r.point), radius_m=r.radius_m) for r in mission.refuges
         ),
@@ -474,6 +488,22 @@ def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
         onward_en_m=frame.en_from_geo(mission.start) if mission.start and mission.skipper.end == "home" else None,
         recentre_m=(mission.passage.recentre_m or RECENTRE_M) if mission.is_passage else None,
         far_m=max(FAR_M, mission.passage.leg_m or 0.0),
+    )
+
+
+def drying_of(mission: Mission, frame: LocalFrame) -> tuple[DryingWater, ...]:
+    """Return the water that dries in the metres of ``frame``, each piece with the tide that opens it."""
+    if not mission.drying:
+        return ()
+    need_m = (mission.boat.draft_m or 0.0) + mission.options.area.under_keel_m
+    return tuple(
+        DryingWater(
+            name=water.name or f"drying water {number}",
+            polygon=polygon_en(water.shape, frame),
+            margin_m=water.margin_m or 0.0,
+            opens_at_m=need_m - (water.depth_m or 0.0) + TIDE_DOUBT_M,
+        )
+        for number, water in enumerate(mission.drying, start=1)
     )
 
 

@@ -19,6 +19,7 @@ from companion.compose import (
     boat_of,
     config_of,
     displays_of,
+    drying_of,
     estimator_of,
     feeds_of,
     field_findings_of,
@@ -26,6 +27,7 @@ from companion.compose import (
     require_fields,
     sounder_of,
     target_limits_of,
+    tide_of,
     voyage_of,
     water_of,
 )
@@ -60,7 +62,7 @@ from companion.planner import Plan, Problem
 from companion.planner.problem import assumed
 from companion.safety import LIGHT_WIND, STRONG_WIND
 from companion.skipper.planning import HOME_RADIUS_M
-from companion.skipper.way import Composed, Until
+from companion.skipper.way import Composed, Until, timed
 from companion.skipper.way.gates import Approach, gates_of
 from companion.words import counted
 
@@ -348,10 +350,12 @@ def leg_problem(
     title: str = "",
     local: LocalArea | None = None,
     current: WaterCurrent = STILL_WATER,
+    unix_s: float | None = None,
 ) -> Problem:
     """Return the problem of sailing to one goal of a mission [m in its frame] in a wind that is held steady.
 
-    Where ``current`` is planned for the wind, which is that over the ground, is carried over to the water.
+    Where ``current`` is planned for the wind, which is that over the ground, is carried over to the water. ``unix_s``:
+    when it begins, for water that dries; without it that is solid.
     """
     local = mission.water() if local is None else local
     boat, sails = boat_of(mission), mission.autopilot.frame == "sailboat"
@@ -360,7 +364,20 @@ def leg_problem(
         from_rad, speed_mps = over_water(math.radians(wind.from_deg), wind.speed_mps, current.en_mps)
         wind = replace(wind, from_deg=math.degrees(from_rad), speed_mps=speed_mps)
         water["current"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
-    return Problem.from_json(
+    dries = timed(
+        drying_of(mission, mission.frame()),
+        tide_of(mission) if mission.drying else None,
+        unix_s,
+        margin_m=mission.margin_m,
+        start_en=here_en,
+    )
+    if dries.solid:
+        local = local.also(
+            tuple(w.name for w in dries.solid),
+            tuple(w.polygon for w in dries.solid),
+            tuple(w.margin_m for w in dries.solid),
+        )
+    problem = Problem.from_json(
         {
             "id": mission.name,
             "title": title,
@@ -383,6 +400,7 @@ def leg_problem(
             **water,
         }
     )
+    return replace(problem, targets=dries.targets) if dries.targets else problem
 
 
 def expected_current(mission: Mission, unix_s: float | None) -> WaterCurrent:
@@ -438,6 +456,7 @@ def legs(
             title=title,
             local=local,
             current=expected_current(mission, unix_s),
+            unix_s=unix_s,
         )
         if not answer.has_path:
             return

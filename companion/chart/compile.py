@@ -53,6 +53,17 @@ class ChartArea:
     fence: Zone
     frame: LocalFrame
     reach_m: float
+    floats_m: float | None = None
+
+    @property
+    def always(self) -> tuple[Solid, ...]:
+        """What is solid at any hour."""
+        return tuple(s for s in self.solids if not _floats(s.depth_m, self.floats_m))
+
+    @property
+    def drying(self) -> tuple[Solid, ...]:
+        """What some tide of the table makes deep enough."""
+        return tuple(s for s in self.solids if _floats(s.depth_m, self.floats_m))
 
     def document(self) -> Document:
         """Return obstacles and fence as what every command reads."""
@@ -72,7 +83,11 @@ class ChartArea:
 
     def obstacles_json(self) -> bytes:
         """Return the obstacles as GeoJSON, each with its reason, source, edition, date and depth."""
-        return _collection([_feature(solid) for solid in self.solids])
+        return _collection([_feature(solid) for solid in self.always])
+
+    def drying_json(self) -> bytes:
+        """Return the water that dries in the same way."""
+        return _collection([_feature(solid) for solid in self.drying])
 
     def fence_json(self) -> bytes:
         """Return the fence as GeoJSON."""
@@ -81,8 +96,22 @@ class ChartArea:
         return _collection([{"type": "Feature", "properties": properties, "geometry": _geometry(self.fence.shape)}])
 
 
-def area_of(charts: Sequence[Chart], center: GeoPoint, reach_m: float, tolerance_m: float = TOLERANCE_M) -> ChartArea:
-    """Return what the charts say within ``reach_m`` of a place; shapes are at most twice the tolerance too large."""
+def _floats(depth_m: float | None, floats_m: float | None) -> bool:
+    return floats_m is not None and depth_m is not None and depth_m >= floats_m
+
+
+def area_of(
+    charts: Sequence[Chart],
+    center: GeoPoint,
+    reach_m: float,
+    tolerance_m: float = TOLERANCE_M,
+    floats_m: float | None = None,
+) -> ChartArea:
+    """Return what the charts say within ``reach_m`` of a place; shapes are at most twice the tolerance too large.
+
+    What is no shallower than ``floats_m`` below the datum is deep enough at some tide: it is kept apart by its depth,
+    and takes no rock's place.
+    """
     frame = LocalFrame(center)
     disc = shapely.segmentize(shapely.buffer(shapely.points((0.0, 0.0)), reach_m, quad_segs=16), EDGE_M)
     wide_m = reach_m + 2.0 * tolerance_m + SEAM_M
@@ -90,7 +119,7 @@ def area_of(charts: Sequence[Chart], center: GeoPoint, reach_m: float, tolerance
     as_fine: list[BaseGeometry] = []
     last_m = 0.0
     covered: list[BaseGeometry] = []
-    areas: dict[tuple[str, Source, float], list[tuple[BaseGeometry, float | None]]] = defaultdict(list)
+    areas: dict[tuple[str, Source, float, float | None], list[tuple[BaseGeometry, float | None]]] = defaultdict(list)
     marks: list[tuple[BaseGeometry, Danger, Source]] = []
     for chart in sorted(charts, key=lambda c: c.resolution_m):
         if chart.resolution_m > last_m and as_fine:
@@ -103,7 +132,8 @@ def area_of(charts: Sequence[Chart], center: GeoPoint, reach_m: float, tolerance
                 if isinstance(shape, Polygon):
                     left = shapely.difference(shape, finer) if shapely.intersects(finer, shape) else shape
                     if not left.is_empty:
-                        areas[danger.reason, chart.source, danger.doubt_m].append((left, danger.depth_m))
+                        apart = danger.depth_m if _floats(danger.depth_m, floats_m) else None
+                        areas[danger.reason, chart.source, danger.doubt_m, apart].append((left, danger.depth_m))
                 elif not (chart.supersedes and shapely.covers(finer, shape)):
                     marks.append((shape, danger, chart.source))
         if chart.coverage is None:
@@ -115,9 +145,10 @@ def area_of(charts: Sequence[Chart], center: GeoPoint, reach_m: float, tolerance
             as_fine.append(spoken)
     solids: list[Solid] = []
     whole: dict[float, list[BaseGeometry]] = defaultdict(list)
-    for (reason, source, doubt_m), found in areas.items():
+    for (reason, source, doubt_m, apart), found in areas.items():
         union = shapely.intersection(containing(shapely.union_all([s for s, _ in found]), tolerance_m), disc)
-        whole[doubt_m].append(union)
+        if apart is None:
+            whole[doubt_m].append(union)
         depths = [d for _, d in found if d is not None]
         solids += [
             Solid(
@@ -134,7 +165,7 @@ def area_of(charts: Sequence[Chart], center: GeoPoint, reach_m: float, tolerance
     blank = shapely.intersection(containing(blank, tolerance_m), disc)
     solids += [Solid(shape=_lonlat(p, frame), reason=NO_CHART, source=None) for p in parts(blank)]
     fence = Zone(kind=ZoneKind.INCLUSION, shape=_lonlat(disc, frame), name="the chart's edge")
-    return ChartArea(solids=tuple(solids), fence=fence, frame=frame, reach_m=reach_m)
+    return ChartArea(solids=tuple(solids), fence=fence, frame=frame, reach_m=reach_m, floats_m=floats_m)
 
 
 def containing(shape: BaseGeometry, tolerance_m: float) -> BaseGeometry:

@@ -14,6 +14,7 @@ from companion.words import counted, listed
 
 if TYPE_CHECKING:
     from companion.chart import Chart, ChartArea
+    from companion.current import TideRow
     from companion.geofence.mission import MissionOptions
     from companion.messages import GeoPoint
 
@@ -65,6 +66,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     )
     load.add_argument("--from", dest="begins", type=moment, metavar="TIME", help="2026-11-24T08:00Z, with --tide")
     load.add_argument("--to", dest="ends", type=moment, metavar="TIME", help="the same, of the voyage's end")
+    load.add_argument(
+        "--drying",
+        action="store_true",
+        help="what the table's highest tide makes deep enough goes to NAME-drying.geojson, for [area] drying: it is "
+        "solid at its hours",
+    )
     load.add_argument(
         "--air-draft",
         type=number("m", above=0.0, at_most=100.0),
@@ -159,10 +166,12 @@ def _import(args: argparse.Namespace) -> int:
     out = args.out or (Path(args.mission).stem + "-chart" if args.mission else "chart")
     folder = Path(args.mission).parent if args.mission and not args.out else Path()
     obstacles, fence = folder / f"{out}.geojson", folder / f"{out}-fence.geojson"
-    refuse_existing([str(obstacles), str(fence)], force=args.force)
+    drying = folder / f"{out}-drying.geojson"
+    refuse_existing([str(obstacles), str(fence), *([str(drying)] if args.drying else [])], force=args.force)
     table = _tide_table(args, options)
     tide_m = _tide_m(args, table)
     depth_m = _depth_m(args, options) - tide_m
+    floats_m = depth_m - _highest_m(args, table) if args.drying else None
     wanted = Wanted(
         safety_depth_m=depth_m,
         air_draft_m=math.inf if args.air_draft is None else args.air_draft,
@@ -179,22 +188,28 @@ def _import(args: argparse.Namespace) -> int:
         for finding in chart.findings:
             print(finding.line(name))
         print(f"{name}: {chart.source}: {told_of(chart)}" + ("" if chart.knows_depths else "; it tells no depths"))
-    area = area_of(charts, center, reach_m, args.tolerance or TOLERANCE_M)
+    area = area_of(charts, center, reach_m, args.tolerance or TOLERANCE_M, floats_m)
     if area.is_too_much:
         raise JobError(
             f"{obstacles}: not written: it would hold {area.positions()} positions, more than a mission reads; "
             "say a smaller --radius or a larger --tolerance"
         )
-    write_files({str(obstacles): area.obstacles_json(), str(fence): area.fence_json()}, force=args.force)
+    files = {str(obstacles): area.obstacles_json(), str(fence): area.fence_json()}
+    write_files(files | ({str(drying): area.drying_json()} if args.drying else {}), force=args.force)
     print(
-        f"{obstacles}: written: {counted(len(area.solids), 'obstacle')} ({counted(area.positions(), 'position')}) "
+        f"{obstacles}: written: {counted(len(area.always), 'obstacle')} ({counted(area.positions(), 'position')}) "
         f"within {reach_m:g} m of {center.lat_deg:.5f}, {center.lon_deg:.5f}; solid is what is less deep than "
         f"{depth_m:g} m" + (f" with {tide_m:g} m of tide" if table else "")
     )
+    if args.drying:
+        print(
+            f"{drying}: written: {counted(len(area.drying), 'piece')} of water that is too shallow at some hours only"
+        )
     print(f"{fence}: written: the edge of it")
     if any(s.doubt_m >= args.most_doubt > 0.0 for s in area.solids):
         print(f"surveys here are so doubtful that margins would be wider: cut at {args.most_doubt:g} m (--most-doubt)")
-    print(f'in the mission: [area] obstacles = ["{obstacles.name}"], fence = "{fence.name}"')
+    told = f', drying = ["{drying.name}"]' if args.drying else ""
+    print(f'in the mission: [area] obstacles = ["{obstacles.name}"], fence = "{fence.name}"{told}')
     bad = _troubles(area, places)
     for line in bad:
         print(line)
@@ -246,24 +261,45 @@ def _tide_table(args: argparse.Namespace, options: MissionOptions | None) -> str
     """Return the table of the tide: that of the command, or the mission's where hours are asked for."""
     if args.tide is not None or options is None or options.area.tide is None:
         return args.tide if args.tide is None else str(args.tide)
-    return None if args.begins is None and args.ends is None else str(Path(args.mission).parent / options.area.tide)
+    return (
+        None
+        if args.begins is None and args.ends is None and not args.drying
+        else str(Path(args.mission).parent / options.area.tide)
+    )
 
 
 def _tide_m(args: argparse.Namespace, table: str | None) -> float:
     """Return the lowest height of tide in the voyage's hours [m]: 0, the chart's datum, without a table."""
-    from companion.current import lowest_m, read_tide
-    from companion.current.prior import table_lines
-    from companion.geofence.formats import decode, read_bytes
+    from companion.current import lowest_m
 
-    if table is None and args.begins is None and args.ends is None:
+    if args.begins is None and args.ends is None and (table is None or args.drying):
         return 0.0
     if table is None or args.begins is None or args.ends is None or args.begins >= args.ends:
         raise InputError(
             "companion chart import", "--tide", "goes with --from and a later --to", "say all three, or none"
         )
+    return lowest_m(_rows(table), args.begins.timestamp(), args.ends.timestamp(), table)
+
+
+def _highest_m(args: argparse.Namespace, table: str | None) -> float:
+    """Return the highest tide of the table [m]."""
+    if table is None or args.begins is not None or args.ends is not None:
+        raise InputError(
+            "companion chart import",
+            "--drying",
+            "is by the hours of a table, not by one height",
+            "say --tide, or [area] tide in the mission, without --from and --to",
+        )
+    return max(row.height_m for row in _rows(table))
+
+
+def _rows(table: str) -> tuple[TideRow, ...]:
+    from companion.current import read_tide
+    from companion.current.prior import table_lines
+    from companion.geofence.formats import decode, read_bytes
+
     text = decode(read_bytes(Path(table)), table)
-    rows = read_tide(text, table, tuple(_utc_s(line.split(",")[0].strip()) for _, line in table_lines(text)))
-    return lowest_m(rows, args.begins.timestamp(), args.ends.timestamp(), table)
+    return read_tide(text, table, tuple(_utc_s(line.split(",")[0].strip()) for _, line in table_lines(text)))
 
 
 def _utc_s(text: str) -> float | None:

@@ -18,7 +18,7 @@ from companion.geo.angles import direction
 from companion.planner.courses import courses
 from companion.planner.problem import evaluate
 from companion.planners import ALGORITHMS
-from companion.program.arguments import add_command, number, out_file, picture, shifts, whole, wind
+from companion.program.arguments import add_command, moment, number, out_file, picture, shifts, whole, wind
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -51,6 +51,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     )
     parser.add_argument(
         "--wind", type=wind, metavar="SPEED@FROM", help="of a mission [m/s, degrees] (else what its previews assume)"
+    )
+    parser.add_argument(
+        "--at",
+        type=moment,
+        metavar="TIME",
+        help="of a mission: when she sets out, for tables of the tide: 2026-11-24T08:00Z (now)",
     )
     parser.add_argument(
         "--budget",
@@ -95,6 +101,8 @@ def run(args: argparse.Namespace) -> int:
         ground = {"area": mission.water(), "margin_m": mission.margin_m}
     elif args.wind is not None:
         raise InputError("--wind", "", "a problem has a wind of its own", "leave it out, or plan a mission TOML")
+    elif args.at is not None:
+        raise InputError("--at", "", "a problem has hours of its own", "leave it out, or plan a mission TOML")
     else:
         answers = [_answer(Problem.from_json(args.problem), args)]
     files = [_file(problem, answer) for problem, answer in answers]
@@ -186,7 +194,9 @@ def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Prob
         return answers[-1][1]
 
     wind = AssumedWind(from_deg=from_deg, speed_mps=tws_mps)
-    planned_legs(legs(mission, wind, goes_home=False, unix_s=time.time()), answer)
+    planned_legs(
+        legs(mission, wind, goes_home=False, unix_s=time.time() if args.at is None else args.at.timestamp()), answer
+    )
     return answers
 
 

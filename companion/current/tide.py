@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import bisect
+import functools
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 from companion.current.prior import timed_rows
 from companion.errors import InputError
@@ -37,6 +39,29 @@ class TideTable:
             return a.height_m
         share = (utc_s - a.utc_s) / (b.utc_s - a.utc_s)
         return a.height_m + (b.height_m - a.height_m) * (1.0 - math.cos(math.pi * share)) / 2.0
+
+
+@functools.lru_cache(maxsize=256)  # by the level: asked for at each step of a voyage
+def open_spans(table: TideTable, level_m: float) -> tuple[tuple[float, float], ...]:
+    """Return when the tide stands at a level or higher, as spans of Unix time in order; beyond its rows it does not.
+
+    From row to row the height is half a wave, as ``TideTable.height_m`` has it, so each crossing is exact.
+    """
+    spans: list[tuple[float, float]] = []
+    for a, b in pairwise(table.rows):
+        low, high = min(a.height_m, b.height_m), max(a.height_m, b.height_m)
+        if high < level_m or b.utc_s <= a.utc_s:
+            continue
+        begin, end = a.utc_s, b.utc_s
+        if low < level_m:
+            share = math.acos(1.0 - 2.0 * (level_m - a.height_m) / (b.height_m - a.height_m)) / math.pi
+            at_s = a.utc_s + share * (b.utc_s - a.utc_s)
+            begin, end = (at_s, end) if b.height_m > a.height_m else (begin, at_s)
+        if spans and spans[-1][1] >= begin:
+            spans[-1] = (spans[-1][0], end)
+        else:
+            spans.append((begin, end))
+    return tuple(spans)
 
 
 def read_tide(text: str, source: str, times: tuple[float | None, ...]) -> tuple[TideRow, ...]:

@@ -151,6 +151,15 @@ class LocalArea:
         """The obstacles alone: for a boat that has got outside the limits. What is known of them is kept there."""
         return self if self.limits is None else replace(self, limits=None)
 
+    def also(self, names: tuple[str, ...], polygons: tuple[Polygon, ...], margins_m: tuple[float, ...]) -> LocalArea:
+        """Return the area with more obstacles, after its own."""
+        return replace(
+            self,
+            names=self.names + names,
+            polygons=self.polygons + polygons,
+            own_margins_m=self.own_margins_m + margins_m,
+        )
+
     @functools.lru_cache(maxsize=4)  # noqa: B019 - an area lives as long as its voyage
     def within(self, centre_en: tuple[float, float], radius_m: float, name: str) -> LocalArea:
         """Return the area with one limit more: a circle, by ``name``, drawn inside of it."""

@@ -144,7 +144,7 @@ class Document:
     def as_obstacles(self, radius_m: float) -> tuple[Obstacle, ...]:
         """Return everything solid as obstacles: keep-out zones, and marks grown by ``radius_m``."""
         solid = [
-            Obstacle(shape=z.shape, name=z.name, margin_m=z.margin_m)
+            Obstacle(shape=z.shape, name=z.name, margin_m=z.margin_m, depth_m=z.depth_m)
             for z in self.zones
             if z.kind is ZoneKind.EXCLUSION
         ]

@@ -58,25 +58,35 @@ Shape: TypeAlias = Polygon | Circle
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Zone:
-    """A keep-in or keep-out zone of a fence. ``margin_m`` is the zone's own margin, None for the mission's."""
+    """A keep-in or keep-out zone of a fence. ``margin_m`` is the zone's own margin, None for the mission's.
+
+    ``depth_m`` is the water's, below the chart's datum, where a chart tells it; negative: it dries.
+    """
 
     kind: ZoneKind
     shape: Shape
     name: str = ""
     margin_m: float | None = None
+    depth_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Obstacle:
-    """Something solid. ``margin_m`` is its own margin where it must be larger than the mission's."""
+    """Something solid. ``margin_m`` is its own margin where it must be larger than the mission's.
+
+    ``depth_m`` is as a ``Zone`` has it.
+    """
 
     shape: Shape
     name: str = ""
     margin_m: float | None = None
+    depth_m: float | None = None
 
     def zone(self) -> Zone:
         """Return the obstacle as a keep-out zone."""
-        return Zone(kind=ZoneKind.EXCLUSION, shape=self.shape, name=self.name, margin_m=self.margin_m)
+        return Zone(
+            kind=ZoneKind.EXCLUSION, shape=self.shape, name=self.name, margin_m=self.margin_m, depth_m=self.depth_m
+        )
 
 
 def polygon_en(shape: Shape, frame: LocalFrame, *, cover: bool = True) -> Polygon:

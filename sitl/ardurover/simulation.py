@@ -33,7 +33,7 @@ from companion.geo.frame import LocalFrame
 from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint, Mode
 from sitl.autopilot import Truth
-from sitl.world import Waters, WindModel
+from sitl.world import LEAST_M, MOST_M, SimulatedSounder, Waters, WindModel
 
 URL = "https://firmware.ardupilot.org/Rover/stable/SITL_x86_64_linux_gnu/ardurover"
 _SMALLEST_BYTES = 1_000_000
@@ -146,6 +146,14 @@ _WIND_HZ = 5.0
 _WIND = ("SIM_WIND_DIR", "SIM_WIND_SPD")
 _TIDE = ("SIM_TIDE_DIR", "SIM_TIDE_SPEED")
 _WIND_REPEAT_S = 5.0
+_SOUNDER = {  # a rangefinder that looks down and is told by MAVLink; its reach by the names of 4.7 and of before
+    "RNGFND1_TYPE": 10.0,
+    "RNGFND1_ORIENT": float(mav.MAV_SENSOR_ROTATION_PITCH_270),
+    "RNGFND1_MIN": LEAST_M,
+    "RNGFND1_MAX": MOST_M,
+    "RNGFND1_MIN_CM": 100.0 * LEAST_M,
+    "RNGFND1_MAX_CM": 100.0 * MOST_M,
+}
 _INSTANCES = 20
 _HARNESS = (250, mav.MAV_COMP_ID_MISSIONPLANNER)
 _EKF_READY = mav.EKF_ATTITUDE | mav.EKF_VELOCITY_HORIZ | mav.EKF_POS_HORIZ_ABS
@@ -167,6 +175,7 @@ class ArduRover:
         folder: where it keeps eeprom and logs; a temporary one when None.
         model: of the simulator; ``sailboat-motor`` has a throttle.
         waters: wind and stream by place, told as they are where the boat is.
+        sounder: of the bottom under her: each ping goes to the autopilot, which tells it on as its rangefinder's.
 
     ``link`` is the companion's LINK, ``shore_link`` another port (SERIAL2) for a ground station.
     """
@@ -184,11 +193,13 @@ class ArduRover:
         folder: Path | None = None,
         model: str = "sailboat",
         waters: Waters | None = None,
+        sounder: SimulatedSounder | None = None,
     ) -> None:
         self._program, self._home, self._wind = program.resolve(), home, wind
         self._heading_rad, self._speedup = heading_rad, speedup
         self._wanted = instance
-        self._parameters = dict(parameters or {})
+        self._parameters = {**(_SOUNDER if sounder is not None else {}), **(parameters or {})}
+        self._sounder = sounder
         self._folder, self._model = folder, model
         self._waters = waters
         self._set_en_mps = (0.0, 0.0)
@@ -422,7 +433,7 @@ class ArduRover:
                     self.command(mav.MAV_CMD_SET_MESSAGE_INTERVAL, float(msgid), 1e6 / hertz)
 
     async def _live(self) -> None:
-        """Heartbeat, and the wind as it is now."""
+        """Heartbeat, the wind as it is now, and the depth."""
         beat_s = told_s = -math.inf
         told: tuple[float, ...] | None = None
         while True:
@@ -437,7 +448,29 @@ class ArduRover:
                     told, told_s = weather, now_s()
                     for name, value in zip((*_WIND, *_TIDE), weather, strict=False):
                         self.set_parameter(name, value)
+                if self._sounder is not None:
+                    self._ping(self._sounder)
             await asyncio.sleep(1.0 / _WIND_HZ)
+
+    def _ping(self, sounder: SimulatedSounder) -> None:
+        """Tell the autopilot the depth here; nothing where no echo comes back."""
+        sim = self._seen.get("SIMSTATE")
+        if sim is None:
+            return
+        depth_m = sounder.ping_m(GeoPoint(lat_deg=sim.lat / 1e7, lon_deg=sim.lng / 1e7), max(0.0, self.t_s))
+        if depth_m is not None:
+            self._send(
+                mav.MAVLink_distance_sensor_message(
+                    round(1000.0 * self._boot_s),
+                    round(100.0 * LEAST_M),
+                    round(100.0 * MOST_M),
+                    round(100.0 * depth_m),
+                    mav.MAV_DISTANCE_SENSOR_ULTRASOUND,
+                    0,
+                    mav.MAV_SENSOR_ROTATION_PITCH_270,
+                    255,
+                )
+            )
 
     def _wind_here(self) -> tuple[float, float]:
         t_s = max(0.0, self.t_s)

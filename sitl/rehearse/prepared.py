@@ -9,7 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from companion.compose import planner_of, water_of
+from companion.compose import planner_of, tide_of, water_of
 from companion.disk import Disk
 from companion.errors import InputError
 from companion.geofence import Mission
@@ -96,7 +96,10 @@ def prepared(
         doubts=Doubts(
             wind=replace(given, spec=scenario.wind), boat=doubt, faults=faults, voyage_s=round(max(voyage_s, 60.0), 1)
         ),
-        tells_the_hour=given.record_s > 0.0 or mission.tide_path is not None or mission.safety.end(DARK) is not End.SAY,
+        tells_the_hour=given.record_s > 0.0
+        or mission.tide_path is not None
+        or bool(mission.drying)
+        or mission.safety.end(DARK) is not End.SAY,
     )
 
 
@@ -108,11 +111,14 @@ def _mean(base: Scenario, mission: Mission) -> WindSpec:
 
 
 def _hour(base: Scenario, mission: Mission, path: Path, written: Path) -> dt.datetime:
-    """Return when the boat sails where nobody says: when a tide table begins, a scenario does, or now.
+    """Return when the boat sails where nobody says: when a table of the tide begins, a scenario does, or now.
 
     A rehearsal that goes on keeps the hour at which it was begun: what was sailed is of that.
     """
     rows = water_of(mission).rows
+    heights = tide_of(mission) if mission.drying and not rows else None
+    if heights is not None and heights.rows:
+        return dt.datetime.fromtimestamp(heights.rows[0].utc_s, dt.UTC)
     if rows:
         return dt.datetime.fromtimestamp(rows[0].utc_s, dt.UTC)
     try:
@@ -131,7 +137,8 @@ def _planned(mission: Mission, wind: AssumedWind) -> list[Plan]:
         return plan(problem, expansions=EXPANSIONS, seed=0, algorithm=by.algorithm, settings=by.settings)
 
     try:
-        plans = planned_legs(legs(mission, wind), answer)
+        # water that dries is waited for: it closes no way for good
+        plans = planned_legs(legs(replace(mission, drying=()), wind), answer)
     except ValueError as error:
         raise InputError(str(mission.path), "", str(error), "'companion mission check --plot' draws it") from None
     if not plans[-1].has_path:

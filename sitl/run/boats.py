@@ -30,7 +30,7 @@ from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import MOTOR, ArduRover, require
 from sitl.faults import REDRAWN, give_order, redraw, set_parameter
 from sitl.scenario import EventSpec, Scenario, SensorsSpec, free_port, scenario_waters
-from sitl.world import WindModel
+from sitl.world import SimulatedSounder, WindModel
 
 # A warm simulated autopilot has been up for a minute when its simulation starts [s].
 WARM_BOOT_S = 60.0
@@ -195,7 +195,14 @@ class RealBoat:
     @classmethod
     @contextlib.asynccontextmanager
     async def start(
-        cls, scenario: Scenario, mission: Mission, wind: WindModel, program: Path | None, pace: float, folder: Path
+        cls,
+        scenario: Scenario,
+        mission: Mission,
+        wind: WindModel,
+        program: Path | None,
+        pace: float,
+        folder: Path,
+        sounder: SimulatedSounder | None = None,
     ) -> AsyncIterator[RealBoat]:
         """Run it while the block runs."""
         waters = scenario_waters(scenario, wind, mission.frame().en_from_geo(mission.start or mission.origin))
@@ -213,17 +220,22 @@ class RealBoat:
             if mission.autopilot.frame == "motor"
             else ("sailboat" + (MOTOR if mission.boat.motor else "")),
             waters=waters,
+            sounder=sounder,
         ) as rover:
             yield cls(rover)
         (folder / "autopilot.log").write_text("\n".join(f"{t:.1f} {s} {x}" for t, s, x in rover.texts) + "\n")
 
     @staticmethod
     def cannot_be(scenario: Scenario) -> list[str]:
-        """Return what it cannot be: no leeway, no waves, no sounder, and of its sensors only the position's age."""
+        """Return what it cannot be: no leeway, no waves, and of its sensors only the position's age.
+
+        Nor does its sounder speak NMEA to the companion.
+        """
         told = SensorsSpec() if scenario.sensors is None else scenario.sensors
         errs = msgspec.structs.replace(told, gps_lag_s=0.0) != SensorsSpec()
         tables = {"[boat]": scenario.boat is not None, "[waves]": scenario.waves is not None, "[sensors]": errs}
-        tables["[bottom]"] = scenario.bottom is not None
+        bottom = scenario.bottom
+        tables["[bottom] nmea"] = bottom is not None and bottom.nmea
         return [name for name, asked in tables.items() if asked]
 
     def fix(self) -> LiveFix | None:

@@ -17,13 +17,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from companion.app.options import SailOptions, SatelliteLink, at_once
 from companion.app.sail import OnStatus, sail
 from companion.clock import now_s
-from companion.compose import boat_of
+from companion.compose import boat_of, drying_of, tide_of
 from companion.disk import Disk
 from companion.errors import InputError, LinkError
 from companion.fold import Step
@@ -57,9 +59,11 @@ from sitl.scenario import (
     Outlet,
     Scenario,
     ScenarioVerdict,
+    TrueTrack,
     free_port,
     is_all_ordinary,
     judge,
+    over_drying_m,
     own_polar,
     recentre_m,
     scenario_departures,
@@ -70,7 +74,7 @@ from sitl.scenario import (
     tasks_of,
     under_keel_m,
 )
-from sitl.world import LEAST_M, MOST_M
+from sitl.world import LEAST_M, MOST_M, Seabed
 
 TRUTH_EVERY_S = 0.25
 MAX_TRUTH_SAMPLES = 20_000
@@ -297,13 +301,29 @@ async def run_embedded(
         marks=marks_of(mission),
         tasks=tasks_of(mission, scenario.epoch_s),
         keep_m=mission.traffic.safe_distance_m,
-        keel_m=None
-        if seabed is None or mission.boat.draft_m is None
-        else under_keel_m(world.truth, seabed, mission.boat.draft_m),
+        keel_m=keel_of(mission, world.truth, seabed, 0.0, scenario.epoch_s),
         **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict
+
+
+def keel_of(
+    mission: Mission, truth: TrueTrack, seabed: Seabed | None, began_s: float, epoch_s: float
+) -> NDArray[np.float64] | None:
+    """Return the room under the keel along a track [m]: over the bottom, else by the chart over what dries; or None.
+
+    The scenario began at ``began_s`` of the track's time, at the Unix time ``epoch_s``.
+    """
+    if mission.boat.draft_m is None:
+        return None
+    if seabed is not None:
+        return under_keel_m(truth, seabed, mission.boat.draft_m, began_s)
+    table = tide_of(mission) if mission.drying else None
+    if table is None:
+        return None
+    room_m = mission.options.area.under_keel_m
+    return over_drying_m(truth, drying_of(mission, mission.frame()), table, room_m, epoch_s - began_s)
 
 
 async def _sail_and_restart(

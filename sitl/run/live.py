@@ -32,7 +32,7 @@ from companion.geofence import load_mission
 from companion.telemetry.folder import DECISIONS, SUMMARY, VERDICT
 from sitl.faults import LINK_EVENTS, Relay, break_vane, impair
 from sitl.run.boats import LiveBoat, RealBoat, SimulatedBoat
-from sitl.run.embedded import TRUTH_EVERY_S, ends_of, marks_of, solid_of
+from sitl.run.embedded import TRUTH_EVERY_S, ends_of, keel_of, marks_of, solid_of
 from sitl.scenario import (
     TRAFFIC,
     EventSpec,
@@ -44,6 +44,8 @@ from sitl.scenario import (
     free_port,
     is_all_ordinary,
     judge,
+    scenario_seabed,
+    scenario_sounder,
     scenario_wind,
     tasks_of,
 )
@@ -291,6 +293,7 @@ async def _run(
     mission = load_mission(mission_path)
     wind = scenario_wind(scenario, source, seed)
     frame = mission.frame()
+    seabed = scenario_seabed(scenario, source, frame)
     folder.mkdir(parents=True, exist_ok=True)
     port = free_port()
     others = Others(frame, wind, seed, port=port)
@@ -298,7 +301,10 @@ async def _run(
         share = None if cpu is None else await stack.enter_async_context(cpu_share(cpu))
         boat: LiveBoat
         if kind == "ardurover":
-            boat = await stack.enter_async_context(RealBoat.start(scenario, mission, wind, program, pace, folder))
+            sounder = scenario_sounder(scenario, seabed, seed)
+            boat = await stack.enter_async_context(
+                RealBoat.start(scenario, mission, wind, program, pace, folder, sounder)
+            )
         else:
             boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace, scenario.epoch_s))
         relay, link = None, boat.link
@@ -374,6 +380,7 @@ async def _run(
         began_s=began_s,
         keep_m=mission.traffic.safe_distance_m,
         tasks=tasks_of(mission, scenario.epoch_s - began_s),
+        keel_m=keel_of(mission, truth, seabed, began_s, scenario.epoch_s),
         **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())

@@ -25,6 +25,8 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from companion.boat import Hull, outline_en_m
+from companion.current import TideTable
+from companion.skipper.way import DryingWater
 from companion.words import counted, one_line
 from sitl.scenario.colregs import Met, judge_encounter
 from sitl.scenario.scenario import ExpectSpec
@@ -325,6 +327,21 @@ def under_keel_m(truth: TrueTrack, seabed: Seabed, draft_m: float, began_s: floa
     samples = np.arange(len(places))
     fine = np.column_stack([np.interp(at, samples, places[:, axis]) for axis in (0, 1)])
     return seabed.depth_m(fine, np.interp(at, samples, t_s) - began_s) - draft_m
+
+
+def over_drying_m(
+    truth: TrueTrack, waters: Sequence[DryingWater], table: TideTable, under_keel_m: float, epoch_s: float
+) -> NDArray[np.float64] | None:
+    """Return the room under a keel by the chart where a track is in water that dries [m]; None: it is nowhere in it.
+
+    It is negative at its hours. ``epoch_s`` is the Unix time at 0 of the track's time.
+    """
+    places, room = truth.positions_m(), []
+    for water in waters:
+        for n in np.flatnonzero(shapely.contains_xy(water.polygon, places[:, 0], places[:, 1])).tolist():
+            height_m = table.height_m(epoch_s + truth.t_s[n])
+            room.append(-math.inf if height_m is None else water.room_m(height_m) + under_keel_m)
+    return np.asarray(room) if room else None
 
 
 def judge(

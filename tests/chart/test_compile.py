@@ -200,3 +200,18 @@ def test_long_edges_are_straight_in_longitude_and_latitude():
         east_m, north_m = frame.en_from_geo(GeoPoint(lat_deg=80.0, lon_deg=float(lon_deg)))
         assert is_solid(area, east_m, north_m, here)
         assert not is_solid(area, east_m, north_m + 12.0, here)
+
+
+def test_what_a_tide_makes_deep_enough_is_kept_apart_by_its_depth_and_takes_no_rocks_place():
+    """A rock on a bar is as solid as before when the bar has gone under."""
+    bar = Danger(geometry=square(0.0, 0.0, 200.0), reason="drying height", depth_m=-0.5)
+    flat = Danger(geometry=square(350.0, 0.0, 100.0), reason="drying height", depth_m=-2.5)
+    rock = Danger(geometry=square(0.0, 0.0, 0.0).centroid, reason="rock", radius_m=10.0, depth_m=-3.0)
+    chart = Chart(source=FIRST, dangers=(bar, flat, rock), coverage=square(0.0, 0.0, 3000.0), resolution_m=10.0)
+    plain = area_of([chart], HERE, 1000.0)
+    assert plain.drying == ()
+    assert {s.reason for s in plain.solids} == {"drying height"}  # the rock is in it
+    apart = area_of([chart], HERE, 1000.0, floats_m=-1.0)
+    assert [s.depth_m for s in apart.drying] == [-0.5]
+    assert {(s.reason, s.depth_m) for s in apart.always} == {("drying height", -2.5), ("rock", -3.0)}
+    assert json.loads(apart.drying_json())["features"][0]["properties"]["depth_m"] == -0.5

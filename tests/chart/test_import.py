@@ -125,6 +125,27 @@ def test_the_missions_table_of_the_tide_is_taken_where_hours_are_asked_for(shell
     assert (code, "less deep than 1.7 m\n" in out) == (0, True), out
 
 
+def test_water_that_dries_goes_to_a_file_of_its_own_which_a_mission_reads(shell):
+    row, header = "-9 -9 -9 -9 -9\n", "ncols 5\nnrows 5\nxllcorner -1.33\nyllcorner 50.80\ncellsize 0.01\n"
+    (shell.folder / "g.asc").write_text(header + 2 * row + "-9 -9 -9 -9 0.5\n" + 2 * row)
+    (shell.folder / "t.csv").write_text(TIDE)
+    text = MISSION.replace("[area]\n", '[area]\ntide = "t.csv"\ndrying = ["m-chart-drying.geojson"]\n')
+    (shell.folder / "m.toml").write_text(text)
+    code, out, _ = shell("g.asc", "--mission", "m.toml", "--radius", "1500", "--drying")
+    assert code == 0, out
+    assert "of water that is too shallow at some hours only" in out
+    assert 'drying = ["m-chart-drying.geojson"]' in out
+    pieces = json.loads((shell.folder / "m-chart-drying.geojson").read_text())["features"]
+    depths = [f["properties"]["depth_m"] for f in pieces]
+    solid = json.loads((shell.folder / "m-chart.geojson").read_text())["features"]
+    assert depths
+    assert all(1.7 - 4.0 <= depth < 1.7 for depth in depths)
+    assert not any("depth_m" in f["properties"] for f in solid)
+    assert len(load_mission(shell.folder / "m.toml").drying) == len(pieces)
+    told = refusal(shell, "g.asc", *AROUND, "--depth", "1.7", "--drying")
+    assert told.startswith("companion chart import: --drying: is by the hours of a table")
+
+
 @pytest.mark.parametrize(
     ("text", "begins", "told"),
     [

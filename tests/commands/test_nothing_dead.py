@@ -164,6 +164,7 @@ OTHER = {
         "point_radius_m": 15.0,
         "under_keel_m": 1.0,
         "tide": "heights.csv",
+        "drying": ["drying.geojson"],
     },
     "risk": {"delta_s": 0.8, "max_path_risk": 0.3},
     "boat": {
@@ -258,6 +259,13 @@ DRAWN = {("start", "heading_deg"), ("wind", "preview_from_deg")}
 RUN = {("skipper", "expansions"), ("skipper", "seed"), ("autopilot", "system")}  # the last: test_whose
 
 
+DRYING = (
+    '{"type":"Feature","properties":{"kind":"exclusion","name":"the bar","depth_m":-0.5},"geometry":'
+    '{"type":"Polygon","coordinates":[[[-1.32,50.8180],[-1.30,50.8180],[-1.30,50.8183],[-1.32,50.8183],'
+    "[-1.32,50.8180]]]}}"
+)
+
+
 def folder_with(path):
     for name, text in (("rock.wkt", ROCK), ("fence.wkt", FENCE), ("point.wkt", POINT), ("boat.toml", BOAT)):
         (path / name).write_text(text)
@@ -274,7 +282,10 @@ def mission(path, table="", key="", value=None):
     if table == "current":
         raw["current"] = {} if key == "table" else {"set_deg": 10.0, "drift_mps": 0.2}
         (path / "tide.csv").write_text("2026-11-21T12:00:00Z,90,0.6\n2026-11-21T13:00:00Z,90,0.2\n")
-    if key == "tide":
+    if key == "drying":
+        raw["boat"], raw["area"]["tide"] = {"draft_m": 1.0}, "heights.csv"
+        (path / "drying.geojson").write_text(DRYING)
+    if key in {"tide", "drying"}:
         (path / "heights.csv").write_text("2026-11-21T12:00:00Z, 3.1\n2026-11-21T18:00:00Z, 0.4\n")
     if table == "area" and key in {"axis", "point_radius_m"}:
         raw["area"]["obstacles"] = ["point.wkt"]
@@ -349,6 +360,8 @@ def base_for(path, table, key):
         return mission(path, "boat", "polar", 2.0)
     if key in {"under_keel_m", "transducer_m"}:
         return mission(path, "boat", "draft_m", 1.0)
+    if key == "drying":
+        return mission(path, "area", "drying", [])
     if (table, key) == ("goal", "heading_deg"):
         return mission(path, "skipper", "planner", "astar")
     if table == "planner":
@@ -381,6 +394,7 @@ def sailed(m):
             gates_of(voyage),
             voyage.area.obstacles_wkt(0.0),
             voyage.area.fence_wkt(0.0),
+            [(w.name, w.opens_at_m, w.polygon.wkt) for w in voyage.drying],
             speeds,
             rest,
             config_of(m),

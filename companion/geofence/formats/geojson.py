@@ -8,6 +8,7 @@ from the winding.
 from __future__ import annotations
 
 import json
+import math
 from typing import Any
 
 from shapely.geometry import LineString, Point, Polygon
@@ -103,8 +104,9 @@ class _GeoJsonReading(Reading):
         place = coordinates.path.removesuffix(".coordinates")
         if shape == "Polygon":
             rings = [[self._position(p) for p in ring] for ring in coordinates]
+            depth_m = _depth_m(properties)
             self.zones.extend(
-                Zone(kind=kind, shape=polygon, name=name, margin_m=margin_m)
+                Zone(kind=kind, shape=polygon, name=name, margin_m=margin_m, depth_m=depth_m)
                 for polygon in polygons_from_rings(rings, kind, place, self.findings)
             )
         elif shape == "LineString":
@@ -162,7 +164,10 @@ class _GeoJsonReading(Reading):
             radius_m = radius.number(0.0, 1e6)
             if radius_m <= 0.0:
                 raise radius.fail("a circle needs a positive radius")
-            self.zones.append(Zone(kind=kind, shape=Circle(point, radius_m), name=name, margin_m=margin_m))
+            depth_m = _depth_m(properties)
+            self.zones.append(
+                Zone(kind=kind, shape=Circle(point, radius_m), name=name, margin_m=margin_m, depth_m=depth_m)
+            )
         elif not (self.areas or properties.get("kind") or margin_m is not None):
             self.pins.append((point, 0.0, name))
         else:
@@ -200,6 +205,15 @@ class _GeoJsonReading(Reading):
                 )
                 return False
         return True
+
+
+def _depth_m(properties: JsonNode) -> float | None:
+    """Return the depth that a chart's obstacle tells; None: none, or it is not a number in metres."""
+    node = properties.get("depth_m")
+    value = None if node is None else node.value
+    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+        return None
+    return float(value)
 
 
 def _item(point: GeoPoint, properties: JsonNode, *, rally: bool) -> MissionItem:
@@ -299,7 +313,7 @@ def write_geojson(document: Document) -> Written:
         features.append({"type": "Feature", "properties": kept, "geometry": geometry})
 
     for zone in document.zones:
-        extra = {"kind": zone.kind.value, "name": zone.name, "margin_m": zone.margin_m}
+        extra = {"kind": zone.kind.value, "name": zone.name, "margin_m": zone.margin_m, "depth_m": zone.depth_m}
         if isinstance(zone.shape, Circle):
             add(_point(zone.shape.center), radius_m=zone.shape.radius_m, **extra)
         else:

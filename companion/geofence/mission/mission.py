@@ -59,6 +59,8 @@ class Mission:
     findings: tuple[Finding, ...] = ()
     waters: Mapping[str, Shape] = field(default_factory=dict)
     """What atoms of fields lead out of, by their names."""
+    drying: tuple[Obstacle, ...] = ()
+    """Water that is too shallow at some hours only, each with its depth; it is not in ``area``."""
 
     @property
     def name(self) -> str:
@@ -239,7 +241,7 @@ def read_course(path: Path) -> Mission:
     options = _options_of(path, AS_IT_IS)
     if not options.goal:
         raise InputError(str(path), "goal", "is missing", GOAL_MISSING)
-    bare = msgspec.structs.replace(options.area, obstacles=(), fence=None)
+    bare = msgspec.structs.replace(options.area, obstacles=(), fence=None, drying=())
     return assembled(msgspec.structs.replace(options, area=bare), path)
 
 
@@ -294,6 +296,7 @@ def assembled(
         findings=(*name_findings(options.name, path), *findings),
         refuges=refuges_of(options),
         waters=reader.waters_of(options),
+        drying=load_drying(options, path, origin, given, far_m),
     )
     if mission.polar_path is not None:
         _require(
@@ -323,10 +326,11 @@ def load_area(
     origin: GeoPoint,
     given: Mapping[Path, bytes] = AS_IT_IS,
     far_m: float = FAR_M,
+    key: str = "obstacles",
 ) -> tuple[Area, tuple[Finding, ...]]:
     """Return the area that ``[area]`` names and what its files gave rise to; nothing of it is farther than ``far_m``.
 
-    Raises InputError.
+    ``key`` is what the mission calls the files of obstacles. Raises InputError.
     """
     folder = mission_path.parent
     obstacles: list[Obstacle] = []
@@ -348,7 +352,7 @@ def load_area(
         return document
 
     for name in options.obstacles:
-        document = load(name, "obstacles", ZoneKind.EXCLUSION)
+        document = load(name, key, ZoneKind.EXCLUSION)
         obstacles.extend(document.as_obstacles(options.point_radius_m))
         zones.extend(z for z in document.zones if z.kind is ZoneKind.INCLUSION)
     if options.fence is not None:
@@ -363,6 +367,34 @@ def load_area(
         zones.extend(document.zones)
         obstacles.extend(o for o in document.with_zones(()).as_obstacles(options.point_radius_m))
     return Area(obstacles=tuple(obstacles), fence=Fence(zones=tuple(zones))), tuple(findings)
+
+
+def load_drying(
+    options: MissionOptions,
+    mission_path: Path,
+    origin: GeoPoint,
+    given: Mapping[Path, bytes] = AS_IT_IS,
+    far_m: float = FAR_M,
+) -> tuple[Obstacle, ...]:
+    """Return the water that dries of the files that ``[area] drying`` names. Raises InputError."""
+    area = options.area
+    if not area.drying:
+        return ()
+    needs = (("[area] tide", area.tide, "name a table of the tide"), ("[boat] draft_m", options.boat.draft_m, "say it"))
+    for key, value, remedy in needs:
+        if value is None:
+            raise InputError(str(mission_path), "[area] drying", f"needs {key}: it is open by the hour", remedy)
+    bare = msgspec.structs.replace(area, obstacles=area.drying, fence=None)
+    found, _ = load_area(bare, mission_path, origin, given, far_m, key="drying")
+    for number, water in enumerate(found.solids, start=1):
+        if water.depth_m is None:
+            raise InputError(
+                str(mission_path),
+                "[area] drying",
+                f"{water.name or f'its piece {number}'} has no depth_m",
+                "name GeoJSON of `companion chart import --drying`, or put it among the obstacles",
+            )
+    return found.solids
 
 
 def check_places(mission: Mission) -> None:

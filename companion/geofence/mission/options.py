@@ -254,6 +254,8 @@ class AreaOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     tide: str | None = None
     """A table of the tide's heights beside the mission: lines of time, metres above the chart's datum; by it what was
     sounded is told below the datum."""
+    drying: tuple[str, ...] = ()
+    """Files of water that is too shallow at some hours of that table only, each piece with its ``depth_m``."""
 
 
 class RiskOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

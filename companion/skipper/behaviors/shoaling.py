@@ -50,7 +50,25 @@ def depth_ahead_m(ctx: StepContext) -> float | None:
     status, least_m = ctx.autopilot, ctx.config.least_depth_m
     if status is None or status.depth_m is None or least_m is None:
         return None
-    return status.depth_m + min(0.0, status.depth_rate_mps or 0.0) * TURN_S - least_m
+    here_m = status.depth_m - least_m
+    ahead_m = here_m + min(0.0, status.depth_rate_mps or 0.0) * TURN_S
+    charted_m = _charted_m(ctx) if ahead_m <= 0.0 else None
+    return ahead_m if charted_m is None else max(ahead_m, min(here_m, charted_m))
+
+
+def _charted_m(ctx: StepContext) -> float | None:
+    """Return the room that the chart tells of the water ahead that dries and is open now [m]; None: of none.
+
+    The slope up to a bar says nothing of its top that the chart does not: there only what is sounded counts.
+    """
+    boat, vehicle, now_s = ctx.boat_en, ctx.snapshot.vehicle, ctx.utc_s
+    tide_m = None if ctx.config.tide is None else ctx.config.tide.height_m(now_s)
+    if not ctx.voyage.drying or boat is None or vehicle is None or tide_m is None:
+        return None
+    course_rad = math.atan2(*vehicle.velocity_en_mps)
+    ahead = shapely.linestrings([boat, moved(boat, course_rad, TURN_S * vehicle.speed_mps)])
+    rooms = [w.room_m(tide_m) for w in ctx.voyage.drying if bool(shapely.intersects(w.polygon, ahead))]
+    return min(rooms) if rooms and min(rooms) > 0.0 else None
 
 
 def follow_soundings(ctx: StepContext) -> None:

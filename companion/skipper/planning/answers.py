@@ -19,6 +19,7 @@ from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.not_found import MORE, asks_again, not_found
+from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.track import clearance_text, of_way
 from companion.skipper.planning.uploads import is_begun_risky, is_riskier, upload
 from companion.skipper.planning.vessels import apart_m, meetings
@@ -155,7 +156,7 @@ def _keep_old(ctx: StepContext, pending: PendingPlan, plan: Plan) -> bool:
     # A vessel that the old route was planned clear of need not be kept so far from; it is held against its own discs.
     old = evaluate(replace(resolved(problem), targets=()), np.asarray([pending.start_en_m, *points]))
     gain = old.time_s - plan.cost_s
-    if not old.is_feasible:
+    if not old.is_feasible or closes_ahead(ctx) is not None:
         return False
     before_en, leg_from_en = None, route.leg_from_en_m[first]
     if pending.from_index is not None:
@@ -169,7 +170,7 @@ def _keep_old(ctx: StepContext, pending: PendingPlan, plan: Plan) -> bool:
     )
     if not seen.is_kept or is_riskier(problem, old.legs, plan.legs):
         return False
-    if problem.targets:
+    if problem.is_shared:
         tail = [(float(e), float(n)) for e, n in plan.waypoints_en]
         way = [*route.points_en_m[ctx.state.mission.index : first], *tail]
         verdict = decide(
@@ -267,7 +268,7 @@ def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, 
         )
         keep, set_current = len(old.items), 1
     route = splice(
-        ctx.voyage, ctx.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts
+        ctx.to_stay_in, ctx.known_config, old, keep=keep, tail=tail, twd_from_rad=facts.plan_twd_from_rad, facts=facts
     )
     if ctx.state.mission.route is not None and _is_same(ctx.state.mission.route, route):
         ctx.set(

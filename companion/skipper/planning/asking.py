@@ -16,6 +16,7 @@ from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
 from companion.skipper.planning.diversions import diversion, gate_for, homeward
 from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
+from companion.skipper.planning.tides import told
 from companion.skipper.planning.track import problem_tracking, steps
 from companion.skipper.planning.vessels import shares
 from companion.skipper.step import CancelPlan, Diversion, ReplanReason, RequestPlan, StepContext, WindHealth
@@ -51,11 +52,13 @@ def request(
     aim = _aim(ctx, target, gate, start, step)
     number = ctx.new_id()
     shared = shares(ctx, start.en_m, start.after_s, rung, step.delta_s)
+    water = told(ctx, start.en_m, start.after_s, step.margin_m)
+    voyage = ctx.with_closed(water.solid)
     name = ", ".join(part for part in (step.name, "start repaired" if start.text else "") if part)
     try:
         problem = Problem.from_json(
             problem_dict(
-                ctx.voyage,
+                voyage,
                 target,
                 start=start,
                 aim=aim,
@@ -77,6 +80,7 @@ def request(
                     ctx,
                     start,
                     from_index,
+                    area=voyage.area,
                     floor_m=min(ctx.config.margin_floor_m, ctx.config.margin_m),
                     forecast=forecast,
                 ),
@@ -86,7 +90,9 @@ def request(
         ctx.say(Severity.ERROR, "problem", f"no problem can be stated: {error}")
         ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(ctx.state.plans.retry)))
         return False
-    problem = replace(problem, delta_s=shared.delta_s, targets=shared.targets, vessels_part=shared.part)
+    problem = replace(
+        problem, delta_s=shared.delta_s, targets=(*shared.targets, *water.targets), vessels_part=shared.part
+    )
     facts = replace(
         ctx.blank_facts(number, step.margin_m, shared.delta_s, name),
         plan_twd_from_rad=over_ground(problem.wind.twd_from_rad, problem.wind.tws_mps or 0.0, current.planned_en_mps)[

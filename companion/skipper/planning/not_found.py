@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.planners import AUTO
 from companion.skipper.planning.asking import request
+from companion.skipper.planning.tides import opens_next
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, leads_there, too_risky, upload
 from companion.skipper.planning.vessels import meetings
@@ -16,6 +19,8 @@ from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.stemming import waiting_place
 
 FOUL = "current too strong"  # the code under which it is said
+TIDE = "waiting for the tide"  # the same
+TIDE_S = 120.0  # between two tries then, at most
 TRIES = 3  # of a planner that does not answer, before the next step of the ladder
 LESS, LEAST_EFFORT = 0.5, 0.05  # of the planning budget: after each request that was not answered; never less
 MORE = 1.2  # ... and after each that was
@@ -127,6 +132,14 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         )
         return
     wait = ctx.state.plans.retry.not_before_s - ctx.t_s
+    opens = opens_next(ctx)
+    if opens:
+        retry = ctx.state.plans.retry
+        soon_s = ctx.t_s + min(max(retry.not_before_s - ctx.t_s, 0.0), TIDE_S)
+        ctx.set(plans=changed(ctx.state.plans, retry=replace(retry, not_before_s=soon_s)))
+        ctx.say(Severity.WARNING, TIDE, f"no way before the tide is higher ({reason}): waiting; {opens}")
+        hold(ctx, opens)
+        return
     ctx.say(
         Severity.CRITICAL,
         "no plan at all",
@@ -177,7 +190,7 @@ def hold(ctx: StepContext, why: str, *, anew: bool = False) -> None:
         return  # already in the safe end of the mission
     config = ctx.known_config
     place, room = loiter_place(
-        ctx.voyage, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m
+        ctx.to_stay_in, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m
     )
     keep = state.mission.index
     end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)

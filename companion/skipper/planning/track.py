@@ -16,17 +16,17 @@ from companion.planner.track import ExpectedTrack, expected
 from companion.skipper.planning.ladder import Rung, rungs
 from companion.skipper.planning.statement import Start
 from companion.skipper.step.context import StepContext
-from companion.skipper.way.voyage import PointEn
+from companion.skipper.way.voyage import AreaLike, PointEn
 
 # What a straight leg's track may need, in steps: water that is grown by a margin is kept, and made before sailing.
 TRACKS_M = (2.0, 2.5, 4.0, 8.0)
 
 
 def problem_tracking(
-    ctx: StepContext, start: Start, from_index: int | None, *, floor_m: float, forecast: WindForecast
+    ctx: StepContext, start: Start, from_index: int | None, *, area: AreaLike, floor_m: float, forecast: WindForecast
 ) -> dict[str, Any]:
-    """Return the ``tracking`` of a problem: the autopilot's parameters, the hull, and what is solid as it is."""
-    limits, area, route = ctx.snapshot.limits, ctx.voyage.area, ctx.state.mission.route
+    """Return the ``tracking`` of a problem: the autopilot's parameters, the hull, and what is solid of ``area``."""
+    limits, route = ctx.snapshot.limits, ctx.state.mission.route
     helm = GuidanceModel.of(limits or AutopilotLimits(sail_xtrack_max_m=ctx.tack_corridor_m))
     before = None
     if from_index is not None and route is not None:

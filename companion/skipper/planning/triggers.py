@@ -12,6 +12,7 @@ from companion.messages import Severity
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
 from companion.skipper.planning.diversions import HOME, diversion, homeward, is_composed
+from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
 from companion.skipper.step import (
@@ -98,7 +99,7 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
         if is_composed(ctx) and route is not None and ctx.state.progress.gate in route.gate_of:
             return None  # what is on board leads to the goal's place: that is where it goes when it is not steered
         return _at_end(ctx) or _extension(ctx, bound)  # the mission on board need not be the way that is sailed
-    trigger = _traffic(ctx)
+    trigger = _traffic(ctx) or _tide(ctx)
     if trigger is None and not ctx.is_raised("wind untrusted"):
         trigger = _no_go(ctx)
     trigger = trigger or _position(ctx)
@@ -149,6 +150,16 @@ def _traffic(ctx: StepContext) -> Trigger | None:
     if since_s < interval_s or decide(met, since_replan_s=since_s, urgent_s=0.0) is not Decision.REPLAN:
         return None
     return Trigger(reason=ReplanReason.OBSTACLE, text=text, interval_s=interval_s, urgent=True)
+
+
+def _tide(ctx: StepContext) -> Trigger | None:
+    """The route leads over water that will be too shallow by then."""
+    met = closes_ahead(ctx)
+    if met is None:
+        return None
+    text = f"{met.name} is too shallow when she is there, in {met.in_s:.0f} s"
+    ctx.say(Severity.WARNING, "tide ahead", text)
+    return Trigger(reason=ReplanReason.OBSTACLE, text=text, interval_s=ctx.config.min_replan_interval_s, urgent=True)
 
 
 def board_end(ctx: StepContext, leg: tuple[PointEn, PointEn]) -> PointEn:

@@ -15,6 +15,7 @@ from companion.planner.risk import of_risky, path_risk, tacks_at_risk
 from companion.planner.track import ExpectedTrack
 from companion.skipper.board.mark import marked
 from companion.skipper.planning.autopilot_beats import room_m, tacks_fail
+from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.track import of_way
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step import Route, StepContext, UploadMission, UploadOutcome, UploadResult
@@ -260,7 +261,7 @@ def leads_there(ctx: StepContext, pending: PendingPlan) -> bool:
 def is_on_board_sound(ctx: StepContext) -> bool:
     """Return whether what is left of the mission on board is sound from where the boat is."""
     boat, ahead = ctx.boat_en, ctx.ahead()
-    return boat is not None and bool(ahead) and is_sound(ctx, [boat, *ahead])
+    return boat is not None and bool(ahead) and is_sound(ctx, [boat, *ahead]) and closes_ahead(ctx) is None
 
 
 def is_sound(ctx: StepContext, way: Sequence[PointEn]) -> bool:

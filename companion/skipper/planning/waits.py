@@ -24,10 +24,7 @@ FAR_SHARE = 0.6
 
 def utc_s(ctx: StepContext) -> float | None:
     """Return the Unix time by the autopilot's clock [s], None while that does not know it."""
-    status = ctx.snapshot.autopilot
-    if status is None or status.utc_at_boot_s is None or status.boot_s is None:
-        return None
-    return status.utc_at_boot_s + status.boot_s + max(0.0, ctx.t_s - status.t_s)
+    return ctx.utc_s
 
 
 def gun_in_s(ctx: StepContext, line: Line) -> float | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 from companion.boat import Afloat, as_learned, mark_of
 from companion.frozen import changed
@@ -56,9 +57,11 @@ from companion.skipper.step.state import (
 )
 from companion.skipper.way import Approach, Gate, PointEn, Voyage, bearing_rad, gates_of
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle, circle_of, drawn_of
+from companion.skipper.way.drying import SOLID_S, DryingWater
 from companion.skipper.way.position_plausibility import innovation_m
-from companion.skipper.way.shoals import Shoal, shoaled
+from companion.skipper.way.shoals import Shoal, shoaled, still_shoal
 from companion.skipper.way.stemming import Water
+from companion.skipper.way.voyage import AreaLike
 
 FRESH_S = 3.0  # a part older than this is not acted upon
 BEATEN_MPS = 10.0  # the wind in which the boat may have sailed while nobody looked
@@ -94,10 +97,30 @@ def _kept_in(voyage: Voyage, drawn: Drawn | None, circle: HomeCircle | None) -> 
     return replace(voyage, area=voyage.area.within(circle.en_m, circle.radius_m, circle.words))
 
 
-def _with_shoals(voyage: Voyage, state: SkipperState) -> Voyage:
-    """Return the voyage in what the shoals that were sounded leave of its water."""
+def _with_shoals(voyage: Voyage, state: SkipperState, config: SkipperConfig, utc_s: float | None) -> Voyage:
+    """Return the voyage in what the shoals that were sounded leave of its water, at the present height of the tide."""
     shoals = state.soundings.shoals
+    if shoals and config.tide is not None and config.least_depth_m is not None:
+        shoals = still_shoal(shoals, config.tide.height_m(utc_s), config.least_depth_m)
     return replace(voyage, area=shoaled(voyage.area, shoals)) if shoals else voyage
+
+
+@lru_cache(maxsize=16)
+def _filled(area: AreaLike, solid: tuple[DryingWater, ...]) -> AreaLike:
+    """Return the area with some of the water that dries as obstacles."""
+    return area.also(tuple(w.name for w in solid), tuple(w.polygon for w in solid), tuple(w.margin_m for w in solid))
+
+
+def _with_drying(voyage: Voyage, solid: tuple[DryingWater, ...]) -> Voyage:
+    """Return the voyage with some of the water that dries as obstacles."""
+    return replace(voyage, area=_filled(voyage.area, solid)) if solid else voyage
+
+
+def _utc_s(snapshot: Snapshot) -> float | None:
+    status = snapshot.autopilot
+    if status is None or status.utc_at_boot_s is None or status.boot_s is None:
+        return None
+    return status.utc_at_boot_s + status.boot_s + max(0.0, snapshot.t_s - status.t_s)
 
 
 def _is_fence_off(state: SkipperState, snapshot: Snapshot) -> bool:
@@ -123,8 +146,13 @@ class StepContext:
 
     def __init__(self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot) -> None:
         self.boat_of_file = voyage.boat
-        voyage = self._charted = with_learned_boat(voyage, config, state)
-        voyage = _with_shoals(voyage, state)
+        voyage = unfilled = with_learned_boat(voyage, config, state)
+        self.utc_s = _utc_s(snapshot)
+        """The Unix time by the autopilot's clock [s], None while that does not know it."""
+        closed = tuple(w for w in voyage.drying if w.is_closed(config.tide, self.utc_s, SOLID_S))
+        voyage = self._charted = _with_drying(voyage, closed)
+        self._unfilled = unfilled
+        voyage = _with_shoals(voyage, state, config, self.utc_s)
         self.circle = circle_of(voyage, snapshot.limits, snapshot.autopilot, snapshot.position_en_m)
         self.drawn = drawn_of(
             voyage.area, snapshot.fence, snapshot.limits, config.margin_m, is_off=_is_fence_off(state, snapshot)
@@ -206,11 +234,26 @@ class StepContext:
     def learn_shoals(self, shoals: tuple[Shoal, ...]) -> None:
         """Let these be the shoals that were sounded: from now on they are no water."""
         self.set(soundings=replace(self.state.soundings, shoals=shoals))
-        self.voyage = _kept_in(_with_shoals(self._charted, self.state), None, self.circle)
+        self.voyage = _kept_in(_with_shoals(self._charted, self.state, self.config, self.utc_s), None, self.circle)
         if self.drawn is not None:
             drawn = self.drawn.taken
             self.drawn = Drawn(taken=drawn, left=self.voyage.area.without(drawn, Drawn.words))
             self.voyage = replace(self.voyage, area=self.drawn.left)
+
+    def with_closed(self, solid: tuple[DryingWater, ...]) -> Voyage:
+        """Return the voyage in whose water just ``solid`` of what dries is solid, and not what is closed now."""
+        if not self.voyage.drying:
+            return self.voyage
+        voyage = _with_shoals(_with_drying(self._unfilled, solid), self.state, self.config, self.utc_s)
+        voyage = _kept_in(voyage, None, self.circle)
+        if self.drawn is None:
+            return voyage
+        return replace(voyage, area=voyage.area.without(self.drawn.taken, Drawn.words))
+
+    @property
+    def to_stay_in(self) -> Voyage:
+        """The voyage in the water that is deep enough whatever the tide does: for a place to loiter in."""
+        return self.with_closed(self.voyage.drying)
 
     def new_id(self) -> int:
         """Return a number not used before in this voyage."""

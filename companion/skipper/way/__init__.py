@@ -1,5 +1,6 @@
 """The way: the voyage's goals and gates, legs and points, what a path is worth in a wind. Values and geometry."""
 
+from companion.skipper.way.drying import TIDE_DOUBT_M, DryingWater, timed
 from companion.skipper.way.gates import Approach, Gate, gates_of
 from companion.skipper.way.geometry import along_m, bearing_rad, cross_track_m, distance_m, moved
 from companion.skipper.way.judge import half_width_rad, mean_twd_rad
@@ -21,9 +22,11 @@ from companion.skipper.way.voyage import (
 
 __all__ = [
     "FAR_M",
+    "TIDE_DOUBT_M",
     "Approach",
     "Box",
     "Composed",
+    "DryingWater",
     "Gate",
     "Goal",
     "Line",
@@ -44,5 +47,6 @@ __all__ = [
     "mean_twd_rad",
     "moved",
     "sweeps_over",
+    "timed",
     "water_at",
 ]

@@ -27,6 +27,7 @@ NEAR_M = 150.0
 DOUBT_M = 3.0  # where a sounding was taken ...
 DOUBT_SHARE = 0.3  # ... and of the way that the slope was followed
 KEPT_M = 2.0  # of the way to it that no doubt takes: the boat is not there yet
+RISES_M = 0.5  # of tide over a shoal before it is tried again
 _ROUND = 6  # chords of a quarter of a disc
 _OUTWARDS = 1.0 / math.cos(math.pi / (4.0 * _ROUND))
 
@@ -84,6 +85,17 @@ def found(
 def over(boat_en: PointEn, depth_m: float, tide_m: float | None = None) -> Shoal:
     """Return the shoal that a boat is over: nothing is known of it but where she is."""
     return Shoal(en_m=boat_en, radius_m=SOUNDED_M, doubt_m=DOUBT_M, depth_m=depth_m, tide_m=tide_m)
+
+
+def still_shoal(shoals: tuple[Shoal, ...], tide_m: float | None, least_m: float) -> tuple[Shoal, ...]:
+    """Return those that are shoal at a height of the tide; all where it is not known, or was not when they were found.
+
+    What lies ahead of the last sounding nobody has measured: the tide must have risen by ``RISES_M`` more than what
+    was sounded there lacks. She may be wrong then, too, and turns back as before.
+    """
+    if tide_m is None:
+        return shoals
+    return tuple(s for s in shoals if s.tide_m is None or tide_m < s.tide_m + (least_m - s.depth_m) + RISES_M)
 
 
 @functools.lru_cache(maxsize=8)

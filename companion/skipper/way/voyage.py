@@ -19,6 +19,7 @@ from companion.boat import Boat, outline_en_m
 from companion.field.tree import FieldTree
 from companion.geo.frame import LocalFrame
 from companion.geofence import Zone
+from companion.skipper.way.drying import DryingWater
 
 PointEn = tuple[float, float]
 
@@ -149,6 +150,14 @@ class AreaLike(Protocol):
         """The obstacles alone: for a boat that has got outside the limits."""
         ...
 
+    def __hash__(self) -> int:
+        """By identity: what is made of an area is kept by it."""
+        ...
+
+    def also(self, names: tuple[str, ...], polygons: tuple[Polygon, ...], margins_m: tuple[float, ...]) -> AreaLike:
+        """Return the area with more obstacles."""
+        ...
+
     def within(self, centre_en: PointEn, radius_m: float, name: str) -> AreaLike:
         """Return the area with one limit more: a circle."""
         ...
@@ -218,6 +227,7 @@ class Voyage:
     she stays. With ``recentre_m`` it is a passage: a frame serves until the boat is so far from its origin, then it is
     replaced (``companion.fold``), and ``area`` is what lies about the frame's origin. Nothing may be farther off than
     ``far_m``.
+    ``drying`` is water that is too shallow at some hours only; it is not in ``area``.
     """
 
     name: str
@@ -227,6 +237,7 @@ class Voyage:
     boat: Boat = field(compare=False)
     laps: int = 1
     refuges: tuple[Refuge, ...] = ()
+    drying: tuple[DryingWater, ...] = field(default=(), compare=False)
     home_en_m: PointEn | None = None
     onward_en_m: PointEn | None = None
     recentre_m: float | None = None

@@ -54,6 +54,9 @@ def write_copies(mission: Mission, recorder: Recorder) -> str:
 
     area = options["area"]
     area["obstacles"] = [copied(name) for name in mission.options.area.obstacles]
+    area["drying"] = [copied(name) for name in mission.options.area.drying]
+    if mission.options.area.tide is not None:
+        area["tide"] = copied(mission.options.area.tide)
     if mission.options.area.fence is not None:
         area["fence"] = copied(mission.options.area.fence)
     for goal in options["goal"]:

@@ -8,6 +8,7 @@ import pytest
 from shapely.geometry import box
 
 from companion.skipper.behaviors.position_doubt import follow, is_other_shut
+from companion.skipper.step import StepContext
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.saved import Persisted, SavedPlace
 from companion.skipper.step.state import Fix
@@ -24,8 +25,8 @@ def seen(*, at=(0.0, 0.0), jumped_m=0.0, clock=True, status=None, **parts):
     position = {"last_seen": Fix(t_s=NOW_S - 1.1, en_m=(at[0] - jumped_m, at[1]), velocity_en_mps=(2.0, 0.0))}
     ctx = moment(WAY, at=at, position=position | parts.pop("position", {}), **parts)
     told = {"utc_at_boot_s": UTC_S - 100.0 if clock else None, "boot_s": 100.0, "t_s": NOW_S} | (status or {})
-    ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, **told))
-    return ctx
+    snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, **told))
+    return StepContext(ctx.voyage, ctx.config, ctx.state, snapshot)
 
 
 def doubted(ctx):

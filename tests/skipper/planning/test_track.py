@@ -29,7 +29,13 @@ WALL = box(-4.0, 60.0, 60.0, 61.0)
 
 def tracking(now, **more):
     return problem_tracking(
-        now, Start(en_m=(0.0, 0.0), heading_rad=0.0), None, floor_m=6.0, forecast=now.snapshot.wind.forecast, **more
+        now,
+        Start(en_m=(0.0, 0.0), heading_rad=0.0),
+        None,
+        area=now.voyage.area,
+        floor_m=6.0,
+        forecast=now.snapshot.wind.forecast,
+        **more,
     )
 
 
@@ -160,7 +166,9 @@ WAY = route((100.0, 0.0), (200.0, 50.0), (300.0, 50.0), (300.0, 50.0))
 def test_a_problem_says_where_the_leg_before_it_begins(from_index, lead_in, way, before):
     now = moment(way, at=(7.0, 8.0))
     start = Start(en_m=(0.0, 0.0), heading_rad=0.0, lead_in=lead_in)
-    part = problem_tracking(now, start, from_index, floor_m=6.0, forecast=now.snapshot.wind.forecast)
+    part = problem_tracking(
+        now, start, from_index, area=now.voyage.area, floor_m=6.0, forecast=now.snapshot.wind.forecast
+    )
     assert part["before"] == before
 
 

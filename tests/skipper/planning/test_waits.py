@@ -10,6 +10,7 @@ from shapely.geometry import box
 
 from companion.skipper.planning import waits
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, utc_s, waiting_en, waits_for_gun
+from companion.skipper.step import StepContext
 from companion.skipper.step.state import Inside
 from companion.skipper.way.voyage import Box, Goal, Line
 from tests.skipper.moments import NOW_S, moment, route
@@ -23,8 +24,7 @@ def before_line(*, line=LINE, clock=(None, None), clock_age_s=0.0, **parts):
     goals = (Goal(en_m=(0.0, 200.0), name="start", line=line), Goal(en_m=(0.0, 900.0), name="one"))
     ctx = moment(WAY, goals=goals, **parts)
     status = replace(ctx.snapshot.autopilot, t_s=NOW_S - clock_age_s, utc_at_boot_s=clock[0], boot_s=clock[1])
-    ctx.snapshot = replace(ctx.snapshot, autopilot=status)
-    return ctx
+    return StepContext(ctx.voyage, ctx.config, ctx.state, replace(ctx.snapshot, autopilot=status))
 
 
 # ------------------------------------------------------------------------------------------------- the clock
@@ -41,8 +41,8 @@ def before_line(*, line=LINE, clock=(None, None), clock_age_s=0.0, **parts):
 def test_the_time_of_day_is_the_autopilot_s(clock, age_s, now_s):
     assert utc_s(before_line(clock=clock, clock_age_s=age_s)) == now_s
     ctx = before_line()
-    ctx.snapshot = replace(ctx.snapshot, autopilot=None)
-    assert utc_s(ctx) is None
+    silent = replace(ctx.snapshot, autopilot=None)
+    assert utc_s(StepContext(ctx.voyage, ctx.config, ctx.state, silent)) is None
 
 
 @pytest.mark.parametrize(
@@ -207,6 +207,6 @@ def test_how_long_she_stays_in_a_box(for_s, inside, left_s):
     goal = Goal(en_m=(0.0, 0.0), name="box", box=Box(area_en=box(-50, -50, 50, 50), for_s=for_s))
     ctx = moment(WAY, goals=(goal,), progress={"inside": inside})
     status = replace(ctx.snapshot.autopilot, t_s=NOW_S, utc_at_boot_s=1.0e6, boot_s=120.0)
-    ctx.snapshot = replace(ctx.snapshot, autopilot=status)
+    ctx = StepContext(ctx.voyage, ctx.config, ctx.state, replace(ctx.snapshot, autopilot=status))
     assert stay_left_s(ctx, ctx.gate) == left_s
     assert stay_left_s(ctx, replace(ctx.gate, box=None)) == math.inf

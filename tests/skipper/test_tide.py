@@ -1,0 +1,124 @@
+"""Water that dries under way: waited for, planned over at its hours, given up where the way comes to it too late."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from shapely.geometry import box
+
+from companion.current import TideRow, TideTable
+from companion.skipper.behaviors.shoaling import depth_ahead_m
+from companion.skipper.planning.tides import closes_ahead, opens_next
+from companion.skipper.step import StepContext
+from companion.skipper.way.drying import DryingWater
+from companion.skipper.way.shoals import RISES_M, Shoal, still_shoal
+from companion.skipper.way.voyage import Goal
+from tests.skipper.test_voyage import is_done, make, said
+
+EAST = math.radians(90.0)
+UTC_S = 1_000_000.0
+GOAL = Goal(en_m=(0.0, 300.0), radius_m=6.0, name="the goal")
+BAR = DryingWater(name="the bar", polygon=box(-400.0, 130.0, 400.0, 170.0), margin_m=0.0, opens_at_m=1.0)
+
+
+def voyage_over_a_bar(*heights, bar=BAR, **config):
+    """Return a voyage across a bar by a table of ``heights`` (seconds after the start, metres)."""
+    rows = tuple(TideRow(utc_s=UTC_S + t, height_m=h) for t, h in heights)
+    world = make(GOAL, obstacles=(), wind=lambda t: (EAST, 5.0), config={"tide": TideTable(rows=rows), **config})
+    world.skipper = replace(world.skipper, voyage=replace(world.skipper.voyage, drying=(bar,)))
+    world.shown |= {"utc_at_boot_s": UTC_S - world.boot_s}
+    return world
+
+
+def context(world):
+    return StepContext(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
+
+
+def test_she_waits_off_a_bar_and_goes_over_it_when_the_tide_has_risen():
+    world = voyage_over_a_bar((-1000.0, 0.0), (1400.0, 2.0))
+    crossed, opens_s = [], BAR.closed_s(world.skipper.config.tide, UTC_S)[0][1]
+
+    def watch(w):
+        if BAR.polygon.contains(box(*w.position, w.position[0] + 0.1, w.position[1] + 0.1)):
+            crossed.append(w.t)
+        return is_done(w)
+
+    assert world.run(1500, watch)
+    assert world.state.progress.reached == (0,)
+    assert crossed
+    assert min(crossed) > opens_s
+
+
+def test_where_nothing_opens_until_later_she_holds_and_says_what_she_waits_for():
+    limits = box(-60.0, -100.0, 60.0, 400.0)
+    world = voyage_over_a_bar((-1000.0, 0.0), (9000.0, 2.0))
+    held = world.skipper.voyage
+    world.skipper = replace(world.skipper, voyage=replace(held, area=replace(held.area, limits=limits)))
+    world.run(240)
+    assert said(world, "waiting for the tide")
+    assert world.position[1] < 130.0
+    assert "the bar opens at" in opens_next(context(world))
+
+
+def test_an_open_bar_that_closes_before_she_is_there_is_a_reason_to_plan_again():
+    world = voyage_over_a_bar((-1000.0, 2.0), (100_000.0, 1.9))
+    assert world.run(60, lambda w: w.state.voyage.sailing)
+    assert closes_ahead(context(world)) is None
+    world.skipper = replace(
+        world.skipper,
+        config=replace(
+            world.skipper.config,
+            tide=TideTable(
+                rows=(TideRow(utc_s=UTC_S - 100.0, height_m=2.0), TideRow(utc_s=UTC_S + 80.0, height_m=0.0))
+            ),
+        ),
+    )
+    met = closes_ahead(context(world))
+    assert met is not None
+    assert met.name == "the bar"
+    world.run(5)
+    assert said(world, "tide ahead")
+
+
+def test_a_place_to_stay_in_is_never_in_water_that_dries():
+    now = context(voyage_over_a_bar((-1000.0, 2.0), (100_000.0, 1.9)))
+    assert float(now.voyage.area.clearance_m([(0.0, 150.0)])[0]) > 0.0
+    assert float(now.to_stay_in.area.clearance_m([(0.0, 150.0)])[0]) < 0.0
+
+
+@pytest.mark.parametrize(("height_m", "is_solid"), [(0.2, True), (1.8, False)])
+def test_what_is_closed_for_long_is_solid_for_all_that_looks_at_the_water(height_m, is_solid):
+    now = context(voyage_over_a_bar((-1000.0, height_m), (100_000.0, height_m)))
+    assert (float(now.voyage.area.clearance_m([(0.0, 150.0)])[0]) < 0.0) is is_solid
+
+
+def test_the_slope_up_to_an_open_bar_is_no_alarm_and_a_sounding_is():
+    world = voyage_over_a_bar((-1000.0, 2.0), (100_000.0, 2.0), least_depth_m=1.0)
+    world.run(60, lambda w: w.state.voyage.sailing and w.position[1] > 60.0)
+    world.shown |= {"sounds": True, "depth_m": 4.0, "depth_rate_mps": -0.3}
+    now = context(world)
+    now.snapshot = replace(now.snapshot, vehicle=replace(now.snapshot.vehicle, velocity_en_mps=(0.0, 6.0)))
+    assert depth_ahead_m(now) == pytest.approx(BAR.room_m(2.0))
+    bare = voyage_over_a_bar((-1000.0, 2.0), (100_000.0, 2.0), least_depth_m=1.0, bar=replace(BAR, opens_at_m=3.0))
+    bare.state, bare.position = world.state, world.position
+    bare.shown |= {"sounds": True, "depth_m": 4.0, "depth_rate_mps": -0.3}
+    assert depth_ahead_m(context(bare)) == pytest.approx(4.0 - 6.0 - 1.0)
+    world.shown |= {"depth_m": 0.8}
+    now = context(world)
+    now.snapshot = replace(now.snapshot, vehicle=replace(now.snapshot.vehicle, velocity_en_mps=(0.0, 6.0)))
+    assert depth_ahead_m(now) == pytest.approx(-0.2)
+
+
+def test_a_rising_tide_opens_a_shoal_that_was_sounded_again_and_a_falling_one_closes_it():
+    shoal = Shoal(en_m=(0.0, 150.0), radius_m=20.0, doubt_m=3.0, depth_m=1.4, tide_m=0.5)
+    untold = replace(shoal, tide_m=None)
+    least_m = 2.0
+    opens_m = 0.5 + 0.6 + RISES_M
+    assert still_shoal((shoal, untold), opens_m - 0.01, least_m) == (shoal, untold)
+    assert still_shoal((shoal, untold), opens_m, least_m) == (untold,)
+    assert still_shoal((shoal, untold), None, least_m) == (shoal, untold)
+    for height_m, is_solid in ((0.5, True), (opens_m + 0.1, False), (0.9, True)):
+        world = voyage_over_a_bar((-1000.0, height_m), (100_000.0, height_m), bar=replace(BAR, opens_at_m=-9.0))
+        world.run(1)
+        world.state = replace(world.state, soundings=replace(world.state.soundings, shoals=(shoal,)))
+        assert (float(context(world).voyage.area.clearance_m([(0.0, 150.0)])[0]) < 0.0) is is_solid
