@@ -25,14 +25,15 @@ examples:
   companion passage plan biscay.toml --depart 2026-04-20T00:00Z..2026-04-22T00:00Z --every 6h --explain
 
 PASSAGE.toml names start, goal, departure, forecasts in GRIB, boat and land; its keys are in docs/reference/formats.md.
-The route is the fastest in the forecast's first member, with a time that no way can be faster than. Ashore, before she
-sails.
+Of one forecast the route is the fastest, with a time that no way can be faster than; of an ensemble the one that all
+its members sail well, as surely as [depart] sure asks. Ashore, before she sails.
 
 Exit codes: 0 planned, 1 no way was found, 2 a file that cannot be believed.
 """
 
 
 NODES = 120  # from start to goal, of the first search
+CANDIDATES = 7  # members whose own best routes are tried for one departure
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
@@ -54,7 +55,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         help="compare departures: 2026-04-20T00:00Z..2026-04-22T00:00Z, sailed in every member of the forecast",
     )
     plan.add_argument("--every", type=duration, default=21_600.0, metavar="6h", help="of --depart (6h)")
-    plan.add_argument("--by", type=moment, metavar="TIME", help="with --depart, the chance to be there by a time")
+    plan.add_argument(
+        "--by", type=moment, metavar="TIME", help="she is to be there by then ([depart] by): the chance of it"
+    )
     plan.add_argument("--explain", action="store_true", help="with --depart, what waiting costs and what is against it")
     force_option(plan)
     plan.set_defaults(run=_plan)
@@ -86,10 +89,15 @@ def _sweep(args: argparse.Namespace) -> int:
     if count > MOST_DEPARTURES:
         raise InputError("companion passage plan", "--every", f"makes {count} departures of it", "say a longer time")
     asked, passage = _read(args.file, departs_utc_s=begins)
-    by = None if args.by is None else args.by.timestamp()
+    by = _by(args, asked)
     with patience("planning"):
         departures = sweep(
-            passage, (begins + args.every * np.arange(count)).tolist(), speed_error_of(asked.boat), nodes=NODES // 2
+            passage,
+            (begins + args.every * np.arange(count)).tolist(),
+            speed_error_of(asked.boat),
+            nodes=NODES // 2,
+            by_utc_s=math.inf if by is None else by,
+            sure=asked.depart.sure,
         )
     for line in told_of_departures(departures, by):
         print(line)
@@ -105,6 +113,33 @@ def _sweep(args: argparse.Namespace) -> int:
     return 0 if best(departures, math.inf if by is None else by) is not None else JobError.exit_code
 
 
+def _by(args: argparse.Namespace, asked: PassageFile) -> float | None:
+    """Return until when she is to be there [Unix s], None where nobody says."""
+    by = asked.depart.by if args.by is None else args.by
+    return None if by is None else by.timestamp()
+
+
+def _in_all(args: argparse.Namespace, asked: PassageFile, passage: Passage) -> Route:
+    """Print what an ensemble makes of a departure; return its route."""
+    from companion.compose import speed_error_of
+    from companion.passage import sweep
+    from companion.passage.told import told_of, told_of_chances
+
+    by = _by(args, asked)
+    [found] = sweep(
+        passage,
+        [asked.depart.at.timestamp()],
+        speed_error_of(asked.boat),
+        nodes=NODES,
+        by_utc_s=math.inf if by is None else by,
+        sure=asked.depart.sure,
+        candidates=CANDIDATES,
+    )
+    for line in (*told_of(found.route, found), *told_of_chances(found, by, asked.depart.sure)):
+        print(line)
+    return found.route
+
+
 def _plan(args: argparse.Namespace) -> int:
     from companion.passage import plan
     from companion.passage.told import told_of
@@ -115,15 +150,19 @@ def _plan(args: argparse.Namespace) -> int:
                 "companion passage plan", "--depart", "writes no mission", "plan the best of them with --out"
             )
         return _sweep(args)
-    if args.explain or args.by is not None:
-        raise InputError("companion passage plan", "--explain and --by", "are of a --depart FROM..TO", "say it, too")
+    if args.explain:
+        raise InputError("companion passage plan", "--explain", "is of a --depart FROM..TO", "say it, too")
     if args.out is not None:
         refuse_existing([str(args.out)], force=args.force)
     asked, passage = _read(args.file)
-    with patience("planning"):
-        route = plan(passage, asked.depart.at.timestamp(), nodes=NODES)
-    for line in told_of(route):
-        print(line)
+    if len(passage.weather.members) > 1 or _by(args, asked) is not None:
+        with patience("planning"):
+            route = _in_all(args, asked, passage)
+    else:
+        with patience("planning"):
+            route = plan(passage, asked.depart.at.timestamp(), nodes=NODES)
+        for line in told_of(route):
+            print(line)
     if args.plot is not None and route.waypoints:
         from companion.plots.passage import save_passage
 

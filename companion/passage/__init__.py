@@ -12,9 +12,10 @@ from companion.passage.kernels import Craft
 from companion.passage.land import Land, land_of
 from companion.passage.plan import Outcome, Passage, Route, plan
 from companion.passage.replay import Sailed, sail
-from companion.passage.sweep import Departure, at_most, best, sweep
+from companion.passage.sweep import SURE, Departure, at_least, at_most, best, shown, sweep
 
 __all__ = [
+    "SURE",
     "Craft",
     "Departure",
     "Land",
@@ -23,11 +24,13 @@ __all__ = [
     "PassageFrame",
     "Route",
     "Sailed",
+    "at_least",
     "at_most",
     "best",
     "craft_of",
     "land_of",
     "plan",
     "sail",
+    "shown",
     "sweep",
 ]

@@ -38,6 +38,10 @@ class DepartOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """``[depart]``: when she sets sail."""
 
     at: Annotated[dt.datetime, Meta(tz=True)]
+    by: Annotated[dt.datetime, Meta(tz=True)] | None = None
+    """She is to be there by then; `--by` counts before it."""
+    sure: Annotated[float, Meta(gt=0.0, lt=1.0)] = 0.9
+    """With this chance, by the members of the forecast and her doubtful speed; of routes so sure the fastest counts."""
 
 
 class WeatherOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

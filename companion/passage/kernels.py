@@ -240,28 +240,54 @@ def cross(
 
 
 @kernel
-def arrivals(
+def _fastest(w: Waters, craft: Craft, i: int, j: int, ii: int, jj: int, begins: float, ends: float) -> float:
+    """Return the least time [s] from node (ii, jj) to (i, j) in the best wind on either between two times, or inf."""
+    shrink = math.cos((w.first_y_m + 0.5 * (j + jj) * w.step_m) / w.radius_m)
+    dx, dy = (i - ii) * w.step_m * shrink, (j - jj) * w.step_m
+    length = math.hypot(dx, dy)
+    last = min(int(np.searchsorted(w.t_s, ends)), w.t_s.shape[0] - 1)
+    fastest = 0.0
+    for k in range(max(0, int(np.searchsorted(w.t_s, begins, side="right")) - 1), last + 1):
+        for at_end in range(2):
+            b, a = (j, i) if at_end else (jj, ii)
+            wx, wy = w.wind[k, b, a, 0], w.wind[k, b, a, 1]
+            cx = w.stream[k, b, a, 0] if w.has_stream else 0.0
+            cy = w.stream[k, b, a, 1] if w.has_stream else 0.0
+            if not math.isnan(wx + wy + cx + cy):
+                fastest = max(fastest, made_good(craft, wx, wy, cx, cy, dx / length, dy / length))
+    return length / fastest if fastest > 1e-6 else math.inf
+
+
+@kernel
+def labels(
     w: Waters,
     craft: Craft,
     allowed: NDArray[np.bool_],
     blocked: NDArray[np.uint64],
-    start: int,
-    goal: int,
+    first: int,
+    last: int,
     t: float,
     step_s: float,
+    earliest: Floats,
+    found_s: float,
 ) -> tuple[Floats, NDArray[np.int32], int, int]:
-    """Return the earliest arrivals [Unix s, inf], the nodes before, and how often wind was unknown and too strong.
+    """Return a label for each node [s, inf], the nodes before, and how often wind was unknown and too strong.
 
-    Label setting (Dijkstra's): nodes are left in the order of their arrivals, the goal last. Bit d of ``blocked``
-    closes the direction d of the stencil.
+    Label setting (Dijkstra's): nodes are left in the order of their labels, ``last`` the last. Bit d of ``blocked``
+    closes the direction d of the stencil. Without ``earliest`` (no element) a label is the earliest arrival of who
+    departs at ``t`` [Unix s]. With it, it is the least time left to ``first``, backwards, each way in the best wind
+    that she can meet on it: no sooner than she can be there (``earliest``, less what the stencil may have cost)
+    and no later than leaves time for the rest, if she is to be there in less than ``found_s``.
     """
     ny, nx = w.wind.shape[1], w.wind.shape[2]
-    arrive = np.full(ny * nx, math.inf)
+    is_back = earliest.shape[0] > 0
+    sign = -1 if is_back else 1
+    label = np.full(ny * nx, math.inf)
     before = np.full(ny * nx, -1, dtype=np.int32)
     done = np.zeros(ny * nx, dtype=np.bool_)
     keys, items, n = np.empty(1024), np.empty(1024, dtype=np.int32), 0
-    arrive[start] = t
-    keys, items, n = push(keys, items, n, t, start)
+    label[first] = 0.0 if is_back else t
+    keys, items, n = push(keys, items, n, label[first], first)
     unknown = strong = 0
     while n > 0:
         node = int(items[0])
@@ -269,83 +295,37 @@ def arrivals(
         if done[node]:
             continue
         done[node] = True
-        if node == goal:
+        if node == last:
             break
         j, i = node // nx, node % nx
         x, y = w.first_x_m + i * w.step_m, w.first_y_m + j * w.step_m
         for d in range(STENCIL.shape[0]):
             if (blocked[node] >> np.uint64(d)) & np.uint64(1):
                 continue
-            ii, jj = i + STENCIL[d, 0], j + STENCIL[d, 1]
+            ii, jj = i + sign * STENCIL[d, 0], j + sign * STENCIL[d, 1]
             if ii < 0 or jj < 0 or ii >= nx or jj >= ny:
                 continue
             other = jj * nx + ii
             if done[other] or not allowed[other]:
                 continue
-            there, status = cross(
-                w, craft, x, y, w.first_x_m + ii * w.step_m, w.first_y_m + jj * w.step_m, arrive[node], step_s
-            )
+            if is_back:
+                begins, ends = t + SLACK * (earliest[other] - t), t + found_s - label[node]
+                if not begins <= ends:
+                    continue
+                there, status = label[node] + _fastest(w, craft, i, j, ii, jj, begins, ends), KNOWN
+            else:
+                there, status = cross(
+                    w, craft, x, y, w.first_x_m + ii * w.step_m, w.first_y_m + jj * w.step_m, label[node], step_s
+                )
             if status == UNKNOWN:
                 unknown += 1
             elif status == OVER_LIMIT:
                 strong += 1
-            elif status == KNOWN and there < arrive[other]:
-                arrive[other] = there
+            elif status == KNOWN and there < label[other]:
+                label[other] = there
                 before[other] = node
                 keys, items, n = push(keys, items, n, there, other)
-    return arrive, before, unknown, strong
-
-
-@kernel
-def least_left(w: Waters, craft: Craft, arrive: Floats, start: int, goal: int, t: float, found_s: float) -> float:
-    """Return the least time from ``start`` to ``goal`` [s], each way crossed in the best wind that she can meet on it.
-
-    Backwards from the goal: a way from a node is sailed no sooner than she can be there (``arrive``, less what the
-    stencil may have cost) and no later than leaves time for the rest, if she is to be faster than ``found_s``. Land is
-    left out.
-    """
-    ny, nx = w.wind.shape[1], w.wind.shape[2]
-    left = np.full(ny * nx, math.inf)
-    done = np.zeros(ny * nx, dtype=np.bool_)
-    keys, items, n = np.empty(1024), np.empty(1024, dtype=np.int32), 0
-    left[goal] = 0.0
-    keys, items, n = push(keys, items, n, 0.0, goal)
-    last = w.t_s.shape[0] - 1
-    while n > 0:
-        node = int(items[0])
-        n = pop(keys, items, n)
-        if done[node]:
-            continue
-        done[node] = True
-        if node == start:
-            break
-        j, i = node // nx, node % nx
-        until = t + found_s - left[node]
-        end = min(int(np.searchsorted(w.t_s, until)), last)
-        for d in range(STENCIL.shape[0]):
-            ii, jj = i - STENCIL[d, 0], j - STENCIL[d, 1]
-            if ii < 0 or jj < 0 or ii >= nx or jj >= ny:
-                continue
-            other = jj * nx + ii
-            begins = t + SLACK * (arrive[other] - t)
-            if done[other] or not begins <= until:
-                continue
-            shrink = math.cos((w.first_y_m + 0.5 * (j + jj) * w.step_m) / w.radius_m)
-            dx, dy = STENCIL[d, 0] * w.step_m * shrink, STENCIL[d, 1] * w.step_m
-            length = math.hypot(dx, dy)
-            fastest = 0.0
-            for k in range(max(0, int(np.searchsorted(w.t_s, begins, side="right")) - 1), end + 1):
-                for at_end in range(2):
-                    b, a = (j, i) if at_end else (jj, ii)
-                    wx, wy = w.wind[k, b, a, 0], w.wind[k, b, a, 1]
-                    cx = w.stream[k, b, a, 0] if w.has_stream else 0.0
-                    cy = w.stream[k, b, a, 1] if w.has_stream else 0.0
-                    if not math.isnan(wx + wy + cx + cy):
-                        fastest = max(fastest, made_good(craft, wx, wy, cx, cy, dx / length, dy / length))
-            if fastest > 1e-6 and left[node] + length / fastest < left[other]:
-                left[other] = left[node] + length / fastest
-                keys, items, n = push(keys, items, n, left[other], other)
-    return float(left[start])
+    return label, before, unknown, strong
 
 
 @kernel

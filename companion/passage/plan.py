@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.messages import GeoPoint
 from companion.passage.frame import GEOD, Floats, PassageFrame, up_of
-from companion.passage.kernels import SLACK, STENCIL, Craft, Waters, arrivals, least_left, polyline
+from companion.passage.kernels import SLACK, STENCIL, Craft, Waters, labels, polyline
 from companion.passage.land import Land
 from companion.passage.replay import Sailed, sail
 from companion.weather import Weather
@@ -24,6 +24,7 @@ _LEAST_ROOM_M = 15_000.0
 _MOST_WIDENINGS = 2
 _MOST_SIDE_M, _MOST_ROUND_M = 8.0e6, 3.6e7  # 72 and 324 degrees
 _STEPS_AN_EDGE = 2
+WITHIN = 0.98  # of the most wind, what is planned through: between the grid's nodes there is a little more
 
 
 class Outcome(enum.Enum):
@@ -127,6 +128,9 @@ def times_of(weather: Weather, from_s: float, to_s: float) -> Floats:
 def plan(passage: Passage, depart_utc_s: float, member: int | None = None, *, nodes: int = COARSE) -> Route:
     """Return the fastest way for a departure in one member (the first), by so many nodes from start to goal."""
     member = passage.weather.members[0] if member is None else member
+    bold = passage.craft
+    careful = bold._replace(max_tws_mps=WITHIN * bold.max_tws_mps)
+    passage = replace(passage, craft=careful, weather=passage.weather.only(member))
     frame, length_m = passage.frame, passage.frame.length_m
     step_m = length_m / nodes
     last_s = max(float(cube.utc_s[-1]) for cube in passage.weather.wind)
@@ -169,9 +173,9 @@ def plan(passage: Passage, depart_utc_s: float, member: int | None = None, *, no
         *(GeoPoint(lat_deg=float(a), lon_deg=float(o)) for a, o in zip(lat[1:-1], lon[1:-1], strict=True)),
         passage.goal,
     )
-    sailed = sail(passage.weather, passage.craft, waypoints, depart_utc_s, passage.radius_m, (member,))[0]
+    sailed = sail(passage.weather, bold, waypoints, depart_utc_s, passage.radius_m, (member,))[0]
     ends = _ends(passage, x_m, y_m)
-    bound = SLACK * least_left(waters, passage.craft, coarse.table.ravel(), *ends, depart_utc_s, sailed.time_s)
+    bound = SLACK * _least_left(waters, passage.craft, coarse.table, ends, depart_utc_s, sailed.time_s)
     return Route(
         outcome=Outcome.FOUND,
         depart_utc_s=depart_utc_s,
@@ -214,8 +218,9 @@ def _search(
     ny, nx = y_m.size, x_m.size
     start, goal = _ends(passage, x_m, y_m)
     allowed = np.ones(ny * nx, dtype=np.bool_) if mask is None else mask.ravel()
-    arrive, before, unknown, strong = arrivals(
-        waters, passage.craft, allowed, blocked, start, goal, depart_s, _step_s(waters.step_m)
+    step_s = _step_s(waters.step_m)
+    arrive, before, unknown, strong = labels(
+        waters, passage.craft, allowed, blocked, start, goal, depart_s, step_s, np.empty(0), 0.0
     )
     table = arrive.reshape(ny, nx)
     if not math.isfinite(arrive[goal]):
@@ -229,6 +234,17 @@ def _search(
         nodes.append(int(before[nodes[-1]]))
     path = np.array([(x_m[n % nx], y_m[n // nx]) for n in nodes[::-1]])
     return _Found(outcome=Outcome.FOUND, path=path, arrive_s=float(arrive[goal]), table=table)
+
+
+def _least_left(
+    waters: Waters, craft: Craft, arrive_s: Floats, ends: tuple[int, int], depart_s: float, found_s: float
+) -> float:
+    """Return the least time from start to goal [s] that the grid shows, backwards from the goal. Land is left out."""
+    start, goal = ends
+    earliest = arrive_s.ravel()
+    allowed, blocked = np.ones(earliest.size, dtype=np.bool_), np.zeros(earliest.size, dtype=np.uint64)
+    left, *_ = labels(waters, craft, allowed, blocked, goal, start, depart_s, 0.0, earliest, found_s)
+    return float(left[start])
 
 
 def _is_joined(blocked: NDArray[np.uint64], allowed: NDArray[np.bool_], columns: int, start: int, goal: int) -> bool:

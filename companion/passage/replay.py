@@ -22,7 +22,7 @@ BEAT_RAD = math.radians(50.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sailed:
-    """A route sailed in one member.
+    """A route sailed in one member, by a ``share`` of her speeds.
 
     ``rows`` are (time [Unix s], way [m], speed made good, wind [m/s], angle of the course to the wind [rad], night) by
     steps of five minutes at the most, ``places`` (n, 2) the latitudes and longitudes to them [deg]. ``why`` is empty
@@ -36,6 +36,12 @@ class Sailed:
     rows: Floats
     places: Floats
     length_m: float
+    share: float = 1.0
+
+    @property
+    def way_m(self) -> float:
+        """How far she came along the route [m]."""
+        return float(self.rows[-1, 1]) if len(self.rows) else 0.0
 
     @property
     def time_s(self) -> float:
@@ -108,6 +114,7 @@ def sail(
                     rows=rows,
                     places=places,
                     length_m=float(way[-1]),
+                    share=share,
                 )
             )
     return out

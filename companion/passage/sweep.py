@@ -1,21 +1,23 @@
-"""When to go: departures compared, each route sailed in every member, by a boat that is not quite her polar.
+"""Departures, and the route of each: sailed in every member of the forecast, by a boat that is not quite her polar.
 
-A chance is a share of members, and no more than they can show: of 31 members none that fails only says that it fails
-less than one time in eleven (``at_most``).
+A route is chosen for all members, under a chance: of those that arrive often enough the one that is there first in the
+mean. A chance is a share of members, and no more than they can show: of 31 members none that fails only says that it
+fails less than one time in eleven (``at_most``).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from companion.passage.plan import Outcome, Passage, Route, plan
 from companion.passage.replay import Sailed, sail
 
-CANDIDATES = 3  # members whose own best routes are tried
+CANDIDATES = 3  # members whose own best routes are tried, beside that of their mean
+SURE = 0.9  # the share of runs that must arrive, where nobody says
 # Of the normal distribution, the middles of five parts of equal weight.
 _MIDDLES = (-1.2816, -0.5244, 0.0, 0.5244, 1.2816)
 _SURE = 0.95
@@ -53,48 +55,98 @@ class Departure:
         there = [run.rows[-1, 5] > 0.5 for run in self.runs if run.arrived]
         return float(np.mean(there)) if there else 0.0
 
+    def middle(self) -> Sailed:
+        """Return the run, by her own polar, that half of them are no longer than; of none that arrives the farthest."""
+        share = min({run.share for run in self.runs}, key=lambda share: abs(share - 1.0))
+        plain = [run for run in self.runs if run.share == share]
+        there = sorted((run for run in plain if run.arrived), key=lambda run: run.time_s)
+        return there[len(there) // 2] if there else max(plain, key=lambda run: run.way_m)
+
     def mean_s(self) -> float:
         """Return the mean time of those that arrive [s]; inf where none does."""
         return float(np.mean([run.time_s for run in self.runs if run.arrived] or [math.inf]))
 
     def hours(self, quantile: float) -> float:
-        """Return a quantile of the hours under way; inf where so many do not arrive."""
+        """Return a quantile of the hours under way; inf where so many do not arrive.
+
+        It is one of the runs: members beyond which nothing was seen say no quantile nearer to 0 or 1 (``shown``).
+        """
         hours = sorted(run.time_s / 3600.0 if run.arrived else math.inf for run in self.runs)
         return hours[min(len(hours) - 1, int(quantile * len(hours)))] if hours else math.inf
 
 
-def sweep(passage: Passage, departures: Sequence[float], speed_error: float, *, nodes: int) -> tuple[Departure, ...]:
+def sweep(
+    passage: Passage,
+    departures: Sequence[float],
+    speed_error: float,
+    *,
+    nodes: int,
+    by_utc_s: float = math.inf,
+    sure: float = SURE,
+    candidates: int = CANDIDATES,
+) -> tuple[Departure, ...]:
     """Return what each departure [Unix s] comes to; ``speed_error`` is the deviation of the logarithm of her speeds.
 
-    Of the best routes of up to three members the one counts that is first there in the mean of all that arrive, of
-    those that arrive most often.
+    Tried are the best routes of so many members, from the slowest to the fastest, and of their mean. Of those by which
+    ``sure`` of all runs arrive (by a time) the one counts that is first there in the mean; where none is so sure, the
+    surest.
     """
     shares = tuple(math.exp(speed_error * z) for z in _MIDDLES) if speed_error > 0.0 else (1.0,)
-    members = passage.weather.members
-    chosen = [
-        members[i] for i in np.unique(np.linspace(0, len(members) - 1, min(CANDIDATES, len(members))).astype(int))
-    ]
-    return tuple(_departure(passage, t, members, chosen, shares, nodes) for t in departures)
+    return tuple(_departure(passage, t, shares, nodes, by_utc_s, sure, candidates) for t in departures)
 
 
 def _departure(
-    passage: Passage, utc_s: float, members: Sequence[int], chosen: Sequence[int], shares: Sequence[float], nodes: int
+    passage: Passage, utc_s: float, shares: Sequence[float], nodes: int, by_utc_s: float, sure: float, candidates: int
 ) -> Departure:
-    routes = [plan(passage, utc_s, member, nodes=nodes) for member in chosen]
-    found = [route for route in routes if route.outcome is Outcome.FOUND]
-    if not found:
-        return Departure(utc_s=utc_s, route=routes[0], runs=(), why=routes[0].outcome.value)
-    tried = [
-        Departure(
-            utc_s=utc_s,
-            route=route,
-            runs=tuple(sail(passage.weather, passage.craft, route.waypoints, utc_s, passage.radius_m, members, shares)),
-        )
-        for route in found
-    ]
-    return min(
-        tried, key=lambda d: (-d.chance(), float(np.mean([r.time_s for r in d.runs if r.arrived] or [math.inf])))
-    )
+    members = passage.weather.members
+
+    def sailed(route: Route) -> Departure:
+        runs = sail(passage.weather, passage.craft, route.waypoints, utc_s, passage.radius_m, members, shares)
+        return Departure(utc_s=utc_s, route=route, runs=tuple(runs))
+
+    routes: list[Route] = []
+    chosen = list(members)
+    if len(members) > 1:
+        mean = replace(passage, weather=passage.weather.mean())
+        routes.append(plan(mean, utc_s, nodes=nodes))
+        chosen = _spread(passage, utc_s, routes[0], candidates)
+    routes += [plan(passage, utc_s, member, nodes=nodes) for member in chosen]
+    tried = [d for d in map(sailed, (route for route in routes if route.waypoints)) if d.chance() > 0.0]
+    if not tried:
+        last = next((route for route in routes if route.outcome is not Outcome.FOUND), routes[-1])
+        why = last.outcome.value if last.sailed is None else last.sailed.why
+        return Departure(utc_s=utc_s, route=last, runs=(), why=why)
+    found = min(tried, key=lambda d: (-min(sure, d.chance(by_utc_s)), d.mean_s()))
+    return replace(found, route=replace(found.route, sailed=found.middle()))
+
+
+def _spread(passage: Passage, utc_s: float, first: Route, count: int) -> list[int]:
+    """Return so many members, from the one in which a first route is the fastest to the one where it is the slowest."""
+    members = passage.weather.members
+    points = first.waypoints or (passage.start, passage.goal)
+    runs = sail(passage.weather, passage.craft, points, utc_s, passage.radius_m, members)
+    gone = sorted(runs, key=lambda run: (not run.arrived, run.time_s if run.arrived else -run.way_m))
+    return [gone[i].member for i in np.unique(np.linspace(0, len(gone) - 1, min(count, len(gone))).astype(int))]
+
+
+def shown(members: int) -> tuple[float, float]:
+    """Return a tenth and nine tenths, or the quantiles that so many members show where they show less.
+
+    What comes next is beyond the least and the greatest of n as often as twice in n + 1 times.
+
+    >>> shown(9), shown(4)
+    ((0.1, 0.9), (0.2, 0.8))
+    """
+    return max(0.1, 1.0 / (members + 1)), min(0.9, members / (members + 1))
+
+
+def at_least(share: float, members: int) -> float:
+    """Return what a chance is at least, for 95 %, when a share of so many members shows it (Clopper and Pearson).
+
+    >>> [round(at_least(1.0, n), 3) for n in (1, 31, 51)]
+    [0.05, 0.908, 0.943]
+    """
+    return 1.0 - at_most(1.0 - math.floor(share * members + 1e-9) / members, members)
 
 
 def at_most(share: float, members: int) -> float:

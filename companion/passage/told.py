@@ -10,15 +10,16 @@ import numpy as np
 from companion.geo import M_PER_NM
 from companion.passage.frame import GEOD
 from companion.passage.plan import Route
-from companion.passage.sweep import Departure, at_most, best
+from companion.passage.replay import Sailed
+from companion.passage.sweep import Departure, at_least, at_most, best, shown
 from companion.weather import iso
 from companion.words import counted
 
 _HOURS = {"night": "by night", "beating": "beating", "waiting": "waiting"}
 
 
-def told_of(route: Route) -> tuple[str, ...]:
-    """Return lines about a route that was found; of one that was not, why."""
+def told_of(route: Route, of: Departure | None = None) -> tuple[str, ...]:
+    """Return lines about a route that was found; of one that was not, why. ``of`` is what all members make of it."""
     sailed = route.sailed
     if sailed is None:
         return (f"no way: {route.outcome.value}",)
@@ -27,31 +28,78 @@ def told_of(route: Route) -> tuple[str, ...]:
     arrives = route.depart_utc_s + sailed.time_s
     made = sailed.length_m / max(1.0, sailed.time_s)
     wind = sailed.rows[:, 3]
-    gained = 100.0 * (1.0 - route.bound_s / max(1.0, sailed.time_s))
     way = f"{sailed.length_m / M_PER_NM:.0f} NM at {made:.2f} m/s"
     hours = [f"{sailed.hours(word):.0f} h {said}" for word, said in _HOURS.items()]
     lines = [
         f"departs {iso(route.depart_utc_s)}, arrives {iso(arrives)}: {_span(sailed.time_s)}, {way}",
-        f"no way is faster than about {_span(route.bound_s)} in this forecast: at most {gained:.1f} % could be gained",
+        _bound(route, sailed.time_s)
+        if of is None or of.members == 1
+        else f"so in member {sailed.member}, of {of.members} the middle one",
         f"wind {wind.min():.1f} to {wind.max():.1f} m/s, mean {wind.mean():.1f}; {', '.join(hours)}",
     ]
     lines += [_leg(route, k) for k in range(1, len(route.waypoints))]
     return tuple(lines)
 
 
+def _bound(route: Route, time_s: float) -> str:
+    gained = 100.0 * (1.0 - route.bound_s / max(1.0, time_s))
+    return (
+        f"no way is faster than about {_span(route.bound_s)} in this forecast: at most {gained:.1f} % could be gained"
+    )
+
+
+def told_of_chances(d: Departure, by_utc_s: float | None, sure: float) -> tuple[str, ...]:
+    """Return lines about what all members make of a route, and whether it is as sure as was asked for."""
+    if not d.runs:
+        return ()
+    by = math.inf if by_utc_s is None else by_utc_s
+    chance, until = d.chance(by), "" if by_utc_s is None else f" by {iso(by_utc_s)}"
+    least, most = at_least(chance, d.members), at_least(1.0, d.members)
+    of = f"{counted(len(d.runs), 'run')} in {counted(d.members, 'member')}"
+    lines = [f"arrives{until} in {100.0 * chance:.0f} % of {of}: in at least {100.0 * least:.0f} %, for 95 %"]
+    low, high = shown(d.members)
+    often, *ends = (_number(d.hours(q)) for q in (0.5, low, high))
+    lines.append(f"hours: {often} as often as not, {ends[0]} to {ends[1]} in {_share(low, high)}")
+    for run, words in _failures(d):
+        lines.append(f"in {words} of all runs: {run.why}")
+    if chance < sure:
+        lines.append(f"not as sure as {100.0 * sure:g} %: no route that was tried is")
+    elif most < sure:
+        lines.append(f"{100.0 * sure:g} % is more than {counted(d.members, 'member')} can show: {100.0 * most:.0f} %")
+    return tuple(lines)
+
+
+def _failures(d: Departure) -> list[tuple[Sailed, str]]:
+    """Return why runs do not arrive, one of each reason, with its share."""
+    kinds = {"too much": [r for r in d.runs if r.is_too_much]}
+    kinds["other"] = [r for r in d.runs if not r.arrived and not r.is_too_much]
+    return [(runs[0], f"{100.0 * len(runs) / len(d.runs):.0f} %") for runs in kinds.values() if runs]
+
+
+def _share(low: float, high: float) -> str:
+    """Return what lies between two quantiles.
+
+    >>> _share(0.1, 0.9), _share(0.2, 0.8)
+    ('8 of 10', '6 of 10')
+    """
+    return f"{10.0 * (high - low):.0f} of 10" if high > low else "no share of them, for there is one only"
+
+
 def told_of_departures(departures: Sequence[Departure], by_utc_s: float | None) -> tuple[str, ...]:
     """Return a table of departures, a line each, and what the figures in it are."""
     by = math.inf if by_utc_s is None else by_utc_s
-    lines = ["depart                hours (middle 8 of 10)     arrives  too windy  by night"]
+    count = max((d.members for d in departures), default=0)
+    least, most = shown(max(1, count))
+    head = f"hours (middle {_share(least, most)})" if count > 1 else "hours"
+    lines = [f"{'depart':<22}{head:<26} arrives  too windy  by night"]
     for d in departures:
         if not d.runs:
             lines.append(f"{iso(d.utc_s)}   no way: {d.why}")
             continue
-        low, middle, high = (_number(d.hours(q)) for q in (0.1, 0.5, 0.9))
+        low, middle, high = (_number(d.hours(q)) for q in (least, 0.5, most))
         chances = (d.chance(by), d.chance_of_too_much_wind(), d.chance_of_night())
-        said = f"{iso(d.utc_s)}   {middle:>6} ({low} to {high})"
+        said = f"{iso(d.utc_s)}   {middle:>6}" + (f" ({low} to {high})" if count > 1 else "")
         lines.append(said.ljust(47) + "".join(f"{100.0 * p:8.0f} %" for p in chances))
-    count = max((d.members for d in departures), default=0)
     if count:
         unseen = f"{100.0 * at_most(0.0, count):.0f} %"
         lines.append(

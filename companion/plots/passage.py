@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from companion.geo import MPS_PER_KNOT
-from companion.passage import Departure, Passage, Route, sail
+from companion.passage import Departure, Passage, Route, sail, shown
 from companion.plots.chart import legend_above, save
 from companion.weather import iso
 from companion.words import counted
@@ -53,10 +53,12 @@ def departures_figure(departures: Sequence[Departure], by_utc_s: float | None, n
     """Return the hours under way of each departure, and the chances of arriving, too much wind, a landfall by night."""
     figure, (hours, chances) = plt.subplots(2, 1, figsize=(10.0, 8.0), sharex=True, layout="constrained")
     by = math.inf if by_utc_s is None else by_utc_s
+    count = max((d.members for d in departures), default=0)
+    least, most = shown(max(1, count))
     since = np.array([(d.utc_s - departures[0].utc_s) / 3600.0 for d in departures])
-    low, middle, high = (np.array([d.hours(q) for d in departures]) for q in (0.1, 0.5, 0.9))
+    low, middle, high = (np.array([d.hours(q) for d in departures]) for q in (least, 0.5, most))
     hours.vlines(since, low, np.where(np.isfinite(high), high, low), color="tab:blue", lw=5.0, alpha=0.3,
-                 label="eight in ten of all runs")  # fmt: skip
+                 label=f"{10.0 * (most - least):.0f} in ten of all runs")  # fmt: skip
     hours.plot(since, np.where(np.isfinite(middle), middle, np.nan), "o-", color="tab:blue", label="the middle")
     hours.set_ylabel("hours under way")
     hours.set_ylim(bottom=0.0)
@@ -70,7 +72,6 @@ def departures_figure(departures: Sequence[Departure], by_utc_s: float | None, n
     for axes in (hours, chances):
         axes.grid(alpha=0.3)
         legend_above(axes)
-    count = max((d.members for d in departures), default=0)
     figure.suptitle(f"{name}: departures, in {counted(count, 'member')} of the forecast")
     return figure
 

@@ -7,7 +7,7 @@ of the water. Components are interpolated, never directions. Unknown is NaN.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -110,6 +110,18 @@ class Cube:
         axis = np.append(self.lon_deg - self.lon_deg[0], _ROUND_DEG)
         return _between(axis, past_deg, _TIGHT_DEG)
 
+    def mean(self) -> Cube:
+        """Return the mean of the members, as member 0."""
+        known = ~np.isnan(self.values)
+        with np.errstate(invalid="ignore"):
+            values = np.where(known, self.values, 0.0).sum(axis=0, keepdims=True) / known.sum(axis=0, keepdims=True)
+        return replace(self, members=(0,), values=values.astype(np.float32))
+
+    def only(self, member: int) -> Cube:
+        """Return one member of it."""
+        row = self.members.index(member)
+        return replace(self, members=(member,), values=self.values[row : row + 1])
+
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
         """Return whether a place is within its edges."""
         past = np.array([math.fmod(math.fmod(lon_deg - self.lon_deg[0], 360.0) + 360.0, 360.0)])
@@ -156,6 +168,14 @@ class Weather:
     def members(self) -> tuple[int, ...]:
         """The members of the wind."""
         return tuple(sorted({m for cube in self.wind for m in cube.members}))
+
+    def mean(self) -> Weather:
+        """Return it with one member, 0: the mean of all that know a value. It is weaker than they are."""
+        return replace(self, wind=tuple(cube.mean() for cube in self.wind))
+
+    def only(self, member: int) -> Weather:
+        """Return it with the wind of one member alone; no value is copied."""
+        return replace(self, wind=tuple(cube.only(member) for cube in self.wind if member in cube.members))
 
     def wind_en_mps(self, utc_s: ArrayLike, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
         """Return (m, n, 2): the motion of the air at n times and places, by ``members``; NaN where unknown."""

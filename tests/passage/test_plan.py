@@ -131,7 +131,7 @@ def test_departures_are_compared(shell):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--explain"], "companion passage plan: --explain and --by: are of a --depart FROM..TO; say it, too"),
+        (["--explain"], "companion passage plan: --explain: is of a --depart FROM..TO; say it, too"),
         (
             ["--depart", "2026-04-20T00:00Z..2026-04-28T00:00Z", "--every", "10m"],
             "companion passage plan: --every: makes 1153 departures of it; say a longer time",

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from companion.boat import Polar
-from companion.passage import at_most, best, sweep
-from companion.passage.told import explained, told_of_departures
+from companion.passage import at_least, at_most, best, sweep
+from companion.passage.told import explained, told_of_chances, told_of_departures
 from tests.passage.world import EAST_DEG_M, HOURS, LAT, LON, T0, cube, passage, place, steady
 
 # As fast as two fifths of the wind up to 10 m/s, on every course.
@@ -57,6 +57,44 @@ def test_a_calm_is_waited_for_in_port_or_at_sea():
     there = [d.utc_s + d.hours(0.5) * 3600.0 - T0 for d in found]
     assert there == pytest.approx([22.0 * 3600.0] * 3, abs=1900.0)
     assert best(found) is found[2]
+
+
+def test_a_way_that_is_faster_in_the_mean_and_fails_too_often_is_not_taken():
+    """Straight on there are 14 m/s in one member of four, and she is not to be out in more than 12."""
+    calm = steady(0.0, -5.0)
+    gale = lambda t, y, x: (0.0 * x, np.where((np.abs(y) < 0.12) & (x > 0.2) & (x < 0.4), -14.0, -5.0))  # noqa: E731
+    ready = passage(A, B, polar=POLAR, wind=cube(LAT, LON, HOURS, [calm, calm, calm, gale]), max_tws_mps=12.0)
+    bold, careful = (sweep(ready, [T0], 0.0, nodes=30, sure=sure)[0] for sure in (0.7, 0.9))
+    assert (bold.chance(), careful.chance()) == (0.75, 1.0)
+    assert bold.mean_s() < careful.mean_s()
+    assert max(abs(p.lat_deg) for p in careful.route.waypoints) > 0.11
+
+
+def test_the_mean_of_the_members_is_a_way_to_try():
+    """In either member a wind blows on one side of the way only; on the way there is half of both."""
+    winds = [lambda t, y, x, s=s: (0.0 * x, -2.0 - 4.0 * np.clip(1.0 + s * y / 0.1, 0.0, 2.0)) for s in (-1.0, 1.0)]
+    [d] = sweep(passage(A, B, polar=POLAR, wind=cube(LAT, LON, HOURS, winds)), [T0], 0.0, nodes=30)
+    assert max(abs(p.lat_deg) for p in d.route.waypoints) < 0.02
+
+
+def test_a_quantile_is_none_that_so_few_members_cannot_show():
+    [d] = sweep(asked(5.0, 5.0, 2.5, 10.0), [T0], 0.0, nodes=20)
+    lines = told_of_chances(d, None, 0.9)
+    assert lines == (
+        "arrives in 100 % of 4 runs in 4 members: in at least 47 %, for 95 %",
+        "hours: 10.0 as often as not, 5.0 to 20.0 in 6 of 10",
+        "90 % is more than 4 members can show: 47 %",
+    )
+    assert "hours (middle 6 of 10)" in told_of_departures([d], None)[0]
+    late = told_of_chances(d, T0 + 3600.0 * 15.0, 0.9)
+    assert late[-1] == "not as sure as 90 %: no route that was tried is"
+    [one] = sweep(asked(5.0), [T0], 0.0, nodes=20)
+    assert "middle" not in told_of_departures([one], None)[0]
+
+
+@pytest.mark.parametrize(("share", "members", "least"), [(1.0, 31, 0.908), (0.0, 31, 0.0), (30 / 31, 31, 0.856)])
+def test_a_chance_is_at_least_what_members_show(share, members, least):
+    assert at_least(share, members) == pytest.approx(least, abs=1e-3)
 
 
 def test_what_is_said_of_departures():
