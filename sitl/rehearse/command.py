@@ -7,13 +7,18 @@ one is found by its entry point (pyproject.toml).
 from __future__ import annotations
 
 import argparse
+import datetime as dt
 from argparse import ArgumentTypeError
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from companion.program.arguments import duration, moment, number, out_file, out_folder, whole
+from companion.errors import InputError
+from companion.program.arguments import duration, number, out_file, out_folder, whole
 from companion.words import file_name
 from sitl.options import add_options, options_of
+
+if TYPE_CHECKING:
+    from sitl.rehearse.prepared import PreparedRehearsal
 
 SUMMARY = "sail a mission a thousand times before it is sailed"
 FOLDER = Path("rehearsals")
@@ -23,6 +28,8 @@ examples:
   companion rehearse missions/archipelago.toml --wind 6@240 --sure 5   the forecast, and an answer twice as sharp
   companion rehearse missions/archipelago.toml --wind yesterday.csv    measured (t_s,wind_from_deg,wind_speed_ms)
   companion rehearse missions/archipelago.toml --wind july.csv         a climate (wind_from_deg,wind_speed_ms,share)
+  companion rehearse across.toml --wind ensemble.grb2 --depart 2026-04-20T06:00Z    each voyage in a member of it
+  companion rehearse missions/archipelago.toml --wind day.grb2 --depart 06:00..18:00 --every 2h    when to sail
   companion rehearse missions/archipelago.toml --faults --minutes 10   with trouble; what is known after ten minutes
   companion rehearse missions/archipelago.toml --try margin_m=20 --try later=2h --pairs 50
   companion rehearse missions/archipelago.toml --runs 5000 --sure 1 --dask tcp://HOST:8786
@@ -49,21 +56,28 @@ def add_parser(subparsers: Any, summary: str) -> None:
     weather.add_argument(
         "--wind",
         metavar="WIND",
-        help="SPEED@FROM [m/s, degrees], a measured record or the table "
-        "of a climate as CSV (default: the mission's preview wind)",
+        action="append",
+        default=[],
+        help="SPEED@FROM [m/s, degrees], a measured record or the table of a climate as CSV, or a forecast (GRIB), of "
+        "which more may be given (default: the mission's preview wind)",
     )
     weather.add_argument(
         "--wind-error",
         type=_error,
         metavar="DEG,MPS",
-        help="how far the mean wind that is given may be off, standard deviations (default: 10,0.5; of a climate 0,0)",
+        help="how far the mean wind that is given may be off, standard deviations (default: 10,0.5; of a climate or "
+        "an ensemble 0,0)",
     )
     weather.add_argument(
         "--depart",
-        type=moment,
+        type=_departure,
         metavar="TIME",
-        help="when she sets sail, as 2026-11-24T08:00Z: for "
-        "a tide table and the dark (default: when the table begins, else now; of a scenario its own)",
+        help="when she sets sail, as 2026-11-24T08:00Z: for a forecast, a tide table and the dark (default: when the "
+        "table begins, else now; of a scenario its own); a span compares departures: 06:00..18:00 (UTC, of that day) "
+        "or TIME..TIME",
+    )
+    weather.add_argument(
+        "--every", type=duration, default=7200.0, metavar="TIME", help="between the departures of a span (default: 2h)"
     )
     weather.add_argument(
         "--doubt",
@@ -126,8 +140,15 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.set_defaults(run=run)
 
 
+def _departure(text: str) -> Any:
+    from sitl.rehearse.departures import departure
+
+    return departure(text)
+
+
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
+    from sitl.rehearse import departures
     from sitl.rehearse.changes import change_of, usual
     from sitl.rehearse.prepared import prepared
     from sitl.rehearse.rehearsal import Limits, rehearse
@@ -138,16 +159,26 @@ def run(args: argparse.Namespace) -> int:
     folder = args.out or FOLDER / file_name(load_scenario(args.mission).name)
     compile_ahead()
     limits = Limits(width=args.sure / 100.0, runs=args.runs, minutes=args.minutes)  # whose minutes begin here
-    made = prepared(
-        args.mission,
-        folder,
-        wind=args.wind,
-        wind_error=args.wind_error,
-        doubt=args.doubt,
-        faults=args.faults,
-        depart=args.depart,
-        limit_s=args.limit,
-    )
+
+    def make(place: Path, depart: dt.datetime | None) -> PreparedRehearsal:
+        return prepared(
+            args.mission,
+            place,
+            wind=args.wind,
+            wind_error=args.wind_error,
+            doubt=args.doubt,
+            faults=args.faults,
+            depart=depart,
+            limit_s=args.limit,
+        )
+
+    if isinstance(args.depart, departures.Span):
+        if args.tries or args.json is not None:
+            raise InputError(
+                "--depart", "", "compares departures, and tries no change and writes no figures", "leave those out"
+            )
+        return departures.compare(args, limits, folder, make)
+    made = make(folder, args.depart)
     changes = [change_of(text, made.mission) for text in args.tries] or usual(
         made.mission, tells_the_hour=made.tells_the_hour
     )

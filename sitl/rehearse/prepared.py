@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from companion.geofence import Mission
 from companion.mission_check import AssumedWind, leg_names, legs, planned_legs
 from companion.planner import Plan, Problem, plan
 from companion.safety import DARK, End
-from sitl.rehearse.sampling import Doubts, given_wind
+from sitl.rehearse.sampling import FORECASTS, Doubts, forecast_wind, given_wind
 from sitl.run.embedded import EXPANSIONS, mission_of
 from sitl.scenario import Scenario, WindSpec, beginning, load_scenario, scenario_text
 
@@ -51,7 +52,7 @@ def prepared(
     path: Path,
     folder: Path,
     *,
-    wind: str | None,
+    wind: Sequence[str],
     wind_error: tuple[float, float] | None,
     doubt: float,
     faults: bool,
@@ -73,7 +74,14 @@ def prepared(
             "is missing, and a rehearsal begins somewhere",
             "add lat and lon of where she will set sail",
         )
-    given = given_wind(wind, _mean(base, mission), wind_error)
+    begins = depart or _hour(base, mission, path, folder / SCENARIO)
+    forecasts = [Path(text) for text in wind if Path(text).suffix.lower() in FORECASTS]
+    if len(wind) > max(1, len(forecasts)):
+        raise InputError("--wind", ", ".join(wind), "is more than one wind", "name one, or several forecasts (GRIB)")
+    if forecasts:
+        given, begins = forecast_wind(forecasts, mission, depart, begins, _mean(base, mission), wind_error)
+    else:
+        given = given_wind(wind[0] if wind else None, _mean(base, mission), wind_error)
     middle = given.middle
     plans = _planned(mission, AssumedWind(from_deg=middle[0], speed_mps=middle[1]))
     voyage_s = mission.skipper.laps * sum(p.cost_s for p in plans) + mission.skipper.station_s
@@ -82,7 +90,7 @@ def prepared(
         base,
         mission=os.path.relpath(mission.path, folder),
         wind=given.beside(folder).spec,
-        begins=depart or _hour(base, mission, path, folder / SCENARIO),
+        begins=begins,
         limit_s=limit_s or round(max(SLOWER * voyage_s, AT_LEAST_S) + needs_more * BESIDE_S),
     )
     folder.mkdir(parents=True, exist_ok=True)
@@ -97,6 +105,7 @@ def prepared(
             wind=replace(given, spec=scenario.wind), boat=doubt, faults=faults, voyage_s=round(max(voyage_s, 60.0), 1)
         ),
         tells_the_hour=given.record_s > 0.0
+        or bool(given.members)
         or mission.tide_path is not None
         or bool(mission.drying)
         or mission.safety.end(DARK) is not End.SAY,

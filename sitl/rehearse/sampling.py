@@ -8,20 +8,25 @@ nothing: a polar of the boat's own was measured, leeway and current that are giv
 from __future__ import annotations
 
 import csv
+import datetime as dt
 import math
 import os
 import random
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
 from companion.compose import water_of
 from companion.errors import InputError
 from companion.geofence import Mission
+from companion.weather import iso
+from companion.words import counted
 from sitl.rehearse.fault_sampling import sampled_faults, with_faults
 from sitl.rehearse.mismatch_sampling import departing
-from sitl.scenario import CurrentSpec, HullSpec, LeeSpec, Scenario, SensorsSpec, WavesSpec, WindSpec
+from sitl.scenario import CurrentSpec, HullSpec, LeeSpec, Scenario, SensorsSpec, WavesSpec, WindSpec, forecast
 from sitl.world import Recorded
 
 # How far a forecast of the mean of the next hours is off on a coast, direction [deg] and speed [m/s].
@@ -30,7 +35,7 @@ LEAST_MPS = 0.5
 MOST_MPS = 40.0
 CLIMATE = ("wind_from_deg", "wind_speed_ms", "share")
 FORECASTS = (".grb", ".grb2", ".grib", ".grib2")
-_REMEDY = "write SPEED@FROM, as 5@350, or name a CSV: a record or a table of a climate"
+_REMEDY = "write SPEED@FROM, as 5@350, or name forecasts (GRIB) or a CSV: a record or a table of a climate"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +57,7 @@ class Given:
         error: by how much the mean may be off, direction [deg] and speed [m/s], standard deviations.
         cells: of a climate; a seed draws one of them in place of the mean.
         record_s: how long a record is, 0 for what is none.
+        members: of a forecast; a seed draws one of them.
     """
 
     told: str
@@ -59,12 +65,20 @@ class Given:
     error: tuple[float, float] = ERROR
     cells: tuple[ClimateCell, ...] = ()
     record_s: float = 0.0
+    members: tuple[int, ...] = ()
 
     def drawn(self, rng: random.Random, voyage_s: float) -> WindSpec:
         """Return the weather of a seed, whose voyage takes about so long."""
         if self.spec.model == "recorded":
             return msgspec.structs.replace(
                 self.spec, from_s=round(rng.uniform(0.0, max(0.0, self.record_s - voyage_s)), 1)
+            )
+        if self.members:
+            return msgspec.structs.replace(
+                self.spec,
+                member=rng.choice(self.members),
+                off_deg=round(rng.gauss(0.0, self.error[0]), 2),
+                off_mps=round(rng.gauss(0.0, self.error[1]), 3),
             )
         mean = (self.spec.from_deg, self.spec.tws_mps)
         if self.cells:
@@ -85,14 +99,65 @@ class Given:
         return self.spec.from_deg, self.spec.tws_mps
 
     def beside(self, folder: Path) -> Given:
-        """Return it with its record named relative to a folder."""
-        if self.spec.file is None:
-            return self
-        return replace(self, spec=msgspec.structs.replace(self.spec, file=os.path.relpath(self.spec.file, folder)))
+        """Return it with its files named relative to a folder."""
+        spec = self.spec
+        if spec.file is not None:
+            spec = msgspec.structs.replace(spec, file=os.path.relpath(spec.file, folder))
+        return replace(
+            self, spec=msgspec.structs.replace(spec, files=tuple(os.path.relpath(f, folder) for f in spec.files))
+        )
+
+
+def forecast_wind(
+    paths: Sequence[Path],
+    mission: Mission,
+    depart: dt.datetime | None,
+    hour: dt.datetime,
+    spec: WindSpec,
+    error: tuple[float, float] | None,
+) -> tuple[Given, dt.datetime]:
+    """Return the wind of forecasts, and when she sets sail: ``depart``, else ``hour``, else when it is first known.
+
+    Raises:
+        InputError: they cannot be believed, or do not know the wind of the start when she departs.
+    """
+    names = ", ".join(map(str, paths))
+    files = tuple(path.resolve() for path in paths)
+    weather = forecast(files, mission)
+    start = mission.start or mission.origin
+
+    def why(at: dt.datetime) -> str:
+        return weather.why_unknown(at.timestamp(), start.lat_deg, start.lon_deg)
+
+    begins = depart or hour
+    if depart is None and why(begins):
+        first_s = min(float(cube.utc_s[0]) for cube in weather.wind)
+        begins = dt.datetime.fromtimestamp(first_s, dt.UTC)
+    if why(begins):
+        said = f"the wind of the start is not known at {begins:%Y-%m-%d %H:%M} UTC: {why(begins)}"
+        raise InputError(names, "", said, "name a time that it knows (--depart), or another forecast")
+    blows = weather.wind_en_mps(begins.timestamp(), start.lat_deg, start.lon_deg)
+    east, north = (float(v) for v in np.nanmean(blows, axis=0))
+    members, end_s = weather.members, max(float(cube.utc_s[-1]) for cube in weather.wind)
+    off = error or ((0.0, 0.0) if len(members) > 1 else ERROR)
+    about = "" if off == (0.0, 0.0) else f", off by {off[1]:g} m/s and {off[0]:g}° (standard deviations)"
+    given = Given(
+        told=f"{counted(len(members), 'member')} of {names}, to {iso(end_s)}{about}, wandering by {spec.sd_deg:g}°",
+        spec=msgspec.structs.replace(
+            spec,
+            model="forecast",
+            files=tuple(map(str, files)),
+            from_deg=round(math.degrees(math.atan2(-east, -north)) % 360.0, 2),
+            tws_mps=round(max(math.hypot(east, north), LEAST_MPS), 3),
+        ),
+        error=off,
+        members=members,
+    )
+    return given, begins
 
 
 def given_wind(text: str | None, spec: WindSpec, error: tuple[float, float] | None) -> Given:
-    """Return the wind that ``--wind`` says; without it that of ``spec``.
+    """Return the wind that ``--wind`` says, but for forecasts; without it that of ``spec``.
 
     Raises:
         InputError: it is none, or its file cannot be believed.
@@ -101,8 +166,6 @@ def given_wind(text: str | None, spec: WindSpec, error: tuple[float, float] | No
     if text is None:
         return Given(told=_told(spec, off), spec=spec, error=off)
     path = Path(text)
-    if path.suffix.lower() in FORECASTS:
-        raise InputError("--wind", text, "GRIB is not read", "write the forecast's mean as SPEED@FROM and its error")
     if path.suffix.lower() == ".csv":
         return _of_file(path, spec, error)
     try:

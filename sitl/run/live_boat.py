@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import datetime as dt
 import math
 import os
 import sys
 from pathlib import Path
+
+import msgspec
 
 from companion.clock import run
 from companion.geofence import load_mission
@@ -29,7 +32,8 @@ def main() -> int:
     parser.add_argument("--endpoint", action="append", required=True, metavar="LINK")
     parser.add_argument("--parent", type=int, default=os.getppid(), metavar="PID", help="end with this process")
     args = parser.parse_args()
-    scenario = load_scenario(args.scenario)
+    begins = dt.datetime.fromtimestamp(args.epoch, dt.UTC)
+    scenario = msgspec.structs.replace(load_scenario(args.scenario), begins=begins)
     mission = load_mission(scenario.mission_path(args.scenario))
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     home, wind = mission.start or mission.origin, scenario_wind(scenario, args.scenario, args.seed)

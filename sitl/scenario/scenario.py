@@ -12,6 +12,7 @@ import datetime as dt
 import difflib
 import math
 from collections.abc import Iterable
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
@@ -25,17 +26,20 @@ from companion.chart import parse_ascii_grid, signed
 from companion.compose import RECENTRE_M, polar_of
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
-from companion.geofence import Mission
+from companion.geofence import Mission, load_mission
 from companion.geofence.mission import without_defaults
 from companion.messages import Mode
+from companion.weather import Box, Weather, read_weather
 from companion.words import choices, expected
 from sitl.autopilot import EPOCH_S, FRAME_M, Departures, Sensors, VaneState, Waves
 from sitl.scenario.colregs import Craft, Manner
 from sitl.world import (
     AR1,
     Bank,
+    Blown,
     Constant,
     CurrentModel,
+    ForecastField,
     Gusty,
     Later,
     Lee,
@@ -47,6 +51,7 @@ from sitl.world import (
     Waters,
     WindEvent,
     WindModel,
+    beneath,
 )
 
 # What a number may be. No comparison holds for a number that is none (nan), so that is refused, too.
@@ -269,13 +274,18 @@ STATES: dict[str, tuple[str, ...]] = {
 class WindSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The weather; from ``gust_spread`` on also what varies in time beside it and over the water."""
 
-    model: Literal["constant", "ou", "recorded"] = "ou"  # ou wanders about its mean
+    # ou wanders about its mean, forecast about what files in GRIB say for place and hour (of `begins`)
+    model: Literal["constant", "ou", "recorded", "forecast"] = "ou"
     from_deg: float = 0.0  # where it comes from, on the average
     tws_mps: float = 5.0  # true wind speed, on the average
     sd_deg: float = 9.0  # standard deviation of the direction
     tau_s: float = 28.0  # 1 / rho: Wolsieffer's 0.036 Hz
     tws_sd_mps: float = 0.3  # standard deviation of the speed
     file: str | None = None  # of a recorded wind: CSV, relative to this one
+    files: tuple[str, ...] = ()  # of a forecast: GRIB, relative to this one; its current runs, too
+    member: Annotated[int, msgspec.Meta(ge=0, le=999)] = 0  # of the forecast's
+    off_deg: Degrees = 0.0  # the forecast's wind is turned by so much ...
+    off_mps: Annotated[float, msgspec.Meta(ge=-20.0, le=20.0)] = 0.0  # ... and stronger by this
     from_s: float = 0.0  # of the weather's own time: what has blown by then is over
     gust_spread: Share = 0.0  # of the strength's logarithm, about the strength that is there without gusts
     gust_s: Positive = 15.0  # their correlation time
@@ -580,6 +590,8 @@ def scenario_wind(scenario: Scenario, source: Path, seed: int) -> WindModel:
     base: WindModel
     if spec.model == "recorded":
         base = Recorded.from_csv(source.parent / (spec.file or ""))
+    elif spec.model == "forecast":
+        base = _blown(scenario, source, seed)
     elif spec.model == "constant":
         base = Constant(math.radians(spec.from_deg), spec.tws_mps)
     else:
@@ -593,7 +605,7 @@ def scenario_wind(scenario: Scenario, source: Path, seed: int) -> WindModel:
         )
     if spec.gust_spread > 0.0:
         base = Gusty(base, spread=spec.gust_spread, tau_s=spec.gust_s, seed=seed)
-    if spec.from_s != 0.0:
+    if spec.from_s != 0.0 and spec.model != "forecast":  # whose hours are those of `begins`
         base = Later(base, spec.from_s)
     events = tuple(
         WindEvent(
@@ -609,10 +621,68 @@ def scenario_wind(scenario: Scenario, source: Path, seed: int) -> WindModel:
     return Scripted(base, events) if events else base
 
 
+def _blown(scenario: Scenario, source: Path, seed: int) -> Blown:
+    """Return the wind of a forecast. Raises InputError where it does not know place and hour of the start."""
+    spec = scenario.wind
+    if not spec.files:
+        raise InputError(str(source), "wind", "model forecast names no files", 'write files = ["FORECAST.grb2"]')
+    mission = load_mission(scenario.mission_path(source))
+    weather = forecast(tuple(source.parent / name for name in spec.files), mission)
+    names, frame = ", ".join(spec.files), mission.frame()
+    if spec.member not in weather.members:
+        known = ", ".join(map(str, weather.members)) or "none"
+        raise InputError(str(source), "wind.member", f"{names} has no member {spec.member}", f"known: {known}")
+    field = ForecastField(weather, spec.member, frame, scenario.epoch_s)
+    home_en_m = frame.en_from_geo(mission.start or mission.origin)
+    why = field.why_unknown(0.0, home_en_m)
+    if why:
+        begins = f"{scenario.begins:%Y-%m-%d %H:%M} UTC"
+        raise InputError(names, "", f"the wind of the start is not known at {begins}: {why}", "sail at another time")
+    return Blown(
+        field,
+        home_en_m,
+        seed=seed,
+        sd_rad=math.radians(spec.sd_deg),
+        rho_hz=1.0 / spec.tau_s,
+        tws_sd_mps=spec.tws_sd_mps,
+        off_rad=math.radians(spec.off_deg),
+        off_mps=spec.off_mps,
+    )
+
+
+ROOM_DEG = 1.0  # of a forecast, about the places of a mission
+
+
+def forecast(paths: tuple[Path, ...], mission: Mission) -> Weather:
+    """Return what files say about the waters of a mission; asked again, no file is read again. Raises InputError."""
+    points = [mission.start or mission.origin, *(goal.point for goal in mission.goals)]
+    lat = [p.lat_deg for p in points]
+    lon = [points[0].lon_deg + math.remainder(p.lon_deg - points[0].lon_deg, 360.0) for p in points]
+    wide = ROOM_DEG / max(0.05, math.cos(math.radians(max(map(abs, lat)))))
+    box = (min(lon) - wide, max(-90.0, min(lat) - ROOM_DEG), max(lon) + wide, min(90.0, max(lat) + ROOM_DEG))
+    weather = _weather(paths, box)
+    if not weather.wind:
+        names = ", ".join(map(str, paths))
+        raise InputError(names, "", "holds no wind of 10 m where the mission is", "ask for 10u and 10v of the area")
+    return weather
+
+
+@lru_cache(maxsize=4)
+def _weather(paths: tuple[Path, ...], box: Box) -> Weather:
+    return read_weather(paths, box)
+
+
 def scenario_waters(scenario: Scenario, wind: WindModel, home_en_m: tuple[float, float]) -> Waters | None:
     """Return wind and stream by place, counted from ``home_en_m`` of the mission's frame; None: the same everywhere."""
     spec = scenario.wind
-    if scenario.current is None and not spec.lees and spec.stronger_per_km == 0.0 and spec.bends_deg_per_km == 0.0:
+    blown = beneath(wind)
+    if (
+        scenario.current is None
+        and blown is None
+        and not spec.lees
+        and spec.stronger_per_km == 0.0
+        and spec.bends_deg_per_km == 0.0
+    ):
         return None
     return Waters(
         wind=wind,
@@ -622,6 +692,7 @@ def scenario_waters(scenario: Scenario, wind: WindModel, home_en_m: tuple[float,
         bends_rad_per_km=math.radians(spec.bends_deg_per_km),
         stream=stream_of(scenario.current or CurrentSpec()),
         home_en_m=home_en_m,
+        forecast=blown,
     )
 
 

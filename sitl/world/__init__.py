@@ -16,6 +16,7 @@ from sitl.world.environment import (
     WindModel,
     parse_wind,
 )
+from sitl.world.forecast import Blown, ForecastField, beneath
 from sitl.world.seabed import LEAST_M, MOST_M, Bank, Seabed, SimulatedSounder, Tide
 
 __all__ = [
@@ -24,8 +25,10 @@ __all__ = [
     "LENGTH_M",
     "MOST_M",
     "Bank",
+    "Blown",
     "Constant",
     "CurrentModel",
+    "ForecastField",
     "Gusty",
     "Later",
     "Lee",
@@ -39,6 +42,7 @@ __all__ = [
     "Waters",
     "WindEvent",
     "WindModel",
+    "beneath",
     "habits_for",
     "parse_wind",
     "polar_at",

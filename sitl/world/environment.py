@@ -370,27 +370,40 @@ class Gusty:
     """
 
     def __init__(self, base: WindModel, *, spread: float, tau_s: float, seed: int) -> None:
-        self._base, self._spread = base, spread
+        self.base, self._spread = base, spread
         self._process = Process(1.0 / tau_s, 0.1, seed, 2, from_mean=False)
 
     def at(self, t_s: float) -> tuple[float, float]:
         """Return the wind at ``t_s``."""
-        twd, tws = self._base.at(t_s)
+        twd, tws = self.base.at(t_s)
         return twd, tws * math.exp(self._spread * self._process.at(t_s) - 0.5 * self._spread**2)
+
+
+class ForecastWind(Protocol):
+    """A wind that knows each place by a forecast."""
+
+    def elsewhere(self, t_s: float, en_m: Place, home: tuple[float, float]) -> tuple[float, float]:
+        """Return the wind of a place, where that of home is (from [rad], speed [m/s])."""
+
+    def stream_at(self, t_s: float, en_m: Place) -> Place:
+        """Return the stream of a place, east and north [m/s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Waters:
     """Wind and stream by place and time.
 
+    A forecast beneath the wind says both for each place; the rest is over it.
+
     Attributes:
-        wind: at the frame's origin, far from any island.
+        wind: at the frame's origin, far from any island; of a forecast at home.
         lees: the islands.
         stronger_per_km: the wind is stronger by this share for each km ...
         stronger_to_rad: ... in this direction ...
         bends_rad_per_km: ... and veers by so much there (positive: clockwise).
         stream: of the water.
         home_en_m: from which places are counted, in the frame of the islands.
+        forecast: what is beneath the wind, and varies over the water; None: nothing does but what is said here.
     """
 
     wind: WindModel
@@ -400,11 +413,14 @@ class Waters:
     bends_rad_per_km: float = 0.0
     stream: CurrentModel = field(default_factory=CurrentModel)
     home_en_m: Place = (0.0, 0.0)
+    forecast: ForecastWind | None = None
 
     def wind_at(self, t_s: float, en_m: Place) -> tuple[float, float]:
         """Return (direction it comes from [rad, 0..2π), speed [m/s]) at a time and a place."""
         twd, tws = self.wind.at(t_s)
         here = en_m[0] + self.home_en_m[0], en_m[1] + self.home_en_m[1]
+        if self.forecast is not None:
+            twd, tws = self.forecast.elsewhere(t_s, here, (twd, tws))
         there_km = (here[0] * math.sin(self.stronger_to_rad) + here[1] * math.cos(self.stronger_to_rad)) / _KM
         share = min(max(1.0 + self.stronger_per_km * there_km, LEAST_SHARE), MOST_SHARE)
         for lee in self.lees:
@@ -413,4 +429,9 @@ class Waters:
 
     def stream_at(self, t_s: float, en_m: Place) -> Place:
         """Return the stream at a time and a place, east and north [m/s]."""
-        return self.stream.at(t_s, (en_m[0] + self.home_en_m[0], en_m[1] + self.home_en_m[1]))
+        here = en_m[0] + self.home_en_m[0], en_m[1] + self.home_en_m[1]
+        east, north = self.stream.at(t_s, here)
+        if self.forecast is not None:
+            flows = self.forecast.stream_at(t_s, here)
+            east, north = east + flows[0], north + flows[1]
+        return east, north

@@ -253,7 +253,7 @@ def test_on_another_machine_a_rehearsal_is_whole(sailed, monkeypatch):
     made = prepared(
         Path("rocks.toml"),
         Path("packed"),
-        wind="day.csv",
+        wind=["day.csv"],
         wind_error=None,
         doubt=1.0,
         faults=False,
