@@ -3,8 +3,8 @@
     python -m bench.kernels              the table: kernel, combinations of types, processor seconds (a few minutes)
     python -m bench.kernels --write      ... and companion/kernels.txt, sitl/kernels.txt, from what a voyage called
 
-A voyage is: the planner's ``warm``, the forecaster's, many points against a coast, and a short demonstration on the
-simulated autopilot. Everything is compiled in this one process, in an empty folder.
+A voyage is: the planner's ``warm``, the forecaster's, many points against a coast, a short demonstration on the
+simulated autopilot, and the plan of a passage. Everything is compiled in this one process, in an empty folder.
 """
 
 from __future__ import annotations
@@ -39,6 +39,35 @@ def sail(folder):
         run_virtual(run_embedded(load_scenario(path), path, 0, Path(folder, name), expansions=2000))
 
 
+def cross():
+    """Plan a passage, as ``companion passage plan`` does."""
+    import numpy as np
+
+    from companion.boat import constant
+    from companion.messages import GeoPoint
+    from companion.passage import Passage, PassageFrame, craft_of, land_of, plan
+    from companion.weather import Cube, Weather
+
+    start, goal = GeoPoint(lat_deg=0.0, lon_deg=0.0), GeoPoint(lat_deg=0.0, lon_deg=0.5)
+    axis, hours = np.linspace(-3.0, 3.0, 13), 3600.0 * np.arange(0.0, 49.0, 6.0)
+    values = np.full((1, hours.size, axis.size, axis.size, 2), -5.0, dtype=np.float32)
+    cube = Cube(utc_s=hours, base_utc_s=hours, members=(0,), lat_deg=axis, lon_deg=axis, values=values)
+    frame = PassageFrame(start, goal)
+    plan(
+        Passage(
+            start=start,
+            goal=goal,
+            radius_m=100.0,
+            craft=craft_of(constant(2.0), no_go_half_rad=0.7),
+            weather=Weather(wind=(cube,)),
+            land=land_of(frame, (), (-3.0, -3.0, 3.0, 3.0), 0.0),
+            frame=frame,
+        ),
+        0.0,
+        nodes=12,
+    )
+
+
 def recorded(folder):
     """Return {(kernel, types): own processor seconds}, callees first, and the process's peak memory [MiB]."""
     os.environ["COMPANION_KERNELS"] = str(Path(folder, "kernels"))
@@ -62,6 +91,7 @@ def recorded(folder):
 
     event.register("numba:compile", Listener())
     sail(folder)
+    cross()
     return taken
 
 

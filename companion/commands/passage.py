@@ -213,6 +213,8 @@ def _read(path: Path, departs_utc_s: float | None = None) -> tuple[PassageFile, 
         board_m=asked.sailing.board_m,
         night_share=asked.sailing.night_share,
         max_tws_mps=math.inf if boat.max_tws_mps is None else boat.max_tws_mps,
+        max_wave_m=math.inf if asked.limits.max_wave_m is None else asked.limits.max_wave_m,
+        lee_tws_mps=asked.limits.lee_tws_mps,
     )
     land = land_of(frame, _solids(asked, path), box, asked.area.margin_m)
     for place, point in (("[start]", start), ("[goal]", goal)):
@@ -221,7 +223,14 @@ def _read(path: Path, departs_utc_s: float | None = None) -> tuple[PassageFile, 
                 source, place, "is on land, in closed water or within [area] margin_m of it", "move it out to sea"
             )
     return asked, Passage(
-        start=start, goal=goal, radius_m=asked.goal.radius_m, craft=craft, weather=weather, land=land, frame=frame
+        start=start,
+        goal=goal,
+        radius_m=asked.goal.radius_m,
+        craft=craft,
+        weather=weather,
+        land=land,
+        frame=frame,
+        lee_shore_m=asked.limits.lee_shore_m or 0.0,
     )
 
 
@@ -261,6 +270,10 @@ def _check_weather(asked: PassageFile, weather: Weather, source: str, depart: fl
     for place, point in (("[start]", asked.start), ("[goal]", asked.goal)):
         if not any(cube.covers(point.lat, point.lon) for cube in weather.wind):
             raise InputError(source, place, f"is outside the area of {names}", "ask for a larger area")
+    if asked.limits.max_wave_m is not None and not weather.waves:
+        raise InputError(source, "[limits] max_wave_m", f"{names} says nothing of waves", "add a forecast of them")
+    if asked.limits.lee_shore_m is not None and not asked.area.obstacles:
+        raise InputError(source, "[limits] lee_shore_m", "there is no shore", "name one in [area] obstacles")
     why = weather.why_unknown(depart, asked.start.lat, asked.start.lon)
     if why:
         said = f"{iso(depart)} is {why}" if why[:5] in {"after", "befor"} else f"the wind there is {why}"

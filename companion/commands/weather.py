@@ -20,9 +20,10 @@ examples:
   companion weather show run00.grb2 run12.grb2 --at 50.8,-1.3
   companion weather show ensemble.grb2 --box 48,-12,56,2 --at 50,-6 --plot weather.png
 
-Reads GRIB 1 and 2 on grids of latitudes and longitudes: wind of 10 m, gusts, surface currents; several files, runs that
-overlap (the newest counts, an older one before it, after it and in its holes), ensembles. Simple packing is read here,
-every other by the extra `weather`. Directions are true: of a wind where it comes from, of a current where it goes.
+Reads GRIB 1 and 2 on grids of latitudes and longitudes: wind of 10 m, gusts, wave heights, surface currents; several
+files, runs that overlap (the newest counts, an older one before it, after it and in its holes), ensembles. Simple
+packing is read here, every other by the extra `weather`. Directions are true: of a wind where it comes from, of a
+current where it goes.
 
 Exit codes: 0 told, 2 a file that cannot be believed, or a place that it says nothing of.
 """
@@ -57,13 +58,13 @@ def _show(args: argparse.Namespace) -> int:
     at: GeoPoint | None = args.at
     weather = read_weather(args.files, args.box)
     names = ", ".join(map(str, args.files))
-    cubes = (*weather.wind, *weather.gust, *weather.current)
+    cubes = (*weather.wind, *weather.gust, *weather.waves, *weather.current)
     if not cubes:
         where = " there" if args.box is not None else ""
         raise InputError(
             names,
             "",
-            f"holds no wind of 10 m, no gust and no current{where}"
+            f"holds no wind of 10 m, no gust, no waves and no current{where}"
             + "".join(f"; {note}" for note in weather.notes[:3]),
             "ask for 10u and 10v of the area",
         )

@@ -33,6 +33,8 @@ def craft_of(
     board_m: float = 20_000.0,
     night_share: float = 1.0,
     max_tws_mps: float = math.inf,
+    max_wave_m: float = math.inf,
+    lee_tws_mps: float = math.inf,
 ) -> Craft:
     """Return the hulls of a polar; beyond its last column it is as in it."""
     count = round(MOST_TWS_MPS / TWS_STEP_MPS) + 1
@@ -63,6 +65,8 @@ def craft_of(
         counts=np.array([len(normal) for normal, _ in sides]),
         tws_step_mps=TWS_STEP_MPS,
         max_tws_mps=max_tws_mps,
+        max_wave_m=max_wave_m,
+        lee_tws_mps=lee_tws_mps,
         share=1.0,
         night_share=night_share,
     )

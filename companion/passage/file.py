@@ -59,6 +59,17 @@ class SailingOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Of her speed, how much she sails at when the sun is more than 6 degrees down; 0: she heaves to."""
 
 
+class LimitOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[limits]``: what she is not to be out in, beside ``[boat] max_tws_mps``."""
+
+    max_wave_m: Annotated[float, Meta(gt=0.0, le=40.0)] | None = None
+    """The significant height of the sea; the forecasts must say it."""
+    lee_shore_m: Annotated[float, Meta(gt=0.0, le=200_000.0)] | None = None
+    """So near to a shore ([area] obstacles, with its margin) ..."""
+    lee_tws_mps: Annotated[float, Meta(gt=0.0, le=60.0)] = 8.0
+    """... no more than this is to blow towards it."""
+
+
 class PassageFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A file of ``companion passage``."""
 
@@ -70,6 +81,7 @@ class PassageFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     boat: BoatOptions = BoatOptions()
     area: AreaOptions = AreaOptions()
     sailing: SailingOptions = SailingOptions()
+    limits: LimitOptions = LimitOptions()
 
 
 def parse_passage(text: str, source: str) -> PassageFile:

@@ -14,7 +14,7 @@ from companion.kernels.jit import kernel
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
-KNOWN, UNKNOWN, OVER_LIMIT, STILL = 0, 1, 2, 3
+KNOWN, UNKNOWN, OVER_LIMIT, STILL, OVER_WAVES, LEE_SHORE = 0, 1, 2, 3, 4, 5
 TWILIGHT = math.sin(math.radians(-6.0))  # below it is night
 WAIT_STEP_S = 1800.0  # how often a boat that waits looks again
 WAIT_S = 48 * 3600.0  # so long she waits in a calm for one edge
@@ -31,7 +31,8 @@ class Craft(NamedTuple):
 
     ``radial`` (winds, angles off the wind from 0 to π) [m/s] holds without a stream; ``normals`` (n·v <= 1) and
     ``losses`` are those of the ``counts`` sides of her hulls. ``share`` is of all speeds, ``night_share`` of those by
-    night.
+    night. ``max_tws_mps``, ``max_wave_m`` and ``lee_tws_mps``, the wind towards a near shore, she is not to be out in
+    more of.
     """
 
     radial: Floats
@@ -42,10 +43,15 @@ class Craft(NamedTuple):
     max_tws_mps: float
     share: float
     night_share: float
+    max_wave_m: float
+    lee_tws_mps: float
 
 
 class Waters(NamedTuple):
     """Wind and stream on a grid of the passage's frame: (t, y, x, 2) along x and y; ``up`` (y, x, 3) are its places.
+
+    ``waves`` (t, y, x) are heights [m], NaN where unknown; ``shore`` (y, x, 2) points to a shore that is near, zero
+    where none is.
 
     ``first_x_m``, ``first_y_m`` is its corner, ``step_m`` the distance of its nodes, ``radius_m`` the sphere's.
     """
@@ -54,6 +60,10 @@ class Waters(NamedTuple):
     wind: Singles
     stream: Singles
     has_stream: bool
+    waves: Singles
+    has_waves: bool
+    shore: Singles
+    has_shore: bool
     up: Floats
     first_x_m: float
     first_y_m: float
@@ -172,7 +182,7 @@ def _rate(w: Waters, craft: Craft, x: float, y: float, t: float, ux: float, uy: 
     ny, nx = w.wind.shape[1], w.wind.shape[2]
     i, j = min(max(int(px), 0), nx - 2), min(max(int(py), 0), ny - 2)
     fx, fy = px - i, py - j
-    wx = wy = cx = cy = 0.0
+    wx = wy = cx = cy = height = known = 0.0
     for dt in range(2):
         wt = ft if dt else 1.0 - ft
         if wt == 0.0:
@@ -187,10 +197,19 @@ def _rate(w: Waters, craft: Craft, x: float, y: float, t: float, ux: float, uy: 
                 if w.has_stream:
                     cx += weight * w.stream[k + dt, j + dy, i + dx, 0]
                     cy += weight * w.stream[k + dt, j + dy, i + dx, 1]
+                if w.has_waves and not math.isnan(w.waves[k + dt, j + dy, i + dx]):
+                    height += weight * w.waves[k + dt, j + dy, i + dx]
+                    known += weight
     if math.isnan(wx + wy + cx + cy):
         return 0.0, UNKNOWN
     if math.hypot(wx, wy) > craft.max_tws_mps:
         return 0.0, OVER_LIMIT
+    if height > known * craft.max_wave_m:  # of a sea that is not known nothing is said
+        return 0.0, OVER_WAVES
+    if w.has_shore:
+        towards = w.shore[j + (fy > 0.5), i + (fx > 0.5)]
+        if wx * towards[0] + wy * towards[1] > craft.lee_tws_mps:
+            return 0.0, LEE_SHORE
     speed = made_good(craft, wx, wy, cx, cy, ux, uy)
     if craft.night_share < 1.0:
         place = w.up[j + (fy > 0.5), i + (fx > 0.5)]
@@ -271,7 +290,7 @@ def labels(
     earliest: Floats,
     found_s: float,
 ) -> tuple[Floats, NDArray[np.int32], int, int]:
-    """Return a label for each node [s, inf], the nodes before, and how often wind was unknown and too strong.
+    """Return a label for each node [s, inf], the nodes before, and how often wind was unknown, and a limit broken.
 
     Label setting (Dijkstra's): nodes are left in the order of their labels, ``last`` the last. Bit d of ``blocked``
     closes the direction d of the stencil. Without ``earliest`` (no element) a label is the earliest arrival of who
@@ -319,7 +338,7 @@ def labels(
                 )
             if status == UNKNOWN:
                 unknown += 1
-            elif status == OVER_LIMIT:
+            elif status in (OVER_LIMIT, OVER_WAVES, LEE_SHORE):
                 strong += 1
             elif status == KNOWN and there < label[other]:
                 label[other] = there
@@ -340,9 +359,20 @@ def polyline(w: Waters, craft: Craft, xy_m: Floats, t: float, step_s: float) -> 
 
 @kernel
 def sail_line(
-    craft: Craft, t_axis: Floats, s_m: Floats, wind: Floats, stream: Floats, up: Floats, t: float, step_s: float
+    craft: Craft,
+    t_axis: Floats,
+    s_m: Floats,
+    wind: Floats,
+    stream: Floats,
+    waves: Floats,
+    onshore: Floats,
+    up: Floats,
+    t: float,
+    step_s: float,
 ) -> tuple[Floats, int, int]:
     """Sail a line: wind and stream (t, s, 2) along the course and to its left, at the ways ``s_m`` from its begin.
+
+    ``waves`` (t, s) are heights [m], NaN where unknown, ``onshore`` (t, s) the wind towards a near shore [m/s].
 
     Return rows of (time, way, speed made good, wind speed, angle of the course to the wind, night), how many there are,
     and whether the last of them is the end (KNOWN) or why it is not.
@@ -357,7 +387,7 @@ def sail_line(
             if k < 0:
                 return rows, count, UNKNOWN
             i, fs = _at(s_m, at_s)
-            wx = wy = cx = cy = 0.0
+            wx = wy = cx = cy = height = known = lee = 0.0
             for a in range(2):
                 for b in range(2):
                     weight = (ft if a else 1.0 - ft) * (fs if b else 1.0 - fs)
@@ -366,6 +396,10 @@ def sail_line(
                         wy += weight * wind[k + a, i + b, 1]
                         cx += weight * stream[k + a, i + b, 0]
                         cy += weight * stream[k + a, i + b, 1]
+                        lee += weight * onshore[k + a, i + b]
+                        if not math.isnan(waves[k + a, i + b]):
+                            height += weight * waves[k + a, i + b]
+                            known += weight
             if math.isnan(wx + wy + cx + cy):
                 return rows, count, UNKNOWN
             v = made_good(craft, wx, wy, cx, cy, 1.0, 0.0)
@@ -384,6 +418,10 @@ def sail_line(
                 count += 1
                 if rows[count - 1, 3] > craft.max_tws_mps:
                     return rows, count, OVER_LIMIT
+                if height > known * craft.max_wave_m:
+                    return rows, count, OVER_WAVES
+                if lee > craft.lee_tws_mps:
+                    return rows, count, LEE_SHORE
                 if gone >= length:
                     return rows, count, KNOWN
                 dt = min(step_s, (length - gone) / v) if v > 1e-6 else step_s

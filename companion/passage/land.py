@@ -38,6 +38,18 @@ class Land:
         """Return whether a line of points keeps clear of it."""
         return bool(self.shape.is_empty or not shapely.intersects(self.shape, shapely.linestrings(xy_m)))
 
+    def towards(self, xy_m: Floats, within_m: float) -> Floats:
+        """Return (n, 2): the direction to land that is within ``within_m``, zero where none is."""
+        out = np.zeros((len(xy_m), 2))
+        near = np.flatnonzero(self.distance_m(xy_m) < within_m)
+        if near.size:
+            ends = shapely.get_coordinates(shapely.shortest_line(shapely.points(xy_m[near]), self.shape)).reshape(
+                -1, 2, 2
+            )
+            way = ends[:, 1] - ends[:, 0]
+            out[near] = way / np.maximum(np.hypot(*way.T), 1e-9)[:, None]
+        return out
+
     def blocked(self, x_m: Floats, y_m: Floats) -> NDArray[np.uint64]:
         """Return (y * x,) for each node of a grid a bit for each direction of the stencil that is closed."""
         out = np.zeros(y_m.size * x_m.size, dtype=np.uint64)

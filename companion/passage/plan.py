@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +25,7 @@ _LEAST_ROOM_M = 15_000.0
 _MOST_WIDENINGS = 2
 _MOST_SIDE_M, _MOST_ROUND_M = 8.0e6, 3.6e7  # 72 and 324 degrees
 _STEPS_AN_EDGE = 2
-WITHIN = 0.98  # of the most wind, what is planned through: between the grid's nodes there is a little more
+WITHIN = 0.98  # of the limits, what is planned through: between the grid's nodes there is a little more
 
 
 class Outcome(enum.Enum):
@@ -33,12 +34,15 @@ class Outcome(enum.Enum):
     FOUND = "found"
     NO_WATER = "no way by water leads there"
     NO_WEATHER = "the forecast ends before she is there, or does not reach so far"
-    TOO_MUCH_WIND = "every way leads through more wind than she is to be out in"
+    TOO_MUCH = "every way leads through more wind or sea, or nearer to a lee shore, than she is to be out in"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Passage:
-    """What is asked: from where, to where, when, with which boat, in which water and weather."""
+    """What is asked: from where, to where, when, with which boat, in which water and weather.
+
+    A shore is near within ``lee_shore_m``.
+    """
 
     start: GeoPoint
     goal: GeoPoint
@@ -47,6 +51,27 @@ class Passage:
     weather: Weather
     land: Land
     frame: PassageFrame
+    lee_shore_m: float = 0.0
+
+    def sail(
+        self,
+        waypoints: Sequence[GeoPoint],
+        depart_utc_s: float,
+        members: Sequence[int],
+        shares: Sequence[float] = (1.0,),
+    ) -> list[Sailed]:
+        """Return a route sailed in each member and share of her speeds."""
+        shore = self.shore_en if self.lee_shore_m > 0.0 else None
+        return sail(self.weather, self.craft, waypoints, depart_utc_s, self.radius_m, members, shares, shore)
+
+    def shore_en(self, lat_deg: Floats, lon_deg: Floats) -> Floats:
+        """Return (n, 2), east and north: the direction to land nearer than ``lee_shore_m``, zero where none is."""
+        towards = self.land.towards(self.frame.xy_from_geo(lat_deg, lon_deg), self.lee_shore_m)
+        east, north = (
+            self.frame.turned(np.full(lat_deg.size, e), np.full(lat_deg.size, n), lat_deg, lon_deg)
+            for e, n in ((1.0, 0.0), (0.0, 1.0))
+        )
+        return np.stack([towards[:, 0] * v[0] + towards[:, 1] * v[1] for v in (east, north)], axis=-1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -95,6 +120,7 @@ def waters_of(
     shape = (times.size, y_m.size, x_m.size, 2)
     wind = np.full(shape, np.nan, dtype=np.float32)
     stream = np.full(shape if passage.weather.current else (1, 1, 1, 2), np.nan, dtype=np.float32)
+    heights = np.full(shape[:3] if passage.weather.waves else (1, 1, 1), np.nan, dtype=np.float32)
     here = np.ones(lat.shape, dtype=bool) if mask is None else mask
     row = passage.weather.members.index(member)
     for k, t in enumerate(times):
@@ -103,11 +129,20 @@ def waters_of(
         if passage.weather.current:
             flows = passage.weather.current_en_mps(t, lat[here], lon[here])
             stream[k][here] = np.stack(passage.frame.turned(flows[:, 0], flows[:, 1], lat[here], lon[here]), axis=-1)
+        if passage.weather.waves:
+            heights[k][here] = passage.weather.waves_m(t, lat[here], lon[here])[row]
+    shore = np.zeros((y_m.size, x_m.size, 2) if passage.lee_shore_m > 0.0 else (1, 1, 2), dtype=np.float32)
+    if passage.lee_shore_m > 0.0:
+        shore[here] = passage.land.towards(grid[here], passage.lee_shore_m)
     return Waters(
         t_s=times,
         wind=wind,
         stream=stream,
         has_stream=bool(passage.weather.current),
+        waves=heights,
+        has_waves=bool(passage.weather.waves),
+        shore=shore,
+        has_shore=passage.lee_shore_m > 0.0,
         up=up_of(lat, lon),
         first_x_m=float(x_m[0]),
         first_y_m=float(y_m[0]),
@@ -118,7 +153,7 @@ def waters_of(
 
 def times_of(weather: Weather, from_s: float, to_s: float) -> Floats:
     """Return the times of wind and current between two, with both ends where the wind reaches so far."""
-    known = np.concatenate([cube.utc_s for cube in (*weather.wind, *weather.current)])
+    known = np.concatenate([cube.utc_s for cube in (*weather.wind, *weather.waves, *weather.current)])
     first = min(float(cube.utc_s[0]) for cube in weather.wind)
     last = max(float(cube.utc_s[-1]) for cube in weather.wind)
     begin, end = max(from_s, first), min(to_s, last)
@@ -129,8 +164,13 @@ def plan(passage: Passage, depart_utc_s: float, member: int | None = None, *, no
     """Return the fastest way for a departure in one member (the first), by so many nodes from start to goal."""
     member = passage.weather.members[0] if member is None else member
     bold = passage.craft
-    careful = bold._replace(max_tws_mps=WITHIN * bold.max_tws_mps)
-    passage = replace(passage, craft=careful, weather=passage.weather.only(member))
+    asked = replace(passage, weather=passage.weather.only(member))
+    careful = bold._replace(
+        max_tws_mps=WITHIN * bold.max_tws_mps,
+        max_wave_m=WITHIN * bold.max_wave_m,
+        lee_tws_mps=WITHIN * bold.lee_tws_mps,
+    )
+    passage = replace(asked, craft=careful)
     frame, length_m = passage.frame, passage.frame.length_m
     step_m = length_m / nodes
     last_s = max(float(cube.utc_s[-1]) for cube in passage.weather.wind)
@@ -173,7 +213,7 @@ def plan(passage: Passage, depart_utc_s: float, member: int | None = None, *, no
         *(GeoPoint(lat_deg=float(a), lon_deg=float(o)) for a, o in zip(lat[1:-1], lon[1:-1], strict=True)),
         passage.goal,
     )
-    sailed = sail(passage.weather, bold, waypoints, depart_utc_s, passage.radius_m, (member,))[0]
+    sailed = asked.sail(waypoints, depart_utc_s, (member,))[0]
     ends = _ends(passage, x_m, y_m)
     bound = SLACK * _least_left(waters, passage.craft, coarse.table, ends, depart_utc_s, sailed.time_s)
     return Route(
@@ -227,7 +267,7 @@ def _search(
         if not _is_joined(blocked, allowed, nx, start, goal):
             outcome = Outcome.NO_WATER
         else:
-            outcome = Outcome.TOO_MUCH_WIND if strong and not unknown else Outcome.NO_WEATHER
+            outcome = Outcome.TOO_MUCH if strong and not unknown else Outcome.NO_WEATHER
         return _Found(outcome=outcome, path=None, arrive_s=math.inf, table=table)
     nodes = [goal]
     while nodes[-1] != start:

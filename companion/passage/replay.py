@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,13 +11,18 @@ import numpy as np
 
 from companion.messages import GeoPoint
 from companion.passage.frame import GEOD, Floats, up_of
-from companion.passage.kernels import KNOWN, OVER_LIMIT, Craft, sail_line
+from companion.passage.kernels import KNOWN, LEE_SHORE, OVER_LIMIT, OVER_WAVES, Craft, sail_line
 from companion.weather import Weather
 
 EVERY_M = (200.0, 2000.0)  # wind and stream are looked up so often along the way, on short ones and on long
 PLACES = 1000
 STEP_S = 300.0  # on long ways
 BEAT_RAD = math.radians(50.0)
+_BROKEN = {
+    OVER_LIMIT: "{:.1f} m/s of wind is more than she is to be out in",
+    OVER_WAVES: "the sea is higher than she is to be out in",
+    LEE_SHORE: "{:.1f} m/s of wind blow on a shore that is near",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -26,7 +31,7 @@ class Sailed:
 
     ``rows`` are (time [Unix s], way [m], speed made good, wind [m/s], angle of the course to the wind [rad], night) by
     steps of five minutes at the most, ``places`` (n, 2) the latitudes and longitudes to them [deg]. ``why`` is empty
-    where she arrived.
+    where she arrived; ``is_too_much`` where it is wind, sea or a lee shore that ended it.
     """
 
     member: int
@@ -71,12 +76,16 @@ def sail(
     radius_m: float,
     members: Sequence[int],
     shares: Sequence[float] = (1.0,),
+    shore_en: Callable[[Floats, Floats], Floats] | None = None,
 ) -> list[Sailed]:
-    """Return the route sailed in each member and share of her speeds, to within ``radius_m`` of its end."""
+    """Return the route sailed in each member and share of her speeds, to within ``radius_m`` of its end.
+
+    ``shore_en`` tells of places the direction to a shore that is near, zero where none is.
+    """
     way, lat, lon, course = _line(waypoints, radius_m)
     step_s = min(STEP_S, max(10.0, float(way[-1]) / 1000.0))
     first = max(depart_utc_s, min(float(c.utc_s[0]) for c in weather.wind))
-    known = np.concatenate([cube.utc_s for cube in (*weather.wind, *weather.current)])
+    known = np.concatenate([cube.utc_s for cube in (*weather.wind, *weather.waves, *weather.current)])
     times = np.unique(np.append(known[known > first], first))
     t, s = np.meshgrid(times, np.arange(way.size), indexing="ij")
     wind = weather.wind_en_mps(t, lat[s], lon[s])
@@ -85,17 +94,31 @@ def sail(
     if weather.current:
         stream = _along(weather.current_en_mps(t, lat[s], lon[s]), course)
     up = up_of(lat, lon)
+    height = weather.waves_m(t, lat[s], lon[s]) if weather.waves else None
+    towards = np.zeros((way.size, 2)) if shore_en is None else shore_en(lat, lon)
     out = []
     for member in members:
-        blows = _along(wind[weather.members.index(member)], course)
+        row = weather.members.index(member)
+        waves = np.zeros(shape[:2]) if height is None else np.ascontiguousarray(height[row])
+        onshore = np.nan_to_num(np.sum(wind[row] * towards, axis=-1))
+        blows = _along(wind[row], course)
         for share in shares:
             rows, count, status = sail_line(
-                craft._replace(share=share * craft.share), times, way, blows, stream, up, depart_utc_s, step_s
+                craft._replace(share=share * craft.share),
+                times,
+                way,
+                blows,
+                stream,
+                waves,
+                onshore,
+                up,
+                depart_utc_s,
+                step_s,
             )
             rows = rows[:count]
             why = ""
-            if status == OVER_LIMIT:
-                why = f"{rows[-1, 3]:.1f} m/s of wind is more than she is to be out in"
+            if status in _BROKEN:
+                why = _BROKEN[status].format(rows[-1, 3])
             elif status != KNOWN:
                 here = rows[-1] if count else np.array([depart_utc_s, 0.0])
                 at = (np.interp(here[1], way, lat), np.interp(here[1], way, np.unwrap(lon, period=360.0)))
@@ -110,7 +133,7 @@ def sail(
                     member=member,
                     arrived=status == KNOWN,
                     why=why,
-                    is_too_much=status == OVER_LIMIT,
+                    is_too_much=status in _BROKEN,
                     rows=rows,
                     places=places,
                     length_m=float(way[-1]),

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from companion.passage.plan import Outcome, Passage, Route, plan
-from companion.passage.replay import Sailed, sail
+from companion.passage.replay import Sailed
 
 CANDIDATES = 3  # members whose own best routes are tried, beside that of their mean
 SURE = 0.9  # the share of runs that must arrive, where nobody says
@@ -46,8 +46,8 @@ class Departure:
             return 0.0
         return float(np.mean([run.arrived and self.utc_s + run.time_s <= by_utc_s for run in self.runs]))
 
-    def chance_of_too_much_wind(self) -> float:
-        """Return the share of runs that end in more wind than she is to be out in."""
+    def chance_of_too_much(self) -> float:
+        """Return the share of runs that end in more wind or sea, or nearer to a lee shore, than she is to be out in."""
         return float(np.mean([run.is_too_much for run in self.runs])) if self.runs else 0.0
 
     def chance_of_night(self) -> float:
@@ -101,7 +101,7 @@ def _departure(
     members = passage.weather.members
 
     def sailed(route: Route) -> Departure:
-        runs = sail(passage.weather, passage.craft, route.waypoints, utc_s, passage.radius_m, members, shares)
+        runs = passage.sail(route.waypoints, utc_s, members, shares)
         return Departure(utc_s=utc_s, route=route, runs=tuple(runs))
 
     routes: list[Route] = []
@@ -124,7 +124,7 @@ def _spread(passage: Passage, utc_s: float, first: Route, count: int) -> list[in
     """Return so many members, from the one in which a first route is the fastest to the one where it is the slowest."""
     members = passage.weather.members
     points = first.waypoints or (passage.start, passage.goal)
-    runs = sail(passage.weather, passage.craft, points, utc_s, passage.radius_m, members)
+    runs = passage.sail(points, utc_s, members)
     gone = sorted(runs, key=lambda run: (not run.arrived, run.time_s if run.arrived else -run.way_m))
     return [gone[i].member for i in np.unique(np.linspace(0, len(gone) - 1, min(count, len(gone))).astype(int))]
 

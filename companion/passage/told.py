@@ -91,13 +91,13 @@ def told_of_departures(departures: Sequence[Departure], by_utc_s: float | None) 
     count = max((d.members for d in departures), default=0)
     least, most = shown(max(1, count))
     head = f"hours (middle {_share(least, most)})" if count > 1 else "hours"
-    lines = [f"{'depart':<22}{head:<26} arrives  too windy  by night"]
+    lines = [f"{'depart':<22}{head:<26} arrives  too much  by night"]
     for d in departures:
         if not d.runs:
             lines.append(f"{iso(d.utc_s)}   no way: {d.why}")
             continue
         low, middle, high = (_number(d.hours(q)) for q in (least, 0.5, most))
-        chances = (d.chance(by), d.chance_of_too_much_wind(), d.chance_of_night())
+        chances = (d.chance(by), d.chance_of_too_much(), d.chance_of_night())
         said = f"{iso(d.utc_s)}   {middle:>6}" + (f" ({low} to {high})" if count > 1 else "")
         lines.append(said.ljust(47) + "".join(f"{100.0 * p:8.0f} %" for p in chances))
     if count:
@@ -133,11 +133,9 @@ def explained(departures: Sequence[Departure], by_utc_s: float | None) -> tuple[
 def _against(d: Departure, by: float) -> str:
     """Return what keeps a departure from arriving most often."""
     failed = [run for run in d.runs if not run.arrived]
-    if d.chance_of_too_much_wind() > 0.0:
-        strongest = max(run.strongest_mps for run in d.runs if run.is_too_much)
-        return f"{strongest:.0f} m/s of wind in {100.0 * d.chance_of_too_much_wind():.0f} %"
     if failed:
-        return f"{failed[0].why} in {100.0 * len(failed) / len(d.runs):.0f} %"
+        worst = max(failed, key=lambda run: (run.is_too_much, run.strongest_mps))
+        return f"in {100.0 * len(failed) / len(d.runs):.0f} % {worst.why}"
     late = 1.0 - d.chance(by)
     return f"too late in {100.0 * late:.0f} %" if late > 0.0 else "nothing against it"
 

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from companion.geo import MPS_PER_KNOT
-from companion.passage import Departure, Passage, Route, sail, shown
+from companion.passage import Departure, Passage, Route, shown
 from companion.plots.chart import legend_above, save
 from companion.weather import iso
 from companion.words import counted
@@ -63,7 +63,7 @@ def departures_figure(departures: Sequence[Departure], by_utc_s: float | None, n
     hours.set_ylabel("hours under way")
     hours.set_ylim(bottom=0.0)
     for words, of in (("arrives" if by_utc_s is None else f"arrives by {iso(by)}", [d.chance(by) for d in departures]),
-                      ("too much wind", [d.chance_of_too_much_wind() for d in departures]),
+                      ("too much wind", [d.chance_of_too_much() for d in departures]),
                       ("arrives by night", [d.chance_of_night() for d in departures])):  # fmt: skip
         chances.plot(since, 100.0 * np.array(of), "o-", label=words)
     chances.set_ylabel("of all runs [%]")
@@ -121,7 +121,7 @@ def _draw_hours(axes: Axes, passage: Passage, route: Route) -> None:
     assert sailed is not None
     members = passage.weather.members
     if len(members) > 1:
-        fan = sail(passage.weather, passage.craft, route.waypoints, route.depart_utc_s, passage.radius_m, members)
+        fan = passage.sail(route.waypoints, route.depart_utc_s, members)
         for run in fan:
             since = (run.rows[:, 0] - route.depart_utc_s) / 3600.0
             axes.plot(since, run.rows[:, 3], color="tab:blue", lw=0.5, alpha=0.5)

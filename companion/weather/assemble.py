@@ -16,9 +16,10 @@ Box = tuple[float, float, float, float]
 """West, south, east, north [deg]; east is above 180 where it lies over the date line."""
 
 MOST_BYTES = 2 << 30  # of a cube, unpacked
-# What is more than this is of another unit, or damaged [m/s]; the strongest gust measured is 113.
-MOST_MPS = {Quantity.GUST: 130.0, Quantity.CURRENT_EAST: 10.0, Quantity.CURRENT_NORTH: 10.0}
+# What is more than this is of another unit, or damaged [m/s, m]; the strongest gust measured is 113, the sea 20.
+MOST = {Quantity.GUST: 130.0, Quantity.WAVES: 40.0, Quantity.CURRENT_EAST: 10.0, Quantity.CURRENT_NORTH: 10.0}
 MOST_WIND_MPS = 110.0
+_ALONE = {Quantity.GUST: "gust", Quantity.WAVES: "waves"}
 _PARTNER = {
     Quantity.WIND_EAST: Quantity.WIND_NORTH,
     Quantity.WIND_NORTH: Quantity.WIND_EAST,
@@ -41,10 +42,10 @@ def assemble(fields: Iterable[GribField], box: Box | None = None, *, most_bytes:
         key = (field.base_utc_s, field.valid_utc_s, field.member)
         twice[field.title] += key in place
         place[key] = field
-    cubes: dict[str, list[Cube | None]] = {"wind": [], "gust": [], "current": []}
+    cubes: dict[str, list[Cube | None]] = {"wind": [], "gust": [], "waves": [], "current": []}
     for (quantity, grid), found in used.items():
-        if quantity is Quantity.GUST:
-            cubes["gust"].append(_cube(grid, [found], box, most_bytes))
+        if quantity in _ALONE:
+            cubes[_ALONE[quantity]].append(_cube(grid, [found], box, most_bytes))
             continue
         pair = [used.get((q, grid), {}) for q in sorted((quantity, _PARTNER[quantity]), key=lambda q: q.value)]
         _all_paired(pair)
@@ -53,7 +54,9 @@ def assemble(fields: Iterable[GribField], box: Box | None = None, *, most_bytes:
     notes = [f"not used: {title}, {n} of them" if n > 1 else f"not used: {title}" for title, n in other.most_common()]
     notes += [f"{n} fields of {title} came twice: the last counts" for title, n in twice.items() if n]
     sort = {k: tuple(sorted((c for c in v if c is not None), key=lambda c: c.cell_deg2)) for k, v in cubes.items()}
-    return Weather(wind=sort["wind"], gust=sort["gust"], current=sort["current"], notes=tuple(notes))
+    return Weather(
+        wind=sort["wind"], gust=sort["gust"], waves=sort["waves"], current=sort["current"], notes=tuple(notes)
+    )
 
 
 def _all_paired(pair: list[dict[_Key, GribField]]) -> None:
@@ -126,12 +129,15 @@ def _believed(field: GribField) -> NDArray[np.float32]:
     assert field.quantity is not None
     values = values_of(field)
     most = float(np.nanmax(np.abs(values), initial=0.0))
-    if most > MOST_MPS.get(field.quantity, MOST_WIND_MPS):
+    if most > MOST.get(field.quantity, MOST_WIND_MPS):
+        unit = "m" if field.quantity is Quantity.WAVES else "m/s"
         raise field.refused(
-            f"{field.quantity.value} is up to {most:.4g} m/s", "it is of another unit, or damaged: fetch it again"
+            f"{field.quantity.value} is up to {most:.4g} {unit}", "it is of another unit, or damaged: fetch it again"
         )
-    if np.nanmin(values, initial=0.0) < 0.0 and field.quantity is Quantity.GUST:
-        raise field.refused("gust is below zero", "it is of another unit, or damaged: fetch it again")
+    if np.nanmin(values, initial=0.0) < 0.0 and field.quantity in _ALONE:
+        raise field.refused(
+            f"{field.quantity.value} is below zero", "it is of another unit, or damaged: fetch it again"
+        )
     return values
 
 

@@ -29,6 +29,7 @@ class Quantity(Enum):
     WIND_EAST = "wind to the east"
     WIND_NORTH = "wind to the north"
     GUST = "gust"
+    WAVES = "wave height"
     CURRENT_EAST = "current to the east"
     CURRENT_NORTH = "current to the north"
 
@@ -36,18 +37,19 @@ class Quantity(Enum):
 Q = Quantity
 # (discipline, category, number) [1], code table 4.2
 _OF_2 = {(0, 2, 2): Q.WIND_EAST, (0, 2, 3): Q.WIND_NORTH, (0, 2, 22): Q.GUST,
-         (10, 1, 2): Q.CURRENT_EAST, (10, 1, 3): Q.CURRENT_NORTH}  # fmt: skip
+         (10, 0, 3): Q.WAVES, (10, 1, 2): Q.CURRENT_EAST, (10, 1, 3): Q.CURRENT_NORTH}  # fmt: skip
 _ALSO_2 = {(0, 2, 0): "wind by direction", (0, 2, 1): "wind by speed", (0, 3, 0): "pressure", (0, 0, 0): "temperature",
-           (0, 3, 1): "sea level pressure", (0, 3, 5): "height", (10, 0, 3): "wave height", (10, 0, 5): "wave height",
+           (0, 3, 1): "sea level pressure", (0, 3, 5): "height", (10, 0, 5): "height of the wind's waves",
            (10, 0, 8): "swell height", (10, 1, 0): "current by direction", (10, 1, 1): "current by speed"}  # fmt: skip
 # WMO's table 2 and ECMWF's 128 [2]: one number means different things in them
-_OF_1 = {33: Q.WIND_EAST, 34: Q.WIND_NORTH, 49: Q.CURRENT_EAST, 50: Q.CURRENT_NORTH, 180: Q.GUST}
+_OF_1 = {33: Q.WIND_EAST, 34: Q.WIND_NORTH, 49: Q.CURRENT_EAST, 50: Q.CURRENT_NORTH, 180: Q.GUST,
+         100: Q.WAVES}  # fmt: skip
 # by table, too: 49 is since the last output, 123 of 6 hours, 228.28 of 3, 228.29 of the moment
 _OF_1_ECMWF = {(128, 165): Q.WIND_EAST, (128, 166): Q.WIND_NORTH, (128, 49): Q.GUST, (128, 123): Q.GUST,
-               (228, 28): Q.GUST, (228, 29): Q.GUST}  # fmt: skip
+               (228, 28): Q.GUST, (228, 29): Q.GUST, (140, 229): Q.WAVES}  # fmt: skip
 _ALSO_1 = {1: "pressure", 2: "sea level pressure", 7: "height", 11: "temperature", 31: "wind by direction",
-           32: "wind by speed", 100: "wave height"}  # fmt: skip
-_ALSO_1_ECMWF = {151: "sea level pressure", 167: "temperature", 229: "wave height"}
+           32: "wind by speed"}  # fmt: skip
+_ALSO_1_ECMWF = {151: "sea level pressure", 167: "temperature"}
 _INTERVAL_MAXIMUM = 2  # code table 4.10 [1]
 _SURFACES_2 = {1, 160, 168, 241}  # ground or water, depth below the sea, the same in models, an ordered sequence
 

@@ -14,7 +14,12 @@ from companion.words import counted
 def told_of(weather: Weather) -> tuple[str, ...]:
     """Return lines that say what a forecast holds."""
     lines: list[str] = []
-    for name, cubes in (("wind of 10 m", weather.wind), ("gust", weather.gust), ("current", weather.current)):
+    for name, cubes in (
+        ("wind of 10 m", weather.wind),
+        ("gust", weather.gust),
+        ("waves", weather.waves),
+        ("current", weather.current),
+    ):
         for cube in cubes:
             lines += _told_of_cube(name, cube)
     return (*lines, *weather.notes)
@@ -73,14 +78,18 @@ def told_at(weather: Weather, lat_deg: float, lon_deg: float) -> tuple[str, ...]
     speed = np.hypot(wind[..., 0], wind[..., 1])
     gust = weather.gust_mps(utc, lat_deg, lon_deg)
     current = weather.current_en_mps(utc, lat_deg, lon_deg) if weather.current else np.full((utc.size, 2), math.nan)
+    waves = weather.waves_m(utc, lat_deg, lon_deg) if weather.waves and weather.wind else np.zeros((0, utc.size))
     many = len(weather.members) > 1 or gust.shape[0] > 1
     spread = " (a tenth of the members below, a tenth above)" if many else ""
-    lines = [f"time, wind [m/s] from, gust [m/s], current [m/s] towards{spread}"]
+    lines = [
+        "time, wind [m/s] from, gust [m/s], current [m/s] towards" + (", waves [m]" if waves.size else "") + spread
+    ]
     for i, t in enumerate(utc):
         east, north = (_mean(wind[:, i, k]) for k in (0, 1))
         blows = f"{_spread(speed[:, i])} from {_compass(-east, -north)}" if weather.wind else "-"
         words = [iso(t), blows, _spread(gust[:, i])]
         words.append(f"{math.hypot(*current[i]):.2f} to {_compass(*current[i])}" if weather.current else "-")
+        words += [_spread(waves[:, i])] if waves.size else []
         lines.append("  ".join(words))
     return tuple(lines)
 

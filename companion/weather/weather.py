@@ -154,13 +154,14 @@ def _between(axis: Floats, at: Floats, tight: float) -> tuple[NDArray[np.int64],
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Weather:
-    """A forecast of one or several files: cubes of the wind and, where there are, of gusts and the current.
+    """A forecast of one or several files: cubes of the wind and, where there are, of gusts, waves and the current.
 
     Of several grids the finest that knows a place and time is asked. ``notes`` are what else was found.
     """
 
     wind: tuple[Cube, ...]
     gust: tuple[Cube, ...] = ()
+    waves: tuple[Cube, ...] = ()
     current: tuple[Cube, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -186,6 +187,15 @@ class Weather:
         members = tuple(sorted({m for cube in self.gust for m in cube.members}))
         found: Floats = _asked(self.gust, members, 1, utc_s, lat_deg, lon_deg)[..., 0]
         return found
+
+    def waves_m(self, utc_s: ArrayLike, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
+        """Return (m, n): the significant height of the sea by ``members``; NaN where unknown.
+
+        A member of the wind that has no waves of its own has those of the waves' first.
+        """
+        own = tuple(sorted({m for cube in self.waves for m in cube.members}))
+        found: Floats = _asked(self.waves, own, 1, utc_s, lat_deg, lon_deg)[..., 0]
+        return found[[own.index(m) if m in own else 0 for m in self.members]]
 
     def current_en_mps(self, utc_s: ArrayLike, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
         """Return (n, 2): the motion of the water, of the first member; NaN where unknown."""

@@ -157,6 +157,14 @@ def test_an_option_that_goes_with_another(shell, words, said):
             ("at = 2026-04-20T06:00:00Z", "at = 2026-04-20T06:00:00"),
             "p.toml: [depart] at: expected a date with its time with a timezone component",
         ),
+        (
+            ("[area]", "[limits]\nmax_wave_m = 3.0\n[area]"),
+            "p.toml: [limits] max_wave_m: f.grb2 says nothing of waves; add a forecast of them",
+        ),
+        (
+            ('obstacles = ["rock.wkt"]\nmargin_m = 500.0', "[limits]\nlee_shore_m = 3000.0"),
+            "p.toml: [limits] lee_shore_m: there is no shore; name one in [area] obstacles",
+        ),
         (("lon = -6.0", "lon = -9.0"), "p.toml: [start]: is outside the area of f.grb2; ask for a larger area"),
         (
             ("lon = -6.0", "lon = -5.55"),

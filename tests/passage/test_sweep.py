@@ -37,7 +37,7 @@ def test_her_own_speed_is_not_known_either():
 
 def test_too_much_wind_ends_a_run_and_is_counted():
     [d] = sweep(asked(5.0, 5.0, 5.0, 14.0, max_tws_mps=12.0), [T0], 0.0, nodes=20)
-    assert (d.chance_of_too_much_wind(), d.chance()) == (0.25, 0.75)
+    assert (d.chance_of_too_much(), d.chance()) == (0.25, 0.75)
 
 
 def test_of_the_members_own_routes_the_one_that_serves_all_counts():
@@ -105,7 +105,7 @@ def test_what_is_said_of_departures():
     assert lines[4] == "of 2 members of the forecast: what none of them shows may still come in 78 %"
     said = explained(found, None)
     assert said[0] == "best: 2026-04-20T00:00Z, there in 50 % of all"
-    assert said[1].endswith("14 m/s of wind in 50 %")
+    assert said[1].endswith("in 50 % 14.0 m/s of wind is more than she is to be out in")
     assert explained(found, T0 + 3600.0) == ("none of these departures arrives by 2026-04-20T01:00Z",)
 
 

@@ -1,6 +1,7 @@
 """What other programs of this kind got wrong, one test each."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -67,7 +68,53 @@ def test_too_much_wind_is_said_and_gone_round():
     assert round_it.sailed.strongest_mps <= 12.0
     assert round_it.time_s > 1.05 * free.time_s
     everywhere = passage(A, B, wind=cube(LAT, LON, HOURS, steady(0.0, -20.0)), max_tws_mps=12.0)
-    assert plan(everywhere, T0, nodes=30).outcome is Outcome.TOO_MUCH_WIND
+    assert plan(everywhere, T0, nodes=30).outcome is Outcome.TOO_MUCH
+
+
+def heights(field):
+    """A cube of one component."""
+    pair = cube(LAT, LON, HOURS, lambda t, y, x: (field(t, y, x), 0.0 * x))
+    return replace(pair, values=np.ascontiguousarray(pair.values[..., :1]))
+
+
+def test_a_sea_that_is_too_high_is_said_and_gone_round_and_what_is_not_known_of_it_is_no_limit():
+    sea = heights(lambda t, y, x: np.where((x > 0.3) & (x < 0.6) & (y < 0.4) & (y > -1.5), 6.0, 1.0) + 0.0 * x)
+    free = plan(passage(A, B, waves=sea), T0, nodes=40)
+    asked = passage(A, B, waves=sea, max_wave_m=3.0)
+    round_it = plan(asked, T0, nodes=40)
+    assert round_it.sailed.arrived
+    assert round_it.time_s > 1.05 * free.time_s
+    [through] = asked.sail((A, B), T0, (0,))
+    assert (through.arrived, through.is_too_much, through.why) == (
+        False, True, "the sea is higher than she is to be out in"
+    )  # fmt: skip
+    assert plan(passage(A, B, waves=heights(lambda t, y, x: 6.0 + 0.0 * x), max_wave_m=3.0), T0, nodes=30).outcome is (
+        Outcome.TOO_MUCH
+    )
+    unknown = heights(lambda t, y, x: np.nan + 0.0 * x)
+    assert plan(passage(A, B, waves=unknown, max_wave_m=3.0), T0, nodes=30).sailed.arrived
+
+
+def test_a_lee_shore_is_kept_off_and_a_weather_shore_is_none():
+    """The wind is from the north, an island to the south of the way or to the north of it."""
+    wind = cube(LAT, LON, HOURS, steady(0.0, -10.0))
+    south, north = shapely.box(0.3, -0.3, 0.6, -0.05), shapely.box(0.3, 0.05, 0.6, 0.3)
+    times = {}
+    for name, island in (("lee", south), ("weather", north)):
+        asked = passage(A, B, wind=wind, land=[island], lee_shore_m=12_000.0, lee_tws_mps=8.0)
+        route = plan(asked, T0, nodes=40)
+        assert route.sailed.arrived
+        times[name] = route.time_s
+        xy = asked.frame.xy_from_geo(*route.sailed.places.T)
+        beside = (xy[:, 0] > 40_000.0) & (xy[:, 0] < 60_000.0)
+        off_m = asked.land.distance_m(xy[beside]).min()
+        assert (off_m > 11_900.0) == (name == "lee")
+        [straight] = asked.sail((A, B), T0, (0,))
+        assert straight.arrived == (name == "weather")
+    assert straight.why == ""
+    assert times["lee"] > times["weather"]
+    calm = passage(A, B, land=[south], lee_shore_m=12_000.0, lee_tws_mps=8.0)
+    assert plan(calm, T0, nodes=40).time_s == pytest.approx(times["weather"], rel=1e-3)
 
 
 def by_longitude(lon):

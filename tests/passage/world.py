@@ -46,7 +46,19 @@ def steady(east, north):
 
 
 def passage(
-    start, goal, *, polar=None, wind=None, stream=None, land=(), radius_m=1.0, margin_m=0.0, no_go_deg=0.0, **boat
+    start,
+    goal,
+    *,
+    polar=None,
+    wind=None,
+    stream=None,
+    land=(),
+    radius_m=1.0,
+    margin_m=0.0,
+    no_go_deg=0.0,
+    waves=None,
+    lee_shore_m=0.0,
+    **boat,
 ):
     """A passage in a northerly of 5 m/s for a boat of 2 m/s on every course, where nothing else is said."""
     frame = PassageFrame(start, goal)
@@ -59,7 +71,10 @@ def passage(
         goal=goal,
         radius_m=radius_m,
         craft=craft_of(polar or constant(2.0), no_go_half_rad=math.radians(no_go_deg), **boat),
-        weather=Weather(wind=winds, current=() if stream is None else (stream,)),
+        weather=Weather(
+            wind=winds, waves=() if waves is None else (waves,), current=() if stream is None else (stream,)
+        ),
         land=land_of(frame, land, box, margin_m),
         frame=frame,
+        lee_shore_m=lee_shore_m,
     )

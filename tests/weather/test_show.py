@@ -71,7 +71,7 @@ def test_a_part_of_it(shell):
     [
         (["f.grb2", "--at", "10,10"], "f.grb2: --at: 10, 10 is outside of it; ask within its area"),
         (["none.grb"], "none.grb: no such file; check the path"),
-        (["f.grb2", "--box", "10,10,20,20"], ("f.grb2: holds no wind of 10 m, no gust and no current there; "
+        (["f.grb2", "--box", "10,10,20,20"], ("f.grb2: holds no wind of 10 m, no gust, no waves and no current there; "
          "not used: sea level pressure; ask for 10u and 10v of the area")),
         (["f.grb2", "--plot", "x.png", "--time", "2026-04-22T00:00Z"],
          "f.grb2: --time: is not within it; say another, or leave it out for its first"),

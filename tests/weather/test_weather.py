@@ -7,7 +7,7 @@ import pytest
 
 from companion.errors import InputError
 from companion.weather import Cube, assemble, holes_of, iso, walk
-from tests.weather.grib_file import CURRENT_EAST, CURRENT_NORTH, GUST, WIND_EAST, message_2, wind_2
+from tests.weather.grib_file import CURRENT_EAST, CURRENT_NORTH, GUST, WIND_EAST, message_1, message_2, wind_2
 
 LAT, LON = np.linspace(48.0, 52.0, 5), np.linspace(-8.0, 2.0, 11)
 T0 = 1776643200.0  # 2026-04-20T00:00Z
@@ -180,3 +180,28 @@ def test_a_cube_is_checked_and_cannot_be_changed():
         Cube(**{**ok, "lat_deg": np.array([1.0, 0.0])})
     with pytest.raises(ValueError, match="are not of"):
         Cube(**{**ok, "members": (0, 1)})
+
+
+def test_the_height_of_the_sea_of_both_editions():
+    still = np.full((5, 11), 2.5)
+    sea = [message_2((10, 0, 3), still + m, LAT, LON, level=(1, 0), member=m) for m in (1, 2)]
+    weather = weather_of(*(wind_2(LAT, LON, 0, 0.0, -6.0, member=m) for m in (1, 2, 3)), *sea)
+    assert weather.waves_m(T0, 50.0, -3.0).ravel() == pytest.approx([3.5, 4.5, 3.5], abs=1e-3)  # of 3 nothing is said
+    for code in ({"parameter": 100}, {"parameter": 229, "center": 98, "table": 140}):
+        old = weather_of(
+            message_1(code.pop("parameter"), still, LAT, LON, level=(102, 0), **code), wind_2(LAT, LON, 0, 0.0, -6.0)
+        )
+        assert old.waves_m(T0, 50.0, -3.0) == pytest.approx([2.5], abs=1e-3)
+        assert np.isnan(old.waves_m(T0, 53.0, -3.0)).all()
+    with pytest.raises(InputError, match="wave height is up to 55 m; it is of another unit"):
+        weather_of(message_2((10, 0, 3), np.full((5, 11), 55.0), LAT, LON, level=(1, 0)))
+
+
+def test_one_member_or_their_mean():
+    weather = weather_of(*(wind_2(LAT, LON, 0, 1.0, -6.0 - m, member=m) for m in (1, 2)),
+                         wind_2(LAT, LON, 3, 1.0, -9.0, member=2))  # fmt: skip
+    assert weather.only(2).members == (2,)
+    assert weather.only(2).wind_en_mps(T0, 50.0, -3.0).ravel() == pytest.approx([1.0, -8.0], abs=1e-3)
+    mean = weather.mean()
+    assert mean.members == (0,)
+    assert mean.wind_en_mps([T0, T0 + 3 * HOUR], 50.0, -3.0)[0, :, 1] == pytest.approx([-7.5, -9.0], abs=1e-3)
