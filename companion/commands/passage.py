@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from companion.commands.output import force_option, patience, refuse_existing, write_files
 from companion.errors import InputError, JobError
-from companion.program.arguments import add_command, duration, moment, out_file, picture
+from companion.program.arguments import add_command, duration, moment, number, out_file, picture, place
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
+    from companion.messages import GeoPoint
     from companion.passage import Passage, Route
     from companion.passage.file import PassageFile
     from companion.weather import Weather
@@ -23,6 +24,7 @@ examples:
   companion passage plan biscay.toml
   companion passage plan biscay.toml --plot biscay.png --out mission.toml
   companion passage plan biscay.toml --depart 2026-04-20T00:00Z..2026-04-22T00:00Z --every 6h --explain
+  companion passage again biscay.toml mission.toml --forecast run18.grb2 --from 47.1,-6.3 --now 2026-04-20T18:00Z
 
 PASSAGE.toml names start, goal, departure, forecasts in GRIB, boat and land; its keys are in docs/reference/formats.md.
 Of one forecast the route is the fastest, with a time that no way can be faster than; of an ensemble the one that all
@@ -39,7 +41,7 @@ CANDIDATES = 7  # members whose own best routes are tried for one departure
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command with its verb."""
     parser = add_command(subparsers, "passage", summary, _EPILOG)
-    verbs = parser.add_subparsers(dest="verb", metavar="plan", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="plan|again", required=True)
     plan = verbs.add_parser("plan", help="the fastest way through a forecast, with a bound below every way")
     plan.add_argument("file", metavar="PASSAGE.toml", type=Path)
     plan.add_argument(
@@ -61,6 +63,66 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     plan.add_argument("--explain", action="store_true", help="with --depart, what waiting costs and what is against it")
     force_option(plan)
     plan.set_defaults(run=_plan)
+    again = verbs.add_parser("again", help="a new forecast: is the route under way still the one to sail")
+    again.add_argument("file", metavar="PASSAGE.toml", type=Path)
+    again.add_argument("mission", metavar="MISSION.toml", type=Path, help="what she sails, as plan --out wrote it")
+    again.add_argument("--from", dest="here", type=place, metavar="LAT,LON", help="where she is ([start])")
+    again.add_argument("--now", type=moment, metavar="TIME", help="the hour ([depart] at)")
+    again.add_argument(
+        "--forecast",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="in place of [weather] files; more may be given",
+    )
+    again.add_argument("--by", type=moment, metavar="TIME", help="she is to be there by then ([depart] by)")
+    again.add_argument(
+        "--faster",
+        type=number("percent", at_least=0.0, at_most=50.0),
+        default=3.0,
+        metavar="PERCENT",
+        help="what another route must gain of the time that is left (3)",
+    )
+    again.add_argument(
+        "--out", metavar="M", type=out_file, help="write the new route as a mission, if it is to be sailed"
+    )
+    force_option(again)
+    again.set_defaults(run=_again)
+
+
+def _again(args: argparse.Namespace) -> int:
+    """Hold what she sails against a new forecast, print both; write the new route where it is worth the change."""
+    from companion.compose import speed_error_of
+    from companion.geofence import load_mission
+    from companion.passage import again, shares_of, sweep
+    from companion.passage.told import told_of, told_of_again
+
+    if args.out is not None:
+        refuse_existing([str(args.out)], force=args.force)
+    mission = load_mission(args.mission)
+    points = [mission.start or mission.origin, *(goal.point for goal in mission.goals)]
+    asked, passage = _read(
+        args.file, None if args.now is None else args.now.timestamp(), args.here, tuple(map(str, args.forecast))
+    )
+    now = (args.now or asked.depart.at).timestamp()
+    by, error = _by(args, asked), speed_error_of(asked.boat)
+    by_s, sure = math.inf if by is None else by, asked.depart.sure
+    with patience("planning"):
+        [new] = sweep(passage, [now], error, nodes=NODES, by_utc_s=by_s, sure=sure, candidates=CANDIDATES)
+        found = again(passage, points, new, shares_of(error), by_utc_s=by_s, sure=sure, faster=args.faster / 100.0)
+    for line in told_of_again(found, by, sure):
+        print(line)
+    if not found.chosen.runs:
+        return JobError.exit_code
+    for line in told_of(found.chosen.route, found.chosen):
+        print(line)
+    if args.out is not None and found.is_changed:
+        write_files(
+            {str(args.out): _mission_text(asked, passage, found.chosen.route, args.file, args.out)}, force=args.force
+        )
+        print(f"{args.out}: written: companion mission check {args.out}")
+    return 0
 
 
 MOST_DEPARTURES = 200
@@ -177,8 +239,10 @@ def _plan(args: argparse.Namespace) -> int:
     return 0
 
 
-def _read(path: Path, departs_utc_s: float | None = None) -> tuple[PassageFile, Passage]:
-    """Return what a file asks, with the boat, forecasts and land that it names."""
+def _read(
+    path: Path, departs_utc_s: float | None = None, here: GeoPoint | None = None, forecasts: tuple[str, ...] = ()
+) -> tuple[PassageFile, Passage]:
+    """Return what a file asks, with the boat, forecasts and land that it names; ``here`` in place of its start."""
     import msgspec
 
     from companion.compose import polar_named
@@ -186,13 +250,18 @@ def _read(path: Path, departs_utc_s: float | None = None) -> tuple[PassageFile, 
     from companion.geofence.mission import with_boat_file
     from companion.messages import GeoPoint
     from companion.passage import Passage, PassageFrame, craft_of, land_of
-    from companion.passage.file import parse_passage
+    from companion.passage.file import PlaceOptions, parse_passage
     from companion.weather import read_weather
 
     source = str(path)
     text = decode(read_bytes(path, max_bytes=1 << 20), source)
     asked = parse_passage(text, source)
     asked = msgspec.structs.replace(asked, boat=with_boat_file(asked.boat, text, path))
+    if here is not None:
+        asked = msgspec.structs.replace(asked, start=PlaceOptions(lat=here.lat_deg, lon=here.lon_deg))
+    if forecasts:
+        files = tuple(str(Path(name).resolve()) for name in forecasts)
+        asked = msgspec.structs.replace(asked, weather=msgspec.structs.replace(asked.weather, files=files))
     start, goal = (GeoPoint(lat_deg=p.lat, lon_deg=p.lon) for p in (asked.start, asked.goal))
     try:
         frame = PassageFrame(start, goal)
@@ -217,10 +286,10 @@ def _read(path: Path, departs_utc_s: float | None = None) -> tuple[PassageFile, 
         lee_tws_mps=asked.limits.lee_tws_mps,
     )
     land = land_of(frame, _solids(asked, path), box, asked.area.margin_m)
-    for place, point in (("[start]", start), ("[goal]", goal)):
+    for where, point in (("[start]", start), ("[goal]", goal)):
         if float(land.distance_m(frame.xy_from_geo([point.lat_deg], [point.lon_deg]))[0]) <= 0.0:
             raise InputError(
-                source, place, "is on land, in closed water or within [area] margin_m of it", "move it out to sea"
+                source, where, "is on land, in closed water or within [area] margin_m of it", "move it out to sea"
             )
     return asked, Passage(
         start=start,
@@ -267,9 +336,9 @@ def _check_weather(asked: PassageFile, weather: Weather, source: str, depart: fl
     names = ", ".join(asked.weather.files)
     if not weather.wind:
         raise InputError(source, f"[weather] {names}", "holds no wind of 10 m here", "ask for 10u and 10v of the area")
-    for place, point in (("[start]", asked.start), ("[goal]", asked.goal)):
+    for where, point in (("[start]", asked.start), ("[goal]", asked.goal)):
         if not any(cube.covers(point.lat, point.lon) for cube in weather.wind):
-            raise InputError(source, place, f"is outside the area of {names}", "ask for a larger area")
+            raise InputError(source, where, f"is outside the area of {names}", "ask for a larger area")
     if asked.limits.max_wave_m is not None and not weather.waves:
         raise InputError(source, "[limits] max_wave_m", f"{names} says nothing of waves", "add a forecast of them")
     if asked.limits.lee_shore_m is not None and not asked.area.obstacles:

@@ -6,16 +6,19 @@
 (212971, [106000.0, 0.0])
 """
 
+from companion.passage.again import FASTER, Again, again
 from companion.passage.craft import craft_of
 from companion.passage.frame import PassageFrame
 from companion.passage.kernels import Craft
 from companion.passage.land import Land, land_of
 from companion.passage.plan import Outcome, Passage, Route, plan
 from companion.passage.replay import Sailed, sail
-from companion.passage.sweep import SURE, Departure, at_least, at_most, best, shown, sweep
+from companion.passage.sweep import SURE, Departure, at_least, at_most, best, shares_of, shown, sweep
 
 __all__ = [
+    "FASTER",
     "SURE",
+    "Again",
     "Craft",
     "Departure",
     "Land",
@@ -24,6 +27,7 @@ __all__ = [
     "PassageFrame",
     "Route",
     "Sailed",
+    "again",
     "at_least",
     "at_most",
     "best",
@@ -31,6 +35,7 @@ __all__ = [
     "land_of",
     "plan",
     "sail",
+    "shares_of",
     "shown",
     "sweep",
 ]

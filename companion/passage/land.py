@@ -24,9 +24,14 @@ _FINE_DEG = 0.05  # a side of a polygon is straight in degrees; in the frame so 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Land:
-    """What is solid, with the margin about it; ``shape`` in the frame's metres, empty where nothing is."""
+    """What is solid, with ``margin_m`` about it; ``shape`` in the frame's metres, empty where nothing is."""
 
     shape: BaseGeometry
+    margin_m: float = 0.0
+
+    def narrowed(self, share: float) -> Land:
+        """Return it with that share of its margin."""
+        return Land(shapely.buffer(self.shape, (share - 1.0) * self.margin_m), share * self.margin_m)
 
     def distance_m(self, xy_m: Floats) -> Floats:
         """Return (n,) how far places are from it [m], 0 inside, inf without land."""
@@ -90,4 +95,4 @@ def land_of(
             found.append(shapely.buffer(shapely.make_valid(moved), margin_m) if margin_m > 0.0 else moved)
     shape = shapely.union_all(found) if found else shapely.Polygon()
     shapely.prepare(shape)
-    return Land(shape)
+    return Land(shape, margin_m)

@@ -367,6 +367,15 @@ def _moved(points: Floats, i: int, reach_m: float) -> list[Floats]:
     return out
 
 
+def is_free(passage: Passage, points: Sequence[GeoPoint]) -> bool:
+    """Return whether the shortest ways from point to point keep clear of land, of its margin by half.
+
+    Who is a little off her way cuts the corner that its legs just keep off.
+    """
+    xy = passage.frame.xy_from_geo([p.lat_deg for p in points], [p.lon_deg for p in points])
+    return passage.land.narrowed(0.5).is_free(_bent(passage.frame, xy))
+
+
 def _bent(frame: PassageFrame, points: Floats) -> Floats:
     """Return the shortest ways between points in the frame, as they are sailed: bent, for the frame is a chart."""
     lat, lon = frame.geo_from_xy(points)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from companion.messages import GeoPoint
 from companion.passage.plan import Outcome, Passage, Route, plan
 from companion.passage.replay import Sailed
 
@@ -91,19 +92,29 @@ def sweep(
     ``sure`` of all runs arrive (by a time) the one counts that is first there in the mean; where none is so sure, the
     surest.
     """
-    shares = tuple(math.exp(speed_error * z) for z in _MIDDLES) if speed_error > 0.0 else (1.0,)
+    shares = shares_of(speed_error)
     return tuple(_departure(passage, t, shares, nodes, by_utc_s, sure, candidates) for t in departures)
+
+
+def shares_of(speed_error: float) -> tuple[float, ...]:
+    """Return shares of her polar of equal weight, ``speed_error`` the deviation of their logarithm."""
+    return tuple(math.exp(speed_error * z) for z in _MIDDLES) if speed_error > 0.0 else (1.0,)
+
+
+def departure_of(
+    passage: Passage, waypoints: Sequence[GeoPoint], utc_s: float, shares: Sequence[float], bound_s: float = 0.0
+) -> Departure:
+    """Return what a route comes to in every member of a passage's weather."""
+    runs = tuple(passage.sail(waypoints, utc_s, passage.weather.members, shares))
+    found = Departure(utc_s=utc_s, route=Route(outcome=Outcome.FOUND, depart_utc_s=utc_s), runs=runs)
+    route = replace(found.route, waypoints=tuple(waypoints), sailed=found.middle(), bound_s=bound_s)
+    return replace(found, route=route)
 
 
 def _departure(
     passage: Passage, utc_s: float, shares: Sequence[float], nodes: int, by_utc_s: float, sure: float, candidates: int
 ) -> Departure:
     members = passage.weather.members
-
-    def sailed(route: Route) -> Departure:
-        runs = passage.sail(route.waypoints, utc_s, members, shares)
-        return Departure(utc_s=utc_s, route=route, runs=tuple(runs))
-
     routes: list[Route] = []
     chosen = list(members)
     if len(members) > 1:
@@ -111,13 +122,17 @@ def _departure(
         routes.append(plan(mean, utc_s, nodes=nodes))
         chosen = _spread(passage, utc_s, routes[0], candidates)
     routes += [plan(passage, utc_s, member, nodes=nodes) for member in chosen]
-    tried = [d for d in map(sailed, (route for route in routes if route.waypoints)) if d.chance() > 0.0]
+    each = [
+        (route, departure_of(passage, route.waypoints, utc_s, shares, route.bound_s))
+        for route in routes
+        if route.waypoints
+    ]
+    tried = [replace(d, route=replace(d.route, searched=route.searched)) for route, d in each if d.chance() > 0.0]
     if not tried:
         last = next((route for route in routes if route.outcome is not Outcome.FOUND), routes[-1])
         why = last.outcome.value if last.sailed is None else last.sailed.why
         return Departure(utc_s=utc_s, route=last, runs=(), why=why)
-    found = min(tried, key=lambda d: (-min(sure, d.chance(by_utc_s)), d.mean_s()))
-    return replace(found, route=replace(found.route, sailed=found.middle()))
+    return min(tried, key=lambda d: (-min(sure, d.chance(by_utc_s)), d.mean_s()))
 
 
 def _spread(passage: Passage, utc_s: float, first: Route, count: int) -> list[int]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from companion.geo import M_PER_NM
+from companion.passage.again import Again
 from companion.passage.frame import GEOD
 from companion.passage.plan import Route
 from companion.passage.replay import Sailed
@@ -66,6 +67,15 @@ def told_of_chances(d: Departure, by_utc_s: float | None, sure: float) -> tuple[
         lines.append(f"not as sure as {100.0 * sure:g} %: no route that was tried is")
     elif most < sure:
         lines.append(f"{100.0 * sure:g} % is more than {counted(d.members, 'member')} can show: {100.0 * most:.0f} %")
+    return tuple(lines)
+
+
+def told_of_again(found: Again, by_utc_s: float | None, sure: float) -> tuple[str, ...]:
+    """Return lines about an old route and a new one, and which of them to sail."""
+    lines: list[str] = []
+    for name, d in (("old", found.old), ("new", found.new)):
+        lines += [f"{name}: {line}" for line in told_of_chances(d, by_utc_s, sure)] or [f"{name}: no way: {d.why}"]
+    lines.append(f"{'change' if found.is_changed else 'keep the old one'}: {found.why}")
     return tuple(lines)
 
 

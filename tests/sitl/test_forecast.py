@@ -211,4 +211,4 @@ def test_departures_of_a_day_are_rehearsed_in_the_forecast(files, monkeypatch, c
     assert late["arrived"]
     assert late["time_s"] != early["time_s"]
     assert cli.main(["rehearse", "rocks.toml", *words, "06:00..18:00", "--try", "later=1h"]) == 2
-    assert "with a span tries no change" in capsys.readouterr().err
+    assert "compares departures, and tries no change" in capsys.readouterr().err

@@ -1,0 +1,78 @@
+"""A route under way in a new forecast: kept below the hysteresis, changed above it."""
+
+import numpy as np
+import pytest
+import shapely
+
+from companion.passage import again, sweep
+from companion.passage.again import left_of
+from companion.passage.told import told_of_again
+from tests.passage.test_plan import LAT, LON, shell  # noqa: F401 - the fixture
+from tests.passage.test_sweep import POLAR, A, B
+from tests.passage.world import HOURS, T0, cube, passage, place, steady
+from tests.passage.world import LAT as LAT0
+from tests.passage.world import LON as LON0
+from tests.weather.grib_file import wind_2
+
+ROUND = (A, place(0.12, 0.3), B)  # by the north, 7 % longer
+FAR = float("inf")
+
+
+def held(ready, points, *, by=FAR, **more):
+    [new] = sweep(ready, [T0], 0.0, nodes=20)
+    return again(ready, points, new, (1.0,), by_utc_s=by, sure=0.9, **more)
+
+
+def asked(*fields, **more):
+    return passage(A, B, polar=POLAR, wind=cube(LAT0, LON0, HOURS, [*fields]), **more)
+
+
+def test_a_little_is_not_worth_a_change_and_more_is():
+    ready = asked(steady(0.0, -5.0), steady(0.0, -6.0))
+    kept, changed = (held(ready, ROUND, faster=faster) for faster in (0.10, 0.03))
+    assert (kept.is_changed, kept.chosen is kept.old) == (False, True)
+    assert (changed.is_changed, changed.chosen is changed.new) == (True, True)
+    assert kept.why.endswith("10 % are asked for")
+    assert changed.old.mean_s() > 1.05 * changed.new.mean_s()
+    same = held(ready, (A, B))
+    assert (same.is_changed, told_of_again(same, None, 0.9)[-1][:18]) == (False, "keep the old one: ")
+
+
+def test_a_surer_way_is_taken_though_it_is_longer():
+    gale = lambda t, y, x: (0.0 * x, np.where((np.abs(y) < 0.12) & (x > 0.2) & (x < 0.4), -14.0, -5.0))  # noqa: E731
+    found = held(asked(steady(0.0, -5.0), gale, max_tws_mps=12.0), (A, B))
+    assert (found.is_changed, found.why) == (True, "it arrives in 50 % more of all runs")
+    assert found.new.route.sailed.length_m > 1.05 * found.old.route.sailed.length_m
+
+
+def test_an_old_way_over_land_is_given_up():
+    found = held(asked(steady(0.0, -5.0), land=[shapely.box(0.3, -0.05, 0.35, 0.02)]), (A, B))
+    assert (found.is_changed, found.why) == (True, "it leads over land, or closed water, from here")
+
+
+@pytest.mark.parametrize(("lon", "left"), [(-0.1, 3), (0.05, 3), (0.35, 2), (0.6, 1)])
+def test_what_is_left_begins_where_she_is(lon, left):
+    ready = passage(place(0.01, lon), place(0.0, 0.9))
+    way = left_of(ready, (A, place(0.0, 0.3), place(0.0, 0.5), place(0.0, 0.9)))
+    assert way[0] is ready.start
+    assert way[1:] == (place(0.0, 0.3), place(0.0, 0.5), place(0.0, 0.9))[3 - left :]
+
+
+def test_a_new_forecast_by_the_command(shell, tmp_path, capsys):  # noqa: F811
+    from companion import cli
+
+    assert shell("--out", "m.toml")[0] == 0
+    (tmp_path / "new.grb2").write_bytes(b"".join(wind_2(LAT, LON, h, 0.0, -8.0) for h in range(0, 49, 6)))
+    words = ["passage", "again", "p.toml", "m.toml", "--forecast", "new.grb2", "--from", "50.0,-5.9", "--out", "n.toml"]
+    assert cli.main([*words, "--now", "2026-04-20T08:00Z"]) == 0
+    out = capsys.readouterr().out
+    assert "old: arrives in 100 % of 5 runs in 1 member" in out
+    assert "keep the old one: " in out
+    assert "departs 2026-04-20T08:00Z" in out
+    assert not (tmp_path / "n.toml").exists()
+    wall = "POLYGON ((-5.3 48.5, -5.29 48.5, -5.29 50.02, -5.3 50.02, -5.3 48.5))"
+    (tmp_path / "rock.wkt").write_text(wall)
+    assert cli.main([*words, "--now", "2026-04-20T08:00Z"]) == 0
+    out = capsys.readouterr().out
+    assert "change: it leads over land, or closed water, from here" in out
+    assert (tmp_path / "n.toml").exists()
