@@ -121,9 +121,13 @@ nightly: $(ENV)
 nightly-reference:
 	cp build/nightly.parquet bench/nightly.parquet
 
-# The planners on the problem set (OMPL too, after make env EXTRAS=bench), what answers take over their budget, risk against winds.
+# The planners on the problem set (OMPL too, after make env EXTRAS=bench) and what it comes to as a page, how planning scales, what
+# answers take over their budget, risk against winds.
 bench: $(ENV)
-	$(BIN)/python -m bench
+	@mkdir -p build
+	$(BIN)/python -m sailbench plan --out build/planners.parquet
+	$(BIN)/python -m sailbench page build/planners.parquet --out build/leaderboard.html
+	$(BIN)/python -m bench.scaling
 	$(BIN)/python -m bench.budgets --overrun
 	$(BIN)/python -m bench.reliability
 
@@ -148,6 +152,7 @@ deb:
 release: $(ENV)
 	$(BIN)/python -m hatchling build -t wheel -d dist
 	cd lab && $(abspath $(BIN))/python -m hatchling build -t wheel -d ../dist
+	cd sailbench && $(abspath $(BIN))/python -m hatchling build -t wheel -d ../dist
 	$(BIN)/python packaging/sbom.py requirements.lock > dist/sailboat-companion.cdx.json
 	cd dist && sha256sum *.whl *.deb *.cdx.json 2>/dev/null > SHA256SUMS; cat SHA256SUMS
 

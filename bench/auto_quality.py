@@ -1,8 +1,9 @@
 """How good `auto` is after a given computing time: `python bench/auto_quality.py --budget 1 10 --seeds 3`.
 
-Every problem of bench/problems is planned on one core with warm kernels; budgets and times are processor seconds,
-so that what else the machine does does not matter. Costs are compared with bench/best_known.json (the best path
-that any run of any length has found; --update keeps a better one) and with the plan's own lower bound.
+Every problem of sailbench/problems is planned on one core with warm kernels; budgets and times are processor seconds,
+so that what else the machine does does not matter. Costs are compared with sailbench/answers.json (the best path
+that any run of any length has found; --update keeps a better one, a better bound, and why there is none) and with the
+plan's own lower bound.
 """
 
 from __future__ import annotations
@@ -11,14 +12,19 @@ import argparse
 import json
 import math
 import time
-from pathlib import Path
 
 import numpy as np
 
 import companion.planner.effort as clock
-from companion.planner import Problem, plan
+from companion.planner import PlanStatus, Problem, plan
+from sailbench.problem_set import ANSWERS, FOLDER
 
-HERE = Path(__file__).parent
+UNITS = {
+    "best_s": "seconds, by the exact scorer: the best path that any run has found",
+    "bound_s": "seconds: no path is faster",
+    "waypoints": "metres east and north, of that path",
+    "proof": "why no path is feasible",
+}
 
 
 def main() -> None:
@@ -26,28 +32,31 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help="problems (default: all)")
     parser.add_argument("--budget", type=float, nargs="+", default=[1.0], help="processor seconds")
     parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--update", action="store_true", help="write better paths to best_known.json")
+    parser.add_argument("--update", action="store_true", help="write what is better to answers.json")
     args = parser.parse_args()
     clock.effort_s = time.process_time
-    best = json.loads((HERE / "best_known.json").read_text(encoding="utf-8"))
-    names = args.names or sorted(p.stem for p in (HERE / "problems").glob("*.json"))
-    plan(Problem.from_json(HERE / "problems" / f"{names[0]}.json"), expansions=100)
+    best = json.loads(ANSWERS.read_text(encoding="utf-8"))["answers"]
+    names = args.names or sorted(p.stem for p in FOLDER.glob("*.json"))
+    plan(Problem.from_json(FOLDER / f"{names[0]}.json"), expansions=100)
     for budget in args.budget:
         rows = []
         print(f"after {budget:g} s", f"{'over best %':>34}{'over bound %':>14}{'first ms':>10}{'legs':>6}")
         for name in names:
             for seed in range(args.seeds):
-                problem = Problem.from_json(HERE / "problems" / f"{name}.json")
+                problem = Problem.from_json(FOLDER / f"{name}.json")
                 answer = plan(problem, budget_s=budget, seed=seed)
                 if not answer.has_path:
                     print(f"{name:24}{seed:3}  {answer.status.value}: {answer.reason[:70]}", flush=True)
-                    if name in best:
+                    if "best_s" in best.get(name, {}):
                         rows.append((math.inf, math.inf, math.inf))
+                    elif answer.status in {PlanStatus.INFEASIBLE, PlanStatus.INVALID}:
+                        best[name] = {"proof": answer.reason}
                     continue
-                if name not in best or answer.cost_s < best[name]["time_s"] - 1e-4:
-                    points = answer.waypoints_en.tolist()
-                    best[name] = {"time_s": round(answer.cost_s, 4), "waypoints": points}
-                over = 100.0 * (answer.cost_s / best[name]["time_s"] - 1.0)
+                known = best.setdefault(name, {"best_s": math.inf})
+                if answer.cost_s < known["best_s"] - 1e-4:
+                    known |= {"best_s": round(answer.cost_s, 4), "waypoints": answer.waypoints_en.tolist()}
+                known["bound_s"] = max(known.get("bound_s", 0.0), math.floor(1e4 * answer.lower_bound_s) / 1e4)
+                over = 100.0 * (answer.cost_s / known["best_s"] - 1.0)
                 first = 1e3 * (answer.first_s or 0.0)
                 rows.append((over, 100.0 * answer.gap, first))
                 print(
@@ -67,8 +76,8 @@ def main() -> None:
                     f"   ({len(table)} runs)"
                 )
     if args.update:
-        lines = [json.dumps(k) + ":" + json.dumps(best[k], separators=(",", ":")) for k in sorted(best)]
-        (HERE / "best_known.json").write_text("{" + ",\n".join(lines) + "}\n", encoding="utf-8")
+        lines = ",\n".join(f"{json.dumps(k)}: {json.dumps(best[k], separators=(',', ':'))}" for k in sorted(best))
+        ANSWERS.write_text(f'{{"units": {json.dumps(UNITS)},\n"answers": {{\n{lines}\n}}}}\n', encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -25,8 +25,8 @@ import shapely
 from shapely.geometry import LineString, Polygon, box
 
 import companion.planner.effort as clock
-from bench.__main__ import islands as board_of
 from bench.make_problems import BOAT, NONE, SHIP, ar1, coast, islands, kalman, wkt
+from bench.scaling import islands as board_of
 from companion.planner import Problem, plan
 from companion.planner.solve import warm
 
@@ -309,7 +309,7 @@ def main(argv=None):
         nargs="*",
         type=float,
         metavar="S",
-        help="only what whole answers take, of bench/problems and the recorded bench/requests",
+        help="only what whole answers take, of sailbench/problems and the recorded bench/requests",
     )
     parser.add_argument("--reference", type=float, metavar="S", help="look for better paths first, so long each")
     args = parser.parse_args(argv)

@@ -65,6 +65,7 @@ from companion.wind.study import characterise, parse_csv
 from lab.simulated_wind import weather
 from lab.tasks.wrsc2013 import HALF_M
 from lab.tasks.wrsc2013 import run as run_wrsc2013
+from sailbench.problem_set import FOLDER
 
 OUT = Path(__file__).resolve().parents[1] / "docs" / "figures"
 
@@ -214,7 +215,7 @@ def wind_filter_recorded():
 
 # ------------------------------------------------------------------------------------------- risk
 def risk():
-    base = Problem.from_json(Path(__file__).resolve().parent / "problems" / "trap-beat.json")
+    base = Problem.from_json(FOLDER / "trap-beat.json")
     from companion.planner.problem import RiskLimit
 
     limits = [0.5, 0.3, 0.2, 0.1, 0.05, 0.02, 0.01]

@@ -1,4 +1,4 @@
-"""Make the planner's problem set: `python bench/make_problems.py` writes bench/problems/*.json, always the same."""
+"""Make the planner's problem set: `python bench/make_problems.py` writes sailbench/problems/*.json, always the same."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Point, Polygon, box
 
-OUT = Path(__file__).parent / "problems"
+OUT = Path(__file__).resolve().parents[1] / "sailbench" / "problems"
 # Büsser 2009, equation 4.1, sampled: AVALON's polar at a fresh breeze, shape only (metres a second).
 AVALON = {
     "model": "polar",

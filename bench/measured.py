@@ -23,7 +23,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURES = ROOT / "docs" / "lab" / "figures.md"
-CODE = ("companion", "sitl", "lab", "bench")
+CODE = ("companion", "sitl", "lab", "sailbench", "bench")
 _BLOCK = re.compile(r"<!-- measured: (?P<command>[^\n]+) -->\n\n```text\n.*?```\n\n\*[^\n]*\*\n", re.DOTALL)
 _BY_HAND = re.compile(r"<!-- by hand: (?P<date>\d{4}-\d\d-\d\d): (?P<command>.+?) -->")
 _AGES = re.compile(r"(?<=<!-- ages -->\n).*?(?=<!-- end of the ages -->)", re.DOTALL)

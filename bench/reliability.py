@@ -28,8 +28,8 @@ import numpy as np
 from companion.planner import Problem, plan
 from companion.planner.problem import RiskLimit, defect_of
 from companion.planner.risk import with_risk
+from sailbench.problem_set import FOLDER
 
-HERE = Path(__file__).resolve().parent
 LIMITS = (None, 0.20, 0.05)
 LEAST_PROMISE = 0.005  # below it 2,000 winds cannot tell a third from nothing
 
@@ -118,14 +118,14 @@ def check(path, limit, args):
 
 def main(argv=None):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("problems", nargs="*", help="problem files (default: bench/problems)")
+    parser.add_argument("problems", nargs="*", help="problem files (default: sailbench/problems)")
     parser.add_argument("--winds", type=int, default=2000)
     parser.add_argument("--step", type=float, default=0.5, help="of the simulated wind [s]")
     parser.add_argument("--budget", type=float, default=1.0, help="of each plan [s]; thrice that under a limit")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", metavar="FILE", help="write the rows")
     args = parser.parse_args(argv)
-    paths = args.problems or sorted((HERE / "problems").glob("*.json"))
+    paths = args.problems or sorted(FOLDER.glob("*.json"))
     rows = []
     print(f"{args.winds} winds each, a step of {args.step:g} s")
     print(

@@ -18,7 +18,7 @@ import grimp
 from bench.layered import Box, Chip, draw, implied
 
 ROOT = Path(__file__).resolve().parents[1]
-PICTURES = {root: ROOT / "docs" / "figures" / f"rooms-{root}.svg" for root in ("companion", "sitl", "lab")}
+PICTURES = {root: ROOT / "docs" / "figures" / f"rooms-{root}.svg" for root in ("companion", "sitl", "lab", "sailbench")}
 PAGE = ROOT / "docs" / "architecture.md"
 BEGIN, END = "<!-- rooms: made by python -m bench.rooms -->\n", "<!-- end of rooms -->\n"
 
@@ -168,7 +168,7 @@ def _legend(x: float, y: float) -> list[str]:
 def listing() -> str:
     """Return the list of rooms in docs/architecture.md."""
     held = laws()
-    rows = [*(room for floor in held.floors for room in floor), *rooms("sitl"), *rooms("lab")]
+    rows = [*(room for floor in held.floors for room in floor), *rooms("sitl"), *rooms("lab"), *rooms("sailbench")]
     lines = ["| room | what it owns | pure |\n|---|---|---|\n"]
     for room in rows:
         lines.append(f"| **`{room}`** | {first_line(room)} | {_purity(room, held)} |\n")

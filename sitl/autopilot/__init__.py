@@ -23,8 +23,9 @@ The shell joins it to transports and to the event loop's clock, whatever that is
 
 from sitl.autopilot.autopilot import SimulatedAutopilot
 from sitl.autopilot.boat.kernel import TACK_RETRY_S
-from sitl.autopilot.boat.parameters import check_parameters
+from sitl.autopilot.boat.parameters import Parameters, check_parameters
 from sitl.autopilot.boat.sail_trial import no_go_half_rad, settled_polar, tack_loss_s
+from sitl.autopilot.boat.vehicle import Vehicle
 from sitl.autopilot.config import (
     EPOCH_S,
     FRAME_M,
@@ -55,12 +56,14 @@ __all__ = [
     "Impairment",
     "MemoryEnd",
     "MemoryLink",
+    "Parameters",
     "RadioChannel",
     "Sensors",
     "SimulatedAutopilot",
     "Truth",
     "VaneFault",
     "VaneState",
+    "Vehicle",
     "Waves",
     "check_parameters",
     "no_go_half_rad",

@@ -19,7 +19,7 @@ from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import ExpectSpec, Scenario, WindSpec
 
 ROOT = Path(__file__).parents[2]
-PROBLEM = ROOT / "bench" / "problems"
+PROBLEM = ROOT / "sailbench" / "problems"
 DAMAGES = {
     "missing": None,
     "empty": b"",

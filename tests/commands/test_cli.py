@@ -376,7 +376,7 @@ def test_nothing_writes_to_a_terminal_but_through_the_safe_streams():
     )
     found = {
         str(path)
-        for folder in ("companion", "sitl", "lab")
+        for folder in ("companion", "sitl", "lab", "sailbench")
         for path in Path(folder).rglob("*.py")
         if around.search(path.read_text())
     }

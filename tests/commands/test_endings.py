@@ -153,7 +153,7 @@ def test_an_interrupt_of_which_a_kernel_makes_an_error_of_its_own_is_one(monkeyp
         raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
 
     monkeypatch.setattr("companion.planner.plan", returns)
-    assert cli.main(["plan", "bench/problems/four-beat-60.json"]) == INTERRUPTED
+    assert cli.main(["plan", "sailbench/problems/four-beat-60.json"]) == INTERRUPTED
     assert capsys.readouterr().err == ""
 
     def fails(*_, **__):
@@ -161,7 +161,7 @@ def test_an_interrupt_of_which_a_kernel_makes_an_error_of_its_own_is_one(monkeyp
 
     monkeypatch.setattr("companion.planner.plan", fails)
     with pytest.raises(SystemError):
-        cli.main(["plan", "bench/problems/four-beat-60.json"])
+        cli.main(["plan", "sailbench/problems/four-beat-60.json"])
 
 
 def test_an_interrupt_that_falls_into_a_finalizer_comes_again(monkeypatch, capsys):
@@ -179,7 +179,7 @@ def test_an_interrupt_that_falls_into_a_finalizer_comes_again(monkeypatch, capsy
 
     monkeypatch.setattr("companion.planner.plan", plans)
     began_s = time.monotonic()
-    assert cli.main(["plan", "bench/problems/four-beat-60.json"]) == INTERRUPTED
+    assert cli.main(["plan", "sailbench/problems/four-beat-60.json"]) == INTERRUPTED
     assert time.monotonic() - began_s < 20.0
     assert "ignored" not in capsys.readouterr().err
 

@@ -8,7 +8,7 @@ import pytest
 
 MODULES = sorted(
     ".".join(path.with_suffix("").parts).removesuffix(".__init__")
-    for top in ("companion", "sitl", "lab")
+    for top in ("companion", "sitl", "lab", "sailbench")
     for path in Path(top).rglob("*.py")
     if ">>> " in path.read_text(encoding="utf-8")
 )

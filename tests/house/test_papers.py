@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAPERS = ("Wolsieffer 2020", "Büsser 2009", "Schmitt 2013")
-FILE = re.compile(r"`((?:companion|sitl|lab|bench|docs|missions)/[\w./-]+)`")
+FILE = re.compile(r"`((?:companion|sitl|lab|sailbench|bench|docs|missions)/[\w./-]+)`")
 TEST = re.compile(r"`(tests/[\w./-]+\.py)::(\w+)`")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-CODE = sorted(p for top in ("companion", "sitl", "lab") for p in (ROOT / top).rglob("*.py"))
+CODE = sorted(p for top in ("companion", "sitl", "lab", "sailbench") for p in (ROOT / top).rglob("*.py"))
 ROOMS = sorted({p.parent for p in CODE})
 
 

@@ -48,7 +48,7 @@ OWN = {
     "P.png": "p.png",
     "OUT": "out.plan",
     "PROBLEM.json": "island.json",
-    "bench/problems/channels-noisy.json": "island.json",
+    "sailbench/problems/channels-noisy.json": "island.json",
     "MISSION": "missions/bay.toml",
     "RECORD.csv": "record.csv",
     "RECORD": "record.csv",
@@ -282,7 +282,7 @@ def test_what_pages_say_that_is_cheap_is_run(tmp_path):
         "t_s,wind_from_deg,wind_speed_ms\n"
         + "".join(f"{t},{200 + 10 * math.sin(t / 90):.1f},{6 + math.sin(t / 37):.2f}\n" for t in range(0, 2400, 2))
     )
-    shutil.copy(ROOT / "bench" / "problems" / "channels-noisy.json", tmp_path / "island.json")
+    shutil.copy(ROOT / "sailbench" / "problems" / "channels-noisy.json", tmp_path / "island.json")
     lines = [" ".join(word if "*" in word else shlex.quote(word) for word in words) for words in cheap_lines()]
     assert len(lines) > 15
     for line in lines:

@@ -46,6 +46,32 @@ def test_the_boat_carries_no_laboratory_and_the_laboratory_nothing_else(installe
     assert sorted(inside) == sorted(path.as_posix() for path in Path("lab").rglob("*.py"))
 
 
+def test_the_bench_for_others_is_found_by_gymnasium_where_it_is_installed(tmp_path):
+    """Its wheel holds what is in the tree, and its environments are found by the name with its module."""
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
+        check=True,
+        capture_output=True,
+        cwd="sailbench",
+    )
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    inside = sorted(p.relative_to(tmp_path / "site").as_posix() for p in tmp_path.glob("site/sailbench/**/*.*"))
+    here = {p.as_posix() for p in Path("sailbench").rglob("*.*") if p.suffix != ".pyc"}
+    assert inside == sorted(here - {"sailbench/pyproject.toml"})
+    asked = "import gymnasium; print(gymnasium.make('sailbench:sailbench/Rocks-v0').reset(seed=1)[1])"
+    done = subprocess.run(
+        [sys.executable, "-c", asked],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": f"{tmp_path / 'site'}{os.pathsep}{Path.cwd()}"},
+    )
+    assert done.stdout == "{'t_s': 0.0, 'weather': 1}\n", done.stderr
+
+
 def test_it_holds_what_it_needs(installed):
     for there, here in (("companion/missions", "missions"), ("sitl/missions", "sitl/missions")):
         inside, beside = (

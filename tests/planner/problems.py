@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from companion.planner import Problem
 
-FOLDER = Path(__file__).parents[2] / "bench" / "problems"
+FOLDER = Path(__file__).parents[2] / "sailbench" / "problems"
 CONSTANT = {"model": "constant", "v_mps": 1.5}
 POLAR = {"model": "polar", "twa_deg": [0, 40, 60, 90, 120, 150, 180], "v_mps": [0.1, 1.0, 1.6, 2.0, 2.1, 1.7, 1.2]}
 

@@ -11,7 +11,7 @@ from companion.planner import ALGORITHMS, PlanStatus, Problem, plan
 from companion.planner.problem.evaluate import evaluate
 from companion.planners import AstarSettings, RrtstarSettings
 
-PROBLEMS = Path(__file__).resolve().parents[2] / "bench" / "problems"
+PROBLEMS = Path(__file__).resolve().parents[2] / "sailbench" / "problems"
 # For each: expansions that suffice; with them the tests do not depend on how busy the machine is.
 EFFORT = {"auto": 30_000, "rrtstar": 8000, "astar": 2_000_000}
 

@@ -117,4 +117,4 @@ def test_a_mission_is_planned_and_explained_from_goal_to_goal(capsys, tmp_path):
     assert ends[1][0] == pytest.approx(ends[0][1])
     assert cli.main(["plan", course, "--expansions", "3000", "--plot", str(tmp_path / "p.png")]) == 2
     assert "mission check --plot" in capsys.readouterr().err
-    assert cli.main(["plan", str(Path("bench/problems/open-beat.json").resolve()), "--wind", "5@0"]) == 2
+    assert cli.main(["plan", str(Path("sailbench/problems/open-beat.json").resolve()), "--wind", "5@0"]) == 2

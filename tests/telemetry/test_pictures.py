@@ -103,7 +103,7 @@ def test_a_voyage_is_told_by_the_autopilots_clock_where_the_computers_was_anothe
 
 def test_no_legend_lies_over_a_curve(sailed, drawn, tmp_path):
     voyage.plot_voyage(read_voyage(sailed), tmp_path / "v.png")
-    problem = Problem.from_json(str(ROOT / "bench" / "problems" / "four-beat-60.json"))
+    problem = Problem.from_json(str(ROOT / "sailbench" / "problems" / "four-beat-60.json"))
     plan_picture.save_plan(problem, plan(problem, expansions=500), tmp_path / "p.png")
     for figure in drawn:
         for axes in figure.axes:

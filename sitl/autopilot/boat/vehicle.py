@@ -417,6 +417,11 @@ class Vehicle:
         return float(self.state[k.S_E]), float(self.state[k.S_N])
 
     @property
+    def speed_mps(self) -> float:
+        """Through the water, ahead."""
+        return float(self.state[k.S_V])
+
+    @property
     def destination(self) -> tuple[float, float]:
         """End of the present leg [m]."""
         return float(self.state[k.S_DE]), float(self.state[k.S_DN])

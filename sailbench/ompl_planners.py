@@ -1,6 +1,6 @@
-"""One OMPL planner on one problem, in a process of its own (it is killed when it overruns):
+"""One OMPL planner on one problem, in a process of its own (it is killed when it overruns).
 
-    python -m bench.ompl_planners PROBLEM.json PLANNER BUDGET_S SEED    -> one JSON line: waypoints or null
+    python -m sailbench.ompl_planners PLANNER BUDGET_S SEED < PICKLED_PROBLEM    -> one JSON line: waypoints or null
 
 PLANNER: rrtstar-se2, informed (Informed RRT* in the plane), bitstar. The planners get the problem's collision test
 and no-go zone as a motion validator and the sailing time as the objective: length / speed, and in SE(2) the turns,
@@ -12,7 +12,10 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 import sys
+import time
+from typing import Any
 
 import numpy as np
 
@@ -27,16 +30,19 @@ PLANNERS = ("rrtstar-se2", "informed", "bitstar")
 class Model:
     """Motion test and cost of one problem, without time."""
 
-    def __init__(self, problem):
+    def __init__(self, problem: Problem) -> None:
         self.p, self.w = problem, world_of(problem)
         until_s = 2.0 * simple_bound_s(problem)
         half = max(problem.no_go_half_rad(t) for t in np.linspace(0.0, until_s, 50))
         self.half = min(half, math.radians(80.0)) + 1e-6
 
-    def speed(self, course):
-        return kernels.way_on(course, self.w.number, self.w.polar, self.w.course)
+    def speed(self, course: float) -> tuple[float, float]:
+        """Return the heading [rad] that makes a course good, and the speed on it [m/s]."""
+        heading, speed = kernels.way_on(course, self.w.number, self.w.polar, self.w.course)
+        return float(heading), float(speed)
 
-    def is_free(self, x0, y0, x1, y1):
+    def is_free(self, x0: float, y0: float, x1: float, y1: float) -> bool:
+        """Whether a leg meets nothing and is sailable at any time."""
         if math.hypot(x1 - x0, y1 - y0) < 1e-9:
             return True
         heading, speed = self.speed(math.atan2(x1 - x0, y1 - y0))
@@ -44,9 +50,10 @@ class Model:
         if speed <= 0.0 or twa < self.half or twa > self.p.boat.max_twa_rad + 1e-9:
             return False
         w = self.w
-        return kernels.first_hit(x0, y0, x1, y1, w.edge, w.cell_first, w.cell_edge, w.grid, w.shape) > 1.0
+        return bool(kernels.first_hit(x0, y0, x1, y1, w.edge, w.cell_first, w.cell_edge, w.grid, w.shape) > 1.0)
 
-    def sail_s(self, x0, y0, x1, y1):
+    def sail_s(self, x0: float, y0: float, x1: float, y1: float) -> float:
+        """Return what a leg takes [s], without turns."""
         length = math.hypot(x1 - x0, y1 - y0)
         if length < 1e-9:
             return 0.0
@@ -54,7 +61,8 @@ class Model:
         return length / max(speed, 1e-6)
 
 
-def solve(problem, name, budget_s, seed):
+def solve(problem: Problem, name: str, budget_s: float, seed: int) -> list[tuple[float, float]] | None:
+    """Return the waypoints that a planner of the library found."""
     from ompl import base as ob
     from ompl import geometric as og
     from ompl import util as ou
@@ -72,18 +80,18 @@ def solve(problem, name, budget_s, seed):
     space.setBounds(bounds)
     info = ob.SpaceInformation(space)
 
-    def place(state):
+    def place(state: Any) -> tuple[float, float]:
         return (state.getX(), state.getY()) if is_se2 else (state[0], state[1])
 
-    class Motion(ob.MotionValidator):
-        def checkMotion(self, a, b):  # noqa: N802
+    class Motion(ob.MotionValidator):  # type: ignore[misc]
+        def checkMotion(self, a: Any, b: Any) -> bool:  # noqa: N802
             return model.is_free(*place(a), *place(b))
 
-    class Time(ob.OptimizationObjective):
-        def stateCost(self, state):  # noqa: ARG002, N802
+    class Time(ob.OptimizationObjective):  # type: ignore[misc]
+        def stateCost(self, state: Any) -> Any:  # noqa: ARG002, N802
             return ob.Cost(0.0)
 
-        def motionCost(self, a, b):  # noqa: N802
+        def motionCost(self, a: Any, b: Any) -> Any:  # noqa: N802
             (ax, ay), (bx, by) = place(a), place(b)
             cost = model.sail_s(ax, ay, bx, by)
             if is_se2 and cost > 0.0:
@@ -92,7 +100,7 @@ def solve(problem, name, budget_s, seed):
                 cost += turn / problem.boat.turn_rate_radps
             return ob.Cost(cost)
 
-        def motionCostHeuristic(self, a, b):  # noqa: N802
+        def motionCostHeuristic(self, a: Any, b: Any) -> Any:  # noqa: N802
             return ob.Cost(math.dist(place(a), place(b)) / max(problem.boat.polar_mps))
 
     motion = Motion(info)
@@ -115,16 +123,18 @@ def solve(problem, name, budget_s, seed):
     planner = {"rrtstar-se2": og.RRTstar, "informed": og.InformedRRTstar, "bitstar": og.BITstar}[name](info)
     planner.setProblemDefinition(definition)
     planner.setup()
-    planner.solve(ob.timedPlannerTerminationCondition(budget_s))
+    until_s = time.process_time() + budget_s
+    planner.solve(ob.PlannerTerminationCondition(lambda: time.process_time() >= until_s))
     if not definition.hasExactSolution():
         return None
     states = definition.getSolutionPath().getStates()
-    return [list(place(s)) for s in states]
+    return [place(s) for s in states]
 
 
-def main(argv=None):
-    path, name, budget_s, seed = sys.argv[1:] if argv is None else argv
-    problem = Problem.from_json(path)
+def main() -> None:
+    """Plan what comes on the standard input."""
+    name, budget_s, seed = sys.argv[1:]
+    problem: Problem = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own process
     model = Model(problem)  # the kernels are compiled or loaded before the clock starts
     model.is_free(*problem.start_en, *problem.goal_en)
     model.sail_s(*problem.start_en, *problem.goal_en)

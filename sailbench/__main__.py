@@ -1,0 +1,114 @@
+"""Run the bench: ``python -m sailbench plan``, ``sail`` and ``page``.
+
+    python -m sailbench plan --budgets 1 --seeds 2 --out planners.parquet
+    python -m sailbench plan --planners auto mine:straight --out planners.parquet
+    python -m sailbench sail --seeds 10 --out sailors.parquet
+    python -m sailbench page planners.parquet sailors.parquet --out leaderboard.html
+
+What a results file holds is not run again; its summary is printed. A planner is one function of its own module,
+MODULE:FUNCTION (docs/guides/sailbench.md).
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import datetime as dt
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import companion
+from companion.errors import InputError
+from sailbench import board, plan_bench, sailors
+from sailbench.environment import ENVIRONMENTS
+from sailbench.planners import planner_named, present
+from sailbench.problem_set import answers, problems
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code: 2 where it was asked for what is not there."""
+    parser = argparse.ArgumentParser(
+        prog="python -m sailbench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    one = commands.add_parser("plan", help="planners on the problems", epilog="example: python -m sailbench plan")
+    one.add_argument("problems", nargs="*", help="problem files (default: the set)")
+    one.add_argument("--planners", nargs="+", default=present(), metavar="P", help="by name, or MODULE:FUNCTION")
+    one.add_argument("--budgets", nargs="+", type=float, default=[1.0], metavar="S", help="seconds (default: 1)")
+    one.add_argument("--seeds", type=int, default=2, help="of each problem and budget (default: 2)")
+    one.add_argument("--out", type=Path, metavar="FILE.parquet", help="keep the rows there")
+    one.set_defaults(run=_plan)
+    two = commands.add_parser("sail", help="sailors in the environments", epilog="example: python -m sailbench sail")
+    two.add_argument("--environments", nargs="+", default=list(ENVIRONMENTS), metavar="E", help=", ".join(ENVIRONMENTS))
+    two.add_argument(
+        "--sailors",
+        nargs="+",
+        default=[*sailors.SAILORS, sailors.COMPANION],
+        metavar="S",
+        help="greedy; who sails by a planner, named as for plan; companion: the whole program",
+    )
+    two.add_argument("--seeds", type=int, default=10, help="weathers (default: 10)")
+    two.add_argument("--out", type=Path, metavar="FILE.parquet", help="keep the rows there")
+    two.set_defaults(run=_sail)
+    three = commands.add_parser("page", help="the leaderboard", epilog="example: python -m sailbench page a.parquet")
+    three.add_argument("results", nargs="+", type=Path, help="what --out wrote")
+    three.add_argument("--out", type=Path, default=Path("leaderboard.html"), help="(default: leaderboard.html)")
+    three.set_defaults(run=_page)
+    args = parser.parse_args(argv)
+    try:
+        args.run(args)
+    except InputError as error:
+        print(f"sailbench: {error}", file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+def _plan(args: argparse.Namespace) -> None:
+    planners = {name: planner_named(name) for name in args.planners}
+    asked = problems(args.problems)
+    held = _held(args.out)
+    made = {(row["problem"], row["planner"], row["budget_s"], row["seed"]) for row in held}
+    for planner in planners.values():  # kernels are compiled or loaded before any clock starts
+        with contextlib.suppress(Exception):  # its rows say so
+            planner(asked[0], 1.0, 0)
+    rows = plan_bench.rows(
+        planners, asked, answers(), budgets_s=args.budgets, seeds=args.seeds, is_made=lambda *key: key in made
+    )
+    all_rows: list[Any] = _kept(rows, held, args.out)
+    mine = [row for row in all_rows if row["problem"] in {p.id for p in asked}]
+    print(plan_bench.table(plan_bench.summary(mine, answers())))
+
+
+def _sail(args: argparse.Namespace) -> None:
+    held = _held(args.out)
+    made = {(row["environment"], row["sailor"], row["seed"]) for row in held}
+    rows = sailors.voyages(args.environments, args.sailors, seeds=args.seeds, is_made=lambda *key: key in made)
+    all_rows: list[Any] = _kept(rows, held, args.out)
+    print("| " + " | ".join(sailors.HEADS) + " |\n" + "|---" * len(sailors.HEADS) + "|")
+    for cells in sailors.lines(all_rows):
+        print("| " + " | ".join(cells) + " |")
+
+
+def _page(args: argparse.Namespace) -> None:
+    stamp = f"Made on {dt.datetime.now(dt.UTC).date()} by sailbench {companion.__version__}."
+    args.out.write_text(board.page(board.read(args.results), stamp=stamp), encoding="utf-8")
+    print(args.out)
+
+
+def _held(path: Path | None) -> list[dict[str, Any]]:
+    return board.read([path]) if path is not None and path.exists() else []
+
+
+def _kept(rows: Iterable[Any], held: list[dict[str, Any]], path: Path | None) -> list[dict[str, Any]]:
+    """Return all rows; they are kept as they come."""
+    for row in rows:
+        held.append(dict(row))
+        if path is not None:
+            board.write(path, held)
+    return held
+
+
+if __name__ == "__main__":
+    sys.exit(main())
