@@ -6,9 +6,11 @@ from pathlib import Path
 import pytest
 
 from companion import cli
+from companion.compose import voyage_of
 from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.mission_check import check_mission, require_sailable
+from companion.skipper.way.gates import Approach, gates_of
 from sitl.commands import run as sitl_run
 from sitl.run.embedded import permitted
 from sitl.scenario.scenario import load_scenario
@@ -149,3 +151,25 @@ def test_a_buoy_whose_circle_has_no_room_is_told(tmp_path, hand, told):
     found = [finding for finding in checked.findings if finding.place == "[[goal]] 1 rounding"]
     assert len(found) == told
     assert all("the margin is 8 m" in finding.text for finding in found)
+
+
+@pytest.mark.parametrize(("end", "is_rounded"), [("home", True), ("loiter", False)])
+def test_the_last_buoy_is_rounded_for_the_way_home(tmp_path, end, is_rounded):
+    mission = tmp_path / "m.toml"
+    mission.write_text(
+        f"""
+        [start]
+        lat = 50.8200
+        lon = -1.3100
+        [[goal]]
+        lat = 50.8220
+        lon = -1.3100
+        radius_m = 12
+        rounding = "port"
+        [skipper]
+        end = "{end}"
+        """
+    )
+    voyage = voyage_of(load_mission(mission))
+    begun = Approach(goal=0, en_m=voyage.frame.en_from_geo(load_mission(mission).start))
+    assert (len(gates_of(voyage, (begun,))) > 1) is is_rounded

@@ -51,6 +51,28 @@ def test_a_verdict_is_printed_in_words(capsys):
     assert not [mark for mark in ("[", "{", "None", "inf") if mark in out]
 
 
+@pytest.mark.parametrize(("off_m", "passed"), [(0.9, False), (1.1, True)])
+def test_a_buoy_is_not_sailed_over_asked_for_or_not(off_m, passed):
+    truth = TrueTrack()
+    for t_s in range(31):
+        truth.add(float(t_s), (10.0 * t_s, 0.0), 0.0, 1.0, (0.0, 5.0))
+    verdict = judge(
+        scenario="x",
+        seed=1,
+        expect=ExpectSpec(),
+        truth=truth,
+        solid=shapely.Polygon(),
+        hull=DOT,
+        goal_en_m=(300.0, 0.0),
+        summary={"arrived": True},
+        status_times_s=None,
+        alerts=[],
+        marks=(((100.0, off_m), "port"),),
+    )
+    check = next(c for c in verdict.checks if c.name == "nearest to a mark, m")
+    assert (check.passed, check.figure) == (passed, pytest.approx(off_m))
+
+
 @pytest.mark.parametrize(("held", "within_m"), [((10.0, 20.0), 0.0), ((0.0, 30.0), 75.0), ((100.0, 200.0), None)])
 def test_a_boat_that_is_to_hold_is_judged_by_how_far_she_goes_meanwhile(held, within_m):
     """Away for ten seconds at 10 m/s, still for ten, on for ten; and never seen in the time that was asked for."""

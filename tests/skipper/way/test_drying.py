@@ -19,7 +19,10 @@ from companion.geofence import load_mission
 from companion.mission_check import AssumedWind, leg_problem
 from companion.planner import PlanStatus, plan
 from companion.planner.problem import evaluate
+from companion.skipper.planning.tides import opens_next
+from companion.skipper.step import StepContext
 from companion.skipper.way.drying import DOUBT_S, DryingWater, discs_over, timed
+from tests.skipper.moments import NOW_S, moment, route
 
 GATE = Path("sitl/missions/tide-gate.toml")
 BAR = box(-200.0, 225.0, 60.0, 295.0)
@@ -187,3 +190,18 @@ def test_a_bar_of_a_mission_opens_when_the_keel_is_clear_of_it_and_a_low_tide_is
     (bar,) = voyage_of(load_mission(Path("sitl/missions/tide-gate.toml"))).drying
     assert bar.opens_at_m == pytest.approx(0.6 + 0.3 + 0.3 + 0.2)  # draught, under the keel, what it dries, the doubt
     assert bar.room_m(2.0) == pytest.approx(2.0 - 1.2)
+
+
+def test_what_opens_next_is_said_and_when():
+    now = moment(route((0.0, 300.0), (0.0, 300.0)))
+    voyage = replace(now.voyage, drying=(water(opens_at_m=1.4), water(opens_at_m=9.0)))
+    status = replace(now.snapshot.autopilot, t_s=NOW_S, utc_at_boot_s=1000.0, boot_s=0.0)
+
+    def at(tide, **told):
+        snapshot = replace(now.snapshot, autopilot=replace(status, **told))
+        return opens_next(StepContext(voyage, replace(now.config, tide=tide), now.state, snapshot))
+
+    opens_s = 1000.0 + water().closed_s(TABLE, 1000.0)[0][1]
+    assert at(TABLE) == f"the bar opens at {dt.datetime.fromtimestamp(round(opens_s), dt.UTC):%H:%M} UTC"
+    assert at(TABLE, utc_at_boot_s=opens_s + 60.0) == ""  # it is open
+    assert at(None) == at(TABLE, utc_at_boot_s=None) == ""
