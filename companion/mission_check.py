@@ -62,8 +62,7 @@ from companion.planner import Plan, Problem
 from companion.planner.problem import assumed
 from companion.safety import LIGHT_WIND, STRONG_WIND
 from companion.skipper.planning import HOME_RADIUS_M
-from companion.skipper.way import Composed, Until, timed
-from companion.skipper.way.gates import Approach, gates_of
+from companion.skipper.way import Approach, Composed, Until, gates_of, timed
 from companion.words import counted
 
 __all__ = [
