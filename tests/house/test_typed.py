@@ -50,6 +50,7 @@ OWN = {
     "PROBLEM.json": "island.json",
     "sailbench/problems/channels-noisy.json": "island.json",
     "MISSION": "missions/bay.toml",
+    "sitl/missions/tide-gate.toml": str(ROOT / "sitl" / "missions" / "tide-gate.toml"),
     "RECORD.csv": "record.csv",
     "RECORD": "record.csv",
     "RECORDS": "record.csv",
