@@ -8,7 +8,7 @@ from dataclasses import replace
 from companion.messages import Command, Mode, waypoint
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Route
-from companion.skipper.step.state import Phase, Raised
+from companion.skipper.step.state import PendingPlan, Phase, Raised
 from companion.skipper.way.voyage import Goal
 from tests.skipper.world import FRAME, World, forecast, skipper, voyage, with_parts
 
@@ -37,6 +37,22 @@ def route(*points, begin=(0.0, 0.0), gate_of=(), **facts) -> Route:
         leg_from_en_m=(begin, *points[:-1]),
         gate_of=tuple(gate_of) or (-1,) * len(points),
         **(told | facts),
+    )
+
+
+def asked_for(facts: Route) -> PendingPlan:
+    """Return a plan that was asked for now, from the frame's origin."""
+    return PendingPlan(
+        request_id=9,
+        t_s=NOW_S,
+        reason=None,
+        from_index=None,
+        rung=0,
+        gate=0,
+        lead_in=(),
+        start_en_m=(0.0, 0.0),
+        facts=facts,
+        problem=None,
     )
 
 

@@ -14,10 +14,10 @@ from companion.skipper.planning.ladder import rungs
 from companion.skipper.rules import Skipper
 from companion.skipper.step import SkipperConfig
 from companion.skipper.step.saved import Persisted, SavedPlace, Standing
-from companion.skipper.step.state import Fix, PendingPlan
+from companion.skipper.step.state import Fix
 from companion.skipper.way.position_plausibility import PositionDoubt
 from companion.skipper.way.voyage import Goal
-from tests.skipper.moments import GOALS, NOW_S, moment, route
+from tests.skipper.moments import GOALS, NOW_S, asked_for, moment, route
 from tests.skipper.world import FRAME, voyage, with_parts
 
 WAY = route((300.0, 0.0), (0.0, 600.0), (0.0, 600.0), gate_of=(-1, 0, -1))
@@ -141,18 +141,7 @@ def test_a_frame_is_left_when_she_is_farther_from_its_origin_than_it_serves():
     assert not leaves((999.0, 0.0))
     assert not leaves((5000.0, 0.0), recentre_m=None)
     assert leaves((1001.0, 0.0), last=fix((999.0, 0.0)))
-    plan = PendingPlan(
-        request_id=1,
-        t_s=NOW_S,
-        reason=None,
-        from_index=None,
-        rung=0,
-        gate=0,
-        lead_in=(),
-        start_en_m=(0.0, 0.0),
-        facts=WAY,
-        problem=None,
-    )
+    plan = asked_for(WAY)
     assert not leaves((1001.0, 0.0), plan=plan)  # it would come in the metres of this one
     assert not leaves((1001.0, 0.0), last=fix((1000.0, 0.0)), doubt=DOUBT)
     assert not leaves((3001.0, 0.0), last=fix((2000.0, 0.0)))  # a place that has just jumped

@@ -28,8 +28,8 @@ from companion.skipper.step import CancelPlan, SetMode
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.config import ALL_PERMITTED, Ends
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.state import Adrift, PendingPlan, Phase, Retry, Signs, Stop
-from tests.skipper.moments import NOW_S, moment, route
+from companion.skipper.step.state import Adrift, Phase, Retry, Signs, Stop
+from tests.skipper.moments import NOW_S, asked_for, moment, route
 from tests.skipper.world import FRAME
 
 WAY = route((300.0, 0.0), (600.0, 0.0), (600.0, 0.0))
@@ -482,18 +482,7 @@ def test_after_a_reboot_all_but_a_person_s_turn_begins_again(phase, since_s, kee
 
 
 # ----------------------------------------------------------------------------------------------------- a person
-PLAN = PendingPlan(
-    request_id=9,
-    t_s=NOW_S,
-    reason=None,
-    from_index=None,
-    rung=0,
-    gate=0,
-    lead_in=(),
-    start_en_m=(0.0, 0.0),
-    facts=WAY,
-    problem=None,
-)
+PLAN = asked_for(WAY)
 
 
 @pytest.mark.parametrize("plan", [None, PLAN])

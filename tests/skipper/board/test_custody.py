@@ -19,9 +19,9 @@ from companion.skipper.step.config import ALL_PERMITTED
 from companion.skipper.step.missions import HELD_BACK, NO_PLAN, is_same_mission, stopgap
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import MissionOnBoard
-from companion.skipper.step.state import Inside, PendingPlan, PendingUpload, Phase, Retry
+from companion.skipper.step.state import Inside, PendingUpload, Phase, Retry
 from companion.skipper.way.gates import Approach
-from tests.skipper.moments import NOW_S, moment, route
+from tests.skipper.moments import NOW_S, asked_for, moment, route
 from tests.skipper.world import FRAME
 
 OURS = route((300.0, 0.0), (600.0, 0.0), (600.0, 600.0), (600.0, 600.0), gate_of=(-1, -1, 0, -1))
@@ -532,18 +532,7 @@ def test_known_again_the_mission_is_read_anew():
 @pytest.mark.parametrize("plans", [True, False])
 def test_when_it_may_not_be_ours_all_orders_are_stopped_once(was_ours, plans):
     ctx = heard(is_ours=was_ours, doubt="so it was")
-    plan = PendingPlan(
-        request_id=9,
-        t_s=NOW_S,
-        reason=None,
-        from_index=None,
-        rung=0,
-        gate=0,
-        lead_in=(),
-        start_en_m=(0.0, 0.0),
-        facts=OURS,
-        problem=None,
-    )
+    plan = asked_for(OURS)
     ctx.set(pending=replace(ctx.state.pending, plan=plan if plans else None))
     ctx.set(steering=replace(ctx.state.steering, until_s=NOW_S + 5.0))
     ctx.snapshot = replace(ctx.snapshot, identity=replace(IDENTITY, is_confirmed=False))
