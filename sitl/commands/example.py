@@ -31,7 +31,7 @@ tws_sd_mps = 0.3                  # standard deviation of its speed
 # drift_mps = 0.2
 
 [parameters]                      # of the autopilot, set before the boat sails
-FENCE_TYPE = 4.0                  # polygons alone, without the circle of 300 m round home
+AVOID_ENABLE = 0.0                # as `companion doctor` advises; FENCE_TYPE is 4 (polygons alone) where none is set
 
 [[events]]                        # in any number, in any order
 at_s = 40.0                       # [s] after the simulation's start

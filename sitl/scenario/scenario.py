@@ -496,7 +496,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return ours if path.parent.name == ours.parent.name and ours.is_file() and not path.is_file() else path
 
 
-# The autopilot of a plain mission, as `companion doctor --apply` leaves it: with bit 2, a default, the fence is a
+# As `companion doctor --apply` leaves it, where a scenario does not say: with bit 2, a default, the fence is a
 # circle of 300 m round home, too, and a mission that keeps the fence switched on and leads further is not begun.
 AS_SET_UP = MappingProxyType({"FENCE_TYPE": 4.0})
 
@@ -516,11 +516,12 @@ def load_scenario(path: Path) -> Scenario:
     except (msgspec.DecodeError, ValueError, RecursionError) as error:
         raise InputError(str(path), "", f"is not TOML ({str(error)[:80]})", "is it the file that was meant?") from error
     if "mission" not in raw and "goal" in raw:
-        raw = {"name": str(raw.get("name", path.stem)), "mission": path.name, "parameters": dict(AS_SET_UP)}
+        raw = {"name": str(raw.get("name", path.stem)), "mission": path.name}
     try:
         scenario = msgspec.convert(raw, Scenario)
     except msgspec.ValidationError as error:
         raise InputError(str(path), _place(error), _sentence(error), _suggestion(error)) from error
+    scenario = msgspec.structs.replace(scenario, parameters={**AS_SET_UP, **scenario.parameters})
     if scenario.satellite is None and any(event.kind == "far_order" for event in scenario.events):
         raise InputError(str(path), "events", "far_order needs a satellite link", "add a table [satellite]")
     if any(event.kind == "sensor" and not event.sensor for event in scenario.events):

@@ -78,6 +78,16 @@ def test_of_a_mission_the_fence_is_not_the_circle_of_300_m_that_an_autopilot_com
     assert load_scenario(Path("missions/bay.toml")).parameters == {"FENCE_TYPE": 4.0}
 
 
+def test_of_a_scenario_neither_unless_it_says_so(tmp_path):
+    """A voyage farther than that waited for ever behind a fence that nobody had drawn."""
+    text = Path("sitl/scenarios/demo.toml").read_text().replace("../../missions", str(Path("missions").resolve()))
+    path = tmp_path / "far.toml"
+    path.write_text(f"{text}\n[parameters]\nSAIL_XTRACK_MAX = 8.0\n")
+    assert load_scenario(path).parameters == {"FENCE_TYPE": 4.0, "SAIL_XTRACK_MAX": 8.0}
+    path.write_text(f"{text}\n[parameters]\nFENCE_TYPE = 6.0\n")
+    assert load_scenario(path).parameters == {"FENCE_TYPE": 6.0}
+
+
 def test_the_example_is_a_scenario_that_can_be_read_and_nothing_is_written_over(tmp_path, capsys):
     folder = tmp_path / "squall"
     assert cli.main(["example", str(folder)]) == 0
