@@ -16,6 +16,7 @@ import numpy as np
 from companion.boat import AutopilotLimits, Boat
 from companion.current import over_water
 from companion.geo.angles import difference_rad, heading_of, unit_en
+from companion.geo.segments import enters_disc
 from companion.messages import Command, Mode
 from companion.skipper.step import SkipperState, Snapshot, SpeedSeen, WindEstimate
 from companion.skipper.way import PointEn, Voyage, cross_track_m, gates_of, moved
@@ -294,14 +295,9 @@ def _walk(
 
 def _entered(before: PointEn, at: PointEn, mark: tuple[PointEn, float]) -> float | None:
     """Return where a step enters a mark's circle (centre, radius [m]), as a share of the step; None: it does not."""
-    (east, north), radius_m = mark
-    if math.dist(at, (east, north)) > radius_m:
-        return None
-    step = (at[0] - before[0], at[1] - before[1])
-    off = (before[0] - east, before[1] - north)
-    a, b = step[0] ** 2 + step[1] ** 2, off[0] * step[0] + off[1] * step[1]
-    c = off[0] ** 2 + off[1] ** 2 - radius_m**2
-    return 0.0 if c <= 0.0 or a == 0.0 else (-b - math.sqrt(max(0.0, b * b - a * c))) / a
+    disc = np.array([*mark[0], mark[1]])
+    share = enters_disc(before[0], before[1], at[0] - before[0], at[1] - before[1], disc)
+    return share if share <= 1.0 else None
 
 
 def _winds(wind: WindEstimate, twd_rad: float, tws_mps: float) -> Winds:

@@ -13,7 +13,6 @@ from companion.skipper.passing import pass_gates
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.diversions import diversion, is_composed
 from companion.skipper.planning.uploads import take_upload
-from companion.skipper.planning.waits import utc_s
 from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import FRESH_S, StepContext
@@ -143,7 +142,7 @@ def count_time(ctx: StepContext) -> None:
     ctx.set(
         voyage=changed(ctx.state.voyage, under_way_s=state.voyage.under_way_s + max(0.0, passed_s), last_step_s=ctx.t_s)
     )
-    now_s = utc_s(ctx)
+    now_s = ctx.utc_s
     if sails and state.voyage.set_sail_utc_s is None and now_s is not None:
         ctx.set(voyage=changed(ctx.state.voyage, set_sail_utc_s=round(now_s - ctx.state.voyage.under_way_s, 1)))
 

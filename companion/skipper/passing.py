@@ -10,19 +10,21 @@ import shapely
 from companion.frozen import changed
 from companion.messages import Severity
 from companion.skipper.behaviors.field_guidance import has_sailed
-from companion.skipper.planning.waits import gun_in_s, stay_left_s, utc_s, waits_for_gun
+from companion.skipper.planning.waits import gun_in_s, stay_left_s, waits_for_gun
 from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.state import Inside
 from companion.skipper.way.gates import Approach, Gate, again, is_on_wrong_side
 from companion.skipper.way.geometry import distance_m, leg_distance_m
-from companion.skipper.way.line import BEFORE_M, BEYOND_M, ahead_m, crossing, is_between, width_m
+from companion.skipper.way.line import BEFORE_M, BEYOND_M, STRAY_M, ahead_m, crossing, is_between, width_m
 from companion.skipper.way.sweeps import coverage, grown, is_off, left_over, sweeps_over
 from companion.skipper.way.voyage import PointEn, Search
 
 GAP_S = 2.0 + FRESH_S  # between two fixes that belong together
 AT_MOST = 4  # rounds: the sweeps, and what they left; the wind's own anew are not counted
 HAIR_M = 0.5
+COUNTED_M = 30.0
+OFTEN = 3  # misses on one voyage, and then somebody should know
 
 
 def pass_gates(ctx: StepContext) -> None:
@@ -49,12 +51,13 @@ def pass_gates(ctx: StepContext) -> None:
             lay_sweeps(ctx, gate)
             return
         if gate.is_crossed:
-            if number in ctx.state.mission.route.gate_of[: ctx.state.mission.index]:
+            counted = number in ctx.state.mission.route.gate_of[: ctx.state.mission.index]
+            if counted or _is_outside(gate, boat):
                 _begin_again(ctx, gate, boat, f"{gate.name} was passed by outside of its marks: again")
             return
         left = distance_m(boat, gate.en_m)
         counted = number in ctx.state.mission.route.gate_of[: ctx.state.mission.index]
-        near = max(gate.radius_m, ctx.config.grid_size_m)
+        near = max(gate.radius_m, _grid_m(ctx))
         if not (
             ctx.state.progress.closest_m <= gate.radius_m
             or (counted and left <= near and not _is_last(ctx))
@@ -91,7 +94,7 @@ def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
     if inside is None or inside.goal != gate.goal:
         if not shapely.covers(box.area_en, shapely.points(boat)):
             return False
-        inside = Inside(goal=gate.goal, t_s=ctx.t_s, utc_s=utc_s(ctx))
+        inside = Inside(goal=gate.goal, t_s=ctx.t_s, utc_s=ctx.utc_s)
         ctx.set(progress=changed(ctx.state.progress, inside=inside))
         ctx.say(Severity.NOTICE, "box", f"{gate.name} entered", every_s=0.0)
     is_told = ctx.state.progress.released == gate.goal
@@ -108,10 +111,7 @@ def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
     )
     why = "told to go on" if is_told else "her time is over"
     ctx.say(
-        Severity.NOTICE,
-        "goal",
-        f"{gate.name}: {why} after {inside.age_s(ctx.t_s, utc_s(ctx)):.0f} s in it",
-        every_s=0.0,
+        Severity.NOTICE, "goal", f"{gate.name}: {why} after {inside.age_s(ctx.t_s, ctx.utc_s):.0f} s in it", every_s=0.0
     )
     return True
 
@@ -124,6 +124,12 @@ def _is_before(gate: Gate, boat: PointEn) -> bool:
         and is_between(gate.line, boat)
         and (ahead_m(gate.line, boat) <= -0.5 * BEFORE_M)
     )
+
+
+def _is_outside(gate: Gate, boat: PointEn) -> bool:
+    """Return whether the boat has got beyond the gate's line beside its marks: no way from here crosses it."""
+    line = gate.line
+    return line is not None and ahead_m(line, boat) > STRAY_M and not is_between(line, boat)
 
 
 def _cross(ctx: StepContext) -> None:
@@ -141,7 +147,7 @@ def _cross(ctx: StepContext) -> None:
         is_blind
         and gate.is_crossed
         and is_between(gate.line, boat)
-        and (0.0 < ahead_m(gate.line, boat) <= BEYOND_M + ctx.config.grid_size_m)
+        and (0.0 < ahead_m(gate.line, boat) <= BEYOND_M + _grid_m(ctx))
     )
     if not unseen and (found is None or (not found.is_forward and not gate.is_crossed)):
         return
@@ -202,10 +208,15 @@ def _is_near_enough(ctx: StepContext, gate: Gate, counted: bool) -> bool:
     The boat has been at the waypoint by the autopilot's count and loiters in the mission's safe end.
     """
     route = ctx.state.mission.route
-    if route is None or not counted or not _is_last(ctx) or ctx.state.progress.closest_m > ctx.config.grid_size_m:
+    if route is None or not counted or not _is_last(ctx) or ctx.state.progress.closest_m > _grid_m(ctx):
         return False
     at_end = ctx.state.mission.index >= len(route.items) - 1
     return at_end and (distance_m(route.points_en_m[-1], gate.en_m) > gate.radius_m or ctx.is_raised("mission ended"))
+
+
+def _grid_m(ctx: StepContext) -> float:
+    """Return how near the autopilot's count of a waypoint is believed [m]: as she may be off a leg, but no farther."""
+    return min(ctx.config.grid_size_m, COUNTED_M)
 
 
 def _is_last(ctx: StepContext) -> bool:
@@ -216,10 +227,14 @@ def missed(ctx: StepContext) -> None:
     """Have the gate that is next planned for from where the boat is; what is being planned was for another."""
     if ctx.state.pending.plan is not None:
         ctx.act(CancelPlan(request_id=ctx.state.pending.plan.request_id))
+    count = ctx.state.progress.missed + 1
     ctx.set(
-        progress=changed(ctx.state.progress, missed=ctx.state.progress.missed + 1, missed_s=ctx.t_s),
+        progress=changed(ctx.state.progress, missed=count, missed_s=ctx.t_s),
         pending=changed(ctx.state.pending, plan=None),
     )
+    if count >= OFTEN:
+        text = f"marks were missed {count} times on this voyage; the order skip_goal gives the next one up"
+        ctx.say(Severity.CRITICAL, "missed often", text, every_s=0.0)
 
 
 # -------- Searching an area: its sweeps laid and laid anew, what the track has covered, when it is done.

@@ -251,10 +251,9 @@ def goals_of(step: Step, voyage: Voyage) -> tuple[values.GoalView, ...]:
 def home_of(step: Step, voyage: Voyage) -> values.PlaceView | None:
     """Return where the boat was armed, as the autopilot tells."""
     autopilot = step.snapshot.autopilot
-    home: PointEn | None = voyage.home_en_m
-    if autopilot is not None and autopilot.home is not None:
-        home = voyage.frame.en_from_geo(autopilot.home)
-    return None if home is None else values.PlaceView(name="home", at_en_m=place(home))
+    if autopilot is None or autopilot.home is None:
+        return None
+    return values.PlaceView(name="home", at_en_m=place(voyage.frame.en_from_geo(autopilot.home)))
 
 
 def refuges_of(voyage: Voyage) -> tuple[values.PlaceView, ...]:

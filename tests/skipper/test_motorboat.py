@@ -24,7 +24,7 @@ IDENTITY = Identity(system=1, uid="5a", is_confirmed=True, vehicle_type=11, fram
 
 
 def make(*goals, obstacles=(), wind=None, **config):
-    voyage = Voyage(name="motor", frame=FRAME, goals=goals, area=area(*obstacles), boat=MOTOR, home_en_m=(0.0, 0.0))
+    voyage = Voyage(name="motor", frame=FRAME, goals=goals, area=area(*obstacles), boat=MOTOR)
     world = World(
         skipper=Skipper(voyage=voyage, config=SkipperConfig(sails=False, **config)),
         identity=IDENTITY,

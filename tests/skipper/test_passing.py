@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import shapely
 
+from companion.skipper.passing import pass_gates
 from companion.skipper.step.state import Phase
 from companion.skipper.way.line import ahead_m
 from companion.skipper.way.voyage import Box, Goal, Line
+from tests.skipper.moments import moment, route
 from tests.skipper.world import World, restarted, skipper, voyage
 
 LINE = Line(port_en_m=(-25.0, 80.0), starboard_en_m=(25.0, 80.0), keep_m=5.0)
@@ -29,6 +31,14 @@ def world(*goals, **changes):
 
 def said(w, code):
     return [entry[2] for entry in w.log if entry[1] == code]
+
+
+def carried(w, *way):
+    """Take her along a way at 2 m/s, whatever she would do herself."""
+    for a, b in itertools.pairwise(way):
+        for share in np.arange(0.0, 1.0, 2.0 / math.dist(a, b)):
+            w.position = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
+            w.run(1.0)
 
 
 def crossed_s(w):
@@ -65,11 +75,7 @@ def test_from_beyond_the_line_she_comes_round_and_crosses_it_the_right_way():
 def test_crossed_the_wrong_way_it_does_not_count_and_that_is_said():
     w = world(line(), END)
     w.run(30.0, lambda w: w.state.voyage.sailing)
-    way = [(28.0, 0.0), (28.0, 88.0), (18.0, 88.0), (18.0, 70.0)]  # round the starboard mark, and back through
-    for a, b in itertools.pairwise(way):
-        for share in np.arange(0.0, 1.0, 2.0 / math.dist(a, b)):
-            w.position = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
-            w.run(1.0)
+    carried(w, (28.0, 0.0), (28.0, 82.0), (18.0, 82.0), (18.0, 70.0))  # round the starboard mark, and back through
     assert said(w, "wrong way") == ["line was crossed the wrong way: it does not count"]
     assert w.state.progress.reached == ()
     assert w.run(300.0, lambda w: bool(w.state.progress.reached))
@@ -84,6 +90,57 @@ def test_a_gate_that_was_passed_by_outside_is_sailed_again():
     w.current = lambda t: (0.0, 2.5) if w.position[1] < 110.0 and not said(w, "gate missed") else (0.0, 0.0)
     assert w.run(500.0, lambda w: bool(w.state.progress.reached))
     assert abs(w.track[-1][0]) < 27.0
+
+
+def test_beyond_the_line_beside_its_marks_it_is_missed_at_once():
+    """Sailed on to the place behind it she would have lost the way back besides."""
+    w = world(line(), END)
+    w.run(60.0, lambda w: w.position[1] > 40.0)
+    carried(w, w.position, (40.0, 60.0), (40.0, 82.0))
+    assert not said(w, "gate missed")  # a hair beyond its prolongation: not yet
+    carried(w, w.position, (40.0, 88.0))
+    assert said(w, "gate missed") == ["line was passed by outside of its marks: again"]
+
+
+def test_what_is_missed_for_ever_is_said_loudly():
+    w = world(line(), END)
+    w.run(60.0, lambda w: w.position[1] > 40.0)
+    for count in (1, 2, 3):
+        assert not said(w, "missed often")
+        carried(w, w.position, (35.0, 50.0), (35.0, 90.0))
+        assert len(said(w, "gate missed")) == count
+        carried(w, w.position, (0.0, 50.0))
+        assert w.state.progress.gate == 1  # at the place before it, once more
+    assert said(w, "missed often") == [
+        "marks were missed 3 times on this voyage; the order skip_goal gives the next one up"
+    ]
+
+
+@pytest.mark.parametrize(("off_m", "is_reached"), [(28.0, True), (35.0, False), (150.0, False)])
+def test_how_far_she_may_be_off_a_leg_is_no_second_radius_of_a_goal(off_m, is_reached):
+    """The autopilot has counted its waypoint, and she was never within its 5 m."""
+    way = route((10.0, 100.0), (10.0, 200.0), (10.0, 230.0), gate_of=(0, 1, -1))
+    goals = (Goal(en_m=(10.0, 100.0), radius_m=5.0), Goal(en_m=(10.0, 200.0), radius_m=5.0))
+    ctx = moment(way, goals=goals, at=(10.0 + off_m, 100.0), mission={"index": 1}, config={"grid_size_m": 200.0})
+    pass_gates(ctx)
+    assert ctx.state.progress.reached == ((0,) if is_reached else ())
+    assert ctx.state.progress.missed == (0 if is_reached else 1)
+
+
+@pytest.mark.parametrize("wind_deg", [0.0, 20.0, -20.0])
+def test_a_narrow_gate_dead_to_windward_is_crossed_and_not_gone_round(wind_deg):
+    """At the whole of what is kept clear of its marks no board fits between them: nearer to them one does."""
+    narrow = replace(LINE, port_en_m=(-11.0, 80.0), starboard_en_m=(11.0, 80.0))
+    w = World(
+        skipper=skipper(
+            voyage(Goal(en_m=(0.0, 80.0), name="line", line=narrow), END), margin_m=8.0, margin_floor_m=4.0
+        ),
+        wind=lambda t: (math.radians(wind_deg), 5.0),
+        position=(0.0, -20.0),
+    )
+    assert w.run(400.0, lambda w: w.state.phase is Phase.DONE)
+    assert w.state.progress.missed == 0
+    assert max(abs(p[0]) for p in w.track) < 100.0
 
 
 @pytest.mark.parametrize(

@@ -964,7 +964,7 @@ def test_by_headings_it_rounds_buoys(side):
         *(Goal(en_m=p, side=side) for p in places),
         obstacles=(),
         config={"guidance": Guidance.HEADING},
-        voyage={"laps": 2, "home": (20.0 * hand, -40.0)},
+        voyage={"laps": 2},
         position=(20.0 * hand, -40.0),
         expansions=600,
     )

@@ -71,7 +71,7 @@ def area(*polygons, limits=None) -> LocalArea:
     )
 
 
-def voyage(*goals: Goal, obstacles=(), limits=None, laps=1, home=(0.0, 0.0), refuges=()) -> Voyage:
+def voyage(*goals: Goal, obstacles=(), limits=None, laps=1, refuges=()) -> Voyage:
     boat = Boat(polar=ardurover_sitl(), turn_rate_radps=0.8)
     return Voyage(
         name="test",
@@ -80,7 +80,6 @@ def voyage(*goals: Goal, obstacles=(), limits=None, laps=1, home=(0.0, 0.0), ref
         laps=laps,
         area=area(*obstacles, limits=limits),
         boat=boat,
-        home_en_m=home,
         refuges=tuple(Refuge(name=f"{n + 1}", en_m=p) for n, p in enumerate(refuges)),
     )
 

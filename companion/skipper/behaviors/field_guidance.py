@@ -28,7 +28,7 @@ from companion.skipper.planning.asking import request
 from companion.skipper.planning.diversions import diversion, is_composed
 from companion.skipper.planning.right_of_way import held_of
 from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
-from companion.skipper.planning.waits import stay_left_s, utc_s
+from companion.skipper.planning.waits import stay_left_s
 from companion.skipper.step import Guidance, ReplanReason, SteerHeading, StepContext
 from companion.skipper.step.state import FieldSteering, Inside
 from companion.skipper.step.state import Phase as Doing
@@ -427,7 +427,7 @@ def has_sailed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
     field, inside = gate.field, ctx.state.progress.inside
     assert field is not None
     if inside is None or inside.goal != gate.goal:
-        inside = Inside(goal=gate.goal, t_s=ctx.t_s, utc_s=utc_s(ctx))
+        inside = Inside(goal=gate.goal, t_s=ctx.t_s, utc_s=ctx.utc_s)
         ctx.set(progress=changed(ctx.state.progress, inside=inside))
     why = _over(ctx, gate, field, boat)
     if not why:
@@ -444,7 +444,7 @@ def has_sailed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
     ctx.say(
         Severity.NOTICE,
         "goal",
-        f"{gate.name}: {why} after {inside.age_s(ctx.t_s, utc_s(ctx)):.0f} s by field",
+        f"{gate.name}: {why} after {inside.age_s(ctx.t_s, ctx.utc_s):.0f} s by field",
         every_s=0.0,
     )
     return True

@@ -23,7 +23,6 @@ from companion.messages import Mode, Severity
 from companion.safety import CRITICAL, HOMEWARD, JUMP_M
 from companion.skipper.behaviors.drifting import AWAY_M, stops_drift
 from companion.skipper.behaviors.helm import is_busy, set_mode
-from companion.skipper.planning.waits import utc_s
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.saved import SavedPlace
 from companion.skipper.step.state import Fix, Phase
@@ -70,7 +69,7 @@ def follow(ctx: StepContext) -> None:
     ctx.set(
         position=changed(
             ctx.state.position,
-            restored=None if doubt is not None or utc_s(ctx) is not None else ctx.state.position.restored,
+            restored=None if doubt is not None or ctx.utc_s is not None else ctx.state.position.restored,
         )
     )
     if doubt is None:
@@ -182,7 +181,7 @@ def _begun(ctx: StepContext, seen: Evidence) -> PositionDoubt | None:
 
 def _since_the_last_start(ctx: StepContext, before: SavedPlace, seen: Evidence) -> PositionDoubt | None:
     """Return the doubt of a fix that is not where the boat can have come to since it was saved, or was in doubt."""
-    now_s, saved, late_s = utc_s(ctx), ctx.state.mission.adoptable, ctx.t_s - seen.t_s
+    now_s, saved, late_s = ctx.utc_s, ctx.state.mission.adoptable, ctx.t_s - seen.t_s
     if now_s is not None and now_s < before.utc_s:
         now_s = None  # a clock that was set back since tells nothing
     passed_s = UNKNOWN_S if now_s is None else max(0.0, now_s - late_s - before.utc_s)
@@ -222,7 +221,7 @@ def _follow_filter(ctx: StepContext) -> None:
 def _remember(ctx: StepContext, here: PointEn, doubt: PositionDoubt | None) -> None:
     """Keep for who comes after a kill where the boat is, and how fast; and at once when a doubt begins or ends."""
     now_s, before, vehicle, age = (
-        utc_s(ctx),
+        ctx.utc_s,
         ctx.state.position.place,
         ctx.snapshot.vehicle,
         ctx.snapshot.vehicle_age_s,

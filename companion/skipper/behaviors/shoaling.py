@@ -17,7 +17,6 @@ from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.skipper.behaviors.helm import hand_back
 from companion.skipper.planning.uploads import upload
-from companion.skipper.planning.waits import utc_s
 from companion.skipper.step import CancelPlan, Phase, StepContext
 from companion.skipper.step.state import Sounded
 from companion.skipper.way.geometry import distance_m, is_tack, moved
@@ -84,7 +83,7 @@ def follow_soundings(ctx: StepContext) -> None:
     if not ctx.is_raised(SHOALING) or ahead_m is None or ahead_m > 0.0:
         return
     known = ctx.state.soundings.shoals
-    tide_m = None if ctx.config.tide is None else ctx.config.tide.height_m(utc_s(ctx))
+    tide_m = None if ctx.config.tide is None else ctx.config.tide.height_m(ctx.utc_s)
     is_sailing_on = not (_is_on_board(ctx) or _is_coming(ctx)) and ctx.t_s - ctx.state.soundings.found_s > AGAIN_S
     if SHOALING in ctx.fresh or is_sailing_on:
         shoal = found(

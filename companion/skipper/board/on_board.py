@@ -197,7 +197,9 @@ def _take_over(ctx: StepContext, items: tuple[MissionItem, ...], saved: Persiste
 def _route_of(ctx: StepContext, items: tuple[MissionItem, ...]) -> Route:
     """Return a list that was read as the route that sails: where it leads is known, what for is not."""
     whole = marked(effective(items))
-    home = ctx.voyage.home_en_m or ctx.boat_en or (0.0, 0.0)
+    autopilot = ctx.snapshot.autopilot
+    known = None if autopilot is None else autopilot.home
+    home = ctx.boat_en or (0.0, 0.0) if known is None else ctx.voyage.frame.en_from_geo(known)
     points = tuple(
         home if item.command == Command.NAV_RETURN_TO_LAUNCH else ctx.voyage.frame.en_from_geo(item.point)
         for item in whole

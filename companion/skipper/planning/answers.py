@@ -27,6 +27,7 @@ from companion.skipper.step import DiversionKind, Phase, PlanOutcome, ReplanReas
 from companion.skipper.step.actions import Change
 from companion.skipper.step.missions import Tail, splice
 from companion.skipper.step.state import PendingPlan, Retry
+from companion.skipper.way.gates import astray
 from companion.skipper.way.geometry import distance_m, gybe_round, moved
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
@@ -57,6 +58,10 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
         not_found(ctx, pending, reason)
         return
     ctx.set(plans=changed(ctx.state.plans, unanswered=0, effort=min(1.0, MORE * ctx.state.plans.effort), rung=0))
+    outside = _astray(ctx, pending, plan)
+    if outside:
+        not_found(ctx, pending, outside)
+        return
     keep, set_current = _place(ctx, pending)
     if keep is None:
         ctx.say(Severity.INFO, "plan late", "the new plan came after its waypoint: the old one stays", every_s=0.0)
@@ -102,6 +107,19 @@ def _note_latency(ctx: StepContext, pending: PendingPlan, outcome: PlanOutcome) 
         )
     elif latency.speed is not None:  # measured: in real time
         ctx.say(Severity.INFO, "planner", f"the planner {latency.words}", every_s=math.inf)
+
+
+def _astray(ctx: StepContext, pending: PendingPlan, plan: Plan) -> str:
+    """Return why a plan does not do what its gate is for, in words; empty: it does, or it leads to none."""
+    boat, route, index = ctx.boat_en, ctx.state.mission.route, ctx.state.mission.index
+    if pending.gate < 0 or boat is None:
+        return ""
+    gate = ctx.gates[pending.gate]
+    before = () if route is None or pending.from_index is None else route.points_en_m[index : pending.from_index + 1]
+    way = [*pending.lead_in, *((float(e), float(n)) for e, n in plan.waypoints_en)]
+    if ctx.gate is None or ctx.gate.goal != gate.goal:
+        return astray(gate, way, 0.0)
+    return astray(gate, [boat, *before, *way], ctx.state.progress.bearing_rad)
 
 
 def _may_still_turn_before(ctx: StepContext, waypoint_en: PointEn) -> bool:

@@ -24,6 +24,7 @@ from companion.skipper.step.missions import path_length_m
 from companion.skipper.step.state import PendingPlan
 from companion.skipper.way import Gate, bearing_rad, distance_m, half_width_rad, moved
 from companion.skipper.way.gates import marks_of
+from companion.skipper.way.line import STRAY_M
 from companion.skipper.way.position_plausibility import is_impossible
 from companion.skipper.way.stemming import waiting_place
 
@@ -74,6 +75,7 @@ def request(
                 failing=_failing(ctx),
                 seen=ctx.snapshot.speed_seen,
                 is_wind_known=ctx.snapshot.wind.health is not WindHealth.UNTRUSTED,
+                stray_m=_stray_m(ctx, step),
                 doubt=ctx.snapshot.doubt if ctx.config.sails else None,
                 zone_half_rad=ctx.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
                 tracking=problem_tracking(
@@ -143,6 +145,16 @@ def request(
     return True
 
 
+def _stray_m(ctx: StepContext, step: Rung) -> float:
+    """Return what is kept clear of a line's marks for a track that strays [m]: given up with the margin.
+
+    A line that a wind leaves no straight way through at the whole of it is crossed nearer to a mark, not gone round.
+    """
+    room_m = ctx.config.margin_m - ctx.config.margin_floor_m
+    share = (step.margin_m - ctx.config.margin_floor_m) / room_m if room_m > 0.0 else 1.0
+    return STRAY_M * min(max(share, 0.0), 1.0)
+
+
 def _failing(ctx: StepContext) -> dict[str, Any]:
     """Return what is known of tacks that fail, as a problem's boat has it: before the first, the chance alone."""
     tacking, given = ctx.state.tacking, ctx.voyage.boat.tack_fails
@@ -202,7 +214,7 @@ def _target(ctx: StepContext, from_index: int | None) -> tuple[Gate, int, Divers
     if bound is None and number is None:
         bound = homeward(ctx)
     if bound is not None:
-        return (gate_for(ctx, bound), -1, bound) if bound.has_place else None
+        return (gate_for(bound), -1, bound) if bound.has_place else None
     return None if number is None else (ctx.gates[number], number, None)
 
 

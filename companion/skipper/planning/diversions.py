@@ -17,8 +17,8 @@ from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, 
 from companion.skipper.step import Diversion, DiversionKind, SafeEnd, SkipperConfig, StepContext
 from companion.skipper.step.route import HOME_RADIUS_M
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
-from companion.skipper.way.gates import Gate, marks_of
-from companion.skipper.way.geometry import disc_wkt, distance_m
+from companion.skipper.way.gates import Gate
+from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import PointEn, Refuge
 from companion.traffic import Policy
@@ -350,18 +350,9 @@ def _is_bound(ctx: StepContext, name: str) -> bool:
     return route is not None and route.bound_for == name and bool(ctx.ahead())
 
 
-def gate_for(ctx: StepContext, bound: Diversion) -> Gate:
-    """Return a diversion as a gate that completes nothing; buoys are something to keep clear of on this leg too."""
-    discs = tuple(disc_wkt(mark, keep_m) for mark, keep_m in marks_of(ctx.voyage))
-    return Gate(
-        en_m=bound.en_m,
-        radius_m=bound.radius_m,
-        goal=-1,
-        ends_goal=False,
-        name=bound.name,
-        from_en_m=None,
-        keep_out=discs,
-    )
+def gate_for(bound: Diversion) -> Gate:
+    """Return a diversion as a gate that completes nothing."""
+    return Gate(en_m=bound.en_m, radius_m=bound.radius_m, goal=-1, ends_goal=False, name=bound.name, from_en_m=None)
 
 
 def is_at_rest(ctx: StepContext) -> bool:

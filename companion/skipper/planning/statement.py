@@ -25,6 +25,8 @@ from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import SpeedSeen
 from companion.skipper.step.wind_limits import strength_of
 from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m, half_width_rad, mean_twd_rad, moved
+from companion.skipper.way.gates import discs_of
+from companion.skipper.way.line import STRAY_M
 from companion.skipper.way.shortest import shortest_way
 
 # The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
@@ -266,12 +268,14 @@ def problem_dict(
     failing: dict[str, Any] | None = None,
     seen: SpeedSeen | None = None,
     is_wind_known: bool = True,
+    stray_m: float = STRAY_M,
 ) -> dict[str, Any]:
     """Return the problem in the JSON form of the planner (degrees there, as its format has them).
 
     A ``current`` that is significant is planned with: the wind is then that over the water. ``zone_half_rad`` is how
     far off the wind over the ground, which is the autopilot's, a course must be there for it to be followed.
     ``failing`` is what is known of tacks that fail, as the problem's boat has it, ``seen`` what it makes of its speeds.
+    ``stray_m`` is what is kept clear of a line's marks on top of what the mission says.
 
     Raises:
         ValueError: when no water is left inside the fence at this margin.
@@ -280,6 +284,7 @@ def problem_dict(
     obstacles, names = voyage.area.obstacles_wkt(margin_m), voyage.area.obstacle_names(margin_m)
     if start.notch_m > 0.0:
         obstacles, names, fence = _notched(voyage, start, (obstacles, names), fence, floor_m)
+    discs = discs_of(voyage, stray_m)
     corridor = band(voyage, gate, start.en_m, aim.en_m)
     if corridor is not None:
         limits = shapely.intersection(corridor, shapely.from_wkt(fence)) if fence is not None else corridor
@@ -327,8 +332,12 @@ def problem_dict(
         "title": title,
         "start": {"x": start.en_m[0], "y": start.en_m[1], "heading_deg": math.degrees(wrap_two_pi(start.heading_rad))},
         "goal": {"x": aim.en_m[0], "y": aim.en_m[1], "radius": aim.radius_m},
-        "obstacles": [*obstacles, *gate.keep_out],
-        "obstacle_names": [*names, *(f"the wrong side of {gate.name}" for _ in gate.keep_out)],
+        "obstacles": [*obstacles, *discs, *gate.keep_out],
+        "obstacle_names": [
+            *names,
+            *("a mark" for _ in discs),
+            *(f"the wrong side of {gate.name}" for _ in gate.keep_out),
+        ],
         "fence": fence,
         "wind": wind,
         "boat": boat,

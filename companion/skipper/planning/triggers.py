@@ -354,8 +354,8 @@ def _waypoint(ctx: StepContext) -> Trigger | None:
 
 
 def _is_bend(route: Route, index: int) -> bool:
-    """Return whether the course hardly changes at a waypoint: a leg bent as the no-go zone widens, no manoeuvre."""
-    if index + 1 >= len(route.points_en_m) or distance_m(*route.points_en_m[index : index + 2]) < 1.0:
+    """Return whether the course hardly changes at a waypoint before the last: a leg bent as the no-go zone widens."""
+    if distance_m(*route.points_en_m[index : index + 2]) < 1.0:
         return False
     before = bearing_rad(route.leg_from_en_m[index], route.points_en_m[index])
     after = bearing_rad(route.points_en_m[index], route.points_en_m[index + 1])

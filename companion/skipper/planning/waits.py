@@ -22,17 +22,12 @@ NEAR_M = 120.0  # from farther away the time is not foreseen so well: it goes to
 FAR_SHARE = 0.6
 
 
-def utc_s(ctx: StepContext) -> float | None:
-    """Return the Unix time by the autopilot's clock [s], None while that does not know it."""
-    return ctx.utc_s
-
-
 def gun_in_s(ctx: StepContext, line: Line) -> float | None:
     """Return how long it is to a start line's gun [s], negative after it; None while the time is not known.
 
     A line without one is open for ever.
     """
-    now_s, state = utc_s(ctx), ctx.state
+    now_s, state = ctx.utc_s, ctx.state
     if line.not_before_s is not None:
         return None if now_s is None else line.not_before_s - now_s
     if line.after_s is None:
@@ -69,12 +64,7 @@ def _to_line_s(ctx: StepContext, gate: Gate) -> float:
 def _cut(gate: Gate) -> PointEn:
     """Return where a gate's line is crossed."""
     assert gate.line is not None
-    back_m = ahead_m(gate.line, gate.en_m)
-    return (
-        moved(gate.en_m, course_rad(gate.line) + math.pi, back_m)
-        if back_m > 0.0
-        else moved(gate.en_m, course_rad(gate.line), -back_m)
-    )
+    return moved(gate.en_m, course_rad(gate.line), -ahead_m(gate.line, gate.en_m))
 
 
 def waiting_en(ctx: StepContext, gate: Gate) -> PointEn:
@@ -101,4 +91,4 @@ def stay_left_s(ctx: StepContext, gate: Gate) -> float:
     inside, box = ctx.state.progress.inside, gate.box or gate.field
     if box is None or box.for_s is None or inside is None or inside.goal != gate.goal:
         return math.inf
-    return box.for_s - inside.age_s(ctx.t_s, utc_s(ctx))
+    return box.for_s - inside.age_s(ctx.t_s, ctx.utc_s)

@@ -15,6 +15,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.skipper.way.geometry import barrier_wkt, bearing_rad, disc_wkt, distance_m, moved
@@ -26,6 +27,7 @@ from companion.skipper.way.line import (
     STRAY_M,
     ahead_m,
     course_rad,
+    crossing,
     crossing_en,
     wings_wkt,
 )
@@ -61,7 +63,8 @@ class Approach:
 class Gate:
     """A place to pass: within ``radius_m`` of ``en_m``, coming from ``from_en_m`` (None: wherever the boat is).
 
-    ``goal`` is the index into ``Voyage.legs``. ``keep_out`` are WKT polygons for the way here. For buoys
+    ``goal`` is the index into ``Voyage.legs``. ``keep_out`` are WKT polygons for the way here, besides the marks' own
+    discs (``discs_of``). For buoys
     ``buoy_en_m`` is the buoy and ``side`` where it is left; ``turn_rad`` is how far its rounding turns the boat, and
     ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the approach's
     beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With ``line`` it
@@ -106,7 +109,6 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
     """
     legs = voyage.legs
     begun = {a.goal: a for a in approaches}
-    discs = tuple(disc_wkt(mark, keep_m) for mark, keep_m in marks_of(voyage))
     out: list[Gate] = []
     before: PointEn | None = None
     for i, goal in enumerate(legs):
@@ -119,12 +121,9 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
         name = goal.name or f"goal {i + 1}"
         after = legs[i + 1].en_m if i + 1 < len(legs) else voyage.onward_en_m
         if goal.line is not None:
-            out.extend(
-                replace(gate, keep_out=(*discs, *gate.keep_out))
-                for gate in _cross(goal, i, name, None if is_once_more else before, after, voyage.area)
-            )
+            out.extend(_cross(goal, i, name, None if is_once_more else before, after, voyage.area))
         elif goal.search is not None and approach is not None and approach.round > 0:
-            out.extend(_sweep(goal, i, name, approach, discs))
+            out.extend(_sweep(goal, i, name, approach))
         elif goal.side is Side.NONE:
             out.append(
                 Gate(
@@ -136,7 +135,6 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
                     from_en_m=before,
                     bandwidth_m=goal.bandwidth_m,
                     heading_rad=goal.heading_rad,
-                    keep_out=discs,
                     box=goal.box,
                     search=goal.search,
                     field=goal.field,
@@ -144,25 +142,30 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
             )
         else:
             turn_rad = approach.turn_rad if approach is not None else None
-            out.extend(
-                replace(gate, keep_out=(*discs, *gate.keep_out))
-                for gate in _round(goal, i, name, before, after, turn_rad, is_once_more=is_once_more)
-            )
+            out.extend(_round(goal, i, name, before, after, turn_rad, is_once_more=is_once_more))
     return tuple(out)
 
 
-def marks_of(voyage: Voyage) -> tuple[tuple[PointEn, float], ...]:
-    """Return every mark of the voyage and how far plans keep clear of it [m]: buoys, and the ends of lines."""
+def marks_of(voyage: Voyage, stray_m: float = STRAY_M) -> tuple[tuple[PointEn, float], ...]:
+    """Return every mark of the voyage and how far plans keep clear of it [m]: buoys, and the ends of lines.
+
+    ``stray_m`` is what is added about a line's marks, for a track that strays from its leg.
+    """
     out: list[tuple[PointEn, float]] = []
     for goal in voyage.goals:
         if goal.line is not None:
-            out += [(mark, goal.line.keep_m + STRAY_M) for mark in (goal.line.port_en_m, goal.line.starboard_en_m)]
+            out += [(mark, goal.line.keep_m + stray_m) for mark in (goal.line.port_en_m, goal.line.starboard_en_m)]
         elif goal.side is not Side.NONE:
             out.append((goal.en_m, KEEP_SHARE * goal.rounding_m))
     return tuple(out)
 
 
-def _sweep(goal: Goal, index: int, name: str, approach: Approach, discs: tuple[str, ...]) -> list[Gate]:
+def discs_of(voyage: Voyage, stray_m: float = STRAY_M) -> tuple[str, ...]:
+    """Return the marks' discs as WKT: what is kept out of on every way, whatever it leads to."""
+    return tuple(disc_wkt(mark, keep_m) for mark, keep_m in marks_of(voyage, stray_m))
+
+
+def _sweep(goal: Goal, index: int, name: str, approach: Approach) -> list[Gate]:
     """Return the gates that search an area: both ends of each sweep."""
     count = len(approach.sweeps)
     return [
@@ -174,7 +177,6 @@ def _sweep(goal: Goal, index: int, name: str, approach: Approach, discs: tuple[s
             name=name,
             from_en_m=None,
             ends_goal=n == count - 1 and k == 1,
-            keep_out=discs,
             search=goal.search,
             sweep=(n + 1, count),
         )
@@ -297,6 +299,23 @@ def is_on_wrong_side(gate: Gate, bearing: float) -> bool:
         return False
     hand = 1.0 if gate.side is Side.PORT else -1.0
     return hand * (bearing - gate.bearing_rad) > math.pi
+
+
+def astray(gate: Gate, way: Sequence[PointEn], bearing: float) -> str:
+    """Return why a way to a gate does not do what the gate is for, in words; empty: it does.
+
+    Wings and barriers end somewhere, and where there is no way between the marks the shortest is round their ends.
+    ``bearing`` [rad] is how far the boat has come round the gate's buoy where the way begins.
+    """
+    if gate.is_crossed and gate.line is not None:
+        found = (crossing(gate.line, a, b) for a, b in pairwise(way))
+        return "" if any(f is not None and f.is_forward for f in found) else f"round the outside of {gate.name} only"
+    bearing = bearing_on(gate, way[0], bearing)
+    if is_on_wrong_side(gate, bearing_on(gate, gate.en_m, bearing)):
+        return ""  # she was carried round it already: what is missed is said at the gate, and begun anew
+    for place in way[1:]:
+        bearing = bearing_on(gate, place, bearing)
+    return f"with {gate.name} on the wrong side only" if is_on_wrong_side(gate, bearing) else ""
 
 
 def again(gate: Gate, boat: PointEn, bearing: float) -> Approach:

@@ -238,7 +238,6 @@ class Voyage:
     laps: int = 1
     refuges: tuple[Refuge, ...] = ()
     drying: tuple[DryingWater, ...] = field(default=(), compare=False)
-    home_en_m: PointEn | None = None
     onward_en_m: PointEn | None = None
     recentre_m: float | None = None
     far_m: float = FAR_M

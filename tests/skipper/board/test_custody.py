@@ -285,9 +285,11 @@ def test_an_earlier_list_of_ours_is_sailed_on_by_or_replaced(how, under_way):
 def test_a_list_that_goes_home_leads_to_where_home_is():
     items = marked((*OTHER.items[:2], MissionItem(command=Command.NAV_RETURN_TO_LAUNCH), *OTHER.items))
     ctx = read(items, way=None, sailing=False)
+    home = ctx.voyage.frame.geo_from_en(-30.0, 12.0)
+    ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, home=home))
     assert mission_is_known(ctx)
     assert len(ctx.state.mission.route.items) == 3  # what follows its end is an old tail
-    assert ctx.state.mission.route.points_en_m[-1] == ctx.voyage.home_en_m
+    assert ctx.state.mission.route.points_en_m[-1] == pytest.approx((-30.0, 12.0), abs=0.02)
 
 
 def test_a_list_of_ours_that_a_person_sails_elsewhere_is_an_earlier_one():

@@ -26,7 +26,7 @@ def unsteady(seed, sigma_rad):
 
 
 def sail(seed, sigma_deg, **config):
-    made = voyage(Goal(en_m=(10.0, 420.0), radius_m=4.0), obstacles=[shapely.from_wkt(w) for w in CHANNELS], home=START)
+    made = voyage(Goal(en_m=(10.0, 420.0), radius_m=4.0), obstacles=[shapely.from_wkt(w) for w in CHANNELS])
     rules = {"autopilot_beats": False, "delta_s": 0.75, "margin_m": 6.0, "margin_floor_m": 4.0, **config}
     sigma_rad = math.radians(sigma_deg)
     world = World(

@@ -9,7 +9,7 @@ import pytest
 from shapely.geometry import box
 
 from companion.skipper.planning import waits
-from companion.skipper.planning.waits import gun_in_s, stay_left_s, utc_s, waiting_en, waits_for_gun
+from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step import StepContext
 from companion.skipper.step.state import Inside
 from companion.skipper.way.voyage import Box, Goal, Line
@@ -39,10 +39,10 @@ def before_line(*, line=LINE, clock=(None, None), clock_age_s=0.0, **parts):
     ],
 )
 def test_the_time_of_day_is_the_autopilot_s(clock, age_s, now_s):
-    assert utc_s(before_line(clock=clock, clock_age_s=age_s)) == now_s
+    assert before_line(clock=clock, clock_age_s=age_s).utc_s == now_s
     ctx = before_line()
     silent = replace(ctx.snapshot, autopilot=None)
-    assert utc_s(StepContext(ctx.voyage, ctx.config, ctx.state, silent)) is None
+    assert StepContext(ctx.voyage, ctx.config, ctx.state, silent).utc_s is None
 
 
 @pytest.mark.parametrize(

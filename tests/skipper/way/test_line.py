@@ -7,7 +7,7 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.skipper.way.gates import Approach, gates_of, marks_of
+from companion.skipper.way.gates import Approach, astray, discs_of, gates_of, marks_of
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.line import (
     BEFORE_M,
@@ -19,7 +19,7 @@ from companion.skipper.way.line import (
     is_between,
     wings_wkt,
 )
-from companion.skipper.way.voyage import Goal, Line
+from companion.skipper.way.voyage import Goal, Line, Side
 from tests.skipper.world import area, voyage
 
 NORTHWARD = Line(port_en_m=(-20.0, 100.0), starboard_en_m=(20.0, 100.0), keep_m=5.0)
@@ -121,6 +121,40 @@ def test_the_same_line_once_more_is_approached_from_before_it_again():
 def test_marks_are_kept_clear_of_on_every_leg():
     v = voyage(Goal(en_m=(0.0, 50.0)), goal(NORTHWARD))
     assert [keep for _, keep in marks_of(v)] == [8.0, 8.0]
-    assert all(len(g.keep_out) >= 2 for g in gates_of(v))
-    disc = shapely.from_wkt(gates_of(v)[0].keep_out[0])
-    assert disc.contains(shapely.Point(moved(NORTHWARD.port_en_m, math.pi / 4.0, 7.9)))
+    discs = discs_of(v)
+    assert len(discs) == 2
+    assert shapely.from_wkt(discs[0]).contains(shapely.Point(moved(NORTHWARD.port_en_m, math.pi / 4.0, 7.9)))
+
+
+def test_what_a_track_strays_is_the_lines_and_not_the_buoys():
+    v = voyage(goal(NORTHWARD), Goal(en_m=(0.0, 200.0), side=Side.PORT, rounding_m=12.0))
+    assert [keep for _, keep in marks_of(v, 1.0)] == [6.0, 6.0, 6.0]
+    assert [keep for _, keep in marks_of(v, 0.0)] == [5.0, 5.0, 6.0]
+
+
+@pytest.mark.parametrize(
+    ("way", "is_through"),
+    [
+        ([(0.0, 0.0), (0.0, 114.0)], True),
+        ([(0.0, 0.0), (40.0, 60.0), (10.0, 90.0), (-5.0, 114.0)], True),
+        ([(0.0, 0.0), (300.0, 90.0), (300.0, 120.0), (0.0, 114.0)], False),  # round the end of its wing
+        ([(0.0, 0.0), (60.0, 120.0), (0.0, 114.0), (0.0, 90.0)], False),  # through it, back
+    ],
+)
+def test_a_way_to_a_gate_leads_between_its_marks(way, is_through):
+    (gate,) = (g for g in gates_of(voyage(Goal(en_m=(0.0, 0.0)), goal(NORTHWARD))) if g.is_crossed)
+    assert (astray(gate, way, 0.0) == "") == is_through
+
+
+@pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
+@pytest.mark.parametrize("turns", [0, 1])
+def test_a_way_to_a_buoy_leaves_it_on_its_side(side, turns):
+    """Behind the end of the barrier, too: there is nothing there that a plan would have to keep out of."""
+    hand = 1.0 if side is Side.PORT else -1.0
+    made = voyage(Goal(en_m=(0.0, 200.0), side=side), Goal(en_m=(0.0, 400.0)))
+    gate = gates_of(made, (Approach(goal=0, en_m=(0.0, 0.0)),))[0]
+    begun = -hand * turns * 2.0 * math.pi  # a whole turn round it already, the right way
+    assert astray(gate, [(0.0, 0.0), gate.en_m], begun) == ""
+    assert astray(gate, [(0.0, 0.0), (hand * 400.0, 150.0), gate.en_m], begun) == ""
+    round_it = [(0.0, 0.0), (-hand * 400.0, 200.0), (0.0, 500.0), gate.en_m]
+    assert (astray(gate, round_it, begun) == "") == (turns == 1)
