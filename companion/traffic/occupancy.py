@@ -91,7 +91,36 @@ def _discs(vessel: Vessel, t_s: float, keep: Keep, motion: MotionUncertainty | N
         if end - begin < 1e-6:
             continue
         out.append(_disc(vessel, t_s, begin, end, keep, model, turn))
+    if vessel.is_stopped and out:
+        out.append(_lasting(out[-1]))
     return out
+
+
+def _lasting(disc: Target) -> Target:
+    """Return the disc that takes the place of a vessel's last one for ever: who lies still has not gone by then.
+
+    Without it a plan to a place beside her came there late on purpose, and was made again each time.
+    """
+    end_s, spread = disc.until_s, disc.spread
+    assert spread is not None
+    own_m = spread.own_mps * end_s
+    return replace(
+        disc,
+        radius_m=disc.radius_at_m(end_s),
+        growth_mps=0.0,
+        from_s=end_s,
+        until_s=math.inf,
+        spread=replace(
+            spread,
+            along_m=math.hypot(spread.along_m + spread.along_mps * end_s, own_m),
+            along_mps=0.0,
+            across_m=math.hypot(spread.across_m + spread.across_mps * end_s, own_m),
+            across_mps=0.0,
+            own_mps=0.0,
+            sigma_m=spread.sigma_m + spread.sigma_mps * end_s,
+            sigma_mps=0.0,
+        ),
+    )
 
 
 def _disc(

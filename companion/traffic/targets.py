@@ -60,6 +60,8 @@ REACH_SLACK_M, REACH_MPS = 400.0, 30.0
 FAR_M = 60_000.0
 # The companion's clock never goes back; a replay's or a test's may. More than this is a jump, not disorder.
 CLOCK_BACK_S = 60.0
+LIES_MPS, SWINGS_M = 0.26, 15.0  # half a knot; a fix's error and a swing at the mooring, between two reports
+LIES_APART_S = 400.0  # a vessel that lies still reports each three minutes
 # Who goes next where there are too many is judged for an eighth of them, and for so long [s]: a flood of new numbers
 # must not have all of them judged for each.
 SPARE_SHARE, SPARE_S = 8, 5.0
@@ -324,4 +326,11 @@ def _moved(vessel: Vessel, report: AisReport, en: tuple[float, float], t_s: floa
         is_class_b=report.is_class_b or vessel.is_class_b,
         reports=vessel.reports + 1,
         derived=derived,
+        lain_s=vessel.lain_s + dt if _lies(vessel, report, en, dt) else 0.0,
     )
+
+
+def _lies(vessel: Vessel, report: AisReport, en: tuple[float, float], dt_s: float) -> bool:
+    """Return whether a vessel shows itself lying still since the report before: class B has no status that says so."""
+    has_speed = report.speed_mps is not None and report.speed_mps >= LIES_MPS
+    return not has_speed and math.dist(en, vessel.antenna_en_m) <= SWINGS_M and 0.0 <= dt_s <= LIES_APART_S

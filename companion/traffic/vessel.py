@@ -12,6 +12,7 @@ CLASS_B_LENGTH_M, CLASS_B_BEAM_M = 12.0, 4.0
 # ITU-R M.1371 navigational status.
 AT_ANCHOR, NOT_UNDER_COMMAND, RESTRICTED, BY_DRAUGHT, MOORED, AGROUND, FISHING, UNDER_SAIL = 1, 2, 3, 4, 5, 6, 7, 8
 STOPPED_STATUS = frozenset({AT_ANCHOR, MOORED, AGROUND})
+LAIN_S = 120.0  # who has lain still for so long goes on to, until a report says otherwise
 # ITU-R M.1371 ship types.
 TYPE_FISHING, TYPE_SAILING, TYPE_PLEASURE = 30, 36, 37
 
@@ -75,6 +76,7 @@ class Vessel:
     reports: int = 1
     is_shared_mmsi: bool = False
     derived: bool = False  # speed and course come from positions, not from the report
+    lain_s: float = 0.0  # for how long its reports have shown it lying still, as far as they were heard
 
     @property
     def label(self) -> str:
@@ -84,8 +86,9 @@ class Vessel:
 
     @property
     def is_stopped(self) -> bool:
-        """Return whether it says that it is at anchor, moored or aground."""
-        return self.nav_status in STOPPED_STATUS and (self.speed_mps is None or self.speed_mps < 0.5)
+        """Return whether it says that it is at anchor, moored or aground, or has lain still for ``LAIN_S``."""
+        says_so = self.nav_status in STOPPED_STATUS and (self.speed_mps is None or self.speed_mps < 0.5)
+        return says_so or self.lain_s >= LAIN_S
 
     @property
     def is_moving_known(self) -> bool:

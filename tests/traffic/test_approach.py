@@ -18,6 +18,21 @@ from tests.traffic.conftest import own, vessel
 POINT = (0.5, 0.5, 0.5, 0.5)
 
 
+def test_who_lies_still_is_there_when_a_plan_would_come_late_on_purpose() -> None:
+    still = vessel((0.0, 0.0), None, 0.0, nav_status=5)
+    discs = planning_discs([still], 0.0, Keep(horizon_s=600.0))
+    assert discs[-1].until_s == math.inf
+    before, last = discs[-2:]
+    assert last.from_s == before.until_s == 600.0
+    assert last.radius_at_m(600.0) == pytest.approx(before.radius_at_m(600.0))
+    assert last.radius_at_m(9000.0) == last.radius_at_m(600.0)
+    assert last.spread is not None
+    assert before.spread is not None
+    assert last.spread.sigma_m == pytest.approx(before.spread.sigma_m + 600.0 * before.spread.sigma_mps)
+    sails = planning_discs([vessel((0.0, 0.0), 90.0, 2.0)], 0.0, Keep(horizon_s=600.0))
+    assert max(d.until_s for d in sails) == 600.0
+
+
 def test_a_crossing_by_hand() -> None:
     """We go north at 2 m/s from the origin, it goes west at 2 m/s from (200, 100): CPA 70.7 m after 75 s."""
     a = cpa(own(course_deg=0.0, radius_m=0.0), vessel((200.0, 100.0), 270.0, 2.0, size=(1e-6, 1e-6, 1e-6, 1e-6)), 0.0)

@@ -16,7 +16,7 @@ from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.messages import AisReport, GeoPoint, VehicleState
 from companion.skipper import Skipper
-from companion.traffic import TargetLimits, Targets
+from companion.traffic import TargetLimits, Targets, predict
 from companion.traffic.nmea import NmeaDecoder
 from companion.wind import WindTracker
 from tests.traffic.conftest import FRAME, report
@@ -42,6 +42,32 @@ def test_velocity_from_positions_where_none_is_reported() -> None:
     assert v.derived
     assert v.speed_mps == pytest.approx(5.0, abs=1e-3)
     assert v.course_rad == pytest.approx(math.pi / 2, abs=1e-3)
+
+
+@pytest.mark.parametrize(("every_s", "speed_mps"), [(10.0, 0.0), (180.0, 0.1), (30.0, None)])
+def test_who_has_lain_still_for_two_minutes_goes_on_to(every_s: float, speed_mps: float | None) -> None:
+    """Class B has no status that says moored: a plan made way for a yacht at her mooring that grew by 0.5 m/s."""
+    t = Targets.empty(FRAME)
+    for k in range(int(180.0 / every_s) + 2):
+        t_s = k * every_s
+        t = t.heard(report(t_s, (2.0 * (k % 2), 0.0), speed_mps=speed_mps, course_rad=1.0, is_class_b=True))
+    v = t.picture(t_s).vessels[0]
+    assert v.is_stopped
+    assert predict(v, t_s + 300.0).sigma_along_m < 20.0
+    t_s += 10.0
+    v = t.heard(report(t_s, (4.0, 0.0), speed_mps=2.0, course_rad=1.0, is_class_b=True)).picture(t_s).vessels[0]
+    assert not v.is_stopped  # she has cast off
+    assert predict(v, t_s + 300.0).sigma_along_m > 100.0
+
+
+@pytest.mark.parametrize(
+    ("step_m", "every_s", "speed_mps"), [(0.0, 10.0, 0.5), (20.0, 10.0, 0.1), (0.0, 500.0, 0.0), (0.0, 10.0, 0.0)]
+)
+def test_who_moves_or_was_hardly_heard_does_not_lie_still(step_m: float, every_s: float, speed_mps: float) -> None:
+    t, count = Targets.empty(FRAME), 40 if speed_mps or every_s > 400.0 else 12
+    for k in range(count):
+        t = t.heard(report(k * every_s, (step_m * k, 0.0), speed_mps=speed_mps, course_rad=1.0, is_class_b=True))
+    assert not t.picture(k * every_s).vessels[0].is_stopped
 
 
 def test_static_data_finds_its_vessel() -> None:

@@ -65,6 +65,7 @@ def look_out(ctx: StepContext) -> None:
         found = _meet(ctx, own, found)
     ctx.set(traffic=changed(ctx.state.traffic, watch=found[:SHOWN]))
     _say(ctx, found[:SHOWN])
+    _speak_of_goal(ctx, found)
 
 
 def _meet(ctx: StepContext, own: OwnShip, found: Sequence[Assessment]) -> tuple[Assessment, ...]:
@@ -115,6 +116,21 @@ def _say(ctx: StepContext, found: Sequence[Assessment]) -> None:
         ctx.say(SEVERITY[news.alarm], "vessel near", news.sentence(), every_s=0.0)
         lately = (*lately, (news.vessel.mmsi, news.vessel.branch, ctx.t_s))
     ctx.set(announced=changed(ctx.state.announced, watch=lately))
+
+
+def _speak_of_goal(ctx: StepContext, found: Sequence[Assessment]) -> None:
+    """Say that a vessel lies where the next goal is, so near that no plan leads there."""
+    gate, keep_m = ctx.gate, ctx.config.traffic_clearance_m
+    if gate is None or not ctx.state.voyage.sailing:
+        return
+    for vessel in (one.vessel for one in found if one.vessel.is_stopped):
+        off_m = max(0.0, math.dist(vessel.centre_en_m, gate.en_m) - vessel.reach_m)
+        if off_m < keep_m - gate.radius_m:
+            text = (
+                f"{vessel.label} lies {off_m:.0f} m from {gate.name}, and [traffic] safe_distance_m keeps {keep_m:g} m "
+                "from her: it is not reached while she lies there; the order skip_goal gives it up"
+            )
+            ctx.say(Severity.WARNING, "goal occupied", text, every_s=REMIND_S)
 
 
 EVERY_S = 60.0

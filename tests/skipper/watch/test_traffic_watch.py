@@ -79,6 +79,19 @@ def test_power_gives_way_to_sail_and_is_shown_so():
     assert (encounter.rule, encounter.role) == (Rule.RESPONSIBILITIES, Role.STAND_ON)
 
 
+@pytest.mark.parametrize(
+    ("off_m", "lain_s", "is_said"), [(30.0, 200.0, True), (30.0, 60.0, False), (70.0, 200.0, False)]
+)
+def test_a_vessel_that_lies_where_the_goal_is_is_said(off_m, lain_s, is_said):
+    ctx = turn_among()
+    east, north = ctx.gate.en_m
+    yacht = coming(ctx, away_m=0.0, speed_mps=0.0, nav_status=None, lain_s=lain_s)
+    ctx = turn_among(replace(yacht, antenna_en_m=(east + off_m, north)))
+    look_out(ctx)
+    told = [a.text for a in said(ctx) if "it is not reached while she lies there" in a.text]
+    assert bool(told) is is_said
+
+
 def test_a_vessel_has_one_line_in_half_a_minute_whatever_its_alarm_does():
     world = make()
     world.run(60)
