@@ -183,7 +183,7 @@ def check_mission(
         refusals=troubles,
         findings=(
             *mission.findings,
-            *(() if troubles else (*field_findings_of(mission), *_roundings(mission))),
+            *(() if troubles else (*field_findings_of(mission), *_roundings(mission), *_drying(mission))),
             *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told),
         ),
     )
@@ -210,6 +210,24 @@ def _roundings(mission: Mission) -> Iterator[Finding]:
                 f"{max(0.0, clear_m):.1f} m from {near}; the margin is {mission.margin_m:g} m",
                 remedy="round it closer (radius_m and [area] margin_m say how far off), or leave it on the other hand",
             )
+
+
+def _drying(mission: Mission) -> Iterator[Finding]:
+    """Yield the places to lie in that water takes which dries: she goes to none of them, whatever the tide is."""
+    voyage = voyage_of(mission)
+    places = [(f"[[refuge]] {n}", refuge.en_m) for n, refuge in enumerate(voyage.refuges, start=1)]
+    if mission.start is not None and mission.skipper.end == "home":
+        places.append(("[start], which is home,", voyage.frame.en_from_geo(mission.start)))
+    for place, en_m in places:
+        for water in voyage.drying:
+            if shapely.intersects_xy(water.polygon, *en_m):
+                yield Finding(
+                    severity=FindingLevel.WARNING,
+                    code=Code.DRIES,
+                    place=place,
+                    text=f"lies in {water.name}, which dries: she does not go there to stay",
+                    remedy="choose a place that is deep enough at low water",
+                )
 
 
 def require_sailable(mission: Mission) -> Mission:

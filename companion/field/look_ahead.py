@@ -92,7 +92,7 @@ def foresee(
         drift = habits.leeway_share * situation.tws_mps
         leeway = -drift * np.array([math.sin(twd), math.cos(twd)])
     unit = np.column_stack([np.sin(headings), np.cos(headings)])
-    velocity = speed[:, None] * unit + leeway
+    velocity = speed[:, None] * unit + leeway + np.asarray(situation.current_en_mps)
     lag = max(habits.lag_s, 0.1)
     coast = lag * (1.0 - np.exp(-t / lag))
     after = np.maximum(0.0, t[None, :] - 0.5 * lost[:, None])

@@ -31,7 +31,10 @@ class MovingObstacle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Situation:
-    """What the guidance sees; ``twd_from_rad`` None: the wind is not known (a motorboat need not know)."""
+    """What the guidance sees; ``twd_from_rad`` None: the wind is not known (a motorboat need not know).
+
+    ``current_en_mps`` is what sets her over the ground, 0 where it is not known.
+    """
 
     t_s: float
     en_m: tuple[float, float]
@@ -40,6 +43,7 @@ class Situation:
     twd_from_rad: float | None
     tws_mps: float = 5.0
     obstacles: tuple[MovingObstacle, ...] = ()
+    current_en_mps: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

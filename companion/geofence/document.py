@@ -52,6 +52,7 @@ class Code(enum.Enum):
     EXPANDED = "expanded"
     FORMAT = "format"
     FIELD = "field"
+    DRIES = "dries at low water"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -202,6 +202,17 @@ def test_following_a_line_past_a_boat_that_lies_on_it() -> None:
     assert bare > 5.0
 
 
+def test_what_is_foreseen_is_set_by_the_current() -> None:
+    """Steered by field across a stream she was foreseen beside the quay that she was set onto."""
+    headings = np.array([0.0, 1.0, -2.0])
+    still, _ = foresee(headings, 0.5, seen(), HABITS)
+    stream, _ = foresee(headings, 0.5, seen(current_en_mps=(0.6, -0.8)), HABITS)
+    run_m = stream - still
+    assert run_m[:, :, 0] / 0.6 == pytest.approx(run_m[:, :, 1] / -0.8)
+    assert np.all(np.diff(np.hypot(run_m[:, :, 0], run_m[:, :, 1])) >= 0.0)
+    assert np.all(np.hypot(*run_m[:, -1].T) > 0.5 * HABITS.horizon_s)
+
+
 def test_a_motorboat_needs_no_wind() -> None:
     s = seen(0.0, twd_from_rad=None)
     habits = GuidanceSettings(is_sailing=False, polar_mps=(2.0, 2.0))

@@ -7,17 +7,24 @@ import pytest
 from shapely.geometry import box
 
 from companion.current import TideRow, TideTable
+from companion.orders.order import phrase
+from companion.skipper.behaviors.operator_orders import refuge_place
+from companion.skipper.behaviors.position_doubt import follow
 from companion.skipper.behaviors.shoaling import depth_ahead_m
+from companion.skipper.planning.asking import lacks
+from companion.skipper.planning.diversions import home_trouble, refuges_by_way
 from companion.skipper.planning.tides import closes_ahead, opens_next
 from companion.skipper.step import StepContext
+from companion.skipper.step.missions import loiter_place
 from companion.skipper.way.drying import DryingWater
 from companion.skipper.way.shoals import RISES_M, Shoal, still_shoal
-from companion.skipper.way.voyage import Goal
+from companion.skipper.way.voyage import Goal, Refuge
 from tests.skipper.test_voyage import is_done, make, said
 
 EAST = math.radians(90.0)
 UTC_S = 1_000_000.0
 GOAL = Goal(en_m=(0.0, 300.0), radius_m=6.0, name="the goal")
+FLAT = DryingWater(name="the flat", polygon=box(-400.0, 500.0, 400.0, 1400.0), margin_m=0.0, opens_at_m=1.0)
 BAR = DryingWater(name="the bar", polygon=box(-400.0, 130.0, 400.0, 170.0), margin_m=0.0, opens_at_m=1.0)
 
 
@@ -78,6 +85,48 @@ def test_an_open_bar_that_closes_before_she_is_there_is_a_reason_to_plan_again()
     assert met.name == "the bar"
     world.run(5)
     assert said(world, "tide ahead")
+
+
+def test_a_place_in_water_that_has_closed_is_no_impossible_one():
+    """A table closed the flat about a boat that lay in it: her position was doubted, and she circled to the ground."""
+    world = voyage_over_a_bar((-1000.0, 0.0), (100_000.0, 0.0), bar=FLAT)
+    world.position = (0.0, 900.0)
+    now = context(world)
+    assert float(now.voyage.area.clearance_m([(0.0, 900.0)])[0]) < -200.0
+    assert float(now.always_solid.clearance_m([(0.0, 900.0)])[0]) > 0.0
+    follow(now)
+    assert now.state.position.doubt is None
+    assert lacks(now) == ""
+
+
+def test_she_does_not_stay_in_the_middle_of_a_long_flat_and_goes_to_no_refuge_on_it():
+    flat, deep = Refuge(name="flat", en_m=(0.0, 700.0)), Refuge(name="deep", en_m=(0.0, -400.0))
+    world = voyage_over_a_bar((-1000.0, 2.0), (100_000.0, 1.9), bar=FLAT)
+    world.skipper = replace(world.skipper, voyage=replace(world.skipper.voyage, refuges=(flat, deep)))
+    world.run(60, lambda w: w.state.voyage.sailing)
+    world.position = (0.0, 900.0)
+    now = context(world)
+    place, room_m = loiter_place(now.to_stay_in, now.config, (0.0, 900.0), 0.0)
+    assert room_m > 0.0
+    assert abs(place[0]) > 300.0
+    assert [r.name for r in refuges_by_way(now)] == ["deep"]
+    assert "which dries" in refuge_place(now, phrase(["refuge", "flat"]))
+    assert refuge_place(now, phrase(["refuge", "deep"])) == ("deep", (0.0, -400.0))
+    assert refuge_place(now, phrase(["refuge"])) == ("deep", (0.0, -400.0))
+    status = replace(now.snapshot.autopilot, home=now.voyage.frame.geo_from_en(0.0, 800.0))
+    now.snapshot = replace(now.snapshot, autopilot=status)
+    assert home_trouble(now) == "home is not in free water but in the flat, which dries: the margin's floor is 8 m"
+
+
+def test_who_steers_by_what_is_about_her_keeps_out_of_what_opens_soon():
+    """For a plan it is open when she is there; by field she was taken across it twenty minutes before."""
+    now = context(voyage_over_a_bar((-1000.0, 0.0), (600.0, 1.2), (100_000.0, 1.2)))
+    assert float(now.voyage.area.clearance_m([(0.0, 150.0)])[0]) > 0.0
+    assert float(now.water_now.area.clearance_m([(0.0, 150.0)])[0]) < 0.0
+    soon = context(voyage_over_a_bar((-1000.0, 2.0), (0.0, 1.1), (400.0, 0.0), (100_000.0, 0.0)))
+    assert float(soon.water_now.area.clearance_m([(0.0, 150.0)])[0]) < 0.0
+    later = context(voyage_over_a_bar((-1000.0, 2.0), (2000.0, 2.0), (4000.0, 0.0)))
+    assert float(later.water_now.area.clearance_m([(0.0, 150.0)])[0]) > 0.0
 
 
 def test_a_place_to_stay_in_is_never_in_water_that_dries():

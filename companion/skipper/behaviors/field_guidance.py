@@ -124,6 +124,7 @@ def situation(ctx: StepContext) -> Situation | None:
         twd_from_rad=wind[0] if wind is not None and ctx.config.sails else None,
         tws_mps=wind[1] if wind is not None else 0.0,
         obstacles=(*seen, *buoys),
+        current_en_mps=ctx.current_en_mps,
     )
 
 
@@ -157,7 +158,7 @@ def intent(ctx: StepContext, seen: Situation) -> Intent:
         wanted = follow_line(*leg)
     else:
         wanted = go_to(leg[1] if leg is not None else seen.en_m, seen.twd_from_rad or 0.0)
-    return replace(wanted, clearance=ctx.voyage.area.clearance_m)
+    return replace(wanted, clearance=ctx.water_now.area.clearance_m)
 
 
 def heading(ctx: StepContext) -> Setpoint | None:
@@ -202,7 +203,7 @@ def _composed(ctx: StepContext, seen: Situation, field: Composed) -> Setpoint:
         return setpoint
     made, last = field_of(tree, conditions), memory.guidance.wanted_rad
     value = made(seen.en_m)[0]
-    wanted = Intent(field=made, zone=zone_of(tree, conditions), clearance=ctx.voyage.area.clearance_m)
+    wanted = Intent(field=made, zone=zone_of(tree, conditions), clearance=ctx.water_now.area.clearance_m)
     is_weak = math.hypot(value[0], value[1]) < LEAST
     if is_weak:  # for a moment: over a point that is sailed to
         wanted = replace(hold_heading(seen.heading_rad if last is None else last), clearance=wanted.clearance)

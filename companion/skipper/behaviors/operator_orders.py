@@ -17,7 +17,15 @@ from companion.skipper.behaviors.rest import UNTIL_TOLD
 from companion.skipper.behaviors.shoaling import SHOALING
 from companion.skipper.board.on_board import adopt
 from companion.skipper.planning.asking import lacks, request
-from companion.skipper.planning.diversions import diversion, home_trouble, is_at_rest, place_trouble, pressing
+from companion.skipper.planning.diversions import (
+    diversion,
+    home_trouble,
+    is_at_rest,
+    place_trouble,
+    pressing,
+    refuge_name,
+    refuges_by_way,
+)
 from companion.skipper.planning.next_tack import next_tack_s
 from companion.skipper.planning.not_found import hold
 from companion.skipper.step.actions import Acknowledge, CancelPlan, ReplanReason, RequestPlan, StopOrders
@@ -420,16 +428,15 @@ def refuge_place(ctx: StepContext, wanted: Wanted) -> Found | str:
     refuges = ctx.voyage.refuges
     if not refuges:
         return "the mission has no refuge"
-    here = ctx.boat_en or ctx.snapshot.position_en_m
-    is_any = not (wanted.name or wanted.mark or wanted.number)
-    if is_any and here is not None:
-        nearest = min(refuges, key=lambda r: distance_m(here, r.en_m))
-        return nearest.name, nearest.en_m
-    number = 0 if is_any else which(wanted, [r.name for r in refuges])
+    if not (wanted.name or wanted.mark or wanted.number):
+        lasting = refuges_by_way(ctx)
+        return (lasting[0].name, lasting[0].en_m) if lasting else "every refuge of the mission lies in water that dries"
+    number = which(wanted, [r.name for r in refuges])
     if number is None:
         named = ", ".join(f"{n} {r.name}".rstrip() for n, r in enumerate(refuges, start=1))
         return f"the mission has no such refuge: it has {named}"
-    return refuges[number].name, refuges[number].en_m
+    chosen = refuges[number]
+    return place_trouble(ctx, refuge_name(chosen), chosen.en_m) or (chosen.name, chosen.en_m)
 
 
 def home_place(ctx: StepContext) -> Found | str:

@@ -102,7 +102,7 @@ def follow(ctx: StepContext) -> None:
 
 def _evidence(ctx: StepContext, here: PointEn, at_s: float) -> Evidence:
     """Return what this step shows of the position."""
-    state, vehicle, status, solid = ctx.state, ctx.snapshot.vehicle, ctx.autopilot, ctx.voyage.area.unfenced
+    state, vehicle, status, solid = ctx.state, ctx.snapshot.vehicle, ctx.autopilot, ctx.always_solid
     jumped = ctx.jump_m >= JUMP_M
     velocity = (0.0, 0.0) if vehicle is None else vehicle.velocity_en_mps
     told = status.gps2 if status is not None else None
@@ -164,9 +164,9 @@ def _begun(ctx: StepContext, seen: Evidence) -> PositionDoubt | None:
         begun_anew = _since_the_last_start(ctx, state.position.restored, seen)
         if begun_anew is not None:
             return begun_anew
-    if is_impossible(ctx.voyage.area, seen.en_m, margin_m=ctx.config.margin_m):
-        deep_m = -float(ctx.voyage.area.unfenced.clearance_m([seen.en_m])[0])
-        name = ctx.voyage.area.nearest_name(seen.en_m) or "an obstacle"
+    if is_impossible(ctx.always_solid, seen.en_m, margin_m=ctx.config.margin_m):
+        deep_m = -float(ctx.always_solid.clearance_m([seen.en_m])[0])
+        name = ctx.always_solid.nearest_name(seen.en_m) or "an obstacle"
         return PositionDoubt(
             since_s=ctx.t_s,
             t_s=seen.t_s,
@@ -276,7 +276,7 @@ def _is_steered_falsely(ctx: StepContext) -> bool:
     here, doubt = ctx.snapshot.position_en_m, ctx.state.position.doubt
     if here is None or doubt is None or ctx.t_s - doubt.since_s < GLITCH_S:
         return False
-    return float(ctx.voyage.area.unfenced.clearance_m([here])[0]) < -ERROR_M
+    return float(ctx.always_solid.clearance_m([here])[0]) < -ERROR_M
 
 
 def stands_off(ctx: StepContext) -> bool:

@@ -260,12 +260,13 @@ def follow_route(ctx: StepContext) -> bool:
     if ctx.steers:
         _send_heading(ctx)
     elif ctx.guidance is not Guidance.PLAN:
-        ctx.say(
-            Severity.WARNING,
-            "guidance",
-            f"guidance by {ctx.guidance.value} is asked for and steering is not permitted: by plan",
-            every_s=600.0,
-        )
+        if not ctx.may_guide:
+            ctx.say(
+                Severity.WARNING,
+                "guidance",
+                f"guidance by {ctx.guidance.value} is asked for and steering is not permitted: by plan",
+                every_s=600.0,
+            )
         check_current(ctx)
     else:
         leave_passed(ctx)

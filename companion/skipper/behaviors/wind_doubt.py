@@ -108,6 +108,10 @@ def seeks_sea_room(ctx: StepContext) -> bool:
         return False
     wind = doubted_wind(ctx)
     water = water_at(ctx.voyage.area, boat)
+    circles = _circles_near(ctx, water, boat)
+    if wind is None and circles and ctx.wind_now is not None:
+        told_rad = ctx.wind_now[0]  # by which LOITER is sailed: it is not driven off, and needs room for its circle
+        wind = DoubtedWind(true_from_rad=told_rad, told_from_rad=told_rad, drift_en_mps=(0.0, 0.0))
     floor_m = min(
         ctx.config.margin_floor_m, ctx.config.margin_m, max(0.0, float(water.clearance_m([boat])[0]) - HAIR_M)
     )
@@ -124,8 +128,7 @@ def seeks_sea_room(ctx: StepContext) -> bool:
         return True
     if (
         wind is None
-        or left_s >= HORIZON_S
-        or _stays(ctx, boat, wind)
+        or (not circles and (left_s >= HORIZON_S or _stays(ctx, boat, wind)))
         or ctx.t_s < max(state.pending.upload_retry.not_before_s, state.adrift.looked_s + LOOKS_EVERY_S)
     ):
         return False
@@ -138,14 +141,15 @@ def seeks_sea_room(ctx: StepContext) -> bool:
     found = sea_room(
         water, boat, starts, wind, no_go_half_rad=ctx.no_go_half_rad, clear_m=(ctx.config.margin_m, floor_m)
     )
-    if found is None or found[1] < left_s + ROOMY_S:
-        return False
+    if found is None or found[1] < min(left_s + (0.0 if circles else ROOMY_S), HORIZON_S):
+        return False  # where it circles too near, it need only be driven off no sooner
     _stop_planning(ctx)
     place, gained_s = found
     keep = min(state.mission.index, len(route.items) - 1)
     onto = water.nearest_name(boat) or "something"
+    here = f"drift onto {onto} in {left_s:.0f} s" if left_s < HORIZON_S else f"circle too near to {onto}"
     text = (
-        f"{ctx.snapshot.unsure}: a loiter here would drift onto {onto} in {left_s:.0f} s; waiting until there is "
+        f"{ctx.snapshot.unsure}: a loiter here would {here}; waiting until there is "
         f"{'sea room' if gained_s >= HORIZON_S else f'room for {gained_s:.0f} s'}"
     )
     end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
@@ -155,6 +159,15 @@ def seeks_sea_room(ctx: StepContext) -> bool:
     ctx.say(Severity.WARNING, SEA_ROOM, text, every_s=0.0)
     ctx.phase(Phase.HOLDING, text)
     return True
+
+
+def _circles_near(ctx: StepContext, water: AreaLike, boat: PointEn) -> bool:
+    """Return whether the circles of a LOITER that begins here, or was begun, come below the floor of what is near."""
+    begun, status = ctx.state.adrift.loiter_en_m, ctx.autopilot
+    is_begun = status is not None and status.mode is Mode.LOITER and begun is not None
+    place = begun if is_begun and begun is not None else boat
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
+    return float(water.clearance_m([place])[0]) < STRAYS_M + floor_m
 
 
 def _stays(ctx: StepContext, boat: PointEn, wind: DoubtedWind) -> bool:

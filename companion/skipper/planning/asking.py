@@ -169,7 +169,7 @@ def _failing(ctx: StepContext) -> dict[str, Any]:
 
 def _start(ctx: StepContext, from_index: int | None) -> Start | None:
     boat, vehicle, route = ctx.boat_en, ctx.snapshot.vehicle, ctx.state.mission.route
-    if boat is None or vehicle is None or is_impossible(ctx.voyage.area, boat, margin_m=ctx.config.margin_m):
+    if boat is None or vehicle is None or is_impossible(ctx.always_solid, boat, margin_m=ctx.config.margin_m):
         return None
     if from_index is None:
         # Stopped, or turning in circles, the boat is where it is.

@@ -271,18 +271,24 @@ def _stay(ctx: StepContext, why: str) -> Diversion | None:
 
 def _refuge(ctx: StepContext, why: str) -> Diversion | None:
     """Return the refuge that the route is bound for, else the nearest by water; the next after each that had no way."""
-    refuges = ctx.voyage.refuges
+    refuges = refuges_by_way(ctx)
     if not refuges:
         return None
-    route, here = ctx.state.mission.route, ctx.boat_en or ctx.snapshot.position_en_m
+    route = ctx.state.mission.route
     bound = route.bound_for if route is not None else ""
     chosen = next((r for r in refuges if refuge_name(r) == bound), None)
     if chosen is None:
-        by_distance = sorted(refuges, key=lambda r: _off_m(ctx, here, r.en_m))
-        chosen = by_distance[ctx.state.plans.retry.failures % len(by_distance)]
+        chosen = refuges[ctx.state.plans.retry.failures % len(refuges)]
     return Diversion(
         kind=DiversionKind.REFUGE, name=refuge_name(chosen), why=why, en_m=chosen.en_m, radius_m=chosen.radius_m
     )
+
+
+def refuges_by_way(ctx: StepContext) -> list[Refuge]:
+    """Return the refuges, the nearest by water first; those in water that dries are none."""
+    here, deep = ctx.boat_en or ctx.snapshot.position_en_m, ctx.to_stay_in.area
+    lasting = [r for r in ctx.voyage.refuges if not ctx.voyage.drying or float(deep.clearance_m([r.en_m])[0]) > 0.0]
+    return sorted(lasting, key=lambda r: _off_m(ctx, here, r.en_m))
 
 
 def _off_m(ctx: StepContext, here: PointEn | None, place: PointEn) -> tuple[float, float]:
@@ -308,16 +314,21 @@ def home_trouble(ctx: StepContext) -> str:
 
 
 def place_trouble(ctx: StepContext, what: str, en_m: PointEn) -> str:
-    """Return why no way can be planned to a place (empty: one can be looked for)."""
+    """Return why no way can be planned to a place to stay in (empty: one can be looked for).
+
+    Water that dries is none, whatever the tide is now: she would take the ground there.
+    """
     far_m = math.hypot(*en_m)
     if not far_m <= ctx.voyage.far_m:
         return f"{what} is {far_m / 1000.0:.0f} km from this water"
-    if far_m > ctx.voyage.area.reach_m:
+    area = ctx.to_stay_in.area
+    if far_m > area.reach_m:
         return ""  # what lies there is seen when the boat comes there
-    clearance = float(ctx.voyage.area.clearance_m([en_m])[0])
+    clearance = float(area.clearance_m([en_m])[0])
     floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
     if clearance < floor_m:
-        near, bare = ctx.voyage.area.nearest_name(en_m), float(ctx.voyage.area.unfenced.clearance_m([en_m])[0])
+        near, bare = area.nearest_name(en_m), float(area.unfenced.clearance_m([en_m])[0])
+        near += ", which dries" if near in {water.name for water in ctx.voyage.drying} else ""
         where = (
             f"{clearance:.0f} m from {near}"
             if clearance > 0.0

@@ -186,13 +186,16 @@ def hold(ctx: StepContext, why: str, *, anew: bool = False) -> None:
     ctx.phase(Phase.HOLDING if state.voyage.sailing else Phase.WAITING, f"waiting for a plan: {why}")
     if boat is None or not state.voyage.sailing or state.mission.route is None:
         return  # not under way
-    if state.mission.index >= len(state.mission.route.items) - 1 and not anew:
+    deep, config = ctx.to_stay_in, ctx.known_config
+    is_there = state.mission.index >= len(state.mission.route.items) - 1 and not anew
+    if is_there and not (deep.drying and float(deep.area.clearance_m([state.mission.route.points_en_m[-1]])[0]) <= 0.0):
         return  # already in the safe end of the mission
-    config = ctx.known_config
     place, room = loiter_place(
-        ctx.to_stay_in, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m
+        deep, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m
     )
-    keep = state.mission.index
+    if is_there and room <= 0.0:
+        return  # in water that dries, as any place about here
+    keep = min(state.mission.index, len(state.mission.route.items) - 1)
     end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
     why = f"{why}; loitering with {room:.0f} m of room"
     upload(ctx, state.mission.route.led_aside(keep, boat, [(end, place)], rung="hold", why=why), keep + 1, why)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from companion.boat import Afloat, as_learned, mark_of
 from companion.frozen import changed
@@ -57,7 +57,7 @@ from companion.skipper.step.state import (
 )
 from companion.skipper.way import Approach, Gate, PointEn, Voyage, bearing_rad, gates_of
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle, circle_of, drawn_of
-from companion.skipper.way.drying import SOLID_S, DryingWater
+from companion.skipper.way.drying import SOLID_S, SOON_S, DryingWater
 from companion.skipper.way.position_plausibility import innovation_m
 from companion.skipper.way.shoals import Shoal, shoaled, still_shoal
 from companion.skipper.way.stemming import Water
@@ -249,6 +249,20 @@ class StepContext:
         if self.drawn is None:
             return voyage
         return replace(voyage, area=voyage.area.without(self.drawn.taken, Drawn.words))
+
+    @property
+    def always_solid(self) -> AreaLike:
+        """What is solid whatever the tide does, without limits and soundings: where no boat can be."""
+        return self._unfilled.area.unfenced
+
+    @cached_property
+    def water_now(self) -> Voyage:
+        """The voyage in the water that is deep enough now and for ``SOON_S``: for who steers by what is about her.
+
+        In ``voyage`` water that opens within ``SOLID_S`` is open: she is not there yet.
+        """
+        closed = tuple(w for w in self.voyage.drying if w.closes_within(self.config.tide, self.utc_s, SOON_S))
+        return self.with_closed(closed)
 
     @property
     def to_stay_in(self) -> Voyage:
@@ -558,7 +572,7 @@ class StepContext:
         """
         if self.guidance is Guidance.PLAN or (self.guidance is Guidance.HEADING and self._is_at_safe_end):
             return False
-        return self._may_guide
+        return self.may_guide
 
     @property
     def steers_plans(self) -> bool:
@@ -566,14 +580,15 @@ class StepContext:
 
         A goal's own field ends there: what is planned from it on is sailed as the mission says.
         """
-        return self.config.guidance is not Guidance.PLAN and self._may_guide
+        return self.config.guidance is not Guidance.PLAN and self.may_guide
 
     @property
     def _is_at_safe_end(self) -> bool:
         return self.state.mission.route is not None and not self.ahead()
 
     @property
-    def _may_guide(self) -> bool:
+    def may_guide(self) -> bool:
+        """Whether the operator permits steering in GUIDED."""
         may = self.snapshot.permissions
         return may.may_steer and may.may_set_mode
 

@@ -69,6 +69,13 @@ def ends_safely(items: Sequence[MissionItem]) -> bool:
 # ------------------------------------------------------------------------------------------ safe end
 LEEWARD_ROOM_M = 40.0  # a boat with eased sails drifts this far before somebody looks
 RINGS_M = (0.0, 15.0, 30.0, 50.0, 80.0, 120.0)
+FAR_RINGS_M = (
+    180.0,
+    270.0,
+    400.0,
+    600.0,
+    900.0,
+)  # where nothing nearer is free at all: in the middle of a flat that dries
 DIRECTIONS = 16
 ROOMIER_M = 50.0  # a place with the room that is wanted is worth sailing this far
 ROOMIER_BY_M = 3.0  # ... and a somewhat roomier one only for this much of room
@@ -80,10 +87,10 @@ def loiter_place(
     """Return where to loiter after ``end_en`` and the room there [m].
 
     The first place with ``loiter_radius_m`` all round and to leeward, looked for in growing rings that a straight
-    line reaches; without one, the roomiest found. A line that the wind has closed is one that the autopilot beats
-    about: it needs the room of that corridor as well. From below the floor a line comes no nearer than it begins. With
-    ``wanted_m`` of room to be had within ``ROOMIER_M``, the first place with that comes before the nearest that will
-    do.
+    line reaches; without one, the roomiest found, farther off where none of them is free. A line that the wind has
+    closed is one that the autopilot beats about: it needs the room of that corridor as well. From below the floor a
+    line comes no nearer than it begins. With ``wanted_m`` of room to be had within ``ROOMIER_M``, the first place with
+    that comes before the nearest that will do.
     """
     corridor_m = config.tack_corridor_m if config.tack_corridor_m > 0.0 else math.inf
     best, best_room = end_en, -math.inf
@@ -92,9 +99,11 @@ def loiter_place(
     water = water_at(voyage.area, end_en)
     marks = marks_of(voyage)
     floor_m = floor_from_m(float(water.clearance_m([end_en])[0]), config.margin_floor_m)
-    for ring_m in RINGS_M:
+    for ring_m in (*RINGS_M, *FAR_RINGS_M):
         if will_do is not None and ring_m > ROOMIER_M:
             return will_do
+        if ring_m > RINGS_M[-1] and best_room > 0.0:
+            break
         count = 1 if ring_m == 0.0 else DIRECTIONS
         for n in range(count):
             place = moved(end_en, 2.0 * math.pi * n / DIRECTIONS, ring_m)

@@ -26,6 +26,7 @@ TIDE_DOUBT_M = 0.2  # wind and pressure make a tide lower than its table: so muc
 DOUBT_SHARE = 0.1  # ... and by so much of the time until then: a boat is not where a plan has her
 AHEAD_S = 4.0 * 3600.0  # what is closed for so long is an obstacle of a plan
 SOLID_S = 1800.0  # what is closed for so long is one of all that is looked at under way
+SOON_S = 180.0  # ... and what closes so soon, or is closed, of who looks no farther than about herself
 SLACKS_M = (5.0, 10.0, 20.0, 40.0, 80.0)  # discs reach at most so far beyond what they contain: the finest that is few
 MOST_DISCS = 40  # of one piece of water ...
 MOST_TARGETS = 240  # ... and of a plan; what is more is an obstacle
@@ -76,6 +77,11 @@ class DryingWater:
         """Return whether it is too shallow now and will be for so long."""
         windows = self.closed_s(table, utc_s)
         return bool(windows) and windows[0][0] <= 0.0 and windows[0][1] >= for_s
+
+    def closes_within(self, table: TideTable | None, utc_s: float | None, in_s: float) -> bool:
+        """Return whether it is too shallow now, or will be so soon."""
+        windows = self.closed_s(table, utc_s)
+        return bool(windows) and windows[0][0] <= in_s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

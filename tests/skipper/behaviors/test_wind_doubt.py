@@ -164,6 +164,22 @@ def test_with_nothing_to_leeward_or_a_wind_that_has_hardly_turned_it_loiters_at_
     assert not said(world, SEA_ROOM)
 
 
+@pytest.mark.parametrize("turned_deg", [30.0, 140.0])
+@pytest.mark.parametrize(("off_m", "leaves"), [(18.0, True), (40.0, False)])
+def test_a_loiter_circles_and_is_not_begun_beside_a_rock(turned_deg, off_m, leaves):
+    """Driven to leeward by the wind that blew before she is clear of it; by the told one she turns about her place."""
+    world = north_of_the_rock((box(0.0, off_m, 120.0, off_m + 20.0),))
+    doubted(world, WindBefore(twd_from_rad=0.0, tws_mps=5.0, turned_rad=math.radians(turned_deg)))
+    world.run(60)
+    assert bool(said(world, SEA_ROOM)) is leaves
+    if leaves:
+        assert "circle too near" in said(world, SEA_ROOM)[0][2]
+        place = world.state.mission.route.points_en_m[-1]
+        assert world.skipper.voyage.area.clearance_m([place])[0] >= STRAYS_M + 8.0
+        world.run(60)
+        assert world.clearance() > 8.0
+
+
 def test_where_no_course_leads_to_sea_room_it_loiters():
     world = north_of_the_rock((box(-300.0, -60.0, 500.0, -40.0),))
     doubted(world)

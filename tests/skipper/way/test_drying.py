@@ -15,8 +15,8 @@ from shapely.geometry import Polygon, box
 from companion.compose import drying_of, tide_of, voyage_of
 from companion.current import TideRow, TideTable, open_spans
 from companion.errors import InputError
-from companion.geofence import load_mission
-from companion.mission_check import AssumedWind, leg_problem
+from companion.geofence import Code, FindingLevel, load_mission
+from companion.mission_check import AssumedWind, check_mission, leg_problem
 from companion.planner import PlanStatus, plan
 from companion.planner.problem import evaluate
 from companion.skipper.planning.tides import opens_next
@@ -184,6 +184,19 @@ def test_what_it_needs_is_said(tmp_path, old, new, told):
     with pytest.raises(InputError, match=r"drying") as refused:
         load_mission(tmp_path / "tide-gate.toml")
     assert told in str(refused.value)
+
+
+def test_a_refuge_and_a_home_that_dry_are_told_before_anybody_sails(tmp_path):
+    for file in Path("sitl/missions").glob("tide-gate*"):
+        (tmp_path / file.name).write_text(file.read_text())
+    path = tmp_path / "tide-gate.toml"
+    (bar,) = voyage_of(load_mission(path)).drying
+    frame = voyage_of(load_mission(path)).frame
+    there = frame.geo_from_en(bar.polygon.centroid.x, bar.polygon.centroid.y)
+    path.write_text(f"{path.read_text()}\n[[refuge]]\nlat = {there.lat_deg:.7f}\nlon = {there.lon_deg:.7f}\n")
+    (told,) = [f for f in check_mission(path).findings if f.code is Code.DRIES]
+    assert (told.place, told.severity) == ("[[refuge]] 1", FindingLevel.WARNING)
+    assert "which dries" in told.text
 
 
 def test_a_bar_of_a_mission_opens_when_the_keel_is_clear_of_it_and_a_low_tide_is_reckoned_with():
