@@ -45,7 +45,15 @@ def test_false_bottoms_and_noise_over_good_water_are_no_shoals(monkeypatch):
     """Seeds 7 and 10 were, when the middle of five pings was believed whatever the others said."""
     assert [good_hour(seed)["alarms"] for seed in (7, 10)] == [0, 0]
     monkeypatch.setattr("companion.mavlink.wire.sounder.AGREE", 1)
+    monkeypatch.setattr("companion.mavlink.wire.sounder.HEARD_S", -1.0)  # nor those that she heard before
     assert sum(good_hour(seed)["alarms"] for seed in (7, 10)) > 0
+
+
+def test_three_false_bottoms_that_agree_are_no_shoal_once_the_bottom_is_heard_again(monkeypatch):
+    """Seed 44 was one: two lost pings beside them kept them the middle of five for a second and a half."""
+    assert good_hour(44)["alarms"] == 0
+    monkeypatch.setattr("companion.mavlink.wire.sounder.HEARD_S", -1.0)
+    assert good_hour(44)["alarms"] == 1
 
 
 def test_five_pings_that_agree_on_nothing_tell_no_depth():

@@ -38,6 +38,21 @@ def test_weed_air_and_fish_are_no_bottom(spike_m, count):
     assert (status.sounds, status.depth_m) == (True, 6.0)
 
 
+@pytest.mark.parametrize("spikes_m", [(1.7, 2.0, 1.5), (1.7, 2.0, 1.5, 1.6)])
+def test_a_fish_of_three_or_four_pings_is_no_bottom_once_the_bottom_is_told_again(spikes_m):
+    before = [6.0] * 10
+    assert told([*before, *spikes_m]).status.depth_m <= 2.0
+    status = told([*before, *spikes_m, *[6.0] * (len(spikes_m) - 2)]).status
+    assert (status.depth_m, status.depth_rate_mps) == (6.0, 0.0)
+
+
+def test_a_wall_is_one_from_its_third_ping_on_whatever_a_deeper_ping_says():
+    before = [6.0] * 10
+    assert told([*before, 1.5, 1.5, 1.5]).status.depth_m == 1.5
+    assert told([*before, *[1.5] * 5, 6.0]).status.depth_m == 1.5
+    assert told([*before, *[1.5] * 5, 6.0, 6.0]).status.depth_m == 1.5
+
+
 def test_a_shoal_is_told_and_how_fast_it_comes():
     status = told([10.0 - 0.05 * n for n in range(60)]).status
     assert status.depth_m == pytest.approx(7.15)
