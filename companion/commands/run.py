@@ -177,6 +177,12 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "tcp:HOST:PORT, /dev/NAME:BAUD; may be given more than once",
     )
     parser.add_argument(
+        "--sounder",
+        metavar="FEED",
+        help="hear the depth from here, in place of the mission's [sounder] feed: a sounder that speaks NMEA 0183, "
+        "named as --feed",
+    )
+    parser.add_argument(
         "--nmea",
         action="append",
         default=[],
@@ -250,6 +256,8 @@ def _run(args: argparse.Namespace) -> int:
 
     for name in args.feed:
         parse_feed(name)
+    if args.sounder is not None:
+        parse_feed(args.sounder)
     for name in args.nmea:
         parse_nmea(name)
     for name in args.signalk:
@@ -338,6 +346,7 @@ def _voyage(
         archive = VoyageArchive(folder=folder.parent, budget_bytes=budget_bytes)
     mission = (
         sailed.mission.with_feeds(*args.feed)
+        .with_sounder(args.sounder)
         .with_system(args.system)
         .with_outputs(args.nmea, args.signalk, args.signalk_token)
         .permitting(*args.permit)

@@ -29,6 +29,7 @@ from companion.mavlink.wire import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import MOTOR, ArduRover, require
 from sitl.faults import REDRAWN, give_order, redraw, set_parameter
+from sitl.run.depths import spoken_depths
 from sitl.scenario import EventSpec, Scenario, SensorsSpec, free_port, scenario_waters
 from sitl.world import SimulatedSounder, WindModel
 
@@ -117,9 +118,9 @@ class SimulatedBoat:
     @classmethod
     @contextlib.asynccontextmanager
     async def start(
-        cls, source: Path, wind: WindModel, seed: int, pace: float, epoch_s: float
+        cls, source: Path, wind: WindModel, seed: int, pace: float, epoch_s: float, depths_port: int = 0
     ) -> AsyncIterator[SimulatedBoat]:
-        """Run it while the block runs."""
+        """Run it while the block runs; its sounder speaks NMEA to ``depths_port``, or to the autopilot at 0."""
         port, judge_port = free_port(), free_port()
         process = await asyncio.create_subprocess_exec(
             sys.executable,
@@ -136,6 +137,8 @@ class SimulatedBoat:
             f"udpout:127.0.0.1:{port}",
             "--endpoint",
             f"udpin:127.0.0.1:{judge_port}",
+            "--depths-port",
+            str(depths_port),
             "--parent",
             str(os.getpid()),
         )
@@ -155,9 +158,8 @@ class SimulatedBoat:
 
     @staticmethod
     def cannot_be(scenario: Scenario) -> list[str]:
-        """Return what it cannot be: a boat with a sounder, or whose sensors err, which its judge listens to."""
-        tables = {"[sensors]": scenario.sensors is not None, "[bottom]": scenario.bottom is not None}
-        return [name for name, asked in tables.items() if asked]
+        """Return what it cannot be: a boat whose sensors err, which its judge listens to."""
+        return [] if scenario.sensors is None else ["[sensors]"]
 
     def fix(self) -> LiveFix | None:
         """Return what the simulated autopilot tells, whose sensors do not err unless a scenario says so."""
@@ -203,8 +205,9 @@ class RealBoat:
         pace: float,
         folder: Path,
         sounder: SimulatedSounder | None = None,
+        depths_port: int = 0,
     ) -> AsyncIterator[RealBoat]:
-        """Run it while the block runs."""
+        """Run it while the block runs; its sounder speaks NMEA to ``depths_port``, or to the autopilot at 0."""
         waters = scenario_waters(scenario, wind, mission.frame().en_from_geo(mission.start or mission.origin))
         parameters = dict(scenario.parameters)
         if scenario.sensors is not None and scenario.sensors.gps_lag_s:
@@ -220,22 +223,24 @@ class RealBoat:
             if mission.autopilot.frame == "motor"
             else ("sailboat" + (MOTOR if mission.boat.motor else "")),
             waters=waters,
-            sounder=sounder,
+            sounder=None if depths_port else sounder,
         ) as rover:
-            yield cls(rover)
+            boat = cls(rover)
+
+            def ping_m() -> float | None:
+                fix = boat.fix()
+                return None if fix is None or sounder is None else sounder.ping_m(fix.position, max(0.0, rover.t_s))
+
+            async with spoken_depths(ping_m, depths_port, 0.0 if sounder is None else sounder.below_m):
+                yield boat
         (folder / "autopilot.log").write_text("\n".join(f"{t:.1f} {s} {x}" for t, s, x in rover.texts) + "\n")
 
     @staticmethod
     def cannot_be(scenario: Scenario) -> list[str]:
-        """Return what it cannot be: no leeway, no waves, and of its sensors only the position's age.
-
-        Nor does its sounder speak NMEA to the companion.
-        """
+        """Return what it cannot be: no leeway, no waves, and of its sensors only the position's age."""
         told = SensorsSpec() if scenario.sensors is None else scenario.sensors
         errs = msgspec.structs.replace(told, gps_lag_s=0.0) != SensorsSpec()
         tables = {"[boat]": scenario.boat is not None, "[waves]": scenario.waves is not None, "[sensors]": errs}
-        bottom = scenario.bottom
-        tables["[bottom] nmea"] = bottom is not None and bottom.nmea
         return [name for name, asked in tables.items() if asked]
 
     def fix(self) -> LiveFix | None:

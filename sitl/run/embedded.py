@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import json
 import math
-import socket
 import traceback
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import replace
@@ -34,12 +33,10 @@ from companion.geofence import LocalArea, Mission, load_mission
 from companion.guard import Auxiliary, Guard
 from companion.messages import CompanionStatus, Mode
 from companion.mission_check import require_sailable
-from companion.outputs.nmea import sentence
 from companion.page import Address
 from companion.skipper.behaviors import CALL
 from companion.skipper.step import Announce
 from companion.telemetry.folder import STATE, VERDICT
-from companion.traffic.soundings import FATHOM_M, FOOT_M
 from companion.wind import Estimator, WindTracker
 from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.faults import (
@@ -53,6 +50,7 @@ from sitl.faults import (
     channel,
     inject,
 )
+from sitl.run.depths import feed_of, sounder_port, spoken_depths
 from sitl.run.variation import Variation
 from sitl.scenario import (
     Others,
@@ -74,7 +72,7 @@ from sitl.scenario import (
     tasks_of,
     under_keel_m,
 )
-from sitl.world import LEAST_M, MOST_M, Seabed
+from sitl.world import Seabed
 
 TRUTH_EVERY_S = 0.25
 MAX_TRUTH_SAMPLES = 20_000
@@ -161,41 +159,6 @@ def with_radio(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
     return replace(mission, options=replace_struct(mission.options, traffic=traffic)), port
 
 
-SOUNDS_S = 0.5  # between two pings of a sounder
-
-
-def with_sounder(mission: Mission, scenario: Scenario) -> tuple[Mission, int]:
-    """Return the mission with its sounder's UDP feed at a free port, and the port; 0 where none speaks NMEA.
-
-    Raises InputError: the scenario's sounder speaks NMEA, and the mission does not listen by UDP.
-    """
-    if scenario.bottom is None or not scenario.bottom.nmea:
-        return mission, 0
-    if not (mission.options.sounder.feed or "").startswith("udpin:"):
-        raise InputError(
-            str(mission.path), "[sounder] feed", "hears no sounder by UDP", 'write feed = "udpin:127.0.0.1:PORT"'
-        )
-    port = free_port()
-    sounder = replace_struct(mission.options.sounder, feed=f"udpin:127.0.0.1:{port}")
-    return replace(mission, options=replace_struct(mission.options, sounder=sounder)), port
-
-
-async def _speak_depths(autopilot: SimulatedAutopilot, port: int, below_m: float) -> None:
-    """Tell what the boat's sounder hears as an NMEA 0183 instrument does, each ping as DPT and as DBT."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        while True:
-            depth_m, dbt = autopilot.core.sounding_m, ["", "f", "", "M", "", "F"]
-            if depth_m is None or not LEAST_M < depth_m < MOST_M:
-                dpt = ["", f"{below_m:.1f}", ""]
-            else:
-                dpt = [f"{depth_m:.1f}", f"{below_m:.1f}", f"{MOST_M:.1f}"]
-                dbt[0::2] = (f"{depth_m / unit_m:.1f}" for unit_m in (FOOT_M, 1.0, FATHOM_M))
-            said = sentence("DPT", *dpt) + sentence("DBT", *dbt)
-            with contextlib.suppress(OSError):
-                out.sendto(said.encode(), ("127.0.0.1", port))
-            await asyncio.sleep(SOUNDS_S)
-
-
 async def run_embedded(
     scenario: Scenario,
     source: Path,
@@ -214,7 +177,8 @@ async def run_embedded(
     worker process, and plans by its budget of time. ``variation``: what is another in the mission than its file says.
     """
     mission, radio_port = with_radio(mission_of(scenario, source), scenario)
-    mission, sounder_port = with_sounder(mission, scenario)
+    depths_port = sounder_port(mission, scenario)
+    mission = mission.with_sounder(feed_of(depths_port))
     wind = scenario_wind(scenario, source, seed)
     room = None
     if variation is not None:
@@ -241,7 +205,7 @@ async def run_embedded(
             waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(start)),
             recentre_m=recentre_m(mission),
             sounder=scenario_sounder(scenario, seabed, seed),
-            hears_sounder=not sounder_port,
+            hears_sounder=not depths_port,
         ),
         wind,
         seed=seed,
@@ -265,14 +229,13 @@ async def run_embedded(
     folder.mkdir(parents=True, exist_ok=True)
     station = [world.station.far] if any(e.kind == "station" for e in scenario.events) else []
     shore = world.shore.far if any(e.kind in SHORE_EVENTS for e in scenario.events) else None
-    async with serve(autopilot, [link.far, shore, *station]):
+    below_m = 0.0 if scenario.bottom is None else scenario.bottom.below_m
+    async with (
+        serve(autopilot, [link.far, shore, *station]),
+        spoken_depths(lambda: autopilot.core.sounding_m, depths_port, below_m),
+    ):
         side_tasks = [
             asyncio.create_task(_watch_truth(world, frame, scenario.limit_s), name="truth"),
-            *(
-                [asyncio.create_task(_speak_depths(autopilot, sounder_port, scenario.bottom.below_m), name="sounder")]
-                if sounder_port and scenario.bottom is not None
-                else []
-            ),
             *([asyncio.create_task(world.satellite.run(), name="satellite")] if world.satellite is not None else []),
             *(asyncio.create_task(inject(world, e), name=f"event {e.kind}") for e in scenario.events),
         ]

@@ -32,6 +32,7 @@ from companion.geofence import load_mission
 from companion.telemetry.folder import DECISIONS, SUMMARY, VERDICT
 from sitl.faults import LINK_EVENTS, Relay, break_vane, impair
 from sitl.run.boats import LiveBoat, RealBoat, SimulatedBoat
+from sitl.run.depths import feed_of, sounder_port
 from sitl.run.embedded import TRUTH_EVERY_S, ends_of, keel_of, marks_of, solid_of
 from sitl.scenario import (
     TRAFFIC,
@@ -294,6 +295,7 @@ async def _run(
     wind = scenario_wind(scenario, source, seed)
     frame = mission.frame()
     seabed = scenario_seabed(scenario, source, frame)
+    depths_port = sounder_port(mission, scenario)
     folder.mkdir(parents=True, exist_ok=True)
     port = free_port()
     others = Others(frame, wind, seed, port=port)
@@ -303,10 +305,12 @@ async def _run(
         if kind == "ardurover":
             sounder = scenario_sounder(scenario, seabed, seed)
             boat = await stack.enter_async_context(
-                RealBoat.start(scenario, mission, wind, program, pace, folder, sounder)
+                RealBoat.start(scenario, mission, wind, program, pace, folder, sounder, depths_port)
             )
         else:
-            boat = await stack.enter_async_context(SimulatedBoat.start(source, wind, seed, pace, scenario.epoch_s))
+            boat = await stack.enter_async_context(
+                SimulatedBoat.start(source, wind, seed, pace, scenario.epoch_s, depths_port)
+            )
         relay, link = None, boat.link
         if any(e.kind in ON_THE_LINK for e in scenario.events):
             relay = await stack.enter_async_context(Relay(boat.link, seed=seed))
@@ -332,6 +336,7 @@ async def _run(
                 "--limit",
                 f"{scenario.limit_s:g}",
                 *feeds,
+                *(["--sounder", depths] if (depths := feed_of(depths_port)) is not None else []),
                 *(["--exit-on-arrival"] if scenario.exit_on_arrival else []),
                 *(["--dry-run"] if scenario.dry_run else []),
                 *page,

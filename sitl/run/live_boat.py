@@ -19,7 +19,17 @@ import msgspec
 from companion.clock import run
 from companion.geofence import load_mission
 from sitl.autopilot import EPOCH_S, AutopilotConfig, SimulatedAutopilot, serve
-from sitl.scenario import load_scenario, own_polar, recentre_m, scenario_departures, scenario_waters, scenario_wind
+from sitl.run.depths import spoken_depths
+from sitl.scenario import (
+    load_scenario,
+    own_polar,
+    recentre_m,
+    scenario_departures,
+    scenario_seabed,
+    scenario_sounder,
+    scenario_waters,
+    scenario_wind,
+)
 
 
 def main() -> int:
@@ -30,6 +40,7 @@ def main() -> int:
     parser.add_argument("--speedup", type=float, default=1.0)
     parser.add_argument("--epoch", type=float, default=EPOCH_S, metavar="UNIX_S")
     parser.add_argument("--endpoint", action="append", required=True, metavar="LINK")
+    parser.add_argument("--depths-port", type=int, default=0, metavar="UDP", help="its sounder speaks NMEA there")
     parser.add_argument("--parent", type=int, default=os.getppid(), metavar="PID", help="end with this process")
     args = parser.parse_args()
     begins = dt.datetime.fromtimestamp(args.epoch, dt.UTC)
@@ -37,6 +48,8 @@ def main() -> int:
     mission = load_mission(scenario.mission_path(args.scenario))
     heading_deg = mission.options.start.heading_deg if mission.options.start else 0.0
     home, wind = mission.start or mission.origin, scenario_wind(scenario, args.scenario, args.seed)
+    seabed = scenario_seabed(scenario, args.scenario, mission.frame())
+    sounder = scenario_sounder(scenario, seabed, args.seed)
     autopilot = SimulatedAutopilot(
         AutopilotConfig(
             home=home,
@@ -50,13 +63,20 @@ def main() -> int:
             departures=scenario_departures(scenario),
             waters=scenario_waters(scenario, wind, mission.frame().en_from_geo(home)),
             recentre_m=recentre_m(mission),
+            sounder=sounder,
+            hears_sounder=not args.depths_port,
         ),
         wind,
         args.seed,
     )
 
     async def sail() -> None:
-        async with serve(autopilot, args.endpoint) as server:
+        async with (
+            serve(autopilot, args.endpoint) as server,
+            spoken_depths(
+                lambda: autopilot.core.sounding_m, args.depths_port, 0.0 if sounder is None else sounder.below_m
+            ),
+        ):
             while await server.wait(args.speedup) and os.getppid() == args.parent:  # each second of the wall
                 pass
 

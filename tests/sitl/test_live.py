@@ -1,33 +1,43 @@
 """Live runs: what the vessels of a scenario say over UDP, and a voyage among them on the real ArduRover."""
 
 import asyncio
+import contextlib
+import json
 import math
+import os
 import socket
+import statistics
 import subprocess
 import sys
 import time
+import tty
 from pathlib import Path
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
-from companion.clock import now_s, run_virtual
+from companion.clock import now_s, run, run_virtual
+from companion.errors import InputError
 from companion.geo.angles import difference_rad
 from companion.geo.frame import LocalFrame
 from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint
 from companion.traffic.feeds import open_feed, parse_feed
 from companion.traffic.nmea import NmeaDecoder
+from companion.traffic.soundings import SoundingDecoder
 from sitl.ardurover.simulation import find
 from sitl.autopilot import AisVessel, VaneFault, VaneState
 from sitl.faults.link_faults import FaultyVane, Relay, impair
 from sitl.run.boats import LiveFix
+from sitl.run.depths import spoken_depths
 from sitl.run.live import follow, run_live
 from sitl.scenario.scenario import EventSpec, load_scenario
 from sitl.scenario.traffic import Others, distance_m, free_port, sentences, ship_of
 from sitl.scenario.verdict import TrueTrack
+from sitl.world import MOST_M
 from sitl.world.environment import Constant
 
 ORIGIN = GeoPoint(lat_deg=50.817, lon_deg=-1.31)
@@ -204,6 +214,76 @@ def test_the_voyage_is_over_with_its_summary_however_long_the_picture_takes(tmp_
         return truth.t_s[-1] - truth.t_s[0]
 
     assert run_virtual(watched()) == pytest.approx(10.0, abs=0.5)
+
+
+DEPTHS_M = (6.0, 5.9, None, 5.8, 55.0, 5.7)  # no echo, and beyond its reach
+
+
+async def sounded_over(feed, port, carried):
+    """Return what a companion's feed hears of a sounder that speaks to ``port``, and the decoder's counts."""
+    pings, depths, decoder = [], iter(DEPTHS_M), SoundingDecoder()
+    async with open_feed(parse_feed(feed, baud=4800), pings.append, decoder, "sounder") as heard:
+        async with spoken_depths(lambda: next(depths, 5.7), port, 0.4):
+            while len(pings) < len(DEPTHS_M):
+                carried()
+                await asyncio.sleep(0.1)
+        return pings[: len(DEPTHS_M)], heard.counts
+
+
+def of_pings(pings, counts):
+    assert [ping.depth_m for ping in pings] == [6.0, 5.9, None, 5.8, None, 5.7]
+    assert {(ping.offset_m, ping.most_m) for ping in pings if ping.depth_m} == {(0.4, MOST_M)}
+    assert counts.refused == 0
+
+
+def test_a_sounder_of_a_live_run_is_heard_by_udp():
+    port = free_port()
+    of_pings(*run(sounded_over(f"udpin:127.0.0.1:{port}", port, lambda: None), speedup=10.0))
+
+
+def test_and_through_a_multiplexer_on_a_serial_port():
+    """The same sentences over a pseudo-terminal, as an instrument's port gives them."""
+    ours, theirs = os.openpty()
+    tty.setraw(ours)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as wire:
+        wire.bind(("127.0.0.1", 0))
+        wire.setblocking(False)
+
+        def carried():
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    os.write(ours, wire.recv(1024))
+
+        try:
+            of_pings(*run(sounded_over(f"{os.ttyname(theirs)}:4800", wire.getsockname()[1], carried), speedup=10.0))
+        finally:
+            os.close(ours)
+            os.close(theirs)
+
+
+def test_the_bottom_of_a_live_run_is_sounded_and_judged(tmp_path):
+    """By the companion's own sounder, of the water that the judge holds the keel against."""
+    source, folder = Path("sitl/scenarios/nmea-sounder.toml"), tmp_path / "v"
+    scenario = msgspec.structs.replace(load_scenario(source), limit_s=20.0)
+    verdict = run_live(scenario, source, 0, folder, autopilot="embedded", program=None, speedup=8.0)
+    pings = [
+        entry["ping_m"]
+        for line in (folder / "decisions.jsonl").read_text().splitlines()
+        if (entry := json.loads(line))["kind"] == "sounding" and entry["ping_m"] is not None
+    ]
+    assert len(pings) > 10
+    assert statistics.median(pings) == pytest.approx(10.5, abs=0.3)  # 9 m, 1 m and half of 1 m of tide
+    assert verdict.figures["groundings"] == 0
+
+
+def test_a_mission_that_hears_no_sounder_is_told_before_a_live_run_begins(tmp_path):
+    scenario = load_scenario(Path("sitl/scenarios/nmea-sounder.toml"))
+    silent = msgspec.structs.replace(scenario, mission=str(Path("sitl/missions/shoaling.toml").resolve()))
+    with pytest.raises(InputError, match="hears no sounder by UDP"):
+        run_live(
+            silent, Path("sitl/scenarios/a.toml"), 0, tmp_path / "v", autopilot="embedded", program=None, speedup=9.0
+        )
+    assert not (tmp_path / "v").exists()
 
 
 PROGRAM = find()

@@ -13,7 +13,8 @@ from companion.errors import InputError
 from companion.geofence import load_mission
 from sitl import cli
 from sitl.autopilot import EPOCH_S
-from sitl.run.embedded import mission_of, with_sounder
+from sitl.run.depths import feed_of, sounder_port
+from sitl.run.embedded import mission_of
 from sitl.scenario import scenario as scenario_module
 from sitl.scenario.scenario import beginning, load_scenario, scenario_wind
 from sitl.scenario.traffic import PORTS, free_port
@@ -137,9 +138,11 @@ def test_a_mission_begins_now_a_scenario_when_it_says_and_either_when_it_is_told
 def test_a_sounder_that_speaks_nmea_is_refused_where_the_mission_listens_to_none():
     source = Path("sitl/scenarios/nmea-sounder.toml")
     scenario = load_scenario(source)
-    mission, port = with_sounder(mission_of(scenario, source), scenario)
-    assert mission.options.sounder.feed == f"udpin:127.0.0.1:{port}"
+    mission = mission_of(scenario, source)
+    port = sounder_port(mission, scenario)
+    assert mission.with_sounder(feed_of(port)).options.sounder.feed == f"udpin:127.0.0.1:{port}"
+    assert mission.with_sounder(feed_of(0)) is mission
     silent = load_mission("sitl/missions/shoaling.toml")
     with pytest.raises(InputError, match="hears no sounder by UDP"):
-        with_sounder(silent, scenario)
-    assert with_sounder(silent, load_scenario(Path("sitl/scenarios/sandbank.toml"))) == (silent, 0)
+        sounder_port(silent, scenario)
+    assert sounder_port(silent, load_scenario(Path("sitl/scenarios/sandbank.toml"))) == 0

@@ -162,6 +162,13 @@ class Mission:
         traffic = msgspec.structs.replace(self.traffic, feeds=(*self.traffic.feeds, *names))
         return replace(self, options=msgspec.structs.replace(self.options, traffic=traffic))
 
+    def with_sounder(self, feed: str | None) -> Mission:
+        """Return the mission that hears its sounder from ``feed``; None: as its file says."""
+        if feed is None:
+            return self
+        sounder = msgspec.structs.replace(self.options.sounder, feed=feed)
+        return replace(self, options=msgspec.structs.replace(self.options, sounder=sounder))
+
     def with_outputs(self, nmea: Sequence[str], signalk: Sequence[str], token_file: Path | None) -> Mission:
         """Return the mission that is told to these too, after its own displays."""
         own = self.output
