@@ -500,6 +500,7 @@ def preview_options(parser: argparse.ArgumentParser) -> None:
 def preview(mission: Mission, args: argparse.Namespace) -> None:
     """Draw the mission in the wind that the arguments or the mission give."""
     from companion.compose import boat_of
+    from companion.plots.drying import drying_picture
     from companion.plots.mission import save_mission
 
     tws_mps, from_deg = mission.wind.preview_speed_mps, mission.wind.preview_from_deg
@@ -514,6 +515,7 @@ def preview(mission: Mission, args: argparse.Namespace) -> None:
             twd_from_rad=twd_from_rad,
             beat_rad=boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad,
             plans=[] if args.no_plan else _plans(mission, tws_mps, twd_from_rad),
+            drying=drying_picture(mission, time.time()),
         )
     for line in lines:
         print(line)

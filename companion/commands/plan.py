@@ -99,6 +99,10 @@ def run(args: argparse.Namespace) -> int:
             raise _several(args)
         answers = _sail_through(mission, args)
         ground = {"area": mission.water(), "margin_m": mission.margin_m}
+        if args.plot is not None and mission.drying:
+            from companion.plots.drying import drying_picture
+
+            ground["drying"] = drying_picture(mission, time.time() if args.at is None else args.at.timestamp())
     elif args.wind is not None:
         raise InputError("--wind", "", "a problem has a wind of its own", "leave it out, or plan a mission TOML")
     elif args.at is not None:

@@ -3,7 +3,7 @@
 from companion.current.estimator import UNTOLD_MPS, CurrentEstimator, Sailing, WindAngleUncertainty, plain
 from companion.current.motion import FITS_S, MotionCheck, MotionSample
 from companion.current.prior import STILL, Prior, TableRow, read_table
-from companion.current.tide import TideRow, TideTable, lowest_m, open_spans, read_tide
+from companion.current.tide import TideRow, TideTable, closed_spans, lowest_m, open_spans, read_tide
 from companion.current.water_current import STILL_WATER, WaterCurrent, forecast_over_water, over_ground, over_water
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "TideTable",
     "WaterCurrent",
     "WindAngleUncertainty",
+    "closed_spans",
     "forecast_over_water",
     "lowest_m",
     "open_spans",

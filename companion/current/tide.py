@@ -40,6 +40,10 @@ class TideTable:
         share = (utc_s - a.utc_s) / (b.utc_s - a.utc_s)
         return a.height_m + (b.height_m - a.height_m) * (1.0 - math.cos(math.pi * share)) / 2.0
 
+    def near_s(self, utc_s: float) -> float:
+        """Return a Unix time that the table holds for: this one, else the one at which it begins."""
+        return utc_s if self.height_m(utc_s) is not None or not self.rows else self.rows[0].utc_s
+
 
 @functools.lru_cache(maxsize=256)  # by the level: asked for at each step of a voyage
 def open_spans(table: TideTable, level_m: float) -> tuple[tuple[float, float], ...]:
@@ -62,6 +66,16 @@ def open_spans(table: TideTable, level_m: float) -> tuple[tuple[float, float], .
         else:
             spans.append((begin, end))
     return tuple(spans)
+
+
+def closed_spans(table: TideTable | None, level_m: float) -> tuple[tuple[float, float], ...]:
+    """Return when the tide is not known to stand at a level or higher, as spans of Unix time in order.
+
+    The first may begin at minus infinity, the last end at infinity; without a table it is one: for ever.
+    """
+    spans = () if table is None else open_spans(table, level_m)
+    edges = [-math.inf, *(edge for span in spans for edge in span), math.inf]
+    return tuple(zip(edges[::2], edges[1::2], strict=True))
 
 
 def read_tide(text: str, source: str, times: tuple[float | None, ...]) -> tuple[TideRow, ...]:

@@ -22,7 +22,8 @@ import shapely
 from msgspec import Meta, Struct
 
 from companion import __version__
-from companion.compose import planner_of
+from companion.compose import drying_of, planner_of, tide_of
+from companion.current import closed_spans
 from companion.disk import Disk, reason
 from companion.editor.base import SourceFiles, area_files, read_base
 from companion.editor.draft import Draft, draft_of, looked_at
@@ -38,7 +39,7 @@ from companion.editor.waters import (
     tile_of,
 )
 from companion.errors import CompanionError, InputError, JobError
-from companion.geofence import Circle, Document, Mission, Zone
+from companion.geofence import Circle, Document, Mission, Zone, load_mission
 from companion.geofence.formats import FORMATS
 from companion.geofence.mission import MissionOptions, read_options
 from companion.geofence.shapes import center_of
@@ -96,6 +97,7 @@ def state_of(base: SourceFiles) -> dict[str, Any]:
             for n, zone in area_files(base.options)
         ],
         "locked": [part for other in base.locked for part in _shown(other.name, other.document, base)],
+        **drying_of_base(base),
         "wind": {"from_deg": wind.preview_from_deg, "speed_mps": wind.preview_speed_mps},
         "formats": [
             {"ending": row.endings[0][1:], "said": row.said, "part": part}
@@ -110,6 +112,27 @@ def state_of(base: SourceFiles) -> dict[str, Any]:
         "said": "",
         "free_m": base.options.boat.draft_m + base.options.area.under_keel_m if base.options.boat.draft_m else None,
     }
+
+
+def drying_of_base(base: SourceFiles) -> dict[str, Any]:
+    """Return the saved mission's water that dries as (lat, lon) rings with when it is solid, and the moment shown.
+
+    That is now, or when the table of the tide begins where it does not hold for now. Nothing of a mission that cannot
+    be read: the check says why.
+    """
+    waters: list[dict[str, Any]] = []
+    shown_s = time.time()
+    if not base.is_new and base.options.area.drying:
+        with contextlib.suppress(InputError):
+            mission = load_mission(base.path)
+            table = tide_of(mission)
+            if table is not None:
+                shown_s = table.near_s(shown_s)
+            for water, timed in zip(mission.drying, drying_of(mission, mission.frame()), strict=True):
+                spans = closed_spans(table, timed.opens_at_m)
+                solid = [[round(t) if math.isfinite(t) else None for t in span] for span in spans]
+                waters.append({"name": timed.name, "rings": _rings(water.zone(), SIDES), "solid_unix_s": solid})
+    return {"drying": waters, "shown_unix_s": shown_s}
 
 
 def _origin(base: SourceFiles, sketch: Sketch) -> GeoPoint:

@@ -33,6 +33,7 @@ from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint
 from companion.planner.courses import courses
 from companion.plots.chart import place_words, save, scale_bar
+from companion.plots.drying import DryingPicture, draw_drying
 from companion.skipper.way import Sweep, length_m, sweeps_over
 from companion.words import counted
 
@@ -148,11 +149,12 @@ def save_mission(
     twd_from_rad: float,
     beat_rad: float,
     plans: Sequence[Plan] = (),
+    drying: DryingPicture | None = None,
 ) -> list[str]:
     """Draw a mission and save it; return what the picture has to say in words.
 
     ``beat_rad`` is the boat's best angle to windward in this wind, for the laylines; ``plans`` lead from goal to
-    goal. Raises InputError when the file cannot be written.
+    goal; ``drying`` is the water that dries. Raises InputError when the file cannot be written.
     """
     frame = mission.frame()
     local = mission.water()
@@ -160,6 +162,7 @@ def save_mission(
     goals = [frame.en_from_geo(g.point) for g in mission.goals]
     figure, axes = plt.subplots(figsize=(8.0, 8.6), layout="constrained")
     handles = draw_area(axes, local, mission.margin_m)
+    handles += draw_drying(axes, drying) if drying is not None else []
     handles += _draw_autopilot(axes, mission, frame)
     legs = [np.asarray(p.waypoints_en) for p in plans if p.has_path]
     places = [*([start] if start is not None else []), *goals]

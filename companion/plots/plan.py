@@ -22,6 +22,7 @@ from matplotlib.path import Path as DrawnPath
 
 from companion.planner.courses import courses
 from companion.plots.chart import legend_below, save, scale_bar
+from companion.plots.drying import DryingPicture, draw_drying
 from companion.plots.mission import draw_area
 from companion.words import counted
 
@@ -36,11 +37,18 @@ SEA, TREE, MARGIN = "#f2f7fa", "#9db4c4", "#d98c5f"
 PATH, START, GOAL = "#c1272d", "#00a3b4", "#2e8b3d"
 # Pale, and opaque: where they lie over one another they stay the colours of the legend.
 FAN, WIDER = "#efcc9b", "#caafdb"
+CLOSED = "#4f7a5c"
 FANS_MOST = 14
 
 
 def save_plan(
-    problem: Problem, plan: Plan, path: str | Path, *, area: LocalArea | None = None, margin_m: float = 0.0
+    problem: Problem,
+    plan: Plan,
+    path: str | Path,
+    *,
+    area: LocalArea | None = None,
+    margin_m: float = 0.0,
+    drying: DryingPicture | None = None,
 ) -> None:
     """Draw a plan and save it.
 
@@ -50,12 +58,14 @@ def save_plan(
         path: The picture.
         area: What the problem's obstacles are without the margin that they have grown by.
         margin_m: That margin [m].
+        drying: The water that dries, when the plan begins.
 
     Raises:
         InputError: the file cannot be written or its kind is unknown.
     """
     figure, axes = plt.subplots(figsize=(8.0, 8.6), layout="constrained")
     handles = [] if area is None else draw_area(axes, area, margin_m)
+    handles += [] if drying is None else draw_drying(axes, drying)
     draw_plan(axes, problem, plan, solids=area is None)
     scale_bar(axes)
     legend_below(axes, columns=3, more=handles)
@@ -101,7 +111,13 @@ def draw_plan(
         *problem.goal_en, "o", color=GOAL, ms=8, mec="black", mew=0.6, zorder=7, ls="", label="goal and its radius"
     )
     draw_wind(axes, problem)
-    for k, target in enumerate(resolved(problem).targets):
+    targets = resolved(problem).targets
+    still = [t for t in targets if math.hypot(t.vx_mps, t.vy_mps) == 0.0 and t.spread is None]
+    for target in still:
+        axes.add_patch(Circle((target.x_m, target.y_m), target.radius_m, fc="none", ec=CLOSED, ls=":", zorder=4))
+    if still:
+        axes.plot([], [], color=CLOSED, ls=":", label="kept out of while it is closed")
+    for k, target in enumerate(t for t in targets if t not in still):
         axes.plot([], [], color="#7a3fa0", ls="--", label=None if k else "vessel, and where it is in a minute")
         axes.add_patch(Circle((target.x_m, target.y_m), target.radius_m, fc="none", ec="#7a3fa0", ls="--", zorder=4))
         axes.annotate(

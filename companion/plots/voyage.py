@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from companion.geo.angles import direction
 from companion.plots.chart import date_words, legend_above, legend_below, place_words, save, scale_bar
+from companion.plots.drying import DryingPicture, DryingShape, draw_drying
 from companion.plots.mission import TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
 from companion.telemetry.folder import RecordedChart, RecordedPlan, VoyageRecord
 from companion.words import counted
@@ -80,6 +81,7 @@ def _chart(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
     axes.set_facecolor(WATER)
     for wkt in chart.grown:
         _polygon(axes, wkt, facecolor="none", edgecolor=LAND_EDGE, linewidth=0.7, linestyle=(0, (4, 3)), zorder=1)
+    handles = draw_drying(axes, _drying(record))
     for wkt in chart.obstacles:
         _polygon(axes, wkt, facecolor=LAND, edgecolor=LAND_EDGE, linewidth=1.0, zorder=2)
     if chart.fence:
@@ -135,7 +137,18 @@ def _chart(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
     axes.set_xlabel("east of the origin, m")
     axes.set_ylabel("north of the origin, m")
     axes.grid(visible=True, color="white", linewidth=0.8, zorder=0)
-    legend_below(axes)
+    legend_below(axes, more=handles)
+
+
+def _drying(record: VoyageRecord) -> DryingPicture:
+    """Return the water that dries as it was when the voyage's track begins."""
+    t_s = record.columns["t_s"]
+    at_s = None if record.epoch_s is None or not len(t_s) else record.epoch_s + float(t_s[0])
+    waters = tuple(
+        DryingShape(name=w.name, shape=shapely.from_wkt(w.area), solid_unix_s=w.solid_unix_s)
+        for w in record.chart.drying
+    )
+    return DryingPicture(waters=waters, at_s=at_s)
 
 
 def _goals(axes: Any, chart: RecordedChart) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,11 +11,13 @@ import msgspec
 import shapely
 from shapely.geometry import Polygon
 
+from companion.current import closed_spans
 from companion.messages import GeoPoint
 from companion.skipper.way import Voyage
-from companion.view.values import PointEn, metres
+from companion.view.values import PointEn, metres, rounded
 
 if TYPE_CHECKING:
+    from companion.current import TideTable
     from companion.geo.frame import LocalFrame
 
 SIMPLER_M = 0.25  # a coast is drawn to this; nothing is decided by the picture
@@ -25,12 +27,24 @@ Ring = tuple[PointEn, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DryingView:
+    """Water that dries: polygons as an obstacle's, and when it is solid.
+
+    ``solid_unix_s``: spans of Unix time [s] in order; where an end is None it has none.
+    """
+
+    name: str
+    shapes: tuple[tuple[Ring, ...], ...]
+    solid_unix_s: tuple[tuple[float | None, float | None], ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AreaView:
     """Obstacles as drawn, as grown by the margin, and the limits: polygons, each an outer ring and its holes.
 
     Metres east and north of ``origin_lat_deg`` and ``origin_lon_deg``; ``lat_m`` and ``lon_m`` are the metres in a
-    degree there. ``names`` are the obstacles', one each: of the mission's file, else "obstacle N". ``hash`` names
-    the content.
+    degree there. ``names`` are the obstacles', one each: of the mission's file, else "obstacle N". ``drying`` is
+    solid at its hours. ``hash`` names the content.
     """
 
     hash: str = ""
@@ -43,6 +57,7 @@ class AreaView:
     names: tuple[str, ...] = ()
     grown: tuple[tuple[Ring, ...], ...] = ()
     limits: tuple[tuple[Ring, ...], ...] = ()
+    drying: tuple[DryingView, ...] = ()
     margin_m: float | None = None
 
     @property
@@ -53,8 +68,8 @@ class AreaView:
         return LocalFrame(GeoPoint(lat_deg=self.origin_lat_deg, lon_deg=self.origin_lon_deg))
 
 
-def area_of(voyage: Voyage, margin_m: float) -> AreaView:
-    """Return the area of a voyage."""
+def area_of(voyage: Voyage, margin_m: float, tide: TideTable | None = None) -> AreaView:
+    """Return the area of a voyage; ``tide``: the heights by which its drying water is open."""
     fence = voyage.area.fence_wkt(0.0)
     return drawn(
         voyage.name,
@@ -64,6 +79,7 @@ def area_of(voyage: Voyage, margin_m: float) -> AreaView:
         [] if fence is None else [fence],
         margin_m,
         voyage.area.obstacle_names(0.0),
+        [(w.name, w.polygon.wkt, closed_spans(tide, w.opens_at_m)) for w in voyage.drying],
     )
 
 
@@ -75,8 +91,12 @@ def drawn(
     limits: Iterable[str],
     margin_m: float | None,
     names: Iterable[str] = (),
+    drying: Iterable[tuple[str, str, Sequence[tuple[float | None, float | None]]]] = (),
 ) -> AreaView:
-    """Return the area of WKT polygons in local metres; ``names`` are the obstacles', or there are none."""
+    """Return the area of WKT polygons in local metres; ``names`` are the obstacles', or there are none.
+
+    ``drying``: name, polygon and closed spans of each piece of water that dries.
+    """
     from companion.geo.frame import LocalFrame
 
     frame = LocalFrame(origin)
@@ -96,6 +116,14 @@ def drawn(
         limits=_shapes(limits),
         margin_m=margin_m,
         names=tuple(names),
+        drying=tuple(
+            DryingView(
+                name=called,
+                shapes=_shapes([text]),
+                solid_unix_s=tuple((rounded(begin, 0), rounded(end, 0)) for begin, end in spans),
+            )
+            for called, text, spans in drying
+        ),
     )
     return replace(area, hash=hashlib.sha256(msgspec.json.encode(area)).hexdigest()[:HASH_DIGITS])
 

@@ -46,7 +46,7 @@ class ViewFold:
     def __init__(
         self, voyage: Voyage, config: SkipperConfig, *, source: values.Source = "live", epoch_s: float | None = None
     ) -> None:
-        self.area = area_of(voyage, config.margin_m)
+        self.area = area_of(voyage, config.margin_m, config.tide)
         self._voyage, self._config, self._source, self._epoch_s = voyage, config, source, epoch_s
         self._asked: dict[int, tuple[float, RequestPlan]] = {}
         self._plans: dict[int, Chosen] = {}
@@ -94,7 +94,7 @@ class ViewFold:
         shift, self._voyage = Shift(self._voyage.frame, voyage.frame), voyage
         if shift.before == shift.after:
             return
-        self.area = area_of(voyage, self._config.margin_m)
+        self.area = area_of(voyage, self._config.margin_m, self._config.tide)
         self._track = deque((t_s, place(shift.point(at)), tack) for t_s, at, tack in self._track)
         self._plans = {
             number: replace(chosen, plan=carried(chosen.plan, shift)) for number, chosen in self._plans.items()

@@ -39,6 +39,7 @@ def area_of_chart(record: VoyageRecord) -> AreaView:
         [chart.fence] if chart.fence else [],
         chart.margin_m,
         chart.names,
+        [(water.name, water.area, water.solid_unix_s) for water in chart.drying],
     )
 
 

@@ -24,8 +24,8 @@ export interface Alarm {
  * Obstacles as drawn, as grown by the margin, and the limits: polygons, each an outer ring and its holes.
  *
  *     Metres east and north of ``origin_lat_deg`` and ``origin_lon_deg``; ``lat_m`` and ``lon_m`` are the metres in a
- *     degree there. ``names`` are the obstacles', one each: of the mission's file, else "obstacle N". ``hash`` names
- *     the content.
+ *     degree there. ``names`` are the obstacles', one each: of the mission's file, else "obstacle N". ``drying`` is
+ *     solid at its hours. ``hash`` names the content.
  */
 export interface Area {
   name: string;
@@ -38,6 +38,7 @@ export interface Area {
   names: string[];
   grown: [number, number][][][];
   limits: [number, number][][][];
+  drying: Drying[];
   margin_m: number | null;
 }
 
@@ -75,6 +76,17 @@ export interface Boat {
   length_m: number | null;
   battery_v: number | null;
   battery_share: number | null;
+}
+
+/**
+ * Water that dries: polygons as an obstacle's, and when it is solid.
+ *
+ *     ``solid_unix_s``: spans of Unix time [s] in order; where an end is None it has none.
+ */
+export interface Drying {
+  name: string;
+  shapes: [number, number][][][];
+  solid_unix_s: ([number | null, number | null])[];
 }
 
 /**

@@ -19,6 +19,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from companion.plots.chart import save, scale_bar
+from companion.plots.drying import draw_drying, drying_picture
 from companion.plots.mission import draw_area, draw_marks, extent_of
 from companion.words import counted
 from sitl.rehearse.changes import Tried, scaled
@@ -66,7 +67,8 @@ def _map(axes: Axes, made: PreparedRehearsal, outcome: RehearsalOutcome) -> None
     goals = [frame.en_from_geo(goal.point) for goal in mission.goals]
     tracks = [np.asarray(record["track"]) for record in records if record.get("track")]
     extent = extent_of(local, [*([start] if start else []), *goals], tracks)
-    handles = [*draw_area(axes, local, mission.margin_m), *draw_marks(axes, mission, start, goals)]
+    drying = draw_drying(axes, drying_picture(mission, made.scenario.epoch_s))
+    handles = [*draw_area(axes, local, mission.margin_m), *drying, *draw_marks(axes, mission, start, goals)]
     density = shares_of(tracks, extent)
     image = axes.imshow(
         np.ma.masked_less_equal(density, 0.0),

@@ -373,3 +373,17 @@ def test_a_new_mission_on_a_phone_draws_nothing_and_has_its_water_from_the_chart
         assert [line for line in board.complaints() if "getImageData" not in line] == []  # of this test's own looking
         assert is_own(board, url.split("#")[0])
     assert len(load_mission(tmp_path / "m.toml").area.obstacles) == 3
+
+
+def test_water_that_dries_is_drawn_with_its_hours_from_when_the_table_begins(tmp_path):
+    for name in ("tide-gate.toml", "tide-gate-water.geojson", "tide-gate-drying.geojson", "tide-gate.csv"):
+        shutil.copy(Path("sitl/missions") / name, tmp_path)
+    with edited(tmp_path / "tide-gate.toml") as url, Board() as board:
+        board.open(url)
+        assert board.js("return document.querySelector('#map .drying path').getAttribute('class')") == "solid"
+        said = board.js("return document.querySelector('#map text.drying').textContent")
+        assert said == "The bar (drying height): solid until 08:32 UTC"
+        assert "as it is at 2026-06-09 05:34 UTC" in board.text("dryingkey")
+        keep(board, "editor-drying")
+        assert board.barriers() == []
+        assert board.complaints() == []

@@ -6,6 +6,8 @@ a folder, pictures of it are left there.
 
 import asyncio
 import contextlib
+import copy
+import dataclasses
 import os
 import subprocess
 import sys
@@ -19,6 +21,7 @@ from companion.clock import run
 from companion.commands.view import read_record
 from companion.page import Address, LiveSource, export, served
 from companion.page.charts import open_chart
+from companion.view.area import DryingView
 from tests.page.asking import Asked, free_port
 from tests.page.browsing import Window, needs_browser
 from tests.page.charting import mbtiles, share_in_tile, tile_of
@@ -406,3 +409,29 @@ def test_the_demonstration_is_watched_live_an_order_is_given_and_obeyed(tmp_path
             done.kill()
             done.wait()
         done.stderr.close()
+
+
+def test_water_that_dries_is_as_it_is_at_the_moment_that_is_shown(record):
+    opens_s = record.unix_s + 80.0  # of the voyage
+    bar = DryingView(
+        name="Bar",
+        shapes=((((-200.0, 40.0), (200.0, 40.0), (200.0, 90.0), (-200.0, 90.0)),),),
+        solid_unix_s=((None, opens_s), (opens_s + 7200.0, None)),
+    )
+    dried = copy.copy(record)
+    dried.area = dataclasses.replace(record.area, drying=(bar,), hash=record.area.hash)
+    with serving(dried) as (url, _), Window() as window:
+        window.open(url)
+        shown = "return document.querySelector('#map .drying path').getAttribute('class') === arguments[0]"
+        words = "return document.querySelector('#map text.drying').textContent.startsWith(arguments[0])"
+        for at_s, state in ((70, "solid"), (90, "open")):
+            window.js("companion.timeline.go(companion.timeline.index(arguments[0]))", at_s)
+            window.until(shown, 10.0, state)
+            window.until(words, 10.0, f"Bar: {state} until")
+            assert window.text("goaltable").count(f"dries: {state} until") == 1
+            keep(window, f"drying-{state}")
+        look = "return getComputedStyle(document.querySelector(arguments[0])).fill"
+        assert window.js(look, "#map .drying path") != window.js(look, "#map .obstacles path")
+        assert not window.js("return document.getElementById('dryingkey').hidden")
+        assert window.barriers() == []
+        assert window.complaints() == []

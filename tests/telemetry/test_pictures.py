@@ -3,10 +3,12 @@
 import json
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import gpxpy
 import matplotlib.pyplot as plt
+import msgspec
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
@@ -19,7 +21,7 @@ from companion.geofence import read
 from companion.planner import Problem, plan
 from companion.plots import chart, mission, voyage
 from companion.plots import plan as plan_picture
-from companion.telemetry.folder.reading import read_voyage
+from companion.telemetry.folder.reading import ChartWater, read_voyage
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import ExpectSpec, Scenario, WindSpec
 
@@ -158,6 +160,49 @@ def test_the_plans_picture_tells_obstacles_from_their_margin_and_keeps_the_colou
     assert {to_rgba(w.get_facecolor()) for w in wedges if w.zorder > 0.6} == {
         to_rgba(shown["no-go zone of the boat"].get_color())
     }
+
+
+GATE = ROOT / "sitl/missions/tide-gate.toml"
+BAR_HOURS = "The bar (drying height):\nsolid until 08:32, open until 15:00, then solid"
+
+
+@pytest.mark.parametrize(
+    ("at", "state", "words_of_it"),
+    [
+        ("2026-06-09T08:00Z", "solid", BAR_HOURS),
+        ("2026-06-09T09:00Z", "open", "The bar (drying height):\nopen until 15:00, then solid"),
+    ],
+)
+def test_a_plans_picture_draws_water_that_dries_as_it_is_then(drawn, tmp_path, capsys, at, state, words_of_it):
+    words_said = ["plan", str(GATE), "--at", at, "--plot", str(tmp_path / "p.png"), "--expansions", "300"]
+    cli.main(words_said)
+    names, said, _ = words(drawn[0])
+    assert f"dries: {state} at {at[:10]} {at[11:16]} UTC" in names
+    assert words_of_it in said
+    assert "kept out of while it is closed" in names
+    assert not any("vessel" in name for name in names)
+
+
+def test_so_does_a_missions_from_when_its_table_begins(drawn, tmp_path, capsys):
+    assert cli.main(["mission", "check", str(GATE), "--no-plan", "--plot", str(tmp_path / "m.png")]) == 0
+    names, said, _ = words(drawn[0])
+    assert "dries: solid at 2026-06-09 05:34 UTC" in names
+    assert BAR_HOURS in said
+
+
+def test_so_does_a_voyages_from_its_first_moment(sailed, drawn, tmp_path):
+    """By the boat's clock, which is not always the computer's: the picture's one moment is that of the first row."""
+    record = read_voyage(sailed)
+    began_s = record.epoch_s + float(record.columns["t_s"][0])
+    bar = ChartWater(
+        name="Bar", area="POLYGON ((0 0, 9000 0, 9000 40, 0 40, 0 0))", solid_unix_s=((None, began_s + 600.0),)
+    )
+    seen = replace(record, chart=msgspec.structs.replace(record.chart, drying=(bar,)))
+    voyage.plot_voyage(seen, tmp_path / "v.png")
+    names, said, _ = words(drawn[0])
+    assert any(name.startswith("dries: solid at 2026-") for name in names)
+    assert any(text.startswith("Bar:\nsolid until ") and text.endswith("then open") for text in said)
+    assert drawn[0].axes[0].get_xlim()[1] < 4500.0, "what dries far off widens no picture"
 
 
 def test_the_report_tells_the_voyage_and_writes_its_track(sailed, tmp_path, capsys):

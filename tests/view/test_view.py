@@ -1,5 +1,6 @@
 """The view of a voyage: whole, true to its step, the same from the records, null where nothing is known."""
 
+import datetime as dt
 import json
 import math
 from dataclasses import replace
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.pages import schema
+from companion.compose import config_of, voyage_of
 from companion.current import STILL_WATER, over_water
 from companion.fold import Step
 from companion.geo.angles import difference_rad
@@ -22,7 +24,10 @@ from companion.skipper.step import PlanOutcome, SkipperConfig, SkipperState, Sna
 from companion.skipper.step.actions import RequestPlan
 from companion.skipper.way import Refuge
 from companion.telemetry.folder import TLOG, VoyageFigures
+from companion.telemetry.folder.logbook import chart_record
+from companion.telemetry.folder.reading import RecordedChart
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
+from companion.view.area import area_of
 from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of, polar_of, refuges_of
 from sitl.scenario.scenario import EventSpec
 from tests.view.conftest import sail, write_mission
@@ -385,3 +390,19 @@ def test_a_plans_obstacles_have_the_names_of_the_mission(beat):
     problems = [a.problem for step in beat.steps for a in step.actions if isinstance(a, RequestPlan)]
     assert problems
     assert all(p.obstacle_names[:1] == ("rock",) for p in problems)
+
+
+def test_water_that_dries_is_drawn_with_its_hours_live_and_from_the_record():
+    mission = load_mission("sitl/missions/tide-gate.toml")
+    voyage, config = voyage_of(mission), config_of(mission)
+    (bar,) = ViewFold(voyage, config).area.drying
+    opens, closes = (dt.datetime(2026, 6, 9, *at, tzinfo=dt.UTC).timestamp() for at in ((8, 31, 50), (15, 0, 35)))
+    (begin, opens_s), (closes_s, end) = bar.solid_unix_s
+    assert (begin, end) == (None, None)
+    assert opens_s == pytest.approx(opens, abs=60.0)
+    assert closes_s == pytest.approx(closes, abs=60.0)
+    assert bar.name == "The bar (drying height)"
+    assert len(bar.shapes[0][0]) == 4
+    chart = msgspec.convert(chart_record(mission, voyage, config.margin_m, config.tide), RecordedChart)
+    assert chart.drying[0].solid_unix_s == bar.solid_unix_s
+    assert area_of(voyage, config.margin_m).drying[0].solid_unix_s == ((None, None),), "without a table: for ever"

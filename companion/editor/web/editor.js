@@ -12,7 +12,7 @@ import * as water from "./water.js";
 /** @typedef {{findings: Finding[], is_in_order: boolean, grown: Place[][][]}} Found */
 /** @typedef {{to: string, why: string, way: Place[], time_s: number, late_s: number | null, length_m: number, risk: number | null, risks: (number | null)[], tacks: number, gybes: number, clearance_m: number | null}} Leg */
 /** @typedef {{error: string, legs: Leg[], time_s: number, length_m: number, tacks: number, gybes: number, clearance_m: number | null}} Plan */
-/** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string, charts: import("./charts.js").Chart[], waters: import("./water.js").Water[], free_m: number | null}} State */
+/** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string, charts: import("./charts.js").Chart[], waters: import("./water.js").Water[], free_m: number | null, drying: {name: string, rings: Place[][], solid_unix_s: [number | null, number | null][]}[], shown_unix_s: number}} State */
 
 const KNOT_MPS = 1852 / 3600, CHECK_MS = 180, PLAN_MS = 350, SIDES = 48;
 let token = "";
@@ -81,7 +81,7 @@ function area(sketch) {
   const locked = state.locked.map((shape) => ({ zone: shape.zone, rings: shape.rings.map((ring) => ring.map(en)) }));
   const of = (/** @type {string} */ zone) => [...drawn, ...locked].filter((shape) => shape.zone === zone && shape.rings.length > 0).map((shape) => shape.rings);
   const grown = (found?.grown ?? []).map((shape) => shape.map((ring) => ring.map(en)));
-  return /** @type {Area} */ (/** @type {unknown} */ ({ hash: "", name: state.called, origin_lat_deg: state.frame.lat, origin_lon_deg: state.frame.lon, lat_m: state.frame.lat_m, lon_m: state.frame.lon_m, obstacles: of("exclusion"), names: [], limits: of("inclusion"), grown, margin_m: sketch.margin_m }));
+  return /** @type {Area} */ (/** @type {unknown} */ ({ hash: "", name: state.called, origin_lat_deg: state.frame.lat, origin_lon_deg: state.frame.lon, lat_m: state.frame.lat_m, lon_m: state.frame.lon_m, drying: state.drying.map((water) => ({ name: water.name, shapes: [water.rings.map((ring) => ring.map(en))], solid_unix_s: water.solid_unix_s })), obstacles: of("exclusion"), names: [], limits: of("inclusion"), grown, margin_m: sketch.margin_m }));
 }
 
 /** The sketch as the map knows a voyage: the boat lies at the start. @param {Sketch} sketch @returns {View} */
@@ -95,11 +95,12 @@ function view(sketch) {
   const refuges = sketch.refuges.map((refuge, n) => ({ name: called(sketch, { of: "refuge", n }), at_en_m: en(refuge.at), radius_m: refuge.radius_m ?? 15 }));
   const start = sketch.start ? { at_en_m: en(sketch.start.at), heading_deg: sketch.start.heading_deg ?? 0, cog_deg: null, sog_mps: null } : { at_en_m: null, heading_deg: null, cog_deg: null, sog_mps: null };
   const from = Number(input("windfrom").value) || 0;
-  return /** @type {View} */ (/** @type {unknown} */ ({ name: state.called, t_s: 0, boat: start, goals, refuges, home: null, safe_end: null, plan: null, predicted: null, laylines: null, no_go: null, vessels: [], orders: { standing: null }, wind: { mean_twd_from_deg: from, twd_from_deg: from } }));
+  return /** @type {View} */ (/** @type {unknown} */ ({ name: state.called, t_s: 0, unix_s: state.shown_unix_s, boat: start, goals, refuges, home: null, safe_end: null, plan: null, predicted: null, laylines: null, no_go: null, vessels: [], orders: { standing: null }, wind: { mean_twd_from_deg: from, twd_from_deg: from } }));
 }
 
 function show() {
   const sketch = editor.sketch();
+  get("dryingkey").textContent = `water that dries, as it is at ${new Date(1000 * state.shown_unix_s).toISOString().slice(0, 16).replace("T", " ")} UTC: filled while it is solid`;
   map.show(view(sketch), area(sketch), null);
 }
 

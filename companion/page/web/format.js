@@ -79,6 +79,19 @@ export function clock(unix_s, t_s) {
   return t_s === undefined ? NONE : `+${duration(t_s)}`;
 }
 
+/** When water that dries is solid: now, until when, and in words. @param {(number | null)[][]} spans of Unix time; an end that is null there is none @param {number | null | undefined} unix_s now
+ * @returns {{isSolid: boolean, words: string}} */
+export function drying(spans, unix_s) {
+  if (unix_s === null || unix_s === undefined || !Number.isFinite(unix_s)) return { isSolid: true, words: "solid: the time is not known" };
+  const inside = spans.find(([from, to]) => unix_s >= (from ?? -Infinity) && unix_s < (to ?? Infinity));
+  const next = inside ? inside[1] ?? null : spans.map(([from]) => from ?? null).find((from) => from !== null && from > unix_s) ?? null;
+  const state = inside ? "solid" : "open";
+  if (next === null) return { isSolid: inside !== undefined, words: state };
+  const at = new Date(next * 1000).toISOString();
+  const day = at.slice(0, 10) === new Date(unix_s * 1000).toISOString().slice(0, 10) ? "" : `${at.slice(5, 10)} `;
+  return { isSolid: inside !== undefined, words: `${state} until ${day}${at.slice(11, 16)} UTC` };
+}
+
 /** @param {number} lat @param {number} lon */
 export function position(lat, lon) {
   const part = (/** @type {number} */ value, /** @type {string} */ plus, /** @type {string} */ minus, /** @type {number} */ wide) => {

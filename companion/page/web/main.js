@@ -22,7 +22,7 @@ Object.assign(window, { companion: page });
 
 function show() {
   const { view, area, past } = page;
-  panel.show(view, page.isOver ? "over" : page.hello?.kind ?? "connecting", page.beside);
+  panel.show(view, page.isOver ? "over" : page.hello?.kind ?? "connecting", page.beside, page.area);
   const other = beside();
   map.show(view, area, past, other);
   dial.show(view, past);

@@ -1,7 +1,7 @@
 // The chart: own water first. Metres on a local frame; symbols and words stay upright and of one size.
 import * as charts from "./charts.js";
 import { get, picture, set, svg } from "./dom.js";
-import { bearing, distance, duration, percent } from "./format.js";
+import { bearing, distance, drying, duration, percent } from "./format.js";
 import { byTack, matrix, moved, path, project, riskClass, scaleBar, unproject } from "./geometry.js";
 
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Area} Area @typedef {import("../../view/view").Past} Past @typedef {import("./geometry.js").Point} Point @typedef {import("./geometry.js").Camera} Camera */
@@ -24,7 +24,7 @@ const root = picture("map");
 
 export function build() {
   const world = svg("g", { class: "world" });
-  for (const name of ["chart", "limits", "grown", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
+  for (const name of ["chart", "limits", "grown", "drying", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
   root.append(svg("defs", {}, pattern()), layers.world = world);
   for (const name of ["grid", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat", "furniture", "drawing"]) {
     root.append(layers[name] = svg("g", { class: name }));
@@ -160,7 +160,9 @@ export function again() {
 
 /** What does not move. */
 function water() {
-  for (const name of ["limits", "grown", "obstacles"]) layers[name]?.replaceChildren();
+  for (const name of ["limits", "grown", "drying", "obstacles"]) layers[name]?.replaceChildren();
+  const key = document.getElementById("dryingkey");
+  if (key) key.hidden = !state.area?.drying.length;
   if (state.area === null) return;
   const rings = (/** @type {[number, number][][]} */ shape) => shape.map((ring) => path(ring, true)).join("");
   const draw = (/** @type {string} */ name, /** @type {[number, number][][][]} */ shapes) =>
@@ -168,6 +170,15 @@ function water() {
   draw("grown", state.area.grown);
   draw("obstacles", state.area.obstacles);
   draw("limits", state.area.limits);
+  for (const water of state.area.drying) draw("drying", water.shapes);
+}
+
+/** Water that dries, as it is at the moment that is shown. @param {View | null} view */
+function tides(view) {
+  state.area?.drying.forEach((water, n) => {
+    const shape = layers.drying?.children[n];
+    if (shape) set(shape, { class: drying(water.solid_unix_s, view?.unix_s).isSolid ? "solid" : "open" });
+  });
 }
 
 function draw() {
@@ -181,6 +192,7 @@ function draw() {
   set(/** @type {SVGElement} */ (layers.world), { transform: matrix(camera) });
   set(/** @type {Element} */ (root.querySelector("#hatch")), { patternTransform: `rotate(45) scale(${1 / camera.scale})` });
   charts.draw(camera, state.area);
+  tides(view);
   drawing.under?.(camera);
   const at = (/** @type {Point} */ en) => project(camera, en);
   grid(at);
@@ -383,15 +395,17 @@ function places(view, at) {
     const isCut = x + 8 * text.length > camera.width;
     children.push(svg("text", { x: isCut ? x - 18 : x, y: line, class: `word ${kind}`, "text-anchor": isCut ? "end" : "start" }, text));
   }
-  state.area?.names?.forEach((name, n) => {
-    const ring = state.area?.obstacles[n]?.[0] ?? [], es = ring.map((p) => p[0]), ns = ring.map((p) => p[1]);
+  const land = (/** @type {string} */ name, /** @type {Point[]} */ ring, /** @type {string} */ kind) => {
+    const es = ring.map((p) => p[0]), ns = ring.map((p) => p[1]);
     const [e, w, s, m] = [Math.max(...es), Math.min(...es), Math.min(...ns), Math.max(...ns)];
     const [x, y] = at([(e + w) / 2, (s + m) / 2]);
     // a name that its island has room for, and nothing else is written over
     if (Math.max(e - w, m - s) * camera.scale < 24 || taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - y) < 12)) return;
     taken.push([x, y]);
-    children.push(svg("text", { x, y: y + 4, class: "word land", "text-anchor": "middle" }, name));
-  });
+    children.push(svg("text", { x, y: y + 4, class: `word ${kind}`, "text-anchor": "middle" }, name));
+  };
+  for (const water of state.area?.drying ?? []) land(`${water.name}: ${drying(water.solid_unix_s, view?.unix_s).words}`, water.shapes[0]?.[0] ?? [], "drying");
+  state.area?.names?.forEach((name, n) => land(name, state.area?.obstacles[n]?.[0] ?? [], "land"));
   fill("places", children);
 }
 

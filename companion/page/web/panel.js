@@ -1,14 +1,14 @@
 // State, alarms, figures and tables.
 import { el, get, say, table } from "./dom.js";
-import { atBow, bearing, bearingUnit, clock, distance, duration, figure, NONE, percent, position, speed, speedUnit } from "./format.js";
+import { atBow, bearing, bearingUnit, clock, distance, drying, duration, figure, NONE, percent, position, speed, speedUnit } from "./format.js";
 import { riskClass } from "./geometry.js";
 
 /** @typedef {import("../../view/view").View} View */
 
 const OLD_S = 5;
 
-/** @param {View | null} view @param {string} kind @param {import("./feed.js").Beside | null} [beside] */
-export function show(view, kind, beside = null) {
+/** @param {View | null} view @param {string} kind @param {import("./feed.js").Beside | null} [beside] @param {import("../../view/view").Area | null} [area] */
+export function show(view, kind, beside = null, area = null) {
   say("name", view?.name || "Companion");
   document.title = view ? `${view.name}: ${view.state.phase}` : "Companion";
   say("kind", { live: "live", radio: "by radio", recorded: "recorded" }[kind] ?? kind);
@@ -20,7 +20,7 @@ export function show(view, kind, beside = null) {
   alarms(view);
   figures(view);
   plan(view);
-  tables(view, beside);
+  tables(view, beside, area);
 }
 
 /** How old the data are, with what has passed since they came. @param {View | null} view @param {number} since_s @param {boolean} isLost */
@@ -119,8 +119,8 @@ function keep(id, content) {
   box.scrollLeft = left;
 }
 
-/** @param {View | null} view @param {import("./feed.js").Beside | null} beside */
-function tables(view, beside) {
+/** @param {View | null} view @param {import("./feed.js").Beside | null} beside @param {import("../../view/view").Area | null} area */
+function tables(view, beside, area) {
   keep("vesseltable", table("Vessels", ["vessel", "range", "bearing", "CPA", "in", "alarm", "we must", "report"], (view?.vessels ?? []).map((v) => [
     v.name, distance(v.range_m), bearing(v.bearing_deg), distance(v.cpa_m), v.cpa_s === null ? "opening" : duration(v.cpa_s),
     el("span", { class: `grade ${v.alarm || "none"}` }, v.alarm || NONE), v.role ? `${v.role}${v.rule ? ` (${v.rule})` : ""}` : NONE, v.age_s === null ? NONE : `${duration(v.age_s)} old`])));
@@ -134,6 +134,7 @@ function tables(view, beside) {
   keep("goaltable", table("Goals and places", ["place", "kind", "distance", "bearing"], [
     ...(view?.goals ?? []).map((g) => [g.name, `${g.kind}${g.side ? `, to ${g.side}` : ""}${g.is_reached ? ", reached" : g.is_next ? ", next" : ""}`, distance(g.distance_m), bearing(g.bearing_deg)]),
     ...(view?.refuges ?? []).map((r) => [r.name || "refuge", "refuge", NONE, NONE]),
+    ...(area?.drying ?? []).map((w) => [w.name, `dries: ${drying(w.solid_unix_s, view?.unix_s).words}`, NONE, NONE]),
     ...(view && view.boat.lat_deg !== null && view.boat.lon_deg !== null ? [["boat", position(view.boat.lat_deg, view.boat.lon_deg), NONE, NONE]] : [])]));
   keep("healthtable", table("Health of every part", ["part", "is", "says", "age"], (view?.health ?? []).map((part) => [
     part.name, el("span", { class: `grade ${part.grade}` }, part.grade), part.text || NONE, part.age_s === null ? NONE : duration(part.age_s)])));

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import platform
 import sys
 from collections.abc import Iterator, Mapping
@@ -20,6 +21,7 @@ import tomli_w
 
 from companion import __version__
 from companion.clock import now_s
+from companion.current import TideTable, closed_spans
 from companion.disk import read_regular
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
@@ -78,8 +80,11 @@ def write_copies(mission: Mission, recorder: Recorder) -> str:
     return f"{COPIES}/{MISSION}"
 
 
-def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str, Any]:
-    """Return the content of area.json: local metres about its origin, obstacles as drawn and grown by the margin."""
+def chart_record(mission: Mission, voyage: Voyage, margin_m: float, tide: TideTable | None = None) -> dict[str, Any]:
+    """Return the content of area.json: local metres about its origin, obstacles as drawn and grown by the margin.
+
+    ``tide`` tells when water that dries is solid.
+    """
     area, origin = voyage.area, voyage.frame.origin
     return {
         "name": mission.name,
@@ -92,6 +97,17 @@ def chart_record(mission: Mission, voyage: Voyage, margin_m: float) -> dict[str,
         "names": area.obstacle_names(0.0),
         "grown": area.obstacles_wkt(margin_m),
         "fence": area.fence_wkt(0.0),
+        "drying": [
+            {
+                "name": water.name,
+                "area": water.polygon.wkt,
+                "solid_unix_s": [
+                    [round(at_s) if math.isfinite(at_s) else None for at_s in span]
+                    for span in closed_spans(tide, water.opens_at_m)
+                ],
+            }
+            for water in voyage.drying
+        ],
         "margin_m": margin_m,
         "no_go_half_deg": mission.boat.no_go_half_deg,
     }
@@ -186,7 +202,9 @@ class Logbook:
     ) -> None:
         """Write down what is sailed, with copies of its files, and what was known of earlier voyages."""
         self._frame = self._water = voyage.frame
-        self.recorder.whole(AREA, json.dumps(chart_record(mission, voyage, self._config.margin_m)).encode())
+        self.recorder.whole(
+            AREA, json.dumps(chart_record(mission, voyage, self._config.margin_m, self._config.tide)).encode()
+        )
         copy = write_copies(mission, self.recorder)
         started = datetime.fromtimestamp(self._epoch_s + t_s, UTC).isoformat()
         self.recorder.voyage(

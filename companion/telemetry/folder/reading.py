@@ -61,6 +61,14 @@ class ChartGoal(Struct, frozen=True, kw_only=True):
     water: str | None = None  # of a box or a search, WKT
 
 
+class ChartWater(Struct, frozen=True, kw_only=True):
+    """Water of a chart that dries, WKT, and when it is solid: spans of Unix time, an end that is None there is none."""
+
+    name: str
+    area: str
+    solid_unix_s: tuple[tuple[float | None, float | None], ...] = ()
+
+
 class RecordedChart(Struct, frozen=True, kw_only=True):
     """area.json: obstacles as drawn, their names, obstacles as grown by the margin, the fence; WKT in local metres."""
 
@@ -71,6 +79,7 @@ class RecordedChart(Struct, frozen=True, kw_only=True):
     names: tuple[str, ...] = ()
     grown: tuple[str, ...] = ()
     fence: str | None = None
+    drying: tuple[ChartWater, ...] = ()
     margin_m: float | None = None
     no_go_half_deg: float = 45.0
 
@@ -182,7 +191,12 @@ def read_voyage(folder: Path) -> VoyageRecord:
     decisions = read_decisions(folder)
     behind_s = _behind_s(decisions)
     chart = _converted(_read_json(folder / AREA), RecordedChart, folder / AREA)
-    for wkt in (*chart.obstacles, *chart.grown, *([chart.fence] if chart.fence else [])):
+    for wkt in (
+        *chart.obstacles,
+        *chart.grown,
+        *([chart.fence] if chart.fence else []),
+        *(w.area for w in chart.drying),
+    ):
         with believed(folder / AREA, f"{wkt[:30]!r}"):
             shapely.from_wkt(wkt)
     return VoyageRecord(

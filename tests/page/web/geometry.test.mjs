@@ -132,3 +132,15 @@ test("a pixel of a tile is about one of the screen, and what a chart has not is 
   assert.deepEqual(g.tilesIn(camera, origin, { ...everywhere, bounds_deg: [10, 50, 11, 51] }, 1, 48), []);
   assert.deepEqual(g.tilesIn({ ...camera, scale: 0.002 }, origin, { ...everywhere, least_zoom: 17 }, 1, 48), []);
 });
+
+test("water that dries is as it is at the moment that is shown, with when that changes", () => {
+  const at = (hour, day = 9) => Date.UTC(2026, 5, day, 0, 60 * hour) / 1000;
+  const spans = [[null, at(8.5)], [at(15), at(20)], [at(3, 10), null]];
+  assert.deepEqual(format.drying(spans, at(8)), { isSolid: true, words: "solid until 08:30 UTC" });
+  assert.deepEqual(format.drying(spans, at(8.5)), { isSolid: false, words: "open until 15:00 UTC" });
+  assert.deepEqual(format.drying(spans, at(19)), { isSolid: true, words: "solid until 20:00 UTC" });
+  assert.deepEqual(format.drying(spans, at(21)), { isSolid: false, words: "open until 06-10 03:00 UTC" });
+  assert.deepEqual(format.drying(spans, at(4, 10)), { isSolid: true, words: "solid" });
+  assert.deepEqual(format.drying([[null, null]], at(8)), { isSolid: true, words: "solid" });
+  assert.deepEqual(format.drying(spans, null), { isSolid: true, words: "solid: the time is not known" });
+});

@@ -13,7 +13,7 @@ import shapely
 from shapely.geometry import Polygon, box
 
 from companion.compose import drying_of, tide_of, voyage_of
-from companion.current import TideRow, TideTable, open_spans
+from companion.current import TideRow, TideTable, closed_spans, open_spans
 from companion.errors import InputError
 from companion.geofence import Code, FindingLevel, load_mission
 from companion.mission_check import AssumedWind, check_mission, leg_problem
@@ -47,6 +47,20 @@ def test_it_is_open_just_when_the_table_says_so(level_m):
         assert height is not None
         if abs(height - level_m) > 1e-6:
             assert any(a <= t <= b for a, b in spans) == (height > level_m)
+
+
+@pytest.mark.parametrize("level_m", [-0.5, 0.0, 1.4, 3.2])
+def test_it_is_closed_at_every_other_time_for_whoever_draws_it(level_m):
+    spans = closed_spans(TABLE, level_m)
+    assert (spans[0][0], spans[-1][1]) == (-math.inf, math.inf)
+    for t in (-9e9, 9e9):
+        assert any(a <= t <= b for a, b in spans)
+    for t in np.linspace(1.0, 41_999.0, 997):
+        height = TABLE.height_m(float(t))
+        assert height is not None
+        if abs(height - level_m) > 1e-6:
+            assert any(a <= t <= b for a, b in spans) == (height < level_m)
+    assert closed_spans(None, level_m) == ((-math.inf, math.inf),)
 
 
 def test_without_a_time_or_a_table_and_beyond_its_rows_it_is_closed():
