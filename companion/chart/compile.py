@@ -20,7 +20,7 @@ from companion.geofence.formats import MAX_POSITIONS
 from companion.geofence.shapes import polygon_lonlat, wrap_lon_deg
 from companion.messages import GeoPoint
 
-TOLERANCE_M = 3.0
+TOLERANCE_M = 2.0  # a harbour of narrow creeks loses 1.7 % of its free water by it, at 3 m 2.3 %
 SEAM_M = 1.0  # two charts that are no farther apart meet: their corners are rounded
 ROUNDED_M = 0.02  # positions are written with seven decimals
 EDGE_M = 2000.0  # edges that long are straight in any frame of the area within a hand's breadth

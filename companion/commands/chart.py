@@ -102,7 +102,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         "--tolerance",
         type=number("m", at_least=0.1, at_most=500.0),
         metavar="M",
-        help="shapes may be up to twice this too large, with fewer corners (3)",
+        help="shapes may be up to twice this too large, with fewer corners (2)",
     )
     load.add_argument(
         "--positive",
