@@ -20,7 +20,13 @@ from companion.messages import GeoPoint
 from tests.geofence.strategies import QUIET
 
 ROOT = pathlib.Path(__file__).parents[2]
-MISSIONS = sorted(path for folder in ("missions", "sitl/missions") for path in (ROOT / folder).glob("*.toml"))
+CHARTED = {"rhode-river"}  # a real chart is more than a fence holds: what lies nearest to the way is in it, told apart
+MISSIONS = sorted(
+    path
+    for folder in ("missions", "sitl/missions")
+    for path in (ROOT / folder).glob("*.toml")
+    if path.stem not in CHARTED
+)
 
 
 def ground(shape, frame: LocalFrame, sides: int = 360) -> Polygon:
