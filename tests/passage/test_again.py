@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from companion.passage import again, sweep
+from companion.passage import FASTER, again, sweep
 from companion.passage.again import left_of
 from companion.passage.told import told_of_again
 from tests.passage.test_plan import LAT, LON, shell  # noqa: F401 - the fixture
@@ -36,6 +36,25 @@ def test_a_little_is_not_worth_a_change_and_more_is():
     assert changed.old.mean_s() > 1.05 * changed.new.mean_s()
     same = held(ready, (A, B))
     assert (same.is_changed, told_of_again(same, None, 0.9)[-1][:18]) == (False, "keep the old one: ")
+
+
+@pytest.mark.parametrize(("north_deg", "is_changed"), [(0.055, False), (0.095, True)])
+def test_three_in_a_hundred_are_asked_for_where_nobody_says(north_deg, is_changed):
+    """By the north 1.4 and 4.3 % longer."""
+    found = held(asked(steady(0.0, -5.0)), (A, place(north_deg, 0.3), B))
+    gained = 1.0 - found.new.mean_s() / found.old.mean_s()
+    assert (found.is_changed, 0.01 < gained < 0.05) == (is_changed, True)
+    assert (gained > 0.03) == is_changed
+
+
+def test_the_command_asks_for_three_in_a_hundred_too():
+    import argparse
+
+    from companion.commands.passage import add_parser
+
+    parser = argparse.ArgumentParser()
+    add_parser(parser.add_subparsers(), "where to go")
+    assert parser.parse_args(["passage", "again", "p.toml", "m.toml"]).faster == 100.0 * FASTER == 3.0
 
 
 def test_a_surer_way_is_taken_though_it_is_longer():
