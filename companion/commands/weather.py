@@ -7,8 +7,9 @@ from argparse import ArgumentTypeError
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from companion.commands.output import force_option, refuse_existing, write_files
 from companion.errors import InputError
-from companion.program.arguments import add_command, moment, picture, place
+from companion.program.arguments import add_command, duration, moment, out_file, picture, place
 
 if TYPE_CHECKING:
     from companion.messages import GeoPoint
@@ -18,12 +19,16 @@ _EPILOG = """\
 examples:
   companion weather show gfs.grb2
   companion weather show run00.grb2 run12.grb2 --at 50.8,-1.3
+  companion weather show ensemble.grb2 stations.toml --at 50.8,-1.3
+  companion weather tide stations.toml --at 50.8,-1.3 --from 2026-04-20T00:00Z --to 2026-04-22T00:00Z --out tide.csv
+  companion weather tide stations.toml --stream --at 50.8,-1.3 --from 2026-04-20T00:00Z --to 2026-04-22T00:00Z
   companion weather show ensemble.grb2 --box 48,-12,56,2 --at 50,-6 --plot weather.png
 
 Reads GRIB 1 and 2 on grids of latitudes and longitudes: wind of 10 m, gusts, wave heights, surface currents; several
 files, runs that overlap (the newest counts, an older one before it, after it and in its holes), ensembles. Simple
-packing is read here, every other by the extra `weather`. Directions are true: of a wind where it comes from, of a
-current where it goes.
+packing is read here, every other by the extra `weather`. What ends in .toml are stations of the tide with their
+harmonic constants; `tide` makes of them the tables that a mission's [area] tide and [current] table name. Directions
+are true: of a wind where it comes from, of a current where it goes.
 
 Exit codes: 0 told, 2 a file that cannot be believed, or a place that it says nothing of.
 """
@@ -32,7 +37,7 @@ Exit codes: 0 told, 2 a file that cannot be believed, or a place that it says no
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command with its verb."""
     parser = add_command(subparsers, "weather", summary, _EPILOG)
-    verbs = parser.add_subparsers(dest="verb", metavar="show", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="show|tide", required=True)
     show = verbs.add_parser("show", help="say what, where, when, how many members, and what is missing")
     show.add_argument("files", metavar="FILE", nargs="+", type=Path)
     show.add_argument("--at", type=place, metavar="LAT,LON", help="tell the hours of one place")
@@ -40,6 +45,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     show.add_argument("--plot", type=picture, metavar="FILE", help="draw wind and gusts, with --at its hours")
     show.add_argument("--time", type=moment, metavar="TIME", help="of the picture's map: 2026-11-24T08:00Z (the first)")
     show.set_defaults(run=_show)
+    tide = verbs.add_parser("tide", help="the tide of a place, by its harmonic constants, as a table for a mission")
+    tide.add_argument("files", metavar="STATIONS", nargs="+", type=Path)
+    tide.add_argument("--at", type=place, metavar="LAT,LON", required=True, help="of this place")
+    tide.add_argument("--from", dest="begins", type=moment, metavar="TIME", required=True, help="from this time")
+    tide.add_argument("--to", dest="ends", type=moment, metavar="TIME", required=True, help="to this one")
+    tide.add_argument("--every", type=duration, default=600.0, metavar="10m", help="a row every (10m)")
+    tide.add_argument(
+        "--stream", action="store_true", help="set and drift, for [current] table (height, for [area] tide)"
+    )
+    tide.add_argument("--out", metavar="CSV", type=out_file, help="write it there (it is printed)")
+    force_option(tide)
+    tide.set_defaults(run=_tide)
 
 
 def _box(text: str) -> Box:
@@ -58,8 +75,8 @@ def _show(args: argparse.Namespace) -> int:
     at: GeoPoint | None = args.at
     weather = read_weather(args.files, args.box)
     names = ", ".join(map(str, args.files))
-    cubes = (*weather.wind, *weather.gust, *weather.waves, *weather.current)
-    if not cubes:
+    cubes = [*weather.wind, *weather.gust, *weather.waves, *weather.current]
+    if not (cubes or weather.tides):
         where = " there" if args.box is not None else ""
         raise InputError(
             names,
@@ -68,7 +85,7 @@ def _show(args: argparse.Namespace) -> int:
             + "".join(f"; {note}" for note in weather.notes[:3]),
             "ask for 10u and 10v of the area",
         )
-    if at is not None and not any(cube.covers(at.lat_deg, at.lon_deg) for cube in cubes):
+    if at is not None and not weather.covers(at.lat_deg, at.lon_deg):
         raise InputError(names, "--at", f"{at.lat_deg:g}, {at.lon_deg:g} is outside of it", "ask within its area")
     for line in told_of(weather):
         print(line)
@@ -77,6 +94,57 @@ def _show(args: argparse.Namespace) -> int:
             print(line)
     if args.plot is not None:
         _plot(args, weather, names)
+    return 0
+
+
+MOST_ROWS = 20_000  # as a mission's tables are believed
+
+
+def _tide(args: argparse.Namespace) -> int:
+    """Print or write the tide of a place as a table over time."""
+    import numpy as np
+
+    from companion.weather import iso, read_weather
+
+    at: GeoPoint = args.at
+    names = ", ".join(map(str, args.files))
+    begins, ends = args.begins.timestamp(), args.ends.timestamp()
+    if ends <= begins:
+        raise InputError("companion weather tide", "--to", "is not later than --from", "write the earlier time first")
+    if args.every < 60.0 or (ends - begins) / args.every > MOST_ROWS - 1:
+        raise InputError(
+            "companion weather tide",
+            "--every",
+            f"makes rows nearer than a minute, or more than {MOST_ROWS}",
+            "say another",
+        )
+    if args.out is not None:
+        refuse_existing([str(args.out)], force=args.force)
+    weather = read_weather(args.files)
+    times = np.arange(begins, ends + 1e-6, args.every)
+    if args.stream:
+        found = weather.current_en_mps(times, at.lat_deg, at.lon_deg)
+    else:
+        found = weather.tide_m(times, at.lat_deg, at.lon_deg)[:, None]
+    if np.isnan(found).any():
+        what = "stream" if args.stream else "height"
+        raise InputError(
+            names, "--at", f"no {what} of a tide is known there for all of that time", "ask nearer to a station"
+        )
+    rows = ["time, set_deg, drift_mps" if args.stream else "time, height_m"]
+    for t, row in zip(times.tolist(), found.tolist(), strict=True):
+        if args.stream:
+            east, north = row
+            set_deg = float(np.degrees(np.arctan2(east, north)) % 360.0)
+            rows.append(f"{iso(t)}, {set_deg:.1f}, {float(np.hypot(east, north)):.3f}")
+        else:
+            rows.append(f"{iso(t)}, {row[0]:.3f}")
+    if args.out is None:
+        print("\n".join(rows))
+    else:
+        key = "[current] table" if args.stream else "[area] tide"
+        write_files({str(args.out): ("\n".join(rows) + "\n").encode()}, force=args.force)
+        print(f"{args.out}: written, {len(rows) - 1} rows: name it in {key} of a mission")
     return 0
 
 

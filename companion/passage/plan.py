@@ -119,14 +119,14 @@ def waters_of(
     times = times_of(passage.weather, from_s, to_s)
     shape = (times.size, y_m.size, x_m.size, 2)
     wind = np.full(shape, np.nan, dtype=np.float32)
-    stream = np.full(shape if passage.weather.current else (1, 1, 1, 2), np.nan, dtype=np.float32)
+    stream = np.full(shape if passage.weather.has_current else (1, 1, 1, 2), np.nan, dtype=np.float32)
     heights = np.full(shape[:3] if passage.weather.waves else (1, 1, 1), np.nan, dtype=np.float32)
     here = np.ones(lat.shape, dtype=bool) if mask is None else mask
     row = passage.weather.members.index(member)
     for k, t in enumerate(times):
         blows = passage.weather.wind_en_mps(t, lat[here], lon[here])[row]
         wind[k][here] = np.stack(passage.frame.turned(blows[:, 0], blows[:, 1], lat[here], lon[here]), axis=-1)
-        if passage.weather.current:
+        if passage.weather.has_current:
             flows = passage.weather.current_en_mps(t, lat[here], lon[here])
             stream[k][here] = np.stack(passage.frame.turned(flows[:, 0], flows[:, 1], lat[here], lon[here]), axis=-1)
         if passage.weather.waves:
@@ -138,7 +138,7 @@ def waters_of(
         t_s=times,
         wind=wind,
         stream=stream,
-        has_stream=bool(passage.weather.current),
+        has_stream=passage.weather.has_current,
         waves=heights,
         has_waves=bool(passage.weather.waves),
         shore=shore,
@@ -153,11 +153,10 @@ def waters_of(
 
 def times_of(weather: Weather, from_s: float, to_s: float) -> Floats:
     """Return the times of wind and current between two, with both ends where the wind reaches so far."""
-    known = np.concatenate([cube.utc_s for cube in (*weather.wind, *weather.waves, *weather.current)])
     first = min(float(cube.utc_s[0]) for cube in weather.wind)
     last = max(float(cube.utc_s[-1]) for cube in weather.wind)
     begin, end = max(from_s, first), min(to_s, last)
-    return np.unique(np.concatenate([[begin, end], known[(known > begin) & (known < end)]]))
+    return np.unique(np.concatenate([[begin, end], weather.times_between(begin, end)]))
 
 
 def plan(passage: Passage, depart_utc_s: float, member: int | None = None, *, nodes: int = COARSE) -> Route:

@@ -85,13 +85,13 @@ def sail(
     way, lat, lon, course = _line(waypoints, radius_m)
     step_s = min(STEP_S, max(10.0, float(way[-1]) / 1000.0))
     first = max(depart_utc_s, min(float(c.utc_s[0]) for c in weather.wind))
-    known = np.concatenate([cube.utc_s for cube in (*weather.wind, *weather.waves, *weather.current)])
-    times = np.unique(np.append(known[known > first], first))
+    last = max(float(cube.utc_s[-1]) for cube in weather.wind)
+    times = np.concatenate([[first], weather.times_between(first, last), [last] if last > first else []])
     t, s = np.meshgrid(times, np.arange(way.size), indexing="ij")
     wind = weather.wind_en_mps(t, lat[s], lon[s])
     shape = (times.size, way.size, 2)
     stream = np.zeros(shape)
-    if weather.current:
+    if weather.has_current:
         stream = _along(weather.current_en_mps(t, lat[s], lon[s]), course)
     up = up_of(lat, lon)
     height = weather.waves_m(t, lat[s], lon[s]) if weather.waves else None

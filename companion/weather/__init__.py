@@ -5,21 +5,29 @@
 
 from companion.weather.assemble import Box, assemble
 from companion.weather.grib import GribField, Grid, Quantity, walk
+from companion.weather.harmonics import KNOWN, constituent_named, phasors
 from companion.weather.packing import values_of
-from companion.weather.readers import read_weather
+from companion.weather.readers import read_tides, read_weather
+from companion.weather.tides import Tides, read_stations
 from companion.weather.told import told_at, told_of
 from companion.weather.weather import Cube, Weather, holes_of, iso
 
 __all__ = [
+    "KNOWN",
     "Box",
     "Cube",
     "GribField",
     "Grid",
     "Quantity",
+    "Tides",
     "Weather",
     "assemble",
+    "constituent_named",
     "holes_of",
     "iso",
+    "phasors",
+    "read_stations",
+    "read_tides",
     "read_weather",
     "told_at",
     "told_of",

@@ -7,7 +7,8 @@ from itertools import groupby
 
 import numpy as np
 
-from companion.weather.weather import Cube, Floats, Weather, holes_of, iso
+from companion.weather.tides import Tides
+from companion.weather.weather import Cube, Floats, Weather, iso
 from companion.words import counted
 
 
@@ -22,7 +23,27 @@ def told_of(weather: Weather) -> tuple[str, ...]:
     ):
         for cube in cubes:
             lines += _told_of_cube(name, cube)
+    for tide in weather.tides:
+        lines += _told_of_tide(tide)
+    if any(tide.what == "stream" for tide in weather.tides) and not all(c.is_tideless for c in weather.current):
+        lines.append("where the current is told every few hours the tide is in it, and its stream is not added")
     return (*lines, *weather.notes)
+
+
+def _told_of_tide(tide: Tides) -> list[str]:
+    waves = (
+        f"{counted(len(tide.names), 'constituent')}: {' '.join(tide.names[:8])}{' ...' if len(tide.names) > 8 else ''}"
+    )
+    lat, lon = tide.lat_deg, tide.lon_deg
+    south, north = _degrees(lat.min(), "NS"), _degrees(lat.max(), "NS")
+    where = f"{south} to {north}, {_degrees(lon.min(), 'EW')} to {_degrees(lon.max(), 'EW')}"
+    if tide.shape is not None:
+        rows, columns = tide.shape
+        return [f"tide, {tide.what}, by {waves}", f"  {where} ({rows} x {columns})"]
+    if lat.size == 1:
+        where = f"{_degrees(lat[0], 'NS')}, {_degrees(lon[0], 'EW')}"
+    places = f"{counted(lat.size, 'station')}, {where}; within {tide.reach_m / 1000.0:g} km of one"
+    return [f"tide, {tide.what}, by {waves}", f"  {places}"]
 
 
 def _told_of_cube(name: str, cube: Cube) -> list[str]:
@@ -50,7 +71,7 @@ def _hours(seconds: float) -> str:
 def _when(cube: Cube) -> str:
     if cube.utc_s.size == 1:
         return iso(cube.utc_s[0])
-    holes = {a for a, _ in holes_of(cube.utc_s)}
+    holes = {a for a, _ in cube.holes_s()}
     steps = [b - a for a, b in zip(cube.utc_s[:-1], cube.utc_s[1:], strict=True) if a not in holes]
     every = ", then ".join(_hours(step) for step, _ in groupby(steps))
     count = counted(int(cube.utc_s.size), "time")
@@ -77,19 +98,24 @@ def told_at(weather: Weather, lat_deg: float, lon_deg: float) -> tuple[str, ...]
     wind = weather.wind_en_mps(utc, lat_deg, lon_deg)
     speed = np.hypot(wind[..., 0], wind[..., 1])
     gust = weather.gust_mps(utc, lat_deg, lon_deg)
-    current = weather.current_en_mps(utc, lat_deg, lon_deg) if weather.current else np.full((utc.size, 2), math.nan)
+    current = weather.current_en_mps(utc, lat_deg, lon_deg)
+    tide = weather.tide_m(utc, lat_deg, lon_deg)
     waves = weather.waves_m(utc, lat_deg, lon_deg) if weather.waves and weather.wind else np.zeros((0, utc.size))
     many = len(weather.members) > 1 or gust.shape[0] > 1
     spread = " (a tenth of the members below, a tenth above)" if many else ""
     lines = [
-        "time, wind [m/s] from, gust [m/s], current [m/s] towards" + (", waves [m]" if waves.size else "") + spread
+        "time, wind [m/s] from, gust [m/s], current [m/s] towards"
+        + (", waves [m]" if waves.size else "")
+        + (", tide [m]" if np.isfinite(tide).any() else "")
+        + spread
     ]
     for i, t in enumerate(utc):
         east, north = (_mean(wind[:, i, k]) for k in (0, 1))
         blows = f"{_spread(speed[:, i])} from {_compass(-east, -north)}" if weather.wind else "-"
         words = [iso(t), blows, _spread(gust[:, i])]
-        words.append(f"{math.hypot(*current[i]):.2f} to {_compass(*current[i])}" if weather.current else "-")
+        words.append(f"{math.hypot(*current[i]):.2f} to {_compass(*current[i])}" if weather.has_current else "-")
         words += [_spread(waves[:, i])] if waves.size else []
+        words += [f"{tide[i]:.2f}"] if np.isfinite(tide).any() else []
         lines.append("  ".join(words))
     return tuple(lines)
 

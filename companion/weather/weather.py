@@ -12,11 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from companion.weather.tides import Tides, steps_of
+
 Floats = NDArray[np.float64]
 MOST_STEP_S = 12 * 3600.0  # between two times farther apart than this nothing is made up
 _HOLE = 1.5  # times as long as the longer of the steps beside it: one is missing
 _TIGHT_DEG = 1e-6
 _ROUND_DEG = 360.0
+TIDELESS_S = 6 * 3600.0  # a current that is told at steps longer than this is a mean over the tide, and has none in it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,6 +34,7 @@ class Cube:
         lon_deg: (x,) ascending, above 180 where it lies over the date line.
         values: (m, t, y, x, k) float32, NaN where unknown: k components.
         interval_s: what is said is the maximum of so long before each time; 0: it is of the time.
+        most_step_s: between two times farther apart than this nothing is made up.
         sources: the files that it is of.
     """
 
@@ -41,6 +45,7 @@ class Cube:
     lon_deg: Floats
     values: NDArray[np.float32]
     interval_s: float = 0.0
+    most_step_s: float = MOST_STEP_S
     sources: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -70,9 +75,14 @@ class Cube:
         )
         return float(tall * wide)
 
+    @property
+    def is_tideless(self) -> bool:
+        """Whether its times are too far apart for a tide to be in it."""
+        return bool(self.utc_s.size < 2 or np.diff(self.utc_s).min() > TIDELESS_S)
+
     def holes_s(self) -> tuple[tuple[float, float], ...]:
         """Return its gaps in time."""
-        return holes_of(self.utc_s)
+        return holes_of(self.utc_s, self.most_step_s)
 
     def unknown_share(self) -> float:
         """Return the share of its values that are not known: land under a current, members that lack a time."""
@@ -128,8 +138,8 @@ class Cube:
         return bool(self._across(past)[2][0] and _between(self.lat_deg, np.array([lat_deg]), _TIGHT_DEG)[2][0])
 
 
-def holes_of(utc_s: Floats) -> tuple[tuple[float, float], ...]:
-    """Return the gaps (from, to) between times: longer than 12 h, or longer than the steps on both sides.
+def holes_of(utc_s: Floats, most_step_s: float = MOST_STEP_S) -> tuple[tuple[float, float], ...]:
+    """Return the gaps (from, to) between times: longer than ``most_step_s``, or longer than the steps on both sides.
 
     Where the steps only become longer, as they do some days ahead, nothing is missing.
     """
@@ -137,7 +147,7 @@ def holes_of(utc_s: Floats) -> tuple[tuple[float, float], ...]:
     out = []
     for i in range(step.size):
         is_inside = 0 < i < step.size - 1
-        if step[i] > MOST_STEP_S or (is_inside and step[i] > _HOLE * max(step[i - 1], step[i + 1])):
+        if step[i] > most_step_s or (is_inside and step[i] > _HOLE * max(step[i - 1], step[i + 1])):
             out.append((float(utc_s[i]), float(utc_s[i + 1])))
     return tuple(out)
 
@@ -154,7 +164,7 @@ def _between(axis: Floats, at: Floats, tight: float) -> tuple[NDArray[np.int64],
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Weather:
-    """A forecast of one or several files: cubes of the wind and, where there are, of gusts, waves and the current.
+    """A forecast of one or several files: cubes of the wind and, where there are, of gusts, waves, current, and tides.
 
     Of several grids the finest that knows a place and time is asked. ``notes`` are what else was found.
     """
@@ -163,12 +173,18 @@ class Weather:
     gust: tuple[Cube, ...] = ()
     waves: tuple[Cube, ...] = ()
     current: tuple[Cube, ...] = ()
+    tides: tuple[Tides, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
     def members(self) -> tuple[int, ...]:
         """The members of the wind."""
         return tuple(sorted({m for cube in self.wind for m in cube.members}))
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        """Return whether any of it says something of a place."""
+        cubes = (*self.wind, *self.gust, *self.waves, *self.current)
+        return any(c.covers(lat_deg, lon_deg) for c in cubes) or any(t.covers(lat_deg, lon_deg) for t in self.tides)
 
     def mean(self) -> Weather:
         """Return it with one member, 0: the mean of all that know a value. It is weaker than they are."""
@@ -198,10 +214,42 @@ class Weather:
         return found[[own.index(m) if m in own else 0 for m in self.members]]
 
     def current_en_mps(self, utc_s: ArrayLike, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
-        """Return (n, 2): the motion of the water, of the first member; NaN where unknown."""
+        """Return (n, 2): the motion of the water, of the first member, and of the tide; NaN where neither is known.
+
+        A current that is told every few hours has the tide in it: there, none is added.
+        """
         members = tuple(sorted({m for cube in self.current for m in cube.members}))[:1]
-        found: Floats = _asked(self.current, members, 2, utc_s, lat_deg, lon_deg)[0]
+        streams = [tide for tide in self.tides if tide.what == "stream"]
+        if not streams and members:
+            found: Floats = _asked(self.current, members, 2, utc_s, lat_deg, lon_deg)[0]
+            return found
+        tide = _first_known(streams, 2, utc_s, lat_deg, lon_deg)
+        if not members:
+            return tide
+        whole, mean = (
+            _asked(tuple(c for c in self.current if c.is_tideless is kind), members, 2, utc_s, lat_deg, lon_deg)[0]
+            for kind in (False, True)
+        )
+        both = np.where(np.isnan(mean), tide, mean + np.nan_to_num(tide))
+        return np.where(np.isnan(whole), both, whole)
+
+    @property
+    def has_current(self) -> bool:
+        """Whether it says anything of the motion of the water."""
+        return bool(self.current) or any(tide.what == "stream" for tide in self.tides)
+
+    def tide_m(self, utc_s: ArrayLike, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
+        """Return (n,): the height of the tide above the chart's datum; NaN where unknown."""
+        found: Floats = _first_known([t for t in self.tides if t.what == "height"], 1, utc_s, lat_deg, lon_deg)[..., 0]
         return found
+
+    def times_between(self, from_s: float, to_s: float) -> Floats:
+        """Return the times after one and before another between which wind, waves and streams are linear."""
+        known = [cube.utc_s for cube in (*self.wind, *self.waves, *self.current)]
+        if any(tide.what == "stream" for tide in self.tides):
+            known.append(steps_of(from_s, to_s))
+        times = np.unique(np.concatenate(known))
+        return times[(times > from_s) & (times < to_s)]
 
     def why_unknown(self, utc_s: float, lat_deg: float, lon_deg: float) -> str:
         """Return in words why the wind is not known at a time and place; "" where it is for one member at least."""
@@ -231,6 +279,15 @@ def _asked(
             continue
         found = cube.at(utc, lat, lon)[[m in members for m in cube.members]]
         out[rows] = np.where(np.isnan(out[rows]), found, out[rows])
+    return out
+
+
+def _first_known(tides: list[Tides], components: int, utc: ArrayLike, lat: ArrayLike, lon: ArrayLike) -> Floats:
+    """Return what the first that knows a place says: the order is that of the files."""
+    out = np.full((*np.broadcast(utc, lat, lon).shape, components), math.nan)
+    for tide in tides:
+        if np.isnan(out).any():
+            out = np.where(np.isnan(out), tide.at(utc, lat, lon), out)
     return out
 
 

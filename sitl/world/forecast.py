@@ -67,9 +67,13 @@ class ForecastField:
             here = self._frame.geo_from_en(i * STEP_M, j * STEP_M)
             utc_s = self._begins_s + k * STEP_S
             wind = _nearest(self._weather.wind, utc_s, here.lat_deg, here.lon_deg)
-            stream = _nearest(self._weather.current, utc_s, here.lat_deg, here.lon_deg)
+            stream = self._stream(utc_s, here.lat_deg, here.lon_deg)
             found = self._nodes[i, j, k] = (*wind, *stream)
         return found
+
+    def _stream(self, utc_s: float, lat_deg: float, lon_deg: float) -> Place:
+        east, north = self._weather.current_en_mps(utc_s, lat_deg, lon_deg).ravel().tolist()
+        return _nearest(self._weather.current, utc_s, lat_deg, lon_deg) if math.isnan(east + north) else (east, north)
 
 
 def _nearest(cubes: tuple[Cube, ...], utc_s: float, lat_deg: float, lon_deg: float) -> Place:

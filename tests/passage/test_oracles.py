@@ -1,6 +1,7 @@
 """Routes against solutions that are known: of closed form, or by other people's methods. The bound is below each."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import shapely
 
 from companion.boat import Polar, ardurover_sitl, avalon
 from companion.passage import Outcome, plan
+from companion.weather import read_stations
 from tests.passage.world import EAST_DEG_M, HOURS, LAT, LON, NORTH_DEG_M, T0, cube, passage, place, steady
 
 H, V = 20_000.0, 2.0  # the length and the speed that the flows are scaled by
@@ -127,3 +129,27 @@ def test_a_wind_of_time_only_is_waited_out_and_used():
     asked = passage(place(0.0, 0.0), place(0.0, 43_200.0 / EAST_DEG_M), polar=polar, wind=wind)
     route = solved(asked, 12.0 * 3600.0, 0.01, gap=0.6)  # which knows not that she cannot be elsewhere in the calm
     assert route.sailed.hours("waiting") == pytest.approx(6.0, abs=0.6)
+
+
+def test_a_tide_by_its_constants_is_a_stream_of_the_way():
+    """Six hours along a tide of M2: the time of replay and plan is that of its integral."""
+    text = """reach_km = 400.0
+[[station]]
+name = "mid"
+lat = 0.0
+lon = 0.2
+[[station.stream]]
+towards_deg = 90.0
+waves = { M2 = [0.8, 200.0] }
+"""
+    a, b = place(0.0, 0.0), place(0.0, 43_200.0 / EAST_DEG_M)
+    ready = passage(a, b)
+    ready = replace(ready, weather=replace(ready.weather, tides=read_stations(text, "")))
+    [sailed] = ready.sail((a, b), T0, (0,))
+    t = T0 + np.arange(0.0, 40_000.0, 10.0)
+    flow = ready.weather.current_en_mps(t, 0.0, 0.2)[:, 0]
+    gone = np.cumsum((2.0 + flow) * 10.0)
+    assert sailed.time_s == pytest.approx(10.0 * np.searchsorted(gone, 43_199.0), rel=2e-3)
+    assert abs(sailed.time_s - 21_600.0) > 1500.0
+    route = plan(ready, T0, nodes=20)
+    assert route.time_s == pytest.approx(sailed.time_s, rel=2e-3)
