@@ -26,9 +26,9 @@ examples:
 
 Reads GRIB 1 and 2 on grids of latitudes and longitudes: wind of 10 m, gusts, wave heights, surface currents; several
 files, runs that overlap (the newest counts, an older one before it, after it and in its holes), ensembles. Simple
-packing is read here, every other by the extra `weather`. What ends in .toml are stations of the tide with their
-harmonic constants; `tide` makes of them the tables that a mission's [area] tide and [current] table name. Directions
-are true: of a wind where it comes from, of a current where it goes.
+packing is read here, every other by the extra `weather`; netCDF 4 and Zarr by the extra `currents`. What ends in .toml
+are stations of the tide with their harmonic constants; `tide` makes of them the tables that a mission's [area] tide and
+[current] table name. Directions are true: of a wind where it comes from, of a current where it goes.
 
 Exit codes: 0 told, 2 a file that cannot be believed, or a place that it says nothing of.
 """

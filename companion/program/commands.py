@@ -107,6 +107,8 @@ EXTRAS = {
     "pyogrio": "chart",
     "rasterio": "chart",
     "gribberish": "weather",
+    "h5py": "currents",
+    "zarr": "currents",
     "filterpy": "shore",
 }
 
