@@ -25,6 +25,7 @@ examples:
   companion passage plan biscay.toml --plot biscay.png --out mission.toml
   companion passage plan biscay.toml --depart 2026-04-20T00:00Z..2026-04-22T00:00Z --every 6h --explain
   companion passage again biscay.toml mission.toml --forecast run18.grb2 --from 47.1,-6.3 --now 2026-04-20T18:00Z
+  companion passage again biscay.toml mission.toml --forecast run18.grb2 --from 47.1,-6.3 --measured voyages/one
 
 PASSAGE.toml names start, goal, departure, forecasts in GRIB, boat and land; its keys are in docs/reference/formats.md.
 Of one forecast the route is the fastest, with a time that no way can be faster than; of an ensemble the one that all
@@ -76,6 +77,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         metavar="FILE",
         help="in place of [weather] files; more may be given",
     )
+    again.add_argument(
+        "--measured",
+        type=Path,
+        metavar="VOYAGE|CSV",
+        help="the wind that she measured, by which the first hours of the forecast are corrected: the folder of her"
+        " voyage, or lines of time, lat, lon, from_deg, speed_mps",
+    )
     again.add_argument("--by", type=moment, metavar="TIME", help="she is to be there by then ([depart] by)")
     again.add_argument(
         "--faster",
@@ -106,6 +114,8 @@ def _again(args: argparse.Namespace) -> int:
         args.file, None if args.now is None else args.now.timestamp(), args.here, tuple(map(str, args.forecast))
     )
     now = (args.now or asked.depart.at).timestamp()
+    if args.measured is not None:
+        passage = _as_measured(passage, args.measured, now)
     by, error = _by(args, asked), speed_error_of(asked.boat)
     by_s, sure = math.inf if by is None else by, asked.depart.sure
     with patience("planning"):
@@ -123,6 +133,22 @@ def _again(args: argparse.Namespace) -> int:
         )
         print(f"{args.out}: written: companion mission check {args.out}")
     return 0
+
+
+def _as_measured(passage: Passage, path: Path, now_s: float) -> Passage:
+    """Return it in a forecast whose first hours are corrected by what she measured; print by how much."""
+    from dataclasses import replace
+
+    from companion.telemetry.winds import measured_wind
+    from companion.weather import corrected, off_by
+    from companion.weather.told import told_of_off
+
+    off = off_by(passage.weather, measured_wind(path), now_s)
+    if off is None:
+        print(f"{path}: no wind of the 12 h before now that the forecast knows of: it stands as it is")
+        return passage
+    print(told_of_off(off))
+    return replace(passage, weather=corrected(passage.weather, off))
 
 
 MOST_DEPARTURES = 200

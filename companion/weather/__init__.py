@@ -6,6 +6,7 @@
 from companion.weather.assemble import Box, assemble
 from companion.weather.grib import GribField, Grid, Quantity, walk
 from companion.weather.harmonics import KNOWN, constituent_named, phasors
+from companion.weather.measured import Measured, Off, corrected, off_by
 from companion.weather.packing import values_of
 from companion.weather.readers import read_tides, read_weather
 from companion.weather.tides import Tides, read_stations
@@ -18,13 +19,17 @@ __all__ = [
     "Cube",
     "GribField",
     "Grid",
+    "Measured",
+    "Off",
     "Quantity",
     "Tides",
     "Weather",
     "assemble",
     "constituent_named",
+    "corrected",
     "holes_of",
     "iso",
+    "off_by",
     "phasors",
     "read_stations",
     "read_tides",

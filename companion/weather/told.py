@@ -7,6 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
+from companion.weather.measured import Off
 from companion.weather.tides import Tides
 from companion.weather.weather import Cube, Floats, Weather, iso
 from companion.words import counted
@@ -62,6 +63,16 @@ def _told_of_cube(name: str, cube: Cube) -> list[str]:
     if share > 0.0:
         lines.append(f"  not known: {100.0 * share:.2g} % of it")
     return lines
+
+
+def told_of_off(off: Off) -> str:
+    """Return in words by how much a forecast is off, in the mean of its members, and how long that counts."""
+    east, north = (float(off.off_en_mps[:, k].mean()) for k in (0, 1))
+    return (
+        f"measured: of {counted(off.count, 'mean')} of ten minutes {math.hypot(east, north):.1f} m/s towards"
+        f" {_compass(east, north)} are missing in the forecast, +- {off.sd_mps:.1f}; half of it counts in"
+        f" {_hours(off.memory_s * math.log(2.0))}, within 150 km"
+    )
 
 
 def _hours(seconds: float) -> str:

@@ -95,3 +95,22 @@ def test_a_new_forecast_by_the_command(shell, tmp_path, capsys):  # noqa: F811
     out = capsys.readouterr().out
     assert "change: it leads over land, or closed water, from here" in out
     assert (tmp_path / "n.toml").exists()
+
+
+def test_what_she_measured_corrects_the_first_hours(shell, tmp_path, capsys):  # noqa: F811
+    """A forecast of 8 m/s from the north where she has 4 m/s: the way takes longer than it says."""
+    from companion import cli
+
+    assert shell("--out", "m.toml")[0] == 0
+    (tmp_path / "new.grb2").write_bytes(b"".join(wind_2(LAT, LON, h, 0.0, -8.0) for h in range(0, 49, 6)))
+    rows = [f"2026-04-20T{h:02}:{m:02}:00Z, 50.0, -5.9, 0, 4.0" for h in (6, 7) for m in range(0, 60, 5)]
+    (tmp_path / "w.csv").write_text("\n".join(rows))
+    words = ["passage", "again", "p.toml", "m.toml", "--forecast", "new.grb2", "--from", "50.0,-5.9"]
+    arrives = []
+    for more in ([], ["--measured", "w.csv"]):
+        assert cli.main([*words, "--now", "2026-04-20T08:00Z", *more]) == 0
+        out = capsys.readouterr().out
+        arrives.append(next(line for line in out.splitlines() if line.startswith("departs")))
+    assert out.startswith("measured: of 12 means of ten minutes 3.")
+    assert "m/s towards 000 are missing in the forecast" in out
+    assert arrives[0] != arrives[1]
