@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from companion.messages import GeoPoint
-    from companion.passage import Passage, Route
+    from companion.passage import Energy, Passage, Route
     from companion.passage.file import PassageFile
     from companion.weather import Weather
 
@@ -326,6 +326,23 @@ def _read(
         land=land,
         frame=frame,
         lee_shore_m=asked.limits.lee_shore_m or 0.0,
+        energy=_energy(asked),
+    )
+
+
+def _energy(asked: PassageFile) -> Energy | None:
+    from companion.passage import Energy
+
+    said = asked.energy
+    if said is None:
+        return None
+    return Energy(
+        battery_wh=said.battery_wh,
+        start_wh=said.battery_wh * said.start_percent / 100.0,
+        reserve_wh=said.battery_wh * said.reserve_percent / 100.0,
+        solar_w=said.solar_w,
+        day_w=said.day_w,
+        night_w=said.day_w if said.night_w is None else said.night_w,
     )
 
 

@@ -8,6 +8,7 @@
 
 from companion.passage.again import FASTER, Again, again
 from companion.passage.craft import craft_of
+from companion.passage.energy import Energy, left_wh
 from companion.passage.frame import PassageFrame
 from companion.passage.kernels import Craft
 from companion.passage.land import Land, land_of
@@ -21,6 +22,7 @@ __all__ = [
     "Again",
     "Craft",
     "Departure",
+    "Energy",
     "Land",
     "Outcome",
     "Passage",
@@ -33,6 +35,7 @@ __all__ = [
     "best",
     "craft_of",
     "land_of",
+    "left_wh",
     "plan",
     "sail",
     "shares_of",

@@ -70,6 +70,19 @@ class LimitOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """... no more than this is to blow towards it."""
 
 
+class EnergyOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[energy]``: what is in the battery, what comes and what goes; a run that is down to its reserve ends there."""
+
+    battery_wh: Annotated[float, Meta(gt=0.0, le=1e6)]
+    start_percent: Annotated[float, Meta(ge=0.0, le=100.0)] = 100.0
+    reserve_percent: Annotated[float, Meta(ge=0.0, le=100.0)] = 20.0
+    solar_w: Annotated[float, Meta(ge=0.0, le=1e5)] = 0.0
+    """With the sun overhead, of a mean sky."""
+    day_w: Annotated[float, Meta(ge=0.0, le=1e5)]
+    night_w: Annotated[float, Meta(ge=0.0, le=1e5)] | None = None
+    """With the sun more than 6 degrees down; as by day where it is not said."""
+
+
 class PassageFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A file of ``companion passage``."""
 
@@ -82,6 +95,7 @@ class PassageFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     area: AreaOptions = AreaOptions()
     sailing: SailingOptions = SailingOptions()
     limits: LimitOptions = LimitOptions()
+    energy: EnergyOptions | None = None
 
 
 def parse_passage(text: str, source: str) -> PassageFile:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.messages import GeoPoint
+from companion.passage.energy import Energy, within
 from companion.passage.frame import GEOD, Floats, PassageFrame, up_of
 from companion.passage.kernels import SLACK, STENCIL, Craft, Waters, labels, polyline
 from companion.passage.land import Land
@@ -41,7 +42,7 @@ class Outcome(enum.Enum):
 class Passage:
     """What is asked: from where, to where, when, with which boat, in which water and weather.
 
-    A shore is near within ``lee_shore_m``.
+    A shore is near within ``lee_shore_m``; with ``energy`` a run ends where the battery is down to its reserve.
     """
 
     start: GeoPoint
@@ -52,6 +53,7 @@ class Passage:
     land: Land
     frame: PassageFrame
     lee_shore_m: float = 0.0
+    energy: Energy | None = None
 
     def sail(
         self,
@@ -62,7 +64,9 @@ class Passage:
     ) -> list[Sailed]:
         """Return a route sailed in each member and share of her speeds."""
         shore = self.shore_en if self.lee_shore_m > 0.0 else None
-        return sail(self.weather, self.craft, waypoints, depart_utc_s, self.radius_m, members, shares, shore)
+        runs = sail(self.weather, self.craft, waypoints, depart_utc_s, self.radius_m, members, shares, shore)
+        energy = self.energy
+        return runs if energy is None else [within(energy, run) for run in runs]
 
     def shore_en(self, lat_deg: Floats, lon_deg: Floats) -> Floats:
         """Return (n, 2), east and north: the direction to land nearer than ``lee_shore_m``, zero where none is."""
