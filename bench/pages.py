@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from companion.orders.far import order, status
+from companion.orders.far import order, route, status
 from companion.orders.far.order import SEAL_BYTES
 from companion.orders.order import TABLE as VERBS
 from companion.safety import BY_RANK, ENDINGS, FAILSAFES, SETTINGS, TABLE, WORD_OF, Cause, Recovery, Setting, Watchdog
@@ -136,16 +136,19 @@ def verbs() -> str:
 
 
 def layouts() -> str:
-    """Return the three layouts of messages far away."""
+    """Return the layouts of messages far away."""
     head = ["| byte | type | field | unit | not known | what |", "|---|---|---|---|---|---|"]
     parts = []
     for title, layout, size in (
         ("The order", order.LAYOUT, order.SIZE),
         ("The beginning", order.BEGINNING_LAYOUT, order.BEGINNING_SIZE),
         ("The status", status.LAYOUT, status.SIZE),
+        ("The route, before its places", route.HEADER, route.HEADER.size),
+        ("Each place of the route", route.PLACE, route.PLACE.size),
     ):
         code = f"| {layout.size} | {SEAL_BYTES} bytes | `code` | - | - | the authentication code |"
-        parts += [f"### {title}: {size} bytes", "", *head, *layout.rows(), code, ""]
+        sealed = size > layout.size
+        parts += [f"### {title}: {size} bytes", "", *head, *layout.rows(), *([code] if sealed else []), ""]
     return "\n".join(parts)
 
 

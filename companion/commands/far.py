@@ -18,9 +18,10 @@ from companion.commands.output import force_option, refuse_existing, write_files
 from companion.errors import InputError, JobError, unreadable
 from companion.geo.angles import direction
 from companion.program.arguments import add_command, duration, system_id, whole
+from companion.words import counted
 
 if TYPE_CHECKING:
-    from companion.orders.far import FarStatus
+    from companion.orders.far import FarRoute, FarStatus
 
 
 _EPILOG = """\
@@ -31,6 +32,7 @@ examples:
   companion far order refuge Mill Bay --key far.key --expires 1d
   companion far begin --key far.key --expires 1d --out begin.sbd     (the counters count from 1 again)
   companion far status status.sbd --key far.key
+  companion far route route.sbd --key far.key --mission mission.toml --out new.toml
   companion far status 010600... --key far.key   (as hexadecimal digits, from a web page or a mail)
 
 An order is 24 bytes, and is printed as hexadecimal digits for a web form. How it reaches the boat is the modem's
@@ -46,7 +48,7 @@ Exit codes: 0 done, 1 not, 2 a file or option that cannot be believed.
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command with its verbs."""
     parser = add_command(subparsers, "far", summary, _EPILOG)
-    verbs = parser.add_subparsers(dest="verb", metavar="order|begin|status", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="order|begin|status|route", required=True)
     order = verbs.add_parser("order", help="make an order of 24 bytes")
     order.add_argument("words", nargs="+", metavar="VERB [ARGS]", help="the order, as for `companion order`")
     begin = verbs.add_parser("begin", help="let the counters of orders count from 1 again")
@@ -72,7 +74,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     status = verbs.add_parser("status", help="read a status of 42 bytes")
     status.add_argument("source", metavar="FILE|HEX", help="the bytes: in a file, or as hexadecimal digits")
     status.set_defaults(run=run_status)
-    for verb in (order, begin, status):
+    route = verbs.add_parser("route", help="read a route that `companion passage ... --far-out` made, as a mission")
+    route.add_argument("source", metavar="FILE|HEX", help="the bytes: in a file, or as hexadecimal digits")
+    route.add_argument("--mission", type=Path, metavar="M", help="the mission under way: boat, area and the rest of it")
+    route.add_argument("--out", type=Path, metavar="NEW", help="write it there, beside M, with the places of the route")
+    force_option(route)
+    route.set_defaults(run=run_route)
+    for verb in (order, begin, status, route):
         verb.add_argument("--key", type=Path, required=True, metavar="FILE", help="the key, as on board")
         verb.add_argument(
             "--system",
@@ -231,6 +239,75 @@ def run_status(args: argparse.Namespace) -> int:
     for line in lines_of(status, time.time()):
         print(line)
     return 0
+
+
+def run_route(args: argparse.Namespace) -> int:
+    """Print a route that came from far away; with a mission and a file for it, write it as that mission's goals."""
+    from companion.mavlink.signing import read_key
+    from companion.orders.far import FarKey, unpack_route
+
+    if (args.mission is None) != (args.out is None):
+        raise InputError("companion far route", "--out", "and --mission go together", "say both")
+    try:
+        route = unpack_route(_bytes_of(args.source), FarKey(read_key(args.key), args.system))
+    except ValueError as error:
+        raise InputError(args.source[:60], "", f"is refused: {error}") from None
+    for line in lines_of_route(route):
+        print(line)
+    if args.out is not None:
+        _write_route(route, args.mission, args.out, force=args.force)
+        print(f"{args.out}: written: companion mission check {args.out}")
+    return 0
+
+
+def lines_of_route(route: FarRoute) -> list[str]:
+    """Return a route in words."""
+
+    def when(utc_s: float) -> str:
+        return f"{datetime.fromtimestamp(utc_s, UTC):%Y-%m-%dT%H:%MZ}"
+
+    lines = [
+        f"route of {when(route.departs_utc_s)}, by a forecast of {when(route.base_utc_s)} with"
+        f" {counted(route.members, 'member')}: {len(route.places)} places"
+        + (f"; {route.left_out} more are not in it: send them before she is there" if route.left_out else "")
+    ]
+    for k, place in enumerate(route.places):
+        said = "" if place.middle_s is None or not k else f"  by {when(route.departs_utc_s + place.middle_s)}"
+        if said:
+            said += f" (-{place.early_s / 3600.0:.1f} to +{place.late_s / 3600.0:.1f} h)"
+        band = f"  {place.band_m:.0f} m to each side" if k else ""
+        lines.append(f"  {k}: {place.point.lat_deg:.5f}, {place.point.lon_deg:.5f}{band}{said}")
+    return lines
+
+
+def _write_route(route: FarRoute, mission: Path, out: Path, *, force: bool) -> None:
+    import tomllib
+
+    from companion.geofence import load_mission
+    from companion.geofence.mission import toml
+    from companion.orders.far import bands_m
+    from companion.passage.mission import WAYPOINT_M, goals_of
+
+    if out.parent.resolve() != mission.parent.resolve():
+        raise InputError(str(out), "", "is in another folder", f"write it beside {mission}, whose files it names")
+    load_mission(mission)  # in one line what is wrong with it
+    try:
+        tables = tomllib.loads(mission.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise unreadable(str(mission), error) from None
+    last = tables["goal"][-1] if tables.get("goal") else {}
+    points = tuple(place.point for place in route.places)
+    if len(points) < 2:
+        raise InputError("the route", "", "has one place only", "send it again, from where she is")
+    made = goals_of(points, bands_m(route.places), float(last.get("radius_m", 200.0)))
+    if route.left_out:  # the last one is a place on the way
+        made["goal"][-1] |= {"name": f"waypoint {len(points) - 1}", "radius_m": WAYPOINT_M}
+    tables |= {
+        "start": made["start"],
+        "goal": made["goal"],
+        "passage": {**tables.get("passage", {}), **made["passage"]},
+    }
+    write_files({str(out): toml(tables).encode()}, force=force)
 
 
 def _bytes_of(source: str) -> bytes:

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from companion.commands.output import force_option, patience, refuse_existing, write_files
 from companion.errors import InputError, JobError
-from companion.program.arguments import add_command, duration, moment, number, out_file, picture, place
+from companion.program.arguments import add_command, duration, moment, number, out_file, picture, place, system_id
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
     from companion.messages import GeoPoint
-    from companion.passage import Energy, Passage, Route
+    from companion.passage import Departure, Energy, Passage, Route
     from companion.passage.file import PassageFile
     from companion.weather import Weather
 
@@ -26,6 +26,7 @@ examples:
   companion passage plan biscay.toml --depart 2026-04-20T00:00Z..2026-04-22T00:00Z --every 6h --explain
   companion passage again biscay.toml mission.toml --forecast run18.grb2 --from 47.1,-6.3 --now 2026-04-20T18:00Z
   companion passage again biscay.toml mission.toml --forecast run18.grb2 --from 47.1,-6.3 --measured voyages/one
+  companion passage again biscay.toml mission.toml --folder forecasts --from 47.1,-6.3 --far-key far.key --far-out r.sbd
 
 PASSAGE.toml names start, goal, departure, forecasts in GRIB, boat and land; its keys are in docs/reference/formats.md.
 Of one forecast the route is the fastest, with a time that no way can be faster than; of an ensemble the one that all
@@ -62,6 +63,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         "--by", type=moment, metavar="TIME", help="she is to be there by then ([depart] by): the chance of it"
     )
     plan.add_argument("--explain", action="store_true", help="with --depart, what waiting costs and what is against it")
+    _far_options(plan)
     force_option(plan)
     plan.set_defaults(run=_plan)
     again = verbs.add_parser("again", help="a new forecast: is the route under way still the one to sail")
@@ -77,6 +79,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         metavar="FILE",
         help="in place of [weather] files; more may be given",
     )
+    again.add_argument(
+        "--folder", type=Path, metavar="DIR", help="where forecasts are dropped: of all in it the newest run counts"
+    )
+    _far_options(again)
     again.add_argument(
         "--measured",
         type=Path,
@@ -99,21 +105,88 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     again.set_defaults(run=_again)
 
 
+def _far_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--far-out", type=out_file, metavar="SBD", help="the route in 270 bytes, for `companion far route`"
+    )
+    parser.add_argument("--far-key", type=Path, metavar="FILE", help="of --far-out: the key, as on board")
+    parser.add_argument("--system", type=system_id, default=1, metavar="N", help="of --far-out: the boat's (1)")
+
+
+def _check_far(args: argparse.Namespace) -> None:
+    if (args.far_out is None) != (args.far_key is None):
+        raise InputError(f"companion passage {args.verb}", "--far-out", "and --far-key go together", "say both")
+    if args.far_out is not None:
+        refuse_existing([str(args.far_out)], force=args.force)
+
+
+def _write_far(
+    args: argparse.Namespace, asked: PassageFile, passage: Passage, route: Route, of: Departure | None
+) -> None:
+    """Write a route as the bytes of one message to the boat, with its key's code."""
+    from companion.mavlink.signing import read_key
+    from companion.orders.far import FarKey, FarPlace, FarRoute, pack_route
+    from companion.passage import shown
+    from companion.passage.mission import arrivals_s, mission_of
+
+    runs = () if route.sailed is None else (route.sailed,) if of is None else of.runs
+    low, high = shown(1 if of is None else of.members)
+    goals = mission_of(route, passage, asked.name)["goal"]
+    places = []
+    for k, (point, (early, middle, late)) in enumerate(
+        zip(route.waypoints, arrivals_s(runs, route.waypoints, (low, 0.5, high)), strict=True)
+    ):
+        known = middle if math.isfinite(middle) else None
+        places.append(
+            FarPlace(
+                point=point,
+                band_m=float(goals[k - 1]["bandwidth_m"]) if k else 0.0,
+                middle_s=known,
+                early_s=0.0 if known is None else known - early,
+                late_s=0.0 if known is None else late - known if math.isfinite(late) else 1e9,
+            )
+        )
+    far = FarRoute(
+        departs_utc_s=route.depart_utc_s,
+        base_utc_s=passage.weather.base_utc_s(route.depart_utc_s),
+        members=len(passage.weather.members),
+        places=tuple(places),
+    )
+    data = pack_route(far, FarKey(read_key(args.far_key), args.system))
+    write_files({str(args.far_out): data}, force=args.force)
+    print(f"{args.far_out}: written, {len(data)} bytes: {data.hex()}")
+
+
+def _dropped(folder: Path) -> tuple[str, ...]:
+    """Return the whole files of a folder of forecasts. Raises InputError where it holds none."""
+    if not folder.is_dir():
+        raise InputError(str(folder), "", "is no folder", "name the one that forecasts are dropped into")
+    parts = {".part", ".tmp", ".new"}
+    names = [p for p in sorted(folder.iterdir()) if p.name[0] != "." and p.suffix not in parts]
+    if not names:
+        raise InputError(str(folder), "", "holds no forecast", "drop one into it")
+    return tuple(map(str, names))
+
+
 def _again(args: argparse.Namespace) -> int:
     """Hold what she sails against a new forecast, print both; write the new route where it is worth the change."""
     from companion.compose import speed_error_of
     from companion.geofence import load_mission
     from companion.passage import again, shares_of, sweep
     from companion.passage.told import told_of, told_of_again
+    from companion.weather.told import told_of_age
 
     if args.out is not None:
         refuse_existing([str(args.out)], force=args.force)
+    _check_far(args)
+    if args.folder is not None and args.forecast:
+        raise InputError("companion passage again", "--folder", "and --forecast do not go together", "say one of them")
+    forecasts = tuple(map(str, args.forecast)) if args.folder is None else _dropped(args.folder)
     mission = load_mission(args.mission)
     points = [mission.start or mission.origin, *(goal.point for goal in mission.goals)]
-    asked, passage = _read(
-        args.file, None if args.now is None else args.now.timestamp(), args.here, tuple(map(str, args.forecast))
-    )
+    asked, passage = _read(args.file, None if args.now is None else args.now.timestamp(), args.here, forecasts)
     now = (args.now or asked.depart.at).timestamp()
+    print(told_of_age(passage.weather, now))
     if args.measured is not None:
         passage = _as_measured(passage, args.measured, now)
     by, error = _by(args, asked), speed_error_of(asked.boat)
@@ -127,6 +200,8 @@ def _again(args: argparse.Namespace) -> int:
         return JobError.exit_code
     for line in told_of(found.chosen.route, found.chosen):
         print(line)
+    if args.far_out is not None:
+        _write_far(args, asked, passage, found.chosen.route, found.chosen)
     if args.out is not None and found.is_changed:
         write_files(
             {str(args.out): _mission_text(asked, passage, found.chosen.route, args.file, args.out)}, force=args.force
@@ -207,8 +282,8 @@ def _by(args: argparse.Namespace, asked: PassageFile) -> float | None:
     return None if by is None else by.timestamp()
 
 
-def _in_all(args: argparse.Namespace, asked: PassageFile, passage: Passage) -> Route:
-    """Print what an ensemble makes of a departure; return its route."""
+def _in_all(args: argparse.Namespace, asked: PassageFile, passage: Passage) -> Departure:
+    """Print what an ensemble makes of a departure; return it."""
     from companion.compose import speed_error_of
     from companion.passage import sweep
     from companion.passage.told import told_of, told_of_chances
@@ -225,15 +300,16 @@ def _in_all(args: argparse.Namespace, asked: PassageFile, passage: Passage) -> R
     )
     for line in (*told_of(found.route, found), *told_of_chances(found, by, asked.depart.sure)):
         print(line)
-    return found.route
+    return found
 
 
 def _plan(args: argparse.Namespace) -> int:
     from companion.passage import plan
     from companion.passage.told import told_of
 
+    _check_far(args)
     if args.depart is not None:
-        if args.out is not None:
+        if args.out is not None or args.far_out is not None:
             raise InputError(
                 "companion passage plan", "--depart", "writes no mission", "plan the best of them with --out"
             )
@@ -245,8 +321,11 @@ def _plan(args: argparse.Namespace) -> int:
     asked, passage = _read(args.file)
     if len(passage.weather.members) > 1 or _by(args, asked) is not None:
         with patience("planning"):
-            route = _in_all(args, asked, passage)
+            found: Departure | None = _in_all(args, asked, passage)
+        assert found is not None
+        route = found.route
     else:
+        found = None
         with patience("planning"):
             route = plan(passage, asked.depart.at.timestamp(), nodes=NODES)
         for line in told_of(route):
@@ -259,6 +338,8 @@ def _plan(args: argparse.Namespace) -> int:
         print(f"{args.plot}: written")
     if not math.isfinite(route.time_s):
         return JobError.exit_code
+    if args.far_out is not None:
+        _write_far(args, asked, passage, route, found)
     if args.out is not None:
         write_files({str(args.out): _mission_text(asked, passage, route, args.file, args.out)}, force=args.force)
         print(f"{args.out}: written: companion mission check {args.out}")

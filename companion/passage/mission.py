@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from companion.messages import GeoPoint
 from companion.passage.frame import GEOD
 from companion.passage.plan import COARSE, CORRIDOR, Passage, Route
+from companion.passage.replay import Sailed
 
 _LEAST_BAND_M = 200.0
 _ROOM = 0.8  # of the way to land
-_GOAL_M = 200.0
+WAYPOINT_M = 200.0
 _LEG_ROOM = 1.2
 
 
@@ -26,28 +28,52 @@ def mission_of(route: Route, passage: Passage, name: str) -> dict[str, Any]:
     """
     if not route.waypoints:
         raise ValueError("there is no way to sail")
-    goals, longest = [], 0.0
     points = route.waypoints
-    for k, (a, b) in enumerate(pairwise(points), start=1):
-        _, _, length = GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)
-        longest = max(longest, length)
+    bands = [
+        _band_m(
+            passage, a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg, GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2]
+        )
+        for a, b in pairwise(points)
+    ]
+    return {"name": name, **goals_of(points, bands, min(passage.radius_m, 5000.0))}
+
+
+def goals_of(points: Sequence[GeoPoint], bands_m: Sequence[float], radius_m: float) -> dict[str, Any]:
+    """Return start, goals and ``[passage]`` of a mission, of places and the bands about the legs between them."""
+    goals, longest = [], 0.0
+    for k, ((a, b), band_m) in enumerate(zip(pairwise(points), bands_m, strict=True), start=1):
+        longest = max(longest, GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2])
         last = k == len(points) - 1
         goals.append(
             {
                 "name": "landfall" if last else f"waypoint {k}",
                 "lat": round(b.lat_deg, 7),
                 "lon": round(b.lon_deg, 7),
-                "radius_m": min(passage.radius_m, 5000.0) if last else _GOAL_M,
-                "bandwidth_m": round(_band_m(passage, a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg, length)),
+                "radius_m": radius_m if last else WAYPOINT_M,
+                "bandwidth_m": round(band_m),
             }
         )
     start: Mapping[str, Any] = {"lat": round(points[0].lat_deg, 7), "lon": round(points[0].lon_deg, 7)}
     return {
-        "name": name,
         "start": dict(start),
         "goal": goals,
         "passage": {"leg_m": float(math.ceil(_LEG_ROOM * longest / 1000.0) * 1000)},
     }
+
+
+def arrivals_s(runs: Sequence[Sailed], points: Sequence[GeoPoint], quantiles: Sequence[float]) -> list[list[float]]:
+    """Return by place the quantiles of the time [s] at which runs are there; inf where so many are not."""
+    way = np.cumsum([0.0, *(GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2] for a, b in pairwise(points))])
+    there = np.full((len(runs), way.size), np.inf)
+    for row, run in enumerate(runs):
+        if len(run.rows):
+            at = np.minimum(way, run.length_m)
+            gone = np.maximum.accumulate(run.rows[:, 1])
+            reached = (at <= gone[-1] + 1.0) | ((np.arange(way.size) == way.size - 1) & run.arrived)
+            there[row] = np.where(reached, np.interp(at, gone, run.rows[:, 0] - run.rows[0, 0]), np.inf)
+    there.sort(axis=0)
+    picks = [min(len(runs) - 1, int(q * len(runs))) for q in quantiles]
+    return [[float(there[pick, k]) for pick in picks] for k in range(way.size)]
 
 
 def _band_m(passage: Passage, lat1: float, lon1: float, lat2: float, lon2: float, length_m: float) -> float:

@@ -65,6 +65,13 @@ def _told_of_cube(name: str, cube: Cube) -> list[str]:
     return lines
 
 
+def told_of_age(weather: Weather, now_s: float) -> str:
+    """Return in words of which run the forecast is, how old that is, and until when it reaches."""
+    base = weather.base_utc_s(now_s)
+    last = max(float(cube.utc_s[-1]) for cube in weather.wind)
+    return f"forecast of {iso(base)}, {_hours(now_s - base)} old, until {iso(last)}"
+
+
 def told_of_off(off: Off) -> str:
     """Return in words by how much a forecast is off, in the mean of its members, and how long that counts."""
     east, north = (float(off.off_en_mps[:, k].mean()) for k in (0, 1))

@@ -181,6 +181,11 @@ class Weather:
         """The members of the wind."""
         return tuple(sorted({m for cube in self.wind for m in cube.members}))
 
+    def base_utc_s(self, utc_s: float) -> float:
+        """Return the base time of the run that counts for the wind at a time, or at the nearest that it has."""
+        cube = min(self.wind, key=lambda c: float(np.abs(c.utc_s - utc_s).min()))
+        return float(cube.base_utc_s[int(np.argmin(np.abs(cube.utc_s - utc_s)))])
+
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
         """Return whether any of it says something of a place."""
         cubes = (*self.wind, *self.gust, *self.waves, *self.current)

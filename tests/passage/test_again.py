@@ -111,6 +111,60 @@ def test_what_she_measured_corrects_the_first_hours(shell, tmp_path, capsys):  #
         assert cli.main([*words, "--now", "2026-04-20T08:00Z", *more]) == 0
         out = capsys.readouterr().out
         arrives.append(next(line for line in out.splitlines() if line.startswith("departs")))
-    assert out.startswith("measured: of 12 means of ten minutes 3.")
+    assert "\nmeasured: of 13 means of ten minutes 3." in out
     assert "m/s towards 000 are missing in the forecast" in out
     assert arrives[0] != arrives[1]
+
+
+def test_forecasts_that_are_dropped_into_a_folder_and_a_route_to_the_boat(shell, tmp_path, capsys):  # noqa: F811
+    from companion import cli
+
+    assert shell("--out", "m.toml")[0] == 0
+    words = [
+        "passage",
+        "again",
+        "p.toml",
+        "m.toml",
+        "--folder",
+        "drop",
+        "--from",
+        "50.0,-5.9",
+        "--now",
+        "2026-04-20T08:00Z",
+    ]
+    assert cli.main(words) == 2
+    folder = tmp_path / "drop"
+    folder.mkdir()
+    (folder / "half.grb2.part").write_bytes(b"GRIB")
+    assert cli.main(words) == 2
+    assert [line.split(": ", 1)[1] for line in capsys.readouterr().err.splitlines() if "drop" in line] == [
+        "drop: is no folder; name the one that forecasts are dropped into",
+        "drop: holds no forecast; drop one into it",
+    ]
+    for base in ("2026-04-20T00:00", "2026-04-20T06:00"):
+        data = b"".join(wind_2(LAT, LON, h, 0.0, -8.0, base=base) for h in range(0, 49, 6))
+        (folder / f"{base[-5:-3]}.grb2").write_bytes(data)
+    assert cli.main(["key", "new", "far.key"]) == 0
+    capsys.readouterr()
+    assert cli.main([*words, "--far-out", "r.sbd"]) == 2
+    assert "--far-out and --far-key go together" in capsys.readouterr().err.replace(":", "")
+    assert cli.main([*words, "--far-out", "r.sbd", "--far-key", "far.key"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("forecast of 2026-04-20T06:00Z, 2 h old, until 2026-04-22T06:00Z\n")
+    sent = (tmp_path / "r.sbd").read_bytes()
+    assert f"r.sbd: written, {len(sent)} bytes: {sent.hex()}" in out
+    (tmp_path / "new.toml").unlink(missing_ok=True)
+    made = ["far", "route", "r.sbd", "--key", "far.key"]
+    assert cli.main([*made, "--mission", "m.toml", "--out", "new.toml"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("route of 2026-04-20T08:00Z, by a forecast of 2026-04-20T06:00Z with 1 member: ")
+    from companion.geofence import load_mission
+
+    old, new = (load_mission(tmp_path / name) for name in ("m.toml", "new.toml"))
+    assert new.start.lon_deg == pytest.approx(-5.9, abs=2e-5)
+    assert (new.goals[-1].name, new.goals[-1].radius_m) == ("landfall", old.goals[-1].radius_m)
+    assert 1 <= len(new.goals) <= len(old.goals)
+    assert new.goals[-1].point.lon_deg == pytest.approx(old.goals[-1].point.lon_deg, abs=2e-5)
+    assert all(0.0 < goal.bandwidth_m <= 2000.0 for goal in new.goals)
+    assert cli.main([*made, "--mission", "m.toml", "--out", "drop/new.toml"]) == 2
+    assert "is in another folder" in capsys.readouterr().err

@@ -20,28 +20,35 @@ from companion.orders.far.order import (
     unpack_beginning,
     unpack_order,
 )
+from companion.orders.far.route import MOST_BYTES, FarPlace, FarRoute, bands_m, pack_route, unpack_route
 from companion.orders.far.status import FarStatus, pack_status, unpack_status
 
 __all__ = [
     "BEGINNING_SIZE",
+    "MOST_BYTES",
     "MOST_COUNTER",
     "MOST_JUMP",
     "WINDOW",
     "Beginning",
     "FarKey",
     "FarOrder",
+    "FarPlace",
+    "FarRoute",
     "FarStatus",
     "Reply",
     "Taken",
+    "bands_m",
     "begun",
     "judged",
     "minutes_of",
     "pack_beginning",
     "pack_order",
+    "pack_route",
     "pack_status",
     "reply_of",
     "unix_of",
     "unpack_beginning",
     "unpack_order",
+    "unpack_route",
     "unpack_status",
 ]
