@@ -334,7 +334,7 @@ def _plan(args: argparse.Namespace) -> int:
         from companion.plots.passage import save_passage
 
         with patience("drawing"):
-            save_passage(passage, route, asked.name or args.file.stem, args.plot)
+            save_passage(passage, route, asked.name or args.file.stem, args.plot, found)
         print(f"{args.plot}: written")
     if not math.isfinite(route.time_s):
         return JobError.exit_code
@@ -380,6 +380,7 @@ def _read(
     weather = read_weather([path.parent / name for name in asked.weather.files], box)
     depart = asked.depart.at.timestamp() if departs_utc_s is None else departs_utc_s
     _check_weather(asked, weather, source, depart)
+    weather = _doubted(asked, weather)
     boat = asked.boat
     craft = craft_of(
         polar_named(boat, path),
@@ -409,6 +410,26 @@ def _read(
         lee_shore_m=asked.limits.lee_shore_m or 0.0,
         energy=_energy(asked),
     )
+
+
+def _doubted(asked: PassageFile, weather: Weather) -> Weather:
+    """Return a forecast dressed with its error, and gone on with the wind of the season, where the file says so."""
+    from companion.weather import Climate, ForecastError, continued, dressed, iso
+    from companion.words import counted
+
+    said, season = asked.weather, asked.climate
+    if said.error_mps or said.error_mps_per_day:
+        error = ForecastError(now_mps=said.error_mps, per_day_mps=said.error_mps_per_day)
+        weather = dressed(weather, error)
+        print(f"dressed with its own error: {counted(len(weather.members), 'member')}, wider with the age of the run")
+    if season is not None:
+        towards = math.radians(season.from_deg) + math.pi
+        mean = (season.mean_mps * math.sin(towards), season.mean_mps * math.cos(towards))
+        last = max(float(cube.utc_s[-1]) for cube in weather.wind)
+        climate = Climate(wind_en_mps=mean, spread_mps=season.spread_mps)
+        weather = continued(weather, climate, last + season.days * 86_400.0)
+        print(f"from {iso(last)} on it is climatology, and no forecast")
+    return weather
 
 
 def _energy(asked: PassageFile) -> Energy | None:

@@ -22,6 +22,7 @@ examples:
   companion weather show ensemble.grb2 stations.toml --at 50.8,-1.3
   companion weather tide stations.toml --at 50.8,-1.3 --from 2026-04-20T00:00Z --to 2026-04-22T00:00Z --out tide.csv
   companion weather tide stations.toml --stream --at 50.8,-1.3 --from 2026-04-20T00:00Z --to 2026-04-22T00:00Z
+  companion weather error run00.grb2 run12.grb2 run24.grb2
   companion weather show ensemble.grb2 --box 48,-12,56,2 --at 50,-6 --plot weather.png
 
 Reads GRIB 1 and 2 on grids of latitudes and longitudes: wind of 10 m, gusts, wave heights, surface currents; several
@@ -37,7 +38,7 @@ Exit codes: 0 told, 2 a file that cannot be believed, or a place that it says no
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], summary: str) -> None:
     """Add the command with its verb."""
     parser = add_command(subparsers, "weather", summary, _EPILOG)
-    verbs = parser.add_subparsers(dest="verb", metavar="show|tide", required=True)
+    verbs = parser.add_subparsers(dest="verb", metavar="show|tide|error", required=True)
     show = verbs.add_parser("show", help="say what, where, when, how many members, and what is missing")
     show.add_argument("files", metavar="FILE", nargs="+", type=Path)
     show.add_argument("--at", type=place, metavar="LAT,LON", help="tell the hours of one place")
@@ -57,6 +58,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     tide.add_argument("--out", metavar="CSV", type=out_file, help="write it there (it is printed)")
     force_option(tide)
     tide.set_defaults(run=_tide)
+    error = verbs.add_parser("error", help="by how much successive runs are off, as a passage's [weather] is dressed")
+    error.add_argument("files", metavar="RUN", nargs="+", type=Path, help="a run in each file, two at the least")
+    error.add_argument("--box", type=_box, metavar="S,W,N,E", help="read this part only [deg]")
+    error.set_defaults(run=_error)
 
 
 def _box(text: str) -> Box:
@@ -145,6 +150,30 @@ def _tide(args: argparse.Namespace) -> int:
         key = "[current] table" if args.stream else "[area] tide"
         write_files({str(args.out): ("\n".join(rows) + "\n").encode()}, force=args.force)
         print(f"{args.out}: written, {len(rows) - 1} rows: name it in {key} of a mission")
+    return 0
+
+
+def _error(args: argparse.Namespace) -> int:
+    """Print by how much runs are off, held against the beginnings of later ones, and the keys of a passage for it."""
+    from companion.weather import errors_of, fitted, read_weather
+
+    runs = [read_weather([path], args.box) for path in args.files]
+    for path, run in zip(args.files, runs, strict=True):
+        if not run.wind:
+            raise InputError(str(path), "", "holds no wind of 10 m", "name runs of a forecast of wind")
+    errors = errors_of(runs)
+    try:
+        error = fitted(errors)
+    except ValueError as problem:
+        names = ", ".join(map(str, args.files))
+        remedy = "name three runs or more of one area, each longer than the time between them"
+        raise InputError(names, "", f"{problem} at which a run meets a later one", remedy) from None
+    print("lead [h]  off by [m/s]  members' spread [m/s]  (of a component)")
+    for lead in sorted({round(float(row[0])) for row in errors}):
+        here = errors[abs(errors[:, 0] - lead) < 1.0]
+        print(f"{lead / 3600.0:7.1f}  {here[:, 1].mean() ** 0.5:12.2f}  {here[:, 2].mean() ** 0.5:21.2f}")
+    print("what members do not explain of it, for a passage's file:")
+    print(f"[weather]\nerror_mps = {error.now_mps:.2f}\nerror_mps_per_day = {error.per_day_mps:.2f}")
     return 0
 
 

@@ -48,6 +48,20 @@ class WeatherOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """``[weather]``: the forecasts, beside the passage's file; wind and, where they have it, the current."""
 
     files: Annotated[tuple[str, ...], Meta(min_length=1)]
+    error_mps: Annotated[float, Meta(ge=0.0, le=20.0)] = 0.0
+    """The deviation of a component of the wind from what a member says, at the time of its run ..."""
+    error_mps_per_day: Annotated[float, Meta(ge=0.0, le=20.0)] = 0.0
+    """... and what each day ahead adds to it: `companion weather error` tells both of successive runs."""
+
+
+class ClimateOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """``[climate]``: the wind of the season, in which she sails past the forecast's end."""
+
+    from_deg: Annotated[float, Meta(ge=0.0, le=360.0)]
+    mean_mps: Annotated[float, Meta(ge=0.0, le=60.0)]
+    """Of the vectors: where it blows from everywhere, little."""
+    spread_mps: Annotated[float, Meta(ge=0.0, le=30.0)]
+    days: Annotated[float, Meta(gt=0.0, le=60.0)] = 20.0
 
 
 class SailingOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -96,6 +110,7 @@ class PassageFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     sailing: SailingOptions = SailingOptions()
     limits: LimitOptions = LimitOptions()
     energy: EnergyOptions | None = None
+    climate: ClimateOptions | None = None
 
 
 def parse_passage(text: str, source: str) -> PassageFile:

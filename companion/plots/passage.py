@@ -13,6 +13,7 @@ import shapely
 
 from companion.geo import MPS_PER_KNOT
 from companion.passage import Departure, Passage, Route, shown
+from companion.passage.mission import mission_of
 from companion.plots.chart import legend_above, save
 from companion.weather import iso
 from companion.words import counted
@@ -25,16 +26,20 @@ _BARBS = 28
 _LINES = 16
 
 
-def save_passage(passage: Passage, route: Route, name: str, path: Path) -> None:
+def save_passage(passage: Passage, route: Route, name: str, path: Path, of: Departure | None = None) -> None:
     """Write the picture; see ``passage_figure``. Raises InputError where it cannot be written."""
-    save(passage_figure(passage, route, name), path)
+    save(passage_figure(passage, route, name, of), path)
 
 
-def passage_figure(passage: Passage, route: Route, name: str) -> Figure:
-    """Return a route that was found, drawn in longitudes that run on over the date line."""
-    figure, (chart, hours) = plt.subplots(2, 1, figsize=(11.0, 11.0), height_ratios=(3.0, 1.0), layout="constrained")
+def passage_figure(passage: Passage, route: Route, name: str, of: Departure | None = None) -> Figure:
+    """Return a route that was found, drawn in longitudes that run on over the date line; ``of`` are all its runs."""
+    several = of is not None and len(of.runs) > 1
+    figure = plt.figure(figsize=(11.0, 13.0 if several else 11.0), layout="constrained")
+    chart, hours, *more = figure.subplots(3 if several else 2, 1, height_ratios=(3.0, 1.0, 0.6)[: 3 if several else 2])
     _draw_chart(chart, passage, route)
     _draw_hours(hours, passage, route)
+    if of is not None and several:
+        _draw_arrivals(more[0], of)
     sailed = route.sailed
     assert sailed is not None
     figure.suptitle(
@@ -100,12 +105,17 @@ def _draw_chart(axes: Axes, passage: Passage, route: Route) -> None:
             there = passage.frame.geo_from_xy(np.asarray(part.exterior.coords))
             axes.fill(_lon(passage, there[1]), there[0], color="0.75", ec="0.4", lw=0.6, zorder=3)
     axes.plot(lon, lat, color="tab:red", lw=2.0, zorder=4, label="route")
+    _draw_band(axes, passage, route)
     ends = _lon(passage, [p.lon_deg for p in route.waypoints])
     axes.plot(ends, [p.lat_deg for p in route.waypoints], "o", color="k", ms=4, zorder=5, label="waypoints")
     chosen = np.unique(np.linspace(0, len(lat) - 1, _BARBS).astype(int))
     row = passage.weather.members.index(sailed.member)
     wind = passage.weather.wind_en_mps(sailed.rows[chosen, 0], lat[chosen], lon[chosen])[row] / MPS_PER_KNOT
     axes.barbs(lon[chosen], lat[chosen], wind[:, 0], wind[:, 1], length=6, lw=0.8, color="tab:blue", zorder=6)
+    if passage.weather.has_current:
+        flow = np.nan_to_num(passage.weather.current_en_mps(sailed.rows[chosen, 0], lat[chosen], lon[chosen]))
+        axes.quiver(lon[chosen], lat[chosen], flow[:, 0], flow[:, 1], color="tab:green", width=0.002, zorder=6,
+                    label=f"current as she passes, up to {np.hypot(*flow.T).max():.1f} m/s")  # fmt: skip
     room = 0.15 * max(np.ptp(lat), np.ptp(lon), 0.2)
     axes.set_xlim(lon.min() - room, lon.max() + room)
     axes.set_ylim(lat.min() - room, lat.max() + room)
@@ -113,6 +123,30 @@ def _draw_chart(axes: Axes, passage: Passage, route: Route) -> None:
     axes.set_xlabel("longitude [deg]")
     axes.set_ylabel("latitude [deg]")
     legend_above(axes)
+
+
+def _draw_band(axes: Axes, passage: Passage, route: Route) -> None:
+    """Draw the band about each leg, as the mission of it has."""
+    goals = mission_of(route, passage, "")["goal"]
+    label = "band"
+    for a, b, goal in zip(route.waypoints[:-1], route.waypoints[1:], goals, strict=True):
+        leg = shapely.linestrings(passage.frame.xy_from_geo([a.lat_deg, b.lat_deg], [a.lon_deg, b.lon_deg]))
+        ring = shapely.buffer(leg, goal["bandwidth_m"])
+        there = passage.frame.geo_from_xy(np.asarray(ring.exterior.coords))
+        axes.fill(_lon(passage, there[1]), there[0], color="tab:red", alpha=0.12, lw=0, zorder=2, label=label)
+        label = "_"
+
+
+def _draw_arrivals(axes: Axes, of: Departure) -> None:
+    """Draw when the runs of all members and shares of her speeds arrive, and say what keeps the others."""
+    there = [run.time_s / 3600.0 for run in of.runs if run.arrived]
+    axes.hist(there, bins=min(20, max(4, len(there) // 3)), color="tab:blue", alpha=0.6)
+    failed = [run for run in of.runs if not run.arrived]
+    binds = f"; {len(failed)} do not: {max(failed, key=lambda run: run.is_too_much).why}" if failed else ""
+    axes.set_title(f"{len(there)} of {len(of.runs)} runs arrive{binds}", fontsize=9, loc="right")
+    axes.set_xlabel("hours under way")
+    axes.set_ylabel("runs")
+    axes.grid(alpha=0.3)
 
 
 def _draw_hours(axes: Axes, passage: Passage, route: Route) -> None:

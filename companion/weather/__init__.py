@@ -4,6 +4,7 @@
 """
 
 from companion.weather.assemble import Box, assemble
+from companion.weather.dressing import Climate, ForecastError, continued, dressed, errors_of, fitted
 from companion.weather.grib import GribField, Grid, Quantity, walk
 from companion.weather.harmonics import KNOWN, constituent_named, phasors
 from companion.weather.measured import Measured, Off, corrected, off_by
@@ -16,7 +17,9 @@ from companion.weather.weather import Cube, Weather, holes_of, iso
 __all__ = [
     "KNOWN",
     "Box",
+    "Climate",
     "Cube",
+    "ForecastError",
     "GribField",
     "Grid",
     "Measured",
@@ -26,7 +29,11 @@ __all__ = [
     "Weather",
     "assemble",
     "constituent_named",
+    "continued",
     "corrected",
+    "dressed",
+    "errors_of",
+    "fitted",
     "holes_of",
     "iso",
     "off_by",

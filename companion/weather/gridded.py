@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import PurePath
 
 import numpy as np
@@ -191,7 +190,8 @@ def _unix_s(times: Stored, source: str) -> Floats:
         clock = (found[3] or "00:00:00").rstrip("zZ").split(".")[0]
         year, month, day = (int(part) for part in found[2].rstrip("zZ").split("t")[0].split("-"))
         hour, minute, second = (int(part) for part in (*clock.split(":"), "0", "0")[:3])
-        begins = datetime(year, month, day, hour, minute, second, tzinfo=UTC).timestamp()
+        said = f"{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}"
+        begins = float(np.datetime64(said, "s").astype(np.int64))
     except ValueError:
         raise InputError(
             source, times.name, f"counts from {found[2]!r}, which is no date", "write 1970-01-01"

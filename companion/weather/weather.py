@@ -166,7 +166,8 @@ def _between(axis: Floats, at: Floats, tight: float) -> tuple[NDArray[np.int64],
 class Weather:
     """A forecast of one or several files: cubes of the wind and, where there are, of gusts, waves, current, and tides.
 
-    Of several grids the finest that knows a place and time is asked. ``notes`` are what else was found.
+    Of several grids the finest that knows a place and time is asked. ``notes`` are what else was found. From
+    ``climate_from_s`` on it is climatology, and no forecast.
     """
 
     wind: tuple[Cube, ...]
@@ -175,6 +176,7 @@ class Weather:
     current: tuple[Cube, ...] = ()
     tides: tuple[Tides, ...] = ()
     notes: tuple[str, ...] = ()
+    climate_from_s: float = math.inf
 
     @property
     def members(self) -> tuple[int, ...]:

@@ -168,3 +168,32 @@ def test_forecasts_that_are_dropped_into_a_folder_and_a_route_to_the_boat(shell,
     assert all(0.0 < goal.bandwidth_m <= 2000.0 for goal in new.goals)
     assert cli.main([*made, "--mission", "m.toml", "--out", "drop/new.toml"]) == 2
     assert "is in another folder" in capsys.readouterr().err
+
+
+def test_runs_that_are_off_and_the_season_past_their_end(shell, tmp_path, capsys):  # noqa: F811
+    """What successive runs are off by dresses the members; a forecast that ends too early goes on as climatology."""
+    from companion import cli
+
+    for k, (base, north) in enumerate(
+        (("2026-04-20T00:00", -5.0), ("2026-04-20T12:00", -6.0), ("2026-04-21T00:00", -4.0))
+    ):
+        data = b"".join(wind_2(LAT, LON, h, 0.0, north, base=base) for h in range(0, 37, 6))
+        (tmp_path / f"run{k}.grb2").write_bytes(data)
+    assert cli.main(["weather", "error", "run0.grb2", "run1.grb2", "run2.grb2"]) == 0
+    out = capsys.readouterr().out.splitlines()
+    # Components: 1 and 2 m/s to the north at 12 h, 1 at 24 h, nothing to the east.
+    assert out[1].split() == ["12.0", f"{(2.5 / 2.0) ** 0.5:.2f}", "0.00"]
+    assert out[2].split() == ["24.0", f"{0.5**0.5:.2f}", "0.00"]
+    assert out[-3] == "[weather]"
+    assert cli.main(["weather", "error", "run0.grb2"]) == 2
+    assert "fewer than two leads" in capsys.readouterr().err
+    assert shell()[0] == 0
+    capsys.readouterr()
+    text = (tmp_path / "p.toml").read_text()
+    named = text.replace("[weather]\n", "[weather]\nerror_mps = 0.5\nerror_mps_per_day = 1.0\n")
+    (tmp_path / "q.toml").write_text(named + "\n[climate]\nfrom_deg = 0.0\nmean_mps = 5.0\nspread_mps = 1.0\n")
+    assert cli.main(["passage", "plan", "q.toml"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith("dressed with its own error: 9 members, wider with the age of the run\nfrom 2026-04-2")
+    assert " on it is climatology, and no forecast\n" in out
+    assert "in 9 members" in out

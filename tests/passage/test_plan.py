@@ -88,6 +88,28 @@ def test_the_members_fan_is_drawn(tmp_path):
     plt.close(figure)
 
 
+def test_band_currents_and_arrivals_are_drawn():
+    import matplotlib.pyplot as plt
+
+    from companion.passage import sweep
+    from companion.plots.passage import passage_figure
+    from tests.passage.world import HOURS, T0, cube, passage, place, steady
+    from tests.passage.world import LAT as LAT0
+    from tests.passage.world import LON as LON0
+
+    wind = cube(LAT0, LON0, HOURS, [steady(0.0, -5.0), steady(0.0, -6.0), steady(0.0, -14.0)])
+    stream = cube(LAT0, LON0, HOURS, steady(0.4, 0.3))
+    asked = passage(place(0.0, 0.0), place(0.0, 0.4), wind=wind, stream=stream, max_tws_mps=12.0)
+    [found] = sweep(asked, [T0], 0.0, nodes=20)
+    figure = passage_figure(asked, found.route, "all", found)
+    chart, _, arrivals = figure.axes
+    words = [text.get_text() for text in chart.get_legend().get_texts()]
+    assert words == ["route", "band", "waypoints", "current as she passes, up to 0.5 m/s"]
+    assert arrivals.get_title(loc="right").startswith("2 of 3 runs arrive; 1 do not: 14.0 m/s of wind is more")
+    assert sum(patch.get_height() for patch in arrivals.patches) == 2
+    plt.close(figure)
+
+
 def test_a_current_of_another_file_and_grid_is_sailed_in(shell, tmp_path):
     """Another program read the second file's current wrong: 0.5 m/s fair, of cells of its own and every three hours."""
     lat, lon = np.linspace(49.0, 51.0, 21), np.linspace(-7.0, -4.0, 16)
