@@ -188,12 +188,23 @@ def _rate(w: Waters, craft: Craft, x: float, y: float, t: float, ux: float, uy: 
         if wt == 0.0:
             continue
         for dy in range(2):
+            wy_t = wt * (fy if dy else 1.0 - fy)
+            if wy_t == 0.0:
+                continue
+            if fx != 1.0:
+                weight = wy_t * (1.0 - fx)
+                wx += weight * w.wind[k + dt, j + dy, i, 0]
+                wy += weight * w.wind[k + dt, j + dy, i, 1]
+            if fx != 0.0:
+                weight = wy_t * fx
+                wx += weight * w.wind[k + dt, j + dy, i + 1, 0]
+                wy += weight * w.wind[k + dt, j + dy, i + 1, 1]
+            if not (w.has_stream or w.has_waves):
+                continue
             for dx in range(2):
-                weight = wt * (fy if dy else 1.0 - fy) * (fx if dx else 1.0 - fx)
+                weight = wy_t * (fx if dx else 1.0 - fx)
                 if weight == 0.0:
                     continue
-                wx += weight * w.wind[k + dt, j + dy, i + dx, 0]
-                wy += weight * w.wind[k + dt, j + dy, i + dx, 1]
                 if w.has_stream:
                     cx += weight * w.stream[k + dt, j + dy, i + dx, 0]
                     cy += weight * w.stream[k + dt, j + dy, i + dx, 1]
@@ -348,13 +359,16 @@ def labels(
 
 
 @kernel
-def polyline(w: Waters, craft: Craft, xy_m: Floats, t: float, step_s: float) -> float:
-    """Return when she is at the last of the points [Unix s]; inf where wind is unknown or too strong."""
+def arrivals(w: Waters, craft: Craft, xy_m: Floats, t: float, step_s: float) -> Floats:
+    """Return when she is at each point of a polyline [s], who is at the first at ``t``; inf from where she cannot."""
+    out = np.full(xy_m.shape[0], math.inf)
+    out[0] = t
     for i in range(xy_m.shape[0] - 1):
         t, status = cross(w, craft, xy_m[i, 0], xy_m[i, 1], xy_m[i + 1, 0], xy_m[i + 1, 1], t, step_s)
         if status != KNOWN:
-            return math.inf
-    return t
+            break
+        out[i + 1] = t
+    return out
 
 
 @kernel

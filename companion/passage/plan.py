@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from companion.messages import GeoPoint
 from companion.passage.energy import Energy, within
 from companion.passage.frame import GEOD, Floats, PassageFrame, up_of
-from companion.passage.kernels import SLACK, STENCIL, Craft, Waters, labels, polyline
+from companion.passage.kernels import SLACK, STENCIL, Craft, Waters, arrivals, labels
 from companion.passage.land import Land
 from companion.passage.replay import Sailed, sail
 from companion.weather import Weather
@@ -127,9 +127,14 @@ def waters_of(
     heights = np.full(shape[:3] if passage.weather.waves else (1, 1, 1), np.nan, dtype=np.float32)
     here = np.ones(lat.shape, dtype=bool) if mask is None else mask
     row = passage.weather.members.index(member)
+    blows = passage.weather.only(member).wind_over(times, lat[here], lon[here])[0]
+    along, aside = (  # of a wind to the east
+        part.astype(np.float32)
+        for part in passage.frame.turned(np.ones(lat[here].size), np.zeros(lat[here].size), lat[here], lon[here])
+    )
+    wind[:, here, 0] = blows[..., 0] * along - blows[..., 1] * aside
+    wind[:, here, 1] = blows[..., 1] * along + blows[..., 0] * aside
     for k, t in enumerate(times):
-        blows = passage.weather.wind_en_mps(t, lat[here], lon[here])[row]
-        wind[k][here] = np.stack(passage.frame.turned(blows[:, 0], blows[:, 1], lat[here], lon[here]), axis=-1)
         if passage.weather.has_current:
             flows = passage.weather.current_en_mps(t, lat[here], lon[here])
             stream[k][here] = np.stack(passage.frame.turned(flows[:, 0], flows[:, 1], lat[here], lon[here]), axis=-1)
@@ -251,7 +256,7 @@ def _ends(passage: Passage, x_m: Floats, y_m: Floats) -> tuple[int, int]:
 
 def _step_s(step_m: float) -> float:
     """Return the longest step of time that an edge of the grid is crossed by [s]."""
-    return min(3600.0, max(300.0, step_m / 2.0 / _STEPS_AN_EDGE))
+    return min(7200.0, max(300.0, step_m / 2.0 / _STEPS_AN_EDGE))
 
 
 def _search(
@@ -331,23 +336,24 @@ def _grown(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _straightened(passage: Passage, waters: Waters, path: Floats, depart_s: float, step_s: float) -> Floats:
     """Return fewer points that are reached no later: left out where they can be, moved across the way where it pays."""
     points = path
-
-    def time(of: Floats) -> float:
-        return polyline(waters, passage.craft, of, depart_s, step_s)
-
-    best = time(points)
+    when = arrivals(waters, passage.craft, points, depart_s, step_s)
     reach_m = 4.0 * waters.step_m
     for sweep in range(10):
         for leave_out in (True, False):
             i = 1
             while i < len(points) - 1:
-                tries = [np.delete(points, i, axis=0)] if leave_out else _moved(points, i, reach_m)
-                for tried in tries:
-                    around = tried[max(0, i - 1) : i + 2]
-                    when = time(tried)
-                    slack = 1e-5 * (best - depart_s) if leave_out else -1e-7 * (best - depart_s)
-                    if when <= best + slack and passage.land.is_free(_bent(passage.frame, around)):
-                        points, best = tried, min(best, when) if not leave_out else when
+                # Who is at the next point no later is nowhere later: the tries need not be sailed to the end.
+                least = (1e-5 if leave_out else -1e-7) * (when[-1] - depart_s)
+                before, after = points[i - 1 : i], points[i + 1 : i + 2]
+                for middle in (points[:0],) if leave_out else _moved(points, i, reach_m):
+                    around = np.concatenate([before, middle, after])
+                    there = arrivals(waters, passage.craft, around, when[i - 1], step_s)[-1]
+                    if there > when[i + 1] + least or not passage.land.is_free(_bent(passage.frame, around)):
+                        continue
+                    tried = np.concatenate([points[:i], middle, points[i + 1 :]])
+                    then = arrivals(waters, passage.craft, tried, depart_s, step_s)
+                    if then[-1] <= when[-1] + max(0.0, least):
+                        points, when = tried, then
                         break
                 else:
                     i += 1
@@ -359,15 +365,10 @@ def _straightened(passage: Passage, waters: Waters, path: Floats, depart_s: floa
     return points
 
 
-def _moved(points: Floats, i: int, reach_m: float) -> list[Floats]:
+def _moved(points: Floats, i: int, reach_m: float) -> tuple[Floats, Floats]:
     along = points[i + 1] - points[i - 1]
-    normal = np.array([-along[1], along[0]]) / max(1e-9, float(np.hypot(*along)))
-    out = []
-    for side in (1.0, -1.0):
-        tried = points.copy()
-        tried[i] += side * reach_m * normal
-        out.append(tried)
-    return out
+    normal = reach_m * np.array([-along[1], along[0]]) / max(1e-9, float(np.hypot(*along)))
+    return points[i : i + 1] + normal, points[i : i + 1] - normal
 
 
 def is_free(passage: Passage, points: Sequence[GeoPoint]) -> bool:

@@ -30,8 +30,8 @@ class Sailed:
     """A route sailed in one member, by a ``share`` of her speeds.
 
     ``rows`` are (time [Unix s], way [m], speed made good, wind [m/s], angle of the course to the wind [rad], night) by
-    steps of five minutes at the most, ``places`` (n, 2) the latitudes and longitudes to them [deg]. ``why`` is empty
-    where she arrived; ``is_too_much`` where it is wind, sea or a lee shore that ended it.
+    steps of five minutes at the most; ``line`` (m, 3) is the route in (way [m], latitude, longitude [deg]). ``why`` is
+    empty where she arrived; ``is_too_much`` where it is wind, sea or a lee shore that ended it.
     """
 
     member: int
@@ -39,9 +39,15 @@ class Sailed:
     why: str
     is_too_much: bool
     rows: Floats
-    places: Floats
+    line: Floats
     length_m: float
     share: float = 1.0
+
+    @property
+    def places(self) -> Floats:
+        """Return (n, 2): the latitude and longitude of each row [deg]."""
+        way, lat, lon = self.line.T
+        return np.stack([np.interp(self.rows[:, 1], way, lat), np.interp(self.rows[:, 1], way, lon)], axis=-1)
 
     @property
     def way_m(self) -> float:
@@ -88,7 +94,6 @@ def sail(
     last = max(float(cube.utc_s[-1]) for cube in weather.wind)
     times = np.concatenate([[first], weather.times_between(first, last), [last] if last > first else []])
     t, s = np.meshgrid(times, np.arange(way.size), indexing="ij")
-    wind = weather.wind_en_mps(t, lat[s], lon[s])
     shape = (times.size, way.size, 2)
     stream = np.zeros(shape)
     if weather.has_current:
@@ -96,12 +101,14 @@ def sail(
     up = up_of(lat, lon)
     height = weather.waves_m(t, lat[s], lon[s]) if weather.waves else None
     towards = np.zeros((way.size, 2)) if shore_en is None else shore_en(lat, lon)
+    line = np.stack([way, lat, np.unwrap(lon, period=360.0)], axis=-1)
     out = []
     for member in members:
         row = weather.members.index(member)
         waves = np.zeros(shape[:2]) if height is None else np.ascontiguousarray(height[row])
-        onshore = np.nan_to_num(np.sum(wind[row] * towards, axis=-1))
-        blows = _along(wind[row], course)
+        wind = weather.only(member).wind_over(times, lat, lon)[0].astype(np.float64)
+        onshore = np.nan_to_num(np.sum(wind * towards, axis=-1))
+        blows = _along(wind, course)
         for share in shares:
             rows, count, status = sail_line(
                 craft._replace(share=share * craft.share),
@@ -115,19 +122,16 @@ def sail(
                 depart_utc_s,
                 step_s,
             )
-            rows = rows[:count]
+            rows = rows[:count].copy()
             why = ""
             if status in _BROKEN:
                 why = _BROKEN[status].format(rows[-1, 3])
             elif status != KNOWN:
                 here = rows[-1] if count else np.array([depart_utc_s, 0.0])
-                at = (np.interp(here[1], way, lat), np.interp(here[1], way, np.unwrap(lon, period=360.0)))
+                at = (np.interp(here[1], way, lat), np.interp(here[1], way, line[:, 2]))
                 why = (
                     weather.why_unknown(float(here[0]) + step_s, float(at[0]), float(at[1])) or "not known any further"
                 )
-            places = np.stack(
-                [np.interp(rows[:, 1], way, lat), np.interp(rows[:, 1], way, np.unwrap(lon, period=360.0))], axis=-1
-            )
             out.append(
                 Sailed(
                     member=member,
@@ -135,7 +139,7 @@ def sail(
                     why=why,
                     is_too_much=status in _BROKEN,
                     rows=rows,
-                    places=places,
+                    line=line,
                     length_m=float(way[-1]),
                     share=share,
                 )

@@ -122,17 +122,22 @@ def _departure(
         routes.append(plan(mean, utc_s, nodes=nodes))
         chosen = _spread(passage, utc_s, routes[0], candidates)
     routes += [plan(passage, utc_s, member, nodes=nodes) for member in chosen]
-    each = [
-        (route, departure_of(passage, route.waypoints, utc_s, shares, route.bound_s))
-        for route in routes
-        if route.waypoints
-    ]
-    tried = [replace(d, route=replace(d.route, searched=route.searched)) for route, d in each if d.chance() > 0.0]
-    if not tried:
+    chosen_one: tuple[tuple[float, float], Route] | None = None
+    for route in routes:
+        if not route.waypoints:
+            continue
+        tried = departure_of(passage, route.waypoints, utc_s, shares)
+        rank = -min(sure, tried.chance(by_utc_s)), tried.mean_s()
+        if tried.chance() > 0.0 and (chosen_one is None or rank < chosen_one[0]):
+            chosen_one = rank, route
+        del tried  # the runs of weeks are large, and two of them are not kept
+    if chosen_one is None:
         last = next((route for route in routes if route.outcome is not Outcome.FOUND), routes[-1])
         why = last.outcome.value if last.sailed is None else last.sailed.why
         return Departure(utc_s=utc_s, route=last, runs=(), why=why)
-    return min(tried, key=lambda d: (-min(sure, d.chance(by_utc_s)), d.mean_s()))
+    route = chosen_one[1]
+    found = departure_of(passage, route.waypoints, utc_s, shares, route.bound_s)
+    return replace(found, route=replace(found.route, searched=route.searched))
 
 
 def _spread(passage: Passage, utc_s: float, first: Route, count: int) -> list[int]:

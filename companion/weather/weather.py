@@ -114,6 +114,39 @@ class Cube:
         out[:, ~(in_x & in_y & in_t)] = math.nan
         return out.reshape(len(self.members), *shape, self.values.shape[4])
 
+    def over(self, utc_s: Floats, lat_deg: Floats, lon_deg: Floats) -> NDArray[np.float32]:
+        """Return (m, t, n, k) at each of t times and n places: what ``at`` says, looked up once for all times."""
+        past = np.mod(lon_deg - self.lon_deg[0], _ROUND_DEG)
+        past = np.where(past > _ROUND_DEG - _TIGHT_DEG, 0.0, past)  # a hair west of the first column
+        x, fx, in_x = self._across(past)
+        y, fy, in_y = _between(self.lat_deg, lat_deg, _TIGHT_DEG)
+        t, ft, in_t = _between(self.utc_s, utc_s, 1e-3)
+        for begins, ends in self.holes_s():
+            in_t &= (utc_s <= begins) | (utc_s >= ends)
+        ft, columns = ft.astype(np.float32), self.lon_deg.size
+        first, last = int(t.min()), min(int(t.max()) + 1, self.utc_s.size - 1)
+        flat = self.values[:, first : last + 1].reshape(len(self.members), last + 1 - first, -1, self.values.shape[4])
+        known = np.zeros((len(self.members), last + 1 - first, lat_deg.size, self.values.shape[4]), dtype=np.float32)
+        for dy, wy in ((0, 1.0 - fy), (1, fy)):
+            for dx, wx in ((0, 1.0 - fx), (1, fx)):
+                weight = (wy * wx).astype(np.float32)[:, None]
+                yi = np.minimum(y + dy, self.lat_deg.size - 1)
+                xi = (x + dx) % columns if self.is_round else np.minimum(x + dx, columns - 1)
+                part = weight * flat.take(yi * columns + xi, axis=2)
+                known += part if bool(np.all(weight > 0.0)) else np.where(weight > 0.0, part, np.float32(0.0))
+        known[:, :, ~(in_x & in_y)] = math.nan
+        out = np.empty((len(self.members), utc_s.size, lat_deg.size, self.values.shape[4]), dtype=np.float32)
+        for n, (k, share) in enumerate(zip(t - first, ft, strict=True)):
+            if not in_t[n]:
+                out[:, n] = math.nan
+            elif share == 0.0:
+                out[:, n] = known[:, k]
+            elif share == 1.0:
+                out[:, n] = known[:, k + 1]
+            else:
+                out[:, n] = (1.0 - share) * known[:, k] + share * known[:, k + 1]
+        return out
+
     def _across(self, past_deg: Floats) -> tuple[NDArray[np.int64], Floats, NDArray[np.bool_]]:
         if not self.is_round:
             return _between(self.lon_deg - self.lon_deg[0], past_deg, _TIGHT_DEG)
@@ -204,6 +237,19 @@ class Weather:
     def wind_en_mps(self, utc_s: ArrayLike, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
         """Return (m, n, 2): the motion of the air at n times and places, by ``members``; NaN where unknown."""
         return _asked(self.wind, self.members, 2, utc_s, lat_deg, lon_deg)
+
+    def wind_over(self, utc_s: Floats, lat_deg: Floats, lon_deg: Floats) -> NDArray[np.float32]:
+        """Return (m, t, n, 2): ``wind_en_mps`` at each of t times and n places."""
+        members = self.members
+        out = np.full((len(members), utc_s.size, lat_deg.size, 2), math.nan, dtype=np.float32)
+        for cube in self.wind:
+            rows = [members.index(m) for m in cube.members]
+            unknown = np.isnan(out[rows])
+            if unknown.all():
+                out[rows] = cube.over(utc_s, lat_deg, lon_deg)
+            elif unknown.any():
+                out[rows] = np.where(unknown, cube.over(utc_s, lat_deg, lon_deg), out[rows])
+        return out
 
     def gust_mps(self, utc_s: ArrayLike, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
         """Return (m, n) of the gusts' own members; NaN where unknown."""

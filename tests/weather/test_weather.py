@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.errors import InputError
-from companion.weather import Cube, assemble, holes_of, iso, walk
+from companion.weather import Cube, Weather, assemble, holes_of, iso, walk
 from tests.weather.grib_file import CURRENT_EAST, CURRENT_NORTH, GUST, WIND_EAST, message_1, message_2, wind_2
 
 LAT, LON = np.linspace(48.0, 52.0, 5), np.linspace(-8.0, 2.0, 11)
@@ -205,3 +205,29 @@ def test_one_member_or_their_mean():
     mean = weather.mean()
     assert mean.members == (0,)
     assert mean.wind_en_mps([T0, T0 + 3 * HOUR], 50.0, -3.0)[0, :, 1] == pytest.approx([-7.5, -9.0], abs=1e-3)
+
+
+def test_many_times_at_once_are_what_each_of_them_says():
+    """Over a finer grid that knows less, holes, edges, a bitmap and the date line; between times and on them."""
+    draw = np.random.default_rng(3)
+    lon = np.linspace(176.0, 184.0, 9)
+    values = draw.normal(0.0, 8.0, (2, 5, 5, 9, 2)).astype(np.float32)
+    values[0, 2, 1, 3] = math.nan
+    times = T0 + HOUR * np.array([0.0, 6.0, 12.0, 30.0, 36.0])
+    cube = Cube(utc_s=times, base_utc_s=np.full(5, T0), members=(0, 3), lat_deg=LAT.copy(), lon_deg=lon, values=values)
+    fine = Cube(
+        utc_s=times[1:3].copy(),
+        base_utc_s=np.full(2, T0),
+        members=(3,),
+        lat_deg=LAT[:2].copy(),
+        lon_deg=lon[:3].copy(),
+        values=draw.normal(0.0, 8.0, (1, 2, 2, 3, 2)).astype(np.float32),
+    )
+    weather = Weather(wind=(fine, cube))
+    lat = np.append(draw.uniform(47.5, 52.5, 60), [48.0, 50.0, 52.0])
+    east = np.append(draw.uniform(175.5, 184.5, 60), [176.0, -180.0, -176.0])
+    asked = T0 + HOUR * np.array([-1.0, 0.0, 1.5, 6.0, 9.0, 12.0, 20.0, 31.0, 36.0, 36.5])
+    found = weather.wind_over(asked, lat, east)
+    for k, t in enumerate(asked):
+        assert found[:, k] == pytest.approx(weather.wind_en_mps(t, lat, east), abs=1e-4, nan_ok=True)
+    assert 0.1 < np.isnan(found).mean() < 0.9
