@@ -1,8 +1,9 @@
-"""Run the bench: ``python -m sailbench plan``, ``sail`` and ``page``.
+"""Run the bench: ``python -m sailbench plan``, ``sail``, ``passages`` and ``page``.
 
     python -m sailbench plan --budgets 1 --seeds 2 --out planners.parquet
     python -m sailbench plan --planners auto mine:straight --out planners.parquet
     python -m sailbench sail --seeds 10 --out sailors.parquet
+    python -m sailbench passages --out passages.csv
     python -m sailbench page planners.parquet sailors.parquet --out leaderboard.html
 
 What a results file holds is not run again; its summary is printed. A planner is one function of its own module,
@@ -21,8 +22,9 @@ from typing import Any
 
 import companion
 from companion.errors import InputError
-from sailbench import board, plan_bench, sailors
+from sailbench import board, passage_bench, plan_bench, sailors
 from sailbench.environment import ENVIRONMENTS
+from sailbench.passage_set import SEASONS, WAYS
 from sailbench.planners import planner_named, present
 from sailbench.problem_set import answers, problems
 
@@ -52,6 +54,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     two.add_argument("--seeds", type=int, default=10, help="weathers (default: 10)")
     two.add_argument("--out", type=Path, metavar="FILE.parquet", help="keep the rows there")
     two.set_defaults(run=_sail)
+    four = commands.add_parser(
+        "passages", help="routers in the weather of weeks", epilog="example: python -m sailbench passages"
+    )
+    four.add_argument(
+        "--routers", nargs="+", default=list(passage_bench.ROUTERS), metavar="R", help="or MODULE:FUNCTION"
+    )
+    four.add_argument("--passages", nargs="+", metavar="P", help="of the twelve: " + ", ".join(w.name for w in WAYS))
+    four.add_argument("--seasons", nargs="+", default=list(SEASONS), metavar="S", choices=list(SEASONS))
+    four.add_argument("--out", type=Path, metavar="FILE.csv", help="keep the rows there")
+    four.set_defaults(run=_passages)
     three = commands.add_parser("page", help="the leaderboard", epilog="example: python -m sailbench page a.parquet")
     three.add_argument("results", nargs="+", type=Path, help="what --out wrote")
     three.add_argument("--out", type=Path, default=Path("leaderboard.html"), help="(default: leaderboard.html)")
@@ -89,6 +101,21 @@ def _sail(args: argparse.Namespace) -> None:
     print("| " + " | ".join(sailors.HEADS) + " |\n" + "|---" * len(sailors.HEADS) + "|")
     for cells in sailors.lines(all_rows):
         print("| " + " | ".join(cells) + " |")
+
+
+def _passages(args: argparse.Namespace) -> None:
+    routers = {name: passage_bench.router_named(name) for name in args.routers}
+    unknown = set(args.passages or ()) - {w.name for w in WAYS}
+    if unknown:
+        raise InputError("--passages", min(unknown), "there is no such passage", ", ".join(w.name for w in WAYS))
+    ways = [w for w in WAYS if args.passages is None or w.name in args.passages]
+    held = passage_bench.read(args.out) if args.out is not None and args.out.exists() else []
+    made = {row.key for row in held}
+    for row in passage_bench.rows(routers, ways=ways, seasons=args.seasons, is_made=lambda key: key in made):
+        held.append(row)
+        if args.out is not None:
+            passage_bench.write(args.out, held)
+    print(passage_bench.table(held))
 
 
 def _page(args: argparse.Namespace) -> None:
