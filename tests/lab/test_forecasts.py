@@ -1,4 +1,4 @@
-"""Does a forecast help: four ways to sail a departure, and the table of them."""
+"""Does a forecast help: five ways to sail a departure, and the table of them."""
 
 import math
 
@@ -54,16 +54,16 @@ def test_the_table_compares_the_same_departures_and_counts_who_did_not_arrive():
     rows = [
         f.Row(departure=d, way=way, days=days, strong_h=1.0, distance_nm=100.0)
         for d, four in enumerate([(10.0, 10.5, 9.0, 8.0), (20.0, 19.0, 19.0, 16.0)])
-        for way, days in zip(f.WAYS, four, strict=True)
+        for way, days in zip(f.WAYS[1:], four, strict=True)
     ]
     rows += [f.Row(departure=2, way=way, days=math.inf, strong_h=4.0, distance_nm=9.0) for way in f.WAYS]
-    rows += [f.Row(departure=3, way=way, days=math.inf, strong_h=0.0, distance_nm=9.0) for way in f.WAYS[:3]]
+    rows += [f.Row(departure=3, way=way, days=math.inf, strong_h=0.0, distance_nm=9.0) for way in f.WAYS[1:4]]
     rows.append(f.Row(departure=3, way="foresight", days=12.0, strong_h=0.0, distance_nm=90.0))
     said = f.table(rows).splitlines()
-    assert said[2] == "| fixed | 2 of 4 | 15.0 | 20.0 |  |  |  | 1.5 |"
-    assert said[3].startswith("| season | 2 of 4 | 14.8 | 19.0 | 0.0 % |")
-    assert said[4] == "| forecast | 2 of 4 | 14.0 | 19.0 | 7.5 % | 2.6 to 12.4 | 2 | 1.5 |"
-    assert said[5] == "| foresight | 3 of 4 | 12.0 | 16.0 | 20.0 % | 20.0 to 20.0 | 2 | 1.5 |"
+    assert said[3] == "| fixed | 2 of 4 | 15.0 | 20.0 |  |  |  | 1.5 |"
+    assert said[4].startswith("| season | 2 of 4 | 14.8 | 19.0 | 0.0 % |")
+    assert said[5] == "| forecast | 2 of 4 | 14.0 | 19.0 | 7.5 % | 2.6 to 12.4 | 2 | 1.5 |"
+    assert said[6] == "| foresight | 3 of 4 | 12.0 | 16.0 | 20.0 % | 20.0 to 20.0 | 2 | 1.5 |"
 
 
 def test_rows_that_the_file_holds_are_not_sailed_again(tmp_path, capsys, monkeypatch):
