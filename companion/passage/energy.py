@@ -30,7 +30,7 @@ class Energy:
 def left_wh(energy: Energy, run: Sailed) -> Floats:
     """Return what is left in the battery at each row of a run [Wh]."""
     t = run.rows[:, 0]
-    up = up_of(run.places[:, 0], run.places[:, 1])
+    up = up_of(*run.places.T)
     height = np.array([max(0.0, float(np.dot(up[i], sun(float(s))))) for i, s in enumerate(t)])
     gain_w = energy.solar_w * height - np.where(run.rows[:, 5] > 0.5, energy.night_w, energy.day_w)
     hours = np.diff(t) / 3600.0
@@ -54,6 +54,4 @@ def within(energy: Energy, run: Sailed) -> Sailed:
         return run
     end = int(low[0])
     why = f"the battery is down to {energy.reserve_wh:g} Wh after {(run.rows[end, 0] - run.rows[0, 0]) / 3600.0:.0f} h"
-    return replace(
-        run, arrived=False, why=why, is_too_much=True, rows=run.rows[: end + 1], places=run.places[: end + 1]
-    )
+    return replace(run, arrived=False, why=why, is_too_much=True, rows=run.rows[: end + 1])
