@@ -174,9 +174,9 @@ def test_what_cannot_be_read_or_grounds_nothing_is_one_line(tmp_path):
         mission_of(other, Path("sitl/scenarios/upwind.toml"))
 
 
-def test_the_embedded_autopilot_and_the_real_one_have_a_bottom_the_live_one_has_none():
-    assert RealBoat.cannot_be(scenario_with()) == []
-    assert SimulatedBoat.cannot_be(scenario_with()) == ["[bottom]"]
+@pytest.mark.parametrize("boat", [RealBoat, SimulatedBoat])
+def test_every_boat_has_a_bottom(boat):
+    assert boat.cannot_be(scenario_with()) == []
 
 
 def test_a_boat_that_runs_onto_a_bank_fails_her_scenario(tmp_path):
