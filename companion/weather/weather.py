@@ -93,13 +93,9 @@ class Cube:
         utc, lat, lon = (np.asarray(a, dtype=np.float64) for a in np.broadcast_arrays(utc_s, lat_deg, lon_deg))
         shape = utc.shape
         utc, lat, lon = utc.ravel(), lat.ravel(), lon.ravel()
-        past = np.mod(lon - self.lon_deg[0], _ROUND_DEG)
-        past = np.where(past > _ROUND_DEG - _TIGHT_DEG, 0.0, past)  # a hair west of the first column
-        x, fx, in_x = self._across(past)
+        x, fx, in_x = self._across(lon)
         y, fy, in_y = _between(self.lat_deg, lat, _TIGHT_DEG)
-        t, ft, in_t = _between(self.utc_s, utc, 1e-3)
-        for begins, ends in self.holes_s():
-            in_t &= (utc <= begins) | (utc >= ends)
+        t, ft, in_t = self._along(utc)
         out = np.zeros((len(self.members), utc.size, self.values.shape[4]))
         columns = self.lon_deg.size
         for dt, wt in ((0, 1.0 - ft), (1, ft)):
@@ -116,13 +112,9 @@ class Cube:
 
     def over(self, utc_s: Floats, lat_deg: Floats, lon_deg: Floats) -> NDArray[np.float32]:
         """Return (m, t, n, k) at each of t times and n places: what ``at`` says, looked up once for all times."""
-        past = np.mod(lon_deg - self.lon_deg[0], _ROUND_DEG)
-        past = np.where(past > _ROUND_DEG - _TIGHT_DEG, 0.0, past)  # a hair west of the first column
-        x, fx, in_x = self._across(past)
+        x, fx, in_x = self._across(lon_deg)
         y, fy, in_y = _between(self.lat_deg, lat_deg, _TIGHT_DEG)
-        t, ft, in_t = _between(self.utc_s, utc_s, 1e-3)
-        for begins, ends in self.holes_s():
-            in_t &= (utc_s <= begins) | (utc_s >= ends)
+        t, ft, in_t = self._along(utc_s)
         ft, columns = ft.astype(np.float32), self.lon_deg.size
         first, last = int(t.min()), min(int(t.max()) + 1, self.utc_s.size - 1)
         flat = self.values[:, first : last + 1].reshape(len(self.members), last + 1 - first, -1, self.values.shape[4])
@@ -147,7 +139,17 @@ class Cube:
                 out[:, n] = (1.0 - share) * known[:, k] + share * known[:, k + 1]
         return out
 
-    def _across(self, past_deg: Floats) -> tuple[NDArray[np.int64], Floats, NDArray[np.bool_]]:
+    def _along(self, utc_s: Floats) -> tuple[NDArray[np.int64], Floats, NDArray[np.bool_]]:
+        """Return between which of its times each is, by what share, and whether it is known then."""
+        t, share, is_in = _between(self.utc_s, utc_s, 1e-3)
+        for begins, ends in self.holes_s():
+            is_in &= (utc_s <= begins) | (utc_s >= ends)
+        return t, share, is_in
+
+    def _across(self, lon_deg: Floats) -> tuple[NDArray[np.int64], Floats, NDArray[np.bool_]]:
+        """Return between which of its columns each longitude is, by what share, and whether it reaches so far."""
+        past_deg = np.mod(lon_deg - self.lon_deg[0], _ROUND_DEG)
+        past_deg = np.where(past_deg > _ROUND_DEG - _TIGHT_DEG, 0.0, past_deg)  # a hair west of the first column
         if not self.is_round:
             return _between(self.lon_deg - self.lon_deg[0], past_deg, _TIGHT_DEG)
         axis = np.append(self.lon_deg - self.lon_deg[0], _ROUND_DEG)
@@ -167,8 +169,8 @@ class Cube:
 
     def covers(self, lat_deg: float, lon_deg: float) -> bool:
         """Return whether a place is within its edges."""
-        past = np.array([math.fmod(math.fmod(lon_deg - self.lon_deg[0], 360.0) + 360.0, 360.0)])
-        return bool(self._across(past)[2][0] and _between(self.lat_deg, np.array([lat_deg]), _TIGHT_DEG)[2][0])
+        columns, rows = self._across(np.array([lon_deg])), _between(self.lat_deg, np.array([lat_deg]), _TIGHT_DEG)
+        return bool(columns[2][0] and rows[2][0])
 
 
 def holes_of(utc_s: Floats, most_step_s: float = MOST_STEP_S) -> tuple[tuple[float, float], ...]:

@@ -69,13 +69,8 @@ def ends_safely(items: Sequence[MissionItem]) -> bool:
 # ------------------------------------------------------------------------------------------ safe end
 LEEWARD_ROOM_M = 40.0  # a boat with eased sails drifts this far before somebody looks
 RINGS_M = (0.0, 15.0, 30.0, 50.0, 80.0, 120.0)
-FAR_RINGS_M = (
-    180.0,
-    270.0,
-    400.0,
-    600.0,
-    900.0,
-)  # where nothing nearer is free at all: in the middle of a flat that dries
+# Where nothing nearer is free at all: in the middle of a flat that dries.
+FAR_RINGS_M = (180.0, 270.0, 400.0, 600.0, 900.0)
 DIRECTIONS = 16
 ROOMIER_M = 50.0  # a place with the room that is wanted is worth sailing this far
 ROOMIER_BY_M = 3.0  # ... and a somewhat roomier one only for this much of room
