@@ -8,12 +8,19 @@ import numpy as np
 import pytest
 import shapely
 
+from companion.planner import plan
 from companion.skipper.passing import pass_gates
+from companion.skipper.planning.answers import take_plan
+from companion.skipper.planning.asking import request
+from companion.skipper.planning.track import steps
+from companion.skipper.step.actions import Announce, ReplanReason, UploadMission
+from companion.skipper.step.context import StepContext
+from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import Phase
 from companion.skipper.way.line import ahead_m
 from companion.skipper.way.voyage import Box, Goal, Line
 from tests.skipper.moments import moment, route
-from tests.skipper.world import World, restarted, skipper, voyage
+from tests.skipper.world import World, restarted, skipper, voyage, with_parts
 
 LINE = Line(port_en_m=(-25.0, 80.0), starboard_en_m=(25.0, 80.0), keep_m=5.0)
 END = Goal(en_m=(0.0, 220.0), radius_m=10.0, name="end")
@@ -125,6 +132,44 @@ def test_how_far_she_may_be_off_a_leg_is_no_second_radius_of_a_goal(off_m, is_re
     pass_gates(ctx)
     assert ctx.state.progress.reached == ((0,) if is_reached else ())
     assert ctx.state.progress.missed == (0 if is_reached else 1)
+
+
+def under_way_to_a_gate(**config):
+    w = World(skipper=skipper(voyage(line(), END), **config), wind=lambda t: (math.pi / 2.0, 5.0))
+    assert w.run(60.0, lambda w: w.position[1] > 10.0)
+    w.state = with_parts(w.state, pending={"plan": None, "upload": None})
+    return StepContext(w.skipper.voyage, w.skipper.config, w.state, w.snapshot())
+
+
+@pytest.mark.parametrize(
+    ("way", "is_through"), [([(2.0, 60.0), (0.0, 94.0)], True), ([(200.0, 60.0), (200.0, 120.0), (0.0, 94.0)], False)]
+)
+def test_a_plan_that_goes_round_the_outside_of_a_gate_is_none(way, is_through):
+    ctx = under_way_to_a_gate()
+    assert request(ctx, ReplanReason.ORDER)
+    pending = ctx.state.pending.plan
+    ctx.actions.clear()
+    found = plan(pending.problem, expansions=3000)
+    answer = replace(found, waypoints_en=np.asarray([pending.problem.start_en, *way]), cost_s=1.0)
+    take_plan(ctx, PlanOutcome(request_id=pending.request_id, plan=answer))
+    told = [a.text for a in ctx.actions if isinstance(a, Announce)]
+    assert any("round the outside of line only" in text for text in told) is not is_through
+    assert any(isinstance(a, UploadMission) for a in ctx.actions) is is_through
+
+
+def test_with_the_margin_less_is_kept_of_a_gates_marks_never_less_than_the_mission_says():
+    ctx = under_way_to_a_gate(margin_m=20.0, margin_floor_m=4.0)
+    kept_m = []
+    for rung, step in enumerate(steps(ctx)):
+        assert request(ctx, ReplanReason.ORDER, rung=rung)
+        problem = ctx.state.pending.plan.problem
+        mark = shapely.Point(LINE.port_en_m)
+        discs = [p for p, name in zip(problem.obstacles, problem.obstacle_names, strict=True) if name == "a mark"]
+        (disc,) = (p for p in discs if shapely.contains(p, mark))
+        kept_m.append((step.margin_m, shapely.distance(disc.exterior, mark)))
+    assert kept_m[0][1] == pytest.approx(8.0, abs=0.01)
+    assert 5.0 <= kept_m[-1][1] < 7.0  # what is asked for her track stays beside the floor
+    assert kept_m == sorted(kept_m, reverse=True)
 
 
 @pytest.mark.parametrize("wind_deg", [0.0, 20.0, -20.0])

@@ -3,22 +3,28 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from shapely.geometry import box
 
 from companion.current import TideRow, TideTable
+from companion.messages import Command
 from companion.orders.order import phrase
+from companion.skipper.behaviors.field_guidance import intent, situation
 from companion.skipper.behaviors.operator_orders import refuge_place
 from companion.skipper.behaviors.position_doubt import follow
 from companion.skipper.behaviors.shoaling import depth_ahead_m
 from companion.skipper.planning.asking import lacks
 from companion.skipper.planning.diversions import home_trouble, refuges_by_way
+from companion.skipper.planning.not_found import hold
 from companion.skipper.planning.tides import closes_ahead, opens_next
 from companion.skipper.step import StepContext
+from companion.skipper.step.actions import UploadMission
 from companion.skipper.step.missions import loiter_place
 from companion.skipper.way.drying import DryingWater
 from companion.skipper.way.shoals import RISES_M, Shoal, still_shoal
 from companion.skipper.way.voyage import Goal, Refuge
+from tests.skipper.moments import moment, route
 from tests.skipper.test_voyage import is_done, make, said
 
 EAST = math.radians(90.0)
@@ -99,6 +105,22 @@ def test_a_place_in_water_that_has_closed_is_no_impossible_one():
     assert lacks(now) == ""
 
 
+@pytest.mark.parametrize(("north_m", "leaves"), [(900.0, True), (430.0, False)])
+def test_a_loiter_in_a_flat_that_dries_is_left_for_deep_water(north_m, leaves):
+    """Becalmed there, it was the end of her mission, and she waited in it for the tide."""
+    way = route((0.0, north_m), gate_of=(-1,))
+    now = moment(way, at=(0.0, north_m), mission={"index": 0})
+    voyage = replace(now.voyage, drying=(FLAT,))
+    config = replace(now.config, tide=TideTable(rows=(TideRow(utc_s=0.0, height_m=0.0),)))
+    now = StepContext(voyage, config, now.state, now.snapshot)
+    hold(now, "no way before the tide is higher")
+    sent = [a for a in now.actions if isinstance(a, UploadMission)]
+    assert bool(sent) is leaves
+    if leaves:
+        (end,) = (item for item in sent[0].items if item.command == Command.NAV_LOITER_UNLIM)
+        assert abs(voyage.frame.en_from_geo(end.point)[0]) > 400.0
+
+
 def test_she_does_not_stay_in_the_middle_of_a_long_flat_and_goes_to_no_refuge_on_it():
     flat, deep = Refuge(name="flat", en_m=(0.0, 700.0)), Refuge(name="deep", en_m=(0.0, -400.0))
     world = voyage_over_a_bar((-1000.0, 2.0), (100_000.0, 1.9), bar=FLAT)
@@ -123,6 +145,7 @@ def test_who_steers_by_what_is_about_her_keeps_out_of_what_opens_soon():
     now = context(voyage_over_a_bar((-1000.0, 0.0), (600.0, 1.2), (100_000.0, 1.2)))
     assert float(now.voyage.area.clearance_m([(0.0, 150.0)])[0]) > 0.0
     assert float(now.water_now.area.clearance_m([(0.0, 150.0)])[0]) < 0.0
+    assert float(intent(now, situation(now)).clearance(np.array([(0.0, 150.0)]))[0]) < 0.0
     soon = context(voyage_over_a_bar((-1000.0, 2.0), (0.0, 1.1), (400.0, 0.0), (100_000.0, 0.0)))
     assert float(soon.water_now.area.clearance_m([(0.0, 150.0)])[0]) < 0.0
     later = context(voyage_over_a_bar((-1000.0, 2.0), (2000.0, 2.0), (4000.0, 0.0)))

@@ -7,9 +7,10 @@ from itertools import pairwise
 import pytest
 from shapely.geometry import box
 
+from companion.current import WaterCurrent
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
-from companion.skipper.behaviors.field_guidance import NAME, habits
+from companion.skipper.behaviors.field_guidance import NAME, habits, situation
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import ALL_PERMITTED, Guidance
 from companion.skipper.step.context import StepContext
@@ -18,6 +19,7 @@ from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from companion.traffic import Targets
+from tests.skipper.moments import moment, route
 from tests.skipper.world import FRAME, World, restarted, skipper, voyage
 from tests.traffic.conftest import report
 
@@ -285,3 +287,11 @@ def test_by_field_the_floor_is_the_hulls_and_not_the_antennas():
     reach_m = world.skipper.voyage.boat.hull.reach_m
     assert reach_m > 0.0
     assert habits(ctx, 5.0).keep_m == world.skipper.config.margin_floor_m + reach_m
+
+
+@pytest.mark.parametrize(("is_significant", "seen"), [(True, (0.4, -0.6)), (False, (0.0, 0.0))])
+def test_the_guidance_sees_the_current_that_plans_reckon_with(is_significant, seen):
+    water = WaterCurrent(east_mps=0.4, north_mps=-0.6, is_significant=is_significant)
+    found = situation(moment(route((0.0, 200.0), (0.0, 200.0)), seen={"current": water}))
+    assert found is not None
+    assert found.current_en_mps == seen

@@ -20,16 +20,18 @@ from companion.skipper.behaviors.headings import (
     drift_correction_rad,
     sailable_rad,
 )
+from companion.skipper.behaviors.sailing import follow_route
 from companion.skipper.planning.autopilot_beats import room_m
 from companion.skipper.planning.next_tack import next_tack, next_tack_s
 from companion.skipper.step import actions as act
-from companion.skipper.step.config import Guidance
+from companion.skipper.step.config import Guidance, Permissions
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import CommandOutcome, CommandResult, SpeedSeen
 from companion.skipper.step.state import NO_TACKS
 from companion.skipper.way.geometry import bearing_rad, cross_track_m
 from companion.skipper.way.voyage import Goal, Side
+from tests.skipper.moments import moment, route
 from tests.skipper.test_voyage import is_done, is_sailing, make, said
 from tests.skipper.world import voyage, with_parts
 
@@ -399,3 +401,14 @@ def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
     assert beyond.in_s > 75.0, "not at the first waypoint: the second leg is on this tack, too"
     assert told((0.0, 100.0), **close_hauled).in_s < 50.0
     assert told(east, on, back, share=0.8) == pytest.approx((50.0 + 50.0 / 0.8 + turn_s, False), abs=0.1)
+
+
+@pytest.mark.parametrize(("may_steer", "is_said"), [(True, False), (False, True)])
+def test_that_steering_is_not_permitted_is_said_where_it_is_not(may_steer, is_said):
+    """In the loiter that ends a mission nothing is steered by headings, and that is no want of permission."""
+    permissions = Permissions(may_upload=True, may_set_mode=True, may_steer=may_steer)
+    ctx = moment(route((0.0, 300.0)), config={"guidance": Guidance.HEADING}, permissions=permissions)
+    assert not ctx.steers
+    follow_route(ctx)
+    told = [a.text for a in ctx.actions if isinstance(a, act.Announce) and a.code == "guidance"]
+    assert bool(told) is is_said
