@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -75,7 +76,7 @@ def request(
                 failing=_failing(ctx),
                 seen=ctx.snapshot.speed_seen,
                 is_wind_known=ctx.snapshot.wind.health is not WindHealth.UNTRUSTED,
-                stray_m=_stray_m(ctx, step),
+                stray_m=_stray_m(step, ladder),
                 doubt=ctx.snapshot.doubt if ctx.config.sails else None,
                 zone_half_rad=ctx.no_go_half_rad + (0.0 if step.pinches else FOLLOWS_RAD),
                 tracking=problem_tracking(
@@ -145,14 +146,16 @@ def request(
     return True
 
 
-def _stray_m(ctx: StepContext, step: Rung) -> float:
+def _stray_m(step: Rung, ladder: Sequence[Rung]) -> float:
     """Return what is kept clear of a line's marks for a track that strays [m]: given up with the margin.
 
     A line that a wind leaves no straight way through at the whole of it is crossed nearer to a mark, not gone round.
+    Where the ladder has no margin to give up it goes with the first thing that is.
     """
-    room_m = ctx.config.margin_m - ctx.config.margin_floor_m
-    share = (step.margin_m - ctx.config.margin_floor_m) / room_m if room_m > 0.0 else 1.0
-    return STRAY_M * min(max(share, 0.0), 1.0)
+    wanted_m, least_m = ladder[0].margin_m, min(rung.margin_m for rung in ladder)
+    if wanted_m <= least_m:
+        return STRAY_M if step == ladder[0] else 0.0
+    return STRAY_M * min((step.margin_m - least_m) / (wanted_m - least_m), 1.0)
 
 
 def _failing(ctx: StepContext) -> dict[str, Any]:

@@ -195,7 +195,7 @@ def hold(ctx: StepContext, why: str, *, anew: bool = False) -> None:
     )
     if is_there and room <= 0.0:
         return  # in water that dries, as any place about here
-    keep = min(state.mission.index, len(state.mission.route.items) - 1)
     end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
     why = f"{why}; loitering with {room:.0f} m of room"
-    upload(ctx, state.mission.route.led_aside(keep, boat, [(end, place)], rung="hold", why=why), keep + 1, why)
+    n, route = state.mission.index, state.mission.route
+    upload(ctx, route.led_aside(n, boat, [(end, place)], rung="hold", why=why), n + 1, why)

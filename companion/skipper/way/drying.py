@@ -17,7 +17,7 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from companion.current import TideTable, open_spans
+from companion.current import TideTable, closed_spans
 from companion.geofence.area import buffer_out
 from companion.messages import Target
 
@@ -51,11 +51,10 @@ class DryingWater:
 
     def closed_s(self, table: TideTable | None, utc_s: float | None) -> tuple[tuple[float, float], ...]:
         """Return when it is too shallow, in seconds from ``utc_s`` on; for ever where nothing tells of the tide."""
-        if table is None or utc_s is None:
+        if utc_s is None:
             return ((0.0, math.inf),)
-        spans = [(a - utc_s, b - utc_s) for a, b in open_spans(table, self.opens_at_m) if b > utc_s]
-        edges = [0.0, *(edge for span in spans for edge in span), math.inf]
-        return tuple((max(0.0, a), b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > max(0.0, a))
+        spans = [(max(0.0, a - utc_s), b - utc_s) for a, b in closed_spans(table, self.opens_at_m)]
+        return tuple((a, b) for a, b in spans if b > a)
 
     def doubtful_s(self, table: TideTable | None, utc_s: float | None) -> tuple[tuple[float, float], ...]:
         """Return the same with the doubt of when it closes and opens, windows that meet made one."""
