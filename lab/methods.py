@@ -128,16 +128,16 @@ AS_IT_SAYS = Method()
 
 def drawn_method(rng: random.Random, what: Sequence[str], mission: Mission) -> Method:
     """Return a method for a mission: ``what`` of ``DRAWABLE`` is drawn, of those that it can be sailed by."""
-    guidance = rng.choice([g for g in GUIDANCES if can_be_sailed(mission, g)]) if "guidance" in what else None
+    guidance = rng.choice([g for g in GUIDANCES if not why_not(mission, g)]) if "guidance" in what else None
     return Method(guidance=guidance, planner=rng.choice(PLANNERS) if "planner" in what else None)
 
 
-def can_be_sailed(mission: Mission, guidance: str) -> bool:
-    """Return whether a mission can be sailed by a guidance: gates and fields of goals are not for each of them."""
+def why_not(mission: Mission, guidance: str) -> str:
+    """Return why a mission cannot be sailed by a guidance, empty where it can: gates are not for each of them."""
     variation = Method(guidance=guidance).variation(mission)
     try:
         if variation is not None:
             require_sailable(variation.mission(mission))
-    except InputError:
-        return False
-    return True
+    except InputError as error:
+        return str(error)
+    return ""

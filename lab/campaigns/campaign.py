@@ -13,7 +13,7 @@ from typing import Any
 
 from companion.errors import InputError
 from companion.words import file_name
-from lab.methods import AS_IT_SAYS, Method, can_be_sailed
+from lab.methods import AS_IT_SAYS, Method, why_not
 from sitl.results import columns, compare
 from sitl.results import comparison_text as told_pairs
 from sitl.runner import CampaignResults, Experiment, ExperimentSummary, Job, Key, Table
@@ -80,19 +80,24 @@ def campaign(
     Two settings are compared, too: their voyages of a seed have the same weather as far as both say the same of it.
 
     Raises:
-        InputError: two of them would have one name.
+        InputError: two of them would have one name, or no mission can be sailed by any method.
     """
     from sitl.run.embedded import mission_of
     from sitl.scenario import load_scenario
 
     loaded = [load_scenario(path) for path in scenarios]
     missions = [mission_of(scenario, path) for scenario, path in zip(loaded, scenarios, strict=True)]
-    ways = [
-        (_name(scenario.name, path, method), path, method)
-        for scenario, path, mission in zip(loaded, scenarios, missions, strict=True)
-        for method in methods
-        if method.guidance is None or can_be_sailed(mission, method.guidance)
-    ]
+    ways, left_out = [], []
+    for scenario, path, mission in zip(loaded, scenarios, missions, strict=True):
+        for method in methods:
+            name = _name(scenario.name, path, method)
+            reason = why_not(mission, method.guidance) if method.guidance is not None else ""
+            if reason:
+                left_out.append(f"left out: {name}: {reason}")
+            else:
+                ways.append((name, path, method))
+    if not ways:
+        raise InputError("--guidance", "", "; ".join(left_out), "name another guidance or scenario")
     names = [name for name, _, _ in ways]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -103,7 +108,7 @@ def campaign(
         by_name = {name: [r for r in records if r["scenario"] == name] for name in names}
         table = [figures(name, found) for name, found in by_name.items()]
         rate = sum(t["sailed_s"] for t in table) / sailed.cpu_s if sailed.now == len(records) and sailed.cpu_s else None
-        lines = [*as_lines(table), sailed.took + (f"; {rate:.0f} times real time per core" if rate else "")]
+        lines = [*as_lines(table), *left_out, sailed.took + (f"; {rate:.0f} times real time per core" if rate else "")]
         if len(names) == 2:
             first, second = (
                 Table(

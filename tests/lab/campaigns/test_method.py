@@ -5,15 +5,18 @@ from pathlib import Path
 
 import pytest
 
+from companion.errors import InputError
 from lab.campaigns.campaign import campaign
 from lab.campaigns.drawn_faults import draw
 from lab.campaigns.faults import BASE, FaultCase, event_text, faults, job_of, method_of, sail
 from lab.campaigns.mismatch import MismatchCase, mismatch
-from lab.methods import DRAWABLE, GUIDANCES, PLANNERS, Method, can_be_sailed
+from lab.methods import DRAWABLE, GUIDANCES, PLANNERS, Method, why_not
 from lab.options import add_draw, add_methods, methods_of
 from sitl import cli
 from sitl.run.embedded import mission_of
 from sitl.run.variation import Variation
+from sitl.runner import CampaignResults, made_by
+from sitl.runner.result_store import StoredResults
 from sitl.scenario import load_scenario
 
 HERE = Path("sitl/scenarios")
@@ -71,8 +74,21 @@ def test_another_planner_leaves_the_numbers_of_the_missions_own():
 
 
 def test_what_a_mission_cannot_be_sailed_by_is_not_drawn():
-    assert can_be_sailed(mission("demo"), "field")
-    assert not can_be_sailed(mission("gates"), "field")
+    assert why_not(mission("demo"), "field") == ""
+    assert "gate" in why_not(mission("gates"), "field")
+
+
+def test_a_campaign_says_what_a_mission_cannot_be_sailed_by():
+    gates, demo = HERE / "gates.toml", HERE / "demo.toml"
+    by_heading = [Method(guidance="heading")]
+    both = campaign([gates, demo], runs=1, methods=by_heading)
+    assert [job.scenario for job in both.jobs] == [demo]
+    held = StoredResults(campaign="campaign", by=made_by())
+    none = CampaignResults(records=[], held=held, lost=[], now=0, wall_s=0.0, cpu_s=0.0)
+    told = both.sum_up(none).lines
+    assert any(line.startswith("left out: gates, by heading: ") for line in told)
+    with pytest.raises(InputError, match=r"left out: gates, by heading: .*gate"):
+        campaign([gates], runs=1, methods=by_heading)
 
 
 def test_a_faulty_voyage_is_the_same_but_for_what_is_drawn_of_the_boat(methods):
