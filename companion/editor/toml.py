@@ -15,6 +15,7 @@ import msgspec
 
 from companion.errors import JobError
 from companion.geofence.mission import MissionOptions, parse_options, without_defaults
+from companion.geofence.mission.text import ORDER
 
 _HEADER = re.compile(r"[ \t]*(\[\[?)[ \t]*(\"[^\"\n]*\"|'[^'\n]*'|[A-Za-z0-9_-]+)[ \t]*(\.|\]\]?)")
 _STRINGS = ('"""', "'''", '"', "'")
@@ -118,25 +119,6 @@ def _closed(text: str, mark: str, at: int) -> int:
 
 
 LISTS = ("goal", "refuge")
-# Where a table is put that was not there: before the first of those behind it.
-ORDER = (
-    "",
-    "start",
-    "goal",
-    "refuge",
-    "area",
-    "wind",
-    "risk",
-    "boat",
-    "autopilot",
-    "operator",
-    "skipper",
-    "planner",
-    "passage",
-    "safety",
-    "traffic",
-    "output",
-)
 Keys = Sequence[int | None]
 
 
@@ -255,7 +237,8 @@ def _without(blocks: list[Block], table: str) -> list[Block]:
 def _inserted(blocks: list[Block], *new: Block, at: int | None = None) -> list[Block]:
     """Return the blocks with new ones of one name, parted by empty lines from what is before and behind."""
     if at is None:
-        rank = ORDER.index(new[0].name)
+        # before the first of those that are written behind it
+        rank = _rank(new[0].name)
         at = next((n for n, b in enumerate(blocks) if b.name and _rank(b.name) > rank), len(blocks))
     spaced = []
     before = text_of(blocks[:at])

@@ -14,11 +14,13 @@ from companion.geofence.mission import MissionOptions, parse_options, read_optio
 from companion.geofence.mission.options import (
     AreaOptions,
     BoxOptions,
+    CurrentOptions,
     GateOptions,
     MarkOptions,
     PointOptions,
     RefugeOptions,
     SkipperOptions,
+    SounderOptions,
     StartOptions,
 )
 from companion.geofence.mission.text import dump_options
@@ -206,3 +208,16 @@ def test_other_ways_to_write_a_mission(text):
         skipper=SkipperOptions(end="home"),
     )
     assert parse_options(rewritten(text, before, after, keys), "m") == after
+
+
+def test_a_table_that_was_not_there_is_put_where_it_is_written():
+    text = '[[goal]]\nlat = 1.0\nlon = 2.0\n\n[output]\nnmea = ["udp:127.0.0.1:10110"]\n'
+    before = parse_options(text, "m")
+    after = msgspec.structs.replace(
+        before,
+        current=CurrentOptions(set_deg=90.0, drift_mps=1.0),
+        sounder=SounderOptions(feed="udpin:127.0.0.1:10111"),
+    )
+    out = rewritten(text, before, after, {"goal": (0,), "refuge": ()})
+    assert [b.name for b in blocks_of(out) if b.name] == ["goal", "current", "sounder", "output"]
+    assert parse_options(out, "m") == after

@@ -20,6 +20,30 @@ from companion.geofence.mission.options import ATOMS, KINDS, AtomOptions, Missio
 from companion.words import choices, expected
 
 MAX_TOML_BYTES = 1024 * 1024
+# In which a mission's keys and tables are written.
+ORDER = (
+    "name",
+    "description",
+    "from_autopilot",
+    "start",
+    "goal",
+    "field",
+    "refuge",
+    "area",
+    "wind",
+    "current",
+    "risk",
+    "boat",
+    "autopilot",
+    "operator",
+    "skipper",
+    "planner",
+    "passage",
+    "safety",
+    "traffic",
+    "sounder",
+    "output",
+)
 
 
 def read_options(path: Path) -> MissionOptions:
@@ -60,31 +84,8 @@ GOAL_MISSING = (
 def dump_options(options: MissionOptions) -> str:
     """Return the options as TOML, leaving out what has its default."""
     data = without_defaults(options)
-    order = [
-        "name",
-        "description",
-        "from_autopilot",
-        "start",
-        "goal",
-        "field",
-        "refuge",
-        "area",
-        "wind",
-        "current",
-        "risk",
-        "boat",
-        "autopilot",
-        "operator",
-        "skipper",
-        "planner",
-        "passage",
-        "safety",
-        "traffic",
-        "sounder",
-        "output",
-    ]
     # whatever has no place in the order yet comes last, and is not lost
-    return toml({k: data[k] for k in (*order, *data) if k in data})
+    return toml({k: data[k] for k in (*ORDER, *data) if k in data})
 
 
 def toml(data: Mapping[str, Any]) -> str:
