@@ -94,6 +94,8 @@ BEHIND_S = 5.0
 # How fast the two clocks may run apart: a hurried simulator's does by a few parts in a hundred. Nor is the clock led
 # faster than this by messages that are only a little wrong.
 DRIFT = 0.05
+# What came soonest is forgotten as fast as two quartz clocks can run apart, and believed again ten times as fast.
+FORGET, RECALL = 1e-4, 1e-3
 # Another clock is believed when so many messages agree on it over this time, and the old one is silent for it [s].
 SWITCH_S = 1.0
 SWITCH_COUNT = 3
@@ -121,11 +123,16 @@ MAX_STREAMS = 4
 
 
 class BootClock:
-    """The autopilot's boot time against ours, with one rival for it."""
+    """The autopilot's boot time against ours, with one rival for it.
+
+    Messages wait, and none comes early: while all of them do the clock is led to their delay, and it is remembered how
+    soon they came before, for they will again.
+    """
 
     def __init__(self) -> None:
         self.is_new = False  # the last message that fitted began a new clock
         self._offset_s: float | None = None
+        self._soonest_s = 0.0
         self._last_s = 0.0
         self._rival_s = 0.0
         self._rival_count = 0
@@ -139,8 +146,11 @@ class BootClock:
             self._begin(t_s, offset_s)
             return True
         drift_s = DRIFT * max(0.0, t_s - self._last_s)
-        if -AHEAD_S - drift_s <= offset_s - self._offset_s <= BEHIND_S + drift_s:
+        if -AHEAD_S - drift_s <= offset_s - self._soonest_s and offset_s - self._offset_s <= BEHIND_S + drift_s:
+            rate = FORGET if offset_s >= self._soonest_s else -RECALL
+            soonest_s = self._soonest_s + rate * max(0.0, t_s - self._last_s)
             self._offset_s += min(max(offset_s - self._offset_s, -drift_s), drift_s)
+            self._soonest_s = min(max(soonest_s, self._offset_s - BEHIND_S), self._offset_s)
             self._last_s = t_s
             return True
         if self._rival_count == 0 or abs(offset_s - self._rival_s) > AHEAD_S or t_s - self._rival_last_s > ALIVE_S:
@@ -154,15 +164,21 @@ class BootClock:
         return False
 
     def is_contested(self, t_s: float) -> bool:
-        """Return whether another clock goes on beside this one: two autopilots speak as one."""
+        """Return whether another clock goes on beside this one: two autopilots speak as one.
+
+        One that is ahead by no more than messages wait may be the same autopilot's, whose first messages had waited.
+        """
+        is_ahead = self._offset_s is not None and -BEHIND_S <= self._rival_s - self._offset_s < 0.0
         return (
-            self._rival_count >= CONTEST_COUNT
+            not is_ahead
+            and self._rival_count >= CONTEST_COUNT
             and self._rival_last_s - self._rival_first_s >= CONTEST_S
             and t_s - self._rival_last_s <= CONTEST_OVER_S
         )
 
     def _begin(self, t_s: float, offset_s: float) -> None:
-        self._offset_s, self._last_s = offset_s, t_s
+        self._offset_s = self._soonest_s = offset_s
+        self._last_s = t_s
         self._rival_count = 0
 
 

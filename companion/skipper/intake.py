@@ -218,7 +218,10 @@ def _counts(ctx: StepContext) -> bool:
 
 
 def _own_count(ctx: StepContext) -> None:
-    """Advance our own target by Büsser's double conditions; note when the autopilot lags behind it."""
+    """Advance our own target by Büsser's double conditions; note when the autopilot lags behind it.
+
+    Where its number is not known to be of our route it is not known to lag.
+    """
     boat, route = ctx.boat_en, ctx.state.mission.route
     if boat is None or route is None:
         return
@@ -234,7 +237,7 @@ def _own_count(ctx: StepContext) -> None:
         own += 1
         if own > ctx.state.mission.index + 1:
             break
-    lags = own > ctx.state.mission.index
+    lags = _counts(ctx) and own > ctx.state.mission.index
     since = ctx.state.mission.passed_since_s if ctx.state.mission.passed_since_s is not None else ctx.t_s
     ctx.set(mission=changed(ctx.state.mission, own_index=own, passed_since_s=since if lags else None))
 

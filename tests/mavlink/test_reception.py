@@ -5,7 +5,7 @@ import random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.reception import CONTEST_OVER_S, SWITCH_S, PlausibilityFilter
+from companion.mavlink.reception import BEHIND_S, CONTEST_OVER_S, SWITCH_S, BootClock, PlausibilityFilter
 from companion.mavlink.wire.assembler import VehicleAssembler
 from companion.mavlink.wire.frames import Codec, Drop
 from companion.messages import Mode, VehicleState
@@ -151,6 +151,29 @@ def test_a_reboot_is_believed_within_two_seconds():
     assert bad
     assert all(reason is Drop.WRONG_CLOCK for _, reason in bad)
     assert bad[-1][0] - bad[0][0] <= SWITCH_S + 2 * STEP_S
+
+
+@pytest.mark.parametrize("begins_late", [False, True])
+@pytest.mark.parametrize(("lag_s", "period_s"), [(0.6, 2.0), (0.6, 10.0), (0.8, 60.0), (2.0, 10.0), (4.5, 60.0)])
+def test_one_whose_messages_wait_now_and_then_is_heard_and_is_no_second_autopilot(lag_s, period_s, begins_late):
+    clock, heard_s, unheard = BootClock(), 0.0, []
+    for n in range(30_000):
+        sent_s = 0.2 * n
+        waits = int(sent_s / period_s) % 2 == (0 if begins_late else 1)
+        heard_s = max(heard_s, sent_s + (lag_s if waits else 0.0))
+        if not clock.take(heard_s, sent_s):
+            unheard.append(sent_s)
+        assert not clock.is_contested(heard_s)
+    assert not unheard or begins_late
+    assert all(period_s <= t <= period_s + SWITCH_S + lag_s for t in unheard)  # the first that did not wait, once
+
+
+def test_a_clock_that_is_ahead_by_more_than_messages_wait_is_another():
+    clock = BootClock()
+    for n in range(100):
+        assert clock.take(0.2 * n, 0.2 * n)
+        assert not clock.take(0.2 * n, 0.2 * n + BEHIND_S + 1.0)
+    assert clock.is_contested(20.0)
 
 
 def test_two_autopilots_on_one_id_are_noticed_and_the_first_is_heard():

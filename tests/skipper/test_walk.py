@@ -470,6 +470,25 @@ def test_a_stuck_waypoint_is_pushed_on():
     assert world.run(10, lambda w: w.seq == 2)
 
 
+def row_of_goals():
+    goals = (Goal(en_m=(80.0 * n, 0.0), radius_m=6.0) for n in range(1, 6))
+    world = make(*goals, obstacles=(), wind=lambda t: (math.radians(-10), 5.0))
+    assert world.run(100, lambda w: len(w.mission) == 5 and w.seq == 2)
+    return world
+
+
+def test_who_was_not_known_to_be_ours_for_a_while_was_with_no_operator():
+    world = row_of_goals()
+    known = world.identity
+    world.identity = replace(known, is_contested=True)
+    world.run(11)
+    assert world.state.phase is Phase.OPERATOR
+    world.identity = known
+    assert world.run(20, lambda w: w.state.phase is Phase.STANDARD)
+    assert not [entry for entry in world.log if entry[1] == "operator back"]
+    assert not world.state.operator.is_back
+
+
 def test_a_jump_is_raised_at_once_and_forgotten_after_quiet_fixes():
     world = make(obstacles=())
     world.run(60)

@@ -339,7 +339,10 @@ def operator_has_it(ctx: StepContext) -> bool:
             return False
         ctx.phase(Phase.OPERATOR, f"{_taken(ctx)}: waiting for AUTO")
         return True
-    since = state.operator.since_s if state.operator.since_s is not None else ctx.t_s
+    since = state.operator.since_s
+    if since is None:  # nobody took her: what was heard was not known to be ours for a while
+        ctx.phase(Phase.WAITING, "the autopilot is ours again: waiting for the mission on board to be compared")
+        return False
     ctx.set(
         operator=changed(ctx.state.operator, since_s=None, is_back=True, answering="", given_back_s=ctx.t_s),
         mission=changed(ctx.state.mission, checked=False, read_since_s=ctx.t_s),

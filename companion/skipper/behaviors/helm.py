@@ -86,6 +86,14 @@ def check_current(ctx: StepContext) -> None:
     make_current(ctx, asked)
 
 
+def push_on(ctx: StepContext) -> None:
+    """Make the item that the boat has come to current where the autopilot still sails for one before it."""
+    status, own = ctx.autopilot, ctx.state.mission.own_index
+    sails_for = None if status is None else status.mission_seq
+    if own > ctx.state.mission.index and sails_for is not None and sails_for <= own:
+        make_current(ctx, own + 1)
+
+
 def leave_passed(ctx: StepContext) -> None:
     """Make the first item ahead current where the boat passed its own while the list was on its way.
 

@@ -21,6 +21,7 @@ from companion.skipper.behaviors.helm import (
     is_busy,
     leave_passed,
     make_current,
+    push_on,
     repair,
     set_mode,
     tack,
@@ -273,8 +274,8 @@ def follow_route(ctx: StepContext) -> bool:
         check_current(ctx)
         short_tack(ctx)
         shift_tack(ctx)
-    if ctx.is_raised("stuck waypoint") and ctx.state.mission.own_index > ctx.state.mission.index:
-        make_current(ctx, ctx.state.mission.own_index + 1)
+    if ctx.is_raised("stuck waypoint"):
+        push_on(ctx)
     bound = diversion(ctx)
     if bound is not None and not bound.has_place:
         _stay(ctx, bound)

@@ -12,7 +12,8 @@ import shapely
 
 from companion.messages import Mode
 from companion.planner import plan
-from companion.skipper.behaviors.helm import leave_passed
+from companion.skipper.behaviors.helm import leave_passed, push_on
+from companion.skipper.intake import locate
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.not_found import not_found
@@ -20,6 +21,7 @@ from companion.skipper.planning.uploads import refusal
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, SetCurrent, UploadMission
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.way.voyage import Goal
+from tests.skipper.moments import moment, route
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import make
 from tests.skipper.world import with_parts
@@ -195,6 +197,23 @@ def test_an_item_that_was_passed_during_its_upload_is_not_turned_back_for():
         ctx.state = with_parts(ctx.state, mission={"uploaded_s": uploaded_s})
         leave_passed(ctx)
         assert [a.seq for a in ctx.actions if isinstance(a, SetCurrent)] == wanted
+
+
+@pytest.mark.parametrize(("sails_for", "wanted"), [(1, [3]), (2, [3]), (3, []), (4, [])])
+def test_a_stuck_waypoint_is_pushed_on_and_never_back(sails_for, wanted):
+    """While the mission was read anew the autopilot had come two items farther than our count: she was sent back."""
+    ctx = moment(route((0.0, 20.0), (3.0, 26.0), (4.0, 60.0), GOAL), mission={"index": 0, "own_index": 2})
+    ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, mission_seq=sails_for))
+    push_on(ctx)
+    assert [a.seq for a in ctx.actions if isinstance(a, SetCurrent)] == wanted
+
+
+@pytest.mark.parametrize("checked", [True, False])
+def test_an_autopilot_lags_only_where_its_number_is_known_to_be_of_our_route(checked):
+    ctx = moment(route((0.0, 20.0), (0.0, 60.0), GOAL), at=(0.0, 24.0), mission={"index": 0, "checked": checked})
+    locate(ctx)
+    assert ctx.state.mission.own_index == 1
+    assert (ctx.state.mission.passed_since_s is not None) is checked
 
 
 def test_a_gate_is_never_left_out_as_passed():
