@@ -135,14 +135,8 @@ def _expected(
     tracking = problem.tracking
     assert tracking is not None
     path, beats = np.frombuffer(path_bytes).reshape(-1, 2), np.array(is_beat)
-    whole, first = _with_run_up(before_en, path)
+    whole, first, en, leg, distance = _tracked(problem, path_bytes, before_en)
     curve = curve_mps(problem)
-    heading = None if first else problem.start_heading_rad
-    track = predict(whole, tracking.helm, curve_mps=curve, twd_from_rad=problem.wind.twd_from_rad, heading_rad=heading)
-    leg = track.leg - first
-    mine = (leg >= 0) | (np.hypot(*(track.en_m - path[0]).T) < BESIDE_M)
-    en, leg = track.en_m[mine], np.maximum(leg[mine], 0)
-    distance = tracking.distance_m(en)
     best = float(np.max(curve))
     lengths_m = np.hypot(*np.diff(whole, axis=0).T)
     lengths_m[first] += sailed_m
@@ -171,7 +165,34 @@ def _expected(
         near_en=_nearest(tracking, en[worst]),
         worst_leg=int(leg[worst]),
     )
-    return _with_boards(problem, tracking, whole, first, beats, found) if has_boards and bool(beats.any()) else found
+    if not has_boards or not beats.any():
+        return found
+    return _with_boards(tracking, found, _worst_boards(problem, path_bytes, is_beat, before_en))
+
+
+@lru_cache(maxsize=4)  # by identity: the same with loops and without, asked for one after the other
+def _tracked(
+    problem: Problem, path_bytes: bytes, before_en: tuple[float, float] | None
+) -> tuple[NDArray[np.float64], int, NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Return the path behind its run-up, how many legs that is, and the predicted track that is judged.
+
+    Of the track: places (m, 2), their legs of the path, and their distances from what is solid [m].
+    """
+    tracking = problem.tracking
+    assert tracking is not None
+    path = np.frombuffer(path_bytes).reshape(-1, 2)
+    whole, first = _with_run_up(before_en, path)
+    track = predict(
+        whole,
+        tracking.helm,
+        curve_mps=curve_mps(problem),
+        twd_from_rad=problem.wind.twd_from_rad,
+        heading_rad=None if first else problem.start_heading_rad,
+    )
+    leg = track.leg - first
+    mine = (leg >= 0) | (np.hypot(*(track.en_m - path[0]).T) < BESIDE_M)
+    en = track.en_m[mine]
+    return whole, first, en, np.maximum(leg[mine], 0), tracking.distance_m(en)
 
 
 def _with_run_up(before_en: tuple[float, float] | None, path: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
@@ -186,14 +207,40 @@ def _with_run_up(before_en: tuple[float, float] | None, path: NDArray[np.float64
 
 
 def _with_boards(
-    problem: Problem,
-    tracking: Tracking,
-    whole: NDArray[np.float64],
-    first: int,
-    beats: NDArray[np.bool_],
-    found: ExpectedTrack,
+    tracking: Tracking, found: ExpectedTrack, boards: tuple[tuple[int, float, tuple[float, float]], ...]
 ) -> ExpectedTrack:
     """Return what is expected with the legs that are beaten: at each board, with probability delta_s."""
+    out = found
+    for leg, room, place in boards:
+        if room < out.clearance_m:
+            out = _changed(out, clearance_m=room, at_en=place, leg=leg)
+        lack = tracking.floor_m - room
+        if lack > max(out.lack_m, 1e-9):
+            out = _changed(
+                out,
+                is_kept=False,
+                lack_m=lack,
+                error_m=0.0,
+                worst_en=place,
+                worst_leg=leg,
+                is_beat=True,
+                near_en=_nearest(tracking, np.asarray(place)),
+            )
+    return out
+
+
+@lru_cache(maxsize=32)  # by identity: the same with loops and without
+def _worst_boards(
+    problem: Problem, path_bytes: bytes, is_beat: tuple[bool, ...], before_en: tuple[float, float] | None
+) -> tuple[tuple[int, float, tuple[float, float]], ...]:
+    """Return of each board of the legs that are beaten: the leg, and what is kept with probability delta_s, and where.
+
+    The legs are sailed in winds drawn from the forecast's spread.
+    """
+    tracking = problem.tracking
+    assert tracking is not None
+    whole, first = _with_run_up(before_en, np.frombuffer(path_bytes).reshape(-1, 2))
+    beats = np.flatnonzero(is_beat)
     sigma = problem.wind.sigma.at(SIGMA_AT_S)
     curve = curve_mps(problem)
     length_s = 4.0 * float(np.sum(np.hypot(*np.diff(whole, axis=0).T))) / max(float(np.max(curve)), 0.1) + 60.0
@@ -203,7 +250,7 @@ def _with_boards(
         if sigma > 0.0
         else (np.array([[twd]]))
     )
-    whole = whole[: first + int(np.flatnonzero(beats)[-1]) + 3]  # what comes later is nothing to it
+    whole = whole[: first + int(beats[-1]) + 3]  # what comes later is nothing to it
     tracks = [
         predict(
             whole,
@@ -214,28 +261,15 @@ def _with_boards(
         )
         for wind in winds
     ]
-    out = found
-    for n in np.flatnonzero(beats):
-        for rows in _boards(tracking, tracks, whole, int(n) + first):
+    found: list[tuple[int, float, tuple[float, float]]] = []
+    for n in map(int, beats):
+        for rows in _boards(tracking, tracks, whole, n + first):
             if len(rows) < 0.25 * len(tracks):
                 continue  # few winds bring the boat there at all
             rows.sort()
             room, place = rows[math.floor((1.0 - problem.delta_s) * len(rows) + 1e-9)]
-            if room < out.clearance_m:
-                out = _changed(out, clearance_m=room, at_en=place, leg=int(n))
-            lack = tracking.floor_m - room
-            if lack > max(out.lack_m, 1e-9):
-                out = _changed(
-                    out,
-                    is_kept=False,
-                    lack_m=lack,
-                    error_m=0.0,
-                    worst_en=place,
-                    worst_leg=int(n),
-                    is_beat=True,
-                    near_en=_nearest(tracking, np.asarray(place)),
-                )
-    return out
+            found.append((n, room, place))
+    return tuple(found)
 
 
 def _boards(

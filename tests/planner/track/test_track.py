@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -237,6 +238,18 @@ def test_boards_that_come_too_near_are_seen_and_those_with_room_are_kept():
     assert not seen.is_kept
     assert expected(roomy, path).is_kept
     assert expected(narrow, path, has_boards=False).is_kept  # the boards are what comes near
+
+
+def test_a_path_is_predicted_once_with_loops_and_without(monkeypatch):
+    module, tracks = sys.modules[expected.__module__], []
+    monkeypatch.setattr(module, "predict", lambda *args, **more: tracks.append(1) or predict(*args, **more))
+    path, narrow = [(0.0, 0.0), (0.0, 298.0)], channel(18.0)
+    looped = expected(narrow, path)
+    once = len(tracks)
+    assert once > 20  # the track, and one in each wind that is drawn
+    plain = expected(narrow, path, has_loops=False)
+    assert len(tracks) == once
+    assert (plain.is_beat, plain.worst_en) == (looped.is_beat, looped.worst_en)
 
 
 def test_more_is_asked_of_boards_where_the_mission_asks_for_more():
