@@ -164,6 +164,7 @@ class StepContext:
         self.found: tuple[tuple[object, ...], Diversion | None] | None = None  # the diversion, by what it was found
         self.fresh: tuple[str, ...] = ()  # watchdogs that were raised in this step
         self._gates: tuple[tuple[Approach, ...], tuple[Gate, ...]] | None = None
+        self._jump: tuple[tuple[Snapshot, Fix, Mode | None], float] | None = None
 
     # ------------------------------------------------------------------------------------- changing
     def set(
@@ -417,7 +418,12 @@ class StepContext:
         At a leap's 8 m/s a second would hide what a margin is: it is held against its own speed.
         """
         last = self.state.position.last_seen
-        return 0.0 if last is None or self.state.position.back_s == self.t_s else self.innovation_m(last)
+        if last is None or self.state.position.back_s == self.t_s:
+            return 0.0
+        of = self.snapshot, last, self.state.steering.own_mode
+        if self._jump is None or any(a is not b for a, b in zip(of, self._jump[0], strict=True)):
+            self._jump = of, self.innovation_m(last)  # whoever asks where the boat is asks for it
+        return self._jump[1]
 
     def innovation_m(self, last: Fix, held_in: Mode | None = None) -> float:
         """Return how much farther the boat is off than ``last`` can have led it [m].

@@ -11,6 +11,7 @@ from shapely.geometry import box
 from companion.messages import MissionState, Mode
 from companion.safety import BY_NAME, SENSORS, TABLE
 from companion.skipper.step.config import Ends
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.snapshot import WindEstimate, WindHealth
 from companion.skipper.step.state import Charge, Fix
 from companion.skipper.watch import measures
@@ -60,6 +61,21 @@ def test_a_jump_lasts_as_long_as_the_doubt(off_m, is_doubted, jump_m):
     ctx = moment(WAY, speed_mps=0.0, position={"last_seen": last, "doubt": doubt if is_doubted else None})
     assert measure(ctx, "position jump") == pytest.approx(jump_m, abs=0.2)
     assert measure(moment(WAY, seen={"position_en_m": None}), "position jump") is None
+
+
+def test_a_jump_is_worked_out_once_for_all_who_ask_where_the_boat_is(monkeypatch):
+    last = Fix(t_s=NOW_S - 0.1, en_m=(-57.0, 0.0), velocity_en_mps=(0.0, 0.0))
+    ctx = moment(WAY, speed_mps=0.0, position={"last_seen": last})
+    asked, work = [], StepContext.innovation_m
+    monkeypatch.setattr(StepContext, "innovation_m", lambda self, fix: asked.append(fix) or work(self, fix))
+    assert [ctx.jump_m, ctx.boat_en, ctx.jump_m][1] is None
+    assert asked == [last]
+    near = replace(last, en_m=(0.0, 0.0))
+    ctx.set(position=replace(ctx.state.position, last_seen=near))
+    assert ctx.jump_m == 0.0
+    assert asked == [last, near]
+    ctx.snapshot = replace(ctx.snapshot, position_en_m=(0.0, 90.0))
+    assert ctx.jump_m > 80.0
 
 
 @pytest.mark.parametrize(
