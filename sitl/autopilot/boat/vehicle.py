@@ -28,7 +28,7 @@ class HomeChart:
     def __init__(self, home: GeoPoint) -> None:
         self._frame = LocalFrame(home)
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
-        self._told: dict[tuple[float, float], tuple[int, int]] = {}
+        self._told: dict[tuple[float, float], GeoPoint] = {}
 
     def follow(self, en: tuple[float, float]) -> Shift:
         """Let the metres count from a place from now on; return how those of before become those."""
@@ -40,17 +40,17 @@ class HomeChart:
 
     def point(self, en: tuple[float, float]) -> GeoPoint:
         """Return a position in metres as a GeoPoint."""
-        return self._frame.geo_from_en(*en)
+        found = self._told.get(en)
+        if found is None:  # all that is told and looked at in a moment is of one place, and home is told for long
+            if len(self._told) >= _TOLD:
+                self._told.clear()
+            found = self._told[en] = self._frame.geo_from_en(*en)
+        return found
 
     def to_e7(self, en: tuple[float, float]) -> tuple[int, int]:
         """Return (lat, lon) x 1e7 of a position in metres."""
-        found = self._told.get(en)
-        if found is None:  # several messages of one loop tell one place, and home or a destination is told for long
-            if len(self._told) >= _TOLD:
-                self._told.clear()
-            point = self._frame.geo_from_en(*en)
-            found = self._told[en] = round(point.lat_deg * 1e7), round(point.lon_deg * 1e7)
-        return found
+        point = self.point(en)
+        return round(point.lat_deg * 1e7), round(point.lon_deg * 1e7)
 
     def to_en(self, lat_e7: int, lon_e7: int) -> tuple[float, float]:
         """Return (east, north) [m]; what is not on the globe is brought to its edge."""
