@@ -7,7 +7,8 @@ BIN := $(VENV)/bin
 export PYTHONDONTWRITEBYTECODE :=
 STAMP := $(VENV)/.installed
 ENV := $(STAMP) $(EXTRAS:%=$(STAMP)-%)
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# Errors alone: pip's warnings (of root, of its cache, of paths) are of nothing that who makes this has to mend.
+PIP := $(BIN)/python -m pip install -qq --disable-pip-version-check --root-user-action=ignore
 
 .PHONY: env demo test test-long test-faults draws mutants mutants-sample check format docs slowest campaign nightly nightly-reference bench measured figures deb release clean
 env: $(ENV)
@@ -38,10 +39,13 @@ endif
 $(STAMP): requirements-dev.lock pyproject.toml
 	$(if $(WHY_NOT),$(error $(WHY_NOT)))
 	@$(if $(WHOLE),rm -f $(STAMP)*,[ ! -e $(VENV) ] || echo "$(VENV) is half built: it is cleared and made anew.")
-	$(PYTHON) -m venv $(if $(WHOLE),,--clear) $(VENV)
-	$(PIP) --require-hashes -r requirements-dev.lock
-	$(PIP) --no-deps --no-build-isolation -e .
+	@echo "Making the environment in $(VENV), once: a minute or two, on a slow machine or line up to ten."
+	@$(PYTHON) -m venv $(if $(WHOLE),,--clear) $(VENV)
+	@echo "Fetching and installing $$(grep -c '==' requirements-dev.lock) packages (pip says nothing until it is done)."
+	@$(PIP) --require-hashes -r requirements-dev.lock
+	@$(PIP) --no-deps --no-build-isolation -e .
 	@touch $(STAMP)
+	@echo "The environment in $(VENV) is made."
 
 $(STAMP)-%: requirements-%.lock $(STAMP)
 	$(PIP) --require-hashes -r $<

@@ -82,8 +82,9 @@ def learned_share(step: Step) -> float | None:
 # fmt: off
 FIGURES: tuple[Figure, ...] = (
     Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page", "report"})),
-    Figure(name="co_pace", label="of her polar", kind="share", of=pace_share, shown=frozenset({"page", "report"}),
-           hint="what she made of the predicted speeds in the last minutes"),
+    Figure(name="co_pace", label="pace, of the plan's", kind="share", of=pace_share,
+           shown=frozenset({"page", "report"}),
+           hint="how fast she got along her way in the last minutes, turns and all, of what plans expect"),
     Figure(name="co_sailed", label="sailed", kind="speed", of=sailed_mps, shown=frozenset({"page", "radio", "report"}),
            hint="through the water"),
     Figure(name="co_predict", label="predicted", kind="speed", of=predicted_mps,

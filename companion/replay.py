@@ -223,12 +223,15 @@ class RecordedInput:
             )
 
 
-def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
+def replay(
+    folder: Path, mission_path: Path | None = None, *, told: Callable[[int, int], object] | None = None
+) -> ReplayReport:
     """Fold the voyage in ``folder`` again.
 
     Args:
         folder: what ``companion run`` or ``sitl run`` left.
         mission_path: the mission file, where it is not at the recorded place any more.
+        told: is told after each step how many there were, and of how many.
 
     Raises:
         InputError: a file is missing or is not one of a voyage, or the telemetry log is empty.
@@ -237,6 +240,8 @@ def replay(folder: Path, mission_path: Path | None = None) -> ReplayReport:
     differences: list[Difference] = []
     steps = unrecorded = messages = lost = actions = 0
     for folded in voyage.steps():
+        if told is not None:
+            told(steps + unrecorded + 1, len(voyage.rows))
         if folded.step is None:
             unrecorded += 1
             continue

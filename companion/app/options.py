@@ -49,6 +49,8 @@ class SailOptions:
         seed: of the planner.
         dry_run: look, plan, speak, touch nothing.
         epoch_s: Unix time [s] of the loop's time 0, for stamps only.
+        clock_epoch_s: what this computer's clock showed at the loop's time 0 [s since 1970], where the loop is faster
+            than the clock; None: ``epoch_s``.
         expansions: plan with this effort instead of the mission's time budget (repeatable).
         state_path: where the state for a restart is kept; None: in the voyage folder.
         limit_s: end after this long [s].
@@ -75,6 +77,7 @@ class SailOptions:
     seed: int = 0
     dry_run: bool = False
     epoch_s: float = 0.0
+    clock_epoch_s: float | None = None
     expansions: int | None = None
     state_path: Path | None = None
     limit_s: float | None = None

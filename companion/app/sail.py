@@ -121,7 +121,13 @@ class _Shell:
         self.on_refusal: Callable[[str], None] | None = None
         self.voyage = voyage_of(mission)
         self.config = config_of(mission)
-        self.log = Logbook(recorder, self.config, options.epoch_s)
+        self.log = Logbook(
+            recorder,
+            self.config,
+            options.epoch_s,
+            clock_epoch_s=options.clock_epoch_s,
+            pace=1.0 if options.clock_epoch_s is None else 1.0 / options.budget_scale,
+        )
         self.views = ViewBroadcast(self.voyage, self.config, options.epoch_s, guard)
         self.views.is_kept = options.socket is not None
         self.state_file = StateFile(

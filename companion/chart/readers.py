@@ -37,6 +37,7 @@ TEXT_BYTES = 512 * 1024 * 1024  # of an ASCII grid or a GeoJSON: a coast of a co
 LEADER = re.compile(rb"\d{5}[ 1-3][LD ]")  # how ISO 8211 begins, which S-57 is written in
 GRIDS = frozenset({".tif", ".tiff", ".nc", ".asc", ".grd", ".bag"})
 OSM = frozenset({".osm", ".pbf"})
+LAYERED = OSM | {".shp", ".gpkg", ".fgb", ".gml", ".sqlite"}
 GEOGRAPHIC = re.compile(r"EPSG:(4326|4979)|OGC:CRS84|WGS[ _]?(19)?84", re.IGNORECASE)
 WATER = re.compile(r"water[-_ ]?polygons|ocean|seas?\b", re.IGNORECASE)
 S57_OPTIONS = {"UPDATES": "APPLY", "LIST_AS_STRING": "ON", "RETURN_PRIMITIVES": "OFF", "LNAM_REFS": "OFF"}
@@ -228,6 +229,7 @@ def _rows_of_layers(
     options: dict[str, str] | None = None,
 ) -> Iterator[Row]:
     """Yield the features of every layer, in longitude and latitude."""
+    _require_no_text(path)
     from pyogrio import list_layers
     from pyogrio.errors import DataLayerError, DataSourceError
     from pyogrio.raw import read as read_layer
@@ -253,7 +255,36 @@ def _rows_of_layers(
                 if box is None or shape.is_empty or _touches(shape, box):
                     yield Row(layer=layer, place=place, geometry=shape, attributes=attributes)
     except (DataLayerError, DataSourceError, shapely.errors.GEOSException) as error:
+        # what is called as a chart and is none may have been cut short
+        if "not recognized" in str(error) and path.suffix.lower() not in LAYERED and not options:
+            raise _no_chart(path) from None
         raise _damaged(path, str(error)) from None
+
+
+def _require_no_text(path: Path) -> None:
+    """Refuse what is plain text and no markup, in whatever format GDAL is asked for: nobody needs the library to know.
+
+    OSM's and GML's text is markup, which begins with ``<``; every other layer that is read here is binary or JSON.
+    """
+    if path.suffix.lower() in {".csv", ".tab", ".mif", ".dxf"} or not path.is_file():
+        return
+    try:
+        with path.open("rb") as file:
+            head = file.read(4096)
+    except OSError as error:
+        raise unreadable(str(path), error) from None
+    begins = head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1]
+    if begins not in {b"<", b"{", b"["} and not re.search(rb"[\x00-\x08\x0e-\x1f]", head):
+        raise _no_chart(path)
+
+
+def _no_chart(path: Path) -> InputError:
+    return InputError(
+        str(path),
+        "",
+        "is no chart file",
+        "name an S-57 cell (.000), a shapefile (.shp), GeoPackage, GeoJSON, OSM extract or a grid of depths",
+    )
 
 
 @contextlib.contextmanager

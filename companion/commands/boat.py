@@ -33,7 +33,7 @@ examples:
   companion boat compare pepper.toml ardurover
 
 A mission names the file: file = "pepper.toml" in its [boat].
-Exit codes: 0 written or told, 1 the logs hold too little sailing, 2 a file or a number cannot be believed.
+Exit codes: 0 written or told, 1 the logs hold too little sailing, 2 an invalid file or number.
 """
 TWA_DEG = (40.0, 45.0, 52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0, 165.0, 180.0)
 TRIAL_M = 1000.0  # from the start: nobody sails an hour to a trial

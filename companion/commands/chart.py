@@ -30,7 +30,7 @@ OSM extracts with seamarks (.osm, .pbf), grids of depths (GeoTIFF, netCDF, .asc)
 mission and `companion fence` read; each obstacle says why it is one, and what chart says so.
 
 Nothing that it writes is fit for navigation.
-Exit codes: 0 written, 1 written but a place of the mission is not in free water, 2 a file that cannot be believed.
+Exit codes: 0 written, 1 written but a place of the mission is not in free water, 2 an invalid file.
 """
 WITHIN_M = 2000.0  # beyond a mission's farthest place
 MOST_M = 50_000.0
@@ -224,7 +224,7 @@ def _water(args: argparse.Namespace) -> tuple[GeoPoint, float, list[tuple[str, G
 
     if args.mission is None:
         if args.radius is None:
-            raise InputError("companion chart import", "--around", "has no --radius", "say how far, in metres")
+            raise InputError("--around", "", "has no --radius", "say how far, in metres")
         return args.around, args.radius, [], None
     mission = read_course(Path(args.mission))
     frame = LocalFrame(mission.origin)
@@ -249,9 +249,7 @@ def _depth_m(args: argparse.Namespace, options: MissionOptions | None) -> float:
     if args.depth is not None:
         return float(args.depth)
     if options is None:
-        raise InputError(
-            "companion chart import", "--depth", "is missing", "say the least depth that is free, in metres"
-        )
+        raise InputError("--depth", "", "is missing", "say the least depth that is free, in metres")
     if options.boat.draft_m is None:
         raise InputError(args.mission, "[boat] draft_m", "is missing", "say how deep the keel is, or --depth M")
     return options.boat.draft_m + options.area.under_keel_m
@@ -275,9 +273,7 @@ def _tide_m(args: argparse.Namespace, table: str | None) -> float:
     if args.begins is None and args.ends is None and (table is None or args.drying):
         return 0.0
     if table is None or args.begins is None or args.ends is None or args.begins >= args.ends:
-        raise InputError(
-            "companion chart import", "--tide", "goes with --from and a later --to", "say all three, or none"
-        )
+        raise InputError("--tide", "", "goes with --from and a later --to", "say all three, or none")
     return lowest_m(_rows(table), args.begins.timestamp(), args.ends.timestamp(), table)
 
 
@@ -285,8 +281,8 @@ def _highest_m(args: argparse.Namespace, table: str | None) -> float:
     """Return the highest tide of the table [m]."""
     if table is None or args.begins is not None or args.ends is not None:
         raise InputError(
-            "companion chart import",
             "--drying",
+            "",
             "is by the hours of a table, not by one height",
             "say --tide, or [area] tide in the mission, without --from and --to",
         )

@@ -41,7 +41,7 @@ that follow. To send it again send the same bytes; a new `far order` is a second
 mission: [operator] far_orders = ["hold", ...]. `why` does nothing, and brings a status. Verbs: companion order --help.
 Where the boat and this end have lost each other's count (a counter file that is gone, a computer on board that is new,
 counters that are used up) begin anew: 15 bytes, after which the next order is number 1.
-Exit codes: 0 done, 1 not, 2 a file or option that cannot be believed.
+Exit codes: 0 done, 1 not, 2 an invalid file or option.
 """
 
 

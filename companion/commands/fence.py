@@ -36,8 +36,8 @@ examples:
   companion fence download boat.geojson --link /dev/ttyUSB0:57600
 
 Formats: WKT, EWKT, GeoJSON, QGroundControl .plan, .waypoints, Mission Planner .fen and .poly, GPX, KML, KMZ; a
-mission TOML stands for its area. A file is told by its content, not its name.
-Exit codes: 0 in order, 1 faults found or a failed transfer, 2 a file or option that cannot be believed.
+mission TOML stands for its area. The format is recognised by content, not by name.
+Exit codes: 0 in order, 1 faults found or a failed transfer, 2 an invalid file or option.
 """
 
 

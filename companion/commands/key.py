@@ -37,7 +37,7 @@ examples:
 The key travels unprotected when it is set: do that over the USB cable, with the boat disarmed. ArduPilot then signs on
 every port and refuses what is not signed on all but USB. Mission Planner and QGroundControl make the key of a
 passphrase: give them the one that was asked for by 'key new --passphrase'.
-Exit codes: 0 done and seen, 1 not, 2 a file or option that cannot be believed.
+Exit codes: 0 done and seen, 1 not, 2 an invalid file or option.
 """
 WAIT_S = 15.0  # for the autopilot
 TRIES = 3  # a link may lose the one message

@@ -46,7 +46,7 @@ examples:
 
 A mission TOML holds goals and an area; the companion plans the way itself (companion run). Waypoint files are sailed
 by the autopilot as they are.
-Exit codes: 0 in order, 1 faults found or a failed transfer, 2 a file or option that cannot be believed.
+Exit codes: 0 in order, 1 faults found or a failed transfer, 2 an invalid file or option.
 """
 
 

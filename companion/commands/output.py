@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import sys
 import threading
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from companion.disk import Disk, reason
 from companion.errors import InputError, JobError
+from companion.program import control
 from companion.words import counted
 
 # Beyond this it is told why nothing happens [s]: cached, planning and drawing each take less.
@@ -96,6 +99,32 @@ def patience(doing: str) -> Iterator[None]:
         yield
     finally:
         waiting.cancel()
+
+
+SAID_EVERY_S = 0.5
+
+
+class Folding:
+    """Tells on stderr how much of a voyage is folded again, where somebody looks on; a context manager."""
+
+    def __init__(self) -> None:
+        self._is_seen = sys.stderr.isatty()
+        self._said_s = -math.inf
+
+    def __enter__(self) -> Self:
+        if self._is_seen:
+            control(sys.stderr, "\rreading the voyage")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._is_seen:
+            control(sys.stderr, "\r\x1b[K")
+
+    def __call__(self, number: int, count: int) -> None:
+        """Take that ``number`` of ``count`` steps are folded."""
+        if self._is_seen and time.monotonic() - self._said_s >= SAID_EVERY_S:
+            self._said_s = time.monotonic()
+            control(sys.stderr, f"\rfolding the voyage again: {100 * number // max(1, count)} %")
 
 
 def force_option(parser: argparse.ArgumentParser) -> None:

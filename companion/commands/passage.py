@@ -32,7 +32,7 @@ PASSAGE.toml names start, goal, departure, forecasts in GRIB, boat and land; its
 Of one forecast the route is the fastest, with a time that no way can be faster than; of an ensemble the one that all
 its members sail well, as surely as [depart] sure asks. Ashore, before she sails.
 
-Exit codes: 0 planned, 1 no way was found, 2 a file that cannot be believed.
+Exit codes: 0 planned, 1 no way was found, 2 an invalid file.
 """
 
 

@@ -47,31 +47,42 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     parser.add_argument(
         "problem",
         metavar="PROBLEM.json",
-        help="the planning problem, or a mission TOML, planned from goal to goal in a wind held steady",
+        help="the planning problem, or a mission TOML, planned from goal to goal, and home where it ends "
+        "there, in a wind held steady",
     )
     parser.add_argument(
-        "--wind", type=wind, metavar="SPEED@FROM", help="of a mission [m/s, degrees] (else what its previews assume)"
+        "--wind",
+        type=wind,
+        metavar="SPEED@FROM",
+        help="of a mission: the true wind [m/s, degrees] (default: its preview wind)",
     )
     parser.add_argument(
         "--at",
         type=moment,
         metavar="TIME",
-        help="of a mission: when she sets out, for tables of the tide: 2026-11-24T08:00Z (now)",
+        help="of a mission: the time of departure, for tide tables, as 2026-11-24T08:00Z (default: now)",
     )
     parser.add_argument(
         "--budget",
         type=number("s", above=0.0),
         metavar="S",
-        help="computing time [s]; of a plan 1, unless --expansions is given",
+        help="computing time for each plan [s] (default: 1, unless --expansions is given)",
     )
     parser.add_argument(
-        "--expansions", type=whole(at_least=1), metavar="N", help="effort in the algorithm's own steps instead"
+        "--expansions",
+        type=whole(at_least=1),
+        metavar="N",
+        help="limit the effort in the algorithm's own steps, not in time",
     )
-    parser.add_argument("--seed", type=whole(), default=0, metavar="N", help="of every random choice (default 0)")
+    parser.add_argument("--seed", type=whole(), default=0, metavar="N", help="random seed (default: 0)")
     parser.add_argument("--algorithm", default="auto", choices=tuple(ALGORITHMS))
     parser.add_argument("--explain", action="store_true", help="say what bound each leg and what would change the plan")
     parser.add_argument(
-        "--explain-budget", type=number("s", above=0.0), default=5.0, metavar="S", help="computing time for that [s]"
+        "--explain-budget",
+        type=number("s", above=0.0),
+        default=5.0,
+        metavar="S",
+        help="computing time for --explain [s] (default: 5)",
     )
     parser.add_argument("--out", type=out_file, metavar="PLAN.json", help="write the plan")
     parser.add_argument("--plot", type=picture, metavar="P.png", help="draw problem, search, path and bound")
@@ -95,7 +106,8 @@ def run(args: argparse.Namespace) -> int:
     ground: dict[str, Any] = {}
     if Path(args.problem).suffix.lower() == ".toml":
         mission = _mission(args)
-        if args.plot is not None and args.policy is None and len(mission.goals) > 1:
+        ways = len(mission.goals) + (mission.skipper.end == "home")
+        if args.plot is not None and args.policy is None and ways > 1:
             raise _several(args)
         answers = _sail_through(mission, args)
         ground = {"area": mission.water(), "margin_m": mission.margin_m}
@@ -198,9 +210,7 @@ def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Prob
         return answers[-1][1]
 
     wind = AssumedWind(from_deg=from_deg, speed_mps=tws_mps)
-    planned_legs(
-        legs(mission, wind, goes_home=False, unix_s=time.time() if args.at is None else args.at.timestamp()), answer
-    )
+    planned_legs(legs(mission, wind, unix_s=time.time() if args.at is None else args.at.timestamp()), answer)
     return answers
 
 
@@ -247,6 +257,7 @@ def describe(problem: Problem, answer: Plan, margin_m: float = 0.0) -> str:
             )
         ),
         _risk_text(problem, answer),
+        *_of_light_wind(problem),
         *_of_wind(problem, answer),
         *_current_text(problem),
         effort,
@@ -269,6 +280,19 @@ def _of_wind(problem: Problem, answer: Plan) -> list[str]:
 
     broken = _broken(problem, answer)
     return [arrival_in_words(answer.arrival, answer.cost_s), *([f"NOT to be sailed: {broken}"] if broken else [])]
+
+
+def _of_light_wind(problem: Problem) -> list[str]:
+    """Return what the plan's times are worth in less wind than the polar has speeds for."""
+    speeds, tws_mps = problem.boat.speeds, problem.wind.tws_mps
+    if speeds is None or tws_mps is None or not 0.0 < tws_mps < speeds.lowest_mps:
+        return []
+    return [
+        (
+            f"light wind: her polar has no speeds for {tws_mps:.1f} m/s of wind, the least that it knows is "
+            f"{speeds.lowest_mps:.1f} m/s; those here are scaled down from there, so take the times as a rough guess"
+        )
+    ]
 
 
 def _broken(problem: Problem, answer: Plan) -> str:

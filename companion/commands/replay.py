@@ -7,6 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from companion.commands.output import Folding
+
 SHOWN = 5
 
 
@@ -29,7 +31,8 @@ def run(args: argparse.Namespace) -> int:
     from companion.replay import replay
     from companion.words import counted
 
-    report = replay(args.voyage, args.mission)
+    with Folding() as told:
+        report = replay(args.voyage, args.mission, told=told)
     print(
         f"{counted(report.steps, 'step')}, {counted(report.messages, 'message')}, "
         f"{counted(report.actions, 'action')}, {counted(report.restarts, 'restart')}: "
@@ -46,4 +49,6 @@ def run(args: argparse.Namespace) -> int:
         print(f"  t = {difference.t_s:.1f} s")
         print(f"    recorded {json.dumps(difference.recorded)[:400]}")
         print(f"    replayed {json.dumps(difference.replayed)[:400]}")
+    if not report.differences and report.steps:
+        print("today's code decides as it did under way; nothing was written")
     return 1 if report.differences else 0

@@ -41,8 +41,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
         help=summary,
         description="Sail a mission: estimate the wind, plan, upload, and plan again at each waypoint. Nothing is "
         "sent to the boat that the mission's [operator] table does not allow.",
-        epilog="Exit codes: 0 arrived, 1 not, 2 an order that gets no better by trying again, 66 a file that is not "
-        "there or cannot be read, a drawing that is not there or cannot be sailed. Examples: companion run "
+        epilog="Exit codes: 0 arrived, 1 not, 2 bad usage or input, which no retry mends, 66 a file that is not "
+        "there or cannot be read, a drawing that is not there or cannot be sailed, 130 ended "
+        "by Ctrl-C before the voyage began. Examples: companion run "
         "missions/archipelago.toml --link udpin:127.0.0.1:14551; companion run --from-autopilot boat.toml --link "
         "udpin:127.0.0.1:14551",
     )
@@ -84,7 +85,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
         help="permit this voyage what [operator] does not: set_auto or arm; may be given twice "
         "(sitl run does, for its simulated boat)",
     )
-    parser.add_argument("--seed", type=whole(), default=None, help="of the planner (default: the mission's)")
+    parser.add_argument(
+        "--seed", type=whole(), default=None, help="random seed of the planner (default: the mission's)"
+    )
     parser.add_argument(
         "--state",
         type=Path,
@@ -371,7 +374,8 @@ def _voyage(
         return SailOptions(
             seed=seed,
             dry_run=args.dry_run,
-            epoch_s=time.time() - time.monotonic() * args.speedup,
+            epoch_s=epoch_of(folder, args.speedup, time.time(), time.monotonic()),
+            clock_epoch_s=time.time() - time.monotonic(),
             expansions=mission.skipper.expansions,
             state_path=state_path,
             limit_s=args.limit,
@@ -493,6 +497,28 @@ async def _get_ready(planner: PlannerWorker, out: Console, manager: ServiceManag
             await planner.ready(say)
         except (TimeoutError, EOFError, OSError) as error:
             raise JobError(f"the planner's process did not start: {error!r}") from error
+
+
+def epoch_of(folder: Path, speedup: float, unix_s: float, monotonic_s: float) -> float:
+    """Return the Unix time [s] of the loop's time 0, by the clocks as they stand.
+
+    A hurried loop gains on the clock: begun again in the same folder it goes on by the folder's own epoch, or the
+    stamps of its frames would begin before those that are there.
+    """
+    epoch_s = unix_s - monotonic_s * speedup
+    if speedup == 1.0:
+        return epoch_s
+    from companion.telemetry.folder import VOYAGE, read_description
+
+    if not (folder / VOYAGE).is_file():
+        return epoch_s
+    with contextlib.suppress(InputError, KeyError, TypeError, ValueError):
+        run_table = read_description(folder)["run"]
+        known_s = float(run_table["epoch_s"])
+        # one from before the computer was started again is of another count of seconds
+        if known_s + monotonic_s * speedup >= datetime.fromisoformat(run_table["started_utc"]).timestamp():
+            return known_s
+    return epoch_s
 
 
 class SignalEnding:

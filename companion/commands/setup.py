@@ -11,7 +11,7 @@ import stat
 import sys
 import tempfile
 from argparse import ArgumentTypeError
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -22,6 +22,7 @@ from companion.program.arguments import number, place, system_id
 
 if TYPE_CHECKING:
     from companion.boat import Sizes
+    from companion.messages import GeoPoint
 
 FOLDER = Path("/etc/companion")
 SIMULATOR = "the simulator's boat"
@@ -52,7 +53,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Look for the autopilot on the serial ports, ask what is not given as an option, write a mission "
-        "and the settings of its instance of the unit (NAME.toml, NAME.env), and run the doctor. Nothing else is "
+        "and the settings of its systemd instance (NAME.toml, NAME.env), and run the doctor. Nothing else is "
         "changed, neither here nor on the autopilot.",
     )
     parser.add_argument(
@@ -88,18 +89,22 @@ def add_parser(subparsers: Any, summary: str) -> None:
         metavar="M,KG,M2",
         help="the boat's length, displacement and sail area, of which its file is guessed (1.5,20,0.9)",
     )
-    boat.add_argument("--polar", type=Path, metavar="FILE", help="of the boat (default: the simulator's boat)")
+    boat.add_argument("--polar", type=Path, metavar="FILE", help="the boat's polar (default: the simulator's boat)")
     parser.add_argument(
         "--no-go",
         type=NO_GO_DEG,
         metavar="DEG",
-        help="what the boat can sail to the wind (default: 47, or what is guessed)",
+        help="how close to the wind the boat can sail (default: 47, or what is guessed)",
     )
     parser.add_argument(
-        "--dir", type=Path, default=FOLDER, metavar="DIR", help=f"where the unit looks (default: {FOLDER})"
+        "--dir",
+        type=Path,
+        default=FOLDER,
+        metavar="DIR",
+        help=f"where the systemd unit looks for them (default: {FOLDER})",
     )
-    parser.add_argument("--yes", action="store_true", help="ask nothing: the defaults hold where nothing is given")
-    parser.add_argument("--force", action="store_true", help="take the place of files that are there")
+    parser.add_argument("--yes", action="store_true", help="ask nothing: use the defaults for what is not given")
+    parser.add_argument("--force", action="store_true", help="overwrite files that exist")
     parser.add_argument("--no-doctor", action="store_true", help="do not examine the autopilot")
     parser.set_defaults(run=run)
 
@@ -118,6 +123,12 @@ def run(args: argparse.Namespace) -> int:
     if not args.drawn:
         args.start = args.start or ask("where she starts, LAT,LON", None, place)
         args.goal = args.goal or [ask("where she is to sail, LAT,LON", None, place)]
+        while not ask.is_silent and (problem := apart(args.start, args.goal)):  # unasked, the mission's check says so
+            print(problem)
+            if ask("are they right as they are (yes), or named again (no)", "no", yes_or_no):
+                break
+            args.start = ask("where she starts, LAT,LON", None, place)
+            args.goal = [ask("where she is to sail, LAT,LON", None, place)]
     if args.polar is None and args.boat is None:
         args.boat = ask(
             "her length [m], displacement [kg] and sail area [m2], as 1.5,20,0.9",
@@ -194,6 +205,22 @@ def sizes(text: str) -> Sizes:
         return Sizes(length_m=length_m, displacement_kg=displacement_kg, sail_area_m2=sail_area_m2)
     except ValueError as error:
         raise ArgumentTypeError(str(error)) from None
+
+
+def apart(start: GeoPoint, goals: Sequence[GeoPoint]) -> str:
+    """Return which goal is farther from the start than a mission reaches, and how that may have come; empty: none."""
+    from companion.geo.frame import LocalFrame
+    from companion.geofence.mission import RANGE_M
+
+    frame = LocalFrame(start)
+    for nth, goal in enumerate(goals, start=1):
+        away_m = max(abs(part) for part in frame.en_from_geo(goal))
+        if away_m > RANGE_M:
+            return (
+                f"goal {nth} ({goal.lat_deg:g},{goal.lon_deg:g}) is {away_m / 1000.0:.0f} km from the start "
+                f"({start.lat_deg:g},{start.lon_deg:g}): is one of them LON,LAT, or has a sign wrong?"
+            )
+    return ""
 
 
 def yes_or_no(text: str) -> bool:

@@ -45,15 +45,27 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument("--once", action="store_true", help="print one status and end")
     parser.add_argument("--json", action="store_true", help="JSON, one object per status; unknown is null")
     parser.add_argument(
-        "--timeout", type=number("s", above=0.0), default=10.0, metavar="S", help="for the first status (default: 10)"
+        "--timeout",
+        type=number("s", above=0.0),
+        default=10.0,
+        metavar="S",
+        help="how long to wait for the first status (default: 10)",
     )
     parser.add_argument(
-        "--max-age", type=number("s", above=0.0), default=10.0, metavar="S", help="older is stale (default: 10)"
+        "--max-age",
+        type=number("s", above=0.0),
+        default=10.0,
+        metavar="S",
+        help="a status older than this is stale (default: 10)",
     )
     parser.add_argument(
-        "--every", type=number("s", above=0.0), default=2.0, metavar="S", help="without --once (default: 2)"
+        "--every",
+        type=number("s", above=0.0),
+        default=2.0,
+        metavar="S",
+        help="between two statuses, without --once (default: 2)",
     )
-    parser.add_argument("--units", choices=("ms", "kn"), default="ms", help="of speeds in the text (default: ms)")
+    parser.add_argument("--units", choices=("ms", "kn"), default="ms", help="unit of speeds in the text (default: ms)")
     parser.set_defaults(run=run)
 
 

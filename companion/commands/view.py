@@ -11,13 +11,12 @@ import time
 from pathlib import Path
 from typing import Any
 
-from companion.commands.output import force_option, write_files
+from companion.commands.output import Folding, force_option, write_files
 from companion.errors import InputError
-from companion.program import control
 from companion.program.arguments import chart_option, host_name, http_address, out_file, system_id
+from companion.words import counted
 
 PORT = 8765
-SAID_EVERY = 500  # recorded steps between two words on how far it is
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -105,7 +104,10 @@ def run(args: argparse.Namespace) -> int:
     if args.export is not None:
         data = export(record)
         write_files({str(args.export): data}, force=args.force)
-        print(f"{args.export}: {len(data) / 1e6:.1f} MB, {len(record.times)} moments")
+        print(
+            f"written: {args.export}, {len(data) / 1e6:.1f} MB, {counted(len(record.times), 'moment')} of the voyage; "
+            "it opens in any browser"
+        )
         return 0
     host, port = args.http
     return run_loop(serve(Address(host=host, port=port, names=tuple(args.http_name)), record, charts))
@@ -116,15 +118,13 @@ def read_record(folder: Path) -> Any:
     from companion.page import RecordedSource
     from companion.view import recorded_views
 
-    recorded = recorded_views(folder)
-    record = RecordedSource(recorded.name, recorded.area, is_whole=recorded.is_whole, count=recorded.count)
-    for number, (view, events) in enumerate(recorded.moments, start=1):
-        record.take(view, events)
-        if number % SAID_EVERY == 0 and sys.stderr.isatty():
-            control(sys.stderr, f"\rfolding the voyage again: {100 * number // recorded.count} %")
-    record.finish()
-    if sys.stderr.isatty() and recorded.count >= SAID_EVERY:
-        control(sys.stderr, "\r\x1b[K")
+    with Folding() as told:
+        recorded = recorded_views(folder)
+        record = RecordedSource(recorded.name, recorded.area, is_whole=recorded.is_whole, count=recorded.count)
+        for number, (view, events) in enumerate(recorded.moments, start=1):
+            record.take(view, events)
+            told(number, recorded.count)
+        record.finish()
     if not record.times:
         raise InputError(str(folder), "track.csv", "has no step in it", "name a voyage that was sailed")
     if not recorded.is_whole:

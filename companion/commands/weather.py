@@ -31,7 +31,7 @@ packing is read here, every other by the extra `weather`; netCDF 4 and Zarr by t
 are stations of the tide with their harmonic constants; `tide` makes of them the tables that a mission's [area] tide and
 [current] table name. Directions are true: of a wind where it comes from, of a current where it goes.
 
-Exit codes: 0 told, 2 a file that cannot be believed, or a place that it says nothing of.
+Exit codes: 0 told, 2 an invalid file, or a place that it says nothing of.
 """
 
 

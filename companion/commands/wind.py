@@ -48,7 +48,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         "record", metavar="RECORD", nargs="+", type=Path, help="CSV, tlog, ArduPilot .bin, or a folder of CSV"
     )
     parser.add_argument(
-        "--estimator", default="default", metavar="NAME", help="its name, or all; an unknown one is told the names"
+        "--estimator",
+        default="default",
+        metavar="NAME",
+        help="the estimator, or all of them; an unknown name lists what there is",
     )
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument(

@@ -184,6 +184,8 @@ def place(text: str) -> GeoPoint:
         return GeoPoint(lat_deg=lat, lon_deg=lon)
     except ValueError as error:
         problem = str(error) if "outside" in str(error) else f"{text[:40]!r} is not a position"
+        if "latitude" in problem:
+            problem += ": are lat and lon swapped?"
         raise ArgumentTypeError(f"{problem}; write LAT,LON in degrees, as 50.82,-1.31") from None
 
 

@@ -239,7 +239,7 @@ class Program:
         parser = Parser(
             prog=self.name,
             description=self.description,
-            epilog="Exit codes: 0 success, 1 failed job, 2 bad usage or input. "
+            epilog="Exit codes: 0 success, 1 failed job, 2 bad usage or input, 130 ended by Ctrl-C. "
             f"'{self.name} COMMAND --help' says more.",
         )
         parser.add_argument("--version", action="version", version=f"{self.name} {__version__}")

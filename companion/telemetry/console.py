@@ -201,6 +201,7 @@ class ProgressLine:
         self._last: tuple[float, str] = (-math.inf, "")
         self._standing = 0  # lines that are rewritten
         self._notes: list[str] = []  # to be said with the next step
+        self._behind_s: float | None = None  # our clock's, against the autopilot's; None: no time was told yet
 
     def __enter__(self) -> Self:
         return self
@@ -224,7 +225,9 @@ class ProgressLine:
         if status.alert_code in {DISK, GONE}:
             text += f" | {status.alert_text}"
         said, self._notes = self._notes, []
-        said += [self._said(step.snapshot, a) for a in step.actions if isinstance(a, Announce) and a.severity <= LOUD]
+        for announced in step.actions:
+            if isinstance(announced, Announce) and announced.severity <= LOUD:
+                said += self._said(step.snapshot, announced)
         t_s, phase = step.snapshot.t_s, step.state.phase.value
         if self._is_terminal:
             columns = min(COLUMNS_MOST, shutil.get_terminal_size((COLUMNS_MOST, 24)).columns) - 1
@@ -244,13 +247,21 @@ class ProgressLine:
             self._stream.write("".join(f"{line}\n" for line in said))
             self._stream.flush()
 
-    def _said(self, snapshot: Snapshot, announced: Announce) -> str:
+    def _said(self, snapshot: Snapshot, announced: Announce) -> list[str]:
+        """Return it with its time of day, the page's, below a line where that turns from one clock to the other."""
         unix_s, boat_s = self._epoch_s + snapshot.t_s, unix_of_boat(snapshot, snapshot.t_s)
-        if boat_s is not None and abs(boat_s - unix_s) >= CLOCK_OFF_S:  # as the page's time of day
-            unix_s = boat_s
-        clock = datetime.fromtimestamp(unix_s, UTC).strftime("%H:%M:%S")
+        before_s, lines = self._behind_s, []
+        if boat_s is not None and abs(boat_s - unix_s) >= CLOCK_OFF_S:
+            self._behind_s = boat_s - unix_s
+            if before_s == 0.0:
+                lines.append(
+                    f"it is {datetime.fromtimestamp(boat_s, UTC):%Y-%m-%d %H:%M:%S} UTC by the autopilot's clock"
+                )
+        elif before_s is None:
+            self._behind_s = 0.0
+        clock = datetime.fromtimestamp(unix_s + (self._behind_s or 0.0), UTC).strftime("%H:%M:%S")
         loud = f"{announced.severity.name}: " if announced.severity <= Severity.WARNING else ""
-        return f"{clock} {loud}{one_line(announced.text)}"
+        return [*lines, f"{clock} {loud}{one_line(announced.text)}"]
 
 
 def wrapped(lines: list[str], columns: int) -> list[str]:

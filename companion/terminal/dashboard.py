@@ -440,7 +440,7 @@ def _speeds(view: View, *, knots: bool) -> Row:
         "VMG",
         (
             f"{speed_text(boat.vmg_mps, knots=knots)} {unit_text(knots=knots)}"
-            f"{'' if ratio is None else f', polar {share_text(ratio)}'}{heel}"
+            f"{'' if ratio is None else f', {share_text(ratio)} of polar'}{heel}"
         ),
         Style.PLAIN,
     )
@@ -516,6 +516,18 @@ def age_of(view: View) -> float | None:
     """Return how old what is shown is: of the companion itself where it is heard over a radio."""
     companion = next((part for part in view.health if part.name == "companion"), None)
     return view.age_s if companion is None else companion.age_s
+
+
+def age_text(view: View) -> str:
+    """Return that age in words, and whose it is where the companion is not heard."""
+    age_s = age_of(view)
+    if age_s is not None:
+        return f"{'age' if age_s <= OLD_S else 'OLD'} {span_text(age_s)}"
+    if view.age_s is None:
+        autopilot = next((part.age_s for part in view.health if part.name == "autopilot"), None)
+    else:
+        autopilot = view.age_s
+    return "nothing heard yet" if autopilot is None else f"companion not heard, autopilot's age {span_text(autopilot)}"
 
 
 def why_of(view: View) -> str:
@@ -607,12 +619,11 @@ def _bottom(frame: Frame, what: Shown) -> None:
 def line_of(view: View, unix_s: float, *, knots: bool) -> str:
     """Return the view as one line; nothing without its age."""
     state, boat, wind, plan = view.state, view.boat, view.wind, view.plan
-    age_s = age_of(view)
     unit = unit_text(knots=knots)
     parts = [
         f"{datetime.fromtimestamp(unix_s, UTC):%H:%M:%S} {state.phase.upper()}",
         f"{state.mode or 'mode not heard'}{' armed' if state.is_armed else ''}",
-        "age unknown" if age_s is None else f"{'age' if age_s <= OLD_S else 'OLD'} {span_text(age_s)}",
+        age_text(view),
     ]
     if wind is not None:
         parts.append(

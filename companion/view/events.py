@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+
+import shapely
 
 from companion.fold import Step
 from companion.geo.angles import direction
 from companion.messages import Severity
 from companion.orders import Order
-from companion.planner import Plan
+from companion.planner import Plan, Problem
 from companion.skipper.step import (
     Acknowledge,
     Announce,
@@ -60,8 +63,13 @@ class Happening:
     facts: Facts = ()
 
 
-def happenings(step: Step, phase: str, why: dict[int, str]) -> Iterable[Happening]:
-    """Yield what happened in a step; ``phase`` is the one before it, ``why`` the reasons of plans by request."""
+def happenings(
+    step: Step, phase: str, why: dict[int, str], nearest: Mapping[int, str] = MappingProxyType({})
+) -> Iterable[Happening]:
+    """Yield what happened in a step; ``phase`` is the one before it.
+
+    ``why`` are the reasons of plans by request, ``nearest`` what each is nearest to, as ``nearest_of`` names it.
+    """
     snapshot = step.snapshot
     for event in snapshot.events:
         if isinstance(event, Order):
@@ -77,7 +85,7 @@ def happenings(step: Step, phase: str, why: dict[int, str]) -> Iterable[Happenin
             yield Happening(kind="mode", title=f"mode {after}", text=f"before it {before}")
     for outcome in snapshot.outcomes:
         if isinstance(outcome, PlanOutcome):
-            yield _plan(outcome, why.get(outcome.request_id, ""))
+            yield _plan(outcome, why.get(outcome.request_id, ""), nearest.get(outcome.request_id, ""))
         elif isinstance(outcome, UploadOutcome):
             is_ok = outcome.result is UploadResult.OK
             yield Happening(
@@ -125,7 +133,18 @@ def _facts(action: RequestPlan) -> Facts:
     return tuple(facts)
 
 
-def _plan(outcome: PlanOutcome, why: str) -> Happening:
+def nearest_of(problem: Problem, plan: Plan) -> str:
+    """Return the name of what a plan is nearest to: an obstacle's, a mark's, the fence; empty: nothing is there."""
+    if not plan.has_path:
+        return ""
+    way = shapely.LineString(plan.waypoints_en)
+    found = [(float(shapely.distance(o, way)), problem.obstacle_name(n)) for n, o in enumerate(problem.obstacles)]
+    if problem.fence_polygon is not None:
+        found.append((float(shapely.distance(problem.fence_polygon.boundary, way)), "the fence"))
+    return min(found, default=(0.0, ""))[1]
+
+
+def _plan(outcome: PlanOutcome, why: str, nearest: str) -> Happening:
     plan: Plan | None = outcome.plan
     if plan is None or not plan.has_path:
         title = "no plan" if plan is None else f"no plan: {plan.status.value}"
@@ -153,7 +172,8 @@ def _plan(outcome: PlanOutcome, why: str) -> Happening:
         facts.append(("clearance expected", f"{plan.expected_clearance_m:.1f} m"))
     clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
     if clear:
-        facts.append(("nearest beyond the margin", f"{min(clear):.1f} m"))
+        # a mark is no obstacle: what is kept clear of it is less than the margin
+        facts.append(("nearest, beyond what is kept clear", f"{min(clear):.1f} m{f', {nearest}' if nearest else ''}"))
     return Happening(
         kind="plan",
         title=f"plan {outcome.request_id}: {plan.status.value}",

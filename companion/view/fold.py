@@ -17,7 +17,7 @@ from companion.telemetry.folder import VoyageFigures
 from companion.telemetry.status import CLOCK_OFF_S, unix_of_boat
 from companion.view import parts, values
 from companion.view.area import area_of
-from companion.view.events import Event, happenings
+from companion.view.events import Event, happenings, nearest_of
 from companion.view.parts import (
     Chosen,
     laylines_of,
@@ -51,6 +51,7 @@ class ViewFold:
         self._asked: dict[int, tuple[float, RequestPlan]] = {}
         self._plans: dict[int, Chosen] = {}
         self._whys: dict[int, str] = {}
+        self._nearest: dict[int, str] = {}
         self._phase, self._phase_s = "", 0.0
         self._said: dict[str, str] = {}
         self._track: deque[tuple[float, PointEn, values.Tack | None]] = deque()
@@ -71,7 +72,7 @@ class ViewFold:
         self._follow(step.voyage)
         self._note(step)
         events = []
-        for found in happenings(step, self._phase, self._whys):
+        for found in happenings(step, self._phase, self._whys, self._nearest):
             self._number += 1
             events.append(
                 Event(
@@ -117,6 +118,7 @@ class ViewFold:
                 )
                 self._plans = dict(list(self._plans.items())[-PLANS_KEPT:])
                 self._whys = {number: chosen.why for number, chosen in self._plans.items()}
+                self._nearest = {outcome.request_id: nearest_of(request.problem, outcome.plan)}
         here, t_s = step.snapshot.position_en_m, step.snapshot.t_s
         if here is not None and (not self._track or t_s - self._track[-1][0] >= TRACK_STEP_S):
             self._track.append((t_s, place(here), self._tack(step)))

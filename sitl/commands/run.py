@@ -8,11 +8,14 @@ import math
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from companion.program.arguments import chart_option, http_address, moment, number, out_folder, whole
 from companion.program.commands import missing
 from companion.words import file_name
+
+if TYPE_CHECKING:
+    from sitl.scenario import Scenario, ScenarioVerdict
 
 OURS = {path.stem: path for path in (Path(__file__).resolve().parents[1] / "scenarios").rglob("*.toml")}
 
@@ -38,7 +41,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         description="Run a scenario: autopilot, weather, companion, and a verdict on what the boat really did. The "
         "embedded autopilot runs under the virtual clock in this process; with --live it is a process of its own "
         "over UDP, as is the companion; with --autopilot ardurover it is the real program.",
-        epilog="Examples: sitl run demo --seed 3, sitl run my-mission.toml --live",
+        epilog="Exit codes: 0 passed, 1 a check failed, 2 bad usage or input, 130 ended by Ctrl-C: no verdict, "
+        "and what was recorded is kept. Examples: sitl run demo --seed 3, sitl run my-mission.toml --live",
     )
     parser.add_argument(
         "scenario",
@@ -79,7 +83,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--http-token", type=Path, metavar="FILE", help="orders from the page, as of companion run")
     chart_option(parser)
-    parser.add_argument("--seed", type=whole(), default=0)
+    parser.add_argument("--seed", type=whole(), default=0, metavar="N", help="random seed of the weather (default: 0)")
     parser.add_argument(
         "--at",
         type=moment,
@@ -95,13 +99,12 @@ def run(args: argparse.Namespace) -> int:
     """Run the command."""
     import msgspec
 
-    from companion.clock import run_virtual
     from companion.errors import InputError
     from companion.geofence import load_mission
-    from companion.telemetry.console import ProgressLine
+    from companion.program import INTERRUPTED
     from companion.telemetry.folder import DECISIONS
     from sitl.run.compiled import compile_ahead
-    from sitl.run.embedded import mission_of, run_embedded
+    from sitl.run.embedded import mission_of
     from sitl.scenario import beginning, load_scenario, own_polar, scenario_wind
 
     scenario = load_scenario(args.scenario)
@@ -134,10 +137,27 @@ def run(args: argparse.Namespace) -> int:
         host, port = args.http
         print(f"the page: http://{f'[{host}]' if ':' in host else host}:{port}/ once the companion is up", flush=True)
     compile_ahead(mission.skipper.planner)
+    try:
+        verdict = _sailed(args, scenario, folder, page)
+    except KeyboardInterrupt:
+        kept = f"what was recorded is in {folder}" if (folder / DECISIONS).exists() else "nothing was recorded yet"
+        sys.stderr.write(f"sitl run: interrupted, so there is no verdict; {kept}\n")
+        return INTERRUPTED
+    print_verdict(verdict)
+    print(folder)
+    return 0 if verdict.passed else 1
+
+
+def _sailed(args: argparse.Namespace, scenario: Scenario, folder: Path, page: list[str]) -> ScenarioVerdict:
+    """Sail it, in real time or under the virtual clock, and draw that."""
+    from companion.clock import run_virtual
+    from companion.telemetry.console import ProgressLine
+    from sitl.run.embedded import run_embedded
+
     if is_live(args):
         from sitl.run.live import run_live
 
-        verdict = run_live(
+        return run_live(
             scenario,
             args.scenario,
             args.seed,
@@ -148,13 +168,10 @@ def run(args: argparse.Namespace) -> int:
             page=page,
             cpu=args.cpu,
         )
-    else:
-        with ProgressLine(sys.stdout) as progress:
-            verdict = run_virtual(run_embedded(scenario, args.scenario, args.seed, folder, on_status=progress.show))
-        draw(folder)
-    print_verdict(verdict)
-    print(folder)
-    return 0 if verdict.passed else 1
+    with ProgressLine(sys.stdout) as progress:
+        verdict = run_virtual(run_embedded(scenario, args.scenario, args.seed, folder, on_status=progress.show))
+    draw(folder)
+    return verdict
 
 
 def is_live(args: argparse.Namespace) -> bool:

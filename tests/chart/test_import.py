@@ -143,7 +143,7 @@ def test_water_that_dries_goes_to_a_file_of_its_own_which_a_mission_reads(shell)
     assert not any("depth_m" in f["properties"] for f in solid)
     assert len(load_mission(shell.folder / "m.toml").drying) == len(pieces)
     told = refusal(shell, "g.asc", *AROUND, "--depth", "1.7", "--drying")
-    assert told.startswith("companion chart import: --drying: is by the hours of a table")
+    assert told.startswith("--drying: is by the hours of a table")
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_water_that_dries_goes_to_a_file_of_its_own_which_a_mission_reads(shell)
         (TIDE.replace("4.0", "40"), "06:00", "t.csv: line 3: a tide of 40 m cannot be"),
         (TIDE.replace("12:00Z", "12:00"), "06:00", "t.csv: line 3: '2026-11-24T12:00' is no time with its zone"),
         (TIDE.replace("12:00Z", "05:00Z"), "06:00", "t.csv: line 3: is not a minute or more after the line before"),
-        (TIDE, "19:00", "companion chart import: --tide: goes with --from and a later --to; say all three, or none"),
+        (TIDE, "19:00", "--tide: goes with --from and a later --to; say all three, or none"),
     ],
 )
 def test_a_tide_that_cannot_be_believed_is_refused(shell, text, begins, told):
@@ -337,8 +337,25 @@ def test_a_chart_that_gdal_cannot_read_is_told_in_one_line(shell):
 
 def test_without_the_extra_it_is_one_line(shell, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyogrio", None)
-    (shell.folder / "a.gpkg").write_bytes(b"x")
+    (shell.folder / "a.gpkg").write_bytes(b"SQLite format 3\x00")
     assert shell("a.gpkg", *AROUND, "--depth", "2")[2] == (
         "companion chart: pyogrio is not installed, which this needs; in the clone of this project: "
         "pip install '.[chart]'\n"
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "data"), [("notes.txt", b"Hayling: keep off the bar.\n"), ("a.gpkg", "Untiefe: l\u00e4nger\n".encode())]
+)
+def test_a_text_that_is_no_chart_is_called_so_with_and_without_the_extra(shell, monkeypatch, name, data):
+    """Who named his notes was told to install pyogrio, and with it to fetch the file again."""
+    (shell.folder / name).write_bytes(data)
+    for _ in range(2):
+        assert f"{name}: is no chart file; name an S-57 cell (.000)" in refusal(shell, name, *AROUND, "--depth", "2")
+        monkeypatch.setitem(sys.modules, "pyogrio", None)
+
+
+def test_a_file_that_gdal_knows_no_format_of_is_no_chart(shell):
+    pytest.importorskip("pyogrio")
+    (shell.folder / "photo.png").write_bytes(b"\x89PNG\x00\x01")
+    assert "photo.png: is no chart file" in refusal(shell, "photo.png", *AROUND, "--depth", "2")

@@ -395,3 +395,14 @@ def test_standard_output_that_is_full_is_one_line():
         ended = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
     assert ended.returncode == 1
     assert ended.stderr.splitlines() == ["companion mission: standard output: No space left on device"]
+
+
+def test_the_leg_home_is_planned_and_light_wind_is_said(capsys):
+    """The plan of a mission that ends at home ended at its last goal; in 1 m/s its times stood there as any other's."""
+    words = ["plan", "missions/bay.toml", "--expansions", "20000", "--wind"]
+    assert cli.main([*words, "1@0"]) == 0
+    out = capsys.readouterr().out
+    assert "\nbay: home\n" in out
+    assert "light wind: her polar has no speeds for 1.0 m/s of wind, the least that it knows is 3.0 m/s" in out
+    assert cli.main([*words, "5@0"]) == 0
+    assert "light wind" not in capsys.readouterr().out

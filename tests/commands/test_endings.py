@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from datetime import UTC, datetime
 
 import pytest
 
@@ -14,10 +15,11 @@ from companion import cli
 from companion.app.options import SailOptions, at_once
 from companion.app.sail import sail
 from companion.clock import now_s, run_virtual
-from companion.commands.run import SignalEnding
+from companion.commands.run import SignalEnding, epoch_of
 from companion.geofence import load_mission
 from companion.program import INTERRUPTED
 from companion.program.arguments import absent_device
+from companion.telemetry.folder.logbook import Logbook
 from sitl.autopilot import MemoryLink
 from sitl.faults.computer_faults import FaultyPlanner
 from sitl.scenario.traffic import free_port
@@ -259,3 +261,23 @@ def test_a_terminal_without_umlauts_is_told_in_question_marks(tmp_path, words, c
     assert run.returncode == code, run.stderr
     assert said in run.stdout + run.stderr
     assert (run.stdout + run.stderr).count("\n") == 1
+
+
+def test_a_hurried_voyage_begun_again_in_its_folder_goes_on_by_its_own_epoch(tmp_path):
+    """Eight times as fast as the clock, its second life's frames were stamped before the first's."""
+    at_s, up_s = 1.78e9, 1_000.0
+    first_s = epoch_of(tmp_path, 8.0, at_s, up_s)
+    assert first_s + 8.0 * up_s == at_s
+    started = datetime.fromtimestamp(at_s, UTC).isoformat()
+    (tmp_path / "voyage.toml").write_text(f'[run]\nepoch_s = {first_s}\nstarted_utc = "{started}"\n')
+    assert epoch_of(tmp_path, 8.0, at_s + 60.0, up_s + 60.0) == first_s
+    assert epoch_of(tmp_path, 1.0, at_s + 60.0, up_s + 60.0) == at_s - up_s  # on the water the clock may be set
+    assert epoch_of(tmp_path, 8.0, at_s + 60.0, 5.0) == at_s + 60.0 - 40.0  # the computer was started again
+
+
+def test_utc_of_a_hurried_voyage_is_the_clocks(tmp_path):
+    """It ran eight times as fast, into hours that nobody had lived yet."""
+    hurried = Logbook(None, None, 1_000.0 - 8.0 * 100.0, clock_epoch_s=1_000.0 - 100.0, pace=8.0)
+    assert hurried.stamps(800.0)["utc"] == "1970-01-01T00:16:40.000Z"
+    assert hurried.stamps(880.0)["utc"] == "1970-01-01T00:16:50.000Z"  # ten seconds of the clock
+    assert Logbook(None, None, 1_000.0).stamps(80.0)["utc"] == "1970-01-01T00:18:00.000Z"

@@ -186,3 +186,20 @@ def test_a_busy_port_says_who_to_end(serial):
     with serial.open("r+b", buffering=0) as taken:
         fcntl.flock(taken, fcntl.LOCK_EX)
         assert "another program has it; end that, or share the port" in refusal([setup.Port(path=serial)])
+
+
+def test_a_goal_that_lies_a_continent_away_is_asked_about(tmp_path, monkeypatch, capfd):
+    """Latitude and longitude were swapped, and after all questions the file was refused and nothing written."""
+    answers = iter(["50.817,-1.31", "-1.3085,50.8188", "no", "50.817,-1.31", "50.8188,-1.3085", ""])
+    monkeypatch.setattr("builtins.input", lambda text: next(answers))
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    words = ["setup", "lake", "--link", "udpin:127.0.0.1:14598", "--no-doctor", "--no-go", "50", "--dir", str(tmp_path)]
+    monkeypatch.setattr(setup.Questions, "__call__", _without_drawing(setup.Questions.__call__))
+    assert cli.main(words) == 0
+    assert "goal 1 (-1.3085,50.8188) is " in (out := capfd.readouterr().out)
+    assert "is one of them LON,LAT, or has a sign wrong?" in out
+    assert tomllib.loads((tmp_path / "lake.toml").read_text())["goal"] == [{"lat": 50.8188, "lon": -1.3085}]
+
+
+def _without_drawing(asked):
+    return lambda self, what, default, take: False if "drawn" in what else asked(self, what, default, take)

@@ -61,7 +61,7 @@ def test_the_speed_that_was_predicted_is_told_against_what_was_sailed(step):
     assert "co_pace" not in figure_values(step, "page")  # nothing was seen yet
     slow = dataclasses.replace(step, pace=Pace(tries=5.0, prior=0.0, took_s=100.0, made_s=70.0))
     assert figure_values(slow, "page")["co_pace"] == pytest.approx(0.7)
-    assert "of her polar 70 %" in in_words(figure_values(slow, "page"))
+    assert "pace, of the plan's 70 %" in in_words(figure_values(slow, "page"))
 
 
 def test_the_speed_through_the_water_is_told_beside_what_the_boat_of_the_plans_makes_there(step):

@@ -90,3 +90,10 @@ def test_a_folder_of_something_else_is_never_cleared(tmp_path):
     assert answer.returncode == 2
     assert "is there and is no environment. Name another place: make VENV=.venv" in answer.stderr
     assert (tmp_path / "logbook.txt").exists()
+
+
+def test_it_says_what_it_does_for_minutes_and_pip_does_not(tmp_path):
+    """make demo in a fresh clone stood for minutes below a line of pip's, and then came warnings of pip's."""
+    told = make("-n", "env", f"VENV={tmp_path / 'venv'}", f"PYTHON={sys.executable}").stdout
+    assert "once: a minute or two, on a slow machine or line up to ten." in told
+    assert told.index("Fetching and installing") < told.index("pip install -qq")

@@ -133,6 +133,25 @@ def test_what_is_said_has_the_autopilots_time_where_this_computers_is_another(st
     assert re.search(rf"^{hour}:00:\d\d WARNING: the fence", stream.getvalue(), re.MULTILINE)
 
 
+def test_where_times_turn_to_the_autopilots_clock_that_is_said_and_they_never_turn_back(steps):
+    """Lines of the hour at the desk stood above lines of the scenario's, and times went backwards without a word."""
+    stream = io.StringIO()
+    said = (Announce(severity=Severity.WARNING, code="x", text="so it is"),)
+    with ProgressLine(stream, epoch_s=36_000.0) as progress:
+        for n, step in enumerate(steps):
+            autopilot = replace(step.snapshot.autopilot, t_s=float(n), boot_s=float(n), utc_at_boot_s=3_600.0)
+            untold = replace(step.snapshot.autopilot, utc_at_boot_s=None)
+            snapshot = replace(step.snapshot, autopilot=autopilot if n == 1 else untold)
+            progress.show(STATUS, replace(step, snapshot=snapshot, actions=said))
+    times = [line[:40] for line in stream.getvalue().splitlines() if line[0].isdigit() or line.startswith("it is")]
+    assert times == [
+        "10:00:00 WARNING: so it is",
+        "it is 1970-01-01 01:00:01 UTC by the aut",
+        "01:00:01 WARNING: so it is",
+        "01:00:02 WARNING: so it is",
+    ]
+
+
 def test_what_is_left_behind_is_said_with_where_she_will_end():
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
     made = world.skipper.voyage

@@ -262,6 +262,16 @@ def test_the_winds_history_is_that_of_the_voyage(beat):
     assert any(event_words(e)[:20] in text for e in list(history.events)[-3:])
 
 
+def test_the_age_of_what_is_heard_is_told_where_the_companion_is_not():
+    """A line said "age unknown" beside what the autopilot had told three seconds before."""
+    silent = Part(name="companion", grade="unknown", text="not heard")
+    heard = replace(VIEW, source="radio", age_s=3.0, health=(silent,))
+    assert "companion not heard, autopilot's age 3 s" in line_of(heard, UNIX_S, knots=True)
+    pilot = Part(name="autopilot", grade="good", age_s=2.0)
+    assert "autopilot's age 2 s" in line_of(replace(heard, age_s=None, health=(pilot, silent)), UNIX_S, knots=True)
+    assert "nothing heard yet" in line_of(replace(heard, age_s=None), UNIX_S, knots=True)
+
+
 def test_a_line_says_the_same(beat):
     text = line_of(VIEW, UNIX_S, knots=False)
     assert "STANDARD | AUTO armed | age 0 s | wind 080°±9° 5.0 m/s" in text

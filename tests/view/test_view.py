@@ -20,6 +20,8 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import load_mission
 from companion.messages import AutopilotStatus, CompanionStatus, GeoPoint, VehicleState, WindForecast
 from companion.page.sources import LiveSource
+from companion.planner import Problem, plan
+from companion.planner.explain import with_clearance
 from companion.skipper.step import PlanOutcome, SkipperConfig, SkipperState, Snapshot, WindEstimate, WindHealth
 from companion.skipper.step.actions import RequestPlan
 from companion.skipper.way import Refuge
@@ -28,6 +30,7 @@ from companion.telemetry.folder.logbook import chart_record
 from companion.telemetry.folder.reading import RecordedChart
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
 from companion.view.area import area_of
+from companion.view.events import _plan, nearest_of
 from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of, polar_of, refuges_of
 from sitl.scenario.scenario import EventSpec
 from tests.view.conftest import sail, write_mission
@@ -406,3 +409,34 @@ def test_water_that_dries_is_drawn_with_its_hours_live_and_from_the_record():
     chart = msgspec.convert(chart_record(mission, voyage, config.margin_m, config.tide), RecordedChart)
     assert chart.drying[0].solid_unix_s == bar.solid_unix_s
     assert area_of(voyage, config.margin_m).drying[0].solid_unix_s == ((None, None),), "without a table: for ever"
+
+
+@pytest.mark.parametrize(("obstacle_m", "name"), [(20.0, "Rock"), (60.0, "a mark")])
+def test_what_a_plan_is_nearest_to_is_named(obstacle_m, name):
+    """ "nearest beyond the margin" was a buoy's room, and read as a rock's."""
+    import shapely
+
+    problem = Problem.from_json(
+        {
+            "start": {"x": 0.0, "y": 0.0, "heading_deg": 90.0},
+            "goal": {"x": 100.0, "y": 0.0, "radius": 5.0},
+            "obstacles": [
+                shapely.box(40.0, obstacle_m, 60.0, obstacle_m + 9.0).wkt,
+                shapely.box(40.0, -50.0, 60.0, -40.0).wkt,
+            ],
+            "obstacle_names": ["Rock", "a mark"],
+            "fence": None,
+            "wind": {"from_deg": 0.0, "speed_mps": 5.0, "sigma": {"model": "none"}},
+            "boat": {
+                "no_go_half_deg": 45.0,
+                "max_twa_deg": 180.0,
+                "turn_rate_rad_s": 0.5,
+                "speed": {"model": "constant", "v_mps": 2.0},
+            },
+            "delta_s": 0.9,
+        }
+    )
+    answer = plan(problem, expansions=200)
+    assert nearest_of(problem, answer) == name
+    outcome = PlanOutcome(request_id=1, plan=with_clearance(problem, answer), text="")
+    assert f", {name}" in dict(_plan(outcome, "", name).facts)["nearest, beyond what is kept clear"]

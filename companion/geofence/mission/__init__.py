@@ -14,6 +14,7 @@ from companion.geofence.mission.boat_file import BoatFile, LearnedTable, parse_b
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
 from companion.geofence.mission.goals import GoalField, GoalGate, free_water, is_file
 from companion.geofence.mission.mission import (
+    RANGE_M,
     load_area,
     load_mission,
     load_settings,
@@ -54,6 +55,7 @@ from companion.geofence.mission.text import dump_options, parse_options, read_op
 __all__ = [
     "NO_NAME",
     "PERMITS",
+    "RANGE_M",
     "AreaOptions",
     "AtomOptions",
     "BoatFile",

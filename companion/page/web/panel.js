@@ -106,7 +106,7 @@ function plan(view) {
   get("planfacts").replaceChildren(...facts.map(([name, value, hint]) => el("div", hint ? { title: hint } : {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
   const legs = p?.legs ?? [];
   const first = p?.leg ?? 1;
-  keep("plantable", table("Legs that are left; spare: nearest beyond the margin", ["leg", "off plan", "course", "TWA", "length", "no-go", "spare"], legs.map((leg, n) => [
+  keep("plantable", table("Legs that are left; spare: to the nearest obstacle, fence or mark, beyond what is kept clear of it", ["leg", "off plan", "course", "TWA", "length", "no-go", "spare"], legs.map((leg, n) => [
     leg.is_loiter ? `${first + n} loiter` : el("span", leg.is_beat ? { title: BEAT } : {}, `${first + n} ${[leg.manoeuvre, leg.is_beat ? "beat" : ""].filter(Boolean).join(", ")}`), el("span", { class: `risk r${riskClass(leg.risk)}` }, percent(leg.risk)),
     bearing(leg.course_deg), atBow(leg.twa_deg), leg.is_loiter ? NONE : distance(leg.length_m), leg.is_beat ? NONE : figure(leg.no_go_half_deg, 0, "°"), distance(leg.clearance_m)])));
 }

@@ -56,7 +56,7 @@ export function show(view, past) {
   }
   root.replaceChildren(svg("g", { transform: "translate(170 120)" }, ...out),
     svg("text", { x: 4, y: 16, class: "axis" }, `polar in ${speed(polar.tws_mps)} ${speedUnit()}`), svg("text", { x: 4, y: 240, class: "axis" }, "P"), svg("text", { x: 336, y: 240, class: "axis end" }, "S"),
-    ...(share ? [svg("text", { x: 336, y: 16, class: "axis end strong" }, `${share} of it`)] : []));
+    ...(share ? [svg("text", { x: 336, y: 16, class: "axis end strong" }, `${share} of polar`)] : []));
 }
 
 /** @param {readonly number[]} xs @param {readonly number[]} ys @param {number} x */

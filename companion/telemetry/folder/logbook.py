@@ -145,11 +145,24 @@ def _versions(*names: str) -> Iterator[tuple[str, str]]:
 
 
 class Logbook:
-    """The records of one voyage and its figures. ``epoch_s`` is the Unix time [s] of the loop's time 0."""
+    """The records of one voyage and its figures.
 
-    def __init__(self, recorder: Recorder, config: SkipperConfig, epoch_s: float) -> None:
+    ``epoch_s`` is the Unix time [s] of the loop's time 0. Beside a hurried simulator the loop is ``pace`` times as fast
+    as the clock, which stood at ``clock_epoch_s`` [s since 1970] then: ``utc`` is the clock's, of frames the loop's.
+    """
+
+    def __init__(
+        self,
+        recorder: Recorder,
+        config: SkipperConfig,
+        epoch_s: float,
+        *,
+        clock_epoch_s: float | None = None,
+        pace: float = 1.0,
+    ) -> None:
         self.recorder, self.figures = recorder, VoyageFigures()
         self._config, self._epoch_s = config, epoch_s
+        self._clock_epoch_s, self._pace = epoch_s if clock_epoch_s is None else clock_epoch_s, pace
         self._frames = 0
         self._framed_s, self._framed_us = float("nan"), 0
         self._phase = ""
@@ -172,7 +185,8 @@ class Logbook:
 
     def stamps(self, t_s: float) -> dict[str, Any]:
         """Return what says when in every record."""
-        utc = datetime.fromtimestamp(self._epoch_s + t_s, UTC).isoformat(timespec="milliseconds")
+        unix_s = self._clock_epoch_s + t_s / self._pace
+        utc = datetime.fromtimestamp(unix_s, UTC).isoformat(timespec="milliseconds")
         return {"t_s": t_s, "utc": utc.replace("+00:00", "Z")}
 
     # ------------------------------------------------------------------------------------------- records

@@ -315,7 +315,7 @@ class VoyageFigures:
     a whole plan's, as if nobody replanned on the way. What vessels have of both is beside them.
     ``promised_clearance_m`` is the least clearance that a plan expected which was sailed, beside what was kept;
     ``promised_s``, ``median_s`` and ``late_s`` are the first plan's time, and when half and nine of ten of the winds of
-    its spread would have brought the boat to its end.
+    its spread would have brought the boat to its end: to the first goal, ``promised_to``, and no farther.
     """
 
     first_s: float | None = None
@@ -331,6 +331,7 @@ class VoyageFigures:
     min_clearance_m: float = math.inf
     promised_clearance_m: float | None = None
     promised_s: float | None = None
+    promised_to: str | None = None
     median_s: float | None = None
     late_s: float | None = None
     promised_risk: float | None = None
@@ -378,6 +379,8 @@ class VoyageFigures:
                 )
             if self.promised_s is None:
                 self.promised_s, self.median_s, self.late_s = route.cost_s, route.median_s, route.late_s
+                goal = next(iter(step.voyage.goals), None)
+                self.promised_to = None if route.cost_s is None or goal is None else goal.name or "goal 1"
             if route.risk is not None:
                 self.path_risk = max(self.path_risk or 0.0, route.risk)
         autopilot = snapshot.autopilot
@@ -459,6 +462,7 @@ class VoyageFigures:
             "min_clearance_m": self.min_clearance_m if math.isfinite(self.min_clearance_m) else None,
             "promised_clearance_m": self.promised_clearance_m,
             "promised_s": self.promised_s,
+            "promised_to": self.promised_to,
             "median_s": self.median_s,
             "late_s": self.late_s,
             "promised_risk": self.promised_risk,
