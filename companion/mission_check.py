@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import datetime as dt
 import math
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +57,7 @@ from companion.geo.angles import difference_rad, direction, heading_of, wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geofence import Code, Finding, FindingLevel, LocalArea, Mission
 from companion.geofence.check import AreaConditions, check_area
-from companion.geofence.mission import AreaOptions, kind_of, place_troubles, read_mission
+from companion.geofence.mission import AreaOptions, MissionGoal, kind_of, place_troubles, read_mission
 from companion.planner import Plan, Problem
 from companion.planner.problem import assumed
 from companion.safety import LIGHT_WIND, STRONG_WIND
@@ -539,6 +539,44 @@ def continued_plans(walk: Generator[Problem, Plan, None], plan: Plan) -> Problem
         return walk.send(plan)
     except StopIteration:
         return None
+
+
+def waits_s(mission: Mission, sailed_s: Sequence[float], *, laps: int = 1, unix_s: float | None = None) -> list[float]:
+    """Return how long the boat waits at the end of each leg, lap by lap [s]: for a gun, in a box, by a field.
+
+    ``sailed_s``: what the plans of one lap take, goal by goal, empty where none are made. ``unix_s``: when she sets
+    sail; without it a gun at an hour of the day is left out. So is what nobody knows beforehand: a search, and a box or
+    a field that is left when somebody says so.
+    """
+    now_s, waits = 0.0, []
+    for _ in range(laps):
+        for goal, leg_s in zip_longest(mission.goals, sailed_s, fillvalue=None):
+            now_s += leg_s or 0.0
+            wait_s = 0.0
+            if goal is not None and goal.gate is not None:
+                hour_s, gun_s = goal.gate.not_before_s, goal.gate.after_s
+                if hour_s is not None:
+                    gun_s = None if unix_s is None else hour_s - unix_s
+                wait_s = max(0.0, gun_s - now_s) if gun_s is not None else 0.0
+            elif goal is not None and (task := goal.box or goal.field) is not None:
+                wait_s = task.for_s or 0.0
+            now_s += wait_s
+            waits.append(wait_s)
+    return waits
+
+
+def wait_words(goal: MissionGoal, wait_s: float) -> str:
+    """Return in words what the plan of the leg to a goal does not sail, for who reads its time; empty: nothing."""
+    gate = goal.gate
+    if gate is not None and gate.not_before_s is not None:
+        return f"the gun is at {dt.datetime.fromtimestamp(gate.not_before_s, dt.UTC):%Y-%m-%d %H:%M:%S} UTC"
+    if gate is not None and gate.after_s is not None:
+        return f"then waits {wait_s:.0f} s for the gun" if wait_s > 0.0 else "the gun is before that"
+    if goal.search is not None:
+        return "then the search, which is not counted"
+    if (task := goal.box or goal.field) is not None:
+        return "then stays until told, which is not counted" if task.for_s is None else f"then stays {task.for_s:.0f} s"
+    return ""
 
 
 PointEn = tuple[float, float]

@@ -31,6 +31,7 @@ from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.geofence.mission import free_water
 from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint
+from companion.mission_check import wait_words, waits_s
 from companion.planner.courses import courses
 from companion.plots.chart import place_words, save, scale_bar
 from companion.plots.drying import DryingPicture, draw_drying
@@ -428,16 +429,21 @@ def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
     are_many = len(mission.goals) > 1
     names = [goal.name or (f"goal {n}" if are_many else "goal") for n, goal in enumerate(mission.goals, start=1)]
     names.append("home")
-    for name, answer in zip(names, plans, strict=False):
+    waits = waits_s(mission, [p.cost_s for p in plans if p.has_path])
+    told = [wait_words(goal, wait_s) for goal, wait_s in zip(mission.goals, waits, strict=False)]
+    for name, answer, wait in itertools.zip_longest(names[: len(plans)], plans, told[: len(plans)], fillvalue=""):
         if answer.has_path:
-            out.append(f"{name}: {answer.cost_s:.0f} s in {counted(len(courses(answer.legs)), 'course')}")
+            sails = f"{name}: {answer.cost_s:.0f} s in {counted(len(courses(answer.legs)), 'course')}"
+            out.append(f"{sails}, {wait}" if wait else sails)
         else:
             out.append(f"{name}: no path ({answer.status.value}): {answer.reason}")
     if len(out) > 1 and all(p.has_path for p in plans):
+        sailing_s, waiting_s = sum(p.cost_s for p in plans), sum(waits)
         out.insert(
             0,
-            f"{sum(p.cost_s for p in plans):.0f} s to all {min(len(plans), len(mission.goals))} goals"
-            + (" and home" if len(plans) > len(mission.goals) else ""),
+            f"{sailing_s + waiting_s:.0f} s to all {min(len(plans), len(mission.goals))} goals"
+            + (" and home" if len(plans) > len(mission.goals) else "")
+            + (f": {sailing_s:.0f} s of sailing, {waiting_s:.0f} s of waiting" if waiting_s else ""),
         )
     if plans and any(g.rounding or g.gate for g in mission.goals):
         out.append("the preview sails to the marks; on which side they are left is the skipper's part")

@@ -96,7 +96,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "--limit",
         type=duration,
         metavar="TIME",
-        help="call a voyage off after 90m, 2h (default: three times the plan, at least 15m)",
+        help="call a voyage off after 90m, 2h (default: three times what is planned to be sailed, at least 15m; on top "
+        "comes what is waited for guns and in boxes, and 1h where there is a box, a search or a field)",
     )
     ends = parser.add_argument_group("when it ends, what is tried")
     ends.add_argument(
@@ -182,11 +183,12 @@ def run(args: argparse.Namespace) -> int:
     changes = [change_of(text, made.mission) for text in args.tries] or usual(
         made.mission, tells_the_hour=made.tells_the_hour
     )
-    planned_s = sum(plan.cost_s for plan in made.plans)
+    waited = f", {made.waits_s:.0f} s of them waiting for a gun or staying" if made.waits_s else ""
+    planned = f"; planned {made.planned_s:.0f} s{waited}" if made.plans else ""
     print(
         f"{made.mission.name}: {made.doubts.wind.told}; doubt {args.doubt:g}{', with trouble' if args.faults else ''}"
         f"; sets sail {made.scenario.begins:%Y-%m-%d %H:%M} UTC"
-        f"{f'; planned {planned_s:.0f} s' if planned_s else ''}, called off after {made.scenario.limit_s:.0f} s; "
+        f"{planned}, called off after {made.scenario.limit_s:.0f} s; "
         f"the page, from the first voyage on: {folder / PAGE}",
         flush=True,
     )

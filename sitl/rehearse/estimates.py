@@ -235,8 +235,22 @@ def reached(time: Quantile) -> str:
     )
 
 
+def between(time: Quantile) -> str:
+    """Return in words between which times a quantile is by 95 %.
+
+    >>> between(Quantile(of_all=0.1, value=60.0, low=0.0, high=75.0))
+    '1:15 at the latest'
+    """
+    is_bound = math.isfinite(time.high)
+    if time.low <= 0.0:
+        return f"{clock(time.high)} at the latest" if is_bound else "any time: too few voyages"
+    return f"{clock(time.low)} to {clock(time.high)}"
+
+
 def as_lines(known: Estimates) -> list[str]:
     """Return what is known, a line for each thing."""
+    if not known.records:
+        return ["no voyage was sailed to its end: nothing is known yet"]
     lines = [f"{counted(len(known.records), 'voyage')}; in brackets what is 95 % sure, at whichever voyage one stops"]
     for words, share in (
         ("arrives", known.arrives),
@@ -245,7 +259,7 @@ def as_lines(known: Estimates) -> list[str]:
     ):
         lines.append(f"  {words}: {share.came} of {share.of} ({percent(share)})")
     for time in known.times:
-        lines.append(f"  {reached(time)} ({clock(time.low)} to {clock(time.high)})")
+        lines.append(f"  {reached(time)} ({between(time)})")
     for name, share in known.watchdogs.items():
         lines.append(f"  {name}: {share.came} of {share.of} ({percent(share)})")
     quiet = len(WATCHDOGS) - len(known.watchdogs)

@@ -46,7 +46,7 @@ def save_rehearsal(made: PreparedRehearsal, outcome: RehearsalOutcome, path: Pat
     grid = figure.add_gridspec(3 if has_changes else 2, 2, width_ratios=(1.25, 1.0))
     _map(figure.add_subplot(grid[:, 0]), made, outcome)
     _chances(figure.add_subplot(grid[0, 1]), outcome.known)
-    _times(figure.add_subplot(grid[1, 1]), outcome.known, sum(p.cost_s for p in made.plans))
+    _times(figure.add_subplot(grid[1, 1]), outcome.known, made.planned_s)
     if has_changes:
         _changes(figure.add_subplot(grid[2, 1]), outcome.changes)
     figure.suptitle(

@@ -14,7 +14,7 @@ from companion.compose import planner_of, tide_of, water_of
 from companion.disk import Disk
 from companion.errors import InputError
 from companion.geofence import Mission
-from companion.mission_check import AssumedWind, leg_names, legs, planned_legs
+from companion.mission_check import AssumedWind, leg_names, legs, planned_legs, waits_s
 from companion.planner import Plan, Problem, plan
 from companion.safety import DARK, End
 from sitl.rehearse.sampling import FORECASTS, Doubts, forecast_wind, given_wind
@@ -24,7 +24,7 @@ from sitl.scenario import Scenario, WindSpec, beginning, load_scenario, scenario
 SCENARIO = "rehearsal.toml"
 SLOWER = 3.0  # a voyage may take this much longer than planned ...
 AT_LEAST_S = 900.0  # ... and no less than this before it is called off
-BESIDE_S = 3600.0  # for what the preview of a plan does not count: a search, a box, a field
+BESIDE_S = 3600.0  # beside that and what is waited, for what nobody can count: a search, a box, a field
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,6 +37,7 @@ class PreparedRehearsal:
         mission: what it sails.
         doubts: what a seed draws.
         plans: the way in the mean wind, goal by goal; empty where fields lead.
+        waits_s: how long she waits for guns and stays in boxes, by those plans [s].
         tells_the_hour: whether it makes a difference when the boat sails: a measured wind, a tide, the dark.
     """
 
@@ -45,7 +46,13 @@ class PreparedRehearsal:
     mission: Mission
     doubts: Doubts
     plans: tuple[Plan, ...]
+    waits_s: float
     tells_the_hour: bool
+
+    @property
+    def planned_s(self) -> float:
+        """When she is there by the plans, what she waits included [s]; 0 where there are none."""
+        return self.mission.skipper.laps * sum(plan.cost_s for plan in self.plans) + self.waits_s if self.plans else 0.0
 
 
 def prepared(
@@ -84,14 +91,16 @@ def prepared(
         given = given_wind(wind[0] if wind else None, _mean(base, mission), wind_error)
     middle = given.middle
     plans = _planned(mission, AssumedWind(from_deg=middle[0], speed_mps=middle[1]))
-    voyage_s = mission.skipper.laps * sum(p.cost_s for p in plans) + mission.skipper.station_s
+    laps = mission.skipper.laps
+    waiting_s = sum(waits_s(mission, [p.cost_s for p in plans], laps=laps, unix_s=begins.timestamp()))
+    sailing_s = laps * sum(p.cost_s for p in plans) + mission.skipper.station_s
     needs_more = any(goal.field or goal.search or goal.box for goal in mission.goals)
     scenario = msgspec.structs.replace(
         base,
         mission=os.path.relpath(mission.path, folder),
         wind=given.beside(folder).spec,
         begins=begins,
-        limit_s=limit_s or round(max(SLOWER * voyage_s, AT_LEAST_S) + needs_more * BESIDE_S),
+        limit_s=limit_s or round(max(SLOWER * sailing_s, AT_LEAST_S) + waiting_s + needs_more * BESIDE_S),
     )
     folder.mkdir(parents=True, exist_ok=True)
     source = folder / SCENARIO
@@ -101,8 +110,12 @@ def prepared(
         scenario=scenario,
         mission=mission,
         plans=tuple(plans),
+        waits_s=waiting_s,
         doubts=Doubts(
-            wind=replace(given, spec=scenario.wind), boat=doubt, faults=faults, voyage_s=round(max(voyage_s, 60.0), 1)
+            wind=replace(given, spec=scenario.wind),
+            boat=doubt,
+            faults=faults,
+            voyage_s=round(max(sailing_s + waiting_s, 60.0), 1),
         ),
         tells_the_hour=given.record_s > 0.0
         or bool(given.members)

@@ -19,7 +19,7 @@ from companion.disk import Disk
 from companion.page import export
 from companion.program import control
 from sitl.rehearse.changes import TOLD, Tried, difference_text, is_sure, scaled
-from sitl.rehearse.estimates import Estimates, Share, clock, percent, reached, why_bad
+from sitl.rehearse.estimates import Estimates, Share, between, percent, reached, why_bad
 from sitl.rehearse.prepared import PreparedRehearsal
 from sitl.results import FigureChange as Difference
 
@@ -44,7 +44,7 @@ class RehearsalOutcome:
             "faults": made.doubts.faults,
             "departs": made.scenario.begins.isoformat(),
             "limit_s": made.scenario.limit_s,
-            "planned_s": sum(p.cost_s for p in made.plans) or None,
+            "planned_s": made.planned_s or None,
             "ended": self.ends,
             **self.known.to_dict(),
             "changes": [change.to_dict() for change in self.changes],
@@ -121,10 +121,7 @@ def _chances(known: Estimates) -> str:
             ("touches something", known.touches),
         )
     ]
-    rows += [
-        _row(reached(time), f"<span class=quiet>({clock(time.low)} to {clock(time.high)})</span>")
-        for time in known.times
-    ]
+    rows += [_row(reached(time), f"<span class=quiet>({between(time)})</span>") for time in known.times]
     rows += [_row(html.escape(watchdog), _cell(share)) for watchdog, share in known.watchdogs.items()]
     return f"<h2>What will happen</h2><table>{''.join(rows)}</table>"
 

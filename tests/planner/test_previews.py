@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -12,6 +13,7 @@ from companion.current import CurrentEstimator, over_water
 from companion.geofence import load_mission
 from companion.mission_check import AssumedWind, expected_current, legs, planned_legs
 from companion.planner import Plan, plan
+from companion.plots.mission import _words
 
 SOUTH = Path("sitl/missions/southern-tide.toml")
 WIND = AssumedWind(from_deg=0.0, speed_mps=5.0)
@@ -29,6 +31,29 @@ def mission_with(tmp_path):
         return load_mission(tmp_path / "m.toml")
 
     return write
+
+
+def test_a_preview_tells_what_is_waited_and_stayed(tmp_path):
+    line = "port_mark = { lat = 50.8172, lon = -1.3103 }\nstarboard_mark = { lat = 50.8172, lon = -1.3097 }\n"
+    water = '"POLYGON ((-1.3105 50.818, -1.3095 50.818, -1.3095 50.8185, -1.3105 50.8185, -1.3105 50.818))"'
+    goals = [
+        f'kind = "gate"\nname = "Gun"\n{line}after_s = 60.0\n',
+        f'kind = "gate"\nname = "Hour"\n{line}not_before = 2026-11-21T13:00:00Z\n',
+        f'kind = "box"\nname = "Box"\npolygon = {water}\nfor_s = 40.0\n',
+        f'kind = "box"\nname = "Open"\npolygon = {water}\n',
+        'name = "End"\nlat = 50.82\nlon = -1.31\n',
+    ]
+    start = "[start]\nlat = 50.817\nlon = -1.31\n"
+    (tmp_path / "m.toml").write_text('name = "m"\n' + start + "".join(f"[[goal]]\n{goal}" for goal in goals))
+    mission = load_mission(tmp_path / "m.toml")
+    plans = [SimpleNamespace(cost_s=39.0, has_path=True, legs=()) for _ in goals]
+    lines = "\n".join(_words(mission, plans))
+    assert lines.startswith("256 s to all 5 goals: 195 s of sailing, 61 s of waiting\n")
+    assert "Gun: 39 s in 0 courses, then waits 21 s for the gun\n" in lines
+    assert "Hour: 39 s in 0 courses, the gun is at 2026-11-21 13:00:00 UTC\n" in lines
+    assert "Box: 39 s in 0 courses, then stays 40 s\n" in lines
+    assert "Open: 39 s in 0 courses, then stays until told, which is not counted\n" in lines
+    assert "End: 39 s in 0 courses\n" in lines
 
 
 def first_problem(mission, unix_s=None):

@@ -12,7 +12,7 @@ from companion.geofence.mission.autopilot_mission import (
 )
 from companion.geofence.mission.boat_file import BoatFile, LearnedTable, parse_boat_file, read_boat_file, with_boat_file
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
-from companion.geofence.mission.goals import GoalField, GoalGate, free_water, is_file
+from companion.geofence.mission.goals import GoalField, GoalGate, MissionGoal, free_water, is_file
 from companion.geofence.mission.mission import (
     RANGE_M,
     load_area,
@@ -76,6 +76,7 @@ __all__ = [
     "Longitude",
     "MarkOptions",
     "MissionFiles",
+    "MissionGoal",
     "MissionOptions",
     "PointAtomOptions",
     "PointOptions",

@@ -1,5 +1,6 @@
 """A rehearsal by its command: it ends when it is sure, goes on where it was, and keeps what a full disk leaves."""
 
+import datetime as dt
 import errno
 import json
 import math
@@ -10,6 +11,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -116,6 +118,49 @@ def test_watchdogs_are_counted_by_voyages_and_times_by_all():
     assert known.to_dict()["time_s"][2]["value"] is None
     assert json.loads(json.dumps(known.to_dict(), allow_nan=False))["voyages"] == 3
     assert clock(59.6) == "1:00"
+
+
+def test_where_nothing_was_sailed_only_that_is_said_and_no_bound_is_that_she_is_there_at_once():
+    assert as_lines(estimates_of(())) == ["no voyage was sailed to its end: nothing is known yet"]
+    few = "\n".join(as_lines(estimates_of([record(n) for n in range(6)])))
+    assert "10 % are there within 3:20 (3:22 at the latest)" in few
+    assert "0:00" not in few
+    assert "any time: too few voyages" in "\n".join(as_lines(estimates_of([record(0)])))
+
+
+def test_what_is_waited_for_counts_in_the_plan_and_before_a_voyage_is_called_off(tmp_path, monkeypatch):
+    """A gun half an hour after setting sail: every voyage was called off before it was heard."""
+    kinds = {
+        "line": 'kind = "gate"\nport_mark = { lat = 50.8172, lon = -1.3103 }\n'
+        "starboard_mark = { lat = 50.8172, lon = -1.3097 }\n",
+        "stay": 'kind = "box"\npolygon = "POLYGON ((-1.3105 50.818, -1.3095 50.818, -1.3095 50.8185, -1.3105 50.8185, '
+        '-1.3105 50.818))"\n',
+    }
+
+    def limits(**keys):
+        text = ROCKS.read_text().replace('obstacles = ["rocks.wkt"]\n', "")
+        goals = "".join(f"[[goal]]\n{kind}{keys.get(name, '')}\n" for name, kind in kinds.items() if name in keys)
+        (tmp_path / "m.toml").write_text(text.replace("[[goal]]", f"{goals}[[goal]]", 1))
+        monkeypatch.setattr(
+            "sitl.rehearse.prepared._planned", lambda *_: [SimpleNamespace(cost_s=200.0) for _ in range(len(keys) + 1)]
+        )
+        made = prepared(
+            tmp_path / "m.toml",
+            tmp_path / "out",
+            wind=[],
+            wind_error=None,
+            doubt=1.0,
+            faults=False,
+            depart=dt.datetime(2026, 11, 21, 12, tzinfo=dt.UTC),
+            limit_s=None,
+        )
+        return made.waits_s, made.planned_s, made.scenario.limit_s
+
+    assert limits() == (0.0, 200.0, 900.0)
+    assert limits(line="after_s = 1800.0") == (1600.0, 2000.0, 2800.0)
+    assert limits(line="after_s = 60.0") == (0.0, 400.0, 1200.0)
+    assert limits(line="not_before = 2026-11-21T13:00:00Z") == (3400.0, 3800.0, 4600.0)
+    assert limits(line="after_s = 300.0", stay="for_s = 7200.0") == (7300.0, 7900.0, 1800.0 + 7300.0 + 3600.0)
 
 
 def test_the_map_counts_voyages_and_not_how_long_they_stayed():
