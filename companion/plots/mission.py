@@ -431,7 +431,7 @@ def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
     names.append("home")
     waits = waits_s(mission, [p.cost_s for p in plans if p.has_path])
     told = [wait_words(goal, wait_s) for goal, wait_s in zip(mission.goals, waits, strict=False)]
-    for name, answer, wait in itertools.zip_longest(names[: len(plans)], plans, told[: len(plans)], fillvalue=""):
+    for name, answer, wait in zip(names, plans, [*told, ""], strict=False):
         if answer.has_path:
             sails = f"{name}: {answer.cost_s:.0f} s in {counted(len(courses(answer.legs)), 'course')}"
             out.append(f"{sails}, {wait}" if wait else sails)

@@ -75,7 +75,7 @@ def companion_status(
         traffic=traffic_status(step, feeds, ais_dropped),
         order="" if state.orders.standing is None else state.orders.standing.verb.value,
         order_age_s=None if state.orders.standing is None else state.orders.standing.age_s(snapshot.t_s),
-        plan_answer_s=state.plans.latency.p90_s if state.plans.latency.is_slow else None,
+        plan_answer_s=state.plans.latency.said_p90_s if state.plans.latency.is_slow else None,
         alert_code=code,
         alert_text=text,
     )

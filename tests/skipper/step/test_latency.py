@@ -45,6 +45,15 @@ def test_a_slow_processor_is_called_so_though_its_answers_are_in_time():
     assert "10 % of the reference core" in after(1.0, speed=0.1).words
 
 
+def test_what_is_told_of_few_answers_leaves_none_out_and_what_follows_does():
+    latency = after(3.0, 2.0)
+    assert latency.words == "answers in 2.0 s (nine of ten within 3.0 s)"
+    assert (latency.median_s, latency.p90_s) == (2.0, 2.0)
+    assert after(*[1.0] * 9, 20.0).words == "answers in 1.0 s (nine of ten within 1.0 s)"
+    assert after(*[1.0] * 8, 20.0).said_p90_s == 20.0
+    assert (NO_ANSWERS.words, NO_ANSWERS.said_p90_s) == ("", None)
+
+
 def test_it_survives_a_kill():
     latency = after(4.0, 6.0, budget_s=2.0, speed=0.12)
     saved = Persisted(voyage="v", gate=0, sailing=True, route=None, pending=None, latency=latency)
