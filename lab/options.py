@@ -1,19 +1,55 @@
-"""Options that campaigns share besides the runner's: by which guidance and planner, and what a seed draws."""
+"""Options that campaigns share besides the runner's: which seeds, guidance and planner, and what a seed draws."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from companion.errors import InputError
 from companion.planners import ALGORITHMS
+from companion.program.arguments import out_file, out_folder, whole
 
 if TYPE_CHECKING:
     from lab.methods import Method
 
 ALL = "all"  # of what may be drawn
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seeds:
+    """How many seeds are sailed, from which on; or the first alone, its voyage's folder kept in ``keep``."""
+
+    runs: int
+    first: int
+    keep: Path | None
+
+
+def add_seeds(parser: argparse.ArgumentParser, *, runs: int, of: str = "") -> None:
+    """Add ``--runs`` (of ``of``, by default ``runs``), ``--first-seed``, ``--json`` and ``--keep``."""
+    parser.add_argument(
+        "--runs", type=whole(at_least=1), metavar="N", help=f"seeds to sail{of and ' '}{of} (default: {runs})"
+    )
+    parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
+    parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
+    parser.add_argument(
+        "--keep", type=out_folder, metavar="DIR", help="sail only the first seed and keep its voyage folder"
+    )
+    parser.set_defaults(usual_runs=runs)
+
+
+def seeds_of(args: argparse.Namespace) -> Seeds:
+    """Return the seeds that were asked for. Raises InputError where one is to be kept and more are asked for."""
+    if args.keep is not None:
+        of_many = {"--runs": (args.runs or 1) > 1, "--json": args.json is not None, "--out": args.out is not None}
+        several = next((option for option, is_given in of_many.items() if is_given), None)
+        if several is not None:
+            raise InputError("--keep", str(args.keep), "is for one voyage, of the first seed", f"leave out {several}")
+    return Seeds(runs=args.runs or args.usual_runs, first=args.first_seed, keep=args.keep)
 
 
 def add_draw(parser: argparse.ArgumentParser, more: Mapping[str, str] = MappingProxyType({})) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from companion.program.arguments import out_file, out_folder, whole
 from lab.campaigns.encounters import KINDS, POLICIES, Policy
+from lab.options import add_seeds, seeds_of
 from sitl.options import add_options, options_of
 
 
@@ -21,17 +21,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "gave way, how early, by how much and on which side. A failing seed is printed and repeats exactly.",
         epilog="Example: sitl encounters --runs 100, then sitl encounters --kind sailing --first-seed 17 --keep v",
     )
-    parser.add_argument(
-        "--runs", type=whole(at_least=1), default=100, metavar="N", help="seeds to sail of each kind (default: 100)"
-    )
+    add_seeds(parser, runs=100, of="of each kind")
     parser.add_argument("--kind", choices=KINDS, default=None, help="only these (default: all four)")
     parser.add_argument(
         "--policy", choices=(*POLICIES, "both"), default="rules", help="[traffic] policy of our boat (default: rules)"
-    )
-    parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
-    parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
-    parser.add_argument(
-        "--keep", type=out_folder, metavar="DIR", help="sail only the first seed and keep its voyage folder"
     )
     add_options(parser)
     parser.set_defaults(run=run)
@@ -46,7 +39,8 @@ def run(args: argparse.Namespace) -> int:
     compile_ahead()
     kinds = KINDS if args.kind is None else (args.kind,)
     policies: tuple[Policy, ...] = POLICIES if args.policy == "both" else (args.policy,)
-    if args.keep is not None:
-        return sail_kept(sail, job_of(kinds[0], policies[0], args.first_seed, args.keep))
-    experiment = encounters(runs=args.runs, kinds=kinds, policies=policies, first_seed=args.first_seed)
+    seeds = seeds_of(args)
+    if seeds.keep is not None:
+        return sail_kept(sail, job_of(kinds[0], policies[0], seeds.first, seeds.keep))
+    experiment = encounters(runs=seeds.runs, kinds=kinds, policies=policies, first_seed=seeds.first)
     return experiment.run(options_of(args), args.json)

@@ -6,8 +6,7 @@ import argparse
 from typing import Any
 
 from companion.errors import InputError
-from companion.program.arguments import out_file, out_folder, whole
-from lab.options import add_draw, compile_planners
+from lab.options import add_draw, add_seeds, compile_planners, seeds_of
 from sitl.options import add_options, options_of
 
 # What else may be drawn beside a seed's own faults, of the campaign that has them.
@@ -32,14 +31,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "unhandled error. A failing seed is printed and repeats exactly.",
         epilog="Example: sitl faults --runs 1000, then sitl faults --first-seed 17 --keep v",
     )
-    parser.add_argument(
-        "--runs", type=whole(at_least=1), default=1000, metavar="N", help="seeds to sail (default: 1000)"
-    )
-    parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
-    parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
-    parser.add_argument(
-        "--keep", type=out_folder, metavar="DIR", help="sail only the first seed and keep its voyage folder"
-    )
+    add_seeds(parser, runs=1000)
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
         "--jumps",
@@ -78,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--draw", beside[0], f"is not drawn with --{args.trouble}", "leave out one of them")
     compile_planners(args.draw)
     case = FaultCase(trouble=args.trouble, draws=args.draw)
-    if args.keep is not None:
-        return sail_kept(sail, job_of(args.first_seed, case, args.keep))
-    return faults(case, runs=args.runs, first_seed=args.first_seed).run(options_of(args), args.json)
+    seeds = seeds_of(args)
+    if seeds.keep is not None:
+        return sail_kept(sail, job_of(seeds.first, case, seeds.keep))
+    return faults(case, runs=seeds.runs, first_seed=seeds.first).run(options_of(args), args.json)

@@ -6,8 +6,7 @@ import argparse
 from typing import Any
 
 from companion.errors import InputError
-from companion.program.arguments import out_file, out_folder, whole
-from lab.options import add_draw, compile_planners
+from lab.options import add_draw, add_seeds, compile_planners, seeds_of
 from sitl.options import add_options, options_of
 
 
@@ -23,8 +22,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "against what came. A seed repeats exactly.",
         epilog="Example: sitl mismatch --runs 200 --out mismatch.jsonl, then sitl mismatch --first-seed 17 --keep v",
     )
-    parser.add_argument("--runs", type=whole(at_least=1), default=100, metavar="N", help="seeds (default: 100)")
-    parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
+    add_seeds(parser, runs=100)
     parser.add_argument(
         "--planned",
         action="store_true",
@@ -41,10 +39,6 @@ def add_parser(subparsers: Any, summary: str) -> None:
         action="append",
         metavar="KIND",
         help="every voyage has this, and nothing else; may be repeated (a wrong name lists them)",
-    )
-    parser.add_argument("--json", type=out_file, metavar="FILE", help="write figures and voyages")
-    parser.add_argument(
-        "--keep", type=out_folder, metavar="DIR", help="sail only the first seed and keep its voyage folder"
     )
     add_draw(parser)
     add_options(parser)
@@ -63,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
     if alien is not None:
         raise InputError("--only", alien, "is not drawn", f"name one of: {', '.join(KINDS)}")
     case = MismatchCase(planned=args.planned, only=only, draws=args.draw)
-    if args.keep is not None:
-        return sail_kept(sail, job_of(args.first_seed, case, args.keep))
-    return mismatch(case, runs=args.runs, first_seed=args.first_seed).run(options_of(args), args.json)
+    seeds = seeds_of(args)
+    if seeds.keep is not None:
+        return sail_kept(sail, job_of(seeds.first, case, seeds.keep))
+    return mismatch(case, runs=seeds.runs, first_seed=seeds.first).run(options_of(args), args.json)

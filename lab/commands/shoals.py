@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from companion.program.arguments import out_file, out_folder, whole
 from lab.campaigns.shoals import KINDS
+from lab.options import add_seeds, seeds_of
 from sitl.options import add_options, options_of
 
 
@@ -21,15 +21,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "statistics: each alarm there is a false one. A failing seed is printed and repeats exactly.",
         epilog="Example: sitl shoals --runs 500, then sitl shoals --kind bank --first-seed 17 --keep v",
     )
-    parser.add_argument(
-        "--runs", type=whole(at_least=1), default=100, metavar="N", help="seeds to sail of each kind (default: 100)"
-    )
+    add_seeds(parser, runs=100, of="of each kind")
     parser.add_argument("--kind", choices=KINDS, default=None, help="only these (default: both)")
-    parser.add_argument("--first-seed", type=whole(), default=0, metavar="S", help="the first of them (default: 0)")
-    parser.add_argument("--json", type=out_file, metavar="FILE", help="write what came of each")
-    parser.add_argument(
-        "--keep", type=out_folder, metavar="DIR", help="sail only the first seed and keep its voyage folder"
-    )
     add_options(parser)
     parser.set_defaults(run=run)
 
@@ -42,6 +35,7 @@ def run(args: argparse.Namespace) -> int:
 
     compile_ahead()
     kinds = KINDS if args.kind is None else (args.kind,)
-    if args.keep is not None:
-        return sail_kept(sail, job_of(kinds[0], args.first_seed, args.keep))
-    return shoals(runs=args.runs, kinds=kinds, first_seed=args.first_seed).run(options_of(args), args.json)
+    seeds = seeds_of(args)
+    if seeds.keep is not None:
+        return sail_kept(sail, job_of(kinds[0], seeds.first, seeds.keep))
+    return shoals(runs=seeds.runs, kinds=kinds, first_seed=seeds.first).run(options_of(args), args.json)
