@@ -95,6 +95,8 @@ FIGURES: tuple[Figure, ...] = (
 # fmt: on
 BY_NAME = {figure.name: figure for figure in FIGURES}
 _UNITS = {"speed": " m/s", "distance": " m", "time": " s", "bearing": "°", "angle": "°", "share": " %", "number": ""}
+_DECIMALS = {"speed": 1, "distance": 1, "time": 0, "bearing": 1, "angle": 1, "share": 1, "number": 2}
+WHOLE_M = 10.0  # from here on a distance is told in whole metres
 
 
 def figure_values(step: Step, where: str) -> dict[str, float]:
@@ -128,7 +130,9 @@ def in_words(values: Mapping[str, float]) -> list[str]:
 def _shown(figure: Figure, value: float) -> str:
     if figure.kind == "angle":
         return f"{abs(value):g}° {'P' if value < 0.0 else 'S'}"
-    return f"{round(100.0 * value, 1) if figure.kind == 'share' else round(value, 2):g}{_UNITS[figure.kind]}"
+    scaled = 100.0 * value if figure.kind == "share" else value
+    decimals = 0 if figure.kind == "distance" and abs(value) >= WHOLE_M else _DECIMALS[figure.kind]
+    return f"{round(scaled, decimals):g}{_UNITS[figure.kind]}"
 
 
 @dataclass(slots=True)

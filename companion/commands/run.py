@@ -422,8 +422,8 @@ def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
         end = "arrived" if summary["arrived"] else f"not arrived: {summary['end_reason']}, {summary['end_why']}"
         if summary["end_reason"] == ADOPTED:
             end = "given up for the mission that was drawn under way"
-        text = f"{end}; {summary['time_s'] or 0.0:.0f} s under way, {counted(summary['tacks'], 'tack')}, "
-        text += counted(summary["replans"], "replan")
+        text = f"{end}; {summary['time_s'] or 0.0:.0f} s under way by her own record, "
+        text += f"{counted(summary['tacks'], 'tack')}, " + counted(summary["replans"], "replan")
     if not summary["arrived"] and summary["left_behind"] and summary["end_reason"] != ADOPTED:
         text += f"\n{summary['left_behind']}"
     if summary["records_dropped"]:

@@ -196,6 +196,10 @@ def wind(text: str) -> tuple[float, float]:
     except ValueError:
         raise ArgumentTypeError(f"{text[:30]!r} is not a wind; write SPEED@FROM, as 5@350") from None
     if not (0.0 < speed <= 50.0 and -360.0 <= direction <= 360.0):
+        if 50.0 < speed <= 360.0 and 0.0 < direction <= 50.0:
+            raise ArgumentTypeError(
+                f"{text[:30]!r} looks swapped: SPEED@FROM is {direction:g}@{speed:g}, m/s and degrees"
+            )
         raise ArgumentTypeError(f"{text[:30]!r} is out of range; speed 0..50 m/s, direction in degrees")
     return speed, direction % 360.0
 

@@ -284,7 +284,7 @@ def progress_text(step: Step) -> str:
     if wind.mean_twd_from_rad is not None and wind.mean_tws_mps is not None:
         sigma_rad = sigma_ahead_rad(snapshot) or 0.0
         parts.append(
-            f"wind {direction(wind.mean_twd_from_rad)}±{math.degrees(sigma_rad):.0f}° {wind.mean_tws_mps:.1f} m/s"
+            f"mean wind {direction(wind.mean_twd_from_rad)}±{math.degrees(sigma_rad):.0f}° {wind.mean_tws_mps:.1f} m/s"
         )
     if snapshot.vehicle is not None:
         parts.append(f"{snapshot.vehicle.speed_mps:.1f} m/s")

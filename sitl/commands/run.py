@@ -107,6 +107,13 @@ def run(args: argparse.Namespace) -> int:
     from sitl.run.embedded import mission_of
     from sitl.scenario import beginning, load_scenario, own_polar, scenario_wind
 
+    if args.speedup is not None and not is_live(args):
+        raise InputError(
+            "--speedup",
+            f"{args.speedup:g}",
+            "is for a voyage in real time; this one is as fast as the computer",
+            "leave it out, or add --live",
+        )
     scenario = load_scenario(args.scenario)
     scenario = msgspec.structs.replace(scenario, begins=beginning(scenario, args.scenario, args.at))
     folder = args.out or Path("voyages") / f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}-{file_name(scenario.name)}"

@@ -172,6 +172,8 @@ def given_wind(text: str | None, spec: WindSpec, error: tuple[float, float] | No
         speed, direction = (float(part) for part in text.split("@"))
     except ValueError:
         raise InputError("--wind", text, "is no wind", _REMEDY) from None
+    if MOST_MPS < speed <= 360.0 and 0.0 < direction <= MOST_MPS:
+        raise InputError("--wind", text, "looks swapped", f"write SPEED@FROM, {direction:g}@{speed:g} in m/s, degrees")
     if not (0.0 < speed <= MOST_MPS and -360.0 <= direction <= 360.0):
         raise InputError("--wind", text, f"is out of range: up to {MOST_MPS:g} m/s, from -360 to 360 degrees", _REMEDY)
     spec = msgspec.structs.replace(spec, tws_mps=speed, from_deg=direction % 360.0)

@@ -551,7 +551,8 @@ def verdict_line(record: Mapping[str, Any]) -> str:
     f = record["figures"]
     if f:
         words = (
-            f"{f['time_s']:.0f} s from arming, {counted(f['tacks'], 'tack')}, {f['distance_m']:.0f} m as truly sailed, "
+            f"{f['time_s']:.0f} s and {f['distance_m']:.0f} m by the true track, from arming to the run's end, "
+            f"{counted(f['tacks'], 'tack')} with the turn on setting sail, "
             f"{counted(f['replans'], 'replan')}, "
         )
         words += "nothing to be clear of" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"

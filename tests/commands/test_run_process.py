@@ -210,7 +210,7 @@ def test_the_second_mission_sails_from_wherever_it_is_started(first, link, folde
     )
     assert run.returncode == 0, run.stdout + run.stderr
     *_, end, where = run.stdout.splitlines()
-    assert re.match(r"arrived; [1-9]\d* s under way, ", end)
+    assert re.match(r"arrived; [1-9]\d* s under way by her own record, ", end)
     voyage = tmp_path / where
     said = [d["code"] for d in records(voyage / "decisions.jsonl") if d.get("action") == "Announce"]
     assert "adopted" in said or "earlier mission" in said

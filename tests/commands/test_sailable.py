@@ -11,6 +11,7 @@ from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.mission_check import check_mission, require_sailable
 from companion.skipper.way.gates import Approach, gates_of
+from sitl import cli as sitl_cli
 from sitl.commands import run as sitl_run
 from sitl.run.embedded import permitted
 from sitl.scenario.scenario import load_scenario
@@ -93,6 +94,36 @@ def test_check_and_run_refuse_the_same_in_the_same_words(tmp_path, capsys, what,
             said.append(error.split(": ", 1)[1])
     assert words in said[0]
     assert said[1:] == said[:1] * 2
+
+
+def test_a_start_on_the_other_side_of_the_world_is_named_and_not_the_files_of_the_area(tmp_path, capsys):
+    path = written(tmp_path, "")
+    lat = next(line for line in path.read_text().split("[start]")[1].splitlines() if line.startswith("lat"))
+    goal = next(line for line in path.read_text().split("[[goal]]")[1].splitlines() if line.startswith("lat"))
+    text = path.read_text().replace(lat, lat.replace("lat = ", "lat = -"), 1)
+    path.write_text(f"{text}\n[[refuge]]\n{goal}\nlon = -1.31\n")
+    assert cli.main(["mission", "check", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "[start]: is " in said
+    assert "is the sign of lat wrong" in said
+
+
+def test_one_file_where_a_list_belongs_is_told_how_to_be_written(tmp_path, capsys):
+    path = written(tmp_path, "")
+    path.write_text(path.read_text().replace('obstacles = ["archipelago.wkt"]', 'obstacles = "archipelago.wkt"'))
+    assert cli.main(["mission", "check", str(path)]) == 2
+    assert "write ['archipelago.wkt']" in capsys.readouterr().err
+
+
+def test_a_speed_up_of_a_voyage_that_is_not_in_real_time_is_refused(capsys):
+    assert sitl_cli.main(["run", "demo", "--speedup", "4"]) == 2
+    assert "add --live" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["mission check", "plan"])
+def test_a_wind_that_is_written_the_wrong_way_round_is_told_so(capsys, command):
+    assert cli.main([*command.split(), str(MISSIONS / "archipelago.toml"), "--wind", "340@5"]) == 2
+    assert "looks swapped: SPEED@FROM is 5@340" in capsys.readouterr().err
 
 
 def test_a_good_mission_is_called_in_order(tmp_path, capsys):

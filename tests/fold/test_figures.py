@@ -87,6 +87,22 @@ def test_what_was_learned_is_told_once_plans_are_of_it(step):
 
 
 @pytest.mark.parametrize(
+    ("kind", "value", "told"),
+    [
+        ("distance", 116.18, "116 m"),
+        ("distance", 3.14159, "3.1 m"),
+        ("speed", 2.236, "2.2 m/s"),
+        ("time", 81.7, "82 s"),
+        ("share", 0.7412, "74.1 %"),
+        ("number", 0.126, "0.13"),
+    ],
+)
+def test_a_figure_is_told_as_finely_as_its_kind_is_anywhere_else(monkeypatch, kind, value, told):
+    monkeypatch.setitem(BY_NAME, "co_test", Figure(name="co_test", label="it", kind=kind, of=lambda step: value))
+    assert in_words({"co_test": value}) == [f"it {told}"]
+
+
+@pytest.mark.parametrize(
     ("kind", "of_deg", "line", "page", "watch"),
     [
         ("bearing", 41.26, "41.3°", 41.3, "041°"),

@@ -263,7 +263,7 @@ class _Scanner:
         if self._kind != "word" or name not in _NAMES:
             known = "CURVE" in name or "SURFACE" in name or name == "CIRCULARSTRING"
             raise self._fail(
-                f"{self._word[:30]!r} is not a geometry that can be read",
+                f"{self._word[:30]!r} is not a geometry of WKT, as which this file is read",
                 "draw the curve as a polygon" if known else _hint(self._text),
             )
         self._advance()

@@ -259,6 +259,23 @@ def _options_of(path: Path, given: Mapping[Path, bytes]) -> MissionOptions:
     return msgspec.structs.replace(options, boat=with_boat_file(options.boat, text, path))
 
 
+def _require_near(options: MissionOptions, reader: GoalReader, origin: GeoPoint) -> None:
+    """Raise InputError where all goals and refuges are far from the start, before the area's files are blamed for that.
+
+    Of a start and a single place nobody can say which is wrong: ``place_troubles`` names the place.
+    """
+    places = [goal.point for goal in reader.goals_of(options, Area())]
+    places += [GeoPoint(lat_deg=refuge.lat, lon_deg=refuge.lon) for refuge in options.refuge]
+    if options.start is None or len(places) < 2:
+        return
+    least_m = min(float(np.hypot(*LocalFrame(origin).en_from_geo(point))) for point in places)
+    spread_m = max(float(np.hypot(*LocalFrame(places[0]).en_from_geo(point))) for point in places)
+    if least_m > RANGE_M > spread_m:
+        raise InputError(
+            str(reader.path), "[start]", f"is {least_m / 1000.0:.0f} km from every goal", _asked(origin, places[0])
+        )
+
+
 def load_settings(path: str | Path) -> MissionOptions:
     """Read a mission TOML whose goals are drawn on the autopilot: all but the goals. Raises InputError."""
     path = Path(path)
@@ -287,6 +304,8 @@ def assembled(
     if options.passage.leg_m is not None:
         frame = LocalFrame(origin)
         far_m += max(float(np.hypot(*frame.en_from_geo(g.point))) for g in reader.goals_of(options, Area()))
+    else:
+        _require_near(options, reader, origin)
     area, findings = load_area(options.area, path, origin, given, far_m)
     if drawn is not None:
         limits = tuple(z for z in drawn.zones if z.kind is ZoneKind.INCLUSION)

@@ -242,6 +242,8 @@ def _input_error(message: str, source: str, raw: dict[str, Any]) -> InputError:
     swap = ""
     if place.endswith(" lat") and isinstance(value, int | float) and abs(value) > 90.0:
         swap = "are lat and lon swapped? write degrees within ±90"
+    if isinstance(value, str) and "Expected `array`" in problem:
+        swap = f"write [{_short(value)}]"
     words = expected(problem)
     return InputError(source, place, shown + words.partition(", got ")[0] if shown else words, swap)
 

@@ -123,7 +123,12 @@ def test_a_record_is_sailed_from_a_time_of_each_seed(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("strong", "is no wind; write SPEED@FROM"), ("90@10", "is out of range"), ("nowhere.csv", "cannot be read")],
+    [
+        ("strong", "is no wind; write SPEED@FROM"),
+        ("90@10", "looks swapped; write SPEED@FROM, 10@90"),
+        ("90@60", "is out of range"),
+        ("nowhere.csv", "cannot be read"),
+    ],
 )
 def test_a_wind_that_is_none_is_one_line(text, words):
     with pytest.raises(InputError, match=words) as caught:
