@@ -428,7 +428,7 @@ def _reason(error: BaseException) -> str:
         errno.ENOENT: "no such device",
         errno.EACCES: "no permission (is the user in the group dialout?)",
         errno.EBUSY: "another program has it",
-        errno.EADDRINUSE: "address already in use",
+        errno.EADDRINUSE: "address already in use: another program listens there; stop it, or take another port",
         errno.ECONNREFUSED: "nobody listens there",
     }
     if isinstance(number, int) and number in words:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime as dt
+import difflib
 from argparse import ArgumentTypeError
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -70,7 +71,11 @@ def change_of(text: str, mission: Mission) -> MissionChange:
         number = duration(value) if name == LATER else float(value)
     except (ArgumentTypeError, ValueError):
         raise InputError("--try", text, "is not a change that is known", _REMEDY) from None
-    if name not in {*TABLES, CORRIDOR, LATER} or (name == CORRIDOR and not 0.0 <= number <= 1000.0):
+    known = (*TABLES, CORRIDOR, LATER)
+    near = difflib.get_close_matches(name, known, n=1)
+    if name not in known and near:
+        raise InputError("--try", text, f"{name!r} is no change that is known", f"did you mean {near[0]}?")
+    if name not in known or (name == CORRIDOR and not 0.0 <= number <= 1000.0):
         raise InputError("--try", text, "is not a change that is known", _REMEDY)
     change = MissionChange(name=name, value=number, told=f"{value} {LATER}" if name == LATER else f"{name} {number:g}")
     if change.variation is not None:

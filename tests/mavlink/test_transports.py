@@ -178,7 +178,7 @@ def test_udp_in_answers_who_speaks_and_ignores_strangers():
         await until(lambda: bytes(outside) == b"answer two")
         assert bytes(inside) == b"hello"
         assert not stranger
-        with pytest.raises(LinkError, match="address already in use"):
+        with pytest.raises(LinkError, match="address already in use: another program listens there; stop it"):
             await open_link(f"udpin:127.0.0.1:{port}").open(lambda _: None)
         for transport in (a, b, c):
             await transport.close()

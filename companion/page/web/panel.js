@@ -59,6 +59,7 @@ function alarms(view) {
 }
 
 const THERE = "The time until the next goal is reached, at the pace that the boat has lately kept; in nine cases of ten it is there by the second figure.";
+const NOT_THERE = "No time is told while the way on board is not being sailed, or where it does not lead to the next goal; the plan's own times are of when it was judged.";
 const TACK = "At the end of the leg that is sailed; 'about' is the autopilot's own, on a leg that it beats, which goes with the wind, or one behind a waypoint, where a new plan may change it.";
 const JUDGED = "When the plan was made, or last held against a new one and kept: wind and times beside it are of then.";
 const BEAT = "A beat: the autopilot tacks by itself along this line, so the line may lie in the no-go zone.";
@@ -85,7 +86,7 @@ function figures(view) {
     one("AWS", speed(wind?.aws_mps), speedUnit()), ...(view?.shown ?? []).map(shown),
     one("COG", bearing(boat?.cog_deg), bearingUnit()), one("to mark", distance(boat?.goal_m), ""),
     one("TWD σ 1 min", wind?.sigma_deg == null ? NONE : `±${figure(wind.sigma_deg, 0)}°`, ""), one("clearance", distance(boat?.clearance_m), ""),
-    one("next tack", `${plan?.next_tack_is_planned === false ? "about " : ""}${duration(plan?.next_tack_s)}`, "", "", TACK), one("there in", duration(plan?.there_s), "", "", THERE), one("off the plan", percent(plan?.path_risk), "", "", OFF_PLAN),
+    one("next tack", `${plan?.next_tack_is_planned === false ? "about " : ""}${duration(plan?.next_tack_s)}`, "", "", TACK), one("there in", duration(plan?.there_s), "", "", plan?.there_s == null ? NOT_THERE : THERE), one("off the plan", percent(plan?.path_risk), "", "", OFF_PLAN),
     one("off the leg", boat?.cross_track_m == null ? NONE : `${figure(Math.abs(boat.cross_track_m), 1)} m ${boat.cross_track_m < -0.05 ? "L" : boat.cross_track_m > 0.05 ? "R" : ""}`, ""),
     ...(view?.water?.is_planned ? [one("current", `${bearing(view.water.set_deg)} ${speed(view.water.drift_mps)}`, speedUnit())] : []),
     one("battery", figure(boat?.battery_v, 1), boat?.battery_share == null ? "V" : `V ${percent(boat.battery_share)}`));
@@ -100,7 +101,7 @@ function plan(view) {
     ["in a wind of", p.twd_from_deg === null ? NONE : `${bearing(p.twd_from_deg)} ${speed(p.tws_mps)} ${speedUnit()}`],
     ["time from then", p.cost_s === null ? NONE : `${duration(p.cost_s)}${p.bound_s ? `, no less than ${duration(p.bound_s)}` : ""}`],
     ["as wind and boat may be", p.median_s === null ? NONE : `${duration(p.median_s)}, nine of ten ${p.late_s === null ? "not in any time" : duration(p.late_s)}`],
-    ["there in", p.there_s === null ? NONE : `${duration(p.there_s)}, nine of ten ${duration(p.there_late_s)}`, THERE], ["off the plan", percent(p.path_risk), OFF_PLAN],
+    ["there in", p.there_s === null ? `${NONE} (not under way to it)` : `${duration(p.there_s)}, nine of ten ${duration(p.there_late_s)}`, p.there_s === null ? NOT_THERE : THERE], ["off the plan", percent(p.path_risk), OFF_PLAN],
     ["margin", distance(p.margin_m)], ["clearance expected", distance(p.expected_clearance_m)], ["leg", `${p.leg ?? NONE} of ${p.count ?? NONE}`],
     ...(p.rung ? [["found by", p.rung]] : []), ...(p.bound_for ? [["bound for", p.bound_for]] : [])];
   get("planfacts").replaceChildren(...facts.map(([name, value, hint]) => el("div", hint ? { title: hint } : {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));

@@ -178,6 +178,11 @@ def test_a_change_that_is_none_is_refused(mission, text):
         change_of(text, mission)
 
 
+def test_a_change_that_is_nearly_one_is_asked_about(mission):
+    with pytest.raises(InputError, match=r"'margn_m' is no change that is known; did you mean margin_m\?"):
+        change_of("margn_m=3", mission)
+
+
 def test_the_usual_changes_can_all_be_sailed(mission):
     found = [change.told for change in usual(mission, tells_the_hour=False)]
     assert len(found) == len(set(found)) >= 5
