@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import selectors
+import signal
 import time
 from collections.abc import Coroutine
 from typing import Any, TypeVar
@@ -42,6 +43,12 @@ class RealTimeLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         """Return loop time [s]."""
         return time.monotonic() * self._speedup
+
+    def close(self) -> None:
+        """Close it; a signal that comes meanwhile, a second SIGTERM say, finds no closed pipe to be written to."""
+        with contextlib.suppress(ValueError):  # another thread's loop is woken by no signal
+            signal.set_wakeup_fd(-1)
+        super().close()
 
 
 class _ScaledSelector(selectors.DefaultSelector):

@@ -1,11 +1,12 @@
 """Time: virtual time is arithmetic, scaled time is scaled."""
 
 import asyncio
+import signal
 import time
 
 import pytest
 
-from companion.clock import now_s, run, run_virtual
+from companion.clock import RealTimeLoop, now_s, run, run_virtual
 
 
 def test_virtual_time_passes_without_waiting():
@@ -63,3 +64,18 @@ def test_a_speedup_must_be_positive():
 
     with pytest.raises(ValueError, match="positive"):
         run(main(), speedup=0.0)
+
+
+def test_a_signal_while_the_loop_closes_leaves_no_traceback(capfd, monkeypatch):
+    """The pipe that signals wake it by is closed before their handlers are taken away."""
+    loop = RealTimeLoop()
+    loop.add_signal_handler(signal.SIGUSR1, lambda: None)
+    close_pipe = loop._close_self_pipe
+
+    def close_and_be_told_again():
+        close_pipe()
+        signal.raise_signal(signal.SIGUSR1)
+
+    monkeypatch.setattr(loop, "_close_self_pipe", close_and_be_told_again)
+    loop.close()
+    assert "wakeup fd" not in capfd.readouterr().err
