@@ -582,7 +582,12 @@ def _orders(mission: Mission, key: str, given: tuple[str, ...] | str) -> tuple[s
     for word in words:
         if word != ALL and word not in set(Verb):
             said, _, remedy = unknown(word).partition("; ")
-            raise InputError(str(mission.path), f"[operator] {key}", said, f'{remedy}, or "{ALL}"')
+            raise InputError(
+                str(mission.path),
+                f"[operator] {key}",
+                said,
+                remedy if remedy.endswith("?") else f'{remedy}, or "{ALL}"',
+            )
     return tuple(words)
 
 

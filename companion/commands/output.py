@@ -47,7 +47,7 @@ def summary(document: Document) -> str:
     counts = [
         (sum(z.kind is ZoneKind.INCLUSION for z in document.zones), "keep-in zone"),
         (sum(z.kind is ZoneKind.EXCLUSION for z in document.zones), "keep-out zone"),
-        (len(document.marks), "point or line"),
+        (len(document.marks), "point or line obstacle"),
         (len(document.items), "mission item"),
         (len(document.rally), "rally point"),
         (len(document.tracks), "track"),

@@ -4,11 +4,14 @@ import socket
 from pathlib import Path
 
 import pytest
+import shapely
 
 from companion import cli
+from companion.commands.output import summary
 from companion.compose import voyage_of
 from companion.errors import InputError
-from companion.geofence import load_mission
+from companion.geofence import Document, ZoneKind, load_mission
+from companion.geofence.document import Mark
 from companion.mission_check import check_mission, require_sailable
 from companion.skipper.way.gates import Approach, gates_of
 from sitl import cli as sitl_cli
@@ -30,6 +33,7 @@ BAD = [
         '[skipper]\nguidance = "fields"\n',
         """[skipper] guidance: 'fields' is none of the choices; write "plan" or "heading" or "field\"""",
     ),
+    ("order", '[operator]\norders = ["holdd"]\n', "[operator] orders: there is no order 'holdd'; did you mean hold?\n"),
     ("feed", '[traffic]\nfeeds = ["upd:1234"]\n', "[traffic] feeds: 'upd:1234' is not a feed; write udpin:HOST:PORT"),
     ("floor", "margin_floor_m = 20.0", "[area] margin_floor_m: 20 m is more than margin_m"),
     ("field", '[skipper]\nguidance = "field"\n', '[skipper] guidance: "field" steers in GUIDED, which nobody allows'),
@@ -204,3 +208,8 @@ def test_the_last_buoy_is_rounded_for_the_way_home(tmp_path, end, is_rounded):
     voyage = voyage_of(load_mission(mission))
     begun = Approach(goal=0, en_m=voyage.frame.en_from_geo(load_mission(mission).start))
     assert (len(gates_of(voyage, (begun,))) > 1) is is_rounded
+
+
+def test_points_and_lines_are_counted_in_words():
+    rock = Mark(geometry=shapely.Point(-1.31, 50.82), kind=ZoneKind.EXCLUSION)
+    assert summary(Document(marks=(rock, rock))) == "2 point or line obstacles"
