@@ -52,9 +52,11 @@ from companion.skipper.step import (
 MAX_WAITING = 16
 # Real time that a plan gets at least, however fast the simulator beside it: with less a busy machine finds no path.
 LEAST_BUDGET_S = 0.5
-# The first plan is made while the boat lies still, and all that follows begins with it. On a slow computer it gets more
-# time: 2.3 times as long on a quarter of a core (4.6 s of 2), 4 times on a tenth, and at the most ...
-FIRST_POWER, FIRST_MOST = 0.6, 6.0
+# On a slow computer a plan that is not urgent gets more time: 2.3 times as long on a quarter of a core (4.6 s of 2), 4
+# times on a tenth. The first one, for which she lies still, at the most ...
+LONGER_POWER, FIRST_MOST = 0.6, 6.0
+# ... and one for a waypoint ahead, which is asked for the earlier the longer the last ones took.
+AHEAD_MOST = 2.5
 # An order ends so long before the skipper gives it up [s].
 EARLY_S = 2.0
 
@@ -212,8 +214,8 @@ class Executor:
 
     def _budget_s(self, request: RequestPlan) -> float:
         """Return the real time for a plan [s]: what was asked for, less beside a hurried simulator, never nothing."""
-        is_first = request.reason is ReplanReason.START
-        longer = min(FIRST_MOST, self._planner.share**-FIRST_POWER) if is_first else 1.0
+        most = {ReplanReason.START: FIRST_MOST, ReplanReason.WAYPOINT: AHEAD_MOST}.get(request.reason, 1.0)
+        longer: float = min(most, self._planner.share**-LONGER_POWER)
         return max(min(request.budget_s, LEAST_BUDGET_S), longer * request.budget_s * self._budget_scale)
 
     async def _run_orders(self) -> None:
