@@ -14,8 +14,7 @@ from typing import Any
 import msgspec
 
 from companion.errors import JobError
-from companion.geofence.mission import MissionOptions, parse_options, without_defaults
-from companion.geofence.mission.text import ORDER
+from companion.geofence.mission import TABLE_ORDER, MissionOptions, parse_options, without_defaults
 
 _HEADER = re.compile(r"[ \t]*(\[\[?)[ \t]*(\"[^\"\n]*\"|'[^'\n]*'|[A-Za-z0-9_-]+)[ \t]*(\.|\]\]?)")
 _STRINGS = ('"""', "'''", '"', "'")
@@ -252,7 +251,7 @@ def _inserted(blocks: list[Block], *new: Block, at: int | None = None) -> list[B
 
 
 def _rank(name: str) -> int:
-    return ORDER.index(name) if name in ORDER else len(ORDER)
+    return TABLE_ORDER.index(name) if name in TABLE_ORDER else len(TABLE_ORDER)
 
 
 def _listed(

@@ -245,7 +245,7 @@ def test_who_wants_it_on_his_boat(tmp_path):
         assert "0 errors, 0 warnings; nothing was changed" in done(setup, tmp_path)
         assert "0 errors, 0 warnings; nothing was changed" in done(doctor, tmp_path)
         with typed(run, tmp_path) as shell:
-            until(shell, r"WAITING \| wind")
+            until(shell, r"WAITING \| mean wind")
 
 
 def test_the_bench_of_an_evening_from_an_empty_folder(tmp_path):

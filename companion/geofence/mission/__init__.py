@@ -50,12 +50,20 @@ from companion.geofence.mission.options import (
     WindOptions,
     kind_of,
 )
-from companion.geofence.mission.text import dump_options, parse_options, read_options, toml, without_defaults
+from companion.geofence.mission.text import (
+    TABLE_ORDER,
+    dump_options,
+    parse_options,
+    read_options,
+    toml,
+    without_defaults,
+)
 
 __all__ = [
     "NO_NAME",
     "PERMITS",
     "RANGE_M",
+    "TABLE_ORDER",
     "AreaOptions",
     "AtomOptions",
     "BoatFile",

@@ -21,7 +21,7 @@ from companion.words import choices, expected
 
 MAX_TOML_BYTES = 1024 * 1024
 # In which a mission's keys and tables are written.
-ORDER = (
+TABLE_ORDER = (
     "name",
     "description",
     "from_autopilot",
@@ -85,7 +85,7 @@ def dump_options(options: MissionOptions) -> str:
     """Return the options as TOML, leaving out what has its default."""
     data = without_defaults(options)
     # whatever has no place in the order yet comes last, and is not lost
-    return toml({k: data[k] for k in (*ORDER, *data) if k in data})
+    return toml({k: data[k] for k in (*TABLE_ORDER, *data) if k in data})
 
 
 def toml(data: Mapping[str, Any]) -> str:
