@@ -551,8 +551,8 @@ def verdict_line(record: Mapping[str, Any]) -> str:
     f = record["figures"]
     if f:
         words = (
-            f"{f['time_s']:.0f} s and {f['distance_m']:.0f} m by the true track, from arming to the run's end, "
-            f"{counted(f['tacks'], 'tack')} with the turn on setting sail, "
+            f"{f['time_s']:.0f} s, {f['distance_m']:.0f} m and {counted(f['tacks'], 'tack')} by the true track, "
+            "from arming to the run's end, "
             f"{counted(f['replans'], 'replan')}, "
         )
         words += "nothing to be clear of" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"

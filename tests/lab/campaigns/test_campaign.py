@@ -57,8 +57,8 @@ def summary(paths, records):
 def test_a_voyage_is_a_line():
     experiment = campaign([DEMO], runs=1)
     assert experiment.line(record("demo", 3, 111.7)) == (
-        "PASSED  demo seed 3: 112 s and 277 m by the true track, from arming to the run's end, "
-        "1 tack with the turn on setting sail, 2 replans, clearance 18.2 m "
+        "PASSED  demo seed 3: 112 s, 277 m and 1 tack by the true track, from arming to the run's end, "
+        "2 replans, clearance 18.2 m "
         "(promised 15.2 m)"
     )
     broken = {
