@@ -194,7 +194,7 @@ def wind(text: str) -> tuple[float, float]:
     try:
         speed, direction = (float(part) for part in text.split("@"))
     except ValueError:
-        raise ArgumentTypeError(f"{text[:30]!r} is not a wind; write SPEED@FROM, as 5@350") from None
+        raise ArgumentTypeError(f"{text[:30]!r} is not a wind, SPEED@FROM, as 5@350") from None
     if not (0.0 < speed <= 50.0 and -360.0 <= direction <= 360.0):
         if 50.0 < speed <= 360.0 and 0.0 < direction <= 50.0:
             raise ArgumentTypeError(

@@ -12,6 +12,7 @@ import datetime as dt
 import math
 import os
 import random
+from argparse import ArgumentTypeError
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,6 +23,7 @@ import numpy as np
 from companion.compose import water_of
 from companion.errors import InputError
 from companion.geofence import Mission
+from companion.program import arguments
 from companion.weather import iso
 from companion.words import counted
 from sitl.rehearse.fault_sampling import sampled_faults, with_faults
@@ -169,14 +171,12 @@ def given_wind(text: str | None, spec: WindSpec, error: tuple[float, float] | No
     if path.suffix.lower() == ".csv":
         return _of_file(path, spec, error)
     try:
-        speed, direction = (float(part) for part in text.split("@"))
-    except ValueError:
-        raise InputError("--wind", text, "is no wind", _REMEDY) from None
-    if MOST_MPS < speed <= 360.0 and 0.0 < direction <= MOST_MPS:
-        raise InputError("--wind", text, "looks swapped", f"write SPEED@FROM, {direction:g}@{speed:g} in m/s, degrees")
-    if not (0.0 < speed <= MOST_MPS and -360.0 <= direction <= 360.0):
-        raise InputError("--wind", text, f"is out of range: up to {MOST_MPS:g} m/s, from -360 to 360 degrees", _REMEDY)
-    spec = msgspec.structs.replace(spec, tws_mps=speed, from_deg=direction % 360.0)
+        speed_mps, from_deg = arguments.wind(text)
+    except ArgumentTypeError as none:
+        raise InputError("--wind", "", str(none), _REMEDY) from None
+    if speed_mps > MOST_MPS:
+        raise InputError("--wind", text, f"is out of range: up to {MOST_MPS:g} m/s", _REMEDY)
+    spec = msgspec.structs.replace(spec, tws_mps=speed_mps, from_deg=from_deg)
     return Given(told=_told(spec, off), spec=spec, error=off)
 
 

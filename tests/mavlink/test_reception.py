@@ -168,6 +168,14 @@ def test_one_whose_messages_wait_now_and_then_is_heard_and_is_no_second_autopilo
     assert all(period_s <= t <= period_s + SWITCH_S + lag_s for t in unheard)  # the first that did not wait, once
 
 
+def test_a_second_route_without_the_delay_of_the_first_is_no_second_autopilot():
+    clock = BootClock()
+    for n in range(300):
+        assert clock.take(0.2 * n, 0.2 * n - 2.0)
+        clock.take(0.2 * n, 0.2 * n)
+        assert not clock.is_contested(0.2 * n)
+
+
 def test_a_clock_that_is_ahead_by_more_than_messages_wait_is_another():
     clock = BootClock()
     for n in range(100):

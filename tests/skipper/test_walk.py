@@ -477,16 +477,24 @@ def row_of_goals():
     return world
 
 
-def test_who_was_not_known_to_be_ours_for_a_while_was_with_no_operator():
+@pytest.mark.parametrize("taken", [False, True])
+def test_who_was_not_known_to_be_ours_for_a_while_was_with_an_operator_only_where_one_took_her(taken):
+    """She is planned for from where she is in any case: nobody knows what became of her meanwhile."""
     world = row_of_goals()
-    known = world.identity
+    known, before = world.identity, len(world.actions)
     world.identity = replace(known, is_contested=True)
-    world.run(11)
+    world.run(3)
+    world.mode = Mode.MANUAL if taken else Mode.AUTO
+    world.run(8)
+    world.mode = Mode.AUTO
+    world.run(2)
     assert world.state.phase is Phase.OPERATOR
     world.identity = known
     assert world.run(20, lambda w: w.state.phase is Phase.STANDARD)
-    assert not [entry for entry in world.log if entry[1] == "operator back"]
-    assert not world.state.operator.is_back
+    assert bool([entry for entry in world.log if entry[1] == "operator back"]) is taken
+    assert (world.state.operator.given_back_s > 0.0) is taken
+    asked = [a.reason for _, a in world.actions[before:] if isinstance(a, act.RequestPlan)]
+    assert act.ReplanReason.OPERATOR_BACK in asked
 
 
 def test_a_jump_is_raised_at_once_and_forgotten_after_quiet_fixes():

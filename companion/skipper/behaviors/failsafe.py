@@ -340,15 +340,16 @@ def operator_has_it(ctx: StepContext) -> bool:
         ctx.phase(Phase.OPERATOR, f"{_taken(ctx)}: waiting for AUTO")
         return True
     since = state.operator.since_s
-    if since is None:  # nobody took her: what was heard was not known to be ours for a while
-        ctx.phase(Phase.WAITING, "the autopilot is ours again: waiting for the mission on board to be compared")
-        return False
     ctx.set(
-        operator=changed(ctx.state.operator, since_s=None, is_back=True, answering="", given_back_s=ctx.t_s),
+        operator=changed(ctx.state.operator, since_s=None, is_back=True, answering=""),
         mission=changed(ctx.state.mission, checked=False, read_since_s=ctx.t_s),
         plans=changed(ctx.state.plans, retry=PATIENT),
         progress=changed(ctx.state.progress, history=()),
     )
+    if since is None:  # nobody took her: what was heard was not known to be ours for a while
+        ctx.phase(Phase.WAITING, "the autopilot is ours again: waiting for the mission on board to be compared")
+        return False
+    ctx.set(operator=changed(ctx.state.operator, given_back_s=ctx.t_s))
     ctx.phase(Phase.WAITING, "AUTO is back: waiting for the mission on board to be compared")
     ctx.say(Severity.NOTICE, "operator back", f"AUTO is back after {ctx.t_s - since:.0f} s", every_s=0.0)
     return False

@@ -59,6 +59,8 @@ def stand_by(ctx: StepContext) -> bool:
         phase = Phase.WAITING
     elif phase is not Phase.DONE and wrong:
         phase = Phase.OPERATOR
+        if ctx.is_taken and state.operator.since_s is None:  # somebody takes her meanwhile, and may give her back
+            ctx.set(operator=changed(ctx.state.operator, since_s=ctx.t_s))
     ctx.phase(phase, f"no orders, waiting: {wrong}" if wrong else _unknown(ctx, ctx.snapshot.identity))
     return True
 

@@ -67,7 +67,7 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
         return None
     if state.operator.is_back:
         cause = state.operator.answering
-        text = f"stopped by the {cause} failsafe" if cause else "the operator gave the boat back"
+        text = f"stopped by the {cause} failsafe" if cause else "taken up again from where she is"
         return Trigger(reason=ReplanReason.OPERATOR_BACK, text=text)
     if route is not None and route.plan_id == NO_PLAN:
         # It need not lead to our goals: nothing is planned but another way, and that as soon as the wind is known.

@@ -124,8 +124,9 @@ def test_a_record_is_sailed_from_a_time_of_each_seed(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("strong", "is no wind; write SPEED@FROM"),
-        ("90@10", "looks swapped; write SPEED@FROM, 10@90"),
+        ("strong", "is not a wind, SPEED@FROM, as 5@350; write SPEED@FROM"),
+        ("90@10", "looks swapped: SPEED@FROM is 10@90, m/s and degrees"),
+        ("45@10", "is out of range: up to 40 m/s"),
         ("90@60", "is out of range"),
         ("nowhere.csv", "cannot be read"),
     ],

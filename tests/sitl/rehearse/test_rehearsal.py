@@ -330,7 +330,7 @@ RING = (
         ("[start]\nlat = 50.8170000\nlon = -1.3100000\nheading_deg = 60.0\n", "", (), "[start]: is missing"),
         ("rocks.wkt", "ring.wkt", (), "no way leads there in 5 m/s from 0°"),
         ("rocks.wkt", "reef.wkt", (), "reef.wkt"),
-        ("", "", ("--wind", "gale"), "gale: is no wind"),
+        ("", "", ("--wind", "gale"), "'gale' is not a wind"),
         ("", "", ("--wind-error", "5"), "is no error of a wind; write DEG,MPS"),
         ("", "", ("--depart", "2026-11-24T08:00"), "has no zone"),
         ("", "", ("--try", "jib=1"), "is not a change that is known"),

@@ -68,7 +68,7 @@ def test_no_reason_counts_without_a_place_a_wind_or_a_voyage(lacking):
 def test_a_boat_that_was_given_back_plans_before_all_else_and_says_by_whom():
     by_person = find_trigger(moment(DEEP, operator={"is_back": True}, plans={"asked": "ordered"}), ())
     by_failsafe = find_trigger(moment(DEEP, operator={"is_back": True, "answering": "radio"}), ())
-    assert (by_person.reason, by_person.text) == (ReplanReason.OPERATOR_BACK, "the operator gave the boat back")
+    assert (by_person.reason, by_person.text) == (ReplanReason.OPERATOR_BACK, "taken up again from where she is")
     assert (by_person.interval_s, by_person.urgent, by_person.from_index) == (0.0, False, None)
     assert by_failsafe.text == "stopped by the radio failsafe"
 
