@@ -13,56 +13,28 @@ import multiprocessing
 import sys
 from collections.abc import Iterator
 
-from bench.voyage import live
+from bench.voyage import ask, live, watch, whole
 from sitl.scenario import free_port
 
 WATCHERS = 12
 AGAIN_S = 2.0
 
 
-async def _ask(port: int, path: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
-    while True:
-        try:
-            reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        except OSError:  # not there yet
-            await asyncio.sleep(0.2)
-        else:
-            writer.write(
-                f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nAccept-Encoding: gzip\r\n"
-                "Connection: close\r\n\r\n".encode()
-            )
-            return reader, writer
-
-
-async def _whole(port: int, path: str) -> None:
-    reader, writer = await _ask(port, path)
-    await reader.read()
-    writer.close()
-
-
-async def _watch(port: int) -> None:
-    for path in ("/api/hello", "/api/area", "/api/past", "/api/log"):
-        await _whole(port, path)
-    reader, _ = await _ask(port, "/api/stream")
-    while await reader.read(65_536):
-        pass
-
-
 async def _again(port: int) -> None:
     while True:
-        await _whole(port, "/api/past")
+        await whole(port, "/api/past")
         await asyncio.sleep(AGAIN_S)
 
 
 async def _deaf(port: int) -> None:
-    _, writer = await _ask(port, "/api/stream")
+    _, writer = await ask(port, "/api/stream")
     writer.transport.pause_reading()  # type: ignore[attr-defined]
     await asyncio.Event().wait()
 
 
 def _all(port: int) -> None:
     async def everybody() -> None:
-        watching = [_watch(port) for _ in range(WATCHERS)]
+        watching = [watch(port) for _ in range(WATCHERS)]
         await asyncio.gather(*watching, _again(port), _deaf(port), return_exceptions=True)
 
     with contextlib.suppress(KeyboardInterrupt):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections.abc import Sequence
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -38,6 +37,8 @@ def printable(text: str) -> str:
     """
     if text.isprintable():
         return text
+    import unicodedata  # 0.8 MB of tables, for what hardly any text has
+
     return "".join(
         c
         if c.isprintable() or c in "\n\t" or unicodedata.category(c) == "Zs"

@@ -1,17 +1,12 @@
 """What every test shares: their order, which of them wait to be asked for, and why they were left out."""
 
-import fcntl
-import hashlib
 import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-from companion.kernels import places
+from companion.kernels.carry import as_packaged
 
 # How long an example takes is the machine's business, which others share. What lands is tried on the same draws each
 # time: a rare find must not stop another's change. `make draws` looks for new ones; what it finds is written as an
@@ -61,14 +56,4 @@ def long_first(items, workers):
 @pytest.fixture(scope="session")
 def carried():
     """A folder of kernels as a package carries them, made once for the sources as they are."""
-    digest = hashlib.sha256("".join(map(places.source, ("companion", "sitl"))).encode()).hexdigest()[:24]
-    kept = places.folder().with_name("carried-kernels")
-    kept.mkdir(parents=True, exist_ok=True)
-    folder = kept / digest
-    with (kept / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # the tests' workers make it once
-        if not (folder / places.CARRIED_FOR).exists():
-            for old in kept.glob("?" * len(digest)):
-                shutil.rmtree(old)
-            subprocess.run([sys.executable, "-m", "companion.kernels.carry", str(folder)], check=True)
-    return folder
+    return as_packaged()  # by one of the tests' workers

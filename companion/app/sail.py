@@ -37,6 +37,7 @@ from companion.compose import (
 from companion.fold import Step, VoyageFold, begun
 from companion.geofence import Mission
 from companion.guard import Auxiliary, Guard
+from companion.kernels.memory import trim
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.reception import LinkIdentity, LinkStats
@@ -546,6 +547,8 @@ class _Shell:
             await asyncio.sleep(TEND_EVERY_S)
             stamps = self.log.stamps(self.log.now_s())
             await self.options.offload(functools.partial(self.recorder.tend, stamps))
+            if self.options.is_durable:  # on a boat: what plans and pictures of the past have left, some 2 MB
+                await self.options.offload(trim)
 
     # ---------------------------------------------------------------------------------------- files
     def _refuse(self, what: str, text: str) -> None:

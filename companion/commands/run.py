@@ -246,14 +246,26 @@ def _ignoring_terminal_signals() -> Iterator[None]:
 
 
 def _run(args: argparse.Namespace) -> int:
+    from companion.planner.fork_server import ForkServer
+    from companion.planner.worker import answer_requests
+
+    # Before there are threads, locks and sockets, and before anything is loaded that planners have no use for: a page
+    # that this process writes to after the fork is there twice, and what is loaded by then is written to all the time.
+    with contextlib.ExitStack() as stack:
+        fork_server = ForkServer.begin(answer_requests)
+        if fork_server is not None:
+            stack.callback(fork_server.close)
+        return _checked(args, fork_server)
+
+
+def _checked(args: argparse.Namespace, fork_server: ForkServer | None) -> int:
+    """Read what the command line names, and sail it; return the exit code."""
     from companion.addresses import parse_nmea, parse_signalk
     from companion.geofence import load_mission
     from companion.geofence.mission import NO_NAME
     from companion.guard import Guard
     from companion.mavlink.transports import parse_link
     from companion.mission_check import require_sailable
-    from companion.planner.fork_server import ForkServer
-    from companion.planner.worker import answer_requests
     from companion.telemetry.console import Console
     from companion.traffic.feeds import parse_feed
 
@@ -274,13 +286,7 @@ def _run(args: argparse.Namespace) -> int:
         sailed, name = MissionToSail(mission=named), file_name(named.name)
     else:
         name = file_name(settings.name or NO_NAME)
-    import companion.app.sail  # noqa: F401 - so that a planner has it in common with this process
-
-    # before there are threads, locks and sockets: those of the consoles are the first
     with contextlib.ExitStack() as stack:
-        fork_server = ForkServer.begin(answer_requests)
-        if fork_server is not None:
-            stack.callback(fork_server.close)
         out, err = stack.enter_context(Console(sys.stdout)), stack.enter_context(Console(sys.stderr))
         # what is logged must not wait for a terminal either
         stack.enter_context(contextlib.redirect_stderr(cast("TextIO", err)))
@@ -444,6 +450,7 @@ async def _sail(
     guard: Guard,
 ) -> dict[str, Any]:
     """Sail; return the summary. Raises KeyboardInterrupt: it was ended before it began, or a second time."""
+    from companion.kernels.memory import settle
     from companion.planner.worker import PlannerWorker
 
     ending = SignalEnding()
@@ -456,6 +463,7 @@ async def _sail(
         from companion.telemetry.status import unix_of_boat
 
         await _get_ready(planner, out, manager)
+        settle()
         chosen = options()
 
         with ProgressLine(out, chosen.epoch_s) as progress:

@@ -83,13 +83,15 @@ def _extension() -> ModuleType:
 
 
 @functools.cache
-def _functions(package: str) -> dict[tuple[str, str], dict[tuple[Any, ...], Callable[..., Any]]]:
-    """Return the package's functions by kernel and by the types of their arguments."""
-    out: dict[tuple[str, str], dict[tuple[Any, ...], Callable[..., Any]]] = {}
+def _functions(package: str) -> dict[tuple[str, str], dict[str, Callable[..., Any]]]:
+    """Return the package's functions by kernel and by signature.
+
+    A signature is read when its kernel is called, not here: it may name a class of a room that is never loaded.
+    """
+    out: dict[tuple[str, str], dict[str, Callable[..., Any]]] = {}
     for number, entry in enumerate(read_list(package)):
-        out.setdefault((entry.module, entry.name), {})[key(entry.signature)] = getattr(
-            _extension(), symbol(package, number)
-        )
+        function = getattr(_extension(), symbol(package, number))
+        out.setdefault((entry.module, entry.name), {})[entry.signature] = function
     return out
 
 
@@ -111,7 +113,8 @@ class Carried:
         if self.compiled is None and not named:
             if self._by_types is None:  # now: the classes of its arguments are there
                 module, name = self.py_func.__module__, self.py_func.__qualname__
-                self._by_types = _functions(module.partition(".")[0]).get((module, name), {})
+                listed = _functions(module.partition(".")[0]).get((module, name), {})
+                self._by_types = {key(signature): function for signature, function in listed.items()}
             try:
                 found = self._by_types.get(tuple([key_of(a) for a in args]))
             except TypeError:

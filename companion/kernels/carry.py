@@ -11,8 +11,11 @@ is bounded); a minute or two, by emulation half an hour.
 from __future__ import annotations
 
 import argparse
+import fcntl
 import hashlib
 import json
+import shutil
+import subprocess
 import sys
 import warnings
 from pathlib import Path
@@ -53,6 +56,24 @@ def carry(folder: Path = places.CARRIED) -> Path:
     index |= {"library": library.name, "sha256": hashlib.sha256(library.read_bytes()).hexdigest()}
     (folder / places.CARRIED_FOR).write_text(json.dumps(index, indent=1) + "\n", encoding="utf-8")
     return library
+
+
+def as_packaged() -> Path:
+    """Return a folder of kernels as a package carries them, made once for this user and the sources as they are.
+
+    For who measures or tests in a clone what a boat will have.
+    """
+    digest = hashlib.sha256("".join(map(places.source, PACKAGES)).encode()).hexdigest()[:24]
+    kept = places.folder().with_name("carried-kernels")
+    kept.mkdir(parents=True, exist_ok=True)
+    folder = kept / digest
+    with (kept / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / places.CARRIED_FOR).exists():
+            for old in kept.glob("?" * len(digest)):
+                shutil.rmtree(old)
+            subprocess.run([sys.executable, "-m", "companion.kernels.carry", str(folder)], check=True)  # noqa: S603 - this program
+    return folder
 
 
 def _flags(of_numba: Any) -> Any:

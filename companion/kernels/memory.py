@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import mmap
 import re
 from collections.abc import Iterator
@@ -10,6 +11,14 @@ from pathlib import Path
 
 _HEAD = re.compile(r"([0-9a-f]+)-([0-9a-f]+) r-.p \S+ \S+ \d+ +/.*")  # private, and cannot be written
 _SMAPS = Path("/proc/self/smaps")
+
+
+def settle() -> None:
+    """Keep what a process has loaded as what it will always have, share it with its forks, and give back the rest."""
+    gc.collect()
+    gc.freeze()  # what is there now is never looked at again, so its pages stay shared
+    trim()
+    let_go()  # of the libraries that were read to be loaded, half is never called: what is comes back by itself
 
 
 def trim() -> None:

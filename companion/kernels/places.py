@@ -22,7 +22,6 @@ import stat
 import sys
 import tempfile
 from collections.abc import Iterator
-from importlib import metadata
 from pathlib import Path
 
 FILE = "kernels.txt"  # in each package: see ``listed``
@@ -132,6 +131,8 @@ def versions() -> str:
 
     Of Python the tag of its byte code: within a minor version neither that nor the layout of its objects changes.
     """
+    from importlib import metadata  # which brings e-mail and archives: 3 MB that carried kernels do not ask for
+
     libraries = " ".join(f"{name} {metadata.version(name)}" for name in ("numba", "llvmlite", "numpy"))
     return f"{sys.implementation.cache_tag} {libraries} {platform.machine()}"
 

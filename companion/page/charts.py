@@ -10,7 +10,6 @@ import functools
 import gzip
 import hashlib
 import mmap
-import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -131,6 +130,8 @@ class Mbtiles:
 
     def ask(self, sql: str, *values: object) -> list[tuple[Any, ...]]:
         """Return the rows of a question, by a connection of its own: it is another thread's each time."""
+        import sqlite3
+
         with contextlib.closing(sqlite3.connect(self._uri, uri=True)) as connection:
             return connection.execute(sql, values).fetchall()
 
@@ -146,6 +147,8 @@ class Mbtiles:
 
 
 def _mbtiles(path: Path, tag: str) -> TileChart:
+    import sqlite3
+
     tiles = Mbtiles(path)
     try:
         said = {str(name): str(value) for name, value in tiles.ask("SELECT name, value FROM metadata")}

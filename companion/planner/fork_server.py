@@ -10,7 +10,6 @@ not ready, a planner is started as a program of its own.
 from __future__ import annotations
 
 import contextlib
-import gc
 import math
 import os
 import signal
@@ -26,7 +25,7 @@ from typing import Any, NoReturn
 
 from companion.errors import JobError
 from companion.kernels.build import is_ready
-from companion.kernels.memory import let_go, trim
+from companion.kernels.memory import settle
 
 _PID = struct.Struct("<q")
 _PATIENCE_S = 1.0  # a fork takes milliseconds, and the voyage's loop waits for it
@@ -59,10 +58,8 @@ class ForkServer:
         """
         if threading.active_count() > 1 or not is_ready(("companion",)):
             return None
-        from companion.planner.solve import warm
-
-        warm()
-        share_memory()
+        load()
+        settle()
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(AttributeError, OSError, ValueError):
                 stream.flush()
@@ -170,12 +167,13 @@ class ForkServer:
             self._serve(source, sink)
 
 
-def share_memory() -> None:
-    """Make the memory of a process that has loaded all what its forks will share, and give back the rest."""
-    gc.collect()
-    gc.freeze()  # what is there now is never looked at again, so its pages stay shared
-    trim()
-    let_go()  # of the libraries that were read to be loaded, half is never called: what is comes back by itself
+def load() -> None:
+    """Load all that planners have in common: code, machine code, and the draws that each would else make for itself."""
+    from companion.planner.risk.arrival import draws
+    from companion.planner.solve import warm
+
+    warm()
+    draws()
 
 
 def _until_the_end(work: Callable[[], None]) -> NoReturn:

@@ -30,9 +30,9 @@ import numpy as np
 from companion.clock import effort_s, ended
 from companion.errors import JobError
 from companion.kernels.build import prepare
-from companion.kernels.memory import trim
+from companion.kernels.memory import settle, trim
 from companion.planner.child import Child, Forked, Started
-from companion.planner.fork_server import FORK_SERVER, FORK_SERVER_READY, ForkServer, call_process, share_memory
+from companion.planner.fork_server import FORK_SERVER, FORK_SERVER_READY, ForkServer, call_process, load
 from companion.planner.plan import Plan, PlanStatus, Why
 from companion.planner.problem.value import Problem
 from companion.planner.solve import DEFAULT_BUDGET_S, plan
@@ -480,11 +480,9 @@ def _write(sink: Any, payload: bytes) -> None:
 
 def be_fork_server(fd: int) -> None:
     """Be a fork server on the socket ``fd``, in a program of its own."""
-    from companion.planner.solve import warm
-
     control = socket.socket(fileno=fd)
-    warm()
-    share_memory()
+    load()
+    settle()
     with contextlib.suppress(OSError):  # who began it has gone: the fork server sees it, and ends
         control.sendall(FORK_SERVER_READY)
     ForkServer(control, answer_requests).tend()

@@ -15,8 +15,6 @@ from companion.errors import InputError
 from companion.geo.frame import LocalFrame
 from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.geojson import read_geojson, write_geojson
-from companion.geofence.formats.gpx import read_gpx, write_gpx
-from companion.geofence.formats.kml import read_kml, unzip_kmz, write_kml, write_kmz
 from companion.geofence.formats.losses import Losses, Written, leave_out
 from companion.geofence.formats.mission_planner import (
     read_fen,
@@ -127,13 +125,42 @@ def _is_fen(content: Content) -> bool:
     return content.extension != ".poly" and not content.has_names and len(rows) > 3 and rows[1] == rows[-1]
 
 
+# Formats of XML wait for the first such file: a boat that sails has none, and their libraries take 2 MB.
+def _read_gpx(content: Content) -> Document:
+    from companion.geofence.formats.gpx import read_gpx
+
+    return read_gpx(content.data, content.source, kind=content.kind, areas=content.areas)
+
+
+def _write_gpx(document: Document) -> Written:
+    from companion.geofence.formats.gpx import write_gpx
+
+    return write_gpx(document)
+
+
 def _read_kml(content: Content) -> Document:
+    from companion.geofence.formats.kml import read_kml
+
     return read_kml(content.data, content.source, kind=content.kind, areas=content.areas)
 
 
+def _write_kml(document: Document) -> Written:
+    from companion.geofence.formats.kml import write_kml
+
+    return write_kml(document)
+
+
 def _read_kmz(content: Content) -> Document:
+    from companion.geofence.formats.kml import unzip_kmz
+
     inside = replace(content, data=unzip_kmz(content.data, content.source))
     return replace(_read_kml(inside), format="kmz")
+
+
+def _write_kmz(document: Document) -> Written:
+    from companion.geofence.formats.kml import write_kmz
+
+    return write_kmz(document)
 
 
 def _read_wkt(content: Content) -> Document:
@@ -154,15 +181,15 @@ F = Format
 # fmt: off
 FORMATS: tuple[Format, ...] = (
     F(name="kmz", said="KMZ", endings=(".kmz",), knows=lambda c: c.is_zip,
-      read=_read_kmz, write=lambda d, _: write_kmz(d)),
+      read=_read_kmz, write=lambda d, _: _write_kmz(d)),
     F(name="plan", said=".plan", endings=(".plan",), knows=_is_plan,
       read=lambda c: read_plan(c.text, c.source), write=lambda d, _: write_plan(d)),
     F(name="geojson", said="GeoJSON", endings=(".geojson", ".json"), knows=lambda c: c.is_json,
       read=lambda c: read_geojson(c.text, c.source, kind=c.kind, areas=c.areas), write=lambda d, _: write_geojson(d)),
     F(name="gpx", said="GPX", endings=(".gpx",), knows=lambda c: c.xml_tag == "gpx",
-      read=lambda c: read_gpx(c.data, c.source, kind=c.kind, areas=c.areas), write=lambda d, _: write_gpx(d)),
+      read=_read_gpx, write=lambda d, _: _write_gpx(d)),
     F(name="kml", said="KML", endings=(".kml",), knows=lambda c: c.xml_tag == "kml",
-      read=_read_kml, write=lambda d, _: write_kml(d)),
+      read=_read_kml, write=lambda d, _: _write_kml(d)),
     F(name="waypoints", said=".waypoints", endings=(".waypoints", ".txt"), knows=lambda c: c.head.startswith("QGC WPL"),
       read=lambda c: read_waypoints(c.text, c.source), write=lambda d, part: write_waypoints(d, part=part)),
     F(name="rally", said=".rally", endings=(".rally", ".ral"), knows=lambda c: c.lines.upper().startswith("RALLY"),

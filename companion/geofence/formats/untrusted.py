@@ -8,11 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import ParseError
 
-import defusedxml
 import msgspec
-from defusedxml import ElementTree
 
 from companion.disk import read_regular
 from companion.errors import InputError, unreadable
@@ -201,11 +198,14 @@ def _kind(value: object) -> str:
 
 def parse_xml(data: bytes, source: str) -> Any:
     """Return the root element. Raises InputError with the line for anything malformed or hostile."""
+    import defusedxml
+    from defusedxml import ElementTree
+
     try:
         root = ElementTree.fromstring(data, forbid_dtd=True, forbid_entities=True, forbid_external=True)
     except defusedxml.DefusedXmlException:
         raise InputError(source, "", "declares a DTD or entities, which are refused", "remove the DOCTYPE") from None
-    except ParseError as error:
+    except ElementTree.ParseError as error:
         line, column = error.position
         what = str(error).split(":", maxsplit=1)[0]
         cut = "no element" in what or "unclosed" in what

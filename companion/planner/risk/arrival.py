@@ -87,7 +87,7 @@ def _speeds(problem: Problem, strength: Strength) -> tuple[Speeds, tuple[str, ..
 
 
 @functools.lru_cache(maxsize=1)
-def _noise() -> Floats:
+def draws() -> Floats:
     """Return the draws (3, steps, winds): one set, so that a plan's quantiles are a function of the plan."""
     return np.random.default_rng(SEED).standard_normal((3, LONGEST * STEPS_OF_PLAN, WINDS))
 
@@ -153,7 +153,7 @@ def _sailed(
 def _times_s(problem: Problem, legs: Sequence[Leg], strength: Strength, speeds: Speeds) -> Floats:
     """Return how long the path takes in each drawn wind [s]; inf: it does not get there."""
     step_s = legs[-1].end_s / STEPS_OF_PLAN
-    noise = _noise()
+    noise = draws()
     clock = (np.arange(noise.shape[1]) + 0.5) * step_s
     mean, sigma = strength.mean_at(clock), strength.sigma_at(clock)
     turned = np.minimum([problem.wind.sigma.at(float(t)) for t in clock], 0.5)
