@@ -6,7 +6,8 @@
 # RELEASE is bookworm or trixie, ARCHITECTURE amd64 (default) or arm64 (by emulation: qemu-user-static, binfmt_misc; half an
 # hour). Needs debootstrap. BASE=DIR: a tree with python3-venv and ca-certificates. WORK=DIR: an own place, which is kept:
 # interrupted, it goes on where it was. MIRROR: of Debian. pip's settings (PIP_*, /etc/pip.conf) and this machine's
-# certificates are taken along.
+# certificates are taken along. WHEELS=DIR: everything that pip would fetch (requirements.lock, hatchling, setuptools,
+# shtab), from `pip download --platform manylinux_2_28_aarch64 --only-binary=:all:`: then pip asks no network by emulation.
 set -euo pipefail
 
 release=$1 architecture=${2:-amd64}
@@ -40,6 +41,11 @@ rm -rf "$root/source"
 mkdir "$root/source"
 (cd "$source" && git ls-files -z | tar --create --null --files-from=-) | tar --extract --directory="$root/source"
 settings=$(env | grep '^PIP_' || true)
+if [ -n "${WHEELS:-}" ]; then
+    mkdir -p "$root/wheels"
+    cp "$WHEELS"/*.whl "$root/wheels/"
+    settings="$settings PIP_FIND_LINKS=/wheels PIP_NO_INDEX=1"
+fi
 export SOURCE_DATE_EPOCH=$(git -C "$source" log -1 --format=%ct)
 mkdir -p "$source/dist"
 chroot "$root" /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/source LC_ALL=C.UTF-8 SOURCE_DATE_EPOCH=$SOURCE_DATE_EPOCH \
