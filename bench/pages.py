@@ -21,6 +21,7 @@ from companion.safety import BY_RANK, ENDINGS, FAILSAFES, SETTINGS, TABLE, WORD_
 from companion.skipper.priorities import BEHAVIORS
 from companion.view.area import AreaView
 from companion.view.events import Event
+from companion.view.passage import PassageView
 from companion.view.values import Past, View
 from sitl.scenario import scenario
 
@@ -291,8 +292,8 @@ def _cell(text: str) -> str:
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema (2020-12): a View; Area, Event and Past beside it under ``$defs``."""
-    _, made = msgspec.json.schema_components((View, AreaView, Event, Past), ref_template="#/$defs/{name}")
+    """Return the JSON Schema (2020-12): a View; Area, Event, Passage and Past beside it under ``$defs``."""
+    _, made = msgspec.json.schema_components((View, AreaView, Event, PassageView, Past), ref_template="#/$defs/{name}")
     # In the JSON a WindView is the view's Wind: the classes have longer names, to mean one thing in this project.
     components = json.loads(re.sub(r'("#/\$defs/|"title": ")?(\w+)View"', r'\1\2"', json.dumps(made)))
     for component in components.values():

@@ -31,6 +31,7 @@ class Auxiliary(StrEnum):
     PAGE = "live page"
     ORDERS_BY_PAGE = "orders on the page"
     CHARTS = "charts of the page"
+    PASSAGE = "passage on the page"
     SOCKET = "orders on board"
     OUTPUTS = "other displays"
     SIGNALK_TOKEN = "Signal K token"  # noqa: S105 - a name

@@ -53,6 +53,7 @@ from companion.skipper.step import Acknowledge, SkipperConfig
 from companion.skipper.way import Voyage
 from companion.telemetry.folder import VoyageFigures
 from companion.view import AreaView, Event, View, ViewFold
+from companion.view.passage import PlannedPassage
 
 # What comes in one step beyond this is sent away: each order costs the radio an answer.
 MOST_WAITING = 4
@@ -255,6 +256,7 @@ async def live_page(
     *,
     pace: float,
     charts: Sequence[TileChart],
+    planned: PlannedPassage | None = None,
 ) -> None:
     """Serve the page of a voyage until cancelled. ``pace``: seconds of the loop for each second.
 
@@ -267,6 +269,7 @@ async def live_page(
         name=fold.skipper.voyage.name,
         unix_s=views.epoch_s,
         area=views.area,
+        planned=planned,
         permitted=tuple(verb.value for verb in Verb if permitted(verb, verbs)),
     )
     page = LivePage(live, views, fold, planner, operator)

@@ -12,6 +12,7 @@ from companion.disk import Disk
 from companion.mavlink.signing import SigningStore
 from companion.page import Address, TileChart
 from companion.telemetry.folder import VoyageArchive
+from companion.view.passage import PlannedPassage
 from companion.wind import Estimator, WindTracker
 
 Offload = Callable[[Callable[[], None]], Awaitable[None]]
@@ -66,6 +67,7 @@ class SailOptions:
         socket: where orders from on board are taken; None: nowhere.
         http: where the live page is served; None: nowhere.
         charts: the user's, under the page's own water.
+        planned: the passage that the mission was planned as, for the page.
         far: the folder that a satellite modem's program shares with us; None: there is none.
         signing: key and timestamp for a signed link.
         room: makes the wind room of the mission's estimator; a study may know more of the wind, or less.
@@ -92,6 +94,7 @@ class SailOptions:
     socket: Path | None = None
     http: Address | None = None
     charts: tuple[TileChart, ...] = ()
+    planned: PlannedPassage | None = None
     far: SatelliteLink | None = None
     known: tuple[str, ...] = ()
     signing: SigningStore | None = None

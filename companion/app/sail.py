@@ -191,6 +191,7 @@ class _Shell:
                             self.views,
                             pace=1.0 / self.options.budget_scale,
                             charts=self.options.charts,
+                            planned=self.options.planned,
                         ),
                     )
                 if not await self._wait_autopilot(link):

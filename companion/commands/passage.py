@@ -47,7 +47,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     plan = verbs.add_parser("plan", help="the fastest way through a forecast, with a bound below every way")
     plan.add_argument("file", metavar="PASSAGE.toml", type=Path)
     plan.add_argument(
-        "--out", metavar="M", type=out_file, help="write the route as a mission with a band about each leg"
+        "--out",
+        metavar="M",
+        type=out_file,
+        help="write the route as a mission with a band about each leg; M.passage.json beside it is what pages draw",
     )
     plan.add_argument(
         "--plot", metavar="FILE", type=picture, help="draw the route, isochrones and her wind, or the departures"
@@ -176,8 +179,7 @@ def _again(args: argparse.Namespace) -> int:
     from companion.passage.told import told_of, told_of_again
     from companion.weather.told import told_of_age
 
-    if args.out is not None:
-        refuse_existing([str(args.out)], force=args.force)
+    _refuse_out(args)
     _check_far(args)
     if args.folder is not None and args.forecast:
         raise InputError("companion passage again", "--folder", "and --forecast do not go together", "say one of them")
@@ -203,10 +205,7 @@ def _again(args: argparse.Namespace) -> int:
     if args.far_out is not None:
         _write_far(args, asked, passage, found.chosen.route, found.chosen)
     if args.out is not None and found.is_changed:
-        write_files(
-            {str(args.out): _mission_text(asked, passage, found.chosen.route, args.file, args.out)}, force=args.force
-        )
-        print(f"{args.out}: written: companion mission check {args.out}")
+        _write_mission(args, asked, passage, found.chosen.route, found.chosen)
     return 0
 
 
@@ -316,8 +315,7 @@ def _plan(args: argparse.Namespace) -> int:
         return _sweep(args)
     if args.explain:
         raise InputError("companion passage plan", "--explain", "is of a --depart FROM..TO", "say it, too")
-    if args.out is not None:
-        refuse_existing([str(args.out)], force=args.force)
+    _refuse_out(args)
     asked, passage = _read(args.file)
     if len(passage.weather.members) > 1 or _by(args, asked) is not None:
         with patience("planning"):
@@ -341,8 +339,7 @@ def _plan(args: argparse.Namespace) -> int:
     if args.far_out is not None:
         _write_far(args, asked, passage, route, found)
     if args.out is not None:
-        write_files({str(args.out): _mission_text(asked, passage, route, args.file, args.out)}, force=args.force)
-        print(f"{args.out}: written: companion mission check {args.out}")
+        _write_mission(args, asked, passage, route, found)
     return 0
 
 
@@ -510,6 +507,46 @@ def _solids(asked: PassageFile, path: Path) -> list[BaseGeometry]:
             raise InputError(str(file), "", "holds no polygon", "give land or closed water as areas")
         out += [drawn(zone) for zone in zones]
     return out
+
+
+def _planned_beside(out: Path) -> Path:
+    from companion.view.passage import planned_beside
+
+    return planned_beside(out)
+
+
+def _refuse_out(args: argparse.Namespace) -> None:
+    """Raise InputError where a mission, or the passage that is drawn beside it, is there and nobody said --force."""
+    if args.out is not None:
+        refuse_existing([str(args.out), str(_planned_beside(args.out))], force=args.force)
+
+
+def _write_mission(
+    args: argparse.Namespace, asked: PassageFile, passage: Passage, route: Route, of: Departure | None
+) -> None:
+    """Write a route as a mission, and beside it as what page and editor draw of it."""
+    import msgspec
+
+    from companion import __version__
+    from companion.view.planned import planned_of
+
+    beside = _planned_beside(args.out)
+    planned = planned_of(
+        passage,
+        route,
+        asked.name or args.file.stem,
+        of,
+        version=__version__,
+        by_utc_s=_by(args, asked),
+        sure=asked.depart.sure,
+    )
+    files = {
+        str(args.out): _mission_text(asked, passage, route, args.file, args.out),
+        str(beside): msgspec.json.encode(planned),
+    }
+    write_files(files, force=args.force)
+    print(f"{args.out}: written: companion mission check {args.out}")
+    print(f"{beside}: written, to be drawn on the live page and in the editor")
 
 
 def _mission_text(asked: PassageFile, passage: Passage, route: Route, path: Path, out: Path) -> bytes:

@@ -396,6 +396,7 @@ def _voyage(
             socket=args.socket,
             http=page_of(args, guard),
             charts=charts_of(args, guard),
+            planned=planned_of(args, mission.path, guard),
             far=far_of(args, guard),
             command=" ".join(sys.argv),
             token=secrets.randbelow(0xFFFFFFFF) + 1,
@@ -621,6 +622,19 @@ def charts_of(args: argparse.Namespace, guard: Guard) -> Any:
     if said:
         guard.lost(Auxiliary.CHARTS, "; ".join(said), for_good=True)
     return tuple(charts)
+
+
+def planned_of(args: argparse.Namespace, mission: Path | None, guard: Guard) -> Any:
+    """Return the passage that the mission was planned as; a file that cannot be read is said, and she is sailed."""
+    from companion.page import read_planned
+
+    if args.http is None or mission is None:
+        return None
+    try:
+        return read_planned(mission)
+    except InputError as error:
+        guard.lost(Auxiliary.PASSAGE, f"{error}; she is sailed without showing it", for_good=True)
+    return None
 
 
 def far_of(args: argparse.Namespace, guard: Guard) -> Any:

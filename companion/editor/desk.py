@@ -20,6 +20,7 @@ import msgspec
 import numpy as np
 import shapely
 from msgspec import Meta, Struct
+from numpy.typing import NDArray
 
 from companion import __version__
 from companion.compose import drying_of, planner_of, tide_of
@@ -54,12 +55,15 @@ from companion.page import (
     files,
     listening,
     plan_figures,
+    read_planned,
     require_token,
     tile_at,
 )
 from companion.planner import Plan, Problem
 from companion.planner.worker import PlannerWorker
+from companion.view.area import AreaView
 from companion.view.area import drawn as area_drawn
+from companion.view.passage import passage_view
 from companion.words import counted, listed
 
 SIMPLER_DEG = 2e-6  # 0.2 m
@@ -98,6 +102,7 @@ def state_of(base: SourceFiles) -> dict[str, Any]:
         ],
         "locked": [part for other in base.locked for part in _shown(other.name, other.document, base)],
         **drying_of_base(base),
+        **passage_of_base(base, frame),
         "wind": {"from_deg": wind.preview_from_deg, "speed_mps": wind.preview_speed_mps},
         "formats": [
             {"ending": row.endings[0][1:], "said": row.said, "part": part}
@@ -133,6 +138,21 @@ def drying_of_base(base: SourceFiles) -> dict[str, Any]:
                 solid = [[round(t) if math.isfinite(t) else None for t in span] for span in spans]
                 waters.append({"name": timed.name, "rings": _rings(water.zone(), SIDES), "solid_unix_s": solid})
     return {"drying": waters, "shown_unix_s": shown_s}
+
+
+def passage_of_base(base: SourceFiles, frame: AreaView) -> dict[str, Any]:
+    """Return the passage that the saved mission was planned as, on the editor's chart; where it cannot be read, why."""
+    try:
+        planned = read_planned(base.path)
+    except InputError as error:
+        return {"passage": None, "passage_said": f"{error}; it is not shown"}
+
+    def to_en(lonlat_deg: NDArray[np.float64]) -> NDArray[np.float64]:
+        east_deg = np.mod(lonlat_deg[:, 0] - frame.origin_lon_deg + 180.0, 360.0) - 180.0
+        north_deg = lonlat_deg[:, 1] - frame.origin_lat_deg
+        return np.column_stack([east_deg * frame.lon_m, north_deg * frame.lat_m])
+
+    return {"passage": None if planned is None else passage_view(planned, to_en), "passage_said": ""}
 
 
 def _origin(base: SourceFiles, sketch: Sketch) -> GeoPoint:

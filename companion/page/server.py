@@ -191,6 +191,8 @@ class Page:
             return _json(source.area)
         if path == "/api/past":
             return source.past()
+        if path == "/api/passage" and isinstance(source, LiveSource):
+            return source.passage()
         if path == "/api/log":
             return source.hub.log() if isinstance(source, LiveSource) else source.log
         if path == "/api/beside" and isinstance(source, RecordedSource):

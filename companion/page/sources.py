@@ -21,6 +21,7 @@ from companion import __version__
 from companion.orders import Answer, Wanted
 from companion.planner import Plan
 from companion.view import SCHEMA, AreaView, Event, Past, Trail, View, sample_of
+from companion.view.passage import PlannedPassage, passage_view
 
 KEPT = 600  # events: at most a few hundred kB
 
@@ -130,6 +131,8 @@ class LiveSource:
     hub: Hub = field(default_factory=Hub)
     area: AreaView | None = None
     trail: Trail = field(default_factory=Trail)
+    planned: PlannedPassage | None = None
+    _placed: tuple[str, bytes] | None = field(default=None, repr=False)  # of an area, by its hash
 
     def show(self, view: View, events: Sequence[Event], area: AreaView | None) -> None:
         """Show the next step."""
@@ -152,7 +155,23 @@ class LiveSource:
             "count": None,
             "chunk": None,
             "area": None if self.area is None else self.area.hash,
+            "passage": self.planned is not None,
         }
+
+    def passage(self) -> Callable[[], bytes] | None:
+        """Return what makes the JSON of the planned passage in the area's metres, once for each; None: none is."""
+        planned, area = self.planned, self.area
+        if planned is None or area is None:
+            return None
+
+        def make() -> bytes:
+            placed = self._placed
+            if placed is None or placed[0] != area.hash:
+                view = passage_view(planned, area.frame.array_en_from_lonlat)
+                placed = self._placed = area.hash, msgspec.json.encode(view)
+            return placed[1]
+
+        return make
 
     def past(self) -> Callable[[], bytes]:
         """Return what makes the JSON of the samples so far; a thread may call it while more come."""

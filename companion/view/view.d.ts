@@ -90,6 +90,15 @@ export interface Drying {
 }
 
 /**
+ * Where runs end that do not arrive, and why.
+ */
+export interface End {
+  at_en_m: [number, number];
+  runs: number;
+  why: string;
+}
+
+/**
  * Something that happened at ``t_s``; ``number`` counts them from 1, ``facts`` are the numbers behind it.
  *
  *     ``kind`` is phase, ask, plan, kept, upload, order, answer, mode, command or said.
@@ -153,6 +162,14 @@ export interface Goal {
 }
 
 /**
+ * The places that she can be at after so many hours: lines.
+ */
+export interface Isochrone {
+  hours: number;
+  lines: [number, number][][];
+}
+
+/**
  * The course that fetches the mark on ``tack``, and how far it swings to either side with the wind.
  */
 export interface Layline {
@@ -197,6 +214,23 @@ export interface Leg {
 }
 
 /**
+ * Wind and current at a place as she passes it, ``t_s`` after the departure.
+ *
+ *     ``north_deg`` is where true north is on the chart there: meridians come together.
+ */
+export interface Met {
+  at_en_m: [number, number];
+  north_deg: number;
+  t_s: number;
+  wind_from_deg: number;
+  wind_mps: number;
+  low_mps: number;
+  high_mps: number;
+  current_towards_deg: number | null;
+  current_mps: number | null;
+}
+
+/**
  * The no-go zone: the boat's own half angle, and with the wind's spread so that it holds with ``probability``.
  */
 export interface NoGo {
@@ -223,6 +257,37 @@ export interface Part {
   grade: "bad" | "good" | "poor" | "unknown";
   text: string;
   age_s: number | null;
+}
+
+/**
+ * A planned passage on the chart: what it was planned to be, and never what is sailed by.
+ *
+ *     Times are seconds after the departure, ways metres along ``line`` (way, east, north). ``middle_m`` and each of
+ *     ``members_m`` say how far along it a run is at ``at_s``, None where it has ended; ``band`` is polygons.
+ */
+export interface Passage {
+  name: string;
+  departs_unix_s: number;
+  run_unix_s: number;
+  until_unix_s: number;
+  climate_unix_s: number | null;
+  members: number;
+  runs: number;
+  arrived: number;
+  low: number;
+  high: number;
+  waypoints: Waypoint[];
+  line: [number, number, number][];
+  band: [number, number][][][];
+  at_s: number[];
+  middle_m: (number | null)[];
+  members_m: ((number | null)[])[];
+  met: Met[];
+  isochrones: Isochrone[];
+  arrivals_s: number[];
+  ends: End[];
+  said: string[];
+  binds: string[];
 }
 
 /**
@@ -416,6 +481,19 @@ export interface Water {
   verdict: string;
   twd_from_deg: number | null;
   tws_mps: number | null;
+}
+
+/**
+ * A waypoint of the passage, the band about the leg to it, and when she is there [s] after the departure.
+ */
+export interface Waypoint {
+  at_en_m: [number, number];
+  name: string;
+  band_m: number;
+  way_m: number;
+  early_s: number | null;
+  middle_s: number | null;
+  late_s: number | null;
 }
 
 /**

@@ -17,7 +17,7 @@ from companion.app.local_clients import OperatorCommands
 from companion.app.options import SailOptions, SatelliteLink, at_once
 from companion.app.satellite import SatelliteMailbox
 from companion.clock import now_s, run_virtual
-from companion.commands.run import charts_of, far_of, page_of
+from companion.commands.run import charts_of, far_of, page_of, planned_of
 from companion.compose import displays_of
 from companion.errors import InputError
 from companion.fold import VoyageFold
@@ -81,7 +81,7 @@ FAULTS = {
 }
 ONCE = {Auxiliary.FENCE, Auxiliary.FEEDS}  # at the start, and then no more
 # Of the command, before there is a voyage; and what it shows, below.
-NAMED = {Auxiliary.ORDERS_BY_PAGE, Auxiliary.CHARTS, Auxiliary.SIGNALK_TOKEN}
+NAMED = {Auxiliary.ORDERS_BY_PAGE, Auxiliary.CHARTS, Auxiliary.PASSAGE, Auxiliary.SIGNALK_TOKEN}
 NEEDED = {
     "executor",
     "orders",
@@ -249,14 +249,20 @@ def test_what_is_named_and_cannot_be_used_is_left_out(tmp_path):
     )
     assert page_of(args, guard).token == ""
     assert charts_of(args, guard) == ()
+    assert planned_of(args, tmp_path / "m.toml", guard) is None  # there is none: nothing is said
+    assert Auxiliary.PASSAGE not in guard.gone
+    (tmp_path / "m.passage.json").write_text('{"form": "companion.passage/2"}')
+    assert planned_of(args, tmp_path / "m.toml", guard) is None
+    assert "m.passage.json" in guard.gone[Auxiliary.PASSAGE]
+    assert "\n" not in guard.gone[Auxiliary.PASSAGE]
     assert far_of(args, guard) is None
     (tmp_path / "m.toml").write_text(MISSION.format(feed=1, nmea=2) + 'signalk = ["ws://h"]\nsignalk_token = "t"\n')
     told = checked_displays(displays_of(load_mission(tmp_path / "m.toml")), guard)
     assert (told.token, len(told.signalk)) == ("", 1)
     assert {*guard.gone} == {*NAMED, Auxiliary.FAR}
-    assert all("no such file" in why for why in guard.gone.values())
+    assert all("no such file" in why for name, why in guard.gone.items() if name != Auxiliary.PASSAGE)
     guard.look()
-    assert len(guard.gone) == 4  # for good
+    assert len(guard.gone) == 5  # for good
 
 
 @pytest.mark.parametrize("name", ["rocks.wkt", "boat.pol", "tide.csv", "m.toml"])

@@ -7,6 +7,7 @@ import itertools
 import shutil
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from companion import cli
@@ -20,6 +21,7 @@ from tests.editor.test_water import features
 from tests.page.browsing import Window, needs_browser
 from tests.page.charting import mbtiles
 from tests.page.test_browser import is_own, keep
+from tests.view.planning import planned
 
 pytestmark = needs_browser
 
@@ -387,3 +389,41 @@ def test_water_that_dries_is_drawn_with_its_hours_from_when_the_table_begins(tmp
         keep(board, "editor-drying")
         assert board.barriers() == []
         assert board.complaints() == []
+
+
+def test_the_passage_that_a_mission_was_planned_as_lies_under_it(tmp_path):
+    """Only shown: a mark that is moved is said to be no place of it, and what cannot be read is one line."""
+    from companion.geofence.mission import toml
+    from companion.passage.mission import mission_of
+
+    asked, found, drawn = planned()
+    path, beside = tmp_path / "m.toml", tmp_path / "m.passage.json"
+    path.write_text(toml(mission_of(found.route, asked, "line")))
+    beside.write_bytes(msgspec.json.encode(drawn))
+    with edited(path) as url, Board() as board:
+        board.open(url)
+        board.until("return document.querySelectorAll('#map .pband').length === 1")
+        for kind in ("pbarb", "pflow", "ppoint", "proute"):
+            assert board.js("return document.querySelectorAll('#map .' + arguments[0]).length", kind) > 0, kind
+        assert board.js("return document.querySelectorAll('#map .pnow, #map .pmember').length") == 0
+        said = board.text("passagewords")
+        assert "forecast of 04-20 00:00 UTC" in said
+        assert "other goals" not in said
+        assert "8 of 10 between" in board.text("passagebox")
+        for palette in ("day", "night"):
+            board.js("document.documentElement.dataset.palette = arguments[0]", palette)
+            assert board.barriers() == [], palette
+            keep(board, f"editor-passage-{palette}")
+        board.draw("goal", (0.1, 0.25))
+        board.until("return document.getElementById('passagewords').textContent.includes('other goals')")
+        board.click("#passage")
+        assert board.js("return document.querySelectorAll('#map .passagesigns *').length") == 0
+        before = beside.read_bytes()
+        board.saved()
+        assert beside.read_bytes() == before
+        assert board.complaints() == []
+        beside.write_text("{")
+        board.driver.get("about:blank")
+        board.open(url)
+        board.until("return document.getElementById('passagewords').textContent.includes('is no planned passage')")
+        assert board.js("return document.getElementById('passage').hidden")

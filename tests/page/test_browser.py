@@ -19,6 +19,7 @@ import pytest
 
 from companion.clock import run
 from companion.commands.view import read_record
+from companion.messages import GeoPoint
 from companion.page import Address, LiveSource, export, served
 from companion.page.charts import open_chart
 from companion.view.area import DryingView
@@ -435,3 +436,87 @@ def test_water_that_dries_is_as_it_is_at_the_moment_that_is_shown(record):
         assert not window.js("return document.getElementById('dryingkey').hidden")
         assert window.barriers() == []
         assert window.complaints() == []
+
+
+def test_a_passage_lies_under_her_way_and_says_where_she_should_be():
+    """True of the moment: beside her is the middle run, the forecast has its age; and it can be put away."""
+    from dataclasses import replace
+
+    from companion.view.area import AreaView
+    from companion.view.values import BoatView, GoalView, StateView, View
+    from tests.passage.world import T0
+    from tests.view.planning import planned
+
+    layer = planned()[2]
+    area = AreaView(hash="a", name="line", origin_lat_deg=0.0, origin_lon_deg=0.1, lat_m=110_574.0, lon_m=111_320.0)
+    live = LiveSource(name="line", planned=layer)
+
+    def view_at(hours, lon_deg, number, **more):
+        # the goals are the waypoints of the route, as its mission has them
+        goals = tuple(
+            GoalView(
+                kind="point", name=w.name, at_en_m=area.frame.en_from_geo(GeoPoint(lat_deg=w.at[0], lon_deg=w.at[1]))
+            )
+            for w in layer.waypoints[1:]
+        )
+        boat = BoatView(at_en_m=area.frame.en_from_geo(GeoPoint(lat_deg=0.004, lon_deg=lon_deg)), heading_deg=90.0)
+        when = {"t_s": float(number), "unix_s": T0 + 3600.0 * hours, "age_s": 0.0}
+        view = View(
+            source="live",
+            name="line",
+            area=area.hash,
+            boat=boat,
+            goals=goals,
+            state=StateView(phase="standard"),
+            **when,
+        )
+        return replace(view, **more)
+
+    with serving(live) as (url, call), Window() as window:
+        call(live.show, view_at(2.0, 0.1, 10), (), area)
+        window.open(url)
+        window.until("return document.querySelectorAll('#map .pband').length === 1")
+        window.keys("a")
+        assert window.js("return document.querySelectorAll('#map .pmember').length") == 9
+        for kind in ("pnow", "pbarb", "pflow", "ppoint", "proute", "piso"):
+            assert window.js("return document.querySelectorAll('#map .' + arguments[0]).length", kind) > 0, kind
+        said = window.text("passagewords")
+        assert "behind the middle run" in said
+        assert "forecast of 04-20 00:00 UTC, 2 h 00 old" in said
+        assert "8 of 10 between" in window.text("passagebox")
+        assert window.js("return document.querySelectorAll('.phist rect').length") >= 4
+        call(live.show, view_at(2.1, 0.4, 11), (), area)
+        window.until("return document.getElementById('passagewords').textContent.includes('ahead of the middle run')")
+        call(live.show, view_at(120.0, 0.4, 12), (), area)
+        window.until("return document.getElementById('passagewords').textContent.includes('it ended 24 h 00 ago')")
+        assert window.js("return document.querySelectorAll('#map .pnow, #map .pmember').length") == 0
+        call(
+            live.show,
+            view_at(2.2, 0.2, 13, goals=(GoalView(kind="point", name="x", at_en_m=(9000.0, 9000.0)),)),
+            (),
+            area,
+        )
+        window.until("return document.getElementById('passagewords').textContent.includes('other goals')")
+        call(live.show, view_at(2.2, 0.2, 14, unix_s=None), (), area)
+        window.until("return document.getElementById('passagewords').textContent.includes('time is not known')")
+        call(live.show, view_at(2.2, 0.2, 15), (), area)
+        window.until("return document.querySelectorAll('#map .pnow').length === 1")
+        for palette in ("day", "night"):
+            window.js("document.documentElement.dataset.palette = arguments[0]", palette)
+            assert window.barriers() == [], palette
+            keep(window, f"passage-{palette}")
+        window.js("document.getElementById('numbers').scrollIntoView()")
+        keep(window, "passage-numbers")
+        window.js("scrollTo(0, 0)")
+        # the metres count from elsewhere: the same places are drawn of them
+        moved = replace(area, hash="b", origin_lon_deg=0.3)
+        call(live.show, view_at(2.3, 0.2, 16, area="b"), (), moved)
+        window.until("return companion.area.hash === 'b'")
+        window.until("return document.querySelector('#map .proute').getAttribute('d').startsWith('M-33')")
+        window.click("#passage")
+        assert window.js("return document.querySelectorAll('#map .passagesigns *').length") == 0
+        assert window.js("return getComputedStyle(document.querySelector('#map .proute')).visibility") == "hidden"
+        window.keys("p")
+        window.until("return document.querySelectorAll('#map .passagesigns .pnow').length === 1")
+        assert window.complaints() == []
+        assert is_own(window, url)

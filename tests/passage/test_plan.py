@@ -7,6 +7,7 @@ import pytest
 
 from companion import cli
 from companion.geofence import load_mission
+from companion.page import read_planned
 from tests.weather.grib_file import CURRENT_EAST, CURRENT_NORTH, message_2, wind_2
 
 LAT, LON = np.linspace(48.0, 52.0, 9), np.linspace(-8.0, -2.0, 13)
@@ -69,6 +70,14 @@ def test_a_route_is_told_drawn_and_written_as_a_mission(shell, tmp_path):
     assert tables["boat"]["polar"] == "avalon"
     assert all(200.0 <= goal["bandwidth_m"] < 10_000.0 for goal in tables["goal"])
     assert shell("--out", "m.toml")[2] == "companion passage: m.toml: exists; say --force to overwrite it\n"
+    drawn = read_planned(tmp_path / "m.toml")
+    assert [w.at for w in drawn.waypoints[1:]] == [(g["lat"], g["lon"]) for g in tables["goal"]]
+    assert [w.band_m for w in drawn.waypoints[1:]] == [g["bandwidth_m"] for g in tables["goal"]]
+    assert (drawn.members, drawn.members_m, drawn.name) == (1, (), "across")
+    (tmp_path / "m.toml").unlink()
+    assert shell("--out", "m.toml")[2] == "companion passage: m.passage.json: exists; say --force to overwrite it\n"
+    assert not (tmp_path / "m.toml").exists()
+    assert shell("--out", "m.toml", "--force")[0] == 0
 
 
 def test_the_members_fan_is_drawn(tmp_path):

@@ -12,7 +12,7 @@ import * as water from "./water.js";
 /** @typedef {{findings: Finding[], is_in_order: boolean, grown: Place[][][]}} Found */
 /** @typedef {{to: string, why: string, way: Place[], time_s: number, late_s: number | null, length_m: number, risk: number | null, risks: (number | null)[], tacks: number, gybes: number, clearance_m: number | null}} Leg */
 /** @typedef {{error: string, legs: Leg[], time_s: number, length_m: number, tacks: number, gybes: number, clearance_m: number | null}} Plan */
-/** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string, charts: import("./charts.js").Chart[], waters: import("./water.js").Water[], free_m: number | null, drying: {name: string, rings: Place[][], solid_unix_s: [number | null, number | null][]}[], shown_unix_s: number}} State */
+/** @typedef {{version: string, file: string, folder: string, is_new: boolean, called: string, disk: string, sketch: Sketch, frame: import("./sketch.js").Frame, is_placed: boolean, files: import("./tables.js").AreaFile[], locked: {of: string, zone: string, rings: Place[][]}[], wind: {from_deg: number, speed_mps: number}, formats: {ending: string, said: string, part: string}[], kept: string[], said: string, charts: import("./charts.js").Chart[], waters: import("./water.js").Water[], free_m: number | null, drying: {name: string, rings: Place[][], solid_unix_s: [number | null, number | null][]}[], shown_unix_s: number, passage: import("../../view/view").Passage | null, passage_said: string}} State */
 
 const KNOT_MPS = 1852 / 3600, CHECK_MS = 180, PLAN_MS = 350, SIDES = 48;
 let token = "";
@@ -258,6 +258,8 @@ async function load() {
   selected = null;
   if (isFirst) { windMps = told.wind.speed_mps; input("windfrom").value = String(told.wind.from_deg); typedWind(); shownWind(); tables.build(editor); chart.build(editor); map.lay(told.charts); water.build(/** @type {HTMLCanvasElement} */ (get("water")), () => state.frame, tile); map.drawUnder(water.draw); useChart(); }
   waters(told.waters);
+  map.planned(told.passage, false);
+  if (told.passage_said) get("passagewords").textContent = told.passage_said;
   take(told, true);
   changed();
   whole();

@@ -67,9 +67,12 @@ function remember(past, view) {
 
 /** What is static, again: at the beginning, after a lost link, when the water is another's. */
 async function whole() {
-  const [area, past, events] = await Promise.all([read("/api/area").catch(() => null), read("/api/past"), read("/api/log")]);
+  // in the metres of the area, which go along with a boat that sails far
+  const [area, past, events, planned] = await Promise.all([read("/api/area").catch(() => null), read("/api/past"), read("/api/log"),
+    page.hello?.passage ? read("/api/passage").catch(() => null) : null]);
   page.area = area;
   page.past = past;
+  map.planned(planned);
   if (page.view && past) remember(past, page.view);
   log.add(events);
 }
@@ -158,7 +161,7 @@ function settings() {
 /** @type {[string, string, () => void][]} */
 const KEYS = [
   ["n", "north up", () => map.orient("north")], ["h", "head up", () => map.orient("head")], ["w", "wind up", () => map.orient("wind")],
-  ["c", "charts", () => get("charts").click()], ["f", "follow the boat", () => map.follow(!map.isFollowing())], ["a", "show all", () => map.all()], ["+", "nearer", () => map.zoom(1.5)], ["-", "farther", () => map.zoom(1 / 1.5)],
+  ["c", "charts", () => get("charts").click()], ["p", "the planned passage", () => get("passage").click()], ["f", "follow the boat", () => map.follow(!map.isFollowing())], ["a", "show all", () => map.all()], ["+", "nearer", () => map.zoom(1.5)], ["-", "farther", () => map.zoom(1 / 1.5)],
   ["d", "day, dusk, night", () => cycle("palette")], ["u", "knots or m/s", () => cycle("speeds")], ["m", "true or magnetic", () => cycle("bearings")],
   [" ", "play and pause", () => page.timeline?.play(!page.timeline.isPlaying)], ["ArrowLeft", "a moment back", () => page.timeline?.step(-1)], ["ArrowRight", "a moment on", () => page.timeline?.step(1)],
   ["[", "to the decision before", () => page.timeline?.jump(-1)], ["]", "to the next decision", () => page.timeline?.jump(1)], ["?", "these keys", () => help()],

@@ -1,5 +1,6 @@
 // The chart: own water first. Metres on a local frame; symbols and words stay upright and of one size.
 import * as charts from "./charts.js";
+import * as passage from "./passage.js";
 import { get, picture, set, svg } from "./dom.js";
 import { bearing, distance, drying, duration, percent } from "./format.js";
 import { byTack, matrix, moved, path, project, riskClass, scaleBar, unproject } from "./geometry.js";
@@ -8,6 +9,7 @@ import { byTack, matrix, moved, path, project, riskClass, scaleBar, unproject } 
 
 const ROOM = 1.25;
 const LAY_M = 4000;
+const LEAST_SCALE = 0.0001;   // px a metre: an ocean
 
 /** @type {Camera} */
 const camera = { centre: [0, 0], scale: 1, up: 0, width: 600, height: 400 };
@@ -24,11 +26,12 @@ const root = picture("map");
 
 export function build() {
   const world = svg("g", { class: "world" });
-  for (const name of ["chart", "limits", "grown", "drying", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
+  for (const name of ["chart", "passage", "limits", "grown", "drying", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
   root.append(svg("defs", {}, pattern()), layers.world = world);
-  for (const name of ["grid", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat", "furniture", "drawing"]) {
+  for (const name of ["grid", "passagesigns", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat", "furniture", "drawing"]) {
     root.append(layers[name] = svg("g", { class: name }));
   }
+  passage.build(/** @type {SVGElement} */ (layers.passage), /** @type {SVGElement} */ (layers.passagesigns));
   new ResizeObserver(() => { measure(); draw(); }).observe(root);
   measure();
   listen();
@@ -66,6 +69,11 @@ export function lay(given) {
   charts.build(given, /** @type {SVGElement} */ (layers.chart), draw);
 }
 
+/** The passage that was planned, null: none was. @param {import("../../view/view").Passage | null} planned @param {boolean} [isNow] whether a boat is under way */
+export function planned(planned, isNow = true) {
+  passage.take(planned, draw, isNow);
+}
+
 /** Let the next click choose a place. @param {((en: Point) => void) | null} picks */
 export function pick(picks) {
   state.picks = picks;
@@ -95,7 +103,7 @@ export function isFollowing() {
 
 /** @param {number} factor */
 export function zoom(factor) {
-  camera.scale = Math.min(60, Math.max(0.002, camera.scale * factor));
+  camera.scale = Math.min(60, Math.max(LEAST_SCALE, camera.scale * factor));
   draw();
 }
 
@@ -196,6 +204,8 @@ function draw() {
   drawing.under?.(camera);
   const at = (/** @type {Point} */ en) => project(camera, en);
   grid(at);
+  passage.draw(view, { at, camera, isSouth: (state.area?.origin_lat_deg ?? 0) < 0 });
+  passage.say(view);
   track();
   laylines(view, at);
   wedge(view, at);
@@ -525,7 +535,7 @@ function listen() {
   root.addEventListener("wheel", (event) => {
     event.preventDefault();
     const at = here(event), before = unproject(camera, at);
-    camera.scale = Math.min(60, Math.max(0.002, camera.scale * Math.exp(-event.deltaY / 500)));
+    camera.scale = Math.min(60, Math.max(LEAST_SCALE, camera.scale * Math.exp(-event.deltaY / 500)));
     const after = unproject(camera, at);
     if (!state.follow) camera.centre = [camera.centre[0] + before[0] - after[0], camera.centre[1] + before[1] - after[1]];
     draw();
