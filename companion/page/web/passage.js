@@ -194,7 +194,7 @@ function waypoints(passage, chart) {
     if (taken.some(([a, b]) => Math.abs(a - x) < 110 && Math.abs(b - y) < 14)) continue;
     taken.push([x, y]);
     const isCut = x > chart.camera.width - 80;
-    if (point.middle_s !== null) out.push(svg("text", { x: isCut ? x - 7 : x + 7, y: y + 15, class: "word small pword", "text-anchor": isCut ? "end" : "start" }, when(passage.departs_unix_s + point.middle_s)));
+    if (point.middle_s !== null) out.push(svg("text", { x: isCut ? x - 7 : x + 7, y: y + 28, class: "word small pword", "text-anchor": isCut ? "end" : "start" }, when(passage.departs_unix_s + point.middle_s)));
   }
   return out;
 }
