@@ -52,11 +52,11 @@ from companion.skipper.step import (
 MAX_WAITING = 16
 # Real time that a plan gets at least, however fast the simulator beside it: with less a busy machine finds no path.
 LEAST_BUDGET_S = 0.5
-# On a slow computer a plan that is not urgent gets more time: 2.3 times as long on a quarter of a core (4.6 s of 2), 4
-# times on a tenth. The first one, for which she lies still, at the most ...
-LONGER_POWER, FIRST_MOST = 0.6, 6.0
-# ... and one for a waypoint ahead, which is asked for the earlier the longer the last ones took.
-AHEAD_MOST = 2.5
+# On a slow computer a plan that is not urgent gets more time: 2.3 times as long on a quarter of a core (4.6 s of 2).
+# The first one, for which she lies still, has so much of its budget of the processor itself (11 s on a tenth) ...
+LONGER_POWER, FIRST_SHARE, FIRST_MOST = 0.6, 0.55, 8.0
+# ... and one for a waypoint ahead, which is asked for the earlier the longer the last ones took, at the most ...
+AHEAD_MOST = 3.0
 # An order ends so long before the skipper gives it up [s].
 EARLY_S = 2.0
 
@@ -215,7 +215,10 @@ class Executor:
     def _budget_s(self, request: RequestPlan) -> float:
         """Return the real time for a plan [s]: what was asked for, less beside a hurried simulator, never nothing."""
         most = {ReplanReason.START: FIRST_MOST, ReplanReason.WAYPOINT: AHEAD_MOST}.get(request.reason, 1.0)
-        longer: float = min(most, self._planner.share**-LONGER_POWER)
+        longer: float = self._planner.share**-LONGER_POWER
+        if request.reason is ReplanReason.START:
+            longer = max(longer, FIRST_SHARE / self._planner.share)
+        longer = min(most, longer)
         return max(min(request.budget_s, LEAST_BUDGET_S), longer * request.budget_s * self._budget_scale)
 
     async def _run_orders(self) -> None:

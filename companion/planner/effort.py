@@ -18,6 +18,7 @@ Judge = Callable[[NDArray[np.float64]], float]
 LATE = 1.1  # of the seconds: another path is not judged beyond
 SETTLES = 5.0  # times what the first path takes: so long it soon gets better, and is not judged yet
 SETTLED = 0.25  # ... and no longer than this share of the seconds
+HOPELESS_FROM = 1.0 / 3.0  # of a part
 FASTER = 0.8  # of the time of the path that was judged last: another way, which is judged at once
 
 
@@ -135,9 +136,12 @@ class Effort:
         other.after_s = other.judging_s = self.needed_s
         return other
 
-    def part(self, share: float) -> Effort:
-        """Return an effort that ends when ``share`` of this one's limits is spent; what it spends counts here."""
-        return _Part(self, share)
+    def part(self, share: float, hopeless_s: float = math.inf) -> Effort:
+        """Return an effort that ends when ``share`` of this one's limits is spent; what it spends counts here.
+
+        It ends after a third of that where the best path found takes longer than ``hopeless_s``.
+        """
+        return _Part(self, share, hopeless_s)
 
     def remaining(self, chunk: int) -> int:
         """Return how much of a chunk of expansions is left."""
@@ -150,16 +154,17 @@ class Effort:
 
 
 class _Part(Effort):
-    def __init__(self, whole: Effort, share: float) -> None:
+    def __init__(self, whole: Effort, share: float, hopeless_s: float) -> None:
         super().__init__(
             None if math.isinf(whole.budget_s) else share * whole.remaining_s,
             None if whole.limit is None else max(1, int(share * (whole.limit - whole.used))),
         )
-        self._whole = whole
+        self._whole, self._hopeless_s, self._best_s = whole, hopeless_s, math.inf
 
     @property
     def is_over(self) -> bool:
-        return super().is_over or self._whole.is_late
+        is_hopeless = self._hopeless_s < self._best_s < math.inf and self.fraction > HOPELESS_FROM
+        return is_hopeless or super().is_over or self._whole.is_late
 
     def spend(self, expansions: int) -> None:
         super().spend(expansions)
@@ -170,7 +175,7 @@ class _Part(Effort):
         self._whole.found()
 
     def improved(self, path: Callable[[], NDArray[np.float64]], time_s: float) -> bool:
-        began_s = self.elapsed_s
+        began_s, self._best_s = self.elapsed_s, min(self._best_s, time_s)
         is_judged = self._whole.improved(path, time_s)
         self.budget_s += self.elapsed_s - began_s  # what the judgement took is none of this part's
         return is_judged

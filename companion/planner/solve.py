@@ -98,6 +98,7 @@ def _others(problem: Problem, tacks: tuple[TackAtRisk, ...]) -> Iterator[Problem
 
 BOUND_TESTS = 40_000  # of visibility, for the bound of both kinds of path, when there is effort left
 BEAT_SHARE = 0.3  # of the effort, for the path with beats: an easier search, and often the end of it
+HOPELESS = 2.0  # times what a path without beats takes at the least: one with beats that takes longer is given up
 
 
 def with_beats(search: Search, beat: Beat) -> Search:
@@ -120,7 +121,7 @@ def with_beats(search: Search, beat: Beat) -> Search:
         # Where the fence leaves no corridor there is nothing to search.
         beating, beating_s = Outcome(waypoints_en=None), math.inf
         if defect_of(straight) is None:
-            beating = search(straight, effort.part(BEAT_SHARE), seed)
+            beating = search(straight, effort.part(BEAT_SHARE, HOPELESS * lower_bound_s(closed)), seed)
         if beating.waypoints_en is not None:
             judged = evaluate(problem, beating.waypoints_en)
             beating_s = judged.time_s if judged.is_feasible else math.inf
@@ -294,7 +295,10 @@ class _Answers:
                 is_kept = seen.is_kept
                 if not is_kept and not self._has_looked:
                     self._has_looked = True
-                    other = roomier(self._search, problem, path, effort, self._empty.seed, laying_s=spare_s)
+                    within_s = math.inf if self.best is None else self.best.cost_s
+                    other = roomier(
+                        self._search, problem, path, effort, self._empty.seed, laying_s=spare_s, within_s=within_s
+                    )
                     path, is_kept = (path, False) if other is None else (other, True)
         found = None
         if judged.is_feasible and is_kept:

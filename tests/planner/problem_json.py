@@ -142,6 +142,8 @@ def to_dict(p: Problem) -> dict[str, Any]:
         out["clearance_floor_m"] = p.clearance_floor_m
     if p.leg_saving != LEG_SAVING:
         out["leg_saving"] = p.leg_saving
+    if p.known_en:
+        out["known"] = [list(place) for place in p.known_en]
     if p.beat is not None:
         out["beat"] = {
             "no_go_half_deg": deg(p.beat.no_go_half_rad),

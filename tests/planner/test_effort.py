@@ -52,6 +52,22 @@ def test_a_path_is_judged_when_it_is_time_and_not_within_its_own_judgement():
     assert not steps.improved(lambda: np.zeros((2, 2)), 100.0)
 
 
+def test_a_part_that_finds_nothing_worth_while_is_given_up_after_a_third_of_it():
+    for best_s, ends_after in ((200.1, 51), (199.9, 150)):
+        part = Effort(None, 300).part(0.5, hopeless_s=200.0)
+        part.improved(lambda: np.zeros((2, 2)), 300.0)
+        part.improved(lambda: np.zeros((2, 2)), best_s)
+        part.improved(lambda: np.zeros((2, 2)), 250.0)  # worse: the best counts
+        spent = 0
+        while not part.is_over:
+            part.spend(1)
+            spent += 1
+        assert spent == ends_after
+    part = Effort(None, 300).part(0.5, hopeless_s=200.0)
+    part.spend(100)
+    assert not part.is_over  # nothing was found yet
+
+
 def test_a_part_does_not_pay_for_the_judgement(monkeypatch):
     now = [0.0]
     monkeypatch.setattr("companion.planner.effort.effort_s", lambda: now[0])

@@ -90,6 +90,10 @@ class _JsonReader:
         """Return a list of lists of floats."""
         return self._get(key, ..., lambda v: tuple(tuple(_as_float(x) for x in _as_list(row)) for row in _as_list(v)))
 
+    def places(self, key: str) -> tuple[tuple[float, float], ...]:
+        """Return a list of [x, y], empty where it is missing."""
+        return () if self.raw.get(key) is None else self._get(key, (), lambda v: tuple(map(_as_place, _as_list(v))))
+
     def flag(self, key: str, default: Any = ...) -> bool:
         """Return true or false."""
         return self._get(key, default, _as_bool)
@@ -113,6 +117,11 @@ def _as_float(value: Any) -> float:
         return float(value)
     except OverflowError:
         return math.inf if value > 0 else -math.inf
+
+
+def _as_place(value: Any) -> tuple[float, float]:
+    x, y = _as_list(value)
+    return _as_float(x), _as_float(y)
 
 
 def _as_bool(value: Any) -> bool:
@@ -207,6 +216,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         "obstacle_names",
         "tracking",
         "zone",
+        "known",
     }
     fields: dict[str, Any] = dict(  # noqa: C408, the names of Problem's fields
         id=top.text("id", ""),
@@ -248,6 +258,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         delta_s=top.number("delta_s"),
         current=_parse_current(_JsonReader(raw.get("current") or {}, source, "current")),
         adrift=_parse_current(_JsonReader(raw.get("adrift") or {}, source, "adrift")),
+        known_en=top.places("known"),
         targets=tuple(_parse_target(_JsonReader(t, source, f"targets[{i}]")) for i, t in enumerate(targets)),
         vessels_part=_parse_allocation(top.child("allocation")) if raw.get("allocation") is not None else None,
         risk=_parse_risk(_JsonReader(raw["risk"], source, "risk")) if raw.get("risk") is not None else None,

@@ -54,6 +54,7 @@ class Problem:
     ``tracking`` says how the plan will be sailed, and what that track keeps clear of; without it the legs alone count.
     ``adrift`` is a current that is believed and not sure enough to be planned with: it carries a boat whose tack fails.
     ``leg_saving`` is what a leg must save, as a share of the path's time, for ``auto`` to keep it.
+    ``known_en`` is a way that was found before, from about the start on: ``auto`` begins from it, too.
     """
 
     id: str = ""
@@ -78,6 +79,7 @@ class Problem:
     leg_saving: float = LEG_SAVING
     beat: Beat | None = None
     tracking: Tracking | None = None
+    known_en: tuple[tuple[float, float], ...] = ()
     notes: str = ""
     extra: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -235,6 +237,7 @@ def defect_of(p: Problem) -> str | None:
         "adrift": p.adrift.set_rad + p.adrift.drift_mps,
         "clearance_floor_m": p.clearance_floor_m,
         "leg_saving": p.leg_saving,
+        "known": sum(map(sum, p.known_en)),
         "wind.sigma": sum(
             (
                 w.sigma.sigma0_rad,

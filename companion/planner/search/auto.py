@@ -1,9 +1,9 @@
 """``auto``: exact proposals first, then lattices and the metric's geodesics, all of them annealed.
 
-The straight leg and the fewest tacks are tried at once; a coarse lattice and the visibility graph give a first
-path round obstacles; finer and differently fitted lattices, and the routes round the other sides, give other
-candidates. Each is annealed in cycles; a bandit gives more of them to the candidates that may still win. The
-search stops when its budget ends or when the bound says that there is nothing left to find.
+The straight leg, the fewest tacks and the way that was found before are tried at once; a coarse lattice and the
+visibility graph give a first path round obstacles; finer and differently fitted lattices, and the routes round the
+other sides, give other candidates. Each is annealed in cycles; a bandit gives more of them to the candidates that may
+still win. The search stops when its budget ends or when the bound says that there is nothing left to find.
 """
 
 from __future__ import annotations
@@ -198,6 +198,13 @@ class Searcher:
             for most in (1, 3):
                 self.offer(self.along(guide, most=most), "direct")
                 self.effort.spend(50)
+
+    def known(self) -> None:
+        """Try the way that was found before: as it is, and made sailable again where the wind or the boat has moved."""
+        if self.world.problem.known_en:
+            self.effort.spend(50)
+            way = self.world.to_wind(np.asarray(self.world.problem.known_en))
+            self.try_guide(np.vstack([np.zeros((1, 2)), way]), "known way")
 
     def geodesic(self, tests: int) -> None:
         """Sharpen the bound and try its path."""
@@ -603,6 +610,7 @@ def search(problem: Problem, effort: Effort, seed: int) -> Outcome:
         return Outcome(waypoints_en=None, status=PlanStatus.INFEASIBLE, reason=_hopeless(problem))
     searcher = Searcher(world, gauge, bound, effort, seed)
     searcher.quick()
+    searcher.known()
     if not searcher.is_done:
         closed = _first_paths(searcher)
         if closed:

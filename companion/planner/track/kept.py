@@ -132,6 +132,7 @@ def roomier(
     seed: int,
     judge: Judge | None = None,
     laying_s: float | None = None,
+    within_s: float = math.inf,
 ) -> Path | None:
     """Return a path that keeps the floor, of those that shorter searches find, in narrower water at last; or None.
 
@@ -146,6 +147,7 @@ def roomier(
         seed: of the search.
         judge: as of ``laid``.
         laying_s: what the changes to a path may take [s], None: what is left.
+        within_s: what a path may take [s]; one that takes longer is not laid.
     """
     best: tuple[float, Path] | None = None
     exact = _scorer(problem) if judge is None else judge
@@ -156,14 +158,10 @@ def roomier(
             break
         found = search(replace(problem, clearance_floor_m=problem.clearance_floor_m + more_m), again, seed)
         effort.spend(again.used)
-        if found.waypoints_en is None:
+        line = [] if found.waypoints_en is None else [(float(x), float(y)) for x, y in found.waypoints_en]
+        if not line or exact(line).time_s > within_s:
             continue
-        other, seen = laid(
-            problem,
-            [(float(x), float(y)) for x, y in found.waypoints_en],
-            judge,
-            effort if laying_s is None else Effort(laying_s, None),
-        )
+        other, seen = laid(problem, line, judge, effort if laying_s is None else Effort(laying_s, None))
         judged = exact(other)
         if seen.is_kept and judged.is_feasible and (best is None or judged.time_s < best[0]):
             best = judged.time_s, other

@@ -28,9 +28,11 @@ from companion.skipper.way.gates import marks_of
 from companion.skipper.way.line import STRAY_M
 from companion.skipper.way.position_plausibility import is_impossible
 from companion.skipper.way.stemming import waiting_place
+from companion.skipper.way.voyage import PointEn
 
 UPLOAD_LATENCY_S = 1.5  # item protocol, a few dozen items, and the read-back
 SLOW_MPS = 0.5  # slower than this the course over ground says nothing about the heading
+KNOWN_SHARE = 0.5  # of the distance to the goal: a way on board that ends so near to it leads there
 WIDTH_AHEAD_S = 60.0  # how far ahead the interval is taken that a plan remembers of its wind
 
 
@@ -94,7 +96,11 @@ def request(
         ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(ctx.state.plans.retry)))
         return False
     problem = replace(
-        problem, delta_s=shared.delta_s, targets=(*shared.targets, *water.targets), vessels_part=shared.part
+        problem,
+        delta_s=shared.delta_s,
+        targets=(*shared.targets, *water.targets),
+        vessels_part=shared.part,
+        known_en=_known(ctx, from_index, start, aim),
     )
     facts = replace(
         ctx.blank_facts(number, step.margin_m, shared.delta_s, name),
@@ -208,6 +214,21 @@ def lacks(ctx: StepContext, from_index: int | None = None) -> str:
     if _target(ctx, from_index) is None:
         return "a goal: none is left"
     return ""
+
+
+def _known(ctx: StepContext, from_index: int | None, start: Start, aim: Aim) -> tuple[PointEn, ...]:
+    """Return what is on board behind the start, to where it completes a gate: a search begins from it, too.
+
+    Nothing where that leads elsewhere than the plan that is asked for.
+    """
+    route = ctx.state.mission.route
+    if route is None:
+        return ()
+    begin, last = ctx.state.mission.index if from_index is None else from_index + 1, len(route.items) - 1
+    end = next((n for n in range(begin, last) if route.gate_of[n] >= 0), last)
+    way = route.points_en_m[begin : min(end + 1, last)]
+    leads_there = bool(way) and distance_m(way[-1], aim.en_m) < KNOWN_SHARE * distance_m(start.en_m, aim.en_m)
+    return way if leads_there else ()
 
 
 def _target(ctx: StepContext, from_index: int | None) -> tuple[Gate, int, Diversion | None] | None:

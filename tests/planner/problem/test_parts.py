@@ -147,6 +147,7 @@ def test_what_is_just_within_is_planned(problem):
         (replace(SOUND, obstacles=(shapely.box(0.0, 0.0, 1.0, 2e9),)), "local frame"),
         (replace(SOUND, clearance_floor_m=-0.1), "clearance floor"),
         (replace(SOUND, leg_saving=-0.1), "leg_saving"),
+        (replace(SOUND, known_en=((0.0, math.nan),)), "known"),
         (replace(SOUND, fence=shapely.Polygon()), "the fence is empty"),
         (replace(SOUND, fence=shapely.box(-4, -4, 4, 4), clearance_floor_m=5.0), "less the clearance floor"),
         (replace(SOUND, vessels_part=0.4), "allocation"),

@@ -82,12 +82,14 @@ def test_extensions_survive_write_then_read():
         leg_saving=2e-4,
         targets=[{"x": 1, "y": 2, "vx": 3, "vy": 4, "radius_m": 5, "growth_mps": 0.1, "from_s": 1, "until_s": 9}],
         risk={"max_path_risk": 0.05, "correlation_time_s": 30},
+        known=[[3, 40], [0.5, 80]],
         note_of_mine="kept",
     )
     first = Problem.from_json(raw)
     again = Problem.from_json(to_dict(first))
     assert (again.current, again.targets, again.risk) == (first.current, first.targets, first.risk)
     assert again.clearance_floor_m == 3.0
+    assert again.known_en == first.known_en == ((3.0, 40.0), (0.5, 80.0))
     assert again.leg_saving == first.leg_saving == 2e-4
     assert again.extra["note_of_mine"] == "kept"
     assert math.degrees(again.widening_rad(30.0)) == pytest.approx(5.0)  # half widths, not k sigma

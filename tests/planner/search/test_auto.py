@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -25,6 +26,7 @@ from tests.planner.problems import FOLDER, box, load, random_problems, simple
 
 ANSWERS = json.loads((FOLDER.parent / "answers.json").read_text(encoding="utf-8"))["answers"]
 BEST = {name: known for name, known in ANSWERS.items() if "best_s" in known}
+CHANNEL = "channel-bend"
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.json")), ids=lambda p: p.stem)
@@ -113,6 +115,29 @@ def test_a_leg_must_save_what_the_problem_asks():
     many, few = (plan(Problem.from_json(raw | {"leg_saving": s}), expansions=60_000) for s in (1e-5, 1e-3))
     assert len(many.legs) > len(few.legs)
     assert many.cost_s < few.cost_s
+
+
+def test_a_search_begins_from_the_way_that_is_known():
+    """Of 200 steps the channel is not found; at a tenth of a core there are no more."""
+    p = load(CHANNEL)
+    known = tuple(map(tuple, BEST[CHANNEL]["waypoints"][1:]))
+    few = plan(p, expansions=200)
+    assert not few.has_path or few.cost_s > 1.05 * BEST[CHANNEL]["best_s"]
+    found = plan(replace(p, known_en=known), expansions=200)
+    assert found.cost_s <= 1.001 * BEST[CHANNEL]["best_s"]
+    # where the wind no longer lets it be sailed as it is, by its water
+    veered = replace(p, wind=replace(p.wind, twd_from_rad=p.wind.twd_from_rad + math.radians(8.0)))
+    assert not evaluate(veered, [p.start_en, *known]).is_feasible
+    assert plan(replace(veered, known_en=known), expansions=200).has_path
+
+
+@settings(max_examples=40)
+@given(random_problems(), st.lists(st.tuples(st.floats(-200, 200), st.floats(-60, 400)), max_size=6))
+def test_whatever_is_called_known_a_path_passes_the_scorer_and_ends_at_the_goal(raw, known):
+    p = Problem.from_json(raw | {"known": [list(place) for place in known]})
+    answer = plan(p, expansions=300)
+    if answer.has_path:
+        assert evaluate(p, answer.waypoints_en).is_feasible
 
 
 def test_a_clearance_floor_is_kept():

@@ -17,10 +17,12 @@ from companion.boat.boat import Boat
 from companion.boat.tracking import SHORT_S, predict
 from companion.errors import InputError
 from companion.planner import Plan, PlanStatus, Problem, plan
+from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
+from companion.planner.search.auto import search
 from companion.planner.track import expected
 from companion.planner.track.expected import curve_mps
-from companion.planner.track.kept import laid
+from companion.planner.track.kept import laid, roomier
 
 MARGIN_M, FLOOR_M = 12.0, 6.0
 WALLS = [
@@ -111,6 +113,14 @@ def test_a_slalom_of_thick_walls_is_sailed_in_a_sixth_of_the_legs_all_long_enoug
     assert min(lengths_m(found)) >= SHORT_S * float(np.max(curve_mps(tracked)))
     assert expected(tracked, found.waypoints_en).is_kept
     assert found.cost_s <= 1.03 * lines.cost_s
+
+
+def test_a_roomier_path_that_takes_too_long_is_not_laid():
+    tracked = problem()
+    lines = plan(replace(tracked, tracking=None), expansions=15_000, seed=1)
+    path = [(float(x), float(y)) for x, y in lines.waypoints_en]
+    assert roomier(search, tracked, path, Effort(None, 15_000), 1) is not None
+    assert roomier(search, tracked, path, Effort(None, 15_000), 1, within_s=0.9 * lines.cost_s) is None
 
 
 def test_legs_in_which_ardurover_looped_onto_a_walls_end_are_no_plan():

@@ -82,6 +82,22 @@ def test_a_plan_that_keeps_what_is_asked_goes_on_board():
     assert uploads(offered(ctx, [(8.0, 100.0), GOAL]))
 
 
+def test_a_plan_to_the_same_goal_begins_from_what_is_on_board():
+    ctx = turn_of(sailing(way=((4.0, 60.0), (9.0, 140.0), GOAL)))
+    for from_index, rest in ((None, ((4.0, 60.0), (9.0, 140.0), GOAL)), (0, ((9.0, 140.0), GOAL))):
+        ctx.actions.clear()
+        assert request(ctx, ReplanReason.ORDER, from_index=from_index)
+        [asked] = [a for a in ctx.actions if isinstance(a, RequestPlan)]
+        assert asked.problem.known_en == rest
+
+
+def test_a_plan_to_elsewhere_begins_anew():
+    ctx = turn_of(sailing(way=((4.0, 60.0), (-200.0, 20.0))))
+    assert request(ctx, ReplanReason.ORDER)
+    [asked] = [a for a in ctx.actions if isinstance(a, RequestPlan)]
+    assert asked.problem.known_en == ()
+
+
 def test_nothing_below_the_floor_goes_on_board_from_a_place_that_is_not():
     """What is on board is closed by a rock here, and that is no reason: the ladder's next answer is asked for."""
     ctx = turn_of(sailing(way=((-20.0, 100.0), GOAL)))
