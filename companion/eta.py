@@ -259,7 +259,8 @@ def _walk(
     walker = _Walker(winds, snapshot.current.planned_en_mps, voyage.boat, limits, heading_rad=vehicle.heading_rad)
     gates = gates_of(voyage, state.progress.approaches)
     goal = next((n for n in range(state.progress.gate, len(gates)) if gates[n].ends_goal), None)
-    if route.bound_for:
+    is_bound = bool(route.bound_for) and goal not in route.gate_of[state.mission.index :]
+    if is_bound:
         goal = None  # home, a refuge, a place that was named: there at the last waypoint
     mark = None if goal is None else (gates[goal].en_m, gates[goal].radius_m)
     at, time_s, last = here, 0.0, -1
@@ -269,7 +270,7 @@ def _walk(
         if route.items[n].command != Command.NAV_WAYPOINT or time_s >= whole_s or (until is not None and n > until):
             break
         start, end, last = route.leg_from_en_m[n], route.points_en_m[n], n
-        ends_goal = n == route.bound_at if route.bound_for else goal is not None and route.gate_of[n] == goal
+        ends_goal = n == route.bound_at if is_bound else goal is not None and route.gate_of[n] == goal
         while time_s < REACH_S:
             to_go_m = math.dist(at, end)
             if to_go_m <= limits.wp_radius_m:

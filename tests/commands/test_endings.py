@@ -20,6 +20,7 @@ from companion.geofence import load_mission
 from companion.program import INTERRUPTED
 from companion.program.arguments import absent_device
 from companion.telemetry.folder.logbook import Logbook
+from sitl import cli as sitl
 from sitl.autopilot import MemoryLink
 from sitl.faults.computer_faults import FaultyPlanner
 from sitl.scenario.traffic import free_port
@@ -146,6 +147,22 @@ def test_ctrl_c_before_main_is_called_leaves_no_traceback(program):
     finally:
         run.kill()
     assert (run.returncode, err) == (-signal.SIGINT, "")
+
+
+@pytest.mark.parametrize("has_begun", [False, True])
+def test_an_interrupted_simulation_says_where_its_records_are(has_begun, tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "v"
+
+    def interrupted(*_):
+        if has_begun:
+            folder.mkdir()
+            (folder / "decisions.jsonl").write_text("")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sitl.commands.run._sailed", interrupted)
+    assert sitl.main(["run", "demo", "--out", str(folder)]) == INTERRUPTED
+    kept = f"what was recorded is in {folder}" if has_begun else "nothing was recorded yet"
+    assert capsys.readouterr().err == f"sitl run: interrupted, so there is no verdict; {kept}\n"
 
 
 def test_an_interrupt_of_which_a_kernel_makes_an_error_of_its_own_is_one(monkeypatch, capsys):

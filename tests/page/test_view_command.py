@@ -50,6 +50,9 @@ def test_what_cannot_be_viewed_is_one_line(words, capsys):
 def test_a_voyage_is_packed_once_and_not_over_another_file(sailed, tmp_path, capsys):
     out = tmp_path / "v.html"
     assert cli.main(["view", str(sailed.folder), "--export", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith(f"written: {out}, ")
+    assert told.endswith(" moments of the voyage; it opens in any browser\n")
     first = out.read_bytes()
     assert b"https://" not in first
     assert said(capsys, sailed.folder, "--export", out)[0] == 2

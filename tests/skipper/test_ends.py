@@ -1,18 +1,25 @@
 """Where it ends: home, refuges, the voyage's time, the loiter that is watched, a voyage finished before."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from shapely.geometry import box
 
 from companion.messages import GeoPoint, Mode
+from companion.skipper.behaviors.rest import rest
+from companion.skipper.planning.diversions import ROOM, diversion
+from companion.skipper.planning.diversions import homeward as behind
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import SafeEnd
+from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.saved import Persisted
-from companion.skipper.step.state import Phase
+from companion.skipper.step.state import Phase, Retry
 from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import Goal
 from tests.skipper.behaviors.test_failsafe import text
+from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import is_done, make, said
 from tests.skipper.world import FRAME, restarted, with_parts
 
@@ -45,6 +52,75 @@ def test_the_way_home_is_planned_round_the_island_and_ends_in_a_loiter():
     assert act.ReplanReason.NEXT_GOAL in reasons  # on from the last goal, before she is there
     world.run(60)
     assert world.state.phase is Phase.DONE
+
+
+# ------------------------------------------------------------------------------------------- room for a loiter
+# A blind creek, 26 m wide, and a bar before it, so that no straight line leads out.
+CREEK = (box(-60.0, 60.0, -13.0, 380.0), box(13.0, 60.0, 60.0, 380.0), box(-60.0, 380.0, 60.0, 400.0))
+BAR = box(-20.0, 36.0, 20.0, 40.0)
+QUAY = Goal(en_m=(0.0, 320.0), radius_m=8.0, name="Quay")
+
+
+def in_creek(goal=QUAY, obstacles=(*CREEK, BAR), **state):
+    """Return a turn of a boat under way to the head of the creek, across the wind."""
+    world = make(goal, obstacles=obstacles, config={"margin_m": 8.0, "margin_floor_m": 5.0}, **ASIDE)
+    assert world.run(120, lambda w: w.state.voyage.sailing and w.position[1] > 10.0)
+    world.state = with_parts(world.state, pending={"plan": None, "upload": None}, **state)
+    return turn_of(world)
+
+
+def rooms_m(ctx, place):
+    return float(ctx.voyage.area.clearance_m([place])[0])
+
+
+def test_behind_a_goal_without_room_for_a_loiter_a_place_with_room_is_next():
+    """She circled from side to side of the creek, and touched; from its middle no straight line leads to room."""
+    ctx = in_creek(progress={"gate": 1})
+    bound = behind(ctx)
+    assert (bound.kind, bound.name) == (DiversionKind.ROOM, ROOM)
+    assert bound.why == "Quay has no room for a loiter"
+    assert rooms_m(ctx, bound.en_m) >= 15.0
+    assert math.isfinite(way_m(ctx.voyage.area, QUAY.en_m, bound.en_m, 5.0))
+    assert diversion(ctx) == bound
+    tried = in_creek(progress={"gate": 1}, plans={"retry": Retry(failures=3)})
+    assert behind(tried) is None  # there is no way: she rests, and tries on from there
+    assert behind(in_creek(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(), progress={"gate": 1})) is None
+
+
+def test_she_does_not_wait_for_a_plan_where_a_loiter_has_no_room():
+    at_end = in_creek(plans={"retry": Retry(failures=1)})
+    end = at_end.state.mission.route.points_en_m[-1]
+    index = len(at_end.state.mission.route.items) - 1
+    assert diversion(at_end) is None  # she is still on her way
+    narrow = in_creek(plans={"retry": Retry(failures=1)}, mission={"index": index, "own_index": index})
+    narrow.set(mission=replace(narrow.state.mission, route=led_to(narrow, (0.0, 300.0))))
+    waits = diversion(narrow)
+    assert waits.kind is DiversionKind.ROOM
+    assert rooms_m(narrow, waits.en_m) >= 15.0
+    assert rooms_m(at_end, end) >= 15.0
+    roomy = in_creek(plans={"retry": Retry(failures=1)}, mission={"index": index, "own_index": index})
+    roomy.set(mission=replace(roomy.state.mission, route=led_to(roomy, (0.0, -60.0))))
+    assert diversion(roomy) is None
+    narrow.set(plans=replace(narrow.state.plans, retry=Retry()))
+    assert diversion(narrow) is None  # no plan was wanting
+
+
+def led_to(ctx, place):
+    """Return the route with its loiter at ``place``."""
+    route = ctx.state.mission.route
+    return replace(route, points_en_m=(*route.points_en_m[:-1], place))
+
+
+def test_where_she_rests_without_room_that_is_said_and_she_goes_on_to_where_it_is():
+    ctx = in_creek(progress={"gate": 1}, plans={"retry": Retry(failures=3)})
+    ctx.set(mission=replace(ctx.state.mission, route=led_to(ctx, (0.0, 320.0))))
+    rest(ctx)
+    assert ctx.state.voyage.arrived
+    [text] = [a.text for a in ctx.actions if isinstance(a, act.Announce) and a.code == "no room"]
+    assert text == "she loiters with 13 m of room, a loiter takes 15 m: take her"
+    assert diversion(ctx).kind is DiversionKind.ROOM
+    ctx.set(voyage=replace(ctx.state.voyage, rest_en_m=(0.0, -60.0)))
+    assert diversion(ctx) is None
 
 
 @pytest.mark.parametrize(

@@ -161,7 +161,7 @@ def test_a_dry_run_leaves_the_state_of_a_voyage_that_is_interrupted(short, tmp_p
     assert state.read_bytes() == before
 
 
-def test_a_voyage_is_replayed_where_its_mission_is_no_more(short, tmp_path, monkeypatch):
+def test_a_voyage_is_replayed_where_its_mission_is_no_more(short, tmp_path, monkeypatch, capsys):
     """It could be replayed only in the folder that it was sailed from."""
     there = tmp_path / "there"
     shutil.copytree(short, there / "missions")
@@ -185,6 +185,7 @@ def test_a_voyage_is_replayed_where_its_mission_is_no_more(short, tmp_path, monk
     assert report.steps > 60
     assert not report.differences
     assert cli.main(["replay", "elsewhere"]) == 0
+    assert capsys.readouterr().out.endswith("\ntoday's code decides as it did under way; nothing was written\n")
     assert cli.main(["report", "elsewhere", "--json"]) == 0
 
 

@@ -60,6 +60,7 @@ def test_the_boat_reaches_a_mark_dead_upwind_behind_a_rock(voyage):
     assert summary["arrived"] is True
     assert summary["contacts"] == 0
     assert summary["replans"] >= 1
+    assert summary["promised_to"] == "mark"
     for key in ("time_s", "distance_m", "tacks", "min_clearance_m", "promised_risk", "no_go_entries", "end_reason"):
         assert summary[key] is not None, key
 

@@ -7,17 +7,20 @@ watch goes on until somebody ends the program.
 
 from __future__ import annotations
 
+import math
+
 from companion.frozen import changed
 from companion.messages import Severity
 from companion.safety import BY_RANK, ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
 from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
-from companion.skipper.planning.diversions import home_trouble, is_at_rest, pressing
+from companion.skipper.planning.diversions import HOME, ROOM, home_trouble, is_at_rest, pressing
 from companion.skipper.step import CancelPlan, Diversion, DiversionKind, Phase, SafeEnd, StepContext
 
 ANSWERED = {"": "for a person", SHORE: "until the link to the shore is back, or a person gives AUTO"}
 TAKEN = "until a person takes her and gives AUTO back"
+BEHIND = {HOME: "; home", ROOM: "; she lies where a loiter has room"}  # the last goal
 UNTIL_TOLD = "until told to go on"
 
 
@@ -34,12 +37,14 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
         _end(ctx, f"out of time: {reached} of {len(ctx.voyage.legs)} goals reached", arrived=False)
         return True
     if (
-        bound.kind is DiversionKind.HOME
+        bound.kind in {DiversionKind.HOME, DiversionKind.ROOM}
         and ctx.gate is None
         and not ctx.state.operator.answering
         and not bound.is_ordered
     ):
         ctx.set(voyage=changed(ctx.state.voyage, home_reached=True))
+        if ctx.state.voyage.over:  # she rested in what had no room
+            _end(ctx, f"{ctx.state.voyage.over}{BEHIND[ROOM]}", arrived=ctx.state.voyage.arrived)
         rest(ctx)
         return True
     if bound.kind is DiversionKind.REST:
@@ -74,8 +79,9 @@ def rest(ctx: StepContext) -> None:
             return
         ends_home = ctx.config.safe_end is SafeEnd.RETURN and not ctx.state.voyage.home_reached
         trouble = home_trouble(ctx) if ends_home else ""
-        home = f"; not home: {trouble}" if trouble else "; home" if ctx.state.voyage.home_reached else ""
         route = ctx.state.mission.route
+        behind = BEHIND.get(route.bound_for, "") if ctx.state.voyage.home_reached and route is not None else ""
+        home = f"; not home: {trouble}" if trouble else behind
         end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
         goals = len(ctx.voyage.legs)
         reached = "the goal is reached" if goals == 1 else f"all {goals} goals reached"
@@ -114,6 +120,13 @@ def _end(ctx: StepContext, why: str, *, arrived: bool) -> None:
     hand_back(ctx)
     ctx.phase(Phase.DONE, why)
     ctx.say(Severity.NOTICE if arrived else Severity.WARNING, "done", why, every_s=0.0)
+    room_m = math.inf if place is None else float(ctx.to_stay_in.area.clearance_m([place])[0])
+    if room_m < ctx.config.loiter_radius_m:
+        ctx.say(
+            Severity.CRITICAL,
+            "no room",
+            f"she loiters with {room_m:.0f} m of room, a loiter takes {ctx.config.loiter_radius_m:.0f} m: take her",
+        )
 
 
 def _let_go_of_plans(ctx: StepContext) -> None:

@@ -461,7 +461,7 @@ def _name(ctx: StepContext) -> None:
     elif not ctx.ahead():
         wait = state.plans.retry.not_before_s - ctx.t_s
         again = f", trying again in {wait:.0f} s" if wait > 0.0 else ""
-        waits = f"waiting for a plan{again}"
+        waits = f"waiting for a plan{again}" if state.pending.upload is None else "waiting for a plan's upload"
         if not ctx.snapshot.permissions.may_upload:
             waits = "waiting, for uploading is not permitted"
         ctx.phase(Phase.HOLDING, f"loitering in the mission's safe end: {waits}{tail}")

@@ -20,7 +20,7 @@ from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fa
 from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.tides import closes_ahead
-from companion.skipper.planning.track import clearance_text, of_way
+from companion.skipper.planning.track import clearance_text, of_way, steps
 from companion.skipper.planning.uploads import is_begun_risky, is_riskier, upload
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step import DiversionKind, Phase, PlanOutcome, ReplanReason, Route, StepContext
@@ -81,7 +81,11 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
     if refused:
         not_found(ctx, pending, refused)
         return
-    patience = ctx.failed(ctx.state.plans.retry) if pending.rung > 0 else Retry()
+    # A plan with less margin leads there; one to a nearer place does not, and what is led out of something first is
+    # left in peace meanwhile.
+    ladder = steps(ctx)
+    is_makeshift = bool(pending.lead_in) or ladder[min(pending.rung, len(ladder) - 1)].nearer_goal
+    patience = ctx.failed(ctx.state.plans.retry) if pending.rung > 0 and is_makeshift else Retry()
     ctx.set(plans=changed(ctx.state.plans, retry=patience))
 
 

@@ -15,6 +15,7 @@ from companion.orders import Verb
 from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, End, Recovery
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step import Diversion, DiversionKind, SafeEnd, SkipperConfig, StepContext
+from companion.skipper.step.missions import loiter_place, place_with_room
 from companion.skipper.step.route import HOME_RADIUS_M
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
 from companion.skipper.way.gates import Gate
@@ -24,7 +25,9 @@ from companion.skipper.way.voyage import PointEn, Refuge
 from companion.traffic import Policy
 
 DRAGGED = "dragged off"  # a watchdog
-HOME, REST = "home", "the place to rest"
+HOME, REST, ROOM = "home", "the place to rest", "water with room"
+BEHIND = {HOME, ROOM}  # where she may be bound for behind the last goal
+ROOM_TRIES = 3  # to find a way to water with room, behind the last goal
 GOAL_RADIUS_M = 10.0  # a place that is named under way: there within this
 ABOUT_M = 10.0  # how far off a refuge is by water is told from so near
 FENCE_SAID_S = 600.0  # between two words on a fence that is drawn
@@ -61,6 +64,7 @@ def _find(ctx: StepContext) -> Diversion | None:
         or _kept_in(ctx)
         or _before_start(ctx)
         or (_in_box(ctx) or _off_field(ctx))
+        or _waits_with_room(ctx)
     )
 
 
@@ -172,7 +176,7 @@ def _at_the_end(ctx: StepContext) -> Diversion | None:
         if ended is not None:
             return ended
     if state.voyage.over:
-        return _back(ctx)
+        return _back(ctx) or _off_narrow_rest(ctx)
     return homeward(ctx) if ctx.gate is None else None
 
 
@@ -255,10 +259,46 @@ def _found(ctx: StepContext, end: End, why: str) -> Diversion | None:
 
 
 def homeward(ctx: StepContext) -> Diversion | None:
-    """Return the way home behind the last goal, None where the mission does not end there or has come there."""
-    if ctx.config.safe_end is not SafeEnd.RETURN or ctx.state.voyage.home_reached or ctx.state.voyage.over:
+    """Return the way behind the last goal: home where the mission ends there, to water with room where the goal has
+    none for a loiter; None: there is none, or she has come there.
+    """  # noqa: D205
+    if ctx.state.voyage.home_reached or ctx.state.voyage.over:
         return None
-    return _home(ctx, "all goals are reached")
+    ends_home = ctx.config.safe_end is SafeEnd.RETURN
+    home = _home(ctx, "all goals are reached") if ends_home else None
+    if home is not None or ctx.state.plans.retry.failures >= ROOM_TRIES:
+        return home
+    last, config, wind = ctx.gates[-1], ctx.known_config, ctx.wind_mean
+    _, room_m = loiter_place(ctx.to_stay_in, config, last.en_m, wind[0] if wind is not None else 0.0)
+    if room_m >= config.loiter_radius_m:
+        return None
+    return _to_room(ctx, last.en_m, f"{last.name or 'the goal'} has no room for a loiter")
+
+
+def _waits_with_room(ctx: StepContext) -> Diversion | None:
+    """Return where the boat waits for a plan that was not found, where what it lies in has no room for a loiter."""
+    route, state = ctx.state.mission.route, ctx.state
+    if route is None or not route.points_en_m or not state.voyage.sailing or state.voyage.over or ctx.gate is None:
+        return None
+    is_bound = route.bound_for == ROOM
+    if is_bound != bool(ctx.ahead()) or (not is_bound and state.plans.retry.failures == 0):
+        return None
+    here = route.points_en_m[-1]
+    if not is_bound and float(ctx.to_stay_in.area.clearance_m([here])[0]) >= ctx.config.loiter_radius_m:
+        return None
+    return _to_room(ctx, here, "no plan was found, and here a loiter has no room")
+
+
+def _to_room(ctx: StepContext, end_en: PointEn, why: str) -> Diversion | None:
+    """Return the way to the nearest place by water with room for a loiter; None: there is none, or none is needed."""
+    route, wind = ctx.state.mission.route, ctx.wind_mean
+    if route is not None and route.bound_for == ROOM and ctx.ahead():
+        place: PointEn | None = route.points_en_m[ctx.last_waypoint()]
+    else:
+        place = place_with_room(ctx.to_stay_in, ctx.known_config, end_en, wind[0] if wind is not None else 0.0)
+    if place is None:
+        return None
+    return Diversion(kind=DiversionKind.ROOM, name=ROOM, why=why, en_m=place)
 
 
 def _stay(ctx: StepContext, why: str) -> Diversion | None:
@@ -354,6 +394,14 @@ def _back(ctx: StepContext) -> Diversion | None:
     if not _is_bound(ctx, REST) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
         return None  # the autopilot's own loiter goes back there
     return Diversion(kind=DiversionKind.REST, name=REST, why="she is off the place where she was to rest", en_m=rest)
+
+
+def _off_narrow_rest(ctx: StepContext) -> Diversion | None:
+    """Return the way to water with room, where the boat is to rest in what has none for a loiter."""
+    rest = ctx.state.voyage.rest_en_m
+    if rest is None or float(ctx.to_stay_in.area.clearance_m([rest])[0]) >= ctx.config.loiter_radius_m:
+        return None
+    return _to_room(ctx, rest, "where she is to rest a loiter has no room")
 
 
 def _is_bound(ctx: StepContext, name: str) -> bool:

@@ -11,7 +11,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import Severity
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
-from companion.skipper.planning.diversions import HOME, diversion, homeward, is_composed
+from companion.skipper.planning.diversions import BEHIND, diversion, homeward, is_composed
 from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
@@ -112,6 +112,7 @@ REASONS = {
     DiversionKind.REST: ReplanReason.REST,
     DiversionKind.GOAL: ReplanReason.ORDER,
     DiversionKind.INSIDE: ReplanReason.OBSTACLE,
+    DiversionKind.ROOM: ReplanReason.REST,
     DiversionKind.START: ReplanReason.NEXT_GOAL,
     DiversionKind.BOX: ReplanReason.NEXT_GOAL,
     DiversionKind.FIELD: ReplanReason.RETRY,
@@ -125,9 +126,10 @@ def _diversion(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
     is_first = ctx.state.plans.retry.failures == 0  # then the wait between two tries counts
     interval_s = 0.0 if is_first else ctx.config.min_replan_interval_s
     if bound is not None and leads_to != bound.name:
-        return Trigger(reason=REASONS[bound.kind], text=bound.sentence, urgent=is_first, interval_s=interval_s)
-    is_home = leads_to == HOME and homeward(ctx) is not None
-    if bound is None and leads_to and not is_home and not ctx.state.voyage.over:
+        is_urgent = is_first or bound.kind is DiversionKind.ROOM
+        return Trigger(reason=REASONS[bound.kind], text=bound.sentence, urgent=is_urgent, interval_s=interval_s)
+    is_behind = leads_to in BEHIND and homeward(ctx) is not None
+    if bound is None and leads_to and not is_behind and not ctx.state.voyage.over:
         return Trigger(
             reason=ReplanReason.NEXT_GOAL,
             text=f"no longer bound for {leads_to}: sailing on",
@@ -308,7 +310,7 @@ def _extension(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
     if route is None or boat is None or last < ctx.state.mission.index:
         return None
     ends = route.gate_of[last]
-    if bound is not None or route.bound_for == HOME:
+    if bound is not None or route.bound_for in BEHIND:
         bound = bound or homeward(ctx)
         if bound is None or distance_m(route.points_en_m[last], bound.en_m) <= bound.radius_m + ctx.config.announce_m:
             return None

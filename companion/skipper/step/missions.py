@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +24,7 @@ from companion.skipper.way import PointEn, Voyage, bearing_rad, distance_m, move
 from companion.skipper.way.drift import floor_from_m
 from companion.skipper.way.gates import marks_of
 from companion.skipper.way.geometry import leg_distance_m
+from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import AreaLike
 
 LOOKS = 41  # places looked at along a line that leads through something
@@ -107,10 +109,7 @@ def loiter_place(
                 needed_m = floor_m + (corridor_m if closed else 0.0)
                 if _line_clearance_m(water, end_en, place) < needed_m or _meets_mark(marks, end_en, place):
                     continue
-            down = [moved(place, leeward, s * LEEWARD_ROOM_M) for s in (0.0, 0.25, 0.5, 0.75, 1.0)]
-            clearance = np.minimum(voyage.area.clearance_m(np.asarray(down)), _off_marks_m(marks, down))
-            # Drifting out of the end of the leeward strip is slow: there half the room is enough.
-            room = float(min(clearance[0], np.min(clearance[1:] + 0.5 * config.loiter_radius_m)))
+            room = float(_rooms_m(voyage, config, marks, [place], leeward)[0])
             if room >= max(config.loiter_radius_m, wanted_m):
                 return place, room
             if room >= config.loiter_radius_m and (will_do is None or room > will_do[1] + ROOMIER_BY_M):
@@ -118,6 +117,47 @@ def loiter_place(
             if room > best_room + 1.0:
                 best, best_room = place, room
     return will_do or (best, best_room)
+
+
+WIND_STEP_RAD = math.radians(30.0)  # how fine the wind is told by where room is looked for
+
+
+def place_with_room(voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float) -> PointEn | None:
+    """Return the nearest place by water with ``loiter_radius_m`` all round and to leeward; None: none in 900 m."""
+    about = (float(round(end_en[0])), float(round(end_en[1])))
+    return _place_with_room(voyage, voyage.area, config, about, WIND_STEP_RAD * round(twd_from_rad / WIND_STEP_RAD))
+
+
+@lru_cache(maxsize=8)  # asked for at every step; the area is by identity, which a voyage's equality leaves out
+def _place_with_room(
+    voyage: Voyage, area: AreaLike, config: SkipperConfig, end_en: PointEn, twd_from_rad: float
+) -> PointEn | None:
+    leeward, marks = twd_from_rad + math.pi, marks_of(voyage)
+    for ring_m in (*RINGS_M[1:], *FAR_RINGS_M):
+        places = [moved(end_en, 2.0 * math.pi * n / DIRECTIONS, ring_m) for n in range(DIRECTIONS)]
+        rooms = _rooms_m(voyage, config, marks, places, leeward)
+        roomy = [place for place, room in zip(places, rooms, strict=True) if room >= config.loiter_radius_m]
+        by_water = {place: way_m(area, end_en, place, config.margin_floor_m) for place in roomy}
+        nearest = min(roomy, key=by_water.__getitem__, default=None)
+        if nearest is not None and math.isfinite(by_water[nearest]):
+            return nearest
+    return None
+
+
+def _rooms_m(
+    voyage: Voyage,
+    config: SkipperConfig,
+    marks: Sequence[tuple[PointEn, float]],
+    places: Sequence[PointEn],
+    leeward: float,
+) -> NDArray[np.float64]:
+    """Return of each place the room to loiter there [m]: all round, and for what drifts off to leeward."""
+    down = [[moved(place, leeward, s * LEEWARD_ROOM_M) for s in (0.0, 0.25, 0.5, 0.75, 1.0)] for place in places]
+    flat = [place for row in down for place in row]
+    clear = np.minimum(voyage.area.clearance_m(np.asarray(flat)), _off_marks_m(marks, flat)).reshape(len(places), -1)
+    # Drifting out of the end of the leeward strip is slow: there half the room is enough.
+    rooms: NDArray[np.float64] = np.minimum(clear[:, 0], clear[:, 1:].min(axis=1) + 0.5 * config.loiter_radius_m)
+    return rooms
 
 
 def _off_marks_m(marks: Sequence[tuple[PointEn, float]], places: Sequence[PointEn]) -> NDArray[np.float64]:

@@ -96,6 +96,7 @@ class DiversionKind(enum.Enum):
     GOAL = "goal"  # a place that somebody named
     INSIDE = "inside"  # back into the autopilot's own fence
     START = "start"  # before a start line, until the gun
+    ROOM = "room"  # where a loiter has room
     BOX = "box"  # water to stay in
     FIELD = "field"  # where the boat waits while a goal's field cannot be sailed
     STAY = "stay"  # where there is room near by

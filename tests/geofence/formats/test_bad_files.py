@@ -74,6 +74,11 @@ def test_text_that_is_no_wkt_is_refused_with_its_line(text, place):
     assert "\n" not in str(error.value)
 
 
+def test_what_is_no_geometry_of_wkt_is_told_as_what_it_was_read():
+    with pytest.raises(InputError, match="'CIRCLE' is not a geometry of WKT, as which this file is read"):
+        parse(b"CIRCLE (0 0, 5)", "f.wkt", extension=".wkt")
+
+
 @pytest.mark.parametrize(
     "text",
     [

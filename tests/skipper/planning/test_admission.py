@@ -17,9 +17,11 @@ from companion.skipper.intake import locate
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.not_found import not_found
+from companion.skipper.planning.track import steps
 from companion.skipper.planning.uploads import refusal
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, SetCurrent, UploadMission
 from companion.skipper.step.snapshot import PlanOutcome
+from companion.skipper.step.state import Retry
 from companion.skipper.way.voyage import Goal
 from tests.skipper.moments import moment, route
 from tests.skipper.planning.test_tacks_fail import turn_of
@@ -80,6 +82,20 @@ def uploads(actions):
 def test_a_plan_that_keeps_what_is_asked_goes_on_board():
     ctx = turn_of(sailing())
     assert uploads(offered(ctx, [(8.0, 100.0), GOAL]))
+
+
+def test_a_plan_with_less_margin_is_no_failure_and_one_to_a_nearer_place_is():
+    """Eight goals along a quay, each found with less margin, took three times as long: for the wait between plans."""
+    ctx = turn_of(sailing(way=((-20.0, 100.0), GOAL)))
+    names = [rung.nearer_goal for rung in steps(ctx)]
+    assert names[-1]
+    assert not names[1]
+    ctx.set(plans=replace(ctx.state.plans, retry=Retry(failures=2, not_before_s=ctx.t_s + 80.0)))
+    assert uploads(offered(ctx, [(8.0, 100.0), GOAL], rung=1))
+    assert ctx.state.plans.retry == Retry()
+    ctx.set(pending=replace(ctx.state.pending, upload=None))
+    offered(ctx, [(8.0, 100.0), (6.0, 150.0)], rung=len(names) - 1)
+    assert ctx.state.plans.retry.failures == 1
 
 
 def test_a_plan_to_the_same_goal_begins_from_what_is_on_board():

@@ -169,6 +169,7 @@ def test_each_kind_of_diversion_has_its_reason():
         "rest": ReplanReason.REST,
         "goal": ReplanReason.ORDER,
         "inside": ReplanReason.OBSTACLE,
+        "room": ReplanReason.REST,
         "start": ReplanReason.NEXT_GOAL,
         "box": ReplanReason.NEXT_GOAL,
         "field": ReplanReason.RETRY,
