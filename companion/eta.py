@@ -18,7 +18,8 @@ from companion.current import over_water
 from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.geo.segments import enters_disc
 from companion.messages import Command, Mode
-from companion.skipper.step import SkipperState, Snapshot, SpeedSeen, WindEstimate
+from companion.safety import LIGHT_MPS
+from companion.skipper.step import Phase, SkipperState, Snapshot, SpeedSeen, WindEstimate
 from companion.skipper.way import PointEn, Voyage, cross_track_m, gates_of, moved
 
 Winds = tuple[tuple[float, float], ...]  # from [rad] and speed [m/s], for WIND_S each
@@ -27,6 +28,7 @@ FOLLOWS = frozenset({Mode.AUTO, Mode.GUIDED})  # the modes in which the boat fol
 STEP_S = 5.0  # of a walk
 REACH_S = 900.0  # walked so far in steps; the legs beyond that are taken whole
 WIND_S = 30.0  # the wind is taken to be one for so long
+BECALMED, SAILS_MPS = "becalmed", 0.5  # the watchdog of a calm; who is slower in one only drifts
 SLOW_MPS = 0.2  # the least that it is taken to make
 SHARPEST_RAD = math.radians(150.0)  # a turn that is sharper cuts no more of its corner
 LOOK_S = 30.0  # a walk to the end of the leg that is sailed then is held against what comes ...
@@ -41,6 +43,7 @@ SHOWN = (
     4.0  # a boat that has sailed a fifth of the time that is left has shown half of what it makes of it (sitl shown)
 )
 EVENS_OUT = 0.45  # of a try's scatter, with the root of the time: what one loses the next one gains
+HALTING, HALTING_TRIES = 0.5, 3.0  # less of the polar in so many tries, a minute and a half: nothing tells when
 LATE_LEAST_S = 1.0  # standard deviation of any time
 LATE_SIGMAS = 1.28  # of a normal: nine in ten are below
 
@@ -92,6 +95,11 @@ class Pace:
         return (
             1.0 if self.tries == 0.0 else min(max((self.made_s + prior_s) / (self.took_s + prior_s), SLOWEST), FASTEST)
         )
+
+    @property
+    def is_halting(self) -> bool:
+        """Return whether it has made less than half of its polar's pace for long: nothing tells how it goes on."""
+        return self.share < HALTING and self.tries >= HALTING_TRIES
 
     @property
     def spread(self) -> float:
@@ -163,7 +171,7 @@ class Eta:
     """The way ahead at the boat's pace: places in the order of time, and when the goal that is next is reached.
 
     Or the place that she is bound for in its stead. ``there_s`` is in half of the cases [s], ``there_late_s`` in nine
-    of ten; None: the way on board does not end there.
+    of ten; None: the way on board does not end there, she no longer sails to there, or nothing tells when she can.
     """
 
     points: tuple[ExpectedPlace, ...] = ()
@@ -187,11 +195,27 @@ def eta_of(snapshot: Snapshot, state: SkipperState, voyage: Voyage, pace: Pace) 
         replace(p, in_s=round(pace.left_s(p.in_s), 1), within_m=HERE_M + strays * so_far_m)
         for p, so_far_m in zip(walk.points, way_m, strict=True)
     )
-    if walk.goal_s is None:
+    if walk.goal_s is None or pace.is_halting or _is_becalmed(snapshot, state) or _is_leaving(state):
         return Eta(points=points)
     return Eta(
         points=points, there_s=pace.left_s(walk.goal_s), there_late_s=pace.late_s(walk.goal_s, voyage.boat.speed_error)
     )
+
+
+def _is_becalmed(snapshot: Snapshot, state: SkipperState) -> bool:
+    """Return whether the boat lies in a calm, or has no wind to sail by and does not sail.
+
+    The mean that the watchdog waits for is of a wind that has gone a minute ago.
+    """
+    wind_mps, vehicle = snapshot.wind.present_tws_mps, snapshot.vehicle
+    is_calm = wind_mps is not None and vehicle is not None and wind_mps < LIGHT_MPS and vehicle.speed_mps < SAILS_MPS
+    return is_calm or any(raised.name == BECALMED for raised in state.alarms.raised)
+
+
+def _is_leaving(state: SkipperState) -> bool:
+    """Return whether the boat is held, or ordered elsewhere, and the way on board is still the one to the goals."""
+    route, order = state.mission.route, state.orders.standing
+    return state.phase is Phase.HOLDING or (order is not None and route is not None and not route.bound_for)
 
 
 def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -> Pace:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from companion.boat import AutopilotLimits
 from companion.current import FITS_S, STILL, CurrentEstimator, Prior, Sailing
-from companion.eta import PRIOR_PACE, Eta, Pace, eta_of, paced
+from companion.eta import PRIOR_PACE, UNKNOWN, Eta, Pace, eta_of, paced
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, carried
@@ -58,12 +58,14 @@ from companion.skipper.step import (
     Permissions,
     Persisted,
     ReadOutcome,
+    Route,
     SkipperState,
     Snapshot,
     WaypointReached,
     WindBefore,
     WindEstimate,
     WindHealth,
+    field_steers,
 )
 from companion.traffic import TargetLimits, Targets
 from companion.wind import Estimator, WindStatus, WindTracker, WindVerdict, make
@@ -244,7 +246,8 @@ Waters = Callable[[GeoPoint], Voyage]
 class Step:
     """What one tick saw and decided.
 
-    Its metres are those of ``voyage``'s frame; with ``shift`` that frame has replaced another just before it.
+    Its metres are those of ``voyage``'s frame; with ``shift`` that frame has replaced another just before it. Where it
+    ``is_field_steered`` the plan on board is not sailed, and no figure of it is told.
     """
 
     snapshot: Snapshot
@@ -253,10 +256,16 @@ class Step:
     voyage: Voyage
     shift: Shift | None = None
     pace: Pace = PRIOR_PACE
+    is_field_steered: bool = False
+
+    @property
+    def sailed(self) -> Route | None:
+        """The route that is sailed; None: there is none, or a field steers and the one on board waits."""
+        return None if self.is_field_steered else self.state.mission.route
 
     def eta(self) -> Eta:
         """Return where the boat is expected from here on, and when it is there."""
-        return eta_of(self.snapshot, self.state, self.voyage, self.pace)
+        return UNKNOWN if self.is_field_steered else eta_of(self.snapshot, self.state, self.voyage, self.pace)
 
 
 class VoyageFold:
@@ -476,7 +485,15 @@ class VoyageFold:
         if self.state.afloat.known.is_used != was_used:
             self._pace = PRIOR_PACE  # it is a share of the speeds of another boat
         self._pace = paced(self._pace, snapshot, self.state, voyage)
-        return Step(snapshot=snapshot, state=self.state, actions=actions, voyage=voyage, shift=shift, pace=self._pace)
+        return Step(
+            snapshot=snapshot,
+            state=self.state,
+            actions=actions,
+            voyage=voyage,
+            shift=shift,
+            pace=self._pace,
+            is_field_steered=field_steers(snapshot, self.state, self.skipper.config),
+        )
 
     def _follow(self) -> Shift | None:
         """Replace the frame by one about the boat when it has left its water; None: it has not."""

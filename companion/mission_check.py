@@ -58,11 +58,12 @@ from companion.geo.frame import LocalFrame
 from companion.geofence import Code, Finding, FindingLevel, LocalArea, Mission
 from companion.geofence.check import AreaConditions, check_area
 from companion.geofence.mission import AreaOptions, MissionGoal, kind_of, place_troubles, read_mission
+from companion.messages import GeoPoint
 from companion.planner import Plan, Problem
 from companion.planner.problem import assumed
 from companion.safety import LIGHT_WIND, STRONG_WIND
 from companion.skipper.planning import HOME_RADIUS_M
-from companion.skipper.way import Approach, Composed, Until, gates_of, timed
+from companion.skipper.way import KEEP_SHARE, Approach, Composed, Side, Until, gates_of, timed
 from companion.words import counted
 
 __all__ = [
@@ -76,6 +77,8 @@ __all__ = [
 ]
 
 _DIRECTIONS = 24
+SAME_M = 1.0  # two goals so near are one mark that is passed twice
+SMALL_M = 3.0  # a fix is good to 2.5 m
 
 
 def current_words_of(mission: Mission, unix_s: float) -> tuple[str, ...]:
@@ -183,7 +186,12 @@ def check_mission(
         refusals=troubles,
         findings=(
             *mission.findings,
-            *(() if troubles else (*field_findings_of(mission), *_roundings(mission), *_drying(mission))),
+            *(
+                ()
+                if troubles
+                else (*field_findings_of(mission), *_roundings(mission), *_circles(mission), *_drying(mission))
+            ),
+            *_doubts(mission),
             *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told),
         ),
     )
@@ -210,6 +218,68 @@ def _roundings(mission: Mission) -> Iterator[Finding]:
                 f"{max(0.0, clear_m):.1f} m from {near}; the margin is {mission.margin_m:g} m",
                 remedy="round it closer (radius_m and [area] margin_m say how far off), or leave it on the other hand",
             )
+
+
+def _circles(mission: Mission) -> Iterator[Finding]:
+    """Yield the roundings whose circle holds the start or another goal: half of it is kept clear by every plan."""
+    voyage = voyage_of(mission)
+    places = [(f"[[goal]] {n}", goal.en_m) for n, goal in enumerate(voyage.goals, start=1)]
+    if mission.start is not None:
+        places.insert(0, ("[start]", voyage.frame.en_from_geo(mission.start)))
+    for number, goal in enumerate(voyage.goals, start=1):
+        if goal.side is Side.NONE:
+            continue
+        for place, en_m in places:
+            off_m = math.dist(en_m, goal.en_m)
+            if SAME_M < off_m < goal.rounding_m or (place == "[start]" and off_m <= SAME_M):
+                yield Finding(
+                    severity=FindingLevel.WARNING,
+                    code=Code.ROUNDING,
+                    place=f"[[goal]] {number} radius_m",
+                    text=f"is rounded {goal.rounding_m:g} m off, and {place} lies {off_m:.0f} m from it: "
+                    f"{KEEP_SHARE * goal.rounding_m:g} m are kept clear of the buoy",
+                    remedy=f"let radius_m and [area] margin_m, the greater of which says how far off, be below "
+                    f"{off_m:.0f} m, or move {place}",
+                )
+
+
+def _doubts(mission: Mission) -> Iterator[Finding]:
+    """Yield what is hardly meant: goals too small to meet, one name for two places, a key that does nothing."""
+    for number, goal in enumerate(mission.goals, start=1):
+        is_place = goal.rounding is None and goal.gate is None and goal.box is None and goal.search is None
+        if is_place and goal.field is None and goal.radius_m < SMALL_M:
+            yield Finding(
+                severity=FindingLevel.WARNING,
+                code=Code.SMALL,
+                place=f"[[goal]] {number} radius_m",
+                text=f"{goal.radius_m:g} m: a fix is good to 2.5 m, and at 3 m/s she is past it in a second or two",
+                remedy=f"write {SMALL_M:g} or more, or she may sail about it for ever",
+            )
+    named: dict[str, list[tuple[str, GeoPoint]]] = {
+        "goal": [(goal.name, goal.point) for goal in mission.goals],
+        "refuge": [(refuge.name, refuge.point) for refuge in mission.refuges],
+    }
+    for kind, places in named.items():
+        first: dict[str, tuple[int, GeoPoint]] = {}
+        for number, (name, at) in enumerate(places, start=1):
+            before, point = first.setdefault(name.strip().casefold(), (number, at))
+            if name.strip() and before != number and point != at:
+                yield Finding(
+                    severity=FindingLevel.WARNING,
+                    code=Code.TWICE,
+                    place=f"[[{kind}]] {number} name",
+                    text=f"{name!r} is the name of [[{kind}]] {before}, too, which lies elsewhere",
+                    remedy="give it another: orders and what is said name the one or the other",
+                )
+    if mission.skipper.shifts and mission.skipper.guidance != "plan":
+        yield Finding(
+            severity=FindingLevel.WARNING,
+            code=Code.NO_EFFECT,
+            place="[skipper] shifts",
+            text=f'does nothing with guidance = "{mission.skipper.guidance}": the tacks are asked of the autopilot '
+            "in AUTO",
+            remedy='leave it out, or write guidance = "plan"',
+        )
 
 
 def _drying(mission: Mission) -> Iterator[Finding]:

@@ -101,3 +101,8 @@ def choices(kind: Any, path: str) -> tuple[str, ...]:
 def _parts(kind: Any) -> list[Any]:
     """Return a type and what it is made of: the members of unions, the items of tuples, and theirs."""
     return [kind, *(part for inner in get_args(kind) for part in _parts(inner))]
+
+
+def clearance_words(clearance_m: float, inside: str = "an obstacle or the fence") -> str:
+    """Return a clearance in words: a negative one is how far she is inside of something."""
+    return f"{-clearance_m:.1f} m inside {inside}" if clearance_m < -0.05 else f"{abs(clearance_m):.1f} m"

@@ -12,7 +12,7 @@ from companion.commands.output import force_option, patience, write_out
 from companion.errors import InputError, JobError
 from companion.program.arguments import out_file, picture
 from companion.program.commands import missing
-from companion.words import counted
+from companion.words import clearance_words, counted
 
 TRACKS = (".gpx", ".kml", ".kmz", ".geojson")  # the formats that hold a track
 
@@ -120,6 +120,15 @@ def track_of(record: VoyageRecord) -> Document:
     return Document(source=str(record.folder), format="voyage", tracks=(track,) if len(known) else ())
 
 
+def clearance_line(least_m: float, expected_m: float | None, contacts: int) -> str:
+    """Return how near she came, beside what her plans expected, and how often she touched."""
+    touched = f"{counted(contacts, 'contact')}!" if contacts else "no contact."
+    expected = ""
+    if expected_m is not None:
+        expected = f" (plans expected {clearance_words(expected_m, 'it')}{' or more' if expected_m >= 0.0 else ''})"
+    return f"Nearest to an obstacle or the fence: {clearance_words(least_m, 'it')}{expected}, {touched}"
+
+
 def in_words(record: VoyageRecord) -> list[str]:
     """Return a voyage as sentences."""
     from companion.figures import ranges_in_words
@@ -133,9 +142,7 @@ def in_words(record: VoyageRecord) -> list[str]:
     lines = [head, _end(record)]
     lines += _plans(record)
     if s.min_clearance_m is not None:
-        touched = "no contact" if not s.contacts else f"{counted(s.contacts, 'contact')}!"
-        promised = "" if s.promised_clearance_m is None else f" (plans expected {s.promised_clearance_m:.1f} m or more)"
-        lines.append(f"Nearest to an obstacle or the fence: {s.min_clearance_m:.1f} m{promised}, {touched}.")
+        lines.append(clearance_line(s.min_clearance_m, s.promised_clearance_m, s.contacts))
     if s.promised_risk is not None:
         whole = (
             "" if s.path_risk is None else f"Off the plan: {100.0 * s.path_risk:.0f} % was the highest chance told. "

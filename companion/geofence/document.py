@@ -53,6 +53,10 @@ class Code(enum.Enum):
     FORMAT = "format"
     FIELD = "field"
     DRIES = "dries at low water"
+    ROUNDING = "inside of a rounding"
+    SMALL = "too small to meet"
+    TWICE = "one name twice"
+    NO_EFFECT = "does nothing"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,7 @@ from companion.plots.chart import date_words, legend_above, legend_below, place_
 from companion.plots.drying import DryingPicture, DryingShape, draw_drying
 from companion.plots.mission import TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
 from companion.telemetry.folder import RecordedChart, RecordedPlan, VoyageRecord
-from companion.words import counted
+from companion.words import clearance_words, counted
 
 PORT_RED, STARBOARD_GREEN, WIND_BLUE, PLAN_GREY = "#b3261e", "#1b7f3b", "#1f5fa8", "#5b6472"
 LAND, LAND_EDGE, WATER, GOAL = "#e7dcc3", "#8a7a55", "#f4f8fb", "#f6c945"
@@ -57,7 +57,9 @@ def _title(record: VoyageRecord) -> str:
             parts.append(f"{s.time_s:.0f} s, {s.distance_m or 0.0:.0f} m")
         parts.append(f"{counted(s.tacks, 'tack')}, {counted(s.replans, 'replan')}")
         if s.min_clearance_m is not None:
-            promised = "" if s.promised_clearance_m is None else f" (expected {s.promised_clearance_m:.1f} m)"
+            promised = (
+                "" if s.promised_clearance_m is None else f" (expected {clearance_words(s.promised_clearance_m)})"
+            )
             parts.append(f"smallest clearance {s.min_clearance_m:.1f} m{promised}")
         if s.promised_risk is not None:
             parts.append(f"promised risk {100.0 * s.promised_risk:.0f} %")

@@ -30,9 +30,10 @@ from companion.program import control
 from companion.skipper.planning import next_tack, on_leg
 from companion.skipper.step import Announce, Phase, Snapshot
 from companion.telemetry.folder.records import sigma_ahead_rad
-from companion.telemetry.status import CLOCK_OFF_S, unix_of_boat
-from companion.words import one_line, printable
+from companion.telemetry.status import CLOCK_OFF_S, goal_distance_m, unix_of_boat
+from companion.words import clearance_words, one_line, printable
 
+NEAR_M = 1.0  # what is so near to her way is what a clearance below nought is of
 MOST_WAITING = 64  # lines; a reader that is this far behind misses the next
 _GONE = frozenset({errno.EPIPE, errno.EIO, errno.EBADF, errno.ENXIO})
 LAST_WORDS_S = 1.0  # what is still waiting at the end gets so long
@@ -272,12 +273,15 @@ def wrapped(lines: list[str], columns: int) -> list[str]:
 def progress_text(step: Step) -> str:
     """Return the line: state, waypoint, wind mean and spread, next tack, cross-track, clearance, arrival."""
     snapshot, state = step.snapshot, step.state
-    autopilot, wind, route = snapshot.autopilot, snapshot.wind, state.mission.route
+    autopilot, wind, route, sailed = snapshot.autopilot, snapshot.wind, state.mission.route, step.sailed
     parts = [state.phase.value.upper()]
     if snapshot.heartbeat_age_s is not None and snapshot.heartbeat_age_s > SILENT_S:
         parts.append(f"autopilot silent for {snapshot.heartbeat_age_s:.0f} s: what follows is old")
     under_way = route is not None and state.voyage.sailing and state.phase is not Phase.DONE
-    if under_way and route is not None and autopilot is not None:
+    if under_way and step.is_field_steered:
+        left_m = goal_distance_m(step, step.voyage)
+        parts.append("by field" if left_m is None else f"by field, goal {left_m:.0f} m")
+    elif under_way and route is not None and autopilot is not None:
         distance = on_leg(step).left_m
         at = "" if distance is None else f" {distance:.0f} m"
         parts.append(f"wp {state.mission.index + 1}/{len(route.items)}{at}")
@@ -301,9 +305,9 @@ def progress_text(step: Step) -> str:
         minutes = state.orders.standing.age_s(snapshot.t_s) / 60.0
         parts.append(f"order {state.orders.standing.words} of {state.orders.standing.by}, {minutes:.0f} min")
     if route is not None:
-        clearance_m = route.clearance_ahead_m(state.mission.index)
+        clearance_m = None if sailed is None else sailed.clearance_ahead_m(state.mission.index)
         if clearance_m is not None:
-            parts.append(f"clearance expected {clearance_m:.1f} m")
+            parts.append(f"clearance expected {clearance_words(clearance_m, _inside(step))}")
         eta = step.eta()
         if under_way and eta.there_s is not None:
             late = "" if eta.there_late_s is None else f" (90 %: {eta.there_late_s:.0f} s)"
@@ -313,6 +317,18 @@ def progress_text(step: Step) -> str:
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)
     return " | ".join(parts)
+
+
+def _inside(step: Step) -> str:
+    """Return what her way leads through where it does: a plan begins inside of what was drawn or sounded since."""
+    here, route, area = step.snapshot.position_en_m, step.state.mission.route, step.voyage.area
+    places = [
+        *(() if here is None else (here,)),
+        *(() if route is None else route.points_en_m[step.state.mission.index :]),
+    ]
+    least_m, place = min(((float(area.clearance_m([p])[0]), p) for p in places), default=(math.inf, None))
+    name = "" if place is None or least_m > NEAR_M else area.nearest_name(place)
+    return name or "what was drawn or found since"
 
 
 def left_behind(step: Step) -> str:

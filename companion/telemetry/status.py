@@ -37,12 +37,7 @@ def companion_status(
     """Return the status at ``step``. The wind's spread is that of a minute ahead, which the plan lives on."""
     snapshot, state = step.snapshot, step.state
     autopilot, wind, route, vehicle = snapshot.autopilot, snapshot.wind, state.mission.route, snapshot.vehicle
-    legs = voyage.legs
-    gates = gates_of(voyage, state.progress.approaches)
-    goal = gates[state.progress.gate].goal if state.progress.gate < len(gates) else len(legs) - 1
-    here = snapshot.position_en_m
-    # home, a refuge or a place that was named: how far the last goal is says nothing of that
-    is_elsewhere = state.progress.gate >= len(gates) or (route is not None and bool(route.bound_for))
+    legs, goal = voyage.legs, _goal(step, voyage)
     code, text = _alert(step)
     tws_sigma = None if wind.forecast is None else float(wind.forecast.sigma_tws_mps[0])
     return CompanionStatus(
@@ -53,7 +48,7 @@ def companion_status(
         waypoint_seq=state.mission.index + 1 if route is not None else None,
         waypoint_count=None if route is None else len(route.items),
         waypoint_distance_m=on_leg(step).left_m,
-        goal_distance_m=None if here is None or is_elsewhere else math.dist(here, legs[goal].en_m),
+        goal_distance_m=goal_distance_m(step, voyage),
         cross_track_m=on_leg(step).off_m,
         clearance_m=clearance_m,
         twd_from_rad=None if wind.mean_twd_from_rad is None else wrap_two_pi(wind.mean_twd_from_rad),
@@ -64,7 +59,7 @@ def companion_status(
         current_drift_mps=snapshot.current.drift_mps if snapshot.current.is_significant else None,
         next_tack_s=next_tack_s(step, voyage.boat),
         figures=tuple(figure_values(step, "radio").items()),
-        promised_risk=None if route is None else risk_of(route),
+        promised_risk=None if step.sailed is None else risk_of(step.sailed),
         plan_id=None if route is None else route.plan_id,
         plan_age_s=None if route is None else max(0.0, snapshot.t_s - route.plan_t_s),
         replans=state.plans.replans,
@@ -81,13 +76,31 @@ def companion_status(
     )
 
 
+def _goal(step: Step, voyage: Voyage) -> int:
+    """Return the number of the goal that is next, of the last one behind it."""
+    gates, progress = gates_of(voyage, step.state.progress.approaches), step.state.progress
+    return gates[progress.gate].goal if progress.gate < len(gates) else len(voyage.legs) - 1
+
+
+def goal_distance_m(step: Step, voyage: Voyage) -> float | None:
+    """Return how far the next goal is [m].
+
+    None: that is not known, or says nothing of home, a refuge or a place that was named.
+    """
+    here, route, progress = step.snapshot.position_en_m, step.state.mission.route, step.state.progress
+    is_elsewhere = progress.gate >= len(gates_of(voyage, progress.approaches)) or (
+        route is not None and bool(route.bound_for)
+    )
+    return None if here is None or is_elsewhere else math.dist(here, voyage.legs[_goal(step, voyage)].en_m)
+
+
 def traffic_status(step: Step, feeds: Sequence[Feed[AisReport]], dropped: int) -> TrafficStatus | None:
     """Return what is seen of other vessels, the worst one's figures; None when nobody was heard and no feed is open."""
     picture = step.snapshot.traffic
     if picture is None and not feeds:
         return None
     counts = TrafficCounts() if picture is None else picture.counts
-    route = step.state.mission.route
+    route = step.sailed
     seen = TrafficStatus(
         vessels=0 if picture is None else len(picture.vessels),
         refused=counts.stale + counts.far + dropped + sum(feed.counts.refused for feed in feeds),

@@ -650,8 +650,11 @@ class Chosen:
 def plan_of(
     step: Step, voyage: Voyage, eta: Eta, chosen: Chosen | None, legs: tuple[Leg, ...]
 ) -> values.PlanView | None:
-    """Return the plan that is sailed; ``legs`` are those of the plans that it was spliced from, the newest first."""
-    route, state = step.state.mission.route, step.state
+    """Return the plan that is sailed; ``legs`` are those of the plans that it was spliced from, the newest first.
+
+    Where a field steers it is the plan that waits on board, without what is true only of a boat that sails it.
+    """
+    route, sailed, state = step.state.mission.route, step.sailed, step.state
     if route is None:
         return None
     begin, count = min(state.mission.index, len(route.items)), len(route.items)
@@ -667,21 +670,21 @@ def plan_of(
         twd_from_deg=compass(route.plan_twd_from_rad),
         tws_mps=rounded(route.plan_tws_mps),
         delta_s=rounded(route.delta_s, 4),
-        promised_risk=rounded(1.0 - route.delta_s, 4),
-        path_risk=rounded(_risk_left(route, left), 4),
-        vessel_risk=rounded(route.vessel_risk, 4),
+        promised_risk=None if sailed is None else rounded(1.0 - sailed.delta_s, 4),
+        path_risk=None if sailed is None else rounded(_risk_left(sailed, left), 4),
+        vessel_risk=None if sailed is None else rounded(sailed.vessel_risk, 4),
         margin_m=rounded(route.margin_m, 1),
         cost_s=rounded(route.cost_s, 1),
         median_s=rounded(route.median_s, 0),
         late_s=rounded(route.late_s, 0),
         there_s=rounded(eta.there_s, 0),
         there_late_s=rounded(eta.there_late_s, 0),
-        expected_clearance_m=rounded(route.clearance_ahead_m(begin), 1),
+        expected_clearance_m=None if sailed is None else rounded(sailed.clearance_ahead_m(begin), 1),
         bound_s=_bound_s(route, chosen),
         replans=state.plans.replans,
         next_tack_s=None if tack is None else rounded(tack.in_s, 0),
         next_tack_is_planned=None if tack is None else tack.is_planned,
-        leg=min(begin + 1, count) if count else None,
+        leg=min(begin + 1, count) if count and sailed is not None else None,
         count=count,
         legs=left,
     )

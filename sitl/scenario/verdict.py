@@ -27,7 +27,7 @@ from shapely.geometry.base import BaseGeometry
 from companion.boat import Hull, outline_en_m
 from companion.current import TideTable
 from companion.skipper.way import DryingWater
-from companion.words import counted, one_line
+from companion.words import clearance_words, counted, one_line
 from sitl.scenario.colregs import Met, judge_encounter
 from sitl.scenario.scenario import ExpectSpec
 from sitl.scenario.tasks import Tasks
@@ -557,7 +557,8 @@ def verdict_line(record: Mapping[str, Any]) -> str:
         )
         words += "nothing to be clear of" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"
         if f["min_clearance_m"] is not None and f.get("promised_clearance_m") is not None:
-            words += f" (promised {f['promised_clearance_m']:.1f} m)"
+            least_m = f["promised_clearance_m"]
+            words += f" ({'promised' if least_m >= 0.0 else 'a plan began'} {clearance_words(least_m)})"
         if f.get("min_under_keel_m") is not None:
             aground = f", {counted(f['groundings'], 'grounding')}" if f["groundings"] else ""
             words += f", {f['min_under_keel_m']:.1f} m under the keel{aground}"

@@ -188,6 +188,82 @@ def test_a_buoy_whose_circle_has_no_room_is_told(tmp_path, hand, told):
     assert all("the margin is 8 m" in finding.text for finding in found)
 
 
+ROUND = """
+[start]
+lat = 50.8200
+lon = -1.3100
+[[goal]]
+lat = 50.8220
+lon = -1.3100
+radius_m = {radius}
+name = "{first}"
+{rounding}
+[[goal]]
+lat = {lat}
+lon = -1.3100
+radius_m = 10
+name = "B"
+[[refuge]]
+lat = 50.8210
+lon = -1.3110
+name = "Bay"
+[[refuge]]
+lat = 50.8210
+lon = -1.3090
+name = "{refuge}"
+[operator]
+set_auto = true
+guided = true
+[skipper]
+shifts = {shifts}
+guidance = "{guidance}"
+"""
+WELL = {
+    "radius": 10,
+    "first": "A",
+    "rounding": "",
+    "lat": 50.8230,
+    "refuge": "Cove",
+    "shifts": "false",
+    "guidance": "field",
+}
+PORT = {"rounding": 'rounding = "port"', "guidance": "plan"}
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({}, []),
+        ({"radius": 2.9}, ["[[goal]] 1 radius_m: warning: 2.9 m: a fix is good to 2.5 m"]),
+        ({"radius": 3}, []),
+        ({"refuge": "bay"}, ["[[refuge]] 2 name: warning: 'bay' is the name of [[refuge]] 1, too"]),
+        ({"first": "B"}, ["[[goal]] 2 name: warning: 'B' is the name of [[goal]] 1, too"]),
+        ({"first": "B", "lat": 50.8220}, []),  # passed twice
+        ({"first": "", "refuge": ""}, []),
+        ({"shifts": "true"}, ['[skipper] shifts: warning: does nothing with guidance = "field"']),
+        ({"shifts": "true", "guidance": "plan"}, []),
+        (
+            {"radius": 300, **PORT},
+            [
+                "[[goal]] 1 radius_m: warning: is rounded 300 m off, and [start] lies 222 m from it: 150 m are kept",
+                "[[goal]] 1 radius_m: warning: is rounded 300 m off, and [[goal]] 2 lies 111 m from it",
+            ],
+        ),
+        ({"radius": 100, **PORT}, []),
+        ({"lat": 50.8220, **PORT}, []),
+    ],
+)
+def test_what_is_hardly_meant_is_told_with_its_remedy(tmp_path, change, told):
+    """A circle of 900 m about the start left no place to plan from, and a goal of a millimetre was never met."""
+    mission = tmp_path / "m.toml"
+    mission.write_text(ROUND.format(**(WELL | change)))
+    checked = check_mission(mission)
+    assert not checked.refusals
+    lines = [finding.line() for finding in checked.findings]
+    assert len(lines) == len(told)
+    assert all(line.startswith(words) and "; " in line for line, words in zip(lines, told, strict=True))
+
+
 @pytest.mark.parametrize(("end", "is_rounded"), [("home", True), ("loiter", False)])
 def test_the_last_buoy_is_rounded_for_the_way_home(tmp_path, end, is_rounded):
     mission = tmp_path / "m.toml"

@@ -11,7 +11,9 @@ from companion.boat import AutopilotLimits, Boat, ardurover_sitl
 from companion.clock import run_virtual
 from companion.eta import PRIOR_PACE, TRIED_S, PaceTrial, _Walker
 from companion.messages import Mode
-from companion.skipper.step import Announce
+from companion.orders import Verb
+from companion.skipper.step import Announce, Phase
+from companion.skipper.step.state import Raised, Standing
 from sitl.run.embedded import run_embedded
 from sitl.scenario import load_scenario
 from tests.skipper.world import with_parts
@@ -81,6 +83,43 @@ def test_a_boat_that_is_not_sailing_the_plan_is_told_nothing(demo):
     ):
         assert changed.eta().there_s is None
         assert not changed.eta().points
+
+
+def test_the_time_is_to_the_goal_that_is_next_where_the_mission_leads_on_behind_it(demo):
+    step, eta, _ = next(told(demo))
+    route = step.state.mission.route
+    on = replace(route, bound_for="home")
+    assert replace(step, state=with_parts(step.state, mission={"route": on})).eta().there_s == eta.there_s
+    left = replace(on, gate_of=(-1,) * len(on.items))  # a diversion: no goal is on this way
+    assert replace(step, state=with_parts(step.state, mission={"route": left})).eta().there_s != eta.there_s
+
+
+def test_no_time_is_told_in_a_calm_at_a_halt_or_of_a_goal_that_is_left(demo):
+    """Becalmed, "there in 247 s" stood there for minutes; and on the first line after the order hold."""
+    step, eta, _ = next(told(demo))
+    assert eta.there_s is not None
+    vehicle, wind = step.snapshot.vehicle, step.snapshot.wind
+    calm = replace(wind, present_tws_mps=0.3)
+    adrift = replace(vehicle, velocity_en_mps=(0.3, 0.2))
+    hold = Standing(verb=Verb.HOLD, by="somebody ashore", name="", en_m=None, since_s=step.snapshot.t_s)
+    silent = {
+        "becalmed": replace(
+            step, state=with_parts(step.state, alarms={"raised": (Raised(name="becalmed", since_s=0.0),)})
+        ),
+        "no wind, and slow": replace(step, snapshot=replace(step.snapshot, wind=calm, vehicle=adrift)),
+        "at a halt": replace(step, pace=paced(0.3)),
+        "held": replace(step, state=replace(step.state, phase=Phase.HOLDING)),
+        "ordered away": replace(step, state=with_parts(step.state, orders={"standing": hold})),
+    }
+    assert {name: changed.eta().there_s for name, changed in silent.items()} == dict.fromkeys(silent)
+    assert all(changed.eta().points for changed in silent.values())
+    for sails in (
+        replace(step, snapshot=replace(step.snapshot, wind=calm, vehicle=replace(vehicle, velocity_en_mps=(0.9, 0.0)))),
+        replace(step, snapshot=replace(step.snapshot, vehicle=adrift)),  # in a tack
+        replace(step, pace=paced(0.6)),
+        replace(step, pace=paced(0.3, seconds=50.0)),  # not for long
+    ):
+        assert sails.eta().there_s is not None
 
 
 def paced(share, *, seconds=300.0):

@@ -72,6 +72,13 @@ def test_what_cannot_be_is_refused_by_place_and_reason(tmp_path, file, place, pr
     assert error.remedy
 
 
+def test_a_goal_that_is_near_is_not_asked_about_its_axes(tmp_path):
+    """A goal 60 m away was "0 km from [start]; are lat and lon swapped?"."""
+    error = refusal(written(tmp_path, passage="leg_m = 50.0", goal=(START[0] + 0.00054, START[1])))
+    assert error.problem == "is 60 m from [start]"
+    assert error.remedy == "write a longer one: [passage] leg_m says 50 m"
+
+
 @pytest.mark.parametrize(
     "passage",
     [

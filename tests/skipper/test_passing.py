@@ -165,7 +165,9 @@ def test_down_the_ladder_less_is_kept_of_a_gates_marks_never_less_than_the_missi
         assert request(ctx, ReplanReason.ORDER, rung=rung)
         problem = ctx.state.pending.plan.problem
         mark = shapely.Point(LINE.port_en_m)
-        discs = [p for p, name in zip(problem.obstacles, problem.obstacle_names, strict=True) if name == "a mark"]
+        discs = [
+            p for p, name in zip(problem.obstacles, problem.obstacle_names, strict=True) if name == "a mark of line"
+        ]
         (disc,) = (p for p in discs if shapely.contains(p, mark))
         kept_m.append(shapely.distance(disc.exterior, mark))
     assert kept_m[0] == pytest.approx(8.0, abs=0.01)

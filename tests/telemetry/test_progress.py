@@ -10,13 +10,20 @@ from dataclasses import replace
 import pytest
 import shapely
 
+from companion.commands.report import clearance_line
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.skipper import Skipper
 from companion.skipper.planning import next_tack
+from companion.skipper.step import field_steers
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.config import Guidance, SkipperConfig
 from companion.telemetry.console import ProgressLine, left_behind, progress_text
+from companion.telemetry.folder.records import VoyageFigures
+from companion.telemetry.status import companion_status
+from companion.terminal.dashboard import line_of
+from companion.view.fold import ViewFold
+from sitl.scenario import verdict_line
 from tests.skipper.world import World, voyage, with_parts
 
 STATUS = CompanionStatus(t_s=0.0, state="waiting")
@@ -76,6 +83,30 @@ def test_the_line_tells_the_clearance_and_when_she_is_there():
     assert "there in" not in progress_text(replace(step, state=with_parts(step.state, mission={"route": None})))
 
 
+@pytest.mark.parametrize(("metres", "told"), [(-0.01, "0.0 m"), (3.25, "3.2 m"), (-2.2, "2.2 m inside NAME")])
+@pytest.mark.parametrize("is_in_it", [True, False])
+def test_a_clearance_below_nought_is_told_as_how_far_she_is_inside(metres, told, is_in_it):
+    """ "clearance expected -2.2 m" stood there of a plan that began in a shoal that had just been sounded."""
+    world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
+    assert world.run(120, lambda w: w.state.voyage.sailing)
+    here = shapely.Point(world.position).buffer(8.0)
+    sea = voyage(obstacles=[here] if is_in_it else [])
+    route = replace(world.state.mission.route, expected_clearance_m=metres)
+    state = with_parts(world.state, mission={"route": route})
+    step = Step(snapshot=world.snapshot(), state=state, actions=(), voyage=sea)
+    name = sea.area.names[0] if is_in_it else "what was drawn or found since"
+    assert f"clearance expected {told.replace('NAME', name)} |" in progress_text(step)
+
+
+def test_in_the_report_and_the_verdict_too():
+    told = "Nearest to an obstacle or the fence: "
+    assert clearance_line(-0.3, -2.1, 1) == f"{told}0.3 m inside it (plans expected 2.1 m inside it), 1 contact!"
+    assert clearance_line(3.0, 2.0, 0) == f"{told}3.0 m (plans expected 2.0 m or more), no contact."
+    figures = {"time_s": 1.0, "distance_m": 1.0, "tacks": 0, "replans": 0, "min_clearance_m": 5.0}
+    verdict = {"figures": {**figures, "promised_clearance_m": -2.1}, "passed": True, "scenario": "x", "seed": 0}
+    assert verdict_line(verdict).endswith("clearance 5.0 m (a plan began 2.1 m inside an obstacle or the fence)")
+
+
 def test_steered_by_headings_the_way_to_the_waypoint_is_her_own():
     """ArduRover knows of none then: "wp 60/62 0 m" and "xt -0.0 m" stood there all the way."""
     config = SkipperConfig(guidance=Guidance.HEADING)
@@ -89,6 +120,37 @@ def test_steered_by_headings_the_way_to_the_waypoint_is_her_own():
     world.set_mode(Mode.AUTO)
     by_autopilot = replace(step, snapshot=world.snapshot())
     assert re.search(r"wp \d+/\d+ (\d+) m", progress_text(by_autopilot))[1] == "0"
+
+
+def test_by_field_nothing_is_told_of_the_plan_on_board():
+    """ "there in 1303 s" stood there 15 s before the goal, and the clearance of a plan that was not sailed."""
+    rock = voyage(obstacles=[shapely.box(40.0, 100.0, 60.0, 120.0)])
+    world = World(Skipper(voyage=rock, config=SkipperConfig(guidance=Guidance.FIELD)))
+    assert world.run(120, lambda w: w.mode is Mode.GUIDED and w.speed > 1.0)
+    snapshot, config = world.snapshot(), world.skipper.config
+    by_plan = Step(snapshot=snapshot, state=world.state, actions=(), voyage=rock)
+    by_field = replace(by_plan, is_field_steered=field_steers(snapshot, world.state, config))
+    told, figures = {}, {}
+    for name, step in {"plan": by_plan, "field": by_field}.items():
+        figures[name] = VoyageFigures()
+        figures[name].take(step, 9.0)
+        status = companion_status(step, rock, figures[name], 9.0, None)
+        view, _ = ViewFold(rock, config).take(step, status, figures[name])
+        told[name] = progress_text(step), status, view
+    words = {"wp ", "xt ", "clearance expected", "there in"}
+    assert {w for w in words if w in told["plan"][0]} == words
+    line, status, view = told["field"]
+    assert not [w for w in (*words, "next tack") if w in line]
+    assert re.search(r"by field, goal (\d+) m", line)[1] == f"{status.goal_distance_m:.0f}"
+    assert status.plan_id is not None  # it is on board
+    radio = (status.waypoint_distance_m, status.cross_track_m, status.next_tack_s, status.promised_risk)
+    shown = (view.plan.there_s, view.plan.there_late_s, view.plan.expected_clearance_m, view.plan.path_risk)
+    assert {*radio, *shown, view.plan.leg, view.plan.next_tack_s, figures["field"].promised_clearance_m} == {None}
+    assert view.predicted == ()
+    assert "there in" not in line_of(view, 0.0, knots=False)
+    page = told["plan"][2].plan
+    assert None not in {page.there_s, page.expected_clearance_m, page.path_risk, page.leg}
+    assert figures["plan"].promised_clearance_m is not None
 
 
 def _with(state, **changes):

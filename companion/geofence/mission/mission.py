@@ -40,6 +40,7 @@ from companion.messages import GeoPoint
 from companion.words import file_name
 
 AS_IT_IS: Mapping[Path, bytes] = {}  # nothing is given: every file is read from the disk
+KM_M = 1_000.0
 RANGE_M = 50_000.0  # the frame is below 1 m wrong to here; what lies farther off is a mistake
 
 
@@ -477,10 +478,11 @@ def passage_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
         near = [way[number - 1][1]] if is_goal and number > 0 else [point] if is_goal else [p for _, p in way]
         least_m = min(float(np.hypot(*frame.en_from_geo(other))) for other in near)
         if least_m > leg_m:
+            asked = "are lat and lon swapped? " if least_m >= KM_M else "write a longer one: "
             yield (
                 place,
-                f"is {least_m / 1000.0:.0f} km from {way[number - 1][0] if is_goal else 'every goal'}",
-                f"are lat and lon swapped? [passage] leg_m says {leg_m / 1000.0:g} km",
+                f"is {_far(least_m)} from {way[number - 1][0] if is_goal else 'every goal'}",
+                f"{asked}[passage] leg_m says {_far(leg_m)}",
             )
             continue
         local = mission.area.about(frame, RANGE_M)
@@ -498,6 +500,12 @@ def passage_troubles(mission: Mission) -> Iterator[tuple[str, str, str]]:
         )
         if problem:
             yield place, problem, "move its marks into free water or correct the area's files"
+
+
+def _far(distance_m: float) -> str:
+    """Return a distance in words, below a kilometre in metres."""
+    km = distance_m / KM_M
+    return f"{distance_m:.0f} m" if km < 1.0 else f"{km:.1f} km" if km < 10.0 else f"{km:.0f} km"
 
 
 def _asked(point: GeoPoint, origin: GeoPoint) -> str:

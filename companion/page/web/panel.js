@@ -70,6 +70,11 @@ function one(name, value, unit, kind = "", hint = "") {
   return el("div", hint ? { class: kind, title: hint } : { class: kind }, el("dt", {}, name), el("dd", {}, value, value === NONE || !unit ? "" : el("small", {}, ` ${unit}`)));
 }
 
+/** A clearance; below nought it is how far she is inside of something. @param {number | null | undefined} metres */
+function clearance(metres) {
+  return metres != null && metres < -0.05 ? `${distance(-metres)} inside an obstacle or the fence` : distance(metres);
+}
+
 /** A figure of the table, by its kind. @param {import("../../view/view").Figure} f */
 function shown(f) {
   const [text, unit] = f.kind === "speed" ? [speed(f.value), speedUnit()] : f.kind === "distance" ? [distance(f.value), ""] : f.kind === "time" ? [duration(f.value), ""]
@@ -102,11 +107,11 @@ function plan(view) {
     ["time from then", p.cost_s === null ? NONE : `${duration(p.cost_s)}${p.bound_s ? `, no less than ${duration(p.bound_s)}` : ""}`],
     ["as wind and boat may be", p.median_s === null ? NONE : `${duration(p.median_s)}, nine of ten ${p.late_s === null ? "not in any time" : duration(p.late_s)}`],
     ["there in", p.there_s === null ? `${NONE} (not under way to it)` : `${duration(p.there_s)}, nine of ten ${duration(p.there_late_s)}`, p.there_s === null ? NOT_THERE : THERE], ["off the plan", percent(p.path_risk), OFF_PLAN],
-    ["margin", distance(p.margin_m)], ["clearance expected", distance(p.expected_clearance_m)], ["leg", `${p.leg ?? NONE} of ${p.count ?? NONE}`],
+    ["margin", distance(p.margin_m)], ["clearance expected", clearance(p.expected_clearance_m)], ["leg", `${p.leg ?? NONE} of ${p.count ?? NONE}`],
     ...(p.rung ? [["found by", p.rung]] : []), ...(p.bound_for ? [["bound for", p.bound_for]] : [])];
   get("planfacts").replaceChildren(...facts.map(([name, value, hint]) => el("div", hint ? { title: hint } : {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
   const legs = p?.legs ?? [];
-  const first = p?.leg ?? 1;
+  const first = p?.leg ?? (p?.count ?? legs.length) - legs.length + 1;
   keep("plantable", table("Legs that are left; spare: to the nearest obstacle, fence or mark, beyond what is kept clear of it", ["leg", "off plan", "course", "TWA", "length", "no-go", "spare"], legs.map((leg, n) => [
     leg.is_loiter ? `${first + n} loiter` : el("span", leg.is_beat ? { title: BEAT } : {}, `${first + n} ${[leg.manoeuvre, leg.is_beat ? "beat" : ""].filter(Boolean).join(", ")}`), el("span", { class: `risk r${riskClass(leg.risk)}` }, percent(leg.risk)),
     bearing(leg.course_deg), atBow(leg.twa_deg), leg.is_loiter ? NONE : distance(leg.length_m), leg.is_beat ? NONE : figure(leg.no_go_half_deg, 0, "°"), distance(leg.clearance_m)])));
@@ -143,7 +148,7 @@ function tables(view, beside, area) {
   /** @type {[string, (f: import("../../view/view").Figures) => string][]} */
   const rows = [
     ["time under way", (f) => duration(f.time_s)], ["distance", (f) => distance(f.distance_m)], ["tacks, gybes", (f) => `${f.tacks ?? NONE}, ${f.gybes ?? NONE}`],
-    ["plans, replans", (f) => `${f.plans ?? NONE}, ${f.replans ?? NONE}`], ["least clearance, expected", (f) => `${distance(f.min_clearance_m)}, ${distance(f.promised_clearance_m)}`], ["contacts", (f) => figure(f.contacts)],
+    ["plans, replans", (f) => `${f.plans ?? NONE}, ${f.replans ?? NONE}`], ["least clearance, expected", (f) => `${clearance(f.min_clearance_m)}, ${clearance(f.promised_clearance_m)}`], ["contacts", (f) => figure(f.contacts)],
     ["no-go entries", (f) => figure(f.no_go_entries)], ["goals reached", (f) => `${f.goals_reached ?? NONE} of ${f.goals ?? NONE}`]];
   keep("voyagetable", table("The voyage so far", ["figure", "value", ...(beside ? [`beside: ${beside.name}, at its end`] : [])],
     view ? rows.map(([name, show]) => [name, ...all.map((f) => f === null ? NONE : show(f))]) : []));

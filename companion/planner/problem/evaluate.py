@@ -269,11 +269,40 @@ class Evaluation:
 
 def endpoint_error(p: Problem) -> str | None:
     """Return why no plan can exist on inspection of the endpoints, or None."""
-    if shore_of(p).hits(shapely.Point(p.start_en)):
-        return "start is inside an obstacle or outside the fence"
-    if shore_of(p).hits(shapely.Point(p.goal_en)):
-        return "goal is inside an obstacle or outside the fence"
+    for name, en in (("start", p.start_en), ("goal", p.goal_en)):
+        if shore_of(p).hits(shapely.Point(en)):
+            return f"{name} is {solid_words(p, en)}"
     return None
+
+
+def solid_words(p: Problem, en: tuple[float, float]) -> str:
+    """Return where a place is that no path may come to: in what, or nearer to it than is kept clear.
+
+    Obstacles may have been grown by a margin, and the fence shrunk: where the problem says what is solid as it is
+    (``Tracking``), the two are told apart, with the metres; else both are named.
+    """
+    point, track = shapely.Point(en), p.tracking
+    far_m = [float(shapely.distance(o, point)) for o in p.obstacles]
+    nearest = min(range(len(far_m)), key=far_m.__getitem__, default=None)
+    if nearest is not None and far_m[nearest] <= p.clearance_floor_m:
+        name, grown = p.obstacle_name(nearest), p.obstacles[nearest]
+        if track is None:
+            return f"inside {name}, or nearer to it than is kept clear"
+        within = shapely.buffer(grown, TARGET_SLACK_M)  # as it is written, to the millimetre
+        own_m = [float(shapely.distance(s, point)) for s in track.solids if shapely.covers(within, s)]
+        if not own_m:  # a mark, or what of the water is kept clear of more than one thing
+            return f"within what is kept clear of {name}"
+        if min(own_m) <= 0.0:
+            return f"inside {name}"
+        kept_m = min(own_m) + float(shapely.distance(grown.boundary, point)) + p.clearance_floor_m
+        return f"{min(own_m):.1f} m from {name}, and {kept_m:.1f} m are kept clear of it"
+    if track is None:
+        return "outside the fence, or nearer to it than is kept clear"
+    if track.limits is not None and not shapely.covers(track.limits, point):
+        return "outside the fence"
+    if track.limits is None:
+        return "outside the water of this leg"
+    return f"{float(shapely.distance(track.limits.boundary, point)):.1f} m from the fence, nearer than is kept clear"
 
 
 def manoeuvre(before_rad: float, after_rad: float) -> str:

@@ -321,7 +321,7 @@ def search(
         fits = grid_m * math.sqrt(grid.memory_bytes / settings.memory_bytes)
         reason = (
             f"a grid of {grid_m:.3g} m needs {grid.memory_bytes / 1e6:.0f} MB, more than the "
-            f"{settings.memory_bytes / 1e6:.0f} MB allowed; one of {fits:.3g} m would fit"
+            f"{settings.memory_bytes / 1e6:.0f} MB allowed; one of {fits:.3g} m would fit: [planner] grid_m sets it"
         )
         return Outcome(waypoints_en=None, status=PlanStatus.NOT_FOUND, reason=reason, trace=trace)
     return _run(problem, effort, settings, grid, trace)

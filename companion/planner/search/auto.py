@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from companion.kernels.xorshift import uniform
 from companion.planner.effort import Effort, Outcome
 from companion.planner.plan import PlanStatus
-from companion.planner.problem.evaluate import shore_of, target_hit
+from companion.planner.problem.evaluate import shore_of, solid_words, target_hit
 from companion.planner.problem.value import Problem
 from companion.planner.search.annealing import MOST_POINTS, anneal, timetable
 from companion.planner.search.bound import Bound, cut_off, no_course
@@ -635,7 +635,7 @@ def _endpoint_in_solid(world: SearchWorld) -> str | None:
     p = world.problem
     for name, en in (("start", p.start_en), ("goal", p.goal_en)):
         if not world.is_open(en) and shore_of(p).hits(shapely.Point(en)):
-            return f"{name} is inside an obstacle or outside the fence"
+            return f"{name} is {solid_words(p, en)}"
     return None
 
 

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from companion.frozen import changed
-from companion.geo.angles import difference_rad, heading_of
+from companion.geo.angles import difference_rad, direction, heading_of
 from companion.messages import Mode, Severity
 from companion.safety import LIGHT_MPS
 from companion.skipper.behaviors.helm import is_busy, run_motor, set_mode
@@ -277,13 +277,23 @@ def is_cramped(ctx: StepContext) -> bool:
     return float(water_at(ctx.voyage.area, boat).clearance_m([boat])[0]) < ctx.config.loiter_radius_m
 
 
+def _motion(ctx: StepContext) -> str:
+    """Return how a boat moves that drifts nowhere: in a loiter it goes in circles, and its mean is nothing."""
+    vehicle = ctx.snapshot.vehicle
+    if vehicle is None or ctx.reckoned_en is None:
+        return "her motion not known"
+    if vehicle.speed_mps < DRIFT_MPS:
+        return "lying still"
+    return f"making {vehicle.speed_mps:.2g} m/s towards {direction(heading_of(*vehicle.velocity_en_mps))}°"
+
+
 def _loiters(ctx: StepContext, ahead: DriftAhead | None) -> bool:
     """Keep LOITER, or ask for it where it drifts; a person who sets AUTO meanwhile is let have it."""
     status, state, memory = ctx.autopilot, ctx.state, ctx.state.adrift
     if status is None or not ctx.snapshot.permissions.may_set_mode:
         return False
     what = "becalmed" if ctx.is_raised("becalmed") else "adrift"
-    how = "lying still" if ahead is None else ahead.sentence()
+    how = _motion(ctx) if ahead is None else ahead.sentence()
     if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
         place = memory.loiter_en_m if memory.loiter_en_m is not None else ctx.reckoned_en
         ctx.set(adrift=replace(memory, loitered=True, loiter_en_m=place))

@@ -241,7 +241,7 @@ def last_resort(ctx: StepContext) -> bool:
     """Steer clear of a vessel that is too near to plan for; True while the helm is the field's."""
     memory, status, may = ctx.state.by_field, ctx.autopilot, ctx.snapshot.permissions
     raised = ctx.is_raised(NAME)
-    if status is None or (ctx.guidance is Guidance.FIELD and ctx.steers):
+    if status is None or ctx.is_field_steered:
         return False
     if not memory.resort.engaged:
         if not raised or ctx.t_s < memory.not_before_s:
@@ -339,7 +339,7 @@ def keeps_station(ctx: StepContext) -> bool:
     place = ctx.gates[-1].en_m
     off = "" if boat is None else f", {distance_m(boat, place):.0f} m off"
     ctx.phase(Doing.HOLDING, f"keeping station: waiting {left_s:.0f} s more{off}")
-    if ctx.guidance is not Guidance.FIELD or not ctx.steers or not ctx.config.sails:
+    if not ctx.is_field_steered or not ctx.config.sails:
         hand_back(ctx)  # out of GUIDED; a motorboat lies still in the autopilot's own loiter
         return True
     status, seen = ctx.autopilot, situation(ctx)

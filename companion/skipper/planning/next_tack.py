@@ -34,6 +34,11 @@ class Seen(Protocol):
         """What is remembered."""
         ...
 
+    @property
+    def is_field_steered(self) -> bool:
+        """Whether a field steers the boat, and not the plan on board."""
+        ...
+
 
 class OnLeg(NamedTuple):
     """How far it is to the present waypoint [m], and how far off its leg, to the right of it [m]; None: not known."""
@@ -43,12 +48,12 @@ class OnLeg(NamedTuple):
 
 
 def on_leg(seen: Seen) -> OnLeg:
-    """Return where the boat is on its leg: as the autopilot tells, in GUIDED by her own position.
+    """Return where the boat is on its leg: as the autopilot tells, in GUIDED by her own position; by field on none.
 
     Steered by headings ArduRover knows of no waypoint, and tells 0 of both.
     """
     status, here, mission = seen.snapshot.autopilot, seen.snapshot.position_en_m, seen.state.mission
-    if status is None:
+    if status is None or seen.is_field_steered:
         return OnLeg(None, None)
     if status.mode is not Mode.GUIDED or seen.state.steering.own_mode is not Mode.GUIDED:
         return OnLeg(status.waypoint_distance_m, status.cross_track_m)
@@ -76,7 +81,7 @@ def next_tack_s(seen: Seen, boat: Boat) -> float | None:
 
 
 def next_tack(seen: Seen, boat: Boat) -> NextTack | None:
-    """Return the next tack, planned or the autopilot's own; None: there is none, or no way on.
+    """Return the next tack, planned or the autopilot's own; None: there is none, no way on, or a field steers.
 
     On a leg inside its no-go zone the autopilot beats: it keeps the tack that it comes on until the edge of its
     corridor, or until the other tack fetches the waypoint; in GUIDED it does not beat, and such a leg is planned anew.
@@ -89,6 +94,7 @@ def next_tack(seen: Seen, boat: Boat) -> NextTack | None:
     tws_mps = wind.mean_tws_mps if wind.present_tws_mps is None else wind.present_tws_mps
     if (
         route is None
+        or seen.is_field_steered
         or wind_rad is None
         or tws_mps is None
         or vehicle is None

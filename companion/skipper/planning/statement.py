@@ -24,7 +24,17 @@ from companion.messages import WindForecast
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import SpeedSeen
 from companion.skipper.step.wind_limits import strength_of
-from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m, half_width_rad, mean_twd_rad, moved
+from companion.skipper.way import (
+    Gate,
+    PointEn,
+    Side,
+    Voyage,
+    bearing_rad,
+    distance_m,
+    half_width_rad,
+    mean_twd_rad,
+    moved,
+)
 from companion.skipper.way.gates import discs_of
 from companion.skipper.way.line import STRAY_M
 from companion.skipper.way.shortest import shortest_way
@@ -333,11 +343,7 @@ def problem_dict(
         "start": {"x": start.en_m[0], "y": start.en_m[1], "heading_deg": math.degrees(wrap_two_pi(start.heading_rad))},
         "goal": {"x": aim.en_m[0], "y": aim.en_m[1], "radius": aim.radius_m},
         "obstacles": [*obstacles, *discs, *gate.keep_out],
-        "obstacle_names": [
-            *names,
-            *("a mark" for _ in discs),
-            *(f"the wrong side of {gate.name}" for _ in gate.keep_out),
-        ],
+        "obstacle_names": [*names, *mark_names(voyage), *(f"the wrong side of {gate.name}" for _ in gate.keep_out)],
         "fence": fence,
         "wind": wind,
         "boat": boat,
@@ -350,6 +356,17 @@ def problem_dict(
         if max_path_risk is None
         else {"max_path_risk": max_path_risk, "correlation_time_s": forecast.correlation_time_s},
     }
+
+
+def mark_names(voyage: Voyage) -> tuple[str, ...]:
+    """Return what the marks of ``discs_of`` are called, in its order."""
+    out: list[str] = []
+    for goal in voyage.goals:
+        if goal.line is not None:
+            out += 2 * [f"a mark of {goal.name}" if goal.name else "a mark"]
+        elif goal.side is not Side.NONE:
+            out.append(f"the buoy {goal.name}" if goal.name else "a mark")
+    return tuple(out)
 
 
 def _notched(

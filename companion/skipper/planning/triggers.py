@@ -15,16 +15,7 @@ from companion.skipper.planning.diversions import BEHIND, diversion, homeward, i
 from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
-from companion.skipper.step import (
-    Diversion,
-    DiversionKind,
-    Guidance,
-    Phase,
-    ReplanPolicy,
-    ReplanReason,
-    Route,
-    StepContext,
-)
+from companion.skipper.step import Diversion, DiversionKind, Phase, ReplanPolicy, ReplanReason, Route, StepContext
 from companion.skipper.step.missions import NO_PLAN, path_length_m
 from companion.skipper.way import Gate, PointEn, bearing_rad, distance_m, half_width_rad
 from companion.skipper.way.judge import predicted_beat
@@ -95,7 +86,7 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
         )
     if "fence breach" in fresh:
         return Trigger(reason=ReplanReason.OBSTACLE, text="fence breach", urgent=True)
-    if ctx.guidance is Guidance.FIELD and ctx.steers:
+    if ctx.is_field_steered:
         if is_composed(ctx) and route is not None and ctx.state.progress.gate in route.gate_of:
             return None  # what is on board leads to the goal's place: that is where it goes when it is not steered
         return _at_end(ctx) or _extension(ctx, bound)  # the mission on board need not be the way that is sailed

@@ -88,6 +88,12 @@ def permitted(action: Action, permissions: Permissions) -> bool:
     return True
 
 
+def field_steers(snapshot: Snapshot, state: SkipperState, config: SkipperConfig) -> bool:
+    """Return whether a field steers the boat and not the plan on board: the mission's or a goal's own, if permitted."""
+    may = snapshot.permissions
+    return (state.by_field.composed or config.guidance is Guidance.FIELD) and may.may_steer and may.may_set_mode
+
+
 def _kept_in(voyage: Voyage, drawn: Drawn | None, circle: HomeCircle | None) -> Voyage:
     """Return the voyage in what the autopilot's own fence leaves of its water."""
     if drawn is not None:
@@ -599,10 +605,15 @@ class StepContext:
         return may.may_steer and may.may_set_mode
 
     @property
+    def is_field_steered(self) -> bool:
+        """Whether a field steers the boat: nothing of the plan on board is true of the way that is sailed."""
+        return field_steers(self.snapshot, self.state, self.config)
+
+    @property
     def is_by_field(self) -> bool:
         """Whether a field steers the boat now, in GUIDED."""
         status = self.autopilot
-        return self.steers and self.guidance is Guidance.FIELD and status is not None and status.mode is Mode.GUIDED
+        return self.is_field_steered and status is not None and status.mode is Mode.GUIDED
 
     @property
     def sails_in(self) -> Mode:

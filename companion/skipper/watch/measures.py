@@ -145,8 +145,9 @@ def corridor_m(ctx: StepContext) -> float:
 def _corridor(ctx: StepContext) -> float | None:
     """Share of the corridor used; in open water the grid size bounds it, not the margin, and a beat its own boards."""
     boat, leg = ctx.boat_en, ctx.leg()
-    if boat is None or leg is None or not ctx.ahead() or ctx.state.steering.own_mode in STOPPING or is_composed(ctx):
-        return None  # stopped, or by a field of the boat's own, it follows no leg
+    is_stopped = ctx.state.steering.own_mode in STOPPING
+    if boat is None or leg is None or not ctx.ahead() or is_stopped or ctx.is_field_steered or is_composed(ctx):
+        return None  # stopped, or by field, it follows no leg
     if distance_m(*leg) < 1.0:
         return 0.0
     if along_m(boat, *leg) < 0.0:

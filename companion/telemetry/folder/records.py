@@ -367,7 +367,7 @@ class VoyageFigures:
         self.current = snapshot.current
         if snapshot.traffic is not None:
             self.traffic = snapshot.traffic.counts
-        route = step.state.mission.route
+        route = step.sailed
         if route is not None:
             self.promised_risk = max(self.promised_risk or 0.0, 1.0 - route.delta_s)
             self.promised_risk_vessels = max(self.promised_risk_vessels, route.vessels_part)

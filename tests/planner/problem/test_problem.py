@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
 
 from companion.errors import InputError
 from companion.planner import Plan, PlanStatus, Problem, plan
+from companion.planner.problem.evaluate import endpoint_error
 from companion.planner.problem.parts import interpolated
 from tests.planner.problem_json import to_dict
 from tests.planner.problems import box, random_problems, simple
@@ -119,9 +122,12 @@ def test_the_zone_widens_with_probability_and_time():
         ({"boat": simple()["boat"] | {"turn_rate_rad_s": 0}}, "turn rate"),
         ({"obstacles": [box(-10, -10, 10, 10)]}, "start is inside"),
         ({"obstacles": [box(-10, 90, 10, 110)]}, "goal is inside"),
-        ({"fence": box(-10, 5, 10, 110)}, "start is inside an obstacle or outside"),
-        ({"fence": box(-60, -5060, 60, -5000)}, "start is inside an obstacle or outside"),  # of another lake
-        ({"fence": box(-60, -60, 60, 60), "goal": {"x": 0, "y": 900, "radius": 2}}, "goal is inside"),
+        ({"fence": box(-10, 5, 10, 110)}, "start is outside the fence, or nearer"),
+        ({"fence": box(-60, -5060, 60, -5000)}, "start is outside the fence, or nearer"),  # of another lake
+        (
+            {"fence": box(-60, -60, 60, 60), "goal": {"x": 0, "y": 900, "radius": 2}},
+            "goal is outside the fence, or nearer",
+        ),
     ],
 )
 def test_what_cannot_be_planned_is_invalid_with_the_reason(change, words):
@@ -129,6 +135,28 @@ def test_what_cannot_be_planned_is_invalid_with_the_reason(change, words):
     assert answer.status is PlanStatus.INVALID
     assert words in answer.reason
     assert len(answer.waypoints_en) == 0
+
+
+@pytest.mark.parametrize(
+    ("wall_m", "limit_m", "words"),
+    [
+        ((-9.5, -20.0), -60.0, "9.5 m from the Quay, and 12.0 m are kept clear of it"),
+        ((2.0, -20.0), -60.0, "inside the Quay"),
+        ((-40.0, -50.0), -7.0, "7.0 m from the fence, nearer than is kept clear"),
+        ((-40.0, -50.0), 1.0, "outside the fence"),
+    ],
+)
+@pytest.mark.parametrize("search", [endpoint_error, lambda p: plan(p, expansions=10).reason])
+def test_a_place_in_free_water_is_not_called_inside_an_obstacle(wall_m, limit_m, words, search):
+    """The obstacles of a voyage's problem are grown by its margin: the start lay 9.5 m from a wall, "inside"."""
+    wall, limits = shapely.box(-200, wall_m[1], 200, wall_m[0]), shapely.box(-300, limit_m, 300, 300)
+    made = simple(obstacles=[wall.buffer(12.0).wkt], obstacle_names=["the Quay"], fence=limits.buffer(-12.0).wkt)
+    helm = {"wp_radius_m": 5.0, "turn_radius_m": 5.0, "wp_speed_mps": 3.0, "accel_mps2": 1.0, "jerk_mps3": 1.0}
+    made["tracking"] = {**helm, "corridor_m": 10.0, "no_go_half_deg": 45.0, "floor_m": 3.0, "reach_m": 0.5}
+    made["tracking"] |= {"solids": [wall.wkt], "limits": limits.wkt, "correlation_s": 60.0}
+    assert search(Problem.from_json(made)) == f"start is {words}"
+    mark = replace(Problem.from_json(made), obstacles=(shapely.Point(0.0, 5.0).buffer(6.0),), obstacle_names=("B",))
+    assert search(mark) == "start is within what is kept clear of B"
 
 
 def test_a_plan_survives_json():

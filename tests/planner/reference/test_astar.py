@@ -244,6 +244,7 @@ def test_the_grid_refuses_to_grow_past_its_memory_and_says_what_would_fit():
     assert outcome.waypoints_en is None
     assert outcome.status is PlanStatus.NOT_FOUND
     assert "MB allowed" in outcome.reason
+    assert "[planner] grid_m" in outcome.reason
     fits = float(outcome.reason.split("one of ")[1].split(" m")[0])
     grid = grid_of(problem(), 1.1 * fits)
     assert grid.memory_bytes <= AstarSettings().memory_bytes

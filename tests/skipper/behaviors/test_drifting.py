@@ -9,13 +9,14 @@ import shapely
 import shapely.affinity
 
 from companion.messages import Mode
-from companion.skipper.behaviors.drifting import CALL, MEANS, is_cramped, lies_in_loiter
+from companion.skipper.behaviors.drifting import CALL, MEANS, is_cramped, lies_in_loiter, stops_drift
 from companion.skipper.step import actions as act
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
 from companion.skipper.way.drift import drift_ahead
 from companion.skipper.way.voyage import Goal
+from tests.skipper.moments import NOW_S, moment
 from tests.skipper.test_voyage import is_done, make, said
 from tests.skipper.world import restarted, with_parts
 
@@ -87,6 +88,18 @@ def test_in_a_calm_she_loiters_and_sails_on_from_where_the_current_has_taken_her
     assert not said(w, "operator")
     assert w.run(900, is_done)
     assert w.clearance() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "how"), [(0.1, "lying still"), (0.35, "making 0.35 m/s towards 090°"), (0.6, "making 0.6 m/s")]
+)
+def test_in_a_loiter_she_lies_still_only_where_she_does(speed_mps, how):
+    """Going round in circles her mean is nothing, and "lying still" was said at 0.4 m/s."""
+    still = {"ground_en_mps": (0.0, 0.0), "ground_t_s": NOW_S, "loitered": True}
+    ctx = moment(speed_mps=speed_mps, tws_mps=0.2, up=("becalmed",), adrift=still, steering={"own_mode": Mode.LOITER})
+    ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, mode=Mode.LOITER))
+    assert stops_drift(ctx)
+    assert ctx.state.why.startswith(f"becalmed, {how}")
 
 
 def test_a_still_calm_changes_nothing():

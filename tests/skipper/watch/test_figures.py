@@ -10,7 +10,7 @@ from shapely.geometry import box
 
 from companion.messages import MissionState, Mode
 from companion.safety import BY_NAME, SENSORS, TABLE
-from companion.skipper.step.config import Ends
+from companion.skipper.step.config import ALL_PERMITTED, Ends, Guidance
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.snapshot import WindEstimate, WindHealth
 from companion.skipper.step.state import Charge, Fix
@@ -192,6 +192,14 @@ def test_a_beat_has_its_own_corridor_where_that_is_wider():
 )
 def test_who_follows_no_leg_is_on_none(change):
     assert measure(moment(WAY, at=(100.0, 90.0), **change), "off the corridor") is None
+
+
+def test_who_is_steered_by_field_is_off_no_corridor():
+    """ "off the corridor: plan again from the boat" was said, and by field nothing is planned."""
+    by_field = {"config": {"guidance": Guidance.FIELD}}
+    assert measure(moment(WAY, at=(100.0, 90.0), **by_field), "off the corridor") is None
+    by_plan = replace(ALL_PERMITTED, may_steer=False)
+    assert measure(moment(WAY, at=(100.0, 90.0), permissions=by_plan, **by_field), "off the corridor") > 1.0
 
 
 def test_a_leg_without_length_has_no_corridor():
