@@ -34,9 +34,19 @@ def sail(folder):
     index = PolygonIndex([Point(0.0, 0.0).buffer(10.0)])
     points = np.array([[0.0, 0.0], [20.0, 5.0]])
     index.contains(points), index.distance_m(points), index.intersects([[0.0, 0.0, 30.0, 5.0]])
+    told = []
     for name in ("demo", "crossing", "buoy-course"):
         path = Path("sitl/scenarios", f"{name}.toml")
-        run_virtual(run_embedded(load_scenario(path), path, 0, Path(folder, name), expansions=2000))
+        run_virtual(
+            run_embedded(
+                load_scenario(path),
+                path,
+                0,
+                Path(folder, name),
+                expansions=2000,
+                on_status=lambda _, step: told.append(step.eta()),  # as the status line asks
+            )
+        )
 
 
 def cross():

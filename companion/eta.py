@@ -18,7 +18,7 @@ from companion.current import over_water
 from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.geo.segments import enters_disc
 from companion.messages import Command, Mode
-from companion.safety import LIGHT_MPS
+from companion.safety import LIGHT_MPS, SAILS_MPS
 from companion.skipper.step import Phase, SkipperState, Snapshot, SpeedSeen, WindEstimate
 from companion.skipper.way import PointEn, Voyage, cross_track_m, gates_of, moved
 
@@ -28,7 +28,6 @@ FOLLOWS = frozenset({Mode.AUTO, Mode.GUIDED})  # the modes in which the boat fol
 STEP_S = 5.0  # of a walk
 REACH_S = 900.0  # walked so far in steps; the legs beyond that are taken whole
 WIND_S = 30.0  # the wind is taken to be one for so long
-BECALMED, SAILS_MPS = "becalmed", 0.5  # the watchdog of a calm; who is slower in one only drifts
 SLOW_MPS = 0.2  # the least that it is taken to make
 SHARPEST_RAD = math.radians(150.0)  # a turn that is sharper cuts no more of its corner
 LOOK_S = 30.0  # a walk to the end of the leg that is sailed then is held against what comes ...
@@ -209,7 +208,7 @@ def _is_becalmed(snapshot: Snapshot, state: SkipperState) -> bool:
     """
     wind_mps, vehicle = snapshot.wind.present_tws_mps, snapshot.vehicle
     is_calm = wind_mps is not None and vehicle is not None and wind_mps < LIGHT_MPS and vehicle.speed_mps < SAILS_MPS
-    return is_calm or any(raised.name == BECALMED for raised in state.alarms.raised)
+    return is_calm or any(raised.name == "becalmed" for raised in state.alarms.raised)
 
 
 def _is_leaving(state: SkipperState) -> bool:
@@ -283,8 +282,8 @@ def _walk(
     walker = _Walker(winds, snapshot.current.planned_en_mps, voyage.boat, limits, heading_rad=vehicle.heading_rad)
     gates = gates_of(voyage, state.progress.approaches)
     goal = next((n for n in range(state.progress.gate, len(gates)) if gates[n].ends_goal), None)
-    is_bound = bool(route.bound_for) and goal not in route.gate_of[state.mission.index :]
-    if is_bound:
+    is_for_goals = route.is_for_goals(state.mission.index)
+    if not is_for_goals:
         goal = None  # home, a refuge, a place that was named: there at the last waypoint
     mark = None if goal is None else (gates[goal].en_m, gates[goal].radius_m)
     at, time_s, last = here, 0.0, -1
@@ -294,7 +293,7 @@ def _walk(
         if route.items[n].command != Command.NAV_WAYPOINT or time_s >= whole_s or (until is not None and n > until):
             break
         start, end, last = route.leg_from_en_m[n], route.points_en_m[n], n
-        ends_goal = n == route.bound_at if is_bound else goal is not None and route.gate_of[n] == goal
+        ends_goal = goal is not None and route.gate_of[n] == goal if is_for_goals else n == route.bound_at
         while time_s < REACH_S:
             to_go_m = math.dist(at, end)
             if to_go_m <= limits.wp_radius_m:

@@ -23,6 +23,7 @@ from companion.messages import AutopilotStatus, Mode, Severity, StatusText
 
 JUMP_M = 10.0  # a fix this much farther from where the boat is reckoned than it can have turned away is a jump
 LIGHT_MPS = 0.8  # less wind than this makes no way that is worth a plan
+SAILS_MPS = 0.5  # a boat that is slower in a calm only drifts
 
 
 class Response(enum.Enum):

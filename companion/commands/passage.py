@@ -509,16 +509,12 @@ def _solids(asked: PassageFile, path: Path) -> list[BaseGeometry]:
     return out
 
 
-def _planned_beside(out: Path) -> Path:
-    from companion.view.passage import planned_beside
-
-    return planned_beside(out)
-
-
 def _refuse_out(args: argparse.Namespace) -> None:
     """Raise InputError where a mission, or the passage that is drawn beside it, is there and nobody said --force."""
+    from companion.view.passage import planned_beside
+
     if args.out is not None:
-        refuse_existing([str(args.out), str(_planned_beside(args.out))], force=args.force)
+        refuse_existing([str(args.out), str(planned_beside(args.out))], force=args.force)
 
 
 def _write_mission(
@@ -528,9 +524,10 @@ def _write_mission(
     import msgspec
 
     from companion import __version__
+    from companion.view.passage import planned_beside
     from companion.view.planned import planned_of
 
-    beside = _planned_beside(args.out)
+    beside = planned_beside(args.out)
     planned = planned_of(
         passage,
         route,

@@ -89,7 +89,7 @@ def goal_distance_m(step: Step, voyage: Voyage) -> float | None:
     """
     here, route, progress = step.snapshot.position_en_m, step.state.mission.route, step.state.progress
     is_elsewhere = progress.gate >= len(gates_of(voyage, progress.approaches)) or (
-        route is not None and bool(route.bound_for)
+        route is not None and not route.is_for_goals(step.state.mission.index)
     )
     return None if here is None or is_elsewhere else math.dist(here, voyage.legs[_goal(step, voyage)].en_m)
 

@@ -14,6 +14,7 @@ from companion.messages import Mode
 from companion.orders import Verb
 from companion.skipper.step import Announce, Phase
 from companion.skipper.step.state import Raised, Standing
+from companion.telemetry.status import goal_distance_m
 from sitl.run.embedded import run_embedded
 from sitl.scenario import load_scenario
 from tests.skipper.world import with_parts
@@ -91,7 +92,10 @@ def test_the_time_is_to_the_goal_that_is_next_where_the_mission_leads_on_behind_
     on = replace(route, bound_for="home")
     assert replace(step, state=with_parts(step.state, mission={"route": on})).eta().there_s == eta.there_s
     left = replace(on, gate_of=(-1,) * len(on.items))  # a diversion: no goal is on this way
-    assert replace(step, state=with_parts(step.state, mission={"route": left})).eta().there_s != eta.there_s
+    aside = replace(step, state=with_parts(step.state, mission={"route": left}))
+    assert aside.eta().there_s != eta.there_s
+    assert goal_distance_m(aside, aside.voyage) is None
+    assert goal_distance_m(replace(step, state=with_parts(step.state, mission={"route": on})), step.voyage) > 0.0
 
 
 def test_no_time_is_told_in_a_calm_at_a_halt_or_of_a_goal_that_is_left(demo):

@@ -7,9 +7,8 @@ import pytest
 from shapely.geometry import box
 
 from companion.messages import GeoPoint, Mode
-from companion.skipper.behaviors.rest import rest
-from companion.skipper.planning.diversions import ROOM, diversion
-from companion.skipper.planning.diversions import homeward as behind
+from companion.skipper.behaviors.rest import comes_to_rest, rest
+from companion.skipper.planning.diversions import ROOM, after_last_goal, diversion
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import SafeEnd
 from companion.skipper.step.route import DiversionKind
@@ -76,15 +75,16 @@ def rooms_m(ctx, place):
 def test_behind_a_goal_without_room_for_a_loiter_a_place_with_room_is_next():
     """She circled from side to side of the creek, and touched; from its middle no straight line leads to room."""
     ctx = in_creek(progress={"gate": 1})
-    bound = behind(ctx)
+    bound = after_last_goal(ctx)
     assert (bound.kind, bound.name) == (DiversionKind.ROOM, ROOM)
     assert bound.why == "Quay has no room for a loiter"
     assert rooms_m(ctx, bound.en_m) >= 15.0
+    assert bound.en_m[1] < 100.0  # near the mouth: beside the creek, behind its bank, is farther by water
     assert math.isfinite(way_m(ctx.voyage.area, QUAY.en_m, bound.en_m, 5.0))
     assert diversion(ctx) == bound
     tried = in_creek(progress={"gate": 1}, plans={"retry": Retry(failures=3)})
-    assert behind(tried) is None  # there is no way: she rests, and tries on from there
-    assert behind(in_creek(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(), progress={"gate": 1})) is None
+    assert after_last_goal(tried) is None  # there is no way: she rests, and tries on from there
+    assert after_last_goal(in_creek(Goal(en_m=(0.0, 320.0), radius_m=8.0), obstacles=(), progress={"gate": 1})) is None
 
 
 def test_she_does_not_wait_for_a_plan_where_a_loiter_has_no_room():
@@ -103,6 +103,31 @@ def test_she_does_not_wait_for_a_plan_where_a_loiter_has_no_room():
     assert diversion(roomy) is None
     narrow.set(plans=replace(narrow.state.plans, retry=Retry()))
     assert diversion(narrow) is None  # no plan was wanting
+
+
+@pytest.mark.parametrize("place", [(0.0, -60.0), (0.0, 300.0)])
+def test_it_is_said_once_that_she_rests_elsewhere_now_with_room_or_without(place):
+    ctx = in_creek(progress={"gate": 1}, plans={"retry": Retry(failures=3)})
+    ctx.set(voyage=replace(ctx.state.voyage, over="the goal is reached", arrived=True, rest_en_m=QUAY.en_m))
+    route, index = led_to(ctx, place), len(ctx.state.mission.route.items) - 1
+    ctx.set(mission=replace(ctx.state.mission, route=replace(route, bound_for=ROOM), index=index, own_index=index))
+    for _ in range(3):
+        bound = diversion(ctx)
+        assert bound is None or comes_to_rest(ctx, bound)
+    assert ctx.state.voyage.over == "the goal is reached; she lies where a loiter has room"
+    assert ctx.state.voyage.rest_en_m == place
+    assert [a.code for a in ctx.actions if isinstance(a, act.Announce)].count("done") == 1
+
+
+def test_at_home_with_the_battery_critical_the_voyages_end_is_told_once():
+    world = homeward()
+    assert world.run(900, is_done)
+    why = world.state.voyage.over
+    charged(world, 0.05)
+    world.run(60)
+    assert any(isinstance(a, act.Announce) and a.code == "battery critical" for _, a in world.actions)
+    assert world.state.voyage.over == why
+    assert [a.code for _, a in world.actions if isinstance(a, act.Announce)].count("done") == 1
 
 
 def led_to(ctx, place):

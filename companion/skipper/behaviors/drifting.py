@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from companion.frozen import changed
 from companion.geo.angles import difference_rad, direction, heading_of
 from companion.messages import Mode, Severity
-from companion.safety import LIGHT_MPS
+from companion.safety import LIGHT_MPS, SAILS_MPS
 from companion.skipper.behaviors.helm import is_busy, run_motor, set_mode
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import ROOMIER_M
@@ -29,7 +29,6 @@ STEERAGE_MPS = 0.4  # less wind than this moves no boat that could be steered
 DRIFT_MPS = 0.15  # a slower velocity is a receiver's noise
 SLOW_MPS = 0.04  # of a drift seen in places: 2.4 m in a minute; slower is a receiver's noise, too
 PLACE_S, SLOW_PLACES, LEAST_S = 10.0, 6, 30.0  # places of a boat that hardly moves: one in 10 s, a minute, half of it
-SAILS_MPS = 0.5
 AGAINST_RAD = math.radians(60.0)  # a boat that sails makes less leeway than this, in any current that it can stem
 ASTERN_MPS = 0.3  # slower going astern shows nothing: a turn, a wave, a noisy receiver
 ASTERN_RAD = math.radians(30.0)  # the course is so near to dead astern of the bow

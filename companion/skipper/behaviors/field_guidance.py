@@ -115,7 +115,7 @@ def situation(ctx: StepContext) -> Situation | None:
     if boat is None or vehicle is None or (wind is None and ctx.config.sails):
         return None
     seen = obstacles(ctx, near(ctx))
-    buoys = tuple(MovingObstacle(en_m=mark, keep_m=keep_m) for mark, keep_m in marks_of(ctx.voyage))
+    buoys = tuple(MovingObstacle(en_m=mark.en_m, keep_m=mark.keep_m) for mark in marks_of(ctx.voyage))
     return Situation(
         t_s=ctx.t_s,
         en_m=boat,

@@ -20,7 +20,7 @@ from companion.skipper.step import CancelPlan, Diversion, DiversionKind, Phase, 
 
 ANSWERED = {"": "for a person", SHORE: "until the link to the shore is back, or a person gives AUTO"}
 TAKEN = "until a person takes her and gives AUTO back"
-BEHIND = {HOME: "; home", ROOM: "; she lies where a loiter has room"}  # the last goal
+LIES = {HOME: "; home", ROOM: "; she lies where a loiter has room"}  # behind the last goal
 UNTIL_TOLD = "until told to go on"
 
 
@@ -36,15 +36,9 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
         reached = len(ctx.state.progress.reached)
         _end(ctx, f"out of time: {reached} of {len(ctx.voyage.legs)} goals reached", arrived=False)
         return True
-    if (
-        bound.kind in {DiversionKind.HOME, DiversionKind.ROOM}
-        and ctx.gate is None
-        and not ctx.state.operator.answering
-        and not bound.is_ordered
-    ):
+    if bound.name in LIES and ctx.gate is None and not ctx.state.operator.answering and not bound.is_ordered:
+        _moved_to_room(ctx, bound)
         ctx.set(voyage=changed(ctx.state.voyage, home_reached=True))
-        if ctx.state.voyage.over:  # she rested in what had no room
-            _end(ctx, f"{ctx.state.voyage.over}{BEHIND[ROOM]}", arrived=ctx.state.voyage.arrived)
         rest(ctx)
         return True
     if bound.kind is DiversionKind.REST:
@@ -57,6 +51,14 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
     how_long = UNTIL_TOLD if bound.is_ordered else bound.until or _how_long(ctx)
     ctx.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
     return True
+
+
+def _moved_to_room(ctx: StepContext, bound: Diversion) -> None:
+    """Rest from now on where there is room, of a voyage that was over in what had none."""
+    voyage, route = ctx.state.voyage, ctx.state.mission.route
+    is_moved = route is not None and voyage.rest_en_m != route.points_en_m[-1]
+    if bound.kind is DiversionKind.ROOM and voyage.over and is_moved:
+        _end(ctx, f"{voyage.over.removesuffix(LIES[ROOM])}{LIES[ROOM]}", arrived=voyage.arrived)
 
 
 def _how_long(ctx: StepContext) -> str:
@@ -80,8 +82,8 @@ def rest(ctx: StepContext) -> None:
         ends_home = ctx.config.safe_end is SafeEnd.RETURN and not ctx.state.voyage.home_reached
         trouble = home_trouble(ctx) if ends_home else ""
         route = ctx.state.mission.route
-        behind = BEHIND.get(route.bound_for, "") if ctx.state.voyage.home_reached and route is not None else ""
-        home = f"; not home: {trouble}" if trouble else behind
+        lies = LIES.get(route.bound_for, "") if ctx.state.voyage.home_reached and route is not None else ""
+        home = f"; not home: {trouble}" if trouble else lies
         end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
         goals = len(ctx.voyage.legs)
         reached = "the goal is reached" if goals == 1 else f"all {goals} goals reached"

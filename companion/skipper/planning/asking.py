@@ -14,7 +14,7 @@ from companion.frozen import changed
 from companion.messages import Mode, Severity
 from companion.planner import Problem
 from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
-from companion.skipper.planning.diversions import diversion, gate_for, homeward
+from companion.skipper.planning.diversions import after_last_goal, diversion, gate_for
 from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.planning.tides import told
@@ -236,7 +236,7 @@ def _target(ctx: StepContext, from_index: int | None) -> tuple[Gate, int, Divers
     bound = diversion(ctx)
     number = None if bound is not None else _gate_after(ctx, from_index)
     if bound is None and number is None:
-        bound = homeward(ctx)
+        bound = after_last_goal(ctx)
     if bound is not None:
         return (gate_for(bound), -1, bound) if bound.has_place else None
     return None if number is None else (ctx.gates[number], number, None)
@@ -278,7 +278,7 @@ def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung)
         for side in (0.0, 0.35, -0.35, 0.8, -0.8)
     ]
     for place in candidates:
-        off_marks_m = min((distance_m(place, mark) - keep_m for mark, keep_m in marks_of(ctx.voyage)), default=math.inf)
+        off_marks_m = min((distance_m(place, m.en_m) - m.keep_m for m in marks_of(ctx.voyage)), default=math.inf)
         room_m = min(float(ctx.voyage.area.clearance_m([place])[0]) - step.margin_m, off_marks_m)
         if room_m >= ctx.config.loiter_radius_m:
             return Aim(en_m=place, radius_m=ctx.config.loiter_radius_m, gate=-1)

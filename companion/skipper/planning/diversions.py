@@ -26,7 +26,7 @@ from companion.traffic import Policy
 
 DRAGGED = "dragged off"  # a watchdog
 HOME, REST, ROOM = "home", "the place to rest", "water with room"
-BEHIND = {HOME, ROOM}  # where she may be bound for behind the last goal
+AFTER_LAST_GOAL = {HOME, ROOM}  # where she may be bound for then
 ROOM_TRIES = 3  # to find a way to water with room, behind the last goal
 GOAL_RADIUS_M = 10.0  # a place that is named under way: there within this
 ABOUT_M = 10.0  # how far off a refuge is by water is told from so near
@@ -177,7 +177,7 @@ def _at_the_end(ctx: StepContext) -> Diversion | None:
             return ended
     if state.voyage.over:
         return _back(ctx) or _off_narrow_rest(ctx)
-    return homeward(ctx) if ctx.gate is None else None
+    return after_last_goal(ctx) if ctx.gate is None else None
 
 
 def _ended_early(ctx: StepContext, *, over_orders: bool) -> Diversion | None:
@@ -258,7 +258,7 @@ def _found(ctx: StepContext, end: End, why: str) -> Diversion | None:
     return home or _refuge(ctx, why) if end is End.HOME else _refuge(ctx, why) or home
 
 
-def homeward(ctx: StepContext) -> Diversion | None:
+def after_last_goal(ctx: StepContext) -> Diversion | None:
     """Return the way behind the last goal: home where the mission ends there, to water with room where the goal has
     none for a loiter; None: there is none, or she has come there.
     """  # noqa: D205

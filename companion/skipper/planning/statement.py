@@ -24,18 +24,8 @@ from companion.messages import WindForecast
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import SpeedSeen
 from companion.skipper.step.wind_limits import strength_of
-from companion.skipper.way import (
-    Gate,
-    PointEn,
-    Side,
-    Voyage,
-    bearing_rad,
-    distance_m,
-    half_width_rad,
-    mean_twd_rad,
-    moved,
-)
-from companion.skipper.way.gates import discs_of
+from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m, half_width_rad, mean_twd_rad, moved
+from companion.skipper.way.gates import marks_of
 from companion.skipper.way.line import STRAY_M
 from companion.skipper.way.shortest import shortest_way
 
@@ -294,7 +284,7 @@ def problem_dict(
     obstacles, names = voyage.area.obstacles_wkt(margin_m), voyage.area.obstacle_names(margin_m)
     if start.notch_m > 0.0:
         obstacles, names, fence = _notched(voyage, start, (obstacles, names), fence, floor_m)
-    discs = discs_of(voyage, stray_m)
+    marks = marks_of(voyage, stray_m)
     corridor = band(voyage, gate, start.en_m, aim.en_m)
     if corridor is not None:
         limits = shapely.intersection(corridor, shapely.from_wkt(fence)) if fence is not None else corridor
@@ -342,8 +332,12 @@ def problem_dict(
         "title": title,
         "start": {"x": start.en_m[0], "y": start.en_m[1], "heading_deg": math.degrees(wrap_two_pi(start.heading_rad))},
         "goal": {"x": aim.en_m[0], "y": aim.en_m[1], "radius": aim.radius_m},
-        "obstacles": [*obstacles, *discs, *gate.keep_out],
-        "obstacle_names": [*names, *mark_names(voyage), *(f"the wrong side of {gate.name}" for _ in gate.keep_out)],
+        "obstacles": [*obstacles, *(mark.disc_wkt for mark in marks), *gate.keep_out],
+        "obstacle_names": [
+            *names,
+            *(mark.name for mark in marks),
+            *(f"the wrong side of {gate.name}" for _ in gate.keep_out),
+        ],
         "fence": fence,
         "wind": wind,
         "boat": boat,
@@ -356,17 +350,6 @@ def problem_dict(
         if max_path_risk is None
         else {"max_path_risk": max_path_risk, "correlation_time_s": forecast.correlation_time_s},
     }
-
-
-def mark_names(voyage: Voyage) -> tuple[str, ...]:
-    """Return what the marks of ``discs_of`` are called, in its order."""
-    out: list[str] = []
-    for goal in voyage.goals:
-        if goal.line is not None:
-            out += 2 * [f"a mark of {goal.name}" if goal.name else "a mark"]
-        elif goal.side is not Side.NONE:
-            out.append(f"the buoy {goal.name}" if goal.name else "a mark")
-    return tuple(out)
 
 
 def _notched(

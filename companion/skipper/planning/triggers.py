@@ -11,7 +11,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import Severity
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
-from companion.skipper.planning.diversions import BEHIND, diversion, homeward, is_composed
+from companion.skipper.planning.diversions import AFTER_LAST_GOAL, after_last_goal, diversion, is_composed
 from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
@@ -119,7 +119,7 @@ def _diversion(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
     if bound is not None and leads_to != bound.name:
         is_urgent = is_first or bound.kind is DiversionKind.ROOM
         return Trigger(reason=REASONS[bound.kind], text=bound.sentence, urgent=is_urgent, interval_s=interval_s)
-    is_behind = leads_to in BEHIND and homeward(ctx) is not None
+    is_behind = leads_to in AFTER_LAST_GOAL and after_last_goal(ctx) is not None
     if bound is None and leads_to and not is_behind and not ctx.state.voyage.over:
         return Trigger(
             reason=ReplanReason.NEXT_GOAL,
@@ -301,11 +301,11 @@ def _extension(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
     if route is None or boat is None or last < ctx.state.mission.index:
         return None
     ends = route.gate_of[last]
-    if bound is not None or route.bound_for in BEHIND:
-        bound = bound or homeward(ctx)
+    if bound is not None or route.bound_for in AFTER_LAST_GOAL:
+        bound = bound or after_last_goal(ctx)
         if bound is None or distance_m(route.points_en_m[last], bound.en_m) <= bound.radius_m + ctx.config.announce_m:
             return None
-    elif ends >= len(ctx.gates) - 1 and homeward(ctx) is None:
+    elif ends >= len(ctx.gates) - 1 and after_last_goal(ctx) is None:
         return None
     elif 0 <= ends < len(ctx.gates) - 1 and waits_for_gun(ctx, ctx.gates[ends + 1]):
         return None  # where the boat waits is planned for when it is next

@@ -22,7 +22,7 @@ from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.route import Route
 from companion.skipper.way import PointEn, Voyage, bearing_rad, distance_m, moved, water_at
 from companion.skipper.way.drift import floor_from_m
-from companion.skipper.way.gates import marks_of
+from companion.skipper.way.gates import Mark, marks_of
 from companion.skipper.way.geometry import leg_distance_m
 from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import AreaLike
@@ -133,23 +133,21 @@ def _place_with_room(
     voyage: Voyage, area: AreaLike, config: SkipperConfig, end_en: PointEn, twd_from_rad: float
 ) -> PointEn | None:
     leeward, marks = twd_from_rad + math.pi, marks_of(voyage)
+    nearest, least_m = None, math.inf
     for ring_m in (*RINGS_M[1:], *FAR_RINGS_M):
+        if ring_m >= least_m:
+            break  # by water nothing is nearer than straight
         places = [moved(end_en, 2.0 * math.pi * n / DIRECTIONS, ring_m) for n in range(DIRECTIONS)]
         rooms = _rooms_m(voyage, config, marks, places, leeward)
-        roomy = [place for place, room in zip(places, rooms, strict=True) if room >= config.loiter_radius_m]
-        by_water = {place: way_m(area, end_en, place, config.margin_floor_m) for place in roomy}
-        nearest = min(roomy, key=by_water.__getitem__, default=None)
-        if nearest is not None and math.isfinite(by_water[nearest]):
-            return nearest
-    return None
+        for place in (place for place, room in zip(places, rooms, strict=True) if room >= config.loiter_radius_m):
+            far_m = way_m(area, end_en, place, config.margin_floor_m)
+            if far_m < least_m:
+                nearest, least_m = place, far_m
+    return nearest
 
 
 def _rooms_m(
-    voyage: Voyage,
-    config: SkipperConfig,
-    marks: Sequence[tuple[PointEn, float]],
-    places: Sequence[PointEn],
-    leeward: float,
+    voyage: Voyage, config: SkipperConfig, marks: Sequence[Mark], places: Sequence[PointEn], leeward: float
 ) -> NDArray[np.float64]:
     """Return of each place the room to loiter there [m]: all round, and for what drifts off to leeward."""
     down = [[moved(place, leeward, s * LEEWARD_ROOM_M) for s in (0.0, 0.25, 0.5, 0.75, 1.0)] for place in places]
@@ -160,15 +158,17 @@ def _rooms_m(
     return rooms
 
 
-def _off_marks_m(marks: Sequence[tuple[PointEn, float]], places: Sequence[PointEn]) -> NDArray[np.float64]:
+def _off_marks_m(marks: Sequence[Mark], places: Sequence[PointEn]) -> NDArray[np.float64]:
     """Return how far each place is from what plans keep clear of about the nearest mark [m]; inf without marks."""
-    off = [[distance_m(place, mark) - keep_m for mark, keep_m in marks] for place in places]
+    off = [[distance_m(place, mark.en_m) - mark.keep_m for mark in marks] for place in places]
     return np.array([min(row, default=math.inf) for row in off])
 
 
-def _meets_mark(marks: Sequence[tuple[PointEn, float]], from_en: PointEn, to_en: PointEn) -> bool:
+def _meets_mark(marks: Sequence[Mark], from_en: PointEn, to_en: PointEn) -> bool:
     """Return whether a straight line leads nearer to a mark than plans go, and than it begins."""
-    return any(leg_distance_m(mark, from_en, to_en) < min(keep_m, distance_m(mark, from_en)) for mark, keep_m in marks)
+    return any(
+        leg_distance_m(mark.en_m, from_en, to_en) < min(mark.keep_m, distance_m(mark.en_m, from_en)) for mark in marks
+    )
 
 
 def _line_clearance_m(water: AreaLike, from_en: PointEn, to_en: PointEn) -> float:

@@ -49,6 +49,10 @@ class Route:
         """The item at which she is where she is bound for; None: she is bound for the goals."""
         return len(self.items) - 2 if self.bound_for and len(self.items) > 1 else None  # behind it: the loiter
 
+    def is_for_goals(self, index: int) -> bool:
+        """Return whether what is left from item ``index`` on leads to a goal, even where more is planned behind it."""
+        return not self.bound_for or any(gate >= 0 for gate in self.gate_of[index:])
+
     def is_planned_from(self, index: int) -> bool:
         """Return whether a plan is asked for from item ``index`` on before the boat is there.
 

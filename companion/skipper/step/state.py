@@ -337,7 +337,7 @@ class VoyageState:
     under_way_s: float = 0.0  # how long the voyage has been under way ...
     last_step_s: float = float("-inf")  # ... counted from step to step
     set_sail_utc_s: float | None = None  # Unix time of setting sail, by the autopilot's clock
-    home_reached: bool = False  # the way home that follows the last goal is sailed
+    home_reached: bool = False  # the way that follows the last goal, home or to room for a loiter, is sailed
     over: str = ""  # why the voyage is over: what is left is to watch its loiter; empty: it is not
     arrived: bool = False  # ... with all goals reached, and home where the mission ends there
     rest_en_m: PointEn | None = None  # where the boat loiters since

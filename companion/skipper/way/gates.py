@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.skipper.way.geometry import barrier_wkt, bearing_rad, disc_wkt, distance_m, moved
@@ -146,23 +147,35 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
     return tuple(out)
 
 
-def marks_of(voyage: Voyage, stray_m: float = STRAY_M) -> tuple[tuple[PointEn, float], ...]:
-    """Return every mark of the voyage and how far plans keep clear of it [m]: buoys, and the ends of lines.
+class Mark(NamedTuple):
+    """A buoy, or an end of a line: how far every way keeps clear of it [m], and what it is called in sentences."""
+
+    en_m: PointEn
+    keep_m: float
+    name: str = "a mark"
+
+    @property
+    def disc_wkt(self) -> str:
+        """What is kept out of, as WKT."""
+        return disc_wkt(self.en_m, self.keep_m)
+
+
+def marks_of(voyage: Voyage, stray_m: float = STRAY_M) -> tuple[Mark, ...]:
+    """Return every mark of the voyage: buoys, and the ends of lines.
 
     ``stray_m`` is what is added about a line's marks, for a track that strays from its leg.
     """
-    out: list[tuple[PointEn, float]] = []
+    out: list[Mark] = []
     for goal in voyage.goals:
         if goal.line is not None:
-            out += [(mark, goal.line.keep_m + stray_m) for mark in (goal.line.port_en_m, goal.line.starboard_en_m)]
+            name = f"a mark of {goal.name}" if goal.name else "a mark"
+            ends = (goal.line.port_en_m, goal.line.starboard_en_m)
+            out += [Mark(end, goal.line.keep_m + stray_m, name) for end in ends]
         elif goal.side is not Side.NONE:
-            out.append((goal.en_m, KEEP_SHARE * goal.rounding_m))
+            out.append(
+                Mark(goal.en_m, KEEP_SHARE * goal.rounding_m, f"the buoy {goal.name}" if goal.name else "a mark")
+            )
     return tuple(out)
-
-
-def discs_of(voyage: Voyage, stray_m: float = STRAY_M) -> tuple[str, ...]:
-    """Return the marks' discs as WKT: what is kept out of on every way, whatever it leads to."""
-    return tuple(disc_wkt(mark, keep_m) for mark, keep_m in marks_of(voyage, stray_m))
 
 
 def _sweep(goal: Goal, index: int, name: str, approach: Approach) -> list[Gate]:

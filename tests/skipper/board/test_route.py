@@ -139,7 +139,7 @@ def test_from_below_the_floor_a_loiter_is_found_away_from_what_is_near():
 def test_the_loiter_swings_clear_of_the_buoy_that_was_rounded_last():
     buoy = Goal(en_m=(0.0, 100.0), radius_m=10.0, side=Side.STARBOARD, rounding_m=10.0)
     made = voyage(buoy)
-    ((mark, keep_m),) = marks_of(made)
+    ((mark, keep_m, _),) = marks_of(made)
     for end in ((-10.0, 100.0), (0.0, 110.0), (7.0, 93.0)):
         place, room = loiter_place(made, CONFIG, end, 0.0)
         assert math.dist(place, mark) >= CONFIG.loiter_radius_m + keep_m - 1e-9
@@ -152,7 +152,7 @@ def test_the_way_to_the_loiter_leads_not_over_the_buoy():
     """In a channel with its one room behind the buoy."""
     walls = (box(-500, 116, -2, 300), box(-500, -100, -2, 84), box(-60, 84, -30, 116))
     made = voyage(Goal(en_m=(0.0, 100.0), radius_m=10.0, side=Side.PORT, rounding_m=10.0), obstacles=walls)
-    ((mark, keep_m),) = marks_of(made)
+    ((mark, keep_m, _),) = marks_of(made)
     end = (-10.0, 100.0)
     place, _ = loiter_place(made, CONFIG, end, -math.pi / 2.0)
     assert place == end or Point(mark).distance(LineString([end, place])) >= keep_m - 1e-9

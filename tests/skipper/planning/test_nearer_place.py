@@ -19,7 +19,7 @@ def test_it_is_not_at_a_buoy(north_m):
         Goal(en_m=(0.0, 200.0), radius_m=8.0, name="behind"),
     )
     ctx = moment(route((0.0, 200.0), (0.0, 200.0)), goals=goals)
-    ((mark, keep_m),) = marks_of(ctx.voyage)
+    ((mark, keep_m, _),) = marks_of(ctx.voyage)
     target = gates_of(ctx.voyage)[-1]
     step = Rung(name="a nearer safe place", margin_m=8.0, delta_s=0.66, nearer_goal=True)
     aim = asking._aim(ctx, target, 1, Start(en_m=(0.0, 0.0), heading_rad=0.0), step)

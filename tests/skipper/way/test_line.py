@@ -7,7 +7,7 @@ import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.skipper.way.gates import Approach, astray, discs_of, gates_of, marks_of
+from companion.skipper.way.gates import Approach, astray, gates_of, marks_of
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.line import (
     BEFORE_M,
@@ -120,16 +120,16 @@ def test_the_same_line_once_more_is_approached_from_before_it_again():
 
 def test_marks_are_kept_clear_of_on_every_leg():
     v = voyage(Goal(en_m=(0.0, 50.0)), goal(NORTHWARD))
-    assert [keep for _, keep in marks_of(v)] == [8.0, 8.0]
-    discs = discs_of(v)
-    assert len(discs) == 2
-    assert shapely.from_wkt(discs[0]).contains(shapely.Point(moved(NORTHWARD.port_en_m, math.pi / 4.0, 7.9)))
+    assert [mark.keep_m for mark in marks_of(v)] == [8.0, 8.0]
+    assert shapely.from_wkt(marks_of(v)[0].disc_wkt).contains(
+        shapely.Point(moved(NORTHWARD.port_en_m, math.pi / 4.0, 7.9))
+    )
 
 
 def test_what_a_track_strays_is_the_lines_and_not_the_buoys():
     v = voyage(goal(NORTHWARD), Goal(en_m=(0.0, 200.0), side=Side.PORT, rounding_m=12.0))
-    assert [keep for _, keep in marks_of(v, 1.0)] == [6.0, 6.0, 6.0]
-    assert [keep for _, keep in marks_of(v, 0.0)] == [5.0, 5.0, 6.0]
+    assert [mark.keep_m for mark in marks_of(v, 1.0)] == [6.0, 6.0, 6.0]
+    assert [mark.keep_m for mark in marks_of(v, 0.0)] == [5.0, 5.0, 6.0]
 
 
 @pytest.mark.parametrize(
