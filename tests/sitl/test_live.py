@@ -216,6 +216,7 @@ def test_the_voyage_is_over_with_its_summary_however_long_the_picture_takes(tmp_
     assert run_virtual(watched()) == pytest.approx(10.0, abs=0.5)
 
 
+UNHEARD_M = 9.9  # until the feed hears: what is spoken to a port that is opened later is lost
 DEPTHS_M = (6.0, 5.9, None, 5.8, 55.0, 5.7)  # no echo, and beyond its reach
 
 
@@ -223,11 +224,11 @@ async def sounded_over(feed, port, carried):
     """Return what a companion's feed hears of a sounder that speaks to ``port``, and the decoder's counts."""
     pings, depths, decoder = [], iter(DEPTHS_M), SoundingDecoder()
     async with open_feed(parse_feed(feed, baud=4800), pings.append, decoder, "sounder") as heard:
-        async with spoken_depths(lambda: next(depths, 5.7), port, 0.4):
-            while len(pings) < len(DEPTHS_M):
+        async with spoken_depths(lambda: next(depths, 5.7) if pings else UNHEARD_M, port, 0.4):
+            while len(told := [ping for ping in pings if ping.depth_m != UNHEARD_M]) < len(DEPTHS_M):
                 carried()
                 await asyncio.sleep(0.1)
-        return pings[: len(DEPTHS_M)], heard.counts
+        return told[: len(DEPTHS_M)], heard.counts
 
 
 def of_pings(pings, counts):
