@@ -20,6 +20,7 @@ SHOOT_S = 2.1  # of the boat's speed, before it lies
 FILL_S = 0.8  # of the boat's speed, on the old course until it tries again
 AGAIN_SHARE = 0.6  # of the boat's speed, at the next try
 TRIES = 2  # then the boat gybes round where there is room
+MOST_FAILURES = 5  # in a row that are looked at, where there is none
 RISKY = 0.01  # one failure must not touch; several in a row may, with no more than this probability
 IRONS_S = 10.0  # it lies head to wind: the skipper bears away after 8 s (``in irons``), and that takes it two
 # Of the wind's speed: hull and flogging sails. A skiff under bare poles is blown at 3 to 6 % of it.
@@ -58,6 +59,14 @@ def lee_set(*, course_rad: float, twd_from_rad: float, lee_mps: float) -> tuple[
     """Return how a hull that is set at ``lee_mps`` is while it lies (east, north) [m/s]: abeam, to its old lee."""
     abeam = twd_from_rad - math.copysign(0.5 * math.pi, wrap_pi(twd_from_rad - course_rad))
     return lee_mps * math.sin(abeam), lee_mps * math.cos(abeam)
+
+
+def gybing_centre(
+    place: tuple[float, float], *, course_rad: float, twd_from_rad: float, radius_m: float
+) -> tuple[float, float]:
+    """Return the centre [m] of the circle on which the boat gybes round, to leeward of a place."""
+    side = -1.0 if wrap_pi(twd_from_rad - course_rad) > 0.0 else 1.0
+    return _moved(place, course_rad + side * 0.5 * math.pi, radius_m)
 
 
 def _moved(place: tuple[float, float], course_rad: float, length_m: float) -> tuple[float, float]:

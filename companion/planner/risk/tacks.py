@@ -17,14 +17,13 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.boat.failed_tack import AGAIN_SHARE, RISKY, TRIES, failed_tack, lee_set
+from companion.boat.failed_tack import AGAIN_SHARE, MOST_FAILURES, RISKY, TRIES, failed_tack, gybing_centre, lee_set
 from companion.boat.tracking import stated_error_m
 from companion.geo.angles import wrap_pi
 from companion.planner.plan import Leg
 from companion.planner.problem.evaluate import beat_s, shore_of
 from companion.planner.problem.value import Problem
 
-MOST_FAILURES = 5  # in a row that are looked at
 EDGE_STEP_M = 10.0  # between the places of a corridor's edge at which a tack is looked at
 Place = tuple[float, float]
 
@@ -246,10 +245,8 @@ class _Solids:
     def _may_gybe(self, problem: Problem, place: Place, course_rad: float, speed_mps: float) -> bool:
         """Return whether there is room to gybe round to leeward of a place."""
         radius = speed_mps / problem.boat.turn_rate_radps
-        side = -1.0 if wrap_pi(problem.wind.twd_from_rad - course_rad) > 0.0 else 1.0
-        abeam = course_rad + side * 0.5 * math.pi
-        centre = shapely.Point(place[0] + radius * math.sin(abeam), place[1] + radius * math.cos(abeam))
-        return self.distance_m(centre) - radius >= self.need_m
+        centre = gybing_centre(place, course_rad=course_rad, twd_from_rad=problem.wind.twd_from_rad, radius_m=radius)
+        return self.distance_m(shapely.Point(centre)) - radius >= self.need_m
 
 
 def _point(tracks: Sequence[NDArray[np.float64]]) -> Place:

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import math
 
-from companion.boat.failed_tack import AGAIN_SHARE, IRONS_S, RISKY, SET_SHARE, TRIES, failed_tack, lee_set
+from companion.boat.failed_tack import (
+    AGAIN_SHARE,
+    IRONS_S,
+    MOST_FAILURES,
+    RISKY,
+    SET_SHARE,
+    TRIES,
+    failed_tack,
+    gybing_centre,
+    lee_set,
+)
 from companion.current import UNTOLD_MPS
 from companion.frozen import changed
 from companion.geo.angles import difference_rad, wrap_pi
@@ -105,7 +115,8 @@ def _may_fail(ctx: StepContext, boat: PointEn, wind: tuple[float, float], floor_
     learned_mps = tacking.starboard_lee_mps if is_starboard else tacking.port_lee_mps
     lee = lee_set(course_rad=course, twd_from_rad=wind[0], lee_mps=max(learned_mps, SET_SHARE * wind[1]))
     set_en_mps = (water.en_mps[0] + lee[0], water.en_mps[1] + lee[1])
-    for failures in range(1, TRIES + 1):
+    radius_m = speed / ctx.voyage.boat.turn_rate_radps
+    for failures in range(1, MOST_FAILURES + 1):
         blown, still = _failed(there, course, speed, wind, water.en_mps, irons_s)
         _, aside = _failed(there, course, speed, wind, set_en_mps, irons_s)
         if min(ctx.voyage.area.path_clearance_m(way) for way in (blown, still, aside)) < need_m:
@@ -113,6 +124,10 @@ def _may_fail(ctx: StepContext, boat: PointEn, wind: tuple[float, float], floor_
         if chance ** (failures + 1) <= RISKY:
             return True
         there, speed = aside[-1], AGAIN_SHARE * math.hypot(*ctx.through_en_mps)
+        if failures == TRIES:  # then she gybes round, where there is room
+            centre = gybing_centre(there, course_rad=course, twd_from_rad=wind[0], radius_m=radius_m)
+            if float(ctx.voyage.area.clearance_m([centre])[0]) - radius_m >= need_m:
+                return True
     return True
 
 

@@ -138,6 +138,13 @@ def test_where_tacks_can_fail_there_is_room_for_one_that_does():
     assert doubtful.clearance() > certain.clearance() + 1.0
 
 
+@pytest.mark.parametrize(("tack_fails", "is_asked"), [(0.03, False), (0.4, True)])
+def test_where_she_cannot_gybe_round_after_two_that_fail_there_is_room_for_more(tack_fails, is_asked):
+    world = in_the_narrows(half_m=28.0, tack_fails=tack_fails)
+    world.run(60)
+    assert bool(said(world, "short tack")) is is_asked
+
+
 def test_a_boat_whose_tacks_have_failed_is_asked_too_for_the_leg_that_she_was_to_gybe_on_has_closed():
     world = in_the_narrows(tack_fails=0.03)
     world.state = replace(
