@@ -103,6 +103,6 @@ def _parts(kind: Any) -> list[Any]:
     return [kind, *(part for inner in get_args(kind) for part in _parts(inner))]
 
 
-def clearance_words(clearance_m: float, inside: str = "an obstacle or the fence") -> str:
-    """Return a clearance in words: a negative one is how far she is inside of something."""
-    return f"{-clearance_m:.1f} m inside {inside}" if clearance_m < -0.05 else f"{abs(clearance_m):.1f} m"
+def clearance_words(clearance_m: float, where: str = "inside an obstacle or outside the fence") -> str:
+    """Return a clearance in words: a negative one is how far she is where she must not be."""
+    return f"{-clearance_m:.1f} m {where}" if clearance_m < -0.05 else f"{abs(clearance_m):.1f} m"

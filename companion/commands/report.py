@@ -120,13 +120,16 @@ def track_of(record: VoyageRecord) -> Document:
     return Document(source=str(record.folder), format="voyage", tracks=(track,) if len(known) else ())
 
 
+PAST = "past its edge"
+
+
 def clearance_line(least_m: float, expected_m: float | None, contacts: int) -> str:
     """Return how near she came, beside what her plans expected, and how often she touched."""
     touched = f"{counted(contacts, 'contact')}!" if contacts else "no contact."
     expected = ""
     if expected_m is not None:
-        expected = f" (plans expected {clearance_words(expected_m, 'it')}{' or more' if expected_m >= 0.0 else ''})"
-    return f"Nearest to an obstacle or the fence: {clearance_words(least_m, 'it')}{expected}, {touched}"
+        expected = f" (plans expected {clearance_words(expected_m, PAST)}{' or more' if expected_m >= 0.0 else ''})"
+    return f"Nearest to an obstacle or the fence: {clearance_words(least_m, PAST)}{expected}, {touched}"
 
 
 def in_words(record: VoyageRecord) -> list[str]:

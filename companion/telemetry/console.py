@@ -307,7 +307,7 @@ def progress_text(step: Step) -> str:
     if route is not None:
         clearance_m = None if sailed is None else sailed.clearance_ahead_m(state.mission.index)
         if clearance_m is not None:
-            parts.append(f"clearance expected {clearance_words(clearance_m, _inside(step))}")
+            parts.append(f"clearance expected {clearance_words(clearance_m, _where(step))}")
         eta = step.eta()
         if under_way and eta.there_s is not None:
             late = "" if eta.there_late_s is None else f" (90 %: {eta.there_late_s:.0f} s)"
@@ -319,8 +319,8 @@ def progress_text(step: Step) -> str:
     return " | ".join(parts)
 
 
-def _inside(step: Step) -> str:
-    """Return what her way leads through where it does: a plan begins inside of what was drawn or sounded since."""
+def _where(step: Step) -> str:
+    """Return where her way leads that must not: a plan begins inside of what was drawn or sounded since."""
     here, route, area = step.snapshot.position_en_m, step.state.mission.route, step.voyage.area
     places = [
         *(() if here is None else (here,)),
@@ -328,7 +328,8 @@ def _inside(step: Step) -> str:
     ]
     least_m, place = min(((float(area.clearance_m([p])[0]), p) for p in places), default=(math.inf, None))
     name = "" if place is None or least_m > NEAR_M else area.nearest_name(place)
-    return name or "what was drawn or found since"
+    is_limit = place is not None and least_m < float(area.unfenced.clearance_m([place])[0])
+    return f"{'outside' if name and is_limit else 'inside'} {name or 'what was drawn or found since'}"
 
 
 def left_behind(step: Step) -> str:

@@ -32,7 +32,7 @@ from companion.geo.angles import wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.mavlink.transports import open_link
 from companion.messages import GeoPoint, Mode
-from sitl.autopilot import Truth
+from sitl.autopilot import FORCED_REBOOT, Truth
 from sitl.world import LEAST_M, MOST_M, SimulatedSounder, Waters, WindModel
 
 URL = "https://firmware.ardupilot.org/Rover/stable/SITL_x86_64_linux_gnu/ardurover"
@@ -352,7 +352,7 @@ class ArduRover:
 
     def reboot(self) -> None:
         """Restart the autopilot."""
-        self.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0)
+        self.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, *FORCED_REBOOT)
 
     def set_current(self, set_to_rad: float, drift_mps: float) -> None:
         """Let the water run towards ``set_to_rad``, beside the stream of its waters."""

@@ -40,11 +40,13 @@ from sitl.autopilot.config import (
     Waves,
 )
 from sitl.autopilot.memory_link import FrameStream, Impairment, MemoryEnd, MemoryLink, RadioChannel
+from sitl.autopilot.protocol.handlers import FORCED_REBOOT
 from sitl.autopilot.protocol.telemetry import AisVessel
 from sitl.autopilot.server import serve
 
 __all__ = [
     "EPOCH_S",
+    "FORCED_REBOOT",
     "FRAME_M",
     "HOME",
     "TACK_RETRY_S",

@@ -28,6 +28,7 @@ from companion.mavlink.transports import open_link
 from companion.mavlink.wire import Stream
 from companion.messages import GeoPoint, Mode, VehicleState, waypoint
 from sitl.ardurover import MOTOR, ArduRover, require
+from sitl.autopilot import FORCED_REBOOT
 from sitl.faults import REDRAWN, give_order, redraw, set_parameter
 from sitl.run.depths import spoken_depths
 from sitl.scenario import EventSpec, Scenario, SensorsSpec, free_port, scenario_waters
@@ -180,7 +181,7 @@ class SimulatedBoat:
         if event.kind == "mode":
             await self._pilot.set_mode(Mode[event.mode or "HOLD"])
         elif event.kind == "reboot":
-            await self._pilot.link.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0)
+            await self._pilot.link.command(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, *FORCED_REBOOT)
         else:
             await _from_ashore(self._judge_url, event, frame)
 
@@ -188,7 +189,8 @@ class SimulatedBoat:
 class RealBoat:
     """The real ArduRover; ``sitl.ardurover.simulation`` knows the truth and turns the simulator's knobs."""
 
-    plays = OPERATORS | {"battery", "current", "gps_jump", "gps_lost", "radio_lost", "arm", "disarm"}
+    # At a reboot its simulation begins anew at home, too.
+    plays = (OPERATORS | {"battery", "current", "gps_jump", "gps_lost", "radio_lost", "arm", "disarm"}) - {"reboot"}
 
     def __init__(self, rover: ArduRover) -> None:
         self._rover = rover
@@ -262,8 +264,6 @@ class RealBoat:
         rover = self._rover
         if event.kind == "mode":
             rover.set_mode(Mode[event.mode or "HOLD"])
-        elif event.kind == "reboot":
-            rover.reboot()
         elif event.kind in {"arm", "disarm"}:
             rover.command(mav.MAV_CMD_COMPONENT_ARM_DISARM, float(event.kind == "arm"))
         elif event.kind == "radio_lost":

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.clock import now_s, run, run_virtual
-from companion.errors import InputError
+from companion.errors import InputError, JobError
 from companion.geo.angles import difference_rad
 from companion.geo.frame import LocalFrame
 from companion.mavlink.transports import open_link
@@ -285,6 +285,13 @@ def test_a_mission_that_hears_no_sounder_is_told_before_a_live_run_begins(tmp_pa
             silent, Path("sitl/scenarios/a.toml"), 0, tmp_path / "v", autopilot="embedded", program=None, speedup=9.0
         )
     assert not (tmp_path / "v").exists()
+
+
+def test_a_reboot_is_none_of_the_real_autopilots_whose_simulation_would_begin_anew(tmp_path):
+    source = Path("sitl/scenarios/reboot.toml")
+    with pytest.raises(JobError, match="reboot can be played by the embedded autopilot only"):
+        run_live(load_scenario(source), source, 0, tmp_path, autopilot="ardurover", program=None, speedup=None)
+    assert list(tmp_path.iterdir()) == []
 
 
 PROGRAM = find()

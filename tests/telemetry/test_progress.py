@@ -84,27 +84,33 @@ def test_the_line_tells_the_clearance_and_when_she_is_there():
 
 
 @pytest.mark.parametrize(("metres", "told"), [(-0.01, "0.0 m"), (3.25, "3.2 m"), (-2.2, "2.2 m inside NAME")])
-@pytest.mark.parametrize("is_in_it", [True, False])
-def test_a_clearance_below_nought_is_told_as_how_far_she_is_inside(metres, told, is_in_it):
+@pytest.mark.parametrize("where", ["in it", "nowhere", "outside"])
+def test_a_clearance_below_nought_is_told_as_how_far_she_is_where_she_must_not_be(metres, told, where):
     """ "clearance expected -2.2 m" stood there of a plan that began in a shoal that had just been sounded."""
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
     assert world.run(120, lambda w: w.state.voyage.sailing)
     here = shapely.Point(world.position).buffer(8.0)
-    sea = voyage(obstacles=[here] if is_in_it else [])
+    far = shapely.transform(here, lambda en: en + 500.0)
+    sea = voyage(obstacles=[here] if where == "in it" else [], limits=far if where == "outside" else None)
     route = replace(world.state.mission.route, expected_clearance_m=metres)
     state = with_parts(world.state, mission={"route": route})
     step = Step(snapshot=world.snapshot(), state=state, actions=(), voyage=sea)
-    name = sea.area.names[0] if is_in_it else "what was drawn or found since"
-    assert f"clearance expected {told.replace('NAME', name)} |" in progress_text(step)
+    name = sea.area.names[0] if where == "in it" else "what was drawn or found since"
+    told = told.replace("inside NAME", "outside the fence" if where == "outside" else f"inside {name}")
+    assert f"clearance expected {told} |" in progress_text(step)
 
 
 def test_in_the_report_and_the_verdict_too():
     told = "Nearest to an obstacle or the fence: "
-    assert clearance_line(-0.3, -2.1, 1) == f"{told}0.3 m inside it (plans expected 2.1 m inside it), 1 contact!"
+    assert (
+        clearance_line(-0.3, -2.1, 1) == f"{told}0.3 m past its edge (plans expected 2.1 m past its edge), 1 contact!"
+    )
     assert clearance_line(3.0, 2.0, 0) == f"{told}3.0 m (plans expected 2.0 m or more), no contact."
     figures = {"time_s": 1.0, "distance_m": 1.0, "tacks": 0, "replans": 0, "min_clearance_m": 5.0}
     verdict = {"figures": {**figures, "promised_clearance_m": -2.1}, "passed": True, "scenario": "x", "seed": 0}
-    assert verdict_line(verdict).endswith("clearance 5.0 m (a plan began 2.1 m inside an obstacle or the fence)")
+    assert verdict_line(verdict).endswith(
+        "clearance 5.0 m (a plan began 2.1 m inside an obstacle or outside the fence)"
+    )
 
 
 def test_steered_by_headings_the_way_to_the_waypoint_is_her_own():

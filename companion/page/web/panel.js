@@ -70,9 +70,9 @@ function one(name, value, unit, kind = "", hint = "") {
   return el("div", hint ? { class: kind, title: hint } : { class: kind }, el("dt", {}, name), el("dd", {}, value, value === NONE || !unit ? "" : el("small", {}, ` ${unit}`)));
 }
 
-/** A clearance; below nought it is how far she is inside of something. @param {number | null | undefined} metres */
+/** A clearance; below nought it is how far she is where she must not be. @param {number | null | undefined} metres */
 function clearance(metres) {
-  return metres != null && metres < -0.05 ? `${distance(-metres)} inside an obstacle or the fence` : distance(metres);
+  return metres != null && metres < -0.05 ? `${distance(-metres)} inside an obstacle or outside the fence` : distance(metres);
 }
 
 /** A figure of the table, by its kind. @param {import("../../view/view").Figure} f */

@@ -29,6 +29,8 @@ from sitl.autopilot.protocol.telemetry import BUILDERS, AisList, autopilot_versi
 # MAV_RESULT
 OK, REFUSED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 _FORCE = 21196
+_FORCE_REBOOT = 20190226  # as param6
+FORCED_REBOOT = 1.0, 0.0, 0.0, 0.0, 0.0, float(_FORCE_REBOOT)  # of an autopilot that is armed, too
 # the loop runs at 50 Hz and a message may take part in four of five loops
 _FASTEST_S = 1.0 / 40.0
 
@@ -95,7 +97,8 @@ def _dispatch(pilot: Pilot, m: Any, link: MavlinkPort, p: tuple[float, ...], pla
     if command == mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN:
         if int(p[0]) not in {1, 3}:
             return UNSUPPORTED
-        if pilot.core.is_armed and p[1] != _FORCE:
+        sixth = m.param6 if m.get_type() == "COMMAND_LONG" else m.y
+        if pilot.core.is_armed and sixth != _FORCE_REBOOT:
             return FAILED
         pilot.core.reboot_soon()
         return OK

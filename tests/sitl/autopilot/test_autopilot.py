@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from companion.clock import now_s, run_virtual
 from companion.messages import GeoPoint, Mode
 from sitl.autopilot import (
+    FORCED_REBOOT,
     AisVessel,
     AutopilotConfig,
     GpsFault,
@@ -456,15 +457,18 @@ def test_companion_heartbeat_counts_only_with_its_system_id() -> None:
 
 
 # ------------------------------------------------------------------------------------------------ faults, reboot
-def test_reboot_sets_boot_time_back_and_forgets_rates() -> None:
+@pytest.mark.parametrize("is_forced", [False, True])
+def test_reboot_sets_boot_time_back_and_forgets_rates(is_forced: bool) -> None:
     async def job(c: Client) -> None:
         c.rate(168, 10)
         await c.set_sail(EAST)
         await asyncio.sleep(5.0)
         assert await c.ask(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1) == 4  # armed
-        assert await c.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0) == 0
+        if not is_forced:
+            assert await c.ask(mav.MAV_CMD_COMPONENT_ARM_DISARM, 0) == 0
         before = c.last("SYSTEM_TIME").time_boot_ms
-        assert await c.ask(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1) == 0
+        reboot = FORCED_REBOOT if is_forced else (1.0,)
+        assert await c.ask(mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, *reboot) == 0
         start = now_s()
         await asyncio.sleep(6.0)
         assert c.last("SYSTEM_TIME").time_boot_ms < before
