@@ -151,6 +151,11 @@ class LocalArea:
         """The obstacles alone: for a boat that has got outside the limits. What is known of them is kept there."""
         return self if self.limits is None else replace(self, limits=None)
 
+    @functools.cached_property
+    def outer(self) -> LocalArea:
+        """The area with one limit fewer, in the end the obstacles alone: for a boat that has got outside."""
+        return self.unfenced
+
     def also(self, names: tuple[str, ...], polygons: tuple[Polygon, ...], margins_m: tuple[float, ...]) -> LocalArea:
         """Return the area with more obstacles, after its own."""
         return replace(
@@ -166,7 +171,7 @@ class LocalArea:
         disc = shapely.buffer(shapely.points(centre_en), radius_m, quad_segs=CIRCLE_SEGMENTS)
         limits = disc if self.limits is None else shapely.intersection(self.limits, disc)
         area = replace(self, limits=limits, edge_name=name if self.limits is None else f"{self.edge_name} or {name}")
-        area.__dict__["unfenced"] = self.unfenced  # what was computed of the obstacles serves both
+        area.__dict__.update(unfenced=self.unfenced, outer=self)  # what was computed of the obstacles serves both
         return area
 
     @functools.lru_cache(maxsize=4)  # noqa: B019 - an area lives as long as its voyage
@@ -213,7 +218,7 @@ class LocalArea:
             limits=shapely.difference(limits, taken),
             edge_name=name if self.limits is None else f"{self.edge_name} or {name}",
         )
-        area.__dict__["unfenced"] = self.unfenced  # what was computed of the obstacles serves both
+        area.__dict__.update(unfenced=self.unfenced, outer=self)  # what was computed of the obstacles serves both
         return area
 
     def roomy_en(self, near_en: tuple[float, float], room_m: float) -> tuple[float, float] | None:

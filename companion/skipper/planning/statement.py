@@ -28,6 +28,7 @@ from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m
 from companion.skipper.way.gates import marks_of
 from companion.skipper.way.line import STRAY_M
 from companion.skipper.way.shortest import shortest_way
+from companion.skipper.way.voyage import outside_m, water_at
 
 # The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
 REPAIR_RINGS_M = (
@@ -51,6 +52,8 @@ REPAIR_RINGS_M = (
     3645.0,
 )
 REPAIR_DIRECTIONS = 24
+BACK_TRIES = 3  # to find a way back inside: each takes some hundredths of a second of the loop
+BACK_M = 80.0  # to either side of that way a plan may lead: room to beat
 NOTCH = 2.0  # radius of the notch as a multiple of what the start lacks: room to turn out of it
 LEG_SAVING = 8e-5  # share of a plan's time that a leg must save: each is an item to upload and a plan to make again
 HAIR_M = 0.2  # a repaired point stands this far clear of the margin it was repaired for
@@ -64,6 +67,7 @@ class Start:
     """Where a plan begins: the point, the heading there, when, and how it had to be repaired.
 
     ``lead_in`` are waypoints before it; ``notch_m`` is the radius of a notch that is cut into the margin around it.
+    ``back_en`` is a way about which the limits are opened to a boat that is outside of them.
     """
 
     en_m: PointEn
@@ -71,6 +75,7 @@ class Start:
     after_s: float = 0.0
     lead_in: tuple[PointEn, ...] = ()
     notch_m: float = 0.0
+    back_en: tuple[PointEn, ...] = ()
     text: str = ""
 
 
@@ -135,25 +140,32 @@ def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, t
     Down to ``floor_m`` the margin around it gets a notch, so that the plan begins where the boat is. Nearer than
     that, or inside, the plan begins in free water and a lead-in goes there: from the boat to the nearest free point
     on a line that never comes nearer to the obstacle than the boat is now, nor nearer than ``floor_m`` to any that it
-    is clear of; of equally near ones the one that is not upwind.
+    is clear of; of equally near ones the one that is not upwind. Outside the limits they are opened about a way back
+    inside, and what is solid is all that there is to keep clear of.
     """
-    here = float(voyage.area.clearance_m([start.en_m])[0])
+    area, back = voyage.area, _back_inside(voyage, start, margin_m=margin_m, floor_m=floor_m)
+    if back:
+        out_m, area = outside_m(area, start.en_m), water_at(area, start.en_m)
+        start = replace(start, back_en=back, text=f"the start is {out_m:.0f} m outside the fence: planned back into it")
+    here = float(area.clearance_m([start.en_m])[0])
     solid_m = min(floor_m, float(voyage.area.unfenced.clearance_m([start.en_m])[0])) - HAIR_M
     if here >= margin_m:
         return start
     if here >= floor_m:
         text = f"the start is {here:.1f} m from an obstacle or limit: the margin gets a notch around it"
-        return replace(start, notch_m=NOTCH * (margin_m - here) + HAIR_M, text=text)
+        return replace(
+            start, notch_m=NOTCH * (margin_m - here) + HAIR_M, text="; ".join(filter(None, (start.text, text)))
+        )
     for ring_m in REPAIR_RINGS_M:
         best: tuple[float, PointEn] | None = None
         for n in range(REPAIR_DIRECTIONS):
             course = 2.0 * math.pi * n / REPAIR_DIRECTIONS
             place = moved(start.en_m, course, ring_m)
-            room = float(voyage.area.clearance_m([place])[0])
+            room = float(area.clearance_m([place])[0])
             if room < margin_m + HAIR_M:
                 continue
             way = np.linspace(start.en_m, place, 9)
-            if float(np.min(voyage.area.clearance_m(way))) < here - HAIR_M:
+            if float(np.min(area.clearance_m(way))) < here - HAIR_M:
                 continue
             if solid_m > 0.0 and voyage.area.unfenced.path_clearance_m(way) < solid_m:
                 continue
@@ -163,14 +175,35 @@ def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, t
                 best = (cost, place)
         if best is not None:
             text = f"the start is {here:.1f} m from an obstacle or limit: led {ring_m:.0f} m into free water first"
-            return Start(
+            return replace(
+                start,
                 en_m=best[1],
                 heading_rad=bearing_rad(start.en_m, best[1]),
-                after_s=start.after_s,
                 lead_in=(best[1],),
-                text=text,
+                text="; ".join(filter(None, (start.text, text))),
             )
     return start
+
+
+def _back_inside(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float) -> tuple[PointEn, ...]:
+    """Return a way round what is solid to the roomiest place of the nearest ring that has one inside the limits.
+
+    Empty where she is not outside, or there is none.
+    """
+    sea, tries = water_at(voyage.area, start.en_m), 0
+    for ring_m in () if sea is voyage.area else REPAIR_RINGS_M:
+        places = [moved(start.en_m, 2.0 * math.pi * n / REPAIR_DIRECTIONS, ring_m) for n in range(REPAIR_DIRECTIONS)]
+        rooms = voyage.area.clearance_m(np.asarray(places))
+        if float(np.max(rooms)) < margin_m + HAIR_M:
+            continue
+        for clear_m in (margin_m, floor_m):
+            way = shortest_way(sea, start.en_m, places[int(np.argmax(rooms))], clear_m)
+            if way is not None:
+                return way
+        tries += 1
+        if tries == BACK_TRIES:
+            break
+    return ()
 
 
 def aim_at(voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], gate: int, start_en: PointEn) -> Aim:
@@ -280,7 +313,7 @@ def problem_dict(
     Raises:
         ValueError: when no water is left inside the fence at this margin.
     """
-    fence = voyage.area.fence_wkt(margin_m, start.en_m)
+    fence = _fence(voyage, start, margin_m)
     obstacles, names = voyage.area.obstacles_wkt(margin_m), voyage.area.obstacle_names(margin_m)
     if start.notch_m > 0.0:
         obstacles, names, fence = _notched(voyage, start, (obstacles, names), fence, floor_m)
@@ -350,6 +383,21 @@ def problem_dict(
         if max_path_risk is None
         else {"max_path_risk": max_path_risk, "correlation_time_s": forecast.correlation_time_s},
     }
+
+
+def _fence(voyage: Voyage, start: Start, margin_m: float) -> str | None:
+    """Return the limits less the margin, opened about the way back inside to a start that is outside."""
+    if not start.back_en:
+        return voyage.area.fence_wkt(margin_m, start.en_m)
+    way = shapely.buffer(LineString(start.back_en), BACK_M, quad_segs=8)
+    outer = water_at(voyage.area, start.en_m).fence_wkt(margin_m, start.en_m)
+    if outer is not None:
+        way = shapely.intersection(way, shapely.from_wkt(outer))
+    inner = voyage.area.fence_wkt(margin_m, start.back_en[-1])
+    limits = way if inner is None else shapely.union(way, shapely.from_wkt(inner))
+    here = shapely.points(start.en_m)
+    pieces = [p for p in shapely.get_parts(limits) if isinstance(p, Polygon) and not p.is_empty]
+    return str(shapely.to_wkt(min(pieces, key=lambda p: float(p.distance(here))), rounding_precision=4))
 
 
 def _notched(

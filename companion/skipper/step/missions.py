@@ -87,8 +87,19 @@ def loiter_place(
     line reaches; without one, the roomiest found, farther off where none of them is free. A line that the wind has
     closed is one that the autopilot beats about: it needs the room of that corridor as well. From below the floor a
     line comes no nearer than it begins. With ``wanted_m`` of room to be had within ``ROOMIER_M``, the first place with
-    that comes before the nearest that will do.
+    that comes before the nearest that will do. Outside the limits, where none of their water with room is reached so,
+    it is room off what is solid that counts: the place that is least far outside may lie between two rocks.
     """
+    place, room = _roomy_place(voyage, config, end_en, twd_from_rad, wanted_m)
+    water = water_at(voyage.area, end_en)
+    if room >= config.loiter_radius_m or water is voyage.area:
+        return place, room
+    return _roomy_place(replace(voyage, area=water), config, end_en, twd_from_rad, wanted_m)
+
+
+def _roomy_place(
+    voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float, wanted_m: float
+) -> tuple[PointEn, float]:
     corridor_m = config.tack_corridor_m if config.tack_corridor_m > 0.0 else math.inf
     best, best_room = end_en, -math.inf
     will_do: tuple[PointEn, float] | None = None

@@ -150,6 +150,11 @@ class AreaLike(Protocol):
         """The obstacles alone: for a boat that has got outside the limits."""
         ...
 
+    @property
+    def outer(self) -> AreaLike:
+        """The area with one limit fewer, in the end the obstacles alone: for a boat that has got outside."""
+        ...
+
     def __hash__(self) -> int:
         """By identity: what is made of an area is kept by it."""
         ...
@@ -203,8 +208,13 @@ def outside_m(area: AreaLike, en_m: PointEn) -> float:
 
 
 def water_at(area: AreaLike, en_m: PointEn) -> AreaLike:
-    """Return what there is to keep clear of from a place on: outside the limits only the obstacles."""
-    return area.unfenced if outside_m(area, en_m) > 0.0 else area
+    """Return what there is to keep clear of from a place on: the obstacles, and of the limits those that hold it.
+
+    The autopilot's own fence may leave her outside; the mission's, which may be the shore, stays.
+    """
+    while outside_m(area, en_m) > 0.0:
+        area = area.outer
+    return area
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

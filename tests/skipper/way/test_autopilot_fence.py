@@ -83,6 +83,16 @@ def test_outside_the_limits_only_the_obstacles_are_in_the_way():
     assert outside_m(water, (0.0, 100.0)) == 0.0
 
 
+def test_outside_the_autopilots_fence_the_missions_own_is_still_in_the_way():
+    """It may be the shore: planned back from outside of a fence drawn anew she passed it by 2 m."""
+    mission = area(shapely.box(-10.0, 190.0, 10.0, 210.0), limits=shapely.box(-200.0, -200.0, 200.0, 400.0))
+    water = mission.within((0.0, 0.0), 150.0, "the circle")
+    water = water.without(shapely.box(-40.0, -40.0, 0.0, 40.0), "the drawn")
+    assert water_at(water, (170.0, 0.0)) is mission
+    assert water_at(water, (-20.0, 0.0)) is mission.within((0.0, 0.0), 150.0, "the circle")
+    assert water_at(water, (230.0, 0.0)) is mission.unfenced
+
+
 def fenced(*goals, **made):
     world = make(*goals, obstacles=(), **made)
     world.shown = {"home": HOME, "fence_breached": False}

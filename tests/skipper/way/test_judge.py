@@ -1,6 +1,7 @@
 """Is a path still good, what will the autopilot make of a closed leg, and the problem that is handed to the planner."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -155,6 +156,38 @@ def test_a_start_inside_the_obstacle_is_led_out_too():
     made = voyage(obstacles=(box(-50, -50, 50, 10),))
     out = repaired(made, Start(en_m=(0.0, 0.0), heading_rad=0.0), margin_m=15.0, floor_m=8.0, twd_from_rad=math.pi)
     assert made.area.clearance_m([out.en_m])[0] >= 15.0
+
+
+@pytest.mark.parametrize("shore", [None, box(-300, -100, 190, 400)])
+def test_from_outside_the_limits_a_plan_leads_back_round_what_is_solid(shore):
+    """No straight line did, and none was found: she held for ever. Limits that hold her stay what they are."""
+    isle, spit = box(-60, 120, 40, 170), box(60, -20, 80, 120)
+    water = area(isle, spit, limits=shore).within((-100.0, 250.0), 80.0, "the circle")
+    made = replace(voyage(Goal(en_m=(-100.0, 250.0), radius_m=8.0)), area=water)
+    out = repaired(
+        made, Start(en_m=(130.0, 20.0), heading_rad=0.0), margin_m=12.0, floor_m=6.0, twd_from_rad=-math.pi / 2.0
+    )
+    assert out.en_m == (130.0, 20.0)
+    assert "m outside the fence: planned back into it" in out.text
+    gate = gates_of(made)[0]
+    problem = Problem.from_json(
+        problem_dict(
+            made,
+            gate,
+            start=out,
+            aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0),
+            forecast=forecast(0.0, -math.pi / 2.0),
+            margin_m=12.0,
+            delta_s=0.95,
+            no_go_half_rad=math.radians(47.0),
+            floor_m=6.0,
+        )
+    )
+    assert shore is None or problem.fence.within(shore.buffer(-11.9))
+    answer = plan(problem, expansions=2000)
+    assert answer.has_path
+    assert area(isle, spit, limits=shore).path_clearance_m(answer.waypoints_en) >= 12.0 - 0.01
+    assert water.clearance_m([answer.waypoints_en[-1]])[0] > 12.0
 
 
 def test_the_local_plan_covers_the_next_miles_only():
