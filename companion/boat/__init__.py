@@ -14,6 +14,7 @@ from companion.boat.log import BoatLog, Why
 from companion.boat.margins import (
     AutopilotLimits,
     ProposedMargin,
+    loiter_swing_m,
     narrowest_corridor_m,
     proposed_margin,
     required_margin,
@@ -63,6 +64,7 @@ __all__ = [
     "guessed_text",
     "learned_text",
     "lesson_of",
+    "loiter_swing_m",
     "made_good_mps",
     "mark_of",
     "narrowest_corridor_m",

@@ -18,6 +18,7 @@ from typing import ClassVar
 
 from companion.boat import l1
 from companion.boat.boat import Hull
+from companion.boat.polar import Polar
 
 TRACK_S = 0.85  # |cross-track| <= 2.4 m at 2.93 m/s on reaches and close-hauled legs
 CORRIDOR_OVERSHOOT_S = 0.45  # 0.9 m beyond the corridor at 2.0 m/s before the tack has turned the boat
@@ -25,7 +26,20 @@ CORNER_S = 1.4  # |cross-track| <= 4 m at 2.9 m/s just after the corners of a pl
 # Narrower than this a corridor is crossed, at 45 degrees to the line, in less than 7 s; the autopilot tacks at most
 # every 5 s and would do little else.
 NARROWEST_S = 2.5
+# From its place, of a loiter: past it at full speed, and round. On ArduRover 12.2 m at 3.0 m/s and 18.1 at 4.4; on the
+# simulated autopilot, come from eight sides, 11.0 m at most at 2.2, 13.9 at 3.0, 20.2 at 4.2 and 25.8 at 5.1.
+LOITER_S = 5.2
+GALE_POWER = 0.75  # of the wind beyond a polar's strongest: 29.3 m in 14 m/s of wind and 33.0 in 16
 PAD_RAD = math.radians(2.0)  # legs planned at NO_GO + 2 degrees made no tacks of their own
+
+
+def loiter_swing_m(polar: Polar, tws_mps: float) -> float:
+    """Return how far from its place a loiter takes a boat in a wind [m]."""
+    strongest_mps = float(polar.tws_mps[-1])
+    swing_m = LOITER_S * polar.max_speed_mps(tws_mps)
+    if tws_mps > strongest_mps > 0.0:  # 0: of a boat that sails without a wind
+        swing_m *= math.pow(tws_mps / strongest_mps, GALE_POWER)
+    return swing_m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

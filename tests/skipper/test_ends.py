@@ -136,13 +136,25 @@ def led_to(ctx, place):
     return replace(route, points_en_m=(*route.points_en_m[:-1], place))
 
 
+@pytest.mark.parametrize("tws_mps", [5.0, 12.0])
+def test_the_end_has_room_for_a_loiter_in_that_wind_and_the_floor(tws_mps):
+    """15 m were looked for in any wind: at 12 m/s she swings 25 m, and touched a wall 19 m off her goal 39 times."""
+    wall = box(-60.0, 100.0, -19.0, 400.0)
+    world = make(Goal(en_m=(0.0, 200.0), radius_m=8.0), obstacles=(wall,), wind=lambda t: (math.pi / 2.0, tws_mps))
+    assert world.run(120, lambda w: w.state.voyage.sailing)
+    ctx = turn_of(world)
+    assert ctx.loiter_swing_m == pytest.approx({5.0: 15.3, 12.0: 26.7}[tws_mps], abs=0.1)
+    [room_m] = world.skipper.voyage.area.clearance_m([ctx.state.mission.route.points_en_m[-1]])
+    assert room_m >= ctx.loiter_swing_m + ctx.config.margin_floor_m - 0.5  # in whole metres
+
+
 def test_where_she_rests_without_room_that_is_said_and_she_goes_on_to_where_it_is():
     ctx = in_creek(progress={"gate": 1}, plans={"retry": Retry(failures=3)})
     ctx.set(mission=replace(ctx.state.mission, route=led_to(ctx, (0.0, 320.0))))
     rest(ctx)
     assert ctx.state.voyage.arrived
     [text] = [a.text for a in ctx.actions if isinstance(a, act.Announce) and a.code == "no room"]
-    assert text == "she loiters with 13 m of room, a loiter takes 15 m: take her"
+    assert text == "she loiters with 13 m of room, in this wind a loiter takes 15: take her"
     assert diversion(ctx).kind is DiversionKind.ROOM
     ctx.set(voyage=replace(ctx.state.voyage, rest_en_m=(0.0, -60.0)))
     assert diversion(ctx) is None

@@ -273,7 +273,7 @@ def is_cramped(ctx: StepContext) -> bool:
     wind, boat = ctx.wind_now, ctx.reckoned_en
     if wind is None or boat is None or wind[1] < LIGHT_MPS:
         return False
-    return float(water_at(ctx.voyage.area, boat).clearance_m([boat])[0]) < ctx.config.loiter_radius_m
+    return float(water_at(ctx.voyage.area, boat).clearance_m([boat])[0]) < ctx.loiter_swing_m
 
 
 def _motion(ctx: StepContext) -> str:

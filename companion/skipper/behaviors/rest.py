@@ -17,9 +17,11 @@ from companion.skipper.behaviors.field_guidance import keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
 from companion.skipper.planning.diversions import HOME, ROOM, home_trouble, is_at_rest, pressing
 from companion.skipper.step import CancelPlan, Diversion, DiversionKind, Phase, SafeEnd, StepContext
+from companion.skipper.way import distance_m
 
 ANSWERED = {"": "for a person", SHORE: "until the link to the shore is back, or a person gives AUTO"}
 TAKEN = "until a person takes her and gives AUTO back"
+NEAR_M = 35.0  # a loiter so far off a place is at it
 LIES = {HOME: "; home", ROOM: "; she lies where a loiter has room"}  # behind the last goal
 UNTIL_TOLD = "until told to go on"
 
@@ -47,10 +49,19 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
     if repair(ctx):
         return True
     hand_back(ctx)
-    where = "staying near by" if bound.kind is DiversionKind.STAY else f"at {bound.name}"
+    where = "staying near by" if bound.kind is DiversionKind.STAY else _at(ctx, bound)
     how_long = UNTIL_TOLD if bound.is_ordered else bound.until or _how_long(ctx)
     ctx.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
     return True
+
+
+def _at(ctx: StepContext, bound: Diversion) -> str:
+    """Return where she lies at the end of a diversion, in words: a creek may have no room for a loiter."""
+    route = ctx.state.mission.route
+    if bound.en_m is None or route is None or not route.points_en_m:
+        return f"at {bound.name}"
+    off_m = distance_m(route.points_en_m[-1], bound.en_m)
+    return f"at {bound.name}" if off_m < NEAR_M else f"{off_m:.0f} m from {bound.name}, where a loiter has room"
 
 
 def _moved_to_room(ctx: StepContext, bound: Diversion) -> None:
@@ -123,11 +134,11 @@ def _end(ctx: StepContext, why: str, *, arrived: bool) -> None:
     ctx.phase(Phase.DONE, why)
     ctx.say(Severity.NOTICE if arrived else Severity.WARNING, "done", why, every_s=0.0)
     room_m = math.inf if place is None else float(ctx.to_stay_in.area.clearance_m([place])[0])
-    if room_m < ctx.config.loiter_radius_m:
+    if room_m < ctx.loiter_swing_m:
         ctx.say(
             Severity.CRITICAL,
             "no room",
-            f"she loiters with {room_m:.0f} m of room, a loiter takes {ctx.config.loiter_radius_m:.0f} m: take her",
+            f"she loiters with {room_m:.0f} m of room, in this wind a loiter takes {ctx.loiter_swing_m:.0f}: take her",
         )
 
 

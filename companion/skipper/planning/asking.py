@@ -280,6 +280,6 @@ def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung)
     for place in candidates:
         off_marks_m = min((distance_m(place, m.en_m) - m.keep_m for m in marks_of(ctx.voyage)), default=math.inf)
         room_m = min(float(ctx.voyage.area.clearance_m([place])[0]) - step.margin_m, off_marks_m)
-        if room_m >= ctx.config.loiter_radius_m:
+        if room_m >= ctx.loiter_swing_m:
             return Aim(en_m=place, radius_m=ctx.config.loiter_radius_m, gate=-1)
     return Aim(en_m=target.en_m, radius_m=target.radius_m, gate=gate)

@@ -15,7 +15,7 @@ from companion.orders import Verb
 from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, End, Recovery
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step import Diversion, DiversionKind, SafeEnd, SkipperConfig, StepContext
-from companion.skipper.step.missions import loiter_place, place_with_room
+from companion.skipper.step.missions import loiter_place, place_with_room, roomy_m
 from companion.skipper.step.route import HOME_RADIUS_M
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
 from companion.skipper.way.gates import Gate
@@ -27,6 +27,7 @@ from companion.traffic import Policy
 DRAGGED = "dragged off"  # a watchdog
 HOME, REST, ROOM = "home", "the place to rest", "water with room"
 AFTER_LAST_GOAL = {HOME, ROOM}  # where she may be bound for then
+LACK_M = 1.0  # of the room that a loiter takes: she is not moved for less, as the wind freshens
 ROOM_TRIES = 3  # to find a way to water with room, behind the last goal
 GOAL_RADIUS_M = 10.0  # a place that is named under way: there within this
 ABOUT_M = 10.0  # how far off a refuge is by water is told from so near
@@ -269,7 +270,9 @@ def after_last_goal(ctx: StepContext) -> Diversion | None:
     if home is not None or ctx.state.plans.retry.failures >= ROOM_TRIES:
         return home
     last, config, wind = ctx.gates[-1], ctx.known_config, ctx.wind_mean
-    _, room_m = loiter_place(ctx.to_stay_in, config, last.en_m, wind[0] if wind is not None else 0.0)
+    _, room_m = loiter_place(
+        ctx.to_stay_in, config, last.en_m, wind[0] if wind is not None else 0.0, wanted_m=roomy_m(config)
+    )
     if room_m >= config.loiter_radius_m:
         return None
     return _to_room(ctx, last.en_m, f"{last.name or 'the goal'} has no room for a loiter")
@@ -284,7 +287,7 @@ def _waits_with_room(ctx: StepContext) -> Diversion | None:
     if is_bound != bool(ctx.ahead()) or (not is_bound and state.plans.retry.failures == 0):
         return None
     here = route.points_en_m[-1]
-    if not is_bound and float(ctx.to_stay_in.area.clearance_m([here])[0]) >= ctx.config.loiter_radius_m:
+    if not is_bound and float(ctx.to_stay_in.area.clearance_m([here])[0]) >= ctx.loiter_swing_m - LACK_M:
         return None
     return _to_room(ctx, here, "no plan was found, and here a loiter has no room")
 
@@ -399,7 +402,7 @@ def _back(ctx: StepContext) -> Diversion | None:
 def _off_narrow_rest(ctx: StepContext) -> Diversion | None:
     """Return the way to water with room, where the boat is to rest in what has none for a loiter."""
     rest = ctx.state.voyage.rest_en_m
-    if rest is None or float(ctx.to_stay_in.area.clearance_m([rest])[0]) >= ctx.config.loiter_radius_m:
+    if rest is None or float(ctx.to_stay_in.area.clearance_m([rest])[0]) >= ctx.loiter_swing_m - LACK_M:
         return None
     return _to_room(ctx, rest, "where she is to rest a loiter has no room")
 

@@ -13,7 +13,7 @@ from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, leads_there, too_risky, upload
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.missions import loiter_place
+from companion.skipper.step.missions import loiter_place, roomy_m
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.stemming import waiting_place
@@ -191,7 +191,11 @@ def hold(ctx: StepContext, why: str, *, anew: bool = False) -> None:
     if is_there and not (deep.drying and float(deep.area.clearance_m([state.mission.route.points_en_m[-1]])[0]) <= 0.0):
         return  # already in the safe end of the mission
     place, room = loiter_place(
-        deep, config, boat, wind[0] if wind else 0.0, wanted_m=HOLD_ROOM * config.loiter_radius_m
+        deep,
+        config,
+        boat,
+        wind[0] if wind else 0.0,
+        wanted_m=max(HOLD_ROOM * ctx.config.loiter_radius_m, roomy_m(config)),
     )
     if is_there and room <= 0.0:
         return  # in water that dries, as any place about here

@@ -9,6 +9,7 @@ import math
 
 from companion.geo.angles import difference_rad
 from companion.skipper.step.context import StepContext
+from companion.skipper.step.missions import roomy_m
 from companion.skipper.way import Gate, Line, PointEn, bearing_rad, distance_m, moved
 from companion.skipper.way.line import ahead_m, course_rad
 
@@ -70,8 +71,7 @@ def _cut(gate: Gate) -> PointEn:
 def waiting_en(ctx: StepContext, gate: Gate) -> PointEn:
     """Return where to wait for the gun: near where the line is crossed, with room, and one board away from it."""
     assert gate.line is not None
-    cut, course, wind, config = _cut(gate), course_rad(gate.line), ctx.wind_mean, ctx.config
-    room_m = config.loiter_radius_m + min(config.margin_floor_m, config.margin_m)
+    cut, course, wind, room_m = _cut(gate), course_rad(gate.line), ctx.wind_mean, roomy_m(ctx.known_config)
     best, best_cost = moved(cut, course + math.pi, WAIT_M), math.inf
     for far_m in (WAIT_M, FARTHEST_M):
         for side in SIDES_DEG:

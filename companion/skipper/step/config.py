@@ -146,7 +146,7 @@ class SkipperConfig:
     # Then the numbering starts again: a transfer takes 7 ms an item, and the smallest board holds 655.
     max_items: int = 200
     safe_end: SafeEnd = SafeEnd.LOITER
-    loiter_radius_m: float = 15.0  # room the last item needs (measured: 12.1 m from the point)
+    loiter_radius_m: float = 15.0  # how far from its place a loiter takes her, at the least (``loiter_swing_m``)
     # patience
     min_replan_interval_s: float = 20.0  # Büsser 5.2: never a new plan more often than every 20 s
     no_go_patience_s: float = 4.0  # the present wind must close the leg for this long ...

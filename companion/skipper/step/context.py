@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 from functools import cached_property, lru_cache
 
-from companion.boat import Afloat, as_learned, mark_of
+from companion.boat import Afloat, as_learned, loiter_swing_m, mark_of
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import AutopilotStatus, Mode, Severity
@@ -516,8 +516,20 @@ class StepContext:
 
     @property
     def known_config(self) -> SkipperConfig:
-        """The configuration, with what has been read of the autopilot in place of its defaults."""
-        return replace(self.config, no_go_half_rad=self.no_go_half_rad, tack_corridor_m=self.tack_corridor_m)
+        """The configuration, with what has been read of the autopilot and of the wind in place of its defaults."""
+        return replace(
+            self.config,
+            no_go_half_rad=self.no_go_half_rad,
+            tack_corridor_m=self.tack_corridor_m,
+            loiter_radius_m=float(round(self.loiter_swing_m)),
+        )
+
+    @property
+    def loiter_swing_m(self) -> float:
+        """How far from its place a loiter takes the boat in this wind [m]."""
+        wind = self.wind_mean
+        least_m = self.config.loiter_radius_m
+        return least_m if wind is None else max(least_m, loiter_swing_m(self.voyage.boat.polar, wind[1]))
 
     @property
     def fences(self) -> tuple[HomeCircle | Drawn, ...]:

@@ -78,6 +78,11 @@ ROOMIER_M = 50.0  # a place with the room that is wanted is worth sailing this f
 ROOMIER_BY_M = 3.0  # ... and a somewhat roomier one only for this much of room
 
 
+def roomy_m(config: SkipperConfig) -> float:
+    """Return how clear a loiter's place must be for the boat to keep the margin's floor in it [m]."""
+    return config.loiter_radius_m + min(config.margin_floor_m, config.margin_m)
+
+
 def loiter_place(
     voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float, *, wanted_m: float = 0.0
 ) -> tuple[PointEn, float]:
@@ -134,14 +139,22 @@ WIND_STEP_RAD = math.radians(30.0)  # how fine the wind is told by where room is
 
 
 def place_with_room(voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float) -> PointEn | None:
-    """Return the nearest place by water with ``loiter_radius_m`` all round and to leeward; None: none in 900 m."""
+    """Return the nearest place by water with ``roomy_m`` all round and to leeward; None: none in 900 m.
+
+    Where that is not to be had, with ``loiter_radius_m``.
+    """
     about = (float(round(end_en[0])), float(round(end_en[1])))
-    return _place_with_room(voyage, voyage.area, config, about, WIND_STEP_RAD * round(twd_from_rad / WIND_STEP_RAD))
+    wind_rad = WIND_STEP_RAD * round(twd_from_rad / WIND_STEP_RAD)
+    found = (
+        _place_with_room(voyage, voyage.area, config, about, wind_rad, m)
+        for m in (roomy_m(config), config.loiter_radius_m)
+    )
+    return next((place for place in found if place is not None), None)
 
 
 @lru_cache(maxsize=8)  # asked for at every step; the area is by identity, which a voyage's equality leaves out
 def _place_with_room(
-    voyage: Voyage, area: AreaLike, config: SkipperConfig, end_en: PointEn, twd_from_rad: float
+    voyage: Voyage, area: AreaLike, config: SkipperConfig, end_en: PointEn, twd_from_rad: float, room_m: float
 ) -> PointEn | None:
     leeward, marks = twd_from_rad + math.pi, marks_of(voyage)
     nearest, least_m = None, math.inf
@@ -150,7 +163,7 @@ def _place_with_room(
             break  # by water nothing is nearer than straight
         places = [moved(end_en, 2.0 * math.pi * n / DIRECTIONS, ring_m) for n in range(DIRECTIONS)]
         rooms = _rooms_m(voyage, config, marks, places, leeward)
-        for place in (place for place, room in zip(places, rooms, strict=True) if room >= config.loiter_radius_m):
+        for place in (place for place, room in zip(places, rooms, strict=True) if room >= room_m):
             far_m = way_m(area, end_en, place, config.margin_floor_m)
             if far_m < least_m:
                 nearest, least_m = place, far_m
@@ -200,7 +213,7 @@ def end_item(
     voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float
 ) -> tuple[MissionItem, PointEn]:
     """Return the loiter that ends the mission and where it is."""
-    place, _ = loiter_place(voyage, config, end_en, twd_from_rad)
+    place, _ = loiter_place(voyage, config, end_en, twd_from_rad, wanted_m=roomy_m(config))
     return waypoint(voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM), place
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from companion.boat import ardurover_sitl, loiter_swing_m
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import Vehicle
@@ -220,6 +221,23 @@ def test_loiter_after_the_last_waypoint_keeps_sailing_near_it() -> None:
     rows = r["rows"][r["rows"][:, 0] > r["end"]]
     assert np.hypot(rows[:, 1] - REACH[-1][0], rows[:, 2] - REACH[-1][1]).max() == pytest.approx(12.3, abs=1.5)
     assert rows[:, 3].mean() == pytest.approx(2.4, abs=0.15)
+
+
+@pytest.mark.parametrize("tws_mps", [5.0, 9.0, 14.0])
+def test_a_loiter_swings_no_farther_than_is_reckoned_with(tws_mps: float) -> None:
+    async def job(c: Client) -> Client:
+        c.rate(mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5)
+        await asyncio.sleep(1.0)
+        await c.set_sail([(0.0, 60.0), (0.0, 0.0)])
+        await c.wait("STATUSTEXT", 400.0, lambda m: m.text == "Mission Complete")
+        await asyncio.sleep(120.0)
+        return c
+
+    c = sail(job, is_moored=True, wind=Constant(0.0, tws_mps))
+    rows = track(c)
+    rows = rows[rows[:, 0] > c.text_time("Mission Complete")]
+    reckoned_m = loiter_swing_m(ardurover_sitl(), tws_mps)
+    assert 0.8 * reckoned_m < np.hypot(rows[:, 1], rows[:, 2]).max() < reckoned_m
 
 
 def test_servos_of_the_sail() -> None:
