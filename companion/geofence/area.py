@@ -35,18 +35,23 @@ SLACK_M = 1.0  # a fence's items are rounded, its circles drawn with sides, its 
 AROUND_M = 20_000.0  # of what is known, where nothing limits the water: nobody sails so far in one frame
 
 
+def grown_m(margin_m: float) -> float:
+    """Return how far off a shape grown by a margin may reach [m]: its corners' chords are drawn outwards."""
+    return margin_m * OUTWARDS
+
+
 def buffer_out(shape: BaseGeometry, distance_m: float) -> BaseGeometry:
     """Return a polygon that contains every point within ``distance_m`` of ``shape`` (at most 5 % more)."""
     if distance_m <= 0.0:
         return shape
-    return shapely.buffer(shape, distance_m * OUTWARDS, quad_segs=QUADRANT_SEGMENTS)
+    return shapely.buffer(shape, grown_m(distance_m), quad_segs=QUADRANT_SEGMENTS)
 
 
 def buffer_in(shape: BaseGeometry, distance_m: float) -> BaseGeometry:
     """Return a part of ``shape`` whose points are all at least ``distance_m`` from its boundary."""
     if distance_m <= 0.0:
         return shape
-    return shapely.buffer(shape, -distance_m * OUTWARDS, quad_segs=QUADRANT_SEGMENTS)
+    return shapely.buffer(shape, -grown_m(distance_m), quad_segs=QUADRANT_SEGMENTS)
 
 
 def parts(shape: BaseGeometry) -> list[Polygon]:

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.geo.angles import difference_rad, heading_of
 from companion.geo.frame import LocalFrame
-from companion.geofence.area import Area, LocalArea, buffer_in, parts
+from companion.geofence.area import Area, LocalArea, buffer_in, grown_m, parts
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.geofence.document import Code, Finding, FindingLevel
 from companion.geofence.formats.fence_items import MAX_FENCE_ITEMS, zones_to_items
@@ -134,12 +134,15 @@ def _places(local: LocalArea, conditions: AreaConditions, findings: Findings) ->
             findings.add(FindingLevel.ERROR, code, name, problem, "move it into free water or correct the area")
             continue
         clearance_m = float(local.clearance_m([here])[0])
-        if conditions.margin_m is not None and clearance_m < conditions.margin_m:
+        if conditions.margin_m is not None and clearance_m < grown_m(conditions.margin_m):
+            of_margin = f"the margin of {conditions.margin_m:g} m"
+            if clearance_m >= conditions.margin_m:
+                of_margin += f" is, drawn round corners: {grown_m(conditions.margin_m):.1f} m"
             findings.add(
                 FindingLevel.WARNING,
                 code,
                 name,
-                f"has {clearance_m:.1f} m of free water, less than the margin of {conditions.margin_m:g} m",
+                f"has {clearance_m:.1f} m of free water, less than {of_margin}",
                 "move it off, or lower the margin",
             )
 

@@ -213,8 +213,9 @@ def notice_truncation(ctx: StepContext) -> None:
 
 
 def _counts(ctx: StepContext) -> bool:
-    """Return whether the autopilot's number is about our route."""
-    return ctx.state.mission.checked and not ctx.state.mission.foreign and ctx.state.phase is not Phase.OPERATOR
+    """Return whether the autopilot's number is about our route: that it sails when she is given up, too."""
+    is_taken = ctx.state.phase is Phase.OPERATOR and not ctx.is_given_up
+    return ctx.state.mission.checked and not ctx.state.mission.foreign and not is_taken
 
 
 def _own_count(ctx: StepContext) -> None:

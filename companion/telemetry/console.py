@@ -305,7 +305,7 @@ def progress_text(step: Step) -> str:
         minutes = state.orders.standing.age_s(snapshot.t_s) / 60.0
         parts.append(f"order {state.orders.standing.words} of {state.orders.standing.by}, {minutes:.0f} min")
     if route is not None:
-        clearance_m = None if sailed is None else sailed.clearance_ahead_m(state.mission.index)
+        clearance_m = None if sailed is None or not under_way else sailed.clearance_ahead_m(state.mission.index)
         if clearance_m is not None:
             parts.append(f"clearance expected {clearance_words(clearance_m, _where(step))}")
         eta = step.eta()

@@ -230,7 +230,9 @@ def _skip_goal(ctx: StepContext, _: Order) -> Answer:
         progress=changed(ctx.state.progress, missed_s=None),
         plans=changed(ctx.state.plans, retry=PATIENT, asked=text),
     )
-    return _done(f"{text}: {_next(ctx)}")
+    standing = ctx.state.orders.standing
+    then = f"{ctx.gates[ctx.state.progress.gate].name} is next when {standing.words} ends" if standing else _next(ctx)
+    return _done(f"{text}: {then}")
 
 
 def _sail_to(ctx: StepContext, order: Order, found: tuple[str, tuple[float, float]] | str, then: str) -> Answer:

@@ -241,8 +241,9 @@ def stop_drift(ctx: StepContext) -> bool:
 
 
 def rest_at_end(ctx: StepContext) -> bool:
-    """Loiter at the voyage's end."""
-    if not is_at_end(ctx):
+    """Loiter at the voyage's end; a LOITER for a doubted wind comes first, until the wind is known."""
+    is_held = bool(ctx.snapshot.unsure) and ctx.state.steering.own_mode is Mode.LOITER and not ctx.state.voyage.over
+    if is_held or not is_at_end(ctx):
         return False
     rest(ctx)
     return True

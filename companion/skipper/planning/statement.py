@@ -20,6 +20,7 @@ from shapely.geometry import LineString, Polygon
 from companion.current import STILL_WATER, WaterCurrent, WindAngleUncertainty, forecast_over_water
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.geo.frame import LocalFrame
+from companion.geofence.area import grown_m
 from companion.messages import WindForecast
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import SpeedSeen
@@ -143,6 +144,7 @@ def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, t
     is clear of; of equally near ones the one that is not upwind. Outside the limits they are opened about a way back
     inside, and what is solid is all that there is to keep clear of.
     """
+    margin_m = grown_m(margin_m)  # as the water is drawn that a plan may begin in
     area, back = voyage.area, _back_inside(voyage, start, margin_m=margin_m, floor_m=floor_m)
     if back:
         out_m, area = outside_m(area, start.en_m), water_at(area, start.en_m)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
+from shapely.geometry import box
 
 from companion.messages import Mode
 from companion.orders import Result, Verb
@@ -240,6 +242,43 @@ def test_a_goal_is_skipped_and_the_last_is_not():
     assert world.run(1500, is_done)
     assert world.state.progress.reached == (1,)
     assert "1 of 2 goals reached, 1 given up by order" in world.state.voyage.over
+
+
+def test_a_goal_skipped_while_she_is_held_is_told_with_what_comes_before_the_next():
+    world = sailing()
+    answer(world, "hold")
+    assert answer(world, "skip_goal").text == "A is given up: B is next when hold ends"
+
+
+def test_while_stop_stands_her_number_is_that_which_the_autopilot_sails_for():
+    """The line said wp 3 of 6, and the next tack in 4 minutes, of a boat that loitered at the last."""
+    world = sailing()
+    answer(world, "stop")
+    last = len(world.state.mission.route.items) - 1
+    assert world.run(600, lambda w: w.seq == last + 1)
+    world.run(5)
+    assert world.state.phase is Phase.OPERATOR
+    assert world.state.mission.index == last
+
+
+def test_a_refuge_without_room_for_a_loiter_is_told_with_how_far_off_she_lies():
+    refuge, banks = (0.0, -100.0), (box(-60.0, -160.0, -13.0, -40.0), box(13.0, -160.0, 60.0, -40.0))
+    world = make(
+        A,
+        obstacles=banks,
+        voyage={"refuges": (refuge,)},
+        config={"margin_m": 6.0, "margin_floor_m": 3.0},
+        wind=lambda t: (math.pi / 2.0, 5.0),
+    )
+    world.shown["home"] = FRAME.origin
+    assert world.run(120, is_sailing)
+    world.run(30)
+    answer(world, "refuge")
+    assert world.run(900, lambda w: "waiting until told" in w.state.why)
+    off_m = distance_m(world.state.mission.route.points_en_m[-1], refuge)
+    assert off_m > 40.0
+    assert f"{off_m:.0f} m from the refuge" in world.state.why
+    assert "where a loiter has room" in world.state.why
 
 
 def test_a_skipped_goal_stays_skipped_after_a_restart():

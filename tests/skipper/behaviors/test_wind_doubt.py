@@ -14,7 +14,7 @@ from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from tests.skipper.test_voyage import is_done, make, said
-from tests.skipper.world import area, restarted
+from tests.skipper.world import area, restarted, with_parts
 
 WHY = "the wind's direction leapt by +90° and she makes 0.7 m/s astern where 2.2 m/s were to be expected"
 SAILS = {Phase.STANDARD, Phase.DESTINATION_APPROACH}
@@ -45,6 +45,20 @@ def test_she_loiters_while_it_lasts_and_sails_on_by_a_plan_from_where_she_is():
     assert world.run(60, lambda w: w.mode is Mode.AUTO)
     assert asked_since(world, ends, act.RequestPlan)[0].from_seq is None
     assert world.run(1500, is_done)
+
+
+def test_the_last_goal_reached_meanwhile_does_not_take_the_loiter_away():
+    """AUTO was given back "to the mission" by a wind that nobody knew, 12 m from a lee shore."""
+    world = under_way()
+    world.extra["unsure"], begins = WHY, world.t
+    assert world.run(5, lambda w: w.mode is Mode.LOITER)
+    world.state = with_parts(world.state, progress={"gate": 1})  # what came in meanwhile
+    world.run(60)
+    assert world.mode is Mode.LOITER
+    assert not any(a.mode is Mode.AUTO for a in asked_since(world, begins, act.SetMode))
+    assert world.state.phase is Phase.HOLDING
+    world.extra["unsure"] = ""
+    assert world.run(60, lambda w: is_done(w) and w.mode is Mode.AUTO)
 
 
 def test_a_plan_that_is_being_made_is_called_off_and_no_rung_follows_it():

@@ -125,6 +125,15 @@ def test_a_start_inside_the_margin_is_led_out():
     assert repaired(made, start, margin_m=3.0, floor_m=2.0, twd_from_rad=0.0) is start
 
 
+def test_a_start_just_outside_the_margin_gets_a_notch_where_the_water_is_drawn_narrower():
+    """Corners are drawn 4.5 % outwards: 8.7 m off, with 8.5 m of margin, she never set sail."""
+    made = voyage(obstacles=(box(-50, -50, 50, -8.7),))
+    start = Start(en_m=(0.0, 0.0), heading_rad=0.0)
+    out = repaired(made, start, margin_m=8.5, floor_m=6.0, twd_from_rad=0.0)
+    assert out.notch_m > 0.0
+    assert repaired(made, start, margin_m=8.3, floor_m=6.0, twd_from_rad=0.0) is start
+
+
 @pytest.mark.parametrize("limits", [None, box(-300, -5, 300, 900)])
 def test_a_start_between_floor_and_margin_gets_a_notch(limits):
     made = voyage(Goal(en_m=(0.0, 300.0), radius_m=6.0), obstacles=(box(-50, -50, 50, 30),), limits=limits)
