@@ -511,7 +511,7 @@ def _solids(asked: PassageFile, path: Path) -> list[BaseGeometry]:
 
 def _refuse_out(args: argparse.Namespace) -> None:
     """Raise InputError where a mission, or the passage that is drawn beside it, is there and nobody said --force."""
-    from companion.view.passage import planned_beside
+    from companion.geofence.mission import planned_beside
 
     if args.out is not None:
         refuse_existing([str(args.out), str(planned_beside(args.out))], force=args.force)
@@ -524,7 +524,7 @@ def _write_mission(
     import msgspec
 
     from companion import __version__
-    from companion.view.passage import planned_beside
+    from companion.geofence.mission import planned_beside
     from companion.view.planned import planned_of
 
     beside = planned_beside(args.out)

@@ -27,7 +27,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         description="Serve the page over a recorded voyage, with a timeline, or ashore over what a radio brings of a "
         "companion; or pack a recorded voyage into one HTML file that needs nothing else.",
         epilog="Examples: companion view voyages/20260714T101500Z-archipelago; companion view --link "
-        "/dev/ttyUSB0:57600; companion view voyages/20260714T101500Z-archipelago --export voyage.html",
+        "/dev/ttyUSB0:57600 --passage biscay.passage.json; companion view voyages/20260714T101500Z-archipelago "
+        "--export voyage.html",
     )
     parser.add_argument(
         "voyage", type=Path, nargs="?", metavar="VOYAGE_DIR", help="the folder that `companion run` left"
@@ -48,6 +49,13 @@ def add_parser(subparsers: Any, summary: str) -> None:
         type=system_id,
         metavar="N",
         help="with --link: the autopilot's MAVLink system id (default: the only one heard)",
+    )
+    parser.add_argument(
+        "--passage",
+        type=Path,
+        metavar="FILE.passage.json",
+        help="with --link: the passage that she was planned to sail, as `companion passage plan --out` wrote it; a "
+        "radio brings none",
     )
     parser.add_argument(
         "--http",
@@ -73,7 +81,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
-    from companion.page import Address, export, open_charts
+    from companion.page import Address, export, open_charts, read_passage
 
     if (args.voyage is None) == (args.link is None):
         raise InputError(
@@ -97,7 +105,12 @@ def run(args: argparse.Namespace) -> int:
                 "what is heard by radio is no voyage yet",
                 "export the folder that the companion leaves",
             )
-        return run_loop(ashore(args, charts))
+        planned = None if args.passage is None else read_passage(args.passage)
+        return run_loop(ashore(args, charts, planned))
+    if args.passage is not None:
+        raise InputError(
+            "--passage", str(args.passage), "a recorded voyage has its own", "leave it out, or name --link LINK"
+        )
     record = read_record(args.voyage)
     if args.beside is not None:
         record.beside = read_record(args.beside)
@@ -115,7 +128,8 @@ def run(args: argparse.Namespace) -> int:
 
 def read_record(folder: Path) -> Any:
     """Return the recorded voyage for the page. Raises InputError."""
-    from companion.page import RecordedSource
+    from companion.page import RecordedSource, read_planned
+    from companion.telemetry.folder import mission_copy
     from companion.view import recorded_views
 
     with Folding() as told:
@@ -129,10 +143,16 @@ def read_record(folder: Path) -> Any:
         raise InputError(str(folder), "track.csv", "has no step in it", "name a voyage that was sailed")
     if not recorded.is_whole:
         sys.stderr.write("companion view: note: without its telemetry log the voyage is shown by its track alone\n")
+    try:
+        record.planned = read_planned(mission_copy(folder))
+    except InputError as error:
+        record.passage_said = f"{error}; it is not shown"
+        sys.stderr.write(f"companion view: note: {record.passage_said}\n")
     return record
 
 
 STEP_S = 1.0
+NOT_ON_THE_AIR = "No passage is shown: a radio brings none. `companion view --link` shows that of --passage FILE."
 
 
 def stopping() -> asyncio.Event:
@@ -155,8 +175,8 @@ async def serve(address: Any, source: Any, charts: Any) -> int:
     return 0
 
 
-async def ashore(args: argparse.Namespace, charts: Any) -> int:
-    """Show what a radio brings."""
+async def ashore(args: argparse.Namespace, charts: Any, planned: Any) -> int:
+    """Show what a radio brings, with the passage that was planned ashore."""
     from companion.clock import now_s
     from companion.mavlink.link import Link
     from companion.mavlink.reception import SHORE
@@ -175,7 +195,13 @@ async def ashore(args: argparse.Namespace, charts: Any) -> int:
 
     host, port = args.http
     epoch_s = time.time() - now_s()
-    live = LiveSource(name=args.link, kind="radio", unix_s=epoch_s)
+    live = LiveSource(
+        name=args.link,
+        kind="radio",
+        unix_s=epoch_s,
+        planned=planned,
+        passage_said=NOT_ON_THE_AIR if planned is None else "",
+    )
     async with Link(open_link(args.link), identity=SHORE, target_system=args.system, streams=(), is_quiet=True) as link:
         link.subscribe(take)
 

@@ -11,7 +11,7 @@ from companion.page.connections import (
     read_token,
     require_token,
 )
-from companion.page.passages import read_planned
+from companion.page.passages import read_passage, read_planned
 from companion.page.server import export, files, served, tile_at
 from companion.page.sources import LiveSource, RecordedSource, plan_figures
 
@@ -30,6 +30,7 @@ __all__ = [
     "listening",
     "open_charts",
     "plan_figures",
+    "read_passage",
     "read_planned",
     "read_token",
     "require_token",

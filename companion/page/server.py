@@ -87,9 +87,9 @@ def export(record: RecordedSource) -> bytes:
         "log": msgspec.Raw(record.log()),
         "moments": [base64.b64encode(chunk).decode() for chunk in record.chunks],
     }
-    beside = record.compared()
-    if beside is not None:
-        data["beside"] = msgspec.Raw(beside())
+    for name, make in (("beside", record.compared()), ("passage", record.passage())):
+        if make is not None:
+            data[name] = msgspec.Raw(make())
     packed = _base64(gzip.compress(msgspec.json.encode(data), 9, mtime=0))
     page = re.sub(r'<link rel="stylesheet"[^>]*>', lambda _: f"<style>{style}</style>", page)
     page = re.sub(r'<link rel="icon"[^>]*>', '<link rel="icon" href="data:,">', page)
@@ -191,7 +191,7 @@ class Page:
             return _json(source.area)
         if path == "/api/past":
             return source.past()
-        if path == "/api/passage" and isinstance(source, LiveSource):
+        if path == "/api/passage":
             return source.passage()
         if path == "/api/log":
             return source.hub.log() if isinstance(source, LiveSource) else source.log

@@ -110,6 +110,11 @@ class Watcher:
         return b"".join(parts)
 
 
+def _laid(planned: PlannedPassage, area: AreaView) -> bytes:
+    """Return the JSON of a passage in an area's metres."""
+    return msgspec.json.encode(passage_view(planned, area.frame.array_en_from_lonlat))
+
+
 CHUNK = 60  # recorded views in one answer
 MOST_MOMENTS = 7200  # of a recorded voyage: more are thinned out
 GZIP_LEVEL = 5
@@ -132,6 +137,7 @@ class LiveSource:
     area: AreaView | None = None
     trail: Trail = field(default_factory=Trail)
     planned: PlannedPassage | None = None
+    passage_said: str = ""  # why no passage is shown
     _placed: tuple[str, bytes] | None = field(default=None, repr=False)  # of an area, by its hash
 
     def show(self, view: View, events: Sequence[Event], area: AreaView | None) -> None:
@@ -156,6 +162,7 @@ class LiveSource:
             "chunk": None,
             "area": None if self.area is None else self.area.hash,
             "passage": self.planned is not None,
+            "passage_said": self.passage_said,
         }
 
     def passage(self) -> Callable[[], bytes] | None:
@@ -167,8 +174,7 @@ class LiveSource:
         def make() -> bytes:
             placed = self._placed
             if placed is None or placed[0] != area.hash:
-                view = passage_view(planned, area.frame.array_en_from_lonlat)
-                placed = self._placed = area.hash, msgspec.json.encode(view)
+                placed = self._placed = area.hash, _laid(planned, area)
             return placed[1]
 
         return make
@@ -195,6 +201,8 @@ class RecordedSource:
         self.sails_s: float | None = None
         self.last: View | None = None
         self.beside: RecordedSource | None = None  # another voyage, to compare with
+        self.planned: PlannedPassage | None = None
+        self.passage_said = ""  # why no passage is shown
 
     def take(self, view: View, events: Sequence[Event]) -> None:
         """Take the next moment; of a very long voyage those in which nothing happened are thinned out."""
@@ -235,11 +243,17 @@ class RecordedSource:
             "area": self.area.hash,
             "sails_s": self.sails_s,
             "beside": None if self.beside is None else self.beside.name,
+            "passage": self.planned is not None,
+            "passage_said": self.passage_said,
         }
 
     def log(self) -> bytes:
         """Return the log, as JSON."""
         return msgspec.json.encode(self._events)
+
+    def passage(self) -> Callable[[], bytes] | None:
+        """Return what makes the JSON of the passage that was planned, in the area's metres; None: none was."""
+        return None if self.planned is None else partial(_laid, self.planned, self.area)
 
     def compared(self) -> Callable[[], bytes] | None:
         """Return what makes the JSON of the voyage beside this one, in this one's metres; None: there is none."""

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
@@ -20,13 +19,12 @@ from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from companion.errors import InputError
+from companion.geofence.mission import MOST_PASSAGE_BYTES
 from companion.view.values import PointEn
 from companion.words import expected
 
-ENDING = ".passage.json"
 Form = Literal["companion.passage/1"]
 FORM: Form = "companion.passage/1"
-MOST_BYTES = 400_000
 _NORTH_DEG = 0.01  # how far off true north is looked for
 
 Lat = Annotated[float, Meta(ge=-90.0, le=90.0)]
@@ -125,16 +123,11 @@ class PlannedPassage(Struct, frozen=True, kw_only=True):
                 raise ValueError(f"`{name}` goes backwards")
 
 
-def planned_beside(mission: Path) -> Path:
-    """Return the file of the passage that a mission was planned as: ``m.toml`` has ``m.passage.json``."""
-    return mission.with_suffix(ENDING)
-
-
 def parse_planned(data: bytes, source: str) -> PlannedPassage:
     """Return the passage of a file. Raises InputError."""
     remedy = "write it anew with companion passage plan --out"
-    if len(data) > MOST_BYTES:
-        raise InputError(source, "", f"is larger than {MOST_BYTES // 1000} kB", remedy)
+    if len(data) > MOST_PASSAGE_BYTES:
+        raise InputError(source, "", f"is larger than {MOST_PASSAGE_BYTES // 1000} kB", remedy)
     try:
         return msgspec.json.decode(data, type=PlannedPassage)
     except msgspec.ValidationError as error:

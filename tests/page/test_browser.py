@@ -26,6 +26,7 @@ from companion.view.area import DryingView
 from tests.page.asking import Asked, free_port
 from tests.page.browsing import Window, needs_browser
 from tests.page.charting import mbtiles, share_in_tile, tile_of
+from tests.page.conftest import line_passage
 
 pytestmark = needs_browser
 
@@ -209,6 +210,68 @@ def test_two_voyages_are_seen_beside_each_other_from_setting_sail_on(record, sai
         )
         keep(window, "beside")
         assert window.complaints() == []
+
+
+def is_passage_drawn(window):
+    return all(
+        window.js("return document.querySelectorAll('#map .' + arguments[0]).length", kind) > 0
+        for kind in ("pband", "proute", "piso", "ppoint", "pbarb", "pflow", "pmember", "pnow")
+    )
+
+
+def test_a_recorded_voyage_has_the_passage_that_she_was_planned_to_sail(record, tmp_path):
+    """True of the moment that is shown, in the folder's page and in one file; it can be put away."""
+    (tmp_path / "voyage.html").write_bytes(export(record))
+    with serving(record) as (url, _), Window() as window:
+        for address in (url, f"file://{tmp_path / 'voyage.html'}"):
+            window.open(address)
+            window.keys("a")
+            for t_s in (60.0, 120.0):
+                window.js("companion.timeline.go(companion.timeline.index(arguments[0]))", t_s)
+                window.until("return Math.abs(companion.view.t_s - arguments[0]) < 1.5", 10.0, t_s)
+                assert is_passage_drawn(window)
+                assert "forecast of 06-09 08:13 UTC, 2 h 0" in window.text("passagewords")
+                # by its middle run she is so far along after so long: the sign stands there
+                north_m = window.js(
+                    "return import(arguments[0]).then(({onScreen}) => {"
+                    "const at = (q) => { const b = document.querySelector(q).getBBox(); return b.y + b.height / 2; };"
+                    "const goal = companion.view.goals[0].at_en_m;"
+                    "const [, y0] = onScreen([0, 0]), [, y1] = onScreen(goal);"
+                    "return goal[1] * (at('#map .pnow') - y0) / (y1 - y0); })",
+                    "/map.js" if address == url else "page/map.js",
+                )
+                assert north_m == pytest.approx(t_s / 3.0, abs=2.0)
+            window.keys("p")
+            assert not is_passage_drawn(window)
+            window.keys("p")
+            assert is_passage_drawn(window)
+            keep(window, "recorded-passage")
+        assert window.complaints() == []
+
+
+def test_where_no_passage_can_be_shown_it_is_said_and_of_the_radio_whose_it_is(sailed):
+    """Its layer is not there and empty: a line says why."""
+    from dataclasses import replace
+
+    from companion.commands.view import NOT_ON_THE_AIR
+
+    view = replace(next(v for v in sailed.views if v.state.is_sailing), source="radio", goals=())
+    silent = LiveSource(name="radio", kind="radio", passage_said=NOT_ON_THE_AIR)
+    told = LiveSource(name="radio", kind="radio", planned=line_passage())
+    with Window() as window:
+        for live in (silent, told):
+            live.show(view, (), sailed.area)
+            with serving(live) as (url, _):
+                window.open(url)
+                window.until("return document.getElementById('passagewords').textContent !== ''")
+                assert window.js("return document.getElementById('passage').hidden") is (live is silent)
+                words = window.text("passagewords")
+                assert ("a radio brings none" in words) is (live is silent)
+                assert ("whether this is what she sails is not on the air" in words) is (live is told)
+                assert ("off the route" in words) is (live is told)
+                assert window.barriers() == []
+                assert window.complaints() == []
+                window.driver.get("about:blank")  # before its link is gone
 
 
 def test_a_voyage_in_one_file_needs_nothing_and_nobody(record, tmp_path):

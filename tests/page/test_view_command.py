@@ -1,5 +1,6 @@
 """``companion view``: what it is given, what is half written, where it cannot serve; each in one line."""
 
+import json
 import os
 import shutil
 import signal
@@ -12,9 +13,15 @@ import urllib.request
 import pytest
 
 from companion import cli
+from companion.commands.view import read_record
+from companion.geofence import load_mission
+from companion.geofence.mission import MOST_PASSAGE_BYTES, planned_beside
 from companion.page import export
-from companion.telemetry.folder import TLOG, TRACK
+from companion.telemetry.folder import TLOG, TRACK, Recorder, mission_copy
+from companion.telemetry.folder.logbook import write_copies
 from tests.page.asking import free_port
+from tests.page.conftest import line_passage
+from tests.view.conftest import write_mission
 
 
 def said(capsys, *words):
@@ -38,6 +45,9 @@ def said(capsys, *words):
         ("nowhere", "--chart", "README.md"),
         ("nowhere", "--chart", "README.md", "--export", "x.html"),
         ("--link", "udpin:127.0.0.1:1", "--beside", "nowhere"),
+        ("nowhere", "--passage", "m.passage.json"),
+        ("--link", "udpin:127.0.0.1:1", "--passage", "nowhere.passage.json"),
+        ("--link", "udpin:127.0.0.1:1", "--passage", "README.md"),
     ],
 )
 def test_what_cannot_be_viewed_is_one_line(words, capsys):
@@ -62,6 +72,46 @@ def test_a_voyage_is_packed_once_and_not_over_another_file(sailed, tmp_path, cap
 
 def test_the_same_voyage_gives_the_same_file(record):
     assert export(record) == export(record)
+
+
+def test_the_passage_that_she_was_planned_to_sail_goes_with_the_record(sailed, tmp_path):
+    """From the copy in the folder alone: what lies beside the mission later is of another plan."""
+    planned_beside(sailed.mission).rename(tmp_path / "away")
+    try:
+        record = read_record(sailed.folder)
+    finally:
+        (tmp_path / "away").rename(planned_beside(sailed.mission))
+    assert record.planned == line_passage()
+    assert (record.hello()["passage"], record.hello()["passage_said"]) == (True, "")
+    layer = json.loads(record.passage()())
+    assert layer["waypoints"][1]["at_en_m"] == [0.0, pytest.approx(100.1, abs=0.5)]
+    assert {key: len(layer[key]) for key in ("band", "met", "isochrones", "members_m")} == {
+        "band": 1,
+        "met": 1,
+        "isochrones": 1,
+        "members_m": 2,
+    }
+
+
+def test_a_copy_of_a_passage_that_cannot_be_read_is_said_and_the_voyage_is_shown(sailed, tmp_path, capsys):
+    folder = tmp_path / "v"
+    shutil.copytree(sailed.folder, folder)
+    planned_beside(mission_copy(folder)).write_text("{")
+    record = read_record(folder)
+    assert (record.planned, record.passage(), record.hello()["passage"]) == (None, None, False)
+    assert "is no planned passage" in record.hello()["passage_said"]
+    assert capsys.readouterr().err.count("\n") == 1
+    planned_beside(mission_copy(folder)).unlink()
+    assert read_record(folder).hello()["passage_said"] == ""
+
+
+def test_a_passage_that_is_too_large_is_not_copied_and_the_mission_is(tmp_path):
+    path = write_mission(tmp_path)
+    planned_beside(path).write_bytes(b" " * (MOST_PASSAGE_BYTES + 1))
+    with Recorder(tmp_path / "v") as recorder:
+        assert write_copies(load_mission(path), recorder) == "mission/mission.toml"
+    assert mission_copy(tmp_path / "v").is_file()
+    assert not planned_beside(mission_copy(tmp_path / "v")).exists()
 
 
 @pytest.mark.parametrize("name", ["track.csv", "decisions.jsonl", "telemetry.tlog"])
@@ -120,11 +170,12 @@ def test_it_serves_until_it_is_stopped_and_a_port_in_use_is_one_line(sailed):
         assert serving.stderr.read() == ""
 
 
-def test_ashore_the_page_shows_what_the_radio_brings():
-    """From the status alone, as ``companion status`` hears it."""
-    import json
+@pytest.mark.parametrize("is_named", [False, True])
+def test_ashore_the_page_shows_what_the_radio_brings(is_named, tmp_path):
+    """From the status alone, as ``companion status`` hears it; the passage is of a file, and without one it is said."""
     import threading
 
+    import msgspec
     from pymavlink.dialects.v20 import ardupilotmega as wire
 
     from companion.mavlink.wire.companion_status import status_messages
@@ -146,7 +197,10 @@ def test_ashore_the_page_shows_what_the_radio_brings():
 
     speaking = threading.Thread(target=speak, daemon=True)
     speaking.start()
+    file = tmp_path / "m.passage.json"
+    file.write_bytes(msgspec.json.encode(line_passage()))
     command = [sys.executable, "-m", "companion.cli", "view", "--link", f"udpin:127.0.0.1:{radio}", "--http", str(port)]
+    command += ["--passage", str(file)] if is_named else []
     try:
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as serving:
             assert serving.stdout.readline().startswith("http://")
@@ -162,6 +216,13 @@ def test_ashore_the_page_shows_what_the_radio_brings():
             assert (view["source"], view["orders"]["standing"]["verb"]) == ("radio", "hold")
             assert view["boat"]["at_en_m"] == [0.0, 0.0]
             assert view["laylines"] is None
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/hello") as answer:
+                hello = json.load(answer)
+            assert hello["passage"] is is_named
+            assert ("a radio brings none" in hello["passage_said"]) is not is_named
+            if is_named:
+                with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/passage") as answer:
+                    assert json.load(answer)["name"] == "to the mark"
             os.kill(serving.pid, signal.SIGINT)
             assert serving.wait(10) == 0
     finally:

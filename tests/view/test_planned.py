@@ -10,10 +10,11 @@ import shapely
 
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
+from companion.geofence.mission import MOST_PASSAGE_BYTES
 from companion.messages import GeoPoint
 from companion.page import LiveSource, read_planned
 from companion.view.area import AreaView
-from companion.view.passage import MOST_BYTES, parse_planned, passage_view
+from companion.view.passage import parse_planned, passage_view
 from companion.view.planned import level_lines
 from tests.passage.world import T0
 from tests.view.planning import MEMBERS, planned
@@ -89,7 +90,7 @@ def test_the_file_is_small_and_read_as_it_was_written(tmp_path):
     drawn = msgspec.structs.replace(drawn, isochrones=lines, **{k: tuple(v) for k, v in many.items()})
     drawn = msgspec.structs.replace(drawn, arrivals_s=tuple(sorted(drawn.arrivals_s)))
     data = msgspec.json.encode(drawn)
-    assert len(data) < MOST_BYTES
+    assert len(data) < MOST_PASSAGE_BYTES
     (tmp_path / "m.passage.json").write_bytes(data)
     assert read_planned(tmp_path / "m.toml") == drawn
     assert read_planned(tmp_path / "other.toml") is None
@@ -106,7 +107,7 @@ def changed(**to):
         (b"{", "is no planned passage"),
         (b"\xff\xfe", "is no planned passage"),
         (b'{"more": ' + b"[" * 10_000, "is no planned passage"),
-        (b" " * (MOST_BYTES + 1), "is larger than 400 kB"),
+        (b" " * (MOST_PASSAGE_BYTES + 1), "is larger than 400 kB"),
         (lambda: changed(form="companion.passage/2"), "form: "),
         (lambda: changed(line=[[0.0, 91.0, 0.0], [1.0, 0.0, 0.0]]), "line[0][1]: "),
         (lambda: changed(line=[[5.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), "goes backwards"),

@@ -258,8 +258,7 @@ async function load() {
   selected = null;
   if (isFirst) { windMps = told.wind.speed_mps; input("windfrom").value = String(told.wind.from_deg); typedWind(); shownWind(); tables.build(editor); chart.build(editor); map.lay(told.charts); water.build(/** @type {HTMLCanvasElement} */ (get("water")), () => state.frame, tile); map.drawUnder(water.draw); useChart(); }
   waters(told.waters);
-  map.planned(told.passage, false);
-  if (told.passage_said) get("passagewords").textContent = told.passage_said;
+  map.planned(told.passage, false, told.passage_said);
   take(told, true);
   changed();
   whole();

@@ -14,11 +14,13 @@ from companion.geofence.mission.boat_file import BoatFile, LearnedTable, parse_b
 from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
 from companion.geofence.mission.goals import GoalField, GoalGate, MissionGoal, free_water, is_file
 from companion.geofence.mission.mission import (
+    MOST_PASSAGE_BYTES,
     RANGE_M,
     load_area,
     load_mission,
     load_settings,
     place_troubles,
+    planned_beside,
     polar_path,
     read_course,
     read_mission,
@@ -60,6 +62,7 @@ from companion.geofence.mission.text import (
 )
 
 __all__ = [
+    "MOST_PASSAGE_BYTES",
     "NO_NAME",
     "PERMITS",
     "RANGE_M",
@@ -112,6 +115,7 @@ __all__ = [
     "parse_boat_file",
     "parse_options",
     "place_troubles",
+    "planned_beside",
     "polar_path",
     "read_boat_file",
     "read_course",

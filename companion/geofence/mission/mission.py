@@ -209,6 +209,14 @@ class Mission:
         return polar_path(self.options.boat, self.path)
 
 
+MOST_PASSAGE_BYTES = 400_000  # of the passage that lies beside a mission
+
+
+def planned_beside(mission: Path) -> Path:
+    """Return the file of the passage that a mission was planned as: ``m.toml`` has ``m.passage.json``."""
+    return mission.with_suffix(".passage.json")
+
+
 def polar_path(boat: BoatOptions, source: Path) -> Path | None:
     """Return the polar file that ``[boat]`` of a file names, None for a built-in polar or a constant speed."""
     polar = boat.polar

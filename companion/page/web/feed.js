@@ -1,10 +1,10 @@
 // Where views come from: a companion that speaks, a voyage on record, or one packed into this very file.
 
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Area} Area @typedef {import("../../view/view").Past} Past @typedef {import("../../view/view").Event} LogEvent */
-/** @typedef {{schema: string, version: string, kind: "live" | "radio" | "recorded", name: string, orders: string[] | null, takes_orders: boolean, charts?: import("./charts.js").Chart[], passage?: boolean, count: number | null, chunk: number | null, area: string | null, sails_s?: number | null, beside?: string | null}} Hello */
+/** @typedef {{schema: string, version: string, kind: "live" | "radio" | "recorded", name: string, orders: string[] | null, takes_orders: boolean, charts?: import("./charts.js").Chart[], passage?: boolean, passage_said?: string, count: number | null, chunk: number | null, area: string | null, sails_s?: number | null, beside?: string | null}} Hello */
 /** @typedef {{name: string, sails_s: number | null, past: Past, figures: import("../../view/view").Figures | null}} Beside */
 /** @typedef {{view: (view: View) => void, log: (event: LogEvent) => void, link: (isUp: boolean) => void, over: () => void}} Hears */
-/** @typedef {{hello: Hello, area: Area | null, past: any, log: LogEvent[], moments: string[], beside?: Beside}} Packed */
+/** @typedef {{hello: Hello, area: Area | null, past: any, log: LogEvent[], moments: string[], beside?: Beside, passage?: import("../../view/view").Passage}} Packed */
 
 /** @param {string} path @returns {Promise<any>} */
 export async function read(path) {

@@ -72,7 +72,7 @@ async function whole() {
     page.hello?.passage ? read("/api/passage").catch(() => null) : null]);
   page.area = area;
   page.past = past;
-  map.planned(planned);
+  map.planned(planned, true, page.hello?.passage_said);
   if (page.view && past) remember(past, page.view);
   log.add(events);
 }
@@ -110,6 +110,8 @@ async function recorded(hello, inside) {
   page.past = inside ? inside.past : await read("/api/past");
   log.add(inside ? inside.log : await read("/api/log"));
   page.beside = inside ? inside.beside ?? null : hello.beside ? await read("/api/beside") : null;
+  const planned = inside ? inside.passage ?? null : hello.passage ? await read("/api/passage") : null;
+  map.planned(planned, true, hello.passage_said);
   const moments = new Moments(hello.count ?? 0, hello.chunk ?? 60, inside?.moments ?? null);
   const times = page.past?.t_s ?? [];
   let wanted = 0;

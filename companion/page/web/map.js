@@ -69,9 +69,9 @@ export function lay(given) {
   charts.build(given, /** @type {SVGElement} */ (layers.chart), draw);
 }
 
-/** The passage that was planned, null: none was. @param {import("../../view/view").Passage | null} planned @param {boolean} [isNow] whether a boat is under way */
-export function planned(planned, isNow = true) {
-  passage.take(planned, draw, isNow);
+/** The passage that was planned, null: none was. @param {import("../../view/view").Passage | null} planned @param {boolean} [isNow] whether a boat is under way @param {string} [said] why there is none */
+export function planned(planned, isNow = true, said = "") {
+  passage.take(planned, draw, isNow, said);
 }
 
 /** Let the next click choose a place. @param {((en: Point) => void) | null} picks */

@@ -126,8 +126,8 @@ export function build(world, signs) {
   state.signs = signs;
 }
 
-/** @param {Passage | null} passage @param {() => void} changed @param {boolean} [isNow] whether a boat is under way */
-export function take(passage, changed, isNow = true) {
+/** @param {Passage | null} passage @param {() => void} changed @param {boolean} [isNow] whether a boat is under way @param {string} [said] why there is none */
+export function take(passage, changed, isNow = true, said = "") {
   const isFirst = state.passage === null;
   state.passage = passage;
   state.isNow = isNow;
@@ -141,6 +141,7 @@ export function take(passage, changed, isNow = true) {
     set(button, { "aria-pressed": state.isShown ? "true" : "false" });
     changed();
   });
+  if (passage === null) get("passagewords").textContent = said;
   state.world?.replaceChildren();
   if (passage !== null) {
     const rings = passage.band.map((shape) => shape.map((ring) => path(ring, true)).join("")).join("");
@@ -259,6 +260,7 @@ export function say(view) {
   const unix_s = state.isNow ? view?.unix_s ?? null : Date.now() / 1000;
   const words = [forecastWords(passage, unix_s)];
   if (state.isNow) words.unshift(standing(passage, unix_s, view?.boat.at_en_m ?? null));
+  if (view?.source === "radio") words.unshift("whether this is what she sails is not on the air");
   if (view && !isOf(passage, view.goals)) words.unshift("the mission has other goals than this passage");
   const said = `Passage: ${words.join("; ")}.`;
   const key = `${said}${speedUnit()}${bearing(0)}`;

@@ -1,6 +1,6 @@
 """The folder that a voyage leaves: what is written while it is sailed, and read again."""
 
-from companion.telemetry.folder.logbook import Logbook
+from companion.telemetry.folder.logbook import Logbook, mission_copy
 from companion.telemetry.folder.reading import (
     RecordedChart,
     RecordedPlan,
@@ -63,6 +63,7 @@ __all__ = [
     "fence_record",
     "is_from_the_start",
     "jsonable",
+    "mission_copy",
     "order_record",
     "outcome_record",
     "parts",

@@ -27,7 +27,7 @@ from companion.fold import Step
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift
 from companion.geofence import Mission
-from companion.geofence.mission import is_file
+from companion.geofence.mission import MOST_PASSAGE_BYTES, is_file, planned_beside
 from companion.mavlink.tlog import stamp
 from companion.skipper.step import Permissions, Persisted, SkipperConfig
 from companion.skipper.way import Goal, Voyage
@@ -35,10 +35,19 @@ from companion.telemetry.folder.recorder import AREA, COPIES, Recorder, without_
 from companion.telemetry.folder.records import VoyageFigures, action_record, track_row, water_record
 
 MISSION = "mission.toml"
+PASSAGE = planned_beside(Path(MISSION)).name
+
+
+def mission_copy(folder: Path) -> Path:
+    """Return where a voyage's folder has the copy of its mission, if it has one."""
+    return folder / COPIES / MISSION
 
 
 def write_copies(mission: Mission, recorder: Recorder) -> str:
-    """Put the copy into the voyage's folder; return its place there, "" when a file of the mission has gone."""
+    """Put the copy into the voyage's folder; return its place there, "" when a file of the mission has gone.
+
+    The passage that the mission was planned as goes with it, as it is: nobody sails by it.
+    """
     source = mission.path.parent
     options: dict[str, Any] = {**msgspec.to_builtins(mission.options), "name": mission.name}
     files: dict[str, Path] = {}
@@ -49,7 +58,7 @@ def write_copies(mission: Mission, recorder: Recorder) -> str:
         if known is not None:
             return known
         base, number = Path(name).name, 1
-        while (kept := base if number == 1 else f"{number}-{base}") in {*files, MISSION}:
+        while (kept := base if number == 1 else f"{number}-{base}") in {*files, MISSION, PASSAGE}:
             number += 1
         files[kept] = source / name
         return kept
@@ -77,6 +86,10 @@ def write_copies(mission: Mission, recorder: Recorder) -> str:
     except OSError:
         return ""
     recorder.whole(f"{COPIES}/{MISSION}", tomli_w.dumps(without_none(options)).encode())
+    with contextlib.suppress(OSError):
+        data = read_regular(planned_beside(mission.path), MOST_PASSAGE_BYTES + 1)
+        if len(data) <= MOST_PASSAGE_BYTES:
+            recorder.whole(f"{COPIES}/{PASSAGE}", data)
     return f"{COPIES}/{MISSION}"
 
 
