@@ -253,6 +253,7 @@ def test_by_day_and_by_night_on_a_phone_and_exported(archipelago, tmp_path):
                 palette,
             )
             assert board.barriers() == [], palette
+            assert (board.glaring() == 0) is (palette == "night")
             keep(board, f"editor-{palette}")
         board.click("#export")
         board.js(
@@ -361,6 +362,8 @@ def test_a_new_mission_on_a_phone_draws_nothing_and_has_its_water_from_the_chart
         night = board.js(PIXEL, 0.5, 0.42)
         assert sum(day[:3]) > 300 > 120 > sum(night[:3])
         assert night[0] > 2 * night[2], "red alone"
+        assert board.glaring() == 0
+        keep(board, "editor-water-night")
         told = board.driver.execute_async_script(PAN, 0.5, 120)
         # Of 16.7 ms: what the page itself spends on a frame in which the water moves. Most frames paint nothing anew.
         assert told["took"][60] < 8.0

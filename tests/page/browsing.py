@@ -1,11 +1,14 @@
 """A real browser, without a window: Chromium and its driver, as Debian brings them."""
 
+import io
 import json
 import shutil
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DRIVER = shutil.which("chromedriver")
@@ -83,6 +86,12 @@ class Window:
         from selenium.webdriver.common.action_chains import ActionChains
 
         ActionChains(self.driver).send_keys(*keys).perform()
+
+    def glaring(self):
+        """Return how many pixels of what is seen would dazzle eyes that are used to the night: any colour but red."""
+        seen = np.asarray(Image.open(io.BytesIO(self.driver.get_screenshot_as_png())).convert("RGB"), dtype=int)
+        red, other = seen[:, :, 0], seen[:, :, 1:].max(axis=2)
+        return int(((other > 60) & (other > 0.75 * red)).sum())
 
     def requests(self):
         """Return the addresses asked for so far."""

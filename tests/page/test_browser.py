@@ -147,7 +147,12 @@ def test_a_chart_lies_under_the_own_water_where_it_belongs(record, tmp_path):
             )
             time.sleep(0.3)
             assert window.barriers() == [], palette
+            assert (window.glaring() == 0) is (palette == "night")
             keep(window, f"chart-{palette}")
+        window.keys("?")
+        window.until("return document.getElementById('dialog').open")
+        assert window.glaring() == 0
+        window.click("#dialog button")
         assert "© nobody" in window.text("key")
         window.keys("c")
         assert window.js("return document.querySelectorAll('#map .chart image').length") == 0
@@ -322,6 +327,9 @@ def test_live_views_are_shown_the_link_is_lost_and_comes_back_and_old_data_look_
             window.until("return document.body.classList.contains('stale')")
             assert "12 s old" in window.text("stale")
             keep(window, "stale")
+            window.js("document.documentElement.dataset.palette = 'night'")
+            assert window.glaring() == 0
+            keep(window, "stale-night")
             assert window.barriers() == []
             assert is_own(window, f"http://127.0.0.1:{port}/")
 
@@ -567,6 +575,7 @@ def test_a_passage_lies_under_her_way_and_says_where_she_should_be():
         for palette in ("day", "night"):
             window.js("document.documentElement.dataset.palette = arguments[0]", palette)
             assert window.barriers() == [], palette
+            assert (window.glaring() == 0) is (palette == "night")
             keep(window, f"passage-{palette}")
         window.js("document.getElementById('numbers').scrollIntoView()")
         keep(window, "passage-numbers")
