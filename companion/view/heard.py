@@ -105,10 +105,10 @@ class HeardFold:
             tack=None
             if twd_rad is None or vehicle is None
             else tack_of(math.remainder(twd_rad - vehicle.heading_rad, 2.0 * math.pi)),
-            clearance_m=None if status is None else rounded(status.clearance_m, 1),
-            cross_track_m=None if status is None else rounded(status.cross_track_m, 1),
-            waypoint_m=None if status is None else rounded(status.waypoint_distance_m, 1),
-            goal_m=None if status is None else rounded(status.goal_distance_m, 1),
+            clearance_m=None if status is None else rounded(status.clearance_m),
+            cross_track_m=None if status is None else rounded(status.cross_track_m),
+            waypoint_m=None if status is None else rounded(status.waypoint_distance_m),
+            goal_m=None if status is None else rounded(status.goal_distance_m),
             battery_v=None if status is None else rounded(status.battery_v),
             heading_deg=None if vehicle is None else compass(vehicle.heading_rad),
             cog_deg=None if vehicle is None else compass(heading_of(*vehicle.velocity_en_mps)),

@@ -106,7 +106,7 @@ def heard_vessel(traffic: TrafficStatus | None, age_s: float | None) -> tuple[va
             alarm=traffic.alarm,
             role=traffic.role,
             rule=traffic.rule,
-            range_m=rounded(traffic.range_m, 1),
+            range_m=rounded(traffic.range_m),
             cpa_m=rounded(traffic.cpa_m, 1),
             cpa_s=rounded(traffic.tcpa_s, 0),
             bearing_deg=None
@@ -205,10 +205,10 @@ def boat_of(step: Step, status: CompanionStatus, voyage: Voyage) -> values.BoatV
         tack=None if twa_rad is None else tack_of(twa_rad),
         vmg_mps=rounded(vmg_mps(step)),
         vmc_mps=None if mark is None else rounded(vehicle.speed_mps * math.cos(bearing_rad(here, mark) - cog_rad)),
-        clearance_m=rounded(status.clearance_m, 1),
-        cross_track_m=rounded(on_leg(step).off_m, 1),
-        waypoint_m=rounded(on_leg(step).left_m, 1),
-        goal_m=None if mark is None else rounded(math.dist(here, mark), 1),
+        clearance_m=rounded(status.clearance_m),
+        cross_track_m=rounded(on_leg(step).off_m),
+        waypoint_m=rounded(on_leg(step).left_m),
+        goal_m=None if mark is None else rounded(math.dist(here, mark)),
     )
 
 
@@ -299,8 +299,8 @@ def figures_of(step: Step, figures: VoyageFigures, voyage: Voyage) -> values.Fig
         replans=figures.replans,
         contacts=figures.contacts,
         no_go_entries=figures.no_go_entries,
-        min_clearance_m=rounded(figures.min_clearance_m, 1),
-        promised_clearance_m=rounded(figures.promised_clearance_m, 1),
+        min_clearance_m=rounded(figures.min_clearance_m),
+        promised_clearance_m=rounded(figures.promised_clearance_m),
         goals_reached=min(len(step.state.progress.reached), len(voyage.legs)),
         goals=len(voyage.legs),
     )
@@ -679,7 +679,7 @@ def plan_of(
         late_s=rounded(route.late_s, 0),
         there_s=rounded(eta.there_s, 0),
         there_late_s=rounded(eta.there_late_s, 0),
-        expected_clearance_m=None if sailed is None else rounded(sailed.clearance_ahead_m(begin), 1),
+        expected_clearance_m=None if sailed is None else rounded(sailed.clearance_ahead_m(begin)),
         bound_s=_bound_s(route, chosen),
         replans=state.plans.replans,
         next_tack_s=None if tack is None else rounded(tack.in_s, 0),
@@ -729,7 +729,7 @@ def _leg(route: Route, number: int, legs: tuple[Leg, ...]) -> values.LegView:
         ends_s=rounded(known.end_s, 1),
         sigma_deg=degrees(known.sigma_rad),
         no_go_half_deg=degrees(known.no_go_half_rad),
-        clearance_m=rounded(known.clearance_m, 1),
+        clearance_m=rounded(known.clearance_m),
         risk=rounded(known.risk, 4),
         manoeuvre=known.manoeuvre,
     )

@@ -25,7 +25,7 @@ from companion.planner.explain import with_clearance
 from companion.skipper.step import PlanOutcome, SkipperConfig, SkipperState, Snapshot, WindEstimate, WindHealth
 from companion.skipper.step.actions import RequestPlan
 from companion.skipper.way import Refuge
-from companion.telemetry.folder import TLOG, VoyageFigures
+from companion.telemetry.folder import TLOG, TRACK, VoyageFigures, read_rows
 from companion.telemetry.folder.logbook import chart_record
 from companion.telemetry.folder.reading import RecordedChart
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
@@ -440,3 +440,17 @@ def test_what_a_plan_is_nearest_to_is_named(obstacle_m, name):
     assert nearest_of(problem, answer) == name
     outcome = PlanOutcome(request_id=1, plan=with_clearance(problem, answer), text="")
     assert f", {name}" in dict(_plan(outcome, "", name).facts)["nearest, beyond what is kept clear"]
+
+
+def test_metres_are_rounded_once_where_they_are_shown(beat):
+    """As the track has them: 21.46 m of clearance were 21.5 m in a view, and so 22 m on the page."""
+    rows = {row["t_s"]: row for row in read_rows(beat.folder / TRACK)}
+    seen = 0
+    for view, _ in recorded_views(beat.folder).moments:
+        row = rows[min(rows, key=lambda t_s: abs(t_s - view.t_s))]
+        if view.boat.clearance_m is None or view.boat.cross_track_m is None:
+            continue
+        assert view.boat.clearance_m == pytest.approx(row["clearance_m"], abs=0.011)
+        assert view.boat.cross_track_m == pytest.approx(row["cross_track_m"], abs=0.011)
+        seen += 1
+    assert seen > 60
