@@ -16,6 +16,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import shapely
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from companion.plots.chart import save, scale_bar
@@ -115,6 +117,8 @@ def _map(axes: Axes, made: PreparedRehearsal, outcome: RehearsalOutcome) -> None
         ylabel="north of the start, m",
     )
     scale_bar(axes)
+    for word in axes.texts:  # tracks and the fence run through them
+        word.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.08), ncols=3, fontsize=8, frameon=False)
 
 
@@ -177,10 +181,11 @@ def _times(axes: Axes, known: Estimates, planned_s: float) -> None:
     axes.set(
         ylim=(0.0, 1.02),
         xlim=(0.9 * low_s, None),
-        xlabel="time since setting sail, s",
+        xlabel="time since setting sail",
         ylabel="share that is there",
         title="Times, with three quantiles and what is 95 % sure of them",
     )
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda time_s, _: clock(time_s)))
     axes.grid(visible=True, alpha=0.3)
 
 
@@ -207,6 +212,7 @@ def _changes(axes: Axes, changes: Sequence[Tried]) -> None:
         each.set_xlim(-reach, reach)
     axes.set_yticks(range(len(changes)), [pair.change.told for pair in changes], fontsize=9)
     axes.set_ylim(len(changes) - 0.5, -0.5)
+    axes.set_title("What a change is worth, of voyages by pairs")
     axes.set_xlabel("time, % (95 %)", color=BLUE)
     right.set_xlabel("least clearance, m", color=AMBER, fontsize=9)
     axes.grid(visible=True, axis="x", alpha=0.3)

@@ -71,6 +71,7 @@ body{font:16px/1.45 system-ui,sans-serif;color:var(--ink);background:var(--paper
 body{max-width:72rem;margin:auto;padding:1rem}table{border-collapse:collapse;margin:.5rem 0 1.5rem}
 td,th{border-bottom:1px solid var(--line);padding:.3rem .8rem;text-align:left}
 td.n{text-align:right;font-variant-numeric:tabular-nums}img{max-width:100%;background:#fff}
+@media (prefers-color-scheme:dark){img{filter:invert(1) hue-rotate(180deg)}}
 .good{color:var(--sure)}.bad{color:var(--bad)}.quiet{opacity:.65}a{color:inherit}
 """
 

@@ -18,8 +18,9 @@ import pytest
 
 from companion import cli
 from companion.disk import Disk
+from companion.plots.chart import save
 from sitl import cli as sitl_cli
-from sitl.rehearse import rehearsal
+from sitl.rehearse import picture, rehearsal
 from sitl.rehearse.estimates import as_lines, clock, estimates_of, why_bad
 from sitl.rehearse.picture import shares_of
 from sitl.rehearse.prepared import prepared
@@ -217,6 +218,8 @@ def test_a_user_rehearses_a_mission_goes_on_and_looks_at_the_worst(sailed, monke
     folder = sailed / "rehearsals" / "rocks"
     whole = (folder / "results.jsonl").read_bytes()
 
+    drawn = []
+    monkeypatch.setattr(picture, "save", lambda figure, path: drawn.append(figure) or save(figure, path))
     words = ("--runs", "2", "--pairs", "1", "--try", "margin_m=15", "--minutes", "90", "--json", "figures.json")
     code, out, err = run(sailed, monkeypatch, capsys, *words)
     assert code == 0
@@ -238,6 +241,14 @@ def test_a_user_rehearses_a_mission_goes_on_and_looks_at_the_worst(sailed, monke
     assert (folder / links[0]).is_file()
     assert "http" not in re.sub(r"base64,[^']+", "", page)  # it asks nobody for anything
     assert (folder / "rehearsal.png").read_bytes()[:4] == b"\x89PNG"
+    assert "prefers-color-scheme:dark){img{filter:invert(1)" in page  # no white picture on a dark page
+    chart, times, changes = (
+        next(axes for axes in drawn[-1].axes if words in f"{axes.get_title()}{axes.get_xlabel()}")
+        for words in ("east of the start", "Times", "What a change is worth")
+    )
+    assert all(word.get_path_effects() for word in chart.texts)  # read where tracks run through them
+    assert times.xaxis.get_major_formatter()(371.0, 0) == "6:11"  # as the times beside it
+    assert changes.get_xlabel() == "time, % (95 %)"
     worst = Path(figures["worst"][0]["folder"])
     assert (worst / "track.csv").is_file()
     assert cli.main(["replay", str(worst)]) == 0
