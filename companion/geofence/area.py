@@ -161,6 +161,11 @@ class LocalArea:
         """The area with one limit fewer, in the end the obstacles alone: for a boat that has got outside."""
         return self.unfenced
 
+    @functools.cached_property
+    def own(self) -> LocalArea:
+        """The area with the mission's own limits alone, if it has any."""
+        return self
+
     def also(self, names: tuple[str, ...], polygons: tuple[Polygon, ...], margins_m: tuple[float, ...]) -> LocalArea:
         """Return the area with more obstacles, after its own."""
         return replace(
@@ -176,7 +181,9 @@ class LocalArea:
         disc = shapely.buffer(shapely.points(centre_en), radius_m, quad_segs=CIRCLE_SEGMENTS)
         limits = disc if self.limits is None else shapely.intersection(self.limits, disc)
         area = replace(self, limits=limits, edge_name=name if self.limits is None else f"{self.edge_name} or {name}")
-        area.__dict__.update(unfenced=self.unfenced, outer=self)  # what was computed of the obstacles serves both
+        area.__dict__.update(
+            unfenced=self.unfenced, outer=self, own=self.own
+        )  # what was computed of the obstacles serves both
         return area
 
     @functools.lru_cache(maxsize=4)  # noqa: B019 - an area lives as long as its voyage
@@ -218,12 +225,12 @@ class LocalArea:
             limits = shapely.box(x0 - AROUND_M, y0 - AROUND_M, x1 + AROUND_M, y1 + AROUND_M)
         else:
             limits = self.limits
-        area = replace(
-            self,
-            limits=shapely.difference(limits, taken),
-            edge_name=name if self.limits is None else f"{self.edge_name} or {name}",
-        )
-        area.__dict__.update(unfenced=self.unfenced, outer=self)  # what was computed of the obstacles serves both
+        return self._limited(shapely.difference(limits, taken), name)
+
+    def _limited(self, limits: BaseGeometry, name: str) -> LocalArea:
+        area = replace(self, limits=limits, edge_name=name if self.limits is None else f"{self.edge_name} or {name}")
+        # what was computed of the obstacles serves both
+        area.__dict__.update(unfenced=self.unfenced, outer=self, own=self.own)
         return area
 
     def roomy_en(self, near_en: tuple[float, float], room_m: float) -> tuple[float, float] | None:

@@ -49,7 +49,7 @@ from companion.skipper.planning.waits import stay_left_s
 from companion.skipper.step import Diversion, Guidance, Phase, ReplanReason, SteerHeading, StepContext
 from companion.skipper.step.wind_shifts import shifting
 from companion.skipper.way.geometry import along_m, bear_away_rad, bearing_rad, cross_track_m, distance_m, moved
-from companion.skipper.way.voyage import PointEn, water_at
+from companion.skipper.way.voyage import PointEn, water_to_keep
 from companion.traffic.plans import MIN_INTERVAL_S
 
 LEAD_S = 3.5  # a step to see it, the command, and the turn until the boat goes no farther that way
@@ -89,7 +89,7 @@ def short_tack(ctx: StepContext) -> None:
     now_m = _clearance_m(ctx, boat, vehicle.heading_rad, LEAD_S)
     why = f"{now_m:.0f} m clear ahead on this tack in {LEAD_S:g} s"
     if now_m >= floor_m:
-        here_m = float(water_at(ctx.voyage.area, boat).clearance_m([boat])[0])
+        here_m = float(water_to_keep(ctx.voyage.area, boat).clearance_m([boat])[0])
         if now_m >= here_m - HAIR_M or _may_fail(ctx, boat, wind, floor_m):
             return
         why = "a tack that failed later would bring her below the floor"
@@ -105,7 +105,7 @@ def _may_fail(ctx: StepContext, boat: PointEn, wind: tuple[float, float], floor_
     nearer to whatever is near; it is blown back, or is not, or is set to lee.
     """
     vehicle, water = ctx.snapshot.vehicle, ctx.snapshot.current
-    area = water_at(ctx.voyage.area, boat)
+    area = water_to_keep(ctx.voyage.area, boat)
     chance = ctx.state.tacking.chance(ctx.voyage.boat.tack_fails)
     if vehicle is None or chance <= 0.0:
         return True
@@ -156,7 +156,7 @@ def _failed(
 
 def _clearance_m(ctx: StepContext, boat: PointEn, course_rad: float, span_s: float) -> float:
     """Return how clear the water is that a heading takes the boat through in ``span_s``, the current with it [m]."""
-    return water_at(ctx.voyage.area, boat).path_clearance_m([boat, _there(ctx, boat, course_rad, span_s)])
+    return water_to_keep(ctx.voyage.area, boat).path_clearance_m([boat, _there(ctx, boat, course_rad, span_s)])
 
 
 def _there(ctx: StepContext, boat: PointEn, course_rad: float, span_s: float) -> PointEn:

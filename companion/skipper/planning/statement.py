@@ -29,7 +29,7 @@ from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m
 from companion.skipper.way.gates import marks_of
 from companion.skipper.way.line import STRAY_M
 from companion.skipper.way.shortest import shortest_way
-from companion.skipper.way.voyage import outside_m, water_at
+from companion.skipper.way.voyage import AreaLike, outside_m, water_to_keep
 
 # The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
 REPAIR_RINGS_M = (
@@ -141,16 +141,16 @@ def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, t
     Down to ``floor_m`` the margin around it gets a notch, so that the plan begins where the boat is. Nearer than
     that, or inside, the plan begins in free water and a lead-in goes there: from the boat to the nearest free point
     on a line that never comes nearer to the obstacle than the boat is now, nor nearer than ``floor_m`` to any that it
-    is clear of; of equally near ones the one that is not upwind. Outside the limits they are opened about a way back
-    inside, and what is solid is all that there is to keep clear of.
+    is clear of; of equally near ones the one that is not upwind. Outside of the autopilot's fence and within
+    the mission's own, which may be the shore, the limits are opened about a way back inside.
     """
     margin_m = grown_m(margin_m)  # as the water is drawn that a plan may begin in
-    area, back = voyage.area, _back_inside(voyage, start, margin_m=margin_m, floor_m=floor_m)
+    area, back = voyage.area, _back_inside(voyage.area, start, margin_m=margin_m, floor_m=floor_m)
     if back:
-        out_m, area = outside_m(area, start.en_m), water_at(area, start.en_m)
+        out_m, area = outside_m(area, start.en_m), water_to_keep(area, start.en_m)
         start = replace(start, back_en=back, text=f"the start is {out_m:.0f} m outside the fence: planned back into it")
     here = float(area.clearance_m([start.en_m])[0])
-    solid_m = min(floor_m, float(voyage.area.unfenced.clearance_m([start.en_m])[0])) - HAIR_M
+    solid_m = min(floor_m, float(area.unfenced.clearance_m([start.en_m])[0])) - HAIR_M
     if here >= margin_m:
         return start
     if here >= floor_m:
@@ -169,7 +169,7 @@ def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, t
             way = np.linspace(start.en_m, place, 9)
             if float(np.min(area.clearance_m(way))) < here - HAIR_M:
                 continue
-            if solid_m > 0.0 and voyage.area.unfenced.path_clearance_m(way) < solid_m:
+            if solid_m > 0.0 and area.unfenced.path_clearance_m(way) < solid_m:
                 continue
             upwind = twd_from_rad is not None and abs(difference_rad(course, twd_from_rad)) < math.radians(55.0)
             cost = ring_m * (3.0 if upwind else 1.0) + abs(difference_rad(course, start.heading_rad))
@@ -187,15 +187,15 @@ def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, t
     return start
 
 
-def _back_inside(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float) -> tuple[PointEn, ...]:
+def _back_inside(area: AreaLike, start: Start, *, margin_m: float, floor_m: float) -> tuple[PointEn, ...]:
     """Return a way round what is solid to the roomiest place of the nearest ring that has one inside the limits.
 
-    Empty where she is not outside, or there is none.
+    Empty where she is not outside, or outside of the mission's own, or there is none.
     """
-    sea, tries = water_at(voyage.area, start.en_m), 0
-    for ring_m in () if sea is voyage.area else REPAIR_RINGS_M:
+    sea, tries = water_to_keep(area, start.en_m), 0
+    for ring_m in () if sea is area else REPAIR_RINGS_M:
         places = [moved(start.en_m, 2.0 * math.pi * n / REPAIR_DIRECTIONS, ring_m) for n in range(REPAIR_DIRECTIONS)]
-        rooms = voyage.area.clearance_m(np.asarray(places))
+        rooms = area.clearance_m(np.asarray(places))
         if float(np.max(rooms)) < margin_m + HAIR_M:
             continue
         for clear_m in (margin_m, floor_m):
@@ -392,7 +392,7 @@ def _fence(voyage: Voyage, start: Start, margin_m: float) -> str | None:
     if not start.back_en:
         return voyage.area.fence_wkt(margin_m, start.en_m)
     way = shapely.buffer(LineString(start.back_en), BACK_M, quad_segs=8)
-    outer = water_at(voyage.area, start.en_m).fence_wkt(margin_m, start.en_m)
+    outer = water_to_keep(voyage.area, start.en_m).fence_wkt(margin_m, start.en_m)
     if outer is not None:
         way = shapely.intersection(way, shapely.from_wkt(outer))
     inner = voyage.area.fence_wkt(margin_m, start.back_en[-1])

@@ -16,7 +16,7 @@ from companion.planner.track import ExpectedTrack, expected
 from companion.skipper.planning.ladder import Rung, rungs
 from companion.skipper.planning.statement import Start
 from companion.skipper.step.context import StepContext
-from companion.skipper.way.voyage import AreaLike, PointEn, water_at
+from companion.skipper.way.voyage import AreaLike, PointEn, water_to_keep
 
 # What a straight leg's track may need, in steps: water that is grown by a margin is kept, and made before sailing.
 TRACKS_M = (2.0, 2.5, 4.0, 8.0)
@@ -45,7 +45,7 @@ def problem_tracking(
         "floor_m": floor_m,
         "reach_m": ctx.voyage.boat.hull.reach_m,
         "solids": area.obstacles_wkt(0.0),
-        "limits": (water_at(area, start.en_m) if start.back_en else area).fence_wkt(0.0, start.en_m),
+        "limits": (water_to_keep(area, start.en_m) if start.back_en else area).fence_wkt(0.0, start.en_m),
         "before": None if before is None else {"x": before[0], "y": before[1]},
         "correlation_s": forecast.correlation_time_s,
         "known": _is_known(ctx),

@@ -22,8 +22,9 @@ from companion.skipper.step import Route, StepContext, UploadMission, UploadOutc
 from companion.skipper.step.actions import Change
 from companion.skipper.step.missions import common_prefix, stopgap
 from companion.skipper.step.state import PendingPlan, PendingUpload, Retry
-from companion.skipper.way import PointEn, distance_m, water_at
+from companion.skipper.way import PointEn, distance_m
 from companion.skipper.way.judge import judge
+from companion.skipper.way.voyage import water_to_keep
 
 SPARE_M = 0.3  # a boat below the floor may come no nearer than this more: the turn away takes room
 TACKS_RISK = 1e-3  # a chance of contact by failed tacks is greater than another by more than this
@@ -194,7 +195,7 @@ def refusal(ctx: StepContext, route: Route, set_current: int | None, pending: Pe
     if boat is None or vehicle is None or not ctx.state.voyage.sailing:
         return ""
     problem: Problem = pending.problem
-    here_m = float(water_at(ctx.voyage.area, boat).clearance_m([boat])[0]) - ctx.voyage.boat.hull.reach_m
+    here_m = float(water_to_keep(ctx.voyage.area, boat).clearance_m([boat])[0]) - ctx.voyage.boat.hull.reach_m
     # Below the floor, and where it has to be gybed round, a way of short legs is better than none.
     has_loops = not tacks_fail(ctx) and (problem.tracking is None or here_m >= problem.tracking.floor_m)
     first = ctx.state.mission.index if set_current is None else set_current - 1

@@ -25,7 +25,7 @@ from companion.skipper.way.drift import floor_from_m
 from companion.skipper.way.gates import Mark, marks_of
 from companion.skipper.way.geometry import leg_distance_m
 from companion.skipper.way.shortest import way_m
-from companion.skipper.way.voyage import AreaLike
+from companion.skipper.way.voyage import AreaLike, water_to_keep
 
 LOOKS = 41  # places looked at along a line that leads through something
 ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
@@ -96,7 +96,7 @@ def loiter_place(
     it is room off what is solid that counts: the place that is least far outside may lie between two rocks.
     """
     place, room = _roomy_place(voyage, config, end_en, twd_from_rad, wanted_m)
-    water = water_at(voyage.area, end_en)
+    water = water_to_keep(voyage.area, end_en)
     if room >= config.loiter_radius_m or water is voyage.area:
         return place, room
     return _roomy_place(replace(voyage, area=water), config, end_en, twd_from_rad, wanted_m)

@@ -155,6 +155,11 @@ class AreaLike(Protocol):
         """The area with one limit fewer, in the end the obstacles alone: for a boat that has got outside."""
         ...
 
+    @property
+    def own(self) -> AreaLike:
+        """The area with the mission's own limits alone, if it has any."""
+        ...
+
     def __hash__(self) -> int:
         """By identity: what is made of an area is kept by it."""
         ...
@@ -215,6 +220,14 @@ def water_at(area: AreaLike, en_m: PointEn) -> AreaLike:
     while outside_m(area, en_m) > 0.0:
         area = area.outer
     return area
+
+
+def water_to_keep(area: AreaLike, en_m: PointEn) -> AreaLike:
+    """Return what a way from a place on keeps clear of: as ``water_at``, but of the mission's own limits always.
+
+    They may be the shore: who is outside of them has only the way back.
+    """
+    return area if outside_m(area.own, en_m) > 0.0 else water_at(area, en_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -127,12 +127,16 @@ def test_the_loiter_has_room_all_round_and_to_leeward():
 
 def test_outside_the_limits_the_loiter_has_room_off_what_is_solid():
     """The place least far outside was taken, beside the spit that lay between, and she touched it 18 times."""
-    made = voyage(obstacles=(box(60, -20, 80, 120),), limits=box(-500, -500, -100, 500))
+    made = voyage(obstacles=(box(60, -20, 80, 120),))
+    made = replace(made, area=made.area.within((-300.0, 60.0), 200.0, "the circle"))
     place, room = loiter_place(made, CONFIG, (120.0, 60.0), 0.0)
     assert room >= CONFIG.loiter_radius_m
     assert made.area.unfenced.clearance_m([place])[0] >= CONFIG.loiter_radius_m
     near, _ = loiter_place(made, CONFIG, (-96.0, 0.0), 0.0)  # just outside: where there is room within
     assert made.area.clearance_m([near])[0] >= CONFIG.loiter_radius_m
+    shore = voyage(limits=box(-500, -500, -100, 500))  # the mission's own: beyond it may be land
+    ashore, _ = loiter_place(shore, CONFIG, (200.0, 0.0), 0.0)
+    assert shore.area.clearance_m([ashore])[0] > -300.0
 
 
 def test_from_below_the_floor_a_loiter_is_found_away_from_what_is_near():

@@ -199,6 +199,31 @@ def test_from_outside_the_limits_a_plan_leads_back_round_what_is_solid(shore):
     assert water.clearance_m([answer.waypoints_en[-1]])[0] > 12.0
 
 
+@pytest.mark.parametrize("fence_m", [None, 120.0])
+def test_just_outside_the_missions_own_limits_no_plan_leads_farther_out(fence_m):
+    """They may be the shore: opened about the way back inside, plans led 80 m over it of a boat 2 m off."""
+    shore = box(-300, -100, 190, 400)
+    made = voyage(Goal(en_m=(-100.0, 250.0), radius_m=8.0), limits=shore)
+    if fence_m is not None:
+        made = replace(made, area=made.area.within((-100.0, 250.0), fence_m, "the circle"))
+    start = Start(en_m=(192.0, 100.0), heading_rad=0.0)
+    out = repaired(made, start, margin_m=12.0, floor_m=6.0, twd_from_rad=-math.pi / 2.0)
+    assert out.lead_in
+    assert not out.back_en
+    gate = gates_of(made)[0]
+    data = problem_dict(
+        made,
+        gate,
+        start=out,
+        aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0),
+        forecast=forecast(0.0, -math.pi / 2.0),
+        margin_m=12.0,
+        delta_s=0.95,
+        no_go_half_rad=math.radians(47.0),
+    )
+    assert Problem.from_json(data).fence.within(shore.buffer(2.5))
+
+
 def test_the_local_plan_covers_the_next_miles_only():
     made = voyage(Goal(en_m=(0.0, 50_000.0), radius_m=50.0))
     config = SkipperConfig()
