@@ -289,6 +289,9 @@ class Autopilot:
                 what is on board is then at every moment the old mission, its beginning with the stopgap, or the new
                 one. Only where more than ``keep_first`` items are on board.
 
+        Over ftp the item is made current before the mission is read back: until then the autopilot sails for the item
+        of its old number, wherever that lies in the new one, and a read takes a quarter of a minute on a bad link.
+
         A running autopilot keeps the tail of a longer old mission over ftp and partial writes. Over ftp the new one is
         padded with copies of its last item to the old length; a partial write leaves the tail behind the new end.
         """
@@ -297,10 +300,18 @@ class Autopilot:
         began_s = now_s()
         if method == "auto" and not self._version_asked:
             await self.read_version()
-        result = await self._lists.write_mission(items, method, keep_first, stopgap)
+        answer: CommandAnswer | None = None
+
+        async def make_current() -> None:
+            nonlocal answer
+            if set_current is not None:
+                answer = await self.set_current(set_current, reset=True)
+
+        result = await self._lists.write_mission(items, method, keep_first, stopgap, on_swapped=make_current)
         if result.is_ok and set_current is not None:
-            answer = await self.set_current(set_current, reset=True)
-            if not answer.is_ok:
+            if answer is None or not answer.is_ok:
+                await make_current()
+            if answer is not None and not answer.is_ok:
                 result = replace(result, outcome=answer.outcome, text=f"uploaded, but not made current: {answer.text}")
         return replace(result, duration_s=now_s() - began_s)
 

@@ -7,7 +7,7 @@ protocol, and is believed only after it was read back and compared.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -90,9 +90,17 @@ class MissionLists:
         return TransferResult(outcome=cleared.outcome, text=cleared.text, method="items", duration_s=now_s() - began_s)
 
     async def write_mission(
-        self, items: Sequence[MissionItem], method: Method, keep_first: int, stopgap: MissionItem | None
+        self,
+        items: Sequence[MissionItem],
+        method: Method,
+        keep_first: int,
+        stopgap: MissionItem | None,
+        on_swapped: Callable[[], Awaitable[object]] | None = None,
     ) -> TransferResult:
-        """Put a mission on the autopilot, read it back and compare, as ``Autopilot.upload_mission`` says."""
+        """Put a mission on the autopilot, read it back and compare, as ``Autopilot.upload_mission`` says.
+
+        ``on_swapped`` is awaited when a mission has changed places in one piece, before it is read back.
+        """
         async with self._link.lock("lists"):
             result = TransferResult(outcome=TransferOutcome.LINK, text="the link is silent")
             for chosen in self._ways(items, method, keep_first, is_guarded=stopgap is not None):
@@ -107,7 +115,7 @@ class MissionLists:
                 if chosen == "guarded" and stopgap is not None:
                     result = await self._upload_guarded(items, keep_first, stopgap)
                 else:
-                    result = await self._upload_once(items, chosen, keep_first)
+                    result = await self._upload_once(items, chosen, keep_first, on_swapped)
                 if result.is_ok or self._link.is_lost:
                     break
                 if chosen == "items" and result.outcome not in {TransferOutcome.TIMEOUT, TransferOutcome.MISMATCH}:
@@ -163,7 +171,13 @@ class MissionLists:
         lat_e7, lon_e7 = codec.e7(self.home) if self.home else (items[0].lat_e7, items[0].lon_e7)
         return MissionItem(command=wire.MAV_CMD_NAV_WAYPOINT, lat_e7=lat_e7, lon_e7=lon_e7, frame=0)
 
-    async def _upload_once(self, items: Sequence[MissionItem], method: Method, keep_first: int) -> TransferResult:
+    async def _upload_once(
+        self,
+        items: Sequence[MissionItem],
+        method: Method,
+        keep_first: int,
+        on_swapped: Callable[[], Awaitable[object]] | None,
+    ) -> TransferResult:
         """Write by ``method``, read back, compare."""
         party, kind, home = self._link.party, MissionType.MISSION, self._home_item(items)
         sent = tuple(items)
@@ -175,6 +189,8 @@ class MissionLists:
             outcome, text = written.outcome, written.text
             if outcome is TransferOutcome.OK:
                 self._ftp_works = True
+                if on_swapped is not None:
+                    await on_swapped()
             elif outcome in {TransferOutcome.UNSUPPORTED, TransferOutcome.REFUSED} and self._ftp_works is None:
                 self._ftp_works = False
         elif method == "partial":

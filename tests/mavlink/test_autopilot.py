@@ -11,6 +11,7 @@ from companion.errors import LinkError
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.microservices.command import TransferOutcome
+from companion.mavlink.mission_lists import MissionLists
 from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.wire.companion_status import StatusReader
 from companion.mavlink.wire.frames import Drop
@@ -82,6 +83,25 @@ def test_a_shorter_plan_over_a_running_one_leaves_nothing_of_the_old():
         assert (status.mission_seq, status.mission_state) == (1, MissionState.ACTIVE)
 
     sail(main)
+
+
+def test_over_ftp_the_item_is_made_current_before_the_mission_is_read_back(monkeypatch):
+    """Of a boat at its old item 4 item 4 of the new mission was sailed for while it was read, 15 s, over a rock."""
+    seen, read = [], MissionLists._read
+
+    async def main(boat, link, autopilot, memory):
+        async def reading(lists, kind, method):
+            seen.append(autopilot.status.mission_seq)
+            return await read(lists, kind, method)
+
+        await set_sail(autopilot, mission(10))
+        assert (await autopilot.set_current(4)).is_ok
+        monkeypatch.setattr(MissionLists, "_read", reading)
+        result = await autopilot.upload_mission(mission(6, north=0.001), set_current=1)
+        assert (result.is_ok, result.method) == (True, "ftp")
+
+    sail(main)
+    assert seen == [1]
 
 
 def test_a_partial_write_keeps_the_leg_that_is_sailed():
