@@ -481,7 +481,7 @@ class VoyageFold:
         self._events, self._outcomes = [], []
         was_used = self.state.afloat.known.is_used
         self.state, actions = self.skipper.step(self.state, snapshot)
-        voyage = self.skipper.sailed(self.state)
+        voyage = self.skipper.sailed(self.state, snapshot.limits)
         if self.state.afloat.known.is_used != was_used:
             self._pace = PRIOR_PACE  # it is a share of the speeds of another boat
         self._pace = paced(self._pace, snapshot, self.state, voyage)

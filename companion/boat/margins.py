@@ -29,14 +29,24 @@ NARROWEST_S = 2.5
 # From its place, of a loiter: past it at full speed, and round. On ArduRover 12.2 m at 3.0 m/s and 18.1 at 4.4; on the
 # simulated autopilot, come from eight sides, 11.0 m at most at 2.2, 13.9 at 3.0, 20.2 at 4.2 and 25.8 at 5.1.
 LOITER_S = 5.2
+LOITER_TURNS = (
+    1.1  # of a wider turn, how much it takes more: at 15 to 60 degrees a second 10.4 to 42.9 m in 3 to 12 m/s
+)
 GALE_POWER = 0.75  # of the wind beyond a polar's strongest: 29.3 m in 14 m/s of wind and 33.0 in 16
+RATE_MAX_RADPS = math.radians(120.0)  # ArduRover's ATC_STR_RAT_MAX: all of these were measured by it
+UNLIMITED_RADPS = math.radians(1000.0)  # what 0 stands for as a limit of ArduPilot's
 PAD_RAD = math.radians(2.0)  # legs planned at NO_GO + 2 degrees made no tacks of their own
 
 
-def loiter_swing_m(polar: Polar, tws_mps: float) -> float:
-    """Return how far from its place a loiter takes a boat in a wind [m]."""
+def wider_s(rate_max_radps: float) -> float:
+    """Return how much wider the tightest turn is than by ArduRover's own ATC_STR_RAT_MAX, per speed [s, 0 or more]."""
+    return max(0.0, 1.0 / rate_max_radps - 1.0 / RATE_MAX_RADPS)
+
+
+def loiter_swing_m(polar: Polar, tws_mps: float, rate_max_radps: float = RATE_MAX_RADPS) -> float:
+    """Return how far from its place a loiter takes a boat in a wind [m], by its autopilot's ATC_STR_RAT_MAX."""
     strongest_mps = float(polar.tws_mps[-1])
-    swing_m = LOITER_S * polar.max_speed_mps(tws_mps)
+    swing_m = (LOITER_S + LOITER_TURNS * wider_s(rate_max_radps)) * polar.max_speed_mps(tws_mps)
     if tws_mps > strongest_mps > 0.0:  # 0: of a boat that sails without a wind
         swing_m *= math.pow(tws_mps / strongest_mps, GALE_POWER)
     return swing_m
@@ -55,6 +65,9 @@ class AutopilotLimits:
         "WP_ACCEL",
         "WP_JERK",
         "ATC_ACCEL_MAX",
+        "ATC_STR_RAT_MAX",
+        "ATC_STR_ACC_MAX",
+        "WP_PIVOT_RATE",
         "FENCE_ENABLE",
         "FENCE_ACTION",
         "FENCE_TYPE",
@@ -70,6 +83,9 @@ class AutopilotLimits:
     wp_speed_mps: float | None = None  # of the point that the boat follows, not the boat's; None: it was not read
     wp_accel_mps2: float = 1.0  # of that point
     wp_jerk_mps3: float = 1.0
+    rate_max_radps: float = RATE_MAX_RADPS  # ATC_STR_RAT_MAX: it turns no faster
+    rate_change_radps2: float = math.radians(120.0)  # ATC_STR_ACC_MAX
+    pivot_rate_radps: float = math.radians(60.0)  # WP_PIVOT_RATE: the same in a tack; 0: no such limit
     l1_period_s: float = 0.0  # of ArduRover up to 4.2, which steers by L1; 0: a later one
     l1_damping: float = l1.DAMPING
     fence_action: int | None = None  # None: no fence guards this obstacle; 0 report .. 4, see FENCE_ACTION
@@ -107,6 +123,9 @@ class AutopilotLimits:
             wp_speed_mps=params.get("WP_SPEED", 0.0) or None,
             wp_accel_mps2=accel,
             wp_jerk_mps3=params.get("WP_JERK", 0.0) or accel,
+            rate_max_radps=math.radians(params.get("ATC_STR_RAT_MAX", 120.0)) or UNLIMITED_RADPS,
+            rate_change_radps2=math.radians(params.get("ATC_STR_ACC_MAX", 120.0)) or UNLIMITED_RADPS,
+            pivot_rate_radps=math.radians(params.get("WP_PIVOT_RATE", 60.0)),
             l1_period_s=params.get("NAVL1_PERIOD", default.l1_period_s),
             l1_damping=params.get("NAVL1_DAMPING", default.l1_damping),
             fence_action=action if fenced else None,
@@ -174,7 +193,7 @@ def required_margin(
     hull = hull or Hull()
     radius_m = max(limits.wp_radius_m, limits.turn_radius_m)
     # The chord from one leg to the next, each a radius from the corner, is at most half of one from both legs.
-    cut_m, overshoot_m = 0.5 * radius_m, CORNER_S * speed_mps
+    cut_m, overshoot_m = 0.5 * radius_m, (CORNER_S + wider_s(limits.rate_max_radps)) * speed_mps
     corner_m = max(cut_m, overshoot_m)
     track_m = TRACK_S * speed_mps
     corridor = legs_can_enter_no_go and limits.sail_xtrack_max_m > 0.0

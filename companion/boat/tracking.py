@@ -19,10 +19,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from companion.boat import l1
 from companion.boat import track_kernels as k
-from companion.boat.margins import AutopilotLimits
+from companion.boat.margins import RATE_MAX_RADPS, AutopilotLimits, wider_s
 from companion.boat.polar import Polar
 
 DEFAULT_WP_SPEED_MPS = 2.0  # the firmware's
+HELM_KEYS = (
+    "wp_radius_m",
+    "turn_radius_m",
+    "wp_speed_mps",
+    "accel_mps2",
+    "jerk_mps3",
+    "corridor_m",
+    "rate_max_radps",
+    "rate_change_radps2",
+    "pivot_rate_radps",
+    "l1_period_s",
+    "l1_damping",
+)
+"""Fields of ``GuidanceModel`` that a planning problem may state."""
 CURVE_NODES = 91  # of the polar: every two degrees
 
 
@@ -65,7 +79,7 @@ class GuidanceModel:
     no_go_half_rad: float = math.radians(45.0)
     corridor_m: float = 10.0
     pivot_rate_radps: float = math.radians(60.0)
-    rate_max_radps: float = math.radians(120.0)
+    rate_max_radps: float = RATE_MAX_RADPS
     rate_change_radps2: float = math.radians(120.0)
     gather_m: float = 2.0
     angle_p: float = 2.0
@@ -88,6 +102,7 @@ class GuidanceModel:
             "lateral_mps2",
             "gather_m",
             "rate_max_radps",
+            "rate_change_radps2",
             "l1_damping",
         ):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
@@ -105,9 +120,17 @@ class GuidanceModel:
             jerk_mps3=limits.wp_jerk_mps3,
             no_go_half_rad=limits.sail_no_go_angle_rad,
             corridor_m=limits.sail_xtrack_max_m,
+            rate_max_radps=limits.rate_max_radps,
+            rate_change_radps2=limits.rate_change_radps2,
+            pivot_rate_radps=limits.pivot_rate_radps,
             l1_period_s=limits.l1_period_s,
             l1_damping=limits.l1_damping,
         )
+
+    def stated(self) -> dict[str, float]:
+        """Return the fields that a planning problem states: those of ``HELM_KEYS`` that are not ArduRover's own."""
+        own = GuidanceModel()
+        return {name: value for name in HELM_KEYS if (value := getattr(self, name)) != getattr(own, name)}
 
     def settings(self) -> NDArray[np.float64]:
         """Return the kernel's settings."""
@@ -289,18 +312,20 @@ LOOP_SPEEDS_MPS = (0.5, 1.2, 2.3, 2.95, 3.3, 4.4)
 LOOP_M = (2.7, 2.7, 4.1, 9.6, 10.0, 11.1)
 
 
-def stated_error_m(best_mps: float, *, has_short: bool) -> float:
+def stated_error_m(best_mps: float, helm: GuidanceModel, *, has_short: bool) -> float:
     """Return the prediction's error [m] for a boat whose best speed in this wind is ``best_mps``.
 
-    Above the fastest that was measured it grows with the speed.
+    Above the fastest that was measured it grows with the speed. Where her turns are wider, so is the error, by as much.
     """
     table = SHORT_M if has_short else LONG_M
-    return float(np.interp(best_mps, SPEEDS_MPS, table)) * max(1.0, best_mps / SPEEDS_MPS[-1])
+    measured_m = float(np.interp(best_mps, SPEEDS_MPS, table)) * max(1.0, best_mps / SPEEDS_MPS[-1])
+    return measured_m + wider_s(helm.rate_max_radps) * best_mps
 
 
-def loop_m(best_mps: float) -> float:
+def loop_m(best_mps: float, helm: GuidanceModel) -> float:
     """Return how far off the boat's track [m] a loop about the end of a short leg takes a boat of a best speed."""
-    return float(np.interp(best_mps, LOOP_SPEEDS_MPS, LOOP_M)) * max(1.0, best_mps / LOOP_SPEEDS_MPS[-1])
+    measured_m = float(np.interp(best_mps, LOOP_SPEEDS_MPS, LOOP_M)) * max(1.0, best_mps / LOOP_SPEEDS_MPS[-1])
+    return measured_m + 2.0 * wider_s(helm.rate_max_radps) * best_mps
 
 
 def are_near_short(lengths_m: Sequence[float] | NDArray[np.float64], best_mps: float) -> NDArray[np.bool_]:

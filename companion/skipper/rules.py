@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.boat import Afloat
+from companion.boat import Afloat, AutopilotLimits
 from companion.geo.shift import Shift
 from companion.messages import GeoPoint
 from companion.orders import Wanted
@@ -26,7 +26,7 @@ from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.priorities import act
 from companion.skipper.step import Action, Persisted, RequestPlan, SkipperConfig, SkipperState, Snapshot, StepContext
-from companion.skipper.step.context import with_learned_boat
+from companion.skipper.step.context import with_known_boat
 from companion.skipper.step.state import (
     LoadedMission,
     Orders,
@@ -105,9 +105,9 @@ class Skipper:
         remember_fix(ctx)
         return ctx.state, tuple(ctx.actions)
 
-    def sailed(self, state: SkipperState) -> Voyage:
+    def sailed(self, state: SkipperState, limits: AutopilotLimits | None) -> Voyage:
         """Return the voyage with the boat that plans are of: her file's, or as she was found to sail."""
-        return with_learned_boat(self.voyage, self.config, state)
+        return with_known_boat(self.voyage, self.config, state, limits)
 
     def preview(self, state: SkipperState, snapshot: Snapshot, wanted: Wanted) -> RequestPlan | str:
         """Return the plan that an order to sail somewhere would ask for, or why it would ask for none."""

@@ -9,7 +9,7 @@ from bench.tracking.record import sail_simulated
 from bench.tracking.residuals import curve_mps, residuals
 from bench.tracking.trials import corners
 from companion.boat.l1 import lateral_mps2, length_m
-from companion.boat.tracking import stated_error_m
+from companion.boat.tracking import GuidanceModel, stated_error_m
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import Vehicle
@@ -88,7 +88,7 @@ def test_the_predicted_track_knows_it(trial):
     """An autopilot that steers by L1 is not where that of position control is expected, and where this is."""
     sailed = sail_simulated(trial, {"NAVL1_PERIOD": 8.0})
     by_l1, by_position = residuals(trial, sailed, 8.0), residuals(trial, sailed)
-    stated = stated_error_m(float(np.max(curve_mps(trial.tws_mps))), has_short=False)
+    stated = stated_error_m(float(np.max(curve_mps(trial.tws_mps))), GuidanceModel(), has_short=False)
     assert np.quantile(by_l1.track_m, 0.99) < stated
     assert np.quantile(by_position.track_m, 0.99) > 1.5 * stated
 

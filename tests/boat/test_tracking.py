@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench.tracking.record import sail_simulated
 from bench.tracking.recordings import load
-from bench.tracking.residuals import boards, curve_mps, residuals
+from bench.tracking.residuals import boards, curve_mps, helm_of, residuals
 from bench.tracking.trials import CORNERS_DEG, WINDS_MPS, beats, corners
 from companion.boat import AutopilotLimits, ardurover_sitl
 from companion.boat import track_kernels as s
@@ -58,14 +60,14 @@ def test_the_recordings_hold_every_trial_and_every_kind_of_corner(sailed):
 def test_the_stated_error_is_the_99_percent_of_what_ardurover_sailed(sailed, tws, near_short):
     rows = [residuals(t, sailed[t.name]) for t in corners() if t.tws_mps == tws]
     off = np.concatenate([r.track_m[r.is_short == near_short] for r in rows])
-    stated = stated_error_m(float(np.max(curve_mps(tws))), has_short=near_short)
+    stated = stated_error_m(float(np.max(curve_mps(tws))), HELM, has_short=near_short)
     assert len(off) > 400
     assert 0.4 * stated <= np.quantile(off, 0.99) <= stated
 
 
 def test_no_loop_about_a_short_leg_went_farther_off_than_is_allowed_for(sailed):
     for tws in WINDS_MPS:
-        allowed = loop_m(float(np.max(curve_mps(tws))))
+        allowed = loop_m(float(np.max(curve_mps(tws))), HELM)
         rows = [residuals(t, sailed[t.name]) for t in corners() if t.tws_mps == tws]
         greatest = max(float(np.max(r.track_m[r.is_short], initial=0.0)) for r in rows)
         assert 0.9 * allowed <= greatest <= allowed
@@ -76,8 +78,8 @@ def test_the_loop_onto_a_walls_end_was_farther_off_than_the_99_percent_and_withi
     expected = shapely.LineString(track(short["legs_en_m"], twd=math.radians(20.0)).en_m)
     off = shapely.distance(expected, shapely.points(short["sailed_en_m"]))
     best = float(np.max(curve_of(POLAR, 5.0)))
-    assert np.mean(off > stated_error_m(best, has_short=True)) > 0.2
-    assert np.max(off) <= loop_m(best)
+    assert np.mean(off > stated_error_m(best, HELM, has_short=True)) > 0.2
+    assert np.max(off) <= loop_m(best, HELM)
     end = shapely.Point(short["wall_end_en_m"][0])
     assert shapely.distance(end, expected) > 12.0
     assert shapely.distance(end, shapely.LineString(short["sailed_en_m"])) < 3.2
@@ -188,7 +190,28 @@ def test_drawn_winds_have_the_spread_and_the_memory_that_are_asked_for():
 
 def test_short_legs_taint_their_neighbours():
     assert are_near_short([50.0, 50.0, 5.0, 50.0, 50.0], 2.0).tolist() == [False, True, True, True, False]
-    assert stated_error_m(9.0, has_short=False) > stated_error_m(4.4, has_short=False)
+    assert stated_error_m(9.0, HELM, has_short=False) > stated_error_m(4.4, HELM, has_short=False)
+
+
+def test_a_boat_that_may_turn_slowly_only_is_where_she_is_predicted_and_off_it_by_no_more_than_is_stated():
+    trials = [t for t in corners() if t.tws_mps == 3.0][:2]
+    best = float(np.max(curve_mps(3.0)))
+    told = np.concatenate([off_m(t, 15.0, told=True) for t in trials])
+    untold = np.concatenate([off_m(t, 15.0, told=False) for t in trials])
+    assert np.median(told) < 0.3 * np.median(untold)
+    helm = replace(HELM, rate_max_radps=math.radians(15.0))
+    assert np.quantile(told, 0.99) < stated_error_m(best, helm, has_short=True)
+    assert np.quantile(untold, 0.99) > stated_error_m(best, HELM, has_short=True)
+
+
+def off_m(trial, rate_deg, *, told):
+    """Return how far off the predicted track the simulated boat sails a trial by an ATC_STR_RAT_MAX."""
+    way = sail_simulated(trial, {"ATC_STR_RAT_MAX": rate_deg})
+    helm = helm_of(trial)
+    helm = replace(helm, rate_max_radps=math.radians(rate_deg)) if told else helm
+    legs = [(0.0, 0.0), *trial.points_en_m]
+    expected = predict(legs, helm, curve_mps=curve_mps(trial.tws_mps), twd_from_rad=0.0, speed_mps=0.0)
+    return shapely.distance(shapely.LineString(expected.en_m), shapely.points(way[:, 1:3]))
 
 
 # ---------------------------------------------------------------------------------------------- the parts
@@ -216,6 +239,12 @@ def test_the_helm_is_that_of_the_parameters():
     helm = GuidanceModel.of(limits)
     assert (helm.wp_radius_m, helm.wp_speed_mps, helm.accel_mps2, helm.jerk_mps3) == (4.0, 5.0, 1.5, 1.5)
     assert helm.corridor_m == 20.0
+    slow = GuidanceModel.of(
+        AutopilotLimits.from_params({"ATC_STR_RAT_MAX": 30.0, "ATC_STR_ACC_MAX": 0.0, "WP_PIVOT_RATE": 20.0})
+    )
+    assert (slow.rate_max_radps, slow.pivot_rate_radps) == (math.radians(30.0), math.radians(20.0))
+    assert slow.rate_change_radps2 > GuidanceModel().rate_change_radps2  # 0: no limit
+    assert GuidanceModel.of(AutopilotLimits()).stated() == {}
     assert helm.no_go_half_rad == pytest.approx(math.radians(40.0))
     assert AutopilotLimits.from_params({"ATC_ACCEL_MAX": 1.5, "WP_ACCEL": 0.8, "WP_JERK": 2.0}).wp_accel_mps2 == 0.8
     with pytest.raises(ValueError, match="wp_speed_mps"):

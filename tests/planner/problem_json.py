@@ -8,8 +8,8 @@ from typing import Any
 import shapely
 
 from companion.boat.failed_tack import IRONS_S
+from companion.boat.tracking import HELM_KEYS
 from companion.messages import Spread
-from companion.planner.problem.json_read import HELM_KEYS
 from companion.planner.problem.tracking import Tracking
 from companion.planner.problem.value import LEG_SAVING, Problem
 

@@ -25,6 +25,10 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "WP_ACCEL": (0.0, 100.0),
     "WP_JERK": (0.0, 100.0),
     "ATC_ACCEL_MAX": (0.0, 100.0),
+    # how fast it turns; 0: no limit
+    "ATC_STR_RAT_MAX": (0.0, 1000.0),
+    "ATC_STR_ACC_MAX": (0.0, 1000.0),
+    "WP_PIVOT_RATE": (0.0, 360.0),
     "FENCE_ENABLE": (0.0, 1.0),
     "FENCE_ACTION": (0.0, 255.0),
     "FENCE_TYPE": (0.0, 255.0),

@@ -33,16 +33,6 @@ if TYPE_CHECKING:
     from companion.planner.problem.tracking import Tracking
 
 T = TypeVar("T")
-HELM_KEYS = (
-    "wp_radius_m",
-    "turn_radius_m",
-    "wp_speed_mps",
-    "accel_mps2",
-    "jerk_mps3",
-    "corridor_m",
-    "l1_period_s",
-    "l1_damping",
-)
 _NAN = re.compile(r"\bnan\b", re.IGNORECASE)
 
 
@@ -420,7 +410,7 @@ def _parse_beat(beat: _JsonReader) -> Beat:
 
 
 def _parse_tracking(track: _JsonReader) -> Tracking:
-    from companion.boat.tracking import GuidanceModel
+    from companion.boat.tracking import HELM_KEYS, GuidanceModel
     from companion.planner.problem.tracking import Tracking
 
     default = GuidanceModel()

@@ -148,7 +148,7 @@ class _Solids:
         self.need_m = 0.0
         if tracking is not None:
             best = max(problem.boat.polar_mps)
-            self.need_m = tracking.reach_m + stated_error_m(best, has_short=not tracking.is_known)
+            self.need_m = tracking.reach_m + stated_error_m(best, tracking.helm, has_short=not tracking.is_known)
         self.irons_s, self.most_lee_mps = problem.boat.irons_s, max(problem.boat.lee_mps)
         self._tree = tracking.tree if tracking is not None else shore_of(problem).tree
         self._far_m: dict[tuple[float, float], float] = {}

@@ -141,8 +141,8 @@ def _expected(
     lengths_m = np.hypot(*np.diff(whole, axis=0).T)
     lengths_m[first] += sailed_m
     near = are_near_short(lengths_m, best)[first:]
-    stated_m = stated_error_m(best, has_short=not tracking.is_known)
-    error = np.where(near & has_loops, loop_m(best), stated_m)[leg]
+    stated_m = stated_error_m(best, tracking.helm, has_short=not tracking.is_known)
+    error = np.where(near & has_loops, loop_m(best, tracking.helm), stated_m)[leg]
     if not first:
         error = error * np.minimum(1.0, np.hypot(*(en - path[0]).T) / BESIDE_M)  # where the boat begins is known
     room = distance - error - tracking.reach_m

@@ -26,21 +26,14 @@ def problem_tracking(
     ctx: StepContext, start: Start, from_index: int | None, *, area: AreaLike, floor_m: float, forecast: WindForecast
 ) -> dict[str, Any]:
     """Return the ``tracking`` of a problem: the autopilot's parameters, the hull, and what is solid of ``area``."""
-    limits, route = ctx.snapshot.limits, ctx.state.mission.route
-    helm = GuidanceModel.of(limits or AutopilotLimits(sail_xtrack_max_m=ctx.tack_corridor_m))
+    helm, route = _helm(ctx), ctx.state.mission.route
     before = None
     if from_index is not None and route is not None:
         before = route.leg_from_en_m[from_index]
     elif start.lead_in:
         before = ctx.boat_en
     return {
-        "wp_radius_m": helm.wp_radius_m,
-        "turn_radius_m": helm.turn_radius_m,
-        "wp_speed_mps": helm.wp_speed_mps,
-        "accel_mps2": helm.accel_mps2,
-        "jerk_mps3": helm.jerk_mps3,
-        "corridor_m": helm.corridor_m,
-        **({} if helm.l1_period_s == 0.0 else {"l1_period_s": helm.l1_period_s, "l1_damping": helm.l1_damping}),
+        **helm.stated(),
         "no_go_half_deg": float(np.degrees(ctx.no_go_half_rad)),
         "floor_m": floor_m,
         "reach_m": ctx.voyage.boat.hull.reach_m,
@@ -58,11 +51,15 @@ def steps(ctx: StepContext) -> tuple[Rung, ...]:
     if wind is None:
         return rungs(ctx.config, in_current=in_current)
     best = ctx.voyage.boat.polar.max_speed_mps(wind[1])
-    error_m = stated_error_m(best, has_short=not _is_known(ctx))
+    error_m = stated_error_m(best, _helm(ctx), has_short=not _is_known(ctx))
     track_m = error_m + ctx.voyage.boat.hull.reach_m
     return rungs(
         ctx.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m), in_current=in_current
     )
+
+
+def _helm(ctx: StepContext) -> GuidanceModel:
+    return GuidanceModel.of(ctx.snapshot.limits or AutopilotLimits(sail_xtrack_max_m=ctx.tack_corridor_m))
 
 
 def _is_known(ctx: StepContext) -> bool:

@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 from functools import cached_property, lru_cache
 
-from companion.boat import Afloat, as_learned, loiter_swing_m, mark_of
+from companion.boat import Afloat, AutopilotLimits, as_learned, loiter_swing_m, mark_of
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import AutopilotStatus, Mode, Severity
@@ -136,12 +136,19 @@ def _is_fence_off(state: SkipperState, snapshot: Snapshot) -> bool:
     return snapshot.autopilot is not None and snapshot.autopilot.fence_on is False
 
 
-def with_learned_boat(voyage: Voyage, config: SkipperConfig, state: SkipperState) -> Voyage:
-    """Return the voyage with its boat as she was found to sail, where plans are to be told of that."""
-    known = state.afloat.known
-    if not known.is_used or config.learn is not Learning.USE or known.of != mark_of(voyage.boat):
-        return voyage
-    return replace(voyage, boat=as_learned(voyage.boat, known.told))
+def with_known_boat(
+    voyage: Voyage, config: SkipperConfig, state: SkipperState, limits: AutopilotLimits | None
+) -> Voyage:
+    """Return the voyage with its boat as she is found to sail, and turning no faster than her autopilot lets her.
+
+    What was found counts where plans are to be told of it.
+    """
+    known, boat = state.afloat.known, voyage.boat
+    if known.is_used and config.learn is Learning.USE and known.of == mark_of(voyage.boat):
+        boat = as_learned(boat, known.told)
+    if limits is not None and limits.rate_max_radps < boat.turn_rate_radps:
+        boat = replace(boat, turn_rate_radps=limits.rate_max_radps)
+    return voyage if boat is voyage.boat else replace(voyage, boat=boat)
 
 
 class StepContext:
@@ -152,7 +159,7 @@ class StepContext:
 
     def __init__(self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot) -> None:
         self.boat_of_file = voyage.boat
-        voyage = unfilled = with_learned_boat(voyage, config, state)
+        voyage = unfilled = with_known_boat(voyage, config, state, snapshot.limits)
         self.utc_s = _utc_s(snapshot)
         """The Unix time by the autopilot's clock [s], None while that does not know it."""
         closed = tuple(w for w in voyage.drying if w.is_closed(config.tide, self.utc_s, SOLID_S))
@@ -527,9 +534,9 @@ class StepContext:
     @property
     def loiter_swing_m(self) -> float:
         """How far from its place a loiter takes the boat in this wind [m]."""
-        wind = self.wind_mean
-        least_m = self.config.loiter_radius_m
-        return least_m if wind is None else max(least_m, loiter_swing_m(self.voyage.boat.polar, wind[1]))
+        wind, limits = self.wind_mean, self.snapshot.limits or AutopilotLimits()
+        least_m, polar = self.config.loiter_radius_m, self.voyage.boat.polar
+        return least_m if wind is None else max(least_m, loiter_swing_m(polar, wind[1], limits.rate_max_radps))
 
     @property
     def fences(self) -> tuple[HomeCircle | Drawn, ...]:

@@ -15,8 +15,10 @@ from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.statement import Start, problem_dict
 from companion.skipper.planning.track import clearance_text, of_way, problem_tracking, steps
+from companion.skipper.rules import Skipper
 from companion.skipper.step.actions import Announce, ReplanReason
 from companion.skipper.step.config import SkipperConfig
+from companion.skipper.step.context import StepContext
 from companion.skipper.step.snapshot import PlanOutcome, WindEstimate
 from companion.skipper.way.geometry import moved
 from tests.skipper.moments import moment, route
@@ -173,17 +175,15 @@ def test_a_problem_says_where_the_leg_before_it_begins(from_index, lead_in, way,
 
 
 def test_a_problem_says_all_that_shapes_the_track():
-    limits = AutopilotLimits(wp_radius_m=7.0, wp_speed_mps=5.0, sail_no_go_angle_rad=math.radians(50.0))
+    limits = AutopilotLimits(
+        wp_radius_m=7.0, wp_speed_mps=5.0, sail_no_go_angle_rad=math.radians(50.0), rate_max_radps=0.5
+    )
     now = moment(WAY, obstacles=(WALL,))
     now.snapshot = replace(now.snapshot, limits=limits)
-    helm = GuidanceModel.of(limits)
     assert tracking(now) == {
-        "wp_radius_m": helm.wp_radius_m,
-        "turn_radius_m": helm.turn_radius_m,
-        "wp_speed_mps": helm.wp_speed_mps,
-        "accel_mps2": helm.accel_mps2,
-        "jerk_mps3": helm.jerk_mps3,
-        "corridor_m": helm.corridor_m,
+        "wp_radius_m": 7.0,  # and of the rest what is not ArduRover's own
+        "wp_speed_mps": 5.0,
+        "rate_max_radps": 0.5,
         "no_go_half_deg": pytest.approx(50.0),
         "floor_m": 6.0,
         "reach_m": now.voyage.boat.hull.reach_m,
@@ -194,8 +194,7 @@ def test_a_problem_says_all_that_shapes_the_track():
         "known": True,
     }
     now.snapshot = replace(now.snapshot, limits=None)
-    unread = GuidanceModel.of(AutopilotLimits(sail_xtrack_max_m=now.tack_corridor_m))
-    assert (tracking(now)["corridor_m"], tracking(now)["wp_radius_m"]) == (unread.corridor_m, unread.wp_radius_m)
+    assert tracking(now).keys().isdisjoint({"corridor_m", "wp_radius_m", "rate_max_radps"})
 
 
 @pytest.mark.parametrize("tws_mps", [1.0, 3.0, 5.0, 8.0, 14.0])
@@ -204,7 +203,7 @@ def test_the_ladder_s_track_is_the_next_of_few_steps(tws_mps, wp_speed_mps):
     now = moment(WAY, tws_mps=tws_mps)
     now.snapshot = replace(now.snapshot, limits=AutopilotLimits(wp_speed_mps=wp_speed_mps))
     best = now.voyage.boat.polar.max_speed_mps(tws_mps)
-    need_m = stated_error_m(best, has_short=wp_speed_mps is None) + now.voyage.boat.hull.reach_m
+    need_m = stated_error_m(best, GuidanceModel(), has_short=wp_speed_mps is None) + now.voyage.boat.hull.reach_m
     track_m = next((step for step in (2.0, 2.5, 4.0, 8.0) if step >= need_m), need_m)
     assert steps(now) == rungs(now.config, track_m=track_m)
 
@@ -213,3 +212,17 @@ def test_without_a_wind_the_ladder_knows_no_track():
     now = moment(WAY)
     now.snapshot = replace(now.snapshot, wind=WindEstimate())
     assert steps(now) == rungs(now.config)
+
+
+@pytest.mark.parametrize("rate_deg", [20.0, 120.0])
+def test_the_boat_turns_no_faster_than_her_autopilot_lets_her(rate_deg):
+    now = ctx()
+    snapshot = replace(now.snapshot, limits=AutopilotLimits(rate_max_radps=math.radians(rate_deg)))
+    told = StepContext(now.voyage, now.config, now.state, snapshot)
+    reckoned_radps = min(math.radians(rate_deg), now.voyage.boat.turn_rate_radps)
+    assert told.voyage.boat.turn_rate_radps == reckoned_radps
+    assert told.boat_of_file is now.voyage.boat
+    told = Skipper(voyage=now.voyage, config=now.config).sailed(now.state, snapshot.limits)
+    assert told.boat.turn_rate_radps == reckoned_radps
+    slow = StepContext(now.voyage, now.config, now.state, snapshot).loiter_swing_m
+    assert (slow > now.loiter_swing_m) is (rate_deg < 120.0)

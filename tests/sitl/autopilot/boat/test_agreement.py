@@ -223,8 +223,8 @@ def test_loiter_after_the_last_waypoint_keeps_sailing_near_it() -> None:
     assert rows[:, 3].mean() == pytest.approx(2.4, abs=0.15)
 
 
-@pytest.mark.parametrize("tws_mps", [5.0, 9.0, 14.0])
-def test_a_loiter_swings_no_farther_than_is_reckoned_with(tws_mps: float) -> None:
+@pytest.mark.parametrize(("tws_mps", "rate_deg"), [(5.0, 120.0), (9.0, 120.0), (14.0, 120.0), (5.0, 30.0), (9.0, 20.0)])
+def test_a_loiter_swings_no_farther_than_is_reckoned_with(tws_mps: float, rate_deg: float) -> None:
     async def job(c: Client) -> Client:
         c.rate(mav.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, 5)
         await asyncio.sleep(1.0)
@@ -233,10 +233,10 @@ def test_a_loiter_swings_no_farther_than_is_reckoned_with(tws_mps: float) -> Non
         await asyncio.sleep(120.0)
         return c
 
-    c = sail(job, is_moored=True, wind=Constant(0.0, tws_mps))
+    c = sail(job, is_moored=True, wind=Constant(0.0, tws_mps), ATC_STR_RAT_MAX=rate_deg)
     rows = track(c)
     rows = rows[rows[:, 0] > c.text_time("Mission Complete")]
-    reckoned_m = loiter_swing_m(ardurover_sitl(), tws_mps)
+    reckoned_m = loiter_swing_m(ardurover_sitl(), tws_mps, math.radians(rate_deg))
     assert 0.8 * reckoned_m < np.hypot(rows[:, 1], rows[:, 2]).max() < reckoned_m
 
 
