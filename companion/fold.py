@@ -612,11 +612,14 @@ class VoyageFold:
 
 
 def begun(skipper: Skipper, persisted: Persisted | None, waters: Waters | None) -> tuple[Skipper, Persisted | None]:
-    """Return the skipper and the saved state in one frame: that of the saved state, where the voyage is a passage."""
+    """Return the skipper and the saved state in one frame: that of the saved state, where the voyage is a passage.
+
+    The mission's own frame may be another than when it was saved: its start, or its first goal, was moved.
+    """
     own = skipper.voyage.frame
     saved = own if persisted is None or persisted.water is None else LocalFrame(persisted.water)
     if waters is not None and (saved != own or not math.isfinite(skipper.voyage.area.reach_m)):
         skipper = replace(skipper, voyage=waters(saved.origin))
-    if persisted is not None and waters is None and saved != own:  # it was one when it was saved
+    if persisted is not None and waters is None and saved != own:
         persisted = replace(carried(persisted, Shift(saved, own)), water=None)
     return skipper, persisted

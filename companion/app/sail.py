@@ -338,6 +338,8 @@ class _Shell:
             self._refuse("saved state", self.state_file.refusal)
         elif persisted is not None and self.fold.state.mission.adoptable is None and not options.is_again:
             self._refuse("saved state", f"{self.state_file.path.name} is not used: {self.fold.state.why}")
+        elif persisted is not None and (change := skipper.change_of(persisted)):
+            self._refuse("saved state", change)
 
     # -------------------------------------------------------------------------------------- inputs
     def _on_message(self, t_s: float, message: Any) -> None:

@@ -19,6 +19,7 @@ from companion.skipper.behaviors.field_guidance import follow_field
 from companion.skipper.behaviors.operator_orders import preview, take_orders
 from companion.skipper.behaviors.position_doubt import follow
 from companion.skipper.behaviors.shoaling import follow_soundings
+from companion.skipper.board.resumed import leg_under_way, resumed, saved_goals
 from companion.skipper.board.vehicle_identity import judge
 from companion.skipper.intake import count_time, locate, remember_fix, take_events, take_outcomes
 from companion.skipper.planning.diversions import speak_of_fence
@@ -66,6 +67,8 @@ class Skipper:
             return SkipperState(
                 why="the saved state is of another voyage", mission=LoadedMission(known=(*known, *persisted.names))
             )
+        known = known if not self.change_of(persisted) else (*known, *persisted.names)
+        persisted, _ = resumed(self.voyage, persisted)
         return SkipperState(
             vehicle=VehicleIdentity(uid=persisted.uid, system=persisted.system),
             mission=LoadedMission(adoptable=persisted, known=known),
@@ -87,13 +90,18 @@ class Skipper:
         )
 
     def fits(self, persisted: Persisted) -> bool:
-        """Return whether a saved state is one of this voyage."""
-        gates = [persisted.gate, *(g + 1 for route in persisted.lists for g in route.gate_of)]
-        return persisted.voyage == self.voyage.name and max(gates) <= len(gates_of(self.voyage, persisted.approaches))
+        """Return whether a saved state is one of this voyage, its goals changed since or not."""
+        kept, _ = resumed(self.voyage, persisted)
+        gates = [kept.gate, *(g + 1 for route in kept.lists for g in route.gate_of)]
+        return persisted.voyage == self.voyage.name and max(gates) <= len(gates_of(self.voyage, kept.approaches))
+
+    def change_of(self, persisted: Persisted) -> str:
+        """Return what is to be said of goals that were changed since a state was saved, "" where none was."""
+        return resumed(self.voyage, persisted)[1] if self.fits(persisted) else ""
 
     def has_arrived(self, persisted: Persisted) -> bool:
         """Return whether a saved state is one of this voyage, sailed to its end."""
-        return self.fits(persisted) and persisted.arrived
+        return self.fits(persisted) and resumed(self.voyage, persisted)[0].arrived
 
     def step(self, state: SkipperState, snapshot: Snapshot) -> tuple[SkipperState, tuple[Action, ...]]:
         """Return the next state and what to do now. Call it about once a second, always, whatever is missing."""
@@ -125,12 +133,14 @@ class Skipper:
 
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
-        water = self.voyage.frame.origin if self.voyage.is_passage else None
+        water = self.voyage.frame.origin
         if state.mission.adoptable is not None and (state.mission.foreign or not state.mission.checked):
             return replace(
                 state.mission.adoptable, standing=standing_saved(state), skipped=state.orders.skipped, water=water
             )
-        return replace(saved_of(state, self.voyage.name), water=water)
+        saved = saved_of(state, self.voyage.name)
+        leg = leg_under_way(self.voyage, saved)
+        return replace(saved, water=water, goals=saved_goals(self.voyage), laps=self.voyage.laps, leg=leg)
 
     def leaves_water(self, state: SkipperState, here: GeoPoint) -> bool:
         """Return whether the frame is to be replaced by one about ``here``, where the boat is.

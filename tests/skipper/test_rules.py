@@ -106,13 +106,13 @@ def test_what_was_saved_stays_until_the_mission_on_board_is_known(mission, is_th
     assert (kept.gate == 2) is is_the_old
     assert kept.skipped == 5
     assert kept.voyage == "test"
-    assert kept.water is None
+    assert kept.water == FRAME.origin
     fresh = skipper().persisted(with_parts(skipper().initial(), progress={"gate": 1}))
     assert (fresh.gate, fresh.voyage) == (1, "test")
 
 
 @pytest.mark.parametrize("checked", [False, True])
-def test_a_passage_is_saved_with_the_water_that_its_metres_are_of(checked):
+def test_it_is_saved_with_the_water_that_its_metres_are_of(checked):
     passage = replace(skipper(), voyage=replace(voyage(*GOALS), recentre_m=1000.0))
     state = with_parts(passage.initial(saved()), mission={"checked": checked})
     assert passage.persisted(state).water == FRAME.origin

@@ -152,8 +152,7 @@ def test_a_saved_state_knows_its_water_and_is_read_in_it():
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
     world.run(60)
     home = world.skipper.voyage
-    assert world.skipper.persisted(world.state).water is None
-    assert "water" not in world.skipper.persisted(world.state).to_dict()
+    assert world.skipper.persisted(world.state).water == home.frame.origin
     there = replace(passage(world), frame=shifted(world).after)
 
     def waters(origin: GeoPoint):

@@ -106,6 +106,14 @@ class SavedPlace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SavedGoal:
+    """A goal as it is known again after a restart: where it is, and what is done there."""
+
+    place: GeoPoint
+    kind: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Persisted:
     """What survives a kill: written whenever it changes, before the actions of the step are carried out.
 
@@ -141,6 +149,9 @@ class Persisted:
     shoals: tuple[Shoal, ...] = ()  # that were sounded
     afloat: LearnedAfloat = NOTHING_LEARNED  # what is known of the boat from this voyage
     water: GeoPoint | None = None  # the origin of all metres here; None: the mission's
+    goals: tuple[SavedGoal, ...] = ()  # of the mission as it was then; none: it was not saved
+    laps: int = 1  # ... and how often they are sailed
+    leg: int = 0  # which of the goals of all laps was sailed to, from 0
 
     @property
     def lists(self) -> tuple[Route, ...]:
@@ -182,7 +193,10 @@ class Persisted:
             "latency": [list(self.latency.answers_s), self.latency.room_s, self.latency.speed],
             **({"shoals": [_shoal_to_list(s) for s in self.shoals]} if self.shoals else {}),
             **({} if self.afloat == NOTHING_LEARNED else {"afloat": self.afloat.to_dict()}),
-            **({} if self.water is None else {"water": [self.water.lat_deg, self.water.lon_deg]}),
+            **({} if self.water is None else {"water": _geo_to_list(self.water)}),
+            **({} if not self.goals else {"goals": [[*_geo_to_list(g.place), g.kind] for g in self.goals]}),
+            "laps": self.laps,
+            "leg": self.leg,
         }
 
     @classmethod
@@ -225,12 +239,24 @@ class Persisted:
                 latency=_latency(data.get("latency")),
                 shoals=tuple(_shoal_from_list(s) for s in data.get("shoals", ())[-MOST_SHOALS:]),
                 afloat=NOTHING_LEARNED if data.get("afloat") is None else LearnedAfloat.from_dict(data["afloat"]),
-                water=None
-                if data.get("water") is None
-                else GeoPoint(lat_deg=_number(data["water"][0]), lon_deg=_number(data["water"][1])),
+                water=None if data.get("water") is None else _geo_from_list(data["water"]),
+                goals=tuple(
+                    SavedGoal(place=_geo_from_list(goal), kind=_words(goal[2]))
+                    for goal in data.get("goals", ())[:MAX_GOALS]
+                ),
+                laps=_whole(data.get("laps", 1), 1, MAX_GOALS),
+                leg=_whole(data.get("leg", 0), 0, MAX_GOALS),
             )
         except (KeyError, TypeError, IndexError, AttributeError, OverflowError, RecursionError) as error:
             raise ValueError(f"it is damaged: {str(error)[:80] or type(error).__name__}") from error
+
+
+def _geo_to_list(place: GeoPoint) -> list[float]:
+    return [place.lat_deg, place.lon_deg]
+
+
+def _geo_from_list(data: Any) -> GeoPoint:
+    return GeoPoint(lat_deg=_number(data[0]), lon_deg=_number(data[1]))
 
 
 def _latency(data: Any) -> PlannerLatency:
