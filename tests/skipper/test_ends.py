@@ -7,12 +7,14 @@ import pytest
 from shapely.geometry import box
 
 from companion.messages import GeoPoint, Mode
+from companion.orders import Verb
 from companion.skipper.behaviors.rest import comes_to_rest, rest
-from companion.skipper.planning.diversions import ROOM, after_last_goal, diversion
+from companion.skipper.planning.diversions import HOME, OFF_HOME, ROOM, after_last_goal, diversion
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import SafeEnd
+from companion.skipper.step.missions import loiter_place
 from companion.skipper.step.route import DiversionKind
-from companion.skipper.step.saved import Persisted
+from companion.skipper.step.saved import Persisted, Standing
 from companion.skipper.step.state import Phase, Retry
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.shortest import way_m
@@ -148,9 +150,61 @@ def test_the_end_has_room_for_a_loiter_in_that_wind_and_the_floor(tws_mps):
     assert room_m >= ctx.loiter_swing_m + ctx.config.margin_floor_m - 0.5  # in whole metres
 
 
+@pytest.mark.parametrize("is_ordered", [False, True])
+def test_home_in_a_creek_she_goes_on_to_where_a_loiter_has_room(is_ordered):
+    """She lay there, "home", and touched its sides 22 times; under the order `home` without a word."""
+    ctx = in_creek(progress={"gate": 1})
+    order = Standing(verb=Verb.HOME, by="crew", name="home", en_m=QUAY.en_m, since_s=0.0)
+    route = replace(led_to(ctx, (0.0, 310.0)), bound_for=HOME)
+    ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.autopilot, home=FRAME.geo_from_en(*QUAY.en_m)))
+    ctx.config = replace(ctx.config, safe_end=SafeEnd.RETURN)
+    ctx.set(mission=replace(ctx.state.mission, route=route, index=0))
+    ctx.set(orders=replace(ctx.state.orders, standing=order if is_ordered else None))
+    assert (diversion(ctx).name, diversion(ctx).kind) == (HOME, DiversionKind.HOME)  # on the way
+    ctx.set(mission=replace(ctx.state.mission, index=len(route.items) - 1))
+    bound = diversion(ctx)
+    assert (bound.name, bound.kind, bound.is_ordered) == (OFF_HOME, DiversionKind.ROOM, is_ordered)
+    assert rooms_m(ctx, bound.en_m) >= 15.0
+    assert not comes_to_rest(ctx, bound)
+    there = replace(led_to(ctx, bound.en_m), bound_for=OFF_HOME)
+    ctx.set(mission=replace(ctx.state.mission, route=there))
+    assert diversion(ctx).en_m == bound.en_m
+    ctx.snapshot = replace(ctx.snapshot, position_en_m=bound.en_m)
+    assert comes_to_rest(ctx, diversion(ctx))
+    if is_ordered:
+        assert ctx.state.why.startswith("at water with room off home: ")
+    else:
+        assert ctx.state.voyage.over == "the goal is reached; home; she lies where a loiter has room"
+
+
+def test_the_voyage_is_over_where_its_loiter_is_and_not_before():
+    """Passing home at 3.5 m/s, 90 m before her place, it was over, and then: dragged off by 97 m."""
+    ctx = in_creek(progress={"gate": 1}, plans={"retry": Retry(failures=3)})
+    far, near = (led_to(ctx, place) for place in ((0.0, -60.0), ctx.boat_en))
+    last = len(far.items) - 1
+    ctx.set(mission=replace(ctx.state.mission, route=far, index=last))
+    rest(ctx)
+    assert not ctx.state.voyage.over
+    assert "to where a loiter has room" in ctx.state.why
+    ctx.set(mission=replace(ctx.state.mission, route=near, index=last))
+    rest(ctx)
+    off_m = distance_m(*near.points_en_m[-2:])
+    assert ctx.state.voyage.over == f"the goal is reached; she lies {off_m:.0f} m off, where a loiter has room"
+
+
+def test_room_all_round_comes_before_more_of_it_to_leeward_alone():
+    """The place with most room to leeward lay 8 m from a bank, that with 20 m all round beside it."""
+    banks = (box(-200.0, 22.0, 200.0, 60.0), box(-200.0, -60.0, 200.0, -22.0))
+    ctx = in_creek(obstacles=banks)
+    place, room_m = loiter_place(ctx.voyage, ctx.known_config, (0.0, 6.0), 0.0)
+    assert room_m >= ctx.known_config.loiter_radius_m
+    assert rooms_m(ctx, place) == pytest.approx(room_m)
+
+
 def test_where_she_rests_without_room_that_is_said_and_she_goes_on_to_where_it_is():
     ctx = in_creek(progress={"gate": 1}, plans={"retry": Retry(failures=3)})
     ctx.set(mission=replace(ctx.state.mission, route=led_to(ctx, (0.0, 320.0))))
+    ctx.snapshot = replace(ctx.snapshot, position_en_m=(0.0, 310.0))
     rest(ctx)
     assert ctx.state.voyage.arrived
     [text] = [a.text for a in ctx.actions if isinstance(a, act.Announce) and a.code == "no room"]

@@ -10,19 +10,23 @@ from __future__ import annotations
 import math
 
 from companion.frozen import changed
-from companion.messages import Severity
+from companion.messages import Mode, Severity
 from companion.safety import BY_RANK, ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
 from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
-from companion.skipper.planning.diversions import HOME, ROOM, home_trouble, is_at_rest, pressing
-from companion.skipper.step import CancelPlan, Diversion, DiversionKind, Phase, SafeEnd, StepContext
+from companion.skipper.planning.diversions import HOME, OFF_HOME, ROOM, home_trouble, is_at_rest, pressing
+from companion.skipper.step import CancelPlan, Diversion, DiversionKind, Phase, Route, SafeEnd, StepContext
 from companion.skipper.way import distance_m
 
 ANSWERED = {"": "for a person", SHORE: "until the link to the shore is back, or a person gives AUTO"}
 TAKEN = "until a person takes her and gives AUTO back"
 NEAR_M = 35.0  # a loiter so far off a place is at it
-LIES = {HOME: "; home", ROOM: "; she lies where a loiter has room"}  # behind the last goal
+LIES = {  # behind the last goal
+    HOME: "; home",
+    ROOM: "; she lies where a loiter has room",
+    OFF_HOME: "; home; she lies where a loiter has room",
+}
 UNTIL_TOLD = "until told to go on"
 
 
@@ -90,11 +94,13 @@ def rest(ctx: StepContext) -> None:
     if not ctx.state.voyage.over:
         if keeps_station(ctx):
             return
+        if _is_on_to_its_place(ctx):
+            return
         ends_home = ctx.config.safe_end is SafeEnd.RETURN and not ctx.state.voyage.home_reached
         trouble = home_trouble(ctx) if ends_home else ""
         route = ctx.state.mission.route
         lies = LIES.get(route.bound_for, "") if ctx.state.voyage.home_reached and route is not None else ""
-        home = f"; not home: {trouble}" if trouble else lies
+        home = (f"; not home: {trouble}" if trouble else lies) + _lies_off(route)
         end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
         goals = len(ctx.voyage.legs)
         reached = "the goal is reached" if goals == 1 else f"all {goals} goals reached"
@@ -117,6 +123,26 @@ def rest(ctx: StepContext) -> None:
     elif not repair(ctx):
         hand_back(ctx)
         ctx.phase(Phase.DONE, ctx.state.voyage.over + ("; waiting for AUTO" if stopped else _raised(ctx)))
+
+
+def _lies_off(route: Route | None) -> str:
+    """Return how far off the last waypoint the loiter lies that ends the mission, where it is not by it."""
+    if route is None or route.bound_for not in {"", HOME} or len(route.points_en_m) < 2:
+        return ""
+    off_m = distance_m(*route.points_en_m[-2:])
+    return f"; she lies {off_m:.0f} m off, where a loiter has room" if off_m > NEAR_M else ""
+
+
+def _is_on_to_its_place(ctx: StepContext) -> bool:
+    """Say so while she still sails to the loiter that ends her mission, which a place without room has farther off."""
+    route, boat, status = ctx.state.mission.route, ctx.boat_en, ctx.autopilot
+    if route is None or boat is None or status is None or not (status.is_armed and status.mode is Mode.AUTO):
+        return False
+    off_m = distance_m(boat, route.points_en_m[-1])
+    if off_m <= max(NEAR_M, ctx.loiter_swing_m):
+        return False
+    ctx.phase(Phase.STANDARD, f"all goals are reached; {off_m:.0f} m to where a loiter has room")
+    return True
 
 
 def _raised(ctx: StepContext) -> str:

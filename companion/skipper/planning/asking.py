@@ -14,7 +14,7 @@ from companion.frozen import changed
 from companion.messages import Mode, Severity
 from companion.planner import Problem
 from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
-from companion.skipper.planning.diversions import after_last_goal, diversion, gate_for
+from companion.skipper.planning.diversions import after_last_goal, diversion, gate_for, room_behind
 from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
 from companion.skipper.planning.tides import told
@@ -237,6 +237,8 @@ def _target(ctx: StepContext, from_index: int | None) -> tuple[Gate, int, Divers
     number = None if bound is not None else _gate_after(ctx, from_index)
     if bound is None and number is None:
         bound = after_last_goal(ctx)
+    if bound is not None and from_index is not None and from_index == ctx.last_waypoint():
+        bound = room_behind(ctx, bound) or bound
     if bound is not None:
         return (gate_for(bound), -1, bound) if bound.has_place else None
     return None if number is None else (ctx.gates[number], number, None)

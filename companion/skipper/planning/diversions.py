@@ -26,8 +26,11 @@ from companion.traffic import Policy
 
 DRAGGED = "dragged off"  # a watchdog
 HOME, REST, ROOM = "home", "the place to rest", "water with room"
-AFTER_LAST_GOAL = {HOME, ROOM}  # where she may be bound for then
+OFF_HOME = f"{ROOM} off {HOME}"
+AFTER_LAST_GOAL = {HOME, ROOM, OFF_HOME}  # where she may be bound for then
 LACK_M = 1.0  # of the room that a loiter takes: she is not moved for less, as the wind freshens
+LIES_THERE = {DiversionKind.HOME, DiversionKind.REFUGE, DiversionKind.GOAL}
+NO_ROOM = "{} has no room for a loiter"
 ROOM_TRIES = 3  # to find a way to water with room, behind the last goal
 GOAL_RADIUS_M = 10.0  # a place that is named under way: there within this
 ABOUT_M = 10.0  # how far off a refuge is by water is told from so near
@@ -58,6 +61,35 @@ def diversion(ctx: StepContext) -> Diversion | None:
 
 
 def _find(ctx: StepContext) -> Diversion | None:
+    bound, route = _wanted(ctx), ctx.state.mission.route
+    if bound is None or route is None or not route.points_en_m:
+        return bound
+    if bound.kind in LIES_THERE and route.bound_for == _off(bound):  # on the way there, or there
+        place = route.points_en_m[ctx.last_waypoint() if ctx.ahead() else -1]
+        return replace(bound, kind=DiversionKind.ROOM, name=_off(bound), why=NO_ROOM.format(bound.name), en_m=place)
+    return bound if ctx.ahead() else room_behind(ctx, bound) or bound
+
+
+def room_behind(ctx: StepContext, bound: Diversion) -> Diversion | None:
+    """Return the way on to water with room, where the place that the route is bound for has none for a loiter."""
+    route, wind = ctx.state.mission.route, ctx.wind_mean
+    if bound.kind not in LIES_THERE or route is None or not route.points_en_m or route.bound_for != bound.name:
+        return None
+    lies_en = route.points_en_m[-1]
+    if float(ctx.to_stay_in.area.clearance_m([lies_en])[0]) >= ctx.loiter_swing_m - LACK_M:
+        return None
+    place = place_with_room(ctx.to_stay_in, ctx.known_config, lies_en, wind[0] if wind is not None else 0.0)
+    if place is None:
+        return None
+    why = NO_ROOM.format(bound.name)
+    return replace(bound, kind=DiversionKind.ROOM, name=_off(bound), why=why, en_m=place)
+
+
+def _off(bound: Diversion) -> str:
+    return f"{ROOM} off {bound.name}"
+
+
+def _wanted(ctx: StepContext) -> Diversion | None:
     return (
         pressing(ctx)
         or _ordered(ctx)

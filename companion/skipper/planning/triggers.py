@@ -11,7 +11,7 @@ from companion.geo.angles import difference_rad
 from companion.messages import Severity
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
-from companion.skipper.planning.diversions import AFTER_LAST_GOAL, after_last_goal, diversion, is_composed
+from companion.skipper.planning.diversions import AFTER_LAST_GOAL, after_last_goal, diversion, is_composed, room_behind
 from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
@@ -303,6 +303,7 @@ def _extension(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
     ends = route.gate_of[last]
     if bound is not None or route.bound_for in AFTER_LAST_GOAL:
         bound = bound or after_last_goal(ctx)
+        bound = bound and (room_behind(ctx, bound) or bound)
         if bound is None or distance_m(route.points_en_m[last], bound.en_m) <= bound.radius_m + ctx.config.announce_m:
             return None
     elif ends >= len(ctx.gates) - 1 and after_last_goal(ctx) is None:

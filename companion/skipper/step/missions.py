@@ -89,11 +89,12 @@ def loiter_place(
     """Return where to loiter after ``end_en`` and the room there [m].
 
     The first place with ``loiter_radius_m`` all round and to leeward, looked for in growing rings that a straight
-    line reaches; without one, the roomiest found, farther off where none of them is free. A line that the wind has
-    closed is one that the autopilot beats about: it needs the room of that corridor as well. From below the floor a
-    line comes no nearer than it begins. With ``wanted_m`` of room to be had within ``ROOMIER_M``, the first place with
-    that comes before the nearest that will do. Outside the limits, where none of their water with room is reached so,
-    it is room off what is solid that counts: the place that is least far outside may lie between two rocks.
+    line reaches; without one, the first that has it all round, else the roomiest, farther off where none is free. A
+    line that the wind has closed is one that the autopilot beats about: it needs the room of that corridor as well.
+    From below the floor a line comes no nearer than it begins. With ``wanted_m`` of room to be had within
+    ``ROOMIER_M``, the first place with that comes before the nearest that will do. Outside the limits, where none of
+    their water with room is reached so, it is room off what is solid that counts: the place that is least far outside
+    may lie between two rocks.
     """
     place, room = _roomy_place(voyage, config, end_en, twd_from_rad, wanted_m)
     water = water_to_keep(voyage.area, end_en)
@@ -108,6 +109,7 @@ def _roomy_place(
     corridor_m = config.tack_corridor_m if config.tack_corridor_m > 0.0 else math.inf
     best, best_room = end_en, -math.inf
     will_do: tuple[PointEn, float] | None = None
+    all_round: tuple[PointEn, float] | None = None  # with that room, but for what drifts off to leeward
     leeward = twd_from_rad + math.pi
     water = water_at(voyage.area, end_en)
     marks = marks_of(voyage)
@@ -115,7 +117,7 @@ def _roomy_place(
     for ring_m in (*RINGS_M, *FAR_RINGS_M):
         if will_do is not None and ring_m > ROOMIER_M:
             return will_do
-        if ring_m > RINGS_M[-1] and best_room > 0.0:
+        if ring_m > RINGS_M[-1] and (best_room > 0.0 or all_round is not None):
             break
         count = 1 if ring_m == 0.0 else DIRECTIONS
         for n in range(count):
@@ -132,7 +134,10 @@ def _roomy_place(
                 will_do = place, room
             if room > best_room + 1.0:
                 best, best_room = place, room
-    return will_do or (best, best_room)
+            if all_round is None:
+                about_m = float(_rooms_m(voyage, config, marks, [place], None)[0])
+                all_round = (place, about_m) if about_m >= config.loiter_radius_m else None
+    return will_do or all_round or (best, best_room)
 
 
 WIND_STEP_RAD = math.radians(30.0)  # how fine the wind is told by where room is looked for
@@ -141,22 +146,26 @@ WIND_STEP_RAD = math.radians(30.0)  # how fine the wind is told by where room is
 def place_with_room(voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float) -> PointEn | None:
     """Return the nearest place by water with ``roomy_m`` all round and to leeward; None: none in 900 m.
 
-    Where that is not to be had, with ``loiter_radius_m``.
+    Where that is not to be had, with ``loiter_radius_m``; and where nothing has that to leeward too, all round.
     """
     about = (float(round(end_en[0])), float(round(end_en[1])))
     wind_rad = WIND_STEP_RAD * round(twd_from_rad / WIND_STEP_RAD)
     found = (
-        _place_with_room(voyage, voyage.area, config, about, wind_rad, m)
-        for m in (roomy_m(config), config.loiter_radius_m)
+        _place_with_room(voyage, voyage.area, config, about, wind, room_m)
+        for room_m, wind in (
+            (roomy_m(config), wind_rad),
+            (config.loiter_radius_m, wind_rad),
+            (config.loiter_radius_m, None),
+        )
     )
     return next((place for place in found if place is not None), None)
 
 
 @lru_cache(maxsize=8)  # asked for at every step; the area is by identity, which a voyage's equality leaves out
 def _place_with_room(
-    voyage: Voyage, area: AreaLike, config: SkipperConfig, end_en: PointEn, twd_from_rad: float, room_m: float
+    voyage: Voyage, area: AreaLike, config: SkipperConfig, end_en: PointEn, twd_from_rad: float | None, room_m: float
 ) -> PointEn | None:
-    leeward, marks = twd_from_rad + math.pi, marks_of(voyage)
+    leeward, marks = None if twd_from_rad is None else twd_from_rad + math.pi, marks_of(voyage)
     nearest, least_m = None, math.inf
     for ring_m in (*RINGS_M[1:], *FAR_RINGS_M):
         if ring_m >= least_m:
@@ -171,9 +180,11 @@ def _place_with_room(
 
 
 def _rooms_m(
-    voyage: Voyage, config: SkipperConfig, marks: Sequence[Mark], places: Sequence[PointEn], leeward: float
+    voyage: Voyage, config: SkipperConfig, marks: Sequence[Mark], places: Sequence[PointEn], leeward: float | None
 ) -> NDArray[np.float64]:
-    """Return of each place the room to loiter there [m]: all round, and for what drifts off to leeward."""
+    """Return of each place the room to loiter there [m]: all round, and for what drifts off to ``leeward``."""
+    if leeward is None:
+        return np.minimum(voyage.area.clearance_m(np.asarray(places)), _off_marks_m(marks, places))
     down = [[moved(place, leeward, s * LEEWARD_ROOM_M) for s in (0.0, 0.25, 0.5, 0.75, 1.0)] for place in places]
     flat = [place for row in down for place in row]
     clear = np.minimum(voyage.area.clearance_m(np.asarray(flat)), _off_marks_m(marks, flat)).reshape(len(places), -1)
