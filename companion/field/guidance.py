@@ -18,7 +18,16 @@ import numpy as np
 
 from companion.field.look_ahead import choose
 from companion.field.projection import HysteresisZone, Projection, near_and_ahead
-from companion.field.values import Clearance, GuidanceSettings, GuidanceState, Intent, Manoeuvre, Setpoint, Situation
+from companion.field.values import (
+    Clearance,
+    GuidanceSettings,
+    GuidanceState,
+    Intent,
+    Manoeuvre,
+    MovingObstacle,
+    Setpoint,
+    Situation,
+)
 from companion.field.vector_fields import (
     REPULSIVE,
     ZONE_M,
@@ -31,15 +40,28 @@ from companion.field.vector_fields import (
 )
 from companion.geo.angles import wrap_pi
 
+STILL_MPS = 0.3  # slower an obstacle lies
+
 
 def avoiding(field: Field, situation: Situation, habits: GuidanceSettings) -> Field:
-    """Return the field with a repulsive point at every obstacle that is near and ahead (Schmitt, section 4.2)."""
+    """Return the field with a repulsive point at every obstacle that is near and ahead (Schmitt, section 4.2).
+
+    One that comes nearer by itself counts from all sides: by the bow alone, a boat that turns away from it would be
+    led back to it at once, and away again.
+    """
     for obstacle in situation.obstacles:
-        if near_and_ahead(situation.en_m, situation.heading_rad, obstacle.en_m, near_m=habits.near_m):
+        bow_rad = None if _comes(obstacle, situation) else situation.heading_rad
+        if near_and_ahead(situation.en_m, bow_rad, obstacle.en_m, near_m=habits.near_m):
             # The Gaussian starts at the disc's edge: it is as wide as the obstacle is.
             width = math.hypot(habits.repulsive_sigma_m, obstacle.keep_m)
             field = field + RepulsivePoint(sigma_m=width).shifted(*obstacle.en_m)
     return field
+
+
+def _comes(obstacle: MovingObstacle, situation: Situation) -> bool:
+    """Return whether an obstacle's own motion brings it nearer to where the boat is now."""
+    (east, north), (here_e, here_n), (ve, vn) = obstacle.en_m, situation.en_m, obstacle.velocity_en_mps
+    return math.hypot(ve, vn) > STILL_MPS and ve * (here_e - east) + vn * (here_n - north) > 0.0
 
 
 def step(

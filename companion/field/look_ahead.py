@@ -20,8 +20,15 @@ from companion.field.vector_fields import NOMINAL, Field, Vectors
 from companion.geo.angles import wrap_pi, wrap_pi_array
 
 OTHER_SIDE_COST = 2.0  # of changing one's mind about the side on which to pass what stands in the way
+KEPT_LEAST, KEPT_MOST, KEPT_SHARE = 0.1, 1.0, 0.25  # of a change by a right angle; the share of the best one's cost
+TURNS_RAD = math.radians(25.0)  # farther off the heading that was chosen she is turning to it
+OTHER_TURN_COST = 4.0  # of turning back in the middle of a turn
+PINCHED = 2.0  # of the shore's cost: so much, wherever she keeps out of the vessels' discs, and she is between both
+RING_COST = 2.0  # of all of a disc's ring, then
 _FAN_TWA = np.radians(np.arange(0.0, 181.0, 6.0))
 _STEP_S = 2.5
+_FINE_S = 0.5
+STEERAGE_MPS = 0.3  # slower she goes wherever she is set
 
 
 def choose(
@@ -43,23 +50,21 @@ def choose(
         headings = np.concatenate([[wanted_rad], twd - edges, twd + edges])
     track, lost_s = foresee(headings, twd, situation, habits)
     cost = 1.0 - np.cos(headings - wanted_rad) + 0.02 * lost_s
-    last = state.wanted_rad
-    if last is not None:
-        cost += 0.1 * (1.0 - np.cos(headings - last))
     margin, blocked = margins(track, situation.obstacles), False
+    ashore = None if intent.clearance is None else _ashore(track, intent.clearance, habits)
     if situation.obstacles:
-        cost += np.where(margin < 0.0, 10.0 - 0.2 * margin, 0.0)
+        cost += _inside(track, margin, ashore, situation.obstacles)
         cost += np.maximum(0.0, 1.0 - np.maximum(margin, 0.0) / habits.comfort_m)
         cost += habits.ahead_cost * crosses_ahead(track, situation.obstacles)
     if intent.stay_in is not None:
         cost += 4.0 * _leaving(track, intent.stay_in, habits)
-    if intent.clearance is not None:
-        ashore = _ashore(track, intent.clearance, habits)
+    if ashore is not None:
         # headings[0] is the field's own. On a beat the tack the boat is on is the side that is kept, by q.
         beats = twd is not None and abs(wrap_pi(wanted_rad - twd)) < habits.no_go_half_rad + 1e-6
         blocked = bool(ashore[0] > 0.0) and not beats
         side = wrap_pi_array(headings - wanted_rad) * state.round_side
         cost += ashore + np.where(blocked & (side < 0.0), OTHER_SIDE_COST, 0.0)
+    cost += _changing(headings, cost, situation.heading_rad, state.wanted_rad)
     best = int(np.argmin(cost))
     round_side = state.round_side
     if not blocked:
@@ -69,37 +74,80 @@ def choose(
     return wrap_pi(float(headings[best])), float(margin[best]) if situation.obstacles else None, round_side
 
 
+def _changing(
+    headings: NDArray[np.float64], cost: NDArray[np.float64], heading_rad: float, last_rad: float | None
+) -> NDArray[np.float64]:
+    """Return what changing one's mind costs, (k,): what was chosen is kept while it is about as good.
+
+    About as good is a share of what the best heading costs: in a corner, where each costs much, two alike ways differ
+    by more than two in open water do. A turn that is begun is finished, unless another is better by much.
+    """
+    if last_rad is None:
+        return np.zeros(len(headings))
+    keen = max(KEPT_LEAST, min(KEPT_MOST, KEPT_SHARE * float(cost.min())))
+    changed = keen * (1.0 - np.cos(headings - last_rad))
+    turn_rad = wrap_pi(last_rad - heading_rad)
+    if abs(turn_rad) > TURNS_RAD:
+        turns_back = wrap_pi_array(headings - heading_rad) * turn_rad < 0.0
+        is_another = np.cos(headings - last_rad) < math.cos(TURNS_RAD)
+        changed = changed + np.where(turns_back & is_another, OTHER_TURN_COST, 0.0)
+    return np.asarray(changed, dtype=np.float64)
+
+
+def _inside(
+    track: NDArray[np.float64],
+    margin: NDArray[np.float64],
+    ashore: NDArray[np.float64] | None,
+    obstacles: Sequence[MovingObstacle],
+) -> NDArray[np.float64]:
+    """Return what entering a disc costs each track, (k,): 10 and more, less in its ring where the shore presses.
+
+    The shore is solid and certain, the ring of a vessel's disc is distance kept beside her: where every heading that
+    keeps out of the discs leads towards the shore, the ring is entered by degrees, the disc within it not.
+    """
+    if ashore is None or bool(((margin >= 0.0) & (ashore < PINCHED)).any()):
+        return np.asarray(np.where(margin < 0.0, 10.0 - 0.2 * margin, 0.0), dtype=np.float64)
+    worst = np.zeros(len(margin))
+    for o in obstacles:
+        depth = np.maximum(0.0, -margins(track, (o,)))
+        ring = RING_COST * np.minimum(1.0, depth / max(o.ring_m, 1e-9))
+        beyond = depth - o.ring_m
+        worst = np.maximum(worst, np.where(beyond > 0.0, RING_COST + 10.0 + 0.2 * beyond, ring))
+    return worst
+
+
 def foresee(
     headings: NDArray[np.float64], twd: float | None, situation: Situation, habits: GuidanceSettings
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return where each heading (k,) takes the boat: (k, t, 2) [m], and the time each loses by turning (k,) [s].
 
-    The present velocity dies away while the boat turns, that of the new heading grows after it.
+    The way through the water turns with the bow, evenly over that time, and its speed becomes that of the new heading:
+    so a turn looks the same from the middle of it as from its beginning.
     """
-    t = np.arange(0.0, habits.horizon_s + 1e-9, _STEP_S)
+    way = wrap_pi_array(headings - situation.heading_rad)
+    lost = np.abs(way) / habits.turn_rate_radps
     if twd is None:
         speed = np.full(len(headings), habits.polar_mps[-1])
-        lost = np.abs(wrap_pi_array(headings - situation.heading_rad)) / habits.turn_rate_radps
         leeway = np.zeros(2)
     else:
         twa = wrap_pi_array(twd - headings)
         now = wrap_pi(twd - situation.heading_rad)
         speed = np.interp(np.abs(twa), habits.polar_twa_rad, habits.polar_mps)
-        turn = np.abs(twa - now)
-        tacks = (twa * now < 0.0) & (turn < math.pi)
-        turn = np.where(turn > math.pi, 2.0 * math.pi - turn, turn)
-        lost = turn / habits.turn_rate_radps + np.where(tacks, habits.tack_s, 0.0)
+        lost = lost + np.where((twa * now < 0.0) & (np.abs(twa - now) < math.pi), habits.tack_s, 0.0)
         drift = habits.leeway_share * situation.tws_mps
         leeway = -drift * np.array([math.sin(twd), math.cos(twd)])
-    unit = np.column_stack([np.sin(headings), np.cos(headings)])
-    velocity = speed[:, None] * unit + leeway + np.asarray(situation.current_en_mps)
-    lag = max(habits.lag_s, 0.1)
-    coast = lag * (1.0 - np.exp(-t / lag))
-    after = np.maximum(0.0, t[None, :] - 0.5 * lost[:, None])
-    go = after - lag * (1.0 - np.exp(-after / lag))
-    present = np.asarray(situation.velocity_en_mps)
-    track = np.asarray(situation.en_m) + coast[None, :, None] * present + go[:, :, None] * velocity[:, None, :]
-    return track, lost
+    carried = leeway + np.asarray(situation.current_en_mps)
+    through = np.asarray(situation.velocity_en_mps) - carried
+    present = float(np.hypot(*through))
+    course = math.atan2(through[0], through[1]) if present > STEERAGE_MPS else situation.heading_rad
+    turn = way + wrap_pi(situation.heading_rad - course)  # of the way through the water, to the bow's side
+    t = np.arange(0.5 * _FINE_S, habits.horizon_s, _FINE_S)
+    share = np.minimum(1.0, t / np.maximum(lost, _FINE_S)[:, None])
+    heading = course + turn[:, None] * share
+    runs = speed[:, None] + (present - speed)[:, None] * np.exp(-t / max(habits.lag_s, 0.1))
+    steps = _FINE_S * (runs[:, :, None] * np.stack([np.sin(heading), np.cos(heading)], axis=2) + carried)
+    run = np.concatenate([np.zeros((len(headings), 1, 2)), np.cumsum(steps, axis=1)], axis=1)
+    return np.asarray(situation.en_m) + run[:, :: round(_STEP_S / _FINE_S)], lost
 
 
 def margins(track: NDArray[np.float64], obstacles: Sequence[MovingObstacle]) -> NDArray[np.float64]:

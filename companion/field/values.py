@@ -21,12 +21,16 @@ RESEND_S = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MovingObstacle:
-    """A moving disc to keep out of: centre, velocity, radius ``keep_m`` growing by ``growth_mps``."""
+    """A moving disc to keep out of: centre, velocity, radius ``keep_m`` growing by ``growth_mps``.
+
+    The outermost ``ring_m`` of it is distance kept beside it, of which some is given up before the boat goes ashore.
+    """
 
     en_m: tuple[float, float]
     velocity_en_mps: tuple[float, float] = (0.0, 0.0)
     keep_m: float = 10.0
     growth_mps: float = 0.0
+    ring_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.field.guidance import LastResort, follow_line, go_to, helm, hold_heading, step
+from companion.field.guidance import LastResort, avoiding, follow_line, go_to, helm, hold_heading, step
 from companion.field.look_ahead import foresee, margins
 from companion.field.values import GuidanceSettings, GuidanceState, Intent, Manoeuvre, MovingObstacle, Situation
 from companion.geo.angles import wrap_pi
@@ -206,11 +206,39 @@ def test_what_is_foreseen_is_set_by_the_current() -> None:
     """Steered by field across a stream she was foreseen beside the quay that she was set onto."""
     headings = np.array([0.0, 1.0, -2.0])
     still, _ = foresee(headings, 0.5, seen(), HABITS)
-    stream, _ = foresee(headings, 0.5, seen(current_en_mps=(0.6, -0.8)), HABITS)
+    carried = seen(current_en_mps=(0.6, -0.8), velocity_en_mps=(2.6, -0.8))  # the same way through the water
+    stream, _ = foresee(headings, 0.5, carried, HABITS)
     run_m = stream - still
-    assert run_m[:, :, 0] / 0.6 == pytest.approx(run_m[:, :, 1] / -0.8)
+    assert run_m[:, :, 0] / 0.6 == pytest.approx(run_m[:, :, 1] / -0.8, abs=1e-9)
     assert np.all(np.diff(np.hypot(run_m[:, :, 0], run_m[:, :, 1])) >= 0.0)
     assert np.all(np.hypot(*run_m[:, -1].T) > 0.5 * HABITS.horizon_s)
+
+
+def test_a_turn_looks_the_same_from_the_middle_of_it() -> None:
+    """Seen to run straight on meanwhile, a turn that was chosen for its room had none when half of it was made."""
+    speed, rate = 2.0, HABITS.turn_rate_radps
+    habits = replace(HABITS, polar_mps=(speed, speed))
+    track, lost = foresee(np.array([math.radians(170.0)]), 0.0, seen(50.0, speed=speed), habits)
+    half_s = 2.5
+    h = math.radians(50.0) + rate * half_s
+    middle = seen(math.degrees(h), speed=speed, en_m=tuple(track[0, 1]))
+    after, left = foresee(np.array([math.radians(170.0)]), 0.0, middle, habits)
+    assert left[0] == pytest.approx(lost[0] - half_s)
+    assert np.hypot(*(after[0, :-1] - track[0, 1:]).T).max() < 0.5
+
+
+def test_an_obstacle_that_comes_repels_from_astern_too() -> None:
+    """By her bow alone a boat that turned away from a ship was led back to it at once, and away again."""
+    comes = MovingObstacle(en_m=(0.0, 200.0), velocity_en_mps=(0.0, -3.0), keep_m=80.0)
+    goes = replace(comes, velocity_en_mps=(0.0, 3.0))
+    there = hold_heading(0.0).field
+    plain = there((0.0, 0.0))[0][1]
+    for heading_deg, other, repels in [(h, comes, True) for h in (0.0, 90.0, 180.0, 270.0)] + [
+        (0.0, goes, True),
+        (180.0, goes, False),
+    ]:
+        met = avoiding(there, seen(heading_deg, obstacles=(other,)), HABITS)((0.0, 0.0))[0][1]
+        assert (met < plain - 0.5) == repels
 
 
 def test_a_motorboat_needs_no_wind() -> None:

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon, box
 
-from companion.field.guidance import RepulsiveShore, go_to, hold_heading, step
-from companion.field.values import GuidanceSettings, GuidanceState, Situation
+from companion.field.guidance import RepulsiveShore, follow_line, go_to, hold_heading, step
+from companion.field.values import GuidanceSettings, GuidanceState, MovingObstacle, Situation
 from companion.field.vector_fields import REPULSIVE
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
@@ -101,3 +101,54 @@ def test_a_heading_at_the_shore_is_not_held() -> None:
     intent = replace(hold_heading(math.pi / 2.0), clearance=area(rock).clearance_m)
     _, setpoint = step(GuidanceState(), seen, intent, HABITS)
     assert math.sin(setpoint.heading_rad) < 0.5
+
+
+# A channel of 70 m between two pools, and a small boat's polar.
+NORTH = [(35.0, 260.0), (90.0, 280.0), (90.0, 380.0), (-90.0, 380.0), (-90.0, 280.0), (-35.0, 260.0)]
+POOLS = Polygon([*NORTH, (-35.0, 60.0), (-90.0, 40.0), (-90.0, -60.0), (90.0, -60.0), (90.0, 40.0), (35.0, 60.0)])
+SMALL = GuidanceSettings(
+    no_go_half_rad=math.radians(49.0),
+    polar_twa_rad=tuple(map(math.radians, (0.0, 30.0, 45.0, 60.0, 90.0, 120.0, 150.0, 180.0))),
+    polar_mps=(0.0, 0.5, 1.9, 2.4, 2.8, 2.9, 2.6, 2.2),
+    turn_rate_radps=math.radians(60.0),
+    tack_s=2.0,
+    lag_s=3.0,
+    horizon_s=60.0,
+    keep_m=6.5,
+)
+
+
+def chased(seed: int, twd_deg: float, ship_mps: float = 3.0) -> tuple[float, float]:
+    """Meet a ship that comes through the channel; return the least clearance and distance from her middle [m]."""
+    noise, state, at, heading, speed, twd = np.random.default_rng(seed), GuidanceState(), (0.3, 175.0), 0.0, 2.9, 0.0
+    water, clear_m, off_m = area(limits=POOLS), math.inf, math.inf
+    for t in range(150):
+        twd += -twd / 20.0 + noise.normal(0.0, math.radians(2.0))
+        wind = math.radians(twd_deg) + twd
+        ship = (5.0, 429.0 - ship_mps * t)
+        disc = MovingObstacle(en_m=ship, velocity_en_mps=(0.0, -ship_mps), keep_m=87.0, growth_mps=0.3, ring_m=50.0)
+        seen = Situation(
+            t_s=float(t),
+            en_m=(at[0] + noise.normal(0.0, 0.3), at[1] + noise.normal(0.0, 0.3)),
+            velocity_en_mps=(speed * math.sin(heading), speed * math.cos(heading)),
+            heading_rad=heading,
+            twd_from_rad=wind,
+            obstacles=(disc,),
+        )
+        back = replace(follow_line((0.3, 0.0), (0.0, 320.0)), clearance=water.clearance_m)
+        state, setpoint = step(state, seen, back, SMALL)
+        for _ in range(10):
+            heading += max(-0.105, min(0.105, wrap_pi(setpoint.heading_rad - heading)))
+            twa = abs(wrap_pi(wind - heading))
+            speed += (float(np.interp(twa, SMALL.polar_twa_rad, SMALL.polar_mps)) - speed) / 30.0
+            at = (at[0] + 0.1 * speed * math.sin(heading), at[1] + 0.1 * speed * math.cos(heading))
+        clear_m, off_m = min(clear_m, float(water.clearance_m([at])[0])), min(off_m, math.dist(at, ship))
+    return clear_m, off_m
+
+
+@pytest.mark.parametrize(("seed", "twd_deg"), [(0, 270.0), (1, 270.0), (2, 270.0), (0, 315.0), (0, 0.0), (0, 90.0)])
+def test_between_a_ship_and_the_shore_she_goes_ashore_for_neither_way_round(seed: int, twd_deg: float) -> None:
+    """Two ways out, each about as good: she took another each second, and none before the shore came."""
+    clear_m, off_m = chased(seed, twd_deg)
+    assert clear_m > 2.0
+    assert off_m > 37.0  # the ship's hull, and what is not known of her

@@ -63,7 +63,8 @@ INSIDE_M = 1.5  # a vessel is in the water when it is so far in: its position is
 def obstacles(ctx: StepContext, vessels: Sequence[Vessel]) -> tuple[MovingObstacle, ...]:
     """Return the discs that the field keeps out of: hull, half the distance that plans keep, and what is not known."""
     hull = ctx.voyage.boat.hull
-    own_m = hull.reach_m + KEEP_SHARE * ctx.config.traffic_clearance_m
+    ring_m = KEEP_SHARE * ctx.config.traffic_clearance_m
+    own_m = hull.reach_m + ring_m
     out = []
     for vessel in vessels:
         motion = None if held_of(ctx, vessel) is None else expected(vessel)
@@ -75,6 +76,7 @@ def obstacles(ctx: StepContext, vessels: Sequence[Vessel]) -> tuple[MovingObstac
                 velocity_en_mps=now.velocity_en_mps,
                 keep_m=radius_m + own_m,
                 growth_mps=max(0.0, later.radius_m(GIVE_UP_RISK) - radius_m) / GROWN_S,
+                ring_m=ring_m,
             )
         )
     return tuple(out)

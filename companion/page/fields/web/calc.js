@@ -8,7 +8,7 @@
 /** @typedef {{tree: Node_, atoms: Record<string, Atom>, sails: boolean, noGo: number, turnRate: number, tackS: number, lagS: number, leeway: number, winds: number[], twa: number[], speeds: number[][]}} Field */
 /** @typedef {{twd: number, tws: number}} Wind */
 
-const NOMINAL = 10, REPULSIVE = 20, RING = 10, LEAST = 0.5, STEP_S = 2.5;
+const NOMINAL = 10, REPULSIVE = 20, RING = 10, LEAST = 0.5, STEP_S = 2.5, FINE_S = 0.5;
 const TAU = 2 * Math.PI;
 /** @param {number} a */
 const wrap = (a) => ((a + Math.PI) % TAU + TAU) % TAU - Math.PI;
@@ -158,20 +158,24 @@ function within(rings, p) {
 function leaveAt(f, atom, p, wind) {
   const rings = need(atom.rings);
   if (!within(rings, p)) return [0, 0];
-  const lookS = need(atom.range), count = Math.floor((lookS + 1e-9) / STEP_S) + 1, stepS = lookS / Math.max(1, count - 1);
+  const lookS = need(atom.range), fine = Math.ceil((lookS - FINE_S / 2) / FINE_S), per = STEP_S / FINE_S;
+  const count = Math.floor(fine / per) + 1, stepS = lookS / Math.max(1, count - 1);
   let best = 0, least = Infinity;
   for (let deg = 0; deg < 360; deg += 10) {
-    const h = deg * Math.PI / 180, twa = wrap(wind.twd - h);
+    const h = deg * Math.PI / 180, twa = wrap(wind.twd - h), turn = wrap(h);
     if (f.sails && !(Math.abs(twa) > f.noGo + 4 * Math.PI / 180)) continue;
-    let lost = Math.abs(wrap(h)) / f.turnRate, speed = speedAt(f, f.sails ? twa : Math.PI, wind);
-    if (f.sails) {
-      const now = wrap(wind.twd), turn = Math.abs(twa - now);
-      lost = (turn > Math.PI ? TAU - turn : turn) / f.turnRate + (twa * now < 0 && turn < Math.PI ? f.tackS : 0);
-    }
-    let steps = count;
-    for (let k = 0; k < count; k += 1) {
-      const after = Math.max(0, k * STEP_S - 0.5 * lost), go = after - f.lagS * (1 - Math.exp(-after / f.lagS));
-      if (!within(rings, [p[0] + go * speed * Math.sin(h), p[1] + go * speed * Math.cos(h)])) { steps = k; break; }
+    const speed = speedAt(f, f.sails ? twa : Math.PI, wind), now = wrap(wind.twd);
+    const tacks = f.sails && twa * now < 0 && Math.abs(twa - now) < Math.PI;
+    const lost = Math.abs(turn) / f.turnRate + (tacks ? f.tackS : 0);
+    let steps = count, x = p[0], y = p[1];
+    for (let k = 0, n = 0; k < count; k += 1) {
+      if (!within(rings, [x, y])) { steps = k; break; }
+      for (let m = 0; m < per && n < fine; m += 1, n += 1) {  // the way turns with the bow, the speed grows
+        const t = (n + 0.5) * FINE_S, to = turn * Math.min(1, t / Math.max(lost, FINE_S));
+        const run = FINE_S * speed * (1 - Math.exp(-t / Math.max(f.lagS, 0.1)));
+        x += run * Math.sin(to);
+        y += run * Math.cos(to);
+      }
     }
     if (steps * stepS < least - 1e-12) { least = steps * stepS; best = h; }
   }
