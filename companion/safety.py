@@ -154,6 +154,7 @@ TABLE: tuple[Watchdog, ...] = (
     W(name="vessel too near", number=8, notification="collision",
       watches="time until our way is within half the distance to keep of a vessel that moves",
       enter=30.0, exit=60.0, unit="s", enter_s=2.0, exit_s=8.0, severity=S.WARNING, response=Response.BY_FIELD,
+      loitering=True,
       why="a plan, its upload and the turn take too long; while headings are sent, our own field keeps clear"),
     W(name="no progress", number=9,
       watches="way made good towards the target in 180 s", enter=5.0, exit=15.0, unit="m",

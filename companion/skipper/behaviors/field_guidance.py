@@ -152,10 +152,12 @@ def intent(ctx: StepContext, seen: Situation) -> Intent:
 
     What stands still is in it.
     """
-    leg, gate, bound = ctx.leg(), ctx.gate, diversion(ctx)
+    leg, gate, bound, rest = ctx.leg(), ctx.gate, diversion(ctx), ctx.state.voyage.rest_en_m
     place = bound.en_m if bound is not None and bound.has_place else gate.en_m if gate is not None else None
     if ctx.guidance is Guidance.FIELD and place is not None:
         wanted = go_to(place, seen.twd_from_rad or 0.0)
+    elif _is_at_rest(ctx):
+        wanted = go_to(seen.en_m if rest is None else rest, seen.twd_from_rad or 0.0)
     elif leg is not None and distance_m(*leg) > 1.0:
         wanted = follow_line(*leg)
     else:
@@ -264,11 +266,13 @@ def last_resort(ctx: StepContext) -> bool:
         return False
     resort = memory.resort.step(ctx.t_s, too_near=raised, can_plan=_is_planned(ctx), clear_s=0.0)
     if memory.resort.engaged and not resort.engaged:
-        ctx.set(by_field=FieldSteering())
+        rests = _is_at_rest(ctx)
+        ctx.set(by_field=FieldSteering(let_go_s=ctx.t_s) if rests else FieldSteering())
+        back = "her place" if rests else "the plan"
         ctx.say(
             Severity.NOTICE,
             "last resort over",
-            f"the way is clear again after {ctx.t_s - memory.resort.since_s:.0f} s: back to AUTO and the plan",
+            f"the way is clear again after {ctx.t_s - memory.resort.since_s:.0f} s: back to AUTO and {back}",
             every_s=0.0,
         )
         return False
@@ -300,9 +304,16 @@ def last_resort(ctx: StepContext) -> bool:
     return True
 
 
+def _is_at_rest(ctx: StepContext) -> bool:
+    """Return whether there is nothing to sail to but the place where she rests, and the straight way there is clear."""
+    return bool(ctx.state.voyage.over) and diversion(ctx) is None
+
+
 def _is_planned(ctx: StepContext) -> bool:
     """Return whether a plan asked for since the water was clear has been answered and is on board."""
     state, clear_s = ctx.state, ctx.state.by_field.clear_s
+    if _is_at_rest(ctx):
+        return clear_s is not None and state.pending.upload is None  # the mission ends in a loiter at her place
     return (
         clear_s is not None
         and state.plans.last_s >= clear_s
@@ -315,7 +326,8 @@ def _is_planned(ctx: StepContext) -> bool:
 def _plan(ctx: StepContext) -> None:
     """Ask for a plan from where the field has brought the boat: now and then, and at once when the water is clear."""
     state = ctx.state
-    if state.pending.plan is not None or state.pending.upload is not None or ctx.is_raised("becalmed"):
+    is_busy_with = state.pending.plan is not None or state.pending.upload is not None
+    if is_busy_with or _is_at_rest(ctx) or ctx.is_raised("becalmed"):
         return
     clear_s = state.by_field.clear_s
     due = clear_s is not None and state.plans.last_s < clear_s

@@ -23,6 +23,7 @@ from companion.safety import HOMEWARD, STOPPING
 from companion.skipper.behaviors.drifting import stops_drift
 from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import heading as by_field_heading
+from companion.skipper.behaviors.field_guidance import last_resort
 from companion.skipper.behaviors.headings import desired_heading_rad
 from companion.skipper.behaviors.helm import (
     TACK,
@@ -245,6 +246,8 @@ def rest_at_end(ctx: StepContext) -> bool:
     is_held = bool(ctx.snapshot.unsure) and ctx.state.steering.own_mode is Mode.LOITER and not ctx.state.voyage.over
     if is_held or not is_at_end(ctx):
         return False
+    if last_resort(ctx):
+        return True  # at rest she keeps clear as under way, and goes back to her place
     rest(ctx)
     return True
 

@@ -31,6 +31,7 @@ AFTER_LAST_GOAL = {HOME, ROOM, OFF_HOME}  # where she may be bound for then
 LACK_M = 1.0  # of the room that a loiter takes: she is not moved for less, as the wind freshens
 LIES_THERE = {DiversionKind.HOME, DiversionKind.REFUGE, DiversionKind.GOAL}
 NO_ROOM = "{} has no room for a loiter"
+COMES_BACK_S = 120.0  # from where the field has led her she is back at her place: so long she is not dragged off
 ROOM_TRIES = 3  # to find a way to water with room, behind the last goal
 GOAL_RADIUS_M = 10.0  # a place that is named under way: there within this
 ABOUT_M = 10.0  # how far off a refuge is by water is told from so near
@@ -423,12 +424,18 @@ def _home(ctx: StepContext, why: str) -> Diversion | None:
 def _back(ctx: StepContext) -> Diversion | None:
     """Return the way back to where the boat is to rest, when it is off it and the straight way is not clear."""
     rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
-    off = ctx.is_raised(DRAGGED) or bool(ctx.state.operator.answering)
+    off = ctx.is_raised(DRAGGED) or bool(ctx.state.operator.answering) or is_led_off(ctx)
     if rest is None or boat is None or not (off or _is_bound(ctx, REST)):
         return None
     if not _is_bound(ctx, REST) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
         return None  # the autopilot's own loiter goes back there
     return Diversion(kind=DiversionKind.REST, name=REST, why="she is off the place where she was to rest", en_m=rest)
+
+
+def is_led_off(ctx: StepContext) -> bool:
+    """Return whether the field keeps the boat off her place to rest for a vessel, or she is on her way back."""
+    memory = ctx.state.by_field
+    return memory.resort.engaged or ctx.t_s - memory.let_go_s < COMES_BACK_S
 
 
 def _off_narrow_rest(ctx: StepContext) -> Diversion | None:

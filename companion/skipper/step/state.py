@@ -234,6 +234,7 @@ class FieldSteering:
     weak_since_s: float | None = None  # since when the field says nothing of where to go
     strong_since_s: float | None = None  # ... and, given up for that, does again
     lost: str = ""  # why it is given up, in words
+    let_go_s: float = float("-inf")  # when it let go of a boat that was at rest, off her place
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from companion.skipper.behaviors.drifting import meets_in_s, sails
 from companion.skipper.behaviors.field_guidance import meets_in
 from companion.skipper.behaviors.shoaling import depth_ahead_m
 from companion.skipper.planning.autopilot_beats import beaten_within_m
-from companion.skipper.planning.diversions import diversion, home_trouble, is_composed
+from companion.skipper.planning.diversions import diversion, home_trouble, is_composed, is_led_off
 from companion.skipper.step import DiversionKind, StepContext, WindHealth
 from companion.skipper.step.state import Charge
 from companion.skipper.step.wind_limits import too_light, too_strong
@@ -233,7 +233,7 @@ def _time(ctx: StepContext) -> float | None:
 
 def _dragged(ctx: StepContext) -> float | None:
     rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
-    if rest is None or boat is None:
+    if rest is None or boat is None or is_led_off(ctx):
         return None
     bound = diversion(ctx)
     return distance_m(boat, rest) if bound is None or bound.kind is DiversionKind.REST else None

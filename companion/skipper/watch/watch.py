@@ -19,7 +19,7 @@ from companion.skipper.watch.measures import measure
 from companion.skipper.way.drift import DriftAhead, drift_ahead
 from companion.skipper.way.voyage import PointEn, outside_m, water_at
 from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, Policy, assess
-from companion.traffic.colregs import follow
+from companion.traffic.colregs import Role, follow
 
 SHOWN = 8  # vessels kept in the state: the worst
 VESSEL_EVERY_S = 30.0  # between two lines of one vessel
@@ -63,6 +63,8 @@ def look_out(ctx: StepContext) -> None:
     found = assess(own, picture, limits(ctx.config), None if wind is None else wind[0])
     if ctx.config.traffic_policy is Policy.RULES:
         found = _meet(ctx, own, found)
+    else:  # we do what we do, whatever the rule gives us: that we stand on would not be true
+        found = tuple(replace(a, encounter=replace(a.encounter, role=Role.KEEP_CLEAR)) for a in found)
     ctx.set(traffic=changed(ctx.state.traffic, watch=found[:SHOWN]))
     _say(ctx, found[:SHOWN])
     _speak_of_goal(ctx, found)

@@ -93,6 +93,10 @@ def steered(world):
     return [(t, a) for t, a in world.actions if isinstance(a, act.SteerHeading)]
 
 
+def texts(world):
+    return [a.text for _, a in world.actions if isinstance(a, act.Announce)]
+
+
 def said(world):
     return [a.code for _, a in world.actions if isinstance(a, act.Announce)]
 
@@ -127,6 +131,27 @@ def test_the_same_intruder_comes_nearer_without_permission_to_steer_and_it_is_sa
     assert NAME in said(world)
     assert not steered(world)
     assert not any(isinstance(a, act.SetMode) and a.mode is Mode.GUIDED for _, a in world.actions)
+
+
+@pytest.mark.parametrize("may_steer", [True, False])
+def test_at_rest_she_keeps_clear_and_goes_back_to_her_place(may_steer):
+    world = make(
+        goals=(Goal(en_m=(150.0, 0.0), radius_m=6.0, name="the goal"),),
+        permissions=replace(ALL_PERMITTED, may_steer=may_steer),
+    )
+    assert world.run(600, lambda w: w.state.phase is Phase.DONE)
+    rest = world.state.voyage.rest_en_m
+    intruder = Intruder(world, 60.0, 150.0)
+    east, north = (a - b for a, b in zip(rest, intruder.en, strict=True))
+    intruder.course = math.atan2(east, north)  # over the place where she lies
+    least = meet(world, intruder, 240.0)
+    assert (least > HALF_M + 8.0) is may_steer
+    assert ("no last resort" in said(world)) is not may_steer
+    assert world.mode is Mode.AUTO
+    assert world.state.phase is Phase.DONE
+    assert distance_m(world.position, rest) < 40.0
+    assert "dragged off" not in said(world)
+    assert not [text for text in texts(world) if "stand on" in text]
 
 
 def test_a_vessel_at_anchor_is_the_planners_matter():

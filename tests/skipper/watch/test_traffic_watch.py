@@ -12,7 +12,7 @@ from companion.messages import Severity
 from companion.skipper.step import actions as act
 from companion.skipper.step.context import StepContext
 from companion.skipper.watch.watch import SHOWN, limits, look_out
-from companion.traffic import LAKE, Alarm, Role, Rule, TrafficPicture
+from companion.traffic import LAKE, Alarm, Policy, Role, Rule, TrafficPicture
 from tests.skipper.planning.test_traffic import Ship, make, sail
 from tests.traffic.conftest import vessel
 
@@ -71,16 +71,18 @@ def test_an_alarm_needs_both_limits_and_is_said_with_the_rule(away_m, alarm, sev
         assert "rule" in announced.text
 
 
-def test_power_gives_way_to_sail_and_is_shown_so():
+@pytest.mark.parametrize(("policy", "role"), [(Policy.RULES, Role.STAND_ON), (Policy.KEEP_CLEAR, Role.KEEP_CLEAR)])
+def test_power_gives_way_to_sail_and_what_she_does_is_shown(policy, role):
     ctx = turn_among()
     ctx = turn_among(coming(ctx, away_m=300.0))
+    ctx.config = replace(ctx.config, traffic_policy=policy)
     look_out(ctx)
     encounter = ctx.state.traffic.watch[0].encounter
-    assert (encounter.rule, encounter.role) == (Rule.RESPONSIBILITIES, Role.STAND_ON)
+    assert (encounter.rule, encounter.role) == (Rule.RESPONSIBILITIES, role)
 
 
 @pytest.mark.parametrize(
-    ("off_m", "lain_s", "is_said"), [(30.0, 200.0, True), (30.0, 60.0, False), (70.0, 200.0, False)]
+    ("off_m", "lain_s", "is_said"), [(30.0, 200.0, True), (30.0, 60.0, True), (70.0, 200.0, False)]
 )
 def test_a_vessel_that_lies_where_the_goal_is_is_said(off_m, lain_s, is_said):
     ctx = turn_among()
