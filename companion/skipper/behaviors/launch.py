@@ -13,6 +13,7 @@ from companion.skipper.behaviors.helm import arm, make_current, repair, set_mode
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.diversions import announcement, fenced_off, home_trouble
 from companion.skipper.planning.uploads import upload
+from companion.skipper.planning.vessels import lies_in_the_way
 from companion.skipper.step import Phase, ReplanReason, SafeEnd, StepContext, WindHealth
 from companion.skipper.step.wind_limits import winds_wanted
 from companion.skipper.way.gates import Approach
@@ -61,7 +62,7 @@ def start(ctx: StepContext) -> None:
     wants += winds_wanted(ctx)
     wait_s = max(state.plans.retry.not_before_s, state.pending.upload_retry.not_before_s) - ctx.t_s
     if wait_s > 0.0:
-        wrong = _misplaced(ctx)
+        wrong = _misplaced(ctx) or (lies_in_the_way(ctx) if state.plans.retry.failures else "")
         wants.append(f"the next try in {wait_s:.0f} s" + (f": {wrong}" if wrong else ""))
     ctx.set(wants=tuple(wants))
     if wants:

@@ -11,7 +11,7 @@ from companion.skipper.planning.asking import request
 from companion.skipper.planning.tides import opens_next
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, leads_there, too_risky, upload
-from companion.skipper.planning.vessels import meetings
+from companion.skipper.planning.vessels import lies_in_the_way, meetings
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.missions import loiter_place, roomy_m
 from companion.skipper.step.state import PendingPlan, Phase
@@ -132,6 +132,8 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         )
         return
     wait = ctx.state.plans.retry.not_before_s - ctx.t_s
+    lies = lies_in_the_way(ctx)
+    reason += f"; {lies}" if lies else ""
     opens = opens_next(ctx)
     if opens:
         retry = ctx.state.plans.retry

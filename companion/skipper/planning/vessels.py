@@ -19,6 +19,7 @@ from companion.planner.problem import VESSELS_SHARE, sigmas_for, vessel_count
 from companion.skipper.planning.right_of_way import MEET_SHARE, bow_discs, held_of, is_stood_on_to, regions
 from companion.skipper.step.context import StepContext
 from companion.skipper.way import PointEn, bearing_rad, distance_m
+from companion.skipper.way.geometry import leg_distance_m
 from companion.skipper.way.judge import LOST_MPS
 from companion.traffic import Conflict, Vessel, check_legs, path_distance_m, peril_m, planning_discs, predict
 from companion.traffic.colregs import expected
@@ -38,6 +39,7 @@ NEAREST = 12  # vessels that a plan looks at: half of them those that come neare
 #                              stay; then those that could be met soonest, however the boat turns and we do
 OWN_MPS = 4.0  # no boat of ours closes faster by itself
 FAR_RISK = 1e-2  # that a vessel is nearer than counted when those that could be met are chosen
+STILL_MPS = 0.3  # slower a vessel lies
 HAIR_M = 1.0  # a boat within a disc is let out of it: the disc ends this much before the boat
 
 
@@ -74,6 +76,41 @@ def near(ctx: StepContext) -> tuple[Vessel, ...]:
         kept.update(s[1:3] for s in [s for s in soon if s[1:3] not in kept][: NEAREST - len(kept)])
         soon = [s for s in soon if s[1:3] in kept]
     return tuple(vessel for *_, vessel in soon)
+
+
+def lies_at_goal(ctx: StepContext) -> str:
+    """Return which vessel lies so near to the next goal that no plan leads there, and what helps; empty: none does."""
+    gate, keep_m = ctx.gate, ctx.config.traffic_clearance_m
+    for vessel in () if gate is None else _lying(ctx):
+        assert gate is not None
+        off_m = max(0.0, distance_m(vessel.centre_en_m, gate.en_m) - vessel.reach_m)
+        if off_m < keep_m - gate.radius_m:
+            return (
+                f"{vessel.label} lies {off_m:.0f} m from {gate.name}, and [traffic] safe_distance_m keeps {keep_m:g} m "
+                "from her: it is not reached while she lies there; the order skip_goal gives it up"
+            )
+    return ""
+
+
+def lies_in_the_way(ctx: StepContext) -> str:
+    """Return which vessel lies at the next goal or beside the straight way to it, and what helps; empty: none does."""
+    gate, boat, keep_m = ctx.gate, ctx.boat_en, ctx.config.traffic_clearance_m
+    at_goal = lies_at_goal(ctx)
+    if at_goal or gate is None or boat is None:
+        return at_goal
+    for vessel in _lying(ctx):
+        off_m = max(0.0, leg_distance_m(vessel.centre_en_m, boat, gate.en_m) - vessel.reach_m)
+        if off_m < keep_m:
+            return (
+                f"{vessel.label} lies {off_m:.0f} m from the straight way to {gate.name}, and [traffic] "
+                f"safe_distance_m keeps {keep_m:g} m from her: where no other way leads there she has to go first, or "
+                "the order skip_goal gives it up"
+            )
+    return ""
+
+
+def _lying(ctx: StepContext) -> list[Vessel]:
+    return [v for v in near(ctx) if v.is_stopped or (v.is_moving_known and math.hypot(*v.velocity_en_mps) < STILL_MPS)]
 
 
 def discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Target, ...]:

@@ -13,6 +13,7 @@ from companion.safety import BY_NAME, CAUSES, HOMEWARD, PERSON, TABLE, Response,
 from companion.skipper.behaviors.drifting import STEERAGE_MPS, is_driven_astern
 from companion.skipper.behaviors.failsafe import TOLD_S, is_answered
 from companion.skipper.planning.diversions import words
+from companion.skipper.planning.vessels import lies_at_goal
 from companion.skipper.step import SkipperConfig, StepContext
 from companion.skipper.step.state import Raised
 from companion.skipper.watch.measures import measure
@@ -67,7 +68,7 @@ def look_out(ctx: StepContext) -> None:
         found = tuple(replace(a, encounter=replace(a.encounter, role=Role.KEEP_CLEAR)) for a in found)
     ctx.set(traffic=changed(ctx.state.traffic, watch=found[:SHOWN]))
     _say(ctx, found[:SHOWN])
-    _speak_of_goal(ctx, found)
+    _speak_of_goal(ctx)
 
 
 def _meet(ctx: StepContext, own: OwnShip, found: Sequence[Assessment]) -> tuple[Assessment, ...]:
@@ -120,19 +121,11 @@ def _say(ctx: StepContext, found: Sequence[Assessment]) -> None:
     ctx.set(announced=changed(ctx.state.announced, watch=lately))
 
 
-def _speak_of_goal(ctx: StepContext, found: Sequence[Assessment]) -> None:
-    """Say that a vessel lies where the next goal is, so near that no plan leads there."""
-    gate, keep_m = ctx.gate, ctx.config.traffic_clearance_m
-    if gate is None or not ctx.state.voyage.sailing:
-        return
-    for vessel in (one.vessel for one in found if one.vessel.is_stopped):
-        off_m = max(0.0, math.dist(vessel.centre_en_m, gate.en_m) - vessel.reach_m)
-        if off_m < keep_m - gate.radius_m:
-            text = (
-                f"{vessel.label} lies {off_m:.0f} m from {gate.name}, and [traffic] safe_distance_m keeps {keep_m:g} m "
-                "from her: it is not reached while she lies there; the order skip_goal gives it up"
-            )
-            ctx.say(Severity.WARNING, "goal occupied", text, every_s=REMIND_S)
+def _speak_of_goal(ctx: StepContext) -> None:
+    """Say that a vessel lies where the next goal is, so near that no plan leads there, before setting sail too."""
+    why = lies_at_goal(ctx)
+    if why:
+        ctx.say(Severity.WARNING, "goal occupied", why, every_s=REMIND_S)
 
 
 EVERY_S = 60.0

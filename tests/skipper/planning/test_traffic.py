@@ -10,7 +10,7 @@ import pytest
 from companion.planner import plan
 from companion.planner.problem.value import sigmas_for, sized, vessel_count
 from companion.planner.worker import failed
-from companion.skipper.planning.vessels import HORIZON_S, NEAREST, UNKNOWN_S, meetings, near, shares
+from companion.skipper.planning.vessels import HORIZON_S, NEAREST, UNKNOWN_S, lies_in_the_way, meetings, near, shares
 from companion.skipper.step import actions as act
 from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.context import StepContext
@@ -262,3 +262,16 @@ def test_of_too_many_a_plan_is_told_of_the_ship_on_collision_course(comes_from):
     assert told[:6] == [1000 + k for k in range(6)], "the soonest first, as ever"
     few = near(turn_among(*moored[:11], ship))
     assert [v.mmsi for v in few] == [*range(1000, 1011), 77], "where there is room nobody is left out"
+
+
+@pytest.mark.parametrize(("en", "what"), [((905.0, 30.0), "m from the goal"), ((450.0, 30.0), "from the straight way")])
+def test_a_vessel_that_lies_in_the_way_is_named_before_setting_sail(en, what):
+    world = make()
+    lying = Ship(en, 0.0, 0.0, name="Nellie")
+    world.extra = {"traffic": Targets.empty(FRAME).heard(lying.heard(0.0)).picture(1.0)}
+    ctx = StepContext(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
+    assert not ctx.state.voyage.sailing
+    why = lies_in_the_way(ctx)
+    assert "Nellie lies" in why
+    assert what in why
+    assert "skip_goal" in why
