@@ -460,7 +460,7 @@ def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
             rounding_m=max(g.radius_m, mission.margin_m) if g.rounding else 12.0,
             bandwidth_m=mission.skipper.bandwidth_m if g.bandwidth_m is None else g.bandwidth_m,
             heading_rad=None if g.heading_deg is None else math.radians(g.heading_deg),
-            line=_line(g.gate, frame),
+            line=_line(g.gate, frame, mission.margin_m),
             box=None if g.box is None else Box(area_en=polygon_en(g.box.shape, frame, cover=False), for_s=g.box.for_s),
             search=None
             if g.search is None
@@ -507,13 +507,14 @@ def drying_of(mission: Mission, frame: LocalFrame) -> tuple[DryingWater, ...]:
     )
 
 
-def _line(gate: GoalGate | None, frame: LocalFrame) -> Line | None:
+def _line(gate: GoalGate | None, frame: LocalFrame, margin_m: float) -> Line | None:
     if gate is None:
         return None
     return Line(
         port_en_m=frame.en_from_geo(gate.port),
         starboard_en_m=frame.en_from_geo(gate.starboard),
         keep_m=gate.keep_m,
+        margin_m=margin_m,
         not_before_s=gate.not_before_s,
         after_s=gate.after_s,
     )

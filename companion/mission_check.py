@@ -63,7 +63,7 @@ from companion.planner import Plan, Problem
 from companion.planner.problem import assumed
 from companion.safety import LIGHT_WIND, STRONG_WIND
 from companion.skipper.planning import HOME_RADIUS_M
-from companion.skipper.way import KEEP_SHARE, Approach, Composed, Side, Until, gates_of, timed
+from companion.skipper.way import KEEP_SHARE, Approach, Composed, Gate, Side, Until, gates_of, no_room, timed
 from companion.words import counted
 
 __all__ = [
@@ -189,7 +189,13 @@ def check_mission(
             *(
                 ()
                 if troubles
-                else (*field_findings_of(mission), *_roundings(mission), *_circles(mission), *_drying(mission))
+                else (
+                    *field_findings_of(mission),
+                    *_roundings(mission),
+                    *_lines(mission),
+                    *_circles(mission),
+                    *_drying(mission),
+                )
             ),
             *_doubts(mission),
             *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told),
@@ -218,6 +224,38 @@ def _roundings(mission: Mission) -> Iterator[Finding]:
                 f"{max(0.0, clear_m):.1f} m from {near}; the margin is {mission.margin_m:g} m",
                 remedy="round it closer (radius_m and [area] margin_m say how far off), or leave it on the other hand",
             )
+
+
+NO_ROOM_REMEDY = "move both marks farther from it, or let [area] margin_m and margin_floor_m be smaller"
+
+
+def _lines(mission: Mission) -> Iterator[Finding]:
+    """Yield the gates that cannot be crossed with the margin: beyond the line, or before it, there is no room."""
+    for number, gate, words in _crowded(mission, mission.margin_m):
+        floor_m = min(mission.margin_floor_m, mission.margin_m)
+        room_m = max(0.0, float(voyage_of(mission).area.clearance_m([gate.en_m])[0]))
+        less = "never sailed" if room_m < floor_m else "sailed with less margin, where she can at all"
+        yield Finding(
+            severity=FindingLevel.WARNING,
+            code=Code.NARROW_GAP,
+            place=f"[[goal]] {number}",
+            text=f"{words}; it is {less} (margin_floor_m {floor_m:g})",
+            remedy=NO_ROOM_REMEDY,
+        )
+
+
+def _crowded(mission: Mission, margin_m: float) -> Iterator[tuple[int, Gate, str]]:
+    """Yield the goal's number, the gate and the words of each line with no room by a margin, once a goal."""
+    if all(goal.gate is None for goal in mission.goals):
+        return
+    voyage, told = voyage_of(mission), set[int]()
+    begun = (Approach(goal=0, en_m=voyage.frame.en_from_geo(mission.start)),) if mission.start is not None else ()
+    for gate in gates_of(voyage, begun):
+        number = gate.goal % len(voyage.goals) + 1
+        words = "" if number in told else no_room(gate, voyage.area, margin_m)
+        if words:
+            told.add(number)
+            yield number, gate, words
 
 
 def _circles(mission: Mission) -> Iterator[Finding]:
@@ -522,6 +560,7 @@ def legs(
 
     Raises:
         ValueError: no water is left inside the fence at the margin.
+        InputError: a line has not even the margin's floor of room beyond or before it: it is never sailed.
     """
     if mission.start is None:
         return
@@ -531,7 +570,11 @@ def legs(
     targets = [(goal.point, goal.radius_m, goal.name or f"goal {n}") for n, goal in enumerate(mission.goals, start=1)]
     if goes_home and mission.skipper.end == "home":
         targets.append((mission.start, HOME_RADIUS_M, "home"))
-    for point, radius_m, title in targets:
+    floor_m = min(mission.margin_floor_m, mission.margin_m)
+    closed = {n: words for n, _, words in _crowded(mission, floor_m)}
+    for number, (point, radius_m, title) in enumerate(targets, start=1):
+        if number in closed:
+            raise InputError(str(mission.path), f"[[goal]] {number}", closed[number], NO_ROOM_REMEDY)
         blows = replace(wind, from_deg=wind.from_deg + _north_deg(frame, here)) if mission.is_passage else wind
         answer = yield leg_problem(
             mission,

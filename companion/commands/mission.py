@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
 import sys
 import tempfile
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from companion.boat import ProposedMargin
     from companion.geofence import Document, Mission
     from companion.geofence.mission import MissionFiles
-    from companion.planner import Plan
+    from companion.planner import Plan, Problem
 
 
 _EPILOG = """\
@@ -529,12 +530,24 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
     from companion.planner import plan
 
     by = planner_of(mission).about(mission.frame().origin)
-    return planned_legs(
-        legs(mission, AssumedWind(from_deg=math.degrees(twd_from_rad), speed_mps=tws_mps), unix_s=time.time()),
-        lambda problem: plan(
-            problem, budget_s=mission.skipper.planning_budget_s, seed=0, algorithm=by.algorithm, settings=by.settings
-        ),
-    )
+    made: list[Plan] = []
+
+    def answer(problem: Problem) -> Plan:
+        made.append(
+            plan(
+                problem,
+                budget_s=mission.skipper.planning_budget_s,
+                seed=0,
+                algorithm=by.algorithm,
+                settings=by.settings,
+            )
+        )
+        return made[-1]
+
+    wind = AssumedWind(from_deg=math.degrees(twd_from_rad), speed_mps=tws_mps)
+    with contextlib.suppress(InputError):  # a line without room: the check says it, and the picture shows where
+        planned_legs(legs(mission, wind, unix_s=time.time()), answer)
+    return made
 
 
 def read_mission_file(path: str) -> Document:

@@ -325,6 +325,18 @@ class LocalArea:
             return np.array([self._clearance_at_m(points_en[0])])  # the boat's: asked for several times a step
         return np.minimum(self.obstacle_clearance_m(points_en), self.limit_clearance_m(points_en))
 
+    def spare_m(self, points_en: ArrayLike, margin_m: float) -> NDArray[np.float64]:
+        """Return how much farther off each point is than is kept clear [m]: the margin, or an obstacle's own, larger.
+
+        As the water is drawn: with the corners' chords outwards.
+        """
+        spare = self.clearance_m(points_en) - grown_m(margin_m)
+        points = shapely.points(np.asarray(points_en, dtype=np.float64).reshape(-1, 2))
+        for polygon, own_m in zip(self.polygons, self.own_margins_m, strict=True):
+            if own_m > margin_m:
+                spare = np.minimum(spare, shapely.distance(polygon, points) - grown_m(own_m))
+        return np.asarray(spare, dtype=np.float64)
+
     @functools.lru_cache(maxsize=16)  # noqa: B019 - an area lives as long as its voyage
     def _clearance_at_m(self, point_en: tuple[float, float]) -> float:
         """Return the clearance of one place [m]."""

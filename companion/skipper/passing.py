@@ -24,6 +24,7 @@ GAP_S = 2.0 + FRESH_S  # between two fixes that belong together
 AT_MOST = 4  # rounds: the sweeps, and what they left; the wind's own anew are not counted
 HAIR_M = 0.5
 COUNTED_M = 30.0
+UPON_M = 6.0  # before a line: a waypoint close beyond it may be left, or said to be left, a moment before she crosses
 OFTEN = 3  # misses on one voyage, and then somebody should know
 
 
@@ -52,7 +53,7 @@ def pass_gates(ctx: StepContext) -> None:
             return
         if gate.is_crossed:
             counted = number in ctx.state.mission.route.gate_of[: ctx.state.mission.index]
-            if counted or _is_outside(gate, boat):
+            if (counted and not _is_upon(gate, boat)) or _is_outside(gate, boat):
                 _begin_again(ctx, gate, boat, f"{gate.name} was passed by outside of its marks: again")
             return
         left = distance_m(boat, gate.en_m)
@@ -124,6 +125,12 @@ def _is_before(gate: Gate, boat: PointEn) -> bool:
         and is_between(gate.line, boat)
         and (ahead_m(gate.line, boat) <= -0.5 * BEFORE_M)
     )
+
+
+def _is_upon(gate: Gate, boat: PointEn) -> bool:
+    """Return whether the boat is straight before the gate's line and all but over it."""
+    line = gate.line
+    return line is not None and is_between(line, boat) and -UPON_M < ahead_m(line, boat) <= 0.0
 
 
 def _is_outside(gate: Gate, boat: PointEn) -> bool:

@@ -289,3 +289,57 @@ def test_the_last_buoy_is_rounded_for_the_way_home(tmp_path, end, is_rounded):
 def test_points_and_lines_are_counted_in_words():
     rock = Mark(geometry=shapely.Point(-1.31, 50.82), kind=ZoneKind.EXCLUSION)
     assert summary(Document(marks=(rock, rock))) == "2 point or line obstacles"
+
+
+QUAY = "POLYGON ((-1.32 {0}, -1.30 {0}, -1.30 50.8185, -1.32 50.8185, -1.32 {0}))"
+FINISH = """
+[start]
+lat = 50.8165
+lon = -1.31
+[[goal]]
+kind = "gate"
+name = "Finish"
+port_mark = { lat = 50.8175, lon = -1.3102 }
+starboard_mark = { lat = 50.8175, lon = -1.3098 }
+[area]
+obstacles = ["quay.wkt"]
+margin_m = 12
+margin_floor_m = 6
+"""
+
+
+@pytest.mark.parametrize(
+    ("off_m", "says"),
+    [
+        (25.0, ""),
+        (17.0, "17 m from obstacle 1: no room to cross it with 12.0 m kept clear, 10.0 m at the most beyond it; it is"),
+        (12.0, "12 m from obstacle 1: no room to cross it with 12.0 m kept clear, 5.0 m at the most beyond it; it is"),
+    ],
+)
+def test_a_finish_line_before_a_quay_is_told_by_the_room_beyond_it(tmp_path, off_m, says):
+    mission = tmp_path / "m.toml"
+    mission.write_text(FINISH)
+    (tmp_path / "quay.wkt").write_text(QUAY.format(50.8175 + off_m / 111_250.0))
+    told = [f.text for f in check_mission(mission).findings if f.place == "[[goal]] 1"]
+    assert len(told) == bool(says)
+    assert not says or says in told[0]
+    assert not says or ("never sailed" in told[0]) is (off_m < 7.0 + 6.0)
+
+
+def test_no_preview_leads_over_a_line_that_is_never_sailed(tmp_path, capsys):
+    mission = tmp_path / "m.toml"
+    mission.write_text(FINISH)
+    (tmp_path / "quay.wkt").write_text(QUAY.format(50.8175 + 12.0 / 111_250.0))
+    assert cli.main(["plan", str(mission)]) == 2
+    assert (
+        "[[goal]] 1: the line Finish is 12 m from obstacle 1: no room to cross it with 6.0 m" in capsys.readouterr().err
+    )
+
+
+def test_a_mark_of_a_gate_may_stand_on_the_bank(tmp_path):
+    mission = tmp_path / "m.toml"
+    mission.write_text(FINISH)
+    bank = "POLYGON ((-1.32 50.816, -1.3102 50.816, -1.3102 50.819, -1.32 50.819, -1.32 50.816))"
+    (tmp_path / "quay.wkt").write_text(bank)
+    assert not [f.text for f in check_mission(mission).findings if "Finish" in f.text or "marks" in f.text]
+    assert require_sailable(load_mission(mission))

@@ -109,6 +109,29 @@ def test_beyond_the_line_beside_its_marks_it_is_missed_at_once():
     assert said(w, "gate missed") == ["line was passed by outside of its marks: again"]
 
 
+def test_a_line_before_a_quay_is_crossed_with_the_floor_kept_clear():
+    quay = shapely.box(-200.0, 100.0, 200.0, 120.0)
+    w = World(
+        skipper=skipper(voyage(line(margin_m=12.0), obstacles=(quay,)), margin_m=12.0, margin_floor_m=4.0),
+        wind=lambda t: (math.pi / 2.0, 5.0),
+    )
+    assert w.run(300.0, lambda w: bool(w.state.progress.reached))
+    assert not said(w, "gate missed")
+    assert min(100.0 - p[1] for p in w.track) > 4.0
+
+
+def test_a_line_without_room_before_a_quay_is_told_in_words_of_the_line():
+    quay = shapely.box(-200.0, 88.0, 200.0, 120.0)
+    w = World(
+        skipper=skipper(voyage(line(margin_m=12.0), obstacles=(quay,)), margin_m=12.0, margin_floor_m=6.0),
+        wind=lambda t: (math.pi / 2.0, 5.0),
+    )
+    w.run(30.0)
+    told = [text for _, code, text in w.log if code.startswith("ladder")]
+    assert told
+    assert all("the line line is 8 m from o0: no room to cross it with" in text for text in told)
+
+
 def test_what_is_missed_for_ever_is_said_loudly():
     w = world(line(), END)
     w.run(60.0, lambda w: w.position[1] > 40.0)
@@ -329,3 +352,13 @@ def test_a_voyage_that_ends_with_a_box_is_done_when_its_time_is_over():
     w = world(box(for_s=60.0))
     assert w.run(300.0, lambda w: w.state.phase is Phase.DONE)
     assert w.state.voyage.arrived
+
+
+@pytest.mark.parametrize(("at", "is_missed"), [((0.0, 78.0), False), ((0.0, 70.0), True), ((40.0, 78.0), True)])
+def test_a_waypoint_close_beyond_the_line_may_be_left_a_moment_before_she_crosses_it(at, is_missed):
+    way = route((0.0, 87.0), (0.0, 200.0), (0.0, 230.0), begin=(0.0, 0.0), gate_of=(1, 2, -1))
+    ctx = moment(way, goals=(line(), END), at=at, mission={"index": 1})
+    ctx.set(progress=replace(ctx.state.progress, gate=1))
+    pass_gates(ctx)
+    said_of = [a for a in ctx.actions if isinstance(a, Announce) and a.code == "gate missed"]
+    assert bool(said_of) is is_missed

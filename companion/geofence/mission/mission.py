@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -535,15 +536,27 @@ def trouble_at(local: LocalArea, point_en: tuple[float, float]) -> str:
     return ""
 
 
+OPENING_STEP_M = 1.0
+
+
 def gate_trouble(gate: GoalGate, frame: LocalFrame, local: LocalArea, floor_m: float) -> str:
-    """Return why a gate cannot be sailed through ("" when it can): what stands nearer to its opening than the floor."""
+    """Return why a gate cannot be sailed through ("" when it can).
+
+    Its opening has the floor's room nowhere, or in more than one part.
+    """
     marks = np.asarray([frame.en_from_geo(gate.port), frame.en_from_geo(gate.starboard)])
-    share = gate.keep_m / float(np.hypot(*(marks[1] - marks[0])))
-    opening = [marks[0] + s * (marks[1] - marks[0]) for s in (share, 1.0 - share)]
-    clearance_m = local.path_clearance_m(opening)
-    if clearance_m >= floor_m:
+    width_m = float(np.hypot(*(marks[1] - marks[0])))
+    share = min(gate.keep_m / width_m, 0.5)
+    steps = np.linspace(share, 1.0 - share, max(2, math.ceil(width_m / OPENING_STEP_M)))
+    opening = marks[0] + steps[:, None] * (marks[1] - marks[0])
+    clear_m = local.clearance_m(opening)
+    # A mark may stand on the shore; a rock between the marks leaves two ways, and none of them is meant.
+    roomy = np.flatnonzero(clear_m >= floor_m)
+    middle = clear_m[roomy[0] : roomy[-1] + 1] if len(roomy) else clear_m
+    if len(roomy) and float(np.min(middle)) >= floor_m:
         return ""
-    where = np.asarray(opening)[int(np.argmin(local.clearance_m(opening)))]
+    least = int(np.argmin(middle)) + int(roomy[0]) if len(roomy) else int(np.argmax(clear_m))
+    clearance_m, where = float(clear_m[least]), opening[least]
     return (
         f"between its marks there are {max(0.0, clearance_m):.0f} m to {local.nearest_name(where)}: "
         f"the margin's floor is {floor_m:g} m"

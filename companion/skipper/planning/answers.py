@@ -27,7 +27,7 @@ from companion.skipper.step import DiversionKind, Phase, PlanOutcome, ReplanReas
 from companion.skipper.step.actions import Change
 from companion.skipper.step.missions import Tail, splice
 from companion.skipper.step.state import PendingPlan, Retry
-from companion.skipper.way.gates import astray
+from companion.skipper.way.gates import astray, no_room
 from companion.skipper.way.geometry import distance_m, gybe_round, moved
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
@@ -55,7 +55,7 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
         reason = outcome.text or (plan.reason if plan is not None else "the planner died")
         if (plan is None or plan.status is PlanStatus.UNANSWERED) and asks_again(ctx, pending, reason):
             return
-        not_found(ctx, pending, reason)
+        not_found(ctx, pending, _no_room(ctx, pending) or reason)
         return
     ctx.set(plans=changed(ctx.state.plans, unanswered=0, effort=min(1.0, MORE * ctx.state.plans.effort), rung=0))
     outside = _astray(ctx, pending, plan)
@@ -111,6 +111,13 @@ def _note_latency(ctx: StepContext, pending: PendingPlan, outcome: PlanOutcome) 
         )
     elif latency.speed is not None:  # measured: in real time
         ctx.say(Severity.INFO, "planner", f"the planner {latency.words}", every_s=math.inf)
+
+
+def _no_room(ctx: StepContext, pending: PendingPlan) -> str:
+    """Return that the line which a plan was to cross has no room by its margin, in words of it; empty: it has."""
+    if not 0 <= pending.gate < len(ctx.gates):
+        return ""
+    return no_room(ctx.gates[pending.gate], ctx.voyage.area, pending.facts.margin_m)
 
 
 def _astray(ctx: StepContext, pending: PendingPlan, plan: Plan) -> str:

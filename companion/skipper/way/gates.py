@@ -22,14 +22,14 @@ from companion.geo.angles import difference_rad, wrap_pi
 from companion.skipper.way.geometry import barrier_wkt, bearing_rad, disc_wkt, distance_m, moved
 from companion.skipper.way.line import (
     BEFORE_M,
-    BEFORE_RADIUS_M,
-    BEYOND_M,
-    BEYOND_RADIUS_M,
     STRAY_M,
     ahead_m,
-    course_rad,
     crossing,
     crossing_en,
+    foot_en,
+    no_room_words,
+    place_before,
+    place_beyond,
     wings_wkt,
 )
 from companion.skipper.way.sweeps import Sweep
@@ -102,12 +102,17 @@ class Gate:
         return self.line is not None and not self.is_before_line
 
 
-@lru_cache(maxsize=8)  # asked for at every step, and the same until a buoy is missed
 def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate, ...]:
     """Return the gates of all laps in order. Every buoy is something to keep clear of on every leg.
 
-    ``approaches`` says where the way to a goal began; the last one that names a goal counts.
+    ``approaches`` says where the way to a goal began; the last one that names a goal counts. How many they are does not
+    depend on the water, where they lie does.
     """
+    return _gates_of(voyage, voyage.area, tuple(approaches))
+
+
+@lru_cache(maxsize=8)  # asked for at every step, and the same until a buoy is missed or other water is closed
+def _gates_of(voyage: Voyage, area: AreaLike, approaches: tuple[Approach, ...]) -> tuple[Gate, ...]:
     legs = voyage.legs
     begun = {a.goal: a for a in approaches}
     out: list[Gate] = []
@@ -122,7 +127,7 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
         name = goal.name or f"goal {i + 1}"
         after = legs[i + 1].en_m if i + 1 < len(legs) else voyage.onward_en_m
         if goal.line is not None:
-            out.extend(_cross(goal, i, name, None if is_once_more else before, after, voyage.area))
+            out.extend(_cross(goal, i, name, None if is_once_more else before, after, area))
         elif goal.search is not None and approach is not None and approach.round > 0:
             out.extend(_sweep(goal, i, name, approach))
         elif goal.side is Side.NONE:
@@ -145,6 +150,11 @@ def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate,
             turn_rad = approach.turn_rad if approach is not None else None
             out.extend(_round(goal, i, name, before, after, turn_rad, is_once_more=is_once_more))
     return tuple(out)
+
+
+def no_room(gate: Gate, area: AreaLike, margin_m: float) -> str:
+    """Return why a gate of a line has no room by a margin, in words of the line; empty: it has, or is of none."""
+    return "" if gate.line is None else no_room_words(gate.line, gate.name, gate.en_m, area, margin_m)
 
 
 class Mark(NamedTuple):
@@ -205,10 +215,10 @@ def _cross(
     line = goal.line
     assert line is not None
     way_m = 0.0 if before is None else distance_m(before, goal.en_m)
-    cut, course = crossing_en(line, before, after), course_rad(line)
+    place, radius_m = place_beyond(line, crossing_en(line, before, after), area)
     to = Gate(
-        en_m=moved(cut, course, BEYOND_M),
-        radius_m=BEYOND_RADIUS_M,
+        en_m=place,
+        radius_m=radius_m,
         goal=index,
         ends_goal=True,
         name=name,
@@ -219,9 +229,9 @@ def _cross(
     )
     if before is not None and ahead_m(line, before) <= -0.5 * BEFORE_M:
         return [to]
-    place = moved(cut, course + math.pi, BEFORE_M)
+    place, radius_m = place_before(line, foot_en(line, place), area)
     return [
-        replace(to, en_m=place, radius_m=BEFORE_RADIUS_M, ends_goal=False, keep_out=(), is_before_line=True),
+        replace(to, en_m=place, radius_m=radius_m, ends_goal=False, keep_out=(), is_before_line=True),
         replace(to, from_en_m=place, is_first=False),
     ]
 

@@ -2,7 +2,8 @@
 
 A line is crossed where the track between two fixes cuts the straight line between the marks, and nowhere else:
 nearness counts for nothing. The plan leads to a place beyond it, with a wing outwards from each mark that no plan
-crosses; a boat that is beyond the line already is led to a place before it first.
+crosses; a boat that is beyond the line already is led to a place before it first. Where a shore is near, these places
+lie nearer to the line, or to one side along it: as far off as there is room for.
 """
 
 from __future__ import annotations
@@ -17,8 +18,15 @@ from companion.skipper.way.voyage import AreaLike, Line, PointEn
 
 BEFORE_M = 25.0  # the place before the line: room to settle on the course across it
 BEYOND_M = 14.0  # the place beyond: the autopilot leaves a waypoint 3 to 5 m early, and must have crossed by then
+BEYOND_LEAST_M = 7.0  # ... beside a shore: what is left then is a second's way
 BEYOND_RADIUS_M = 6.0
+BEFORE_LEAST_M = 10.0
 BEFORE_RADIUS_M = 10.0
+RADIUS_SHARE = 0.5  # of a place's distance from the line: at the most its radius
+ASIDE_M = 2.0  # between the places that are tried along the line, ...
+ASIDES = 100  # ... and as many of them at the most
+ASIDE_SHARE = 0.5  # a metre to one side is worth so many of distance from the line
+ROOM_M = 0.1  # rooms that differ by less are the same
 STRAY_M = 3.0  # what the track strays from its leg: added to what is kept clear of a mark
 WING_M = 60.0  # shortest wing ...
 WING_SHARE = 1.5  # ... and this share of the way to the line is added
@@ -84,9 +92,80 @@ def crossing_en(line: Line, before: PointEn | None, after: PointEn | None) -> Po
             at_m = alongs[0] + (alongs[1] - alongs[0]) * cut[0] / (cut[0] + cut[1])
         else:
             at_m = alongs[0]
+    low_m, high_m = _opening_m(line)
+    return _on_line(line, min(max(at_m, low_m), high_m))
+
+
+def _opening_m(line: Line) -> tuple[float, float]:
+    """Return from where to where it is crossed, clear of both marks [m from the port one]."""
+    width = width_m(line)
     clear_m = min(line.keep_m + STRAY_M + 2.0, width / 2.0)
-    at_m = min(max(at_m, clear_m), width - clear_m)
+    return clear_m, width - clear_m
+
+
+def _on_line(line: Line, at_m: float) -> PointEn:
     return moved(line.port_en_m, bearing_rad(line.port_en_m, line.starboard_en_m), at_m)
+
+
+def foot_en(line: Line, point: PointEn) -> PointEn:
+    """Return the place on the line that a point is abreast of."""
+    return _on_line(line, along_m(point, line.port_en_m, line.starboard_en_m))
+
+
+def place_beyond(line: Line, cut_en: PointEn, area: AreaLike) -> tuple[PointEn, float]:
+    """Return the place beyond the line that the way across it at ``cut_en`` leads to, and its radius [m]."""
+    place, off_m = _place(line, cut_en, area, course_rad(line), BEYOND_M, BEYOND_LEAST_M)
+    return place, min(BEYOND_RADIUS_M, RADIUS_SHARE * off_m)
+
+
+def place_before(line: Line, cut_en: PointEn, area: AreaLike) -> tuple[PointEn, float]:
+    """Return the place before the line where the way across it at ``cut_en`` begins, and its radius [m]."""
+    place, off_m = _place(line, cut_en, area, course_rad(line) + math.pi, BEFORE_M, BEFORE_LEAST_M)
+    return place, min(BEFORE_RADIUS_M, RADIUS_SHARE * off_m)
+
+
+def _place(
+    line: Line, cut_en: PointEn, area: AreaLike, course: float, most_m: float, least_m: float
+) -> tuple[PointEn, float]:
+    """Return a place off the line, and how far off: as far as there is room for the line's margin, up to ``most_m``.
+
+    Not where something solid lies between it and the line. Where nothing fits, the roomiest place: the ladder's lower
+    steps lead there.
+    """
+    wanted, (low_m, high_m) = moved(cut_en, course, most_m), _opening_m(line)
+    if area.spare_m([wanted], line.margin_m)[0] >= 0.0 and area.path_clearance_m([cut_en, wanted]) > 0.0:
+        return wanted, most_m
+    cut_m = along_m(cut_en, line.port_en_m, line.starboard_en_m)
+    step_m = max(ASIDE_M, width_m(line) / ASIDES)
+    alongs_m = [at_m for n in range(-ASIDES, ASIDES + 1) if low_m <= (at_m := cut_m + n * step_m) <= high_m]
+    tried = [
+        (off_m - ASIDE_SHARE * abs(at_m - cut_m), off_m, _on_line(line, at_m))
+        for off_m in np.arange(most_m, least_m - 0.5, -1.0).tolist()
+        for at_m in alongs_m or [cut_m]
+    ]
+    tried.sort(key=lambda one: -one[0])
+    places = [moved(foot, course, off_m) for _, off_m, foot in tried]
+    spare_m = area.spare_m(places, line.margin_m)
+    # What fits, the best first; then the others, the roomiest first.
+    order = sorted(range(len(tried)), key=lambda n: -min(0.0, round(float(spare_m[n]) / ROOM_M)))
+    for n in order:
+        if area.path_clearance_m([tried[n][2], places[n]]) > 0.0:
+            return places[n], tried[n][1]
+    return wanted, most_m
+
+
+def no_room_words(line: Line, name: str, place_en: PointEn, area: AreaLike, margin_m: float) -> str:
+    """Return that a place off the line has less room than the margin, in words of the line; empty: it has the room."""
+    if area.spare_m([place_en], margin_m)[0] >= 0.0:
+        return ""
+    foot = foot_en(line, place_en)
+    side = "beyond" if ahead_m(line, place_en) > 0.0 else "before"
+    clear_m, off_m = (max(0.0, float(area.clearance_m([en])[0])) for en in (place_en, foot))
+    near = area.nearest_name(place_en) or "something"
+    return (
+        f"the line {name} is {off_m:.0f} m from {near}: no room to cross it with {margin_m:.1f} m kept clear, "
+        f"{clear_m:.1f} m at the most {side} it"
+    )
 
 
 def wings_wkt(line: Line, area: AreaLike, way_m: float) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ class Line:
         port_en_m: the mark that is left to port.
         starboard_en_m: the mark that is left to starboard.
         keep_m: what is kept clear of each mark.
+        margin_m: what is kept clear of anything solid before and beyond it, where there is room.
         not_before_s: a start line's gun, Unix time; an earlier crossing does not count.
         after_s: the same, counted from setting sail.
 
@@ -48,6 +49,7 @@ class Line:
     port_en_m: PointEn
     starboard_en_m: PointEn
     keep_m: float
+    margin_m: float = 0.0
     not_before_s: float | None = None
     after_s: float | None = None
 
@@ -139,6 +141,10 @@ class AreaLike(Protocol):
 
     def clearance_m(self, points_en: ArrayLike) -> NDArray[np.float64]:
         """Return each point's distance to the nearest obstacle or limit [m], negative where it is not free."""
+        ...
+
+    def spare_m(self, points_en: ArrayLike, margin_m: float) -> NDArray[np.float64]:
+        """Return how much farther off each point is than is kept clear by a margin [m], negative: it is nearer."""
         ...
 
     def path_clearance_m(self, path_en: ArrayLike) -> float:

@@ -1,16 +1,18 @@
 """Lines: which way a track cuts them, where they are crossed, what stands beside them. Signs by property."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import shapely
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from companion.skipper.way.gates import Approach, astray, gates_of, marks_of
+from companion.skipper.way.gates import Approach, astray, gates_of, marks_of, no_room
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.line import (
     BEFORE_M,
+    BEYOND_LEAST_M,
     BEYOND_M,
     ahead_m,
     course_rad,
@@ -158,3 +160,66 @@ def test_a_way_to_a_buoy_leaves_it_on_its_side(side, turns):
     assert astray(gate, [(0.0, 0.0), (hand * 400.0, 150.0), gate.en_m], begun) == ""
     round_it = [(0.0, 0.0), (-hand * 400.0, 200.0), (0.0, 500.0), gate.en_m]
     assert (astray(gate, round_it, begun) == "") == (turns == 1)
+
+
+CAREFUL = replace(NORTHWARD, margin_m=8.0)
+FROM_SOUTH, FROM_NORTH = Approach(goal=0, en_m=(0.0, 0.0)), Approach(goal=0, en_m=(0.0, 150.0))
+
+
+def beside(*solid, line=CAREFUL, approach=FROM_SOUTH):
+    made = voyage(goal(line), obstacles=solid)
+    return gates_of(made, (approach,)), made.area
+
+
+def test_before_a_quay_the_place_beyond_is_as_far_off_as_there_is_room_for():
+    (across,), water = beside(shapely.box(-200.0, 118.0, 200.0, 140.0))
+    assert ahead_m(CAREFUL, across.en_m) == pytest.approx(9.0)
+    assert across.radius_m == pytest.approx(4.5)  # a plan that ends so much before it has crossed
+    assert float(water.spare_m([across.en_m], 8.0)[0]) >= 0.0
+    assert no_room(across, water, 8.0) == ""
+    assert astray(across, [(0.0, 0.0), across.en_m], 0.0) == ""
+
+
+def test_where_no_place_has_the_margin_it_is_the_roomiest_for_the_ladders_lower_steps_and_said_of_the_line():
+    (across,), water = beside(shapely.box(-200.0, 113.0, 200.0, 140.0))
+    assert ahead_m(CAREFUL, across.en_m) == pytest.approx(BEYOND_LEAST_M)
+    assert no_room(across, water, 5.0) == ""
+    assert no_room(across, water, 8.0) == (
+        "the line gate is 13 m from o0: no room to cross it with 8.0 m kept clear, 6.0 m at the most beyond it"
+    )
+
+
+def test_where_it_is_roomier_to_one_side_along_the_line_it_is_crossed_there():
+    (across,), water = beside(shapely.box(-200.0, 113.0, -6.0, 140.0))
+    assert ahead_m(CAREFUL, across.en_m) == pytest.approx(BEYOND_M)
+    assert 2.0 <= across.en_m[0] <= 10.0
+    assert float(water.spare_m([across.en_m], 8.0)[0]) >= 0.0
+
+
+def test_with_a_mark_on_the_bank_it_is_crossed_off_the_bank():
+    bank = shapely.box(-200.0, 0.0, -20.0, 200.0)
+    (across,), water = beside(bank, approach=Approach(goal=0, en_m=(-15.0, 0.0)))
+    assert -20.0 + 8.0 <= across.en_m[0] <= 10.0
+    assert no_room(across, water, 8.0) == ""
+
+
+def test_no_place_beyond_is_behind_a_wall():
+    (across,), _ = beside(shapely.box(-200.0, 110.0, 200.0, 110.5), line=replace(NORTHWARD, margin_m=2.0))
+    assert 0.0 < ahead_m(CAREFUL, across.en_m) < 10.0
+
+
+def test_the_place_before_it_fits_the_water_too():
+    (before, across), water = beside(shapely.box(-200.0, 60.0, 200.0, 81.0), approach=FROM_NORTH)
+    assert not before.is_crossed
+    assert -18.0 < ahead_m(CAREFUL, before.en_m) <= -9.0
+    assert before.radius_m < 10.0
+    assert no_room(before, water, 8.0) == ""
+    assert across.from_en_m == before.en_m
+
+
+def test_what_an_obstacle_keeps_for_itself_is_kept_there_too():
+    made = voyage(goal(CAREFUL))
+    quay = shapely.box(-200.0, 124.0, 200.0, 140.0)
+    wide = replace(made, area=made.area.also(("quay",), (quay,), (12.0,)))
+    assert ahead_m(CAREFUL, gates_of(made, (FROM_SOUTH,))[0].en_m) == pytest.approx(BEYOND_M)
+    assert ahead_m(CAREFUL, gates_of(wide, (FROM_SOUTH,))[0].en_m) == pytest.approx(11.0)  # another water, asked anew
