@@ -28,7 +28,7 @@ from companion.skipper.step import (
 )
 from companion.view.parts import level_of
 from companion.view.values import Level
-from companion.words import clearance_words, counted
+from companion.words import counted
 
 LOUD = Severity.INFO
 LEAST_RISK = 0.001  # a smaller chance is not worth a line
@@ -168,8 +168,6 @@ def _plan(outcome: PlanOutcome, why: str, nearest: str) -> Happening:
         facts.append(("off the plan", f"{100.0 * plan.risk:.0f} %"))
     if plan.tack_risk >= LEAST_RISK:
         facts.append(("of it by tacks that fail", f"{100.0 * plan.tack_risk:.1f} %"))
-    if plan.expected_clearance_m is not None:
-        facts.append(("clearance expected", clearance_words(plan.expected_clearance_m)))
     clear = [leg.clearance_m for leg in plan.legs if leg.clearance_m is not None]
     if clear:
         # a mark is no obstacle: what is kept clear of it is less than the margin

@@ -15,13 +15,14 @@ from companion.planner import Plan, PlanStatus
 from companion.planner.plan import Arrival
 from companion.planner.problem import evaluate, resolved
 from companion.planner.risk import arrival, path_risk
+from companion.planner.track import ExpectedTrack
 from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.track import clearance_text, of_way, steps
-from companion.skipper.planning.uploads import is_begun_risky, is_riskier, upload
+from companion.skipper.planning.uploads import is_begun_risky, is_riskier, judged, upload
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step import DiversionKind, Phase, PlanOutcome, ReplanReason, Route, StepContext
 from companion.skipper.step.actions import Change
@@ -305,21 +306,43 @@ def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, 
             mission=changed(
                 ctx.state.mission,
                 route=replace(
-                    route, items=ctx.state.mission.route.items, points_en_m=ctx.state.mission.route.points_en_m
+                    route,
+                    items=ctx.state.mission.route.items,
+                    points_en_m=ctx.state.mission.route.points_en_m,
+                    expected_clearance_m=ctx.state.mission.route.expected_clearance_m,
                 ),
             ),
         )
         ctx.say(Severity.INFO, "plan kept", f"{pending.reason.words}: the new plan is the old one", every_s=0.0)
         return ""
+    refused, track = judged(ctx, route, set_current, pending)
+    if refused:
+        return refused
+    route = replace(route, expected_clearance_m=_told_m(ctx, plan, expected_m, track))
     way = route.points_en_m[ctx.state.mission.index if set_current is None else set_current - 1 : -1]
     met = meetings(ctx)
     unsafe = f"meets {met[0].name} in {met[0].time_s:.0f} s" if met else ""
     change = Change(apart_m=apart_m(ctx, way), unsafe=unsafe) if ctx.state.mission.route is not None else Change()
     _look_at_time(ctx, route)
-    clear = clearance_text(expected_m, ctx.config.margin_floor_m)
-    return upload(
-        ctx, route, set_current, f"{pending.reason.words}: {facts.why}{clear}", change=change, planned=pending
-    )
+    clear = clearance_text(route.expected_clearance_m, ctx.config.margin_floor_m)
+    upload(ctx, route, set_current, f"{pending.reason.words}: {facts.why}{clear}", change=change)
+    return ""
+
+
+def _told_m(ctx: StepContext, plan: Plan, planned_m: float | None, track: ExpectedTrack | None) -> float | None:
+    """Return the clearance that a plan is told with [m]: of the track that it was judged by, which begins at the boat.
+
+    The planner's own (``planned_m``) is of a track that begins at a waypoint, on a heading that she may not have there.
+    It stands where nothing was judged; and for the boards of legs that are left to the autopilot, which it alone looks
+    at, where it keeps the floor.
+    """
+    if track is None:
+        return planned_m
+    seen_m = track.clearance_m
+    has_boards = any(leg.is_beat for leg in plan.legs)
+    if has_boards and planned_m is not None and planned_m >= min(ctx.config.margin_floor_m, ctx.config.margin_m):
+        seen_m = min(seen_m, planned_m)
+    return seen_m if math.isfinite(seen_m) else None
 
 
 def _gybed_round(ctx: StepContext, pending: PendingPlan, start: PointEn, points: list[PointEn]) -> tuple[PointEn, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,16 +40,11 @@ def upload(
     *,
     whole: bool = False,
     change: Change | None = None,
-    planned: PendingPlan | None = None,
-) -> str:
+) -> None:
     """Ask for the upload of a route, with our mark; without permission it stays ready and the status says so.
 
-    A route that was ``planned`` must be admitted (``companion.skipper.planning.uploads``). Return why it is not, in
-    words; empty: it is.
+    A route that was planned must have been admitted (``judged``).
     """
-    refused = "" if planned is None else refusal(ctx, route, set_current, planned)
-    if refused:
-        return refused
     route = replace(route, items=marked(route.items))
     old = ctx.state.mission.route
     known = old is not None and not ctx.state.mission.foreign and ctx.state.mission.checked and not whole
@@ -73,7 +69,7 @@ def upload(
     if not ctx.act(action):
         ctx.set(plans=changed(ctx.state.plans, ready_route=route))
         ctx.say(Severity.WARNING, "upload not permitted", "a plan is ready; uploading is not permitted")
-        return ""
+        return
     # A read that is still under way will tell of the mission before this upload: its answer is not wanted.
     ctx.set(
         pending=changed(
@@ -85,7 +81,6 @@ def upload(
         ),
         plans=changed(ctx.state.plans, ready_route=None),
     )
-    return ""
 
 
 def take_upload(ctx: StepContext, outcome: UploadOutcome) -> None:
@@ -173,7 +168,7 @@ def _over_limit(problem: Problem, legs: Sequence[Leg]) -> float:
 
 
 # ----------- Admission: whether a plan may go to the autopilot, held against what is on board there.
-# Every upload of a plan passes here (``companion.skipper.planning.uploads``). The way on board and the new one, both
+# Every plan passes here before its upload. The way on board and the new one, both
 # from where the boat is now, are judged by one problem: the same wind, current, obstacles and predicted track. Two
 # rules:
 #
@@ -186,14 +181,24 @@ def _over_limit(problem: Problem, legs: Sequence[Leg]) -> float:
 #    of now or the forecast's has shut it.
 
 
-def refusal(ctx: StepContext, route: Route, set_current: int | None, pending: PendingPlan) -> str:
-    """Return why a plan's route may not replace the one on board, in words; empty: it may.
+class Judgement(NamedTuple):
+    """Why a plan's route may not replace the one on board, in words, empty: it may; and the track it was judged by.
+
+    The track is None where nothing is sailed yet: then nothing is refused.
+    """
+
+    refused: str = ""
+    track: ExpectedTrack | None = None
+
+
+def judged(ctx: StepContext, route: Route, set_current: int | None, pending: PendingPlan) -> Judgement:
+    """Return whether a plan's route may replace the one on board.
 
     ``set_current`` is the item number (1: the first) that is made current with it, None: the present one stays.
     """
     boat, vehicle = ctx.boat_en, ctx.snapshot.vehicle
     if boat is None or vehicle is None or not ctx.state.voyage.sailing:
-        return ""
+        return Judgement()
     problem: Problem = pending.problem
     here_m = float(water_to_keep(ctx.voyage.area, boat).clearance_m([boat])[0]) - ctx.voyage.boat.hull.reach_m
     # Below the floor, and where it has to be gybed round, a way of short legs is better than none.
@@ -223,8 +228,8 @@ def refusal(ctx: StepContext, route: Route, set_current: int | None, pending: Pe
     )
     low = _below_floor(problem, seen, before if ahead and _is_sailed(ctx) else None, here_m=here_m)
     if low or not ahead or not is_open(ctx, pending, before):
-        return low
-    return _less(ctx, pending, new, old, heading_rad=heading_rad)
+        return Judgement(low, seen)
+    return Judgement(_less(ctx, pending, new, old, heading_rad=heading_rad), seen)
 
 
 def _is_sailed(ctx: StepContext) -> bool:

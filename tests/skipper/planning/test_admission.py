@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,13 +13,14 @@ import shapely
 
 from companion.messages import Mode
 from companion.planner import plan
+from companion.planner.track import ExpectedTrack
 from companion.skipper.behaviors.helm import leave_passed, push_on
 from companion.skipper.intake import locate
-from companion.skipper.planning.answers import take_plan
+from companion.skipper.planning.answers import _told_m, take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.not_found import not_found
 from companion.skipper.planning.track import steps
-from companion.skipper.planning.uploads import refusal
+from companion.skipper.planning.uploads import judged
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, SetCurrent, UploadMission
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import Retry
@@ -179,7 +181,7 @@ def test_from_below_the_floor_only_what_comes_no_nearer_goes_on_board():
             leg_from_en_m=(beside, *ways[:-1]),
             gate_of=(*(-1,) * len(points), 0, -1),
         )
-        return refusal(ctx, route, 1, replace(pending, start_en_m=beside))
+        return judged(ctx, route, 1, replace(pending, start_en_m=beside)).refused
 
     assert refused((20.0, 120.0)) == ""
     assert "the boat is" in refused((-14.0, 115.0))
@@ -200,6 +202,32 @@ def test_a_plan_from_a_place_that_she_is_led_to_tells_the_clearance_of_the_way_t
     assert 0.0 < passes_m <= 3.0
 
 
+def test_the_clearance_that_is_told_is_of_the_track_that_admitted_the_plan():
+    """ "Passes -3.1 m clear or more (floor 4 m)": the planner's own began at a waypoint, a tight corner before it."""
+    world = sailing()
+    ctx = turn_of(world)
+    assert request(ctx, ReplanReason.RETRY)
+    pending = ctx.state.pending.plan
+    found = replace(plan(pending.problem, expansions=4000), expected_clearance_m=-3.1)
+    take_plan(ctx, PlanOutcome(request_id=pending.request_id, plan=found))
+    [told] = uploads(ctx.actions)
+    new = ctx.state.pending.upload
+    track = judged(ctx, new.route, new.set_current, pending).track
+    assert new.route.expected_clearance_m == pytest.approx(track.clearance_m)
+    assert track.clearance_m >= FLOOR_M
+    assert f"passes {track.clearance_m:.1f} m clear" in told.text
+
+
+@pytest.mark.parametrize(
+    ("is_beat", "planned_m", "told_m"), [(False, 5.0, 9.0), (True, 5.0, 5.0), (True, -3.1, 9.0), (True, None, 9.0)]
+)
+def test_what_the_planner_alone_looks_at_is_told_too(is_beat, planned_m, told_m):
+    ctx, found = turn_of(sailing()), SimpleNamespace(legs=(SimpleNamespace(is_beat=is_beat),))
+    assert _told_m(ctx, found, planned_m, ExpectedTrack(clearance_m=9.0)) == told_m
+    assert _told_m(ctx, found, planned_m, None) == planned_m
+    assert _told_m(ctx, found, None, ExpectedTrack()) is None
+
+
 @pytest.mark.parametrize(("mode", "is_admitted"), [(Mode.AUTO, True), (Mode.LOITER, False)])
 def test_what_is_on_board_and_not_sailed_excuses_no_way_onto_a_rock(mode, is_admitted):
     """In LOITER the boat need not go: that the way on board leads onto the rock, too, made one of -7 m good enough."""
@@ -216,7 +244,7 @@ def test_what_is_on_board_and_not_sailed_excuses_no_way_onto_a_rock(mode, is_adm
         leg_from_en_m=(beside, *ways[:-1]),
         gate_of=(-1, 0, -1),
     )
-    assert (refusal(ctx, route, 1, replace(ctx.state.pending.plan, start_en_m=beside)) == "") is is_admitted
+    assert (judged(ctx, route, 1, replace(ctx.state.pending.plan, start_en_m=beside)).refused == "") is is_admitted
 
 
 def test_an_item_that_was_passed_during_its_upload_is_not_turned_back_for():

@@ -69,7 +69,7 @@ def pending_plan(*, gate=0, bound_for="", margin_m=15.0, delta_s=0.95, problem=N
 )
 def test_what_is_on_board_and_the_same_is_kept(mission, whole, keep):
     ctx = moment(None, mission=mission, pending={"read": (3, NOW_S)}, plans={"ready_route": OLD})
-    assert upload(ctx, NEW, 2, "why", whole=whole, change=Change(unsafe=True)) == ""
+    upload(ctx, NEW, 2, "why", whole=whole, change=Change(unsafe=True))
     (action,) = ctx.actions
     assert isinstance(action, UploadMission)
     assert (action.keep_first, action.set_current, action.plan_id, action.text) == (keep, 2, 9, "why")
@@ -105,18 +105,10 @@ def test_a_boat_that_is_armed_never_has_a_stranger_s_mixture_on_board(armed, is_
 
 def test_without_permission_it_stays_ready_and_is_said():
     ctx = moment(OLD, mission=CHECKED, permissions=DRY_RUN, pending={"read": (3, NOW_S)})
-    assert upload(ctx, NEW, None, "") == ""
+    upload(ctx, NEW, None, "")
     assert [a.code for a in ctx.actions if isinstance(a, Announce)] == ["upload not permitted"]
     assert ctx.state.plans.ready_route.items == marked(NEW.items)
     assert (ctx.state.pending.upload, ctx.state.pending.read) == (None, (3, NOW_S))
-
-
-def test_a_planned_route_is_admitted_first(monkeypatch):
-    monkeypatch.setattr(uploads, "refusal", lambda *_: "too near")
-    ctx = moment(OLD, mission=CHECKED)
-    assert upload(ctx, NEW, None, "", planned=pending_plan()) == "too near"
-    assert ctx.actions == []
-    assert upload(ctx, NEW, None, "") == ""  # what was not planned is not held against anything
 
 
 # ------------------------------------------------------------------------------------------------------- its end
@@ -399,7 +391,7 @@ def test_what_of_a_way_is_too_great_a_risk(monkeypatch, over, touches, words):
 
 # ------------------------------------------------------------------------------------- what is held against what
 def judged(monkeypatch, *, low="", is_way_open=True, less="", set_current=None, here=(0.0, 0.0), **parts):
-    """``refusal`` with its parts told; return it and what each part was asked."""
+    """``judged`` with its parts told; return it and what each part was asked."""
     asked = {}
 
     def of_way(_, way, **more):
@@ -420,7 +412,7 @@ def judged(monkeypatch, *, low="", is_way_open=True, less="", set_current=None, 
     monkeypatch.setattr(uploads, "_less", less_of)
     plan = parts.pop("plan", None) or pending_plan(problem=SimpleNamespace(tracking=None, start_heading_rad=0.3))
     ctx = moment(OLD, at=here, **({"mission": {"route": OLD, "index": 0}} | parts))
-    return uploads.refusal(ctx, NEW, set_current, plan), asked, ctx
+    return uploads.judged(ctx, NEW, set_current, plan).refused, asked, ctx
 
 
 def test_both_ways_are_judged_from_where_she_is(monkeypatch):
