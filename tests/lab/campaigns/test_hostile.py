@@ -35,7 +35,10 @@ DOCUMENT = Path("docs/reference/mavlink.md")
 # Names of messages in the code that are not read there: sent, asked for, or counted.
 NOT_READ = {
     ("MISSION_CLEAR_ALL", "mavsdk_session"),
-    *((name, "doctor") for name in ("WIND", "GLOBAL_POSITION_INT", "ATTITUDE", "MISSION_CURRENT", "EKF_STATUS_REPORT")),
+    *(
+        (name, "vehicle")
+        for name in ("WIND", "GLOBAL_POSITION_INT", "ATTITUDE", "MISSION_CURRENT", "EKF_STATUS_REPORT")
+    ),
 }
 TABLES = {"streams", "safety", "reads", "boat_logs"}  # the last reads recordings, and nobody forges those
 KEY = b"0123456789abcdef" * 2
