@@ -485,7 +485,7 @@ MUTATIONS = (
         "tests/voyages/test_by_field.py::test_two_boats_that_do_not_look_meet",
     ),
     Mutation(
-        "companion/mission_check.py",
+        "companion/mission_check/fields.py",
         "twa < habits.no_go_half_rad - 1e-9, 0.0,",
         "twa < 0.5 * habits.no_go_half_rad, 0.0,",
         "tests/commands/test_field.py::test_the_fan_is_as_long_as_the_polar_and_shut_to_windward",

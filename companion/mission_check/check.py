@@ -1,0 +1,190 @@
+"""A mission file checked as the boat would read it: what refuses it, and findings of what is hardly meant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import shapely
+
+from companion.compose import field_findings_of, voyage_of
+from companion.errors import InputError
+from companion.geofence import Code, Finding, FindingLevel, Mission
+from companion.geofence.check import AreaConditions, check_area
+from companion.geofence.mission import place_troubles, read_mission
+from companion.messages import GeoPoint
+from companion.mission_check.lines import line_findings
+from companion.mission_check.sailable import require_sailable
+from companion.skipper.way import KEEP_SHARE, Approach, Side, gates_of
+
+SAME_M = 1.0  # two goals so near are one mark that is passed twice
+SMALL_M = 3.0  # a fix is good to 2.5 m
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CheckedMission:
+    """A mission file as the boat would read it.
+
+    Attributes:
+        mission: None when it cannot be read at all.
+        refusals: why it must not be sailed; the first is what ``load_mission`` or ``require_sailable`` raises.
+        findings: what else is wrong or worth knowing, worst first.
+    """
+
+    mission: Mission | None
+    refusals: tuple[InputError, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+
+def check_mission(
+    path: Path, *, from_deg: float | None = None, given: Mapping[Path, bytes] | None = None
+) -> CheckedMission:
+    """Read a mission and its area as the boat will, and look for what is wrong with it: never raises InputError.
+
+    ``from_deg``: where the wind comes from, in which gaps are looked at (else the mission's). ``given``: see
+    ``load_mission``.
+    """
+    try:
+        mission = read_mission(path, given or {})
+        troubles = tuple(InputError(str(path), *trouble) for trouble in place_troubles(mission))
+        if not troubles:
+            require_sailable(mission)
+    except InputError as error:
+        return CheckedMission(mission=None, refusals=(error,))
+    found = check_area(
+        mission.area,
+        AreaConditions(
+            start=mission.start,
+            goals=tuple(g.point for g in mission.goals),
+            margin_m=mission.margin_m,
+            is_passage=mission.is_passage,
+            twd_from_rad=math.radians(mission.wind.preview_from_deg if from_deg is None else from_deg),
+            no_go_half_rad=math.radians(mission.boat.no_go_half_deg),
+        ),
+    )
+    told = {Code.START_OUTSIDE, Code.GOAL_OUTSIDE} if troubles else set()
+    return CheckedMission(
+        mission=mission,
+        refusals=troubles,
+        findings=(
+            *mission.findings,
+            *(
+                ()
+                if troubles
+                else (
+                    *field_findings_of(mission),
+                    *_roundings(mission),
+                    *line_findings(mission),
+                    *_circles(mission),
+                    *_drying(mission),
+                )
+            ),
+            *_doubts(mission),
+            *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told),
+        ),
+    )
+
+
+def _roundings(mission: Mission) -> Iterator[Finding]:
+    """Yield the buoys that cannot be rounded with the margin: a place of the circle has no room."""
+    voyage, told = voyage_of(mission), set[int]()
+    begun = (Approach(goal=0, en_m=voyage.frame.en_from_geo(mission.start)),) if mission.start is not None else ()
+    for gate in gates_of(voyage, begun):
+        number = gate.goal % len(voyage.goals) + 1
+        if gate.buoy_en_m is None or number in told:
+            continue
+        clear_m = float(voyage.area.clearance_m([gate.en_m])[0])
+        if clear_m < mission.margin_m:
+            told.add(number)
+            goal = voyage.goals[number - 1]
+            near = voyage.area.nearest_name(gate.en_m) or "something"
+            yield Finding(
+                severity=FindingLevel.WARNING,
+                code=Code.NARROW_GAP,
+                place=f"[[goal]] {number} rounding",
+                text=f"rounded {goal.rounding_m:.0f} m off with {gate.name} to {goal.side.value} she comes to "
+                f"{max(0.0, clear_m):.1f} m from {near}; the margin is {mission.margin_m:g} m",
+                remedy="round it closer (radius_m and [area] margin_m say how far off), or leave it on the other hand",
+            )
+
+
+def _circles(mission: Mission) -> Iterator[Finding]:
+    """Yield the roundings whose circle holds the start or another goal: half of it is kept clear by every plan."""
+    voyage = voyage_of(mission)
+    places = [(f"[[goal]] {n}", goal.en_m) for n, goal in enumerate(voyage.goals, start=1)]
+    if mission.start is not None:
+        places.insert(0, ("[start]", voyage.frame.en_from_geo(mission.start)))
+    for number, goal in enumerate(voyage.goals, start=1):
+        if goal.side is Side.NONE:
+            continue
+        for place, en_m in places:
+            off_m = math.dist(en_m, goal.en_m)
+            if SAME_M < off_m < goal.rounding_m or (place == "[start]" and off_m <= SAME_M):
+                yield Finding(
+                    severity=FindingLevel.WARNING,
+                    code=Code.ROUNDING,
+                    place=f"[[goal]] {number} radius_m",
+                    text=f"is rounded {goal.rounding_m:g} m off, and {place} lies {off_m:.0f} m from it: "
+                    f"{KEEP_SHARE * goal.rounding_m:g} m are kept clear of the buoy",
+                    remedy=f"let radius_m and [area] margin_m, the greater of which says how far off, be below "
+                    f"{off_m:.0f} m, or move {place}",
+                )
+
+
+def _doubts(mission: Mission) -> Iterator[Finding]:
+    """Yield what is hardly meant: goals too small to meet, one name for two places, a key that does nothing."""
+    for number, goal in enumerate(mission.goals, start=1):
+        is_place = goal.rounding is None and goal.gate is None and goal.box is None and goal.search is None
+        if is_place and goal.field is None and goal.radius_m < SMALL_M:
+            yield Finding(
+                severity=FindingLevel.WARNING,
+                code=Code.SMALL,
+                place=f"[[goal]] {number} radius_m",
+                text=f"{goal.radius_m:g} m: a fix is good to 2.5 m, and at 3 m/s she is past it in a second or two",
+                remedy=f"write {SMALL_M:g} or more, or she may sail about it for ever",
+            )
+    named: dict[str, list[tuple[str, GeoPoint]]] = {
+        "goal": [(goal.name, goal.point) for goal in mission.goals],
+        "refuge": [(refuge.name, refuge.point) for refuge in mission.refuges],
+    }
+    for kind, places in named.items():
+        first: dict[str, tuple[int, GeoPoint]] = {}
+        for number, (name, at) in enumerate(places, start=1):
+            before, point = first.setdefault(name.strip().casefold(), (number, at))
+            if name.strip() and before != number and point != at:
+                yield Finding(
+                    severity=FindingLevel.WARNING,
+                    code=Code.TWICE,
+                    place=f"[[{kind}]] {number} name",
+                    text=f"{name!r} is the name of [[{kind}]] {before}, too, which lies elsewhere",
+                    remedy="give it another: orders and what is said name the one or the other",
+                )
+    if mission.skipper.shifts and mission.skipper.guidance != "plan":
+        yield Finding(
+            severity=FindingLevel.WARNING,
+            code=Code.NO_EFFECT,
+            place="[skipper] shifts",
+            text=f'does nothing with guidance = "{mission.skipper.guidance}": the tacks are asked of the autopilot '
+            "in AUTO",
+            remedy='leave it out, or write guidance = "plan"',
+        )
+
+
+def _drying(mission: Mission) -> Iterator[Finding]:
+    """Yield the places to lie in that water takes which dries: she goes to none of them, whatever the tide is."""
+    voyage = voyage_of(mission)
+    places = [(f"[[refuge]] {n}", refuge.en_m) for n, refuge in enumerate(voyage.refuges, start=1)]
+    if mission.start is not None and mission.skipper.end == "home":
+        places.append(("[start], which is home,", voyage.frame.en_from_geo(mission.start)))
+    for place, en_m in places:
+        for water in voyage.drying:
+            if shapely.intersects_xy(water.polygon, *en_m):
+                yield Finding(
+                    severity=FindingLevel.WARNING,
+                    code=Code.DRIES,
+                    place=place,
+                    text=f"lies in {water.name}, which dries: she does not go there to stay",
+                    remedy="choose a place that is deep enough at low water",
+                )

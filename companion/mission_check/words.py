@@ -1,0 +1,125 @@
+"""A mission in words: its current, its passage, the winds that it sets sail in, what is waited for."""
+
+from __future__ import annotations
+
+import datetime as dt
+import math
+from itertools import pairwise
+
+from companion.boat import can_hold
+from companion.compose import RECENTRE_M, boat_of, voyage_of, water_of
+from companion.current import Prior, over_water
+from companion.geo.angles import direction, heading_of
+from companion.geo.frame import LocalFrame
+from companion.geofence import Mission
+from companion.geofence.mission import MissionGoal
+from companion.safety import LIGHT_WIND, STRONG_WIND
+from companion.words import counted
+
+_DIRECTIONS = 24
+
+
+def current_words_of(mission: Mission, unix_s: float) -> tuple[str, ...]:
+    """Return what ``[current]`` says, one thing a line; nothing without the table.
+
+    ``unix_s``: the time now, by which a tide table is over or not yet begun. Raises InputError as ``water_of``.
+    """
+    if mission.current is None:
+        return ()
+    prior = water_of(mission)
+    strongest = prior.strongest_mps
+    if not prior.rows:
+        lines = [
+            (
+                f"current: sets {direction(heading_of(prior.east_mps, prior.north_mps))}° "
+                f"{strongest:.2f} m/s, give or take {prior.sigma_mps:.2f} m/s"
+            )
+        ]
+    else:
+        first, last = (
+            f"{dt.datetime.fromtimestamp(row.utc_s, dt.UTC):%Y-%m-%d %H:%M}" for row in (prior.rows[0], prior.rows[-1])
+        )
+        lines = [
+            (
+                f"current: {prior.name}, {counted(len(prior.rows), 'row')} from {first} to {last} UTC, at most "
+                f"{strongest:.2f} m/s, give or take {prior.sigma_mps:.2f} m/s"
+            )
+        ]
+        said = prior.at(unix_s).verdict
+        lines += [f"current: now {said}"] if said else []
+    if not _holds(mission, prior):
+        tws_mps = mission.wind.preview_speed_mps
+        lines.append(
+            f"current: in {tws_mps:g} m/s of wind "
+            f"from {direction(math.radians(mission.wind.preview_from_deg))}° she cannot make "
+            f"way against {strongest:.2f} m/s in every direction"
+        )
+    return tuple(lines)
+
+
+def _holds(mission: Mission, prior: Prior) -> bool:
+    """Return whether the boat can stem the strongest of it, whichever way it sets, in the wind of previews."""
+    boat, drift = boat_of(mission), prior.strongest_mps
+    sets = (
+        [2.0 * math.pi * n / _DIRECTIONS for n in range(_DIRECTIONS)]
+        if prior.rows
+        else [math.atan2(prior.east_mps, prior.north_mps)]
+    )
+    for set_rad in sets:
+        current = drift * math.sin(set_rad), drift * math.cos(set_rad)
+        from_rad, tws_mps = over_water(
+            math.radians(mission.wind.preview_from_deg), mission.wind.preview_speed_mps, current
+        )
+        if not can_hold(
+            boat, twd_from_rad=from_rad, tws_mps=tws_mps, current_en_mps=current, no_go_half_rad=boat.no_go_half_rad
+        ):
+            return False
+    return True
+
+
+def passage_words(mission: Mission) -> str:
+    """Return in words what a passage is: how far, in which waters, how far a plan looks."""
+    if mission.start is None:
+        return "a passage from wherever she lies"
+    places = [mission.start, *(goal.point for goal in mission.goals)]
+    lengths_km = [math.hypot(*LocalFrame(a).en_from_geo(b)) / 1000.0 for a, b in pairwise(places)]
+    bands = sorted({goal.bandwidth_m for goal in voyage_of(mission).goals if goal.bandwidth_m is not None})
+    widths = " and ".join(f"{band / 1000.0:g}" for band in bands)
+    band = f"bands of {widths} km to either side" if bands else "no band"
+    return (
+        f"a passage of {sum(lengths_km):.0f} km, the longest leg {max(lengths_km):.0f} km, {band}; "
+        f"plans for {mission.skipper.horizon_m / 1000.0:g} km at a time, the frame moves along every "
+        f"{(mission.passage.recentre_m or RECENTRE_M) / 1000.0:g} km"
+    )
+
+
+def wind_limit_words(mission: Mission) -> str:
+    """Return in words the winds that the boat sets sail in, empty: in any."""
+    boat = mission.boat
+    limits = [
+        f"{word} {limit:g} m/s"
+        for word, limit in (("more than", boat.max_tws_mps), ("less than", boat.min_tws_mps))
+        if limit is not None
+    ]
+    if not limits:
+        return ""
+    allowed = 100.0 * (1.0 - mission.risk.delta_s)
+    strong, light = (mission.safety.end(name).value for name in (STRONG_WIND, LIGHT_WIND))
+    return (
+        f"she does not set sail where {' or '.join(limits)} of wind is forecast with over {allowed:.0f} % at any "
+        f"instant of the plan; under way [safety] has {strong!r} for strong wind and {light!r} for light"
+    )
+
+
+def wait_words(goal: MissionGoal, wait_s: float) -> str:
+    """Return in words what the plan of the leg to a goal does not sail, for who reads its time; empty: nothing."""
+    gate = goal.gate
+    if gate is not None and gate.not_before_s is not None:
+        return f"the gun is at {dt.datetime.fromtimestamp(gate.not_before_s, dt.UTC):%Y-%m-%d %H:%M:%S} UTC"
+    if gate is not None and gate.after_s is not None:
+        return f"then waits {wait_s:.0f} s for the gun" if wait_s > 0.0 else "the gun is before that"
+    if goal.search is not None:
+        return "then the search, which is not counted"
+    if (task := goal.box or goal.field) is not None:
+        return "then stays until told, which is not counted" if task.for_s is None else f"then stays {task.for_s:.0f} s"
+    return ""
