@@ -57,6 +57,8 @@ from sitl.scenario import (
     Outlet,
     Scenario,
     ScenarioVerdict,
+    Terms,
+    Told,
     TrueTrack,
     free_port,
     is_all_ordinary,
@@ -97,17 +99,23 @@ def solid_of(area: LocalArea) -> BaseGeometry:
     return solid
 
 
-def marks_of(mission: Mission) -> list[tuple[tuple[float, float], str]]:
-    """Return the marks to be rounded, all laps written out."""
+def terms_of(scenario: Scenario, mission: Mission, seed: int, began_s: float = 0.0) -> Terms:
+    """Return what a run of a scenario is held against, which began at ``began_s`` of the track's time."""
     frame = mission.frame()
     lap = [(frame.en_from_geo(g.point), g.rounding) for g in mission.goals if g.rounding is not None]
-    return lap * mission.skipper.laps
-
-
-def ends_of(mission: Mission) -> dict[str, Any]:
-    """Return where a voyage may end beside its last goal and home: the refuges."""
-    frame = mission.frame()
-    return {"refuges_en_m": [frame.en_from_geo(r.point) for r in mission.refuges]}
+    return Terms(
+        scenario=scenario.name,
+        seed=seed,
+        expect=scenario.expect,
+        solid=solid_of(mission.water()),
+        hull=boat_of(mission).hull,
+        goal_en_m=frame.en_from_geo(mission.goals[-1].point),
+        refuges_en_m=[frame.en_from_geo(r.point) for r in mission.refuges],
+        marks=lap * mission.skipper.laps,
+        tasks=tasks_of(mission, scenario.epoch_s - began_s),
+        keep_m=mission.traffic.safe_distance_m,
+        floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
+    )
 
 
 def permitted(mission: Mission, scenario: Scenario) -> Mission:
@@ -245,27 +253,18 @@ async def run_embedded(
         for task in side_tasks:
             with contextlib.suppress(asyncio.CancelledError):
                 await task
-    area = mission.water()
     verdict = judge(
-        scenario=scenario.name,
-        seed=seed,
-        expect=scenario.expect,
-        truth=world.truth,
-        solid=solid_of(area),
-        hull=boat_of(mission).hull,
-        floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
-        called_at_s=world.called_at_s,
-        ordered=world.ordered if world.neighbours else None,
-        goal_en_m=frame.en_from_geo(mission.goals[-1].point),
-        summary=world.summary,
-        status_times_s=world.status_s,
-        alerts=world.alerts,
-        errors=world.errors,
-        marks=marks_of(mission),
-        tasks=tasks_of(mission, scenario.epoch_s),
-        keep_m=mission.traffic.safe_distance_m,
+        terms_of(scenario, mission, seed),
+        world.truth,
+        Told(
+            summary=world.summary,
+            alerts=world.alerts,
+            errors=world.errors,
+            status_times_s=world.status_s,
+            called_at_s=world.called_at_s,
+            ordered=world.ordered if world.neighbours else None,
+        ),
         keel_m=keel_of(mission, world.truth, seabed, 0.0, scenario.epoch_s),
-        **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict

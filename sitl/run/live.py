@@ -24,7 +24,6 @@ from pathlib import Path
 from typing import Any
 
 from companion.clock import now_s, run
-from companion.compose import boat_of
 from companion.disk import Disk
 from companion.errors import JobError, LinkError
 from companion.geo.frame import LocalFrame
@@ -33,7 +32,7 @@ from companion.telemetry.folder import DECISIONS, SUMMARY, VERDICT
 from sitl.faults import LINK_EVENTS, Relay, break_vane, impair
 from sitl.run.boats import LiveBoat, RealBoat, SimulatedBoat
 from sitl.run.depths import feed_of, sounder_port
-from sitl.run.embedded import TRUTH_EVERY_S, ends_of, keel_of, marks_of, solid_of
+from sitl.run.embedded import TRUTH_EVERY_S, keel_of, terms_of
 from sitl.scenario import (
     TRAFFIC,
     EventSpec,
@@ -41,14 +40,13 @@ from sitl.scenario import (
     Others,
     Scenario,
     ScenarioVerdict,
+    Told,
     TrueTrack,
     free_port,
-    is_all_ordinary,
     judge,
     scenario_seabed,
     scenario_sounder,
     scenario_wind,
-    tasks_of,
 )
 
 PERIOD_S = 0.1
@@ -369,24 +367,11 @@ async def _run(
         raise JobError(f"the companion left no summary in {folder}; its exit code was {companion.exit_code}")
     summary: dict[str, Any] = json.loads(summary_path.read_bytes())
     verdict = judge(
-        scenario=scenario.name,
-        seed=seed,
-        expect=scenario.expect,
-        truth=truth,
-        solid=solid_of(mission.water()),
-        hull=boat_of(mission).hull,
-        floor_m=mission.margin_floor_m if is_all_ordinary(scenario.events) else None,
-        goal_en_m=frame.en_from_geo(mission.goals[-1].point),
-        summary=summary,
-        status_times_s=None,
-        alerts=summary.get("alerts", {}),
-        errors=errors,
-        marks=marks_of(mission),
+        terms_of(scenario, mission, seed, began_s),
+        truth,
+        Told(summary=summary, alerts=summary.get("alerts", {}), errors=errors),
         began_s=began_s,
-        keep_m=mission.traffic.safe_distance_m,
-        tasks=tasks_of(mission, scenario.epoch_s - began_s),
         keel_m=keel_of(mission, truth, seabed, began_s, scenario.epoch_s),
-        **ends_of(mission),
     )
     Disk().replace(folder / VERDICT, json.dumps(verdict.to_dict(), indent=1).encode())
     return verdict

@@ -30,20 +30,17 @@ from sitl.scenario.scenario import (
 )
 from sitl.scenario.tasks import tasks_of
 from sitl.scenario.traffic import TRAFFIC, Motion, Others, free_port
-from sitl.scenario.verdict import (
-    CALL_HOLDS_S,
+from sitl.scenario.true_track import (
     TASK_S,
     HullTrack,
-    ScenarioVerdict,
     StationScore,
     TrueTrack,
     count_tacks,
-    judge,
     over_drying_m,
     station_score,
     under_keel_m,
-    verdict_line,
 )
+from sitl.scenario.verdict import CALL_HOLDS_S, ScenarioVerdict, Terms, Told, judge, verdict_line
 
 __all__ = [
     "CALL_HOLDS_S",
@@ -69,6 +66,8 @@ __all__ = [
     "ScenarioVerdict",
     "SensorsSpec",
     "StationScore",
+    "Terms",
+    "Told",
     "TrueTrack",
     "WavesSpec",
     "WindSpec",

@@ -27,7 +27,7 @@ from companion.geo.frame import LocalFrame
 from sitl.autopilot import AisVessel
 from sitl.scenario.colregs import SHIP_TYPE, STATUS, Mariner, Met, Mover, Receiver, met_by
 from sitl.scenario.scenario import EventSpec
-from sitl.scenario.verdict import TrueTrack
+from sitl.scenario.true_track import TrueTrack
 from sitl.world import LENGTH_M as VAIMOS_M
 from sitl.world import SimulatedVaimos, WindModel, habits_for
 

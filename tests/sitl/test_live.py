@@ -36,7 +36,7 @@ from sitl.run.depths import spoken_depths
 from sitl.run.live import follow, run_live
 from sitl.scenario.scenario import EventSpec, load_scenario
 from sitl.scenario.traffic import Others, distance_m, free_port, sentences, ship_of
-from sitl.scenario.verdict import TrueTrack
+from sitl.scenario.true_track import TrueTrack
 from sitl.world import MOST_M
 from sitl.world.environment import Constant
 

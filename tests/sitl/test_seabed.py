@@ -15,10 +15,11 @@ from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from sitl.run.boats import RealBoat, SimulatedBoat
 from sitl.run.embedded import mission_of, run_embedded
-from sitl.scenario import judge, load_scenario, scenario_seabed, scenario_sounder, under_keel_m, verdict_line
+from sitl.scenario import load_scenario, scenario_seabed, scenario_sounder, under_keel_m, verdict_line
 from sitl.scenario.scenario import BankSpec, BottomSpec, ExpectSpec
-from sitl.scenario.verdict import TrueTrack
+from sitl.scenario.true_track import TrueTrack
 from sitl.world import Bank, Seabed, SimulatedSounder, Tide
+from tests.sitl.judged import judged
 
 FRAME = LocalFrame(GeoPoint(lat_deg=50.8, lon_deg=-1.3))
 HERE = FRAME.geo_from_en(0.0, 0.0)
@@ -98,8 +99,8 @@ def test_a_keel_that_strikes_between_two_samples_has_struck():
     keel_m = under_keel_m(truth, seabed, 1.5)
     assert keel_m.min() < -1.4
 
-    def judged(expect):
-        return judge(
+    def held_against(expect):
+        return judged(
             scenario="x",
             seed=1,
             expect=expect,
@@ -113,11 +114,11 @@ def test_a_keel_that_strikes_between_two_samples_has_struck():
             keel_m=keel_m,
         )
 
-    verdict = judged(ExpectSpec())
+    verdict = held_against(ExpectSpec())
     assert not verdict.passed
     assert verdict.figures["groundings"] == 1
     assert "1 grounding" in verdict_line(verdict.to_dict())
-    assert judged(ExpectSpec(groundings=1)).passed
+    assert held_against(ExpectSpec(groundings=1)).passed
 
 
 def scenario_solid():

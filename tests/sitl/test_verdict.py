@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from companion.boat import Hull
 from sitl.commands.run import print_verdict
 from sitl.scenario.scenario import EventSpec, ExpectSpec, HeldSpec, is_ordinary
-from sitl.scenario.verdict import HullTrack, TrueTrack, count_roundings, count_tacks, judge, longest_silence_s
+from sitl.scenario.true_track import HullTrack, TrueTrack, count_roundings, count_tacks, longest_silence_s
+from tests.sitl.judged import judged
 
 ISLAND = shapely.Point(0.0, 0.0).buffer(10.0)
 
@@ -29,7 +30,7 @@ def hulls(en_m, heading_deg=0.0, hull=DOT):
 def test_a_verdict_is_printed_in_words(capsys):
     """It printed "pass  no unhandled error: [] ([])"."""
     print_verdict(
-        judge(
+        judged(
             scenario="x",
             seed=1,
             expect=ExpectSpec(arrived=True, contacts=0, min_clearance_m=2.0, alerts=("irons",)),
@@ -56,7 +57,7 @@ def test_a_buoy_is_not_sailed_over_asked_for_or_not(off_m, passed):
     truth = TrueTrack()
     for t_s in range(31):
         truth.add(float(t_s), (10.0 * t_s, 0.0), 0.0, 1.0, (0.0, 5.0))
-    verdict = judge(
+    verdict = judged(
         scenario="x",
         seed=1,
         expect=ExpectSpec(),
@@ -80,7 +81,7 @@ def test_a_boat_that_is_to_hold_is_judged_by_how_far_she_goes_meanwhile(held, wi
     for t_s in range(31):
         truth.add(5.0 + t_s, (10.0 * (min(t_s, 10) + max(0, t_s - 20)), 0.0), 0.0, 1.0, (0.0, 5.0))
     for limit_m in (1.0, 200.0):
-        verdict = judge(
+        verdict = judged(
             scenario="x",
             seed=1,
             expect=ExpectSpec(held=HeldSpec(from_s=held[0], to_s=held[1], within_m=limit_m)),
@@ -149,7 +150,7 @@ def test_the_hull_is_where_the_planes_geometry_has_it():
 
 def test_a_boat_that_never_sailed_touched_nothing_and_does_not_pass():
     def verdict(truth):
-        return judge(
+        return judged(
             scenario="x",
             seed=0,
             expect=ExpectSpec(arrived=None),
@@ -195,7 +196,7 @@ def test_tacks_are_counted_on_the_way_only():
 
     def passed(goal_north_m):
         return (
-            judge(
+            judged(
                 scenario="s",
                 seed=0,
                 expect=expect,
@@ -233,7 +234,7 @@ def test_silence_counts_both_ends():
 
 def test_a_verdict_fails_for_each_reason_by_name():
     truth = _truth([45.0] * 20)
-    verdict = judge(
+    verdict = judged(
         scenario="x",
         seed=1,
         expect=ExpectSpec(arrived=True, contacts=0, within_m=1.0, alerts=("irons",)),
@@ -275,7 +276,7 @@ def test_a_board_near_a_mark_and_a_miss_sailed_again_are_not_the_rounding():
 
 
 def verdict_of(truth, hull=DOT, **how):
-    return judge(
+    return judged(
         scenario="x",
         seed=0,
         expect=how.pop("expect", ExpectSpec(arrived=None, contacts=9)),
