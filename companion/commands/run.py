@@ -47,6 +47,23 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "missions/archipelago.toml --link udpin:127.0.0.1:14551; companion run --from-autopilot boat.toml --link "
         "udpin:127.0.0.1:14551",
     )
+    _add_mission(parser)
+    _add_shore(parser)
+    _add_limits(parser)
+    _add_instruments(parser)
+    parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (32 bytes, mode 0600)")
+    parser.add_argument(
+        "--speedup",
+        type=number(above=0.0, at_most=1000.0),
+        default=1.0,
+        metavar="N",
+        help="the autopilot is a simulator that runs N times as fast as time (default: 1)",
+    )
+    parser.set_defaults(run=run)
+
+
+def _add_mission(parser: argparse.ArgumentParser) -> None:
+    """Add the options of what is sailed, and on which autopilot."""
     parser.add_argument(
         "mission",
         type=Path,
@@ -95,6 +112,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
         help="where the state for a restart is kept (default: voyages/<mission>.state.json); its "
         "folder is one boat's, and locked",
     )
+
+
+def _add_shore(parser: argparse.ArgumentParser) -> None:
+    """Add the options of who may look on and give orders."""
     parser.add_argument(
         "--socket",
         type=Path,
@@ -146,6 +167,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
         metavar="MIN",
         help="a new status this often (default: 10), and after each order",
     )
+
+
+def _add_limits(parser: argparse.ArgumentParser) -> None:
+    """Add the options of how long she sails, and what is kept of it."""
     parser.add_argument(
         "--again",
         action="store_true",
@@ -171,6 +196,10 @@ def add_parser(subparsers: Any, summary: str) -> None:
         action="store_true",
         help="end when the voyage is over; by default the boat is watched in its loiter until SIGINT or SIGTERM",
     )
+
+
+def _add_instruments(parser: argparse.ArgumentParser) -> None:
+    """Add the options of what is heard of other vessels and the depth, and which displays are told."""
     parser.add_argument(
         "--feed",
         action="append",
@@ -204,15 +233,6 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument(
         "--signalk-token", type=Path, metavar="FILE", help="the token that the Signal K server asks for (mode 0600)"
     )
-    parser.add_argument("--signing-key", type=Path, metavar="FILE", help="MAVLink signing key (32 bytes, mode 0600)")
-    parser.add_argument(
-        "--speedup",
-        type=number(above=0.0, at_most=1000.0),
-        default=1.0,
-        metavar="N",
-        help="the autopilot is a simulator that runs N times as fast as time (default: 1)",
-    )
-    parser.set_defaults(run=run)
 
 
 NOT_THERE = 66  # exit code (EX_NOINPUT of sysexits.h): a card mounted a second late is no reason to give up
