@@ -54,69 +54,80 @@ def execute(pilot: Pilot, m: Any, link: MavlinkPort) -> None:
 
 
 def _dispatch(pilot: Pilot, m: Any, link: MavlinkPort, p: tuple[float, ...], place: tuple[int, int]) -> int:
+    """Do what a command asks for; return its MAV_RESULT."""
     command = m.command
-    if command == mav.MAV_CMD_SET_MESSAGE_INTERVAL:
-        return _set_interval(pilot, link, int(p[0]), p[1])
-    if command == mav.MAV_CMD_GET_MESSAGE_INTERVAL:
-        interval = link.interval_s(int(p[0]))
-        link.send(mav.MAVLink_message_interval_message(int(p[0]), round(interval * 1e6) if interval else 0))
-        return OK
-    if command == mav.MAV_CMD_REQUEST_MESSAGE:
-        return OK if send_once(pilot, link, int(p[0])) else FAILED
-    if command == mav.MAV_CMD_DO_SET_MODE:
-        return OK if pilot.helm.set_mode(int(p[1])) else FAILED
-    if command == mav.MAV_CMD_COMPONENT_ARM_DISARM:
-        if p[0] == 1.0:
-            return OK if pilot.arming.arm(force=p[1] == _FORCE) else FAILED
-        if p[0] != 0.0:
-            return FAILED
-        pilot.arming.disarm()
-        return OK
-    if command == mav.MAV_CMD_MISSION_START:
-        return OK if pilot.helm.set_mode(Mode.AUTO) else FAILED
-    if command == mav.MAV_CMD_DO_SET_MISSION_CURRENT:
-        known = 0 <= p[0] < len(pilot.helm.mission.items)
-        if not (known and pilot.helm.set_current(int(p[0]), resets=p[1] == 1.0)):
-            return REFUSED
-        send_once(pilot, link, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
-        return OK
+    if command in _MODE_OF:
+        return _done(pilot.helm.set_mode(_MODE_OF[command]))
+    if command in _FOR_THE_LINK:
+        return _FOR_THE_LINK[command](pilot, link, p)
+    if command in _FOR_THE_PILOT:
+        return _FOR_THE_PILOT[command](pilot, p)
     if command == mav.MAV_CMD_DO_REPOSITION:
         return _reposition(pilot, m, p, place)
-    if command == mav.MAV_CMD_DO_FENCE_ENABLE:
-        pilot.fence.switch(enabled=p[0] == 1.0)
-        return OK
-    if command == mav.MAV_CMD_DO_AUX_FUNCTION:
-        if int(p[0]) == AUX_MOTOR:
-            pilot.core.run_motor(on=int(p[1]) == 2)
-            return OK
-        if int(p[0]) != AUX_TACK:
-            return FAILED
-        if int(p[1]) == 2:
-            pilot.core.vehicle.ask_tack()
-        return OK
     if command == mav.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN:
-        if int(p[0]) not in {1, 3}:
-            return UNSUPPORTED
-        sixth = m.param6 if m.get_type() == "COMMAND_LONG" else m.y
-        if pilot.core.is_armed and sixth != _FORCE_REBOOT:
-            return FAILED
-        pilot.core.reboot_soon()
-        return OK
+        return _reboot(pilot, m, int(p[0]))
     if command == mav.MAV_CMD_DO_SET_HOME:
-        return OK if pilot.core.set_home(None if p[0] == 1.0 else pilot.core.chart.to_en(*place)) else FAILED
-    if command == mav.MAV_CMD_GET_HOME_POSITION:
-        return OK if send_once(pilot, link, mav.MAVLINK_MSG_ID_HOME_POSITION) else FAILED
-    if command == mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES:
-        link.send(autopilot_version(pilot))
+        return _done(pilot.core.set_home(None if p[0] == 1.0 else pilot.core.chart.to_en(*place)))
+    return OK if command in _WITHOUT_EFFECT else UNSUPPORTED
+
+
+def _done(is_done: bool) -> int:
+    return OK if is_done else FAILED
+
+
+def _tell_interval(_pilot: Pilot, link: MavlinkPort, p: tuple[float, ...]) -> int:
+    interval = link.interval_s(int(p[0]))
+    link.send(mav.MAVLink_message_interval_message(int(p[0]), round(interval * 1e6) if interval else 0))
+    return OK
+
+
+def _set_current(pilot: Pilot, link: MavlinkPort, p: tuple[float, ...]) -> int:
+    known = 0 <= p[0] < len(pilot.helm.mission.items)
+    if not (known and pilot.helm.set_current(int(p[0]), resets=p[1] == 1.0)):
+        return REFUSED
+    send_once(pilot, link, mav.MAVLINK_MSG_ID_MISSION_CURRENT)
+    return OK
+
+
+def _tell_capabilities(pilot: Pilot, link: MavlinkPort, _p: tuple[float, ...]) -> int:
+    link.send(autopilot_version(pilot))
+    return OK
+
+
+def _arm_or_disarm(pilot: Pilot, p: tuple[float, ...]) -> int:
+    if p[0] == 1.0:
+        return _done(pilot.arming.arm(force=p[1] == _FORCE))
+    if p[0] != 0.0:
+        return FAILED
+    pilot.arming.disarm()
+    return OK
+
+
+def _switch_fence(pilot: Pilot, p: tuple[float, ...]) -> int:
+    pilot.fence.switch(enabled=p[0] == 1.0)
+    return OK
+
+
+def _auxiliary(pilot: Pilot, p: tuple[float, ...]) -> int:
+    """Run the motor, or tack, as an auxiliary switch in its high position does."""
+    if int(p[0]) == AUX_MOTOR:
+        pilot.core.run_motor(on=int(p[1]) == 2)
         return OK
-    if command == mav.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-        return OK if pilot.helm.set_mode(Mode.RTL) else FAILED
-    if command == mav.MAV_CMD_NAV_LOITER_UNLIM:
-        return OK if pilot.helm.set_mode(Mode.LOITER) else FAILED
-    # a pure sailboat cannot choose its speed: acknowledged and without effect, as on the real one
-    if command in {mav.MAV_CMD_DO_CHANGE_SPEED, mav.MAV_CMD_DO_SEND_BANNER}:
-        return OK
-    return UNSUPPORTED
+    if int(p[0]) != AUX_TACK:
+        return FAILED
+    if int(p[1]) == 2:
+        pilot.core.vehicle.ask_tack()
+    return OK
+
+
+def _reboot(pilot: Pilot, m: Any, what: int) -> int:
+    if what not in {1, 3}:
+        return UNSUPPORTED
+    sixth = m.param6 if m.get_type() == "COMMAND_LONG" else m.y
+    if pilot.core.is_armed and sixth != _FORCE_REBOOT:
+        return FAILED
+    pilot.core.reboot_soon()
+    return OK
 
 
 def _set_interval(pilot: Pilot, link: MavlinkPort, msgid: int, interval_us: float) -> int:
@@ -142,6 +153,31 @@ def _reposition(pilot: Pilot, m: Any, p: tuple[float, ...], place: tuple[int, in
         return FAILED
     pilot.helm.go_to(pilot.core.chart.to_en(*place))
     return OK
+
+
+_MODE_OF = {
+    mav.MAV_CMD_MISSION_START: Mode.AUTO,
+    mav.MAV_CMD_NAV_RETURN_TO_LAUNCH: Mode.RTL,
+    mav.MAV_CMD_NAV_LOITER_UNLIM: Mode.LOITER,
+}
+_FOR_THE_LINK: dict[int, Callable[[Pilot, MavlinkPort, tuple[float, ...]], int]] = {
+    mav.MAV_CMD_SET_MESSAGE_INTERVAL: lambda pilot, link, p: _set_interval(pilot, link, int(p[0]), p[1]),
+    mav.MAV_CMD_GET_MESSAGE_INTERVAL: _tell_interval,
+    mav.MAV_CMD_REQUEST_MESSAGE: lambda pilot, link, p: _done(send_once(pilot, link, int(p[0]))),
+    mav.MAV_CMD_DO_SET_MISSION_CURRENT: _set_current,
+    mav.MAV_CMD_GET_HOME_POSITION: lambda pilot, link, _: _done(
+        send_once(pilot, link, mav.MAVLINK_MSG_ID_HOME_POSITION)
+    ),
+    mav.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _tell_capabilities,
+}
+_FOR_THE_PILOT: dict[int, Callable[[Pilot, tuple[float, ...]], int]] = {
+    mav.MAV_CMD_DO_SET_MODE: lambda pilot, p: _done(pilot.helm.set_mode(int(p[1]))),
+    mav.MAV_CMD_COMPONENT_ARM_DISARM: _arm_or_disarm,
+    mav.MAV_CMD_DO_FENCE_ENABLE: _switch_fence,
+    mav.MAV_CMD_DO_AUX_FUNCTION: _auxiliary,
+}
+# a pure sailboat cannot choose its speed: acknowledged and without effect, as on the real one
+_WITHOUT_EFFECT = frozenset({mav.MAV_CMD_DO_CHANGE_SPEED, mav.MAV_CMD_DO_SEND_BANNER})
 
 
 def setpoint(pilot: Pilot, m: Any) -> None:
