@@ -124,6 +124,230 @@ def straighten(xs: Floats, ys: Floats, n: int, i: int, count: int) -> int:
     return _delete(xs, ys, n, i + 1, count)
 
 
+# The moves: each changes the path in place and returns its new number of points, 0: there is no such move.
+
+
+@kernel
+def _push_corner(xs: Floats, ys: Floats, n: int, step: float, rng: NDArray[np.uint64]) -> int:
+    """Push a corner anywhere, at most ``step`` metres either way."""
+    i = 1 + int(uniform(rng) * (n - 2))
+    xs[i] += step * (2.0 * uniform(rng) - 1.0)
+    ys[i] += step * (2.0 * uniform(rng) - 1.0)
+    return n
+
+
+@kernel
+def _keep_course(
+    b: BoatModel, xs: Floats, ys: Floats, n: int, m: int, back: bool, ax: float, ay: float, at: Floats, course: Floats
+) -> int:
+    """Solve corner ``m`` again by the two courses that it had before its neighbour moved away from (ax, ay); 0: cannot.
+
+    ``back``: the neighbour is the next point, not the one before.
+    """
+    if not 0 < m < n - 1:
+        return n
+    t, h = at[m - 1], course[m - 1]
+    if back:
+        k1 = kind_of(math.atan2(xs[m] - xs[m - 1], ys[m] - ys[m - 1]))
+        k2 = kind_of(math.atan2(ax - xs[m], ay - ys[m]))
+    else:
+        k1 = kind_of(math.atan2(xs[m] - ax, ys[m] - ay))
+        k2 = kind_of(math.atan2(xs[m + 1] - xs[m], ys[m + 1] - ys[m]))
+    if k1 == k2:
+        return 0
+    if not back:
+        t, h = arrive(b, xs[m - 2], ys[m - 2], xs[m - 1], ys[m - 1], at[m - 2], course[m - 2])
+    x, y, _, ok = corner(b, xs[m - 1], ys[m - 1], h, t, xs[m + 1], ys[m + 1], k1, k2)
+    if not ok:
+        return 0
+    xs[m], ys[m] = x, y
+    return n
+
+
+@kernel
+def _slide_corner(
+    b: BoatModel, xs: Floats, ys: Floats, n: int, step: float, at: Floats, course: Floats, rng: NDArray[np.uint64]
+) -> int:
+    """Slide a corner along one of its legs, at times keeping the courses next to it."""
+    i = 1 + int(uniform(rng) * (n - 2))
+    if uniform(rng) < 0.5:
+        ux, uy = _course(xs, ys, i - 1)
+    else:
+        ux, uy = _course(xs, ys, i)
+    s = step if uniform(rng) < 0.5 else -step
+    ax, ay = xs[i], ys[i]
+    xs[i] += s * ux
+    ys[i] += s * uy
+    if uniform(rng) < 0.6:  # ... and keep the courses next to it
+        back = uniform(rng) < 0.5
+        return _keep_course(b, xs, ys, n, i - 1 if back else i + 1, back, ax, ay, at, course)
+    return n
+
+
+@kernel
+def _shift_block(xs: Floats, ys: Floats, n: int, step: float, rng: NDArray[np.uint64]) -> int:
+    """Shift a block of legs, courses kept."""
+    i = 1 + int(uniform(rng) * (n - 2))
+    j = min(n - 2, i + int(4.0 * uniform(rng) * uniform(rng) + uniform(rng)))
+    ux, uy = _course(xs, ys, i - 1)
+    s = step if uniform(rng) < 0.5 else -step
+    if uniform(rng) < 0.3:
+        ux, uy = 2.0 * uniform(rng) - 1.0, 2.0 * uniform(rng) - 1.0
+    for k in range(i, j + 1):
+        xs[k] += s * ux
+        ys[k] += s * uy
+    return n
+
+
+@kernel
+def _one_corner(
+    b: BoatModel, xs: Floats, ys: Floats, n: int, at: Floats, course: Floats, rng: NDArray[np.uint64]
+) -> int:
+    """Replace a stretch by one corner of two edge courses."""
+    i = int(uniform(rng) * (n - 1))
+    j = min(n - 1, i + 1 + int(4.0 * uniform(rng) * uniform(rng) + 0.7))
+    t, h = at[i], course[i]
+    k1, k2 = _pair(uniform(rng), ys[j] < ys[i])
+    x, y, _, ok = corner(b, xs[i], ys[i], h, t, xs[j], ys[j], k1, k2)
+    if not ok or n + 1 >= MOST_POINTS:
+        return 0
+    if j > i + 1:
+        n = _delete(xs, ys, n, i + 1, j - i - 1)
+    return _insert(xs, ys, n, i + 1, x, y)
+
+
+@kernel
+def _leave_out(xs: Floats, ys: Floats, n: int, rng: NDArray[np.uint64]) -> int:
+    """Leave corners out."""
+    i = 1 + int(uniform(rng) * (n - 2))
+    count = min(n - 1 - i, 1 + int(3.0 * uniform(rng) * uniform(rng)))
+    return _delete(xs, ys, n, i, count)
+
+
+@kernel
+def _corner_beside(xs: Floats, ys: Floats, n: int, step: float, rng: NDArray[np.uint64]) -> int:
+    """Put a new corner beside a leg."""
+    i = int(uniform(rng) * (n - 1))
+    f = uniform(rng)
+    x = xs[i] + f * (xs[i + 1] - xs[i]) + step * (2.0 * uniform(rng) - 1.0)
+    y = ys[i] + f * (ys[i + 1] - ys[i]) + step * (2.0 * uniform(rng) - 1.0)
+    return _insert(xs, ys, n, i + 1, x, y)
+
+
+@kernel
+def _nearest_leg(xs: Floats, ys: Floats, n: int, x: float, y: float) -> int:
+    """Return the leg that is nearest to (x, y), -1: there is none."""
+    best, m = math.inf, -1
+    for i in range(n - 1):
+        dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
+        d2 = dx * dx + dy * dy
+        f = ((x - xs[i]) * dx + (y - ys[i]) * dy) / d2 if d2 > 0.0 else 0.0
+        f = min(1.0, max(0.0, f))
+        d = (xs[i] + f * dx - x) ** 2 + (ys[i] + f * dy - y) ** 2
+        if d < best:
+            best, m = d, i
+    return m
+
+
+@kernel
+def _touch_spot(xs: Floats, ys: Floats, n: int, spots: Floats, rng: NDArray[np.uint64]) -> int:
+    """Lead the path by an obstacle's corner, through a new point or by one of the nearest leg's two."""
+    q = int(uniform(rng) * spots.shape[0])
+    x, y = spots[q, 0], spots[q, 1]
+    m = _nearest_leg(xs, ys, n, x, y)
+    if m < 0:
+        return 0
+    r = uniform(rng)
+    if r < 0.4 and n + 1 < MOST_POINTS:
+        return _insert(xs, ys, n, m + 1, x, y)
+    i = m if r < 0.7 else m + 1
+    if i == 0 or i == n - 1:
+        return 0
+    xs[i], ys[i] = x, y
+    return n
+
+
+@kernel
+def _move_end(xs: Floats, ys: Floats, n: int, goal: Floats, step: float, rng: NDArray[np.uint64]) -> int:
+    """Move the end in the goal's disc."""
+    radius = goal[2]
+    if radius <= 0.0:
+        return 0
+    m = n - 1
+    if uniform(rng) < 0.5 and n > 2:  # ... carrying the last corner with it
+        s = min(step, radius) * (2.0 * uniform(rng) - 1.0)
+        ux, uy = _course(xs, ys, m - 2)
+        xs[m - 1] += s * ux
+        ys[m - 1] += s * uy
+        xs[m] += s * ux
+        ys[m] += s * uy
+    elif uniform(rng) < 0.3:
+        ux, uy = _course(xs, ys, m - 1)
+        s = min(step, radius) * (2.0 * uniform(rng) - 1.0)
+        xs[m] += s * ux
+        ys[m] += s * uy
+    else:
+        xs[m] += min(step, radius) * (2.0 * uniform(rng) - 1.0)
+        ys[m] += min(step, radius) * (2.0 * uniform(rng) - 1.0)
+    dx, dy = xs[m] - goal[0], ys[m] - goal[1]
+    d = math.hypot(dx, dy)
+    if d > radius:
+        f = radius / d
+        xs[m], ys[m] = goal[0] + f * dx, goal[1] + f * dy
+    return n
+
+
+@kernel
+def _swap_courses(xs: Floats, ys: Floats, n: int, rng: NDArray[np.uint64]) -> int:
+    """Sail two courses in the other order."""
+    i = int(uniform(rng) * (n - 1))
+    if i + 2 >= n:
+        return 0
+    xs[i + 1] = xs[i] + xs[i + 2] - xs[i + 1]
+    ys[i + 1] = ys[i] + ys[i + 2] - ys[i + 1]
+    return n
+
+
+@kernel
+def _other_chain(xs: Floats, ys: Floats, n: int, i: int, j: int, rng: NDArray[np.uint64]) -> tuple[int, int, int]:
+    """Part, leave out or pick a leg of the chain from point i to j; return (points, j, the leg to be longer or -1)."""
+    r, longer = uniform(rng), -1
+    if r < 0.1 and n + j - i < MOST_POINTS:  # ... each of them in two parts
+        for m in range(j - 1, i - 1, -1):
+            n = _insert(xs, ys, n, m + 1, 0.5 * (xs[m] + xs[m + 1]), 0.5 * (ys[m] + ys[m + 1]))
+        j += j - i
+    elif r < 0.2 and n + 1 < MOST_POINTS:  # ... one of them in two parts
+        m = i + int(uniform(rng) * (j - i))
+        f = uniform(rng)
+        n = _insert(xs, ys, n, m + 1, xs[m] + f * (xs[m + 1] - xs[m]), ys[m] + f * (ys[m + 1] - ys[m]))
+        j += 1
+    elif r < 0.45 and j - i > 2:  # ... without some of the points between
+        m = i + 1 + int(uniform(rng) * (j - i - 1))
+        count = min(j - m, 1 + int(3.0 * uniform(rng) * uniform(rng)))
+        if j - count - i < 2:
+            return 0, j, -1
+        n = _delete(xs, ys, n, m, count)
+        j -= count
+    elif r < 0.85:  # ... one of them longer or shorter
+        longer = i + int(uniform(rng) * (j - i))
+    return n, j, longer
+
+
+@kernel
+def _lay_again(b: BoatModel, xs: Floats, ys: Floats, n: int, h0: float, step: float, rng: NDArray[np.uint64]) -> int:
+    """Lay close-hauled legs again in time."""
+    i = int(uniform(rng) * (n - 2))
+    j = min(n - 1, i + 2 + int(8.0 * uniform(rng) * uniform(rng)))
+    if uniform(rng) < 0.25:  # (sometimes to the end, or from the start)
+        j = n - 1
+    if uniform(rng) < 0.25:
+        i = 0
+    n, j, longer = _other_chain(xs, ys, n, i, j, rng)
+    if n == 0 or not relay(b, xs, ys, n, h0, i, j, longer, step if uniform(rng) < 0.5 else -step):
+        return 0
+    return n
+
+
 @kernel
 def propose(
     b: BoatModel,
@@ -150,157 +374,26 @@ def propose(
         if uniform(rng) < 0.5:
             return straighten(xs, ys, n, i, 1 + int(2.0 * uniform(rng)))
         return go_round(b, xs, ys, n, i, at, course, int(WAYS * uniform(rng)))
-    if b.kind != 0 and inner > 0 and uniform(rng) < 0.15:  # lay close-hauled legs again in time
-        i = int(uniform(rng) * (n - 2))
-        j = min(n - 1, i + 2 + int(8.0 * uniform(rng) * uniform(rng)))
-        if uniform(rng) < 0.25:  # (sometimes to the end, or from the start)
-            j = n - 1
-        if uniform(rng) < 0.25:
-            i = 0
-        r, longer = uniform(rng), -1
-        if r < 0.1 and n + j - i < MOST_POINTS:  # ... each of them in two parts
-            for m in range(j - 1, i - 1, -1):
-                n = _insert(xs, ys, n, m + 1, 0.5 * (xs[m] + xs[m + 1]), 0.5 * (ys[m] + ys[m + 1]))
-            j += j - i
-        elif r < 0.2 and n + 1 < MOST_POINTS:  # ... one of them in two parts
-            m = i + int(uniform(rng) * (j - i))
-            f = uniform(rng)
-            n = _insert(xs, ys, n, m + 1, xs[m] + f * (xs[m + 1] - xs[m]), ys[m] + f * (ys[m + 1] - ys[m]))
-            j += 1
-        elif r < 0.45 and j - i > 2:  # ... without some of the points between
-            m = i + 1 + int(uniform(rng) * (j - i - 1))
-            count = min(j - m, 1 + int(3.0 * uniform(rng) * uniform(rng)))
-            if j - count - i < 2:
-                return 0
-            n = _delete(xs, ys, n, m, count)
-            j -= count
-        elif r < 0.85:  # ... one of them longer or shorter
-            longer = i + int(uniform(rng) * (j - i))
-        if not relay(b, xs, ys, n, h0, i, j, longer, step if uniform(rng) < 0.5 else -step):
-            return 0
-        return n
-    if u < 0.18 and inner > 0:  # push a corner anywhere
-        i = 1 + int(uniform(rng) * inner)
-        xs[i] += step * (2.0 * uniform(rng) - 1.0)
-        ys[i] += step * (2.0 * uniform(rng) - 1.0)
-        return n
-    if u < 0.36 and inner > 0:  # slide a corner along one of its legs
-        i = 1 + int(uniform(rng) * inner)
-        if uniform(rng) < 0.5:
-            ux, uy = _course(xs, ys, i - 1)
-        else:
-            ux, uy = _course(xs, ys, i)
-        s = step if uniform(rng) < 0.5 else -step
-        ax, ay = xs[i], ys[i]
-        xs[i] += s * ux
-        ys[i] += s * uy
-        if uniform(rng) < 0.6:  # ... and keep the courses next to it
-            back = uniform(rng) < 0.5
-            m = i - 1 if back else i + 1
-            if 0 < m < n - 1:
-                t, h = at[m - 1], course[m - 1]
-                if back:
-                    k1 = kind_of(math.atan2(xs[m] - xs[m - 1], ys[m] - ys[m - 1]))
-                    k2 = kind_of(math.atan2(ax - xs[m], ay - ys[m]))
-                else:
-                    k1 = kind_of(math.atan2(xs[m] - ax, ys[m] - ay))
-                    k2 = kind_of(math.atan2(xs[m + 1] - xs[m], ys[m + 1] - ys[m]))
-                if k1 == k2:
-                    return 0
-                if not back:
-                    t, h = arrive(b, xs[m - 2], ys[m - 2], xs[m - 1], ys[m - 1], at[m - 2], course[m - 2])
-                x, y, _, ok = corner(b, xs[m - 1], ys[m - 1], h, t, xs[m + 1], ys[m + 1], k1, k2)
-                if not ok:
-                    return 0
-                xs[m], ys[m] = x, y
-        return n
-    if u < 0.46 and inner > 1:  # shift a block of legs, courses kept
-        i = 1 + int(uniform(rng) * inner)
-        j = min(n - 2, i + int(4.0 * uniform(rng) * uniform(rng) + uniform(rng)))
-        ux, uy = _course(xs, ys, i - 1)
-        s = step if uniform(rng) < 0.5 else -step
-        if uniform(rng) < 0.3:
-            ux, uy = 2.0 * uniform(rng) - 1.0, 2.0 * uniform(rng) - 1.0
-        for k in range(i, j + 1):
-            xs[k] += s * ux
-            ys[k] += s * uy
-        return n
-    if u < 0.56:  # replace a stretch by one corner
-        i = int(uniform(rng) * (n - 1))
-        j = min(n - 1, i + 1 + int(4.0 * uniform(rng) * uniform(rng) + 0.7))
-        t, h = at[i], course[i]
-        k1, k2 = _pair(uniform(rng), ys[j] < ys[i])
-        x, y, _, ok = corner(b, xs[i], ys[i], h, t, xs[j], ys[j], k1, k2)
-        if not ok or n + 1 >= MOST_POINTS:
-            return 0
-        if j > i + 1:
-            n = _delete(xs, ys, n, i + 1, j - i - 1)
-        return _insert(xs, ys, n, i + 1, x, y)
-    if u < 0.64 and inner > 0:  # leave corners out
-        i = 1 + int(uniform(rng) * inner)
-        count = min(n - 1 - i, 1 + int(3.0 * uniform(rng) * uniform(rng)))
-        return _delete(xs, ys, n, i, count)
-    if u < 0.70 and n + 1 < MOST_POINTS:  # a new corner beside a leg
-        i = int(uniform(rng) * (n - 1))
-        f = uniform(rng)
-        x = xs[i] + f * (xs[i + 1] - xs[i]) + step * (2.0 * uniform(rng) - 1.0)
-        y = ys[i] + f * (ys[i + 1] - ys[i]) + step * (2.0 * uniform(rng) - 1.0)
-        return _insert(xs, ys, n, i + 1, x, y)
-    if u < 0.80 and spots.shape[0] > 0:  # touch an obstacle's corner
-        q = int(uniform(rng) * spots.shape[0])
-        x, y = spots[q, 0], spots[q, 1]
-        best, m = math.inf, -1
-        for i in range(n - 1):
-            dx, dy = xs[i + 1] - xs[i], ys[i + 1] - ys[i]
-            d2 = dx * dx + dy * dy
-            f = ((x - xs[i]) * dx + (y - ys[i]) * dy) / d2 if d2 > 0.0 else 0.0
-            f = min(1.0, max(0.0, f))
-            d = (xs[i] + f * dx - x) ** 2 + (ys[i] + f * dy - y) ** 2
-            if d < best:
-                best, m = d, i
-        if m < 0:
-            return 0
-        r = uniform(rng)
-        if r < 0.4 and n + 1 < MOST_POINTS:
-            return _insert(xs, ys, n, m + 1, x, y)
-        i = m if r < 0.7 else m + 1
-        if i == 0 or i == n - 1:
-            return 0
-        xs[i], ys[i] = x, y
-        return n
-    if u < 0.88 and n > 1:  # move the end in the goal's disc
-        radius = goal[2]
-        if radius <= 0.0:
-            return 0
-        m = n - 1
-        if uniform(rng) < 0.5 and n > 2:  # ... carrying the last corner with it
-            s = min(step, radius) * (2.0 * uniform(rng) - 1.0)
-            ux, uy = _course(xs, ys, m - 2)
-            xs[m - 1] += s * ux
-            ys[m - 1] += s * uy
-            xs[m] += s * ux
-            ys[m] += s * uy
-        elif uniform(rng) < 0.3:
-            ux, uy = _course(xs, ys, m - 1)
-            s = min(step, radius) * (2.0 * uniform(rng) - 1.0)
-            xs[m] += s * ux
-            ys[m] += s * uy
-        else:
-            xs[m] += min(step, radius) * (2.0 * uniform(rng) - 1.0)
-            ys[m] += min(step, radius) * (2.0 * uniform(rng) - 1.0)
-        dx, dy = xs[m] - goal[0], ys[m] - goal[1]
-        d = math.hypot(dx, dy)
-        if d > radius:
-            f = radius / d
-            xs[m], ys[m] = goal[0] + f * dx, goal[1] + f * dy
-        return n
-    if u < 0.94:  # two courses in the other order
-        i = int(uniform(rng) * (n - 1))
-        if i + 2 >= n:
-            return 0
-        xs[i + 1] = xs[i] + xs[i + 2] - xs[i + 1]
-        ys[i + 1] = ys[i] + ys[i + 2] - ys[i + 1]
-        return n
+    if b.kind != 0 and inner > 0 and uniform(rng) < 0.15:
+        return _lay_again(b, xs, ys, n, h0, step, rng)
+    if u < 0.18 and inner > 0:
+        return _push_corner(xs, ys, n, step, rng)
+    if u < 0.36 and inner > 0:
+        return _slide_corner(b, xs, ys, n, step, at, course, rng)
+    if u < 0.46 and inner > 1:
+        return _shift_block(xs, ys, n, step, rng)
+    if u < 0.56:
+        return _one_corner(b, xs, ys, n, at, course, rng)
+    if u < 0.64 and inner > 0:
+        return _leave_out(xs, ys, n, rng)
+    if u < 0.70 and n + 1 < MOST_POINTS:
+        return _corner_beside(xs, ys, n, step, rng)
+    if u < 0.80 and spots.shape[0] > 0:
+        return _touch_spot(xs, ys, n, spots, rng)
+    if u < 0.88 and n > 1:
+        return _move_end(xs, ys, n, goal, step, rng)
+    if u < 0.94:
+        return _swap_courses(xs, ys, n, rng)
     if n > 2:  # all corners to their times
         fit_corners(b, xs, ys, n, h0, 1 + int(uniform(rng) * inner), True)
         return n

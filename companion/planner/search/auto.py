@@ -22,9 +22,10 @@ from companion.planner.problem.evaluate import shore_of, solid_words, target_hit
 from companion.planner.problem.value import Problem
 from companion.planner.search.annealing import MOST_POINTS, anneal, timetable
 from companion.planner.search.bound import Bound, cut_off, no_course
+from companion.planner.search.drift import run_drift
 from companion.planner.search.gauge import Gauge, make_gauge
 from companion.planner.search.kernels import Floats, is_free
-from companion.planner.search.lattice import run_drift, run_lattice
+from companion.planner.search.lattice import run_lattice
 from companion.planner.search.moves import check_path, fitted, follow, rounded, zigzag
 from companion.planner.search.visibility import crossings, geodesics, graph_nodes, least_through
 from companion.planner.search.world import SearchWorld, make_world

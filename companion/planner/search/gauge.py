@@ -26,6 +26,19 @@ _TABLE = 2048
 _STRIDE = 16
 
 
+class Aim(NamedTuple):
+    """The goal as a search aims at it: its disc [m], and the least time to it.
+
+    ``table``: least seconds per metre by direction, over [-π, π); ``slack``: what the disc saves of it [s].
+    """
+
+    x: float
+    y: float
+    radius: float
+    table: Floats
+    slack: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Gauge:
     """``normals`` (m, 2) are scaled so that γ(d) >= max(normals @ d), with equality up to the pushing out.
@@ -43,9 +56,26 @@ class Gauge:
     can_move: bool
     slack: float = 1.0
 
+    def aim(self, x: float, y: float, radius_m: float) -> Aim:
+        """Return the goal's disc about (x, y) [m] with the least time to it from anywhere."""
+        return Aim(x, y, radius_m, self.table, radius_m * self.table_max)
+
     def disc(self, dx: float, dy: float, radius_m: float) -> float:
         """Return the least time [s] to come within ``radius_m`` of the displacement (dx, dy); inf if it cannot."""
         return float(disc_time(self.normals, self.blocked, dx, dy, radius_m))
+
+
+@kernel
+def least_time(table: Floats, dx: float, dy: float) -> float:
+    """Return the least time [s] that the displacement (dx, dy) [m] can take, by a table over directions [-π, π)."""
+    n = table.shape[0]
+    return float(table[int((math.atan2(dx, dy) + math.pi) / (2.0 * math.pi) * n) % n] * math.hypot(dx, dy))
+
+
+@kernel
+def least_from(aim: Aim, x: float, y: float) -> float:
+    """Return the least time [s] from (x, y) [m] to the goal's disc, obstacles apart."""
+    return max(0.0, least_time(aim.table, aim.x - x, aim.y - y) - aim.slack)
 
 
 @kernel

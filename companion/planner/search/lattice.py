@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.kernels.heap import pop, push
 from companion.kernels.jit import kernel
-from companion.planner.search.gauge import Gauge
+from companion.planner.search.gauge import Aim, Gauge, least_from
 from companion.planner.search.kernels import (
     SLACK_RAD,
     BoatModel,
@@ -25,7 +26,6 @@ from companion.planner.search.kernels import (
     Ints,
     SegmentGrid,
     is_free,
-    is_refused,
     meets_target,
     speed_at,
     track,
@@ -34,11 +34,11 @@ from companion.planner.search.kernels import (
     worst_half,
     wrap,
 )
-from companion.planner.search.moves import corner, edge_angle
+from companion.planner.search.moves import corner
 from companion.planner.search.world import SearchWorld
 
 LEAST_SINE = 0.1  # of the angle between a lattice's axes
-_START, _CLOCKWISE, _COUNTER, _MOVE, _ROUND = 1, 2, 3, 4, 5
+_CLOCKWISE, _COUNTER, _STEP, _ROUND, _START = 0, 1, 2, 3, 4  # the moves, and what came before all of them
 
 
 @kernel
@@ -55,121 +55,273 @@ def _misses(b: BoatModel, x: float, y: float, h: float, t: float, mx: float, my:
     return True
 
 
-@kernel
-def _wound(
-    b: BoatModel,
-    came: NDArray[np.uint8],
-    s: int,
-    nj: int,
-    steps: Ints,
-    angle: Floats,
-    lengths: Floats,
-    h0: float,
-    deep: float,
-) -> float:
-    """Return how far the boat has turned [rad, signed] in state ``s`` since its last leg as long as ``b.room``.
+class Lattice(NamedTuple):
+    """Where the nodes are: (i, j), of (0, 0) to (ni - 1, nj - 1), lies i - i0 axes a and j - j0 axes b from the start.
 
-    ``lengths``: of one step on each course [m]; a turn the long way round goes by a leg at TWA ``deep``.
+    All in metres: ``x``, ``y`` of the start, the axis vectors (``ax``, ``ay``) and (``bx``, ``by``), and the box from
+    (``x0``, ``y0``) to (``x1``, ``y1``) that nodes stay in.
+    """
+
+    ni: int
+    nj: int
+    i0: int
+    j0: int
+    x: float
+    y: float
+    ax: float
+    ay: float
+    bx: float
+    by: float
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+
+class Moves(NamedTuple):
+    """What can be done in a node on each course, (nd, 4): turn clockwise or counter-clockwise, sail a step, go round.
+
+    Going round leads from one close-hauled course to the other by a gybe, with a leg to leeward as long as that asks
+    for. Of each move: the ``shift`` from a state to the one that it leads to, and ``before``, the course from which it
+    leads to this one; lattice steps ``i`` and ``j``, in metres ``dx`` and ``dy``; the TWA ``angle`` [rad] that it turns
+    to or sails; and what it ``takes`` [s], for going round the turn to leeward alone (inf: it cannot be done).
+    ``twa`` (nd,): of the courses, sorted [rad]; ``length`` (nd,): of a step [m]; ``leg_s`` what the leg to leeward
+    takes [s], ``up_s`` (nd,) the turn up to this course behind it [s].
+    """
+
+    shift: Ints
+    before: Ints
+    i: Ints
+    j: Ints
+    dx: Floats
+    dy: Floats
+    angle: Floats
+    takes: Floats
+    twa: Floats
+    length: Floats
+    leg_s: float
+    up_s: Floats
+
+
+class End(NamedTuple):
+    """An end of the path: arrival [s], place [m], and the corner before it [m] where it is two legs off."""
+
+    t: float
+    x: float
+    y: float
+    via_x: float
+    via_y: float
+    by_corner: bool
+
+
+@kernel
+def _moves_of(b: BoatModel, on: Lattice, steps: Ints, leeward: Ints) -> Moves:
+    """Return the moves of the courses that ``steps`` (nd, 2) lead on, sorted by their TWA, as at the start's time.
+
+    ``leeward``: the leg of going round in lattice steps (0, 0: that is not done).
     """
     nd = steps.shape[0]
+    shift, before = np.empty((nd, 4), np.int32), np.empty((nd, 4), np.int32)
+    i, j = np.zeros((nd, 4), np.int32), np.zeros((nd, 4), np.int32)
+    dx, dy, angle, takes = np.zeros((nd, 4)), np.zeros((nd, 4)), np.empty((nd, 4)), np.empty((nd, 4))
+    twa, length, up_s = np.empty(nd), np.empty(nd), np.full(nd, np.inf)
+    port, starboard = -1, -1
+    for k in range(nd):
+        i[k, _STEP], j[k, _STEP] = steps[k, 0], steps[k, 1]
+        dx[k, _STEP] = steps[k, 0] * on.ax + steps[k, 1] * on.bx
+        dy[k, _STEP] = steps[k, 0] * on.ay + steps[k, 1] * on.by
+        twa[k], v = track(b, dx[k, _STEP], dy[k, _STEP], 0.0)
+        length[k] = math.hypot(dx[k, _STEP], dy[k, _STEP])
+        takes[k, _STEP] = length[k] / v if v > 1e-9 else math.inf
+        if twa[k] < 0.0:
+            port = k
+        elif starboard < 0:
+            starboard = k
+    deep, leg_s = 0.0, math.inf
+    down_x, down_y = leeward[0] * on.ax + leeward[1] * on.bx, leeward[0] * on.ay + leeward[1] * on.by
+    if (leeward[0] != 0 or leeward[1] != 0) and port >= 0 and starboard >= 0:
+        deep, v = track(b, down_x, down_y, 0.0)
+        leg_s = math.hypot(down_x, down_y) / v
+    for k in range(nd):
+        after, ahead = (k + 1) % nd, (k - 1) % nd
+        shift[k, _CLOCKWISE], before[k, _CLOCKWISE], angle[k, _CLOCKWISE] = after - k, ahead, twa[after]
+        shift[k, _COUNTER], before[k, _COUNTER], angle[k, _COUNTER] = ahead - k, after, twa[ahead]
+        takes[k, _CLOCKWISE], takes[k, _COUNTER] = turn_time(b, twa[k], twa[after]), turn_time(b, twa[ahead], twa[k])
+        shift[k, _STEP], before[k, _STEP], angle[k, _STEP] = (steps[k, 0] * on.nj + steps[k, 1]) * nd, k, twa[k]
+        other = starboard if k == port else port
+        shift[k, _ROUND], before[k, _ROUND] = (leeward[0] * on.nj + leeward[1]) * nd + other - k, other
+        angle[k, _ROUND], takes[k, _ROUND] = deep, math.inf
+        i[k, _ROUND], j[k, _ROUND], dx[k, _ROUND], dy[k, _ROUND] = leeward[0], leeward[1], down_x, down_y
+        if leg_s < math.inf and k in (port, starboard):
+            takes[k, _ROUND], up_s[k] = turn_time(b, twa[k], deep), turn_time(b, deep, twa[k])
+    return Moves(shift, before, i, j, dx, dy, angle, takes, twa, length, leg_s, up_s)
+
+
+@kernel
+def _place(on: Lattice, i: int, j: int) -> tuple[float, float]:
+    """Return where a node is, x and y [m]."""
+    return on.x + (i - on.i0) * on.ax + (j - on.j0) * on.bx, on.y + (i - on.i0) * on.ay + (j - on.j0) * on.by
+
+
+@kernel
+def _is_outside(on: Lattice, i: int, j: int, x: float, y: float) -> bool:
+    """Is this no node of the lattice, or one outside of its box?"""
+    return i < 0 or j < 0 or i >= on.ni or j >= on.nj or x < on.x0 or y < on.y0 or x > on.x1 or y > on.y1
+
+
+@kernel
+def _before(moves: Moves, move: int, s: int) -> int:
+    """Return the state from which a move came to state ``s``."""
+    return int(s - moves.shift[moves.before[s % moves.twa.shape[0], move], move])
+
+
+@kernel
+def _wound(b: BoatModel, moves: Moves, came: NDArray[np.uint8], s: int, h0: float) -> float:
+    """Return how far the boat has turned [rad, signed] in state ``s`` since its last leg as long as ``b.room``."""
+    nd = moves.twa.shape[0]
     wound, length = 0.0, 0.0
     for _ in range(256):
-        node, k = s // nd, s % nd
-        label = came[s]
-        if label == _START:
-            return wound + wrap(angle[k] - h0)
-        if label == _ROUND:
-            return wound + wrap(angle[k] - deep)
-        if label == _MOVE:
-            length += lengths[k]
+        move, k = came[s], s % nd
+        if move == _START:
+            return wound + wrap(moves.twa[k] - h0)
+        if move == _ROUND:
+            return wound + wrap(moves.twa[k] - moves.angle[k, _ROUND])
+        before = _before(moves, move, s)
+        if move == _STEP:
+            length += moves.length[k]
             if length >= b.room:
                 return wound
-            s = (node - steps[k, 0] * nj - steps[k, 1]) * nd + k
         else:
             length = 0.0
-            before = (k - 1) % nd if label == _CLOCKWISE else (k + 1) % nd
-            wound += wrap(angle[k] - angle[before])
-            s = node * nd + before
+            wound += wrap(moves.twa[k] - moves.twa[before % nd])
+        s = before
     return wound
+
+
+@kernel
+def nearest_of(aim: Aim, x: float, y: float) -> tuple[float, float, float]:
+    """Return x, y of the goal disc's nearest point to a place outside of it, and the way there [m]."""
+    gx, gy = aim.x - x, aim.y - y
+    d = math.hypot(gx, gy)
+    f = (d - 0.999999 * aim.radius) / d
+    return x + gx * f, y + gy * f, d * f
+
+
+@kernel
+def by_corner(
+    g: SegmentGrid, b: BoatModel, aim: Aim, x: float, y: float, h: float, t: float, bound: float, heeds: bool
+) -> End:
+    """Return the end by two edge courses from a place where the boat is at time t with TWA h; at inf: none.
+
+    It arrives before ``bound`` [s], and clear of moving targets where it ``heeds`` them.
+    """
+    ex, ey, _ = nearest_of(aim, x, y)
+    end = End(math.inf, ex, ey, 0.0, 0.0, True)
+    first = 0 if aim.y - y > 0.0 else 2
+    for way in range(2):
+        mx, my, t2, ok = corner(b, x, y, h, t, ex, ey, first + way, first + 1 - way)
+        if (
+            ok
+            and t2 < min(bound, end.t)
+            and is_free(g, x, y, mx, my)
+            and is_free(g, mx, my, ex, ey)
+            and (not heeds or b.targets.shape[0] == 0 or _misses(b, x, y, h, t, mx, my, ex, ey))
+        ):
+            end = End(t2, ex, ey, mx, my, True)
+    return end
+
+
+@kernel
+def _end_from(
+    g: SegmentGrid, b: BoatModel, aim: Aim, x: float, y: float, h: float, t: float, wound: float, bound: float
+) -> End:
+    """Return the exact end, by the straight leg or, where that is no course, by two; at inf: none before ``bound``."""
+    ex, ey, length = nearest_of(aim, x, y)
+    a, v = track(b, aim.x - x, aim.y - y, t)
+    if v > 1e-9 and abs(a) <= b.max_twa + SLACK_RAD:
+        t1 = t + turn_time(b, h, a)
+        t2 = t1 + length / v
+        if abs(a) >= worst_half(b, t1, t2):
+            is_open = (
+                t2 < bound
+                and (b.room == 0.0 or abs(wound + wrap(a - h)) <= b.most_turn)
+                and is_free(g, x, y, ex, ey)
+                and not (meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, ex, ey, t1, t2))
+            )
+            return End(t2 if is_open else math.inf, ex, ey, 0.0, 0.0, False)
+    if b.can_tack:
+        return by_corner(g, b, aim, x, y, h, t, bound, True)
+    return End(math.inf, ex, ey, 0.0, 0.0, False)
+
+
+@kernel
+def _way_back(on: Lattice, moves: Moves, came: NDArray[np.uint8], s: int, end: End) -> Floats:
+    """Return the points (n, 2) from the start by way of state ``s`` to the end, only those where the course changes."""
+    nd = moves.twa.shape[0]
+    count, last = 1, -1
+    path = np.empty((4096, 2))
+    path[0, 0], path[0, 1] = end.x, end.y
+    if end.by_corner:
+        path[1, 0], path[1, 1] = end.via_x, end.via_y
+        count = 2
+    while True:
+        node, k, move = s // nd, s % nd, came[s]
+        if (move != _STEP or last != k) and count < 4095:
+            x, y = _place(on, node // on.nj, node % on.nj)
+            if abs(x - path[count - 1, 0]) + abs(y - path[count - 1, 1]) > 1e-9:
+                path[count, 0], path[count, 1] = x, y
+                count += 1
+        if move == _START:
+            return path[:count][::-1].copy()
+        if move == _STEP:
+            last = k
+        elif move == _ROUND:
+            last = -1
+        s = _before(moves, move, s)
 
 
 @kernel
 def lattice_search(
     g: SegmentGrid,
     b: BoatModel,
-    origin: Floats,
-    axes: Floats,
-    shape: Ints,
+    on: Lattice,
     steps: Ints,
-    goal: Floats,
-    box: Floats,
-    gauge: Floats,
-    slack: float,
+    leeward: Ints,
+    h0: float,
+    t0: float,
+    aim: Aim,
     bound: float,
     max_pops: int,
     shot_m: float,
     side: int,
 ) -> tuple[float, Floats, int]:
-    """Search; return (arrival time, points (n, 2), states expanded).
+    """Search from TWA ``h0`` [rad] at ``t0`` [s]; return (arrival time, points (n, 2), states expanded).
 
-    ``origin``: x, y, TWA and time of the start;
-    ``axes`` (2, 2): axis vectors in rows [m]; ``shape``: ni, nj, i0, j0 of the start, and the
-    leg of a turn the long way round as a lattice step (0, 0: none); ``steps`` (nd, 2): courses as
-    lattice steps, sorted by angle; ``goal``: x, y, radius; ``box``: x0, y0, x1, y1 that nodes stay in; ``gauge``:
-    least seconds per metre by direction (a table over [-π, π)), ``slack`` what the goal's disc saves; only paths
-    below ``bound`` are looked for; ``side`` 1 or -1 starts on courses with that sign of TWA only. Exhausted without a
-    path: there is none on this lattice within the bound.
+    ``steps`` and ``leeward`` as ``_moves_of``. Only paths below ``bound`` [s] are looked for; the exact end is tried
+    from within ``shot_m`` [m] of the goal and now and then from afar; ``side`` 1 or -1 starts on courses with that sign
+    of TWA only. Exhausted without a path: there is none on this lattice within the bound.
     """
-    ni, nj, i0, j0 = shape[0], shape[1], shape[2], shape[3]
-    ox, oy, h0, t0 = origin[0], origin[1], origin[2], origin[3]
-    nd = steps.shape[0]
-    dx, dy = np.empty(nd), np.empty(nd)
-    angle, duration, turn = np.empty(nd), np.empty(nd), np.empty(nd)
-    for k in range(nd):
-        dx[k] = steps[k, 0] * axes[0, 0] + steps[k, 1] * axes[1, 0]
-        dy[k] = steps[k, 0] * axes[0, 1] + steps[k, 1] * axes[1, 1]
-        a, v = track(b, dx[k], dy[k], 0.0)
-        angle[k], duration[k] = a, (math.hypot(dx[k], dy[k]) / v if v > 1e-9 else math.inf)
-    for k in range(nd):
-        turn[k] = turn_time(b, angle[k], angle[(k + 1) % nd])
-    # The way round from close-hauled to close-hauled: the leg (jump, hop) to leeward, with the room for it.
-    lengths = np.hypot(dx, dy)
-    jump, hop = shape[4], shape[5]
-    port, starboard, deep, round_t, wound = -1, -1, 0.0, math.inf, 0.0
-    for k in range(nd):
-        if angle[k] < 0.0:
-            port = k
-        elif starboard < 0:
-            starboard = k
-    down_x, down_y = jump * axes[0, 0] + hop * axes[1, 0], jump * axes[0, 1] + hop * axes[1, 1]
-    if (jump != 0 or hop != 0) and port >= 0 and starboard >= 0:
-        deep, v = track(b, down_x, down_y, 0.0)
-        round_t = math.hypot(down_x, down_y) / v
-    n_states = ni * nj * nd
+    moves = _moves_of(b, on, steps, leeward)
+    nj, nd, twa = on.nj, moves.twa.shape[0], moves.twa
+    shift, di, dj, dx, dy, angle, takes = moves.shift, moves.i, moves.j, moves.dx, moves.dy, moves.angle, moves.takes
+    n_states = on.ni * nj * nd
     cost = np.full(n_states, np.inf, np.float32)
     came = np.zeros(n_states, np.uint8)
     done = np.zeros(n_states, np.uint8)
-    h_node = np.full(ni * nj, -1.0, np.float32)
+    to_go = np.full(on.ni * nj, -1.0, np.float32)  # the least time from each node [s], -1 while not known
     keys, items, size = np.empty(1 << 15), np.empty(1 << 15, np.int32), 0
-    best, best_state, end_x, end_y, via_x, via_y, with_via = bound, -1, 0.0, 0.0, 0.0, 0.0, False
-    n_gauge = gauge.shape[0]
-
-    start = i0 * nj + j0
     for k in range(nd):
-        if side * angle[k] < 0.0:
-            continue
-        s = start * nd + k
-        cost[s] = t0 + turn_time(b, h0, angle[k])
-        if cost[s] == np.inf:
-            continue
-        came[s] = _START
-        keys, items, size = push(keys, items, size, cost[s], s)
-    pops = 0
-    while size > 0:
-        f, s = keys[0], items[0]
+        s = (on.i0 * nj + on.j0) * nd + k
+        if side * twa[k] >= 0.0:
+            cost[s] = t0 + turn_time(b, h0, twa[k])
+            came[s] = _START
+            if cost[s] < np.inf:
+                keys, items, size = push(keys, items, size, cost[s], s)
+    is_watched, n_moves = b.targets.shape[0] > 0, 4 if moves.leg_s < math.inf else 3
+    end, last, pops, wound = End(bound, 0.0, 0.0, 0.0, 0.0, False), -1, 0, 0.0
+    while size > 0 and keys[0] < end.t:
+        s = items[0]
         size = pop(keys, items, size)
-        if f >= best:
-            break
         if done[s]:
             continue
         done[s] = 1
@@ -178,146 +330,56 @@ def lattice_search(
             break
         node, k = s // nd, s % nd
         i, j = node // nj, node % nj
-        x = ox + (i - i0) * axes[0, 0] + (j - j0) * axes[1, 0]
-        y = oy + (i - i0) * axes[0, 1] + (j - j0) * axes[1, 1]
+        x, y = _place(on, i, j)
         t = float(cost[s])
         if b.room > 0.0:
-            wound = _wound(b, came, s, nj, steps, angle, lengths, h0, deep)
-        # ---- the exact end, from near the goal and now and then from afar
-        gx, gy = goal[0] - x, goal[1] - y
-        d = math.hypot(gx, gy)
+            wound = _wound(b, moves, came, s, h0)
+        d = math.hypot(aim.x - x, aim.y - y)
         if d <= shot_m or pops % 64 == 1:
-            if d <= goal[2]:
-                if t < best:
-                    best, best_state, end_x, end_y, with_via = t, s, x, y, False
+            if d <= aim.radius:
+                if t < end.t:
+                    end, last = End(t + 0.0, x, y, 0.0, 0.0, False), s
                 continue
-            f_d = (d - 0.999999 * goal[2]) / d
-            ex, ey = x + gx * f_d, y + gy * f_d
-            a, v = track(b, gx, gy, t)
-            direct = False
-            if v > 1e-9 and abs(a) <= b.max_twa + SLACK_RAD:
-                t1 = t + turn_time(b, angle[k], a)
-                t2 = t1 + d * f_d / v
-                if abs(a) >= worst_half(b, t1, t2):
-                    direct = True
-                    turns = b.room == 0.0 or abs(wound + wrap(a - angle[k])) <= b.most_turn
-                    if (
-                        t2 < best
-                        and turns
-                        and is_free(g, x, y, ex, ey)
-                        and not (meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, ex, ey, t1, t2))
-                    ):
-                        best, best_state, end_x, end_y, with_via = t2, s, ex, ey, False
-            if not direct and b.can_tack:
-                first = 0 if gy > 0.0 else 2
-                for way in range(2):
-                    mx, my, t2, ok = corner(b, x, y, angle[k], t, ex, ey, first + way, first + 1 - way)
-                    if (
-                        ok
-                        and t2 < best
-                        and is_free(g, x, y, mx, my)
-                        and is_free(g, mx, my, ex, ey)
-                        and (b.targets.shape[0] == 0 or _misses(b, x, y, angle[k], t, mx, my, ex, ey))
-                    ):
-                        best, best_state, end_x, end_y = t2, s, ex, ey
-                        via_x, via_y, with_via = mx, my, True
-        # ---- neighbours: turn either way, or sail one step on
-        for move in range(4):
-            if move == 3:
-                if not round_t < math.inf or k not in (port, starboard):
-                    break
-                k1 = starboard if k == port else port
-                i1, j1 = i + jump, j + hop
-                x1, y1 = x + down_x, y + down_y
-                if i1 < 0 or j1 < 0 or i1 >= ni or j1 >= nj or abs(wound + wrap(deep - angle[k])) > b.most_turn:
-                    break
-                if x1 < box[0] or y1 < box[1] or x1 > box[2] or y1 > box[3]:
-                    break
-                t1 = t + turn_time(b, angle[k], deep) + round_t + turn_time(b, deep, angle[k1])
-                label, node1 = _ROUND, i1 * nj + j1
-                s1 = node1 * nd + k1
-            elif (
-                move < 2
-                and b.room > 0.0
-                and came[s] != _START
-                and abs(wound + wrap(angle[(k + 1 - 2 * move) % nd] - angle[k])) > b.most_turn
-            ):
-                continue
-            elif move == 0:
-                k1 = (k + 1) % nd
-                s1, t1, label = node * nd + k1, t + turn[k], _CLOCKWISE
-                node1 = node
-            elif move == 1:
-                k1 = (k - 1) % nd
-                s1, t1, label = node * nd + k1, t + turn[k1], _COUNTER
-                node1 = node
-            else:
-                i1, j1 = i + steps[k, 0], j + steps[k, 1]
-                if i1 < 0 or j1 < 0 or i1 >= ni or j1 >= nj:
+            shot = _end_from(g, b, aim, x, y, twa[k], t, wound, end.t)
+            if shot.t < end.t:
+                end, last = shot, s
+        for move in range(n_moves):
+            s1 = s + shift[k, move]
+            t1 = t + takes[k, move]
+            x1, y1 = x, y
+            if move >= _STEP:
+                x1, y1 = x + dx[k, move], y + dy[k, move]
+                if not t1 < math.inf or _is_outside(on, i + di[k, move], j + dj[k, move], x1, y1):
                     continue
-                x1, y1 = x + dx[k], y + dy[k]
-                if x1 < box[0] or y1 < box[1] or x1 > box[2] or y1 > box[3]:
-                    continue
-                t1, label = t + duration[k], _MOVE
-                node1 = i1 * nj + j1
-                s1 = node1 * nd + k
+            if move == _ROUND:
+                t1 = t1 + moves.leg_s + moves.up_s[s1 % nd]
             if done[s1] or t1 >= cost[s1]:
                 continue
-            if h_node[node1] < 0.0:
-                qx = goal[0] - (x if move < 2 else x1)
-                qy = goal[1] - (y if move < 2 else y1)
-                c = int((math.atan2(qx, qy) + math.pi) / (2.0 * math.pi) * n_gauge) % n_gauge
-                h_node[node1] = max(0.0, gauge[c] * math.hypot(qx, qy) - slack)
-            f1 = t1 + h_node[node1]
-            if f1 >= best:
+            turns = move == _ROUND or (move < _STEP and came[s] != _START)
+            if b.room > 0.0 and turns and abs(wound + wrap(angle[k, move] - twa[k])) > b.most_turn:
                 continue
-            if (
-                move < 2
-                and b.targets.shape[0] > 0
-                and (came[s] == (_COUNTER if move == 0 else _CLOCKWISE) or meets_target(b, x, y, x, y, t, t1))
-            ):
+            node1 = s1 // nd
+            if to_go[node1] < 0.0:
+                to_go[node1] = least_from(aim, x1, y1)
+            f1 = t1 + to_go[node1]
+            if f1 >= end.t:
                 continue
-            if move > 1:
-                a = angle[k] if move == 2 else deep
-                if abs(a) < worst_half(b, t, t1) - 0.5 * SLACK_RAD or not is_free(g, x, y, x1, y1):
-                    continue
-                if b.targets.shape[0] > 0 and meets_target(b, x, y, x1, y1, t, t1):
-                    continue
+            if move < _STEP:
+                is_closed = is_watched and (came[s] == 1 - move or meets_target(b, x, y, x, y, t, t1))
+            else:
+                is_closed = (
+                    abs(angle[k, move]) < worst_half(b, t, t1) - 0.5 * SLACK_RAD
+                    or not is_free(g, x, y, x1, y1)
+                    or (is_watched and meets_target(b, x, y, x1, y1, t, t1))
+                )
+            if is_closed:
+                continue
             cost[s1] = t1
-            came[s1] = label
+            came[s1] = move
             keys, items, size = push(keys, items, size, f1, s1)
-    if best_state < 0:
+    if last < 0:
         return math.inf, np.empty((0, 2)), pops
-    # ---- back along the parents; only the points where the course changes are kept
-    count, s, last = 1, best_state, -1
-    path = np.empty((4096, 2))
-    path[0, 0], path[0, 1] = end_x, end_y
-    if with_via:
-        path[1, 0], path[1, 1] = via_x, via_y
-        count = 2
-    while True:
-        node, k = s // nd, s % nd
-        i, j = node // nj, node % nj
-        label = came[s]
-        if (label != _MOVE or last != k) and (last != -2) and count < 4095:
-            px = ox + (i - i0) * axes[0, 0] + (j - j0) * axes[1, 0]
-            py = oy + (i - i0) * axes[0, 1] + (j - j0) * axes[1, 1]
-            if abs(px - path[count - 1, 0]) + abs(py - path[count - 1, 1]) > 1e-9:
-                path[count, 0], path[count, 1] = px, py
-                count += 1
-        if label == _START:
-            break
-        if label == _MOVE:
-            last = k
-            s = ((i - steps[k, 0]) * nj + (j - steps[k, 1])) * nd + k
-        elif label == _ROUND:
-            last = -1
-            s = ((i - jump) * nj + (j - hop)) * nd + (starboard if k == port else port)
-        elif label == _CLOCKWISE:
-            s = node * nd + (k - 1) % nd
-        else:
-            s = node * nd + (k + 1) % nd
-    return best, path[:count][::-1].copy(), pops
+    return end.t, _way_back(on, moves, came, last, end), pops
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -402,6 +464,7 @@ def run_lattice(
     along = (np.array(goal[:2]) - start) @ inverse
     sizes = [abs(v) / max(1, round(abs(v) / step)) if abs(v) > 0.6 * step else step for v in along]
     axes = u * np.array(sizes)[:, None]
+    (ax, ay), (bx, by) = axes.tolist()
     corners = np.array([[box[i], box[j]] for i in (0, 2) for j in (1, 3)])
     corners = (corners - start) @ np.linalg.inv(axes)
     low, high = np.floor(corners.min(axis=0)).astype(int), np.ceil(corners.max(axis=0)).astype(int)
@@ -419,14 +482,11 @@ def run_lattice(
     cost, points, pops = lattice_search(
         world.grid,
         b,
-        np.array(origin),
-        axes,
-        np.array([ni, nj, -low[0], -low[1], *_leeward(b, axes)], np.int32),
+        Lattice(ni, nj, -int(low[0]), -int(low[1]), origin[0], origin[1], ax, ay, bx, by, *box),
         np.array([(i, j) for _, i, j in steps], np.int32),
-        np.array(goal),
-        np.array(box),
-        gauge.table,
-        goal[2] * gauge.table_max,
+        np.array(_leeward(b, axes), np.int32),
+        *origin[2:],
+        gauge.aim(*goal),
         bound_s,
         max_pops,
         6.0 * max(sizes),
@@ -434,190 +494,3 @@ def run_lattice(
     )
     found = math.isfinite(cost) and len(points) > 0
     return LatticeResult(cost_s=float(cost) if found else math.inf, points=points if found else None, pops=int(pops))
-
-
-# A search whose close-hauled courses follow the no-go zone as it moves: for wind that gets uncertain quickly.
-#
-# A lattice has its axes at one angle; when the zone opens by many degrees on the way, no angle fits. Here states are
-# cells of a plain grid times courses, but each state keeps the exact position and time at which its cell was first
-# reached, and a step is sailed at the edge of the zone at that very time (hybrid A*). Not exhaustive: the first to
-# reach a cell on a course closes it. What it finds is exact and goes to annealing like everything else.
-
-_FIXED = 16
-
-
-@kernel
-def drift_search(
-    g: SegmentGrid,
-    b: BoatModel,
-    h0: float,
-    goal: Floats,
-    box: Floats,
-    shape: Ints,
-    step: float,
-    gauge: Floats,
-    slack: float,
-    bound: float,
-    max_pops: int,
-    side: int,
-) -> tuple[float, Floats, int]:
-    """Search from the origin; return (time, points (n, 2), states expanded). Arguments as ``lattice_search``."""
-    nx, ny = shape[0], shape[1]
-    kinds = 4 + _FIXED
-    n_states = nx * ny * kinds
-    wx, wy = (box[2] - box[0]) / nx, (box[3] - box[1]) / ny
-    time = np.full(n_states, np.inf)
-    # Of what a state keeps only what is written is read; most states are never come to, and their pages never touched.
-    px, py, course = np.empty(n_states), np.empty(n_states), np.empty(n_states)
-    # What the boat has turned since its last leg with room for a turn the long way round, and its present leg so far.
-    wound, run = np.empty(n_states), np.empty(n_states)
-    w, r, w1, r1 = 0.0, 0.0, 0.0, 0.0
-    parent = np.empty(n_states, np.int32)
-    done = np.zeros(n_states, np.uint8)
-    n_gauge = gauge.shape[0]
-    keys, items, size = np.empty(1 << 14), np.empty(1 << 14, np.int32), 0
-    best, last, end_x, end_y, via_x, via_y, with_via = bound, -2, 0.0, 0.0, 0.0, 0.0, False
-    pops, s = 0, -1
-    x, y, t, h = 0.0, 0.0, 0.0, h0
-    while True:
-        # ---- the exact end
-        gx, gy = goal[0] - x, goal[1] - y
-        d = math.hypot(gx, gy)
-        if d <= goal[2]:
-            if t < best:
-                best, last, end_x, end_y, with_via = t, s, x, y, False
-        elif d < 8.0 * step or pops % 64 == 0:
-            f_d = (d - 0.999999 * goal[2]) / d
-            ex, ey = x + gx * f_d, y + gy * f_d
-            a, v = track(b, gx, gy, t)
-            direct = False
-            if v > 1e-9 and abs(a) <= b.max_twa:
-                t1 = t + turn_guess(b, h, a)
-                t2 = t1 + d * f_d / v
-                if abs(a) >= worst_half(b, t1, t2):
-                    direct = True
-                    if t2 < best and is_free(g, x, y, ex, ey):
-                        best, last, end_x, end_y, with_via = t2, s, ex, ey, False
-            if not direct:
-                first = 0 if gy > 0.0 else 2
-                for way in range(2):
-                    mx, my, t2, ok = corner(b, x, y, h, t, ex, ey, first + way, first + 1 - way)
-                    if ok and t2 < best and is_free(g, x, y, mx, my) and is_free(g, mx, my, ex, ey):
-                        best, last, end_x, end_y = t2, s, ex, ey
-                        via_x, via_y, with_via = mx, my, True
-        # ---- one step on every course
-        for k in range(kinds):
-            a = edge_angle(b, k, t, t) if k < 4 else -math.pi + 2.0 * math.pi * (k - 3.5) / _FIXED
-            if not abs(a) <= b.max_twa or (pops == 0 and side * a < 0.0):
-                continue
-            v = speed_at(b, a)
-            if v <= 1e-6:
-                continue
-            t1 = t + turn_guess(b, h, a)
-            t2 = t1 + step / v
-            if k < 2:
-                for _ in range(6):  # the angle at the edge of the time that the angle makes
-                    settled = abs(a) >= worst_half(b, t1, t2) - 1e-7
-                    if settled:
-                        break
-                    a = edge_angle(b, k, t1, t2)
-                    v = speed_at(b, a) if abs(a) <= b.max_twa else 0.0
-                    if v <= 1e-6:
-                        break
-                    t1 = t + turn_guess(b, h, a)
-                    t2 = t1 + step / v
-            if not abs(a) >= worst_half(b, t1, t2) - 2e-7 or not abs(a) <= b.max_twa:
-                continue
-            vx, vy = v * math.sin(a) + b.cx, v * math.cos(a) + b.cy
-            if is_refused(b, a, vx, vy):
-                continue
-            x1, y1 = x + vx * (t2 - t1), y + vy * (t2 - t1)
-            i, j = math.floor((x1 - box[0]) / wx), math.floor((y1 - box[1]) / wy)
-            if i < 0 or j < 0 or i >= nx or j >= ny:
-                continue
-            q = (i * ny + j) * kinds + k
-            if done[q] or t2 >= time[q]:
-                continue
-            qx, qy = goal[0] - x1, goal[1] - y1
-            c = int((math.atan2(qx, qy) + math.pi) / (2.0 * math.pi) * n_gauge) % n_gauge
-            f1 = t2 + max(0.0, gauge[c] * math.hypot(qx, qy) - slack)
-            if f1 >= best or not is_free(g, x, y, x1, y1):
-                continue
-            if b.room > 0.0:
-                w1, r1 = w + wrap(a - h), math.hypot(x1 - x, y1 - y)
-                if abs(wrap(a - h)) < 1e-9:
-                    r1 += r
-                if abs(w1) > b.most_turn and s >= 0:
-                    continue
-                if r1 >= b.room:
-                    w1 = 0.0
-                wound[q], run[q] = w1, r1
-            if b.targets.shape[0] > 0 and (meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, x1, y1, t1, t2)):
-                continue
-            time[q], px[q], py[q], course[q], parent[q] = t2, x1, y1, wrap(a), s
-            keys, items, size = push(keys, items, size, f1, q)
-        # ---- the next state
-        s = -1
-        while size > 0:
-            f, q = keys[0], items[0]
-            size = pop(keys, items, size)
-            if f >= best:
-                size = 0
-                break
-            if not done[q]:
-                s = q
-                break
-        pops += 1
-        if s < 0 or pops > max_pops:
-            break
-        done[s] = 1
-        x, y, t, h = px[s], py[s], time[s], course[s]
-        if b.room > 0.0:
-            w, r = wound[s], run[s]
-    if last == -2:
-        return math.inf, np.empty((0, 2)), pops
-    path = np.empty((4096, 2))
-    path[0, 0], path[0, 1] = end_x, end_y
-    count = 1
-    if with_via:
-        path[1, 0], path[1, 1] = via_x, via_y
-        count = 2
-    while last >= 0 and count < 4095:
-        path[count, 0], path[count, 1] = px[last], py[last]
-        count += 1
-        last = parent[last]
-    path[count, 0], path[count, 1] = 0.0, 0.0
-    return best, path[: count + 1][::-1].copy(), pops
-
-
-def run_drift(
-    world: SearchWorld,
-    gauge: Gauge,
-    *,
-    cells: int,
-    box: tuple[float, float, float, float],
-    bound_s: float,
-    max_pops: int,
-    stride: float = 1.45,
-    side: int = 0,
-) -> LatticeResult:
-    """Search a grid of about ``cells`` cells within ``box``, with steps ``stride`` cells long."""
-    width, height = max(box[2] - box[0], 1e-3), max(box[3] - box[1], 1e-3)
-    size = math.sqrt(width * height / cells)
-    nx, ny = int(width / size) + 1, int(height / size) + 1
-    time_s, points, pops = drift_search(
-        world.grid,
-        world.boat,
-        world.h0,
-        np.array([*world.goal, world.goal_radius]),
-        np.array(box),
-        np.array([nx, ny], np.int32),
-        stride * size,
-        gauge.table,
-        world.goal_radius * gauge.table_max,
-        bound_s,
-        max_pops,
-        side,
-    )
-    found = math.isfinite(time_s) and len(points) > 1
-    return LatticeResult(cost_s=float(time_s) if found else math.inf, points=points if found else None, pops=int(pops))

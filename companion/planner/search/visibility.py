@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from companion.kernels.jit import kernel
-from companion.planner.search.gauge import Gauge, disc_time
+from companion.planner.search.gauge import Gauge, disc_time, least_time
 from companion.planner.search.kernels import Floats, Ints, SegmentGrid, is_free
 
 _EXACT = 5_000
@@ -55,17 +55,14 @@ def geodesics(
     parent = np.full(n, -1, np.int32)
     state = np.zeros(n, np.uint8)
     to_go, from_start = np.zeros(n), np.zeros(n)
-    n_table = table.shape[0]
     steepest = 0.0
     for i in range(normals.shape[0]):
         steepest = max(steepest, math.hypot(normals[i, 0], normals[i, 1]))
     for i in range(n):
         gx, gy = goal[0] - nodes[i, 0], goal[1] - nodes[i, 1]
         sx, sy = nodes[i, 0] - nodes[0, 0], nodes[i, 1] - nodes[0, 1]
-        c = int((math.atan2(gx, gy) + math.pi) / (2.0 * math.pi) * n_table) % n_table
-        to_go[i] = max(0.0, table[c] * math.hypot(gx, gy) - goal[2] * steepest)
-        c = int((math.atan2(sx, sy) + math.pi) / (2.0 * math.pi) * n_table) % n_table
-        from_start[i] = table[c] * math.hypot(sx, sy)
+        to_go[i] = max(0.0, least_time(table, gx, gy) - goal[2] * steepest)
+        from_start[i] = least_time(table, sx, sy)
         if to_go[i] + from_start[i] <= bound and n <= _EXACT:
             to_go[i] = disc_time(normals, blocked, gx, gy, goal[2])
             from_start[i] = _time(normals, sx, sy)
@@ -117,8 +114,7 @@ def geodesics(
             dx, dy = nodes[i, 0] - nodes[k, 0], nodes[i, 1] - nodes[k, 1]
             if backward:
                 dx, dy = -dx, -dy
-            c = int((math.atan2(dx, dy) + math.pi) / (2.0 * math.pi) * n_table) % n_table
-            low = cost[k] + table[c] * math.hypot(dx, dy)
+            low = cost[k] + least_time(table, dx, dy)
             if low >= cost[i] or low + (from_start[i] if backward else to_go[i]) > limit:
                 continue
             new = cost[k] + _time(normals, dx, dy)
