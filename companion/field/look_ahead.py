@@ -25,6 +25,9 @@ TURNS_RAD = math.radians(25.0)  # farther off the heading that was chosen she is
 OTHER_TURN_COST = 4.0  # of turning back in the middle of a turn
 PINCHED = 2.0  # of the shore's cost: so much, wherever she keeps out of the vessels' discs, and she is between both
 RING_COST = 2.0  # of all of a disc's ring, then
+TOUCH_M = 3.0  # nearer is touching: the hull, and where she is within it
+TOUCH_COST = 1000.0
+TURNS_SPARE_S = 3.0
 _FAN_TWA = np.radians(np.arange(0.0, 181.0, 6.0))
 _STEP_S = 2.5
 _FINE_S = 0.5
@@ -64,6 +67,8 @@ def choose(
         blocked = bool(ashore[0] > 0.0) and not beats
         side = wrap_pi_array(headings - wanted_rad) * state.round_side
         cost += ashore + np.where(blocked & (side < 0.0), OTHER_SIDE_COST, 0.0)
+    if intent.clearance is not None:
+        cost += _touches(track, intent.clearance, habits)
     cost += _changing(headings, cost, situation.heading_rad, state.wanted_rad)
     best = int(np.argmin(cost))
     round_side = state.round_side
@@ -214,6 +219,18 @@ def _ashore(track: NDArray[np.float64], clearance: Clearance, habits: GuidanceSe
         first = np.where(hit.any(axis=1), np.argmax(hit, axis=1), near.shape[1]) * _STEP_S
         cost += 12.0 * np.maximum(0.0, 1.0 - first / habits.shore_s)
     return cost
+
+
+def _touches(track: NDArray[np.float64], clearance: Clearance, habits: GuidanceSettings) -> NDArray[np.float64]:
+    """Return what touching what stands still costs within the time that turning round takes, (k,): more than all else.
+
+    Nothing where every heading does: the shore is certain, a vessel's disc is not, and what is left then is to choose.
+    """
+    turns_s = math.pi / habits.turn_rate_radps + habits.tack_s + TURNS_SPARE_S
+    near = track[:, : int(turns_s / _STEP_S) + 2]
+    clear = clearance(near.reshape(-1, 2)).reshape(near.shape[:2])
+    hits = (clear < min(TOUCH_M, float(clear[:, 0].min()) - 0.5)).any(axis=1)
+    return np.where(hits & ~hits.all(), TOUCH_COST, 0.0)
 
 
 # Out of some water: the heading by which a boat is soonest outside, clear of who is in the way (WRSC 2013).

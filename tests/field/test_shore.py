@@ -146,6 +146,12 @@ def chased(seed: int, twd_deg: float, ship_mps: float = 3.0) -> tuple[float, flo
     return clear_m, off_m
 
 
+@pytest.mark.parametrize(("seed", "twd_deg"), [(1, 90.0), (3, 270.0)])
+def test_no_way_that_touches_before_she_could_turn_is_taken_while_another_is_left(seed: int, twd_deg: float) -> None:
+    """Along a shore that came nearer she kept away from a fast ship until no turn had room: 0.7 and 0.3 m."""
+    assert chased(seed, twd_deg, 5.0)[0] > 2.0
+
+
 @pytest.mark.parametrize(("seed", "twd_deg"), [(0, 270.0), (1, 270.0), (2, 270.0), (0, 315.0), (0, 0.0), (0, 90.0)])
 def test_between_a_ship_and_the_shore_she_goes_ashore_for_neither_way_round(seed: int, twd_deg: float) -> None:
     """Two ways out, each about as good: she took another each second, and none before the shore came."""

@@ -26,6 +26,7 @@ from companion.messages import Mode, Severity
 from companion.skipper.behaviors.helm import hand_back, is_busy, set_mode
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.diversions import diversion, is_composed
+from companion.skipper.planning.not_found import hold
 from companion.skipper.planning.right_of_way import held_of
 from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
 from companion.skipper.planning.waits import stay_left_s
@@ -266,9 +267,12 @@ def last_resort(ctx: StepContext) -> bool:
         return False
     resort = memory.resort.step(ctx.t_s, too_near=raised, can_plan=_is_planned(ctx), clear_s=0.0)
     if memory.resort.engaged and not resort.engaged:
-        rests = _is_at_rest(ctx)
-        ctx.set(by_field=FieldSteering(let_go_s=ctx.t_s) if rests else FieldSteering())
-        back = "her place" if rests else "the plan"
+        bound = diversion(ctx)
+        ctx.set(by_field=FieldSteering(let_go_s=ctx.t_s) if _is_at_rest(ctx) else FieldSteering())
+        back = "her place" if bound is None and _lies(ctx) else "the plan"
+        if bound is not None and not bound.has_place:
+            hold(ctx, bound.sentence, anew=True)
+            back = "a loiter here"
         ctx.say(
             Severity.NOTICE,
             "last resort over",
@@ -309,11 +313,17 @@ def _is_at_rest(ctx: StepContext) -> bool:
     return bool(ctx.state.voyage.over) and diversion(ctx) is None
 
 
+def _lies(ctx: StepContext) -> bool:
+    """Return whether no plan leads on from here: all goals are passed, she is at rest, or is to stay where she is."""
+    bound = diversion(ctx)
+    return ctx.gate is None or _is_at_rest(ctx) if bound is None else not bound.has_place
+
+
 def _is_planned(ctx: StepContext) -> bool:
     """Return whether a plan asked for since the water was clear has been answered and is on board."""
     state, clear_s = ctx.state, ctx.state.by_field.clear_s
-    if _is_at_rest(ctx):
-        return clear_s is not None and state.pending.upload is None  # the mission ends in a loiter at her place
+    if _lies(ctx):
+        return clear_s is not None and state.pending.upload is None  # the mission ends in a loiter
     return (
         clear_s is not None
         and state.plans.last_s >= clear_s
@@ -327,7 +337,7 @@ def _plan(ctx: StepContext) -> None:
     """Ask for a plan from where the field has brought the boat: now and then, and at once when the water is clear."""
     state = ctx.state
     is_busy_with = state.pending.plan is not None or state.pending.upload is not None
-    if is_busy_with or _is_at_rest(ctx) or ctx.is_raised("becalmed"):
+    if is_busy_with or _lies(ctx) or ctx.is_raised("becalmed"):
         return
     clear_s = state.by_field.clear_s
     due = clear_s is not None and state.plans.last_s < clear_s

@@ -20,7 +20,8 @@ from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.voyage import Goal
 from companion.traffic import Targets
 from tests.skipper.moments import moment, route
-from tests.skipper.world import FRAME, World, restarted, skipper, voyage
+from tests.skipper.planning.test_tacks_fail import turn_of
+from tests.skipper.world import FRAME, World, restarted, skipper, voyage, with_parts
 from tests.traffic.conftest import report
 
 GOAL = Goal(en_m=(900.0, 0.0), radius_m=6.0, name="the goal")  # a reach: the wind is from the north
@@ -152,6 +153,26 @@ def test_at_rest_she_keeps_clear_and_goes_back_to_her_place(may_steer):
     assert distance_m(world.position, rest) < 40.0
     assert "dragged off" not in said(world)
     assert not [text for text in texts(world) if "stand on" in text]
+
+
+@pytest.mark.parametrize("is_held", [True, False])
+def test_with_nothing_to_plan_for_the_field_lets_go_when_the_way_is_clear(is_held):
+    """Under the order hold, or with the last goal passed meanwhile, she waited for a plan that nobody asked for."""
+    world = make(goals=(Goal(en_m=(150.0, 0.0), radius_m=6.0, name="the goal"),))
+    world.run(40)
+    if is_held:
+        world.order("hold")
+        world.run(30)
+    intruder = Intruder(world, 90.0, 45.0)
+    assert meet(world, intruder, 60.0, lambda w: w.state.by_field.resort.engaged)
+    if not is_held:
+        world.state = with_parts(world.state, progress={"gate": len(turn_of(world).gates)})
+    meet(world, intruder, 240.0)
+    assert said(world).count("last resort over") == 1
+    assert world.mode is Mode.AUTO
+    if is_held:
+        [*_, last] = [t for t, a in world.actions if isinstance(a, act.Announce) and a.code == "last resort over"]
+        assert any(t >= last for t, a in world.actions if isinstance(a, act.UploadMission))  # a loiter where she is now
 
 
 def test_a_vessel_at_anchor_is_the_planners_matter():
