@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,12 +125,16 @@ PAST = "past its edge"
 
 
 def clearance_line(least_m: float, expected_m: float | None, contacts: int) -> str:
-    """Return how near she came, beside what her plans expected, and how often she touched."""
+    """Return how near she came, beside what her plans expected, and how often she touched.
+
+    Below 0 she was past an edge: the record does not say how far.
+    """
     touched = f"{counted(contacts, 'contact')}!" if contacts else "no contact."
     expected = ""
     if expected_m is not None:
         expected = f" (plans expected {clearance_words(expected_m, PAST)}{' or more' if expected_m >= 0.0 else ''})"
-    return f"Nearest to an obstacle or the fence: {clearance_words(least_m, PAST)}{expected}, {touched}"
+    least = PAST if least_m < 0.0 else clearance_words(least_m)
+    return f"Nearest to an obstacle or the fence: {least}{expected}, {touched}"
 
 
 def in_words(record: VoyageRecord) -> list[str]:
@@ -142,7 +147,7 @@ def in_words(record: VoyageRecord) -> list[str]:
     head = ", ".join(word for word in (chart.name, date_words(record.began_utc), where) if word)
     if s.arrived is None:
         return [head, "The voyage has no summary: it has not ended, or its end was not recorded.", *_plans(record)]
-    lines = [head, _end(record)]
+    lines = [head, *_starts(record), _end(record)]
     lines += _plans(record)
     if s.min_clearance_m is not None:
         lines.append(clearance_line(s.min_clearance_m, s.promised_clearance_m, s.contacts))
@@ -170,6 +175,14 @@ def in_words(record: VoyageRecord) -> list[str]:
     return lines
 
 
+def _starts(record: VoyageRecord) -> list[str]:
+    if len(record.starts_s) < 2:
+        return []
+    after_s = record.starts_s[-1] - record.starts_s[0]
+    starts = f"The companion was started {_times(len(record.starts_s))}: picture and track are of all of it"
+    return [f"{starts}, what is told here of the last start, {after_s:.0f} s after the first."]
+
+
 def _end(record: VoyageRecord) -> str:
     s = record.summary
     why = ": ".join(part for part in (s.end_reason or "unknown", s.end_why) if part)
@@ -184,14 +197,15 @@ def _end(record: VoyageRecord) -> str:
 
 def _plans(record: VoyageRecord) -> list[str]:
     reasons: dict[str, int] = {}
-    for plan in record.plans:
+    plans = [plan for plan in record.plans if plan.t_s >= max(record.starts_s, default=-math.inf)]
+    for plan in plans:
         reasons[plan.reason or "unknown"] = reasons.get(plan.reason or "unknown", 0) + 1
     if not reasons:
         return ["No plan was made."]
     why = ", ".join(
         f"{reason.replace('_', ' ')} {number}" for reason, number in sorted(reasons.items(), key=lambda r: -r[1])
     )
-    return [f"{counted(len(record.plans), 'plan')} made, by reason: {why}."]
+    return [f"{counted(len(plans), 'plan')} made, by reason: {why}."]
 
 
 def _times(number: int) -> str:

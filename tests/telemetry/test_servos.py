@@ -45,3 +45,15 @@ def test_a_voyage_tells_rudder_and_sheet_in_its_summary_and_in_words(tmp_path, c
     told = capsys.readouterr().out
     assert "Servos moved: output 1, " in told
     assert "\nVMG: " in told
+    assert "started" not in told
+    decisions = tmp_path / "decisions.jsonl"
+    records = [json.loads(line) for line in decisions.read_text().splitlines()]
+    start, plans = next(r for r in records if r["kind"] == "start"), [r for r in records if r["kind"] == "plan"]
+    with decisions.open("a") as file:
+        file.write(json.dumps({**start, "t_s": plans[-1]["t_s"]}) + "\n")
+    assert cli.main(["report", str(tmp_path)]) == 0
+    told = capsys.readouterr().out
+    after_s = plans[-1]["t_s"] - start["t_s"]
+    assert "started twice: picture and track are of all of it" in told
+    assert f"of the last start, {after_s:.0f} s after the first" in told
+    assert "\n1 plan made" in told

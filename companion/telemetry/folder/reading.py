@@ -153,7 +153,8 @@ class _Run(Struct, frozen=True, kw_only=True):
 class VoyageRecord:
     """What a voyage folder holds; columns are float arrays with NaN for what is unknown.
 
-    ``figures`` is summary.json as it stands, ``summary`` what of it is put into words; ``began_utc`` and ``epoch_s``
+    ``figures`` is summary.json as it stands, ``summary`` what of it is put into words: both are of the last start, and
+    ``starts_s`` has the time of each. ``began_utc`` and ``epoch_s``
     (Unix time of t_s = 0) are from voyage.toml, "" and None without one, by the autopilot's clock where the record says
     that it was another.
     """
@@ -167,6 +168,7 @@ class VoyageRecord:
     summary: Summary
     began_utc: str = ""
     epoch_s: float | None = None
+    starts_s: tuple[float, ...] = ()
 
     @property
     def start_s(self) -> float:
@@ -213,6 +215,7 @@ def read_voyage(folder: Path) -> VoyageRecord:
         summary=_converted(figures, Summary, folder / SUMMARY),
         began_utc=_later(run.started_utc, behind_s),
         epoch_s=None if run.epoch_s is None else run.epoch_s + behind_s,
+        starts_s=tuple(float(d["t_s"]) for d in decisions if d["kind"] == "start"),
     )
 
 
