@@ -22,6 +22,7 @@ from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.step import Phase, StepContext
 from companion.skipper.way import Gate, PointEn, Side, bearing_rad, cross_track_m, distance_m, water_at
 from companion.skipper.way.drift import DriftAhead, drift_ahead, floor_from_m
+from companion.skipper.way.gates import marks_of
 
 DRIFT_LIMIT_RAD = math.radians(20.0)  # more is not leeway but a current or a compass error
 STEERAGE_MPS = 0.5  # slower than this the drift angle means nothing
@@ -100,17 +101,44 @@ def desired_heading_rad(ctx: StepContext) -> float | None:
             if _hand(gate.side) * difference_rad(clear, wanted) > 0.0:
                 wanted = clear
         return sailable_rad(wrap_pi(wanted + drift), vehicle.heading_rad, twd, half, gate.side)
+    return _past_marks(
+        ctx, boat, vehicle.heading_rad, _on_leg_rad(ctx, boat, leg, vehicle.heading_rad, drift, twd), twd
+    )
+
+
+def _on_leg_rad(
+    ctx: StepContext, boat: PointEn, leg: tuple[PointEn, PointEn], heading_rad: float, drift: float, twd: float
+) -> float:
+    """Return the heading along a leg, led back to its line, or to its end where that is near or the wind shut it."""
+    half = ctx.no_go_half_rad
     along = wrap_pi(bearing_rad(*leg) + drift)
     off_wind = difference_rad(along, twd)
     is_last = ctx.state.mission.index == ctx.last_waypoint() and distance_m(boat, leg[1]) < ctx.config.grid_size_m
     if is_last or distance_m(*leg) < 1.0 or abs(off_wind) < half:
         # On a leg that the wind has closed the boat goes about where the other tack is nearer to its end.
-        return sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), vehicle.heading_rad, twd, half)
+        return sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), heading_rad, twd, half)
     # Back to the line on the leg's own tack: through the wind the boat would come to it sooner, and be on the wrong
     # one.
     back = back_to_line_rad(cross_track_m(boat, *leg), ctx.speed_mps)
     side = math.copysign(1.0, off_wind)
     return wrap_pi(twd + side * max(half, side * off_wind + side * back))
+
+
+def _past_marks(ctx: StepContext, boat: PointEn, heading_rad: float, wanted_rad: float, twd: float) -> float:
+    """Return the wanted heading, or one that leaves a mark on the hand where it lies until it is passed.
+
+    A turn across a mark that is no farther off than the turn is wide leads over it.
+    """
+    half, wide_m = ctx.no_go_half_rad, ctx.speed_mps / ctx.voyage.boat.turn_rate_radps
+    for mark in marks_of(ctx.voyage):
+        away_m, at = distance_m(boat, mark.en_m), bearing_rad(boat, mark.en_m)
+        bow, off = difference_rad(heading_rad, at), difference_rad(wanted_rad, at)
+        if away_m > mark.keep_m + wide_m or abs(bow) > 0.5 * math.pi or bow * off >= 0.0 or abs(off - bow) > math.pi:
+            continue
+        clear = at + math.copysign(max(abs(bow), math.asin(min(1.0, mark.keep_m / max(away_m, 1e-9)))), bow)
+        to_wind = difference_rad(clear, twd)
+        return wrap_pi(twd + math.copysign(half, to_wind)) if abs(to_wind) < half else wrap_pi(clear)
+    return wanted_rad
 
 
 def course_rad(ctx: StepContext) -> float | None:

@@ -412,3 +412,32 @@ def test_that_steering_is_not_permitted_is_said_where_it_is_not(may_steer, is_sa
     follow_route(ctx)
     told = [a.text for a in ctx.actions if isinstance(a, act.Announce) and a.code == "guidance"]
     assert bool(told) is is_said
+
+
+@pytest.mark.parametrize(
+    ("bow_deg", "end", "wanted_deg"),
+    [
+        (90.0, (20.0, -60.0), 43.0),  # the turn to her leg leads across it: she leaves it on the hand where it lies
+        (110.0, (20.0, -60.0), None),  # it lies on her other bow, and she turns away from it
+        (90.0, (60.0, 20.0), None),  # so she does to this one
+        (280.0, (20.0, -60.0), None),  # it is astern
+    ],
+)
+def test_a_turn_across_a_buoy_close_ahead_is_put_off_until_it_is_passed(bow_deg, end, wanted_deg):
+    """In his five laps she turned to her next leg 5 m before a buoy, and passed its middle by 0.1 m."""
+    buoy = Goal(en_m=(5.0, -0.5), name="buoy", side=Side.PORT, rounding_m=8.0)
+    way = route((0.0, 0.0), end, end, gate_of=(-1, 0, -1))
+
+    def told(*goals):
+        ctx = moment(
+            way, goals=(Goal(en_m=end), *goals), heading_deg=bow_deg, speed_mps=2.5, twd_deg=310.0, mission={"index": 1}
+        )
+        return desired_heading_rad(ctx)
+
+    plain, beside = told(), told(buoy)
+    if wanted_deg is None:
+        assert beside == plain
+    else:
+        at = math.degrees(bearing_rad((0.0, 0.0), buoy.en_m))
+        assert math.degrees(beside) == pytest.approx(wanted_deg, abs=0.5)
+        assert math.degrees(plain) > at
