@@ -44,7 +44,7 @@ def vmg_mps(step: Step) -> float | None:
 
 def pace_share(step: Step) -> float | None:
     """Return what the boat lately made of the speeds that were predicted, 1: all of them; None: nothing was seen."""
-    return step.pace.share if step.pace.tries > 0.0 and not step.is_field_steered else None
+    return step.pace.share if step.pace.tries > 0.0 and not step.is_off_plan else None
 
 
 def _through_water(step: Step) -> tuple[float, float, float] | None:

@@ -65,7 +65,7 @@ from companion.skipper.step import (
     WindBefore,
     WindEstimate,
     WindHealth,
-    field_steers,
+    is_off_plan,
 )
 from companion.traffic import TargetLimits, Targets
 from companion.wind import Estimator, WindStatus, WindTracker, WindVerdict, make
@@ -247,7 +247,7 @@ class Step:
     """What one tick saw and decided.
 
     Its metres are those of ``voyage``'s frame; with ``shift`` that frame has replaced another just before it. Where it
-    ``is_field_steered`` the plan on board is not sailed, and no figure of it is told.
+    ``is_off_plan`` a field steers, and no figure of the plan on board is told.
     """
 
     snapshot: Snapshot
@@ -256,16 +256,16 @@ class Step:
     voyage: Voyage
     shift: Shift | None = None
     pace: Pace = PRIOR_PACE
-    is_field_steered: bool = False
+    is_off_plan: bool = False
 
     @property
     def sailed(self) -> Route | None:
         """The route that is sailed; None: there is none, or a field steers and the one on board waits."""
-        return None if self.is_field_steered else self.state.mission.route
+        return None if self.is_off_plan else self.state.mission.route
 
     def eta(self) -> Eta:
         """Return where the boat is expected from here on, and when it is there."""
-        return UNKNOWN if self.is_field_steered else eta_of(self.snapshot, self.state, self.voyage, self.pace)
+        return UNKNOWN if self.is_off_plan else eta_of(self.snapshot, self.state, self.voyage, self.pace)
 
 
 class VoyageFold:
@@ -492,7 +492,7 @@ class VoyageFold:
             voyage=voyage,
             shift=shift,
             pace=self._pace,
-            is_field_steered=field_steers(snapshot, self.state, self.skipper.config),
+            is_off_plan=is_off_plan(snapshot, self.state, self.skipper.config),
         )
 
     def _follow(self) -> Shift | None:

@@ -134,11 +134,11 @@ class Skipper:
     def persisted(self, state: SkipperState) -> Persisted:
         """Return what must be on disk before the actions of this step are carried out."""
         water = self.voyage.frame.origin
-        if state.mission.adoptable is not None and (state.mission.foreign or not state.mission.checked):
-            return replace(
-                state.mission.adoptable, standing=standing_saved(state), skipped=state.orders.skipped, water=water
-            )
-        saved = saved_of(state, self.voyage.name)
+        kept = state.mission.adoptable if state.mission.foreign or not state.mission.checked else None
+        if kept is None:
+            saved = saved_of(state, self.voyage.name)
+        else:
+            saved = replace(kept, standing=standing_saved(state), skipped=state.orders.skipped)
         leg = leg_under_way(self.voyage, saved)
         return replace(saved, water=water, goals=saved_goals(self.voyage), laps=self.voyage.laps, leg=leg)
 

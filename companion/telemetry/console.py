@@ -278,7 +278,7 @@ def progress_text(step: Step) -> str:
     if snapshot.heartbeat_age_s is not None and snapshot.heartbeat_age_s > SILENT_S:
         parts.append(f"autopilot silent for {snapshot.heartbeat_age_s:.0f} s: what follows is old")
     under_way = route is not None and state.voyage.sailing and state.phase is not Phase.DONE
-    if under_way and step.is_field_steered:
+    if under_way and step.is_off_plan:
         left_m = goal_distance_m(step, step.voyage)
         parts.append("by field" if left_m is None else f"by field, goal {left_m:.0f} m")
     elif under_way and route is not None and autopilot is not None:

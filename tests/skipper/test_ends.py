@@ -185,7 +185,7 @@ def test_the_voyage_is_over_where_its_loiter_is_and_not_before():
     ctx.set(mission=replace(ctx.state.mission, route=far, index=last))
     rest(ctx)
     assert not ctx.state.voyage.over
-    assert "to where a loiter has room" in ctx.state.why
+    assert "to where she is to lie" in ctx.state.why
     ctx.set(mission=replace(ctx.state.mission, route=near, index=last))
     rest(ctx)
     off_m = distance_m(*near.points_en_m[-2:])

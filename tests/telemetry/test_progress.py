@@ -11,11 +11,12 @@ import pytest
 import shapely
 
 from companion.commands.report import clearance_line
+from companion.field.guidance import LastResort
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.skipper import Skipper
 from companion.skipper.planning import next_tack
-from companion.skipper.step import field_steers
+from companion.skipper.step import is_off_plan
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.config import Guidance, SkipperConfig
 from companion.telemetry.console import ProgressLine, left_behind, progress_text
@@ -126,14 +127,19 @@ def test_steered_by_headings_the_way_to_the_waypoint_is_her_own():
     assert re.search(r"wp \d+/\d+ (\d+) m", progress_text(by_autopilot))[1] == "0"
 
 
-def test_by_field_nothing_is_told_of_the_plan_on_board():
-    """ "there in 1303 s" stood there 15 s before the goal, and the clearance of a plan that was not sailed."""
+@pytest.mark.parametrize("guidance", [Guidance.FIELD, Guidance.PLAN])
+def test_by_field_nothing_is_told_of_the_plan_on_board(guidance):
+    """ "there in 1303 s" stood there 15 s before the goal, and the clearance of a plan that was not sailed.
+
+    In a mission sailed by plan it is the last resort that steers.
+    """
     rock = voyage(obstacles=[shapely.box(40.0, 100.0, 60.0, 120.0)])
-    world = World(Skipper(voyage=rock, config=SkipperConfig(guidance=Guidance.FIELD)))
-    assert world.run(120, lambda w: w.mode is Mode.GUIDED and w.speed > 1.0)
+    world = World(Skipper(voyage=rock, config=SkipperConfig(guidance=guidance)))
+    assert world.run(120, lambda w: w.mode in {Mode.GUIDED, Mode.AUTO} and w.speed > 1.0)
     snapshot, config = world.snapshot(), world.skipper.config
     by_plan = Step(snapshot=snapshot, state=world.state, actions=(), voyage=rock)
-    by_field = replace(by_plan, is_field_steered=field_steers(snapshot, world.state, config))
+    state = with_parts(world.state, by_field={"resort": LastResort(engaged=guidance is Guidance.PLAN)})
+    by_field = replace(by_plan, state=state, is_off_plan=is_off_plan(snapshot, state, config))
     told, figures = {}, {}
     for name, step in {"plan": by_plan, "field": by_field}.items():
         figures[name] = VoyageFigures()

@@ -142,7 +142,7 @@ def _is_on_to_its_place(ctx: StepContext) -> bool:
     is_open = ctx.voyage.area.path_clearance_m([boat, *ctx.ahead(), route.points_en_m[-1]]) >= ctx.config.margin_floor_m
     if off_m <= max(NEAR_M, ctx.loiter_swing_m) or not is_open:
         return False  # where the straight way is shut, the way back to her place is planned, of a voyage that is over
-    ctx.phase(Phase.STANDARD, f"all goals are reached; {off_m:.0f} m to where a loiter has room")
+    ctx.phase(Phase.STANDARD, f"no goal is left; {off_m:.0f} m to where she is to lie")
     return True
 
 

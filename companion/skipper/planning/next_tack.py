@@ -35,7 +35,7 @@ class Seen(Protocol):
         ...
 
     @property
-    def is_field_steered(self) -> bool:
+    def is_off_plan(self) -> bool:
         """Whether a field steers the boat, and not the plan on board."""
         ...
 
@@ -53,7 +53,7 @@ def on_leg(seen: Seen) -> OnLeg:
     Steered by headings ArduRover knows of no waypoint, and tells 0 of both.
     """
     status, here, mission = seen.snapshot.autopilot, seen.snapshot.position_en_m, seen.state.mission
-    if status is None or seen.is_field_steered:
+    if status is None or seen.is_off_plan:
         return OnLeg(None, None)
     if status.mode is not Mode.GUIDED or seen.state.steering.own_mode is not Mode.GUIDED:
         return OnLeg(status.waypoint_distance_m, status.cross_track_m)
@@ -94,7 +94,7 @@ def next_tack(seen: Seen, boat: Boat) -> NextTack | None:
     tws_mps = wind.mean_tws_mps if wind.present_tws_mps is None else wind.present_tws_mps
     if (
         route is None
-        or seen.is_field_steered
+        or seen.is_off_plan
         or wind_rad is None
         or tws_mps is None
         or vehicle is None

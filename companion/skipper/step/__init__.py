@@ -20,7 +20,7 @@ from companion.skipper.step.actions import (
     UploadMission,
 )
 from companion.skipper.step.config import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
-from companion.skipper.step.context import StepContext, field_steers
+from companion.skipper.step.context import StepContext, is_off_plan
 from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Diversion, DiversionKind, Route
 from companion.skipper.step.saved import Persisted
@@ -99,6 +99,6 @@ __all__ = [
     "WindEstimate",
     "WindHealth",
     "ends_safely",
-    "field_steers",
     "is_given_up",
+    "is_off_plan",
 ]

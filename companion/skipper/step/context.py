@@ -94,6 +94,11 @@ def field_steers(snapshot: Snapshot, state: SkipperState, config: SkipperConfig)
     return (state.by_field.composed or config.guidance is Guidance.FIELD) and may.may_steer and may.may_set_mode
 
 
+def is_off_plan(snapshot: Snapshot, state: SkipperState, config: SkipperConfig) -> bool:
+    """Return whether a field steers, as a last resort too: nothing of the plan on board is true of what is sailed."""
+    return field_steers(snapshot, state, config) or state.by_field.resort.engaged
+
+
 def _kept_in(voyage: Voyage, drawn: Drawn | None, circle: HomeCircle | None) -> Voyage:
     """Return the voyage in what the autopilot's own fence leaves of its water."""
     if drawn is not None:
@@ -625,8 +630,13 @@ class StepContext:
 
     @property
     def is_field_steered(self) -> bool:
-        """Whether a field steers the boat: nothing of the plan on board is true of the way that is sailed."""
+        """Whether a field steers the boat, the mission's or a goal's own."""
         return field_steers(self.snapshot, self.state, self.config)
+
+    @property
+    def is_off_plan(self) -> bool:
+        """Whether nothing of the plan on board is true of what is sailed: a field steers, as a last resort too."""
+        return is_off_plan(self.snapshot, self.state, self.config)
 
     @property
     def is_by_field(self) -> bool:

@@ -380,7 +380,7 @@ def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
             pending=SimpleNamespace(plan=pending),
             tacking=tacking,
         )
-        return next_tack(SimpleNamespace(snapshot=snapshot, state=state, is_field_steered=False), boat)
+        return next_tack(SimpleNamespace(snapshot=snapshot, state=state, is_off_plan=False), boat)
 
     east, on, back = (86.6, 50.0), (173.2, 100.0), (86.6, 150.0)
     turn_s = 2.0  # 60 degrees at 30 degrees a second

@@ -8,6 +8,7 @@ from companion.skipper.board.resumed import resumed
 from companion.skipper.rules import Skipper
 from companion.skipper.step import SkipperConfig
 from companion.skipper.step.saved import Persisted
+from companion.skipper.step.state import saved_of
 from companion.skipper.way import Side, gates_of
 from companion.skipper.way.voyage import Goal
 from tests.skipper.moments import route
@@ -68,6 +69,16 @@ def test_the_list_on_board_is_known_as_an_earlier_one_of_ours_and_not_adopted():
     again = sails.persisted(state)  # killed once more, before the list on board was looked at
     assert sails.change_of(again) == ""
     assert (again.gate, again.leg) == (1, 1)
+
+
+def test_beside_a_strangers_mission_the_state_that_is_kept_says_of_which_goals_it_is():
+    sails = skipper(A, B, C)
+    state = with_parts(sails.initial(), progress={"gate": 2}, voyage={"sailing": True})
+    kept = saved_of(state, sails.voyage.name)  # what the step puts aside has no goals of its own
+    state = with_parts(state, mission={"foreign": "a stranger's", "adoptable": kept})
+    again = Persisted.from_dict(sails.persisted(state).to_dict())
+    assert (again.goals, again.leg) == (saved(A, B, C, gate=2).goals, 2)
+    assert skipper(A, X, C).change_of(again).endswith("1 of the 2 goals reached counts, on to X")
 
 
 def test_what_had_arrived_has_arrived_no_more_with_a_goal_behind_the_last():

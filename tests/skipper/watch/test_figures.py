@@ -10,6 +10,7 @@ from shapely.geometry import box
 
 from companion.messages import MissionState, Mode
 from companion.safety import BY_NAME, SENSORS, TABLE
+from companion.skipper.planning.diversions import diversion
 from companion.skipper.step.config import ALL_PERMITTED, Ends, Guidance
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.snapshot import WindEstimate, WindHealth
@@ -386,6 +387,15 @@ def test_on_her_way_back_she_is_still_off_it_and_bound_elsewhere_it_is_not_asked
     rest = {"sailing": True, "over": "all goals are reached", "rest_en_m": (0.0, 100.0)}
     ctx = moment(WAY, voyage=rest, obstacles=(box(-20, 40, 20, 60),), up=up)
     assert measure(ctx, "dragged off") == figure
+
+
+def test_led_off_her_place_by_the_field_she_is_given_two_minutes_for_the_way_back():
+    rest = {"sailing": True, "over": "all goals are reached", "rest_en_m": (0.0, 100.0)}
+    island = box(-20, 40, 20, 60)
+    for ago_s, figure in {10.0: None, 119.0: None, 121.0: 100.0}.items():
+        ctx = moment(WAY, voyage=rest, obstacles=(island,), by_field={"let_go_s": NOW_S - ago_s})
+        assert measure(ctx, "dragged off") == figure
+        assert (diversion(ctx) is not None) == (figure is None)  # planned: the island is in the straight way
 
 
 # ------------------------------------------------------------------------------------ how long the charge lasts
