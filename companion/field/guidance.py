@@ -40,8 +40,6 @@ from companion.field.vector_fields import (
 )
 from companion.geo.angles import wrap_pi
 
-STILL_MPS = 0.3  # slower an obstacle lies
-
 
 def avoiding(field: Field, situation: Situation, habits: GuidanceSettings) -> Field:
     """Return the field with a repulsive point at every obstacle that is near and ahead (Schmitt, section 4.2).
@@ -61,7 +59,7 @@ def avoiding(field: Field, situation: Situation, habits: GuidanceSettings) -> Fi
 def _comes(obstacle: MovingObstacle, situation: Situation) -> bool:
     """Return whether an obstacle's own motion brings it nearer to where the boat is now."""
     (east, north), (here_e, here_n), (ve, vn) = obstacle.en_m, situation.en_m, obstacle.velocity_en_mps
-    return math.hypot(ve, vn) > STILL_MPS and ve * (here_e - east) + vn * (here_n - north) > 0.0
+    return obstacle.moves and ve * (here_e - east) + vn * (here_n - north) > 0.0
 
 
 def step(

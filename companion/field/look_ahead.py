@@ -54,7 +54,8 @@ def choose(
     track, lost_s = foresee(headings, twd, situation, habits)
     cost = 1.0 - np.cos(headings - wanted_rad) + 0.02 * lost_s
     margin, blocked = margins(track, situation.obstacles), False
-    ashore = None if intent.clearance is None else _ashore(track, intent.clearance, habits)
+    clear = None if intent.clearance is None else _clear(track, intent.clearance, habits)
+    ashore = None if clear is None else _ashore(clear, habits)
     if situation.obstacles:
         cost += _inside(track, margin, ashore, situation.obstacles)
         cost += np.maximum(0.0, 1.0 - np.maximum(margin, 0.0) / habits.comfort_m)
@@ -67,8 +68,8 @@ def choose(
         blocked = bool(ashore[0] > 0.0) and not beats
         side = wrap_pi_array(headings - wanted_rad) * state.round_side
         cost += ashore + np.where(blocked & (side < 0.0), OTHER_SIDE_COST, 0.0)
-    if intent.clearance is not None:
-        cost += _touches(track, intent.clearance, habits)
+    if clear is not None:
+        cost += _touches(clear, habits)
     cost += _changing(headings, cost, situation.heading_rad, state.wanted_rad)
     best = int(np.argmin(cost))
     round_side = state.round_side
@@ -178,9 +179,9 @@ def crosses_ahead(track: NDArray[np.float64], obstacles: Sequence[MovingObstacle
     t = np.arange(track.shape[1]) * _STEP_S
     worst = np.zeros(track.shape[0])
     for o in obstacles:
-        speed = math.hypot(*o.velocity_en_mps)
-        if speed < 0.3:
+        if not o.moves:
             continue
+        speed = math.hypot(*o.velocity_en_mps)
         ux, uy = o.velocity_en_mps[0] / speed, o.velocity_en_mps[1] / speed
         dx = track[:, :, 0] - o.en_m[0] - o.velocity_en_mps[0] * t
         dy = track[:, :, 1] - o.en_m[1] - o.velocity_en_mps[1] * t
@@ -201,34 +202,42 @@ def _leaving(
     return np.asarray(np.maximum(0.0, 1.0 - steps / (0.5 * habits.horizon_s)), dtype=np.float64)
 
 
-def _ashore(track: NDArray[np.float64], clearance: Clearance, habits: GuidanceSettings) -> NDArray[np.float64]:
+def _turns_round_s(habits: GuidanceSettings) -> float:
+    """Return how long turning round takes at most, to be sure [s]."""
+    return math.pi / habits.turn_rate_radps + habits.tack_s + TURNS_SPARE_S
+
+
+def _clear(track: NDArray[np.float64], clearance: Clearance, habits: GuidanceSettings) -> NDArray[np.float64]:
+    """Return how far off what stands still each track is, step by step as far as anything here looks: (k, t) [m]."""
+    near = track[:, : max(int(habits.shore_s / _STEP_S) + 1, int(_turns_round_s(habits) / _STEP_S) + 2)]
+    return clearance(near.reshape(-1, 2)).reshape(near.shape[:2])
+
+
+def _ashore(clear: NDArray[np.float64], habits: GuidanceSettings) -> NDArray[np.float64]:
     """Return what each track's way towards what stands still costs, (k,): 0 clear, to 40 where it touches now.
 
     Nearer than ``keep_m`` counts by how soon, and so does touching, again; how near counts from half as far again on,
     so that of two ways past a corner the wider is taken. A boat that is within that distance already is let out of it:
     what counts then is coming nearer still.
     """
-    near = track[:, : int(habits.shore_s / _STEP_S) + 1]
-    clear = clearance(near.reshape(-1, 2)).reshape(near.shape[:2])
+    clear = clear[:, : int(habits.shore_s / _STEP_S) + 1]
     now = float(clear[:, 0].min())
-    soon = 1.0 - np.arange(near.shape[1]) * _STEP_S / habits.shore_s
+    soon = 1.0 - np.arange(clear.shape[1]) * _STEP_S / habits.shore_s
     depth = np.clip((1.5 * habits.keep_m - clear) / max(habits.keep_m, 1.0), 0.0, 2.5)
     cost = np.asarray(3.0 * np.max((depth * np.maximum(soon, 0.0))[:, 1:], axis=1, initial=0.0), dtype=np.float64)
     for keep in (min(habits.keep_m, now - 0.5), min(0.5, now - 0.5)):
         hit = clear < keep
-        first = np.where(hit.any(axis=1), np.argmax(hit, axis=1), near.shape[1]) * _STEP_S
+        first = np.where(hit.any(axis=1), np.argmax(hit, axis=1), clear.shape[1]) * _STEP_S
         cost += 12.0 * np.maximum(0.0, 1.0 - first / habits.shore_s)
     return cost
 
 
-def _touches(track: NDArray[np.float64], clearance: Clearance, habits: GuidanceSettings) -> NDArray[np.float64]:
+def _touches(clear: NDArray[np.float64], habits: GuidanceSettings) -> NDArray[np.float64]:
     """Return what touching what stands still costs within the time that turning round takes, (k,): more than all else.
 
     Nothing where every heading does: the shore is certain, a vessel's disc is not, and what is left then is to choose.
     """
-    turns_s = math.pi / habits.turn_rate_radps + habits.tack_s + TURNS_SPARE_S
-    near = track[:, : int(turns_s / _STEP_S) + 2]
-    clear = clearance(near.reshape(-1, 2)).reshape(near.shape[:2])
+    clear = clear[:, : int(_turns_round_s(habits) / _STEP_S) + 2]
     hits = (clear < min(TOUCH_M, float(clear[:, 0].min()) - 0.5)).any(axis=1)
     return np.where(hits & ~hits.all(), TOUCH_COST, 0.0)
 

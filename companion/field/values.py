@@ -17,6 +17,7 @@ Clearance = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Points (n, 2) [m] to their distances from what stands still (n,) [m]: positive in free water."""
 
 RESEND_S = 1.0
+STILL_MPS = 0.3  # slower an obstacle lies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +32,11 @@ class MovingObstacle:
     keep_m: float = 10.0
     growth_mps: float = 0.0
     ring_m: float = 0.0
+
+    @property
+    def moves(self) -> bool:
+        """Return whether it goes somewhere; slower it lies, and its course is the fixes' noise."""
+        return math.hypot(*self.velocity_en_mps) > STILL_MPS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from companion.messages import Spread, Target
 from companion.traffic.approach import OwnShip
 from companion.traffic.predict import TURN_HOLD_S, MotionUncertainty, Prediction, motion_of, predict, turn_rate
-from companion.traffic.vessel import Vessel
+from companion.traffic.vessel import STILL_MPS, Vessel
 
 # Predictions beyond this are not worth avoiding: the plan is made again long before.
 HORIZON_S = 900.0
@@ -161,7 +161,7 @@ def _disc(
         sigma_m=sigma[0],
         sigma_mps=sigma[1],
     )
-    if keep.ahead_m > 0.0 and math.hypot(vx, vy) > 0.3:
+    if keep.ahead_m > 0.0 and math.hypot(vx, vy) > STILL_MPS:
         ahead = 0.5 * keep.ahead_m
         x, y = x + ahead * vx / math.hypot(vx, vy), y + ahead * vy / math.hypot(vx, vy)
         ra += ahead

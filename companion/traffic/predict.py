@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
-from companion.traffic.vessel import FISHING, TYPE_FISHING, TYPE_PLEASURE, TYPE_SAILING, Vessel
+from companion.traffic.vessel import FISHING, STILL_MPS, TYPE_FISHING, TYPE_PLEASURE, TYPE_SAILING, Vessel
 
 # A turn that is reported goes on for this long and then stops; no vessel is believed to circle for ever.
 TURN_HOLD_S = 30.0
@@ -165,7 +165,7 @@ def predict(vessel: Vessel, t_s: float, motion: MotionUncertainty | None = None)
 def turn_rate(vessel: Vessel) -> float:
     """Return the rate of turn that the mean follows [rad/s]: none for a vessel that hardly moves."""
     rate = vessel.turn_rate_radps
-    if rate is None or vessel.speed_mps is None or vessel.speed_mps < 0.3 or vessel.is_stopped:
+    if rate is None or vessel.speed_mps is None or vessel.speed_mps < STILL_MPS or vessel.is_stopped:
         return 0.0
     return max(-TURN_LIMIT_RADPS, min(TURN_LIMIT_RADPS, rate))
 

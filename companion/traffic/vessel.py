@@ -12,6 +12,7 @@ CLASS_B_LENGTH_M, CLASS_B_BEAM_M = 12.0, 4.0
 # ITU-R M.1371 navigational status.
 AT_ANCHOR, NOT_UNDER_COMMAND, RESTRICTED, BY_DRAUGHT, MOORED, AGROUND, FISHING, UNDER_SAIL = 1, 2, 3, 4, 5, 6, 7, 8
 STOPPED_STATUS = frozenset({AT_ANCHOR, MOORED, AGROUND})
+STILL_MPS = 0.3  # slower a vessel lies
 LAIN_S = 120.0  # who has lain still for so long goes on to, until a report says otherwise
 # ITU-R M.1371 ship types.
 TYPE_FISHING, TYPE_SAILING, TYPE_PLEASURE = 30, 36, 37
@@ -103,11 +104,16 @@ class Vessel:
         return self.speed_mps * math.sin(self.course_rad), self.speed_mps * math.cos(self.course_rad)
 
     @property
+    def lies(self) -> bool:
+        """Return whether it is known to go nowhere: slower than ``STILL_MPS`` its course is the fixes' noise."""
+        return self.is_moving_known and math.hypot(*self.velocity_en_mps) < STILL_MPS
+
+    @property
     def bow_rad(self) -> float | None:
         """Where the bow points: heading, else the course of a vessel that moves, else None."""
         if self.heading_rad is not None:
             return self.heading_rad
-        return self.course_rad if self.speed_mps is not None and self.speed_mps >= 0.3 else None
+        return self.course_rad if self.speed_mps is not None and self.speed_mps >= STILL_MPS else None
 
     @property
     def centre_en_m(self) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """Station keeping on VAIMOS's model: by field, and by a plan, a short loop.
 
-The scores are in ``sitl.scenario.true_track``. Published: 9.4 m with a boat of 2.6 m, 3.61 lengths, is the best of
+The scores are in ``sitl.scenario.tasks``. Published: 9.4 m with a boat of 2.6 m, 3.61 lengths, is the best of
 WRSC 2018; mean radii of 2.1 to 8.4 m are those of 2019.
 
     python -m lab.tasks.station --runs 20

@@ -28,18 +28,9 @@ from sitl.scenario.scenario import (
     scenario_waters,
     scenario_wind,
 )
-from sitl.scenario.tasks import tasks_of
+from sitl.scenario.tasks import TASK_S, StationScore, station_score, tasks_of
 from sitl.scenario.traffic import TRAFFIC, Motion, Others, free_port
-from sitl.scenario.true_track import (
-    TASK_S,
-    HullTrack,
-    StationScore,
-    TrueTrack,
-    count_tacks,
-    over_drying_m,
-    station_score,
-    under_keel_m,
-)
+from sitl.scenario.true_track import HullTrack, TrueTrack, count_tacks, over_drying_m, under_keel_m
 from sitl.scenario.verdict import CALL_HOLDS_S, ScenarioVerdict, Terms, Told, judge, verdict_line
 
 __all__ = [

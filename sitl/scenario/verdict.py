@@ -18,9 +18,9 @@ from companion.boat import Hull
 from companion.words import clearance_words, counted, one_line
 from sitl.scenario.colregs import Judgement, judge_encounter
 from sitl.scenario.scenario import ExpectSpec
-from sitl.scenario.tasks import Tasks
+from sitl.scenario.tasks import Tasks, station_score
 from sitl.scenario.tasks import findings as task_findings
-from sitl.scenario.true_track import TrueTrack, count_roundings, count_tacks, longest_silence_s, station_score
+from sitl.scenario.true_track import TrueTrack, count_roundings, count_tacks, longest_silence_s
 
 # A call to the anchor is for what comes within this time [s].
 CALL_HOLDS_S = 600.0

@@ -20,7 +20,7 @@ from lab.tasks.station import run as keep_station
 from lab.tasks.wrsc2013 import ENTRY_LIMIT_S, draw, run, score, table, wrsc2013
 from lab.tasks.wrsc2013_skippers import HALF_M
 from sitl.options import CampaignOptions
-from sitl.scenario.true_track import sailbot_points, station_score
+from sitl.scenario.tasks import sailbot_points, station_score
 
 EARLY = (66, 154)
 

@@ -42,7 +42,6 @@ NAME = "vessel too near"  # the watchdog's
 KEEP_SHARE = 0.5  # of the distance that plans keep: what the last resort defends
 GROWN_S = 30.0  # the growth of a vessel's disc is that of its next half minute
 LOOK_S = 90.0
-STILL_MPS = 0.3
 PLAN_EVERY_S = 20.0  # Büsser 5.2
 LEFT_ALONE_S = 60.0  # after somebody set AUTO in the middle of it
 LAG_S = 3.0  # a boat of a few metres gathers its speed in this time
@@ -89,7 +88,7 @@ def meets_in(ctx: StepContext) -> tuple[float, str] | None:
     The way is the route from where the boat is, at the polar's speeds, and the boat's place where it ends. A vessel
     that lies still is the planner's matter. None without vessels or position.
     """
-    vessels, boat = [v for v in near(ctx) if not _lies_still(v)], ctx.boat_en
+    vessels, boat = [v for v in near(ctx) if not v.lies], ctx.boat_en
     if not vessels or boat is None:
         return None
     at_s, way = [0.0], [boat]
@@ -106,10 +105,6 @@ def meets_in(ctx: StepContext) -> tuple[float, str] | None:
         if inside.any() and t_s[int(np.argmax(inside))] < first[0]:
             first = (float(t_s[int(np.argmax(inside))]), vessel.label)
     return first
-
-
-def _lies_still(vessel: Vessel) -> bool:
-    return vessel.is_moving_known and math.hypot(*vessel.velocity_en_mps) < STILL_MPS
 
 
 def situation(ctx: StepContext) -> Situation | None:

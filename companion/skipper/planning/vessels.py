@@ -39,7 +39,6 @@ NEAREST = 12  # vessels that a plan looks at: half of them those that come neare
 #                              stay; then those that could be met soonest, however the boat turns and we do
 OWN_MPS = 4.0  # no boat of ours closes faster by itself
 FAR_RISK = 1e-2  # that a vessel is nearer than counted when those that could be met are chosen
-STILL_MPS = 0.3  # slower a vessel lies
 HAIR_M = 1.0  # a boat within a disc is let out of it: the disc ends this much before the boat
 
 
@@ -110,7 +109,7 @@ def lies_in_the_way(ctx: StepContext) -> str:
 
 
 def _lying(ctx: StepContext) -> list[Vessel]:
-    return [v for v in near(ctx) if v.is_stopped or (v.is_moving_known and math.hypot(*v.velocity_en_mps) < STILL_MPS)]
+    return [v for v in near(ctx) if v.lies]
 
 
 def discs(ctx: StepContext, vessels: Sequence[Vessel], t_s: float, sigmas: float) -> tuple[Target, ...]:
