@@ -11,7 +11,7 @@ import json
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -376,23 +376,13 @@ def _is_lonlat(grid: grids.Grid) -> bool:
 
 
 def _cut(grid: grids.Grid, box: Box, path: Path) -> grids.Grid:
-    """Return the part of a grid in longitude and latitude that holds the box."""
-    step_x, step_y = abs(grid.x[1] - grid.x[0]), abs(grid.y[1] - grid.y[0])
-    rows = (grid.y >= box[1] - step_y) & (grid.y <= box[3] + step_y)
-    columns = np.zeros(grid.x.shape, dtype=bool)
-    for turn in (-360.0, 0.0, 360.0):
-        columns |= (grid.x + turn >= box[0] - step_x) & (grid.x + turn <= box[2] + step_x)
-    if rows.sum() < 2 or columns.sum() < 2:
-        raise InputError(
-            str(path),
-            "",
-            f"reaches from {grid.y.min():.4f}, {grid.x.min():.4f} to {grid.y.max():.4f}, {grid.x.max():.4f} "
-            "and holds nothing of the place that is asked for",
-            "fetch it for the mission's water",
-        )
-    if rows.sum() * columns.sum() > grids.MOST_CELLS:
-        raise InputError(str(path), "", "has too many cells in reach", "say a smaller --radius")
-    return grids.Grid(x=grid.x[columns], y=grid.y[rows], heights_m=grid.heights_m[np.ix_(rows, columns)])
+    """Return the part of a grid in longitude and latitude that holds the box, its longitudes the box's."""
+    rows, parts = _within(grid.x, grid.y, box, path)
+    return grids.Grid(
+        x=_joined(parts, grid.x),
+        y=grid.y[rows],
+        heights_m=np.concatenate([grid.heights_m[rows, columns] for columns, _ in parts], axis=1),
+    )
 
 
 def _read_raster(path: Path, box: Box, wanted: Wanted, positive: str) -> Chart:
@@ -411,15 +401,20 @@ def _read_raster(path: Path, box: Box, wanted: Wanted, positive: str) -> Chart:
             y = affine.f + affine.e * (np.arange(raster.height) + 0.5)
             crs = "EPSG:4326" if raster.crs is None else raster.crs.to_wkt()
             is_lonlat = raster.crs is None or raster.crs.is_geographic
-            rows, columns = _within(x, y, box, None if is_lonlat else _from_lonlat(crs), path)
-            window = Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
-            band = raster.read(1, window=window, masked=True)
-            heights = np.ma.filled(band.astype(np.float64), np.nan)
+            if not is_lonlat:
+                box = _from_lonlat(crs).transform_bounds(*box)
+            rows, parts = _within(x, y, box, path, is_round=is_lonlat)
+            windows = [
+                Window(columns.start, rows.start, columns.stop - columns.start, rows.stop - rows.start)
+                for columns, _ in parts
+            ]
+            bands = [raster.read(1, window=window, masked=True) for window in windows]
+            heights = np.concatenate([np.ma.filled(band.astype(np.float64), np.nan) for band in bands], axis=1)
             heights = heights * raster.scales[0] + raster.offsets[0]
             said = {**raster.tags(), **raster.tags(1)}
     except RasterioError as error:
         raise InputError(str(path), "", f"cannot be read ({str(error)[:100]})", "is it a grid, and whole?") from None
-    grid = grids.Grid(x=x[columns], y=y[rows], heights_m=heights)
+    grid = grids.Grid(x=_joined(parts, x), y=y[rows], heights_m=heights)
     heading = " ".join(str(v).lower() for k, v in said.items() if k.rpartition("#")[2] in {"positive", "standard_name"})
     if positive == "auto" and ("down" in heading.split() or "depth" in heading):
         positive = "down"
@@ -454,18 +449,36 @@ def _from_lonlat(crs: str) -> Any:
 
 
 def _within(
-    x: NDArray[np.float64], y: NDArray[np.float64], box: Box, from_lonlat: Any, path: Path
-) -> tuple[slice, slice]:
-    """Return which rows and columns hold the box, with one more to each side."""
-    if from_lonlat is not None:
-        box = from_lonlat.transform_bounds(*box)
-    found = []
-    for at, low, high in ((y, box[1], box[3]), (x, box[0], box[2])):
-        step = abs(at[1] - at[0])
-        inside = np.nonzero((at >= low - step) & (at <= high + step))[0]
-        if inside.size < 2:
-            raise InputError(
-                str(path), "", "holds nothing of the place that is asked for", "fetch it for the mission's water"
-            )
-        found.append(slice(int(inside[0]), int(inside[-1]) + 1))
-    return found[0], found[1]
+    x: NDArray[np.float64], y: NDArray[np.float64], box: Box, path: Path, *, is_round: bool = True
+) -> tuple[slice, list[tuple[slice, float]]]:
+    """Return which rows and columns of a grid hold the box, with one more to each side.
+
+    The columns come in parts with what is added to their x, from west to east: with ``is_round`` a grid may lie a turn
+    of 360 degrees from the box, and its two ends join in it.
+    """
+    step = abs(y[1] - y[0])
+    rows = np.nonzero((y >= box[1] - step) & (y <= box[3] + step))[0]
+    parts, east, wide = [], -math.inf, abs(x[1] - x[0])
+    for turn in (-360.0, 0.0, 360.0) if is_round else (0.0,):
+        from_x = max(box[0] - wide, east + 0.5 * wide)  # the first meridian may be there twice
+        columns = np.nonzero((x + turn >= from_x) & (x + turn <= box[2] + wide))[0]
+        if columns.size:
+            parts.append((slice(int(columns[0]), int(columns[-1]) + 1), turn))
+            east = float(x[columns].max()) + turn
+    count = sum(columns.stop - columns.start for columns, _ in parts)
+    if rows.size < 2 or count < 2:
+        form = ".4f" if is_round else ".0f"
+        raise InputError(
+            str(path),
+            "",
+            f"reaches from {y.min():{form}}, {x.min():{form}} to {y.max():{form}}, {x.max():{form}} "
+            "and holds nothing of the place that is asked for",
+            "fetch it for the mission's water",
+        )
+    if rows.size * count > grids.MOST_CELLS:
+        raise InputError(str(path), "", "has too many cells in reach", "say a smaller --radius")
+    return slice(int(rows[0]), int(rows[-1]) + 1), parts
+
+
+def _joined(parts: Sequence[tuple[slice, float]], x: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.concatenate([x[columns] + turn for columns, turn in parts])

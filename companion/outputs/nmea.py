@@ -280,7 +280,11 @@ def names_ahead(view: View) -> tuple[str, ...]:
     for number, leg in enumerate(legs_ahead(view), first):
         goal = next((g for g in view.goals if _is_at(g, leg.to_en_m)), None)
         name = "" if goal is None else name_of(goal.name)
-        names.append(name if name and name not in names else f"W{number}")
+        if not name or name in names:
+            name = f"W{number}"
+            while name in names:  # a goal was called so
+                name += "-"
+        names.append(name)
     return tuple(names)
 
 

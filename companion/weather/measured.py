@@ -101,12 +101,18 @@ def _means(measured: Measured, now_s: float) -> Measured:
     def mean(values: Floats) -> Floats:
         return np.asarray(np.bincount(which, weights=values[fresh], minlength=slots.size) / count)
 
+    first_deg = float(measured.lon_deg[fresh][0]) if fresh.any() else 0.0
     return Measured(
         utc_s=mean(measured.utc_s),
         lat_deg=mean(measured.lat_deg),
-        lon_deg=mean(measured.lon_deg),
+        lon_deg=_wrapped_deg(first_deg + mean(_wrapped_deg(measured.lon_deg - first_deg))),
         wind_en_mps=np.stack([mean(measured.wind_en_mps[:, k]) for k in (0, 1)], axis=-1),
     )
+
+
+def _wrapped_deg(lon_deg: Floats) -> Floats:
+    """Return longitudes in -180..180."""
+    return np.asarray((lon_deg + 180.0) % 360.0 - 180.0)
 
 
 def corrected(weather: Weather, off: Off) -> Weather:

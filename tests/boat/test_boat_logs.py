@@ -4,6 +4,7 @@ import csv
 import gzip
 import io
 import math
+import re
 import struct
 
 import numpy as np
@@ -194,6 +195,18 @@ def test_nmea_0183_is_read_and_its_variation_with_it(tmp_path):
     log = only(nmea(tmp_path / "a.nmea", spoiled=(41, 43)))
     same(log)
     assert np.nanmedian(log.stw_mps) == pytest.approx(2.0 * KNOT, abs=0.01)
+
+
+def test_a_receiver_that_tells_no_course_tells_no_velocity_but_of_a_boat_that_lies(tmp_path):
+    """An empty course was north."""
+    path = nmea(tmp_path / "a.nmea")
+    sentences = re.sub(r"(RMC,[^*\n]*?,[\d.]+,)[\d.]+(,\d{6},)[^*\n]*\*..", r"\1\2,", path.read_text())
+    path.write_text(sentences)
+    _, (skipped,) = read_logs([path])
+    assert "the boat's speed" in skipped.why
+    path.write_text(re.sub(r"(RMC,.*?[EW],)[\d.]+,", r"\g<1>0.1,", sentences))
+    (read,), _ = read_logs([path])
+    assert np.nanmax(np.hypot(*read.log.velocity_en_mps.T)) < 0.1
 
 
 def test_an_autopilot_s_own_log_is_read(tmp_path):

@@ -9,7 +9,9 @@ import shapely
 from shapely.geometry import LineString, Point, box
 
 from companion import cli
+from companion.chart import Wanted, area_of, box_about, read_chart
 from companion.geofence import load_mission
+from companion.messages import GeoPoint
 
 AROUND = ["--around", "50.82,-1.31", "--radius", "1500"]
 ISLAND = box(-1.312, 50.8210, -1.308, 50.8230)
@@ -299,6 +301,43 @@ def test_an_osm_extract_has_shores_and_seamarks(shell):
     (shore,) = (f for f in features if f["properties"]["name"] == "shore")
     line = LineString([(-1.310, 50.822), (-1.308, 50.823)])
     assert shapely.covers(shapely.from_geojson(json.dumps(shore["geometry"])), line)
+
+
+@pytest.mark.parametrize("west_deg", [-131.0, 229.0])
+@pytest.mark.parametrize("ending", ["asc", "tif"])
+def test_a_grid_that_counts_to_360_is_read_as_one_that_counts_to_180(tmp_path, west_deg, ending):
+    heights = np.full((200, 200), -50.0)
+    heights[90:110, 90:110] = 5.0
+    path = grid_file(tmp_path / f"g.{ending}", heights, west_deg, 36.0, 0.01)
+    here = box_about(GeoPoint(lat_deg=35.0, lon_deg=-130.0), 20_000.0)
+    (shoal,) = read_chart(path, here, Wanted(safety_depth_m=2.0)).dangers
+    west, south, east, north = shoal.geometry.bounds
+    assert (west, south, east, north) == pytest.approx((-130.1, 34.9, -129.9, 35.1), abs=0.011)
+
+
+@pytest.mark.parametrize("ending", ["asc", "tif"])
+def test_over_the_date_line_the_two_ends_of_a_grid_of_the_world_join(tmp_path, ending):
+    """A wall of a cell stood there: "no chart"; and of a GeoTIFF only the half on this side was read."""
+    path = grid_file(tmp_path / f"w.{ending}", np.full((100, 3600), -50.0), -180.0, 5.0, 0.1)
+    center = GeoPoint(lat_deg=0.0, lon_deg=180.0)
+    chart = read_chart(path, box_about(center, 60_000.0), Wanted(safety_depth_m=2.0))
+    assert area_of([chart], center, 60_000.0).solids == ()
+
+
+def grid_file(path, heights, west_deg, north_deg, cell_deg):
+    """Write a grid whose first row lies in the north, as its ending says."""
+    rows, columns = heights.shape
+    if path.suffix == ".asc":
+        head = f"ncols {columns}\nnrows {rows}\nxllcorner {west_deg}\nyllcorner {north_deg - rows * cell_deg}\n"
+        lines = "\n".join(" ".join(map(str, row)) for row in heights)
+        path.write_text(f"{head}cellsize {cell_deg}\n{lines}\n")
+        return path
+    rasterio = pytest.importorskip("rasterio")
+    affine = rasterio.Affine(cell_deg, 0, west_deg, 0, -cell_deg, north_deg)
+    shape = {"width": columns, "height": rows, "count": 1, "dtype": "float64"}
+    with rasterio.open(path, "w", driver="GTiff", crs="EPSG:4326", transform=affine, **shape) as out:
+        out.write(heights, 1)
+    return path
 
 
 @pytest.mark.parametrize("up", [True, False])

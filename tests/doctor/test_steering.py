@@ -197,11 +197,11 @@ def begun_at(log):
     return {round(at / STEP_S) for at in log.tacks_s}
 
 
-def tlog(path, log, mode=10):
+def tlog(path, log, mode=10, system=1, jump_s=0.0):
     out = b""
-    mav, begun = wire.MAVLink(None, srcSystem=1, srcComponent=1), begun_at(log)
+    mav, begun = wire.MAVLink(None, srcSystem=system, srcComponent=1), begun_at(log)
     for i, t_s in enumerate(log.t_s.tolist()):
-        us, boot = int(1e6 * (1.75e9 + t_s)), int(1000.0 * t_s)
+        us, boot = int(1e6 * (1.75e9 + t_s + (jump_s if 2 * i > log.t_s.size else 0.0))), int(1000.0 * t_s)
         v, bow = log.ahead_mps[i], log.heading_rad[i]
         scaled = log.rudder[i] * min(1.0, log.parameters["MOT_SPD_SCA_BASE"] / v)
         pwm = [0] * 8
@@ -285,6 +285,23 @@ def test_both_kinds_of_log_tell_what_was_simulated(write, tmp_path):
     if write is bin_log:
         assert read.time_outs == 1
         assert told.lag_s == pytest.approx(true.lag_s, abs=0.21)
+
+
+def test_two_boats_in_one_recording_are_not_one_that_turns_about(tmp_path):
+    log = steered(minutes=1.0)
+    one, other = tlog(tmp_path / "a.tlog", log), tlog(tmp_path / "b.tlog", log, system=2)
+    other.write_bytes(one.read_bytes() + other.read_bytes())
+    read, (skipped,) = read_steering([one, other])
+    assert len(read) == 1
+    assert "two boats, systems 1 and 2" in skipped.why
+
+
+def test_how_it_steered_is_told_by_the_autopilots_clock(tmp_path):
+    """The logger's jumped in the middle of it: 40 minutes of nothing were steered in."""
+    log = steered(ATC_STR_RAT_FF=0.5, minutes=6.0)
+    (plain, jumped), _ = read_steering([tlog(tmp_path / "a.tlog", log), tlog(tmp_path / "b.tlog", log, jump_s=2400.0)])
+    assert jumped.t_s.size == plain.t_s.size
+    assert steering_of([jumped]).bands[0].ff == pytest.approx(steering_of([plain]).bands[0].ff, rel=0.02)
 
 
 def test_hands_on_the_tiller_are_not_the_autopilots(tmp_path):

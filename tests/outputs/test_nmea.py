@@ -173,6 +173,11 @@ def test_two_goals_of_one_name_are_two_waypoints():
     assert told(view_of(goals=goals))["RTE"][0].waypoint_list == ["Mark", "W3"]
 
 
+def test_a_goal_that_is_called_as_a_leg_is_numbered_keeps_its_name_alone():
+    goals = (GoalView(name="W3", kind="point", at_en_m=(60.0, 80.0)),)
+    assert told(view_of(goals=goals))["RTE"][0].waypoint_list == ["W3", "W3-"]
+
+
 numbers, turns = st.none() | st.floats(0.0, 359.9), st.none() | st.floats(-180.0, 179.9)
 ages = st.none() | st.floats(0.0, 30.0)
 places = st.tuples(st.floats(-4e4, 4e4), st.floats(-4e4, 4e4))

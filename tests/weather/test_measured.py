@@ -1,5 +1,6 @@
 """The wind measured on board corrects the first hours of a forecast, by as much as it knows, and no longer."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -43,6 +44,16 @@ def test_now_the_measured_wind_counts_and_after_days_the_forecast():
     assert at(after, -1.0)[0] == pytest.approx([0.0, -5.0], abs=1e-5)
     assert abs(at(after, 0.0, 2.8)[0][0]) < 0.3  # 300 km away
     assert [round(off.sd_ahead_mps(3600.0 * h), 1) for h in (0.0, 48.0)] == [round(off.sd_mps, 1), OFF_MPS]
+
+
+def test_ten_minutes_over_the_date_line_are_a_place_on_it():
+    """Their mean was at longitude 0: nothing was measured there, or it was held against the wind of Greenwich."""
+    here = measured((7.0, 0.0))
+    lon_deg = np.where(np.arange(here.utc_s.size) % 2, 179.99, -179.99)
+    away = Weather(wind=(cube(LAT, LON + 180.0, HOURS, [steady(5.0, 0.0)]),))
+    off = off_by(away, dataclasses.replace(here, lon_deg=lon_deg), NOW)
+    assert off.off_en_mps[0] == pytest.approx([2.0, 0.0], abs=0.15)
+    assert abs(off.lon_deg) == pytest.approx(180.0, abs=0.02)
 
 
 def test_each_member_is_corrected_and_keeps_what_is_not_known():
