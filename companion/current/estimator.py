@@ -340,10 +340,10 @@ class CurrentEstimator:
         base = np.array([self._expected.east_mps, self._expected.north_mps])
         current = float(base[0] + x[0]), float(base[1] + x[1])
         twa, v = self._speed_with(now, current, float(x[5]))
-        sog = math.hypot(*now.velocity_en_mps)
-        if abs(twa) < LEAST_TWA_RAD or (sog < STANDS_MPS and v > SHOULD_MPS):
-            return
         sin, cos = math.sin(now.heading_rad), math.cos(now.heading_rad)
+        should_mps = math.hypot(v * sin + current[0], v * cos + current[1])  # over the ground: a stream may hold her
+        if abs(twa) < LEAST_TWA_RAD or (math.hypot(*now.velocity_en_mps) < STANDS_MPS and should_mps > SHOULD_MPS):
+            return
         along, across = np.array([sin, cos]), np.array([cos, -sin])  # across: to starboard
         side = -1.0 if twa > 0.0 else 1.0  # leeway goes to leeward
         slope = (

@@ -180,11 +180,7 @@ class LocalArea:
         """Return the area with one limit more: a circle, by ``name``, drawn inside of it."""
         disc = shapely.buffer(shapely.points(centre_en), radius_m, quad_segs=CIRCLE_SEGMENTS)
         limits = disc if self.limits is None else shapely.intersection(self.limits, disc)
-        area = replace(self, limits=limits, edge_name=name if self.limits is None else f"{self.edge_name} or {name}")
-        area.__dict__.update(
-            unfenced=self.unfenced, outer=self, own=self.own
-        )  # what was computed of the obstacles serves both
-        return area
+        return self._limited(limits, name)
 
     @functools.lru_cache(maxsize=4)  # noqa: B019 - an area lives as long as its voyage
     def taken_by(self, zones: tuple[Zone, ...], margin_m: float) -> BaseGeometry:
@@ -218,14 +214,17 @@ class LocalArea:
         return taken
 
     @functools.lru_cache(maxsize=4)  # noqa: B019 - an area lives as long as its voyage
-    def without(self, taken: BaseGeometry, name: str) -> LocalArea:
-        """Return the area whose limits leave ``taken`` out, too, by ``name``."""
+    def without(self, taken: BaseGeometry, name: str, *, is_own: bool = False) -> LocalArea:
+        """Return the area less ``taken``, by ``name``: a limit, with ``is_own`` one of the mission's own."""
         if self.limits is None:
             x0, y0, x1, y1 = shapely.total_bounds([taken, *self.polygons])
             limits = shapely.box(x0 - AROUND_M, y0 - AROUND_M, x1 + AROUND_M, y1 + AROUND_M)
         else:
             limits = self.limits
-        return self._limited(shapely.difference(limits, taken), name)
+        area = self._limited(shapely.difference(limits, taken), name)
+        if is_own:
+            area.__dict__["own"] = area
+        return area
 
     def _limited(self, limits: BaseGeometry, name: str) -> LocalArea:
         area = replace(self, limits=limits, edge_name=name if self.limits is None else f"{self.edge_name} or {name}")

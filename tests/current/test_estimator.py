@@ -124,6 +124,18 @@ def test_turns_stops_and_sails_that_are_eased_teach_nothing():
     assert estimator.view().samples_s == 0.0, "a boat that stands is not carried by its own speed backwards"
 
 
+def test_a_stream_that_grows_until_it_holds_her_is_followed():
+    """Over the ground she stood, and was taken to be aground: 0.53 m/s were believed of 0.75."""
+    slow = POLAR.speed_mps(math.pi / 2.0, TWS)
+    estimator = CurrentEstimator(lambda twa, tws: 0.8 / slow * POLAR.speed_mps(twa, tws))
+    for t in range(600):
+        current = (min(0.8, 0.002 * t), 0.0)
+        now = reading(float(t), 270.0, current, scale=0.8 / slow)
+        estimator.update(float(t), None, now)
+    assert math.hypot(*now.velocity_en_mps) < 0.15
+    assert math.dist(estimator.view().en_mps, current) < 0.12
+
+
 @pytest.mark.parametrize("period_s", [2.0, 3.5, 5.0])
 def test_a_bow_that_the_waves_swing_tells_of_it_too(period_s):
     """8 degrees to either side every few seconds: 10 to 25 degrees a second, faster than she tacks."""

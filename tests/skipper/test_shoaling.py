@@ -208,6 +208,16 @@ def test_the_deep_place_is_straight_behind_on_the_track():
     assert deep_place((), (0.0, 0.0), 2.0) is None
 
 
+def test_where_nothing_was_sounded_she_floated():
+    """Of a sounder that loses two pings in three "no deep water is known behind her", and she sailed on."""
+    gaps = tuple(Sounded(en_m=(0.0, 4.0 * n), depth_m=9.0 if n % 10 == 0 else None) for n in range(50))
+    assert deep_place(gaps, (0.0, 200.0), 2.0) in {(0.0, 120.0), (0.0, 160.0)}
+    silent = tuple(Sounded(en_m=(0.0, 4.0 * n), depth_m=None) for n in range(50))
+    assert 25.0 <= distance_m((0.0, 200.0), deep_place(silent, (0.0, 200.0), 2.0)) <= 80.0
+    shoal = (*silent[:40], *track(*((0.0, 4.0 * n) for n in range(40, 50)), depth_m=1.0))
+    assert deep_place(shoal, (0.0, 200.0), 2.0) is None  # the way back leads over what was too shallow
+
+
 def test_the_water_inside_a_bend_of_the_track_is_not_known_to_be_deep():
     bent = track(*((4.0 * n, 0.0) for n in range(20)), *((80.0, 4.0 * n) for n in range(10)))
     place = deep_place(bent, (80.0, 40.0), 2.0)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.planner.plan import Leg
-from companion.planner.problem.parts import CLEAR_TURN_RAD, NO_CURRENT, NO_GO_SLACK_RAD, TOUCH_M, Beat
+from companion.planner.problem.parts import CLEAR_TURN_RAD, FENCE, NO_CURRENT, NO_GO_SLACK_RAD, TOUCH_M, Beat
 from companion.planner.problem.value import Problem, resolved
 
 # Headings in a current: which way to point so that the track over the ground is the leg.
@@ -296,13 +296,17 @@ def solid_words(p: Problem, en: tuple[float, float]) -> str:
             return f"inside {name}"
         kept_m = min(own_m) + float(shapely.distance(grown.boundary, point)) + p.clearance_floor_m
         return f"{min(own_m):.1f} m from {name}, and {kept_m:.1f} m are kept clear of it"
+    beyond = f"outside {FENCE}" if p.fence_name == FENCE else f"beyond the edge of {p.fence_name}"
     if track is None:
-        return "outside the fence, or nearer to it than is kept clear"
+        return f"{beyond}, or nearer to it than is kept clear"
     if track.limits is not None and not shapely.covers(track.limits, point):
-        return "outside the fence"
+        return beyond
     if track.limits is None:
         return "outside the water of this leg"
-    return f"{float(shapely.distance(track.limits.boundary, point)):.1f} m from the fence, nearer than is kept clear"
+    off_m = float(shapely.distance(track.limits.boundary, point))
+    if p.fence is not None and off_m > float(shapely.distance(track.limits.boundary, p.fence)) + TARGET_SLACK_M:
+        return f"{off_m:.1f} m from {p.fence_name}, in water that no way leads to that is wide enough"
+    return f"{off_m:.1f} m from {p.fence_name}, nearer than is kept clear"
 
 
 def manoeuvre(before_rad: float, after_rad: float) -> str:

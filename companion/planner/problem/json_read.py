@@ -17,6 +17,7 @@ from companion.disk import read_regular
 from companion.errors import InputError
 from companion.messages import Spread, Target
 from companion.planner.problem.parts import (
+    FENCE,
     SIGMA_MODELS,
     AutopilotBeatZone,
     Beat,
@@ -204,6 +205,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         "leg_saving",
         "beat",
         "obstacle_names",
+        "fence_name",
         "tracking",
         "zone",
         "known",
@@ -219,6 +221,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
         obstacles=tuple(_polygon(w, source, f"obstacles[{i}]") for i, w in enumerate(obstacles)),
         obstacle_names=tuple(str(name) for name in names),
         fence=None if fence is None else _polygon(fence, source, "fence"),
+        fence_name=top.text("fence_name", FENCE),
         wind=ProblemWind(
             twd_from_rad=math.radians(wind.number("from_deg")),
             tws_mps=wind.maybe("speed_mps"),

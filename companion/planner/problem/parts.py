@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from companion.boat.failed_tack import IRONS_S
 
+FENCE = "the fence"  # what a fence is called that has no other name
 TOUCH_M = 1e-3
 """A path may be this deep in an obstacle [m]: numerical slack for touching."""
 NO_GO_SLACK_RAD = math.radians(0.01)

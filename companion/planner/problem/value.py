@@ -24,6 +24,7 @@ from companion.boat.boat import SHAPE_TWA_RAD
 from companion.messages import Spread, Target
 from companion.planner.problem.json_read import read_fields
 from companion.planner.problem.parts import (
+    FENCE,
     LEAST_MPS,
     NO_CURRENT,
     TOUCH_M,
@@ -66,6 +67,7 @@ class Problem:
     obstacles: tuple[shapely.Geometry, ...] = ()
     obstacle_names: tuple[str, ...] = ()
     fence: shapely.Geometry | None = None
+    fence_name: str = FENCE
     wind: ProblemWind
     boat: BoatLimits
     delta_s: float = 0.5

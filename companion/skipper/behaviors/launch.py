@@ -18,6 +18,7 @@ from companion.skipper.step import Phase, ReplanReason, SafeEnd, StepContext, Wi
 from companion.skipper.step.wind_limits import winds_wanted
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.geometry import distance_m, leg_distance_m
+from companion.skipper.way.shoals import beyond_words
 
 ARRIVED_BEFORE = "all goals were reached before this start; --again sails the mission again"
 MAY_UPLOAD = "[operator] set_auto = true in the mission, and no --dry-run"
@@ -86,7 +87,7 @@ def _misplaced(ctx: StepContext) -> str:
     if clearance_m > 0.0:
         return ""
     if clearance_m < float(ctx.voyage.area.unfenced.clearance_m([here])[0]):
-        return f"she is {-clearance_m:.0f} m outside the fence"
+        return f"she is {-clearance_m:.0f} m {beyond_words(ctx.voyage.area, here)}"
     return f"her position is inside {ctx.voyage.area.nearest_name(here) or 'an obstacle'}"
 
 

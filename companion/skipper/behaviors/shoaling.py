@@ -74,12 +74,14 @@ def follow_soundings(ctx: StepContext) -> None:
     """Remember where the water was deep, and what was found to be shoal."""
     status, boat, vehicle, least_m = ctx.autopilot, ctx.boat_en, ctx.snapshot.vehicle, ctx.config.least_depth_m
     ahead_m = depth_ahead_m(ctx)
-    if least_m is None or status is None or status.depth_m is None or boat is None or vehicle is None:
+    if least_m is None or status is None or boat is None or vehicle is None:
         return
     track = ctx.state.soundings.track
     if not track or distance_m(track[-1].en_m, boat) >= STEP_M:
-        track = (*track, Sounded(en_m=boat, depth_m=round(status.depth_m, 2)))[-KEPT:]
-        ctx.set(soundings=changed(ctx.state.soundings, track=track))
+        depth_m = None if status.depth_m is None else round(status.depth_m, 2)
+        ctx.set(soundings=changed(ctx.state.soundings, track=(*track, Sounded(en_m=boat, depth_m=depth_m))[-KEPT:]))
+    if status.depth_m is None:
+        return
     if not ctx.is_raised(SHOALING) or ahead_m is None or ahead_m > 0.0:
         return
     known = ctx.state.soundings.shoals
@@ -220,20 +222,21 @@ def _goes_back(ctx: StepContext, boat: PointEn, velocity_en_mps: tuple[float, fl
 def deep_place(track: tuple[Sounded, ...], boat_en: PointEn, least_m: float) -> PointEn | None:
     """Return where to on her own track: the deepest place that water known to be deep leads to; None: there is none.
 
-    Known is what lies near to soundings of the track, in whatever order they were taken: she may have turned since.
+    Known is what lies near to the track but where it was too shallow, in whatever order she was there: she may have
+    turned since. Where nothing was sounded she floated; it is where to only if no deep sounding is in reach.
     """
-    deep = [s for s in track if s.depth_m >= least_m]
+    deep = [s for s in track if s.depth_m is None or s.depth_m >= least_m]
     if not deep:
         return None
     known = shapely.multipoints(np.array([s.en_m for s in deep]))
-    best: Sounded | None = None
-    for sounded in reversed(deep):
-        far_m = distance_m(boat_en, sounded.en_m)
-        if not LEAST_BACK_M <= far_m <= BACK_M or sounded.depth_m < least_m + SPARE_M:
+    best: tuple[float, PointEn] | None = None
+    for place in reversed(deep):
+        far_m, depth_m = distance_m(boat_en, place.en_m), 0.0 if place.depth_m is None else place.depth_m
+        if not LEAST_BACK_M <= far_m <= BACK_M or (place.depth_m is not None and depth_m < least_m + SPARE_M):
             continue
-        if best is not None and sounded.depth_m < best.depth_m + (SPARE_M if far_m > LEAST_BACK_M else 0.0):
+        if best is not None and depth_m < best[0] + (SPARE_M if far_m > LEAST_BACK_M else 0.0):
             continue
-        way = np.linspace(boat_en, sounded.en_m, max(2, math.ceil(far_m / STEP_M)))
+        way = np.linspace(boat_en, place.en_m, max(2, math.ceil(far_m / STEP_M)))
         if float(shapely.distance(known, shapely.points(way)).max()) <= BESIDE_M:
-            best = sounded
-    return None if best is None else best.en_m
+            best = depth_m, place.en_m
+    return None if best is None else best[1]

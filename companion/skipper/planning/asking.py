@@ -52,7 +52,14 @@ def request(
     target, gate, bound = aimed
     wind = ctx.wind_mean
     floor_m = min(ctx.config.margin_floor_m, step.margin_m)
-    start = repaired(ctx.voyage, start, margin_m=step.margin_m, floor_m=floor_m, twd_from_rad=wind[0] if wind else None)
+    start = repaired(
+        ctx.voyage,
+        start,
+        margin_m=step.margin_m,
+        floor_m=floor_m,
+        twd_from_rad=wind[0] if wind else None,
+        water=ctx.water,
+    )
     aim = _aim(ctx, target, gate, start, step)
     number = ctx.new_id()
     shared = shares(ctx, start.en_m, start.after_s, rung, step.delta_s)

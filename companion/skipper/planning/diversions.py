@@ -20,6 +20,7 @@ from companion.skipper.step.route import HOME_RADIUS_M
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
 from companion.skipper.way.gates import Gate
 from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.shoals import beyond_words
 from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import PointEn, Refuge
 from companion.traffic import Policy
@@ -408,7 +409,7 @@ def place_trouble(ctx: StepContext, what: str, en_m: PointEn) -> str:
         where = (
             f"{clearance:.0f} m from {near}"
             if clearance > 0.0
-            else ("outside the fence" if bare > 0.0 else f"not in free water but in {near}")
+            else (beyond_words(area, en_m) if bare > 0.0 else f"not in free water but in {near}")
         )
         return f"{what} is {where}: the margin's floor is {floor_m:g} m"
     return ""

@@ -29,6 +29,7 @@ from companion.skipper.way import Gate, PointEn, Voyage, bearing_rad, distance_m
 from companion.skipper.way.gates import marks_of
 from companion.skipper.way.line import STRAY_M
 from companion.skipper.way.shortest import shortest_way
+from companion.skipper.way.stemming import Water
 from companion.skipper.way.voyage import AreaLike, outside_m, water_to_keep
 
 # The last ones are for a boat that has drifted out of the fence; nobody is led so far past anything solid.
@@ -135,14 +136,23 @@ def with_no_go_error(forecast: WindForecast, error_rad: float) -> WindForecast:
     )
 
 
-def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, twd_from_rad: float | None) -> Start:
+def repaired(
+    voyage: Voyage,
+    start: Start,
+    *,
+    margin_m: float,
+    floor_m: float,
+    twd_from_rad: float | None,
+    water: Water | None = None,
+) -> Start:
     """Return the start made plannable if it is nearer than ``margin_m`` to an obstacle or limit.
 
     Down to ``floor_m`` the margin around it gets a notch, so that the plan begins where the boat is. Nearer than
     that, or inside, the plan begins in free water and a lead-in goes there: from the boat to the nearest free point
     on a line that never comes nearer to the obstacle than the boat is now, nor nearer than ``floor_m`` to any that it
-    is clear of; of equally near ones the one that is not upwind. Outside of the autopilot's fence and within
-    the mission's own, which may be the shore, the limits are opened about a way back inside.
+    is clear of; of equally near ones the one that is not upwind. In ``water`` that runs it is the one that the boat is
+    soonest at: the nearest may lie up the stream. Outside of the autopilot's fence and within the mission's own, which
+    may be the shore, the limits are opened about a way back inside.
     """
     margin_m = grown_m(margin_m)  # as the water is drawn that a plan may begin in
     area, back = voyage.area, _back_inside(voyage.area, start, margin_m=margin_m, floor_m=floor_m)
@@ -158,10 +168,17 @@ def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, t
         return replace(
             start, notch_m=NOTCH * (margin_m - here) + HAIR_M, text="; ".join(filter(None, (start.text, text)))
         )
+    best: tuple[float, PointEn, float] | None = None
+    courses = [2.0 * math.pi * n / REPAIR_DIRECTIONS for n in range(REPAIR_DIRECTIONS)]
+    made_mps = {course: None if water is None else water.made_good_mps(course) for course in courses}
+    fastest_mps = max((made for made in made_mps.values() if made is not None), default=math.inf)
     for ring_m in REPAIR_RINGS_M:
-        best: tuple[float, PointEn] | None = None
-        for n in range(REPAIR_DIRECTIONS):
-            course = 2.0 * math.pi * n / REPAIR_DIRECTIONS
+        if best is not None and (water is None or ring_m / fastest_mps >= best[0]):
+            break
+        for course in courses:
+            made = made_mps[course]
+            if water is not None and made is None:
+                continue
             place = moved(start.en_m, course, ring_m)
             room = float(area.clearance_m([place])[0])
             if room < margin_m + HAIR_M:
@@ -173,18 +190,23 @@ def repaired(voyage: Voyage, start: Start, *, margin_m: float, floor_m: float, t
                 continue
             upwind = twd_from_rad is not None and abs(difference_rad(course, twd_from_rad)) < math.radians(55.0)
             cost = ring_m * (3.0 if upwind else 1.0) + abs(difference_rad(course, start.heading_rad))
+            if made is not None:
+                cost = ring_m / made
             if best is None or cost < best[0]:
-                best = (cost, place)
-        if best is not None:
-            text = f"the start is {here:.1f} m from an obstacle or limit: led {ring_m:.0f} m into free water first"
-            return replace(
-                start,
-                en_m=best[1],
-                heading_rad=bearing_rad(start.en_m, best[1]),
-                lead_in=(best[1],),
-                text="; ".join(filter(None, (start.text, text))),
-            )
-    return start
+                best = (cost, place, ring_m)
+    if best is None:
+        if water is None:
+            return start
+        return repaired(voyage, start, margin_m=margin_m, floor_m=floor_m, twd_from_rad=twd_from_rad)  # she may yet
+    _, place, ring_m = best
+    text = f"the start is {here:.1f} m from an obstacle or limit: led {ring_m:.0f} m into free water first"
+    return replace(
+        start,
+        en_m=place,
+        heading_rad=bearing_rad(start.en_m, place),
+        lead_in=(place,),
+        text="; ".join(filter(None, (start.text, text))),
+    )
 
 
 def _back_inside(area: AreaLike, start: Start, *, margin_m: float, floor_m: float) -> tuple[PointEn, ...]:
@@ -374,6 +396,7 @@ def problem_dict(
             *(f"the wrong side of {gate.name}" for _ in gate.keep_out),
         ],
         "fence": fence,
+        **({} if fence is None else {"fence_name": voyage.area.edge_name}),
         "wind": wind,
         "boat": boat,
         "delta_s": delta_s,

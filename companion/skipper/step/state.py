@@ -200,10 +200,10 @@ class Adrift:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sounded:
-    """A sounding on the boat's own track."""
+    """A place on the boat's own track, and what was sounded there; None: nothing was."""
 
     en_m: PointEn
-    depth_m: float
+    depth_m: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,6 +18,7 @@ from companion.skipper.step import SkipperConfig, StepContext
 from companion.skipper.step.state import Raised
 from companion.skipper.watch.measures import measure
 from companion.skipper.way.drift import DriftAhead, drift_ahead
+from companion.skipper.way.shoals import beyond_words
 from companion.skipper.way.voyage import PointEn, outside_m, water_at
 from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, Policy, assess
 from companion.traffic.colregs import Role, follow
@@ -190,7 +191,7 @@ def _ahead(ctx: StepContext, here: PointEn, velocity: tuple[float, float]) -> Dr
 def _where(ctx: StepContext, here: PointEn, ahead: DriftAhead) -> str:
     vehicle, far_m = ctx.snapshot.vehicle, outside_m(ctx.voyage.area, here)
     place = "" if vehicle is None else f" at {vehicle.position.lat_deg:.5f}, {vehicle.position.lon_deg:.5f}"
-    fence = f", {far_m:.0f} m outside the fence" if far_m > 0.0 else ""
+    fence = f", {far_m:.0f} m {beyond_words(ctx.voyage.area, here)}" if far_m > 0.0 else ""
     if ctx.autopilot is not None and ctx.autopilot.mode in HOMEWARD and ahead.speed_mps > 0.0:
         way = f"sailing straight home, {direction(heading_of(*ahead.velocity_en_mps))}°"
         if ahead.floor_s is not None:

@@ -15,7 +15,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from companion.skipper.way.geometry import distance_m, moved
-from companion.skipper.way.voyage import AreaLike, PointEn
+from companion.skipper.way.voyage import AreaLike, PointEn, outside_m
 
 NAME = "a shoal that was sounded"
 MOST_SHOALS = 200  # of a voyage: the oldest is forgotten
@@ -107,6 +107,13 @@ def water_taken(shoals: tuple[Shoal, ...]) -> BaseGeometry:
     return shapely.union_all(discs)
 
 
+def beyond_words(area: AreaLike, en_m: PointEn) -> str:
+    """Return where a place is that is outside of the area's limits: in a shoal that was found, or outside the fence."""
+    own = area.own
+    is_shoal = own.edge_name.endswith(NAME) and outside_m(own, en_m) > 0.0 and outside_m(own.outer, en_m) == 0.0
+    return f"inside {NAME}" if is_shoal else "outside the fence"
+
+
 def shoaled(area: AreaLike, shoals: tuple[Shoal, ...]) -> AreaLike:
-    """Return the area less the shoals."""
-    return area.without(water_taken(shoals), NAME) if shoals else area
+    """Return the area less the shoals: from within one there is only the way off it, and none through it."""
+    return area.without(water_taken(shoals), NAME, is_own=True) if shoals else area

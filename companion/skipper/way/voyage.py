@@ -182,8 +182,13 @@ class AreaLike(Protocol):
         """Return the water that a fence's zones take and that the margin leaves; empty where there is none."""
         ...
 
-    def without(self, taken: BaseGeometry, name: str) -> AreaLike:
-        """Return the area whose limits leave ``taken`` out, too."""
+    @property
+    def edge_name(self) -> str:
+        """What its limits are called."""
+        ...
+
+    def without(self, taken: BaseGeometry, name: str, *, is_own: bool = False) -> AreaLike:
+        """Return the area less ``taken``, by ``name``: a limit, with ``is_own`` one of the mission's own."""
         ...
 
     def roomy_en(self, near_en: PointEn, room_m: float) -> PointEn | None:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Point, box
 
 from companion.boat import Boat, ardurover_sitl
+from companion.boat.polar import constant
 from companion.planner import Problem, plan
 from companion.planner.problem.value import defect_of
 from companion.planners import AUTO, AstarSettings, PlannerChoice
@@ -18,7 +19,9 @@ from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dic
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.judge import half_width_rad, judge, predicted_beat
+from companion.skipper.way.shoals import NAME, Shoal, beyond_words, shoaled
 from companion.skipper.way.shortest import way_m
+from companion.skipper.way.stemming import Water
 from companion.skipper.way.voyage import Goal
 from tests.skipper.world import area, forecast, voyage
 
@@ -123,6 +126,46 @@ def test_a_start_inside_the_margin_is_led_out():
     assert made.area.clearance_m([out.en_m])[0] >= 15.0
     assert "from an obstacle" in out.text
     assert repaired(made, start, margin_m=3.0, floor_m=2.0, twd_from_rad=0.0) is start
+
+
+@pytest.mark.parametrize("set_deg", [90.0, 270.0])
+def test_in_a_stream_the_free_water_is_the_one_that_she_is_soonest_at(set_deg):
+    """The nearest lay up the stream: she stood before the rock until it had her."""
+    made = voyage(obstacles=(Point(-12.0, 0.0).buffer(8.0),))
+    start = Start(en_m=(0.0, 0.0), heading_rad=math.radians(90.0))
+    flows = 0.9 * math.sin(math.radians(set_deg)), 0.9 * math.cos(math.radians(set_deg))
+    slow = replace(made.boat, polar=constant(1.0))
+    water = Water(boat=slow, wind=(0.0, 5.0), current_en_mps=flows, no_go_half_rad=math.radians(45.0))
+    still = repaired(made, start, margin_m=12.0, floor_m=6.0, twd_from_rad=0.0)
+    out = repaired(made, start, margin_m=12.0, floor_m=6.0, twd_from_rad=0.0, water=water)
+    assert still.lead_in[0][0] > 5.0
+    by_nearest, by_soonest = (math.hypot(*s.en_m) / water.made_good_mps(s.heading_rad) for s in (still, out))
+    assert by_soonest <= by_nearest
+    assert (by_soonest < 0.5 * by_nearest) == (set_deg == 270.0)
+    assert made.area.clearance_m([out.en_m])[0] >= 12.0
+
+
+def test_where_the_stream_lets_her_nowhere_she_is_led_out_as_in_still_water():
+    made = voyage(obstacles=(Point(-12.0, 0.0).buffer(8.0),))
+    start = Start(en_m=(0.0, 0.0), heading_rad=math.radians(90.0))
+    calm = Water(boat=made.boat, wind=(0.0, 0.0), current_en_mps=(-3.0, 0.0), no_go_half_rad=math.radians(45.0))
+    ways = [repaired(made, start, margin_m=12.0, floor_m=6.0, twd_from_rad=0.0, water=w) for w in (None, calm)]
+    assert ways[0] == ways[1] != start
+
+
+def test_out_of_a_shoal_there_is_only_the_way_off_it():
+    """Of a boat in one the whole shoal was opened, as a fence is: "the old plan stays", over the bank at 3.7 m/s."""
+    shoal = Shoal(en_m=(0.0, 12.0), radius_m=20.0, doubt_m=0.0, depth_m=0.4)
+    made = voyage(Goal(en_m=(0.0, 300.0), radius_m=6.0))
+    made = replace(made, area=shoaled(made.area, (shoal,)))
+    out = repaired(made, Start(en_m=(0.0, 0.0), heading_rad=0.0), margin_m=12.0, floor_m=6.0, twd_from_rad=math.pi)
+    assert out.lead_in[0][1] < 0.0
+    assert made.area.clearance_m([out.en_m])[0] >= 12.0
+    assert not out.back_en
+    assert "the fence" not in out.text
+    for name, en_m in {f"inside {NAME}": (0.0, 0.0), "outside the fence": (900.0, 0.0)}.items():
+        water = shoaled(voyage(limits=box(-500, -500, 500, 500)).area, (shoal,))
+        assert beyond_words(water, en_m) == name
 
 
 def test_a_start_just_outside_the_margin_gets_a_notch_where_the_water_is_drawn_narrower():
