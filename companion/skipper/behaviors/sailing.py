@@ -42,7 +42,7 @@ from companion.skipper.behaviors.rest import comes_to_rest, rest
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S, is_left_to_beat, tacks_fail
 from companion.skipper.planning.diversions import diversion, is_at_rest, is_composed
-from companion.skipper.planning.not_found import hold
+from companion.skipper.planning.not_found import FOUL, hold
 from companion.skipper.planning.right_of_way import stands_on
 from companion.skipper.planning.triggers import find_trigger, is_buoy
 from companion.skipper.planning.vessels import near
@@ -391,12 +391,23 @@ def _send_heading(ctx: StepContext) -> None:
         told = by_field_heading(ctx)
         if told is not None:
             ctx.act(SteerHeading(heading_rad=told.heading_rad, thrust=told.thrust, text=told.reason))
+        _say_carried(ctx)
     else:
         wanted = desired_heading_rad(ctx)
         if wanted is not None:
             ctx.act(SteerHeading(heading_rad=wanted, text="leg"))
     if status.mission_seq is not None and status.mission_seq < ctx.state.mission.index + 1:
         make_current(ctx, ctx.state.mission.index + 1)
+
+
+def _say_carried(ctx: StepContext) -> None:
+    """Say so where the current keeps her from her goal: steered by field no plan is asked for that would tell it."""
+    water, boat, gate = ctx.water, ctx.boat_en, ctx.gate
+    if water is None or boat is None or gate is None or ctx.is_said(FOUL, ctx.config.announce_interval_s):
+        return
+    foul = water.trouble(boat, gate.en_m)
+    if foul:
+        ctx.say(Severity.CRITICAL, FOUL, f"{foul}: {gate.name} is not reached by field until it is weaker")
 
 
 def _consider(ctx: StepContext) -> None:
@@ -479,6 +490,8 @@ def _name(ctx: StepContext) -> None:
         left_s = stay_left_s(ctx, gate)
         field, time = gate.field, "" if math.isinf(left_s) else f"; {left_s:.0f} s left"
         ctx.phase(Phase.STANDARD, f"{gate.name}: by field {field.tree.text}, {field.until_words}{time}{tail}")
+    elif ctx.is_by_field and not ctx.ahead():
+        ctx.phase(Phase.STANDARD, f"by field{f' to {gate.name}' if gate is not None else ''}, no plan on board{tail}")
     elif not ctx.ahead():
         wait = state.plans.retry.not_before_s - ctx.t_s
         again = f", trying again in {wait:.0f} s" if wait > 0.0 else ""

@@ -53,6 +53,7 @@ FALL = 0.05  # the rate is told when the charge has fallen by this much ...
 LOOK_S = 300.0  # ... and for this long
 DETOUR = 2.0  # a beat is 1.4 times its straight way, and something lies between
 LEAST_MPS = 0.5
+SWINGS = 1.25  # of what her loiter takes in this wind: within it she is at her place
 
 
 def measure(ctx: StepContext, name: str) -> float | None:
@@ -171,6 +172,8 @@ def _ended(ctx: StepContext) -> float | None:
     route = ctx.state.mission.route
     if route is None or ctx.gate is None or ctx.autopilot is None or diversion(ctx) is not None or (is_composed(ctx)):
         return None
+    if ctx.is_by_field:
+        return 0.0  # where the mission on board ends is nothing to her
     return float(ctx.state.mission.index >= len(route.items) - 1 or ctx.autopilot.mission_state.name == "COMPLETE")
 
 
@@ -235,8 +238,10 @@ def _dragged(ctx: StepContext) -> float | None:
     rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
     if rest is None or boat is None or is_led_off(ctx):
         return None
-    bound = diversion(ctx)
-    return distance_m(boat, rest) if bound is None or bound.kind is DiversionKind.REST else None
+    bound, off_m = diversion(ctx), distance_m(boat, rest)
+    if bound is not None and bound.kind is not DiversionKind.REST:
+        return None
+    return off_m if off_m > SWINGS * ctx.loiter_swing_m else 0.0
 
 
 def _planner(ctx: StepContext) -> float | None:

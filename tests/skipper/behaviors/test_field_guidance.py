@@ -11,8 +11,10 @@ from companion.current import WaterCurrent
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.skipper.behaviors.field_guidance import NAME, habits, situation
+from companion.skipper.behaviors.sailing import _name
+from companion.skipper.rules import Skipper
 from companion.skipper.step import actions as act
-from companion.skipper.step.config import ALL_PERMITTED, Guidance
+from companion.skipper.step.config import ALL_PERMITTED, Guidance, SkipperConfig
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
@@ -333,6 +335,32 @@ def test_by_field_the_floor_is_the_hulls_and_not_the_antennas():
     reach_m = world.skipper.voyage.boat.hull.reach_m
     assert reach_m > 0.0
     assert habits(ctx, 5.0).keep_m == world.skipper.config.margin_floor_m + reach_m
+
+
+@pytest.mark.parametrize("drift_mps", [0.5, 4.0])
+def test_by_field_it_is_said_that_a_current_keeps_her_from_her_goal(drift_mps):
+    """She was carried to leeward for 900 s, and nothing was said: no plan was asked for that would have told it."""
+    made = voyage(Goal(en_m=(0.0, 600.0), radius_m=6.0, name="the mark"))
+    world = World(Skipper(voyage=made, config=SkipperConfig(guidance=Guidance.FIELD)))
+    assert world.run(120, lambda w: w.mode is Mode.GUIDED and w.speed > 1.0)
+    world.extra = {"current": WaterCurrent(east_mps=0.0, north_mps=-drift_mps, is_significant=True)}
+    world.run(30)
+    told = [text for text in texts(world) if "cannot make way against" in text]
+    assert bool(told) == (drift_mps == 4.0)
+    assert all("the mark is not reached by field" in text for text in told)
+
+
+@pytest.mark.parametrize("is_guided", [True, False])
+def test_with_no_plan_on_board_the_field_steers_on_and_nobody_loiters(is_guided):
+    world = World(Skipper(voyage=voyage(), config=SkipperConfig(guidance=Guidance.FIELD)))
+    assert world.run(120, lambda w: w.mode is Mode.GUIDED and w.speed > 1.0)
+    mission = world.state.mission
+    world.state = with_parts(world.state, mission={"index": len(mission.route.items) - 1})
+    world.set_mode(Mode.GUIDED if is_guided else Mode.AUTO)
+    ctx = StepContext(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
+    _name(ctx)
+    assert ("loitering" in ctx.state.why) is not is_guided
+    assert ("by field to" in ctx.state.why) is is_guided
 
 
 @pytest.mark.parametrize(("is_significant", "seen"), [(True, (0.4, -0.6)), (False, (0.0, 0.0))])

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from shapely.geometry import box
 
+from companion.boat.margins import AutopilotLimits
 from companion.messages import MissionState, Mode
 from companion.safety import BY_NAME, SENSORS, TABLE
 from companion.skipper.planning.diversions import diversion
@@ -387,6 +388,22 @@ def test_on_her_way_back_she_is_still_off_it_and_bound_elsewhere_it_is_not_asked
     rest = {"sailing": True, "over": "all goals are reached", "rest_en_m": (0.0, 100.0)}
     ctx = moment(WAY, voyage=rest, obstacles=(box(-20, 40, 20, 60),), up=up)
     assert measure(ctx, "dragged off") == figure
+
+
+def test_within_her_loiters_own_swing_she_is_at_her_place():
+    """A boat of 4.5 m/s that turns by 10 degrees a second swings by 49 m, and was "dragged off" again and again."""
+    rest = {"sailing": True, "over": "all goals are reached", "rest_en_m": (0.0, 55.0)}
+    figures = {
+        limits.rate_max_radps: measure(moment(WAY, voyage=rest, tws_mps=9.0, seen={"limits": limits}), "dragged off")
+        for limits in (AutopilotLimits(), AutopilotLimits(rate_max_radps=math.radians(10.0)))
+    }
+    assert list(figures.values()) == [pytest.approx(55.0), 0.0]
+
+
+def test_by_field_where_the_mission_on_board_ends_is_nothing_to_her():
+    ends = moment(WAY, mission={"index": len(WAY.items) - 1}, config={"guidance": Guidance.FIELD})
+    assert measure(ends, "mission ended") == 1.0
+    assert measure(shown(ends, mode=Mode.GUIDED), "mission ended") == 0.0
 
 
 def test_led_off_her_place_by_the_field_she_is_given_two_minutes_for_the_way_back():
