@@ -191,6 +191,8 @@ def _tracked(
     )
     leg = track.leg - first
     mine = (leg >= 0) | (np.hypot(*(track.en_m - path[0]).T) < BESIDE_M)
+    if not mine.any():  # a boat that turns too wide for the corner before never comes onto it: what she sails is judged
+        mine[:] = True
     en = track.en_m[mine]
     return whole, first, en, np.maximum(leg[mine], 0), tracking.distance_m(en)
 

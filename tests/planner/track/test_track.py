@@ -325,3 +325,20 @@ def test_a_floor_that_is_no_number_cannot_be_planned():
     found = plan(problem(tracking={"floor_m": math.nan}), expansions=1000)
     assert found.status is PlanStatus.INVALID
     assert "tracking" in found.reason
+
+
+def test_a_boat_that_circles_before_the_corner_for_ever_is_judged_by_her_circles():
+    """Of a boat that turns 25 m wide nothing of the track was on legs of 7, 5 and 2 m: IndexError."""
+    path = np.array([(136.76, 140.597), (37.692, 143.232), (30.527, 144.538), (25.965, 145.922), (23.805, 146.943)])
+    wall = [shapely.box(-40.0, 100.0, 20.0, 200.0)]
+    made = problem(wall, wind_deg=265.0, tws=9.4)
+    angles = np.radians([0, 30, 45, 55, 70, 90, 110, 135, 160, 180])
+    mps = 2.5 * np.array([0, 0, 0.5, 0.84, 0.95, 1, 1, 0.95, 0.85, 0.8])
+    helm = replace(made.tracking.helm, no_go_half_rad=math.radians(50.0), rate_max_radps=math.radians(10.0))
+    slow = replace(
+        made,
+        boat=replace(made.boat, polar_twa_rad=tuple(angles), polar_mps=tuple(mps)),
+        tracking=replace(made.tracking, helm=helm),
+    )
+    seen = expected(slow, path, part=slice(1, None), has_boards=False)
+    assert -math.inf < seen.clearance_m < 30.0
