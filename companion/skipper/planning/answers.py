@@ -29,7 +29,7 @@ from companion.skipper.step.actions import Change
 from companion.skipper.step.missions import Tail, splice
 from companion.skipper.step.state import PendingPlan, Retry
 from companion.skipper.way.gates import astray, no_room
-from companion.skipper.way.geometry import distance_m, gybe_round, moved
+from companion.skipper.way.geometry import bearing_rad, distance_m, gybe_round, has_way_out, moved
 from companion.skipper.way.voyage import PointEn
 from companion.traffic import Decision, decide
 
@@ -37,6 +37,7 @@ SLOW = "slow computer"  # the code under which it is said
 SAME_M = 1.0  # a new waypoint this near to the old one is the old one
 # Plans from a waypoint between here and a goal: one from the boat leads to the same goal.
 AT_WAYPOINT = frozenset({ReplanReason.WAYPOINT, ReplanReason.FORECAST})
+WIDE_TURN_M = 8.0  # a tighter one has room where plans lead
 GYBE_RADIUS_M = 8.0  # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
 
 
@@ -59,7 +60,7 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
         not_found(ctx, pending, _no_room(ctx, pending) or reason)
         return
     ctx.set(plans=changed(ctx.state.plans, unanswered=0, effort=min(1.0, MORE * ctx.state.plans.effort), rung=0))
-    outside = _astray(ctx, pending, plan)
+    outside = _astray(ctx, pending, plan) or _dead_end(ctx, pending, plan)
     if outside:
         not_found(ctx, pending, outside)
         return
@@ -132,6 +133,29 @@ def _astray(ctx: StepContext, pending: PendingPlan, plan: Plan) -> str:
     if ctx.gate is None or ctx.gate.goal != gate.goal:
         return astray(gate, way, 0.0)
     return astray(gate, [boat, *before, *way], ctx.state.progress.bearing_rad)
+
+
+def _dead_end(ctx: StepContext, pending: PendingPlan, plan: Plan) -> str:
+    """Return why the boat comes to a gate and not away from it, in words; empty: she does, or it leads to none.
+
+    Behind the plan's end there is another plan, or a loiter: one that turns wide has to be turned for before.
+    """
+    wind, limits = ctx.wind_mean, ctx.snapshot.limits
+    if pending.gate < 0 or wind is None or limits is None or len(plan.waypoints_en) < 2:
+        return ""
+    speed_mps = ctx.voyage.boat.polar.max_speed_mps(wind[1])
+    radius_m = speed_mps / limits.rate_max_radps
+    if radius_m < WIDE_TURN_M:
+        return ""
+    before, end = ((float(e), float(n)) for e, n in plan.waypoints_en[-2:])
+    area, course_rad = ctx.voyage.area, bearing_rad(before, end)
+    if has_way_out(area, end, course_rad, radius_m=radius_m, reach_m=ctx.voyage.boat.hull.reach_m):
+        return ""
+    rate = f"{math.degrees(limits.rate_max_radps):.0f} deg/s (ATC_STR_RAT_MAX)"
+    return (
+        f"{ctx.gates[pending.gate].name} is a dead end: at {speed_mps:.1f} m/s and {rate} a turn is "
+        f"{2.0 * radius_m:.0f} m wide, and touches {area.nearest_name(end)}"
+    )
 
 
 def _may_still_turn_before(ctx: StepContext, waypoint_en: PointEn) -> bool:

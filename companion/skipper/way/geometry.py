@@ -13,6 +13,7 @@ from companion.skipper.way.voyage import AreaLike, PointEn
 
 BEAR_AWAY_RAD = math.radians(100.0)  # a beam reach with a little to spare: every boat gathers way on it
 LOOK_M = 40.0  # water looked at on either side before bearing away
+AWAY_RADII = 4.0  # straight on for so far there is room to turn in, or water that goes on
 LOOP_SHARE = 0.6  # of the way round from the course before a loop to that away from the leg after it
 
 
@@ -118,6 +119,19 @@ def bear_away_rad(boat_en: PointEn, heading_rad: float, twd_from_rad: float, are
         for h in options
     ]
     return options[1] if rooms[1] > rooms[0] + 5.0 and rooms[0] < LOOK_M / 2.0 else options[0]
+
+
+def has_way_out(area: AreaLike, at_en: PointEn, course_rad: float, *, radius_m: float, reach_m: float) -> bool:
+    """Return whether a hull that comes to a place on a course gets away from it: straight on, or round to either side.
+
+    ``radius_m`` is of the turn, ``reach_m`` what the hull reaches about its middle.
+    """
+    ways = [[at_en, moved(at_en, course_rad, AWAY_RADII * radius_m)]]
+    for side in (1.0, -1.0):
+        abeam = course_rad + side * math.pi / 2.0
+        middle = moved(at_en, abeam, radius_m)
+        ways.append([moved(middle, abeam + math.pi + side * math.pi * n / 12.0, radius_m) for n in range(13)])
+    return any(area.path_clearance_m(way) >= reach_m for way in ways)
 
 
 def is_tack(before_rad: float, after_rad: float, twd_from_rad: float) -> bool:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import shapely
 
+from companion.boat.margins import AutopilotLimits
 from companion.messages import Mode
 from companion.planner import plan
 from companion.planner.track import ExpectedTrack
@@ -33,6 +34,26 @@ from tests.skipper.world import with_parts
 GOAL = (0.0, 220.0)
 ROCK = shapely.box(-30.0, 80.0, -10.0, 120.0)  # its eastern side is 10 m west of the straight way
 MARGIN_M, FLOOR_M = 14.0, 4.0
+
+
+DOCK = (
+    shapely.box(-60.0, 200.0, -40.0, 345.0),
+    shapely.box(40.0, 200.0, 60.0, 345.0),
+    shapely.box(-60.0, 345.0, 60.0, 365.0),
+)
+
+
+@pytest.mark.parametrize("rate_deg_s", [120.0, 10.0])
+def test_into_a_dock_that_is_narrower_than_her_turn_she_does_not_sail(rate_deg_s):
+    """At 10 degrees a second she struck its side in the turn behind the goal: "the old one is sound and stays"."""
+    world = make(Goal(en_m=(0.0, 300.0), radius_m=10.0, name="the head"), obstacles=DOCK)
+    world.wind = lambda t: (math.radians(270.0), 9.0)
+    world.extra = {"limits": AutopilotLimits(rate_max_radps=math.radians(rate_deg_s))}
+    world.run(200)
+    texts = " ".join(a.text for _, a in world.actions if isinstance(a, Announce))
+    assert ("the head is a dead end: at" in texts) is (rate_deg_s == 10.0)
+    assert bool(world.state.progress.reached) is (rate_deg_s == 120.0)
+    assert world.clearance() > 5.0
 
 
 def sailing(way=((0.0, 60.0), GOAL), *, rock=ROCK, **config):

@@ -18,6 +18,7 @@ from companion.skipper.way.geometry import (
     cross_track_m,
     distance_m,
     gybe_round,
+    has_way_out,
     is_past,
     is_tack,
     leg_distance_m,
@@ -184,3 +185,22 @@ def test_a_buoy_that_is_the_last_is_rounded_for_the_way_home():
     assert home[0].en_m == pytest.approx((15.0, 200.0), abs=1e-6)
     assert home[1].en_m == pytest.approx((0.0, 215.0), abs=1e-6)
     assert home[2].en_m == pytest.approx((-15.0, 200.0), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("half_m", "head_m", "radius_m", "is_out"),
+    [
+        (40.0, 45.0, 15.0, True),  # round in the dock
+        (40.0, 45.0, 23.0, False),
+        (60.0, 45.0, 23.0, True),
+        (40.0, 120.0, 23.0, True),  # straight on
+        (None, 20.0, 23.0, True),  # along a quay with open water to one side
+    ],
+)
+def test_a_turn_that_is_wider_than_a_dock_is_no_way_out_of_it(half_m, head_m, radius_m, is_out):
+    walls = [box(-300.0, head_m, 300.0, head_m + 10.0)]
+    course_rad = math.pi / 2.0 if half_m is None else 0.0
+    if half_m is not None:
+        walls += [box(-half_m - 10.0, -200.0, -half_m, head_m), box(half_m, -200.0, half_m + 10.0, head_m)]
+    out = has_way_out(area(*walls), (0.0, 0.0), course_rad, radius_m=radius_m, reach_m=1.0)
+    assert out is is_out
