@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,8 +20,16 @@ Offload = Callable[[Callable[[], None]], Awaitable[None]]
 
 
 async def in_thread(work: Callable[[], None]) -> None:
-    """Do disk work in a thread: a slow card must not hold the loop."""
-    await asyncio.to_thread(work)
+    """Do disk work in a thread: a slow card must not hold the loop. Who is cancelled ends when the work has."""
+    working = asyncio.ensure_future(asyncio.to_thread(work))
+    try:
+        await asyncio.shield(working)
+    finally:  # a thread cannot be ended, and what it works on must not be closed, or another's, before it is
+        while not working.done():
+            with contextlib.suppress(asyncio.CancelledError):
+                await asyncio.wait({working})
+        if not working.cancelled():
+            working.exception()  # heard: who was cancelled has nothing more to do with it
 
 
 async def at_once(work: Callable[[], None]) -> None:

@@ -1,20 +1,34 @@
 """The voyage folder: what is written survives a torn last line and a sick disk; whole files are whole or absent."""
 
+import asyncio
 import contextlib
 import errno
 import json
 import math
 import os
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from companion.app.options import in_thread
+from companion.clock import run
 from companion.disk import NEW, Disk
 from companion.errors import JobError
+from companion.guard import Auxiliary, Guard
 from companion.telemetry.folder import recorder as module
-from companion.telemetry.folder.recorder import DECISIONS, TLOG, TRACK_COLUMNS, Recorder, jsonable, read_jsonl
+from companion.telemetry.folder.recorder import (
+    DECISIONS,
+    TLOG,
+    TRACK_COLUMNS,
+    Recorder,
+    VoyageArchive,
+    closed,
+    jsonable,
+    read_jsonl,
+)
 
 
 def test_records_survive_a_torn_last_line(tmp_path):
@@ -212,3 +226,89 @@ def test_a_torn_line_is_cut_off_a_long_file(tmp_path, monkeypatch):
     with Recorder(tmp_path):
         pass
     assert path.read_bytes() == whole
+
+
+class Slow(Disk):
+    """A card on which what ``tend`` asks takes a while; ``is_full`` for what is appended meanwhile."""
+
+    is_full = False
+
+    def room(self, folder):
+        time.sleep(0.2)
+        return super().room(folder)
+
+    def sync(self, fd):
+        time.sleep(0.2)
+        super().sync(fd)
+
+    def write(self, fd, data):
+        if self.is_full:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return super().write(fd, data)
+
+
+@pytest.mark.parametrize("is_taken_up", [False, True])
+def test_the_thread_that_tends_the_records_does_not_outlive_the_voyage(tmp_path, is_taken_up):
+    disk, found = Slow(), []
+
+    async def voyage():
+        with Recorder(tmp_path / "v", disk=disk) as recorder:
+
+            def tend():
+                recorder.tend(STAMPS)
+                found.append(recorder.trouble)
+
+            guard = Guard()
+            disk.is_full = is_taken_up
+            recorder.decision({"k": 1})
+            disk.is_full = False
+            guard.keep(Auxiliary.RECORDS, lambda: in_thread(tend))
+            await asyncio.sleep(0.05)
+            await guard.end()
+            assert found == [""], "the records are whole, or taken up again, before they are closed"
+            recorder.summary({"arrived": True})
+
+    run(voyage())
+    with Recorder(tmp_path / "v") as recorder:  # the folder is free again
+        assert recorder.trouble == ""
+
+
+def test_a_whole_file_that_is_wanted_anew_while_it_is_written_is_written_anew(tmp_path):
+    class Later(Disk):
+        is_full = is_asked = False
+
+        def replace(self, path, data, **how):
+            if self.is_full:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            super().replace(path, data, **how)
+            if self.is_asked:  # by the voyage's own loop, while the thread takes the records up
+                self.is_asked = False
+                recorder.whole("f", b"new")
+
+    disk = Later()
+    with Recorder(tmp_path / "v", disk=disk) as recorder:
+        disk.is_full = True
+        recorder.whole("f", b"old")
+        disk.is_full, disk.is_asked = False, True
+        recorder.tend(STAMPS)
+    assert (tmp_path / "v" / "f").read_bytes() == b"new"
+
+
+def test_what_is_written_while_a_part_is_closed_is_not_counted_to_the_next(tmp_path):
+    class Meanwhile(Disk):
+        is_tended = False
+
+        def append(self, fd, data):
+            super().append(fd, data)
+            if self.is_tended:
+                self.is_tended = False
+                recorder.tend(STAMPS)  # in the thread, before the loop goes on
+
+    disk, archive = Meanwhile(), VoyageArchive(folder=tmp_path, budget_bytes=6400)
+    with Recorder(tmp_path / "v", disk=disk, archive=archive) as recorder:
+        recorder.frame(bytes(100))
+        disk.is_tended = True
+        recorder.frame(bytes(100))
+        assert [p.name for p in closed(tmp_path / "v" / TLOG)] == ["telemetry-000001.tlog"]
+        recorder.tend(STAMPS)
+        assert len(closed(tmp_path / "v" / TLOG)) == 1, "an empty file is no part"

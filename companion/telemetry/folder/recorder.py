@@ -26,6 +26,7 @@ import json
 import math
 import os
 import re
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -286,6 +287,9 @@ def jsonable(value: Any) -> Any:
 class Recorder:
     """The files of one voyage. A context manager; ``folder`` is made if it is not there.
 
+    Records are written in the voyage's own loop, while ``tend`` may be at work in a thread; it has ended before the
+    context does.
+
     Args:
         folder: of the voyage.
         disk: what is written to.
@@ -320,6 +324,7 @@ class Recorder:
         self._gone: tuple[str, ...] = ()  # of older voyages, and not yet told
         self._told: set[str] = set()  # of those, which a record says to have ended
         self._tends = 0
+        self._counting = threading.Lock()  # of loop and thread, over the counts and ``_wanted``; never over disk work
 
     def __enter__(self) -> Self:
         self._tidy()
@@ -371,9 +376,10 @@ class Recorder:
 
         The summary is tried whatever the trouble: no other moment comes.
         """
-        self._wanted[name] = data
-        if self.trouble and name != SUMMARY:
-            return
+        with self._counting:
+            self._wanted[name] = data
+            if self.trouble and name != SUMMARY:
+                return
         try:
             self._write_wanted(name)
         except OSError as error:
@@ -383,22 +389,30 @@ class Recorder:
         path = self.folder / name
         if path.parent != self.folder:
             self._disk.make_folder(path.parent)
-        self._disk.replace(path, self._wanted[name], is_durable=self._is_durable)
-        del self._wanted[name]
+        data = self._wanted[name]
+        self._disk.replace(path, data, is_durable=self._is_durable)
+        with self._counting:
+            if self._wanted[name] is data:  # and not what is wanted since
+                del self._wanted[name]
 
     def _append(self, name: str, data: bytes) -> bool:
-        if not self.trouble and self._bytes[name] + len(data) > self._caps[name] and name not in self._ended:
-            self._ended[name] = self._row_t_s
-        if self.trouble or name in self._ended:
-            self.dropped += 1
-            return False
+        with self._counting:
+            if not self.trouble and self._bytes[name] + len(data) > self._caps[name] and name not in self._ended:
+                self._ended[name] = self._row_t_s
+            if self.trouble or name in self._ended:
+                self.dropped += 1
+                return False
+            fd = self._fds[name]
         try:
-            self._disk.append(self._fds[name], data)
+            self._disk.append(fd, data)
         except OSError as error:
             self._pause(reason(error))
-            self.dropped += 1
+            with self._counting:
+                self.dropped += 1
             return False
-        self._bytes[name] += len(data)
+        with self._counting:
+            if self._fds.get(name) == fd:  # and not closed as a part meanwhile
+                self._bytes[name] += len(data)
         return True
 
     # -------------------------------------------------------------------------------------------- care
@@ -466,13 +480,15 @@ class Recorder:
         if name == TRACK and size == 0:
             self._disk.append(fd, _HEADER)
             size = len(_HEADER)
-        self._fds[name], self._bytes[name] = fd, size
+        with self._counting:
+            self._fds[name], self._bytes[name] = fd, size
 
     def _pause(self, why: str) -> None:
         """Record nothing any more, until ``tend`` finds that it can be."""
-        if not self.trouble:
-            self._gap = (self._row_t_s, self.dropped)
-        self.trouble = why
+        with self._counting:
+            if not self.trouble:
+                self._gap = (self._row_t_s, self.dropped)
+            self.trouble = why
 
     def _take_up(self, stamps: Mapping[str, Any]) -> None:
         """Record again, after what came too early and a record of what is missing."""
