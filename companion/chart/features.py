@@ -32,7 +32,7 @@ class Danger:
     """Something to keep clear of: longitude and latitude [deg], an area, or points and lines with a radius.
 
     ``depth_m`` is the least depth over it below the chart's datum, negative where it dries; ``doubt_m`` how far off its
-    place may be, by the quality of the survey.
+    place may be, by the quality of the survey, or the margin that it was drawn with.
     """
 
     reason: str

@@ -26,9 +26,11 @@ from companion.chart.features import Chart, Danger, Row, Source, Wanted
 from companion.chart.picture import DRAWN, ChartPicture, Mark, marks_of_chart, marks_of_rows
 from companion.disk import read_regular
 from companion.errors import InputError, unreadable
-from companion.geofence import Code, Finding, FindingLevel, read
-from companion.geofence.formats import decode
+from companion.geofence import Circle, Code, Finding, FindingLevel, Zone, ZoneKind, read
+from companion.geofence.document import Mark as DrawnMark
+from companion.geofence.formats import decode, zone_kind
 from companion.messages import GeoPoint
+from companion.words import counted
 
 Box = tuple[float, float, float, float]
 """West, south, east, north [deg]; west and east may lie beyond the date line."""
@@ -142,6 +144,7 @@ def _of_rows(rows: Iterator[Row], path: Path, wanted: Wanted, *, without_depths:
     """Return what features say: by S-57's classes where layers are called so, by tags, else areas are land."""
     found: list[Danger] = []
     cell: list[Row] = []
+    kept_in = 0
     is_osm = path.suffix.lower() in OSM
     for row in rows:
         if row.geometry is None or row.geometry.is_empty:
@@ -150,8 +153,10 @@ def _of_rows(rows: Iterator[Row], path: Path, wanted: Wanted, *, without_depths:
             cell.append(Row(layer=row.layer.upper(), place=row.place, geometry=row.geometry, attributes=row.attributes))
         elif is_osm or tags.is_tagged(row):
             found += tags.dangers_of(row, wanted)
+        elif zone_kind(row.text("kind")) is ZoneKind.INCLUSION:
+            kept_in += 1
         else:
-            found.append(_plain(row))
+            found += _plain(row, wanted)
     if cell:
         if not (s57.has_depths(cell) or without_depths):
             raise s57.no_depths(str(path))
@@ -161,37 +166,70 @@ def _of_rows(rows: Iterator[Row], path: Path, wanted: Wanted, *, without_depths:
             dangers=(*chart.dangers, *found),
             coverage=chart.coverage,
             knows_depths=chart.knows_depths,
+            findings=_findings(cell, kept_in, path),
         )
-    findings: tuple[Finding, ...] = ()
-    if not found:
-        findings = (
-            Finding(
-                severity=FindingLevel.NOTE, code=Code.EMPTY, place="", text="holds nothing solid here", source=str(path)
-            ),
-        )
-    return Chart(source=Source(name=path.name), dangers=tuple(found), findings=findings)
+    return Chart(source=Source(name=path.name), dangers=tuple(found), findings=_findings(found, kept_in, path))
 
 
-def _plain(row: Row) -> Danger:
-    kind = row.geometry.geom_type
-    name = row.text("name")
-    if kind.endswith("Polygon"):
-        return Danger(reason="land", geometry=row.geometry, name=name)
-    if kind.endswith("LineString"):
-        return Danger(reason="shore", geometry=row.geometry, name=name, radius_m=LINE_M)
-    return Danger(reason="danger", geometry=row.geometry, name=name, radius_m=POINT_M)
+def _plain(row: Row, wanted: Wanted) -> list[Danger]:
+    """Return what a feature without class or tags is, by what an obstacle file says of it; none: deep enough."""
+    shape, radius_m, depth_m = row.geometry.geom_type, row.number("radius_m"), row.number("depth_m")
+    if depth_m is not None and depth_m >= wanted.safety_depth_m:
+        return []
+    if shape.endswith("Polygon"):
+        reason, radius_m = "land", 0.0
+    elif shape.endswith("LineString"):
+        reason, radius_m = "shore", LINE_M
+    else:
+        reason, radius_m = "danger", POINT_M if radius_m is None or radius_m <= 0.0 else radius_m
+    reason = row.text("reason") or reason
+    name = row.text("name").removesuffix(f" ({reason})")  # with which a file of ours has it
+    return [
+        Danger(
+            reason=reason,
+            geometry=row.geometry,
+            name="" if name == reason else name,
+            depth_m=depth_m,
+            radius_m=radius_m,
+            doubt_m=max(0.0, row.number("margin_m") or 0.0),
+        )
+    ]
 
 
 def _of_document(path: Path) -> Chart:
     """Return what a file of drawings holds: its zones and marks to keep out of."""
     document = read(path, areas=True).require_clean()
-    found = [
-        Danger(reason="drawn", geometry=z.shape, name=z.name)
-        for z in document.zones
-        if isinstance(z.shape, shapely.Polygon)
-    ]
-    found += [Danger(reason="drawn", geometry=m.geometry, name=m.name, radius_m=POINT_M) for m in document.marks]
-    return Chart(source=Source(name=path.name), dangers=tuple(found))
+    found: list[Danger] = []
+    drawn: list[Zone | DrawnMark] = [*document.zones, *document.marks]
+    for each in drawn:
+        if each.kind is ZoneKind.INCLUSION:
+            continue
+        geometry: BaseGeometry
+        if isinstance(each, DrawnMark):
+            geometry, radius_m = each.geometry, POINT_M
+        elif isinstance(each.shape, Circle):
+            center, radius_m = each.shape.center, each.shape.radius_m
+            geometry = shapely.Point(center.lon_deg, center.lat_deg)
+        else:
+            geometry, radius_m = each.shape, 0.0
+        found.append(
+            Danger(reason="drawn", geometry=geometry, name=each.name, radius_m=radius_m, doubt_m=each.margin_m or 0.0)
+        )
+    kept_in = len(drawn) - len(found)
+    return Chart(source=Source(name=path.name), dangers=tuple(found), findings=_findings(found, kept_in, path))
+
+
+def _findings(found: Sequence[Danger | Row], kept_in: int, path: Path) -> tuple[Finding, ...]:
+    """Return what there is to say of a file with ``kept_in`` zones to keep in, which are nothing solid."""
+
+    def noted(code: Code, text: str, remedy: str = "") -> Finding:
+        return Finding(severity=FindingLevel.NOTE, code=code, place="", text=text, remedy=remedy, source=str(path))
+
+    said = [] if found else [noted(Code.EMPTY, "holds nothing solid here")]
+    if kept_in:
+        text = f"holds {counted(kept_in, 'zone')} to keep in: only what to keep out of is taken"
+        said.append(noted(Code.NOT_CARRIED, text, "name the file as the mission's fence"))
+    return tuple(said)
 
 
 def _rows_of_geojson(path: Path, box: Box) -> Iterator[Row]:

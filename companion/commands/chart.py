@@ -206,7 +206,7 @@ def _import(args: argparse.Namespace) -> int:
             f"{drying}: written: {counted(len(area.drying), 'piece')} of water that is too shallow at some hours only"
         )
     print(f"{fence}: written: the edge of it")
-    if any(s.doubt_m >= args.most_doubt > 0.0 for s in area.solids):
+    if any(s.doubt_m == args.most_doubt > 0.0 for s in area.solids):
         print(f"surveys here are so doubtful that margins would be wider: cut at {args.most_doubt:g} m (--most-doubt)")
     told = f', drying = ["{drying.name}"]' if args.drying else ""
     print(f'in the mission: [area] obstacles = ["{obstacles.name}"], fence = "{fence.name}"{told}')

@@ -10,7 +10,8 @@ from shapely.geometry import LineString, Point, box
 
 from companion import cli
 from companion.chart import Wanted, area_of, box_about, read_chart
-from companion.geofence import load_mission
+from companion.geofence import Circle, Document, Zone, ZoneKind, load_mission
+from companion.geofence.formats import write
 from companion.messages import GeoPoint
 
 AROUND = ["--around", "50.82,-1.31", "--radius", "1500"]
@@ -301,6 +302,50 @@ def test_an_osm_extract_has_shores_and_seamarks(shell):
     (shore,) = (f for f in features if f["properties"]["name"] == "shore")
     line = LineString([(-1.310, 50.822), (-1.308, 50.823)])
     assert shapely.covers(shapely.from_geojson(json.dumps(shore["geometry"])), line)
+
+
+def test_what_was_written_is_read_again_as_it_is(shell):
+    """A wreck of 20 m was one of 10, and all had lost reason, depth and margin."""
+    wreck = {"kind": "exclusion", "name": "Ada (wreck)", "reason": "wreck", "radius_m": 20.0, "depth_m": 1.0}
+    shallow = {"kind": "exclusion", "name": "shallow", "reason": "shallow", "depth_m": 0.5, "margin_m": 7.0}
+    deep = {"kind": "exclusion", "name": "wreck", "reason": "wreck", "radius_m": 20.0, "depth_m": 9.0}
+    fence = {"kind": "inclusion", "name": "the chart's edge"}
+    features = [(Point(-1.31, 50.825), wreck), (ISLAND, shallow), (Point(-1.31, 50.815), deep)]
+    (shell.folder / "own.geojson").write_text(collection(*features, (box(-1.33, 50.81, -1.29, 50.83), fence)))
+    code, out, _ = shell("own.geojson", *AROUND, "--depth", "2")
+    assert code == 0
+    assert out.startswith(
+        "own.geojson: note: holds 1 zone to keep in: only what to keep out of is taken; name the file as the mission's "
+        "fence\n"
+    )
+    found = [f["properties"] for f in json.loads((shell.folder / "chart.geojson").read_text())["features"]]
+    kept = ({key: each[key] for key in each if key != "source"} for each in found)
+    assert sorted(kept, key=lambda each: each["name"]) == [wreck, shallow]
+
+
+@pytest.mark.parametrize(("kind", "count"), [("exclusion", 2), ("inclusion", 0)])
+def test_of_drawings_what_is_to_keep_out_of_is_solid(tmp_path, kind, count):
+    """A fence in a KML was an obstacle as large as the water, and a circle nothing."""
+    ring = "-1.33,50.81 -1.29,50.81 -1.29,50.83 -1.33,50.83 -1.33,50.81"
+    data = f'<ExtendedData><Data name="kind"><value>{kind}</value></Data></ExtendedData>'
+    (tmp_path / "f.kml").write_text(
+        f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document><Placemark><name>a</name>{data}<Polygon><outerBoundaryIs>'
+        f"<LinearRing><coordinates>{ring}</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>"
+        f"<Placemark><name>b</name>{data}<Point><coordinates>-1.31,50.82</coordinates></Point></Placemark></Document></kml>"
+    )
+    here = box_about(GeoPoint(lat_deg=50.82, lon_deg=-1.31), 1500.0)
+    chart = read_chart(tmp_path / "f.kml", here, Wanted(safety_depth_m=2.0))
+    assert [(d.name, d.radius_m) for d in chart.dangers] == [("a", 0.0), ("b", 10.0)][:count]
+    assert any("2 zones to keep in" in f.text for f in chart.findings) == (count == 0)
+
+
+def test_a_circle_that_is_drawn_is_solid_and_as_large(tmp_path):
+    circle = Zone(kind=ZoneKind.EXCLUSION, shape=Circle(GeoPoint(lat_deg=50.82, lon_deg=-1.31), 35.0), name="rock")
+    (tmp_path / "c.wkt").write_bytes(write(Document(zones=(circle,)), "c.plan").data)  # told by its content
+    here = box_about(GeoPoint(lat_deg=50.82, lon_deg=-1.31), 1500.0)
+    (danger,) = read_chart(tmp_path / "c.wkt", here, Wanted(safety_depth_m=2.0)).dangers
+    assert danger.radius_m == 35.0
+    assert (danger.geometry.x, danger.geometry.y) == pytest.approx((-1.31, 50.82))
 
 
 @pytest.mark.parametrize("west_deg", [-131.0, 229.0])

@@ -7,6 +7,7 @@ from companion.geofence.formats.fence_items import (
     storage_bytes,
     zones_to_items,
 )
+from companion.geofence.formats.geojson import zone_kind
 from companion.geofence.formats.losses import Written
 from companion.geofence.formats.registry import FORMATS, format_of, parse, write
 from companion.geofence.formats.rings import Findings
@@ -32,5 +33,6 @@ __all__ = [
     "read_bytes",
     "storage_bytes",
     "write",
+    "zone_kind",
     "zones_to_items",
 ]

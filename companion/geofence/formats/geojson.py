@@ -32,6 +32,11 @@ _KINDS = {
 }
 
 
+def zone_kind(word: str) -> ZoneKind | None:
+    """Return the kind that a property ``kind`` says, None where it is no word for one."""
+    return _KINDS.get(word.strip().lower())
+
+
 class _GeoJsonReading(Reading):
     def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
         super().__init__(source, kind, areas=areas)
@@ -86,10 +91,11 @@ class _GeoJsonReading(Reading):
         node = properties.get("kind")
         if node is None:
             return self.kind
-        word = node.text().strip().lower()
-        if word not in _KINDS:
-            raise node.fail(f"{word!r} is not a kind", "write inclusion or exclusion")
-        return _KINDS[word]
+        word = node.text()
+        kind = zone_kind(word)
+        if kind is None:
+            raise node.fail(f"{word.strip().lower()!r} is not a kind", "write inclusion or exclusion")
+        return kind
 
     def _single(
         self,
