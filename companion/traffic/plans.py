@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -57,7 +57,7 @@ class PlainLeg:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conflict:
-    """The plan enters a target's disc: on which leg, when first, and how deep at worst [m]."""
+    """The plan enters a target's disc: on which leg, when first, and how deep at worst, on any leg [m]."""
 
     mmsi: int
     name: str
@@ -67,7 +67,7 @@ class Conflict:
 
 
 def check_legs(legs: Sequence[TimedLeg], discs: Sequence[Target]) -> tuple[Conflict, ...]:
-    """Return where the plan meets the discs, the earliest meeting of each vessel, in order of time.
+    """Return where the plan meets the discs: each vessel's earliest meeting, with its greatest depth, in order of time.
 
     Args:
         legs: of the plan, their times on the discs' scale; what was sailed before 0, which is now, is not looked at.
@@ -85,10 +85,12 @@ def check_legs(legs: Sequence[TimedLeg], discs: Sequence[Target]) -> tuple[Confl
             if hit is None:
                 continue
             assert disc.mmsi is not None, "a vessel's disc says whose it is"
+            time_s, depth_m = hit
+            met = Conflict(mmsi=disc.mmsi, name=disc.name, leg=i, time_s=time_s, depth_m=depth_m)
             before = found.get(disc.mmsi)
-            if before is None or hit[0] < before.time_s:
-                depth = hit[1] if before is None else max(hit[1], before.depth_m)
-                found[disc.mmsi] = Conflict(mmsi=disc.mmsi, name=disc.name, leg=i, time_s=hit[0], depth_m=depth)
+            if before is not None:
+                met = replace(min(before, met, key=lambda c: c.time_s), depth_m=max(before.depth_m, depth_m))
+            found[disc.mmsi] = met
     return tuple(sorted(found.values(), key=lambda c: (c.time_s, c.mmsi)))
 
 

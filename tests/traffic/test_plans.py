@@ -50,6 +50,16 @@ def test_a_meeting_is_found_with_its_time() -> None:
     assert check_legs([LEG], [disc(-200.0, 100.0, vx=4.0)])  # it comes when we do
 
 
+def test_the_greatest_depth_of_a_meeting_is_that_of_any_leg() -> None:
+    """1 m was told of a plan whose second leg leads through the middle."""
+    first = PlainLeg(from_en=(-100.0, 49.0), to_en=(0.0, 49.0), start_s=0.0, end_s=100.0)
+    second = PlainLeg(from_en=(0.0, 49.0), to_en=(0.0, -100.0), start_s=100.0, end_s=250.0)
+    for legs in ((first, second), (second, first)):
+        (c,) = check_legs(legs, [disc(0.0, 0.0, radius=50.0)])
+        assert (legs[c.leg], c.depth_m) == (first, pytest.approx(50.0, abs=0.01))
+        assert c.time_s < 100.0
+
+
 def test_what_is_sailed_already_does_not_count() -> None:
     assert check_legs([LEG], [disc(0.0, 20.0)])
     sailed = replace(LEG, start_s=LEG.start_s - 60.0, end_s=LEG.end_s - 60.0)
