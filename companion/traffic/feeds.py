@@ -6,7 +6,8 @@ The one module of this room with sockets. A feed is named like a link::
     tcp:HOST:PORT            a multiplexer that serves NMEA lines
     /dev/ttyUSB0:38400       a receiver on a serial port
 
-A feed never raises once it is open: streams connect again for ever with capped jitter, noise is counted.
+A feed never raises once it is open: streams connect again for ever with capped jitter, over TCP also after a minute
+in which nothing came; noise is counted.
 """
 
 from __future__ import annotations
@@ -152,7 +153,9 @@ class Feed(Generic[Report]):
         try:
             self.connections += 1
             self.last_error, self._partial = "", b""
-            while data := await reader.read(4096):
+            # Over TCP one that is half open (the other side lost its power) is as quiet as the sea.
+            limit_s = SILENT_S if self.name.kind == "tcp" else None
+            while data := await asyncio.wait_for(reader.read(4096), limit_s):
                 self.stream(data)
         finally:
             writer.close()

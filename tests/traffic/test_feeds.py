@@ -127,6 +127,24 @@ def test_tcp_connects_again_when_the_receiver_restarts() -> None:
     hurried(listen())
 
 
+def test_tcp_connects_again_when_the_receiver_has_lost_its_power() -> None:
+    """No end of the connection comes, and nothing more: for as long as it was sailed it was waited for."""
+
+    async def listen() -> None:
+        heard: list[AisReport] = []
+        port = free_port(socket.SOCK_STREAM)
+        async with (
+            receiver(port, sentence(211000001)),
+            open_feed(parse_feed(f"tcp:127.0.0.1:{port}"), heard.append, NmeaDecoder(), "AIS feed") as feed,
+        ):
+            await asyncio.sleep(SILENT_S / 2.0)
+            assert feed.connections == 1
+            await until(lambda: len(heard) == 2)
+            assert feed.connections == 2
+
+    hurried(listen())
+
+
 def test_a_feed_that_is_left_leaves_no_task_and_no_socket() -> None:
     async def listen() -> None:
         port = free_port(socket.SOCK_STREAM)
