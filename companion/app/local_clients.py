@@ -69,7 +69,8 @@ class OperatorCommands:
         self._link, self._authority = link, "signed" if has_key else "unsigned"
         self._waiting: list[Order] = []
         self._is_open = False
-        self._asked: dict[tuple[str, int], asyncio.Future[Answer]] = {}  # by the way and the number of who asks
+        # Not yet answered, as they came: a station's are answered in their order, also those that it waits for no more.
+        self._asked: list[tuple[Source, asyncio.Future[Answer]]] = []
         self.wants_high_latency = False  # HIGH_LATENCY2 was asked for
         link.on_command = self._hear
 
@@ -95,22 +96,23 @@ class OperatorCommands:
         if not self._is_open:
             return Answer(result=Result.NOT_NOW, text="the companion is not under way yet")
         answer: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
-        self._asked[way, number] = answer
-        self._waiting.append(
-            Order(wanted=wanted, t_s=now_s(), authority=way, source=Source(kind=way, component=number))
-        )
-        try:
-            return await answer
-        finally:
-            del self._asked[way, number]
+        source = Source(kind=way, component=number)
+        self._asked.append((source, answer))
+        self._waiting.append(Order(wanted=wanted, t_s=now_s(), authority=way, source=source))
+        return await answer
 
     def answered(self, action: Acknowledge) -> None:
         """Take an answer to where the order came from."""
-        asked = self._asked.get((action.way, action.component))
         if action.way == MAVLINK:
             self._link.acknowledge(action.command, RESULTS[action.result], action.system, action.component)
-        elif asked is not None and not asked.done():
-            asked.set_result(Answer(result=action.result, text=action.text))
+            return
+        source = Source(kind=action.way, system=action.system, component=action.component)
+        asked = next((each for each in self._asked if each[0] == source), None)
+        if asked is None:
+            return
+        self._asked.remove(asked)
+        if not asked[1].done():
+            asked[1].set_result(Answer(result=action.result, text=action.text))
 
     async def watch(self, autopilot: Autopilot, record: Callable[[dict[str, Any]], None]) -> None:
         """Say and record, once, that somebody without the key gives commands."""

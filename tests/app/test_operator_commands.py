@@ -4,10 +4,11 @@ import asyncio
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.app.local_clients import MOST_WAITING, OperatorCommands
+from companion.app.local_clients import BROWSERS, MOST_WAITING, OperatorCommands
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.wire.frames import Codec, Drop, SigningState
-from companion.orders import Verb
+from companion.orders import Result, Verb, Wanted
+from companion.skipper.step import Acknowledge
 from tests.mavlink.test_link import store, with_peer
 
 
@@ -68,3 +69,36 @@ def test_with_a_key_what_is_not_signed_with_it_is_counted_and_said_once(tmp_path
         assert [(o.wanted.verb, o.authority) for o in operator.take()] == [(Verb.STOP, "signed")]
 
     with_peer(main, peer_signing=SigningState(key=ours.state.key, timestamp=ours.state.timestamp), signing=ours)
+
+
+def test_an_answer_is_that_of_the_order_and_not_of_one_that_nobody_waits_for_any_more():
+    """All browsers are one station: after an order that was not answered in time the next was told its answer."""
+
+    async def main(_peer, link):
+        operator = OperatorCommands(link, has_key=False)
+        operator.begin()
+
+        def ask(verb):
+            return asyncio.create_task(operator.ask(Wanted(verb=verb), BROWSERS))
+
+        late = ask(Verb.HOLD)
+        await asyncio.sleep(0.0)
+        late.cancel()
+        first, second = ask(Verb.GO_ON), ask(Verb.STOP)
+        await asyncio.sleep(0.0)
+        for order in operator.take():
+            source, verb = order.source, order.wanted.verb
+            operator.answered(
+                Acknowledge(
+                    way=source.kind,
+                    system=source.system,
+                    component=source.component,
+                    command=order.command,
+                    result=Result.DONE if verb is Verb.HOLD else Result.REFUSED,
+                    text=verb.value,
+                )
+            )
+        answers = [await asyncio.wait_for(each, 5.0) for each in (first, second)]
+        assert [(a.result, a.text) for a in answers] == [(Result.REFUSED, "go_on"), (Result.REFUSED, "stop")]
+
+    with_peer(main)
