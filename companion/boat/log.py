@@ -256,7 +256,8 @@ def steady(
     if _has_leapt(log, window):
         return Why.RESET
     swing = _spread(heading)
-    still = np.nanmax(np.abs(wrap_pi_array(log.awa_rad[window] - log.awa_rad[window.start]))) < 1e-5
+    vane = log.awa_rad[window][known]
+    still = np.max(np.abs(wrap_pi_array(vane - vane[0]))) < 1e-5
     if swing > math.radians(0.5) and still and window.stop - window.start >= FROZEN_S:
         return Why.FROZEN_VANE
     course = np.arctan2(velocity[:, 0], velocity[:, 1])

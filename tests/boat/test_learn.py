@@ -9,7 +9,7 @@ import pytest
 from companion.boat.guess import Sizes, guessed_polar
 from companion.boat.learn import TWA_DEG, TWS_MPS, learn
 from companion.boat.lesson import lesson_of, offset_step_deg
-from companion.boat.log import NEAR_RAD, Stretches, Why, stretches_of
+from companion.boat.log import NEAR_RAD, Stretches, Why, steady, stretches_of
 from companion.boat.manoeuvres import chances, manoeuvres_of
 from companion.boat.polar import Polar
 from companion.boat.towed import driven
@@ -195,6 +195,15 @@ def test_what_poisons_a_log_is_left_out_by_name_and_counted(why):
     assert found.left_out[why] >= 6
     # What came before it is learned from as ever.
     assert len(found) >= 0.4 * len(whole)
+
+
+def test_a_frozen_vane_is_known_where_the_first_reading_is_lost():
+    log = spoiled(Why.FROZEN_VANE)
+    window = slice(log.t_s.shape[0] - 60, log.t_s.shape[0])
+    turning = np.zeros(log.t_s.shape[0], dtype=bool)
+    assert steady(log, window, turning, PRIOR, ERROR) is Why.FROZEN_VANE
+    log.awa_rad[window.start] = np.nan
+    assert steady(log, window, turning, PRIOR, ERROR) is Why.FROZEN_VANE
 
 
 def of_time(log, stretches, since_s, until_s):
