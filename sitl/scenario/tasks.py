@@ -222,7 +222,6 @@ class StationScore:
     lengths: float  # WRSC 2018: that per boat length
     mean_m: float  # WRSC 2019: mean distance to the point
     sailbot: float  # SailBot: points, 10 at best, left out of the box in time
-    farthest_m: float
 
 
 def station_score(
@@ -240,14 +239,7 @@ def station_score(
     d = np.hypot(track[:, 1] - point_en[0], track[:, 2] - point_en[1])
     inside = np.flatnonzero(d <= radius_m)
     if not inside.size:
-        return StationScore(
-            kept=False,
-            radius95_m=math.inf,
-            lengths=math.inf,
-            mean_m=math.inf,
-            sailbot=0.0,
-            farthest_m=float(d.max(initial=math.inf)),
-        )
+        return StationScore(kept=False, radius95_m=math.inf, lengths=math.inf, mean_m=math.inf, sailbot=0.0)
     begin = float(track[inside[0], 0])
     during = (track[:, 0] >= begin) & (track[:, 0] <= begin + TASK_S)
     p = track[during, 1:3]
@@ -262,7 +254,6 @@ def station_score(
         lengths=radius95 / length_m,
         mean_m=float(d[during].mean()),
         sailbot=sailbot_points(track, point_en),
-        farthest_m=float(d[during].max()),
     )
 
 
