@@ -267,6 +267,9 @@ def atlas_of(containers: Sequence[tuple[Container, str]]) -> tuple[Tides, ...]:
             lat, lon = _axes(first, container, source)
             rows, columns, lon_deg = _part(lat.values(), lon.values(), None)
             grid = (lat.values()[rows], lon_deg)
+            if min(rows.size, columns.size) < 2:
+                text = f"is a grid of {rows.size} x {columns.size}: no place lies between its points"
+                raise InputError(source, first.name, text, "cut a wider piece of the atlas")
             here = grids.setdefault(kind, grid)
             if not (np.array_equal(here[0], grid[0]) and np.array_equal(here[1], grid[1])):
                 raise InputError(source, first.name, f"is not on the grid of {where[kind]}", "take files of one atlas")

@@ -211,3 +211,19 @@ def test_an_atlas_of_one_file_a_constituent(tmp_path, monkeypatch, capsys):
     assert np.isnan(weather.current_en_mps(T0, 50.1, -0.5)).any()
     assert cli.main(["weather", "show", "eastward/m2.nc", "eastward/s2.nc"]) == 0
     assert "tide, stream, by 2 constituents: M2 S2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 4), (4, 1)])
+def test_an_atlas_without_an_area_is_refused(tmp_path, rows, columns):
+    """A cut along one parallel ended in an IndexError at its first use; one along a meridian knew nothing."""
+    dims, degrees = ("latitude", "longitude"), {"units": "degrees"}
+    found = {
+        "latitude": (("latitude",), 50.0 + np.arange(rows), {"units": "degrees_north"}),
+        "longitude": (("longitude",), np.arange(columns) * 1.0, {"units": "degrees_east"}),
+        "amplitude": (dims, np.ones((rows, columns)), {"units": "cm"}),
+        "phase": (dims, np.zeros((rows, columns)), degrees),
+    }
+    netcdf(tmp_path / "m2.nc", found)
+    told = f"m2.nc: amplitude: is a grid of {rows} x {columns}: no place lies between its points; cut a wider piece"
+    with pytest.raises(InputError, match=told):
+        read_weather([tmp_path / "m2.nc"])
