@@ -16,7 +16,7 @@ from shapely.geometry import LineString, Point, Polygon
 from companion.errors import InputError
 from companion.geofence.document import Code, Document, FindingLevel, Mark, Track
 from companion.geofence.formats.losses import Losses, Written, leave_out
-from companion.geofence.formats.rings import polygons_from_rings
+from companion.geofence.formats.rings import on_globe, polygons_from_rings
 from companion.geofence.formats.routes import Reading, RoutePoint, items_of, pins_as_dangers, pins_as_route
 from companion.geofence.formats.untrusted import MAX_DEPTH, MAX_POSITIONS, JsonNode, parse_json
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
@@ -128,7 +128,7 @@ class _GeoJsonReading(Reading):
                     "the line has fewer than two points",
                     "draw it or remove it",
                 )
-            elif self._on_globe(points, place):
+            elif on_globe(points, place, self.findings):
                 self.marks.append(Mark(geometry=LineString(points), kind=kind, name=name, margin_m=margin_m))
         elif shape == "Point":
             if isinstance(coordinates.value, list) and not coordinates.value:
@@ -149,7 +149,7 @@ class _GeoJsonReading(Reading):
         margin_m: float | None,
     ) -> None:
         place = node.path.removesuffix(".coordinates")
-        if not self._on_globe([position], place):
+        if not on_globe([position], place, self.findings):
             return
         point = GeoPoint(lat_deg=position[1], lon_deg=wrap_lon_deg(position[0]))
         role_node = properties.get("role")
@@ -180,7 +180,7 @@ class _GeoJsonReading(Reading):
             self.marks.append(Mark(geometry=Point(position), kind=kind, name=name, margin_m=margin_m))
 
     def _track(self, points: list[tuple[float, float]], properties: JsonNode, name: str, node: JsonNode) -> Track:
-        if not self._on_globe(points, node.path):
+        if not on_globe(points, node.path, self.findings):
             points = []
         times = properties.get("times_s")
         times_s = tuple(t.number() for t in times) if times is not None else None
@@ -198,19 +198,6 @@ class _GeoJsonReading(Reading):
         if len(values) < 2:
             raise node.fail(f"a position has {len(values)} numbers, not 2 (longitude, latitude)")
         return values[0].number(-1e6, 1e6), values[1].number(-1e6, 1e6)
-
-    def _on_globe(self, points: list[tuple[float, float]], place: str) -> bool:
-        for x, y in points:
-            if abs(y) > 90.0 or abs(x) > 360.0:
-                self.findings.add(
-                    FindingLevel.ERROR,
-                    Code.SWAPPED_AXES,
-                    place,
-                    f"latitude {y:g} is outside ±90 degrees",
-                    "GeoJSON writes longitude first: swap them",
-                )
-                return False
-        return True
 
 
 def _depth_m(properties: JsonNode) -> float | None:

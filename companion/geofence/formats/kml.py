@@ -19,7 +19,7 @@ from companion.errors import InputError
 from companion.geofence.document import Code, Document, FindingLevel, Mark, Track
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out
 from companion.geofence.formats.mission_planner import decimal
-from companion.geofence.formats.rings import polygons_from_rings
+from companion.geofence.formats.rings import on_globe, polygons_from_rings
 from companion.geofence.formats.routes import (
     Reading,
     RoutePoint,
@@ -90,20 +90,6 @@ class _KmlReading(Reading):
         if self.positions > MAX_POSITIONS:
             raise InputError(self.source, place, f"holds more than {MAX_POSITIONS} positions", "simplify it")
         return out
-
-    def on_globe(self, coordinates: list[tuple[float, float, float]], place: str) -> bool:
-        """Return whether all positions exist, with a finding if not."""
-        for x, y, _ in coordinates:
-            if abs(y) > 90.0 or abs(x) > 360.0:
-                self.findings.add(
-                    FindingLevel.ERROR,
-                    Code.SWAPPED_AXES,
-                    place,
-                    f"latitude {y:g} is outside ±90 degrees",
-                    "KML writes longitude first",
-                )
-                return False
-        return True
 
 
 def read_kml(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, areas: bool = False) -> Document:
@@ -197,7 +183,7 @@ def _shape(element: Any, name: str, data_of: dict[str, str], place: str, *, read
     if not coordinates:
         reading.findings.add(FindingLevel.ERROR, Code.EMPTY, place, f"the {shape} is empty", "draw it or remove it")
         return
-    if not reading.on_globe(coordinates, place):
+    if not on_globe(coordinates, place, reading.findings):
         return
     lonlat = [(x, y) for x, y, _ in coordinates]
     if shape == "Point":

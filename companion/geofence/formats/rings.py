@@ -108,7 +108,7 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
             "draw an area, or a POINT or LINESTRING with a radius",
         )
         return np.empty((0, 2))
-    if not _on_globe(coordinates, place, findings):
+    if not on_globe(coordinates, place, findings):
         return np.empty((0, 2))
     if float(np.ptp(coordinates[:, 0])) > 180.0:
         coordinates = unwrapped(coordinates)
@@ -125,31 +125,31 @@ def _ring(coordinates: NDArray[np.float64], place: str, findings: Findings, *, c
     return coordinates
 
 
-def _on_globe(coordinates: NDArray[np.float64], place: str, findings: Findings) -> bool:
-    """Return whether every position exists, with a finding if not."""
-    lat_bad = np.abs(coordinates[:, 1]) > 90.0
+def on_globe(points: Sequence[Sequence[float]] | NDArray[np.float64], place: str, findings: Findings) -> bool:
+    """Return whether every position (longitude, latitude, and what follows) exists, with a finding if not."""
+    lonlat = np.array([[float(p[0]), float(p[1])] for p in points], dtype=np.float64).reshape(-1, 2)
+    lat_bad, lon_bad = np.abs(lonlat[:, 1]) > 90.0, np.abs(lonlat[:, 0]) > 360.0
     if lat_bad.any():
-        vertex = coordinates[int(np.argmax(lat_bad))]
+        lon_deg, lat_deg = lonlat[int(np.argmax(lat_bad))].tolist()
+        is_swapped = abs(lon_deg) <= 90.0
         findings.add(
             FindingLevel.ERROR,
-            Code.SWAPPED_AXES if abs(vertex[0]) <= 90.0 else Code.OUT_OF_RANGE,
+            Code.SWAPPED_AXES if is_swapped else Code.OUT_OF_RANGE,
             place,
-            f"latitude {vertex[1]:g} is outside ±90 degrees",
-            'latitude and longitude look swapped: try --axis latlon (or axis = "latlon")'
-            if abs(vertex[0]) <= 90.0
+            f"latitude {lat_deg:g} is outside ±90 degrees",
+            'latitude and longitude look swapped: swap them, or of a WKT say --axis latlon (or axis = "latlon")'
+            if is_swapped
             else "write WGS 84 degrees",
         )
-        return False
-    lon_bad = np.abs(coordinates[:, 0]) > 360.0
-    if lon_bad.any():
+    elif lon_bad.any():
         findings.add(
             FindingLevel.ERROR,
             Code.OUT_OF_RANGE,
             place,
-            f"longitude {coordinates[int(np.argmax(lon_bad)), 0]:g} is outside ±180 degrees",
+            f"longitude {lonlat[int(np.argmax(lon_bad)), 0]:g} is outside ±180 degrees",
             "write WGS 84 degrees",
         )
-    return not lon_bad.any()
+    return not (lat_bad.any() or lon_bad.any())
 
 
 def _repaired(polygon: Polygon, kind: ZoneKind, place: str, findings: Findings) -> list[Polygon]:

@@ -1,6 +1,7 @@
 """Each fault of a file is named with its place; none of them makes the sea larger."""
 
 import itertools
+import json
 
 import pytest
 import shapely
@@ -119,6 +120,25 @@ def test_swapped_axes_are_told_by_the_place():
     assert check_place(parse(text, "f.wkt", axis="latlon"), near).findings == ()
     far = parse(b"POLYGON ((3.66 12.15, 3.67 12.15, 3.67 12.14, 3.66 12.15))", "f.wkt")
     assert check_place(far, near).findings[-1].code is Code.FAR_AWAY
+
+
+@pytest.mark.parametrize(
+    ("lonlat", "code", "said"),
+    [
+        ([10.0, 100.0], Code.SWAPPED_AXES, "latitude 100 is outside ±90 degrees"),
+        ([400.0, 10.0], Code.OUT_OF_RANGE, "longitude 400 is outside ±180 degrees"),
+        ([400.0, 100.0], Code.OUT_OF_RANGE, "latitude 100 is outside ±90 degrees"),
+    ],
+)
+@pytest.mark.parametrize("extension", [".geojson", ".kml"])
+def test_a_point_beyond_the_globe_is_told_by_what_is_wrong_with_it(extension, lonlat, code, said):
+    """Of longitude 400 it was said that latitude 10 is outside ±90 degrees."""
+    text = json.dumps({"type": "Point", "coordinates": lonlat})
+    if extension == ".kml":
+        place = ",".join(map(str, lonlat))
+        text = f"<kml><Placemark><Point><coordinates>{place}</coordinates></Point></Placemark></kml>"
+    (fault,) = found(text, extension)
+    assert (fault.code, fault.text) == (code, said)
 
 
 @pytest.mark.parametrize(("half_deg", "findings"), [(0.01, []), (14.0, []), (80.0, [Code.ANTIMERIDIAN])])
