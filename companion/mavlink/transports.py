@@ -244,6 +244,8 @@ class StreamEndpoint(_Endpoint):
         if self._server is not None:
             self._server.close()
             self._server = None
+        while not self._accepted.empty():  # a client that waited to be served
+            _hang_up(self._accepted.get_nowait()[0])
         self._state = TransportState.CLOSED
 
     def received(self, stream: _Stream, data: bytes) -> None:

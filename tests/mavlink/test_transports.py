@@ -1,6 +1,7 @@
 """LINK names and the endpoints of the real world: a pty, UDP, TCP."""
 
 import asyncio
+import contextlib
 import os
 import random
 import tty
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from companion.clock import run
 from companion.errors import InputError, LinkError
+from companion.mavlink import transports
 from companion.mavlink.transports import (
     BACKOFF_CAP_S,
     MAX_WRITE_BUFFER_BYTES,
@@ -228,6 +230,27 @@ def test_tcp_connects_again_when_the_server_comes_back():
 
     # ten times as fast: the pauses of the back-off are loop time
     run(main(), speedup=10.0)
+
+
+def test_a_client_that_waits_to_be_served_is_hung_up_when_the_server_closes(monkeypatch):
+    monkeypatch.setattr(transports, "backoff_s", lambda *_: 60.0)
+
+    async def main():
+        port = free_port("tcp")
+        server = open_link(f"tcpin:127.0.0.1:{port}")
+        await server.open(lambda _: None)
+        _, first = await asyncio.open_connection("127.0.0.1", port)
+        await until(lambda: server.state is TransportState.OPEN)
+        first.close()
+        await until(lambda: bool(server.stats.last_error))
+        reader, second = await asyncio.open_connection("127.0.0.1", port)
+        await until(server._accepted.full)
+        await server.close()
+        with contextlib.suppress(ConnectionError):
+            assert await asyncio.wait_for(reader.read(), 5.0) == b""
+        second.close()
+
+    run(main())
 
 
 def test_a_peer_that_stops_reading_costs_frames_not_memory():
