@@ -107,7 +107,7 @@ class Targets:
         return cls(frame=frame, limits=limits or TargetLimits())
 
     def picture(self, t_s: float) -> TrafficPicture:
-        """Return what is known at ``t_s``: vessels not expired, nearest MMSI order (stable)."""
+        """Return what is known at ``t_s``: vessels not expired, by MMSI."""
         alive = [v for _, v in sorted(self.vessels.items()) if t_s - v.heard_s <= self.limits.expire_s]
         return TrafficPicture(t_s=t_s, vessels=tuple(alive), counts=self.counts, last_heard_s=self.last_heard_s)
 
