@@ -260,7 +260,7 @@ class RecordedSource:
         return None if self.beside is None else partial(self._compared, self.beside)
 
     def _compared(self, other: RecordedSource) -> bytes:
-        east_m = (other.area.origin_lon_deg - self.area.origin_lon_deg) * self.area.lon_m
+        east_m = math.remainder(other.area.origin_lon_deg - self.area.origin_lon_deg, 360.0) * self.area.lon_m
         north_m = (other.area.origin_lat_deg - self.area.origin_lat_deg) * self.area.lat_m
         moved = [
             replace(

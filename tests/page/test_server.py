@@ -249,6 +249,17 @@ def test_a_voyage_beside_another_is_in_its_metres():
     assert with_page(lambda browser, *_: browser.get("/api/beside"), record_of(5))[0] == 404
 
 
+def test_a_voyage_beside_another_over_the_date_line_is_beside_it():
+    """They were drawn 40,000 km apart."""
+    record, other = record_of(5), record_of(5)
+    record.area = replace(record.area, origin_lon_deg=179.9995)
+    other.area = replace(other.area, origin_lon_deg=-179.9995)
+    other.trail.samples = [replace(s, east_m=0.0, north_m=0.0) for s in other.trail.samples]
+    record.beside = other
+    made = record.compared()
+    assert set(json.loads(made())["past"]["east_m"]) == {round(0.001 * record.area.lon_m, 1)}
+
+
 def test_a_record_is_read_by_chunks_and_a_day_is_thinned_but_for_what_happened():
     async def talk(browser, record, _):
         hello = json.loads((await browser.get("/api/hello"))[2])
