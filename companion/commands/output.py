@@ -70,12 +70,20 @@ def write_out(written: Written, out: str, *, lossy: bool, force: bool, remedy: s
 
 
 def write_files(files: dict[str, bytes], *, force: bool) -> None:
-    """Write all files or none: what exists is not overwritten without ``force``. Raises InputError."""
+    """Write all files or none: what exists is not overwritten without ``force``. Raises InputError.
+
+    A pipe or a device is written to; nothing takes its place.
+    """
     refuse_existing(list(files), force=force)
+    whole = {Path(name): data for name, data in files.items()}
+    name: str | Path = ""
     try:
-        Disk().replace_all({Path(name): data for name, data in files.items()})
+        for name in [path for path in whole if path.is_fifo() or path.absolute().parent == Path("/dev")]:
+            name.write_bytes(whole.pop(name))
+        Disk().replace_all(whole)
     except OSError as error:
-        raise InputError(error.filename, "", f"cannot be written ({reason(error)})", "name another place") from None
+        place = str(error.filename or name)
+        raise InputError(place, "", f"cannot be written ({reason(error)})", "name another place") from None
 
 
 def refuse_existing(names: Sequence[str], *, force: bool) -> None:

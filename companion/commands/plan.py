@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.commands.output import patience
+from companion.commands.output import patience, write_files
 from companion.errors import InputError
 from companion.geo.angles import direction
 from companion.planner.courses import courses
@@ -124,7 +124,7 @@ def run(args: argparse.Namespace) -> int:
     files = [_file(problem, answer) for problem, answer in answers]
     text = json.dumps(files[0] if len(files) == 1 else files, indent=1) + "\n"
     if args.out is not None:
-        args.out.write_text(text, encoding="utf-8")
+        write_files({str(args.out): text.encode()}, force=True)
     if args.policy is not None:
         return _policy([problem for problem, _ in answers], args)
     if args.plot is not None:

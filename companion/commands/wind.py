@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from companion.commands.output import write_files
 from companion.errors import InputError
 from companion.program.arguments import add_command, out_file, picture
 
@@ -89,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
             grid = characterised(records, advance)
         print_grid(grid)
         if args.json is not None:
-            args.json.write_text(json.dumps(grid_document(grid), indent=1) + "\n")
+            _write_json(grid_document(grid), args.json)
         draw(grid, args.filter)
         return 0
     wanted = names + [n for n in _REFERENCES if args.plot is not None and n not in names]
@@ -112,13 +113,17 @@ def run(args: argparse.Namespace) -> int:
         document = {
             "records": [_document(r, s[: len(names)], f) for r, s, f in zip(records, scores, fits, strict=True)]
         }
-        args.json.write_text(json.dumps(document, indent=1) + "\n")
+        _write_json(document, args.json)
     if args.plot is not None:
         from companion.plots.wind import save_wind
 
         save_wind(records[0], scores[0], args.plot)
         print(f"drawn in {args.plot}")
     return 0
+
+
+def _write_json(document: dict[str, Any], path: Path) -> None:
+    write_files({str(path): json.dumps(document, indent=1).encode() + b"\n"}, force=True)
 
 
 def _score(record: Record, name: str, advance: Any) -> Score:

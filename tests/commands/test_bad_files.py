@@ -1,6 +1,8 @@
 """Every command with every file that it reads or writes broken: one line that names the file, and no traceback."""
 
+import errno
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -10,7 +12,9 @@ import pytest
 
 from companion import cli
 from companion.clock import run_virtual
+from companion.commands.output import write_files
 from companion.commands.run import NOT_THERE
+from companion.disk import Disk
 from companion.errors import InputError
 from companion.plots.chart import save
 from sitl import cli as sitl_cli
@@ -266,3 +270,28 @@ def test_a_picture_or_track_that_cannot_be_written_is_named_with_what_would_do(v
     assert str(refused.value).endswith("x.png: cannot be written (No such file or directory); name a .png elsewhere")
     assert cli.main(["report", str(voyage), "--track", str(tmp_path / "day.wkt")]) == 2
     assert capsys.readouterr().err.strip().endswith("use .gpx, .kml, .kmz, .geojson")
+
+
+@pytest.mark.parametrize(
+    ("argv", "name"), [(argv, name) for _, argv, name in WRITES if name in {"plan.json", "wind.json"}], ids=str
+)
+def test_on_a_full_disk_what_was_written_before_is_kept(short, tmp_path, monkeypatch, capsys, argv, name):
+    """It was cut to nothing, and "standard output" was blamed."""
+    shutil.copytree(short, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_text("before")
+
+    def full(_disk, _fd, _data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Disk, "write", full)
+    assert cli.main([*argv, name]) == 2
+    said = f"companion {argv[0]}: {name}: cannot be written (No space left on device); name another place"
+    assert capsys.readouterr().err.splitlines()[-1] == said
+    assert Path(name).read_text() == "before"
+
+
+def test_a_device_that_is_named_is_written_to_and_stays():
+    with pytest.raises(InputError, match=r"^/dev/full: cannot be written \(No space left on device\)"):
+        write_files({"/dev/full": b"x"}, force=True)
+    assert Path("/dev/full").is_char_device()
