@@ -12,7 +12,7 @@ import fcntl
 import io
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -23,7 +23,7 @@ from companion.errors import InputError, unreadable
 RESERVE_BYTES = 8 << 20
 # ... or, on a small disk, at this share of it.
 RESERVE_SHARE = 0.1
-NEW = ".new"
+NEW, REPLACED = ".new", ".replaced"  # beside a file: what takes its place, and what it was until all are replaced
 
 _KINDS = (
     (stat.S_ISFIFO, "a FIFO"),
@@ -87,43 +87,74 @@ class Disk:
         self.replace_all({path: data}, is_durable=is_durable, mode=mode)
 
     def replace_all(self, files: Mapping[Path, bytes], *, is_durable: bool = True, mode: int | None = None) -> None:
-        """Put each of ``files`` in its place, all or none: they are renamed when all are written.
+        """Put each of ``files`` in its place, all or none; modes are kept where none is given.
 
-        Modes are kept where none is given.
+        They are renamed when all are written. If then one cannot be, those before it are put back. A power cut among
+        the renames leaves some old and some new, each of them whole.
 
         Raises:
-            OSError: one cannot be written, which its ``filename`` says; what was there is there.
+            OSError: its ``filename`` cannot be written. What was there is there, but for ``filename2``, if that is
+                not None: it is new and cannot be put back.
         """
         beside = {path: path.with_name(path.name + NEW) for path in files}
+        kept: dict[Path, Path | None] = {}
+        renamed: list[Path] = []
         path = Path()
         try:
             for path, data in files.items():
-                fd = self.create(beside[path])
-                try:
-                    if mode is not None:
-                        os.fchmod(fd, mode)
-                    done = 0
-                    while done < len(data):
-                        done += self.write(fd, data[done:])
-                    with contextlib.suppress(OSError):
-                        before = path.lstat().st_mode if mode is None else stat.S_IFREG | mode
-                        if stat.S_ISREG(before):  # the rights of what a link leads to are another file's
-                            os.fchmod(fd, before & 0o777)
-                    if is_durable:
-                        self.sync(fd)
-                finally:
-                    os.close(fd)
+                self._write(path, beside[path], data, is_durable=is_durable, mode=mode)
+            if len(files) > 1:
+                kept = _kept(files)
             for path, new in beside.items():
                 self.rename(new, path)
+                renamed.append(path)
+            if is_durable:
+                for folder in {path.parent for path in files}:
+                    self.sync_folder(folder)
         except OSError as error:
+            left = [str(done) for done in renamed if not self._put_back(done, kept)]
             for new in beside.values():
                 with contextlib.suppress(OSError):
                     new.unlink()  # a full disk needs the room
-            error.filename = str(path)
+            error.filename, error.filename2 = str(path), left[0] if left else None
             raise
-        if is_durable:
-            for folder in {path.parent for path in files}:
-                self.sync_folder(folder)
+        finally:
+            for old in kept.values():
+                if old is not None:
+                    with contextlib.suppress(OSError):
+                        old.unlink(missing_ok=True)
+
+    def _write(self, path: Path, new: Path, data: bytes, *, is_durable: bool, mode: int | None) -> None:
+        """Write what ``path`` is to hold beside it, with the rights that it is to have."""
+        fd = self.create(new)
+        try:
+            if mode is not None:
+                os.fchmod(fd, mode)
+            done = 0
+            while done < len(data):
+                done += self.write(fd, data[done:])
+            with contextlib.suppress(OSError):
+                before = path.lstat().st_mode if mode is None else stat.S_IFREG | mode
+                if stat.S_ISREG(before):  # the rights of what a link leads to are another file's
+                    os.fchmod(fd, before & 0o777)
+            if is_durable:
+                self.sync(fd)
+        finally:
+            os.close(fd)
+
+    def _put_back(self, path: Path, kept: Mapping[Path, Path | None]) -> bool:
+        """Put back what ``path`` was, and return whether that was done."""
+        if path not in kept:
+            return False
+        old = kept[path]
+        try:
+            if old is None:
+                path.unlink()
+            else:
+                self.rename(old, path)
+        except OSError:
+            return False
+        return True
 
     # ---------------------------------------------------------------------------------- what the above is made of
     def create(self, path: Path) -> int:
@@ -165,6 +196,22 @@ class Disk:
         return Room(free_bytes=status.f_bavail * status.f_frsize, reserve_bytes=min(RESERVE_BYTES, share))
 
 
+def _kept(paths: Iterable[Path]) -> dict[Path, Path | None]:
+    """Return a second name of each file, which outlives the first; None: there is no file.
+
+    One that cannot have two is left out: a directory, or any on a file system that knows no links, as FAT.
+    """
+    kept: dict[Path, Path | None] = {}
+    for path in paths:
+        old = path.with_name(path.name + REPLACED) if os.path.lexists(path) else None
+        with contextlib.suppress(OSError):
+            if old is not None:
+                old.unlink(missing_ok=True)  # a power cut left it
+                os.link(path, old, follow_symlinks=False)
+            kept[path] = old
+    return kept
+
+
 def open_regular(path: Path, *, follows_links: bool = True) -> BinaryIO:
     """Open a file for reading that is one: a FIFO or a device might never answer, or do something when it is opened.
 
@@ -203,6 +250,11 @@ def _require_regular(mode: int) -> None:
 def reason(error: OSError) -> str:
     """Return what a disk's error says, in the operating system's words."""
     return error.strerror or str(error) or type(error).__name__
+
+
+def what_is_there(error: OSError) -> str:
+    """Return what files hold of which ``replace_all`` could not replace one, in words."""
+    return "what was there is there" if error.filename2 is None else f"{error.filename2} is new already"
 
 
 def is_mistake(error: OSError) -> bool:

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
-from companion.disk import Disk, reason
+from companion.disk import Disk, reason, what_is_there
 from companion.errors import InputError, JobError
 from companion.program import control
 from companion.words import counted
@@ -83,7 +83,8 @@ def write_files(files: dict[str, bytes], *, force: bool) -> None:
         Disk().replace_all(whole)
     except OSError as error:
         place = str(error.filename or name)
-        raise InputError(place, "", f"cannot be written ({reason(error)})", "name another place") from None
+        problem = f"cannot be written ({reason(error)})" + (f"; {what_is_there(error)}" if len(files) > 1 else "")
+        raise InputError(place, "", problem, "name another place") from None
 
 
 def refuse_existing(names: Sequence[str], *, force: bool) -> None:

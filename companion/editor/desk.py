@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from companion import __version__
 from companion.compose import drying_of, planner_of, tide_of
 from companion.current import closed_spans
-from companion.disk import Disk, reason
+from companion.disk import Disk, reason, what_is_there
 from companion.editor.base import SourceFiles, area_files, read_base
 from companion.editor.draft import Draft, draft_of, looked_at
 from companion.editor.sketch import Place, Sketch
@@ -226,15 +226,15 @@ def changed_meanwhile(expected: Mapping[Path, bytes], files: Mapping[Path, bytes
 
 
 def save(files: Mapping[Path, bytes], disk: Disk) -> None:
-    """Write all files or none.
+    """Write all files or none, as ``Disk.replace_all`` does.
 
     Raises:
-        JobError: one cannot be written; what was there is there.
+        JobError: one cannot be written.
     """
     try:
         disk.replace_all(files)
     except OSError as error:
-        raise JobError(f"{error.filename}: cannot be written ({reason(error)}); what was there is there") from None
+        raise JobError(f"{error.filename}: cannot be written ({reason(error)}); {what_is_there(error)}") from None
 
 
 BUDGET_S = 0.5  # for a leg: near the best, and while one looks

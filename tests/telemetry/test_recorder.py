@@ -15,7 +15,7 @@ import pytest
 
 from companion.app.options import in_thread
 from companion.clock import run
-from companion.disk import NEW, Disk
+from companion.disk import NEW, Disk, what_is_there
 from companion.errors import JobError
 from companion.guard import Auxiliary, Guard
 from companion.telemetry.folder import recorder as module
@@ -124,6 +124,30 @@ def test_a_failed_whole_file_leaves_the_old_one_and_no_rubbish(small):
         Disk().replace(path, bytes(1 << 20))
     assert path.read_bytes() == b"old"
     assert [p.name for p in small.iterdir()] == ["state.json"]
+
+
+@pytest.mark.parametrize("knows_links", [True, False])
+def test_of_several_files_all_are_replaced_or_none(tmp_path, monkeypatch, knows_links):
+    """They were renamed one by one: one that could not be left those before it new, and the words said otherwise."""
+
+    def refused(*_, **__):
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    if not knows_links:
+        monkeypatch.setattr(os, "link", refused)
+    (tmp_path / "a").write_bytes(b"old")
+    (tmp_path / "d").mkdir()
+    with pytest.raises(IsADirectoryError) as error:
+        Disk().replace_all({tmp_path / name: b"new" for name in ("a", "b", "d", "e")})
+    assert error.value.filename == str(tmp_path / "d")
+    assert what_is_there(error.value) == (
+        "what was there is there" if knows_links else f"{tmp_path / 'a'} is new already"
+    )
+    assert (tmp_path / "a").read_bytes() == (b"old" if knows_links else b"new")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "d"]
+    Disk().replace_all({tmp_path / name: b"new" for name in ("a", "b")})
+    assert [(tmp_path / name).read_bytes() for name in ("a", "b")] == [b"new", b"new"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a", "b", "d"]
 
 
 @pytest.mark.parametrize("is_there", [True, False])
