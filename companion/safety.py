@@ -80,7 +80,7 @@ class Ending:
     sails_on: bool = False  # where there is no place to go to what is left takes the boat on; else it stays near by
     because: str
     until: str = ""  # how long the boat waits there; empty: the voyage is over
-    asked_by: str = ""  # the key without which it is not watched, and not announced
+    asked_by: str = ""  # a setting of its own, or a limit, without which it is not watched and not announced
     settings: tuple[Setting, ...] = ()
 
 

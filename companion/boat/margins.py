@@ -35,7 +35,6 @@ LOITER_TURNS = (
 GALE_POWER = 0.75  # of the wind beyond a polar's strongest: 29.3 m in 14 m/s of wind and 33.0 in 16
 RATE_MAX_RADPS = math.radians(120.0)  # ArduRover's ATC_STR_RAT_MAX: all of these were measured by it
 UNLIMITED_RADPS = math.radians(1000.0)  # what 0 stands for as a limit of ArduPilot's
-PAD_RAD = math.radians(2.0)  # legs planned at NO_GO + 2 degrees made no tacks of their own
 
 
 def wider_s(rate_max_radps: float) -> float:
@@ -136,10 +135,6 @@ class AutopilotLimits:
                 for name, channel in zip(("RCMAP_ROLL", "RCMAP_THROTTLE", "MODE_CH"), default.rc_channels, strict=True)
             ),
         )
-
-    def planned_no_go_rad(self) -> float:
-        """Return the no-go half angle to plan with: the autopilot's own plus a pad, so it adds no tacks."""
-        return self.sail_no_go_angle_rad + PAD_RAD
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from companion.boat import AutopilotLimits, Boat
+from companion.boat import Boat
 from companion.current import over_water
 from companion.eta import Eta
 from companion.figures import BY_NAME as FIGURES_BY_NAME
@@ -421,12 +421,6 @@ SIGMA_AT_S = 60.0  # the spread in figures is that of a minute ahead, as in the 
 HAS_WAY_MPS = 0.2
 
 
-def planned_no_go_rad(config: SkipperConfig, voyage: Voyage, limits: AutopilotLimits | None) -> float:
-    """Return the half angle that plans keep out of, before it is widened."""
-    of_autopilot = config.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
-    return max(of_autopilot + config.no_go_pad_rad, voyage.boat.no_go_half_rad)
-
-
 @lru_cache(maxsize=64)  # asked for twice in every step, and the search takes longer than all else in a view
 def best_angles(boat: Boat, tws_mps: float, no_go_rad: float) -> tuple[float, float]:
     """Return the best angles to windward and to leeward [rad]."""
@@ -512,12 +506,15 @@ def apparent(
 
 
 def no_go_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.NoGo | None:
-    """Return the no-go zone now and later, widened as a plan that keeps the promise in force would have it."""
+    """Return the no-go zone now and later, widened as a plan that keeps the promise in force would have it.
+
+    None without a forecast, and of a boat that does not sail.
+    """
     forecast, route = step.snapshot.wind.forecast, step.state.mission.route
-    if forecast is None:
+    if forecast is None or not config.sails:
         return None
     delta_s = config.delta_s if route is None else route.delta_s
-    half_rad = planned_no_go_rad(config, voyage, step.snapshot.limits)
+    half_rad = config.planned_no_go_rad(voyage.boat, step.snapshot.limits)
     wedges = []
     for at_s in WEDGES_S:
         if at_s <= float(forecast.horizon_s[-1]):
@@ -536,14 +533,17 @@ def no_go_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.NoGo |
 def laylines_of(
     step: Step, voyage: Voyage, config: SkipperConfig, name: str, mark_en: PointEn
 ) -> values.Laylines | None:
-    """Return the laylines of a mark; None where it is fetched on one course, or the wind is not known."""
+    """Return the laylines of a mark; None where it is fetched on one course, as any is of a boat that does not sail,
+    or the wind is not known."""  # noqa: D205, D209
     snapshot, boat = step.snapshot, voyage.boat
     here, wind, vehicle = snapshot.position_en_m, snapshot.wind, snapshot.vehicle
     twd_rad, tws_mps, current = wind.mean_twd_from_rad, wind.mean_tws_mps, snapshot.current.planned_en_mps
     if here is None or vehicle is None or twd_rad is None or tws_mps is None or math.dist(here, mark_en) < 1.0:
         return None
+    if not config.sails:
+        return None
     twd_rad, tws_mps = over_water(twd_rad, tws_mps, current)
-    no_go_rad = planned_no_go_rad(config, voyage, snapshot.limits)
+    no_go_rad = config.planned_no_go_rad(boat, snapshot.limits)
     beat, run = best_angles(boat, round(tws_mps, 1), no_go_rad)
     off_rad = abs(difference_rad(twd_rad, heading_of(mark_en[0] - here[0], mark_en[1] - here[1])))
     if off_rad < beat:
@@ -602,7 +602,7 @@ def polar_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.PolarV
     if tws_mps is None:
         return None
     polar = voyage.boat.polar
-    no_go_rad = planned_no_go_rad(config, voyage, step.snapshot.limits)
+    no_go_rad = config.planned_no_go_rad(voyage.boat, step.snapshot.limits)
     twd_rad = wind.present_twd_from_rad
     current = step.snapshot.current.planned_en_mps
     if twd_rad is not None:

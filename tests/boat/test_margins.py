@@ -41,7 +41,7 @@ def test_parameters_by_their_ardupilot_names():
             "FENCE_ACTION": 2.0,
         }
     )
-    assert math.degrees(limits.planned_no_go_rad()) == pytest.approx(37.0)
+    assert math.degrees(limits.sail_no_go_angle_rad) == pytest.approx(35.0)
     assert limits.fence_action == 2
     assert AutopilotLimits.from_params({"FENCE_ACTION": 2.0}).fence_action is None
     assert limits.rc_channels == (1, 3, 8)

@@ -1,8 +1,10 @@
 """What ends a voyage early, as the mission's ``[safety]`` says: where to, until when, and what is said of it."""
 
+from dataclasses import replace
+
 import pytest
 
-from companion.safety import End
+from companion.safety import ENDINGS, TABLE, End
 from companion.skipper.planning.diversions import announcement
 from companion.skipper.step.actions import RequestPlan
 from companion.skipper.step.config import Ends, SafeEnd, SkipperConfig
@@ -129,3 +131,19 @@ def test_what_will_be_done_is_said_once_before_she_sails():
     assert "leaking: to the nearest refuge, else loiter near by" in text
     with_home = announcement(SkipperConfig(safe_end=SafeEnd.RETURN, voyage_timeout_s=60.0), world.skipper.voyage.boat)
     assert "out of time: to the nearest refuge, else home, loiter near by" in with_home
+
+
+@pytest.mark.parametrize("volts", [None, 10.5])
+def test_a_row_may_be_watched_only_where_a_setting_of_safety_asks_for_it(monkeypatch, volts):
+    """Only keys of other tables were known: with one of ``[safety]`` the launch was a KeyError at every step."""
+    monkeypatch.setitem(ENDINGS, "leaking", replace(ENDINGS["leaking"], asked_by="battery_v"))
+    world = under_way(Ends.of(battery_v=volts))
+    leak(world)
+    world.run(30)
+    assert ("leaking:" in said(world, "safe ends")[0][2]) == bool(said(world, "leaking")) == (volts is not None)
+
+
+def test_every_key_that_asks_for_a_row_is_known():
+    config, boat = SkipperConfig(), under_way().skipper.voyage.boat
+    asked = {dog.name for dog in TABLE if not config.is_watched(dog.name, boat)}
+    assert asked >= {"out of time", "strong wind", "light wind"}

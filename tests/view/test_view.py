@@ -343,6 +343,15 @@ def test_the_no_go_zone_widens_by_the_promises_quantile(tmp_path):
     assert zone.half_deg == pytest.approx(47.0, abs=0.01)
 
 
+def test_a_motor_boat_is_shown_no_no_go_zone_and_no_laylines(voyage):
+    """Plans of one have none; the page of one with a vane showed a zone of 47 deg."""
+    step, mark = step_at((0.0, 0.0)), (0.0, 100.0)
+    for sails in (True, False):
+        config = SkipperConfig(sails=sails)
+        assert (no_go_of(step, voyage, config) is not None) is sails
+        assert (laylines_of(step, voyage, config, "mark", mark) is not None) is sails
+
+
 @given(off_deg=st.floats(-30.0, 30.0), far_m=st.floats(50.0, 500.0))
 def test_a_mark_to_windward_has_two_laylines_and_each_fetches_it(off_deg, far_m, voyage):
     mark = (far_m * math.sin(math.radians(off_deg)), far_m * math.cos(math.radians(off_deg)))

@@ -486,14 +486,7 @@ def words(config: SkipperConfig, name: str) -> str:
 
 def announcement(config: SkipperConfig, boat: Boat) -> str:
     """Return all of it in one sentence, and how vessels are met, to be said before setting sail."""
-    limits = {
-        "voyage_timeout_s": config.voyage_timeout_s,
-        "max_tws_mps": boat.max_tws_mps,
-        "min_tws_mps": boat.min_tws_mps,
-        "": 0.0,
-    }
-    names = [name for name, ending in ENDINGS.items() if limits[ending.asked_by] is not None]
-    said = [f"{name}: {words(config, name)}" for name in names]
+    said = [f"{name}: {words(config, name)}" for name in ENDINGS if config.is_watched(name, boat)]
     for name in (cause.name for cause in FAILSAFES):
         answer = config.ends.answer(name)
         if answer is not None:

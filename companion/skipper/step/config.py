@@ -9,6 +9,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from companion.boat import AutopilotLimits, Boat
 from companion.current import TideTable
 from companion.orders import ALL
 from companion.planners import AUTO, PlannerChoice
@@ -167,3 +168,28 @@ class SkipperConfig:
     adopts: bool = False  # the goals were drawn on the autopilot: others may be, under way
     ends: Ends = Ends()
     voyage_timeout_s: float | None = None  # under way for longer than this the goals are given up; None: never
+
+    def autopilot_no_go_rad(self, limits: AutopilotLimits | None) -> float:
+        """Return where the autopilot stops following the line: SAIL_NO_GO_ANGLE; nowhere where it does not sail."""
+        if not self.sails:
+            return 0.0
+        return self.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
+
+    def planned_no_go_rad(self, boat: Boat, limits: AutopilotLimits | None) -> float:
+        """Return the half angle that plans keep out of, before it is widened by what is not known of the wind."""
+        if not self.sails:
+            return 0.0
+        return max(self.autopilot_no_go_rad(limits) + self.no_go_pad_rad, boat.no_go_half_rad)
+
+    def is_watched(self, watchdog: str, boat: Boat) -> bool:
+        """Return whether the mission has the key without which this one is not (``Ending.asked_by``)."""
+        ending = ENDINGS.get(watchdog)
+        if ending is None or not ending.asked_by:
+            return True
+        elsewhere = {
+            "voyage_timeout_s": self.voyage_timeout_s,
+            "max_tws_mps": boat.max_tws_mps,
+            "min_tws_mps": boat.min_tws_mps,
+        }
+        key = ending.asked_by
+        return (elsewhere[key] if key in elsewhere else self.ends.figure(key)) is not None

@@ -501,11 +501,8 @@ class StepContext:
 
     @property
     def no_go_half_rad(self) -> float:
-        """Where the autopilot stops following the line: SAIL_NO_GO_ANGLE; nowhere where it does not sail."""
-        if not self.config.sails:
-            return 0.0
-        limits = self.snapshot.limits
-        return self.config.no_go_half_rad if limits is None else limits.sail_no_go_angle_rad
+        """Where the autopilot stops following the line."""
+        return self.config.autopilot_no_go_rad(self.snapshot.limits)
 
     def is_closed(self, a: PointEn, b: PointEn, wind: tuple[float, float] | None) -> bool:
         """Return whether a to b lies where the autopilot does not follow the line in ``wind`` (from [rad], [m/s])."""
@@ -514,9 +511,7 @@ class StepContext:
     @property
     def planned_no_go_rad(self) -> float:
         """The half angle that plans keep out of."""
-        if not self.config.sails:
-            return 0.0
-        return max(self.no_go_half_rad + self.config.no_go_pad_rad, self.voyage.boat.no_go_half_rad)
+        return self.config.planned_no_go_rad(self.voyage.boat, self.snapshot.limits)
 
     @property
     def tack_corridor_m(self) -> float:

@@ -57,8 +57,10 @@ SWINGS = 1.25  # of what her loiter takes in this wind: within it she is at her 
 
 
 def measure(ctx: StepContext, name: str) -> float | None:
-    """Return the watched figure in the table's unit, None when it cannot be told now."""
+    """Return the watched figure in the table's unit, None when it is not watched or cannot be told now."""
     dog = BY_NAME[name]
+    if not ctx.config.is_watched(name, ctx.voyage.boat):
+        return None
     if dog.sensor:
         return ctx.autopilot.sensor(dog.sensor) if ctx.autopilot is not None else None
     return _MEASURES[name](ctx)
