@@ -392,6 +392,18 @@ class Command(enum.IntEnum):
     NAV_RALLY_POINT = 5100
 
 
+MOST_FLOAT32 = 3.4028234663852886e38
+
+
+def float32(value: float) -> float:
+    """Return a number as MAVLink carries it: in single precision, and infinite beyond ``MOST_FLOAT32``.
+
+    >>> float32(0.1), float32(-1e39)
+    (0.10000000149011612, -inf)
+    """
+    return float(np.float32(value)) if abs(value) <= MOST_FLOAT32 else value * math.inf
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionItem:
     """One item of a mission, fence or rally list, as files and the wire carry it.

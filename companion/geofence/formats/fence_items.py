@@ -8,7 +8,6 @@ at most 255 vertices per polygon; it reads back frame 0 and autocontinue 0, so t
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,7 +17,7 @@ from companion.geofence.document import Code, FindingLevel
 from companion.geofence.formats.losses import Losses, without_holes
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
-from companion.messages import Command, GeoPoint, MissionItem
+from companion.messages import Command, GeoPoint, MissionItem, float32
 
 MAX_FENCE_ITEMS = 84  # ArduRover 4.7: "Only 84 items are supported" (672 bytes of storage, 8 a piece)
 STORAGE_BYTES = 672  # ... and "Fence exceeds storage size": see ``storage_bytes``
@@ -33,11 +32,6 @@ _CIRCLE = {
     Command.NAV_FENCE_CIRCLE_EXCLUSION: ZoneKind.EXCLUSION,
 }
 FENCE_COMMANDS = frozenset({int(c) for c in (*_VERTEX, *_CIRCLE)} | {int(Command.NAV_FENCE_RETURN_POINT)})
-
-
-def float32(value: float) -> float:
-    """Return the number as the wire carries it."""
-    return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
 def zones_to_items(

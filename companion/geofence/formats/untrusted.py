@@ -13,6 +13,7 @@ import msgspec
 
 from companion.disk import read_regular
 from companion.errors import InputError, unreadable
+from companion.messages import MOST_FLOAT32
 
 MAX_BYTES = 16 * 1024 * 1024  # a coast of 500,000 vertices; more is a mistake or an attack
 MAX_POSITIONS = 500_000  # vertices and items that one file may hold
@@ -63,6 +64,8 @@ def number(text: str, source: str, place: str) -> float:
         raise InputError(source, place, f"{text[:40]!r} is not a number")
     if not math.isfinite(value):
         raise InputError(source, place, f"{text[:40]!r} is not a finite number")
+    if abs(value) > MOST_FLOAT32:
+        raise InputError(source, place, f"{value:g} is larger than any number that an autopilot holds")
     return value
 
 
@@ -128,8 +131,8 @@ class JsonNode:
         for index, element in enumerate(self.value):
             yield JsonNode(element, self.source, f"{self.path}[{index}]")
 
-    def number(self, low: float = -math.inf, high: float = math.inf) -> float:
-        """Return a finite number within bounds."""
+    def number(self, low: float = -MOST_FLOAT32, high: float = MOST_FLOAT32) -> float:
+        """Return a finite number within bounds: those of what an autopilot holds, where none are told."""
         if isinstance(self.value, bool) or not isinstance(self.value, int | float):
             raise self.fail(f"is {_kind(self.value)} where a number should be")
         try:

@@ -6,12 +6,12 @@ A name that the autopilot does not have is simply not answered, so a read that t
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
+from companion.messages import float32
 from companion.mavlink.microservices.command import Party, Retransmission, TransferOutcome
 from companion.mavlink.wire.frames import Message
 
@@ -134,7 +134,7 @@ class ParamSet:
     def __init__(self, party: Party, name: str, value: float, param_type: int = wire.MAV_PARAM_TYPE_REAL32) -> None:
         self.result: ParamAnswer | None = None
         self._party, self._name, self._type = party, name, param_type
-        self._value = _float32(value)
+        self._value = float32(value)
         self._retry = Retransmission(first_s=0.6, give_up_s=5.0)
         self._other: float | None = None
 
@@ -239,7 +239,3 @@ class ParamList:
         return [
             wire.MAVLink_param_request_read_message(*self._party.target, b"", i) for i in missing[:MISSING_PER_ROUND]
         ]
-
-
-def _float32(value: float) -> float:
-    return float(struct.unpack("<f", struct.pack("<f", value))[0])

@@ -12,7 +12,7 @@ import math
 import struct
 from collections.abc import Sequence
 
-from companion.messages import Command, MissionItem, MissionType
+from companion.messages import Command, MissionItem, MissionType, float32
 
 # A mission ends here: nothing behind such an item is ever sailed.
 ENDING = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
@@ -37,7 +37,7 @@ def canonical(item: MissionItem) -> MissionItem:
 
     Found by writing items to ArduRover 4.7.0-dev and reading them back.
     """
-    p1, p2, p3, p4 = (_float32(p) if math.isfinite(p) else 0.0 for p in item.params)
+    p1, p2, p3, p4 = (p if math.isfinite(p) else 0.0 for p in map(float32, item.params))
     frame, lat_e7, lon_e7 = _FRAMES.get(item.frame, item.frame), item.lat_e7, item.lon_e7
     if item.command in _PLACELESS:
         frame, lat_e7, lon_e7 = 0, 0, 0
@@ -155,13 +155,6 @@ def unpack_mission_dat(data: bytes) -> tuple[MissionType, int, tuple[MissionItem
             )
         )
     return MissionType(kind), start, tuple(items)
-
-
-def _float32(value: float) -> float:
-    try:
-        return float(struct.unpack("<f", struct.pack("<f", value))[0])
-    except OverflowError:
-        return 0.0
 
 
 def _words(item: MissionItem) -> str:

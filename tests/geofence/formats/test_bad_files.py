@@ -223,6 +223,15 @@ def encloses(ring, point) -> bool:
         ("QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t43.6\t-72.1\t0\n", ".waypoints", "line 2"),
         ("QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\tinf\t-72.1\t0\t1\n", ".waypoints", "line 2 lat"),
         ("QGC WPL 110\n0\t1\t0\t16.5\t0\t0\t0\t0\t1\t-72.1\t0\t1\n", ".waypoints", "line 2 command"),
+        ("QGC WPL 110\n0\t1\t0\t16\t0\t1e39\t0\t0\t1\t-72.1\t0\t1\n", ".waypoints", "line 2 p2"),
+        (
+            (
+                '{"fileType": "Plan", "mission": {"items": '
+                '[{"type": "SimpleItem", "command": 16, "params": [0, -1e39, 0, 0, 1, 2, 3]}]}}'
+            ),
+            ".plan",
+            "mission.items[0].params[1]",
+        ),
         ("43.66 -72.15\n43.66 -72.15 1 1\n", ".fen", "line 2"),
         ("<gpx version='1.1'><rte><rtept lat='1' lon='2'></rte></gpx>", ".gpx", "line 1 column 50"),
         ("<gpx version='1.1'><wpt lat='1' lon='200'/></gpx>", ".gpx", "wpt 1"),
