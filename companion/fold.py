@@ -576,10 +576,7 @@ class VoyageFold:
 
     def _utc_s(self, t_s: float) -> float | None:
         """Return the Unix time at ``t_s`` by the autopilot's clock, None before it knows the time."""
-        status = self._autopilot
-        if status is None or status.utc_at_boot_s is None or status.boot_s is None:
-            return None
-        return status.utc_at_boot_s + status.boot_s + max(0.0, t_s - status.t_s)
+        return None if self._autopilot is None else self._autopilot.unix_s(t_s)
 
     def _sailing(self, t_s: float, wind: WindEstimate) -> Sailing | None:
         """Return what the present tells of the current, None without a position or a wind."""

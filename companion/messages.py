@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -136,6 +137,15 @@ class AutopilotStatus:
     depth_m: float | None = None  # of the water below the sounder, by several pings; None: not told, or out of reach
     depth_rate_mps: float | None = None  # how that changes, negative where it shoals
     sensors: tuple[tuple[str, float], ...] = ()  # told now by a script on it, by name (``companion.safety.SENSORS``)
+
+    def unix_s(self, t_s: float) -> float | None:
+        """Return the time at ``t_s`` [s since 1970] by the autopilot's clock, which GPS sets; None: it has told none.
+
+        Our own clock is not asked: a board without a battery begins somewhere in the past.
+        """
+        if self.utc_at_boot_s is None or self.boot_s is None:
+            return None
+        return self.utc_at_boot_s + self.boot_s + t_s - self.t_s
 
     def sensor(self, name: str) -> float | None:
         """Return what a script on the autopilot tells under this name, None: nothing now."""
@@ -392,6 +402,8 @@ class Command(enum.IntEnum):
     NAV_RALLY_POINT = 5100
 
 
+# A mission ends here: nothing behind such an item is ever sailed.
+ENDING = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
 MOST_FLOAT32 = 3.4028234663852886e38
 
 
@@ -431,6 +443,15 @@ class MissionItem:
     def point(self) -> GeoPoint:
         """The item's position."""
         return GeoPoint(lat_deg=self.lat_e7 / 1e7, lon_deg=self.lon_e7 / 1e7)
+
+
+def sailed_part(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
+    """Return the items up to and with the first that ends a mission: what the boat can ever sail.
+
+    What follows it is an old tail that a shorter upload left behind.
+    """
+    end = next((n for n, item in enumerate(items, start=1) if item.command in ENDING), len(items))
+    return tuple(items[:end])
 
 
 def waypoint(point: GeoPoint, *, command: int = Command.NAV_WAYPOINT) -> MissionItem:

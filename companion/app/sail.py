@@ -58,7 +58,7 @@ from companion.telemetry.folder import (
     sounding_record,
 )
 from companion.telemetry.state_file import StateFile
-from companion.telemetry.status import CLOCK_OFF_S, TelemetrySender, companion_status, speak_high_latency, unix_of_boat
+from companion.telemetry.status import CLOCK_OFF_S, TelemetrySender, companion_status, speak_high_latency
 from companion.traffic.feeds import Feeds
 from companion.traffic.nmea import NmeaDecoder
 from companion.traffic.soundings import SoundingDecoder, below_transducer_m
@@ -504,7 +504,7 @@ class _Shell:
         A board without a battery begins in the past, and the network, which would say so, is far away. Nothing that is
         decided hangs on this clock.
         """
-        boat_s = None if self._are_clocks_compared else unix_of_boat(snapshot, snapshot.t_s)
+        boat_s = None if self._are_clocks_compared else snapshot.unix_s(snapshot.t_s)
         if boat_s is None:
             return
         self._are_clocks_compared = True

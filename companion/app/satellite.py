@@ -39,7 +39,7 @@ from companion.orders.far import (
     unpack_beginning,
     unpack_order,
 )
-from companion.telemetry.status import far_status, unix_of_boat
+from companion.telemetry.status import far_status
 
 LOOK_S = 5.0  # into the folder
 MOST = 20  # files in one look: a flood waits
@@ -255,7 +255,7 @@ class SatelliteMailbox:
 
     async def _take(self, data: bytes) -> bool:
         seen = self._seen()
-        unix_s = None if seen is None else unix_of_boat(seen[1].snapshot, now_s())
+        unix_s = None if seen is None else seen[1].snapshot.unix_s(now_s())
         try:
             if len(data) == BEGINNING_SIZE:
                 return await self._begin_anew(data, unix_s)

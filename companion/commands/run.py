@@ -481,7 +481,6 @@ async def _sail(
         from companion.guard import Auxiliary
         from companion.outputs import Outputs
         from companion.telemetry.console import ProgressLine
-        from companion.telemetry.status import unix_of_boat
 
         await _get_ready(planner, out, manager)
         settle()
@@ -495,7 +494,7 @@ async def _sail(
                     guard.call(Auxiliary.CONSOLE, lambda: progress.show(status, step))
 
                 def tell(view: Any, _: Any, step: Any) -> None:
-                    outputs.tell(view, unix_of_boat(step.snapshot, step.snapshot.t_s), step.voyage.frame)
+                    outputs.tell(view, step.snapshot.unix_s(step.snapshot.t_s), step.voyage.frame)
 
                 return await sail(
                     mission,

@@ -19,8 +19,8 @@ from companion.mavlink.microservices.command import TransferOutcome
 from companion.mavlink.microservices.ftp import FENCE_FILE, MISSION_FILE, RALLY_FILE, FtpRead, FtpWrite
 from companion.mavlink.microservices.mission import ListClear, ListDownload, ListUpload
 from companion.mavlink.wire import codec
-from companion.mavlink.wire.items import ENDING, first_difference, pack_mission_dat, padded, sailed, unpack_mission_dat
-from companion.messages import AutopilotStatus, GeoPoint, MissionItem, MissionState, MissionType
+from companion.mavlink.wire.items import first_difference, pack_mission_dat, padded, unpack_mission_dat
+from companion.messages import ENDING, AutopilotStatus, GeoPoint, MissionItem, MissionState, MissionType, sailed_part
 
 Method = Literal["auto", "ftp", "items", "partial", "guarded"]
 
@@ -210,7 +210,7 @@ class MissionLists:
         if read.items is None:
             outcome = read.outcome if not self._link.is_lost else TransferOutcome.LINK
             return TransferResult(outcome=outcome, text=f"written, not read back: {read.text}", method=method)
-        difference = first_difference(sailed(sent), sailed(read.items))
+        difference = first_difference(sailed_part(sent), sailed_part(read.items))
         if not difference and len(read.items) < len(sent):
             difference = f"{len(sent)} items written, {len(read.items)} read back"
         if difference:
@@ -251,7 +251,7 @@ class MissionLists:
         read = await self._read(kind, "items")
         if read.items is None:
             return self._guarded(read.outcome, f"written, not read back: {read.text}")
-        difference = first_difference(sailed(items), sailed(read.items))
+        difference = first_difference(sailed_part(items), sailed_part(read.items))
         result = self._guarded(TransferOutcome.MISMATCH if difference else TransferOutcome.OK, difference)
         return replace(result, count=len(read.items))
 

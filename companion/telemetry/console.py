@@ -30,7 +30,7 @@ from companion.program import control
 from companion.skipper.planning import next_tack, on_leg
 from companion.skipper.step import Announce, Phase, Snapshot
 from companion.telemetry.folder.records import sigma_ahead_rad
-from companion.telemetry.status import CLOCK_OFF_S, goal_distance_m, unix_of_boat
+from companion.telemetry.status import CLOCK_OFF_S, goal_distance_m
 from companion.words import clearance_words, one_line, printable
 
 NEAR_M = 1.0  # what is so near to her way is what a clearance below nought is of
@@ -250,7 +250,7 @@ class ProgressLine:
 
     def _said(self, snapshot: Snapshot, announced: Announce) -> list[str]:
         """Return it with its time of day, the page's, below a line where that turns from one clock to the other."""
-        unix_s, boat_s = self._epoch_s + snapshot.t_s, unix_of_boat(snapshot, snapshot.t_s)
+        unix_s, boat_s = self._epoch_s + snapshot.t_s, snapshot.unix_s(snapshot.t_s)
         before_s, lines = self._behind_s, []
         if boat_s is not None and abs(boat_s - unix_s) >= CLOCK_OFF_S:
             self._behind_s = boat_s - unix_s

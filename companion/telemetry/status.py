@@ -17,7 +17,7 @@ from companion.messages import AisReport, CompanionStatus, Severity, TrafficStat
 from companion.orders.far import FarStatus, Reply, minutes_of
 from companion.safety import BY_NAME
 from companion.skipper.planning import next_tack_s, on_leg
-from companion.skipper.step import Announce, Phase, Route, Snapshot
+from companion.skipper.step import Announce, Phase, Route
 from companion.skipper.way import Voyage, gates_of
 from companion.telemetry.folder.logbook import Logbook
 from companion.telemetry.folder.records import VoyageFigures, sigma_ahead_rad
@@ -150,17 +150,6 @@ def _alert(step: Step) -> tuple[str, str]:
 CLOCK_OFF_S = 10.0  # of this computer's clock against the autopilot's: from here on it is said
 
 
-def unix_of_boat(snapshot: Snapshot, t_s: float) -> float | None:
-    """Return the time at ``t_s`` [s since 1970] by the autopilot's clock, which GPS sets; None: it has not told one.
-
-    Our own clock is not asked: a board without a battery begins somewhere in the past.
-    """
-    autopilot = snapshot.autopilot
-    if autopilot is None or autopilot.utc_at_boot_s is None or autopilot.boot_s is None:
-        return None
-    return autopilot.utc_at_boot_s + autopilot.boot_s + t_s - autopilot.t_s
-
-
 def worst_watchdog(step: Step) -> str:
     """Return the name of the most severe watchdog that is raised, empty: none is."""
     names = (raised.name for raised in step.state.alarms.raised)
@@ -179,7 +168,7 @@ def far_status(
 ) -> FarStatus:
     """Return what is told far away; ``order`` and ``reply`` are those of the order that came last."""
     snapshot, traffic = step.snapshot, status.traffic
-    unix_s, autopilot, standing = unix_of_boat(snapshot, status.t_s), snapshot.autopilot, step.state.orders.standing
+    unix_s, autopilot, standing = snapshot.unix_s(status.t_s), snapshot.autopilot, step.state.orders.standing
     goal = None if status.goal_index is None else status.goal_index + 1
     return FarStatus(
         phase=status.state,

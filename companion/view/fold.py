@@ -14,7 +14,7 @@ from companion.planner.explain import bounds_in_words
 from companion.skipper.step import Announce, PlanOutcome, RequestPlan, SkipperConfig
 from companion.skipper.way import PointEn, Voyage
 from companion.telemetry.folder import VoyageFigures
-from companion.telemetry.status import CLOCK_OFF_S, unix_of_boat
+from companion.telemetry.status import CLOCK_OFF_S
 from companion.view import parts, values
 from companion.view.area import area_of
 from companion.view.events import Event, happenings, nearest_of
@@ -66,7 +66,7 @@ class ViewFold:
     ) -> tuple[values.View, tuple[Event, ...]]:
         """Return the view at a step, and what happened in it."""
         t_s = step.snapshot.t_s
-        boat_s = unix_of_boat(step.snapshot, t_s)
+        boat_s = step.snapshot.unix_s(t_s)
         if boat_s is not None and (self._epoch_s is None or abs(boat_s - t_s - self._epoch_s) >= CLOCK_OFF_S):
             self._epoch_s = boat_s - t_s
         self._follow(step.voyage)

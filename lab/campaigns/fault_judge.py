@@ -59,7 +59,7 @@ from shapely.geometry.base import BaseGeometry
 from companion.boat import Hull
 from companion.fold import Step
 from companion.geo.frame import LocalFrame
-from companion.messages import Command, Mode
+from companion.messages import ENDING, Command, Mode
 from companion.skipper.behaviors import CALL
 from companion.skipper.step import Announce, UploadMission
 from sitl.autopilot import MemoryLink, SimulatedAutopilot
@@ -204,7 +204,6 @@ EXCUSES = {
     "false wind": "with the vane turned far, by which the autopilot sails and loiters",
 }
 # Where a mission stops being read.
-_ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
 
 MissionKey = tuple[tuple[int, int, int], ...]
 
@@ -424,7 +423,7 @@ def mission_key(items: Iterable[tuple[int, int, int]]) -> MissionKey:
     out: list[tuple[int, int, int]] = []
     for command, x, y in items:
         out.append((int(command), int(x), int(y)) if command != Command.NAV_RETURN_TO_LAUNCH else (int(command), 0, 0))
-        if command in _ENDS:
+        if command in ENDING:
             break
     return tuple(out)
 

@@ -27,7 +27,7 @@ from companion.orders.far import (
     pack_order,
     unpack_status,
 )
-from companion.skipper.step import Acknowledge
+from companion.skipper.step import Acknowledge, Snapshot
 from companion.skipper.step.state import SkipperState, VoyageState
 from sitl.autopilot import MemoryLink
 from sitl.faults.computer_faults import FaultyDisk
@@ -50,8 +50,7 @@ def seen(t_s=0.0, utc_s=UTC_S):
     """Return a status and as much of its step as is told far away."""
     autopilot = AutopilotStatus(t_s=t_s, boot_s=100.0, utc_at_boot_s=None if utc_s is None else utc_s - 100.0)
     step = SimpleNamespace(
-        snapshot=SimpleNamespace(autopilot=autopilot, vehicle=None, t_s=t_s),
-        state=SkipperState(voyage=VoyageState(sailing=True)),
+        snapshot=Snapshot(t_s=t_s, autopilot=autopilot), state=SkipperState(voyage=VoyageState(sailing=True))
     )
     return CompanionStatus(t_s=t_s, state="standard", battery_v=12.2), step
 

@@ -12,8 +12,8 @@ from companion.mavlink.microservices.command import TransferOutcome
 from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.transports import open_link
 from companion.mavlink.wire.companion_status import StatusReader
-from companion.mavlink.wire.items import first_difference, mission_hash, sailed
-from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, Mode, StatusText, waypoint
+from companion.mavlink.wire.items import first_difference, mission_hash
+from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, Mode, StatusText, sailed_part, waypoint
 from sitl.ardurover.simulation import ArduRover, find
 from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot.memory_link import frames
@@ -162,7 +162,7 @@ async def orders(near, shore_near):
             await asyncio.gather(upload, return_exceptions=True)
         assert (await Autopilot(link).upload_mission(mission(4))).is_ok
         await holds(autopilot, mission(4))
-        assert sailed(mission(4))[-1].command == Command.NAV_LOITER_UNLIM
+        assert sailed_part(mission(4))[-1].command == Command.NAV_LOITER_UNLIM
         assert (await autopilot.disarm()).is_ok
 
         await link.command(246, 1.0)  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN

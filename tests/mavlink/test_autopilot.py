@@ -15,8 +15,17 @@ from companion.mavlink.mission_lists import MissionLists
 from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.wire.companion_status import StatusReader
 from companion.mavlink.wire.frames import Drop
-from companion.mavlink.wire.items import canonical, mission_hash, sailed
-from companion.messages import Command, CompanionStatus, GeoPoint, MissionItem, MissionState, Mode, waypoint
+from companion.mavlink.wire.items import canonical, mission_hash
+from companion.messages import (
+    Command,
+    CompanionStatus,
+    GeoPoint,
+    MissionItem,
+    MissionState,
+    Mode,
+    sailed_part,
+    waypoint,
+)
 from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot.memory_link import Impairment
 from sitl.world.environment import Constant
@@ -75,7 +84,7 @@ def test_a_shorter_plan_over_a_running_one_leaves_nothing_of_the_old():
         result = await autopilot.upload_mission(short, set_current=1)
         assert result.is_ok, result
         read = await autopilot.read_mission()
-        assert sailed(read.items) == tuple(canonical(i) for i in short)
+        assert sailed_part(read.items) == tuple(canonical(i) for i in short)
         old = {canonical(i) for i in mission(10)}
         assert not old & set(read.items)
         assert mission_hash(read.items) == mission_hash(short)
@@ -127,7 +136,7 @@ GUARD_GAP = waypoint(GeoPoint(lat_deg=51.1, lon_deg=-1.298), command=Command.NAV
 def test_behind_a_stopgap_no_mixture_is_ever_on_board(old):
     """The link is cut after every so many frames: what the boat would sail is the old, the held back or the new."""
     new = [*old[:2], *GUARD_NEW[2:]]
-    whole = [tuple(canonical(i) for i in sailed(m)) for m in (old, [*old[:2], GUARD_GAP], new)]
+    whole = [tuple(canonical(i) for i in sailed_part(m)) for m in (old, [*old[:2], GUARD_GAP], new)]
     seen = set()
 
     async def main(boat, link, autopilot, memory, frames):
@@ -162,10 +171,10 @@ def test_behind_a_stopgap_no_mixture_is_ever_on_board(old):
                 )
                 for i in stored
             )
-            assert sailed(on_board) in whole, (frames, on_board)
-            seen.add(whole.index(sailed(on_board)))
+            assert sailed_part(on_board) in whole, (frames, on_board)
+            seen.add(whole.index(sailed_part(on_board)))
         result = await task
-        assert not result.is_ok or sailed(on_board) == whole[2]
+        assert not result.is_ok or sailed_part(on_board) == whole[2]
         return result.is_ok
 
     frames = 0

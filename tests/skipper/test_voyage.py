@@ -11,7 +11,7 @@ from shapely.geometry import box
 
 from companion.boat import AutopilotLimits
 from companion.geo.angles import difference_rad
-from companion.messages import MissionItem, Mode, StatusText
+from companion.messages import MissionItem, Mode, StatusText, sailed_part
 from companion.planner import PlanStatus, plan
 from companion.planner.worker import failed
 from companion.planners import AstarSettings, PlannerChoice
@@ -19,7 +19,7 @@ from companion.skipper.planning.triggers import board_end
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import DRY_RUN, Guidance, Permissions, ReplanPolicy
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.missions import effective, ends_safely, is_same_mission
+from companion.skipper.step.missions import ends_safely, is_same_mission
 from companion.skipper.step.snapshot import AutopilotRebooted, UploadResult, WindHealth
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import bearing_rad, distance_m, is_tack, moved
@@ -549,7 +549,7 @@ def test_hold_by_wish_and_go_on():
     world.order("hold")
     world.run(90)
     assert world.state.phase is Phase.HOLDING
-    assert len(effective(world.mission)) == world.seq
+    assert len(sailed_part(world.mission)) == world.seq
     world.order("go_on")
     assert world.run(1500, is_done)
 
@@ -939,7 +939,7 @@ def test_by_headings_under_guided_it_arrives_and_hands_back():
     assert world.count(act.SteerHeading) > 100
     world.run(20)
     assert world.mode is Mode.AUTO
-    assert world.seq == len(effective(world.mission))
+    assert world.seq == len(sailed_part(world.mission))
     assert distance_m(world.position, (0.0, 200.0)) < 25.0
 
 

@@ -27,7 +27,7 @@ from companion.geofence.mission.options import (
     SkipperOptions,
 )
 from companion.geofence.shapes import ZoneKind
-from companion.messages import Command, GeoPoint, MissionItem
+from companion.messages import ENDING, Command, GeoPoint, MissionItem
 from companion.words import counted
 
 # From the items of a drawn mission to the goals of a voyage: laps written out, the end, and what is refused by name.
@@ -43,7 +43,6 @@ REDRAW = "change the drawing and upload it again"
 
 _LOITERS = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TIME, Command.NAV_LOITER_TURNS})
 _STOPS = _LOITERS | {Command.NAV_WAYPOINT}
-_ENDS = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,7 +117,7 @@ def course_of(items: Sequence[MissionItem]) -> DrawnCourse:
     end: Literal["loiter", "home"] | None = "loiter" if ending in _LOITERS else None
     if ending == Command.NAV_RETURN_TO_LAUNCH:
         end, walked = "home", walked[:-1]
-    if ending in _ENDS and last < len(items):
+    if ending in ENDING and last < len(items):
         found.say(
             last + 1,
             f"stands behind item {last} ({found.name(last)}), where the mission ends: it would never be sailed",
@@ -242,7 +241,7 @@ def _walk(items: Sequence[MissionItem], jumps: dict[int, tuple[int, int]]) -> tu
             done[number] += 1
             number = jumps[number][0]
             continue
-        if item.command in _ENDS:
+        if item.command in ENDING:
             return [*walked, number], True
         if item.command in _STOPS:
             walked.append(number)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.messages import float32
 from companion.mavlink.microservices.command import Party, Retransmission, TransferOutcome
 from companion.mavlink.wire.frames import Message
+from companion.messages import float32
 
 # 4.7 renamed these [ArduPilot PR #29617]; SRn_ numbered serial links from 0, MAVn_ numbers MAVLink links from 1.
 _RENAMED = {"SYSID_THISMAV": "MAV_SYSID", "SYSID_MYGCS": "MAV_GCS_SYSID"}

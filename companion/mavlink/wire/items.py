@@ -12,10 +12,7 @@ import math
 import struct
 from collections.abc import Sequence
 
-from companion.messages import Command, MissionItem, MissionType, float32
-
-# A mission ends here: nothing behind such an item is ever sailed.
-ENDING = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_RETURN_TO_LAUNCH})
+from companion.messages import Command, MissionItem, MissionType, float32, sailed_part
 
 # MAV_FRAME: _INT twins and what they are stored as.
 _FRAMES = {5: 0, 6: 3, 11: 10}
@@ -57,14 +54,6 @@ def canonical(item: MissionItem) -> MissionItem:
     return MissionItem(command=item.command, lat_e7=lat_e7, lon_e7=lon_e7, frame=frame, params=(p1, p2, p3, p4))
 
 
-def sailed(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """Return the items up to and with the first that ends a mission: what the boat can ever sail."""
-    for i, item in enumerate(items):
-        if item.command in ENDING:
-            return tuple(items[: i + 1])
-    return tuple(items)
-
-
 def first_difference(sent: Sequence[MissionItem], read: Sequence[MissionItem]) -> str:
     """Return where two lists differ as the autopilot keeps them, in words; empty when they do not."""
     if len(sent) != len(read):
@@ -82,7 +71,7 @@ def mission_hash(items: Sequence[MissionItem]) -> str:
     a round trip through the autopilot and when an old tail or padding stands behind it. Works for fences too.
     """
     digest = hashlib.sha256()
-    for item in sailed(items):
+    for item in sailed_part(items):
         kept = canonical(item)
         digest.update(struct.pack("<HBii4f", kept.command, kept.frame, kept.lat_e7, kept.lon_e7, *kept.params))
     return digest.hexdigest()[:16]

@@ -11,8 +11,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 
-from companion.messages import Command, MissionItem
-from companion.skipper.step.missions import effective
+from companion.messages import Command, MissionItem, sailed_part
 
 _PLACE = struct.Struct("<Hii")
 # Altitudes from 1 cm to 41 m; a list of two items bears ours by chance once in 16 million.
@@ -30,7 +29,7 @@ def marked(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
 
 def are_marked(items: Sequence[MissionItem]) -> bool:
     """Return whether every item that can be sailed, and has a place, bears our mark; False when there is none."""
-    places = [item for item in effective(items) if _has_place(item)]
+    places = [item for item in sailed_part(items) if _has_place(item)]
     return bool(places) and all(_is_marked(item) for item in places)
 
 
@@ -39,7 +38,7 @@ def is_remnant(items: Sequence[MissionItem], drawn: Sequence[MissionItem]) -> bo
     left = {(item.command, item.lat_e7, item.lon_e7) for item in drawn}
     ours = [item for item in items if _has_place(item) and _is_marked(item)]
     return bool(ours) and all(
-        item in ours or (item.command, item.lat_e7, item.lon_e7) in left for item in effective(items)
+        item in ours or (item.command, item.lat_e7, item.lon_e7) in left for item in sailed_part(items)
     )
 
 

@@ -12,11 +12,11 @@ from dataclasses import replace
 from companion.frozen import changed
 from companion.geofence.mission import hindrance, offer
 from companion.mavlink.wire import mission_hash
-from companion.messages import Command, MissionItem, Mode, Severity
+from companion.messages import Command, MissionItem, Mode, Severity, sailed_part
 from companion.safety import STOPPING
 from companion.skipper.board.mark import are_marked, marked
 from companion.skipper.step import AdoptDrawing, Persisted, Phase, ReadMission, Route, StepContext
-from companion.skipper.step.missions import HELD_BACK, NO_PLAN, effective, held_back, is_mixture, is_same_mission
+from companion.skipper.step.missions import HELD_BACK, NO_PLAN, held_back, is_mixture, is_same_mission
 from companion.skipper.step.state import Inside, saved_of
 from companion.words import counted
 
@@ -196,7 +196,7 @@ def _take_over(ctx: StepContext, items: tuple[MissionItem, ...], saved: Persiste
 
 def _route_of(ctx: StepContext, items: tuple[MissionItem, ...]) -> Route:
     """Return a list that was read as the route that sails: where it leads is known, what for is not."""
-    whole = marked(effective(items))
+    whole = marked(sailed_part(items))
     autopilot = ctx.snapshot.autopilot
     known = None if autopilot is None else autopilot.home
     home = ctx.boat_en or (0.0, 0.0) if known is None else ctx.voyage.frame.en_from_geo(known)

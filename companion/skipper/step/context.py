@@ -127,13 +127,6 @@ def _with_drying(voyage: Voyage, solid: tuple[DryingWater, ...]) -> Voyage:
     return replace(voyage, area=_filled(voyage.area, solid)) if solid else voyage
 
 
-def _utc_s(snapshot: Snapshot) -> float | None:
-    status = snapshot.autopilot
-    if status is None or status.utc_at_boot_s is None or status.boot_s is None:
-        return None
-    return status.utc_at_boot_s + status.boot_s + max(0.0, snapshot.t_s - status.t_s)
-
-
 def _is_fence_off(state: SkipperState, snapshot: Snapshot) -> bool:
     """Return whether the autopilot keeps a fence no more: under way not for a moment's silence, but by the watchdog."""
     if state.voyage.sailing:
@@ -165,7 +158,7 @@ class StepContext:
     def __init__(self, voyage: Voyage, config: SkipperConfig, state: SkipperState, snapshot: Snapshot) -> None:
         self.boat_of_file = voyage.boat
         voyage = unfilled = with_known_boat(voyage, config, state, snapshot.limits)
-        self.utc_s = _utc_s(snapshot)
+        self.utc_s = snapshot.unix_s(snapshot.t_s)
         """The Unix time by the autopilot's clock [s], None while that does not know it."""
         closed = tuple(w for w in voyage.drying if w.is_closed(config.tide, self.utc_s, SOLID_S))
         voyage = self._charted = _with_drying(voyage, closed)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.geo.angles import difference_rad
-from companion.messages import Command, MissionItem, waypoint
+from companion.messages import ENDING, Command, MissionItem, sailed_part, waypoint
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.route import Route
 from companion.skipper.way import PointEn, Voyage, bearing_rad, distance_m, moved, water_at
@@ -28,23 +28,11 @@ from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import AreaLike, water_to_keep
 
 LOOKS = 41  # places looked at along a line that leads through something
-ENDS = frozenset({int(Command.NAV_LOITER_UNLIM), int(Command.NAV_RETURN_TO_LAUNCH)})
-
-
-def effective(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """Return the items that can ever be sailed: up to the first that ends a mission.
-
-    What follows it is an old tail that a shorter upload left behind.
-    """
-    for i, item in enumerate(items):
-        if item.command in ENDS:
-            return tuple(items[: i + 1])
-    return tuple(items)
 
 
 def fingerprint(items: Sequence[MissionItem]) -> tuple[tuple[int, int, int], ...]:
     """Return what two missions must share to be the same to the boat: command and place of each item."""
-    return tuple((item.command, item.lat_e7, item.lon_e7) for item in effective(items))
+    return tuple((item.command, item.lat_e7, item.lon_e7) for item in sailed_part(items))
 
 
 def is_same_mission(a: Sequence[MissionItem], b: Sequence[MissionItem]) -> bool:
@@ -64,8 +52,8 @@ def _by_index(old: Sequence[MissionItem], new: Sequence[MissionItem]) -> list[li
 
 def ends_safely(items: Sequence[MissionItem]) -> bool:
     """Return whether the mission's last sailed item is one that ends it."""
-    whole = effective(items)
-    return bool(whole) and whole[-1].command in ENDS
+    whole = sailed_part(items)
+    return bool(whole) and whole[-1].command in ENDING
 
 
 # ------------------------------------------------------------------------------------------ safe end
@@ -292,7 +280,7 @@ def stopgap(route: Route, keep: int, index: int) -> MissionItem | None:
     """
     if keep >= len(route.items):
         return None
-    if route.items[keep].command in ENDS:
+    if route.items[keep].command in ENDING:
         return route.items[keep]
     place = min(index, len(route.items) - 1) if index >= keep else keep - 1
     return replace(route.items[place], command=Command.NAV_LOITER_UNLIM)

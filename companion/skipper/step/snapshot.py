@@ -216,6 +216,10 @@ class Snapshot:
     events: tuple[Event, ...] = ()
     outcomes: tuple[Outcome, ...] = ()
 
+    def unix_s(self, t_s: float) -> float | None:
+        """Return the time at ``t_s`` by the autopilot's clock (``AutopilotStatus.unix_s``)."""
+        return None if self.autopilot is None else self.autopilot.unix_s(t_s)
+
 
 def wind_now(snapshot: Snapshot) -> tuple[float, float] | None:
     """Return the wind to judge the present by: (from where [rad], how fast [m/s]), None when nothing is known."""

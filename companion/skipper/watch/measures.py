@@ -216,13 +216,10 @@ def _battery_critical(ctx: StepContext) -> float | None:
 
 def _dark(ctx: StepContext) -> float | None:
     status, vehicle, below_deg = ctx.autopilot, ctx.snapshot.vehicle, ctx.config.ends.figure("dark_below_deg")
-    if below_deg is None or status is None or vehicle is None or status.utc_at_boot_s is None or status.boot_s is None:
+    unix_s = None if status is None else status.unix_s(ctx.t_s)
+    if below_deg is None or vehicle is None or unix_s is None:
         return None
-    height_rad = sun_height_rad(
-        math.radians(vehicle.position.lat_deg),
-        math.radians(vehicle.position.lon_deg),
-        status.utc_at_boot_s + status.boot_s,
-    )
+    height_rad = sun_height_rad(math.radians(vehicle.position.lat_deg), math.radians(vehicle.position.lon_deg), unix_s)
     return math.degrees(height_rad - math.radians(below_deg))
 
 

@@ -11,16 +11,14 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.mavlink.wire.items import (
-    ENDING,
     canonical,
     first_difference,
     mission_hash,
     pack_mission_dat,
     padded,
-    sailed,
     unpack_mission_dat,
 )
-from companion.messages import Command, MissionItem, MissionType
+from companion.messages import ENDING, Command, MissionItem, MissionType, sailed_part
 
 PLACELESS = (20, 93, 177, 178, 207)
 COMMANDS = st.sampled_from([int(c) for c in Command])
@@ -50,7 +48,7 @@ def test_padding_changes_the_length_and_nothing_that_is_sailed(items, count):
     items = [*items, MissionItem(command=Command.NAV_LOITER_UNLIM, lat_e7=1, lon_e7=2)]
     long = padded(items, count)
     assert len(long) == max(len(items), count)
-    assert sailed(long) == sailed(items)
+    assert sailed_part(long) == sailed_part(items)
     assert mission_hash(long) == mission_hash(items)
     assert all(i.command in ENDING for i in long[len(items) :])
 
@@ -58,7 +56,7 @@ def test_padding_changes_the_length_and_nothing_that_is_sailed(items, count):
 @settings(max_examples=100)
 @given(ITEMS, st.data())
 def test_the_hash_names_what_is_sailed(items, data):
-    ended = sailed(items)
+    ended = sailed_part(items)
     assert mission_hash(items) == mission_hash([canonical(i) for i in items])
     places = [i for i, item in enumerate(ended) if item.command not in PLACELESS]
     if not places:
@@ -187,8 +185,8 @@ def test_padding_repeats_the_last_item_and_the_name_ends_with_the_mission():
     way, end = MissionItem(command=16, lat_e7=5), MissionItem(command=Command.NAV_LOITER_UNLIM, lat_e7=9)
     assert padded([way, end], 4) == (way, end, end, end)
     assert padded([], 3) == ()
-    assert sailed([way, end, way]) == (way, end)
-    assert sailed([way, way]) == (way, way)
+    assert sailed_part([way, end, way]) == (way, end)
+    assert sailed_part([way, way]) == (way, way)
     home = MissionItem(command=Command.NAV_RETURN_TO_LAUNCH)
     assert mission_hash([way, home, way]) == mission_hash([way, home]) != mission_hash([way, way, home])
 

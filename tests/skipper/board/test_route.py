@@ -9,12 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, box
 
-from companion.messages import Command, MissionItem
+from companion.messages import Command, MissionItem, sailed_part
 from companion.skipper.step.config import SafeEnd, SkipperConfig
 from companion.skipper.step.missions import (
     Tail,
     common_prefix,
-    effective,
     ends_safely,
     is_mixture,
     is_same_mission,
@@ -103,7 +102,7 @@ def test_a_mixture_is_ours_and_no_other_mission_is(first, second, cut):
 def test_an_old_tail_behind_the_end_is_dead():
     items = route([(0, 100), (50, 200)]).items
     tail = (MissionItem(command=16, lat_e7=1, lon_e7=2),)
-    assert effective((*items, *tail)) == items
+    assert sailed_part((*items, *tail)) == items
     assert is_same_mission((*items, *tail), items)
     assert not ends_safely(tail)
 

@@ -365,7 +365,8 @@ def test_the_sun_stands_where_another_almanac_has_it(lat_deg, lon_deg):
 def test_dark_is_the_sun_s_height_over_the_limit_by_the_autopilot_s_time(limit_deg):
     ctx = moment(WAY, config={"ends": Ends.of(dark_below_deg=limit_deg)})
     at = ctx.snapshot.vehicle.position
-    height = math.degrees(sun_height_rad(math.radians(at.lat_deg), math.radians(at.lon_deg), 1.75e9 + 50.0))
+    height = math.degrees(sun_height_rad(math.radians(at.lat_deg), math.radians(at.lon_deg), 1.75e9 + 53.0))
+    shown(ctx, t_s=NOW_S - 3.0)  # and its word is some seconds old
     assert measure(shown(ctx, utc_at_boot_s=1.75e9, boot_s=50.0), "dark") == pytest.approx(height - limit_deg)
     for lacking in ({"utc_at_boot_s": None, "boot_s": 50.0}, {"utc_at_boot_s": 1.75e9, "boot_s": None}):
         assert measure(shown(ctx, **lacking), "dark") is None
