@@ -6,7 +6,16 @@
 """
 
 from companion.boat.afloat import Afloat, LearnedAfloat, Look, as_learned, factor, followed, mark_of
-from companion.boat.boat import Boat, Hull, can_hold, made_good_mps, outline_en_m, slowest_en_mps
+from companion.boat.boat import (
+    Boat,
+    Hull,
+    can_hold,
+    made_good_mps,
+    orc_text,
+    outline_en_m,
+    signalk_text,
+    slowest_en_mps,
+)
 from companion.boat.guess import GuessedBoat, Sizes, guessed, guessed_text
 from companion.boat.learned_file import learned_text
 from companion.boat.lesson import Lesson, lesson_of
@@ -25,12 +34,10 @@ from companion.boat.polar import (
     ardurover_sitl,
     avalon,
     constant,
-    orc_text,
     parse_polar,
     pol_text,
     polar_of_table,
     read_polar,
-    signalk_text,
 )
 from companion.boat.steering import Steering, SteeringBand, SteeringLog, steering_of
 from companion.boat.trial import Trial, trial_in

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import uuid
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -10,11 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from companion.boat.polar import Polar
+from companion.boat.polar import Polar, SailingAngle
+from companion.geo import MPS_PER_KNOT
 
 Floats = NDArray[np.float64]
 
 SHAPE_TWA_RAD = tuple(math.radians(a) for a in range(0, 181, 30))  # of a problem's ``shape_error``
+BEST_STEP_RAD = math.radians(0.1)  # of the best angle to windward
 SPEED_ANGLES = 73  # of ``Boat.problem_speeds``: 2.5 degrees apart
 
 
@@ -59,7 +63,8 @@ class Boat:
         no_go_error_rad: How far ``no_go_half_rad`` may be off, as a deviation [rad, 0..0.5].
         speed_error: How far all speeds of the polar may be off together, as the deviation of the logarithm [0..1].
         shape_error: How far each speed may be off beside that, as deviations of the logarithm; None: nobody says.
-        leeway_rad: On a beat, the apparent wind 30 degrees off its bow and three times as fast as it; see ``leeway``.
+        leeway_rad: Where the apparent wind is 30 degrees off its bow and three times as fast as it: on a beat in a
+            moderate wind. In more wind it grows until the boat goes no faster (``Polar.full_tws_mps``).
     """
 
     polar: Polar
@@ -107,7 +112,28 @@ class Boat:
         if self.leeway_rad == 0.0:
             return twa_rad
         speed = self.polar.speed_mps(twa_rad, tws_mps)
-        return min(twa_rad + float(leeway_at(coefficient_of(self.leeway_rad), twa_rad, tws_mps, speed)), math.pi)
+        k, full_mps = coefficient_of(self.leeway_rad), self.polar.full_tws_mps
+        return min(twa_rad + float(leeway_at(k, twa_rad, tws_mps, speed, full_mps)), math.pi)
+
+    def best_beat(self, tws_mps: float, *, no_go_half_rad: float = 0.0) -> SailingAngle:
+        """Return the bow's angle of the best way to windward that it may be sailed at, leeway taken off.
+
+        ``no_go_half_rad`` is what is kept out of where that is more than the boat's own.
+        """
+        low_rad = max(self.no_go_half_rad, no_go_half_rad)
+        best = self.polar.best_beat(tws_mps, no_go_half_rad=low_rad)
+        if self.leeway_rad == 0.0:
+            return best
+        bows = np.linspace(min(low_rad, 0.5 * math.pi), 0.5 * math.pi, 1 + math.ceil(0.5 * math.pi / BEST_STEP_RAD))
+        speeds = self.polar.speeds_mps(bows, tws_mps)
+        slips = leeway_at(coefficient_of(self.leeway_rad), bows, tws_mps, speeds, self.polar.full_tws_mps)
+        made = speeds * np.cos(bows + slips) / np.maximum(np.cos(slips), 0.1)
+        i = int(np.argmax(made))
+        return SailingAngle(twa_rad=float(bows[i]), speed_mps=float(speeds[i]), vmg_mps=float(made[i]))
+
+    def best_run(self, tws_mps: float) -> SailingAngle:
+        """Return the angle of the best way to leeward, no deeper than the boat sails."""
+        return self.polar.best_run(tws_mps, max_twa_rad=self.max_twa_rad)
 
     def _made_good(
         self, twa_rad: NDArray[np.float64], speed_mps: NDArray[np.float64], tws_mps: float
@@ -116,7 +142,7 @@ class Boat:
         k = coefficient_of(self.leeway_rad)
         bows = np.unique(np.concatenate([twa_rad, np.radians(np.arange(0.0, 181.0, 5.0))]))
         speeds = np.interp(bows, twa_rad, speed_mps)
-        slips = leeway_at(k, bows, tws_mps, speeds)
+        slips = leeway_at(k, bows, tws_mps, speeds, self.polar.full_tws_mps)
         courses = np.minimum(bows + slips, math.pi)
         # Nearer to the wind than where its course comes nearest to it the boat only drifts more: not sailed by anybody.
         later = np.append(np.minimum.accumulate(courses[::-1])[::-1][1:], math.inf)
@@ -149,6 +175,8 @@ class Boat:
             out["tack_loss_s"] = self.tack_loss_s
         if self.gybe_loss_s > 0.0:
             out["gybe_loss_s"] = self.gybe_loss_s
+        if self.leeway_rad > 0.0:
+            out["leeway_deg"] = out["no_go_half_deg"] - math.degrees(self.no_go_half_rad)
         if self.speed_error > 0.0:
             out["speed_error"] = self.speed_error
         if self.shape_error is not None:
@@ -179,6 +207,55 @@ def _speeds_of(boat: Boat) -> dict[str, Any]:
         "twa_deg": [round(float(a), 6) for a in np.degrees(angles)],
         "v_mps": rows,
     }
+
+
+# The winds [kn] and angles [deg] of an ORC certificate.
+ORC_KN = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 20.0, 24.0)
+ORC_DEG = (52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0)
+
+
+def orc_text(boat: Boat, share: float = 1.0) -> str:
+    """Return a boat's polar as an ORC certificate tells one, in knots and degrees; its speeds times ``share``.
+
+    A wind that the polar does not reach is left out: a speed there would be a guess that looks like a rating.
+    """
+    polar = boat.polar
+    least, most = float(np.min(polar.tws_mps)), float(np.max(polar.tws_mps))
+    winds = [w for w in ORC_KN if least - 1e-9 <= w * MPS_PER_KNOT <= most + 1e-9 or least == most]
+    beats, runs = ([best(w * MPS_PER_KNOT) for w in winds] for best in (boat.best_beat, boat.best_run))
+    rows = [
+        ("beat angle", [f"{math.degrees(b.twa_rad):.1f}" for b in beats]),
+        ("beat VMG", [f"{share * b.vmg_mps / MPS_PER_KNOT:.2f}" for b in beats]),
+        *(
+            (
+                f"{a:g}",
+                [f"{share * polar.speed_mps(math.radians(a), w * MPS_PER_KNOT) / MPS_PER_KNOT:.2f}" for w in winds],
+            )
+            for a in ORC_DEG
+        ),
+        ("run VMG", [f"{share * r.vmg_mps / MPS_PER_KNOT:.2f}" for r in runs]),
+        ("run angle", [f"{math.degrees(r.twa_rad):.1f}" for r in runs]),
+    ]
+    return "\n".join(["TWA/TWS," + ",".join(f"{w:g}" for w in winds), *(",".join([n, *c]) for n, c in rows)]) + "\n"
+
+
+def signalk_text(boat: Boat, share: float = 1.0) -> str:
+    """Return a boat's polar as Signal K has one (``performance/polars``: radians, m/s), its speeds times ``share``."""
+    polar, winds = boat.polar, []
+    for tws_mps in [w for w in polar.tws_mps.tolist() if w > 0.0] or [5.0]:
+        beat, run = boat.best_beat(tws_mps), boat.best_run(tws_mps)
+        winds.append(
+            {
+                "trueWindSpeed": tws_mps,
+                "optimalBeats": [[round(beat.twa_rad, 4), round(share * beat.speed_mps, 3)]],
+                "optimalGybes": [[round(run.twa_rad, 4), round(share * run.speed_mps, 3)]],
+                "angleData": [
+                    [round(a, 4), round(share * polar.speed_mps(a, tws_mps), 3)] for a in polar.twa_rad.tolist()
+                ],
+            }
+        )
+    number = str(uuid.uuid5(uuid.NAMESPACE_OID, polar.name))
+    return json.dumps({number: {"id": number, "name": polar.name, "windData": winds}}, indent=1) + "\n"
 
 
 # Leeway: how far to leeward of its bow a boat goes through the water.
@@ -217,11 +294,35 @@ def leeway_rad(
 
 
 def leeway_at(
-    coefficient: float, twa_rad: float | Floats, tws_mps: float | Floats, speed_mps: float | Floats
+    coefficient: float,
+    twa_rad: float | Floats,
+    tws_mps: float | Floats,
+    speed_mps: float | Floats,
+    full_tws_mps: float = math.inf,
 ) -> Floats:
-    """Return the same for headings at ``twa_rad`` to the true wind."""
-    across, ahead = tws_mps * np.sin(twa_rad), tws_mps * np.cos(twa_rad) + speed_mps
+    """Return the same for headings at ``twa_rad`` to the true wind.
+
+    A hull carries no more side force than its stability holds: in more wind than ``full_tws_mps`` it is as much as in
+    that, the sails eased or reefed.
+
+    >>> k, beat = coefficient_of(math.radians(5.0)), math.radians(45.0)
+    >>> [round(math.degrees(leeway_at(k, beat, w, 1.1, 3.0)), 1) for w in (2.0, 3.0, 8.0)]
+    [3.7, 6.8, 6.8]
+    """
+    tws = np.minimum(tws_mps, full_tws_mps)
+    across, ahead = tws * np.sin(twa_rad), tws * np.cos(twa_rad) + speed_mps
     return leeway_rad(coefficient, np.hypot(across, ahead), np.arctan2(across, ahead), speed_mps)
+
+
+def carried(twa_rad: float, tws_mps: float, speed_mps: float, full_tws_mps: float) -> float:
+    """Return the share of the sails' side force in this wind that the hull carries, as ``leeway_at`` has it [0..1]."""
+    if tws_mps <= full_tws_mps:
+        return 1.0
+
+    def force(tws: float) -> float:
+        return tws * math.hypot(tws * math.sin(twa_rad), tws * math.cos(twa_rad) + speed_mps)
+
+    return min(1.0, force(full_tws_mps) / max(force(tws_mps), 1e-9))
 
 
 def outline_en_m(hull: Hull, en_m: ArrayLike, heading_rad: ArrayLike) -> NDArray[np.float64]:

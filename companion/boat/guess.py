@@ -20,6 +20,7 @@ from importlib.resources import files
 
 import numpy as np
 
+from companion.boat.boat import coefficient_of, leeway_at
 from companion.boat.polar import Polar
 
 GRAVITY_MPS2, WATER_KGPM3 = 9.81, 1025.0
@@ -33,7 +34,7 @@ NO_GO_ERROR_DEG = 4.0  # a judgement: that of small robots that were published i
 # Of a boat of a metre; by Froude's law a time grows as the root of the length.
 TURN_RATE_DEG_S, TACK_LOSS_S = 30.0, 4.0
 TACK_FAILS = 0.05  # one in twenty, until some were seen
-LEEWAY_DEG = 5.0
+LEEWAY_DEG = 5.0  # in a moderate wind; 5 to 12 close-hauled in a fresh one is told of small robots, and this makes 7
 LEAST_M, MOST_M = 0.3, 40.0
 BEAM = 0.3  # of the length
 
@@ -118,9 +119,17 @@ def _rows() -> list[dict[str, str]]:
     return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
 
 
+def _most_leeway_deg(boat: GuessedBoat) -> float:
+    """Return the leeway at the edge of the no-go zone where it is most [deg]."""
+    beat_rad, full_mps = math.radians(boat.no_go_half_deg), boat.polar.full_tws_mps
+    speed_mps = boat.polar.speed_mps(beat_rad, full_mps)
+    return math.degrees(leeway_at(coefficient_of(math.radians(boat.leeway_deg)), beat_rad, full_mps, speed_mps))
+
+
 def guessed_text(name: str, sizes: Sizes, boat: GuessedBoat, when: str, beam_m: float | None = None) -> str:
     """Return the boat file of a guess, made on the day ``when``; a beam is taken for ``BEAM`` of the length."""
     polar = boat.polar
+    slips = f"{_most_leeway_deg(boat):.0f} in {polar.full_tws_mps:.1f} m/s or more"
 
     def share(value: float, by: float) -> str:
         return f"{value / by:.2g} to {value * by:.2g}"
@@ -133,9 +142,10 @@ def guessed_text(name: str, sizes: Sizes, boat: GuessedBoat, when: str, beam_m: 
         ("turn_rate_deg_s", boat.turn_rate_deg_s, f"{share(boat.turn_rate_deg_s, 2.0)}: in a tack"),
         ("tack_loss_s", boat.tack_loss_s, f"{share(boat.tack_loss_s, 3.0)}: what a tack costs beside the turn"),
         ("tack_fails", boat.tack_fails, "0 to 0.15: the share of tacks that end where they began"),
-        ("leeway_deg", boat.leeway_deg, "2 to 12: on a beat in a fresh wind"),
+        ("leeway_deg", boat.leeway_deg, f"2 to 9: beating, apparent wind 3 times her speed; {slips}"),
         ("speed_error_percent", boat.speed_error_percent, "all of [polar] may be off together by this"),
     )
+    most = f"{polar.tws_mps[-1]:.1f}"
     made_of = f"{sizes.length_m:g} m, {sizes.displacement_kg:g} kg, {sizes.sail_area_m2:g} m2"
     lines = [
         f"name = {json.dumps(name)}",
@@ -145,7 +155,7 @@ def guessed_text(name: str, sizes: Sizes, boat: GuessedBoat, when: str, beam_m: 
         "[boat]   # the keys of a mission's [boat]; what a mission says itself counts before this",
         *(f"{f'{key} = {value:g}':<28}{comment and '# '}{comment}".rstrip() for key, value, comment in keys),
         "",
-        "[polar]   # through the water, in the wind at the height of the vane",
+        f"[polar]   # through the water, in the wind at the height of the vane; in more than {most} m/s as in that",
         f"tws_mps = [{', '.join(f'{w:.1f}' for w in polar.tws_mps)}]",
         f"twa_deg = [{', '.join(f'{math.degrees(a):g}' for a in polar.twa_rad)}]",
         "speed_mps = [",

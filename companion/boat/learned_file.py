@@ -67,7 +67,9 @@ def learned_text(
             f"{lesson.tacks.failed} of {lesson.tacks.tried}; at most {lesson.tacks.fails_most:.2g}",
         )
     learned(
-        "leeway_deg", round(deg(boat.leeway.mean), 1), f"deviation {deg(boat.leeway.sd):.1f}: on a beat in a fresh wind"
+        "leeway_deg",
+        round(deg(boat.leeway.mean), 1),
+        f"deviation {deg(boat.leeway.sd):.1f}: beating, apparent wind 3 times her speed",
     )
     learned(
         "speed_error_percent",

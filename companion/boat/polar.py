@@ -14,10 +14,8 @@ from __future__ import annotations
 
 import bisect
 import csv
-import json
 import math
 import re
-import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -32,6 +30,8 @@ from companion.errors import InputError, unreadable
 from companion.geo import MPS_PER_KNOT
 from companion.geo.angles import wrap_pi_array
 
+_TO_WINDWARD_RAD = math.radians(60.0)  # every boat sails there, and is pressed as on a beat
+_NO_FASTER = 0.01
 _SEARCH_STEP_RAD = math.radians(0.05)  # of the best angles; VMG is flat there, finer changes nothing
 
 
@@ -157,6 +157,17 @@ class Polar:
     def max_speed_mps(self, tws_mps: float) -> float:
         """Return the highest speed [m/s] at any angle."""
         return max(self._curve_of(tws_mps)[1])
+
+    @property
+    def full_tws_mps(self) -> float:
+        """The wind [m/s] from which on the boat goes no faster to windward: there it carries all that it can.
+
+        Infinite for a polar of one column, which says nothing of it.
+        """
+        speeds = np.array([np.interp(_TO_WINDWARD_RAD, self.twa_rad, column) for column in self.speed_mps_table.T])
+        if speeds.size == 1 or speeds.max() == 0.0:
+            return math.inf
+        return float(self.tws_mps[int(np.argmax(speeds >= (1.0 - _NO_FASTER) * speeds.max()))])
 
     # ------------------------------------------------------------------------------------ best angles
     def vmg_mps(self, twa_rad: float, tws_mps: float) -> float:
@@ -328,54 +339,6 @@ def pol_text(polar: Polar, share: float = 1.0) -> str:
         speeds = (share * polar.speed_mps(angle, w) / MPS_PER_KNOT for w in winds)
         lines.append(f"{math.degrees(angle):g};" + ";".join(f"{v:.2f}" for v in speeds))
     return "\n".join(lines) + "\n"
-
-
-# The winds [kn] and angles [deg] of an ORC certificate.
-ORC_KN = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 20.0, 24.0)
-ORC_DEG = (52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0)
-
-
-def orc_text(polar: Polar, share: float = 1.0) -> str:
-    """Return a polar as an ORC certificate tells one, in knots and degrees; its speeds times ``share``.
-
-    A wind that the polar does not reach is left out: a speed there would be a guess that looks like a rating.
-    """
-    least, most = float(np.min(polar.tws_mps)), float(np.max(polar.tws_mps))
-    winds = [w for w in ORC_KN if least - 1e-9 <= w * MPS_PER_KNOT <= most + 1e-9 or least == most]
-    beats, runs = ([best(w * MPS_PER_KNOT) for w in winds] for best in (polar.best_beat, polar.best_run))
-    rows = [
-        ("beat angle", [f"{math.degrees(b.twa_rad):.1f}" for b in beats]),
-        ("beat VMG", [f"{share * b.vmg_mps / MPS_PER_KNOT:.2f}" for b in beats]),
-        *(
-            (
-                f"{a:g}",
-                [f"{share * polar.speed_mps(math.radians(a), w * MPS_PER_KNOT) / MPS_PER_KNOT:.2f}" for w in winds],
-            )
-            for a in ORC_DEG
-        ),
-        ("run VMG", [f"{share * r.vmg_mps / MPS_PER_KNOT:.2f}" for r in runs]),
-        ("run angle", [f"{math.degrees(r.twa_rad):.1f}" for r in runs]),
-    ]
-    return "\n".join(["TWA/TWS," + ",".join(f"{w:g}" for w in winds), *(",".join([n, *c]) for n, c in rows)]) + "\n"
-
-
-def signalk_text(polar: Polar, share: float = 1.0) -> str:
-    """Return a polar as Signal K has one (``performance/polars``: radians, m/s), its speeds times ``share``."""
-    winds = []
-    for tws_mps in [w for w in polar.tws_mps.tolist() if w > 0.0] or [5.0]:
-        beat, run = polar.best_beat(tws_mps), polar.best_run(tws_mps)
-        winds.append(
-            {
-                "trueWindSpeed": tws_mps,
-                "optimalBeats": [[round(beat.twa_rad, 4), round(share * beat.speed_mps, 3)]],
-                "optimalGybes": [[round(run.twa_rad, 4), round(share * run.speed_mps, 3)]],
-                "angleData": [
-                    [round(a, 4), round(share * polar.speed_mps(a, tws_mps), 3)] for a in polar.twa_rad.tolist()
-                ],
-            }
-        )
-    number = str(uuid.uuid5(uuid.NAMESPACE_OID, polar.name))
-    return json.dumps({number: {"id": number, "name": polar.name, "windData": winds}}, indent=1) + "\n"
 
 
 # ------------------------------------------------------------------------------------------- cells

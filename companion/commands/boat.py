@@ -17,7 +17,7 @@ from companion.words import counted
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry
 
-    from companion.boat import Polar, Trial
+    from companion.boat import Boat, Polar, Trial
     from companion.boat_logs import ReadLog
     from companion.geo.frame import LocalFrame
     from companion.geofence import Mission
@@ -224,7 +224,7 @@ def _trial(args: argparse.Namespace) -> int:
         frame.en_from_geo(mission.origin),
         twd_from_rad=math.radians(wind),
         no_go_half_rad=no_go_rad,
-        speed_mps=polar.best_beat(tws_mps).vmg_mps / math.cos(no_go_rad),
+        speed_mps=polar.best_beat(tws_mps, no_go_half_rad=no_go_rad).vmg_mps / math.cos(no_go_rad),
     )
     if found is None:
         raise JobError(f"{args.mission}: there is no room in its water for six tacks, a reach there and back and a run")
@@ -306,21 +306,24 @@ def _left_out(read: list[ReadLog], believed: BoatFile, source: str) -> str:
 
 
 def _show(args: argparse.Namespace) -> int:
+    from statistics import NormalDist
+
+    from companion.boat import orc_text, pol_text, signalk_text
+    from companion.commands.output import write_files
     from companion.compose import speed_error_of
 
     polar, boat = _boat(args.file)
+    sailed = _sailed(polar, boat)
     error = 0.0 if boat is None else speed_error_of(boat.boat)
-    print("\n".join([*_words(args.file, boat), *_angles(polar), *_table("boat speed [m/s]", polar, _speeds)]))
-    from companion.boat import orc_text, pol_text, signalk_text
-
-    for file, text_of in ((args.pol, pol_text), (args.signalk, signalk_text), (args.orc, orc_text)):
+    print("\n".join([*_words(args.file, boat), *_angles(sailed), *_table("boat speed [m/s]", polar, _speeds)]))
+    slower = math.exp(error * NormalDist().inv_cdf(args.quantile))
+    for file, text in (
+        (args.pol, pol_text(polar, slower)),
+        (args.signalk, signalk_text(sailed, slower)),
+        (args.orc, orc_text(sailed, slower)),
+    ):
         if file is not None:
-            from statistics import NormalDist
-
-            from companion.commands.output import write_files
-
-            slower = math.exp(error * NormalDist().inv_cdf(args.quantile))
-            write_files({str(file): text_of(polar, slower).encode()}, force=args.force)
+            write_files({str(file): text.encode()}, force=args.force)
             print(f"{file}: written")
     if args.plot is not None:
         from companion.commands.output import patience
@@ -373,6 +376,20 @@ def _boat(name: str) -> tuple[Polar, BoatFile | None]:
     return read_polar(name).polar, None
 
 
+def _sailed(polar: Polar, boat: BoatFile | None) -> Boat:
+    """Return what decides on best angles: a polar alone has neither a no-go zone nor leeway."""
+    from companion.boat import Boat
+
+    if boat is None:
+        return Boat(polar=polar, no_go_half_rad=0.0)
+    return Boat(
+        polar=polar,
+        no_go_half_rad=math.radians(boat.boat.no_go_half_deg),
+        max_twa_rad=math.radians(boat.boat.max_twa_deg),
+        leeway_rad=math.radians(boat.boat.leeway_deg),
+    )
+
+
 def _words(name: str, boat: BoatFile | None) -> list[str]:
     from companion.compose import speed_error_of
 
@@ -381,7 +398,7 @@ def _words(name: str, boat: BoatFile | None) -> list[str]:
     o, error = boat.boat, 100.0 * speed_error_of(boat.boat)
     tacks = (
         f"turns {o.turn_rate_deg_s:g} degrees/s; a tack costs {o.tack_loss_s:g} s and fails in "
-        f"{100.0 * o.tack_fails:g} %; leeway {o.leeway_deg:g} degrees"
+        f"{100.0 * o.tack_fails:g} %; leeway {o.leeway_deg:g} degrees, apparent wind three times her speed"
     )
     return [
         f"{boat.name}: {boat.made or 'nobody says how it was made'}",
@@ -414,14 +431,17 @@ def _winds(polar: Polar) -> list[float]:
     return winds[:: math.ceil(len(winds) / MOST_WINDS)]
 
 
-def _angles(polar: Polar) -> list[str]:
-    lines = ["", _row("wind [m/s]", [f"{w:.1f}" for w in _winds(polar)])]
-    for what, best in (("beat", polar.best_beat), ("run", polar.best_run)):
-        found = [best(w) for w in _winds(polar)]
-        lines += [
-            _row(f"best {what} [deg]", [f"{math.degrees(a.twa_rad):.0f}" for a in found]),
-            _row("  made good [m/s]", [f"{a.vmg_mps:.2f}" for a in found]),
-        ]
+def _angles(boat: Boat) -> list[str]:
+    """Return where her bow is best held, and what she then makes good, leeway taken off."""
+    winds = _winds(boat.polar)
+    lines = ["", _row("wind [m/s]", [f"{w:.1f}" for w in winds])]
+    for what, best in (("beat", boat.best_beat), ("run", boat.best_run)):
+        found = [best(w) for w in winds]
+        lines.append(_row(f"best {what} [deg]", [f"{math.degrees(a.twa_rad):.0f}" for a in found]))
+        if what == "beat" and boat.leeway_rad > 0.0:
+            made = [boat.made_good_rad(a.twa_rad, w) for a, w in zip(found, winds, strict=True)]
+            lines.append(_row("  course [deg]", [f"{math.degrees(a):.0f}" for a in made]))
+        lines.append(_row("  made good [m/s]", [f"{a.vmg_mps:.2f}" for a in found]))
     return lines
 
 

@@ -500,21 +500,21 @@ def preview_options(parser: argparse.ArgumentParser) -> None:
 
 def preview(mission: Mission, args: argparse.Namespace) -> None:
     """Draw the mission in the wind that the arguments or the mission give."""
-    from companion.compose import boat_of
+    from companion.mission_check import AssumedWind, layline_rad
     from companion.plots.drying import drying_picture
     from companion.plots.mission import save_mission
 
     tws_mps, from_deg = mission.wind.preview_speed_mps, mission.wind.preview_from_deg
     if args.wind:
         tws_mps, from_deg = args.wind
-    twd_from_rad, boat = math.radians(from_deg), boat_of(mission)
+    twd_from_rad = math.radians(from_deg)
     with patience("planning and drawing"):
         lines = save_mission(
             mission,
             args.plot,
             tws_mps=tws_mps,
             twd_from_rad=twd_from_rad,
-            beat_rad=boat.polar.best_beat(tws_mps, no_go_half_rad=boat.no_go_half_rad).twa_rad,
+            beat_rad=layline_rad(mission, AssumedWind(from_deg=from_deg, speed_mps=tws_mps)),
             plans=[] if args.no_plan else _plans(mission, tws_mps, twd_from_rad),
             drying=drying_picture(mission, time.time()),
         )

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
+from statistics import NormalDist
 
 from companion.compose import boat_of, drying_of, tide_of, water_of
 from companion.current import STILL_WATER, WaterCurrent, over_water
@@ -101,6 +102,16 @@ def leg_problem(
         }
     )
     return replace(problem, targets=dries.targets) if dries.targets else problem
+
+
+def layline_rad(mission: Mission, wind: AssumedWind) -> float:
+    """Return the angle to the wind of the course by which a mark to windward is laid in the plans of ``legs`` [rad]."""
+    boat = boat_of(mission)
+    bow_rad = boat.best_beat(wind.speed_mps).twa_rad
+    sigma_rad = math.hypot(math.radians(wind.spread_deg), boat.no_go_error_rad)
+    edge_rad = boat.made_good_rad(boat.no_go_half_rad, wind.speed_mps)
+    edge_rad += NormalDist().inv_cdf(mission.risk.delta_s) * sigma_rad
+    return max(edge_rad, boat.made_good_rad(bow_rad, wind.speed_mps))
 
 
 def expected_current(mission: Mission, unix_s: float | None) -> WaterCurrent:

@@ -23,6 +23,7 @@ from companion.words import counted
 
 TOUCH_M = 0.5  # nearer than this a leg is said to touch
 NO_GO_TOUCH_RAD = math.radians(0.5)
+ROUND_ROOMS = 2.0  # a leg that is longer than so many times the room for turning round leads somewhere
 _ING = {"tack": "tacking", "gybe": "gybing"}
 
 
@@ -46,7 +47,7 @@ def explain(problem: Problem, plan: Plan, budget_s: float = 5.0, *, expansions: 
         _courses_in_words(problem, plan, legs),
         {
             "legs": legs,
-            "turns": turns(plan),
+            "turns": turns(problem, plan),
             "courses": [[course.first + 1, course.first + len(course.legs)] for course in courses(plan.legs)],
         },
     )
@@ -193,7 +194,7 @@ def _courses_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]]) 
         )
     zones = [bind for bound in legs for bind in bound["binds"] if bind["by"] == "no_go"]
     if zones:
-        sentences.append(_zone_in_words(zones))
+        sentences.append(_zone_in_words(problem, zones))
     sentences += turns_in_words(problem, plan)
     if not sentences:
         return "No leg is bound by anything but its corners."
@@ -201,28 +202,42 @@ def _courses_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]]) 
     return " ".join(shown)
 
 
-def turns(plan: Plan) -> list[dict[str, Any]]:
+def turns(problem: Problem, plan: Plan) -> list[dict[str, Any]]:
     """Return each tack and gybe: the leg it leads into (from 1), its name and, of a gybe or tack the long way round
-    in place of the other, the legs that it takes."""  # noqa: D205, D209
+    in place of the other, which must cost more, the short legs that it takes."""  # noqa: D205, D209
     out: list[dict[str, Any]] = []
-    legs = plan.legs
+    legs, boat = plan.legs, problem.boat
+    dear = (
+        "tack"
+        if not boat.can_tack or boat.tack_loss_s > boat.gybe_loss_s
+        else "gybe"
+        if boat.gybe_loss_s > boat.tack_loss_s
+        else ""
+    )
     for i, leg in enumerate(legs):
         if not leg.manoeuvre:
             continue
         entry: dict[str, Any] = {"leg": i + 1, "manoeuvre": leg.manoeuvre, "instead_of": None, "legs": []}
         # The same way round on both sides of a leg, by more than half a circle in all: that leg is there to turn.
+        other = "tack" if leg.manoeuvre == "gybe" else "gybe"
         for j in (i - 1, i):
-            if 0 < j + 1 < len(legs) and j >= 0 and abs(legs[j].turn_rad + legs[j + 1].turn_rad) > math.pi:
+            if (
+                other == dear
+                and 0 < j + 1 < len(legs)
+                and j >= 0
+                and legs[j].length_m <= ROUND_ROOMS * boat.room_m
+                and abs(legs[j].turn_rad + legs[j + 1].turn_rad) > math.pi
+            ):
                 entry["legs"].append(j + 1)
         if entry["legs"]:
-            entry["instead_of"] = "tack" if leg.manoeuvre == "gybe" else "gybe"
+            entry["instead_of"] = other
         out.append(entry)
     return out
 
 
 def turns_in_words(problem: Problem, plan: Plan) -> list[str]:
     """Return sentences on the tacks and gybes, and why one is sailed in place of the other."""
-    every = turns(plan)
+    every = turns(problem, plan)
     course_of = {k + 1: i for i, course in enumerate(courses(plan.legs), start=1) for k in course.numbers}
     out = []
     for name in ("tack", "gybe"):
@@ -262,20 +277,25 @@ def _named(word: str, which: list[int]) -> str:
     return f"{word}{'s' if len(which) > 1 else ''} {text}"
 
 
-def _zone_in_words(zones: list[dict[str, Any]]) -> str:
-    """Say how wide the no-go zone is where it binds, and at what sigma."""
+def _zone_in_words(problem: Problem, zones: list[dict[str, Any]]) -> str:
+    """Say how wide the no-go zone is where it binds, and what of it is the boat's, her leeway's and the doubt's."""
 
     def span(key: str) -> str:
         low, high = round(min(z[key] for z in zones)), round(max(z[key] for z in zones))
         return f"{low}°" if low == high else f"{low} to {high}°"
 
-    text = f"Close-hauled is {span('half_angle_deg')} off the wind"
+    leeway_deg = math.degrees(problem.boat.leeway_rad)
+    bow_deg = math.degrees(problem.boat.no_go_half_rad) - leeway_deg
+    parts = [f"{bow_deg:.0f}° of it her no-go angle"]
+    if leeway_deg > 0.0:
+        parts.append(f"{leeway_deg:.0f}° leeway")
     if max(z["widened_deg"] for z in zones) > 0.0:
-        text += (
-            f", {span('widened_deg')} of it for a wind uncertain by {span('sigma_deg')} "
+        parts.append(
+            f"{span('widened_deg')} for an angle to the wind uncertain by {span('sigma_deg')} "
             f"({max(z['sigmas'] for z in zones):.2f} sigma)"
         )
-    return f"{text}."
+    said = f": {', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else ""
+    return f"Close-hauled is a course {span('half_angle_deg')} off the wind{said}."
 
 
 def _bind_in_words(bind: dict[str, Any]) -> str:

@@ -154,8 +154,9 @@ def save_mission(
 ) -> list[str]:
     """Draw a mission and save it; return what the picture has to say in words.
 
-    ``beat_rad`` is the boat's best angle to windward in this wind, for the laylines; ``plans`` lead from goal to
-    goal; ``drying`` is the water that dries. Raises InputError when the file cannot be written.
+    ``beat_rad`` is the angle to the wind of the course by which plans lay a mark in this wind, for the laylines;
+    ``plans`` lead from goal to goal; ``drying`` is the water that dries. Raises InputError when the file cannot be
+    written.
     """
     frame = mission.frame()
     local = mission.water()
@@ -309,10 +310,10 @@ def _draw_laylines(
             )
     if not drawn:
         return []
-    angle = math.degrees(beat_rad)
+    angle = f"{math.degrees(beat_rad):.0f}° off the wind"
     return [
-        Line2D([], [], color=STARBOARD, lw=1.0, ls=(0, (7, 3)), label=f"layline, starboard tack (TWA {angle:.0f}°)"),
-        Line2D([], [], color=PORT, lw=1.0, ls=(0, (7, 3)), label=f"layline, port tack (TWA {angle:.0f}°)"),
+        Line2D([], [], color=colour, lw=1.0, ls=(0, (7, 3)), label=f"layline, {tack} tack ({angle})")
+        for tack, colour in (("starboard", STARBOARD), ("port", PORT))
     ]
 
 

@@ -423,9 +423,8 @@ HAS_WAY_MPS = 0.2
 
 @lru_cache(maxsize=64)  # asked for twice in every step, and the search takes longer than all else in a view
 def best_angles(boat: Boat, tws_mps: float, no_go_rad: float) -> tuple[float, float]:
-    """Return the best angles to windward and to leeward [rad]."""
-    beat = boat.polar.best_beat(tws_mps, no_go_half_rad=no_go_rad)
-    return beat.twa_rad, boat.polar.best_run(tws_mps, max_twa_rad=boat.max_twa_rad).twa_rad
+    """Return the bow's best angles to windward and to leeward [rad]."""
+    return boat.best_beat(tws_mps, no_go_half_rad=no_go_rad).twa_rad, boat.best_run(tws_mps).twa_rad
 
 
 def wind_of(step: Step) -> values.WindView | None:
@@ -546,13 +545,14 @@ def laylines_of(
     no_go_rad = config.planned_no_go_rad(boat, snapshot.limits)
     beat, run = best_angles(boat, round(tws_mps, 1), no_go_rad)
     off_rad = abs(difference_rad(twd_rad, heading_of(mark_en[0] - here[0], mark_en[1] - here[1])))
-    if off_rad < beat:
-        angle_rad, is_beat = max(beat, no_go_rad), True
-    elif off_rad > run + 1e-3:
-        angle_rad, is_beat = run, False
-    else:
-        return None
-    speed_mps = max(HAS_WAY_MPS, boat.polar.speed_mps(angle_rad, tws_mps))
+    bow_rad = max(beat, no_go_rad)
+    angle_rad = boat.made_good_rad(bow_rad, tws_mps)  # a line is of the course
+    is_beat = off_rad < (beat if angle_rad == bow_rad else angle_rad)
+    if not is_beat:
+        if off_rad <= run + 1e-3:
+            return None
+        bow_rad = angle_rad = run
+    speed_mps = max(HAS_WAY_MPS, boat.polar.speed_mps(bow_rad, tws_mps))
     there_s = min(600.0, math.dist(here, mark_en) / speed_mps)
     swing = 0.0 if wind.forecast is None else half_width_rad(wind.forecast, there_s, SWING_LEVEL)
     lines = []

@@ -1,6 +1,7 @@
 """Leeway in the boat's model: where it is stated, how it grows, and what it makes of a plan's courses."""
 
 import math
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.boat import Boat, ardurover_sitl, constant
-from companion.boat.boat import coefficient_of, leeway_at, leeway_rad
+from companion.boat import Boat, Sizes, ardurover_sitl, constant, guessed, guessed_text
+from companion.boat.boat import carried, coefficient_of, leeway_at, leeway_rad
 from companion.compose import boat_of
 from companion.geofence import load_mission
 
@@ -70,3 +71,59 @@ def test_a_mission_says_it(tmp_path: Path):
 def test_a_leeway_that_cannot_be_is_refused(leeway):
     with pytest.raises(ValueError, match="leeway"):
         Boat(polar=constant(2.0), leeway_rad=leeway)
+
+
+PEPPER = guessed(Sizes(length_m=1.5, displacement_kg=20.0, sail_area_m2=0.9))
+GUESS = Boat(
+    polar=PEPPER.polar, no_go_half_rad=math.radians(PEPPER.no_go_half_deg), leeway_rad=math.radians(PEPPER.leeway_deg)
+)
+
+
+def leeway_deg(boat, tws_mps):
+    return math.degrees(boat.made_good_rad(boat.no_go_half_rad, tws_mps) - boat.no_go_half_rad)
+
+
+@pytest.mark.parametrize("sizes", [(1.5, 20.0, 0.9), (1.0, 4.0, 0.4), (4.0, 450.0, 9.0), (12.0, 6000.0, 80.0)])
+def test_a_guessed_boat_makes_the_leeway_of_small_robots_in_a_fresh_wind_and_no_more_in_a_gale(sizes):
+    length, weight, sail = sizes
+    guess = guessed(Sizes(length_m=length, displacement_kg=weight, sail_area_m2=sail))
+    boat = Boat(
+        polar=guess.polar, no_go_half_rad=math.radians(guess.no_go_half_deg), leeway_rad=math.radians(guess.leeway_deg)
+    )
+    fresh = guess.polar.full_tws_mps
+    assert 5.0 < leeway_deg(boat, fresh) < 12.0
+    assert leeway_deg(boat, 3.0 * fresh) == pytest.approx(leeway_deg(boat, fresh), abs=0.5)
+    assert leeway_deg(boat, 0.5 * fresh) < leeway_deg(boat, fresh)
+
+
+def test_the_words_of_the_guess_are_what_is_used():
+    sizes = Sizes(length_m=1.5, displacement_kg=20.0, sail_area_m2=0.9)
+    line = next(row for row in guessed_text("x", sizes, PEPPER, "today").splitlines() if row.startswith("leeway_deg"))
+    told_deg, from_mps = (float(word) for word in re.findall(r"([\d.]+) in ([\d.]+) m/s or more", line)[0])
+    for tws_mps in (from_mps, 6.0, 12.0):
+        assert leeway_deg(GUESS, tws_mps) == pytest.approx(told_deg, abs=0.5)
+
+
+def test_the_best_beat_is_outside_the_no_go_zone_and_leeway_is_taken_off():
+    """The polar alone has it at 40 degrees, where this boat may not be."""
+    assert GUESS.polar.best_beat(4.0).twa_rad < GUESS.no_go_half_rad
+    best = GUESS.best_beat(4.0)
+    assert best.twa_rad >= GUESS.no_go_half_rad - 1e-9
+    course = GUESS.made_good_rad(best.twa_rad, 4.0)
+    speed = best.speed_mps / math.cos(course - best.twa_rad)
+    assert best.vmg_mps == pytest.approx(speed * math.cos(course), abs=1e-6)
+    assert best.vmg_mps < GUESS.polar.best_beat(4.0, no_go_half_rad=GUESS.no_go_half_rad).vmg_mps
+
+
+def test_a_polar_whose_speed_grows_to_its_last_wind_is_not_full_before_it():
+    assert ardurover_sitl().full_tws_mps == ardurover_sitl().tws_mps[-1]
+    assert constant(2.0).full_tws_mps == math.inf
+
+
+@given(st.floats(0.1, 3.0), st.floats(0.5, 20.0), st.floats(0.2, 3.0), st.floats(1.0, 10.0))
+def test_the_share_that_is_carried_makes_the_same_leeway_for_the_simulated_hull(twa, tws, speed, full):
+    across, ahead = tws * math.sin(twa), tws * math.cos(twa) + speed
+    by_share = leeway_rad(
+        FIVE * carried(twa, tws, speed, full), math.hypot(across, ahead), math.atan2(across, ahead), speed
+    )
+    assert by_share == pytest.approx(leeway_at(FIVE, twa, tws, speed, full), abs=1e-9)

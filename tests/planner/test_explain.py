@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import pytest
 
@@ -154,3 +155,40 @@ def test_the_explanation_says_the_clearance_expected_and_the_tacks_that_may_fail
     why = explain(base, answer, expansions=500).why
     assert f"passes {answer.expected_clearance_m:.1f} m clear or more" in why.text
     assert why.data["expected_clearance_m"] == answer.expected_clearance_m
+
+
+def upwind(heading_deg=0.0, **boat):
+    return problem(
+        start={"x": 0, "y": 0, "heading_deg": heading_deg},
+        obstacles=[],
+        wind=wind(0, AR1),
+        boat={
+            "no_go_half_deg": 52,
+            "leeway_deg": 7,
+            "turn_rate_rad_s": 0.43,
+            "tack_loss_s": 4.9,
+            "speed": {"model": "constant", "v_mps": 1.2},
+            **boat,
+        },
+    )
+
+
+def test_what_close_hauled_is_made_of_adds_up():
+    text = explained(upwind()).why.text
+    whole, bow, leeway, doubt = (
+        float(found)
+        for found in re.search(
+            r"a course (\d+)° off the wind: (\d+)° of it her no-go angle, (\d+)° leeway and (\d+)° for an angle", text
+        ).groups()
+    )
+    assert (bow, leeway) == (45.0, 7.0)
+    assert whole == pytest.approx(bow + leeway + doubt, abs=1.0)
+
+
+@pytest.mark.parametrize("heading_deg", [180.0, 0.0, 120.0])
+def test_a_leg_that_leads_somewhere_is_no_detour_to_turn_on(heading_deg):
+    """The turn out of the heading at the start and the first tack come to more than half a circle, of 300 m between."""
+    answer = explained(upwind(heading_deg))
+    assert answer.why.data["turns"]
+    assert not any(turn["instead_of"] for turn in answer.why.data["turns"])
+    assert "round instead of" not in answer.why.text

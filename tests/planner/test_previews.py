@@ -11,7 +11,7 @@ from companion.boat import ardurover_sitl
 from companion.compose import water_of
 from companion.current import CurrentEstimator, over_water
 from companion.geofence import load_mission
-from companion.mission_check import AssumedWind, expected_current, legs, planned_legs
+from companion.mission_check import AssumedWind, expected_current, layline_rad, legs, planned_legs
 from companion.planner import Plan, plan
 from companion.plots.mission import _words
 
@@ -111,3 +111,16 @@ def test_the_way_of_a_preview_is_another_in_a_stream_and_keeps_the_margin():
 def test_the_command_plans_in_it(capsys):
     assert cli.main(["plan", str(SOUTH), "--expansions", "2000"]) == 0
     assert "current: sets 090° 0.40 m/s; headings and angles are through the water" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("more", ["", "no_go_error_deg = 4.0\n", "leeway_deg = 5.0\nno_go_error_deg = 4.0\n"])
+def test_the_laylines_of_the_picture_are_those_that_plans_keep_to(tmp_path, more):
+    (tmp_path / "m.toml").write_text(
+        f'name = "m"\n[start]\nlat = 50.817\nlon = -1.31\n[[goal]]\nlat = 50.82\nlon = -1.31\n[boat]\n{more}'
+    )
+    mission = load_mission(tmp_path / "m.toml")
+    problem = first_problem(mission)
+    legs_sailed = plan(problem, expansions=5000).legs
+    angle_rad = layline_rad(mission, WIND)
+    assert angle_rad == pytest.approx(min(abs(leg.twa_rad) for leg in legs_sailed), abs=math.radians(2.0))
+    assert angle_rad >= problem.no_go_half_rad(0.0) - 1e-6

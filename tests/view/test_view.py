@@ -369,6 +369,12 @@ def test_a_mark_to_windward_has_two_laylines_and_each_fetches_it(off_deg, far_m,
         assert (mark[0] - east) * math.sin(course) + (mark[1] - north) * math.cos(course) > -1.1
 
 
+def test_a_layline_is_of_the_course_that_leeway_leaves(voyage):
+    slips = replace(voyage, boat=replace(voyage.boat, leeway_rad=math.radians(5.0)))
+    plain, lee = (laylines_of(step_at((0.0, 0.0)), v, SkipperConfig(), "mark", (0.0, 100.0)) for v in (voyage, slips))
+    assert lee.angle_deg > plain.angle_deg + 2.0
+
+
 @pytest.mark.parametrize(("mark", "is_beat"), [((0.0, 100.0), True), ((100.0, 0.0), None), ((100.0, 30.0), None)])
 def test_a_mark_that_is_fetched_on_one_course_has_no_laylines(mark, is_beat, voyage):
     lines = laylines_of(step_at((0.0, 0.0)), voyage, SkipperConfig(), "mark", mark)

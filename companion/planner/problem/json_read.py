@@ -247,6 +247,7 @@ def _fields(raw: Mapping[str, Any], source: str) -> dict[str, Any]:
             speed_error=boat.number("speed_error", 0.0),
             speed_share=boat.number("speed_share", 1.0),
             shape_error=boat.numbers("shape_error", ()),
+            leeway_rad=math.radians(boat.number("leeway_deg", 0.0)),
         ),
         delta_s=top.number("delta_s"),
         current=_parse_current(_JsonReader(raw.get("current") or {}, source, "current")),

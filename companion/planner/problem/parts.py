@@ -99,7 +99,8 @@ class BoatLimits:
     ``irons_s``, set to lee at ``lee_mps`` (on starboard tack, on port) beside what the water does. ``speed_error`` is
     how far all its speeds may be off together: the standard deviation of the logarithm; ``speed_share`` what it is
     seen to make of them, and ``shape_error`` how far each may be off beside that, at the angles of
-    ``SHAPE_TWA_RAD``. All of it moves when it arrives, not what it is planned to do.
+    ``SHAPE_TWA_RAD``. All of it moves when it arrives, not what it is planned to do. ``leeway_rad`` is how much of
+    ``no_go_half_rad`` is leeway, for words: angles here are of courses.
     """
 
     no_go_half_rad: float
@@ -120,6 +121,7 @@ class BoatLimits:
     speed_error: float = 0.0
     speed_share: float = 1.0
     shape_error: tuple[float, ...] = ()
+    leeway_rad: float = 0.0
 
     @property
     def room_m(self) -> float:

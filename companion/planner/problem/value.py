@@ -229,6 +229,7 @@ def defect_of(p: Problem) -> str | None:
         "wind.from_deg": w.twd_from_rad,
         "wind.speed_mps": 1.0 if w.tws_mps is None else w.tws_mps,
         "boat.no_go_half_deg": b.no_go_half_rad,
+        "boat.leeway_deg": b.leeway_rad,
         "boat.max_twa_deg": b.max_twa_rad,
         "boat.turn_rate_rad_s": b.turn_rate_radps,
         "delta_s": p.delta_s,

@@ -80,9 +80,11 @@ def vessel_risk(problem: Problem, legs: Sequence[Leg]) -> VesselRisk:
         name = windows[0][0].name or f"vessel {vessel}"
         by_name[name] = min(1.0, by_name.get(name, 0.0) + VESSELS_PROMISE_FACTOR * float(entries.sum()))
     computed = float(min(1.0, by_leg.sum()))
+    total = min(1.0, VESSELS_PROMISE_FACTOR * computed)
+    by_leg *= total / float(by_leg.sum()) if computed > 0.0 else 0.0
     return VesselRisk(
         computed=computed,
-        total=min(1.0, VESSELS_PROMISE_FACTOR * computed),
+        total=total,
         worst_instant=min(1.0, sum(worst.values())),
         by_name=tuple(sorted(by_name.items(), key=lambda n: -n[1])),
         legs=tuple(float(x) for x in by_leg),
@@ -307,13 +309,14 @@ def _first_passage(
 
 
 def with_risk(problem: Problem, plan: Plan) -> Plan:
-    """Return the plan with ``risk`` and each leg's ``risk`` filled in."""
+    """Return the plan with ``risk`` and each leg's ``risk`` filled in: what is promised of the legs adds up to it."""
     if not plan.has_path:
         return plan
     risk = path_risk(problem, plan)
     of_tacks = tack_risks(plan.legs, risk.tacks)
+    promised = risk.wind / risk.computed if risk.computed > 0.0 else 1.0
     legs = tuple(
-        replace(leg, risk=min(1.0, wind.first_entry + vessels + tacks))
+        replace(leg, risk=min(1.0, promised * wind.first_entry + vessels + tacks))
         for leg, wind, vessels, tacks in zip(plan.legs, risk.legs, risk.vessels.legs, of_tacks, strict=True)
     )
     plan = replace(plan, legs=legs, risk=risk.total, vessel_risk=risk.vessels.total, tack_risk=risk.of_tacks)

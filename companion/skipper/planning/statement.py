@@ -384,6 +384,8 @@ def problem_dict(
     if not current.is_significant and failing and failing["tack_fails"] > 0.0:
         water["adrift"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
     boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(half_rad, wind["speed_mps"]))
+    if "leeway_deg" in boat:
+        boat["leeway_deg"] = boat["no_go_half_deg"] - math.degrees(half_rad)
     return {
         "id": voyage.name,
         "title": title,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.boat import Polar
-from companion.boat.boat import coefficient_of
+from companion.boat.boat import carried, coefficient_of
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift
@@ -162,6 +162,7 @@ class Vehicle:
         self._seen = -1
         self._seed = seed
         self._polar = np.zeros((0, 0)) if polar is None else polar_table(polar)
+        self._full_tws_mps = math.inf if polar is None else polar.full_tws_mps
         self._still_until_s = 0.0
         self._surroundings = surroundings
         self._looked = -1  # the first loop of the tenth of a second for which they were looked at
@@ -231,6 +232,8 @@ class Vehicle:
                 surroundings.look(t_s, self.state, self._tide, self._jump, self._compass_rad)
                 twd, tws = surroundings.wind_at(t_s, self.state)
                 self._here = np.array([[twd, tws if t_s >= self._still_until_s else 0.0]])
+                share = carried(twd - self.state[k.S_YAW], tws, self.state[k.S_V], self._full_tws_mps)
+                self._settings[k.P_LEEWAY] = share * coefficient_of(surroundings.departures.leeway_rad)
             piece, events = self._loops(self._here, first, min(loops - done, first + _WIND_LOOPS - 1 - self.tick))
             done += piece
         return done, events

@@ -256,7 +256,7 @@ def test_a_limit_is_kept_and_its_promise_is_true(algorithm, expansions):
     assert 0.0 < answer.risk <= 0.1
     share = float(np.mean(simulate_entries(p, answer, winds=2000, step_s=0.5, seed=3) >= 0))
     assert answer.risk / 3.0 <= share <= answer.risk
-    assert sum(leg.risk for leg in answer.legs) == pytest.approx(answer.risk / PROMISE_FACTOR)
+    assert sum(leg.risk for leg in answer.legs) == pytest.approx(answer.risk)
 
 
 def test_a_limit_that_nothing_keeps_is_said_so():

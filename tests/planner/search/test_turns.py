@@ -194,7 +194,7 @@ def test_a_gybe_that_costs_is_tacked_round():
     )
     answer = plan(Problem.from_json(down), expansions=20_000)
     assert {n for n in names(answer) if n} == {"tack"}
-    assert all(t["instead_of"] == "gybe" for t in turns(answer))
+    assert all(t["instead_of"] == "gybe" for t in turns(Problem.from_json(down), answer))
 
 
 @pytest.mark.parametrize("name", ["channel-beat", "channel-bend-kalman", "four-beat-60", "trap-beat"])
