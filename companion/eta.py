@@ -221,7 +221,13 @@ def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -
     """Return the pace after a step."""
     route, tried = state.mission.route, pace.tried
     autopilot = snapshot.autopilot
-    if route is None or state.position.doubt is not None or autopilot is None or not autopilot.is_armed:
+    if (
+        route is None
+        or state.position.doubt is not None
+        or autopilot is None
+        or not autopilot.is_armed
+        or state.phase is Phase.HOLDING  # where she lies tells nothing of how fast she sails
+    ):
         return pace if tried is None else replace(pace, tried=None)
     if not pace.is_due(snapshot.t_s, route.plan_id):
         return pace
@@ -236,6 +242,8 @@ def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -
     left = None
     if tried is not None and tried.plan_id == route.plan_id and state.mission.index <= tried.until:
         left = _walk(snapshot, state, voyage, until=tried.until, winds=tried.winds)
+        if left is not None and left.last != tried.until:  # a loiter lies on her way: the walk does not end there
+            left = None
     return pace.seen(snapshot.t_s, None if left is None else left.points[-1].in_s, fresh)
 
 

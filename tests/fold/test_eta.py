@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from companion import eta as companion_eta
 from companion.boat import AutopilotLimits, Boat, ardurover_sitl
 from companion.clock import run_virtual
 from companion.eta import PRIOR_PACE, TRIED_S, PaceTrial, _Walker
-from companion.messages import Mode
+from companion.messages import Command, Mode
 from companion.orders import Verb
 from companion.skipper.step import Announce, Phase
 from companion.skipper.step.state import Raised, Standing
@@ -196,3 +197,17 @@ def test_a_walk_on_another_plan_or_after_a_pause_tells_nothing():
     assert begun.seen(5.0, None, replace(first, plan_id=2)).share == 1.0
     assert begun.seen(2.0 * TRIED_S, 90.0, None).share == 1.0
     assert begun.seen(TRIED_S, 90.0, None).share < 1.0
+
+
+@pytest.mark.parametrize("is_holding", [True, False])
+def test_a_hold_tells_nothing_of_her_pace(demo, is_holding):
+    """Ordered to hold 10 s after a walk of 140 s began, she had made all of it: "pace, of the plan's 160 %"."""
+    step = next(step for step, *_ in told(demo) if step.pace.tried is not None)
+    mission = step.state.mission
+    loiter = replace(mission.route.items[mission.index], command=Command.NAV_LOITER_UNLIM)
+    items = tuple(loiter if n == mission.index else item for n, item in enumerate(mission.route.items))
+    before = replace(step.pace, tried=replace(step.pace.tried, t_s=step.snapshot.t_s - TRIED_S))
+    state = with_parts(step.state, mission={"route": replace(mission.route, items=items)})
+    state = replace(state, phase=Phase.HOLDING if is_holding else Phase.STANDARD)
+    after = companion_eta.paced(before, step.snapshot, state, step.voyage)
+    assert (after.tries, after.share, after.tried) == (before.tries, before.share, None)
