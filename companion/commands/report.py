@@ -155,10 +155,12 @@ def in_words(record: VoyageRecord) -> list[str]:
         whole = (
             "" if s.path_risk is None else f"Off the plan: {100.0 * s.path_risk:.0f} % was the highest chance told. "
         )
-        entered = f"entered it {_times(s.no_go_entries)}" if s.no_go_entries else "never entered it"
+        times = _times(s.no_go_entries) if s.no_go_entries else "never"
+        nearer = "" if s.no_go_entry_deg is None else f"nearer to the wind than {s.no_go_entry_deg:g}°, "
         lines.append(
-            f"{whole}At each instant the chance that the wind would force her into the no-go zone was at most "
-            f"{100.0 * s.promised_risk:.0f} %; she {entered}."
+            f"{whole}At each instant the chance that the wind closed the leg that she sailed was at most "
+            f"{100.0 * s.promised_risk:.0f} %. No-go entries, {nearer}5° inside the angle to which the autopilot beats "
+            f"(SAIL_NO_GO_ANGLE), for 5 s on end: {times}."
         )
     lines += ranges_in_words(s.figures)
     if s.servos:

@@ -302,7 +302,7 @@ def _no_go(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
     c = record.columns
     t0 = record.start_s
     bare = record.chart.no_go_half_deg
-    axes.axhspan(0.0, bare, color="#d9867f", alpha=0.35, linewidth=0, label="no-go zone")
+    axes.axhspan(0.0, bare, color="#d9867f", alpha=0.35, linewidth=0, label=f"no-go zone of the mission, {bare:g}°")
     times = [p.t_s - t0 for p in plans] + [float(c["t_s"][-1]) - t0 if len(c["t_s"]) else 0.0]
     for k, plan in enumerate(plans):
         start_s = times[k]
@@ -319,13 +319,7 @@ def _no_go(axes: Any, record: VoyageRecord, plans: list[RecordedPlan]) -> None:
             ys.append(ys[-1])
         if xs:
             axes.fill_between(
-                xs,
-                bare,
-                ys,
-                color="#f3c1bd",
-                alpha=0.6,
-                linewidth=0,
-                label="as the plan widened it" if k == 0 else None,
+                xs, bare, ys, color="#f3c1bd", alpha=0.6, linewidth=0, label="as plans widened it" if k == 0 else None
             )
     twa = np.abs(_wrap_deg(c["heading_deg"] - c["twd_deg"]))
     axes.plot(c["t_s"] - t0, twa, color="black", linewidth=0.9, label="|TWA| as sailed")

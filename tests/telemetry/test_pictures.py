@@ -212,6 +212,9 @@ def test_the_report_tells_the_voyage_and_writes_its_track(sailed, tmp_path, caps
     out = capsys.readouterr().out
     figures = json.loads((sailed / "summary.json").read_text())
     assert f"{figures['distance_m']:.0f} m, with" in out
+    # a beat is inside the mission's zone for most of its time: which angle is meant is said
+    assert figures["no_go_entry_deg"] == pytest.approx(40.0)
+    assert "No-go entries, nearer to the wind than 40°, 5° inside the angle to which the autopilot beats" in out
     assert "9 June 2026" in out
     assert "None" not in out
     c = read_voyage(sailed).columns

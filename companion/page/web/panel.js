@@ -145,11 +145,12 @@ function tables(view, beside, area) {
   keep("healthtable", table("Health of every part", ["part", "is", "says", "age"], (view?.health ?? []).map((part) => [
     part.name, el("span", { class: `grade ${part.grade}` }, part.grade), part.text || NONE, part.age_s === null ? NONE : duration(part.age_s)])));
   const all = [view?.figures ?? null, ...(beside ? [beside.figures] : [])];
-  /** @type {[string, (f: import("../../view/view").Figures) => string][]} */
+  const entries = el("span", { title: "5° inside the autopilot's SAIL_NO_GO_ANGLE for 5 s on end" }, "no-go entries");
+  /** @type {[string | HTMLElement, (f: import("../../view/view").Figures) => string][]} */
   const rows = [
     ["time under way", (f) => duration(f.time_s)], ["distance", (f) => distance(f.distance_m)], ["tacks, gybes", (f) => `${f.tacks ?? NONE}, ${f.gybes ?? NONE}`],
     ["plans, replans", (f) => `${f.plans ?? NONE}, ${f.replans ?? NONE}`], ["least clearance, expected", (f) => `${clearance(f.min_clearance_m)}, ${clearance(f.promised_clearance_m)}`], ["contacts", (f) => figure(f.contacts)],
-    ["no-go entries", (f) => figure(f.no_go_entries)], ["goals reached", (f) => `${f.goals_reached ?? NONE} of ${f.goals ?? NONE}`]];
+    [entries, (f) => figure(f.no_go_entries)], ["goals reached", (f) => `${f.goals_reached ?? NONE} of ${f.goals ?? NONE}`]];
   keep("voyagetable", table("The voyage so far", ["figure", "value", ...(beside ? [`beside: ${beside.name}, at its end`] : [])],
     view ? rows.map(([name, show]) => [name, ...all.map((f) => f === null ? NONE : show(f))]) : []));
 }

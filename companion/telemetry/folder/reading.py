@@ -131,6 +131,7 @@ class Summary(Struct, frozen=True, kw_only=True):
     replans: int = 0
     contacts: int = 0
     no_go_entries: int = 0
+    no_go_entry_deg: float | None = None
     goals_reached: int | None = None
     goals: int | None = None
     min_clearance_m: float | None = None

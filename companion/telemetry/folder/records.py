@@ -297,8 +297,9 @@ class Servos:
         }
 
 
-# Inside the no-go zone for longer than a tack takes [s] is an entry, not a tack.
-NO_GO_ENTRY_S = 5.0
+# So far inside the angle to which the autopilot beats, for longer than a tack takes [s], is a no-go entry: on its edge
+# it sails, and a shift takes it over.
+NO_GO_ENTRY_RAD, NO_GO_ENTRY_S = math.radians(5.0), 5.0
 # A tack counts when the boat has been on the new side for this long [s].
 TACK_SETTLED_S = 3.0
 # Positions closer together than this are GPS noise, not distance [m].
@@ -328,6 +329,7 @@ class VoyageFigures:
     uploads: int = 0
     contacts: int = 0
     no_go_entries: int = 0
+    no_go_entry_deg: float | None = None  # nearer to the wind than this, by the parameter that was read last
     min_clearance_m: float = math.inf
     promised_clearance_m: float | None = None
     promised_s: float | None = None
@@ -420,8 +422,8 @@ class VoyageFigures:
         off_rad = wrap_pi(snapshot.vehicle.heading_rad - wind_rad)
         limits = snapshot.limits
         half_rad = math.radians(45.0) if limits is None else limits.sail_no_go_angle_rad
-        # Sailing exactly on the edge is what the autopilot does: an entry is clearly inside.
-        if abs(off_rad) < half_rad - math.radians(5.0):
+        self.no_go_entry_deg = round(math.degrees(half_rad - NO_GO_ENTRY_RAD), 1)
+        if abs(off_rad) < half_rad - NO_GO_ENTRY_RAD:
             if self._in_no_go_since is None:
                 self._in_no_go_since, self._no_go_counted = t_s, False
             inside_s = t_s - self._in_no_go_since
@@ -470,6 +472,7 @@ class VoyageFigures:
             "path_risk": self.path_risk,
             "path_risk_vessels": self.path_risk_vessels,
             "no_go_entries": self.no_go_entries,
+            "no_go_entry_deg": self.no_go_entry_deg,
             "current": None if self.current is None else plain(self.current),
             "servos": self.servos.to_dict(),
             "figures": self.ranges.to_dict(),
