@@ -57,7 +57,7 @@ def again(
     if not is_free(passage, way):
         old = Departure(utc_s=new.utc_s, route=new.route, runs=(), why="it leads over land, or closed water, from here")
     else:
-        old = departure_of(passage, way, new.utc_s, shares)
+        old = departure_of(passage, way, new.utc_s, shares, new.route.bound_s)  # no way at all is faster
     if not new.runs:
         return Again(old=old, new=new, is_changed=False, why=f"there is no other: {new.why}")
     if not old.runs:

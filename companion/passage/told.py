@@ -57,16 +57,25 @@ def told_of_chances(d: Departure, by_utc_s: float | None, sure: float) -> tuple[
     chance, until = d.chance(by), "" if by_utc_s is None else f" by {iso(by_utc_s)}"
     least, most = at_least(chance, d.members), at_least(1.0, d.members)
     of = f"{counted(len(d.runs), 'run')} in {counted(d.members, 'member')}"
-    lines = [f"arrives{until} in {100.0 * chance:.0f} % of {of}: in at least {100.0 * least:.0f} %, for 95 %"]
     low, high = shown(d.members)
     often, *ends = (_number(d.hours(q)) for q in (0.5, low, high))
-    lines.append(f"hours: {often} as often as not, {ends[0]} to {ends[1]} in {_share(low, high)}")
+    is_one, arrives = d.members == 1, f"arrives{until} in {100.0 * chance:.0f} % of"
+    if is_one:
+        runs = counted(len(d.runs), "run")
+        lines = [f"{arrives} {runs} in the one forecast there is, which says nothing of how sure that is"]
+    else:
+        lines = [f"{arrives} {of}: in at least {100.0 * least:.0f} %, with 95 % confidence"]
+    lines.append(
+        f"hours: {often} as often as not" + ("" if is_one else f", {ends[0]} to {ends[1]} in {_share(low, high)}")
+    )
     for run, words in _failures(d):
         lines.append(f"in {words} of all runs: {run.why}")
     if chance < sure:
         lines.append(f"not as sure as {100.0 * sure:g} %: no route that was tried is")
-    elif most < sure:
-        lines.append(f"{100.0 * sure:g} % is more than {counted(d.members, 'member')} can show: {100.0 * most:.0f} %")
+    elif most < sure and not is_one:
+        lines.append(
+            f"{counted(d.members, 'member')} can show no more than {100.0 * most:.0f} % of the {100.0 * sure:g} %"
+        )
     return tuple(lines)
 
 
@@ -76,6 +85,8 @@ def told_of_again(found: Again, by_utc_s: float | None, sure: float) -> tuple[st
     for name, d in (("old", found.old), ("new", found.new)):
         lines += [f"{name}: {line}" for line in told_of_chances(d, by_utc_s, sure)] or [f"{name}: no way: {d.why}"]
     lines.append(f"{'change' if found.is_changed else 'keep the old one'}: {found.why}")
+    if found.chosen.runs:
+        lines.append(f"the {'new' if found.is_changed else 'old'} one from here:")
     return tuple(lines)
 
 
@@ -92,7 +103,7 @@ def _share(low: float, high: float) -> str:
     >>> _share(0.1, 0.9), _share(0.2, 0.8)
     ('8 of 10', '6 of 10')
     """
-    return f"{10.0 * (high - low):.0f} of 10" if high > low else "no share of them, for there is one only"
+    return f"{10.0 * (high - low):.0f} of 10"
 
 
 def told_of_departures(departures: Sequence[Departure], by_utc_s: float | None) -> tuple[str, ...]:
@@ -126,7 +137,7 @@ def explained(departures: Sequence[Departure], by_utc_s: float | None) -> tuple[
         return ("none of these departures arrives" + ("" if by_utc_s is None else f" by {iso(by_utc_s)}"),)
     often = first.hours(0.5)
     said = f"{often:.1f} h as often as not" if math.isfinite(often) else f"{100.0 * first.chance(by):.0f} % of all"
-    lines = [f"best: {iso(first.utc_s)}, there in {said}"]
+    lines = [f"best, of the surest the least long under way: {iso(first.utc_s)}, there in {said}"]
     for d in departures:
         if d is first or not d.runs:
             continue

@@ -1,12 +1,14 @@
 """A route under way in a new forecast: kept below the hysteresis, changed above it."""
 
+import re
+
 import numpy as np
 import pytest
 import shapely
 
 from companion.passage import FASTER, again, sweep
 from companion.passage.again import left_of
-from companion.passage.told import told_of_again
+from companion.passage.told import told_of_again, told_of_chances
 from tests.passage.test_plan import LAT, LON, shell  # noqa: F401 - the fixture
 from tests.passage.test_sweep import POLAR, A, B
 from tests.passage.world import HOURS, T0, cube, passage, place, steady
@@ -35,7 +37,21 @@ def test_a_little_is_not_worth_a_change_and_more_is():
     assert kept.why.endswith("10 % are asked for")
     assert changed.old.mean_s() > 1.05 * changed.new.mean_s()
     same = held(ready, (A, B))
-    assert (same.is_changed, told_of_again(same, None, 0.9)[-1][:18]) == (False, "keep the old one: ")
+    assert (same.is_changed, told_of_again(same, None, 0.9)[-2][:18]) == (False, "keep the old one: ")
+    assert told_of_again(same, None, 0.9)[-1] == "the old one from here:"
+    assert told_of_again(changed, None, 0.9)[-1] == "the new one from here:"
+
+
+def test_the_old_one_is_held_against_the_same_bound():
+    """ "No way is faster than about 00:00: at most 100.0 % could be gained"."""
+    found = held(asked(steady(0.0, -5.0)), ROUND)
+    assert 0.0 < found.old.route.bound_s == found.new.route.bound_s < found.new.mean_s()
+
+
+def test_one_forecast_says_nothing_of_chances():
+    first, hours = told_of_chances(held(asked(steady(0.0, -5.0)), ROUND).old, None, 0.9)
+    assert first == "arrives in 100 % of 1 run in the one forecast there is, which says nothing of how sure that is"
+    assert re.fullmatch(r"hours: [\d.]+ as often as not", hours)
 
 
 @pytest.mark.parametrize(("north_deg", "is_changed"), [(0.055, False), (0.095, True)])
@@ -85,7 +101,7 @@ def test_a_new_forecast_by_the_command(shell, tmp_path, capsys):  # noqa: F811
     words = ["passage", "again", "p.toml", "m.toml", "--forecast", "new.grb2", "--from", "50.0,-5.9", "--out", "n.toml"]
     assert cli.main([*words, "--now", "2026-04-20T08:00Z"]) == 0
     out = capsys.readouterr().out
-    assert "old: arrives in 100 % of 5 runs in 1 member" in out
+    assert "old: arrives in 100 % of 5 runs in the one forecast there is" in out
     assert "keep the old one: " in out
     assert "departs 2026-04-20T08:00Z" in out
     assert not (tmp_path / "n.toml").exists()

@@ -81,9 +81,9 @@ def test_a_quantile_is_none_that_so_few_members_cannot_show():
     [d] = sweep(asked(5.0, 5.0, 2.5, 10.0), [T0], 0.0, nodes=20)
     lines = told_of_chances(d, None, 0.9)
     assert lines == (
-        "arrives in 100 % of 4 runs in 4 members: in at least 47 %, for 95 %",
+        "arrives in 100 % of 4 runs in 4 members: in at least 47 %, with 95 % confidence",
         "hours: 10.0 as often as not, 5.0 to 20.0 in 6 of 10",
-        "90 % is more than 4 members can show: 47 %",
+        "4 members can show no more than 47 % of the 90 %",
     )
     assert "hours (middle 6 of 10)" in told_of_departures([d], None)[0]
     late = told_of_chances(d, T0 + 3600.0 * 15.0, 0.9)
@@ -104,7 +104,7 @@ def test_what_is_said_of_departures():
     assert lines[3] == "2026-04-23T18:00Z   no way: the forecast ends before she is there, or does not reach so far"
     assert lines[4] == "of 2 members of the forecast: what none of them shows may still come in 78 %"
     said = explained(found, None)
-    assert said[0] == "best: 2026-04-20T00:00Z, there in 50 % of all"
+    assert said[0] == "best, of the surest the least long under way: 2026-04-20T00:00Z, there in 50 % of all"
     assert said[1].endswith("in 50 % 14.0 m/s of wind is more than she is to be out in")
     assert explained(found, T0 + 3600.0) == ("none of these departures arrives by 2026-04-20T01:00Z",)
 
