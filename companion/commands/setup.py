@@ -144,8 +144,11 @@ def run(args: argparse.Namespace) -> int:
         print("her speeds are those of the simulator's boat; --boat 1.5,20,0.9 guesses them of her sizes")
     code = 0 if args.no_doctor else _examine(written[0], link, system)
     print(
-        f"[operator] of {written[0]} permits nothing yet. To start: sudo systemctl enable --now companion@{args.name}"
+        f"[operator] of {written[0]} permits nothing yet. To look, plan and change nothing: "
+        f"companion run {written[0]} --link {link} --dry-run"
     )
+    if args.dir == FOLDER:
+        print(f"to start at each boot: sudo systemctl enable --now companion@{args.name}")
     return code
 
 

@@ -226,10 +226,13 @@ class ProgressLine:
         if status.alert_code in {DISK, GONE}:
             text += f" | {status.alert_text}"
         said, self._notes = self._notes, []
-        for announced in step.actions:
-            if isinstance(announced, Announce) and announced.severity <= LOUD:
-                said += self._said(step.snapshot, announced)
+        loud = [a for a in step.actions if isinstance(a, Announce) and a.severity <= LOUD]
         t_s, phase = step.snapshot.t_s, step.state.phase.value
+        is_due = self._is_terminal or t_s - self._last[0] >= PLAIN_EVERY_S or phase != self._last[1]
+        if is_due or loud:
+            turned, clock = self._clock(step.snapshot)
+            text = f"{clock} {text}"
+            said += [*turned, *(_said(clock, announced) for announced in loud)]
         if self._is_terminal:
             columns = min(COLUMNS_MOST, shutil.get_terminal_size((COLUMNS_MOST, 24)).columns) - 1
             back = f"\r\x1b[{self._standing - 1}A" if self._standing > 1 else "\r"
@@ -240,7 +243,6 @@ class ProgressLine:
             self._stream.flush()
             self._standing = len(standing)
             return
-        is_due = t_s - self._last[0] >= PLAIN_EVERY_S or phase != self._last[1]
         if is_due:
             said.append(text)
             self._last = (t_s, phase)
@@ -248,8 +250,8 @@ class ProgressLine:
             self._stream.write("".join(f"{line}\n" for line in said))
             self._stream.flush()
 
-    def _said(self, snapshot: Snapshot, announced: Announce) -> list[str]:
-        """Return it with its time of day, the page's, below a line where that turns from one clock to the other."""
+    def _clock(self, snapshot: Snapshot) -> tuple[list[str], str]:
+        """Return the time of day, the page's, and a line where it turns from one clock to the other."""
         unix_s, boat_s = self._epoch_s + snapshot.t_s, snapshot.unix_s(snapshot.t_s)
         before_s, lines = self._behind_s, []
         if boat_s is not None and abs(boat_s - unix_s) >= CLOCK_OFF_S:
@@ -260,9 +262,12 @@ class ProgressLine:
                 )
         elif before_s is None:
             self._behind_s = 0.0
-        clock = datetime.fromtimestamp(unix_s + (self._behind_s or 0.0), UTC).strftime("%H:%M:%S")
-        loud = f"{announced.severity.name}: " if announced.severity <= Severity.WARNING else ""
-        return [*lines, f"{clock} {loud}{one_line(announced.text)}"]
+        return lines, datetime.fromtimestamp(unix_s + (self._behind_s or 0.0), UTC).strftime("%H:%M:%S")
+
+
+def _said(clock: str, announced: Announce) -> str:
+    loud = f"{announced.severity.name}: " if announced.severity <= Severity.WARNING else ""
+    return f"{clock} {loud}{one_line(announced.text)}"
 
 
 def wrapped(lines: list[str], columns: int) -> list[str]:

@@ -664,7 +664,11 @@ def plan_of(
         number=route.plan_id,
         age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),
         reason="" if chosen is None else chosen.reason,
-        why=(chosen.why if chosen is not None and chosen.why else route.why),
+        why=(
+            f"As it was made, courses counted from its start: {chosen.why}"
+            if chosen is not None and chosen.why
+            else route.why
+        ),
         rung=route.rung,
         bound_for=route.bound_for,
         twd_from_deg=compass(route.plan_twd_from_rad),

@@ -118,7 +118,9 @@ def test_a_drawn_mission_is_run_as_one(tmp_path, capfd):
     )
     written = tomllib.loads((tmp_path / "pond.toml").read_text())
     assert (written["from_autopilot"], written["boat"]["no_go_half_deg"]) == (True, 50)
-    assert "systemctl enable --now companion@pond" in capfd.readouterr().out
+    out = capfd.readouterr().out
+    assert f"companion run {tmp_path / 'pond.toml'} --link udpin:127.0.0.1:14598 --dry-run" in out
+    assert "systemctl" not in out  # the unit looks in another folder
 
 
 @pytest.mark.parametrize(

@@ -57,6 +57,9 @@ def _f32(value: float | None) -> float:
     return math.nan if value is None else max(-3e38, min(3e38, value))
 
 
+_CUT = b"..."  # a sentence that goes on
+
+
 def _scaled(value: int, scale: float = 1.0) -> float | None:
     return None if value == _NONE16 else value / scale
 
@@ -80,7 +83,9 @@ def pack_status(status: CompanionStatus) -> bytes:
     code = status.alert_code.encode("ascii", "replace")[:_CODE_BYTES]
     order = status.order.encode("ascii", "replace")[:_CODE_BYTES]
     room = MAX_PAYLOAD_BYTES - _PACK.size - len(state) - len(code) - len(order)
-    text = status.alert_text.encode("ascii", "replace")[:room]
+    text = status.alert_text.encode("ascii", "replace")
+    if len(text) > room:
+        text = text[: max(0, room - len(_CUT))] + _CUT[:room]
     head = _PACK.pack(
         VERSION,
         int(max(0.0, status.t_s) * 10.0) & 0xFFFFFFFF,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.frozen import changed
-from companion.messages import Mode, Severity
+from companion.messages import Command, Mode, Severity
 from companion.planner import Leg, Problem
 from companion.planner.problem import evaluate, resolved
 from companion.planner.risk import of_risky, path_risk, tacks_at_risk
@@ -26,6 +27,7 @@ from companion.skipper.step.state import PendingPlan, PendingUpload, Retry
 from companion.skipper.way import PointEn, distance_m
 from companion.skipper.way.judge import judge
 from companion.skipper.way.voyage import water_to_keep
+from companion.words import counted
 
 SPARE_M = 0.3  # a boat below the floor may come no nearer than this more: the turn away takes room
 TACKS_RISK = 1e-3  # a chance of contact by failed tacks is greater than another by more than this
@@ -68,7 +70,8 @@ def upload(
     )
     if not ctx.act(action):
         ctx.set(plans=changed(ctx.state.plans, ready_route=route))
-        ctx.say(Severity.WARNING, "upload not permitted", "a plan is ready; uploading is not permitted")
+        ready = f"a plan is ready: {_in_words(route)}{text and '; '}{text}"
+        ctx.say(Severity.WARNING, "upload not permitted", f"{ready}; uploading is not permitted")
         return
     # A read that is still under way will tell of the mission before this upload: its answer is not wanted.
     ctx.set(
@@ -81,6 +84,14 @@ def upload(
         ),
         plans=changed(ctx.state.plans, ready_route=None),
     )
+
+
+def _in_words(route: Route) -> str:
+    """Return how long a route is, in what time she is there and in how many legs."""
+    ways = list(zip(route.leg_from_en_m, route.points_en_m, route.items, strict=True))
+    sailed = [(a, b) for a, b, item in ways if item.command == Command.NAV_WAYPOINT]
+    time = "" if route.cost_s is None else f" in {route.cost_s:.0f} s"
+    return f"{sum(math.dist(a, b) for a, b in sailed):.0f} m{time}, {counted(len(sailed), 'leg')}"
 
 
 def take_upload(ctx: StepContext, outcome: UploadOutcome) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -105,8 +106,12 @@ def test_a_boat_that_is_armed_never_has_a_stranger_s_mixture_on_board(armed, is_
 
 def test_without_permission_it_stays_ready_and_is_said():
     ctx = moment(OLD, mission=CHECKED, permissions=DRY_RUN, pending={"read": (3, NOW_S)})
-    upload(ctx, NEW, None, "")
-    assert [a.code for a in ctx.actions if isinstance(a, Announce)] == ["upload not permitted"]
+    upload(ctx, replace(NEW, cost_s=412.0), None, "first: optimal")
+    (said,) = (a for a in ctx.actions if isinstance(a, Announce))
+    assert said.code == "upload not permitted"
+    assert re.fullmatch(
+        r"a plan is ready: \d+ m in 412 s, \d+ legs?; first: optimal; uploading is not permitted", said.text
+    )
     assert ctx.state.plans.ready_route.items == marked(NEW.items)
     assert (ctx.state.pending.upload, ctx.state.pending.read) == (None, (3, NOW_S))
 
