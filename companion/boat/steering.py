@@ -196,7 +196,8 @@ def _band(parts: list[tuple[SteeringLog, NDArray[np.bool_]]], low: float, high: 
     )
 
 
-def _runs(on: NDArray[np.bool_], least: int) -> list[slice]:
+def runs_of(on: NDArray[np.bool_], least: int) -> list[slice]:
+    """Return where ``on`` (n,) holds for ``least`` samples and more on end."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], on.astype(np.int8), [0]])))
     return [slice(a, b) for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True) if b - a >= least]
 
@@ -219,7 +220,7 @@ def _lag_s(parts: list[tuple[SteeringLog, NDArray[np.bool_]]]) -> float | None:
     total = np.zeros(most + 1)
     of_wanted = of_rate = 0.0
     for log, on in parts:
-        for run in _runs(on & np.isfinite(log.wanted_rate_radps) & np.isfinite(log.rate_radps), 4 * most):
+        for run in runs_of(on & np.isfinite(log.wanted_rate_radps) & np.isfinite(log.rate_radps), 4 * most):
             wanted, rate = log.wanted_rate_radps[run], log.rate_radps[run]
             wanted, rate = wanted - wanted.mean(), rate - rate.mean()
             end = wanted.shape[0] - most
@@ -234,7 +235,7 @@ def _lag_s(parts: list[tuple[SteeringLog, NDArray[np.bool_]]]) -> float | None:
 def _reversals(parts: list[tuple[SteeringLog, NDArray[np.bool_]]]) -> float | None:
     count, time_s = 0, 0.0
     for log, on in parts:
-        for run in _runs(on, round(PIECE_S / STEP_S)):
+        for run in runs_of(on, round(PIECE_S / STEP_S)):
             width = np.ones(round(MIDDLE_S / STEP_S))
             about = np.convolve(log.rudder[run], width, "same") / np.convolve(
                 np.ones(run.stop - run.start), width, "same"
@@ -254,7 +255,7 @@ def _swing(parts: list[tuple[SteeringLog, NDArray[np.bool_]]]) -> tuple[float, f
     spectra = np.zeros((2, hz.shape[0]))
     pieces = 0
     for log, on in parts:
-        for run in _runs(on & np.isfinite(log.rate_radps), n):
+        for run in runs_of(on & np.isfinite(log.rate_radps), n):
             for start in range(run.start, run.stop - n + 1, n // 2):
                 piece = slice(start, start + n)
                 for i, values in enumerate((log.rate_radps[piece], log.rudder[piece])):

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.boat.steering import STEP_S, SteeringLog
+from companion.boat.steering import STEP_S, SteeringLog, runs_of
 from companion.boat_logs.read import MESSAGES, Skipped, bytes_of
 from companion.boat_logs.recordings import State, Tlog, dataflash, messages_of
 from companion.boat_logs.rows import AT_REST, LEAST_SAMPLES, Useless
@@ -32,6 +32,8 @@ _STEERER, _FULL_STEER = 26, 4500.0  # a servo's function, ground steering; the c
 _PWM = (1100.0, 1500.0, 1900.0)  # least, middle and most of a servo, unless its parameters say otherwise
 _HANDS_ON = AT_REST | {Mode.MANUAL}
 _HELD_S = 1.5  # between samples that are farther apart nothing is known
+# No leg is so near to its end for so long: she loiters there, and her circles are no turns onto a course.
+_LOITER_M, _LOITER_S = 25.0, 60.0
 _NAN = math.nan
 
 
@@ -43,7 +45,7 @@ class _Series:
     parameters: dict[str, float] = field(default_factory=dict)
     servos: list[tuple[float, tuple[float, ...]]] = field(default_factory=list)
     tacks_s: list[float] = field(default_factory=list)
-    time_outs: int = 0
+    time_outs_s: list[float] = field(default_factory=list)
 
     def take(self, t_s: float, **values: float) -> None:
         for name, value in values.items():
@@ -53,7 +55,7 @@ class _Series:
 
     def text(self, t_s: float, text: str) -> None:
         if text.startswith("Sailboat: Tacking timed out"):
-            self.time_outs += 1
+            self.time_outs_s.append(t_s)
         elif text.startswith("Sailboat: Tacking"):
             self.tacks_s.append(t_s)
 
@@ -94,6 +96,11 @@ class _Series:
         if self.servos:  # what a servo is told is scaled by speed already
             base = self.parameters.get("MOT_SPD_SCA_BASE", 1.0)
             rudder = rudder * (np.maximum(np.abs(ahead) / base, 1.0) if base > 0.0 else 1.0)
+        steered = (self.state_at("steered", t) > 0.5) & ~_loiters(self.at("wp_m", t))
+
+        def on_legs(times_s: list[float]) -> tuple[float, ...]:
+            return tuple(at for at in times_s if steered[min(int(np.searchsorted(t, at)), t.shape[0] - 1)])
+
         return SteeringLog(
             name=name,
             t_s=t,
@@ -104,9 +111,9 @@ class _Series:
             rudder=np.clip(rudder, -1.0, 1.0),
             ahead_mps=ahead,
             heel_rad=self.at("heel", t),
-            is_steered=self.state_at("steered", t) > 0.5,
-            tacks_s=tuple(self.tacks_s),
-            time_outs=self.time_outs,
+            is_steered=steered,
+            tacks_s=on_legs(self.tacks_s),
+            time_outs=len(on_legs(self.time_outs_s)),
             parameters=self.parameters,
         )
 
@@ -122,6 +129,14 @@ class _Series:
             if pwm > 0.0:
                 share = (pwm - middle) / max(high - middle if pwm > middle else middle - low, 1.0)
                 self.take(t_s, rudder=turned * share)
+
+
+def _loiters(wp_m: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return (n,) whether she lies about a waypoint, by how far off it she is [m], ``STEP_S`` apart."""
+    out = np.zeros(wp_m.shape, dtype=np.bool_)
+    for run in runs_of(wp_m <= _LOITER_M, round(_LOITER_S / STEP_S)):
+        out[run] = float(np.ptp(wp_m[run])) > 0.0  # steered by headings it is 0 all the time
+    return out
 
 
 def read_steering(paths: list[Path]) -> tuple[list[SteeringLog], list[Skipped]]:
@@ -164,7 +179,7 @@ def _steering_of_tlog(files: list[Path], series: _Series) -> None:
             if m.port == 0:
                 series.servos.append((t_s, tuple(float(getattr(m, f"servo{n}_raw")) for n in range(1, 9))))
         elif kind == "NAV_CONTROLLER_OUTPUT":
-            series.take(t_s, wanted_heading=math.radians(m.nav_bearing))
+            series.take(t_s, wanted_heading=math.radians(m.nav_bearing), wp_m=m.wp_dist)
         elif kind == "PID_TUNING":
             if m.axis == wire.PID_TUNING_STEER:
                 series.take(t_s, wanted_rate=math.radians(m.desired))
@@ -190,7 +205,7 @@ def _steering_of_bin(path: Path, data: bytes, series: _Series) -> None:
                 rates = {"wanted_rate": math.radians(m.DesTurnRate), "rate": math.radians(m.TurnRate)}
                 series.take(t_s, rudder=m.SteerOut / _FULL_STEER, **rates)
             elif kind == "NTUN":
-                series.take(t_s, wanted_heading=math.radians(m.DesYaw))
+                series.take(t_s, wanted_heading=math.radians(m.DesYaw), wp_m=getattr(m, "WpDist", _NAN))
             elif kind == "PARM":
                 series.parameters[m.Name] = m.Value
             elif kind == "MSG":

@@ -237,7 +237,8 @@ def _trial(args: argparse.Namespace) -> int:
     write_files({str(out): text.encode()}, force=args.force)
     print(
         f"{out}: written for wind from {wind:.0f} degrees: {counted(len(found.names), 'mark')}, boards of "
-        f"{found.board_m:.0f} m. Plan it: companion mission check {out} --plot {out.stem}.png; sail it; then companion boat learn"
+        f"{found.board_m:.0f} m. Plan it: companion mission check {out} --plot {out.stem}.png; sail it; "
+        "then companion boat learn"
     )
     return 0
 

@@ -197,7 +197,11 @@ def begun_at(log):
     return {round(at / STEP_S) for at in log.tacks_s}
 
 
-def tlog(path, log, mode=10, system=1, jump_s=0.0):
+def far(_i):
+    return 200
+
+
+def tlog(path, log, mode=10, system=1, jump_s=0.0, *, wp_m=far):
     out = b""
     mav, begun = wire.MAVLink(None, srcSystem=system, srcComponent=1), begun_at(log)
     for i, t_s in enumerate(log.t_s.tolist()):
@@ -216,7 +220,9 @@ def tlog(path, log, mode=10, system=1, jump_s=0.0):
         if i % 5 == 0:
             messages.append(mav.heartbeat_encode(11, 3, 0x80, mode, 4))
             messages.append(
-                mav.nav_controller_output_encode(0, 0, round(math.degrees(log.wanted_heading_rad[i])), 0, 0, 0, 0, 0)
+                mav.nav_controller_output_encode(
+                    0, 0, round(math.degrees(log.wanted_heading_rad[i])), 0, wp_m(i), 0, 0, 0
+                )
             )
         if i in begun:
             messages.append(mav.statustext_encode(6, b"Sailboat: Tacking"))
@@ -231,12 +237,12 @@ def tlog(path, log, mode=10, system=1, jump_s=0.0):
     return path
 
 
-def bin_log(path, log):
+def bin_log(path, log, *, wp_m=far):
     formats = {
         "ATT": (131, "Qff", "TimeUS,Roll,Yaw"),
         "XKF1": (132, "QBff", "TimeUS,C,VN,VE"),
         "STER": (133, "Qfff", "TimeUS,SteerOut,DesTurnRate,TurnRate"),
-        "NTUN": (134, "Qf", "TimeUS,DesYaw"),
+        "NTUN": (134, "Qff", "TimeUS,DesYaw,WpDist"),
         "PARM": (135, "QNf", "TimeUS,Name,Value"),
         "MSG": (136, "QZ", "TimeUS,Message"),
         "MODE": (137, "QMB", "TimeUS,Mode,ModeNum"),
@@ -262,7 +268,7 @@ def bin_log(path, log):
         say("ATT", t_s, degrees(log.heel_rad[i]), degrees(bow) % 360.0)
         say("XKF1", t_s, 0, v * math.cos(bow), v * math.sin(bow))
         say("STER", t_s, 4500.0 * log.rudder[i], degrees(log.wanted_rate_radps[i]), degrees(log.rate_radps[i]))
-        say("NTUN", t_s, degrees(log.wanted_heading_rad[i]))
+        say("NTUN", t_s, degrees(log.wanted_heading_rad[i]), wp_m(i))
         if i in begun:
             say("MSG", t_s, b"Sailboat: Tacking")
     say("MSG", log.t_s[-1], b"Sailboat: Tacking timed out")
@@ -285,6 +291,19 @@ def test_both_kinds_of_log_tell_what_was_simulated(write, tmp_path):
     if write is bin_log:
         assert read.time_outs == 1
         assert told.lag_s == pytest.approx(true.lag_s, abs=0.21)
+
+
+@pytest.mark.parametrize("write", [tlog, bin_log])
+def test_circles_of_a_loiter_are_no_turns_and_tell_nothing_of_the_helm(write, tmp_path):
+    """Two holds of ten minutes were "204 degrees past the new course" and "0 of 17 tacks were given up"."""
+    log = steered(ATC_STR_RAT_FF=0.5, helm=0.1, minutes=6.0)
+    path = tmp_path / ("a.tlog" if write is tlog else "a.BIN")
+    (read,), _ = read_steering([write(path, log, wp_m=lambda i: 3 + i % 3)])
+    assert np.mean(read.is_steered) < 0.02
+    assert (read.tacks_s, read.time_outs) == ((), 0)
+    (leg,), _ = read_steering([write(path, log, wp_m=lambda i: 20 + i // 5 % 30)])  # a leg of 50 m after the other
+    assert np.mean(leg.is_steered) > 0.98
+    assert len(leg.tacks_s) == len(log.tacks_s)
 
 
 def test_two_boats_in_one_recording_are_not_one_that_turns_about(tmp_path):
