@@ -205,9 +205,9 @@ def _failures(t: Floats, twa: Floats, tws: Floats, sailed: NDArray[np.bool_]) ->
     for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if a < BOARD_S or b + SETTLE_S >= t.shape[0] or not np.all(sailed[a - BOARD_S : b]):
             continue
-        old, new = float(np.median(twa[a - BOARD_S : a - 2])), float(np.median(twa[b + 3 : b + SETTLE_S]))
+        old = float(np.median(twa[a - BOARD_S : a - 2]))
         if abs(old) > math.radians(35.0) and float(np.min(np.abs(twa[a:b]))) < LUFFED_SHARE * abs(old):
-            spells.append((a, b - a, old * new < 0.0))
+            spells.append((a, b - a, old * float(twa[b]) < 0.0))  # she may tack back at once: that is another one
     through = [length for _, length, crosses in spells if crosses]
     late = max(LATE_S, 3.0 * float(np.quantile(through, 0.25))) if through else math.inf
     return [

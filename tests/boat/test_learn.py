@@ -10,7 +10,7 @@ from companion.boat.guess import Sizes, guessed_polar
 from companion.boat.learn import TWA_DEG, TWS_MPS, learn
 from companion.boat.lesson import lesson_of, offset_step_deg
 from companion.boat.log import NEAR_RAD, Stretches, Why, steady, stretches_of
-from companion.boat.manoeuvres import chances, manoeuvres_of
+from companion.boat.manoeuvres import _failures, chances, manoeuvres_of
 from companion.boat.polar import Polar
 from companion.boat.towed import driven
 from lab.boat_learning import _quickest, _time, inside, marks_of, time_lost
@@ -141,6 +141,14 @@ def test_the_no_go_zone_is_where_the_beats_were_held():
     assert lesson.no_go_is_sailed
     assert abs(math.degrees(lesson.no_go.mean) - 48.0) < 3.0
     assert lesson.turn_rate.mean == pytest.approx(math.radians(30.0), rel=0.15)
+
+
+@pytest.mark.parametrize(("turn", "fails"), [((-25, 18, 25, 12, 30, 43, 43, 23, -22), 0), ((-25, -9, 3, 4, -2, -9), 1)])
+def test_a_tack_that_is_followed_by_another_got_through_and_one_that_falls_off_did_not(turn, fails):
+    """A short tack and back, seen every second, was "1 of 3 tacks failed"."""
+    twa = np.radians([-50.0] * 30 + list(turn) + [-52.0] * 30)
+    n = twa.shape[0]
+    assert len(_failures(np.arange(float(n)), twa, np.full(n, 5.0), np.ones(n, dtype=bool))) == fails
 
 
 def test_tacks_cost_what_they_cost_and_failures_are_counted():
