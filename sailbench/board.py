@@ -53,8 +53,13 @@ def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     import pyarrow.parquet as pq
 
     beside = path.with_name(path.name + ".new")
-    pq.write_table(pa.Table.from_pylist([dict(row) for row in rows]), beside)
-    beside.replace(path)
+    try:
+        pq.write_table(pa.Table.from_pylist([dict(row) for row in rows]), beside)
+        beside.replace(path)
+    except OSError as error:
+        raise InputError(
+            str(path), "", f"cannot be written ({error.strerror or error})", "name a folder that is there"
+        ) from error
 
 
 def page(rows: Sequence[Mapping[str, Any]], *, stamp: str) -> str:

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import signal
+import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Literal, TypedDict
 
@@ -10,17 +14,45 @@ import numpy as np
 
 from companion.planner import Problem
 from companion.planner.problem import evaluate
+from companion.words import counted
 from sailbench.planners import SAID, Answer, Planner, answer_of
 from sailbench.problem_set import Known
 
 Outcome = Literal["path", "impossible", "wrong", "nothing", "late"]
 LATE = 2.0  # an answer after so many budgets of the processor's time ...
 LATE_S = 4.0  # ... and so much longer (a library in another process loads first) is none
+ENDED_S = 1.0  # after that it is ended
 
 
 def processor_s() -> float:
     """Return a reading of what this process and those that it waited for took of a processor [s]."""
     return sum(os.times()[:4])
+
+
+class Late(BaseException):
+    """A planner that is ended: no planner catches it, as it may all errors."""
+
+
+@contextlib.contextmanager
+def ended_after(limit_s: float) -> Iterator[None]:
+    """Raise ``Late`` in what takes more than ``limit_s`` of this process' time; compiled code is ended at its end.
+
+    Only the main thread can be ended.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(*_: object) -> None:
+        raise Late
+
+    before = signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, limit_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 class PlanRow(TypedDict):
@@ -67,14 +99,18 @@ def rows(
                         continue
                     begun_s = processor_s()
                     answer, error = Answer(), ""
+                    limit_s = LATE * budget_s + LATE_S
                     try:
-                        answer = answer_of(planner(problem, budget_s, seed))
+                        with ended_after(limit_s + ENDED_S):
+                            answer = answer_of(planner(problem, budget_s, seed))
+                    except Late:
+                        pass  # what it took says it
                     except Exception as raised:  # whose planner it is must not end the others'
                         error = f"{type(raised).__name__}: {raised}"
                     took_s = processor_s() - begun_s
                     outcome, time_s, why = judge(problem, answer, known.get(problem.id))
-                    if took_s > LATE * budget_s + LATE_S:
-                        outcome, time_s, why = "late", None, f"took {took_s:.1f} s"
+                    if took_s > limit_s:
+                        outcome, time_s, why = "late", None, f"no answer in {limit_s:g} s: took {took_s:.1f} s"
                     yield PlanRow(
                         problem=problem.id,
                         planner=name,
@@ -177,3 +213,9 @@ def table(lines: Iterable[PlanLine]) -> str:
     """Return the lines as a Markdown table."""
     rule = "|---" * len(HEADS) + "|"
     return "\n".join(["| " + " | ".join(HEADS) + " |", rule, *("| " + " | ".join(cells(n)) + " |" for n in lines)])
+
+
+def troubles(rows: Iterable[PlanRow]) -> list[str]:
+    """Return what planners raised, were refused or were late with, each once with how often."""
+    counts = Counter((row["planner"], row["why"].partition(": took ")[0]) for row in rows if row["why"])
+    return [f"{planner}, {counted(n, 'answer')}: {why}" for (planner, why), n in counts.most_common()]

@@ -1,5 +1,6 @@
 """The bench of planners: answers judged by the scorer alone, whoever gives them, and what they come to."""
 
+import contextlib
 import json
 import math
 import re
@@ -11,7 +12,7 @@ import pytest
 from companion.planner.problem import evaluate
 from sailbench import BASELINES, IMPOSSIBLE, Answer, answers, problems
 from sailbench.__main__ import main
-from sailbench.plan_bench import judge, rows, summary, table
+from sailbench.plan_bench import judge, rows, summary, table, troubles
 from sailbench.planners import by_ompl, greedy, planner_named, present
 from sailbench.problem_set import FOLDER
 from tests.planner.problems import load
@@ -85,8 +86,26 @@ def test_who_answers_late_has_not_answered(monkeypatch):
     ticks = iter([0.0, 4.2, 10.0, 14.0])  # more than twice 0.05 s and 4 s, and less
     monkeypatch.setattr("sailbench.plan_bench.processor_s", lambda: next(ticks))
     late, in_time = made({"mine": ten_lines}, "open-reach", seeds=2)
-    assert (late["outcome"], late["time_s"], late["why"]) == ("late", None, "took 4.2 s")
+    assert (late["outcome"], late["time_s"], late["why"]) == ("late", None, "no answer in 4.1 s: took 4.2 s")
     assert in_time["outcome"] == "path"
+
+
+def test_who_never_comes_back_is_ended_and_what_was_raised_is_told(monkeypatch):
+    """It hung for ever, whatever the budget; and of a guest that raises "solved 0 of 1" was all that was said."""
+    monkeypatch.setattr("sailbench.plan_bench.LATE_S", 0.1)
+    monkeypatch.setattr("sailbench.plan_bench.ENDED_S", 0.1)
+
+    def slow(*_):
+        while True:
+            with contextlib.suppress(Exception):
+                sum(range(100))
+
+    def broken(*_):
+        raise ValueError("oh")
+
+    found = made({"slow": slow, "broken": broken}, "open-reach", seeds=2)
+    assert [row["outcome"] for row in found] == ["late", "late", "nothing", "nothing"]
+    assert troubles(found) == ["slow, 2 answers: no answer in 0.2 s", "broken, 2 answers: ValueError: oh"]
 
 
 def test_the_summary_counts_what_was_in_every_seed():
@@ -142,6 +161,19 @@ def test_the_command_asks_a_guest_by_name_and_keeps_its_rows(tmp_path, capsys, m
         (
             ["plan", "--planners", "nobody:plan"],
             "sailbench: planner: nobody:plan: there is none (No module named 'nobody')",
+        ),
+        (
+            [
+                "plan",
+                str(FOLDER / "open-reach.json"),
+                "--planners",
+                "greedy",
+                "--seeds",
+                "1",
+                "--out",
+                "none/x.parquet",
+            ],
+            "sailbench: none/x.parquet: cannot be written ",
         ),
         (["plan", "--planners", "math:sale"], "sailbench: planner: math:sale: there is none"),
         (["plan", "none.json", "--planners", "greedy"], "sailbench: none.json: "),
