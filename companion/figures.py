@@ -132,7 +132,7 @@ def _shown(figure: Figure, value: float) -> str:
         return f"{abs(value):g}° {'P' if value < 0.0 else 'S'}"
     scaled = 100.0 * value if figure.kind == "share" else value
     decimals = 0 if figure.kind == "distance" and abs(value) >= WHOLE_M else _DECIMALS[figure.kind]
-    return f"{round(scaled, decimals):g}{_UNITS[figure.kind]}"
+    return f"{round(scaled, decimals) + 0.0:g}{_UNITS[figure.kind]}"  # + 0: no minus before a zero
 
 
 @dataclass(slots=True)

@@ -224,7 +224,7 @@ def _trial(args: argparse.Namespace) -> int:
         frame.en_from_geo(mission.origin),
         twd_from_rad=math.radians(wind),
         no_go_half_rad=no_go_rad,
-        speed_mps=polar.best_beat(tws_mps, no_go_half_rad=no_go_rad).vmg_mps / math.cos(no_go_rad),
+        speed_mps=polar.best_beat(tws_mps).vmg_mps / math.cos(no_go_rad),
     )
     if found is None:
         raise JobError(f"{args.mission}: there is no room in its water for six tacks, a reach there and back and a run")
@@ -273,6 +273,7 @@ def _trial_options(
         name=f"{name}-trial",
         description=f"Trial for wind from {wind_deg:.0f} degrees: six tacks, a reach there and back, a run.",
         goal=tuple(goals),
+        wind=msgspec.structs.replace(options.wind, preview_from_deg=wind_deg % 360.0),
         field={},
     )
 

@@ -131,7 +131,13 @@ def run(args: argparse.Namespace) -> int:
         sys.stderr.write("sitl run: note: ArduRover's simulator has a hull of its own, not the one of [boat] polar\n")
     page = page_words(args)
     print(
-        f"{scenario.name} begins {scenario.begins:%Y-%m-%d %H:%M} UTC{'' if args.at else '; --at names another time'}",
+        f"{scenario.name} begins {scenario.begins:%Y-%m-%d %H:%M} UTC{'' if args.at else '; --at names another time'}"
+        + (
+            f"; the wind is {scenario.wind.tws_mps:g} m/s from {scenario.wind.from_deg:03.0f}° in the mean, as [wind] "
+            "preview_from_deg and preview_speed_mps say"
+            if scenario.mission_path(args.scenario) == args.scenario.resolve()
+            else ""
+        ),
         flush=True,
     )
     own = load_mission(scenario.mission_path(args.scenario)).options.operator

@@ -516,7 +516,7 @@ def load_scenario(path: Path) -> Scenario:
     except (msgspec.DecodeError, ValueError, RecursionError) as error:
         raise InputError(str(path), "", f"is not TOML ({str(error)[:80]})", "is it the file that was meant?") from error
     if "mission" not in raw and "goal" in raw:
-        raw = {"name": str(raw.get("name", path.stem)), "mission": path.name}
+        raw = {"name": str(raw.get("name", path.stem)), "mission": path.name, "wind": _previewed(raw.get("wind"))}
     try:
         scenario = msgspec.convert(raw, Scenario)
     except msgspec.ValidationError as error:
@@ -533,6 +533,13 @@ def load_scenario(path: Path) -> Scenario:
     if not scenario.mission_path(path).is_file():
         raise InputError(str(path), "mission", f"there is no file {scenario.mission}", "paths start at the scenario")
     return scenario
+
+
+def _previewed(wind: object) -> dict[str, float]:
+    """Return the wind that a mission is previewed in, as a scenario has it; what is wrong the mission's reader says."""
+    given = wind if isinstance(wind, dict) else {}
+    keys = {"preview_from_deg": "from_deg", "preview_speed_mps": "tws_mps"}
+    return {key: given[name] for name, key in keys.items() if isinstance(given.get(name), int | float)}
 
 
 def beginning(scenario: Scenario, source: Path, at: dt.datetime | None = None) -> dt.datetime:

@@ -9,6 +9,7 @@ import shapely
 
 from companion.boat import trial_in
 from companion.cli import main
+from companion.geofence import load_mission
 
 
 def trial(water, *, twd_deg=0.0, near=(0.0, 0.0), speed=1.0):
@@ -62,5 +63,7 @@ def test_a_mission_of_it_stands_beside_the_one_whose_water_it_takes(tmp_path, ca
     assert main(["boat", "trial", str(lake)]) == 2
     assert "exists" in capsys.readouterr().err
     assert main(["mission", "check", str(tmp_path / "lake-trial.toml")]) == 0
+    assert main(["boat", "trial", str(lake), "--from-deg", "240", "--force"]) == 0
+    assert load_mission(tmp_path / "lake-trial.toml").wind.preview_from_deg == 240.0
     assert main(["boat", "trial", str(tmp_path / "archipelago.toml")]) == 1
     assert "no room" in capsys.readouterr().err

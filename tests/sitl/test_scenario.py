@@ -69,6 +69,15 @@ def test_a_mission_is_a_scenario():
     assert scenario.mission == "open-water.toml"
 
 
+def test_a_mission_is_sailed_in_the_wind_that_it_is_previewed_in(tmp_path):
+    """It was 5 m/s from 000, whatever the mission said, and no line told so."""
+    goal = "[[goal]]\nlat = 50.0\nlon = 1.0\n"
+    for table, wind in (("preview_from_deg = 200\npreview_speed_mps = 6.5\n", (200.0, 6.5)), ("", (0.0, 5.0))):
+        (tmp_path / "m.toml").write_text(f"{goal}[wind]\n{table}")
+        told = load_scenario(tmp_path / "m.toml").wind
+        assert (told.from_deg, told.tws_mps) == wind
+
+
 def test_a_water_that_is_in_both_folders_is_the_same():
     both = [path for path in Path("sitl/missions").glob("*.wkt") if Path("missions", path.name).exists()]
     assert len(both) == 5
