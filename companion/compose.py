@@ -121,10 +121,7 @@ def polar_named(boat: BoatOptions, source: Path) -> Polar:
     if path is not None and path.suffix == ".toml":
         return polar_of_file(read_boat_file(path), str(path))
     if path is not None:
-        file = read_polar(path)
-        if file.warnings:
-            raise InputError(str(path), "", file.warnings[0], "fill it in: a guessed polar is not sailed")
-        return file.polar
+        return whole_polar(path)
     polar = boat.polar
     if isinstance(polar, str):
         maker = POLARS.get(polar)
@@ -137,6 +134,14 @@ def polar_named(boat: BoatOptions, source: Path) -> Polar:
             )
         return maker()
     return constant(float(polar))
+
+
+def whole_polar(path: str | Path) -> Polar:
+    """Return the polar of a file in which nothing had to be guessed. Raises InputError."""
+    file = read_polar(path)
+    if file.warnings:
+        raise InputError(str(path), "", file.warnings[0], "fill it in: a guessed polar is not sailed")
+    return file.polar
 
 
 def polar_of_file(file: BoatFile, source: str) -> Polar:

@@ -366,8 +366,7 @@ def _compare(args: argparse.Namespace) -> int:
 
 def _boat(name: str) -> tuple[Polar, BoatFile | None]:
     """Return a polar by its file or name, and the boat file that it is of, None: it is none."""
-    from companion.boat import read_polar
-    from companion.compose import POLARS, polar_of_file
+    from companion.compose import POLARS, polar_of_file, whole_polar
     from companion.geofence.mission import read_boat_file
 
     if name in POLARS:
@@ -375,7 +374,7 @@ def _boat(name: str) -> tuple[Polar, BoatFile | None]:
     if Path(name).suffix == ".toml":
         boat = read_boat_file(Path(name))
         return polar_of_file(boat, name), boat
-    return read_polar(name).polar, None
+    return whole_polar(name), None
 
 
 def _sailed(polar: Polar, boat: BoatFile | None) -> Boat:

@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     import asyncio
 
     from companion import clock
-    from companion.boat import read_polar
+    from companion.compose import whole_polar
     from companion.errors import LinkError
     from companion.mavlink.transports import parse_link
     from sitl.autopilot import AutopilotConfig, SimulatedAutopilot, check_parameters, serve
@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
         is_moored=args.moored,
         sysid=args.sysid,
         parameters=parameters,
-        polar=None if args.polar is None else read_polar(args.polar).polar,
+        polar=None if args.polar is None else whole_polar(args.polar),
         epoch_s=begins.timestamp(),
     )
     autopilot = SimulatedAutopilot(config, parse_wind(args.wind, seed=args.seed), args.seed)

@@ -133,3 +133,10 @@ def test_logs_that_teach_nothing_are_one_line(tmp_path, capsys, what):
     told = [line for line in capsys.readouterr().err.splitlines() if "reading" not in line and "learning" not in line]
     assert len(told) == 1
     assert not (tmp_path / "o.toml").exists()
+
+
+def test_a_polar_with_a_gap_is_refused_here_too(tmp_path, capsys):
+    """It was shown with a guess in the gap, and exported, without a word."""
+    (tmp_path / "x.pol").write_text("TWA\\TWS;6;10;12\n45;3.0;4.0;4.2\n90;2.8;0;3.9\n150;3.5;4.5;4.6\n")
+    assert main(["boat", "show", str(tmp_path / "x.pol")]) == 2
+    assert "x.pol: line 3, column 3: a bare 0 is taken as not known" in capsys.readouterr().err
