@@ -537,6 +537,8 @@ class CompanionStatus:
     figures: tuple[tuple[str, float], ...] = ()  # of the table (``companion.figures``), by name; sent beside the wind
     alert_code: str = ""  # the rule or watchdog that speaks; empty: all is well
     alert_text: str = ""
+    disk_trouble: str = ""  # while it lasts, whatever else speaks; not on the air, where it is an alert if nothing is
+    gone: str = ""  # likewise of a page, a socket, an output
 
     def __post_init__(self) -> None:
         _finite(

@@ -475,7 +475,11 @@ class _Shell:
             await guard.wait(Auxiliary.STATE, lambda: self.state_file.save(self.fold.skipper.persisted(step.state)))
         guard.call(Auxiliary.RECORDS, lambda: self._compare_clocks(step.snapshot))
         status = guard.call(Auxiliary.STATUS, lambda: self._status(step, clearance_m, link)) or CompanionStatus(
-            t_s=step.snapshot.t_s, state=step.state.phase.value, alert_code=GONE, alert_text=guard.sentence()
+            t_s=step.snapshot.t_s,
+            state=step.state.phase.value,
+            alert_code=GONE,
+            alert_text=guard.sentence(),
+            gone=guard.sentence(),
         )
         self.status, self._step = status, step
         if self.on_status is not None:
@@ -494,9 +498,14 @@ class _Shell:
             self.feeds.dropped,
         )
         trouble, gone = self._trouble(), self.guard.sentence()
-        if status.alert_code or not (trouble or gone):
+        if not (trouble or gone):
             return status
-        return replace(status, alert_code=DISK if trouble else GONE, alert_text=trouble or gone)
+        status = replace(status, disk_trouble=trouble, gone=gone)
+        return (
+            status
+            if status.alert_code
+            else replace(status, alert_code=DISK if trouble else GONE, alert_text=trouble or gone)
+        )
 
     def _compare_clocks(self, snapshot: Snapshot) -> None:
         """Record once by how much this computer's clock, which stamps the records, is off the autopilot's by GPS.

@@ -222,9 +222,7 @@ class ProgressLine:
 
     def show(self, status: CompanionStatus, step: Step) -> None:
         """Show one step."""
-        text = progress_text(step)
-        if status.alert_code in {DISK, GONE}:
-            text += f" | {status.alert_text}"
+        text = " | ".join(part for part in (progress_text(step), status.disk_trouble, status.gone) if part)
         said, self._notes = self._notes, []
         loud = [a for a in step.actions if isinstance(a, Announce) and a.severity <= LOUD]
         t_s, phase = step.snapshot.t_s, step.state.phase.value

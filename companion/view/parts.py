@@ -159,8 +159,11 @@ def alarms(step: Step, status: CompanionStatus, said: Mapping[str, str]) -> tupl
         for raised in step.state.alarms.raised
     ]
     out += alarms_of(step)
-    if status.alert_code in {DISK, GONE}:
-        out.append(values.AlarmView(code=status.alert_code, level="warning", text=status.alert_text))
+    out += [
+        values.AlarmView(code=code, level="warning", text=text)
+        for code, text in ((DISK, status.disk_trouble), (GONE, status.gone))
+        if text
+    ]
     return tuple(out)
 
 
@@ -355,13 +358,11 @@ def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
             text=state.mission.foreign or ("not read yet" if mission.items is None else "ours, as read back"),
         ),
         values.Part(
-            name="records",
-            grade="bad" if status.alert_code == DISK else "good",
-            text=status.alert_text if status.alert_code == DISK else "written",
+            name="records", grade="bad" if status.disk_trouble else "good", text=status.disk_trouble or "written"
         ),
     ]
-    if status.alert_code == GONE:
-        parts.append(values.Part(name="beside the voyage", grade="poor", text=status.alert_text))
+    if status.gone:
+        parts.append(values.Part(name="beside the voyage", grade="poor", text=status.gone))
     if status.traffic is not None:
         seen = status.traffic
         is_poor = seen.silent_feeds > 0 or seen.silence_s is None or seen.silence_s > FEED_SILENT_S

@@ -24,6 +24,7 @@ from companion.telemetry.folder.records import VoyageFigures
 from companion.telemetry.status import companion_status
 from companion.terminal.dashboard import line_of
 from companion.view.fold import ViewFold
+from companion.view.parts import alarms, health_of
 from sitl.scenario import verdict_line
 from tests.skipper.world import World, voyage, with_parts
 
@@ -238,3 +239,16 @@ def test_what_is_left_behind_is_said_with_where_she_will_end():
         rf"the boat sails on in AUTO: \d+ items to go, the last a loiter at {end.lat_deg:.5f}, {end.lon_deg:.5f}",
         left_behind(step),
     )
+
+
+def test_a_full_disk_is_told_while_it_lasts_whatever_else_speaks(steps):
+    """It vanished with "dark", and nothing was recorded to the end; the page said "written"."""
+    full = "nothing is recorded: 0.0 MB left on the disk"
+    status = replace(STATUS, alert_code="dark", alert_text="dark", disk_trouble=full)
+    stream = io.StringIO()
+    with ProgressLine(stream) as progress:
+        progress.show(status, steps[0])
+    assert stream.getvalue().rstrip().endswith(f" | {full}")
+    assert full in [alarm.text for alarm in alarms(steps[0], status, {})]
+    (records,) = (part for part in health_of(steps[0], status) if part.name == "records")
+    assert (records.grade, records.text) == ("bad", full)
