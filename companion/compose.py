@@ -208,6 +208,7 @@ def boat_of(mission: Mission) -> Boat:
         min_tws_mps=mission.boat.min_tws_mps,
         tack_fails=mission.boat.tack_fails if mission.boat.can_tack else 0.0,
         speed_error=speed_error_of(mission.boat),
+        told_speed_error=(mission.boat.speed_error_percent or 0.0) / 100.0,
         no_go_error_rad=math.radians(mission.boat.no_go_error_deg),
         shape_error=shape_error_of(mission),
     )

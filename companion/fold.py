@@ -290,7 +290,8 @@ class VoyageFold:
         self._waters = waters
         skipper, persisted = begun(skipper, persisted, waters)
         self._prior = water
-        self.current = CurrentEstimator(skipper.voyage.boat.polar.speed_mps, water)
+        boat = skipper.voyage.boat
+        self.current = CurrentEstimator(boat.polar.speed_mps, water, speed_error=boat.told_speed_error)
         self._anew = ""  # why the wind is learned anew, until it is ...
         self._anew_s: float | None = None  # ... and since when
         self._sure_wind: tuple[float, float] | None = None  # the mean wind when it was believed last ...
@@ -440,7 +441,8 @@ class VoyageFold:
         elif change.effect is Effect.BOAT:
             learns = ": current and polar are learned anew"
         if learns:
-            self.current = CurrentEstimator(self.skipper.voyage.boat.polar.speed_mps, self._prior)
+            boat = self.skipper.voyage.boat
+            self.current = CurrentEstimator(boat.polar.speed_mps, self._prior, speed_error=boat.told_speed_error)
         self._events.append(ParameterChanged(name=change.name, text=text + learns))
 
     @property

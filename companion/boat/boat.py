@@ -62,6 +62,7 @@ class Boat:
         tack_fails: The chance that a tack fails [0..1), before any was seen; 0: they are not reckoned to fail.
         no_go_error_rad: How far ``no_go_half_rad`` may be off, as a deviation [rad, 0..0.5].
         speed_error: How far all speeds of the polar may be off together, as the deviation of the logarithm [0..1].
+        told_speed_error: The same as her file tells it, 0 where it tells nothing and ``speed_error`` is assumed.
         shape_error: How far each speed may be off beside that, as deviations of the logarithm; None: nobody says.
         leeway_rad: Where the apparent wind is 30 degrees off its bow and three times as fast as it: on a beat in a
             moderate wind. In more wind it grows until the boat goes no faster (``Polar.full_tws_mps``).
@@ -82,6 +83,7 @@ class Boat:
     min_tws_mps: float | None = None
     tack_fails: float = 0.0
     speed_error: float = 0.0
+    told_speed_error: float = 0.0
     no_go_error_rad: float = 0.0
     shape_error: Polar | None = None
 

@@ -176,11 +176,13 @@ class CurrentEstimator:
     Args:
         speed: the boat's polar.
         prior: what the mission expects.
+        speed_error: how far all speeds of the polar may be off together, as the deviation of the logarithm: of a guess
+            much, and what is faster or slower by it is the boat's, not the water's or the wind's.
         checked: readings are held against what water can do; without, all are taken.
     """
 
-    def __init__(self, speed: Speed, prior: Prior = STILL, *, checked: bool = True) -> None:
-        self._speed, self._prior = speed, prior
+    def __init__(self, speed: Speed, prior: Prior = STILL, *, speed_error: float = 0.0, checked: bool = True) -> None:
+        self._speed, self._prior, self._speed_error = speed, prior, speed_error
         self._check = MotionCheck() if checked else None
         self._trial: CurrentEstimator | None = None  # of the water that is there since the doubt began
         self._believed: deque[tuple[float, tuple[float, float]]] = deque()  # the current, when
@@ -244,7 +246,8 @@ class CurrentEstimator:
         heading_rad, made = cmath.phase(means[0]), means[1]
         sin, cos = math.sin(heading_rad), math.cos(heading_rad)
         along, across = _through_water((made.real, made.imag), current, heading_rad)
-        sigma = math.sqrt(max(0.0, float(np.array([sin, cos]) @ self._p[:2, :2] @ np.array([sin, cos]))))
+        unknown = max(0.0, float(np.array([sin, cos]) @ self._p[:2, :2] @ np.array([sin, cos])))
+        unknown += speed**2 * max(0.0, float(self._p[2, 2]) - SCALE_SD**2)  # of a guessed polar
         was = check.doubt
         mean = MotionSample(
             along_mps=along,
@@ -254,7 +257,7 @@ class CurrentEstimator:
             twd_from_rad=now.twd_from_rad,
             tws_mps=now.tws_mps,
             heading_rad=heading_rad,
-            sigma_mps=sigma,
+            sigma_mps=math.sqrt(unknown),
             roll_rad=now.roll_rad,
         )
         along, across = _through_water(now.velocity_en_mps, current, now.heading_rad)
@@ -264,7 +267,7 @@ class CurrentEstimator:
             return check.is_odd
         if not check.is_winds:
             if not was or self._trial is None:
-                self._trial = CurrentEstimator(self._speed, self._prior, checked=False)
+                self._trial = CurrentEstimator(self._speed, self._prior, speed_error=self._speed_error, checked=False)
             self._trial.update(t_s, utc_s, now)
             if self._trial.tells_of_new_water:
                 self._become(self._trial)
@@ -310,12 +313,12 @@ class CurrentEstimator:
     def _predict(self, t_s: float, utc_s: float | None) -> None:
         expected = self._prior.at(utc_s)
         if self._t_s is None or self._expected is None:
-            self._p = np.diag(_limit(expected))
+            self._p = np.diag(self._limit(expected))
         else:
             dt_s = max(0.0, t_s - self._t_s)
             keep = np.exp(-dt_s / np.array([TAU_S, TAU_S, SLOW_S, SLOW_S, SLOW_S, SLOW_S]))
             was = self._expected
-            limit = _limit(expected)
+            limit = self._limit(expected)
             self._x *= keep
             self._p = self._p * np.outer(keep, keep) + np.diag(limit * (1.0 - keep**2))
             if expected.sigma_mps > was.sigma_mps:  # a table that ends: what is doubted more is at once
@@ -423,17 +426,17 @@ class CurrentEstimator:
         """How fast the boat is against its polar, as a share: 1 as it says."""
         return 1.0 + float(self._x[2])
 
+    def _limit(self, expected: ExpectedCurrent) -> Matrix:
+        """Return the variances of what is not known before anything is told."""
+        scale_sd = max(SCALE_SD, self._speed_error)
+        return np.array([expected.sigma_mps**2] * 2 + [scale_sd**2] + [ANGLE_SD_RAD**2] * 2 + [VANE_SD_RAD**2])
+
     def _headings_rad(self) -> float:
         """Return how far apart the headings sailed within the current's memory are [rad, 0..π]."""
         if self._t_s is None:
             return 0.0
         recent = [math.radians(20.0) * n for n, t_s in self._seen.items() if self._t_s - t_s < TAU_S]
         return max((abs(difference_rad(a, b)) for a in recent for b in recent), default=0.0)
-
-
-def _limit(expected: ExpectedCurrent) -> Matrix:
-    """Return the variances of what is not known before anything is told."""
-    return np.array([expected.sigma_mps**2] * 2 + [SCALE_SD**2] + [ANGLE_SD_RAD**2] * 2 + [VANE_SD_RAD**2])
 
 
 def plain(current: WaterCurrent) -> dict[str, float | str | bool]:

@@ -124,6 +124,19 @@ def test_turns_stops_and_sails_that_are_eased_teach_nothing():
     assert estimator.view().samples_s == 0.0, "a boat that stands is not carried by its own speed backwards"
 
 
+def test_what_a_guessed_polar_is_off_by_is_the_boats():
+    """Twice as fast as the guess of a file: a current of 1.2 m/s was told, and then the wind doubted, for ever."""
+    told = {}
+    for error in (0.0, 0.35):
+        told[error] = estimator = CurrentEstimator(lambda *wind: POLAR.speed_mps(*wind) / 2.1, speed_error=error)
+        for t in range(400):
+            estimator.update(float(t), None, reading(float(t), (60.0, 100.0, -60.0, -100.0)[t // 100], (0.0, 0.0)))
+    assert told[0.0].motion_doubt
+    assert not told[0.35].motion_doubt
+    assert told[0.35].scale == pytest.approx(2.1, abs=0.15)
+    assert told[0.35].view().drift_mps < 0.15
+
+
 def test_a_stream_that_grows_until_it_holds_her_is_followed():
     """Over the ground she stood, and was taken to be aground: 0.53 m/s were believed of 0.75."""
     slow = POLAR.speed_mps(math.pi / 2.0, TWS)

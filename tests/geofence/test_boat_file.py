@@ -31,7 +31,7 @@ def test_a_mission_takes_from_the_file_what_it_does_not_say_itself(tmp_path):
     assert (boat.hull.length_m, boat.hull.beam_m, boat.tack_fails) == (1.5, 0.45, 0.05)
     assert boat.tack_loss_s == 4.0
     assert math.degrees(boat.turn_rate_radps) == pytest.approx(24.5)
-    assert boat.speed_error == 0.35
+    assert boat.speed_error == boat.told_speed_error == 0.35
     assert boat.polar.speed_mps(math.radians(90.0), 4.0) == pytest.approx(
         guessed(SIZES).polar.speed_mps(math.radians(90.0), 4.0), abs=0.01
     )

@@ -50,7 +50,8 @@ def test_what_is_believed_before_fades_with_what_is_seen():
 def test_a_boat_of_which_nobody_says_how_far_off_its_speeds_are_is_taken_to_be_as_others_are(tmp_path, said, error):
     path = tmp_path / "m.toml"
     path.write_text(f"[[goal]]\nlat = 50.83\nlon = -1.3\n[boat]\npolar = 2.0\n{said}\n", encoding="utf-8")
-    assert boat_of(load_mission(path)).speed_error == error
+    boat = boat_of(load_mission(path))
+    assert (boat.speed_error, boat.told_speed_error) == (error, 0.0)  # assumed, not told
 
 
 def test_a_slow_boat_s_later_plans_arrive_later_than_their_own_time(tmp_path):
