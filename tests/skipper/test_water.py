@@ -11,6 +11,7 @@ from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift, is_place, is_velocity
 from companion.messages import GeoPoint
 from companion.orders import Verb
+from companion.planner import Problem
 from companion.skipper import Skipper, SkipperConfig
 from companion.skipper.step.saved import Persisted, Standing
 from companion.skipper.step.state import Adrift, Fix, PendingPlan, SkipperState, in_water
@@ -52,7 +53,7 @@ def reached(*roots):
     seen, todo = set(), list(roots)
     while todo:
         cls = todo.pop()
-        if cls in seen:
+        if cls in seen or cls is Problem:  # that of a plan which is cancelled where the water changes
             continue
         seen.add(cls)
         for hint in typing.get_type_hints(cls).values():

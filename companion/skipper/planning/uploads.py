@@ -210,7 +210,7 @@ def judged(ctx: StepContext, route: Route, set_current: int | None, pending: Pen
     boat, vehicle = ctx.boat_en, ctx.snapshot.vehicle
     if boat is None or vehicle is None or not ctx.state.voyage.sailing:
         return Judgement()
-    problem: Problem = pending.problem
+    problem = pending.problem
     here_m = float(water_to_keep(ctx.voyage.area, boat).clearance_m([boat])[0]) - ctx.voyage.boat.hull.reach_m
     # Below the floor, and where it has to be gybed round, a way of short legs is better than none.
     has_loops = not tacks_fail(ctx) and (problem.tracking is None or here_m >= problem.tracking.floor_m)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import Any
 
 from companion.messages import MissionItem, Mode, Severity
 from companion.orders import Result
+from companion.planner import Problem
 from companion.planners import AUTO, PlannerChoice
 
 
@@ -42,14 +42,14 @@ class ReplanReason(enum.Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RequestPlan:
-    """Plan ``problem`` (a companion.planner.Problem) within ``budget_s``; answered by PlanOutcome.
+    """Plan ``problem`` within ``budget_s``; answered by PlanOutcome.
 
     ``from_seq`` is the mission item that the plan starts at: its result replaces the items after it; None when
     the plan starts at the boat and replaces the present target too. ``rung`` names the step of the ladder.
     """
 
     request_id: int
-    problem: Any
+    problem: Problem
     reason: ReplanReason
     budget_s: float
     seed: int

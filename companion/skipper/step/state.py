@@ -5,7 +5,6 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from companion.boat import Afloat
 from companion.field.guidance import LastResort
@@ -15,6 +14,7 @@ from companion.frozen import changed
 from companion.geo.shift import Shift, carried
 from companion.messages import MissionItem, Mode
 from companion.orders import Answer, Order, Verb
+from companion.planner import Problem
 from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.latency import NO_ANSWERS, PlannerLatency
 from companion.skipper.step.route import Route
@@ -113,7 +113,7 @@ class PendingPlan:
     lead_in: tuple[PointEn, ...]  # waypoints before the plan's start (a repaired start)
     start_en_m: PointEn
     facts: Route  # figures of the plan to be, without items
-    problem: Any
+    problem: Problem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
