@@ -487,7 +487,7 @@ def _check_weather(asked: PassageFile, weather: Weather, source: str, depart: fl
         raise InputError(source, "[limits] lee_shore_m", "there is no shore", "name one in [area] obstacles")
     why = weather.why_unknown(depart, asked.start.lat, asked.start.lon)
     if why:
-        said = f"{iso(depart)} is {why}" if why[:5] in {"after", "befor"} else f"the wind there is {why}"
+        said = f"the wind at [start] is not known at {iso(depart)}: {why}"
         raise InputError(source, "[depart] at", said, "say another time, or give a forecast of it")
 
 

@@ -182,7 +182,8 @@ def test_an_option_that_goes_with_another(shell, words, said):
     [
         (
             ("at = 2026-04-20T06", "at = 2026-04-19T06"),
-            "p.toml: [depart] at: 2026-04-19T06:00Z is before the forecast's begin, 2026-04-20T00:00Z; " + ANOTHER,
+            "p.toml: [depart] at: the wind at [start] is not known at 2026-04-19T06:00Z: before the forecast's begin, "
+            "2026-04-20T00:00Z; " + ANOTHER,
         ),
         (
             ("at = 2026-04-20T06:00:00Z", "at = 2026-04-20T06:00:00"),
