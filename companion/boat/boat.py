@@ -309,7 +309,7 @@ def leeway_at(
 
     >>> k, beat = coefficient_of(math.radians(5.0)), math.radians(45.0)
     >>> [round(math.degrees(leeway_at(k, beat, w, 1.1, 3.0)), 1) for w in (2.0, 3.0, 8.0)]
-    [3.7, 6.8, 6.8]
+    [3.8, 7.3, 7.3]
     """
     tws = np.minimum(tws_mps, full_tws_mps)
     across, ahead = tws * np.sin(twa_rad), tws * np.cos(twa_rad) + speed_mps

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.boat import constant
-from companion.boat.boat import coefficient_of, leeway_rad
+from companion.boat import Sizes, constant
+from companion.boat.boat import coefficient_of, leeway_at, leeway_rad
+from companion.boat.guess import guessed_polar
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.kernel import side_mps, speed_share
 from sitl.autopilot.boat.parameters import Parameters
@@ -83,6 +84,20 @@ def test_she_makes_leeway_away_from_the_wind(heading):
     assert math.copysign(1.0, slip) == math.copysign(1.0, heading)
     assert 2.0 < abs(slip) < 9.0
     assert track_deg(sailed(AS_PLANNED, heading)) == pytest.approx(heading, abs=0.1)
+
+
+@pytest.mark.parametrize("heading", [55, -80])
+def test_in_more_wind_than_her_polar_grows_with_she_makes_no_more_leeway(heading):
+    """Five degrees of a guessed boat were 32 in 8 m/s, beside a plan that now says 7."""
+    polar = guessed_polar(Sizes(length_m=1.5, displacement_kg=20.0, sail_area_m2=0.9))
+    k_beat = coefficient_of(math.radians(5.0))
+    state = sailed(Departures(leeway_rad=math.radians(5.0)), heading, polar=polar)
+    slip = abs(track_deg(state) - heading)
+    twa = math.radians(abs(heading))
+    assert polar.full_tws_mps < 4.0 < 5.0  # the wind here
+    expected = leeway_at(k_beat, twa, 5.0, state[k.S_V], polar.full_tws_mps)
+    assert slip == pytest.approx(math.degrees(expected), abs=1.0)
+    assert slip < math.degrees(leeway_at(k_beat, twa, 5.0, state[k.S_V])) - 3.0
 
 
 @given(beat=st.floats(0.01, 0.3), aws=st.floats(0.5, 20.0), awa=st.floats(0.45, 3.1), v=st.floats(0.0, 5.0))
