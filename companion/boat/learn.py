@@ -55,6 +55,7 @@ WIND_STEPS_MPS, WIND_GAIN, WIND_LEFT, WIND_OF_DAY = np.arange(0.0, 1.01, 0.05), 
 STEEPEST = 1.5  # of the speed with the wind, both as logarithms
 ROUNDS, CLOSE = 24, 1e-4
 EASED = (8.0, 8.0, 4.0, 4.0, 2.0, 2.0)  # times the noise, in the first rounds
+LEAST_OF_OUTING, LEAST_ALIKE = 5, 0.67  # stretches; of the fastest outing's speed: less is no boat's day
 LEAST_AHEAD = 0.3  # of the speed: more leeway than that is no leeway
 STEP = 1e-4  # of numerical derivatives: radians, m/s
 OWN = 4  # unknowns of the boat beside the field
@@ -395,6 +396,28 @@ def _scatter(r: Floats, slow: Floats, least: float, now: float) -> float:
     return float(np.clip(0.5 * (seen + now), 0.4 * least, 5.0 * least))
 
 
+def _of_two_boats(solver: _Solver, x: _State) -> tuple[str, ...]:
+    """Return a question where two outings differ by more than a boat's days do, on one course in one wind."""
+    off = x.day[solver.s.outing] + solver.residuals(x, x.nuisance, x.stream[solver.block])[:, 0]
+    found = {
+        name: float(np.median(off[on]))
+        for number, name in enumerate(solver.s.outing_names)
+        if int(np.sum(on := solver.s.outing == number)) >= LEAST_OF_OUTING
+    }
+    if len(found) < 2:
+        return ()
+    slow, fast = min(found, key=found.__getitem__), max(found, key=found.__getitem__)
+    share = math.exp(found[slow] - found[fast])
+    if share > LEAST_ALIKE:
+        return ()
+    return (
+        (
+            f"in {slow} she made {100.0 * share:.0f} % of her speed in {fast}, as courses and winds compare: is it one "
+            "boat? If not, all that was learned is of neither: learn from the logs of one"
+        ),
+    )
+
+
 def _told(
     solver: _Solver,
     x: _State,
@@ -464,4 +487,5 @@ def _told(
         wind_mps=WIND_LEFT * solver.wind_mps,
         stretches=len(solver.s),
         twa_rad=twa,
+        findings=_of_two_boats(solver, x),
     )

@@ -190,7 +190,7 @@ def _with_findings(lesson: Lesson) -> Lesson:
 
 
 def _findings(lesson: Lesson) -> list[str]:
-    boat, out = lesson.boat, list[str]()
+    boat, out = lesson.boat, list(lesson.boat.findings)
     vane, compass, leeway = boat.vane, boat.compass, boat.leeway
     vane_sd, compass_sd, leeway_sd = (f"{math.degrees(k.sd):.1f}" for k in (vane, compass, leeway))
     if abs(vane.mean) > max(CERTAIN * vane.sd, TELLING):

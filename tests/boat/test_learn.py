@@ -323,6 +323,18 @@ def test_a_gap_parts_outings_and_short_ones_only_stretches():
     assert stretches_of([replace(log, t_s=gap)], PRIOR, ERROR).outing_names == ("sailed",)
 
 
+@pytest.mark.parametrize(("scale", "is_asked"), [(0.7, False), (1.3, True)])
+def test_logs_of_a_boat_that_is_half_as_fast_are_asked_about(scale, is_asked):
+    """Voyages of the simulator's boat beside her own: "the vane points 5 degrees too far to port: turn it back"."""
+    logs = [
+        replace(sailed(truth, hours=0.15, seed=seed, name=name), t_s=1e5 * seed + np.arange(540.0))
+        for seed, (name, truth) in enumerate({"hers": SLOW, "another": replace(SLOW, scale=scale)}.items(), start=1)
+    ]
+    findings = lesson_of(logs, PRIOR, ERROR, no_go_half_rad=math.radians(45.0)).findings
+    assert ["in hers she made" in finding for finding in findings[:1]] == [is_asked]
+    assert sum("is it one boat?" in finding for finding in findings) == is_asked
+
+
 def test_too_little_is_not_learned_from():
     with pytest.raises(ValueError, match="stretches of steady sailing"):
         learned(SLOW, 0.02, 0)
