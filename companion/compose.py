@@ -118,8 +118,6 @@ def polar_of(mission: Mission) -> Polar:
 def polar_named(boat: BoatOptions, source: Path) -> Polar:
     """Return the polar that ``[boat]`` of a file names. Raises InputError."""
     path = polar_path(boat, source)
-    if path is not None and path.suffix == ".toml":
-        return polar_of_file(read_boat_file(path), str(path))
     if path is not None:
         return whole_polar(path)
     polar = boat.polar
@@ -137,7 +135,9 @@ def polar_named(boat: BoatOptions, source: Path) -> Polar:
 
 
 def whole_polar(path: str | Path) -> Polar:
-    """Return the polar of a file in which nothing had to be guessed. Raises InputError."""
+    """Return the polar of a boat file, or of a polar file in which nothing had to be guessed. Raises InputError."""
+    if Path(path).suffix == ".toml":
+        return polar_of_file(read_boat_file(Path(path)), str(path))
     file = read_polar(path)
     if file.warnings:
         raise InputError(str(path), "", file.warnings[0], "fill it in: a guessed polar is not sailed")

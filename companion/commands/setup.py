@@ -142,6 +142,8 @@ def run(args: argparse.Namespace) -> int:
         print(f"{path}: written")
     if args.polar is None and args.boat is None:
         print("her speeds are those of the simulator's boat; --boat 1.5,20,0.9 guesses them of her sizes")
+    if args.boat is not None:
+        print(f"at the bench, a simulated boat as fast as she is guessed to be: sitl boat --polar {written[-1]}")
     code = 0 if args.no_doctor else _examine(written[0], link, system)
     print(
         f"[operator] of {written[0]} permits nothing yet. To look, plan and change nothing: "

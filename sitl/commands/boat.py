@@ -75,7 +75,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
         help="set a parameter; it has been set up as 'companion doctor' asks: "
         + ", ".join(f"{name}={value:g}" for name, value in SET_UP.items()),
     )
-    parser.add_argument("--polar", type=Path, metavar="FILE", help="a boat that sails by this polar")
+    parser.add_argument("--polar", type=Path, metavar="FILE", help="a boat that sails by this polar, or boat file")
     parser.add_argument(
         "--for", dest="for_s", type=number("s", above=0.0), metavar="S", help="end after S simulated seconds"
     )

@@ -8,7 +8,7 @@ import pytest
 
 from companion.boat import Boat, Sizes, guessed, read_polar
 from companion.cli import main
-from companion.compose import polar_of_file
+from companion.compose import polar_of_file, whole_polar
 from companion.geofence.mission import read_boat_file
 from lab.simulated_logs import Truth, sailed
 
@@ -140,3 +140,9 @@ def test_a_polar_with_a_gap_is_refused_here_too(tmp_path, capsys):
     (tmp_path / "x.pol").write_text("TWA\\TWS;6;10;12\n45;3.0;4.0;4.2\n90;2.8;0;3.9\n150;3.5;4.5;4.6\n")
     assert main(["boat", "show", str(tmp_path / "x.pol")]) == 2
     assert "x.pol: line 3, column 3: a bare 0 is taken as not known" in capsys.readouterr().err
+
+
+def test_the_simulated_boat_takes_a_boat_file(tmp_path):
+    file = tmp_path / "pepper.toml"
+    assert main(["boat", "guess", *SIZES, "--out", str(file)]) == 0
+    assert whole_polar(file) == polar_of_file(read_boat_file(file), str(file))
