@@ -172,8 +172,8 @@ def compare(before: Table, after: Table) -> Comparison:
         )
     first, second = _by_job(before), _by_job(after)
     both = [job for job in first if job in second]
-    if not both and len(_scenarios(before)) == len(_scenarios(after)) == 1:  # two settings of one thing
-        first, second = _by_job(before, "scenario"), _by_job(after, "scenario")
+    if not both:  # two settings of one thing: scenario, guidance, planner are one in each file
+        first, second = (_by_job(table, *_settings(table)) for table in (before, after))
         both = [job for job in first if job in second]
     if not both:
         raise InputError("results", "", "no job is in both files", "compare files with the same scenarios and seeds")
@@ -206,8 +206,9 @@ def compare(before: Table, after: Table) -> Comparison:
     )
 
 
-def _scenarios(table: Table) -> set[Any]:
-    return {row.get("scenario") for row in table.rows}
+def _settings(table: Table) -> list[str]:
+    """Return the keys that have one value in all of a table."""
+    return [name for name in table.keys if name != "seed" and len({row.get(name) for row in table.rows}) == 1]
 
 
 def _by_job(table: Table, *unpaired: str) -> dict[tuple[Any, ...], Row]:

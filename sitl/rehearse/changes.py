@@ -113,6 +113,7 @@ def usual(mission: Mission, *, tells_the_hour: bool) -> list[MissionChange]:
 
 Record = Mapping[str, Any]
 TOLD = ("arrived", "touched", "below floor", "time", "clearance")
+FEWEST = 6  # pairs: of fewer not even all of one sign are more than luck, at 95 %
 
 
 def scaled(change: Difference) -> tuple[float, float, float]:
@@ -126,13 +127,14 @@ def difference_text(change: Difference) -> str:
     """Return a difference with its interval."""
     low, middle, high = scaled(change)
     unit = "%" if change.measure.kind in {"ratio", "share"} else change.measure.unit
-    return f"{middle:+.1f} {unit} ({low:+.1f} to {high:+.1f})"
+    interval = "too few for an interval" if change.pairs < FEWEST else f"{low:+.1f} to {high:+.1f}"
+    return f"{middle:+.1f} {unit} ({interval})"
 
 
 def is_sure(change: Difference) -> bool:
     """Whether the interval leaves no doubt which way it goes."""
     low, _, high = scaled(change)
-    return low > 0.0 or high < 0.0
+    return change.pairs >= FEWEST and (low > 0.0 or high < 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

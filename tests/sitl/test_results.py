@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from companion.errors import InputError, JobError
 from sitl import cli
 from sitl.options import CampaignOptions
+from sitl.rehearse.changes import difference_text, is_sure
 from sitl.results import LEVEL, compare, comparison_text, table_text
 from sitl.runner import ResultStore, Table, made_by, read_results, read_table, write_table
 from tests.sitl.runner.jobs import jobs_in, quick
@@ -59,6 +60,25 @@ def test_two_files_of_a_scenario_each_are_two_settings_and_paired_by_seed():
     assert change_of(found, "time").change == pytest.approx(1.1)
     with pytest.raises(InputError, match="no job is in both"):
         compare(table(noisy(range(8), 1)), table([row(1, scenario="a"), row(2, scenario="b")]))
+
+
+def test_one_guidance_in_each_file_is_two_settings_too():
+    """As the guide has it; it was "no job is in both files"."""
+    keys = ("scenario", "hash", "seed", "guidance")
+    one, other = (
+        replace(table(noisy(range(8), 1, share, guidance=guidance)), keys=keys)
+        for guidance, share in (("waypoints", 1.0), ("heading", 1.1))
+    )
+    assert len(compare(one, other).pairs) == len(compare(table(one.rows), other).pairs) == 8
+
+
+@pytest.mark.parametrize(("pairs", "is_told"), [(1, False), (5, False), (6, True)])
+def test_of_a_few_pairs_no_interval_is_told_and_nothing_is_sure(pairs, is_told):
+    """ "clearance +2.7 m (+2.7 to +2.7)" of one pair read as certain."""
+    found = compare(table(noisy(range(pairs), 1)), table(noisy(range(pairs), 1, 1.1)))
+    change = change_of(found, "time")
+    assert difference_text(change).endswith("too few for an interval)") is not is_told
+    assert is_sure(change) is is_told
 
 
 def test_a_ratio_is_of_pairs_and_its_interval_holds_it():
