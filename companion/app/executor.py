@@ -132,7 +132,6 @@ class Executor:
         self._cut_short = ""  # why it was ended
         self._plan: RequestPlan | None = None
         self._plan_wanted = asyncio.Event()
-        self.refused = 0
 
     def submit(self, actions: Sequence[Action]) -> None:
         """Take the actions of one step; never waits."""
@@ -160,7 +159,6 @@ class Executor:
         if isinstance(action, UploadMission):
             self._give_up(ReadMission, "an upload has overtaken it")  # what a read would tell is void by it
         if len(self._orders) >= MAX_WAITING:
-            self.refused += 1
             self._on_outcome(_gave_up(action, f"{MAX_WAITING} orders are waiting"))
             return
         self._orders.append((now_s() + self._patience_s(action), action))

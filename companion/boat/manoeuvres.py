@@ -53,8 +53,6 @@ class Chances:
     failed: int
     loss_s: float | None
     loss_spread: float
-    loss_error: float
-    """Deviation of the logarithm of ``loss_s``, which is a median of few."""
     fails: float
     fails_most: float
     """Not more often than this with 90 % probability."""
@@ -233,7 +231,6 @@ def chances(done: list[Manoeuvre]) -> Chances:
         failed=failed,
         loss_s=float(np.median(losses)) if told else None,
         loss_spread=spread,
-        loss_error=1.25 * spread / math.sqrt(told) if told else math.inf,
         fails=a / (a + b),
         fails_most=_beta_quantile(a, b, 0.9),
     )

@@ -78,7 +78,6 @@ class SteeringBand:
         ff: Rudder for a rate of turn [1 / (rad/s)], and by how many seconds of turning it is known.
         turning_s: As said.
         lag_s: Of the rate behind the wanted one.
-        rate_error_radps: Root mean square.
         reversals_per_min: Of the rudder, on a course.
         swing_hz: Where bow and rudder swing together; None: nowhere.
         swing_rad: By how much the bow then does, as an amplitude.
@@ -92,7 +91,6 @@ class SteeringBand:
     ff: float | None
     turning_s: float
     lag_s: float | None
-    rate_error_radps: float | None
     reversals_per_min: float | None
     swing_hz: float | None
     swing_rad: float
@@ -169,14 +167,11 @@ def _band(parts: list[tuple[SteeringLog, NDArray[np.bool_]]], low: float, high: 
 
     rudder = joined([g.rudder[on] for g, on in parts])
     rate = joined([g.rate_radps[on] for g, on in parts])
-    wanted = joined([g.wanted_rate_radps[on] for g, on in parts])
     turning = (np.abs(rudder) > MOVED) & (np.abs(rate) > TURNS_RADPS) & (rudder * rate > 0.0)
     turning_s = STEP_S * int(np.sum(turning))
     ff = None
     if turning_s >= LEAST_TURNING_S:
         ff = FF_SHARE * float(np.sum(np.abs(rudder[turning])) / np.sum(np.abs(rate[turning])))
-    off = rate - wanted
-    off = off[np.isfinite(off)]
     steady = [(g, on & _steady(g)) for g, on in parts]
     # One that swings so far that she is on no course is known by all of it.
     swing = _swing(steady if any(bool(np.any(still)) for _, still in steady) else parts)
@@ -187,7 +182,6 @@ def _band(parts: list[tuple[SteeringLog, NDArray[np.bool_]]], low: float, high: 
         ff=ff,
         turning_s=turning_s,
         lag_s=_lag_s(parts),
-        rate_error_radps=float(np.sqrt(np.mean(off * off))) if off.shape[0] else None,
         reversals_per_min=_reversals(steady),
         swing_hz=None if swing is None else swing[0],
         swing_rad=0.0 if swing is None else swing[1],

@@ -375,7 +375,7 @@ class EditorApi:
         self._keep(base)
 
     def admit(self, request: h11.Request, path: str) -> int:
-        """Let in who may ask for it; return how many bytes are read. Raises Refused."""
+        """Let in who may ask for it; return how many bytes are read. Raises HttpRefusal."""
         if request.method != b"POST":
             if path.startswith("/water/"):
                 require_token(request, self._token)
@@ -386,7 +386,7 @@ class EditorApi:
         return MOST_OPENED if path == "/api/open" else MOST_BODY
 
     async def reply(self, request: h11.Request, path: str, body: bytes) -> HttpReply | Stream:
-        """Answer a request. Raises Refused."""
+        """Answer a request. Raises HttpRefusal."""
         if request.method != b"POST":
             file, tile = self._files.get(path), await tile_at(self._charts, path)
             if tile is not None:

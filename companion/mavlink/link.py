@@ -1,9 +1,9 @@
 """The link: one transport, one autopilot, our identity on it.
 
-``async with Link(transport) as link`` listens who is there, takes the autopilot that is ours (see ``census``), speaks
+``async with Link(transport) as link`` listens who is there, takes the autopilot that is ours (see ``Census``), speaks
 as component 191 of the same system (an onboard computer, never a ground station), asks for its messages one by one and
-again after a reboot or a gap, hands every message of that autopilot that is believed (see ``witness``) to its
-subscribers and every frame of both directions to the tlog sink.
+again after a reboot or a gap, hands every message of that autopilot that is believed (see ``PlausibilityFilter``) to
+its subscribers and every frame of both directions to the tlog sink.
 
 The heartbeat is sent from the same task that watches the link, so a companion that hangs falls silent. Whatever a
 subscriber raises ends with that subscriber: it is counted, said once, and the others hear the message all the same.
@@ -38,8 +38,6 @@ from companion.mavlink.vehicle_identity import GAP_S, LISTEN_S, OtherCompanion, 
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.frames import Codec, Drop, Message
 from companion.mavlink.wire.streams import DEFAULT_STREAMS, Stream, StreamMonitor
-
-# The rates of an autopilot's messages: asked for one by one, and again when they were forgotten.
 
 # Streams below their rate are asked for again this often, at most [s].
 REASK_S = 30.0

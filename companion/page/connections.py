@@ -141,9 +141,9 @@ MARK = b"x-companion"  # no form and no picture can send it
 class HttpRefusal(Exception):  # noqa: N818
     """An answer other than 200."""
 
-    def __init__(self, status: int, text: str, *, closes: bool = False) -> None:
+    def __init__(self, status: int, text: str) -> None:
         super().__init__(text)
-        self.status, self.text, self.closes = status, text, closes
+        self.status, self.text = status, text
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,10 +183,10 @@ class App(Protocol):
     """What is served: from a request that was let in comes a reply, or a stream of events."""
 
     def admit(self, request: h11.Request, path: str) -> int:
-        """Return how many bytes of body are read of a request, before any is. Raises Refused: it may not be asked."""
+        """Return how many bytes of a request's body are read, before any is. Raises HttpRefusal: it may not ask."""
 
     async def reply(self, request: h11.Request, path: str, body: bytes) -> HttpReply | Stream:
-        """Answer what was let in. Raises Refused."""
+        """Answer what was let in. Raises HttpRefusal."""
 
 
 class Guests:
@@ -307,23 +307,23 @@ class HttpServer:
         """Return how many bytes of body are read of a request.
 
         Raises:
-            Refused: it does not come from our own page, nor from who typed its address, or may not be asked.
+            HttpRefusal: it does not come from our own page, nor from who typed its address, or may not be asked.
         """
         hosts = [v.decode("latin-1") for k, v in request.headers if k == b"host"]
         if len(hosts) != 1 or not is_known(hosts[0], self.address):
-            raise HttpRefusal(421, "this is not the host that was asked for; name it with --http-name", closes=True)
+            raise HttpRefusal(421, "this is not the host that was asked for; name it with --http-name")
         origin = header(request, b"origin")
         if origin and not is_own(origin, hosts[0]):
-            raise HttpRefusal(403, "asked for by a page from elsewhere", closes=True)
+            raise HttpRefusal(403, "asked for by a page from elsewhere")
         if request.method not in {b"GET", b"HEAD", b"POST"}:
-            raise HttpRefusal(405, "there is GET, and POST for orders", closes=True)
+            raise HttpRefusal(405, "there is GET, and POST for orders")
         if request.method == b"POST" and not origin:
-            raise HttpRefusal(403, "an order names the page that it comes from (Origin)", closes=True)
+            raise HttpRefusal(403, "an order names the page that it comes from (Origin)")
         if header(request, b"transfer-encoding"):  # of chunks of a byte each a body costs minutes of the loop
-            raise HttpRefusal(411, "what is posted says how long it is (Content-Length)", closes=True)
+            raise HttpRefusal(411, "what is posted says how long it is (Content-Length)")
         most = self.app.admit(request, path_of(request))
         if int(header(request, b"content-length") or 0) > most:  # h11 has seen that it is a number
-            raise HttpRefusal(413, f"at most {most} bytes are taken", closes=True)
+            raise HttpRefusal(413, f"at most {most} bytes are taken")
         return most
 
 

@@ -147,7 +147,7 @@ class Page:
         self._ordering = asyncio.Lock()
 
     def admit(self, request: h11.Request, path: str) -> int:
-        """Let in who may ask for it; return how many bytes are read. Raises Refused."""
+        """Let in who may ask for it; return how many bytes are read. Raises HttpRefusal."""
         if request.method != b"POST":
             return 0
         if path not in {"/api/order", "/api/preview", "/api/token"}:
@@ -158,7 +158,7 @@ class Page:
         return MOST_BODY
 
     async def reply(self, request: h11.Request, path: str, body: bytes) -> HttpReply | Stream:
-        """Answer a request. Raises Refused."""
+        """Answer a request. Raises HttpRefusal."""
         if path == "/api/token" and request.method == b"POST":
             return HttpReply(data=b'{"error":null}')  # who got here has it
         if request.method == b"POST":

@@ -144,7 +144,6 @@ class Terminal:
         self._shown: Frame | None = None
         self._waiting = b""
         self._keys = codecs.getincrementaldecoder("utf-8")("replace")
-        self.bytes_out = 0
         self.is_gone = False  # hung up: nobody looks any more
 
     def __enter__(self) -> Self:
@@ -214,7 +213,6 @@ class Terminal:
         self._on_key("\x03")
 
     def _write(self, data: bytes) -> None:
-        self.bytes_out += len(data)
         self._waiting += data
         self._flush()
 

@@ -46,7 +46,6 @@ class Wrsc2013Course:
     entry_s: float
     heading_rad: float
     speed_mps: float
-    through_en: tuple[float, float]  # a point of its track inside the square
     entry_en: tuple[float, float]
 
     def at(self, t_s: float | NDArray[np.float64]) -> tuple[Any, Any]:
@@ -80,7 +79,6 @@ def draw(seed: int) -> Wrsc2013Course:
         entry_s=float(rng.uniform(60.0, ENTRY_LIMIT_S)),
         heading_rad=heading,
         speed_mps=speed,
-        through_en=(x, y),
         entry_en=(x - back * s, y - back * c),
     )
 

@@ -123,10 +123,6 @@ class Estimates:
     times: tuple[Quantile, ...]
     watchdogs: Mapping[str, Share]
 
-    def is_sure(self, width: float) -> bool:
-        """Whether no interval of arriving and of the floor is wider."""
-        return max(self.arrives.width, self.low.width) <= width
-
     def line(self) -> str:
         """Return it for a line on a terminal."""
         middle = next(time for time in self.times if time.of_all == 0.5)

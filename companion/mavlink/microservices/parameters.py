@@ -62,7 +62,7 @@ class ParamAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParamTable:
-    """All parameters; ``is_complete`` is False when some never came."""
+    """All parameters; by ``outcome`` some may never have come."""
 
     outcome: TransferOutcome
     values: Mapping[str, float]

@@ -2,7 +2,7 @@
 
 The wire speaks degrees x 1e7, centidegrees, cm/s, mm, knots and milliseconds; here they become radians and SI, or
 come from them. Decoders return None where the autopilot says that it does not know, and raise ``ValueError`` when a
-field is not a number or out of range; ``VehicleAssembler`` counts those and never raises.
+field is not a number or out of range; ``VehicleAssembler`` leaves those out and never raises.
 
 Units and signs of ArduRover as recorded from it: WIND.direction is where the true wind comes from [deg, 0..360];
 AppWndDir is positive to starboard [deg, ±180]; xtrack_error is positive when the boat is LEFT of its leg (ours is

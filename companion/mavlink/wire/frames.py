@@ -174,9 +174,7 @@ class Codec:
 
     def __init__(self, system: int, component: int, signing: SigningState | None = None) -> None:
         self.dropped: Counter[Drop] = Counter()
-        self.frames_in = 0
-        self.signed_in = 0  # of them, those with a signature, whether or not it was checked
-        self.frames_out = 0
+        self.signed_in = 0  # frames with a signature, whether or not it was checked
         self._buffer = bytearray()
         self._mav = Dialect(None, srcSystem=system, srcComponent=component)
         self._signing = signing
@@ -208,7 +206,6 @@ class Codec:
             self.set_signing_time(0)
         frame = self._mav.packed(message)
         self._mav.seq = (self._mav.seq + 1) % 256
-        self.frames_out += 1
         if self._signing is not None:
             self._signing.timestamp = min(self._mav.signing.timestamp, MOST_TIMESTAMP)
         return frame
@@ -245,7 +242,6 @@ class Codec:
                 continue
             at += size
             if message is not False:
-                self.frames_in += 1
                 self.signed_in += message.get_msgbuf()[2] & _SIGNED
                 messages.append(message)
         del buffer[:at]

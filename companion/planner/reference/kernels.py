@@ -1,6 +1,6 @@
 """Kernels of the reference algorithms: speed, no-go zone, collision, turns and steering (Algorithm 1).
 
-The wind, boat and world come as ``rrtstar_world.World`` (unpacked by its fields' order in ``number``).
+The wind, boat and world come as ``world.ReferenceWorld`` (unpacked by its fields' order in ``number``).
 """
 
 from __future__ import annotations

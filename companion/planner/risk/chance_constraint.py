@@ -44,7 +44,7 @@ from companion.planner.risk.tacks import TackAtRisk, tack_risks, tacks_at_risk
 #
 # Over a whole path a vessel's error is one draw, not one at each instant: a ship that is late is late all the way. The
 # risk is the expected number of entries into its disc of hulls and clearance, first inside or later (Rice's formula,
-# ``vessel_kernels``), which bounds the probability of any. Vessels and wind add up, by the union bound again.
+# ``kernels.entry_rate``), which bounds the probability of any. Vessels and wind add up, by the union bound again.
 
 VESSELS_PROMISE_FACTOR = 1.15
 """What is promised over what is computed: simulated futures scatter, and bends of a predicted track are chords."""
@@ -156,7 +156,7 @@ EXTRA_RESOLUTION = 0.02  # of the bisection [standard deviations]
 
 
 class WindProcess(NamedTuple):
-    """The wind's deviation from its mean, as ``risk_kernels`` describe it [rad, s]."""
+    """The wind's deviation from its mean, as ``kernels`` describe it [rad, s]."""
 
     model: int
     s0: float = 0.0

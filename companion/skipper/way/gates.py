@@ -65,13 +65,12 @@ class Gate:
     """A place to pass: within ``radius_m`` of ``en_m``, coming from ``from_en_m`` (None: wherever the boat is).
 
     ``goal`` is the index into ``Voyage.legs``. ``keep_out`` are WKT polygons for the way here, besides the marks' own
-    discs (``discs_of``). For buoys
-    ``buoy_en_m`` is the buoy and ``side`` where it is left; ``turn_rad`` is how far its rounding turns the boat, and
-    ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the approach's
-    beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With ``line`` it
-    is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place before it. With
-    ``box`` it is where it stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before there
-    are any, of none. With ``field`` it is steered by that, and it is where the mission on board leads meanwhile.
+    discs. For buoys ``buoy_en_m`` is the buoy and ``side`` where it is left; ``turn_rad`` is how far its rounding turns
+    the boat, and ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the
+    approach's beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With
+    ``line`` it is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place before
+    it. With ``box`` it is where it stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before
+    there are any, of none. With ``field`` it is steered by that, and it is where the mission on board leads meanwhile.
     """
 
     en_m: PointEn

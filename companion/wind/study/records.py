@@ -143,7 +143,6 @@ class Ar1Fit:
     sigma_rad: float
     mean_twd_from_rad: float
     correlation_time_s: float
-    log_likelihood: float
     count: int
 
 
@@ -175,7 +174,7 @@ def fit_ar1(record: Record) -> Ar1Fit:
         options={"xatol": 1e-6},
     )
     k = math.exp(float(found.x))
-    best, m, v = parts(k)
+    _, m, v = parts(k)
 
     def paper(p: Array) -> tuple[float, float]:
         """Return (ρ, σ_w) of (17) from (ln k, ln v)."""
@@ -201,7 +200,6 @@ def fit_ar1(record: Record) -> Ar1Fit:
         sigma_rad=math.sqrt(v),
         mean_twd_from_rad=wrap_pi(centre + m),
         correlation_time_s=1.0 / k,
-        log_likelihood=best,
         count=len(record),
     )
 
