@@ -101,6 +101,16 @@ def test_every_file_that_a_page_names_is_there(page):
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 
+CODE = [path.relative_to(ROOT) for path in ROOT.glob("[!.]*/**/*.py")]
+
+
+@pytest.mark.parametrize("page", [str(p.relative_to(ROOT)) for p in PAGES if p.parent.name in {"lab", "reference"}])
+def test_every_module_that_a_page_names_without_its_folder_is_there(page):
+    """The page of `auto` named five files that had other names by then."""
+    named = re.findall(r"`((?:\w+/)*\w+\.py)`", (ROOT / page).read_text())
+    assert [name for name in named if not any(path.match(name) for path in CODE)] == []
+
+
 def invariants():
     """Return the rows of the skipper's table of invariants: (invariant, held in, tests, campaign)."""
     text = (ROOT / "docs" / "reference" / "skipper.md").read_text()
