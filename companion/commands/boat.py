@@ -397,9 +397,10 @@ def _words(name: str, boat: BoatFile | None) -> list[str]:
     if boat is None:
         return [f"{name}: speeds alone; `companion boat guess` writes a file that says more"]
     o, error = boat.boat, 100.0 * speed_error_of(boat.boat)
+    moderate = " where the apparent wind is three times her speed" if o.leeway_deg > 0.0 else ""
     tacks = (
         f"turns {o.turn_rate_deg_s:g} degrees/s; a tack costs {o.tack_loss_s:g} s and fails in "
-        f"{100.0 * o.tack_fails:g} %; leeway {o.leeway_deg:g} degrees, apparent wind three times her speed"
+        f"{100.0 * o.tack_fails:g} %; leeway {o.leeway_deg:g} degrees{moderate}"
     )
     return [
         f"{boat.name}: {boat.made or 'nobody says how it was made'}",

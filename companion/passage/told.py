@@ -43,10 +43,9 @@ def told_of(route: Route, of: Departure | None = None) -> tuple[str, ...]:
 
 
 def _bound(route: Route, time_s: float) -> str:
-    gained = 100.0 * (1.0 - route.bound_s / max(1.0, time_s))
-    return (
-        f"no way is faster than about {_span(route.bound_s)} in this forecast: at most {gained:.1f} % could be gained"
-    )
+    bound_s = min(route.bound_s, time_s)
+    gained = 100.0 * (1.0 - bound_s / max(1.0, time_s))
+    return f"no way is faster than about {_span(bound_s)} in this forecast: at most {gained:.1f} % could be gained"
 
 
 def told_of_chances(d: Departure, by_utc_s: float | None, sure: float) -> tuple[str, ...]:

@@ -548,7 +548,7 @@ def laylines_of(
     off_rad = abs(difference_rad(twd_rad, heading_of(mark_en[0] - here[0], mark_en[1] - here[1])))
     bow_rad = max(beat, no_go_rad)
     angle_rad = boat.made_good_rad(bow_rad, tws_mps)  # a line is of the course
-    is_beat = off_rad < (beat if angle_rad == bow_rad else angle_rad)
+    is_beat = off_rad < angle_rad
     if not is_beat:
         if off_rad <= run + 1e-3:
             return None
