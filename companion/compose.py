@@ -40,7 +40,7 @@ from companion.field.tree import (
 )
 from companion.field.values import GuidanceSettings, Situation
 from companion.fold import Waters
-from companion.geo.frame import LocalFrame
+from companion.geo.frame import RANGE_M, LocalFrame
 from companion.geofence import Code, Finding, FindingLevel, LocalArea, Mission
 from companion.geofence.mission import (
     AtomOptions,
@@ -67,7 +67,6 @@ from companion.orders import ALL, Verb, unknown
 from companion.planners import ALGORITHMS, AUTO, PlannerChoice
 from companion.skipper.step import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.way import (
-    FAR_M,
     TIDE_DOUBT_M,
     Box,
     Composed,
@@ -255,7 +254,6 @@ def planner_of(mission: Mission) -> PlannerChoice:
 
 LEAST_LINE_M = 1.0
 MOST_ATOMS = 64
-RANGE_M = 50_000.0
 
 
 def composed_field_of(mission: Mission, number: int, by_field: GoalField, frame: LocalFrame) -> Composed:
@@ -493,7 +491,7 @@ def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
         # home is where she is armed, and that is near the start
         onward_en_m=frame.en_from_geo(mission.start) if mission.start and mission.skipper.end == "home" else None,
         recentre_m=(mission.passage.recentre_m or RECENTRE_M) if mission.is_passage else None,
-        far_m=max(FAR_M, mission.passage.leg_m or 0.0),
+        far_m=max(RANGE_M, mission.passage.leg_m or 0.0),
     )
 
 

@@ -5,10 +5,10 @@ it is fit for navigation.
 """
 
 from companion.chart.compile import TOLERANCE_M, ChartArea, Solid, area_of, containing
-from companion.chart.features import Chart, Danger, Row, Source, Wanted
+from companion.chart.features import Box, Chart, Danger, Row, Source, Wanted, box_about
 from companion.chart.grid import Grid, parse_ascii_grid, signed
 from companion.chart.picture import ChartPicture
-from companion.chart.readers import Box, box_about, read_chart, read_picture
+from companion.chart.readers import read_chart, read_picture
 from companion.chart.s57 import told_of
 
 __all__ = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +11,8 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from companion.chart.features import Chart, Danger, Source
+from companion.chart.features import Chart, Danger, Source, box_about
+from companion.geo import DEGREE_M
 from companion.geo.frame import LocalFrame
 from companion.geofence import Circle, Document, Zone, ZoneKind
 from companion.geofence.area import buffer_out, parts, polygons_about
@@ -234,23 +234,20 @@ def _marks(
 def _local(geometry: BaseGeometry, frame: LocalFrame, reach_m: float) -> list[BaseGeometry]:
     """Return polygons, lines and points of a shape within reach, in metres; edges are straight in lon and lat."""
     here = frame.origin
-    tall = reach_m / 110_500.0
-    most = min(89.0, abs(here.lat_deg) + tall)
-    wide = min(180.0, tall / math.cos(math.radians(most)))
+    box_west, box_south, box_east, box_north = box_about(here, reach_m)
+    is_polar = max(-box_south, box_north) >= 89.0
     out: list[BaseGeometry] = []
     for part in shapely.get_parts(geometry):
         west, south, east, north = shapely.bounds(part)
-        if part.is_empty or south > here.lat_deg + tall or north < here.lat_deg - tall:
+        if part.is_empty or south > box_north or north < box_south:
             continue
-        if most < 89.0 and not any(
-            west + turn <= here.lon_deg + wide and east + turn >= here.lon_deg - wide for turn in (-360, 0, 360)
-        ):
+        if not is_polar and not any(west + t <= box_east and east + t >= box_west for t in (-360.0, 0.0, 360.0)):
             continue
         if isinstance(part, Polygon):
             for polygon in polygons_about(part if part.is_valid else shapely.make_valid(part), frame, reach_m):
                 out += parts(polygon if polygon.is_valid else shapely.make_valid(polygon))
             continue
-        line = shapely.segmentize(part, EDGE_M / 111_200.0) if part.length else part
+        line = shapely.segmentize(part, EDGE_M / DEGREE_M) if part.length else part
         moved = shapely.transform(shapely.force_2d(line), frame.array_en_from_lonlat)
         near = shapely.intersection(moved, shapely.box(-reach_m, -reach_m, reach_m, reach_m))
         out += [p for p in shapely.get_parts(near) if not p.is_empty]

@@ -8,10 +8,23 @@ from dataclasses import dataclass, field
 
 from shapely.geometry.base import BaseGeometry
 
+from companion.geo import LEAST_DEGREE_M
 from companion.geofence import Finding
+from companion.messages import GeoPoint
+
+Box = tuple[float, float, float, float]
+"""West, south, east, north [deg]; west and east may lie beyond the date line."""
 
 Attributes = Mapping[str, object]
 """Of one feature: what its file says of it, by name; lists as text (``"7,8"``), nothing as None."""
+
+
+def box_about(center: GeoPoint, reach_m: float) -> Box:
+    """Return the box of longitude and latitude that holds the water."""
+    tall = reach_m / LEAST_DEGREE_M
+    most = min(89.0, abs(center.lat_deg) + tall)
+    wide = min(180.0, tall / math.cos(math.radians(most)))
+    return (center.lon_deg - wide, center.lat_deg - tall, center.lon_deg + wide, center.lat_deg + tall)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,9 +12,9 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.chart.features import Chart, Danger, Source, Wanted
 from companion.errors import InputError
+from companion.geo import DEGREE_M
 
 MOST_CELLS = 25_000_000
-DEGREE_M = 111_200.0
 COARSE_M = 100.0  # from here on a harbour is a cell or two
 
 

@@ -21,6 +21,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.chart.features import Chart, Row, Source
 from companion.chart.s57 import BUOYS, DEPTH_AREAS
+from companion.geo import DEGREE_M
 
 FINEST_M = 0.5  # what level 0 leaves out; each further level twice that
 LEVELS = 13
@@ -28,7 +29,6 @@ UNITS = 4  # positions of a tile are counted in, for each tolerance: a screen sh
 TILE_UNITS = 4096
 OVERLAP_UNITS = 8  # beyond a tile's edge, so that no seam shows between two
 KEPT_TILES = 256
-DEGREE_M = 111_195.0
 EQUATOR_DEGREE_M = 111_320.0
 
 # How far apart they are kept, in tolerances: 30 to 60 pixels between two soundings.

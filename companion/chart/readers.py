@@ -22,18 +22,14 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.chart import grid as grids
 from companion.chart import s57, tags
-from companion.chart.features import Chart, Danger, Row, Source, Wanted
+from companion.chart.features import Box, Chart, Danger, Row, Source, Wanted
 from companion.chart.picture import DRAWN, ChartPicture, Mark, marks_of_chart, marks_of_rows
 from companion.disk import read_regular
 from companion.errors import InputError, unreadable
 from companion.geofence import Circle, Code, Finding, FindingLevel, Zone, ZoneKind, read
 from companion.geofence.document import Mark as DrawnMark
 from companion.geofence.formats import decode, zone_kind
-from companion.messages import GeoPoint
 from companion.words import counted
-
-Box = tuple[float, float, float, float]
-"""West, south, east, north [deg]; west and east may lie beyond the date line."""
 
 TEXT_BYTES = 512 * 1024 * 1024  # of an ASCII grid or a GeoJSON: a coast of a country
 LEADER = re.compile(rb"\d{5}[ 1-3][LD ]")  # how ISO 8211 begins, which S-57 is written in
@@ -45,14 +41,6 @@ WATER = re.compile(r"water[-_ ]?polygons|ocean|seas?\b", re.IGNORECASE)
 S57_OPTIONS = {"UPDATES": "APPLY", "LIST_AS_STRING": "ON", "RETURN_PRIMITIVES": "OFF", "LNAM_REFS": "OFF"}
 LINE_M = 3.0
 POINT_M = 10.0
-
-
-def box_about(center: GeoPoint, reach_m: float) -> Box:
-    """Return the box of longitude and latitude that holds the water."""
-    tall = reach_m / 110_500.0
-    most = min(89.0, abs(center.lat_deg) + tall)
-    wide = min(180.0, tall / math.cos(math.radians(most)))
-    return (center.lon_deg - wide, center.lat_deg - tall, center.lon_deg + wide, center.lat_deg + tall)
 
 
 def read_chart(path: Path, box: Box, wanted: Wanted, *, positive: str = "auto", without_depths: bool = False) -> Chart:

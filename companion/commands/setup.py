@@ -214,8 +214,7 @@ def sizes(text: str) -> Sizes:
 
 def apart(start: GeoPoint, goals: Sequence[GeoPoint]) -> str:
     """Return which goal is farther from the start than a mission reaches, and how that may have come; empty: none."""
-    from companion.geo.frame import LocalFrame
-    from companion.geofence.mission import RANGE_M
+    from companion.geo.frame import RANGE_M, LocalFrame
 
     frame = LocalFrame(start)
     for nth, goal in enumerate(goals, start=1):

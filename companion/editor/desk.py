@@ -40,6 +40,7 @@ from companion.editor.waters import (
     tile_of,
 )
 from companion.errors import CompanionError, InputError, JobError
+from companion.geo import DEGREE_M
 from companion.geofence import Circle, Document, Mission, Zone, load_mission
 from companion.geofence.formats import FORMATS
 from companion.geofence.mission import MissionOptions, read_options
@@ -67,7 +68,6 @@ from companion.view.passage import passage_view
 from companion.words import counted, listed
 
 SIMPLER_DEG = 2e-6  # 0.2 m
-DEGREE_M = 111_195.0  # of latitude
 SIDES, FEW_SIDES = 48, 8  # of a circle, and of one of many
 MANY = 500
 MOST_SIBLINGS = 200  # missions in the folder that are asked whether they share a file

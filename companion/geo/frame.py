@@ -17,6 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from companion.messages import GeoPoint
 
+RANGE_M = 50_000.0  # so far from its origin a frame is good for; what lies farther off is a mistake
+
 
 @lru_cache(maxsize=32)
 def _transformer(origin: GeoPoint) -> tuple[Any, Any]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from companion.geo import LEAST_DEGREE_M
 from companion.geo.frame import LocalFrame
 from companion.geofence.shapes import Circle, Obstacle, Shape, Zone, ZoneKind, drawn, polygon_en
 from companion.words import listed
@@ -421,7 +422,6 @@ class LocalArea:
 
 SAGITTA_M = 0.1
 RADIUS_M = 6_371_000.0
-DEGREE_M = 110_500.0  # the shortest degree of latitude
 LEAST_TAN = 0.1  # of the latitude: pieces at the equator are no longer than for this
 POLE_DEG = 89.0  # from here on a box of longitudes says nothing
 
@@ -454,7 +454,7 @@ def polygons_about(shape: Shape, frame: LocalFrame, reach_m: float, *, cover: bo
 def _box(frame: LocalFrame, reach_m: float) -> Polygon:
     """Return the box of longitude and latitude that holds every place within ``reach_m`` of the origin."""
     lat, lon = frame.origin.lat_deg, frame.origin.lon_deg
-    tall = reach_m / DEGREE_M
+    tall = reach_m / LEAST_DEGREE_M
     south, north = max(-90.0, lat - tall), min(90.0, lat + tall)
     most = max(abs(south), abs(north))
     wide = 180.0 if most >= POLE_DEG else min(180.0, tall / math.cos(math.radians(most)))
@@ -465,7 +465,7 @@ def _piece_deg(frame: LocalFrame, part: BaseGeometry) -> float:
     """Return how long the pieces of an edge may be [deg]: the middle of each is off its chord by ``SAGITTA_M``."""
     south, north = (frame.origin.lat_deg,) * 2 if part.is_empty else (part.bounds[1], part.bounds[3])
     steep = math.tan(math.radians(min(POLE_DEG, max(abs(south), abs(north)))))
-    return math.sqrt(8.0 * RADIUS_M * SAGITTA_M / max(LEAST_TAN, steep)) / DEGREE_M
+    return math.sqrt(8.0 * RADIUS_M * SAGITTA_M / max(LEAST_TAN, steep)) / LEAST_DEGREE_M
 
 
 def _in_metres(polygon: Polygon, frame: LocalFrame) -> Polygon:

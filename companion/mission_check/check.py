@@ -15,9 +15,9 @@ from companion.geofence import Code, Finding, FindingLevel, Mission
 from companion.geofence.check import AreaConditions, check_area
 from companion.geofence.mission import place_troubles, read_mission
 from companion.messages import GeoPoint
-from companion.mission_check.lines import line_findings
+from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
-from companion.skipper.way import KEEP_SHARE, Approach, Side, gates_of
+from companion.skipper.way import KEEP_SHARE, Side
 
 SAME_M = 1.0  # two goals so near are one mark that is passed twice
 SMALL_M = 3.0  # a fix is good to 2.5 m
@@ -89,10 +89,9 @@ def check_mission(
 
 def _roundings(mission: Mission) -> Iterator[Finding]:
     """Yield the buoys that cannot be rounded with the margin: a place of the circle has no room."""
-    voyage, told = voyage_of(mission), set[int]()
-    begun = (Approach(goal=0, en_m=voyage.frame.en_from_geo(mission.start)),) if mission.start is not None else ()
-    for gate in gates_of(voyage, begun):
-        number = gate.goal % len(voyage.goals) + 1
+    told = set[int]()
+    voyage, gates = voyage_gates(mission)
+    for number, gate in gates:
         if gate.buoy_en_m is None or number in told:
             continue
         clear_m = float(voyage.area.clearance_m([gate.en_m])[0])

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from companion.compose import voyage_of
 from companion.geofence import Code, Finding, FindingLevel, Mission
-from companion.skipper.way import Approach, Gate, gates_of, no_room
+from companion.skipper.way import Approach, Gate, Voyage, gates_of, no_room
 
 NO_ROOM_REMEDY = "move both marks farther from it, or let [area] margin_m and margin_floor_m be smaller"
 
@@ -26,14 +26,20 @@ def line_findings(mission: Mission) -> Iterator[Finding]:
         )
 
 
+def voyage_gates(mission: Mission) -> tuple[Voyage, tuple[tuple[int, Gate], ...]]:
+    """Return the mission's voyage and its gates as they are approached from the start, each with its goal's number."""
+    voyage = voyage_of(mission)
+    begun = (Approach(goal=0, en_m=voyage.frame.en_from_geo(mission.start)),) if mission.start is not None else ()
+    return voyage, tuple((gate.goal % len(voyage.goals) + 1, gate) for gate in gates_of(voyage, begun))
+
+
 def crowded_lines(mission: Mission, margin_m: float) -> Iterator[tuple[int, Gate, str]]:
     """Yield the goal's number, the gate and the words of each line with no room by a margin, once a goal."""
     if all(goal.gate is None for goal in mission.goals):
         return
-    voyage, told = voyage_of(mission), set[int]()
-    begun = (Approach(goal=0, en_m=voyage.frame.en_from_geo(mission.start)),) if mission.start is not None else ()
-    for gate in gates_of(voyage, begun):
-        number = gate.goal % len(voyage.goals) + 1
+    told = set[int]()
+    voyage, gates = voyage_gates(mission)
+    for number, gate in gates:
         words = "" if number in told else no_room(gate, voyage.area, margin_m)
         if words:
             told.add(number)

@@ -32,7 +32,7 @@ class Hub:
     def __init__(self, kept: int = KEPT) -> None:
         self.view: bytes | None = None
         self.is_closed = False
-        self._version = 0
+        self.version = 0  # of the view
         self._ring: deque[tuple[int, bytes]] = deque(maxlen=kept)
         self._waiting: set[asyncio.Event] = set()
         self.watchers = 0
@@ -42,7 +42,7 @@ class Hub:
         for event in events:
             self._ring.append((event.number, msgspec.json.encode(event)))
         self.view = msgspec.json.encode(view)
-        self._version += 1
+        self.version += 1
         self._wake()
 
     def close(self) -> None:
@@ -53,6 +53,20 @@ class Hub:
     def _wake(self) -> None:
         for event in self._waiting:
             event.set()
+
+    def enter(self, news: asyncio.Event) -> None:
+        """Let one more watch; ``news`` is set when there is something new."""
+        self._waiting.add(news)
+        self.watchers += 1
+
+    def leave(self, news: asyncio.Event) -> None:
+        """Let one go."""
+        self._waiting.discard(news)
+        self.watchers -= 1
+
+    def since(self, number: int) -> tuple[tuple[int, bytes], ...]:
+        """Return the events that are kept after this one, with their numbers."""
+        return tuple(event for event in self._ring if event[0] > number)
 
     def log(self) -> Callable[[], bytes]:
         """Return what makes the JSON array of the log that is kept now; a thread may call it while more comes."""
@@ -75,13 +89,11 @@ class Watcher:
         self._news = asyncio.Event()
 
     def __enter__(self) -> Self:
-        self._hub._waiting.add(self._news)  # noqa: SLF001
-        self._hub.watchers += 1
+        self._hub.enter(self._news)
         return self
 
     def __exit__(self, *unused: object) -> None:
-        self._hub._waiting.discard(self._news)  # noqa: SLF001
-        self._hub.watchers -= 1
+        self._hub.leave(self._news)
 
     def wake(self) -> None:
         """Let ``wait`` return."""
@@ -90,7 +102,7 @@ class Watcher:
     async def wait(self, at_most_s: float) -> bytes:
         """Return what is new as server-sent events, nothing after ``at_most_s`` [s]."""
         hub = self._hub
-        if self._version == hub._version and not hub.is_closed:  # noqa: SLF001
+        if self._version == hub.version and not hub.is_closed:
             self._news.clear()
             try:
                 async with asyncio.timeout(at_most_s):
@@ -98,13 +110,12 @@ class Watcher:
             except TimeoutError:
                 return b": still here\n\n"
         parts = []
-        for number, data in tuple(hub._ring):  # noqa: SLF001
-            if number > self._number:
-                parts.append(b"id: %d\nevent: log\ndata: %s\n\n" % (number, data))
-                self._number = number
-        if hub.view is not None and self._version != hub._version:  # noqa: SLF001
+        for number, data in hub.since(self._number):
+            parts.append(b"id: %d\nevent: log\ndata: %s\n\n" % (number, data))
+            self._number = number
+        if hub.view is not None and self._version != hub.version:
             parts.append(b"event: view\ndata: %s\n\n" % hub.view)
-        self._version = hub._version  # noqa: SLF001
+        self._version = hub.version
         if hub.is_closed:
             parts.append(b"event: over\ndata: {}\n\n")
         return b"".join(parts)

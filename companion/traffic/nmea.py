@@ -69,17 +69,8 @@ class NmeaDecoder:
             t_s: when it arrived.
 
         """
-        counts = self.counts
-        counts.lines += 1
-        text = line.decode("ascii", "replace") if isinstance(line, bytes) else line
-        text = text.strip("\r\n \0")
-        if text.startswith("\\"):  # IEC 61162-450 tag block
-            text = text.rpartition("\\")[2]
-        if not text or len(text) > MAX_LINE or text[0] not in "!$":
-            counts.bad_form += 1
-            return None
-        if not has_right_checksum(text):
-            counts.bad_checksum += 1
+        counts, text = self.counts, whole_sentence(line, "!$", self.counts)
+        if text is None:
             return None
         fields = text[1:].partition("*")[0].split(",")
         if len(fields[0]) != 5 or fields[0][2:] != "VDM":  # VDO is our own transponder
@@ -132,6 +123,25 @@ class NmeaDecoder:
         else:
             self.counts.reports += 1
         return report
+
+
+def whole_sentence(line: str | bytes, begins: str, counts: DecodeCounts) -> str | None:
+    """Return a sentence that begins with one of ``begins`` and has its checksum, without line end and tag block.
+
+    None for any other; all are counted.
+    """
+    counts.lines += 1
+    text = line.decode("ascii", "replace") if isinstance(line, bytes) else line
+    text = text.strip("\r\n \0")
+    if text.startswith("\\"):  # IEC 61162-450 tag block
+        text = text.rpartition("\\")[2]
+    if not text or len(text) > MAX_LINE or text[0] not in begins:
+        counts.bad_form += 1
+        return None
+    if not has_right_checksum(text):
+        counts.bad_checksum += 1
+        return None
+    return text
 
 
 def has_right_checksum(text: str) -> bool:

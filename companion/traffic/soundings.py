@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from companion.messages import Sounding
-from companion.traffic.nmea import MAX_LINE, DecodeCounts, has_right_checksum
+from companion.traffic.nmea import DecodeCounts, whole_sentence
 
 FOOT_M, FATHOM_M = 0.3048, 1.8288
 ALIKE_M, ALIKE_SHARE = 0.2, 0.02  # figures of one depth in several units are rounded, each by itself
@@ -27,17 +27,8 @@ class SoundingDecoder:
 
     def feed(self, line: str | bytes, t_s: float) -> Sounding | None:
         """Return the ping of a sentence that came at ``t_s``, None for any other. Never raises."""
-        counts = self.counts
-        counts.lines += 1
-        text = line.decode("ascii", "replace") if isinstance(line, bytes) else line
-        text = text.strip("\r\n \0")
-        if text.startswith("\\"):  # IEC 61162-450 tag block
-            text = text.rpartition("\\")[2]
-        if not text or len(text) > MAX_LINE or text[0] != "$":
-            counts.bad_form += 1
-            return None
-        if not has_right_checksum(text):
-            counts.bad_checksum += 1
+        counts, text = self.counts, whole_sentence(line, "$", self.counts)
+        if text is None:
             return None
         name, *fields = text[1:].partition("*")[0].split(",")
         if len(name) != 5 or name[0] == "P" or name[2:] not in {"DPT", "DBT"}:  # P: of one maker

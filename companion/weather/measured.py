@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.geo import EARTH_RADIUS_M
 from companion.weather.weather import Cube, Floats, Weather
 
 OFF_MPS = 1.5  # of a component, a day ahead: forecasts of the open sea are off by 2 m/s of speed
@@ -23,7 +24,6 @@ GUST_MPS = 0.8  # a mean of ten minutes still differs from the wind of the model
 OLD_S = 12 * 3600.0  # what was measured longer ago is not asked
 _HOUR_S = 3600.0
 _LASTS = 4.0  # memories
-_EARTH_M = 6_371_008.8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -172,4 +172,4 @@ def _away_m(cube: Cube, off: Off) -> Floats:
     lat, lon = np.meshgrid(np.radians(cube.lat_deg), np.radians(cube.lon_deg), indexing="ij")
     lat0, lon0 = math.radians(off.lat_deg), math.radians(off.lon_deg)
     half = np.sin(0.5 * (lat - lat0)) ** 2 + np.cos(lat) * math.cos(lat0) * np.sin(0.5 * (lon - lon0)) ** 2
-    return np.asarray(2.0 * _EARTH_M * np.arcsin(np.sqrt(np.clip(half, 0.0, 1.0))))
+    return np.asarray(2.0 * EARTH_RADIUS_M * np.arcsin(np.sqrt(np.clip(half, 0.0, 1.0))))

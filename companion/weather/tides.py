@@ -19,13 +19,13 @@ from msgspec import Meta, Struct
 from numpy.typing import ArrayLike, NDArray
 
 from companion.errors import InputError
+from companion.geo import EARTH_RADIUS_M
 from companion.weather.harmonics import KNOWN, Complexes, Floats, constituent_named, phasors
 from companion.words import expected
 
 STEP_S = 1800.0  # where a tide is sampled to be interpolated in time: of half a day's wave it loses 0.8 % at the most
 LONG_STEP_S = 3600.0  # beyond LONG_S: 3 %
 LONG_S = 5.0 * 86_400.0
-_EARTH_M = 6_371_008.8
 _CHUNK = 1024  # places at a time
 _KEPT = 8  # sets of places whose weights are kept: a grid is asked for each time again
 MOST_M, MOST_MPS = 20.0, 10.0
@@ -129,7 +129,7 @@ class Tides:
         for begin in range(0, lat.size, _CHUNK):
             part = slice(begin, begin + _CHUNK)
             chord = np.linalg.norm(_up(lat[part], lon[part])[:, None] - here, axis=-1)
-            far = _EARTH_M * 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
+            far = EARTH_RADIUS_M * 2.0 * np.arcsin(np.minimum(1.0, 0.5 * chord))
             weight = (np.maximum(0.0, self.reach_m - far) / np.maximum(far, 0.01)) ** 2
             total = weight.sum(axis=1, keepdims=True)
             shares[part] = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0.0)

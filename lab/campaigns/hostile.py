@@ -19,6 +19,7 @@ from companion.app.sail import sail
 from companion.clock import now_s, run_virtual
 from companion.errors import InputError
 from companion.fold import Step
+from companion.geo import DEGREE_M
 from companion.geo.angles import difference_rad
 from companion.geofence import load_mission
 from companion.mavlink.signing import SigningStore
@@ -158,7 +159,7 @@ def _false(step: Step, autopilot: SimulatedAutopilot) -> list[str]:
 
 def _apart_m(a: GeoPoint, b: GeoPoint) -> float:
     """Return about how far two places are apart [m]: a degree of longitude is taken for one of latitude."""
-    return math.dist((a.lat_deg, a.lon_deg), (b.lat_deg, b.lon_deg)) * 111_195.0
+    return math.dist((a.lat_deg, a.lon_deg), (b.lat_deg, b.lon_deg)) * DEGREE_M
 
 
 async def _measure(

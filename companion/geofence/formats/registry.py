@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from companion.errors import InputError
-from companion.geo.frame import LocalFrame
+from companion.geo.frame import RANGE_M, LocalFrame
 from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.geojson import read_geojson, write_geojson
 from companion.geofence.formats.losses import Losses, Written, leave_out
@@ -31,8 +31,6 @@ from companion.geofence.formats.untrusted import decode, parse_json, read_bytes
 from companion.geofence.formats.wkt import read_wkt, write_wkt
 from companion.geofence.shapes import Circle, ZoneKind, center_of
 from companion.messages import GeoPoint
-
-FAR_M = 50_000.0  # what lies farther from the mission is a mistake
 
 _WKT_WORD = re.compile(
     r"\b(POINT|LINESTRING|LINEARRING|POLYGON|TRIANGLE|TIN|MULTI\w+|GEOMETRYCOLLECTION|POLYHEDRALSURFACE|"
@@ -217,7 +215,7 @@ def read(
     axis: str = "auto",
     near: GeoPoint | None = None,
     areas: bool = False,
-    far_m: float = FAR_M,
+    far_m: float = RANGE_M,
 ) -> Document:
     """Read a file of any known format, told by its content.
 
@@ -279,7 +277,7 @@ def write(document: Document, path: str | Path, *, format_name: str = "", part: 
     return _BY_NAME[format_name or format_of(path)].write(document, part)
 
 
-def check_place(document: Document, near: GeoPoint, far_m: float = FAR_M) -> Document:
+def check_place(document: Document, near: GeoPoint, far_m: float = RANGE_M) -> Document:
     """Return the document with a finding if part of it lies more than ``far_m`` from ``near``."""
     frame = LocalFrame(near)
     places = [

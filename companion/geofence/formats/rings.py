@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from companion.geo import DEGREE_M
 from companion.geofence.document import Code, Finding, FindingLevel
 from companion.geofence.shapes import ZoneKind, unwrapped
 
@@ -253,7 +254,7 @@ def _plain(reason: str) -> str:
 def _hectares(polygons: Sequence[Polygon]) -> str:
     """Return an area in hectares, good to a percent: degrees scaled at the polygon's latitude."""
     total = sum(
-        abs(p.area) * 111_195.0**2 * math.cos(math.radians(min(89.9, abs(p.exterior.coords[0][1])))) / 1e4
+        abs(p.area) * DEGREE_M**2 * math.cos(math.radians(min(89.9, abs(p.exterior.coords[0][1])))) / 1e4
         for p in polygons
     )
     return f"{total:.3g}"

@@ -15,7 +15,6 @@ from companion.geofence.mission.files import PERMITS, MissionFiles, document_of,
 from companion.geofence.mission.goals import GoalField, GoalGate, MissionGoal, free_water, is_file
 from companion.geofence.mission.mission import (
     MOST_PASSAGE_BYTES,
-    RANGE_M,
     load_area,
     load_mission,
     load_settings,
@@ -65,7 +64,6 @@ __all__ = [
     "MOST_PASSAGE_BYTES",
     "NO_NAME",
     "PERMITS",
-    "RANGE_M",
     "TABLE_ORDER",
     "AreaOptions",
     "AtomOptions",

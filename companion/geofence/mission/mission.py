@@ -13,10 +13,10 @@ import shapely
 
 from companion.disk import open_regular
 from companion.errors import InputError, unreadable
-from companion.geo.frame import LocalFrame
+from companion.geo.frame import RANGE_M, LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
 from companion.geofence.document import Code, Document, Finding, FindingLevel
-from companion.geofence.formats.registry import FAR_M, check_place, parse, read
+from companion.geofence.formats.registry import check_place, parse, read
 from companion.geofence.formats.untrusted import decode, read_bytes
 from companion.geofence.mission.boat_file import with_boat_file
 from companion.geofence.mission.goals import GoalGate, GoalReader, MissionGoal, RefugePoint, refuges_of
@@ -42,7 +42,6 @@ from companion.words import file_name
 
 AS_IT_IS: Mapping[Path, bytes] = {}  # nothing is given: every file is read from the disk
 KM_M = 1_000.0
-RANGE_M = 50_000.0  # the frame is below 1 m wrong to here; what lies farther off is a mistake
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -310,7 +309,7 @@ def assembled(
     """
     reader = GoalReader(path=path, axis=options.area.axis)
     origin = reader.origin_of(options)
-    far_m = FAR_M
+    far_m = RANGE_M
     if options.passage.leg_m is not None:
         frame = LocalFrame(origin)
         far_m += max(float(np.hypot(*frame.en_from_geo(g.point))) for g in reader.goals_of(options, Area()))
@@ -361,7 +360,7 @@ def load_area(
     mission_path: Path,
     origin: GeoPoint,
     given: Mapping[Path, bytes] = AS_IT_IS,
-    far_m: float = FAR_M,
+    far_m: float = RANGE_M,
     key: str = "obstacles",
 ) -> tuple[Area, tuple[Finding, ...]]:
     """Return the area that ``[area]`` names and what its files gave rise to; nothing of it is farther than ``far_m``.
@@ -410,7 +409,7 @@ def load_drying(
     mission_path: Path,
     origin: GeoPoint,
     given: Mapping[Path, bytes] = AS_IT_IS,
-    far_m: float = FAR_M,
+    far_m: float = RANGE_M,
 ) -> tuple[Obstacle, ...]:
     """Return the water that dries of the files that ``[area] drying`` names. Raises InputError."""
     area = options.area

@@ -15,6 +15,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.frozen import changed
+from companion.geo import DEGREE_M
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.frames import Message
 from companion.mavlink.wire.sounder import Sounder
@@ -40,7 +41,6 @@ LEAP_FIXES = 3
 LEAP_S = 2.0
 # After a longer silence any place is possible [s].
 MEMORY_S = 10.0
-DEGREE_M = 111_195.0  # of latitude, on the mean sphere
 
 
 def leap_m(distance_m: float, elapsed_s: float) -> float:

@@ -28,7 +28,7 @@ from companion.skipper.planning.diversions import (
 )
 from companion.skipper.planning.next_tack import next_tack_s
 from companion.skipper.planning.not_found import hold
-from companion.skipper.step.actions import Acknowledge, CancelPlan, ReplanReason, RequestPlan, StopOrders
+from companion.skipper.step.actions import Acknowledge, ReplanReason, RequestPlan, StopOrders
 from companion.skipper.step.config import Learning
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import DiversionKind
@@ -167,7 +167,7 @@ def _hold(ctx: StepContext, order: Order) -> Answer:
     if not ctx.state.voyage.sailing:
         return _stand(ctx, order, f"she stays where she is, and is not set sailing until {Verb.GO_ON}")
     answer = _stand(ctx, order, f"loitering here, where there is room, until {Verb.GO_ON}")
-    _let_go_of_plan(ctx)
+    ctx.let_go_of_plan()
     route, boat = ctx.state.mission.route, ctx.boat_en
     if (
         route is not None
@@ -222,7 +222,7 @@ def _skip_goal(ctx: StepContext, _: Order) -> Answer:
         return _not_now(f"{gate.name} is the last goal: {Verb.HOLD} to stay here, {Verb.HOME} or {Verb.REFUGE}")
     if boat is None or ctx.state.mission.adoptable is not None:
         return _not_now("her position is not known" if boat is None else "the mission on board is being compared")
-    _let_go_of_plan(ctx)
+    ctx.let_go_of_plan()
     ctx.approach(Approach(goal=following, en_m=boat))
     text = f"{gate.name} is given up"
     ctx.set(
@@ -273,7 +273,7 @@ def _replan(ctx: StepContext, order: Order) -> Answer:
 def _stop(ctx: StepContext, order: Order) -> Answer:
     if ctx.is_given_up:
         return _stand(ctx, order, "she is given up already")
-    _let_go_of_plan(ctx)
+    ctx.let_go_of_plan()
     status, is_busy = ctx.autopilot, ctx.state.pending.upload is not None
     if not is_busy:
         ctx.act(StopOrders(text="she is given up"))
@@ -372,12 +372,6 @@ _DEEDS: dict[Verb, Callable[[StepContext, Order], Answer]] = {
     Verb.LEARN: _learn,
     Verb.FORGET_SHOAL: _forget_shoal,
 }
-
-
-def _let_go_of_plan(ctx: StepContext) -> None:
-    if ctx.state.pending.plan is not None:
-        ctx.act(CancelPlan(request_id=ctx.state.pending.plan.request_id))
-        ctx.set(pending=changed(ctx.state.pending, plan=None))
 
 
 # --------------------------------------------------------------------------------------------- standing

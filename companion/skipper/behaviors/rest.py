@@ -16,7 +16,7 @@ from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
 from companion.skipper.planning.diversions import HOME, OFF_HOME, ROOM, home_trouble, is_at_rest, pressing
-from companion.skipper.step import CancelPlan, Diversion, DiversionKind, Phase, Route, SafeEnd, StepContext
+from companion.skipper.step import Diversion, DiversionKind, Phase, Route, SafeEnd, StepContext
 from companion.skipper.way import distance_m
 
 ANSWERED = {"": "for a person", SHORE: "until the link to the shore is back, or a person gives AUTO"}
@@ -49,7 +49,7 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
         return True
     if bound.kind is DiversionKind.REST:
         return False
-    _let_go_of_plans(ctx)
+    ctx.let_go_of_plan()
     if repair(ctx):
         return True
     hand_back(ctx)
@@ -153,7 +153,7 @@ def _raised(ctx: StepContext) -> str:
 
 def _end(ctx: StepContext, why: str, *, arrived: bool) -> None:
     """The voyage is over: remember where the boat is to rest."""
-    _let_go_of_plans(ctx)
+    ctx.let_go_of_plan()
     route = ctx.state.mission.route
     place = route.points_en_m[-1] if route is not None and route.points_en_m else ctx.boat_en
     ctx.set(voyage=changed(ctx.state.voyage, over=why, arrived=arrived, rest_en_m=place))
@@ -167,9 +167,3 @@ def _end(ctx: StepContext, why: str, *, arrived: bool) -> None:
             "no room",
             f"she loiters with {room_m:.0f} m of room, in this wind a loiter takes {ctx.loiter_swing_m:.0f}: take her",
         )
-
-
-def _let_go_of_plans(ctx: StepContext) -> None:
-    if ctx.state.pending.plan is not None:
-        ctx.act(CancelPlan(request_id=ctx.state.pending.plan.request_id))
-        ctx.set(pending=changed(ctx.state.pending, plan=None))

@@ -19,6 +19,7 @@ from companion.skipper.step.actions import (
     Action,
     Announce,
     Arm,
+    CancelPlan,
     RunMotor,
     SetCurrent,
     SetMode,
@@ -286,6 +287,12 @@ class StepContext:
         number = self.state.pending.next_id
         self.set(pending=changed(self.state.pending, next_id=number + 1))
         return number
+
+    def let_go_of_plan(self) -> None:
+        """Take back the request for a plan, where one waits for its answer."""
+        if self.state.pending.plan is not None:
+            self.act(CancelPlan(request_id=self.state.pending.plan.request_id))
+            self.set(pending=changed(self.state.pending, plan=None))
 
     def act(self, action: Action) -> bool:
         """Ask for an action; False (nothing is asked) when it is not permitted, the autopilot not ours, or given up."""

@@ -6,7 +6,6 @@ from companion.skipper.way.geometry import along_m, bearing_rad, cross_track_m, 
 from companion.skipper.way.judge import half_width_rad, mean_twd_rad
 from companion.skipper.way.sweeps import Sweep, length_m, sweeps_over
 from companion.skipper.way.voyage import (
-    FAR_M,
     Box,
     Composed,
     Goal,
@@ -21,7 +20,6 @@ from companion.skipper.way.voyage import (
 )
 
 __all__ = [
-    "FAR_M",
     "KEEP_SHARE",
     "TIDE_DOUBT_M",
     "Approach",

@@ -17,7 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.boat import Boat, outline_en_m
 from companion.field.tree import FieldTree
-from companion.geo.frame import LocalFrame
+from companion.geo.frame import RANGE_M, LocalFrame
 from companion.geofence import Zone
 from companion.skipper.way.drying import DryingWater
 
@@ -250,9 +250,6 @@ class Refuge:
     radius_m: float = 15.0
 
 
-FAR_M = 50_000.0  # what lies farther off is not of this water; a passage says what is far for it
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Voyage:
     """Goals in their order, sailed ``laps`` times, in ``area``.
@@ -274,7 +271,7 @@ class Voyage:
     drying: tuple[DryingWater, ...] = field(default=(), compare=False)
     onward_en_m: PointEn | None = None
     recentre_m: float | None = None
-    far_m: float = FAR_M
+    far_m: float = RANGE_M  # what lies farther off is not of this water; a passage says what is far for it
 
     def __post_init__(self) -> None:
         if not self.goals or self.laps < 1:
