@@ -121,7 +121,7 @@ def _boat(cell: dict[str, float | None], here: values.PointEn | None) -> values.
         sog_mps=cell["sog_mps"],
         clearance_m=cell["clearance_m"],
         cross_track_m=cell["cross_track_m"],
-        tack=None if twa_deg is None else tack_of(twa_deg),
+        tack=None if twa_deg is None else tack_of(math.radians(twa_deg)),
     )
 
 
