@@ -16,7 +16,9 @@ from companion.boat import Afloat, AutopilotLimits, LearnedAfloat, as_learned, m
 from companion.boat.afloat import Told
 from companion.clock import run
 from companion.compose import config_of, estimator_of, voyage_of
+from companion.current.estimator import SCALE_SD
 from companion.eta import Pace
+from companion.field.guidance import LastResort
 from companion.fold import VoyageFold
 from companion.geofence import load_mission
 from companion.mavlink.autopilot import Autopilot
@@ -181,6 +183,30 @@ def test_one_that_changes_how_she_answers_leaves_the_wind(name, anew):
     assert ("anew" in event.text) is anew
     assert (fold.current is not current) is anew
     assert heard(fold, 61, 63).wind.record_s > 50.0
+
+
+@pytest.mark.parametrize("error", [0.0, 0.35])
+def test_what_her_file_says_of_her_speeds_is_what_the_current_reckons_with(error):
+    fold = fresh()
+    voyage = fold.skipper.voyage
+    skipper = replace(fold.skipper, voyage=replace(voyage, boat=replace(voyage.boat, told_speed_error=error)))
+    fold = VoyageFold(skipper, WindTracker(estimator=estimator_of(load_mission(DEMO))), Permissions())
+
+    told(fold, "SERVO1_REVERSED", 0.0)
+    heard(fold, 1, 60)
+    first = fold.current
+    for value in (0.0, 1.0, 1.0):  # the current is learned anew with the last
+        told(fold, "SERVO1_REVERSED", value)
+        fold.tick(60.0)
+        assert math.sqrt(fold.current.doubt().covariance[2][2]) == pytest.approx(max(SCALE_SD, error), rel=0.01)
+    assert fold.current is not first
+
+
+@pytest.mark.parametrize("is_engaged", [True, False])
+def test_while_the_last_resort_steers_the_step_is_off_the_plan(is_engaged):
+    fold = fresh()
+    fold.state = with_parts(fold.state, by_field={"resort": LastResort(engaged=is_engaged)})
+    assert fold.tick(1.0).is_off_plan is is_engaged
 
 
 def test_a_filter_is_no_sensor_and_a_stranger_to_the_table_is_nobodys():

@@ -12,6 +12,7 @@ import pytest
 import shapely
 
 from companion.boat.margins import AutopilotLimits
+from companion.current import WaterCurrent
 from companion.messages import Mode
 from companion.planner import plan
 from companion.planner.track import ExpectedTrack
@@ -34,6 +35,17 @@ from tests.skipper.world import with_parts
 GOAL = (0.0, 220.0)
 ROCK = shapely.box(-30.0, 80.0, -10.0, 120.0)  # its eastern side is 10 m west of the straight way
 MARGIN_M, FLOOR_M = 14.0, 4.0
+
+
+@pytest.mark.parametrize("is_significant", [True, False])
+def test_in_a_stream_that_plans_reckon_with_she_is_led_out_to_where_she_is_soonest(is_significant):
+    """Up the stream to the nearest place she stood before the rock, until it had her."""
+    stream = WaterCurrent(east_mps=-2.6, north_mps=0.0, is_significant=is_significant)
+    rock = shapely.Point(-12.0, 0.0).buffer(8.0)
+    ctx = moment(route((200.0, 0.0), (200.0, 0.0)), obstacles=(rock,), speed_mps=0.1, seen={"current": stream})
+    assert request(ctx, ReplanReason.CURRENT)
+    [place] = ctx.state.pending.plan.lead_in
+    assert (abs(math.degrees(math.atan2(place[0], place[1])) - 90.0) < 20.0) is not is_significant
 
 
 DOCK = (
