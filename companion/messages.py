@@ -371,6 +371,11 @@ class Target:
         """Return the radius at ``t_s``."""
         return self.radius_m + self.growth_mps * t_s
 
+    def row(self, wider_m: float = 0.0) -> tuple[float, ...]:
+        """Return the disc, so much wider, as a row of what ``companion.geo.kernels.first_met`` asks for."""
+        motion = self.x_m, self.y_m, self.vx_mps, self.vy_mps
+        return *motion, self.radius_m + wider_m, self.growth_mps, self.from_s, self.until_s
+
 
 # ------------------------------------------------------------------------------------------- mission
 class MissionType(enum.IntEnum):

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from companion.geo.angles import wrap_pi
 from companion.planner import Problem
 from companion.planner.reference import kernels
 from companion.planner.reference.rrtstar import simple_bound_s
@@ -46,7 +47,7 @@ class Model:
         if math.hypot(x1 - x0, y1 - y0) < 1e-9:
             return True
         heading, speed = self.speed(math.atan2(x1 - x0, y1 - y0))
-        twa = abs(kernels.wrap(heading - self.p.wind.twd_from_rad))
+        twa = abs(wrap_pi(heading - self.p.wind.twd_from_rad))
         if speed <= 0.0 or twa < self.half or twa > self.p.boat.max_twa_rad + 1e-9:
             return False
         w = self.w
@@ -96,7 +97,7 @@ def solve(problem: Problem, name: str, budget_s: float, seed: int) -> list[tuple
             cost = model.sail_s(ax, ay, bx, by)
             if is_se2 and cost > 0.0:
                 course = math.atan2(bx - ax, by - ay)
-                turn = abs(kernels.wrap(course - a.getYaw())) + abs(kernels.wrap(b.getYaw() - course))
+                turn = abs(wrap_pi(course - a.getYaw())) + abs(wrap_pi(b.getYaw() - course))
                 cost += turn / problem.boat.turn_rate_radps
             return ob.Cost(cost)
 
@@ -113,7 +114,7 @@ def solve(problem: Problem, name: str, budget_s: float, seed: int) -> list[tuple
         if is_se2:
             state.setX(x)
             state.setY(y)
-            state.setYaw(kernels.wrap(yaw))
+            state.setYaw(wrap_pi(yaw))
         else:
             state[0], state[1] = x, y
     definition = ob.ProblemDefinition(info)

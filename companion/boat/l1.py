@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 
+from companion.geo.kernels import wrap
 from companion.kernels.jit import kernel
 
 # ArduRover's own defaults: NAVL1_PERIOD [s], NAVL1_DAMPING, NAVL1_XTRACK_I.
@@ -89,8 +90,7 @@ def lateral_mps2(
             nudge_rad = min(max(nudge_rad + back * gain * dt_s, -_NUDGE_MOST_RAD), _NUDGE_MOST_RAD)
         angle = back + nudge_rad + math.atan2(vn * ue - ve * un, ve * ue + vn * un)
     # sailing away from the waypoint she keeps to the side that she turns to
-    ahead = math.atan2(de - e, dn - n) - yaw_rad
-    ahead = abs((ahead + math.pi) % (2.0 * math.pi) - math.pi)
+    ahead = abs(wrap(math.atan2(de - e, dn - n) - yaw_rad))
     if min(abs(angle), abs(last_rad)) > _UNDECIDED_RAD and ahead > _AWAY_RAD and angle * last_rad < 0.0:
         angle = last_rad
     turned = min(max(angle, -0.5 * math.pi), 0.5 * math.pi)

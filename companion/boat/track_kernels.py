@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.boat.l1 import STEERS_FROM_MPS, lateral_mps2
+from companion.geo.kernels import wrap
 from companion.kernels.jit import kernel
 
 # AR_WPNav's point on one leg, compiled: from rest to rest under a greatest speed, acceleration and jerk.
@@ -132,17 +133,6 @@ RUDDER_MAX_RAD = math.radians(35.0)
 
 
 @kernel
-def turn_to(angle_rad: float) -> float:
-    """Return the angle on -pi to pi."""
-    angle = angle_rad + math.pi
-    if 0.0 <= angle < 2.0 * math.pi:  # what a remainder comes to within a turn either way, without its division
-        return angle - math.pi
-    if -2.0 * math.pi < angle < 0.0:
-        return (angle + 2.0 * math.pi) - math.pi
-    return angle % (2.0 * math.pi) - math.pi
-
-
-@kernel
 def polar_at(curve: NDArray[np.float64], twa_rad: float) -> float:
     """Return the speed at an angle to the wind, from speeds at even steps from 0 to pi."""
     place = abs(twa_rad) / math.pi * (curve.shape[0] - 1)
@@ -201,8 +191,8 @@ def sail(
         share = (step - i * WIND_STEPS) / WIND_STEPS
         i = min(i, wind_rad.shape[0] - 1)
         j = min(i + 1, wind_rad.shape[0] - 1)
-        twd = wind_rad[i] + share * turn_to(wind_rad[j] - wind_rad[i])
-        heard += dt / max(h[H_WIND_LAG_S], dt) * turn_to(twd - heard)
+        twd = wind_rad[i] + share * wrap(wind_rad[j] - wind_rad[i])
+        heard += dt / max(h[H_WIND_LAG_S], dt) * wrap(twd - heard)
         # what the autopilot believes of its place is a little old
         sin, cos = math.sin(yaw), math.cos(yaw)
         ve, vn = v * sin, v * cos
@@ -263,26 +253,26 @@ def sail(
         reached = arrived and ((leg < last and not by_l1) or math.hypot(de - be, dn - bn) <= h[H_WP_RADIUS] or past)
         # --- what is steered
         bearing = math.atan2(de - be, dn - bn)
-        beats = tacking or abs(turn_to(heard - bearing)) <= h[H_NO_GO] + NO_GO_PAD_RAD
+        beats = tacking or abs(wrap(heard - bearing)) <= h[H_NO_GO] + NO_GO_PAD_RAD
         if beats:
-            on_port = turn_to(twd - yaw) < 0.0
+            on_port = wrap(twd - yaw) < 0.0
             should = False
-            heading = turn_to(heard + h[H_NO_GO]) if on_port else turn_to(heard - h[H_NO_GO])
-            if abs(turn_to(heard - bearing)) > h[H_NO_GO] and not tacking:
-                if (turn_to(heard - bearing) < 0.0) == on_port:
+            heading = wrap(heard + h[H_NO_GO]) if on_port else wrap(heard - h[H_NO_GO])
+            if abs(wrap(heard - bearing)) > h[H_NO_GO] and not tacking:
+                if (wrap(heard - bearing) < 0.0) == on_port:
                     heading = bearing
                 else:
                     should = True
             if not tacking and not should and abs(xtrack) >= h[H_CORRIDOR] > 0.0:
                 should = (xtrack > 0.0) != on_port
             if should and t - tack_end > TACK_RETRY_S:
-                tack_yaw = turn_to(heard - h[H_NO_GO]) if on_port else turn_to(heard + h[H_NO_GO])
+                tack_yaw = wrap(heard - h[H_NO_GO]) if on_port else wrap(heard + h[H_NO_GO])
                 tacking, tack_start = True, t
             if tacking:
                 heading = tack_yaw
-                if abs(turn_to(tack_yaw - yaw)) <= TACK_DONE_RAD or t - tack_start > TACK_TIMEOUT_S:
+                if abs(wrap(tack_yaw - yaw)) <= TACK_DONE_RAD or t - tack_start > TACK_TIMEOUT_S:
                     tacking, tack_end = False, t
-            asked = h[H_ANGLE_P] * turn_to(heading - yaw)
+            asked = h[H_ANGLE_P] * wrap(heading - yaw)
             if tacking and h[H_PIVOT_RATE] > 0.0:
                 asked = min(max(asked, -h[H_PIVOT_RATE]), h[H_PIVOT_RATE])
         elif by_l1:
@@ -313,16 +303,16 @@ def sail(
         integral = min(max(integral + RATE_I * miss * dt, -1.0), 1.0)
         rudder = min(max(RATE_P * miss + integral + RATE_FF * want_rate, -1.0), 1.0) / max(v, RUDDER_BASE_MPS)
         rate = v * math.sin(rudder * RUDDER_MAX_RAD) / (max(h[H_TURN_RADIUS], 0.1) * math.sin(RUDDER_MAX_RAD))
-        top = polar_at(curve, turn_to(twd - yaw))
+        top = polar_at(curve, wrap(twd - yaw))
         v = max(v + (top * top - v * v) / (2.0 * h[H_GATHER_M]) * dt, 0.0)
         half = yaw + 0.5 * rate * dt
         e += v * math.sin(half) * dt
         n += v * math.cos(half) * dt
-        yaw = turn_to(yaw + rate * dt)
+        yaw = wrap(yaw + rate * dt)
         if step % KEEP_STEPS == 0:
             out[rows, T_E], out[rows, T_N], out[rows, T_LEG] = e, n, leg
             out[rows, T_BEATS] = 1.0 if beats else 0.0
-            out[rows, T_SIDE] = 1.0 if turn_to(twd - yaw) >= 0.0 else -1.0
+            out[rows, T_SIDE] = 1.0 if wrap(twd - yaw) >= 0.0 else -1.0
             rows += 1
         step += 1
         if reached:

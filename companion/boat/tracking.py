@@ -21,6 +21,7 @@ from companion.boat import l1
 from companion.boat import track_kernels as k
 from companion.boat.margins import RATE_MAX_RADPS, AutopilotLimits, wider_s
 from companion.boat.polar import Polar
+from companion.geo.angles import wrap_pi
 
 DEFAULT_WP_SPEED_MPS = 2.0  # the firmware's
 HELM_KEYS = (
@@ -221,7 +222,7 @@ def predict(
     course = math.atan2(*(points[1] - points[0]))
     heading = course if heading_rad is None else heading_rad
     if speed_mps is None:
-        off = abs(float(k.turn_to(float(wind[0]) - heading)))
+        off = abs(wrap_pi(float(wind[0]) - heading))
         speed_mps = float(k.polar_at(curve_mps, max(off, helm.no_go_half_rad)))
     here = points[0] if start_en_m is None else np.asarray(start_en_m, dtype=np.float64)
     state = np.array([here[0], here[1], heading, speed_mps])

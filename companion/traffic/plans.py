@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from companion.geo.kernels import first_met
 from companion.messages import Target
 
 # A plan may be this deep in a disc [m]: numerical slack.
@@ -21,6 +22,8 @@ BETTER_SHARE, BETTER_S = 0.15, 20.0
 ALIKE_M = 150.0
 # A meeting later than this is left to later reports: a degree of course moves a fast ship by hundreds of metres.
 PRESSING_S = 300.0
+# So far ahead of a meeting its depth is looked for where neither leg nor disc ends.
+_LOOKED_S = 1e9
 # Plans are made again for traffic at most this often (Büsser 2009, section 5.2).
 MIN_INTERVAL_S = 20.0
 
@@ -75,17 +78,14 @@ def check_legs(legs: Sequence[TimedLeg], discs: Sequence[Target]) -> tuple[Confl
 
     """
     found: dict[int, Conflict] = {}
+    rows = [np.array([replace(disc, from_s=max(disc.from_s, 0.0)).row(-SLACK_M)]) for disc in discs]
     for i, leg in enumerate(legs):
-        begin, end = leg.start_s, leg.end_s
-        for disc in discs:
-            lo, hi = max(begin, disc.from_s, 0.0), min(end, disc.until_s)
-            if hi < lo or not math.isfinite(begin):
-                continue
-            hit = _enters(leg, begin, end, lo, hi, disc)
-            if hit is None:
+        for disc, row in zip(discs, rows, strict=True):
+            hit, time_s = first_met(*leg.from_en, *leg.to_en, leg.start_s, leg.end_s, row)
+            if hit < 0:
                 continue
             assert disc.mmsi is not None, "a vessel's disc says whose it is"
-            time_s, depth_m = hit
+            depth_m = _depth_m(leg, disc, time_s, min(leg.end_s, disc.until_s, time_s + _LOOKED_S))
             met = Conflict(mmsi=disc.mmsi, name=disc.name, leg=i, time_s=time_s, depth_m=depth_m)
             before = found.get(disc.mmsi)
             if before is not None:
@@ -94,52 +94,17 @@ def check_legs(legs: Sequence[TimedLeg], discs: Sequence[Target]) -> tuple[Confl
     return tuple(sorted(found.values(), key=lambda c: (c.time_s, c.mmsi)))
 
 
-def _enters(leg: TimedLeg, begin: float, end: float, lo: float, hi: float, disc: Target) -> tuple[float, float] | None:
-    """Return (first time inside, greatest depth) or None: |r + w s|² < (R + g s)², a quadratic in s."""
-    span = end - begin
+def _depth_m(leg: TimedLeg, disc: Target, lo: float, hi: float) -> float:
+    """Return how deep the leg is in the disc at worst, between lo and hi [m]."""
+    span = leg.end_s - leg.start_s
     ux, uy = (0.0, 0.0)
     if span > 0.0 and math.isfinite(span):
         ux, uy = (leg.to_en[0] - leg.from_en[0]) / span, (leg.to_en[1] - leg.from_en[1]) / span
-    cx, cy = disc.centre_en_m(lo)
-    rx, ry = leg.from_en[0] + ux * (lo - begin) - cx, leg.from_en[1] + uy * (lo - begin) - cy
-    wx, wy = ux - disc.vx_mps, uy - disc.vy_mps
-    radius, g = max(0.0, disc.radius_at_m(lo) - SLACK_M), disc.growth_mps
-    a, b, c = wx * wx + wy * wy - g * g, rx * wx + ry * wy - radius * g, rx * rx + ry * ry - radius * radius
-    last = hi - lo
-    if not math.isfinite(last):
-        last = 1e9
-    first = _first_negative(a, b, c, last)
-    if first is None:
-        return None
-    # Depth = R + g s - |r + w s| is concave in s: its maximum by golden section on [first, last].
-    depth = _max_depth(rx, ry, wx, wy, radius, g, first, last)
-    return lo + first, depth
+    ax, ay = leg.from_en
 
-
-def _first_negative(a: float, b: float, c: float, last: float) -> float | None:
-    """Return the first s in [0, last] with a s² + 2 b s + c < 0, or None."""
-    if c < 0.0:
-        return 0.0
-    disc = b * b - a * c
-    if abs(a) < 1e-12:
-        if b >= 0.0:
-            return None
-        s = -0.5 * c / b
-        return s if s < last else None
-    if a > 0.0:
-        if disc <= 0.0 or b >= 0.0:
-            return None
-        # Stable form of the smaller root for b < 0.
-        s = c / (-b + math.sqrt(disc))
-        return s if s < last else None
-    # a < 0: the parabola opens downwards, the root above 0 is where it becomes negative.
-    s = (-b - math.sqrt(max(0.0, disc))) / a
-    return s if 0.0 <= s < last else None
-
-
-def _max_depth(rx: float, ry: float, wx: float, wy: float, radius: float, g: float, lo: float, hi: float) -> float:
-    def depth(s: float) -> float:
-        return radius + g * s - math.hypot(rx + wx * s, ry + wy * s)
+    def depth(t: float) -> float:  # concave in t: its maximum by golden section
+        s = t - leg.start_s
+        return disc.radius_at_m(t) - SLACK_M - math.dist((ax + ux * s, ay + uy * s), disc.centre_en_m(t))
 
     ratio = 0.5 * (math.sqrt(5.0) - 1.0)
     for _ in range(60):

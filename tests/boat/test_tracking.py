@@ -19,7 +19,6 @@ from bench.tracking.residuals import boards, curve_mps, helm_of, residuals
 from bench.tracking.trials import CORNERS_DEG, WINDS_MPS, beats, corners
 from companion.boat import AutopilotLimits, ardurover_sitl
 from companion.boat import track_kernels as s
-from companion.boat.track_kernels import turn_to
 from companion.boat.tracking import (
     GuidanceModel,
     are_near_short,
@@ -249,8 +248,3 @@ def test_the_helm_is_that_of_the_parameters():
     assert AutopilotLimits.from_params({"ATC_ACCEL_MAX": 1.5, "WP_ACCEL": 0.8, "WP_JERK": 2.0}).wp_accel_mps2 == 0.8
     with pytest.raises(ValueError, match="wp_speed_mps"):
         GuidanceModel(wp_speed_mps=0.0)
-
-
-@given(st.one_of(st.floats(-20.0, 20.0), st.sampled_from([math.pi, -math.pi, 3.0 * math.pi, -3.0 * math.pi, 0.0])))
-def test_an_angle_is_turned_to_the_bit_as_a_remainder_turns_it(angle_rad):
-    assert turn_to(angle_rad) == (angle_rad + math.pi) % (2.0 * math.pi) - math.pi

@@ -20,6 +20,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from companion.geo.angles import wrap_pi, wrap_two_pi
+from companion.geo.kernels import first_met
 from companion.planner.plan import Leg
 from companion.planner.problem.parts import CLEAR_TURN_RAD, FENCE, NO_CURRENT, NO_GO_SLACK_RAD, TOUCH_M, Beat
 from companion.planner.problem.value import Problem, resolved
@@ -485,25 +486,8 @@ def target_hit(
     """Return the first target whose disc the boat enters between a at t0 and b at t1 (constant speed), or None.
 
     The boat may be ``wide_m`` off the line.
-
-    The squared distance minus the squared radius is a quadratic in time: its minimum over the common window is
-    exact.
     """
-    for i, target in enumerate(p.targets):
-        lo, hi = max(t0_s, target.from_s), min(t1_s, target.until_s)
-        if hi < lo:
-            continue
-        span = t1_s - t0_s
-        ux, uy = ((b[0] - a[0]) / span, (b[1] - a[1]) / span) if span > 0.0 and math.isfinite(span) else (0.0, 0.0)
-        rx = a[0] + ux * (lo - t0_s) - target.x_m - target.vx_mps * lo
-        ry = a[1] + uy * (lo - t0_s) - target.y_m - target.vy_mps * lo
-        wx, wy = ux - target.vx_mps, uy - target.vy_mps
-        radius, g = max(0.0, target.radius_m + wide_m + target.growth_mps * lo - TARGET_SLACK_M), target.growth_mps
-        c2, c1, c0 = wx * wx + wy * wy - g * g, rx * wx + ry * wy - radius * g, rx * rx + ry * ry - radius * radius
-        duration = hi - lo
-        candidates = [0.0, duration]
-        if c2 > 0.0 and 0.0 < -c1 / c2 < duration:
-            candidates.append(-c1 / c2)
-        if any((c2 * s + 2.0 * c1) * s + c0 < 0.0 for s in candidates if math.isfinite(s)):
-            return i
-    return None
+    if not p.targets:
+        return None
+    hit, _ = first_met(*a, *b, t0_s, t1_s, np.array([target.row(wide_m - TARGET_SLACK_M) for target in p.targets]))
+    return hit if hit >= 0 else None

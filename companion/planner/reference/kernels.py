@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from companion.geo.kernels import meets_discs, wrap
 from companion.kernels.heap import pop, push
 from companion.kernels.jit import kernel
 from companion.planner.problem.parts import CLEAR_TURN_RAD
@@ -19,12 +20,6 @@ ZONE_PAD = math.radians(0.3)  # of a course laid on the edge of the autopilot's 
 STEER_ROUNDS = 6  # of the fixed point between a leg's heading and its end's no-go zone
 # ``number``'s places
 TWD, HALF, DEEP, RATE, TACK, GYBE, W0, W1, RHO, CX, CY, ZONE, ZONE_HALF = range(13)
-
-
-@kernel
-def wrap(a):  # type: ignore[no-untyped-def]
-    """Return the angle on [-π, π)."""
-    return (a + math.pi) % TWO_PI - math.pi
 
 
 @kernel
@@ -121,35 +116,6 @@ def first_hit(ax, ay, bx, by, edge, cell_first, cell_edge, grid, shape):  # type
             for k in range(cell_first[cell], cell_first[cell + 1]):
                 best = min(best, _first_on(edge, cell_edge[k], ax, ay, dx, dy))
     return best
-
-
-@kernel
-def meets_target(ax, ay, bx, by, t0, t1, target):  # type: ignore[no-untyped-def]
-    """Tell whether the boat, from a at t0 to b at t1, enters a moving disc."""
-    for i in range(target.shape[0]):
-        lo, hi = max(t0, target[i, 6]), min(t1, target[i, 7])
-        if hi < lo:
-            continue
-        span = t1 - t0
-        ux, uy = 0.0, 0.0
-        if span > 0.0:
-            ux, uy = (bx - ax) / span, (by - ay) / span
-        rx = ax + ux * (lo - t0) - target[i, 0] - target[i, 2] * lo
-        ry = ay + uy * (lo - t0) - target[i, 1] - target[i, 3] * lo
-        wx, wy = ux - target[i, 2], uy - target[i, 3]
-        g = target[i, 5]
-        radius = target[i, 4] + g * lo
-        c2 = wx * wx + wy * wy - g * g
-        c1 = rx * wx + ry * wy - radius * g
-        c0 = rx * rx + ry * ry - radius * radius
-        duration = hi - lo
-        if c0 < 0.0 or (c2 * duration + 2.0 * c1) * duration + c0 < 0.0:
-            return True
-        if c2 > 0.0:
-            s = -c1 / c2
-            if 0.0 < s < duration and (c2 * s + 2.0 * c1) * s + c0 < 0.0:
-                return True
-    return False
 
 
 @kernel
@@ -405,7 +371,7 @@ def expand(  # type: ignore[no-untyped-def]
                 continue
             if disc.shape[0] > 0 and _in_disc(x, y, to_x, to_y, disc):
                 continue
-            if target.shape[0] > 0 and meets_target(x, y, to_x, to_y, t0, t1, target):
+            if target.shape[0] > 0 and meets_discs(target, x, y, to_x, to_y, t0, t1):
                 continue
             if g[next_state] == np.inf:
                 count[SEEN] += 1

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
+from companion.geo.kernels import meets_discs, wrap
 from companion.kernels.jit import kernel
 from companion.kernels.xorshift import uniform
-from companion.planner.reference.kernels import HALF, TWD, TWO_PI, first_hit, meets_target, steer, straight, wrap
+from companion.planner.reference.kernels import HALF, TWD, TWO_PI, first_hit, steer, straight
 from companion.planner.risk.kernels import inside, leg_risk, piece, sigma_at, spread_at, tail
 
 # Kernels of the reference RRT*: what uncertain vessels make of one edge of its tree.
@@ -39,11 +40,7 @@ def passing(  # type: ignore[no-untyped-def]
     vessel's part is reached: without a sum of entries (``is_summed``) an edge clear of them all is not looked at.
     The pieces are those that the judge of whole paths takes (``companion.planner.risk.chance_constraint``).
     """
-    if (
-        not is_summed
-        and not meets_target(ax, ay, ax, ay, t, t0, disc)
-        and not meets_target(ax, ay, bx, by, t0, t1, disc)
-    ):
+    if not is_summed and not meets_discs(disc, ax, ay, ax, ay, t, t0) and not meets_discs(disc, ax, ay, bx, by, t0, t1):
         return True, 0.0
     course, span = math.atan2(bx - ax, by - ay), t1 - t0
     out, spread, errors = np.empty(3), np.empty(9), np.empty((3, 4))
@@ -175,7 +172,7 @@ def _reach(  # type: ignore[no-untyped-def]
     ok, h, t0, t1 = straight(
         node[i, X], node[i, Y], node[i, H], node[i, T], tx, ty, number, model, table, polar, course
     )
-    if not ok or (target.shape[0] > 0 and meets_target(node[i, X], node[i, Y], tx, ty, t0, t1, target)):
+    if not ok or (target.shape[0] > 0 and meets_discs(target, node[i, X], node[i, Y], tx, ty, t0, t1)):
         return False, h, t1, 0.0, 0.0
     risk, most = node[i, R], node[i, M]
     twa = wrap(h - number[TWD])

@@ -94,13 +94,7 @@ def world_of(p: Problem) -> ReferenceWorld:
         ],
         dtype=np.float64,
     )
-    target = np.array(
-        [
-            [t.x_m, t.y_m, t.vx_mps, t.vy_mps, t.radius_m, t.growth_mps, t.from_s, min(t.until_s, 1e15)]
-            for t in p.targets
-        ],
-        dtype=np.float64,
-    ).reshape(-1, 8)
+    target = np.array([t.row() for t in p.targets], dtype=np.float64).reshape(-1, 8)
     return ReferenceWorld(
         edge=edge,
         cell_first=cell_first,

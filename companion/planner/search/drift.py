@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.geo.kernels import meets_discs
 from companion.kernels.heap import pop, push
 from companion.kernels.jit import kernel
 from companion.planner.search.gauge import Aim, Gauge, least_from
@@ -23,7 +24,6 @@ from companion.planner.search.kernels import (
     SegmentGrid,
     is_free,
     is_refused,
-    meets_target,
     speed_at,
     track,
     turn_guess,
@@ -217,7 +217,7 @@ def drift_search(
                     continue
                 reached.wound[q], reached.run[q] = 0.0 if run1 >= b.room else wound1, run1
             if b.targets.shape[0] > 0 and (
-                meets_target(b, x, y, x, y, t, leg.t1) or meets_target(b, x, y, x1, y1, leg.t1, leg.t2)
+                meets_discs(b.targets, x, y, x, y, t, leg.t1) or meets_discs(b.targets, x, y, x1, y1, leg.t1, leg.t2)
             ):
                 continue
             reached.time[q], reached.x[q], reached.y[q], reached.course[q] = leg.t2, x1, y1, wrap(leg.angle)

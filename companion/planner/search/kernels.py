@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.geo.kernels import meets_discs
 from companion.kernels.jit import kernel
 from companion.planner.problem.parts import CLEAR_TURN_RAD
 
@@ -37,7 +38,7 @@ class SegmentGrid(NamedTuple):
 
 
 class BoatModel(NamedTuple):
-    """Speed by |TWA|, turning, no-go zone in time, losses, current, targets (m, 9), what gybing round takes.
+    """Speed by |TWA|, turning, no-go zone in time, losses, current, targets (m, 8), what gybing round takes.
 
     ``zone_half`` above 0: in a current, courses over the ground that the autopilot does not follow
     (``AutopilotBeatZone``).
@@ -252,31 +253,6 @@ def wound_at(b: BoatModel, xs: Floats, ys: Floats, course: Floats, i: int) -> fl
 
 
 @kernel
-def meets_target(b: BoatModel, ax: float, ay: float, bx: float, by: float, t0: float, t1: float) -> bool:
-    """Does the boat, at a at t0 and at b at t1, enter a target's disc?"""
-    span = t1 - t0
-    for i in range(b.targets.shape[0]):
-        q = b.targets[i]
-        lo, hi = max(t0, q[6]), min(t1, q[7])
-        if hi < lo:
-            continue
-        ux = (bx - ax) / span if span > 0.0 else 0.0
-        uy = (by - ay) / span if span > 0.0 else 0.0
-        rx = ax + ux * (lo - t0) - q[0] - q[2] * lo
-        ry = ay + uy * (lo - t0) - q[1] - q[3] * lo
-        wx, wy = ux - q[2], uy - q[3]
-        r, g, d = max(0.0, q[4] + q[5] * lo), q[5], hi - lo
-        c2 = wx * wx + wy * wy - g * g
-        c1 = rx * wx + ry * wy - r * g
-        c0 = rx * rx + ry * ry - r * r
-        if c0 < 0.0 or (c2 * d + 2.0 * c1) * d + c0 < 0.0:
-            return True
-        if c2 > 0.0 and 0.0 < -c1 / c2 < d and c0 - c1 * c1 / c2 < 0.0:
-            return True
-    return False
-
-
-@kernel
 def is_free(g: SegmentGrid, ax: float, ay: float, bx: float, by: float) -> bool:
     """Is the segment clear of every boundary segment? Exact; walks the grid's rows that it crosses."""
     if g.edges.shape[0] == 0:
@@ -381,8 +357,8 @@ def walk_on(b: BoatModel, xs: Floats, ys: Floats, first: int, last: int, t: floa
         if abs(a) < worst_half(b, t1, t2) - SLACK_RAD:
             return math.inf
         if b.targets.shape[0] > 0 and (
-            meets_target(b, xs[i], ys[i], xs[i], ys[i], t, t1)
-            or meets_target(b, xs[i], ys[i], xs[i + 1], ys[i + 1], t1, t2)
+            meets_discs(b.targets, xs[i], ys[i], xs[i], ys[i], t, t1)
+            or meets_discs(b.targets, xs[i], ys[i], xs[i + 1], ys[i + 1], t1, t2)
         ):
             return math.inf
         t, h = t2, a

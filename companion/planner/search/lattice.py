@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.geo.kernels import meets_discs
 from companion.kernels.heap import pop, push
 from companion.kernels.jit import kernel
 from companion.planner.search.gauge import Aim, Gauge, least_from
@@ -26,7 +27,6 @@ from companion.planner.search.kernels import (
     Ints,
     SegmentGrid,
     is_free,
-    meets_target,
     speed_at,
     track,
     turn_guess,
@@ -49,7 +49,7 @@ def _misses(b: BoatModel, x: float, y: float, h: float, t: float, mx: float, my:
         a, v = track(b, qx - x, qy - y, t)
         t1 = t + turn_guess(b, h, a)
         t2 = t1 + math.hypot(qx - x, qy - y) / max(v, 1e-9)
-        if meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, qx, qy, t1, t2):
+        if meets_discs(b.targets, x, y, x, y, t, t1) or meets_discs(b.targets, x, y, qx, qy, t1, t2):
             return False
         x, y, h, t = qx, qy, a, t2
     return True
@@ -246,7 +246,7 @@ def _end_from(
                 t2 < bound
                 and (b.room == 0.0 or abs(wound + wrap(a - h)) <= b.most_turn)
                 and is_free(g, x, y, ex, ey)
-                and not (meets_target(b, x, y, x, y, t, t1) or meets_target(b, x, y, ex, ey, t1, t2))
+                and not (meets_discs(b.targets, x, y, x, y, t, t1) or meets_discs(b.targets, x, y, ex, ey, t1, t2))
             )
             return End(t2 if is_open else math.inf, ex, ey, 0.0, 0.0, False)
     if b.can_tack:
@@ -365,12 +365,12 @@ def lattice_search(
             if f1 >= end.t:
                 continue
             if move < _STEP:
-                is_closed = is_watched and (came[s] == 1 - move or meets_target(b, x, y, x, y, t, t1))
+                is_closed = is_watched and (came[s] == 1 - move or meets_discs(b.targets, x, y, x, y, t, t1))
             else:
                 is_closed = (
                     abs(angle[k, move]) < worst_half(b, t, t1) - 0.5 * SLACK_RAD
                     or not is_free(g, x, y, x1, y1)
-                    or (is_watched and meets_target(b, x, y, x1, y1, t, t1))
+                    or (is_watched and meets_discs(b.targets, x, y, x1, y1, t, t1))
                 )
             if is_closed:
                 continue

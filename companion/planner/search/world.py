@@ -260,7 +260,7 @@ def make_boat(p: Problem) -> BoatModel:
     for t in p.targets:
         xy = to_wind(p, np.array([[t.x_m, t.y_m]]))[0]
         v = to_wind(p, origin + np.array([[t.vx_mps, t.vy_mps]]))[0]
-        rows.append([xy[0], xy[1], v[0], v[1], t.radius_m, t.growth_mps, t.from_s, t.until_s, 0.0])
+        rows.append((*xy, *v, *t.row()[4:]))
     up, down = _best_angles(p)
     return BoatModel(
         np.asarray(b.polar_twa_rad, np.float64),
@@ -282,7 +282,7 @@ def make_boat(p: Problem) -> BoatModel:
         p.current.drift_mps * math.cos(angle),
         up,
         down,
-        np.asarray(rows, np.float64).reshape(-1, 9),
+        np.asarray(rows, np.float64).reshape(-1, 8),
         b.can_tack,
         b.room_m,
         b.most_turn_rad,

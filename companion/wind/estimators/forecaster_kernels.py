@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.geo.kernels import wrap
 from companion.kernels.jit import kernel
 
 # mypy: disable-error-code="no-any-return"
@@ -101,12 +102,6 @@ def new_state(constants: Constants) -> ForecasterState:
         ring=np.zeros((ROWS, 3 + 5 * J)),
         pointer=np.zeros(J),
     )
-
-
-@kernel
-def wrap(a: float) -> float:
-    """Return the angle on [-π, π)."""
-    return (a + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @kernel

@@ -20,13 +20,8 @@ from numpy.typing import NDArray
 from companion.boat import Polar
 from companion.boat.boat import CROSS_FLOW
 from companion.boat.l1 import STEERS_FROM_MPS, lateral_mps2
+from companion.geo.kernels import wrap
 from companion.kernels.jit import kernel
-
-
-@kernel
-def wrap(angle: float) -> float:
-    """Return an angle [rad] on -π..π."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @kernel

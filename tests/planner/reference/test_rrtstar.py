@@ -7,11 +7,12 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from companion.geo.kernels import wrap
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.effort import Effort
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.reference import rrtstar_kernels as kernels
-from companion.planner.reference.kernels import first_hit, turn_time, wrap
+from companion.planner.reference.kernels import first_hit, turn_time
 from companion.planner.reference.kernels import steer as steer_kernel
 from companion.planner.reference.rrtstar import RrtTree, search
 from companion.planner.reference.world import bounds_of, world_of
