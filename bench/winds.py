@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from companion.geo.angles import wrap_pi
 from companion.kernels.jit import kernel
 from companion.planner.plan import Leg, Plan
+from companion.planner.problem.sigma import NONE
 from companion.planner.problem.value import Problem
 from companion.planner.risk.chance_constraint import process_of
-from companion.planner.risk.kernels import NONE, correlation, sigma_at
+from companion.planner.risk.kernels import correlation, sigma_at
 
 
 def simulate_entries(

@@ -18,7 +18,6 @@ from companion.errors import InputError
 from companion.messages import Spread, Target
 from companion.planner.problem.parts import (
     FENCE,
-    SIGMA_MODELS,
     AutopilotBeatZone,
     Beat,
     BoatLimits,
@@ -29,6 +28,7 @@ from companion.planner.problem.parts import (
     Speeds,
     Strength,
 )
+from companion.planner.problem.sigma import SIGMA_MODELS
 
 if TYPE_CHECKING:
     from companion.planner.problem.tracking import Tracking

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from companion.boat.failed_tack import IRONS_S
+from companion.planner.problem.sigma import SIGMA_MODELS, sigma_of
 
 FENCE = "the fence"  # what a fence is called that has no other name
 TOUCH_M = 1e-3
@@ -24,8 +25,6 @@ CLEAR_TURN_RAD = math.radians(10.0)
 """A boat that cannot tack turns through dead down wind only where that is the shorter way by twice this [rad]."""
 ROUND_RADII = 5.0
 """Turning radii in the leg of a round: from close-hauled to dead down wind and on, 2 tan(135°/2) of them."""
-
-SIGMA_MODELS = ("none", "kalman", "ar1", "forecast")
 
 
 def interpolated(x: float, nodes: Sequence[float], values: Sequence[float]) -> float:
@@ -65,14 +64,19 @@ class Sigma:
 
     def at(self, t_s: float) -> float:
         """Return sigma [rad] at ``t_s`` >= 0 from now."""
-        if self.model == "kalman":
-            return math.sqrt(self.sigma0_rad**2 + self.growth_rad_per_sqrt_s**2 * t_s)
-        if self.model == "ar1":
-            v0, vi = self.sigma0_rad**2, self.sigma_inf_rad**2
-            return math.sqrt(vi + (v0 - vi) * math.exp(-2.0 * self.rho_hz * t_s))
         if self.model == "forecast":
             return interpolated(t_s, self.horizon_s, self.sigma_rad)
-        return 0.0
+        return float(sigma_of(t_s, self.number, self.sigma0_rad, self.later, self.rho_hz))
+
+    @property
+    def number(self) -> int:
+        """The model as kernels have it."""
+        return SIGMA_MODELS.index(self.model)
+
+    @property
+    def later(self) -> float:
+        """What the model has beside sigma0: its growth [rad/sqrt s] or limit [rad]; 0 of the others."""
+        return {"kalman": self.growth_rad_per_sqrt_s, "ar1": self.sigma_inf_rad}.get(self.model, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

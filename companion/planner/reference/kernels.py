@@ -13,6 +13,7 @@ from companion.geo.kernels import meets_discs, wrap
 from companion.kernels.heap import pop, push
 from companion.kernels.jit import kernel
 from companion.planner.problem.parts import CLEAR_TURN_RAD
+from companion.planner.problem.sigma import TABLE, sigma_of
 
 TWO_PI = 2.0 * math.pi
 EDGE_PAD = 1e-6  # of a heading laid on the edge of the no-go zone [rad]: below the judge's slack
@@ -45,22 +46,16 @@ def polar_speed(twa, polar):  # type: ignore[no-untyped-def]
 @kernel
 def no_go(t, number, model, table):  # type: ignore[no-untyped-def]
     """Return the tightened no-go half angle at t (eq. 15, widening)."""
-    half = number[HALF]
-    if model == 1:
-        return half + math.sqrt(number[W0] ** 2 + number[W1] ** 2 * t)
-    if model == 2:
-        v0, vi = number[W0] ** 2, number[W1] ** 2
-        return half + math.sqrt(max(0.0, vi + (v0 - vi) * math.exp(-2.0 * number[RHO] * t)))
-    if model == 3:
-        return half + np.interp(t, table[0], table[1])
-    return half
+    if model == TABLE:
+        return number[HALF] + np.interp(t, table[0], table[1])
+    return number[HALF] + sigma_of(t, model, number[W0], number[W1], number[RHO])
 
 
 @kernel
 def worst_no_go(t0, t1, number, model, table):  # type: ignore[no-untyped-def]
     """Return the largest half angle over [t0, t1]."""
     worst = max(no_go(t0, number, model, table), no_go(t1, number, model, table))
-    if model == 3:
+    if model == TABLE:
         for i in range(table.shape[1]):
             if t0 < table[0, i] < t1:
                 worst = max(worst, number[HALF] + table[1, i])

@@ -10,7 +10,7 @@ from companion.geo.kernels import meets_discs, wrap
 from companion.kernels.jit import kernel
 from companion.kernels.xorshift import uniform
 from companion.planner.reference.kernels import HALF, TWD, TWO_PI, first_hit, steer, straight
-from companion.planner.risk.kernels import inside, leg_risk, piece, sigma_at, spread_at, tail
+from companion.planner.risk.kernels import below, inside, leg_risk, piece, sigma_at, spread_at
 
 # Kernels of the reference RRT*: what uncertain vessels make of one edge of its tree.
 
@@ -136,7 +136,7 @@ def _state_risk(twa, t, number, risk_number, risk_table):  # type: ignore[no-unt
     )
     if sigma <= 1e-12:
         return 0.0 if margin >= -1e-9 else 1.0
-    return tail(margin / sigma)
+    return below(-margin / sigma)
 
 
 @kernel

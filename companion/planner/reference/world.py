@@ -18,7 +18,6 @@ from companion.planner.problem.evaluate import is_zoned
 from companion.planner.problem.parts import TOUCH_M
 from companion.planner.problem.value import Problem
 
-NO_GO_NONE, NO_GO_KALMAN, NO_GO_AR1, NO_GO_TABLE = 0, 1, 2, 3
 _COURSES = 1441  # of the table of headings in a current: a quarter of a degree
 _MAX_CELLS = 400_000
 
@@ -70,13 +69,8 @@ def world_of(p: Problem) -> ReferenceWorld:
     edge = _edges(p)
     cell_first, cell_edge, grid, shape = _buckets(edge)
     s, k = p.wind.sigma, p.k_delta
-    model, widen, table = NO_GO_NONE, (0.0, 0.0, 0.0), np.zeros((2, 1))
-    if s.model == "kalman":
-        model, widen = NO_GO_KALMAN, (k * s.sigma0_rad, k * s.growth_rad_per_sqrt_s, 0.0)
-    elif s.model == "ar1":
-        model, widen = NO_GO_AR1, (k * s.sigma0_rad, k * s.sigma_inf_rad, s.rho_hz)
-    elif s.model == "forecast":
-        model = NO_GO_TABLE
+    table = np.zeros((2, 1))
+    if s.model == "forecast":
         table = np.array([s.horizon_s, [p.widening_rad(t) for t in s.horizon_s]], dtype=np.float64)
     b, c = p.boat, p.current
     number = np.array(
@@ -87,7 +81,9 @@ def world_of(p: Problem) -> ReferenceWorld:
             b.turn_rate_radps,
             b.tack_loss_s if b.can_tack else math.inf,
             b.gybe_loss_s,
-            *widen,
+            k * s.sigma0_rad,
+            k * s.later,
+            s.rho_hz,
             c.drift_mps * math.sin(c.set_rad),
             c.drift_mps * math.cos(c.set_rad),
             *((p.zone.from_rad, p.zone.half_rad) if p.zone is not None and c.drift_mps > 0.0 else (0.0, 0.0)),
@@ -102,7 +98,7 @@ def world_of(p: Problem) -> ReferenceWorld:
         grid=grid,
         shape=shape,
         number=number,
-        no_go_model=model,
+        no_go_model=s.number,
         table=table,
         polar=np.array([b.polar_twa_rad, b.polar_mps], dtype=np.float64),
         course=_courses(p),

@@ -36,6 +36,7 @@ from companion.messages import Spread, Target
 from companion.planner.effort import Effort, Outcome, Search
 from companion.planner.plan import Leg, Plan, PlanStatus, Why
 from companion.planner.problem.evaluate import evaluate
+from companion.planner.problem.sigma import AR1, NONE, TABLE
 from companion.planner.problem.value import LEAST_PART, Problem, sigmas_for, uncertain, vessel_count
 from companion.planner.risk import kernels
 from companion.planner.risk.tacks import TackAtRisk, tack_risks, tacks_at_risk
@@ -169,9 +170,9 @@ class WindProcess(NamedTuple):
     @property
     def correlation_time_s(self) -> float:
         """Time over which the correlation falls to 1/e [s]; infinite for a random walk."""
-        if self.model == kernels.TABLE:
+        if self.model == TABLE:
             return self.tau
-        return 1.0 / self.rho if self.model == kernels.AR1 and self.rho > 0.0 else math.inf
+        return 1.0 / self.rho if self.model == AR1 and self.rho > 0.0 else math.inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,17 +214,13 @@ class PathRisk:
 def process_of(problem: Problem) -> WindProcess:
     """Return the wind process that the problem's sigma implies."""
     s = problem.wind.sigma
-    if s.model == "kalman":
-        return WindProcess(kernels.KALMAN, s.sigma0_rad, s.growth_rad_per_sqrt_s)
-    if s.model == "ar1":
-        return WindProcess(kernels.AR1, s.sigma0_rad, s.sigma_inf_rad, s.rho_hz)
     if s.model == "forecast":
         tau = problem.risk.correlation_time_s if problem.risk is not None else DEFAULT_CORRELATION_S
         sigma = np.array(s.sigma_rad, dtype=np.float64)
         if s.half_width_rad is not None and problem.k_delta > 1e-6:
             sigma = np.maximum(sigma, np.array(s.half_width_rad) / problem.k_delta)
-        return WindProcess(kernels.TABLE, tau=tau, table_t=np.array(s.horizon_s, dtype=np.float64), table_s=sigma)
-    return WindProcess(kernels.NONE)
+        return WindProcess(TABLE, tau=tau, table_t=np.array(s.horizon_s, dtype=np.float64), table_s=sigma)
+    return WindProcess(s.number, s.sigma0_rad, s.later, s.rho_hz)
 
 
 def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
@@ -235,7 +232,7 @@ def path_risk(problem: Problem, plan: Plan | Sequence[Leg]) -> PathRisk:
     end = np.array([leg.end_s for leg in legs], dtype=np.float64)
     twa = _angles(legs)
     first = np.zeros(len(legs))
-    if legs and process.model != kernels.NONE:
+    if legs and process.model != NONE:
         _first_passage((start, end), twa, half, process, first)
     out = []
     for i, leg in enumerate(legs):

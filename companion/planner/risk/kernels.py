@@ -17,18 +17,17 @@ import math
 import numpy as np
 
 from companion.kernels.jit import kernel
+from companion.planner.problem.sigma import AR1, KALMAN, TABLE, sigma_of
 
 # First passage of a Gaussian Markov wind into the no-go zone: the numbers behind ``risk``.
 #
 # The deviation of the wind from its forecast is X(t) = sigma(t) Z(t), with Z standard normal at every moment and
 # Markov: Z(t + d) = r Z(t) + sqrt(1 - r^2) N(0, 1). The models differ only in sigma and in the correlation r:
 #
-#     0 none    sigma = 0
-#     1 kalman  sigma^2 = s0^2 + g^2 t, a random walk: r = sigma(t) / sigma(t + d)
-#     2 ar1     sigma^2 = si^2 + (s0^2 - si^2) exp(-2 rho t), an OU process: r = sigma(t) exp(-rho d) / sigma(t + d)
-#     3 table   sigma from a table, r = exp(-d / tau)
-
-NONE, KALMAN, AR1, TABLE = 0, 1, 2, 3
+#     none    sigma = 0
+#     kalman  a random walk: r = sigma(t) / sigma(t + d)
+#     ar1     an OU process: r = sigma(t) exp(-rho d) / sigma(t + d)
+#     table   sigma from a table, r = exp(-d / tau)
 
 Z_MAX = 6.5  # the grid ends here; beyond lies 4e-11 of the wind
 Z_CELLS = 260  # cells of 0.05 standard deviations
@@ -43,23 +42,17 @@ BARRIER_SHIFT = 0.5826
 def sigma_at(  # type: ignore[no-untyped-def]
     t_s, model, s0, s1, rho, table_t, table_s
 ):
-    """Return sigma [rad] at time t: s1 is the growth [rad/sqrt s] of model 1, the limit [rad] of model 2."""
-    if model == 1:
-        return math.sqrt(s0 * s0 + s1 * s1 * t_s)
-    if model == 2:
-        return math.sqrt(max(0.0, s1 * s1 + (s0 * s0 - s1 * s1) * math.exp(-2.0 * rho * t_s)))
-    if model == 3:
-        return np.interp(t_s, table_t, table_s)
-    return 0.0
+    """Return sigma [rad] at time t, of a table too."""
+    return np.interp(t_s, table_t, table_s) if model == TABLE else sigma_of(t_s, model, s0, s1, rho)
 
 
 @kernel
 def _step_for(t_s, r, model, s0, s1, rho, tau, table_t, table_s):  # type: ignore[no-untyped-def]
     """Return the time [s] over which the correlation falls to r; infinite when it never does."""
     sigma = sigma_at(t_s, model, s0, s1, rho, table_t, table_s)
-    if model == 1:
+    if model == KALMAN:
         return sigma * sigma * (1.0 / (r * r) - 1.0) / (s1 * s1) if s1 > 0.0 else np.inf
-    if model == 2:
+    if model == AR1:
         if rho <= 0.0 or s1 <= 0.0:
             return np.inf
         e = r * r * s1 * s1 / (sigma * sigma - r * r * (sigma * sigma - s1 * s1))
@@ -70,21 +63,22 @@ def _step_for(t_s, r, model, s0, s1, rho, tau, table_t, table_s):  # type: ignor
 @kernel
 def correlation(t_s, d_s, model, s0, s1, rho, tau, table_t, table_s):  # type: ignore[no-untyped-def]
     """Return the correlation of X(t) and X(t + d)."""
-    if model == 3:
+    if model == TABLE:
         return math.exp(-d_s / tau)
     a = sigma_at(t_s, model, s0, s1, rho, table_t, table_s)
     b = sigma_at(t_s + d_s, model, s0, s1, rho, table_t, table_s)
     if b <= 0.0:
         return 1.0
     r = a / b
-    if model == 2:
+    if model == AR1:
         r *= math.exp(-rho * d_s)
     return min(1.0, r)
 
 
 @kernel
-def _phi(x):  # type: ignore[no-untyped-def]
-    return 0.5 * math.erfc(-x / math.sqrt(2.0))
+def below(z):  # type: ignore[no-untyped-def]
+    """Return the chance that a standard normal value is below ``z``."""
+    return 0.5 * math.erfc(-z / math.sqrt(2.0))
 
 
 @kernel
@@ -96,11 +90,11 @@ def _kernel(r, dz, out):  # type: ignore[no-untyped-def]
         mean = r * (-Z_MAX + (i + 0.5) * dz)
         first = max(0, min(n, int((mean - NEVER * s + Z_MAX) / dz)))
         last = min(n, int((mean + NEVER * s + Z_MAX) / dz) + 2)
-        low = _phi((-Z_MAX + first * dz - mean) / s)
+        low = below((-Z_MAX + first * dz - mean) / s)
         total = 0.0
         out[i, :] = 0.0
         for j in range(first, last):
-            high = _phi((-Z_MAX + (j + 1.0) * dz - mean) / s)
+            high = below((-Z_MAX + (j + 1.0) * dz - mean) / s)
             out[i, j] = high - low
             total += high - low
             low = high
@@ -162,7 +156,7 @@ def first_passage(  # type: ignore[no-untyped-def]
     dz = 2.0 * Z_MAX / n
     p = np.empty(n)
     for j in range(n):
-        p[j] = _phi(-Z_MAX + (j + 1.0) * dz) - _phi(-Z_MAX + j * dz)
+        p[j] = below(-Z_MAX + (j + 1.0) * dz) - below(-Z_MAX + j * dz)
     fresh = p.copy()
     q = np.empty(n)
     part = np.empty((n, n))
@@ -224,7 +218,7 @@ def first_passage(  # type: ignore[no-untyped-def]
                     out[k] += taken
                     # On a long leg in a settled wind the share taken per step settles too: the rest is a power.
                     share = taken / mass if mass > 1e-12 else 0.0
-                    settled = (model == 2 and abs(sigma - s1) < 1e-4 * s1) or (model == 3 and t >= table_t[-1])
+                    settled = (model == AR1 and abs(sigma - s1) < 1e-4 * s1) or (model == TABLE and t >= table_t[-1])
                     if settled and r == R_STEP and abs(share - last_share) <= 1e-4 * share:
                         steady += 1
                         whole = math.floor((stop - t) / move)
@@ -239,12 +233,6 @@ def first_passage(  # type: ignore[no-untyped-def]
                     last_share = share
                 at_start = False
     return steps
-
-
-@kernel
-def tail(z):  # type: ignore[no-untyped-def]
-    """Return the chance that a standard normal value is above ``z``."""
-    return 0.5 * math.erfc(z / math.sqrt(2.0))
 
 
 @kernel
@@ -264,11 +252,11 @@ def leg_risk(  # type: ignore[no-untyped-def]
     s_start = sigma_at(t0, model, s0, s1, rho, table_t, table_s)
     if max(s_start, sigma_at(t1, model, s0, s1, rho, table_t, table_s)) <= 1e-9:
         return 0.0 if margin >= -1e-9 else 1.0
-    entry = tail(margin / max(s_start, 1e-9))
+    entry = below(-margin / max(s_start, 1e-9))
     is_full = True
     if before_t >= 0.0 and before_twa * twa > 0.0:
         s_before = max(sigma_at(before_t, model, s0, s1, rho, table_t, table_s), 1e-9)
-        entry = max(0.0, entry - tail((abs(before_twa) - half) / s_before))
+        entry = max(0.0, entry - below((half - abs(before_twa)) / s_before))
         is_full = False
     total, press = 0.0, 0.0
     n = 16
@@ -278,13 +266,13 @@ def leg_risk(  # type: ignore[no-untyped-def]
         s = max(sigma_at(t, model, s0, s1, rho, table_t, table_s), 1e-9)
         z = max(1.0, margin / s)
         inverse_tau, growth = 0.0, 0.0
-        if model == 1:
+        if model == KALMAN:
             inverse_tau = 0.5 * s1 * s1 / (s * s)
             growth = inverse_tau
-        elif model == 2:
+        elif model == AR1:
             inverse_tau = rho * s1 * s1 / (s * s)
             growth = max(0.0, inverse_tau - rho)
-        elif model == 3:
+        elif model == TABLE:
             inverse_tau = 1.0 / tau
             later = sigma_at(t + 0.5 * dt, model, s0, s1, rho, table_t, table_s)
             earlier = sigma_at(t - 0.5 * dt, model, s0, s1, rho, table_t, table_s)
@@ -299,11 +287,6 @@ def leg_risk(  # type: ignore[no-untyped-def]
 FAR_SIGMAS = 6.5  # farther outside than this nothing happens
 LEAST_SIGMA_M = 0.3  # a spread is not taken smaller: no report is better
 MOST_ANGLES = 1440
-
-
-@kernel
-def _cdf(z):  # type: ignore[no-untyped-def]
-    return 0.5 * math.erfc(-z / math.sqrt(2.0))
 
 
 @kernel
@@ -359,7 +342,7 @@ def inside(mx, my, s, radius):  # type: ignore[no-untyped-def]
         chord = math.sqrt(max(0.0, radius * radius - u * u))
         z = (u - a) / big
         weight = math.exp(-0.5 * z * z) / (big * math.sqrt(2.0 * math.pi)) * half * math.sin(angle) * step
-        total += weight * (_cdf((chord - b) / small) - _cdf((-chord - b) / small))
+        total += weight * (below((chord - b) / small) - below((-chord - b) / small))
     return min(1.0, total)
 
 
@@ -392,7 +375,7 @@ def entry_rate(mx, my, vx, vy, s, radius):  # type: ignore[no-untyped-def]
         d = math.sqrt(max(0.0, dxx * nx * nx + 2.0 * dxy * nx * ny + dyy * ny * ny))
         if d > 1e-9:
             z = m / d
-            speed = d * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi) + m * _cdf(z)
+            speed = d * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi) + m * below(z)
         else:
             speed = max(0.0, m)
         total += density * speed

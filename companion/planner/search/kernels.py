@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from companion.geo.kernels import meets_discs
 from companion.kernels.jit import kernel
 from companion.planner.problem.parts import CLEAR_TURN_RAD
+from companion.planner.problem.sigma import NONE, TABLE, sigma_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -51,8 +52,7 @@ class BoatModel(NamedTuple):
     max_twa: float
     kind: int
     s0: float
-    growth: float
-    s_inf: float
+    s1: float
     rho: float
     k: float
     horizon: Floats
@@ -86,13 +86,10 @@ def wrap(a: float) -> float:
 @kernel
 def half_at(b: BoatModel, t: float) -> float:
     """Return the no-go half angle at time t [rad]."""
-    if b.kind == 0:
+    if b.kind == NONE:
         return b.base
-    if b.kind == 1:
-        return b.base + b.k * math.sqrt(b.s0 * b.s0 + b.growth * b.growth * t)
-    if b.kind == 2:
-        v0, vi = b.s0 * b.s0, b.s_inf * b.s_inf
-        return b.base + b.k * math.sqrt(max(0.0, vi + (v0 - vi) * math.exp(-2.0 * b.rho * t)))
+    if b.kind != TABLE:
+        return b.base + b.k * sigma_of(t, b.kind, b.s0, b.s1, b.rho)
     h = b.horizon
     n = h.shape[0]
     if t <= h[0]:
@@ -107,10 +104,10 @@ def half_at(b: BoatModel, t: float) -> float:
 @kernel
 def worst_half(b: BoatModel, t0: float, t1: float) -> float:
     """Return the largest no-go half angle over [t0, t1] [rad]."""
-    if b.kind == 0:
+    if b.kind == NONE:
         return b.base
     worst = max(half_at(b, t0), half_at(b, t1))
-    if b.kind == 3:
+    if b.kind == TABLE:
         for i in range(b.horizon.shape[0]):
             if t0 < b.horizon[i] < t1:
                 worst = max(worst, b.base + b.width[i])

@@ -21,7 +21,6 @@ DEEP_SKIN_M = 9.8e-4
 """The same where start or goal lies in the solid, less deep than the scorer allows."""
 TANGLE = 60_000
 """Pairs of obstacles whose boxes overlap, above which obstacles are not united (thousands of crossing slivers)."""
-SIGMA_KINDS = {"none": 0, "kalman": 1, "ar1": 2, "forecast": 3}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -268,10 +267,9 @@ def make_boat(p: Problem) -> BoatModel:
         b.turn_rate_radps,
         b.no_go_half_rad,
         b.max_twa_rad,
-        SIGMA_KINDS[s.model] if p.is_time_varying or s.model == "forecast" else 0,
+        s.number if p.is_time_varying or s.model == "forecast" else 0,
         s.sigma0_rad,
-        s.growth_rad_per_sqrt_s,
-        s.sigma_inf_rad,
+        s.later,
         s.rho_hz,
         p.k_delta,
         horizon,
