@@ -16,13 +16,14 @@ from statistics import NormalDist
 import numpy as np
 import shapely
 
+from companion.boat.rover import TACK_RETRY_S
 from companion.compose import boat_of
 from companion.geo.angles import difference_rad
 from companion.geofence import Mission, load_mission
 from companion.planner import Problem
 from companion.planner.policy import Policy, Shifts, solve, steady, wandering
 from lab.perfect_information import Race, RaceBoat, RaceMark, Weather
-from sitl.autopilot import TACK_RETRY_S, no_go_half_rad, settled_polar, tack_loss_s
+from sitl.autopilot import no_go_half_rad, settled_polar, tack_loss_s
 from sitl.commands.run import scenario_file
 from sitl.results import markdown
 from sitl.run.embedded import solid_of

@@ -1,11 +1,10 @@
 """The predicted track, compiled: a point that runs along the legs, a boat that is steered to it, and its tacks.
 
 The guidance is ArduRover's since 4.3, restated: AR_WPNav's point on the legs, which waits for the boat and rounds each
-corner in a curve of its own acceleration; AR_PosControl, which turns the boat by what its velocity lacks; and
-sailboat.cpp, which holds the edge of the no-go zone on a leg that is inside it and tacks where it is a corridor off
-the line. With ``H_L1_PERIOD`` it is that of 4.2 and before: ``companion.boat.l1`` in place of the point and of
-AR_PosControl. The boat is a speed that follows the polar and a yaw rate that follows what is asked: no more is known of
-most boats. What it leaves out is in the stated error (``companion.boat.tracking``).
+corner in a curve of its own acceleration, and the laws of ``companion.boat.rover``. With ``H_L1_PERIOD`` it is that of
+4.2 and before: ``companion.boat.l1`` in place of the point and of AR_PosControl. The boat is a speed that follows the
+polar and a yaw rate that follows what is asked: no more is known of most boats. What it leaves out is in the stated
+error (``companion.boat.tracking``).
 
 Frame: east, north [m]; headings [rad] clockwise from north; the wind's direction is where it comes from.
 """
@@ -18,6 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.boat.l1 import STEERS_FROM_MPS, lateral_mps2
+from companion.boat.rover import (
+    RUDDER_MAX_RAD,
+    SLOWEST_MPS,
+    TACK_DONE_RAD,
+    TACK_RETRY_S,
+    TACK_TIMEOUT_S,
+    edge,
+    is_beaten,
+    leads_away,
+    pace_share,
+    position_control,
+)
 from companion.geo.kernels import wrap
 from companion.kernels.jit import kernel
 
@@ -119,17 +130,9 @@ H_SIZE = 20
 # --- columns of the track
 T_E, T_N, T_LEG, T_BEATS, T_SIDE, T_SIZE = 0, 1, 2, 3, 4, 5
 
-NO_GO_PAD_RAD = math.radians(10.0)
-TACK_DONE_RAD = math.radians(10.0)
-TACK_TIMEOUT_S = 5.0
-TACK_RETRY_S = 5.0
-TRACK_LEAD = 0.05
-OVERSPEED = 5.0
-SLOWEST_MPS = 0.1
 # ATC_STR_RAT_P, _I, _FF and MOT_SPD_SCA_BASE of a boat whose rudder is tuned: the yaw rate is soon what is asked
 RATE_P, RATE_I, RATE_FF = 0.2, 0.2, 0.75
 RUDDER_BASE_MPS = 1.0
-RUDDER_MAX_RAD = math.radians(35.0)
 
 
 @kernel
@@ -213,7 +216,7 @@ def sail(
         if pace > 1e-6:
             re, rn = he / pace, hn / pace
             behind = (te - be) * re + (tn - bn) * rn
-            want = min(max(TRACK_LEAD + (ve * re + vn * rn - h[H_POS_P] * behind) / pace, 0.0), OVERSPEED)
+            want = pace_share(ve * re + vn * rn, behind, pace, h[H_POS_P])
         scale += (want - scale) * min(1.0, dt * jerk / accel)
         ahead_s = scale * dt
         t_this += ahead_s
@@ -253,20 +256,20 @@ def sail(
         reached = arrived and ((leg < last and not by_l1) or math.hypot(de - be, dn - bn) <= h[H_WP_RADIUS] or past)
         # --- what is steered
         bearing = math.atan2(de - be, dn - bn)
-        beats = tacking or abs(wrap(heard - bearing)) <= h[H_NO_GO] + NO_GO_PAD_RAD
+        beats = tacking or is_beaten(heard, bearing, h[H_NO_GO])
         if beats:
             on_port = wrap(twd - yaw) < 0.0
             should = False
-            heading = wrap(heard + h[H_NO_GO]) if on_port else wrap(heard - h[H_NO_GO])
+            heading = edge(heard, h[H_NO_GO], on_port)
             if abs(wrap(heard - bearing)) > h[H_NO_GO] and not tacking:
                 if (wrap(heard - bearing) < 0.0) == on_port:
                     heading = bearing
                 else:
                     should = True
-            if not tacking and not should and abs(xtrack) >= h[H_CORRIDOR] > 0.0:
-                should = (xtrack > 0.0) != on_port
+            if not tacking and not should:
+                should = leads_away(xtrack, h[H_CORRIDOR], on_port)
             if should and t - tack_end > TACK_RETRY_S:
-                tack_yaw = wrap(heard - h[H_NO_GO]) if on_port else wrap(heard + h[H_NO_GO])
+                tack_yaw = edge(heard, h[H_NO_GO], not on_port)
                 tacking, tack_start = True, t
             if tacking:
                 heading = tack_yaw
@@ -287,15 +290,16 @@ def sail(
             )
             asked = min(max(lateral, -h[H_LATERAL]), h[H_LATERAL]) / max(v, STEERS_FROM_MPS)
         else:
-            le, ln = h[H_POS_P] * (te - be) + he, h[H_POS_P] * (tn - bn) + hn
-            wanted = math.hypot(le, ln)
-            if wanted > h[H_WP_SPEED]:
-                le, ln, wanted = le * h[H_WP_SPEED] / wanted, ln * h[H_WP_SPEED] / wanted, h[H_WP_SPEED]
-            lateral = h[H_VEL_P] * ((le - ve) * cos - (ln - vn) * sin) + ae * cos - an * sin
-            slowest = min(wanted, math.sqrt(h[H_LATERAL] * h[H_TURN_RADIUS]))
-            ahead = max(le * sin + ln * cos, slowest)
-            want_speed = min(max(ahead, want_speed - h[H_ACCEL] * dt), want_speed + h[H_ACCEL] * dt)
-            asked = min(max(lateral, -h[H_LATERAL]), h[H_LATERAL]) / max(want_speed, SLOWEST_MPS)
+            lateral, want_speed = position_control(
+                (te - be, tn - bn),
+                (he, hn, ae, an),
+                (ve, vn),
+                (sin, cos),
+                want_speed,
+                (h[H_POS_P], h[H_VEL_P], h[H_WP_SPEED], h[H_ACCEL], h[H_LATERAL], h[H_TURN_RADIUS]),
+                dt,
+            )
+            asked = lateral / max(want_speed, SLOWEST_MPS)
         # --- the boat
         asked = min(max(asked, -h[H_RATE_MAX]), h[H_RATE_MAX])
         want_rate = min(max(asked, want_rate - h[H_RATE_CHANGE] * dt), want_rate + h[H_RATE_CHANGE] * dt)

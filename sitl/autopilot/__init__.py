@@ -22,7 +22,6 @@ The shell joins it to transports and to the event loop's clock, whatever that is
 """
 
 from sitl.autopilot.autopilot import SimulatedAutopilot
-from sitl.autopilot.boat.kernel import TACK_RETRY_S
 from sitl.autopilot.boat.parameters import Parameters, check_parameters
 from sitl.autopilot.boat.sail_trial import no_go_half_rad, settled_polar, tack_loss_s
 from sitl.autopilot.boat.vehicle import Vehicle
@@ -49,7 +48,6 @@ __all__ = [
     "FORCED_REBOOT",
     "FRAME_M",
     "HOME",
-    "TACK_RETRY_S",
     "AisVessel",
     "AutopilotConfig",
     "Departures",

@@ -20,6 +20,18 @@ from numpy.typing import NDArray
 from companion.boat import Polar
 from companion.boat.boat import CROSS_FLOW
 from companion.boat.l1 import STEERS_FROM_MPS, lateral_mps2
+from companion.boat.rover import (
+    RUDDER_MAX_RAD,
+    SLOWEST_MPS,
+    TACK_DONE_RAD,
+    TACK_RETRY_S,
+    TACK_TIMEOUT_S,
+    edge,
+    is_beaten,
+    leads_away,
+    pace_share,
+    position_control,
+)
 from companion.geo.kernels import wrap
 from companion.kernels.jit import kernel
 
@@ -226,15 +238,10 @@ REACHED, TACKED, TACK_TIMED_OUT = 1, 2, 4
 
 MOORED, ANCHORED = 1.0, 2.0  # in S_MOORED: until it is armed; whatever it does
 
-NOGO_PAD_RAD = math.radians(10.0)
-TACK_DONE_RAD = math.radians(10.0)
-TACK_TIMEOUT_S = 5.0
-TACK_RETRY_S = 5.0
 TACK_REQUEST_S = 0.5
 MASS_KG = 2.0
 MOTOR_MPS = 2.0  # speed under the auxiliary motor: what a small boat's makes
 TURNING_CIRCLE_M = 1.8
-RUDDER_MAX_RAD = math.radians(35.0)
 WIND_DELAY_S = 5.0
 # A tack is tried where the wind comes within the first of ahead, having been beyond the second.
 HEAD_TO_WIND_RAD = math.radians(12.0)
@@ -244,8 +251,6 @@ FALLING_OFF_S = 8.0  # at most, until the boat sails again
 # AP_WindVane filters with dt = 0.05 s, but its 20 Hz task runs at every second loop: 25 Hz.
 VANE_DT_S = 0.05
 VANE_LOOPS = 2
-TRACK_LEAD = 0.05
-OVERSPEED = 5.0
 
 Vector = NDArray[np.float64]
 
@@ -379,7 +384,7 @@ def _indirect(s: Vector, p: Vector, yaw_rad: float) -> bool:
     if s[S_TACKING]:
         return True
     twd = math.atan2(s[S_TWD_SIN], s[S_TWD_COS])
-    return bool(abs(wrap(twd - yaw_rad)) <= p[P_NOGO] + NOGO_PAD_RAD)
+    return is_beaten(twd, yaw_rad, p[P_NOGO])
 
 
 @kernel
@@ -398,12 +403,10 @@ def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
     if s[S_TACK_ASKED] > 0.0 and not should_tack and not tacking:
         should_tack = t - s[S_TACK_ASKED] < TACK_REQUEST_S
         s[S_TACK_ASKED] = 0.0
-    xtrack = s[S_XTRACK]
-    if abs(xtrack) >= p[P_XTRACK_MAX] > 0.0 and not should_tack and not tacking:
-        # left of the leg on starboard tack, or right of it on port tack: the other tack leads back
-        should_tack = (xtrack > 0.0) != on_port
+    if not should_tack and not tacking:
+        should_tack = leads_away(s[S_XTRACK], p[P_XTRACK_MAX], on_port)
     if should_tack and t - s[S_TACK_END] > TACK_RETRY_S:
-        s[S_TACK_YAW] = wrap(twd - p[P_NOGO] if on_port else twd + p[P_NOGO])
+        s[S_TACK_YAW] = edge(twd, p[P_NOGO], not on_port)
         s[S_TACKING] = 1.0
         s[S_TACK_START] = t
         s[S_TACKS] += 1.0
@@ -418,7 +421,7 @@ def _upwind_heading(s: Vector, p: Vector, yaw_rad: float) -> tuple[float, int]:
             s[S_TACK_END] = t
             events |= TACK_TIMED_OUT
         return s[S_TACK_YAW], events
-    return wrap(twd + p[P_NOGO] if on_port else twd - p[P_NOGO]), events
+    return edge(twd, p[P_NOGO], on_port), events
 
 
 @kernel
@@ -462,7 +465,7 @@ def _target(s: Vector, p: Vector) -> tuple[float, float, float, float, bool]:
     # the target waits for the boat, and keeps a little ahead of it
     error = (s[S_TE] - (s[S_E] + s[S_GPS_E])) * de + (s[S_TN] - (s[S_N] + s[S_GPS_N])) * dn
     along = s[S_VE] * de + s[S_VN] * dn
-    want = clip(TRACK_LEAD + (along - p[P_POS_P] * error) / pace, 0.0, OVERSPEED)
+    want = pace_share(along, error, pace, p[P_POS_P])
     s[S_SCALE] += (want - s[S_SCALE]) * LOOP_S
     step = s[S_SCALE] * pace * LOOP_S
     arrived = False
@@ -534,22 +537,19 @@ def _leg(s: Vector, p: Vector) -> tuple[float, float, bool, int]:
             LOOP_S,
         )
         return 0.0, clip(lateral, -limit, limit) / max(abs(s[S_V]), STEERS_FROM_MPS), False, events
-    # AR_PosControl: velocity wanted, the acceleration across the bow that it takes, the turn rate for that
-    ve, vn = p[P_POS_P] * (s[S_TE] - (s[S_E] + s[S_GPS_E])) + he, p[P_POS_P] * (s[S_TN] - (s[S_N] + s[S_GPS_N])) + hn
-    v = math.hypot(ve, vn)
-    if v > p[P_WP_SPEED]:
-        ve, vn, v = ve * p[P_WP_SPEED] / v, vn * p[P_WP_SPEED] / v, p[P_WP_SPEED]
-    sin, cos = math.sin(s[S_YAW] + s[S_COMPASS]), math.cos(s[S_YAW] + s[S_COMPASS])
-    forward = ve * sin + vn * cos
-    lateral = p[P_VEL_P] * ((ve - s[S_VE]) * cos - (vn - s[S_VN]) * sin) + a_e * cos - a_n * sin
-    slowest = min(v, math.sqrt(limit * p[P_TURN_RADIUS]))
-    # the desired speed changes no faster than P_ACCEL; it starts at 0 when avoidance had eased the sheet
-    step = p[P_ACCEL] * LOOP_S
-    s[S_WANT_SPEED] = clip(max(forward, slowest), s[S_WANT_SPEED] - step, s[S_WANT_SPEED] + step)
+    yaw = s[S_YAW] + s[S_COMPASS]
+    lateral, s[S_WANT_SPEED] = position_control(
+        (s[S_TE] - (s[S_E] + s[S_GPS_E]), s[S_TN] - (s[S_N] + s[S_GPS_N])),
+        (he, hn, a_e, a_n),
+        (s[S_VE], s[S_VN]),
+        (math.sin(yaw), math.cos(yaw)),
+        s[S_WANT_SPEED],
+        (p[P_POS_P], p[P_VEL_P], p[P_WP_SPEED], p[P_ACCEL], limit, p[P_TURN_RADIUS]),
+        LOOP_S,
+    )
     if s[S_EASE]:
-        s[S_WANT_SPEED] = 0.0
-    speed = max(s[S_WANT_SPEED], 0.1)
-    return 0.0, clip(lateral, -limit, limit) / speed, False, events
+        s[S_WANT_SPEED] = 0.0  # it starts from there when the sheet is hauled in again
+    return 0.0, lateral / max(s[S_WANT_SPEED], SLOWEST_MPS), False, events
 
 
 @kernel

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from companion.boat import Polar
 from companion.boat.boat import carried, coefficient_of
+from companion.boat.rover import TACK_RETRY_S
 from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift
@@ -170,7 +171,7 @@ class Vehicle:
         self._compass_rad = 0.0
         self.state[k.S_YAW] = heading_rad
         self.state[k.S_MOORED] = float(is_moored)
-        self.state[k.S_TACK_END] = -k.TACK_RETRY_S
+        self.state[k.S_TACK_END] = -TACK_RETRY_S
         self.load_parameters()
         # compiles the kernel, or loads it, now rather than in the middle of a voyage in real time
         k.advance(self.state, self._settings, np.zeros((1, 2)), 0, _NONE, 0, self._polar)
