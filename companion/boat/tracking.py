@@ -240,14 +240,14 @@ def predict(
 
 
 def drawn_winds(
-    twd_from_rad: float, *, sigma_rad: float, tau_s: float, length_s: float, count: int = DRAWN, seed: int = DRAW_SEED
+    twd_from_rad: float, *, sigma_rad: float, tau_s: float, length_s: float, count: int = DRAWN
 ) -> NDArray[np.float64]:
     """Return (count, n) directions every half second: stationary Gaussian, correlated over ``tau_s``.
 
     Wolsieffer 2020, equation 17, in its exact form. ``tau_s`` of 0 or less draws one steady direction for each.
     """
     steps = int(length_s / (k.STEP_S * k.WIND_STEPS)) + 2
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(DRAW_SEED)
     phi = math.exp(-k.STEP_S * k.WIND_STEPS / tau_s) if tau_s > 0.0 else 1.0
     noise = rng.standard_normal((steps, count)) * math.sqrt(1.0 - phi * phi)
     return np.asarray(twd_from_rad + sigma_rad * k.remembered(noise, rng.standard_normal(count), phi))

@@ -213,7 +213,7 @@ def needs_of(mission: Mission | None) -> Needs:
     )
 
 
-def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> AutopilotLimits:
+def limits_at(link: str, *, system: int | None = None) -> AutopilotLimits:
     """Return what the autopilot on a link does with a plan. Raises InputError and LinkError."""
     from companion.boat import AutopilotLimits
     from companion.clock import run as run_loop
@@ -225,7 +225,7 @@ def limits_at(link: str, *, wait_s: float = 10.0, system: int | None = None) -> 
     async def ask() -> AutopilotLimits:
         own = LinkIdentity(component=TOOL_COMPONENT)
         async with Link(open_link(link), identity=own, target_system=system) as connected:
-            await connected.wait_autopilot(wait_s)
+            await connected.wait_autopilot(10.0)
             async with Autopilot(connected) as autopilot:
                 answers = {name: await autopilot.get_parameter(name) for name in AutopilotLimits.PARAMETERS}
         return AutopilotLimits.from_params(

@@ -186,7 +186,7 @@ def _sharing(base: SourceFiles, name: str) -> list[str]:
 
 def _shown(name: str, document: Document, base: SourceFiles) -> list[dict[str, Any]]:
     """Return the zones of a file that is shown and not edited, as (lat, lon) rings."""
-    marks = document.with_zones(()).as_obstacles(base.options.area.point_radius_m)
+    marks = document.without_zones().as_obstacles(base.options.area.point_radius_m)
     zones = [*document.zones, *(o.zone() for o in marks)]
     sides = SIDES if len(zones) <= MANY else FEW_SIDES
     return [{"of": name, "zone": zone.kind.value, "rings": _rings(zone, sides)} for zone in zones]

@@ -95,7 +95,7 @@ class AttractiveCircle(Field):
         d = np.hypot(p[:, 0], p[:, 1])
         pull = self.vr * np.arctan(self.rho * (CIRCLE_RADIUS_M - d))
         x, y = np.where(d > 0.0, p[:, 0], 1.0), p[:, 1]
-        return _to_length(np.column_stack([x * pull + self.v0 * y, y * pull - self.v0 * x]), NOMINAL)
+        return _to_nominal(np.column_stack([x * pull + self.v0 * y, y * pull - self.v0 * x]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,9 +230,9 @@ class Gain(Field):
         return self.gain * self.left.evaluate(p)
 
 
-def _to_length(v: Vectors, length: float) -> Vectors:
+def _to_nominal(v: Vectors) -> Vectors:
     norm = np.hypot(v[:, 0], v[:, 1])
-    return np.asarray(v * (length / np.maximum(norm, 1e-12))[:, None], dtype=np.float64)
+    return np.asarray(v * (NOMINAL / np.maximum(norm, 1e-12))[:, None], dtype=np.float64)
 
 
 def line_between(a_en: tuple[float, float], b_en: tuple[float, float], r_m: float = ZONE_M) -> Field:

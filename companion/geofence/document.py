@@ -142,9 +142,9 @@ class Document:
         require_clean(self.findings, self.source)
         return self
 
-    def with_zones(self, zones: tuple[Zone, ...]) -> Document:
-        """Return the document with other zones."""
-        return replace(self, zones=zones)
+    def without_zones(self) -> Document:
+        """Return the document without its zones."""
+        return replace(self, zones=())
 
     def as_obstacles(self, radius_m: float) -> tuple[Obstacle, ...]:
         """Return everything solid as obstacles: keep-out zones, and marks grown by ``radius_m``."""

@@ -24,7 +24,7 @@ from companion.mavlink.wire import codec
 from companion.mavlink.wire.assembler import Value, VehicleAssembler
 from companion.mavlink.wire.companion_status import high_latency2, status_messages
 from companion.mavlink.wire.frames import Message
-from companion.messages import AutopilotStatus, CompanionStatus, GeoPoint, MissionItem, MissionType, Mode, VehicleState
+from companion.messages import AutopilotStatus, CompanionStatus, MissionItem, MissionType, Mode, VehicleState
 
 OnValue = Callable[[Value], None]
 
@@ -152,16 +152,9 @@ class Autopilot:
 
     async def arm(self) -> CommandAnswer:
         """Arm; a refusal carries the pre-arm reasons verbatim."""
-        return await self._arm(is_armed=True)
-
-    async def disarm(self) -> CommandAnswer:
-        """Disarm."""
-        return await self._arm(is_armed=False)
-
-    async def _arm(self, *, is_armed: bool) -> CommandAnswer:
         since_s = now_s()
-        answer = await self.link.command(wire.MAV_CMD_COMPONENT_ARM_DISARM, 1.0 if is_armed else 0.0)
-        if answer.is_ok and not await self._wait_status(lambda s: s.is_armed is is_armed, since_s):
+        answer = await self.link.command(wire.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        if answer.is_ok and not await self._wait_status(lambda s: s.is_armed, since_s):
             return CommandAnswer(
                 outcome=TransferOutcome.MISMATCH,
                 text="accepted, but the heartbeat does not show it",
@@ -207,11 +200,6 @@ class Autopilot:
     async def enable_fence(self, *, enabled: bool = True) -> CommandAnswer:
         """Switch the fence on or off until the next reboot (the parameter FENCE_ENABLE stays)."""
         return await self.link.command(wire.MAV_CMD_DO_FENCE_ENABLE, 1.0 if enabled else 0.0)
-
-    async def reposition(self, point: GeoPoint) -> CommandAnswer:
-        """In GUIDED: sail to ``point``, tacking as needed."""
-        message = codec.reposition(self.link.party.target, point)
-        return await self.link.command(wire.MAV_CMD_DO_REPOSITION, message=message)
 
     def steer_heading(self, heading_rad: float, *, thrust: float = 1.0) -> None:
         """In GUIDED: hold a heading [rad, true]; to be repeated at 1 Hz or faster, it times out after 3 s.
@@ -296,7 +284,7 @@ class Autopilot:
         padded with copies of its last item to the old length; a partial write leaves the tail behind the new end.
         """
         if not items:
-            raise ValueError("an empty mission is not uploaded; use clear_mission")
+            raise ValueError("an empty mission is not uploaded")
         began_s = now_s()
         if method == "auto" and not self._version_asked:
             await self.read_version()
@@ -322,7 +310,3 @@ class Autopilot:
     async def upload_rally(self, items: Sequence[MissionItem]) -> TransferResult:
         """Put rally points on the autopilot, read back and compare."""
         return await self._lists.write(MissionType.RALLY, items)
-
-    async def clear_mission(self) -> TransferResult:
-        """Remove the mission; refused while it sails."""
-        return await self._lists.clear(MissionType.MISSION)

@@ -17,7 +17,7 @@ from companion.clock import now_s
 from companion.mavlink.link import Link
 from companion.mavlink.microservices.command import TransferOutcome
 from companion.mavlink.microservices.ftp import FENCE_FILE, MISSION_FILE, RALLY_FILE, FtpRead, FtpWrite
-from companion.mavlink.microservices.mission import ListClear, ListDownload, ListUpload
+from companion.mavlink.microservices.mission import ListDownload, ListUpload
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.items import first_difference, pack_mission_dat, padded, unpack_mission_dat
 from companion.messages import ENDING, AutopilotStatus, GeoPoint, MissionItem, MissionState, MissionType, sailed_part
@@ -81,13 +81,6 @@ class MissionLists:
         """Read a list: "ftp" as a file, anything else one by one."""
         async with self._link.lock("lists"):
             return await self._read(kind, method)
-
-    async def clear(self, kind: MissionType) -> TransferResult:
-        """Remove a list."""
-        began_s = now_s()
-        async with self._link.lock("lists"):
-            cleared = await self._link.perform(ListClear(self._link.party, kind))
-        return TransferResult(outcome=cleared.outcome, text=cleared.text, method="items", duration_s=now_s() - began_s)
 
     async def write_mission(
         self,

@@ -128,7 +128,6 @@ def apb(right_of_leg_m: float, leg_rad: float, bearing_rad: float, name: str, *,
 
 def rmb(
     right_of_leg_m: float,
-    origin: str,
     name: str,
     point: GeoPoint,
     distance_m: float,
@@ -144,7 +143,7 @@ def rmb(
         "A",
         off,
         side,
-        origin,
+        ORIGIN,
         name,
         *_place(point),
         _miles(distance_m),
@@ -159,9 +158,9 @@ def wpl(point: GeoPoint, name: str) -> str:
     return sentence("WPL", *_place(point), name)
 
 
-def rte(route: str, names: Sequence[str]) -> list[str]:
+def rte(names: Sequence[str]) -> list[str]:
     """Return the sentences that name a route's waypoints in their order, as few as hold them."""
-    room = MAX_CHARACTERS - _FRAME - len(f"{TALKER}RTE,99,99,c,{route}")
+    room = MAX_CHARACTERS - _FRAME - len(f"{TALKER}RTE,99,99,c,{ROUTE}")
     parts: list[list[str]] = [[]]
     left = room
     for name in names:
@@ -170,7 +169,7 @@ def rte(route: str, names: Sequence[str]) -> list[str]:
             left = room
         parts[-1].append(name)
         left -= len(name) + 1
-    return [sentence("RTE", str(len(parts)), str(number), "c", route, *part) for number, part in enumerate(parts, 1)]
+    return [sentence("RTE", str(len(parts)), str(number), "c", ROUTE, *part) for number, part in enumerate(parts, 1)]
 
 
 def _place(point: GeoPoint | None) -> tuple[str, str, str, str]:
@@ -335,7 +334,7 @@ def lines_of(view: View, frame: LocalFrame, utc_s: float | None) -> Lines:
     route = tuple(wpl(point, name) for point, name in zip(points, names, strict=True))
     return Lines(
         now=(*_motion(view, utc_s), *_wind(view), *_water(view), *underway),
-        route=(*route, *rte(ROUTE, names)) if names else (),
+        route=(*route, *rte(names)) if names else (),
     )
 
 
@@ -376,7 +375,6 @@ def _course(course: ActiveLeg, name: str, point: GeoPoint, *, has_arrived: bool)
         apb(course.right_m, course.leg_rad, course.bearing_rad, name, is_inside=is_inside, is_past=course.is_past),
         rmb(
             course.right_m,
-            ORIGIN,
             name,
             point,
             course.distance_m,

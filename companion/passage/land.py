@@ -29,9 +29,9 @@ class Land:
     shape: BaseGeometry
     margin_m: float = 0.0
 
-    def narrowed(self, share: float) -> Land:
-        """Return it with that share of its margin."""
-        return Land(shapely.buffer(self.shape, (share - 1.0) * self.margin_m), share * self.margin_m)
+    def narrowed(self) -> Land:
+        """Return it with half its margin."""
+        return Land(shapely.buffer(self.shape, -0.5 * self.margin_m), 0.5 * self.margin_m)
 
     def distance_m(self, xy_m: Floats) -> Floats:
         """Return (n,) how far places are from it [m], 0 inside, inf without land."""

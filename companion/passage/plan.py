@@ -377,7 +377,7 @@ def is_free(passage: Passage, points: Sequence[GeoPoint]) -> bool:
     Who is a little off her way cuts the corner that its legs just keep off.
     """
     xy = passage.frame.xy_from_geo([p.lat_deg for p in points], [p.lon_deg for p in points])
-    return passage.land.narrowed(0.5).is_free(_bent(passage.frame, xy))
+    return passage.land.narrowed().is_free(_bent(passage.frame, xy))
 
 
 def _bent(frame: PassageFrame, points: Floats) -> Floats:

@@ -90,9 +90,9 @@ def draw_water(axes: Axes, area: BaseGeometry, name: str) -> None:
     axes.annotate(name, (float(top[0]), float(top[1])), xytext=(0, 4), textcoords="offset points", fontsize=8, zorder=9)
 
 
-def water_handle(label: str) -> Line2D:
-    """Return what a legend says of it."""
-    return Line2D([], [], color=LINE, lw=1.3, marker="s", mfc="none", label=label)
+def water_handle() -> Line2D:
+    """Return what a legend says of water that is a task."""
+    return Line2D([], [], color=LINE, lw=1.3, marker="s", mfc="none", label=TASK_WATER)
 
 
 def corners_of(mission: Mission) -> list[En]:
@@ -349,7 +349,7 @@ def draw_marks(axes: Axes, mission: Mission, start: En | None, goals: list[En]) 
     if any(goal.gate is not None for goal in mission.goals):
         handles += gate_handles()
     if any(goal.box or goal.search for goal in mission.goals):
-        handles.append(water_handle(TASK_WATER))
+        handles.append(water_handle())
     return handles
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from companion.geo.angles import direction
 from companion.plots.chart import date_words, legend_above, legend_below, place_words, save, scale_bar
 from companion.plots.drying import DryingPicture, DryingShape, draw_drying
-from companion.plots.mission import TASK_WATER, draw_gate, draw_water, gate_handles, water_handle
+from companion.plots.mission import draw_gate, draw_water, gate_handles, water_handle
 from companion.telemetry.folder import RecordedChart, RecordedPlan, VoyageRecord
 from companion.words import clearance_words, counted
 
@@ -172,7 +172,7 @@ def _goals(axes: Any, chart: RecordedChart) -> None:
         for handle in gate_handles():
             axes.add_line(handle)  # nothing of it is drawn: it stands in the legend
     if any(goal.water is not None for goal in chart.goals):
-        axes.add_line(water_handle(TASK_WATER))
+        axes.add_line(water_handle())
     if any(goal.line is None and goal.water is None for goal in chart.goals):
         axes.plot([], [], "o", color=GOAL, markeredgecolor="black", markersize=8, label="goal and its radius")
 

@@ -343,9 +343,9 @@ _FIRST, _LAST = 0.05, 0.85  # of the colour map: its last yellow is not seen on 
 _REFERENCE = "#b3541e"
 
 
-def save_filter(found: Characterisation, path: str | Path, *, title: str = "") -> None:
+def save_filter(found: Characterisation, path: str | Path) -> None:
     """Write the picture; see ``filter_figure``. Raises InputError when the file cannot be written."""
-    save(filter_figure(found, title=title), path)
+    save(filter_figure(found), path)
 
 
 def filter_figure(found: Characterisation, *, title: str = "") -> Figure:

@@ -488,7 +488,7 @@ def draw(what: Shown, columns: int, rows: int) -> Frame:
     for line in textwrap.wrap(why_of(view), columns - 2, max_lines=2, placeholder=" …"):
         frame.put(row, 1, line, Style.BOLD)
         row += 1
-    row = _alarms(frame, view, 3, 2 if rows >= 24 else 1)
+    row = _alarms(frame, view, 2 if rows >= 24 else 1)
     tape(frame, row, view)
     row += 2
     log_rows = max(4 if rows >= 24 else 3, (rows - row - 2) // 4)
@@ -551,8 +551,9 @@ def _title(frame: Frame, what: Shown, view: View, age_s: float | None, *, is_old
     frame.put(0, end, " " * (room - end) + right, style)
 
 
-def _alarms(frame: Frame, view: View, row: int, rows: int) -> int:
+def _alarms(frame: Frame, view: View, rows: int) -> int:
     """Show the worst alarms on ``rows`` rows, and return the row behind them."""
+    row = 3
     if not view.alarms:
         frame.put(row, 1, "no alarms", Style.DIM)
     for offset, alarm in enumerate(view.alarms[:rows]):

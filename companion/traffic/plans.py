@@ -20,6 +20,7 @@ SLACK_M = 1e-3
 BETTER_SHARE, BETTER_S = 0.15, 20.0
 # ... and by twice as much where the new path does not look like it: farther apart than this [m], see path_distance_m.
 ALIKE_M = 150.0
+STEP_M = 5.0  # at which they are compared
 # A meeting later than this is left to later reports: a degree of course moves a fast ship by hundreds of metres.
 PRESSING_S = 300.0
 # So far ahead of a meeting its depth is looked for where neither leg nor disc ends.
@@ -162,19 +163,18 @@ def decide(
     return Decision.REPLAN
 
 
-def path_distance_m(a_en: ArrayLike, b_en: ArrayLike, *, step_m: float = 5.0) -> float:
+def path_distance_m(a_en: ArrayLike, b_en: ArrayLike) -> float:
     """Return how different two paths look: the discrete Fréchet distance of their common future [m].
 
-    Both are resampled every ``step_m`` (error at most half of it). The older path may begin further back: it is
+    Both are resampled every ``STEP_M`` (error at most half of it). The older path may begin further back: it is
     cut at the point nearest to the newer one's start first, so that what was sailed since does not count.
 
     Args:
         a_en: (n, 2) the older path.
         b_en: (m, 2) the newer path.
-        step_m: resampling step.
 
     """
-    a, b = _resample(np.asarray(a_en, dtype=np.float64), step_m), _resample(np.asarray(b_en, dtype=np.float64), step_m)
+    a, b = _resample(np.asarray(a_en, dtype=np.float64)), _resample(np.asarray(b_en, dtype=np.float64))
     if len(a) == 0 or len(b) == 0:
         return math.inf
     a = a[int(np.argmin(np.hypot(*(a - b[0]).T))) :]
@@ -191,11 +191,11 @@ def path_distance_m(a_en: ArrayLike, b_en: ArrayLike, *, step_m: float = 5.0) ->
     return float(reach[-1, -1])
 
 
-def _resample(path: NDArray[np.float64], step_m: float) -> NDArray[np.float64]:
+def _resample(path: NDArray[np.float64]) -> NDArray[np.float64]:
     points = path.reshape(-1, 2)
     if len(points) < 2:
         return points
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    count = max(2, math.ceil(float(run[-1]) / step_m) + 1)
+    count = max(2, math.ceil(float(run[-1]) / STEP_M) + 1)
     at = np.linspace(0.0, float(run[-1]), count)
     return np.column_stack([np.interp(at, run, points[:, 0]), np.interp(at, run, points[:, 1])])

@@ -148,7 +148,7 @@ def fitted(errors: Floats) -> ForecastError:
     return ForecastError(now_mps=math.sqrt(max(0.0, first)), per_day_mps=math.sqrt(max(0.0, second)))
 
 
-def continued(weather: Weather, climate: Climate, until_s: float, *, seed: int = 0) -> Weather:
+def continued(weather: Weather, climate: Climate, until_s: float) -> Weather:
     """Return a forecast that goes on past its end with the wind of the season, and says from when on it does."""
     last = max(float(cube.utc_s[-1]) for cube in weather.wind)
     if until_s <= last:
@@ -161,7 +161,7 @@ def continued(weather: Weather, climate: Climate, until_s: float, *, seed: int =
     values = []
     for row, member in enumerate(widest.members):
         # As sure of the season as its spread says, whatever the forecast ended with.
-        own = climate.spread_mps * np.sqrt(1.0 - left**2)[:, None] * _wander(more, MEMORY_S, seed + 1, member)
+        own = climate.spread_mps * np.sqrt(1.0 - left**2)[:, None] * _wander(more, MEMORY_S, 1, member)
         faded = left[:, None, None, None] * (widest.values[row, -1] - mean)
         values.append((mean + faded + own[:, None, None, :]).astype(np.float32))
     longer = replace(

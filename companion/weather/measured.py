@@ -50,11 +50,10 @@ class Off:
     off_en_mps: Floats
     sd_mps: float
     count: int
-    memory_s: float = MEMORY_S
 
     def share(self, ahead_s: float) -> float:
         """Return how much of it is left after a time."""
-        return math.exp(-ahead_s / self.memory_s)
+        return math.exp(-ahead_s / MEMORY_S)
 
     def sd_ahead_mps(self, ahead_s: float) -> float:
         """Return the deviation of the corrected forecast from the wind after a time [m/s], a component."""
@@ -62,7 +61,7 @@ class Off:
         return math.sqrt(left * self.sd_mps**2 + (1.0 - left) * OFF_MPS**2)
 
 
-def off_by(weather: Weather, measured: Measured, now_s: float, memory_s: float = MEMORY_S) -> Off | None:
+def off_by(weather: Weather, measured: Measured, now_s: float) -> Off | None:
     """Return by how much a forecast is off now; None where nothing was measured in the last hours that it knows of."""
     means = _means(measured, now_s)
     forecast = weather.wind_en_mps(means.utc_s, means.lat_deg, means.lon_deg)
@@ -73,11 +72,11 @@ def off_by(weather: Weather, measured: Measured, now_s: float, memory_s: float =
     state = np.zeros((residual.shape[0], 2))
     variance, last_s = OFF_MPS**2, float(means.utc_s[known][0])
     for t, off in zip(means.utc_s[known], np.moveaxis(residual[:, known], 1, 0), strict=True):
-        left = math.exp(-(float(t) - last_s) / memory_s)
+        left = math.exp(-(float(t) - last_s) / MEMORY_S)
         state, variance = left * state, left**2 * variance + (1.0 - left**2) * OFF_MPS**2
         gain = variance / (variance + GUST_MPS**2)
         state, variance, last_s = state + gain * (off - state), (1.0 - gain) * variance, float(t)
-    left = math.exp(-(now_s - last_s) / memory_s)
+    left = math.exp(-(now_s - last_s) / MEMORY_S)
     return Off(
         utc_s=now_s,
         lat_deg=float(means.lat_deg[known][-1]),
@@ -86,7 +85,6 @@ def off_by(weather: Weather, measured: Measured, now_s: float, memory_s: float =
         off_en_mps=left * state,
         sd_mps=math.sqrt(left**2 * variance + (1.0 - left**2) * OFF_MPS**2),
         count=int(known.sum()),
-        memory_s=memory_s,
     )
 
 
@@ -139,7 +137,7 @@ def _scores(members: int) -> Floats:
 
 def _shifted(cube: Cube, off: Off, shift: dict[int, Floats]) -> Cube:
     """Return a cube on its own times and, while the correction lasts, each hour of them."""
-    ends = off.utc_s + _LASTS * off.memory_s
+    ends = off.utc_s + _LASTS * MEMORY_S
     hours = off.utc_s + _HOUR_S * np.arange(0.0, (ends - off.utc_s) / _HOUR_S + 1.0)
     hours = hours[(hours > cube.utc_s[0]) & (hours < cube.utc_s[-1])]
     for begins, closes in cube.holes_s():
@@ -149,7 +147,7 @@ def _shifted(cube: Cube, off: Off, shift: dict[int, Floats]) -> Cube:
     times = np.unique(np.concatenate([cube.utc_s, hours, [before] if cube.utc_s[0] < before < cube.utc_s[-1] else []]))
     values = _at_times(cube, times)
     ahead = times - off.utc_s
-    left = np.where(ahead < 0.0, 0.0, np.exp(-np.maximum(0.0, ahead) / off.memory_s))
+    left = np.where(ahead < 0.0, 0.0, np.exp(-np.maximum(0.0, ahead) / MEMORY_S))
     near = np.exp(-_away_m(cube, off) / REACH_M)
     for row, member in enumerate(cube.members):
         if member in shift:

@@ -7,7 +7,7 @@ from itertools import groupby
 
 import numpy as np
 
-from companion.weather.measured import Off
+from companion.weather.measured import MEMORY_S, Off
 from companion.weather.tides import Tides
 from companion.weather.weather import Cube, Floats, Weather, iso
 from companion.words import counted
@@ -78,7 +78,7 @@ def told_of_off(off: Off) -> str:
     return (
         f"measured: of {counted(off.count, 'mean')} of ten minutes {math.hypot(east, north):.1f} m/s towards"
         f" {_compass(east, north)} are missing in the forecast, +- {off.sd_mps:.1f}; half of it counts in"
-        f" {_hours(off.memory_s * math.log(2.0))}, within 150 km"
+        f" {_hours(MEMORY_S * math.log(2.0))}, within 150 km"
     )
 
 

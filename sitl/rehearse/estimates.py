@@ -60,7 +60,7 @@ def _evidence(came: int, of: int, p: float) -> float:
     return mean - (came * math.log(p) if came else 0.0) - (missed * math.log1p(-p) if missed else 0.0)
 
 
-def share_of(came: int, of: int, level: float = LEVEL) -> Share:
+def share_of(came: int, of: int) -> Share:
     """Return a share with its interval.
 
     >>> found = share_of(0, 100)
@@ -69,7 +69,7 @@ def share_of(came: int, of: int, level: float = LEVEL) -> Share:
     """
     if of == 0:
         return Share(came=0, of=0, low=0.0, high=1.0)
-    most, best = -math.log1p(-level), came / of
+    most, best = -math.log1p(-LEVEL), came / of
 
     def bound(outside: float) -> float:
         if _evidence(came, of, outside) < most:
@@ -86,12 +86,12 @@ def share_of(came: int, of: int, level: float = LEVEL) -> Share:
     return Share(came=came, of=of, low=bound(0.0), high=bound(1.0))
 
 
-def quantile_of(values: Sequence[float], of_all: float, level: float = LEVEL) -> Quantile:
+def quantile_of(values: Sequence[float], of_all: float) -> Quantile:
     """Return a quantile with its interval, which holds at all looks too: of each value one asks how many are below it.
 
     ``values`` are in order; what never ends is ``inf``. Without any: nothing is known.
     """
-    count, most = len(values), -math.log1p(-level)
+    count, most = len(values), -math.log1p(-LEVEL)
     if not count:
         return Quantile(of_all=of_all, value=math.inf, low=0.0, high=math.inf)
     likely = [below for below in range(count + 1) if _evidence(below, count, of_all) < most]

@@ -177,7 +177,6 @@ def settled_on(
     workers: int | None,
     *,
     say: Callable[[str], None],
-    patience_s: float = PATIENCE_S,
 ) -> Iterator[tuple[int, ResultT | Exception]]:
     """Yield the number of each job with its result or what it raised, as they are done.
 
@@ -203,9 +202,9 @@ def settled_on(
                         del left[number]
                         yield number, result
                 except _GoneError:
-                    say(f"{address}: the scheduler went; it is waited for ({patience_s:.0f} s); {len(left)} jobs to do")
+                    say(f"{address}: the scheduler went; it is waited for ({PATIENCE_S:.0f} s); {len(left)} jobs to do")
                     _close(client)
-                    client = _connected(place, address, patience_s=patience_s)
+                    client = _connected(place, address, patience_s=PATIENCE_S)
         finally:
             _close(client)
 

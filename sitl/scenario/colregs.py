@@ -206,7 +206,6 @@ def judge_encounter(
     *,
     keep_m: float,
     our_length_m: float,
-    craft: Craft = "sail",
 ) -> Judgement | None:
     """Return what the tracks show; None where the other was not heard, or nothing was sailed after that.
 
@@ -218,7 +217,6 @@ def judge_encounter(
         twd_from_rad: the wind there.
         keep_m: between the hulls, what the mission asks for.
         our_length_m: of our hull, taken as a disc.
-        craft: ours.
 
     """
     if met.heard_s is None:
@@ -241,7 +239,7 @@ def judge_encounter(
                 course_rad=math.radians(ours_deg[i]),
                 heading_rad=float(bows[i]),
                 speed_mps=float(speeds[0][i]),
-                craft=craft,
+                craft="sail",
             ),
             Mover(
                 en_m=(float(hers[i, 0]), float(hers[i, 1])),

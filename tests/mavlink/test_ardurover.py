@@ -143,7 +143,6 @@ async def orders(near, shore_near):
         assert {"status", "wind", "co_twd"} <= set(report.age_s)
 
         assert (await autopilot.set_mode(Mode.GUIDED)).is_ok
-        assert (await autopilot.reposition(GeoPoint(lat_deg=51.101, lon_deg=-1.29))).is_ok
         assert (await autopilot.set_mode(Mode.HOLD)).is_ok
 
         for method in ("items", "ftp"):
@@ -163,8 +162,8 @@ async def orders(near, shore_near):
         assert (await Autopilot(link).upload_mission(mission(4))).is_ok
         await holds(autopilot, mission(4))
         assert sailed_part(mission(4))[-1].command == Command.NAV_LOITER_UNLIM
-        assert (await autopilot.disarm()).is_ok
 
+        assert (await link.command(400, 0.0)).is_ok  # MAV_CMD_COMPONENT_ARM_DISARM: armed, it does not reboot
         await link.command(246, 1.0)  # MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
         async with asyncio.timeout(60.0):
             while not (link.stats.reboots == 1 and link.is_alive):  # noqa: ASYNC110 - the telemetry is the event

@@ -12,9 +12,11 @@ from companion.planner import plan
 from companion.skipper.passing import pass_gates
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
+from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.track import steps
 from companion.skipper.step.actions import Announce, ReplanReason, UploadMission
 from companion.skipper.step.context import StepContext
+from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import Phase
 from companion.skipper.way.line import ahead_m
@@ -231,6 +233,15 @@ def test_she_waits_before_the_line_and_crosses_after_the_gun(when, shown):
     assert not said(w, "early start")
     assert any("waiting for the gun" in entry[2] for entry in w.log)
     assert max(ahead_m(LINE, p) for p in w.track[: int(5 * (gun_s - 2.0))]) < 0.0
+
+
+def test_where_she_waits_is_not_chosen_anew_on_the_way_there():
+    there = (-31.0, 27.0)
+    for name, keeps in (("the water before line", True), ("somewhere else", False)):
+        way = route((-10.0, 10.0), there, there, bound_for=name)
+        waits = diversion(moment(way, goals=(line(not_before_s=UTC_AT_BOOT), END)))
+        assert waits.kind is DiversionKind.START
+        assert (waits.en_m == there) is keeps
 
 
 def test_without_the_time_of_day_she_waits_for_it_and_says_so():

@@ -400,7 +400,7 @@ def load_area(
                 "draw the fence as an area",
             )
         zones.extend(document.zones)
-        obstacles.extend(o for o in document.with_zones(()).as_obstacles(options.point_radius_m))
+        obstacles.extend(o for o in document.without_zones().as_obstacles(options.point_radius_m))
     return Area(obstacles=tuple(obstacles), fence=Fence(zones=tuple(zones))), tuple(findings)
 
 

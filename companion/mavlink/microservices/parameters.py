@@ -77,10 +77,10 @@ class ParamTable:
 class ParamRead:
     """Reads the first of several names that the autopilot answers."""
 
-    def __init__(self, party: Party, names: Iterable[str], *, give_up_s: float = 5.0) -> None:
+    def __init__(self, party: Party, names: Iterable[str]) -> None:
         self.result: ParamAnswer | None = None
         self._party, self._names = party, tuple(names)
-        self._retry = Retransmission(first_s=0.6, give_up_s=give_up_s)
+        self._retry = Retransmission(first_s=0.6, give_up_s=5.0)
 
     @property
     def wake_s(self) -> float:

@@ -325,26 +325,6 @@ def command_long(target: tuple[int, int], command: int, params: tuple[float, ...
     return wire.MAVLink_command_long_message(target[0], target[1], command, confirmation, *padded)
 
 
-def reposition(target: tuple[int, int], point: GeoPoint) -> Message:
-    """Return COMMAND_INT DO_REPOSITION to ``point``; the autopilot must be in GUIDED."""
-    lat_e7, lon_e7 = e7(point)
-    return wire.MAVLink_command_int_message(
-        target[0],
-        target[1],
-        wire.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-        wire.MAV_CMD_DO_REPOSITION,
-        0,
-        0,
-        -1.0,
-        0.0,
-        0.0,
-        0.0,
-        lat_e7,
-        lon_e7,
-        0.0,
-    )
-
-
 def heading_setpoint(target: tuple[int, int], boot_s: float, heading_rad: float, thrust: float) -> Message:
     """Return SET_ATTITUDE_TARGET: sail at ``heading_rad``; thrust 0 eases the sails, 1 trims them."""
     half = wrap_pi(heading_rad) / 2.0

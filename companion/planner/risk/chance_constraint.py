@@ -149,7 +149,6 @@ def _errors(spread: Spread, along: tuple[float, float]) -> NDArray[np.float64]:
 PROMISE_FACTOR = 1.15
 """What is promised over what is computed: a simulation of 2,000 winds scatters by a tenth at a share of 5 %."""
 DEFAULT_CORRELATION_S = 60.0
-MAX_STEPS = 400_000
 RISK_ROUNDS = 8  # parts that the bisection under a limit divides its effort into
 RISK_TURNS = 16
 MOST_EXTRA_SIGMAS = 8.0
@@ -297,7 +296,6 @@ def _first_passage(
         float(p.tau),
         p.table_t,
         p.table_s,
-        MAX_STEPS,
         _full(),
         out,
     )

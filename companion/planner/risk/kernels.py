@@ -32,6 +32,7 @@ from companion.planner.problem.sigma import AR1, KALMAN, TABLE, sigma_of
 Z_MAX = 6.5  # the grid ends here; beyond lies 4e-11 of the wind
 Z_CELLS = 260  # cells of 0.05 standard deviations
 NEVER = 7.0  # standard deviations that no step goes: 3e-12
+MAX_STEPS = 400_000  # of one path
 R_STEP = 0.965  # correlation over one step: its standard deviation, 0.26, is five cells
 # Between steps a continuous process peeks over the barrier; a barrier nearer by this many step deviations
 # accounts for it (Chernoff 1965; Broadie, Glasserman and Kou 1997: -zeta(1/2) / sqrt(2 pi)).
@@ -144,7 +145,7 @@ def _absorb(p, low, high, dz):  # type: ignore[no-untyped-def]
 
 @kernel
 def first_passage(  # type: ignore[no-untyped-def]
-    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, max_steps, full, out
+    start_s, end_s, twa_rad, half_rad, model, s0, s1, rho, tau, table_t, table_s, full, out
 ):
     """Fill out[k]: the probability that the wind first forces the boat into the no-go zone on leg k.
 
@@ -198,7 +199,7 @@ def first_passage(  # type: ignore[no-untyped-def]
                             _spread(p, part, int(6.0 * s / dz) + 2, r, q)
                             p[:] = q
                     steps += 1
-                    if steps > max_steps:
+                    if steps > MAX_STEPS:
                         return -1
                     t = stop if move >= stop - t else t + move
                 if phase == 1:

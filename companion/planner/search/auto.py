@@ -53,6 +53,8 @@ _LONGEST_CYCLE = 512_000
 _HOT, _COLD = 2e-3, 1e-7
 """Temperatures of an annealing cycle, as a share of the path's time."""
 _POOL = 16
+_MOST_SIDES = 12
+"""Routes round the other sides of obstacles that are offered."""
 _MANY = 5_000
 """Corners above which those near a path are looked for now and then only."""
 
@@ -250,7 +252,7 @@ class Searcher:
             out[i] = (x + 0.5 * room * ux, y + 0.5 * room * uy)
         return out
 
-    def other_sides(self, most: int) -> int:
+    def other_sides(self) -> int:
         """Offer the routes round the other sides of obstacles: shortest of the metric through each corner.
 
         The time to each corner plus the time from it tells what a detour through it costs at least; of each
@@ -269,7 +271,7 @@ class Searcher:
         known = {c.side for c in self.pool}
         count = 0
         for v in np.argsort(through, kind="stable"):
-            if not through[v] < limit or count >= most or self.is_done:
+            if not through[v] < limit or count >= _MOST_SIDES or self.is_done:
                 break
             left, right, k = [], [], int(v)
             while k >= 0:
@@ -702,7 +704,7 @@ def _improve(s: Searcher) -> None:
             continue
         if not looked and before > 0.08:
             looked = True
-            s.other_sides(12)
+            s.other_sides()
         elif not turned and before > 0.15:
             turned = True
             s.other_tack()

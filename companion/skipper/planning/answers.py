@@ -38,7 +38,6 @@ SAME_M = 1.0  # a new waypoint this near to the old one is the old one
 # Plans from a waypoint between here and a goal: one from the boat leads to the same goal.
 AT_WAYPOINT = frozenset({ReplanReason.WAYPOINT, ReplanReason.FORECAST})
 WIDE_TURN_M = 8.0  # a tighter one has room where plans lead
-GYBE_RADIUS_M = 8.0  # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
 
 
 def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
@@ -378,7 +377,6 @@ def _gybed_round(ctx: StepContext, pending: PendingPlan, start: PointEn, points:
         moved(start, heading, -1.0),
         [start, *points],
         twd_from_rad=pending.facts.plan_twd_from_rad,
-        radius_m=GYBE_RADIUS_M,
         area=ctx.voyage.area,
         floor_m=min(ctx.config.margin_floor_m, pending.facts.margin_m),
     )[1:]

@@ -263,8 +263,7 @@ def _gate_after(ctx: StepContext, from_index: int | None) -> int | None:
 def _aim(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
     if step.nearer_goal:
         return _nearer(ctx, target, gate, start, step)
-    aim = aim_at(ctx.voyage, ctx.config, (target,), 0, start.en_m)
-    return replace(aim, gate=gate if aim.gate == 0 else -1)
+    return aim_at(ctx.voyage, ctx.config, target, gate, start.en_m)
 
 
 def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) -> Aim:

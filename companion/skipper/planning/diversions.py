@@ -426,9 +426,9 @@ def _back(ctx: StepContext) -> Diversion | None:
     """Return the way back to where the boat is to rest, when it is off it and the straight way is not clear."""
     rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
     off = ctx.is_raised(DRAGGED) or bool(ctx.state.operator.answering) or is_led_off(ctx)
-    if rest is None or boat is None or not (off or _is_bound(ctx, REST)):
+    if rest is None or boat is None or not (off or _is_bound_for_rest(ctx)):
         return None
-    if not _is_bound(ctx, REST) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
+    if not _is_bound_for_rest(ctx) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
         return None  # the autopilot's own loiter goes back there
     return Diversion(kind=DiversionKind.REST, name=REST, why="she is off the place where she was to rest", en_m=rest)
 
@@ -447,9 +447,9 @@ def _off_narrow_rest(ctx: StepContext) -> Diversion | None:
     return _to_room(ctx, rest, "where she is to rest a loiter has no room")
 
 
-def _is_bound(ctx: StepContext, name: str) -> bool:
+def _is_bound_for_rest(ctx: StepContext) -> bool:
     route = ctx.state.mission.route
-    return route is not None and route.bound_for == name and bool(ctx.ahead())
+    return route is not None and route.bound_for == REST and bool(ctx.ahead())
 
 
 def gate_for(bound: Diversion) -> Gate:

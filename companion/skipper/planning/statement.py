@@ -230,9 +230,8 @@ def _back_inside(area: AreaLike, start: Start, *, margin_m: float, floor_m: floa
     return ()
 
 
-def aim_at(voyage: Voyage, config: SkipperConfig, gates: Sequence[Gate], gate: int, start_en: PointEn) -> Aim:
-    """Return what to plan for: the gate, or a place on the way to it where the local plan ends (Büsser 4.1)."""
-    target = gates[gate]
+def aim_at(voyage: Voyage, config: SkipperConfig, target: Gate, gate: int, start_en: PointEn) -> Aim:
+    """Return what to plan for: the gate ``target``, or a place on the way where a local plan ends (Büsser 4.1)."""
     left_m = distance_m(start_en, target.en_m)
     # The autopilot leaves a waypoint behind before it is there: the plan ends that much inside the radius.
     inner_m = max(target.radius_m - config.announce_m, 0.2 * target.radius_m)

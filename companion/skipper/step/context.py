@@ -58,7 +58,7 @@ from companion.skipper.step.state import (
 )
 from companion.skipper.way import Approach, Gate, PointEn, Voyage, bearing_rad, gates_of
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle, circle_of, drawn_of
-from companion.skipper.way.drying import SOLID_S, SOON_S, DryingWater
+from companion.skipper.way.drying import SOLID_S, DryingWater
 from companion.skipper.way.position_plausibility import innovation_m
 from companion.skipper.way.shoals import Shoal, shoaled, still_shoal
 from companion.skipper.way.stemming import Water
@@ -274,7 +274,7 @@ class StepContext:
 
         In ``voyage`` water that opens within ``SOLID_S`` is open: she is not there yet.
         """
-        closed = tuple(w for w in self.voyage.drying if w.closes_within(self.config.tide, self.utc_s, SOON_S))
+        closed = tuple(w for w in self.voyage.drying if w.closes_soon(self.config.tide, self.utc_s))
         return self.with_closed(closed)
 
     @property

@@ -120,27 +120,20 @@ def floor_from_m(here_m: float, floor_m: float) -> float:
     return min(floor_m, here_m - NEARER_M if here_m <= 0.0 else max(0.0, here_m - NEARER_M))
 
 
-def floor_after_s(
-    area: AreaLike,
-    here_en_m: PointEn,
-    velocity_en_mps: tuple[float, float],
-    *,
-    floor_m: float,
-    horizon_s: float = HORIZON_S,
-) -> float:
-    """Return when a drift first comes within ``floor_m`` of something [s], ``horizon_s`` where it does not by then.
+def floor_after_s(area: AreaLike, here_en_m: PointEn, velocity_en_mps: tuple[float, float], *, floor_m: float) -> float:
+    """Return when a drift first comes within ``floor_m`` of something [s], ``HORIZON_S`` where it does not by then.
 
     What ``drift_ahead`` tells, in a tenth of the time: no clearance changes faster than the boat moves, so a wide one
     is a long time without another look.
     """
     speed_mps, t_s = math.hypot(*velocity_en_mps), 0.0
-    while t_s < horizon_s:
+    while t_s < HORIZON_S:
         place = np.array([[here_en_m[0] + t_s * velocity_en_mps[0], here_en_m[1] + t_s * velocity_en_mps[1]]])
         left_m = float(area.clearance_m(place)[0]) - floor_m
         if left_m <= 0.0:
             return t_s
-        t_s += max(horizon_s / (LOOKS - 1), left_m / max(speed_mps, HAIR_M))
-    return horizon_s
+        t_s += max(HORIZON_S / (LOOKS - 1), left_m / max(speed_mps, HAIR_M))
+    return HORIZON_S
 
 
 def _first_s(t_s: NDArray[np.float64], clear_m: NDArray[np.float64], least_m: float) -> float:

@@ -77,10 +77,10 @@ class DryingWater:
         windows = self.closed_s(table, utc_s)
         return bool(windows) and windows[0][0] <= 0.0 and windows[0][1] >= for_s
 
-    def closes_within(self, table: TideTable | None, utc_s: float | None, in_s: float) -> bool:
-        """Return whether it is too shallow now, or will be so soon."""
+    def closes_soon(self, table: TideTable | None, utc_s: float | None) -> bool:
+        """Return whether it is too shallow now, or will be within ``SOON_S``."""
         windows = self.closed_s(table, utc_s)
-        return bool(windows) and windows[0][0] <= in_s
+        return bool(windows) and windows[0][0] <= SOON_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -208,9 +208,9 @@ def _log_likelihood(error: Array, variance: Array) -> float:
     return float(-0.5 * np.sum(np.log(2.0 * math.pi * variance) + error * error / variance))
 
 
-def _information(function: Callable[[Array], float], at: Array, step: float = 1e-3) -> Array:
+def _information(function: Callable[[Array], float], at: Array) -> Array:
     """Return minus the Hessian by central differences."""
-    n = at.size
+    n, step = at.size, 1e-3
     h = np.eye(n) * step
     found = np.empty((n, n))
     for i in range(n):

@@ -190,9 +190,9 @@ class Vehicle:
         if self._surroundings is not None:
             self._surroundings.fill(self._settings)
 
-    def still_air_until(self, t_s: float) -> None:
+    def still_air(self) -> None:
         """SITL has no wind in the first seconds after boot."""
-        self._still_until_s = t_s
+        self._still_until_s = k.WIND_DELAY_S
         self.state[k.S_WSPD] = 0.0
 
     def settle(self) -> None:

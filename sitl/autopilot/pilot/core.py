@@ -8,7 +8,6 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from companion.messages import Mode
-from sitl.autopilot.boat.kernel import WIND_DELAY_S
 from sitl.autopilot.boat.parameters import Parameters
 from sitl.autopilot.boat.vehicle import HomeChart, Surroundings, Vehicle
 from sitl.autopilot.config import AutopilotConfig
@@ -76,7 +75,7 @@ class Core:
             self.take_origin()
             self.set_home(None)
         else:
-            self.vehicle.still_air_until(WIND_DELAY_S)
+            self.vehicle.still_air()
 
     def power_up(self, boot_at_s: float) -> None:
         """Start as at ``boot_at_s``: disarmed, without origin and home."""

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.mavlink.microservices.command import REASON_WAIT_S, Party, TransferOutcome
 from companion.mavlink.microservices.ftp import MISSION_FILE, FtpRead, FtpResult, FtpWrite
-from companion.mavlink.microservices.mission import DownloadResult, ListClear, ListDownload, ListResult, ListUpload
+from companion.mavlink.microservices.mission import DownloadResult, ListDownload, ListResult, ListUpload
 from companion.mavlink.mission_lists import MissionLists, ReadResult, compared
 from companion.mavlink.wire.codec import AutopilotVersion
 from companion.mavlink.wire.frames import Codec
@@ -290,34 +290,6 @@ def test_a_download_gives_up_after_twelve_seconds(heard, words):
     assert questions > 8
     assert machine.result.outcome is TransferOutcome.TIMEOUT
     assert words in machine.result.text
-
-
-# -------------------------------------------------------------------------------------------------- a removal
-@pytest.mark.parametrize(
-    ("kind", "outcome", "words"),
-    [(0, TransferOutcome.OK, ""), (3, TransferOutcome.REFUSED, "MISSION_ACK 3 (unsupported) not while armed")],
-)
-def test_a_list_is_cleared_or_not(kind, outcome, words):
-    machine = ListClear(PARTY, FENCE)
-    (ask,) = machine.start(100.0)
-    assert (ask.get_type(), ask.mission_type) == ("MISSION_CLEAR_ALL", 1)
-    machine.receive(100.1, text("not while armed"))
-    for other in (ack(kind), ack(kind, mission_type=1, to=9), ack(kind, mission_type=1, component=3), count(1)):
-        machine.receive(100.2, other)
-        assert machine.result is None
-    machine.receive(100.3, ack(kind, mission_type=1))
-    assert machine.result == ListResult(outcome=outcome, text=words, ack=kind)
-
-
-def test_a_removal_gives_up_after_eight_seconds():
-    machine = ListClear(PARTY, FENCE)
-    machine.start(100.0)
-    again = []
-    while machine.result is None:
-        again += machine.tick(machine.wake_s)
-    assert machine.wake_s == pytest.approx(108.0)
-    assert {(m.get_type(), m.mission_type) for m in again} == {("MISSION_CLEAR_ALL", 1)}
-    assert (machine.result.outcome, machine.result.text) == (TransferOutcome.TIMEOUT, "no answer to clear")
 
 
 # ----------------------------------------------------------------------------------- what is done with the machines
@@ -676,13 +648,6 @@ def test_what_is_read_is_without_home_where_there_is_one():
     assert (lost.outcome, lost.items) == (TransferOutcome.LINK, None)
     no = asyncio.run(lists(Side({ListDownload: [back(outcome=REFUSED, text="no")]})).read(MISSION, "items"))
     assert (no.outcome, no.text, no.items) == (REFUSED, "no", None)
-
-
-def test_a_removal_tells_how_it_ended():
-    side = Side({ListClear: [listed(REFUSED, text="no")]})
-    result = asyncio.run(lists(side).clear(FENCE))
-    assert (result.outcome, result.text, result.method) == (REFUSED, "no", "items")
-    assert result.duration_s >= 0.0
 
 
 def test_what_is_compared():

@@ -10,7 +10,7 @@ from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.microservices.command import CommandSend, Party
 from companion.mavlink.microservices.ftp import FtpRead, FtpWrite
-from companion.mavlink.microservices.mission import ListClear, ListDownload, ListUpload
+from companion.mavlink.microservices.mission import ListDownload, ListUpload
 from companion.mavlink.microservices.parameters import ParamList, ParamRead, ParamSet
 from companion.mavlink.wire.assembler import VehicleAssembler
 from companion.mavlink.wire.companion_status import StatusReader
@@ -69,7 +69,6 @@ def machines():
         ListUpload(PARTY, kind, ITEMS),
         ListUpload(PARTY, kind, ITEMS, first=2, partial=True),
         ListDownload(PARTY, kind),
-        ListClear(PARTY, kind),
         CommandSend(PARTY, 1, ()),
         ParamRead(PARTY, ["A"]),
         ParamSet(PARTY, "A", 1.0),

@@ -215,7 +215,6 @@ def test_a_passage_of_a_day_costs_no_more_steps_than_the_wind_needs_to_settle():
         p.tau,
         p.table_t,
         p.table_s,
-        10**6,
         full,
         out,
     )
@@ -233,7 +232,6 @@ def test_a_passage_of_a_day_costs_no_more_steps_than_the_wind_needs_to_settle():
         p.tau,
         p.table_t,
         p.table_s,
-        10**6,
         full,
         short,
     )

@@ -81,7 +81,7 @@ def test_gybe_round_turns_the_other_way_never_through_the_wind_and_ends_on_the_n
     start = (0.0, 0.0)
     corner = moved(start, before, 100.0)
     end = moved(corner, after, next_m)
-    path = [start, *gybe_round(start, [corner, end], twd_from_rad=twd, radius_m=8.0, area=area(), floor_m=5.0)]
+    path = [start, *gybe_round(start, [corner, end], twd_from_rad=twd, area=area(), floor_m=5.0)]
     assert len(path) == 5
     courses = [bearing_rad(a, b) for a, b in pairwise(path)]
     for one, two in pairwise(courses):
@@ -93,7 +93,7 @@ def test_gybe_round_turns_the_other_way_never_through_the_wind_and_ends_on_the_n
 def test_gybe_round_needs_room():
     start, corner, end = (0.0, 0.0), (-70.0, 70.0), (0.0, 140.0)
     rock = box(-100.0, 40.0, -80.0, 72.0)
-    out = gybe_round(start, [corner, end], twd_from_rad=0.0, radius_m=8.0, area=area(rock), floor_m=8.0)
+    out = gybe_round(start, [corner, end], twd_from_rad=0.0, area=area(rock), floor_m=8.0)
     assert out == (corner, end)
 
 

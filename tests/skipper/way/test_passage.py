@@ -74,7 +74,7 @@ def lonlat(point):
 @given(st.floats(0.05, 0.85), st.floats(-0.9, 0.9), st.tuples(st.floats(-9000.0, 9000.0), st.floats(-9000.0, 9000.0)))
 def test_a_plan_ends_at_the_horizon_on_the_leg_within_its_band(share, aside, shift_m):
     made, gate, here = sailing(on_leg(share, aside * BAND_M), shift_m)
-    aim = aim_at(made, SkipperConfig(horizon_m=HORIZON_M), (gate,), 0, here)
+    aim = aim_at(made, SkipperConfig(horizon_m=HORIZON_M), gate, 0, here)
     assert aim.gate == -1
     place = made.frame.geo_from_en(*aim.en_m)
     assert abs(off_leg_m(place)) + aim.radius_m < BAND_M
@@ -92,12 +92,12 @@ def test_a_plan_ends_at_the_horizon_on_the_leg_within_its_band(share, aside, shi
 
 def test_the_last_plan_of_a_leg_ends_at_its_goal():
     made, gate, here = sailing(on_leg(1.0 - 20_000.0 / LENGTH_M))
-    aim = aim_at(made, SkipperConfig(horizon_m=HORIZON_M), (gate,), 0, here)
+    aim = aim_at(made, SkipperConfig(horizon_m=HORIZON_M), gate, 0, here)
     assert (aim.gate, aim.en_m) == (0, gate.en_m)
 
 
 def test_without_a_band_it_is_straight_ahead():
     made, gate, here = sailing(on_leg(0.3, 3000.0))
-    aim = aim_at(made, SkipperConfig(horizon_m=HORIZON_M), (replace(gate, bandwidth_m=None),), 0, here)
+    aim = aim_at(made, SkipperConfig(horizon_m=HORIZON_M), replace(gate, bandwidth_m=None), 0, here)
     assert math.dist(aim.en_m, here) == pytest.approx(HORIZON_M)
     assert band(made, replace(gate, bandwidth_m=None), here, aim.en_m) is None
