@@ -1,8 +1,8 @@
 """The recipes of CONTRIBUTING.md, carried out as written in a copy of the tree: what they say is all there is to do.
 
 Of each numbered step the words before a block of code say where it goes: ``a new file `PATH` ``, ``at the end of `NAME`
-in `PATH` `` (a table of Python's), ``before `NAME` in `PATH` `` (a definition, or the row of that name), ``to the
-imports of `PATH` ``, ``after the row `NAME` in `PATH` `` (of a page's table). Commands are run.
+in `PATH` `` (a table of Python's), ``before `NAME` in `PATH` `` (a definition, a field, or the row of that name), ``to
+the imports of `PATH` ``, ``after the row `NAME` in `PATH` `` (of a page's table). Commands are run.
 """
 
 import ast
@@ -22,6 +22,7 @@ ROOT = Path(__file__).parents[2]
 FILES = {
     "A wind estimator": 4,
     "A planner": 5,
+    "A mission key": 5,
     "A safety trigger": 6,
     "A figure": 4,
     "A fence format": 6,
@@ -58,7 +59,7 @@ def applied(tree, words, body):
     if how == "at the end of":
         text = at_the_end(text, name, body)
     elif how == "after the row":
-        at = next(n for n, line in enumerate(lines) if re.match(rf"\| `?{re.escape(name)}\b", line))
+        at = next(n for n, line in enumerate(lines) if re.match(rf"\|( \|)? `?{re.escape(name)}\b", line))
         text = "".join([*lines[: at + 1], body, *lines[at + 1 :]])
     elif how == "to the imports of":
         imports = [node for node in ast.parse(text).body if isinstance(node, ast.Import | ast.ImportFrom)]
@@ -70,11 +71,11 @@ def applied(tree, words, body):
         at = min(later, default=imports[-1].end_lineno)
         text = "".join([*lines[:at], body, *lines[at:]])
     else:
-        begins = re.compile(rf"(def |class )?{re.escape(name)}\b| .*\bname=\"{re.escape(name)}\"")
+        said = re.escape(name)
+        begins = re.compile(rf"(def |class )?{said}\b| .*\bname=\"{said}\"| +\"?{said}\"?[:=]")
         at = next(n for n, line in enumerate(lines) if begins.match(line))
-        text = "".join(
-            [*lines[:at], textwrap.indent(body, "    ") if lines[at].startswith(" ") else f"{body}\n\n", *lines[at:]]
-        )
+        margin = lines[at][: len(lines[at]) - len(lines[at].lstrip())]
+        text = "".join([*lines[:at], textwrap.indent(body, margin) if margin else f"{body}\n\n", *lines[at:]])
     (tree / path).write_text(text, encoding="utf-8")
     return path
 
