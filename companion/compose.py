@@ -65,20 +65,9 @@ from companion.geofence.shapes import polygon_en
 from companion.messages import GeoPoint
 from companion.orders import ALL, Verb, unknown
 from companion.planners import ALGORITHMS, AUTO, PlannerChoice
-from companion.skipper.step import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
-from companion.skipper.way import (
-    TIDE_DOUBT_M,
-    Box,
-    Composed,
-    DryingWater,
-    Goal,
-    Line,
-    Refuge,
-    Search,
-    Side,
-    Until,
-    Voyage,
-)
+from companion.skipper import SkipperConfig, Voyage
+from companion.skipper.step import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd
+from companion.skipper.way import TIDE_DOUBT_M, Box, Composed, DryingWater, Goal, Line, Refuge, Search, Side, Until
 from companion.traffic import Policy, TargetLimits
 from companion.traffic.feeds import FeedName, parse_feed
 from companion.wind import Estimator, make

@@ -19,8 +19,9 @@ from companion.geo.angles import difference_rad, heading_of, unit_en
 from companion.geo.segments import enters_disc
 from companion.messages import Command, Mode
 from companion.safety import LIGHT_MPS, SAILS_MPS
-from companion.skipper.step import Phase, SkipperState, Snapshot, SpeedSeen, WindEstimate
-from companion.skipper.way import PointEn, Voyage, cross_track_m, gates_of, moved
+from companion.skipper import SkipperState, Voyage
+from companion.skipper.step import Phase, Snapshot, SpeedSeen, WindEstimate
+from companion.skipper.way import PointEn, cross_track_m, gates_of, moved
 
 Winds = tuple[tuple[float, float], ...]  # from [rad] and speed [m/s], for WIND_S each
 

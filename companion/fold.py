@@ -45,7 +45,7 @@ from companion.messages import (
     VehicleState,
     WindSample,
 )
-from companion.skipper import Skipper, Voyage
+from companion.skipper import Skipper, SkipperState, Voyage
 from companion.skipper.step import (
     Action,
     AutopilotRebooted,
@@ -59,7 +59,6 @@ from companion.skipper.step import (
     Persisted,
     ReadOutcome,
     Route,
-    SkipperState,
     Snapshot,
     WaypointReached,
     WindBefore,

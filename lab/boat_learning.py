@@ -24,10 +24,10 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat import BoatLog, Polar
+from companion.boat import BoatLog, Polar, Why
 from companion.boat.guess import guessed_polar
 from companion.boat.learn import LEAST_STRETCHES, TWA_DEG, TWS_MPS, learn
-from companion.boat.log import Why, stretches_of
+from companion.boat.log import stretches_of
 from lab.simulated_logs import SIZES, Truth, sailed
 
 Floats = NDArray[np.float64]

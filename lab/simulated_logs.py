@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat import Polar, Sizes
+from companion.boat import BoatLog, Polar, Sizes
 from companion.boat.boat import coefficient_of, leeway_at
 from companion.boat.guess import guessed_polar
-from companion.boat.log import BoatLog
 
 Floats = NDArray[np.float64]
 

@@ -20,6 +20,7 @@ from companion.mavlink.microservices import CommandAnswer
 from companion.mavlink.microservices import TransferOutcome as WireOutcome
 from companion.planner import Plan, Problem
 from companion.planners import Settings
+from companion.skipper import SkipperConfig
 from companion.skipper.step import (
     Acknowledge,
     Action,
@@ -38,7 +39,6 @@ from companion.skipper.step import (
     RunMotor,
     SetCurrent,
     SetMode,
-    SkipperConfig,
     SteerHeading,
     StopOrders,
     Tack,

@@ -49,8 +49,8 @@ from companion.orders import (
 )
 from companion.page import Address, Guests, LiveSource, TileChart, plan_figures, served
 from companion.planner import Plan
-from companion.skipper.step import Acknowledge, SkipperConfig
-from companion.skipper.way import Voyage
+from companion.skipper import SkipperConfig, Voyage
+from companion.skipper.step import Acknowledge
 from companion.telemetry.folder import VoyageFigures
 from companion.view import AreaView, Event, View, ViewFold
 from companion.view.passage import PlannedPassage

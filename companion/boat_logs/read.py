@@ -14,7 +14,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.boat.log import BoatLog
+from companion.boat import BoatLog
 from companion.boat_logs.recordings import State, Tlog, dataflash, messages_of
 from companion.boat_logs.rows import AT_REST, Rows, Useless, Winds
 from companion.boat_logs.text import read_csv, read_nmea

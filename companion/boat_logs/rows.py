@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat.log import BoatLog
+from companion.boat import BoatLog
 from companion.geo.angles import wrap_pi_array
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint, Mode, VehicleState, WindSample

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.boat.steering import STEP_S, SteeringLog, runs_of
+from companion.boat import SteeringLog
+from companion.boat.steering import STEP_S, runs_of
 from companion.boat_logs.read import MESSAGES, Skipped, bytes_of
 from companion.boat_logs.recordings import State, Tlog, dataflash, messages_of
 from companion.boat_logs.rows import AT_REST, LEAST_SAMPLES, Useless

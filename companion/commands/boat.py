@@ -209,7 +209,8 @@ def _trial(args: argparse.Namespace) -> int:
     from companion.commands.output import print_findings, write_files
     from companion.compose import polar_of
     from companion.errors import JobError
-    from companion.geofence.mission import dump_options, load_mission, read_options
+    from companion.geofence import load_mission
+    from companion.geofence.mission import dump_options, read_options
     from companion.mission_check import check_mission
 
     mission = load_mission(args.mission)

@@ -105,8 +105,8 @@ class _Count:
 def run_order(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.mavlink.signing import read_key
+    from companion.orders import phrase
     from companion.orders.far import FarKey, FarOrder, pack_order
-    from companion.orders.order import phrase
 
     wanted, key = phrase(args.words), FarKey(read_key(args.key), args.system)
     if args.out is not None:

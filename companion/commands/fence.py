@@ -151,8 +151,8 @@ def place_options(parser: argparse.ArgumentParser) -> None:
 
 def read_input(args: argparse.Namespace) -> Document:
     """Return the document that the arguments name."""
-    from companion.geofence import ZoneKind, read
-    from companion.geofence.mission import document_of, load_mission
+    from companion.geofence import ZoneKind, load_mission, read
+    from companion.geofence.mission import document_of
 
     if Path(args.file).suffix.lower() == ".toml":
         return document_of(load_mission(args.file))
@@ -168,7 +168,7 @@ def point_radius_m(args: argparse.Namespace) -> float:
 
 def places(args: argparse.Namespace) -> tuple[GeoPoint | None, tuple[GeoPoint, ...], float | None]:
     """Return start, goals and margin of the arguments, or of a mission TOML."""
-    from companion.geofence.mission import load_mission
+    from companion.geofence import load_mission
 
     start, goals, margin_m = args.start, tuple(args.goal), args.margin
     if Path(args.file).suffix.lower() == ".toml":
@@ -211,7 +211,7 @@ def _check(args: argparse.Namespace) -> int:
     wind_deg = args.wind_from
     names: list[str] = []
     if Path(args.file).suffix.lower() == ".toml":
-        from companion.geofence.mission import load_mission
+        from companion.geofence import load_mission
 
         mission = load_mission(args.file)
         wind_deg = mission.wind.preview_from_deg if wind_deg is None else wind_deg

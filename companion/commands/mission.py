@@ -185,9 +185,9 @@ def _only(document: Document, part: str) -> Document:
 
 def _convert(args: argparse.Namespace) -> int:
     from companion.commands.fence import grown_marks
-    from companion.geofence import read
+    from companion.geofence import load_mission, read
     from companion.geofence.formats import write
-    from companion.geofence.mission import goal_losses, load_mission, mission_files
+    from companion.geofence.mission import goal_losses, mission_files
 
     document = read_mission_file(args.file)
     print_findings(document.findings, args.file)
@@ -378,7 +378,7 @@ def write_mission(made: MissionFiles, out: Path, *, force: bool) -> Mission:
     """
     from dataclasses import replace
 
-    from companion.geofence.mission import load_mission
+    from companion.geofence import load_mission
 
     print_losses(made.losses, str(out))
     files = {str(out): made.toml, **{str(out.parent / name): data for name, data in made.files.items()}}
@@ -552,9 +552,9 @@ def _plans(mission: Mission, tws_mps: float, twd_from_rad: float) -> list[Plan]:
 
 def read_mission_file(path: str) -> Document:
     """Return what a mission TOML or a drawing holds, with its only line as the route. Raises InputError."""
-    from companion.geofence import read
+    from companion.geofence import load_mission, read
     from companion.geofence.formats import lines_as_route
-    from companion.geofence.mission import document_of, load_mission
+    from companion.geofence.mission import document_of
 
     if Path(path).suffix.lower() == ".toml":
         return document_of(load_mission(path))

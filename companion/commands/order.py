@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from companion.commands.output import force_option, write_files
 from companion.errors import InputError
-from companion.orders.order import TABLE, phrase
+from companion.orders import TABLE, phrase
 from companion.program.arguments import number, system_id
 
 if TYPE_CHECKING:

@@ -108,7 +108,8 @@ def track_of(record: VoyageRecord) -> Document:
     """Return the positions of a voyage as a document with one track."""
     import numpy as np
 
-    from companion.geofence.document import Document, Track
+    from companion.geofence import Document
+    from companion.geofence.document import Track
     from companion.messages import GeoPoint
 
     c = record.columns

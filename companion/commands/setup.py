@@ -324,7 +324,8 @@ def write_instance(
         InputError: it could not be sailed; nothing is written.
     """
     from companion.disk import Disk
-    from companion.geofence.mission import load_mission, load_settings, toml
+    from companion.geofence import load_mission
+    from companion.geofence.mission import load_settings, toml
 
     files = {f"{name}.toml": toml(mission).encode(), f"{name}.env": settings.encode(), **boat}
     with tempfile.TemporaryDirectory() as scratch:

@@ -71,7 +71,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def run(args: argparse.Namespace) -> int:
     """Score, print, write and draw; return the exit code."""
-    from companion.wind.estimators import NAMES, make
+    from companion.wind import NAMES, make
     from companion.wind.study import fit_ar1
 
     names = list(NAMES) if args.estimator == "all" else [args.estimator]
@@ -127,7 +127,7 @@ def _write_json(document: dict[str, Any], path: Path) -> None:
 
 
 def _score(record: Record, name: str, advance: Any) -> Score:
-    from companion.wind.estimators import make
+    from companion.wind import make
     from companion.wind.study import score
 
     done = 0
@@ -258,7 +258,7 @@ def _document(record: Record, found: Sequence[Score], ar1: Ar1Fit) -> dict[str, 
 
 def _print_cost(record: Record, names: Sequence[str]) -> None:
     """Time every estimator over the record; the Kalman filter of filterpy is timed in the same run, as the unit."""
-    from companion.wind.estimators import make
+    from companion.wind import make
 
     rows = min(len(record), 5000)
     cost: dict[str, tuple[float, float]] = {}

@@ -62,7 +62,7 @@ from companion.page import (
 )
 from companion.planner import Plan, Problem
 from companion.planner.worker import PlannerWorker
-from companion.view.area import AreaView
+from companion.view import AreaView
 from companion.view.area import drawn as area_drawn
 from companion.view.passage import passage_view
 from companion.words import counted, listed

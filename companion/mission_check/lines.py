@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from companion.compose import voyage_of
 from companion.geofence import Code, Finding, FindingLevel, Mission
-from companion.skipper.way import Approach, Gate, Voyage, gates_of, no_room
+from companion.skipper import Voyage
+from companion.skipper.way import Approach, Gate, gates_of, no_room
 
 NO_ROOM_REMEDY = "move both marks farther from it, or let [area] margin_m and margin_floor_m be smaller"
 

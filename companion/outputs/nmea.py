@@ -22,7 +22,8 @@ from companion.geo.angles import heading_of, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 from companion.outputs.outlet import Outlet, Say
-from companion.view.values import GoalView, LegView, PointEn, View
+from companion.view import View
+from companion.view.values import GoalView, LegView, PointEn
 
 TALKER = "II"  # integrated instrumentation
 MAX_CHARACTERS = 82  # from $ to the line end, both included

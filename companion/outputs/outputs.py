@@ -17,7 +17,7 @@ from companion.guard import Auxiliary, Guard
 from companion.outputs.nmea import Lines, TcpOutlet, UdpOutlet, lines_of
 from companion.outputs.outlet import Outlet, Say
 from companion.outputs.signalk import TcpSignalK, Values, WebSocketSignalK, require_websockets, values_of
-from companion.view.values import View
+from companion.view import View
 
 MOST_TOKEN = 8192  # characters
 

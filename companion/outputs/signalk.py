@@ -26,7 +26,8 @@ from companion.outputs.nmea import UNTRUSTED, course_of, is_fresh, place_of
 from companion.outputs.outlet import Outlet, Say
 from companion.program.commands import install
 from companion.safety import TABLE
-from companion.view.values import AlarmView, PointEn, View
+from companion.view import View
+from companion.view.values import AlarmView, PointEn
 
 # As $source: into a source with a label a server puts a label of its own.
 LABEL = "sailboat-companion"

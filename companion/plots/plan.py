@@ -29,7 +29,7 @@ from companion.words import counted
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from companion.geofence.area import LocalArea
+    from companion.geofence import LocalArea
     from companion.planner import Plan, Problem
 
 LAND, LAND_EDGE = "#d9cfb4", "#8d7f5a"

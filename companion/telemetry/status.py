@@ -16,9 +16,10 @@ from companion.mavlink.wire import HIGH_LATENCY_S
 from companion.messages import AisReport, CompanionStatus, Severity, TrafficStatus
 from companion.orders.far import FarStatus, Reply, minutes_of
 from companion.safety import BY_NAME
+from companion.skipper import Voyage
 from companion.skipper.planning import next_tack_s, on_leg
 from companion.skipper.step import Announce, Phase, Route
-from companion.skipper.way import Voyage, gates_of
+from companion.skipper.way import gates_of
 from companion.telemetry.folder.logbook import Logbook
 from companion.telemetry.folder.records import VoyageFigures, sigma_ahead_rad
 from companion.traffic import TrafficCounts

@@ -13,7 +13,7 @@ from shapely.geometry import Polygon
 
 from companion.current import closed_spans
 from companion.messages import GeoPoint
-from companion.skipper.way import Voyage
+from companion.skipper import Voyage
 from companion.view.values import PointEn, metres, rounded
 
 if TYPE_CHECKING:

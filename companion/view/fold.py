@@ -11,8 +11,9 @@ from companion.geo.shift import Shift, carried
 from companion.messages import CompanionStatus
 from companion.planner import Leg
 from companion.planner.explain import bounds_in_words
-from companion.skipper.step import Announce, PlanOutcome, RequestPlan, SkipperConfig
-from companion.skipper.way import PointEn, Voyage
+from companion.skipper import SkipperConfig, Voyage
+from companion.skipper.step import Announce, PlanOutcome, RequestPlan
+from companion.skipper.way import PointEn
 from companion.telemetry.folder import VoyageFigures
 from companion.telemetry.status import CLOCK_OFF_S
 from companion.view import parts, values

@@ -18,9 +18,10 @@ from companion.messages import Command, CompanionStatus, TrafficStatus, VehicleS
 from companion.orders import Verb, permitted
 from companion.planner import Leg, Plan
 from companion.safety import BY_NAME
+from companion.skipper import SkipperConfig, Voyage
 from companion.skipper.planning import next_tack, on_leg
-from companion.skipper.step import Route, SkipperConfig, WindHealth
-from companion.skipper.way import Goal, PointEn, Side, Voyage, bearing_rad, gates_of, half_width_rad, mean_twd_rad
+from companion.skipper.step import Route, WindHealth
+from companion.skipper.way import Goal, PointEn, Side, bearing_rad, gates_of, half_width_rad, mean_twd_rad
 from companion.telemetry.console import DISK, GONE
 from companion.telemetry.folder import VoyageFigures
 from companion.traffic import Alarm, Assessment

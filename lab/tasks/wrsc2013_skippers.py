@@ -21,9 +21,19 @@ from companion.geo.frame import LocalFrame
 from companion.messages import Target
 from companion.planner import Problem, plan
 from companion.planner.problem import BoatLimits, ProblemWind, Sigma, evaluate
-from companion.traffic import TargetLimits, Targets, Vessel, check_legs, decide, decode_json, planning_discs, predict
+from companion.traffic import (
+    Conflict,
+    Decision,
+    TargetLimits,
+    Targets,
+    Vessel,
+    check_legs,
+    decide,
+    decode_json,
+    planning_discs,
+    predict,
+)
 from companion.traffic.occupancy import Keep
-from companion.traffic.plans import Conflict, Decision
 from companion.traffic.predict import STEADY, risk_factor
 from lab.tasks.controllers import line_following
 from sitl.world import LENGTH_M

@@ -1,4 +1,4 @@
-"""The house: every room says what it owns, and who is outside a sub-room comes in by its face."""
+"""The house: every room says what it owns, its face is where its names come from, a sub-room is entered by its face."""
 
 import ast
 from pathlib import Path
@@ -47,6 +47,30 @@ def test_a_sub_room_is_entered_by_its_face():
     ]
     assert wrong == []
     assert len(faced) > 15
+
+
+def test_what_is_at_a_rooms_face_is_taken_from_there_and_what_is_private_by_nobody():
+    """What is not at the face is taken from the module that owns it."""
+    faces = {
+        name_of(room): set(ast.literal_eval(node.value))
+        for room in ROOMS
+        if len(room.relative_to(ROOT).parts) == 2
+        for node in ast.parse((room / "__init__.py").read_text(encoding="utf-8")).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+    }
+    assert len(faces) > 20
+    wrong = []
+    for path in CODE:
+        me = name_of(path)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or node.module is None:
+                continue
+            room = ".".join(node.module.split(".")[:2])
+            if not (ROOT / room.replace(".", "/")).exists() or f"{me}.".startswith(f"{room}."):
+                continue
+            at_face = faces.get(room, set()) if node.module != room else set()
+            wrong += [(me, node.module, a.name) for a in node.names if a.name in at_face or a.name.startswith("_")]
+    assert wrong == []
 
 
 def test_no_name_of_a_face_is_hidden_by_a_module_that_is_loaded_later():

@@ -20,8 +20,8 @@ from companion.skipper.watch.measures import measure
 from companion.skipper.way.drift import DriftAhead, drift_ahead
 from companion.skipper.way.shoals import beyond_words
 from companion.skipper.way.voyage import PointEn, outside_m, water_at
-from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, Policy, assess
-from companion.traffic.colregs import Role, follow
+from companion.traffic import Alarm, AlarmLimits, Assessment, OwnShip, Policy, Role, assess
+from companion.traffic.colregs import follow
 
 SHOWN = 8  # vessels kept in the state: the worst
 VESSEL_EVERY_S = 30.0  # between two lines of one vessel

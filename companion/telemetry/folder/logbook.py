@@ -29,8 +29,9 @@ from companion.geo.shift import Shift
 from companion.geofence import Mission
 from companion.geofence.mission import MOST_PASSAGE_BYTES, is_file, planned_beside
 from companion.mavlink.tlog import stamp
-from companion.skipper.step import Permissions, Persisted, SkipperConfig
-from companion.skipper.way import Goal, Voyage
+from companion.skipper import SkipperConfig, Voyage
+from companion.skipper.step import Permissions, Persisted
+from companion.skipper.way import Goal
 from companion.telemetry.folder.recorder import AREA, COPIES, Recorder, without_none
 from companion.telemetry.folder.records import VoyageFigures, action_record, track_row, water_record
 

@@ -22,6 +22,7 @@ from companion.geo.shift import Shift
 from companion.mavlink.wire import mission_hash
 from companion.messages import AisReport, Command, GeoPoint, MissionItem, Mode
 from companion.orders import Order
+from companion.skipper import SkipperConfig
 from companion.skipper.step import (
     Action,
     Announce,
@@ -30,7 +31,6 @@ from companion.skipper.step import (
     PlanOutcome,
     ReadOutcome,
     RequestPlan,
-    SkipperConfig,
     Snapshot,
     SteerHeading,
     UploadFence,
