@@ -1,4 +1,4 @@
-"""Addresses of other displays: where NMEA 0183 goes to, and where a Signal K server is."""
+"""Addresses: a host with its port, where NMEA 0183 goes to, and where a Signal K server is."""
 
 from __future__ import annotations
 
@@ -36,19 +36,32 @@ class Displays:
     token: str = field(default="", repr=False)
 
 
+def host_port(text: str) -> tuple[str, int] | None:
+    """Return host and port of ``HOST:PORT``, an address of IPv6 in brackets; None: it is none.
+
+    >>> host_port("boat.local:80"), host_port("[::1]:80"), host_port("::1:80"), host_port("boat:99999")
+    (('boat.local', 80), ('::1', 80), None, None)
+    """
+    match = re.fullmatch(r"(?:\[([\w:.%]+)\]|([^:\s/\[\]]+)):([0-9]{1,5})", text)
+    if match is None or not 0 < int(match[3]) < 65536:
+        return None
+    return match[1] or match[2], int(match[3])
+
+
 def parse_nmea(text: str) -> OutputName:
     """Return the name of an output of sentences.
 
-    >>> parse_nmea("tcp:10110").host, parse_nmea("udp:255.255.255.255:10110").port
-    ('127.0.0.1', 10110)
+    >>> parse_nmea("tcp:10110").host, parse_nmea("udp:255.255.255.255:10110").port, parse_nmea("tcp:[::]:10110").host
+    ('127.0.0.1', 10110, '::')
 
     Raises:
         InputError: it is none.
     """
-    match = re.fullmatch(r"(?:(udp):([^:\s/]+)|(tcp)(?::([^:\s/]+))?):(\d{1,5})", text)
-    if match is None or not 0 < int(match[5]) < 65536:
+    kind, _, rest = text.partition(":")
+    found = host_port(rest) or (host_port(f"{LOOPBACK}:{rest}") if kind == "tcp" else None)
+    if found is None or kind not in {"udp", "tcp"}:
         raise InputError("--nmea", text, "is no place to send NMEA 0183 to", _NMEA)
-    return OutputName(text=text, kind=match[1] or match[3], host=match[2] or match[4] or LOOPBACK, port=int(match[5]))
+    return OutputName(text=text, kind=kind, host=found[0], port=found[1])
 
 
 def parse_signalk(text: str) -> OutputName:
@@ -60,9 +73,9 @@ def parse_signalk(text: str) -> OutputName:
     Raises:
         InputError: it is none.
     """
-    match = re.fullmatch(r"tcp:([^:\s/]+):(\d{1,5})", text)
-    if match and 0 < int(match[2]) < 65536:
-        return OutputName(text=text, kind="tcp", host=match[1], port=int(match[2]))
+    found = host_port(text.removeprefix("tcp:")) if text.startswith("tcp:") else None
+    if found is not None:
+        return OutputName(text=text, kind="tcp", host=found[0], port=found[1])
     try:
         parts = urlsplit(text)
         host, port = parts.hostname, parts.port

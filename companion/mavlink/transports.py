@@ -25,6 +25,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
+from companion.addresses import host_port
 from companion.clock import ended, now_s
 from companion.errors import InputError, LinkError
 
@@ -129,12 +130,16 @@ def parse_link(text: str) -> LinkName:
     kind, colon, rest = text.partition(":")
     if not colon or kind not in _KINDS:
         raise bad("not a link")
-    host, colon, port = rest.removeprefix("//").rpartition(":")
+    where = rest.removeprefix("//")
+    found = host_port(where)
+    if found is not None:
+        return LinkName(text, _KINDS[kind], host=found[0], port=found[1])
+    host, colon, port = where.rpartition(":")
     if not colon or not host:
         raise bad("host or port is missing")
-    if not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
+    if host_port(f"host:{port}") is None:
         raise bad(f"{port!r} is not a port from 1 to 65535")
-    return LinkName(text, _KINDS[kind], host=host.strip("[]"), port=int(port))
+    raise bad(f"{host!r} is not a host (an address of IPv6 stands in brackets)")
 
 
 # The transports of the real world: serial, UDP and TCP.

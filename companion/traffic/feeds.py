@@ -19,6 +19,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
+from companion.addresses import host_port
 from companion.clock import ended, now_s
 from companion.errors import InputError, LinkError
 from companion.guard import kept
@@ -62,9 +63,10 @@ def parse_feed(text: str, *, baud: int = DEFAULT_BAUD) -> FeedName:
         InputError: it is not one.
 
     """
-    match = re.fullmatch(r"(udpin|tcp):([^:\s]+):(\d{1,5})", text)
-    if match and 0 < int(match[3]) < 65536:
-        return FeedName(text=text, kind=match[1], host=match[2], port=int(match[3]))
+    kind, _, rest = text.partition(":")
+    found = host_port(rest) if kind in {"udpin", "tcp"} else None
+    if found is not None:
+        return FeedName(text=text, kind=kind, host=found[0], port=found[1])
     match = re.fullmatch(r"(/[^\s:]+)(?::(\d{3,7}))?", text)
     if match:
         return FeedName(text=text, kind="serial", host=match[1], baud=int(match[2] or baud))

@@ -68,6 +68,8 @@ def test_link_names(text, kind, where):
         "/dev/ttyS0:12",
         "tcp::5760",
         "udpin:h:²",
+        "tcp:::1:5760",
+        "tcp:a b:5760",
     ],
 )
 def test_bad_link_names_say_what_to_write(text):

@@ -71,6 +71,23 @@ def test_udp_takes_sentences_and_json_and_counts_the_rest() -> None:
     hurried(listen())
 
 
+def test_a_feed_may_have_an_address_of_ipv6() -> None:
+    async def listen() -> None:
+        heard: list[AisReport] = []
+        with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as sender:
+            try:
+                sender.bind(("::1", 0))
+            except OSError:
+                pytest.skip("no IPv6 here")
+            port = free_port(socket.SOCK_DGRAM)
+            async with open_feed(parse_feed(f"udpin:[::1]:{port}"), heard.append, NmeaDecoder(), "AIS feed"):
+                sender.sendto(sentence(211000001), ("::1", port))
+                await until(lambda: bool(heard))
+        assert [r.mmsi for r in heard] == [211000001]
+
+    hurried(listen())
+
+
 def test_a_udp_port_that_is_taken_is_a_dead_link() -> None:
     async def listen() -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
