@@ -14,8 +14,6 @@ from companion.mavlink.vehicle_identity import Census, CensusState
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.frames import Drop, Message
 
-# What a link has counted: frames, losses, bytes a second, faults of those who listen.
-
 RATE_WINDOW_S = 10.0
 
 
@@ -75,17 +73,6 @@ class Throughput:
             self._received -= received
             self._sent -= sent
 
-
-# What of the autopilot's messages is believed on a link without a key: they must fit together. Pure.
-#
-# Whoever can write to a link can send a frame with the autopilot's ids. Two things in a frame are hard to get right
-# without listening first: the boot time that many messages carry, and the sequence number of every frame. The boot
-# times of one autopilot run with our clock, so a message that is ahead of it or far behind is not used; and frames
-# count up, at the rate at which they come, so a frame that is out of step with a stream of frames whose boot times are
-# right is not used either. A new clock (a reboot) or a new count (a gap, a second route) is believed when it goes on
-# and the old one does not contradict it.
-#
-# A forger who listens gets both right. Against that one there is only a key.
 
 # A delay only ever makes a message late: ahead of the clock by more than this it is not the autopilot's [s].
 AHEAD_S = 0.5
@@ -237,7 +224,17 @@ class _MessageStream:
 
 
 class PlausibilityFilter:
-    """Judges every message of the autopilot's own component, in the order of arrival."""
+    """Judges every message of the autopilot's own component, in the order of arrival: they must fit together.
+
+    Whoever can write to a link without a key can send a frame with the autopilot's ids. Two things in a frame are hard
+    to get right without listening first: the boot time that many messages carry, and the sequence number of every
+    frame. The boot times of one autopilot run with our clock, so a message that is ahead of it or far behind is not
+    used; and frames count up, at the rate at which they come, so a frame that is out of step with a stream of frames
+    whose boot times are right is not used either. A new clock (a reboot) or a new count (a gap, a second route) is
+    believed when it goes on and the old one does not contradict it.
+
+    A forger who listens gets both right. Against that one there is only a key.
+    """
 
     def __init__(self) -> None:
         self.clock = BootClock()

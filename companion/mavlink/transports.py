@@ -34,6 +34,13 @@ OnBytes = Callable[[bytes], None]
 # A write buffer of 64 kB is 0.7 s of a 921600 baud port: beyond it a peer has stopped reading.
 MAX_WRITE_BUFFER_BYTES = 65536
 DEFAULT_BAUD = 921600
+BACKOFF_BASE_S = 0.25
+BACKOFF_CAP_S = 10.0
+# A TCP connection on which nothing came for this long is half open (the other side lost its power): hung up and made
+# anew. An autopilot says something every second [s].
+SILENT_TCP_S = 15.0
+# A peer of udpin that was silent this long gives its place to the next one that speaks (a restarted router).
+PEER_SILENCE_S = 3.0
 
 
 class TransportState(enum.Enum):
@@ -142,21 +149,6 @@ def parse_link(text: str) -> LinkName:
     raise bad(f"{host!r} is not a host (an address of IPv6 stands in brackets)")
 
 
-# The transports of the real world: serial, UDP and TCP.
-#
-# A stream (serial, TCP) lives in one named task that connects, waits for the loss, and connects again after a
-# capped full-jitter pause: uniform between 0 and min(cap, base x 2^n), so that many boats or programs do not knock
-# in step. [AWS Architecture Blog, "Exponential Backoff And Jitter", 2015]
-
-BACKOFF_BASE_S = 0.25
-BACKOFF_CAP_S = 10.0
-# A TCP connection on which nothing came for this long is half open (the other side lost its power): hung up and made
-# anew. An autopilot says something every second [s].
-SILENT_TCP_S = 15.0
-# A peer of udpin that was silent this long gives its place to the next one that speaks (a restarted router).
-PEER_SILENCE_S = 3.0
-
-
 def backoff_s(attempt: int, rng: random.Random) -> float:
     """Return the pause [s] before attempt ``attempt`` + 1, in 0..min(cap, base x 2^attempt)."""
     return rng.uniform(0.0, min(BACKOFF_CAP_S, BACKOFF_BASE_S * 2.0 ** min(attempt, 16)))
@@ -206,7 +198,12 @@ class _Endpoint:
 
 
 class StreamEndpoint(_Endpoint):
-    """Serial port, TCP client or TCP server of one client."""
+    """Serial port, TCP client or TCP server of one client.
+
+    It lives in one named task that connects, waits for the loss, and connects again after a capped full-jitter pause:
+    uniform between 0 and min(cap, base x 2^n), so that many boats or programs do not knock in step. [AWS Architecture
+    Blog, "Exponential Backoff And Jitter", 2015]
+    """
 
     def __init__(self, link: LinkName, seed: int) -> None:
         super().__init__(link)

@@ -28,6 +28,16 @@ from companion.view.values import GoalView, LegView, PointEn
 TALKER = "II"  # integrated instrumentation
 MAX_CHARACTERS = 82  # from $ to the line end, both included
 NAME_CHARACTERS = 8  # of a waypoint: more than a few do not fit into the sentences of a route
+FRESH_S = 5.0  # what is older is not told as if it were so now
+INSIDE_M = 5.0  # of a waypoint: ArduRover announces it 3 to 5 m early
+SAME_M = 1.0  # a waypoint nearer to a goal than this is the goal's
+ROUTE = "companion"
+ORIGIN = "FROM"  # the name of where the leg begins
+UNTRUSTED = frozenset({"none", "untrusted"})  # of a wind's health: shown as not valid
+ROUTE_EVERY_S = 60.0  # who comes to a broadcast later has the route after this long
+MOST_CLIENTS = 16
+BEHIND_BYTES = 16_384  # a client that has not read so much misses what comes
+PATIENCE_S = 10.0  # ... and is hung up on after this long
 _FRAME = len("$*00\r\n")
 _MOST_XTE_NM = 9.99  # what the field of a cross-track error holds
 
@@ -213,11 +223,6 @@ def _flag(is_so: bool) -> str:
     return "A" if is_so else "V"
 
 
-FRESH_S = 5.0  # what is older is not told as if it were so now
-INSIDE_M = 5.0  # of a waypoint: ArduRover announces it 3 to 5 m early
-SAME_M = 1.0  # a waypoint nearer to a goal than this is the goal's
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActiveLeg:
     """The leg and the boat on it: ``right_m`` to the right of it, ``closing_mps`` the speed towards its end."""
@@ -309,11 +314,6 @@ def _between(start: PointEn, end: PointEn) -> PointEn:
     return end[0] - start[0], end[1] - start[1]
 
 
-ROUTE = "companion"
-ORIGIN = "FROM"  # the name of where the leg begins
-UNTRUSTED = frozenset({"none", "untrusted"})  # of a wind's health: shown as not valid
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lines:
     """Sentences: those that are told each second, and those of the route, which are told when they change."""
@@ -392,12 +392,6 @@ def _point(frame: LocalFrame, en_m: tuple[float, float]) -> GeoPoint:
 
 def _rad(angle_deg: float | None) -> float | None:
     return None if angle_deg is None else math.radians(angle_deg)
-
-
-ROUTE_EVERY_S = 60.0  # who comes to a broadcast later has the route after this long
-MOST_CLIENTS = 16
-BEHIND_BYTES = 16_384  # a client that has not read so much misses what comes
-PATIENCE_S = 10.0  # ... and is hung up on after this long
 
 
 class RouteTeller:

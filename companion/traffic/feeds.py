@@ -42,6 +42,7 @@ class Decoder(Protocol[Report]):
 
 DEFAULT_BAUD = 38400  # ITU-R M.1371 receivers: NMEA 0183-HS
 MAX_PARTIAL = 1024  # bytes without a line end: noise, dropped
+FED_AT_MOST = 500  # reports between two steps: more are noise or an attack, and the rest is dropped
 SILENT_S = 60.0  # a feed unheard for this long is stale: say so, AIS traffic or not
 
 
@@ -215,12 +216,6 @@ async def open_feed(
         yield feed
     finally:
         await ended(task)
-
-
-# The feeds of a voyage: opened, listened to, and told of when they fall silent.
-
-# More reports than this between two steps are noise or an attack: the rest of them is dropped.
-FED_AT_MOST = 500
 
 
 class Feeds(Generic[Report]):

@@ -14,11 +14,8 @@ from typing import Any
 
 from companion.orders.order import BY_VERB, NUMBERED, Place, Result, Verb, Wanted, mark_of, verb_of
 
-# Fields of a message of a few bytes: where each is, its step, and what says that it is not known.
-#
-# Little-endian, without gaps. A value that does not fit is told as the nearest that does: never as another one, never
-# as unknown. What is not known has a number of its own, which is never 0.
-
+SEAL_BYTES = 8
+ORDER, STATUS, BEGINNING, NAME = "order", "status", "beginning", "name"  # purposes
 EPOCH_S = 1_577_836_800  # 2020-01-01T00:00:00Z: minutes in three bytes from here on last until 2051
 
 
@@ -63,7 +60,11 @@ class BitField:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Fields one behind the other."""
+    """Fields one behind the other, little-endian, without gaps.
+
+    A value that does not fit is told as the nearest that does: never as another one, never as unknown. What is not
+    known has a number of its own, which is never 0.
+    """
 
     fields: tuple[BitField, ...]
 
@@ -105,18 +106,12 @@ def unix_of(minutes: int) -> float:
     return EPOCH_S + 60.0 * minutes
 
 
-# The authentication code behind every message from far away: eight bytes that only who has the key can make.
-#
-# HMAC-SHA-256 (RFC 2104), cut to 64 bits, with a key of its own for each purpose and boat: what was sealed as a status
-# or for another system is no order of this one. The key file is that of ``companion key new``.
-
-SEAL_BYTES = 8
-ORDER, STATUS, BEGINNING, NAME = "order", "status", "beginning", "name"  # purposes
-
-
 @dataclass(frozen=True, slots=True, repr=False)
 class FarKey:
     """A key of 32 bytes and the MAVLink system id of the boat that it is used for.
+
+    What it seals with is HMAC-SHA-256 (RFC 2104), cut to 64 bits, with a key of its own for each purpose and boat: what
+    was sealed as a status or for another system is no order of this one. The key file is that of ``companion key new``.
 
     ``began`` is the minute (since 2020) from which the counters of orders count, 0: from the first order with this key.
     It is in the code of every order: what was sealed before a beginning is none of those behind it.
@@ -309,17 +304,6 @@ def unpack_order(data: bytes, key: FarKey) -> FarOrder:
     )
 
 
-# The judge of orders from far away: they come late, twice, in any order, or not at all.
-#
-# Each has a counter that its sender never uses again, and a time after which it counts for nothing. Every counter is
-# taken once. A link that reorders needs more than the highest: of the last 64 each may still come. What is older is
-# refused, and so is an order where the boat does not know the time. A counter far ahead is a slip of the shore's, and
-# would leave no room for those behind it: it is refused and not remembered.
-#
-# Where shore and boat have lost each other's count, the shore begins anew: a sealed moment later than every one before.
-# From then on counters count from 1, and nothing counts that was sealed before it (``FarKey.began``), however often it
-# is played back.
-
 WINDOW = 64
 MOST_JUMP = 1024  # counters ahead of the highest: as many messages as are lost in a row, and more
 MOST_AHEAD_S = 7 * 86_400.0 + 3600.0  # an order that lives longer is somebody's mistake, or a wrong clock
@@ -412,6 +396,12 @@ class Taken:
 def judged(order: FarOrder, taken: Taken, unix_s: float | None) -> tuple[Reply | None, Taken]:
     """Judge an authentic order by the boat's clock [s since 1970], None: not known.
 
+    Orders come late, twice, in any order, or not at all. Each has a counter that its sender never uses again, and a
+    time after which it counts for nothing. Every counter is taken once. A link that reorders needs more than the
+    highest: of the last 64 each may still come. What is older is refused, and so is an order where the boat does not
+    know the time. A counter far ahead is a slip of the shore's, and would leave no room for those behind it: it is
+    refused and not remembered.
+
     Returns:
         its reply, None: it is to be carried out, once; and what is taken from now on, to be kept before that.
     """
@@ -437,6 +427,10 @@ def judged(order: FarOrder, taken: Taken, unix_s: float | None) -> tuple[Reply |
 
 def begun(beginning: Beginning, taken: Taken, unix_s: float | None) -> tuple[Reply, Taken]:
     """Judge an authentic beginning by the boat's clock [s since 1970], None: not known.
+
+    Where shore and boat have lost each other's count, the shore begins anew: a sealed moment later than every one
+    before. From then on counters count from 1, and nothing counts that was sealed before it (``FarKey.began``), however
+    often it is played back.
 
     Returns:
         its reply, and what is taken from now on, to be kept.
