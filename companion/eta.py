@@ -20,12 +20,12 @@ from companion.geo.segments import enters_disc
 from companion.messages import Command, Mode
 from companion.safety import LIGHT_MPS, SAILS_MPS
 from companion.skipper import SkipperState, Voyage
+from companion.skipper.planning import FOLLOWS
 from companion.skipper.step import Phase, Snapshot, SpeedSeen, WindEstimate
 from companion.skipper.way import PointEn, cross_track_m, gates_of, moved
 
 Winds = tuple[tuple[float, float], ...]  # from [rad] and speed [m/s], for WIND_S each
 
-FOLLOWS = frozenset({Mode.AUTO, Mode.GUIDED})  # the modes in which the boat follows the legs on board
 STEP_S = 5.0  # of a walk
 REACH_S = 900.0  # walked so far in steps; the legs beyond that are taken whole
 WIND_S = 30.0  # the wind is taken to be one for so long

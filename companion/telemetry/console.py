@@ -298,7 +298,7 @@ def progress_text(step: Step) -> str:
     if under_way:
         tack = next_tack(step, step.voyage.boat)
         if tack is not None:
-            parts.append(f"next tack {'' if tack.is_planned else 'about '}{tack.in_s:.0f} s")
+            parts.append(f"next tack {tack.words}")
         off_m = on_leg(step).off_m
         if off_m is not None:
             parts.append(f"xt {off_m:+.1f} m")

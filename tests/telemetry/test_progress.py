@@ -16,7 +16,7 @@ from companion.fold import Step
 from companion.messages import CompanionStatus, Mode, Severity
 from companion.skipper import Skipper
 from companion.skipper.planning import next_tack
-from companion.skipper.step import is_off_plan
+from companion.skipper.step import Phase, is_off_plan
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.config import Guidance, SkipperConfig
 from companion.telemetry.console import ProgressLine, left_behind, progress_text
@@ -126,6 +126,27 @@ def test_steered_by_headings_the_way_to_the_waypoint_is_her_own():
     world.set_mode(Mode.AUTO)
     by_autopilot = replace(step, snapshot=world.snapshot())
     assert re.search(r"wp \d+/\d+ (\d+) m", progress_text(by_autopilot))[1] == "0"
+
+
+def test_held_in_a_loiter_no_tack_comes_and_the_way_to_the_circles_middle_is_none_to_the_waypoint():
+    """ "WP 1/3 0 m  next tack about 6 s" was told by radio of a boat that lay in LOITER 292 m before it."""
+    world = World(Skipper(voyage=voyage(), config=SkipperConfig()), shown={"waypoint_distance_m": 0.0})
+    assert world.run(120, lambda w: w.mode is Mode.AUTO and w.speed > 1.0)
+    world.run(5)
+    sails = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
+    world.set_mode(Mode.LOITER)
+    held = replace(sails, snapshot=world.snapshot(), state=with_parts(world.state, phase=Phase.HOLDING))
+    in_auto = replace(sails, state=held.state)
+    told = {}
+    for name, step in {"sails": sails, "held": held, "in auto": in_auto}.items():
+        status = companion_status(step, step.voyage, VoyageFigures(), 9.0, None)
+        view, _ = ViewFold(step.voyage, SkipperConfig()).take(step, status, VoyageFigures())
+        told[name] = (status.waypoint_distance_m, view.boat.waypoint_m, status.next_tack_s, view.plan.next_tack_s)
+        assert ("next tack" in progress_text(step)) == (name == "sails")
+        assert bool(re.search(r"wp 1/\d+ \d+ m", progress_text(step))) == (name != "held")
+    assert None not in told["sails"]
+    assert set(told["held"]) == {None}
+    assert told["in auto"][2:] == (None, None)
 
 
 @pytest.mark.parametrize("guidance", [Guidance.FIELD, Guidance.PLAN])

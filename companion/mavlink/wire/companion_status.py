@@ -85,7 +85,8 @@ def pack_status(status: CompanionStatus) -> bytes:
     room = MAX_PAYLOAD_BYTES - _PACK.size - len(state) - len(code) - len(order)
     text = status.alert_text.encode("ascii", "replace")
     if len(text) > room:
-        text = text[: max(0, room - len(_CUT))] + _CUT[:room]
+        kept = text[: max(0, room - len(_CUT)) + 1].rpartition(b" ")[0]  # at a word: of "12.8 m" 1 m is another figure
+        text = kept.rstrip(b" ,;:") + _CUT[:room]
     head = _PACK.pack(
         VERSION,
         int(max(0.0, status.t_s) * 10.0) & 0xFFFFFFFF,

@@ -26,7 +26,7 @@ from companion.skipper.planning.diversions import (
     refuge_name,
     refuges_by_way,
 )
-from companion.skipper.planning.next_tack import next_tack_s
+from companion.skipper.planning.next_tack import next_tack
 from companion.skipper.planning.not_found import hold
 from companion.skipper.step.actions import Acknowledge, ReplanReason, RequestPlan, StopOrders
 from companion.skipper.step.config import Learning
@@ -349,8 +349,8 @@ def _forget_shoal(ctx: StepContext, order: Order) -> Answer:
 
 def _say_why(ctx: StepContext, _: Order) -> Answer:
     state = ctx.state
-    tack_s = next_tack_s(ctx, ctx.voyage.boat) if ctx.config.sails else None
-    tack = "" if tack_s is None else f"; next tack in {tack_s:.0f} s"
+    comes = next_tack(ctx, ctx.voyage.boat) if ctx.config.sails else None
+    tack = "" if comes is None else f"; next tack in {comes.words}"
     order = state.orders.standing
     under = "" if order is None else f"; {order.words} for {order.age_s(ctx.t_s) / 60.0:.0f} min, {order.why}"
     return _done(f"{state.phase.value}: {state.why}{tack}{under}")

@@ -1,6 +1,6 @@
 """Planning under way: why, from where, with which step of the ladder, and what is done with the answer."""
 
-from companion.skipper.planning.next_tack import next_tack, next_tack_s, on_leg
+from companion.skipper.planning.next_tack import FOLLOWS, next_tack, next_tack_s, on_leg
 from companion.skipper.planning.vessels import (
     ALIKE_S,
     GIVE_UP_RISK,
@@ -14,6 +14,7 @@ from companion.skipper.step.route import HOME_RADIUS_M
 
 __all__ = [
     "ALIKE_S",
+    "FOLLOWS",
     "GIVE_UP_RISK",
     "HOME_RADIUS_M",
     "HORIZON_S",

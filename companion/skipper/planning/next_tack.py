@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 from companion.boat import AutopilotLimits, Boat
 from companion.geo.angles import difference_rad, heading_of
 from companion.messages import Command, Mode
-from companion.skipper.step import SkipperState, Snapshot
+from companion.skipper.step import Phase, SkipperState, Snapshot
 from companion.skipper.way import PointEn, along_m, cross_track_m, moved
 
 # A tack takes this long: who should have tacked a moment ago is tacking [s].
@@ -19,6 +19,7 @@ MIN_SPEED_MPS = 0.2
 GATHERING_WAY = 0.8
 LOSING_WAY = 0.4  # ... and in a tack, with less than this, it may fail
 MANY_FAIL = 0.1  # of the tacks of a voyage: of the next nothing is promised
+FOLLOWS = frozenset({Mode.AUTO, Mode.GUIDED})  # the modes in which the boat follows the legs on board
 
 
 class Seen(Protocol):
@@ -50,10 +51,10 @@ class OnLeg(NamedTuple):
 def on_leg(seen: Seen) -> OnLeg:
     """Return where the boat is on its leg: as the autopilot tells, in GUIDED by her own position; by field on none.
 
-    Steered by headings ArduRover knows of no waypoint, and tells 0 of both.
+    Steered by headings ArduRover knows of no waypoint, and tells 0 of both; in LOITER it tells of where she circles.
     """
     status, here, mission = seen.snapshot.autopilot, seen.snapshot.position_en_m, seen.state.mission
-    if status is None or seen.is_off_plan:
+    if status is None or seen.is_off_plan or status.mode not in FOLLOWS:
         return OnLeg(None, None)
     if status.mode is not Mode.GUIDED or seen.state.steering.own_mode is not Mode.GUIDED:
         return OnLeg(status.waypoint_distance_m, status.cross_track_m)
@@ -73,6 +74,11 @@ class NextTack(NamedTuple):
     in_s: float
     is_planned: bool
 
+    @property
+    def words(self) -> str:
+        """When it is, as console and radio tell it."""
+        return f"{'' if self.is_planned else 'about '}{self.in_s:.0f} s"
+
 
 def next_tack_s(seen: Seen, boat: Boat) -> float | None:
     """Return the time until the next tack [s]; None: there is none, or no way on."""
@@ -81,20 +87,22 @@ def next_tack_s(seen: Seen, boat: Boat) -> float | None:
 
 
 def next_tack(seen: Seen, boat: Boat) -> NextTack | None:
-    """Return the next tack, planned or the autopilot's own; None: there is none, no way on, or a field steers.
+    """Return the next tack, planned or the autopilot's own; None: there is none, no way on, she is held, or by field.
 
     On a leg inside its no-go zone the autopilot beats: it keeps the tack that it comes on until the edge of its
     corridor, or until the other tack fetches the waypoint; in GUIDED it does not beat, and such a leg is planned anew.
     The end of a mission, a loiter, is no course. Legs ahead are sailed at what the boat has shown of the polar's speed,
     this one at its own, once it has way on.
     """
-    route, snapshot = seen.state.mission.route, seen.snapshot
+    route, snapshot, status = seen.state.mission.route, seen.snapshot, seen.snapshot.autopilot
     vehicle, here, wind = snapshot.vehicle, snapshot.position_en_m, snapshot.wind
     wind_rad = wind.mean_twd_from_rad if wind.present_twd_from_rad is None else wind.present_twd_from_rad
     tws_mps = wind.mean_tws_mps if wind.present_tws_mps is None else wind.present_tws_mps
     if (
         route is None
         or seen.is_off_plan
+        or seen.state.phase is Phase.HOLDING
+        or (status is not None and status.mode not in FOLLOWS)
         or wind_rad is None
         or tws_mps is None
         or vehicle is None
@@ -130,7 +138,7 @@ def next_tack(seen: Seen, boat: Boat) -> NextTack | None:
         speed_mps = max(MIN_SPEED_MPS, expected_mps)
         has_way = number == 0 and vehicle.speed_mps > GATHERING_WAY * speed_mps
         if is_closed:
-            if snapshot.autopilot is not None and snapshot.autopilot.mode is Mode.GUIDED:
+            if status is not None and status.mode is Mode.GUIDED:
                 return None
             close_rad = wind_rad - no_go_rad if side else wind_rad + no_go_rad
             velocity_en = vehicle.velocity_en_mps if has_way else moved((0.0, 0.0), close_rad, speed_mps)

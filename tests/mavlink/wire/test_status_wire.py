@@ -124,6 +124,15 @@ def test_a_sentence_that_is_cut_says_so():
     assert words.startswith(got[:-3])
 
 
+def test_no_figure_of_it_is_cut():
+    """ "where 1.3 m" was left of "where 1.3 m/s": metres."""
+    words = "she makes 2.8 m/s ahead where 1.3 m/s is all that her file has in this wind, she is held"
+    for more in range(40):
+        text = "x" * more + " " + words
+        got = unpack_status(pack_status(dataclasses.replace(FULL, alert_text=text))).alert_text
+        assert got == text or (set(got.removesuffix("...").split()) <= {w.rstrip(",") for w in text.split()})
+
+
 def on_air(status, turns, keep=lambda _: True):
     sender, receiver = Codec(1, 191), Codec(254, 25)
     sent = [m for turn in range(turns) for m in status_messages(status, 50.0, turn)]

@@ -28,7 +28,7 @@ from companion.skipper.step.config import Guidance, Permissions
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import CommandOutcome, CommandResult, SpeedSeen
-from companion.skipper.step.state import NO_TACKS
+from companion.skipper.step.state import NO_TACKS, Phase
 from companion.skipper.way.geometry import bearing_rad, cross_track_m
 from companion.skipper.way.voyage import Goal, Side
 from tests.skipper.moments import moment, route
@@ -375,6 +375,7 @@ def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
             speed_seen=SpeedSeen(share=share),
         )
         state = SimpleNamespace(
+            phase=Phase.STANDARD,
             mission=SimpleNamespace(route=route, index=0),
             plans=SimpleNamespace(replanned_index=asked),
             pending=SimpleNamespace(plan=pending),
