@@ -6,6 +6,7 @@ What would change it is found by planning again (``what_if``). It is never neede
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -61,9 +62,12 @@ def explain(problem: Problem, plan: Plan, budget_s: float = 5.0, *, expansions: 
     return replace(plan, why=with_parts(why, problem, path_risk(problem, plan)) if problem.is_shared else why)
 
 
-def bounds_in_words(problem: Problem, plan: Plan) -> str:
-    """Return what holds the plan where it is, in words; no replanning, so that it costs milliseconds."""
-    return _courses_in_words(problem, plan, [leg_bounds(problem, leg) for leg in plan.legs])
+def bounds_in_words(problem: Problem, plan: Plan, numbers: Sequence[int] = ()) -> str:
+    """Return what holds the plan where it is, in words; no replanning, so that it costs milliseconds.
+
+    ``numbers``: each leg's in the mission that it is sailed as; without them courses are counted from 1.
+    """
+    return _courses_in_words(problem, plan, [leg_bounds(problem, leg) for leg in plan.legs], numbers)
 
 
 def _clearance_in_words(problem: Problem, plan: Plan) -> tuple[str, dict[str, Any]]:
@@ -172,7 +176,7 @@ def _around(shape: shapely.Geometry) -> list[float]:
     return [round(float(v), 1) for v in shapely.get_coordinates(shape.representative_point())[0]]
 
 
-def _courses_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]]) -> str:
+def _courses_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]], numbered: Sequence[int] = ()) -> str:
     """Say what binds each course; what binds any leg of it binds it."""
     if len(plan.legs) == 1 and not legs[0]["binds"]:
         return "Straight there: nothing is in the way and the heading can be sailed."
@@ -184,9 +188,10 @@ def _courses_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]]) 
         for bind in (b for k in course.numbers for b in legs[k]["binds"]):
             bound[f"close-hauled on {tack} tack" if bind["by"] == "no_go" else _bind_in_words(bind)] = None
         for text in bound:
-            numbers.setdefault(text, []).append(i)
-    sentences = [f"{_named('Course', which)} {text}." for text, which in numbers.items()]
-    if len(merged) < len(plan.legs):
+            numbers.setdefault(text, []).extend(sorted({numbered[k] for k in course.numbers}) if numbered else [i])
+    word = "Leg" if numbered else "Course"
+    sentences = [f"{_named(word, which)} {text}." for text, which in numbers.items()]
+    if len(merged) < len(plan.legs) and not numbered:
         sentences.insert(
             0,
             f"{counted(len(plan.legs), 'leg')} make {counted(len(merged), 'course')}: within a course "
@@ -195,7 +200,7 @@ def _courses_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]]) 
     zones = [bind for bound in legs for bind in bound["binds"] if bind["by"] == "no_go"]
     if zones:
         sentences.append(_zone_in_words(problem, zones))
-    sentences += turns_in_words(problem, plan)
+    sentences += turns_in_words(problem, plan, numbered)
     if not sentences:
         return "No leg is bound by anything but its corners."
     shown = sentences if len(sentences) <= 12 else [*sentences[:11], f"And {len(sentences) - 11} more such bounds."]
@@ -235,15 +240,18 @@ def turns(problem: Problem, plan: Plan) -> list[dict[str, Any]]:
     return out
 
 
-def turns_in_words(problem: Problem, plan: Plan) -> list[str]:
+def turns_in_words(problem: Problem, plan: Plan, numbered: Sequence[int] = ()) -> list[str]:
     """Return sentences on the tacks and gybes, and why one is sailed in place of the other."""
     every = turns(problem, plan)
     course_of = {k + 1: i for i, course in enumerate(courses(plan.legs), start=1) for k in course.numbers}
+    word = "leg" if numbered else "course"
+    if numbered:
+        course_of = dict(enumerate(numbered, start=1))
     out = []
     for name in ("tack", "gybe"):
         plain = [t["leg"] for t in every if t["manoeuvre"] == name and not t["instead_of"]]
         if plain:
-            out.append(f"A {name} leads into {_named('course', sorted({course_of[k] for k in plain}))}.")
+            out.append(f"A {name} leads into {_named(word, sorted({course_of[k] for k in plain}))}.")
         round_ = sorted({k for t in every if t["manoeuvre"] == name and t["instead_of"] for k in t["legs"]})
         if round_:
             other = "tack" if name == "gybe" else "gybe"
@@ -255,7 +263,7 @@ def turns_in_words(problem: Problem, plan: Plan) -> list[str]:
             )
             out.append(
                 f"It {name}s round instead of {_ING[other]}, by way of "
-                f"{_named('course', sorted({course_of[k] for k in round_}))}: {why}."
+                f"{_named(word, sorted({course_of[k] for k in round_}))}: {why}."
             )
     return out
 

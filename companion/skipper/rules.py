@@ -84,7 +84,7 @@ class Skipper:
                 starboard_lee_mps=persisted.lee_mps[0],
                 port_lee_mps=persisted.lee_mps[1],
             ),
-            plans=Planning(latency=persisted.latency),
+            plans=Planning(latency=persisted.latency, made=max((0, *(route.plan_id for route in persisted.lists)))),
             soundings=Soundings(shoals=persisted.shoals),
             afloat=Afloat.of(persisted.afloat),
         )

@@ -68,7 +68,7 @@ def happenings(
 ) -> Iterable[Happening]:
     """Yield what happened in a step; ``phase`` is the one before it.
 
-    ``why`` are the reasons of plans by request, ``nearest`` what each is nearest to, as ``nearest_of`` names it.
+    ``why`` are the reasons of plans by number, ``nearest`` what each is nearest to, as ``nearest_of`` names it.
     """
     snapshot = step.snapshot
     for event in snapshot.events:
@@ -85,7 +85,8 @@ def happenings(
             yield Happening(kind="mode", title=f"mode {after}", text=f"before it {before}")
     for outcome in snapshot.outcomes:
         if isinstance(outcome, PlanOutcome):
-            yield _plan(outcome, why.get(outcome.request_id, ""), nearest.get(outcome.request_id, ""))
+            made = step.state.plans.made
+            yield _plan(outcome, made, why.get(made, ""), nearest.get(made, ""))
         elif isinstance(outcome, UploadOutcome):
             is_ok = outcome.result is UploadResult.OK
             yield Happening(
@@ -144,7 +145,7 @@ def nearest_of(problem: Problem, plan: Plan) -> str:
     return min(found, default=(0.0, ""))[1]
 
 
-def _plan(outcome: PlanOutcome, why: str, nearest: str) -> Happening:
+def _plan(outcome: PlanOutcome, number: int, why: str, nearest: str) -> Happening:
     plan: Plan | None = outcome.plan
     if plan is None or not plan.has_path:
         title = "no plan" if plan is None else f"no plan: {plan.status.value}"
@@ -173,8 +174,5 @@ def _plan(outcome: PlanOutcome, why: str, nearest: str) -> Happening:
         # a mark is no obstacle: what is kept clear of it is less than the margin
         facts.append(("nearest, beyond what is kept clear", f"{min(clear):.1f} m{f', {nearest}' if nearest else ''}"))
     return Happening(
-        kind="plan",
-        title=f"plan {outcome.request_id}: {plan.status.value}",
-        text=why or outcome.text,
-        facts=tuple(facts),
+        kind="plan", title=f"plan {number}: {plan.status.value}", text=why or outcome.text, facts=tuple(facts)
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import replace
 
@@ -9,7 +10,7 @@ from companion.figures import figure_values as figures_now
 from companion.fold import Step
 from companion.geo.shift import Shift, carried
 from companion.messages import CompanionStatus
-from companion.planner import Leg
+from companion.planner import Leg, Plan
 from companion.planner.explain import bounds_in_words
 from companion.skipper import SkipperConfig, Voyage
 from companion.skipper.step import Announce, PlanOutcome, RequestPlan
@@ -20,6 +21,7 @@ from companion.view import parts, values
 from companion.view.area import area_of
 from companion.view.events import Event, happenings, nearest_of
 from companion.view.parts import (
+    SAME_M,
     Chosen,
     laylines_of,
     no_go_of,
@@ -111,15 +113,21 @@ class ViewFold:
                 self._said[action.code] = action.text
         for outcome in step.snapshot.outcomes:
             asked = self._asked.get(outcome.request_id) if isinstance(outcome, PlanOutcome) else None
-            if isinstance(outcome, PlanOutcome) and asked is not None and outcome.plan is not None:
+            plan = outcome.plan if isinstance(outcome, PlanOutcome) else None
+            if asked is not None and plan is not None and plan.has_path:
                 t_s, request = asked
-                why = bounds_in_words(request.problem, outcome.plan) if outcome.plan.has_path else outcome.plan.reason
-                self._plans[outcome.request_id] = Chosen(
-                    t_s=t_s, reason=request.reason.value, plan=outcome.plan, why=why
+                made = step.state.plans.made
+                numbers = _leg_numbers(step, plan)
+                self._plans[made] = Chosen(
+                    t_s=t_s,
+                    reason=request.reason.value,
+                    plan=plan,
+                    why=bounds_in_words(request.problem, plan, numbers),
+                    is_numbered=bool(numbers),
                 )
                 self._plans = dict(list(self._plans.items())[-PLANS_KEPT:])
                 self._whys = {number: chosen.why for number, chosen in self._plans.items()}
-                self._nearest = {outcome.request_id: nearest_of(request.problem, outcome.plan)}
+                self._nearest = {made: nearest_of(request.problem, plan)}
         here, t_s = step.snapshot.position_en_m, step.snapshot.t_s
         if here is not None and (not self._track or t_s - self._track[-1][0] >= TRACK_STEP_S):
             self._track.append((t_s, place(here), self._tack(step)))
@@ -177,6 +185,21 @@ class ViewFold:
             shown=parts.shown(figures_now(step, "page")),
             health=parts.health_of(step, status),
         )
+
+
+def _leg_numbers(step: Step, plan: Plan) -> tuple[int, ...]:
+    """Return the numbers of a new plan's legs in the mission that it was spliced into; empty: it is in none."""
+    state = step.state
+    routes = (None if state.pending.upload is None else state.pending.upload.route, state.plans.ready_route)
+    route = next((r for r in (*routes, state.mission.route) if r is not None and r.plan_id == state.plans.made), None)
+    if route is None:
+        return ()
+    ends = route.points_en_m[:-1]  # behind them is the loiter
+    at, numbers = max(0, len(ends) - len(plan.legs)), []
+    for leg in plan.legs:  # one of no length has no item: it is the next one's
+        at = next((n for n in range(at, len(ends)) if math.dist(ends[n], leg.to_en) < SAME_M), at)
+        numbers.append(at + 1)
+    return tuple(numbers)
 
 
 def aged(view: values.View, passed_s: float) -> values.View:

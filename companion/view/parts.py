@@ -299,7 +299,7 @@ def figures_of(step: Step, figures: VoyageFigures, voyage: Voyage) -> values.Fig
         distance_m=rounded(figures.distance_m, 1),
         tacks=figures.tacks,
         gybes=figures.gybes,
-        plans=figures.plans,
+        plans=step.state.plans.made,
         replans=figures.replans,
         contacts=figures.contacts,
         no_go_entries=figures.no_go_entries,
@@ -647,6 +647,7 @@ class Chosen:
     reason: str
     plan: Plan
     why: str = ""
+    is_numbered: bool = False  # its legs are named as the mission on board numbers them
 
 
 def plan_of(
@@ -667,7 +668,7 @@ def plan_of(
         age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),
         reason="" if chosen is None else chosen.reason,
         why=(
-            f"As it was made, courses counted from its start: {chosen.why}"
+            f"As it was made{'' if chosen.is_numbered else ', courses counted from its start'}: {chosen.why}"
             if chosen is not None and chosen.why
             else route.why
         ),

@@ -46,7 +46,7 @@ def area_of_chart(record: VoyageRecord) -> AreaView:
 def views_of_rows(record: VoyageRecord, area: AreaView) -> Iterator[values.View]:
     """Yield a view for each row of the track."""
     chart, columns = record.chart, record.columns
-    plans = [p for p in record.plans if p.plan is not None and p.plan.waypoints]
+    plans = [p for p in record.plans if p.is_made]
     goals = tuple(
         values.GoalView(
             name=g.name or f"goal {n}",
@@ -75,14 +75,14 @@ def views_of_rows(record: VoyageRecord, area: AreaView) -> Iterator[values.View]
             state=values.StateView(phase=record.texts["phase"][row], mode=record.texts["mode"][row] or None),
             boat=_boat(cell, here),
             wind=_wind(cell),
-            plan=None if number < 0 else _plan(plans[number], t_s),
+            plan=None if number < 0 else _plan(plans[number], number + 1, t_s),
             goals=goals,
         )
 
 
 def events_of_record(record: VoyageRecord) -> Iterator[tuple[Event, ...]]:
     """Yield, for each row of the track, what has happened since the one before: phases and plans."""
-    phase, number, waiting = "", 0, list(record.plans)
+    phase, number, made, waiting = "", 0, 0, list(record.plans)
     for row, t_s in enumerate(float(t) for t in record.columns["t_s"]):
         found: list[tuple[str, str, str]] = []
         if record.texts["phase"][row] != phase:
@@ -90,7 +90,8 @@ def events_of_record(record: VoyageRecord) -> Iterator[tuple[Event, ...]]:
             found.append(("phase", phase, ""))
         while waiting and waiting[0].t_s <= t_s:
             plan = waiting.pop(0)
-            found.append(("plan", f"plan {plan.request_id}", plan.reason or ""))
+            made += plan.is_made
+            found.append(("plan", f"plan {made}" if plan.is_made else "no plan", plan.reason or ""))
         events = []
         for kind, title, text in found:
             number += 1
@@ -139,12 +140,12 @@ def _wind(cell: dict[str, float | None]) -> values.WindView | None:
     )
 
 
-def _plan(recorded: RecordedPlan, t_s: float) -> values.PlanView:
+def _plan(recorded: RecordedPlan, number: int, t_s: float) -> values.PlanView:
     assert recorded.plan is not None
     way = recorded.plan.waypoints
     legs = tuple(values.LegView(from_en_m=place(a), to_en_m=place(b)) for a, b in pairwise(way))
     return values.PlanView(
-        number=recorded.request_id,
+        number=number,
         age_s=round(t_s - recorded.t_s, 1),
         reason=recorded.reason or "",
         twd_from_deg=rounded(recorded.twd_deg, 1),

@@ -3,7 +3,9 @@
 import datetime as dt
 import json
 import math
+import re
 from dataclasses import replace
+from itertools import islice
 
 import jsonschema
 import msgspec
@@ -75,17 +77,33 @@ def test_the_bound_of_a_plan_is_not_told_of_what_is_left_of_it(beat):
         if view.plan is not None and view.plan.bound_s
     )
     route = step.state.mission.route
-    plan = next(
-        o.plan
-        for s in beat.steps
-        for o in s.snapshot.outcomes
-        if isinstance(o, PlanOutcome) and o.request_id == route.plan_id and o.plan is not None
-    )
+    made = (o.plan for s in beat.steps for o in s.snapshot.outcomes if isinstance(o, PlanOutcome) and o.plan.has_path)
+    plan = next(islice(made, route.plan_id - 1, None))
     chosen = Chosen(t_s=0.0, reason="start", plan=plan)
     assert _bound_s(replace(route, cost_s=plan.cost_s), chosen) == pytest.approx(plan.lower_bound_s, abs=0.06)
     assert _bound_s(replace(route, cost_s=plan.cost_s - 20.0), chosen) is None
     for view in beat.under_way:
         assert view.plan.bound_s is None or view.plan.cost_s >= view.plan.bound_s - 0.1
+
+
+def test_plans_are_numbered_as_they_are_made_and_their_legs_as_the_mission_on_board_has_them(beat):
+    """The first of a voyage was "plan 2", then came 6 and 7, of 3 plans; and "course 1" was leg 4 of the table."""
+    titles = [
+        e.title for _, events in beat.moments for e in events if e.kind == "plan" and not e.title.startswith("no")
+    ]
+    assert [int(re.match(r"plan (\d+): ", title)[1]) for title in titles] == list(range(1, len(titles) + 1))
+    last = beat.under_way[-1]
+    assert last.figures.plans == len(titles) >= 2
+    assert {v.plan.number for v in beat.under_way} <= set(range(1, len(titles) + 1))
+    told = 0
+    for view in beat.under_way:
+        hauled = re.match(r"As it was made: Legs? ([^.]*) close-hauled on (port|starboard)", view.plan.why)
+        for number in [] if hauled is None else re.findall(r"\d+", hauled[1]):
+            place = int(number) - 1 - (view.plan.count - len(view.plan.legs))
+            if place >= 0:
+                told += 1
+                assert (view.plan.legs[place].twa_deg > 0.0) == (hauled[2] == "starboard")
+    assert told
 
 
 def test_what_the_boat_makes_of_her_polar_is_of_the_water(beat):
@@ -454,7 +472,7 @@ def test_what_a_plan_is_nearest_to_is_named(obstacle_m, name):
     answer = plan(problem, expansions=200)
     assert nearest_of(problem, answer) == name
     outcome = PlanOutcome(request_id=1, plan=with_clearance(problem, answer), text="")
-    assert f", {name}" in dict(_plan(outcome, "", name).facts)["nearest, beyond what is kept clear"]
+    assert f", {name}" in dict(_plan(outcome, 1, "", name).facts)["nearest, beyond what is kept clear"]
 
 
 def test_metres_are_rounded_once_where_they_are_shown(beat):

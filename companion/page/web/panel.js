@@ -62,7 +62,6 @@ const THERE = "The time until the next goal is reached, at the pace that the boa
 const NOT_THERE = "No time is told while the way on board is not being sailed, or where it does not lead to the next goal; the plan's own times are of when it was judged.";
 const TACK = "At the end of the leg that is sailed; 'about' is the autopilot's own, on a leg that it beats, which goes with the wind, or one behind a waypoint, where a new plan may change it.";
 const JUDGED = "When the plan was made, or last held against a new one and kept: wind and times beside it are of then.";
-const NUMBERED = "One count numbers all that is asked for: plans, uploads and looks at what is on board. What is left out between two plans was no plan.";
 const BEAT = "A beat: the autopilot tacks by itself along this line, so the line may lie in the no-go zone.";
 const OFF_PLAN = "The chance that the boat is forced off the plan before the next goal: that the wind makes it tack or bear away unplanned, or that a vessel comes too near.";
 
@@ -103,7 +102,7 @@ function plan(view) {
   const p = view?.plan;
   say("planwhy", p ? p.why || "The plan in force gives no reason." : view ? "There is no plan." : "");
   const facts = !p ? [] : [
-    ["plan", `${p.number ?? NONE}${p.reason ? `, for ${p.reason.replaceAll("_", " ")}` : ""}`, NUMBERED], ["judged", p.age_s === null ? NONE : `${duration(p.age_s)} ago`, JUDGED],
+    ["plan", `${p.number ?? NONE}${p.reason ? `, for ${p.reason.replaceAll("_", " ")}` : ""}`], ["judged", p.age_s === null ? NONE : `${duration(p.age_s)} ago`, JUDGED],
     ["in a wind of", p.twd_from_deg === null ? NONE : `${bearing(p.twd_from_deg)} ${speed(p.tws_mps)} ${speedUnit()}`],
     ["time from then", p.cost_s === null ? NONE : `${duration(p.cost_s)}${p.bound_s ? `, no less than ${duration(p.bound_s)}` : ""}`],
     ["as wind and boat may be", p.median_s === null ? NONE : `${duration(p.median_s)}, nine of ten ${p.late_s === null ? "not in any time" : duration(p.late_s)}`],
@@ -150,7 +149,7 @@ function tables(view, beside, area) {
   /** @type {[string | HTMLElement, (f: import("../../view/view").Figures) => string][]} */
   const rows = [
     ["time under way", (f) => duration(f.time_s)], ["distance", (f) => distance(f.distance_m)], ["tacks, gybes", (f) => `${f.tacks ?? NONE}, ${f.gybes ?? NONE}`],
-    ["plans, replans", (f) => `${f.plans ?? NONE}, ${f.replans ?? NONE}`], ["least clearance, expected", (f) => `${clearance(f.min_clearance_m)}, ${clearance(f.promised_clearance_m)}`], ["contacts", (f) => figure(f.contacts)],
+    ["plans made, asked for anew", (f) => `${f.plans ?? NONE}, ${f.replans ?? NONE}`], ["least clearance, expected", (f) => `${clearance(f.min_clearance_m)}, ${clearance(f.promised_clearance_m)}`], ["contacts", (f) => figure(f.contacts)],
     [entries, (f) => figure(f.no_go_entries)], ["goals reached", (f) => `${f.goals_reached ?? NONE} of ${f.goals ?? NONE}`]];
   keep("voyagetable", table("The voyage so far", ["figure", "value", ...(beside ? [`beside: ${beside.name}, at its end`] : [])],
     view ? rows.map(([name, show]) => [name, ...all.map((f) => f === null ? NONE : show(f))]) : []));

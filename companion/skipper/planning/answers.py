@@ -47,6 +47,8 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
         return
     ctx.set(pending=changed(ctx.state.pending, plan=None))
     _note_latency(ctx, pending, outcome)
+    if outcome.plan is not None and outcome.plan.has_path:
+        ctx.set(plans=changed(ctx.state.plans, made=ctx.state.plans.made + 1))
     if ctx.state.phase is Phase.OPERATOR or ctx.is_taken:
         return  # the operator may have taken the boat in this very step
     if ctx.state.voyage.sailing and not ctx.state.mission.checked:

@@ -110,7 +110,7 @@ def request(
         known_en=_known(ctx, from_index, start, aim),
     )
     facts = replace(
-        ctx.blank_facts(number, step.margin_m, shared.delta_s, name),
+        ctx.blank_facts(ctx.state.plans.made + 1, step.margin_m, shared.delta_s, name),
         plan_twd_from_rad=over_ground(problem.wind.twd_from_rad, problem.wind.tws_mps or 0.0, current.planned_en_mps)[
             0
         ],

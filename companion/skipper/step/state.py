@@ -356,7 +356,8 @@ class Planning:
     unanswered: int = 0  # requests in a row that the planner did not answer
     latency: PlannerLatency = NO_ANSWERS  # how long the planner takes on this computer
     effort: float = 1.0  # share of the planning budget that is asked for: less on a slow processor
-    replans: int = 0
+    made: int = 0  # plans that were answered with a way: the number of the last one
+    replans: int = 0  # asked for under way
     replanned_index: int = -1  # the target for which Wolsieffer's replan was asked
     no_go_since_s: float | None = None
 

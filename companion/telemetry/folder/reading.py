@@ -109,6 +109,11 @@ class RecordedPlan(Struct, frozen=True, kw_only=True):
     twd_deg: float | None = None
     widening: tuple[tuple[float, float], ...] | None = None
 
+    @property
+    def is_made(self) -> bool:
+        """Whether it has a way."""
+        return self.plan is not None and bool(self.plan.waypoints)
+
 
 class ServoFigures(Struct, frozen=True, kw_only=True):
     """What one servo output did."""

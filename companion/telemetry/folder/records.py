@@ -360,7 +360,6 @@ class VoyageFigures:
             self._anchor = step.shift.point(self._anchor)
         for action in step.actions:
             if isinstance(action, RequestPlan):
-                self.plans += 1
                 self.replans += self.first_s is not None
             elif isinstance(action, UploadMission):
                 self.uploads += 1
@@ -369,6 +368,8 @@ class VoyageFigures:
         self.current = snapshot.current
         if snapshot.traffic is not None:
             self.traffic = snapshot.traffic.counts
+        plans = (outcome.plan for outcome in snapshot.outcomes if isinstance(outcome, PlanOutcome))
+        self.plans += sum(plan is not None and plan.has_path for plan in plans)
         route = step.sailed
         if route is not None:
             self.promised_risk = max(self.promised_risk or 0.0, 1.0 - route.delta_s)
