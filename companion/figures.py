@@ -15,6 +15,7 @@ from typing import Literal
 
 from companion.boat import factor
 from companion.current import over_water
+from companion.eta import FASTEST, SLOWEST
 from companion.fold import Step
 from companion.geo.angles import heading_of, wrap_pi
 
@@ -31,6 +32,8 @@ class Figure:
     kind: Kind
     of: Callable[[Step], float | None]  # None: it cannot be told now
     hint: str = ""  # what it means, where there is room
+    told: str = ""  # the subject of a report's sentence, empty: the label
+    within: tuple[float, float] = (-math.inf, math.inf)  # what it is kept within: an end of it may be more, or less
     shown: frozenset[str] = EVERYWHERE
 
 
@@ -81,16 +84,20 @@ def learned_share(step: Step) -> float | None:
 
 # fmt: off
 FIGURES: tuple[Figure, ...] = (
-    Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page", "report"})),
+    Figure(name="co_vmg", label="VMG", kind="speed", of=vmg_mps, shown=frozenset({"page", "report"}),
+           told="Speed made good to windward"),
     Figure(name="co_pace", label="pace, of the plan's", kind="share", of=pace_share,
            shown=frozenset({"page", "report"}),
-           hint="how fast she got along her way in the last minutes, turns and all, of what plans expect"),
+           hint="how fast she got along her way in the last minutes, turns and all, of what plans expect",
+           told="Pace, turns and all, of what plans expected", within=(SLOWEST, FASTEST)),
     Figure(name="co_sailed", label="sailed", kind="speed", of=sailed_mps, shown=frozenset({"page", "radio", "report"}),
-           hint="through the water"),
+           hint="through the water", told="Speed sailed, through the water"),
     Figure(name="co_predict", label="predicted", kind="speed", of=predicted_mps,
-           shown=frozenset({"page", "radio", "report"}), hint="by the boat that plans are of, in this wind"),
+           shown=frozenset({"page", "radio", "report"}), hint="by the boat that plans are of, in this wind",
+           told="Speed predicted for it, by the boat that plans are of in the wind there was"),
     Figure(name="co_learned", label="learned, of her file", kind="share", of=learned_share,
-           shown=frozenset({"page", "radio", "report"}), hint="what of her file's speed here plans are told"),
+           shown=frozenset({"page", "radio", "report"}), hint="what of her file's speed here plans are told",
+           told="Learned on the way, and told to plans, of her file's speed"),
 )
 # fmt: on
 BY_NAME = {figure.name: figure for figure in FIGURES}
@@ -128,6 +135,12 @@ def in_words(values: Mapping[str, float]) -> list[str]:
 
 
 def _shown(figure: Figure, value: float) -> str:
+    least, most = figure.within
+    beyond = " or less" if value <= least else " or more" if value >= most else ""
+    return _measured(figure, value) + beyond
+
+
+def _measured(figure: Figure, value: float) -> str:
     if figure.kind == "angle":
         return f"{abs(value):g}° {'P' if value < 0.0 else 'S'}"
     scaled = 100.0 * value if figure.kind == "share" else value
@@ -162,7 +175,7 @@ class Ranges:
 def ranges_in_words(ranges: Mapping[str, Mapping[str, float]]) -> list[str]:
     """Return what ``Ranges.to_dict`` has recorded, a sentence each; a figure of another release is left out."""
     return [
-        f"{figure.label}: {_shown(figure, of['least'])} to {_shown(figure, of['most'])}, "
+        f"{figure.told or figure.label}: {_shown(figure, of['least'])} to {_shown(figure, of['most'])}, "
         f"{_shown(figure, of['mean'])} in the mean."
         for name, of in ranges.items()
         if (figure := BY_NAME.get(name)) is not None

@@ -20,6 +20,7 @@ TRACKS = (".gpx", ".kml", ".kmz", ".geojson")  # the formats that hold a track
 if TYPE_CHECKING:
     from companion.geofence import Document
     from companion.telemetry.folder import VoyageRecord
+    from companion.telemetry.folder.reading import Summary
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -123,6 +124,8 @@ def track_of(record: VoyageRecord) -> Document:
 
 
 PAST = "past its edge"
+FILE_OFF = 0.15  # speeds that are off by so much of the file's are the file's fault, not a day's ...
+FILE_TOLD_S = 600.0  # ... over so long
 
 
 def clearance_line(least_m: float, expected_m: float | None, contacts: int) -> str:
@@ -164,6 +167,7 @@ def in_words(record: VoyageRecord) -> list[str]:
             f"(SAIL_NO_GO_ANGLE), for 5 s on end: {times}."
         )
     lines += ranges_in_words(s.figures)
+    lines += boat_file_lines(s)
     if s.servos:
         moved = "; ".join(
             f"output {number}, {_times(servo.movements)} by {servo.travel_us} us in all"
@@ -176,6 +180,31 @@ def in_words(record: VoyageRecord) -> list[str]:
     if s.records_dropped:
         lines.append(f"{counted(s.records_dropped, 'record')} missing: {s.disk_trouble or 'the disk took no more'}.")
     return lines
+
+
+def boat_file_lines(s: Summary) -> list[str]:
+    """Return that her boat file is not the boat that sailed, and what makes it so; empty: nothing tells it."""
+    share = speed_share(s)
+    if share is None or abs(share - 1.0) < FILE_OFF:
+        return []
+    found = f"She sailed at about {100.0 * share:.0f} % of her boat file's speeds: after some hours under sail"
+    return [f"{found} `companion boat learn VOYAGE_DIR ...` makes a file of the boat that she is."]
+
+
+def speed_share(s: Summary) -> float | None:
+    """Return what she made of her boat file's speeds over a voyage, 1: all of it; None: too little tells it.
+
+    What was learned under way tells it; else what was sailed against what was predicted, where the pace agrees.
+    """
+    sailed, predicted, pace, learned = (
+        s.figures.get(name, {}).get("mean") for name in ("co_sailed", "co_predict", "co_pace", "co_learned")
+    )
+    if learned is not None or (s.time_s or 0.0) < FILE_TOLD_S:
+        return learned
+    if sailed is None or pace is None or not predicted:
+        return None
+    share = sailed / predicted
+    return share if min(abs(share - 1.0), abs(pace - 1.0)) >= FILE_OFF and (share < 1.0) == (pace < 1.0) else None
 
 
 def _starts(record: VoyageRecord) -> list[str]:
@@ -200,15 +229,18 @@ def _end(record: VoyageRecord) -> str:
 
 def _plans(record: VoyageRecord) -> list[str]:
     reasons: dict[str, int] = {}
-    plans = [plan for plan in record.plans if plan.t_s >= max(record.starts_s, default=-math.inf)]
+    since_s = max(record.starts_s, default=-math.inf)
+    plans = [plan for plan in record.plans if plan.is_made and plan.t_s >= since_s]
     for plan in plans:
         reasons[plan.reason or "unknown"] = reasons.get(plan.reason or "unknown", 0) + 1
+    made = max(record.summary.plans, len(plans)) if record.summary.records_dropped else len(plans)
     if not reasons:
-        return ["No plan was made."]
+        return ["No plan was made." if not made else f"{counted(made, 'plan')} made, none of them recorded."]
     why = ", ".join(
         f"{reason.replace('_', ' ')} {number}" for reason, number in sorted(reasons.items(), key=lambda r: -r[1])
     )
-    return [f"{counted(len(plans), 'plan')} made, by reason: {why}."]
+    known = "" if made == len(plans) else f", {len(plans)} of them recorded"
+    return [f"{counted(made, 'plan')} made{known}, by reason: {why}."]
 
 
 def _times(number: int) -> str:

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion import figures
 from companion.boat import Afloat, LearnedAfloat, mark_of
 from companion.boat.afloat import Told
+from companion.commands.report import boat_file_lines
 from companion.current import WaterCurrent
 from companion.eta import Pace
 from companion.figures import BY_NAME, FIGURES, Figure, figure_values, in_words, ranges_in_words
@@ -20,6 +21,7 @@ from companion.skipper import Skipper
 from companion.skipper.step.config import SkipperConfig
 from companion.telemetry.console import progress_text
 from companion.telemetry.folder import VoyageFigures
+from companion.telemetry.folder.reading import Summary
 from companion.terminal.dashboard import body_of
 from companion.view import HeardFold
 from tests.skipper.world import FRAME, World, voyage, with_parts
@@ -144,6 +146,30 @@ def test_a_row_is_in_the_report_from_its_least_to_its_most(step, monkeypatch):
     assert recorded.to_dict()["figures"] == {"co_test": {"least": -1.0, "most": 4.0, "mean": 2.0}}
     assert ranges_in_words(recorded.to_dict()["figures"]) == ["way: -1 m to 4 m, 2 m in the mean."]
     assert ranges_in_words({"co_new": {"least": 1.0, "most": 1.0, "mean": 1.0}}) == []
+
+
+@pytest.mark.parametrize(("made_s", "told"), [(70.0, "70 %"), (900.0, "160 % or more"), (1.0, "25 % or less")])
+def test_a_pace_that_is_kept_within_bounds_is_told_as_no_figure(step, made_s, told):
+    """ "pace, of the plan's 160 %" stood there as if it had been measured."""
+    seen = dataclasses.replace(step, pace=Pace(tries=5.0, prior=0.0, took_s=100.0, made_s=made_s))
+    assert in_words({"co_pace": figure_values(seen, "page")["co_pace"]}) == [f"pace, of the plan's {told}"]
+
+
+@pytest.mark.parametrize(
+    ("sailed", "pace", "time_s", "said"),
+    [
+        (1.2, 0.65, 900.0, "60 %"),
+        (2.6, 1.4, 900.0, "130 %"),
+        (1.9, 0.7, 900.0, ""),
+        (1.2, 1.1, 900.0, ""),
+        (1.2, 0.6, 99.0, ""),
+    ],
+)
+def test_a_boat_file_that_is_another_boats_is_told_at_the_end(sailed, pace, time_s, said):
+    means = {"co_sailed": sailed, "co_predict": 2.0, "co_pace": pace}
+    lines = boat_file_lines(Summary(time_s=time_s, figures={name: {"mean": mean} for name, mean in means.items()}))
+    assert bool(lines) == bool(said)
+    assert all(f"about {said} of her boat file's speeds" in line and "`companion boat learn" in line for line in lines)
 
 
 def test_what_another_release_sends_is_not_shown():

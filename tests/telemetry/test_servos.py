@@ -44,7 +44,7 @@ def test_a_voyage_tells_rudder_and_sheet_in_its_summary_and_in_words(tmp_path, c
     assert cli.main(["report", str(tmp_path)]) == 0
     told = capsys.readouterr().out
     assert "Servos moved: output 1, " in told
-    assert "\nVMG: " in told
+    assert "\nSpeed made good to windward: " in told
     assert "started" not in told
     decisions = tmp_path / "decisions.jsonl"
     records = [json.loads(line) for line in decisions.read_text().splitlines()]
@@ -56,4 +56,8 @@ def test_a_voyage_tells_rudder_and_sheet_in_its_summary_and_in_words(tmp_path, c
     after_s = plans[-1]["t_s"] - start["t_s"]
     assert "started twice: picture and track are of all of it" in told
     assert f"of the last start, {after_s:.0f} s after the first" in told
-    assert "\n1 plan made" in told
+    assert "\n1 plan made, by" in told
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    (tmp_path / "summary.json").write_text(json.dumps({**summary, "plans": 3, "records_dropped": 40}))
+    assert cli.main(["report", str(tmp_path)]) == 0
+    assert "\n3 plans made, 1 of them recorded, by reason: " in capsys.readouterr().out  # the disk was full
