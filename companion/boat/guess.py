@@ -59,8 +59,9 @@ class Sizes:
             (self.sail_area_m2, SAIL * self.length_m**2, "a sail area", "m2"),
         ):
             if not middle / 6.0 <= value <= 6.0 * middle:
+                about = float(f"{middle:.2g}")
                 raise ValueError(
-                    f"{what} of {value:g} {unit}; of a boat of {self.length_m:g} m it is about {middle:.2g} {unit}"
+                    f"{what} of {value:g} {unit}; of a boat of {self.length_m:g} m it is about {about:g} {unit}"
                 )
 
 

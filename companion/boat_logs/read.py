@@ -63,7 +63,7 @@ def logs_under(names: list[Path]) -> list[Path]:
     for name in names:
         if not name.exists():
             raise InputError(str(name), "", "no such file or folder", "give voyage folders, .tlog, .BIN, CSV or NMEA")
-        found += [name] if name.is_file() else _in_folder(name)
+        found += _in_folder(name) if name.is_dir() else [name]
     return found
 
 

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
@@ -149,17 +150,14 @@ def area_of(
         union = shapely.intersection(containing(shapely.union_all([s for s, _ in found]), tolerance_m), disc)
         if apart is None:
             whole[doubt_m].append(union)
-        depths = [d for _, d in found if d is not None]
-        solids += [
-            Solid(
-                shape=_lonlat(p, frame),
-                reason=reason,
-                source=source,
-                depth_m=min(depths) if depths else None,
-                doubt_m=doubt_m,
+        known = [(s, d) for s, d in found if d is not None]
+        tree, depths = shapely.STRtree([s for s, _ in known]), np.array([d for _, d in known])
+        for piece in parts(union):
+            own = depths[tree.query(piece, predicate="intersects")]
+            depth_m = float(own.min()) if own.size else None
+            solids.append(
+                Solid(shape=_lonlat(piece, frame), reason=reason, source=source, depth_m=depth_m, doubt_m=doubt_m)
             )
-            for p in parts(union)
-        ]
     solids += _marks(marks, whole, frame, disc)
     blank = shapely.difference(disc, _closed(shapely.union_all(covered)))
     blank = shapely.intersection(containing(blank, tolerance_m), disc)

@@ -115,24 +115,34 @@ def chart_of(
     """
     grid = grid.northwards()
     solid = ~(grid.heights_m <= -wanted.safety_depth_m)
-    shapes = [_shape(grid, solid), _shape(grid, np.ones_like(solid))]
+    pieces = [piece for piece in shapely.get_parts(_shape(grid, solid)) if not piece.is_empty]
+    shapes = [*pieces, _shape(grid, np.ones_like(solid))]
     if to_lonlat is not None:
         shapes = [shapely.transform(shape, to_lonlat) for shape in shapes]
-    heights = grid.heights_m[solid]
-    shoalest = float(np.nanmax(heights)) if np.isfinite(heights).any() else None
-    dangers = (
-        ()
-        if shapes[0].is_empty
-        else (Danger(reason="shallow or land", geometry=shapes[0], depth_m=None if shoalest is None else -shoalest),)
+    dangers = tuple(
+        Danger(reason="shallow or land", geometry=shape, depth_m=_least_m(grid, solid, piece))
+        for shape, piece in zip(shapes[:-1], pieces, strict=True)
     )
     step = float(grid.y[1] - grid.y[0])
     return Chart(
         source=source,
         dangers=dangers,
-        coverage=shapes[1],
+        coverage=shapes[-1],
         resolution_m=cell_m if cell_m is not None else step * DEGREE_M,
         knows_depths=True,
     )
+
+
+def _least_m(grid: Grid, solid: NDArray[np.bool_], piece: BaseGeometry) -> float | None:
+    """Return the least depth of what is solid of a piece [m]; None: no height of it is known."""
+    west, south, east, north = shapely.bounds(piece)
+    columns = slice(*np.searchsorted(grid.x, (west, np.nextafter(east, np.inf))))
+    rows = slice(*np.searchsorted(grid.y, (south, np.nextafter(north, np.inf))))
+    heights = grid.heights_m[rows, columns]
+    row, column = np.nonzero(solid[rows, columns] & np.isfinite(heights))
+    shapely.prepare(piece)
+    own = shapely.intersects_xy(piece, grid.x[columns][column], grid.y[rows][row])
+    return -float(heights[row[own], column[own]].max()) if own.any() else None
 
 
 def _shape(grid: Grid, solid: NDArray[np.bool_]) -> BaseGeometry:

@@ -24,7 +24,7 @@ from companion.chart import grid as grids
 from companion.chart import s57, tags
 from companion.chart.features import Box, Chart, Danger, Row, Source, Wanted
 from companion.chart.picture import DRAWN, ChartPicture, Mark, marks_of_chart, marks_of_rows
-from companion.disk import read_regular
+from companion.disk import open_regular, read_regular
 from companion.errors import InputError, unreadable
 from companion.geofence import Circle, Code, Finding, FindingLevel, Zone, ZoneKind, read
 from companion.geofence.document import Mark as DrawnMark
@@ -46,8 +46,11 @@ POINT_M = 10.0
 def read_chart(path: Path, box: Box, wanted: Wanted, *, positive: str = "auto", without_depths: bool = False) -> Chart:
     """Return what of a file lies in the box. Raises InputError: one line with file, place and remedy."""
     ending = path.suffix.lower()
-    if not path.is_file():
-        raise unreadable(str(path), FileNotFoundError())
+    try:
+        with open_regular(path):
+            pass
+    except OSError as error:
+        raise unreadable(str(path), error) from None
     if re.fullmatch(r"\.\d{3}", ending):
         return _read_cell(path, box, wanted, without_depths=without_depths)
     if ending == ".asc":

@@ -130,7 +130,9 @@ def _guess(args: argparse.Namespace) -> int:
     try:
         sizes = Sizes(length_m=args.length, displacement_kg=args.displacement, sail_area_m2=args.sail_area)
     except ValueError as error:
-        raise InputError("companion boat guess", "", str(error), "give what a scale and a tape say") from None
+        raise InputError(
+            "--length, --displacement, --sail-area", "", str(error), "give what a scale and a tape say"
+        ) from None
     name = args.name or (args.out.stem if args.out is not None else "my boat")
     text = guessed_text(name, sizes, guessed(sizes), f"{datetime.now(UTC):%Y-%m-%d}", args.beam)
     if args.out is None:

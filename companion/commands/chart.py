@@ -187,7 +187,8 @@ def _import(args: argparse.Namespace) -> int:
         charts.append(chart)
         for finding in chart.findings:
             print(finding.line(name))
-        print(f"{name}: {chart.source}: {told_of(chart)}" + ("" if chart.knows_depths else "; it tells no depths"))
+        source = "" if str(chart.source) in {name, Path(name).name} else f"{chart.source}: "
+        print(f"{name}: {source}{told_of(chart)}" + ("" if chart.knows_depths else "; it tells no depths"))
     area = area_of(charts, center, reach_m, args.tolerance or TOLERANCE_M, floats_m)
     if area.is_too_much:
         raise JobError(
@@ -198,7 +199,7 @@ def _import(args: argparse.Namespace) -> int:
     write_files(files | ({str(drying): area.drying_json()} if args.drying else {}), force=args.force)
     print(
         f"{obstacles}: written: {counted(len(area.always), 'obstacle')} ({counted(area.positions(), 'position')}) "
-        f"within {reach_m:g} m of {center.lat_deg:.5f}, {center.lon_deg:.5f}; solid is what is less deep than "
+        f"within {reach_m:.0f} m of {center.lat_deg:.5f}, {center.lon_deg:.5f}; solid is what is less deep than "
         f"{depth_m:g} m" + (f" with {tide_m:g} m of tide" if table else "")
     )
     if args.drying:

@@ -186,9 +186,11 @@ def _only(document: Document, part: str) -> Document:
 def _convert(args: argparse.Namespace) -> int:
     from companion.commands.fence import grown_marks
     from companion.geofence import load_mission, read
-    from companion.geofence.formats import write
+    from companion.geofence.formats import format_of, write
     from companion.geofence.mission import goal_losses, mission_files
 
+    if Path(args.out).suffix.lower() != ".toml":
+        format_of(args.out, also=(".toml",))
     document = read_mission_file(args.file)
     print_findings(document.findings, args.file)
     if args.point_radius is not None:

@@ -58,7 +58,7 @@ def check_area(area: Area, conditions: AreaConditions) -> tuple[Finding, ...]:
     frame = LocalFrame(origin)
     local = area.about(frame, math.inf) if conditions.is_passage else area.local(frame)
     _inclusions(area, frame, findings)
-    _holes(area, findings)
+    _holes(area, conditions, frame, findings)
     _places(local, conditions, findings)
     _round_the_water(local, conditions, findings)
     _sticking_out(local, findings)
@@ -109,16 +109,20 @@ def _inclusions(area: Area, frame: LocalFrame, findings: Findings) -> None:
         )
 
 
-def _holes(area: Area, findings: Findings) -> None:
+def _holes(area: Area, conditions: AreaConditions, frame: LocalFrame, findings: Findings) -> None:
+    """Tell of zones with holes; not of an obstacle all round the boat, as what no chart covers is round an import."""
     for zone in (*area.fence.inclusions, *(o.zone() for o in area.solids)):
         if isinstance(zone.shape, Circle) or not zone.shape.interiors:
             continue
         count = len(zone.shape.interiors)
+        within = polygon_en(zone.shape, frame, cover=False).interiors
+        is_known = conditions.start is not None or bool(conditions.goals)  # the frame's origin: she starts, or is to go
+        given_up = sum(not (is_known and Polygon(ring).contains(shapely.Point(0.0, 0.0))) for ring in within)
         if zone.kind is ZoneKind.INCLUSION:
-            text = f"has {count} hole(s): fences of autopilots have none, so each becomes a keep-out zone"
+            text = f"has {counted(count, 'hole')}: fences of autopilots have none, so each becomes a keep-out zone"
             findings.add(FindingLevel.NOTE, Code.HOLE, zone.name or "keep-in zone", text)
-        else:
-            text = f"has {count} hole(s): water inside an obstacle is given up unless the boat starts in it"
+        elif given_up:
+            text = f"has {counted(given_up, 'hole')} that the boat does not start in: the water inside is given up"
             findings.add(FindingLevel.WARNING, Code.HOLE, zone.name or "keep-out zone", text)
 
 

@@ -6,6 +6,7 @@ import io
 import math
 import re
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -274,6 +275,8 @@ def test_who_lies_still_does_not_sail(tmp_path):
 def test_what_is_not_there_is_refused(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         logs_under([tmp_path / "nowhere"])
+    read, skipped = read_logs(logs_under([Path("/dev/null")]))  # which is no folder ("Not a directory")
+    assert (len(read), [left.why for left in skipped]) == (0, ["it is no file"])
 
 
 @pytest.mark.parametrize("ending", ["tlog", "tlog.gz", "BIN", "csv", "csv.gz", "nmea"])

@@ -101,6 +101,22 @@ def test_the_keel_of_the_mission_says_what_is_too_shallow(shell):
     )
 
 
+def test_an_island_and_a_bank_of_one_grid_have_a_depth_each(shell):
+    """The bank, 1 m deep, was 5 m above the datum, as the island is; and the two were "1 shallow or land"."""
+    heights = np.full((12, 24), -9.0)
+    heights[4:7, 3:6], heights[4:7, 16:19] = 5.0, -1.0
+    rows = "\n".join(" ".join(f"{h:g}" for h in row) for row in heights)
+    header = "ncols 24\nnrows 12\nxllcorner -1.325\nyllcorner 50.81\ncellsize 0.001\n"
+    (shell.folder / "g.asc").write_text(f"{header}{rows}\n")
+    (shell.folder / "m.toml").write_text(MISSION)
+    code, out, _ = shell("g.asc", "--mission", "m.toml", "--radius", "1500.4")
+    assert code in {0, 1}
+    assert out.startswith("g.asc: 2 shallow or land\n")
+    assert " within 1500 m of " in out
+    solid = json.loads((shell.folder / "m-chart.geojson").read_text())["features"]
+    assert sorted(f["properties"]["depth_m"] for f in solid if "depth_m" in f["properties"]) == [-5.0, 1.0]
+
+
 TIDE = "time, height_m\n2026-11-24T06:00Z, 1.0\n2026-11-24T12:00Z, 4.0\n2026-11-24T18:00Z, 0.4\n"
 
 
@@ -219,6 +235,8 @@ def test_what_cannot_be_believed_is_refused_in_one_line(shell, name, text, told)
 def test_what_is_missing_is_said(shell):
     (shell.folder / "a.geojson").write_text(collection())
     assert refusal(shell, "b.geojson", *AROUND, "--depth", "2") == "b.geojson: no such file; check the path"
+    assert "Is a directory" in refusal(shell, ".", *AROUND, "--depth", "2")
+    assert "it is a device and no regular file" in refusal(shell, "/dev/null", *AROUND, "--depth", "2")
     assert "--depth: is missing" in refusal(shell, "a.geojson", *AROUND)
     assert "--around: has no --radius" in refusal(shell, "a.geojson", *AROUND[:2])
 

@@ -96,3 +96,9 @@ def test_a_boat_file_that_is_not_there_is_said_with_what_writes_one(tmp_path):
     path = mission(tmp_path, 'file = "salt.toml"')
     with pytest.raises(InputError, match=r"\[boat\] file .*salt.toml.*companion boat guess"):
         load_mission(path)
+
+
+def test_a_polar_in_place_of_a_boat_file_is_named_as_what_it_is():
+    """ "is not TOML: Expected '=' after a key" was said of pepper.pol."""
+    with pytest.raises(InputError, match="is a polar and no boat file"):
+        parse_boat_file("TWA;4;6\n45;2;3\n", "pepper.pol")

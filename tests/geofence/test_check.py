@@ -86,6 +86,8 @@ def test_holes():
     area = Area(obstacles=(Obstacle(shape=ring, name="atoll"),))
     assert found(area)[Code.HOLE, FindingLevel.WARNING].place == "atoll"
     assert (Code.HOLE, FindingLevel.NOTE) in found(Area(fence=Fence((keep_in(ring),))))
+    # what no chart covers lies all round the water of an import, in which she starts
+    assert found(area, start=goal(0, 145), goals=(goal(5, 140),)).keys().isdisjoint({(Code.HOLE, FindingLevel.WARNING)})
 
 
 def test_places_in_the_wrong_place():

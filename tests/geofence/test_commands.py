@@ -287,3 +287,8 @@ def test_help_has_examples(capsys):
             main([command, "--help"])
         assert stop.value.code == 0
         assert "examples:" in capsys.readouterr().out
+
+
+def test_a_mission_is_among_what_a_mission_is_converted_to(tmp_path, capsys):
+    assert main(["mission", "convert", "missions/bay.toml", str(tmp_path / "bay.xyz")]) == 2
+    assert "use .toml, " in capsys.readouterr().err

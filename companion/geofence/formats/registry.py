@@ -255,8 +255,11 @@ def _any_of(rows: Sequence[Format]) -> str:
     return ", ".join(row.said for row in rows[:-1]) + " or " + rows[-1].said
 
 
-def format_of(path: str | Path, among: Sequence[str] = ()) -> str:
-    """Return the format that a file name asks for. Raises InputError for one not ``among`` those (none: any)."""
+def format_of(path: str | Path, among: Sequence[str] = (), *, also: Sequence[str] = ()) -> str:
+    """Return the format that a file name asks for. Raises InputError for one not ``among`` those (none: any).
+
+    ``also``: what else may be written there, by others.
+    """
     suffix = Path(path).suffix.lower()
     known = among or tuple(_BY_ENDING)
     if suffix not in known:
@@ -264,7 +267,7 @@ def format_of(path: str | Path, among: Sequence[str] = ()) -> str:
             str(path),
             "",
             f"{suffix or 'no extension'!r} is not a format that this can be written in",
-            "use " + ", ".join(known),
+            "use " + ", ".join((*also, *known)),
         )
     return _BY_ENDING[suffix].name
 

@@ -19,6 +19,7 @@ from companion.geofence.mission.options import BoatOptions
 from companion.words import expected
 
 MAX_BYTES = 1_000_000
+POLARS = frozenset({".pol", ".csv"})  # the endings of polars, which a boat file names
 OWN = ("file", "polar")  # keys of a mission's [boat] that are none of the boat's
 
 
@@ -145,4 +146,11 @@ def _raw(text: str, source: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        if Path(source).suffix.lower() in POLARS:
+            raise InputError(
+                source,
+                "",
+                "is a polar and no boat file",
+                "companion boat guess writes one; [boat] polar of it names a polar",
+            ) from None
         raise InputError(source, "", f"is not TOML: {str(error)[:80]}") from None
