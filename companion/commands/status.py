@@ -29,7 +29,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         help=summary,
         description="Show the companion's status from its MAVLink messages alone, on another link of the autopilot: "
         "the shore end of a telemetry radio. Speaks once when it starts, so that the autopilot routes to it, and "
-        "then only listens.",
+        "then only listens. Goes on until Ctrl-C; --once prints one status and ends.",
         epilog="Exit codes: 0 all is well, 3 no link or no companion heard, 4 what was heard is old, 5 the companion "
         "raises an alarm. Example: companion status --link /dev/ttyUSB0:57600 --once",
     )
@@ -120,6 +120,8 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
                     f"{args.timeout:g} s\n"
                 )
                 return EXIT_NO_LINK
+        if not args.once:
+            sys.stderr.write(f"companion status: a status every {args.every:g} s until Ctrl-C; --once prints one\n")
         write: Callable[[dict[str, Any]], None] = _write_json if args.json else (lambda d: _write_text(d, args.units))
         while True:
             report = reader.report(now_s())

@@ -61,6 +61,9 @@ def make_key(path: Path, passphrase: str = "") -> None:
         try:
             os.write(fd, f"{passphrase.strip() or secrets.token_hex(32)}\n".encode())
             os.fsync(fd)
+        except OSError:
+            path.unlink()  # half a key is none, and would stand in the way of the next
+            raise
         finally:
             os.close(fd)
         Disk().sync_folder(path.parent)

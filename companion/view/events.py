@@ -130,7 +130,7 @@ def _facts(action: RequestPlan) -> Facts:
         ("budget", f"{action.budget_s:.1f} s"),
     ]
     if action.rung:
-        facts.append(("step of the ladder", action.rung))
+        facts.append(("given up for it", action.rung))
     return tuple(facts)
 
 

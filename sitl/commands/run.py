@@ -233,13 +233,15 @@ def words(figure: Any) -> str:
 
     >>> words([]), words(["TRAFFIC", "WIND"]), words(True), words({"ferry": 41.27}), words(float("inf"))
     ('none', 'TRAFFIC, WIND', 'yes', 'ferry 41.3', 'nothing near')
+    >>> words([0.983]), words(0.0)  # a share, or less than a metre
+    ('0.98', '0.0')
     """
     if figure is None:
         return "not measured"
     if isinstance(figure, bool):
         return "yes" if figure else "no"
     if isinstance(figure, float):
-        return f"{figure:.1f}" if math.isfinite(figure) else "nothing near"
+        return f"{figure:.{2 if 0.0 < abs(figure) < 1.0 else 1}f}" if math.isfinite(figure) else "nothing near"
     if isinstance(figure, dict):
         figure = [f"{name} {words(value)}" for name, value in figure.items()]
     if isinstance(figure, list):

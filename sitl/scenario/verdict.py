@@ -348,7 +348,7 @@ def verdict_line(record: Mapping[str, Any]) -> str:
             "from arming to the run's end, "
             f"{counted(f['replans'], 'replan')}, "
         )
-        words += "nothing to be clear of" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"
+        words += "no obstacle or fence" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"
         if f["min_clearance_m"] is not None and f.get("promised_clearance_m") is not None:
             least_m = f["promised_clearance_m"]
             words += f" ({'promised' if least_m >= 0.0 else 'a plan began'} {clearance_words(least_m)})"

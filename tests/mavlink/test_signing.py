@@ -1,5 +1,6 @@
 """The stamps of signed frames on disk: their clock, how far ahead they are kept, what is damage."""
 
+import errno
 import math
 import os
 from datetime import UTC, datetime
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from companion.errors import InputError
 from companion.mavlink.signing import SigningStore, make_key, read_key
 
 TICKS = 100_000  # of 10 µs in a second
@@ -158,3 +160,17 @@ def test_ahead_of_the_clock_it_is_kept_anew_when_frames_have_used_half_a_second_
     store.state.timestamp = of_clock(NOW_S + 44.6)
     store.save()
     assert kept(key) == store.state.timestamp + TICKS
+
+
+def test_a_key_that_a_full_disk_does_not_take_leaves_no_file(tmp_path, monkeypatch):
+    """An empty one stayed, which is no key, and is not written over."""
+
+    def full(fd, data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "write", full)
+        with pytest.raises(InputError, match="No space left"):
+            make_key(tmp_path / "boat.key")
+    assert not (tmp_path / "boat.key").exists()
+    make_key(tmp_path / "boat.key")

@@ -118,7 +118,7 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         ctx.say(
             Severity.WARNING,
             "no plan",
-            f"no plan on any step of the ladder ({reason}): the old one stays; {risk}",
+            f"no plan, whatever is given up for one ({reason}): the old one stays; {risk}",
             every_s=0.0,
         )
         return
@@ -145,7 +145,7 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
     ctx.say(
         Severity.CRITICAL,
         "no plan at all",
-        f"no plan on any step of the ladder ({reason}): holding, trying again in {wait:.0f} s",
+        f"no plan, whatever is given up for one ({reason}): holding, trying again in {wait:.0f} s",
         every_s=0.0,
     )
     hold(ctx, f"no plan found: {reason}")

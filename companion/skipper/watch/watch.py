@@ -287,8 +287,9 @@ def watch(ctx: StepContext) -> None:
         dog = BY_NAME[name]
         value = measure(ctx, name)
         figure = "" if value is None or not dog.unit else f" ({value:.1f} {dog.unit})"
+        text = dog.told.format(abs(value)) if dog.told and value is not None else f"{name}{figure}"
         done = _done_about(ctx, dog)
-        ctx.say(dog.severity, name, f"{name}{figure}" + f": {done}" * (done != Response.SAY.value), every_s=0.0)
+        ctx.say(dog.severity, name, text + f": {done}" * (done != Response.SAY.value), every_s=0.0)
     ctx.fresh = tuple(fresh)
 
 

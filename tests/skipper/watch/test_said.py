@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from types import SimpleNamespace
 
 import pytest
@@ -11,13 +13,15 @@ from shapely.geometry import box
 
 from companion.current import WaterCurrent
 from companion.messages import Mode, Severity
+from companion.skipper import Skipper
 from companion.skipper.step.actions import Announce
-from companion.skipper.step.config import ALL_PERMITTED
+from companion.skipper.step.config import ALL_PERMITTED, SkipperConfig
 from companion.skipper.step.state import Stop, Tacking
 from companion.skipper.watch import watch as watching
 from companion.skipper.watch.tacks import TACK_FAILED, watch_tacks
 from companion.skipper.watch.watch import speak_of_stop, watch_water
 from tests.skipper.moments import NOW_S, moment, route
+from tests.skipper.world import World, voyage
 
 WAY = route((300.0, 0.0), (600.0, 0.0), (600.0, 0.0))
 WALL = box(100.0, -500.0, 120.0, 500.0)  # 100 m to the east
@@ -300,3 +304,12 @@ def test_the_end_of_irons_that_were_counted_is_looked_at_too():
     ctx = turning(-45.0, before)
     assert (ctx.state.tacking.tried, ctx.state.tacking.irons_s) == (1, 20.0)
     assert spoken(ctx) == []
+
+
+def test_the_dark_is_said_in_a_sentence():
+    """ "dark (-31.8 deg from the limit)" was all."""
+    midnight_s = datetime(2026, 11, 24, 0, 0, tzinfo=UTC).timestamp()
+    world = World(Skipper(voyage=voyage(), config=SkipperConfig()), shown={"utc_at_boot_s": midnight_s})
+    assert world.run(300, lambda w: any(a.code == "dark" for _, a in w.actions if isinstance(a, Announce)))
+    text = next(a.text for _, a in world.actions if isinstance(a, Announce) and a.code == "dark")
+    assert re.fullmatch(r"it is dark: the sun is \d+ degrees below the mission's dark_below_deg", text)
