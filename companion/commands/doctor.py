@@ -251,7 +251,7 @@ async def diagnose(
     Raises:
         LinkError: no autopilot was heard, none whose signatures fit the key, several and none named, or no rover.
     """
-    from companion.doctor import examine, examine_steering
+    from companion.doctor import Level, examine, examine_steering
     from companion.mavlink.autopilot import Autopilot
     from companion.mavlink.link import Link
     from companion.mavlink.reception import TOOL_COMPONENT, LinkIdentity
@@ -262,8 +262,15 @@ async def diagnose(
         await link.wait_autopilot(wait_s)
         async with Autopilot(link) as autopilot:
             seen = await read(autopilot, has_key=signing is not None)
-            findings = examine(replace(seen, planner_speed=speed), needs)
+            seen = replace(seen, planner_speed=speed)
+            findings = examine(seen, needs)
             changes = await _apply(autopilot, findings) if apply else ()
+            if changes:  # what another value hid comes now, not in the next run
+                now = {change.name: change.after for change in changes if change.after is not None}
+                again = examine(replace(seen, parameters={**seen.parameters, **now}), needs)
+                known = {finding.code for finding in findings}
+                hidden = tuple(f for f in again if f.level is not Level.INFO and f.code not in known)
+                findings, changes = (*findings, *hidden), (*changes, *await _apply(autopilot, hidden))
             tuning = () if steering is None else examine_steering(steering, seen.parameters)
             return (*findings, *tuning), changes
 

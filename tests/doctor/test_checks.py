@@ -363,6 +363,14 @@ def test_the_doctor_reads_a_living_autopilot_and_changes_nothing_unasked():
     assert "nothing was changed" in text
 
 
+def test_what_a_value_hid_that_was_set_is_told_at_once():
+    """The next run of the doctor found a warning that was true in the first."""
+    hiding = {"FENCE_ENABLE": 40.0, "FENCE_RADIUS": 2.0, "FS_ACTION": 3.0}
+    findings, changes = doctor(hiding, apply=True)
+    assert "empty fence" in codes(findings, Level.WARNING) | codes(findings, Level.ERROR)
+    assert {change.name: change.after for change in changes}["FENCE_ENABLE"] == 0.0
+
+
 def test_apply_sets_and_reads_back(consulted):
     findings, changes = consulted
     done = {c.name: c for c in changes}
