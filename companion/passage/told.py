@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -31,6 +32,9 @@ def told_of(route: Route, of: Departure | None = None) -> tuple[str, ...]:
     wind = sailed.rows[:, 3]
     way = f"{sailed.length_m / M_PER_NM:.0f} NM at {made:.2f} m/s"
     hours = [f"{sailed.hours(word):.0f} h {said}" for word, said in _HOURS.items()]
+    short_m = _length_m(route) - sailed.length_m  # she is there at the edge of the goal, the legs end in its middle
+    if short_m >= 0.05 * M_PER_NM:
+        way += f" to within {short_m / M_PER_NM:.1f} NM of the goal"
     lines = [
         f"departs {iso(route.depart_utc_s)}, arrives {iso(arrives)}: {_span(sailed.time_s)}, {way}",
         _bound(route, sailed.time_s)
@@ -146,18 +150,19 @@ def explained(departures: Sequence[Departure], by_utc_s: float | None) -> tuple[
         comes = (
             f"there {abs(there):.1f} h {'later' if there > 0.0 else 'earlier'}" if math.isfinite(there) else "not there"
         )
-        lines.append(f"{said}: {comes}, {_against(d, by)}")
+        longer = f"{max(0.0, d.hours(0.5) - often):.1f} h longer under way"  # there earlier, and not the best
+        lines.append(f"{said}: {comes}, {_against(d, by) or longer}")
     return tuple(lines)
 
 
 def _against(d: Departure, by: float) -> str:
-    """Return what keeps a departure from arriving most often."""
+    """Return what keeps a departure from arriving most often; empty: nothing does."""
     failed = [run for run in d.runs if not run.arrived]
     if failed:
         worst = max(failed, key=lambda run: (run.is_too_much, run.strongest_mps))
         return f"in {100.0 * len(failed) / len(d.runs):.0f} % {worst.why}"
     late = 1.0 - d.chance(by)
-    return f"too late in {100.0 * late:.0f} %" if late > 0.0 else "nothing against it"
+    return f"too late in {100.0 * late:.0f} %" if late > 0.0 else ""
 
 
 def _number(hours: float) -> str:
@@ -173,6 +178,12 @@ def _leg(route: Route, k: int) -> str:
         near = (lat - b.lat_deg) ** 2 + (np.cos(np.radians(b.lat_deg)) * _turned(lon - b.lon_deg)) ** 2
         when = f" by {iso(float(route.sailed.rows[int(np.argmin(near)), 0]))}"
     return f"  {k}: {b.lat_deg:.4f}, {b.lon_deg:.4f}  {length / M_PER_NM:.1f} NM on {azimuth % 360.0:03.0f}{when}"
+
+
+def _length_m(route: Route) -> float:
+    """Return how long the legs are [m]."""
+    places = pairwise(route.waypoints)
+    return sum(float(GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2]) for a, b in places)
 
 
 def _turned(deg: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

@@ -1,5 +1,6 @@
 """``companion passage plan``: a file asks, a route answers in lines; what cannot be believed is refused in one."""
 
+import re
 import tomllib
 
 import numpy as np
@@ -134,6 +135,14 @@ def test_a_current_of_another_file_and_grid_is_sailed_in(shell, tmp_path):
         return float(out.split(" NM at ")[1].split()[0])
 
     assert speed(files=('["f.grb2"]', '["f.grb2", "c.grb2"]')) - speed() == pytest.approx(0.5, abs=0.1)
+
+
+def test_the_way_and_its_legs_are_as_long_as_each_other(shell):
+    """ "203 NM" stood over the only leg, of 204.6 NM: she is there at the edge of the goal."""
+    out = shell(obstacles=('obstacles = ["rock.wkt"]', ""))[1]
+    way, short = re.search(r" (\d+) NM at [\d.]+ m/s to within ([\d.]+) NM of the goal", out).groups()
+    legs = [float(found) for found in re.findall(r"  ([\d.]+) NM on ", out)]
+    assert float(way) + float(short) == pytest.approx(sum(legs), abs=0.6)
 
 
 def test_the_area_of_a_mission_has_its_margin_and_no_less(shell, tmp_path):

@@ -106,6 +106,8 @@ def test_what_is_said_of_departures():
     said = explained(found, None)
     assert said[0] == "best, of the surest the least long under way: 2026-04-20T00:00Z, there in 50 % of all"
     assert said[1].endswith("in 50 % 14.0 m/s of wind is more than she is to be out in")
+    sure = explained(sweep(asked(5.0), [T0, T0 + 3600.0], 0.0, nodes=20), None)
+    assert sure[1] == "1 h later: there 1.0 h later, 0.0 h longer under way"  # "nothing against it" told not why
     assert explained(found, T0 + 3600.0) == ("none of these departures arrives by 2026-04-20T01:00Z",)
 
 
