@@ -19,8 +19,7 @@ TRACKS = (".gpx", ".kml", ".kmz", ".geojson")  # the formats that hold a track
 
 if TYPE_CHECKING:
     from companion.geofence import Document
-    from companion.telemetry.folder import VoyageRecord
-    from companion.telemetry.folder.reading import Summary
+    from companion.telemetry.folder import Summary, VoyageRecord
 
 
 def add_parser(subparsers: Any, summary: str) -> None:
@@ -187,7 +186,7 @@ def boat_file_lines(s: Summary) -> list[str]:
     share = speed_share(s)
     if share is None or abs(share - 1.0) < FILE_OFF:
         return []
-    found = f"She sailed at about {100.0 * share:.0f} % of her boat file's speeds: after some hours under sail"
+    found = f"She sailed at about {5 * round(20.0 * share)} % of her boat file's speeds: after some hours under sail"
     return [f"{found} `companion boat learn VOYAGE_DIR ...` makes a file of the boat that she is."]
 
 

@@ -20,8 +20,7 @@ from companion.messages import CompanionStatus
 from companion.skipper import Skipper
 from companion.skipper.step.config import SkipperConfig
 from companion.telemetry.console import progress_text
-from companion.telemetry.folder import VoyageFigures
-from companion.telemetry.folder.reading import Summary
+from companion.telemetry.folder import Summary, VoyageFigures
 from companion.terminal.dashboard import body_of
 from companion.view import HeardFold
 from tests.skipper.world import FRAME, World, voyage, with_parts

@@ -4,6 +4,7 @@ from companion.telemetry.folder.logbook import Logbook, mission_copy
 from companion.telemetry.folder.reading import (
     RecordedChart,
     RecordedPlan,
+    Summary,
     VoyageRecord,
     believed,
     read_decisions,
@@ -53,6 +54,7 @@ __all__ = [
     "RecordedChart",
     "RecordedPlan",
     "Recorder",
+    "Summary",
     "VoyageArchive",
     "VoyageFigures",
     "VoyageRecord",
