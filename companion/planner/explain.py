@@ -188,9 +188,9 @@ def _courses_in_words(problem: Problem, plan: Plan, legs: list[dict[str, Any]], 
         for bind in (b for k in course.numbers for b in legs[k]["binds"]):
             bound[f"close-hauled on {tack} tack" if bind["by"] == "no_go" else _bind_in_words(bind)] = None
         for text in bound:
-            numbers.setdefault(text, []).extend(sorted({numbered[k] for k in course.numbers}) if numbered else [i])
+            numbers.setdefault(text, []).extend([numbered[k] for k in course.numbers] if numbered else [i])
     word = "Leg" if numbered else "Course"
-    sentences = [f"{_named(word, which)} {text}." for text, which in numbers.items()]
+    sentences = [f"{_named(word, sorted(set(which)))} {text}." for text, which in numbers.items()]
     if len(merged) < len(plan.legs) and not numbered:
         sentences.insert(
             0,

@@ -193,3 +193,14 @@ def test_a_leg_that_leads_somewhere_is_no_detour_to_turn_on(heading_deg):
     assert turns(p, answer)
     assert not any(turn["instead_of"] for turn in turns(p, answer))
     assert "round instead of" not in bounds_in_words(p, answer)
+
+
+def test_legs_are_named_by_the_numbers_of_the_mission_that_they_are_sailed_as():
+    p = upwind()
+    answer = plan(p, expansions=1000)
+    numbers = range(4, 4 + len(answer.legs))
+    into = [numbers[turn["leg"] - 1] for turn in turns(p, answer) if turn["manoeuvre"] == "tack"]
+    text = bounds_in_words(p, answer, numbers)
+    assert "ourse" not in text.split("Close-hauled")[0]
+    assert into
+    assert all(re.search(rf"A tack leads into legs? [^.]*\b{number}\b", text) for number in into)

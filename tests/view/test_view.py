@@ -93,16 +93,16 @@ def test_plans_are_numbered_as_they_are_made_and_their_legs_as_the_mission_on_bo
     ]
     assert [int(re.match(r"plan (\d+): ", title)[1]) for title in titles] == list(range(1, len(titles) + 1))
     last = beat.under_way[-1]
-    assert last.figures.plans == len(titles) >= 2
+    assert last.figures.plans == len(titles) > 0
     assert {v.plan.number for v in beat.under_way} <= set(range(1, len(titles) + 1))
     told = 0
     for view in beat.under_way:
-        hauled = re.match(r"As it was made: Legs? ([^.]*) close-hauled on (port|starboard)", view.plan.why)
-        for number in [] if hauled is None else re.findall(r"\d+", hauled[1]):
+        tacked = re.match(r"As it was made: .*A tack leads into legs? ([^.]*)[.]", view.plan.why)
+        for number in [] if tacked is None else re.findall(r"\d+", tacked[1]):
             place = int(number) - 1 - (view.plan.count - len(view.plan.legs))
             if place >= 0:
                 told += 1
-                assert (view.plan.legs[place].twa_deg > 0.0) == (hauled[2] == "starboard")
+                assert view.plan.legs[place].manoeuvre == "tack"
     assert told
 
 

@@ -95,8 +95,9 @@ def test_what_stands_survives_a_restart_with_its_age(verb):
     assert answer(world, verb).result is Result.DONE
     world.run(130)
     uploads = world.count(act.UploadMission)
-    stood = world.state.orders.standing
+    stood, number = world.state.orders.standing, world.state.mission.route.plan_id
     restarted(world)
+    assert world.state.plans.made == number  # the next plan is not the first again
     world.run(60)
     after = world.state.orders.standing
     assert (after.verb, after.by, after.name, after.en_m) == (stood.verb, stood.by, stood.name, stood.en_m)
