@@ -126,10 +126,13 @@ SLOW_S = 36_000.0  # polar, leeway, compass and vane hardly change in a voyage
 ALONG_MPS, ALONG_SHARE = 0.08, 0.06  # noise of a reading along the heading: gusts that the hull has not answered
 ACROSS_MPS, ACROSS_SHARE = 0.06, 0.03
 ALIKE_S = 12.0  # readings this near in time are wrong alike: waves, a gust, the helm
+TURNING_ALIKE_S = 4.0  # likewise across a heading that turns: what is wrong on one is another way round soon
 STEADY_RAD_S = math.radians(6.0)  # faster turns are manoeuvres ...
 SETTLES_S = 6.0  # ... after which, and the means with them, it needs this long to have its speed again
 STEADY_MPS2 = 0.06  # a faster change of speed is none of the polar's
 LEAST_TWA_RAD = math.radians(38.0)  # closer to the wind the polar says little
+CIRCLES_S = 30.0  # a boat that turns for so long without a steady moment is held: read across its heading
+LAGS_S = 0.4  # how late a velocity may be against a heading, its slip outwards in a turn with it
 EVERY_S = 1.0
 LATE_S = 1.5  # an older position is no reading
 GATE = 16.0  # of the innovation squared over its variance, two degrees of freedom: one in 3000
@@ -194,7 +197,8 @@ class CurrentEstimator:
         self._last: Sailing | None = None
         self._means: tuple[complex, complex] | None = None  # heading's unit vector and velocity over the last seconds
         self._taken_s = -math.inf
-        self._samples_s = 0.0
+        self._steady_s = -math.inf  # of the last steady moment, or the last at which it was not driven
+        self._samples_s = self._turning_s = 0.0  # of readings, and of those that were taken while it turned
         self._rejected_s = 0.0
         self._misfit = 0.0
         self._seen: dict[int, float] = {}  # headings by sectors of 20 degrees: when they were sailed last
@@ -210,7 +214,8 @@ class CurrentEstimator:
         if self._check is not None and now.is_heard:
             self._check.follow_wind(t_s, now.twd_from_rad, now.tws_mps, is_driven=now.is_driven)
         if last is None or not now.is_driven or now.age_s > LATE_S:
-            self._unsteady_s, self._means = t_s, None
+            self._unsteady_s = self._steady_s = t_s
+            self._means = None
             if self._check is not None:
                 self._check.pause()
             return
@@ -226,10 +231,15 @@ class CurrentEstimator:
         is_doubted = self._check is not None and self._is_doubted(t_s, utc_s, now, self._check)
         if abs(difference_rad(cmath.phase(bow), cmath.phase(was_bow))) > STEADY_RAD_S * dt_s:
             self._unsteady_s = t_s
-        if is_doubted or t_s - self._taken_s < 0.9 * EVERY_S or t_s - self._unsteady_s < SETTLES_S:
+        if is_doubted or t_s - self._taken_s < 0.9 * EVERY_S:
+            return
+        if t_s - self._unsteady_s < SETTLES_S:
+            if t_s - self._steady_s > CIRCLES_S:
+                self._take_turning(t_s, now, abs(difference_rad(now.heading_rad, last.heading_rad)) / dt_s)
             return
         if abs(abs(made) - abs(was_made)) > STEADY_MPS2 * max(0.2, dt_s):
             return
+        self._steady_s = t_s
         self._take(t_s, replace(now, heading_rad=cmath.phase(bow), velocity_en_mps=(made.real, made.imag)))
 
     # ------------------------------------------------------------------------------------------ doubt
@@ -238,7 +248,7 @@ class CurrentEstimator:
         expected, means = self._expected, self._means
         assert expected is not None
         assert means is not None
-        self._believed.append((t_s, (float(expected.east_mps + self._x[0]), float(expected.north_mps + self._x[1]))))
+        self._believed.append((t_s, self.current_en_mps))
         while t_s - self._believed[0][0] > BELIEVED_S:
             self._believed.popleft()
         current = self._believed[0][1]
@@ -260,8 +270,12 @@ class CurrentEstimator:
             sigma_mps=math.sqrt(unknown),
             roll_rad=now.roll_rad,
         )
+        if self._trial is not None:  # a boat that is held turns all the time, in the water that its turns tell of
+            current = self._trial.current_en_mps
+            twa, speed = self._speed_with(now, current, float(self._x[5]))
         along, across = _through_water(now.velocity_en_mps, current, now.heading_rad)
-        check.update(t_s, mean, replace(mean, along_mps=along, across_mps=across, heading_rad=now.heading_rad))
+        at_once = replace(mean, along_mps=along, across_mps=across, speed_mps=speed * self.scale, twa_rad=twa)
+        check.update(t_s, mean, replace(at_once, heading_rad=now.heading_rad))
         if not check.doubt:
             self._trial = None
             return check.is_odd
@@ -269,14 +283,26 @@ class CurrentEstimator:
             if not was or self._trial is None:
                 self._trial = CurrentEstimator(self._speed, self._prior, speed_error=self._speed_error, checked=False)
             self._trial.update(t_s, utc_s, now)
-            if self._trial.tells_of_new_water:
+            if self._trial.tells_of_new_water(sails_as_it_should=check.is_refuted):
                 self._become(self._trial)
         return True
 
     @property
-    def tells_of_new_water(self) -> bool:
-        """Whether all that was seen since it was begun is one current that can be, on headings apart."""
-        if self._samples_s < NEW_WATER_S or self._headings_rad() < FAR_APART_RAD or self._misfit > MISFIT:
+    def current_en_mps(self) -> tuple[float, float]:
+        """The current that is believed [m/s, east north]."""
+        expected = self._expected
+        if expected is None:
+            return 0.0, 0.0
+        return float(expected.east_mps + self._x[0]), float(expected.north_mps + self._x[1])
+
+    def tells_of_new_water(self, *, sails_as_it_should: bool) -> bool:
+        """Return whether all that was seen since it was begun is one current that can be, on headings apart.
+
+        What sets the boat across its heading while it turns is no wind's doing, right or wrong: it counts only where
+        the boat sails as it should, too.
+        """
+        samples_s = self._samples_s if sails_as_it_should else self._samples_s - self._turning_s
+        if samples_s < NEW_WATER_S or self._headings_rad() < FAR_APART_RAD or self._misfit > MISFIT:
             return False
         assert self._expected is not None
         most_mps = NEW_WATER_SPREADS * math.hypot(NEW_WATER_MPS, self._expected.sigma_mps)
@@ -284,7 +310,8 @@ class CurrentEstimator:
 
     def _become(self, trial: CurrentEstimator) -> None:
         self._x, self._p, self._misfit, self._seen = trial._x, trial._p, trial._misfit, trial._seen
-        self._samples_s, self._rejected_s, self._taken_s = trial._samples_s, 0.0, trial._taken_s
+        self._samples_s, self._turning_s = trial._samples_s, trial._turning_s
+        self._rejected_s, self._taken_s, self._steady_s = 0.0, trial._taken_s, trial._steady_s
         self._trial = None
         self._believed.clear()
         if self._check is not None:
@@ -339,9 +366,8 @@ class CurrentEstimator:
 
     def _take(self, t_s: float, now: Sailing) -> None:
         assert self._expected is not None
-        x = self._x
+        x, current = self._x, self.current_en_mps
         base = np.array([self._expected.east_mps, self._expected.north_mps])
-        current = float(base[0] + x[0]), float(base[1] + x[1])
         twa, v = self._speed_with(now, current, float(x[5]))
         sin, cos = math.sin(now.heading_rad), math.cos(now.heading_rad)
         should_mps = math.hypot(v * sin + current[0], v * cos + current[1])  # over the ground: a stream may hold her
@@ -363,8 +389,28 @@ class CurrentEstimator:
             * ALIKE_S
             / EVERY_S
         )
+        self._learn(t_s, now.heading_rad, h, z - h @ x, noise)
+
+    def _take_turning(self, t_s: float, now: Sailing, rate_rad_s: float) -> None:
+        """Take what sets the boat across its heading: a current's, however fast it goes while it turns."""
+        assert self._expected is not None
+        base, current = np.array([self._expected.east_mps, self._expected.north_mps]), self.current_en_mps
+        twa, _ = self._speed_with(now, current, float(self._x[5]))
+        speed_mps = _through_water(now.velocity_en_mps, current, now.heading_rad)[0]
+        if abs(twa) < LEAST_TWA_RAD or speed_mps < SLOW_MPS:
+            return
+        across = np.array([math.cos(now.heading_rad), -math.sin(now.heading_rad)])  # to starboard
+        side = -1.0 if twa > 0.0 else 1.0
+        h = np.concatenate([across, [0.0, side * speed_mps, speed_mps, 0.0]])[None, :]  # (a), across
+        residual = np.array([(np.asarray(now.velocity_en_mps) - base) @ across]) - h @ self._x
+        sigma = ACROSS_MPS + (ACROSS_SHARE + LAGS_S * rate_rad_s) * speed_mps
+        if self._learn(t_s, now.heading_rad, h, residual, np.array([[sigma**2 * TURNING_ALIKE_S / EVERY_S]])):
+            self._turning_s += EVERY_S
+
+    def _learn(self, t_s: float, heading_rad: float, h: Matrix, r: Matrix, noise: Matrix) -> bool:
+        """Take a reading that is no stray, and return whether it is none: ``r`` is how far from predicted it is."""
+        assert self._expected is not None
         self._taken_s = t_s
-        r = z - h @ x
         misfit = float(r @ np.linalg.inv(h @ self._p @ h.T + noise) @ r)
         self._misfit += (min(misfit, GATE) - self._misfit) / MISFIT_SAMPLES
         if self._misfit > MISFIT:  # the water has changed faster than a tide: believe the past less
@@ -372,12 +418,13 @@ class CurrentEstimator:
         if misfit > GATE:
             self._rejected_s += EVERY_S
             if self._rejected_s < GATED_S:
-                return
+                return False
             self._p[:2, :2] += np.eye(2) * self._expected.sigma_mps**2  # it has changed: look again
         self._rejected_s = 0.0
         self._correct(h, r, noise)
         self._samples_s += EVERY_S
-        self._seen[int(wrap_pi(now.heading_rad) // math.radians(20.0))] = t_s
+        self._seen[int(wrap_pi(heading_rad) // math.radians(20.0))] = t_s
+        return True
 
     def _speed_with(self, now: Sailing, current_en_mps: tuple[float, float], vane_rad: float) -> tuple[float, float]:
         """Return the wind's angle to the bow and the polar's speed, where the vane is turned clockwise so far."""
@@ -397,8 +444,8 @@ class CurrentEstimator:
         if expected is None:
             return WaterCurrent(verdict="nothing is known of the water yet")
         found = WaterCurrent(
-            east_mps=float(expected.east_mps + self._x[0]),
-            north_mps=float(expected.north_mps + self._x[1]),
+            east_mps=self.current_en_mps[0],
+            north_mps=self.current_en_mps[1],
             var_ee=float(self._p[0, 0]),
             var_en=float(self._p[0, 1]),
             var_nn=float(self._p[1, 1]),
@@ -414,7 +461,7 @@ class CurrentEstimator:
         expected = self._expected
         if expected is None:
             return None
-        believed = expected.east_mps + self._x[0], expected.north_mps + self._x[1], *self._x[2:]
+        believed = *self.current_en_mps, *self._x[2:]
         return WindAngleUncertainty(
             believed=tuple(map(float, believed)),
             covariance=tuple(tuple(map(float, row)) for row in self._p),

@@ -101,7 +101,7 @@ class _Tally:
             self._odd_s += dt_s
 
     @property
-    def tells_of_a_new_wind(self) -> bool:
+    def is_enough(self) -> bool:
         is_on_many_headings = abs(self._bows) <= self._fits_s * math.cos(0.5 * FAR_APART_RAD)
         return self._fits_s >= max(NEW_WIND_S, NEW_WIND_RATIO * self._odd_s) and is_on_many_headings
 
@@ -133,6 +133,11 @@ class MotionCheck:
         """Where the wind came from before it leapt, while that is why it is doubted."""
         return self._before_rad if self.doubt and self.is_winds else None
 
+    @property
+    def is_refuted(self) -> bool:
+        """Whether the boat has moved as it should since the doubt began, for long enough and on headings far apart."""
+        return bool(self.doubt) and self._tally.is_enough
+
     def pause(self) -> None:
         """Take note that nobody knows how the boat is driven: what is settled begins anew."""
         self._t_s = None
@@ -152,11 +157,11 @@ class MotionCheck:
         self._heading_rad = now.heading_rad
         if now.tws_mps < LEAST_TWS_MPS:
             return
-        if self.is_winds and (fits := self._fits(t_s, at_once)) is not None:
+        if self.doubt and (fits := self._fits(t_s, at_once)) is not None:
             is_on_its_way = gains_mps2 * math.copysign(1.0, at_once.speed_mps - at_once.along_mps) >= GAINS_MPS2
             if fits or not is_on_its_way:
                 self._tally.take(dt_s, at_once.heading_rad, fits=fits)
-            if self._tally.tells_of_a_new_wind:
+            if self.is_winds and self.is_refuted:
                 self.settle()
                 return
         if t_s - self._turned_s < SETTLES_S:

@@ -99,16 +99,59 @@ def test_it_is_the_same_however_often_it_is_looked_at_and_asked_for_nothing_new(
     assert a.view() == b.view()
 
 
+def circled(current, seconds, *, estimator=None, begin_s=0.0, late_s=0.0, **boat):
+    """Return the estimator after circles of half a minute, as a boat that is held in a loiter sails them."""
+    estimator = estimator or CurrentEstimator(POLAR.speed_mps)
+    for n in range(int(seconds)):
+        t_s = begin_s + n
+        now, before = (reading(t, 12.0 * t, current, **boat) for t in (t_s, t_s - late_s))
+        estimator.update(t_s, None, replace(now, velocity_en_mps=before.velocity_en_mps))
+    return estimator
+
+
+@pytest.mark.parametrize("boat", [{}, {"scale": 0.6}, {"leeway_deg": 3.0}, {"late_s": 0.4}])
+def test_a_boat_that_is_held_in_circles_tells_what_sets_it_across_whatever_its_speed(boat):
+    found, still = circled((0.5, 0.0), 300, **boat).view(), circled((0.0, 0.0), 300, **boat).view()
+    assert math.dist(found.en_mps, (0.5, 0.0)) < 0.15
+    assert math.hypot(*still.en_mps) < 0.15
+    assert not still.is_significant
+
+
+def test_a_stream_that_ended_while_it_was_waited_for_is_not_believed_for_ever():
+    estimator = sailed((60.0, -60.0, 100.0, -100.0), (0.0, -1.2))
+    assert estimator.view().drift_mps > 1.0
+    assert circled((0.0, 0.0), 300, estimator=estimator, begin_s=401.0).view().drift_mps < 0.35
+
+
+def doubted_motion(told_turned_deg):
+    """Return an estimator that doubts wind or water: the boat goes astern by the wind that it is told."""
+    estimator = sailed((60.0, -60.0, 100.0, -100.0), (0.0, 0.0))
+    for t in range(400, 440):
+        now = reading(float(t), 100.0, (0.0, 0.0))
+        estimator.update(float(t), None, replace(now, velocity_en_mps=(-0.8, 0.0)))
+    assert estimator.motion_doubt
+    assert not estimator.doubts_wind
+    for t in range(440, 740):
+        now = reading(float(t), 12.0 * t, (0.0, 0.0))
+        estimator.update(float(t), None, replace(now, twd_from_rad=TWD + math.radians(told_turned_deg)))
+    return estimator
+
+
+def test_a_doubt_ends_in_circles_that_are_sailed_as_they_should_be_and_in_no_others():
+    assert not doubted_motion(0.0).motion_doubt
+    assert doubted_motion(150.0).motion_doubt
+
+
 def test_turns_stops_and_sails_that_are_eased_teach_nothing():
-    estimator = CurrentEstimator(POLAR.speed_mps)
-    for t in range(120):
-        estimator.update(float(t), None, reading(float(t), 12.0 * t, (0.5, 0.0)))
-    assert estimator.view().samples_s == 0.0, "she turns all the time"
-    for t in range(120, 240):
+    estimator = circled((0.5, 0.0), 30)
+    assert estimator.view().samples_s == 0.0, "a manoeuvre"
+    for t in range(30, 240):
         estimator.update(float(t), None, reading(float(t), 60.0, (0.5, 0.0), is_driven=False))
     assert estimator.view().samples_s == 0.0
+    circled((0.5, 0.0), 29, estimator=estimator, begin_s=240.0)
+    assert estimator.view().samples_s == 0.0, "a start: turning counts from when she is driven"
     aground = reading(0.0, 60.0, (0.0, 0.0))
-    for t in range(240, 400):
+    for t in range(270, 430):
         estimator.update(
             float(t),
             None,

@@ -31,6 +31,7 @@ from companion.skipper.way.drift import HORIZON_S, floor_after_s
 from companion.skipper.way.geometry import distance_m, moved
 from companion.skipper.way.voyage import AreaLike, PointEn, water_at
 
+WAITS = "waiting in a loiter until the wind is known"
 SAID_S = 60.0  # between two words on a wind that is not known
 SEA_ROOM = "sea room"  # the rung of a route that leads there, and the code under which it is said
 ASTERN_SHARE = 0.2  # of the wind's speed: how fast a LOITER by a wrong wind is driven astern
@@ -39,6 +40,7 @@ PAD_RAD = math.radians(10.0)  # outside the true no-go zone, for the same reason
 EASED_RAD = math.radians(10.0)  # a sheet that is eased farther than this for the true wind does not draw
 LOOKS_EVERY_S = 5.0  # for sea room: hundreds of legs and drifts are tried
 ROOMY_S = 60.0  # of drift gained: for less the boat is not sent elsewhere
+AWAY_S = 150.0  # of drift: so long from something it is led where its circles come too near to something here
 RINGS_M = (40.0, 60.0, 80.0, 120.0, 160.0, 240.0)
 DIRECTIONS = 36
 AHEAD_S = 3.0  # what the boat sails on until it turns on to a leg that is being uploaded
@@ -124,7 +126,8 @@ def seeks_sea_room(ctx: StepContext) -> bool:
     if route.rung == SEA_ROOM and _is_on_the_way(ctx, water, boat, route.points_en_m[-1]):
         if state.steering.own_mode is not None:
             hand_back(ctx)
-        ctx.phase(Phase.HOLDING, route.why)
+        is_there = distance_m(boat, route.points_en_m[-1]) < STRAYS_M
+        ctx.phase(Phase.HOLDING, f"{ctx.snapshot.unsure}: {WAITS}" if is_there else route.why)
         return True
     if (
         wind is None
@@ -141,13 +144,13 @@ def seeks_sea_room(ctx: StepContext) -> bool:
     found = sea_room(
         water, boat, starts, wind, no_go_half_rad=ctx.no_go_half_rad, clear_m=(ctx.config.margin_m, floor_m)
     )
-    if found is None or found[1] < min(left_s + (0.0 if circles else ROOMY_S), HORIZON_S):
-        return False  # where it circles too near, it need only be driven off no sooner
+    if found is None or found[1] < (min(left_s, AWAY_S) if circles else min(left_s + ROOMY_S, HORIZON_S)):
+        return False  # where it circles too near already, a drift that is some way off is the better
     _stop_planning(ctx)
     place, gained_s = found
     keep = min(state.mission.index, len(route.items) - 1)
     onto = water.nearest_name(boat) or "something"
-    here = f"drift onto {onto} in {left_s:.0f} s" if left_s < HORIZON_S else f"circle too near to {onto}"
+    here = f"circle too near to {onto}" if circles else f"drift onto {onto} in {left_s:.0f} s"
     text = (
         f"{ctx.snapshot.unsure}: a loiter here would {here}; waiting until there is "
         f"{'sea room' if gained_s >= HORIZON_S else f'room for {gained_s:.0f} s'}"
@@ -264,7 +267,7 @@ def holds(ctx: StepContext) -> bool:
     if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
         if memory.loiter_en_m is None:  # by a wrong wind the boat may be carried off it, which is a drift
             ctx.set(adrift=replace(memory, loiter_en_m=ctx.boat_en, loiter_s=ctx.t_s))
-        ctx.phase(Phase.HOLDING, f"{why}: waiting in a loiter until the wind is known")
+        ctx.phase(Phase.HOLDING, f"{why}: {WAITS}")
         return True
     if state.steering.until_s is not None:  # out of irons, it was believed
         ctx.set(steering=changed(ctx.state.steering, until_s=None, heading_rad=None))

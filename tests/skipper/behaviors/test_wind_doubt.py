@@ -7,7 +7,7 @@ from shapely.geometry import box
 
 from companion.geo.angles import difference_rad
 from companion.messages import Command, Mode
-from companion.skipper.behaviors.wind_doubt import SEA_ROOM, STRAYS_M, DoubtedWind, sea_room
+from companion.skipper.behaviors.wind_doubt import SEA_ROOM, STRAYS_M, WAITS, DoubtedWind, sea_room
 from companion.skipper.step import ParameterChanged, Permissions, WindBefore
 from companion.skipper.step import actions as act
 from companion.skipper.step.state import Phase
@@ -131,6 +131,7 @@ def test_a_loiter_that_would_be_driven_onto_a_rock_waits_for_sea_room():
     world.run(100)
     assert distance_m(world.position, place) < 20.0
     assert world.mode is Mode.AUTO, "in the loiter that ends the leg"
+    assert world.state.why == f"{WHY}: {WAITS}"
     assert world.clearance() > world.skipper.config.margin_floor_m
     assert len(said(world, SEA_ROOM)) == 1
     world.extra = {}
@@ -192,6 +193,15 @@ def test_a_loiter_circles_and_is_not_begun_beside_a_rock(turned_deg, off_m, leav
         assert world.skipper.voyage.area.clearance_m([place])[0] >= STRAYS_M + 8.0
         world.run(60)
         assert world.clearance() > 8.0
+
+
+def test_beside_a_rock_a_drift_that_is_minutes_off_is_the_better():
+    """Each place to go to was to be driven off no sooner than where she lay: she lay on, and came to 1.8 m of it."""
+    coast = box(-2000.0, -280.0, 2000.0, -260.0)
+    world = north_of_the_rock((box(0.0, 18.0, 120.0, 38.0), coast))
+    doubted(world, WindBefore(twd_from_rad=0.0, tws_mps=5.0, turned_rad=math.radians(90.0)))
+    assert world.run(60, lambda w: bool(said(w, SEA_ROOM)))
+    assert "circle too near" in said(world, SEA_ROOM)[0][2]
 
 
 def test_where_no_course_leads_to_sea_room_it_loiters():
