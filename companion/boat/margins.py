@@ -34,12 +34,18 @@ LOITER_TURNS = (
 )
 GALE_POWER = 0.75  # of the wind beyond a polar's strongest: 29.3 m in 14 m/s of wind and 33.0 in 16
 RATE_MAX_RADPS = math.radians(120.0)  # ArduRover's ATC_STR_RAT_MAX: all of these were measured by it
+HEADER_RAD = math.radians(5.0)  # of a no-go zone that is narrower than the boat's: less is lost in the wind's swings
 UNLIMITED_RADPS = math.radians(1000.0)  # what 0 stands for as a limit of ArduPilot's
 
 
 def wider_s(rate_max_radps: float) -> float:
     """Return how much wider the tightest turn is than by ArduRover's own ATC_STR_RAT_MAX, per speed [s, 0 or more]."""
     return max(0.0, 1.0 / rate_max_radps - 1.0 / RATE_MAX_RADPS)
+
+
+def points_too_high(autopilot_no_go_rad: float, boat_no_go_rad: float) -> bool:
+    """Return whether an autopilot's no-go zone is so much narrower than the boat's that it stalls her in a header."""
+    return autopilot_no_go_rad < boat_no_go_rad - HEADER_RAD
 
 
 def loiter_swing_m(polar: Polar, tws_mps: float, rate_max_radps: float = RATE_MAX_RADPS) -> float:

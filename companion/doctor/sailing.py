@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from companion.boat import AutopilotLimits, narrowest_corridor_m, proposed_margin, widest_corridor_m
+from companion.boat import AutopilotLimits, narrowest_corridor_m, points_too_high, proposed_margin, widest_corridor_m
 from companion.doctor.report import Level, Needs, Report
 from companion.mavlink.wire import believable
 
@@ -22,7 +22,7 @@ def boat(report: Report, needs: Needs) -> None:
             f"plans keep to {no_go + 2.0:g}°: if the boat points higher, lower the parameter",
             name="SAIL_NO_GO_ANGLE",
         )
-    if no_go is not None and no_go < planned - 5.0:
+    if no_go is not None and points_too_high(math.radians(no_go), needs.no_go_half_rad):
         report.add(
             Level.WARNING,
             "no-go",

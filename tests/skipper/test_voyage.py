@@ -690,6 +690,15 @@ def test_a_way_that_opens_only_at_the_floor_is_sailed_with_less_margin():
     assert any("margin" in entry[2] for entry in world.log)
 
 
+@pytest.mark.parametrize(("autopilot_deg", "is_told"), [(38.0, True), (43.0, False), (45.0, False)])
+def test_an_autopilot_that_points_higher_than_the_boat_is_told(autopilot_deg, is_told):
+    world = make(obstacles=())
+    assert round(math.degrees(world.skipper.voyage.boat.no_go_half_rad)) == 45
+    world.extra["limits"] = AutopilotLimits(sail_no_go_angle_rad=math.radians(autopilot_deg), wp_speed_mps=2.0)
+    assert world.run(120, is_sailing)
+    assert bool(said(world, "no-go")) is is_told
+
+
 # ------------------------------------------------------------------------------------------ watchdogs
 def test_the_boat_in_irons_bears_away_and_sails_on():
     world = make(obstacles=())

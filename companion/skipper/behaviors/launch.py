@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from companion.boat import required_margin
+from companion.boat import points_too_high, required_margin
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode, Severity
@@ -139,6 +139,7 @@ def launch(ctx: StepContext) -> None:
         ctx.phase(Phase.STANDARD, "under way")
         ctx.say(Severity.NOTICE, "under way", "AUTO and armed: under way", every_s=0.0)
         _look_at_margin(ctx)
+        _look_at_no_go(ctx)
         _look_at_home(ctx)
         if status.mission_state in {MissionState.COMPLETE, MissionState.NOT_STARTED, MissionState.PAUSED}:
             make_current(ctx, state.mission.index + 1)
@@ -188,6 +189,18 @@ def _look_at_margin(ctx: StepContext) -> None:
             Severity.WARNING,
             "margin",
             f"the margin is {ctx.config.margin_m:g} m; the autopilot's habits ask for {asked.describe()}",
+        )
+
+
+def _look_at_no_go(ctx: StepContext) -> None:
+    """Say so when the autopilot points higher than the boat sails: there it stalls, and its tacks fail."""
+    own_rad, boat_rad = ctx.no_go_half_rad, ctx.voyage.boat.no_go_half_rad
+    if ctx.snapshot.limits is not None and ctx.config.sails and points_too_high(own_rad, boat_rad):
+        ctx.say(
+            Severity.WARNING,
+            "no-go",
+            f"SAIL_NO_GO_ANGLE is {math.degrees(own_rad):.0f} degrees, the boat's no-go angle "
+            f"{math.degrees(boat_rad):.0f}: the autopilot points higher than it sails",
         )
 
 

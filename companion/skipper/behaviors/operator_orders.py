@@ -18,6 +18,7 @@ from companion.skipper.behaviors.shoaling import SHOALING
 from companion.skipper.board.on_board import adopt
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.diversions import (
+    LACK_M,
     diversion,
     home_trouble,
     is_at_rest,
@@ -25,6 +26,8 @@ from companion.skipper.planning.diversions import (
     pressing,
     refuge_name,
     refuges_by_way,
+    room_lacking_m,
+    to_be_held,
 )
 from companion.skipper.planning.next_tack import next_tack
 from companion.skipper.planning.not_found import hold
@@ -166,9 +169,9 @@ def _hold(ctx: StepContext, order: Order) -> Answer:
     ctx.set(plans=changed(ctx.state.plans, asked=""))
     if not ctx.state.voyage.sailing:
         return _stand(ctx, order, f"she stays where she is, and is not set sailing until {Verb.GO_ON}")
-    answer = _stand(ctx, order, f"loitering here, where there is room, until {Verb.GO_ON}")
-    ctx.let_go_of_plan()
     route, boat = ctx.state.mission.route, ctx.boat_en
+    answer = _stand(ctx, order, f"{_held(ctx)}, until {Verb.GO_ON}")
+    ctx.let_go_of_plan()
     if (
         route is not None
         and boat is not None
@@ -178,6 +181,17 @@ def _hold(ctx: StepContext, order: Order) -> Answer:
     ):
         hold(ctx, _why(ctx), anew=True)  # on the boat's way to the loiter that ends the mission: that is not here
     return answer
+
+
+def _held(ctx: StepContext) -> str:
+    """Return in words where she is held."""
+    boat, bound = ctx.boat_en, to_be_held(ctx, "")
+    lacks_m = -1.0 if boat is None else room_lacking_m(ctx, boat)
+    if bound is not None and bound.has_place:
+        return f"to {bound.name}: here a loiter has {lacks_m:.0f} m less than it takes in this wind"
+    if lacks_m > LACK_M:
+        return f"loitering here, with {lacks_m:.0f} m less of room than a loiter takes in this wind"
+    return "loitering here, where there is room"
 
 
 def _go_on(ctx: StepContext, _: Order) -> Answer:

@@ -15,7 +15,7 @@ from companion.orders import Verb
 from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, End, Recovery
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step import Diversion, DiversionKind, SafeEnd, SkipperConfig, StepContext
-from companion.skipper.step.missions import loiter_place, place_with_room, roomy_m
+from companion.skipper.step.missions import ROOMIER_BY_M, loiter_place, place_with_room, roomy_m
 from companion.skipper.step.route import HOME_RADIUS_M
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
 from companion.skipper.way.gates import Gate
@@ -29,6 +29,7 @@ DRAGGED = "dragged off"  # a watchdog
 HOME, REST, ROOM = "home", "the place to rest", "water with room"
 OFF_HOME = f"{ROOM} off {HOME}"
 AFTER_LAST_GOAL = {HOME, ROOM, OFF_HOME}  # where she may be bound for then
+HOLD_ROOM = 2.0  # times the loiter's radius: it may lie here for hours, and a HOLD carries it off before help comes
 LACK_M = 1.0  # of the room that a loiter takes: she is not moved for less, as the wind freshens
 LIES_THERE = {DiversionKind.HOME, DiversionKind.REFUGE, DiversionKind.GOAL}
 NO_ROOM = "{} has no room for a loiter"
@@ -192,7 +193,7 @@ def _ordered(ctx: StepContext) -> Diversion | None:
     if order is None or order.verb is Verb.STOP:
         return None
     if order.verb is Verb.HOLD or order.en_m is None:
-        found = _stay(ctx, order.why)
+        found = to_be_held(ctx, order.why)
         return None if found is None else replace(found, is_ordered=True)
     kind, name, radius_m = {
         Verb.REFUGE: (DiversionKind.REFUGE, f"the refuge {order.name}".rstrip(), HOME_RADIUS_M),
@@ -346,6 +347,32 @@ def _stay(ctx: StepContext, why: str) -> Diversion | None:
     return Diversion(kind=DiversionKind.STAY, name="", why=why)
 
 
+def to_be_held(ctx: StepContext, why: str) -> Diversion | None:
+    """Return a diversion to stay, or to water with room where there is too little near by; None: as ``_stay``."""
+    boat, water = ctx.boat_en, ctx.to_stay_in.area
+    lacks_m = 0.0 if boat is None or not ctx.ahead() else room_lacking_m(ctx, boat)
+    if boat is not None and lacks_m > LACK_M:
+        room = _to_room(ctx, boat, why)
+        if room is not None and room.en_m is not None:
+            here_m, there_m = water.clearance_m([held_at(ctx, boat)[0], room.en_m])
+            if _is_bound(ctx, ROOM) or there_m > here_m + min(lacks_m, ROOMIER_BY_M) - LACK_M:
+                return room
+    return _stay(ctx, why)
+
+
+def room_lacking_m(ctx: StepContext, boat: PointEn) -> float:
+    """Return how much room a loiter lacks to keep the margin's floor where a boat is held [m], below 0: none."""
+    place, _ = held_at(ctx, boat)
+    return roomy_m(ctx.known_config) - float(ctx.to_stay_in.area.clearance_m([place])[0])
+
+
+def held_at(ctx: StepContext, boat: PointEn) -> tuple[PointEn, float]:
+    """Return where a boat at a place loiters when it is held, and the room there, to leeward too [m]."""
+    wind, config = ctx.wind_mean, ctx.known_config
+    wanted_m = max(HOLD_ROOM * ctx.config.loiter_radius_m, roomy_m(config))
+    return loiter_place(ctx.to_stay_in, config, boat, wind[0] if wind else 0.0, wanted_m=wanted_m)
+
+
 def _refuge(ctx: StepContext, why: str) -> Diversion | None:
     """Return the refuge that the route is bound for, else the nearest by water; the next after each that had no way."""
     refuges = refuges_by_way(ctx)
@@ -426,9 +453,9 @@ def _back(ctx: StepContext) -> Diversion | None:
     """Return the way back to where the boat is to rest, when it is off it and the straight way is not clear."""
     rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
     off = ctx.is_raised(DRAGGED) or bool(ctx.state.operator.answering) or is_led_off(ctx)
-    if rest is None or boat is None or not (off or _is_bound_for_rest(ctx)):
+    if rest is None or boat is None or not (off or _is_bound(ctx, REST)):
         return None
-    if not _is_bound_for_rest(ctx) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
+    if not _is_bound(ctx, REST) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
         return None  # the autopilot's own loiter goes back there
     return Diversion(kind=DiversionKind.REST, name=REST, why="she is off the place where she was to rest", en_m=rest)
 
@@ -447,9 +474,9 @@ def _off_narrow_rest(ctx: StepContext) -> Diversion | None:
     return _to_room(ctx, rest, "where she is to rest a loiter has no room")
 
 
-def _is_bound_for_rest(ctx: StepContext) -> bool:
+def _is_bound(ctx: StepContext, name: str) -> bool:
     route = ctx.state.mission.route
-    return route is not None and route.bound_for == REST and bool(ctx.ahead())
+    return route is not None and route.bound_for == name and bool(ctx.ahead())
 
 
 def gate_for(bound: Diversion) -> Gate:

@@ -8,12 +8,12 @@ from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.planners import AUTO
 from companion.skipper.planning.asking import request
+from companion.skipper.planning.diversions import held_at
 from companion.skipper.planning.tides import opens_next
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, leads_there, too_risky, upload
 from companion.skipper.planning.vessels import lies_in_the_way, meetings
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.missions import loiter_place, roomy_m
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.stemming import waiting_place
@@ -24,7 +24,6 @@ TIDE_S = 120.0  # between two tries then, at most
 TRIES = 3  # of a planner that does not answer, before the next step of the ladder
 LESS, LEAST_EFFORT = 0.5, 0.05  # of the planning budget: after each request that was not answered; never less
 MORE = 1.2  # ... and after each that was
-HOLD_ROOM = 2.0  # times the loiter's radius: it may lie here for hours, and a HOLD carries it off before help comes
 
 
 def asks_again(ctx: StepContext, pending: PendingPlan, reason: str) -> bool:
@@ -184,21 +183,15 @@ def _tail_only(ctx: StepContext) -> bool:
 
 def hold(ctx: StepContext, why: str, *, anew: bool = False) -> None:
     """Loiter in the roomiest place near by, in a mission that ends there at once; ``anew``: out of another loiter."""
-    boat, wind, state = ctx.boat_en, ctx.wind_mean, ctx.state
+    boat, state = ctx.boat_en, ctx.state
     ctx.phase(Phase.HOLDING if state.voyage.sailing else Phase.WAITING, f"waiting for a plan: {why}")
     if boat is None or not state.voyage.sailing or state.mission.route is None:
         return  # not under way
-    deep, config = ctx.to_stay_in, ctx.known_config
+    deep = ctx.to_stay_in
     is_there = state.mission.index >= len(state.mission.route.items) - 1 and not anew
     if is_there and not (deep.drying and float(deep.area.clearance_m([state.mission.route.points_en_m[-1]])[0]) <= 0.0):
         return  # already in the safe end of the mission
-    place, room = loiter_place(
-        deep,
-        config,
-        boat,
-        wind[0] if wind else 0.0,
-        wanted_m=max(HOLD_ROOM * ctx.config.loiter_radius_m, roomy_m(config)),
-    )
+    place, room = held_at(ctx, boat)
     if is_there and room <= 0.0:
         return  # in water that dries, as any place about here
     end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)

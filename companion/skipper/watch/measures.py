@@ -118,7 +118,7 @@ def _too_near(ctx: StepContext) -> float | None:
 
 def _progress(ctx: StepContext) -> float | None:
     """Way made good in the window; None before the window is full or while there is a reason to stand still."""
-    if ctx.is_raised("becalmed") or not ctx.ahead() or not ctx.state.progress.history:
+    if ctx.is_raised("becalmed") or ctx.snapshot.unsure or not ctx.ahead() or not ctx.state.progress.history:
         return None
     if ctx.state.mission.route is None or ctx.state.progress.history_plan != ctx.state.mission.route.plan_id:
         return None  # the history is of the plan before

@@ -76,6 +76,27 @@ def test_hold_is_here_and_lasts_until_told_to_go_on(guidance):
     assert world.state.progress.reached == (0, 1)
 
 
+def test_hold_where_a_loiter_takes_more_than_there_is_leads_to_water_with_room():
+    """In a channel of 54 m a boat that turns by 15 degrees a second was held, "where there is room", and touched."""
+    dock = (box(-200.0, -400.0, -19.0, 600.0), box(19.0, -400.0, 200.0, 600.0))
+    world = make(A, obstacles=dock, wind=lambda t: (math.pi / 2, 9.0))
+    assert world.run(240, lambda w: w.position[1] > 150.0)
+    assert answer(world, "hold").text.startswith("to water with room: here a loiter has ")
+    assert world.run(600, lambda w: "waiting until told to go on" in w.state.why)
+    place = world.state.mission.route.points_en_m[-1]
+    assert world.skipper.voyage.area.clearance_m([place])[0] >= 21.0
+    world.run(60)
+    assert world.clearance() > world.skipper.config.margin_floor_m
+
+
+def test_hold_says_how_much_room_there_lacks_where_none_is_roomier():
+    dock = (box(-1200.0, -1500.0, -19.0, 1500.0), box(19.0, -1500.0, 1200.0, 1500.0))
+    world = make(A, obstacles=dock, wind=lambda t: (math.pi / 2, 9.0))
+    assert world.run(240, lambda w: w.position[1] > 150.0)
+    assert "m less of room than a loiter takes in this wind" in answer(world, "hold").text
+    assert "where there is room" in answer(sailing(), "hold").text
+
+
 def test_hold_on_the_way_to_the_loiter_that_ends_the_mission_is_here_too():
     world = sailing(A)
     world.run(600, is_done)

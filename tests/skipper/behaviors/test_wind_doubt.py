@@ -41,6 +41,8 @@ def test_she_loiters_while_it_lasts_and_sails_on_by_a_plan_from_where_she_is():
     assert not asked_since(world, begins, act.RequestPlan), "neither a plan nor a step of the ladder"
     assert said(world, "wind contradicted")
     assert 2 <= len(said(world, "held")) <= 3, "once a minute"
+    world.run(300)
+    assert not said(world, "no progress"), "none is looked for"
     world.extra["unsure"], ends = "", world.t
     assert world.run(60, lambda w: w.mode is Mode.AUTO)
     assert asked_since(world, ends, act.RequestPlan)[0].from_seq is None
