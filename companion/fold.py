@@ -591,7 +591,7 @@ class VoyageFold:
             and status.is_armed
             and status.mode in _SAILS
             and (
-                wind.health in {WindHealth.GOOD, WindHealth.LIGHT}
+                wind.health in {WindHealth.GOOD, WindHealth.LIGHT, WindHealth.UNTRUSTED}
                 or self.current.doubts_wind
                 or (self._anew != "" and wind.health is WindHealth.SETTLING)
             )

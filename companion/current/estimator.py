@@ -148,7 +148,8 @@ NEW_WATER_MPS, NEW_WATER_SPREADS = 0.5, 3.0  # ... no stronger than so many of t
 class Sailing:
     """One moment of the boat: velocity over ground [m/s], heading, and the wind over the ground.
 
-    ``is_driven``: its sails are sheeted and nothing else drives it; ``is_heard``: the wind is what the vane says now;
+    ``is_driven``: its sails are sheeted and nothing else drives it; ``is_heard``: the wind is what the vane says now,
+    not the last that was believed of one that is frozen: that is held against how the boat moves, and teaches nothing;
     ``age_s``: of the velocity and the heading;
     ``roll_rad``: positive to starboard, None where it is not told.
     """
@@ -231,7 +232,7 @@ class CurrentEstimator:
         is_doubted = self._check is not None and self._is_doubted(t_s, utc_s, now, self._check)
         if abs(difference_rad(cmath.phase(bow), cmath.phase(was_bow))) > STEADY_RAD_S * dt_s:
             self._unsteady_s = t_s
-        if is_doubted or t_s - self._taken_s < 0.9 * EVERY_S:
+        if is_doubted or not now.is_heard or t_s - self._taken_s < 0.9 * EVERY_S:
             return
         if t_s - self._unsteady_s < SETTLES_S:
             if t_s - self._steady_s > CIRCLES_S:
@@ -269,6 +270,7 @@ class CurrentEstimator:
             heading_rad=heading_rad,
             sigma_mps=math.sqrt(unknown),
             roll_rad=now.roll_rad,
+            is_heard=now.is_heard,
         )
         if self._trial is not None:  # a boat that is held turns all the time, in the water that its turns tell of
             current = self._trial.current_en_mps
@@ -279,7 +281,7 @@ class CurrentEstimator:
         if not check.doubt:
             self._trial = None
             return check.is_odd
-        if not check.is_winds:
+        if not check.is_winds and now.is_heard:
             if not was or self._trial is None:
                 self._trial = CurrentEstimator(self._speed, self._prior, speed_error=self._speed_error, checked=False)
             self._trial.update(t_s, utc_s, now)

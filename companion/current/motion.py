@@ -68,6 +68,7 @@ class MotionSample:
         heading_rad: of its bow, likewise a mean.
         sigma_mps: of the current along its heading.
         roll_rad: positive to starboard; None: not told.
+        is_heard: the wind is what the vane says now, not the last that was believed of one that is frozen.
     """
 
     along_mps: float
@@ -79,6 +80,7 @@ class MotionSample:
     heading_rad: float
     sigma_mps: float
     roll_rad: float | None = None
+    is_heard: bool = True
 
 
 class _Tally:
@@ -251,7 +253,8 @@ class MotionCheck:
     # ---------------------------------------------------------------------------------------- the doubt
     def _begin(self, t_s: float, now: MotionSample) -> None:
         heels = self._heels_to_windward(now)
-        self.fits_s, self._tally, self.is_winds = 0.0, _Tally(), heels or self._has_leapt(t_s)
+        self.fits_s, self._tally = 0.0, _Tally()
+        self.is_winds = heels or not now.is_heard or self._has_leapt(t_s)
         how = "astern" if now.along_mps < 0.0 else "ahead"
         moves = f"she makes {abs(now.along_mps):.1f} m/s {how} where {now.speed_mps:.1f} m/s were to be expected"
         if heels:
@@ -259,6 +262,8 @@ class MotionCheck:
         if self._has_leapt(t_s) and self._before_rad is not None:
             by = math.degrees(difference_rad(now.twd_from_rad, self._before_rad))
             self.doubt = f"the wind's direction leapt by {by:+.0f}° and {moves}: the vane was turned, or its offset"
+        elif not now.is_heard:
+            self.doubt = f"the vane is not believed, and {moves}: the wind is another than it said last"
         elif heels:
             self.doubt = f"{moves}: the wind is not where the vane says"
         else:

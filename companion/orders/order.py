@@ -56,7 +56,7 @@ TABLE: tuple[VerbRow, ...] = (
         number=1,
         stands=True,
         button="Hold here",
-        means="loiter here, where there is room near by, until told to go on",
+        means="loiter here, where there is room near by, else in the nearest water with room, until told to go on",
         refused="a person has her, the battery or a failsafe comes first, uploading is not permitted",
     ),
     VerbRow(
@@ -97,8 +97,8 @@ TABLE: tuple[VerbRow, ...] = (
         stands=True,
         means="sail to that place, then on to the goals that are left",
         refused="it is no position (0, 0; not a number; outside ±90 or ±180), on land, outside the fence, nearer to "
-        "something than the margin's floor, farther than 50 km (on a passage than its longest leg), or latitude and "
-        "longitude are swapped; she is not under way; as `hold`",
+        "something than any plan leads (the margin's floor, and her track beside it), farther than 50 km (on a passage "
+        "than its longest leg), or latitude and longitude are swapped; she is not under way; as `hold`",
     ),
     VerbRow(
         verb=Verb.REPLAN,

@@ -142,6 +142,19 @@ def test_a_doubt_ends_in_circles_that_are_sailed_as_they_should_be_and_in_no_oth
     assert doubted_motion(150.0).motion_doubt
 
 
+@pytest.mark.parametrize(("velocity", "doubts"), [((-1.1, 0.0), True), ((2.2, 0.0), False)])
+def test_a_frozen_vane_is_held_against_how_she_moves_and_teaches_nothing(velocity, doubts):
+    """The wind had veered, the sheet went by the old one: driven astern for 22 minutes, and nobody was told."""
+    estimator = sailed((60.0, -60.0, 100.0, -100.0), (0.0, 0.0))
+    before = estimator.view().samples_s
+    for t in range(400, 440):
+        now = replace(reading(float(t), 90.0, (0.0, 0.0)), is_heard=False, velocity_en_mps=velocity)
+        estimator.update(float(t), None, now)
+    assert ("the vane is not believed, and she makes 1.1 m/s astern" in estimator.motion_doubt) is doubts
+    assert estimator.doubts_wind is doubts
+    assert estimator.view().samples_s == before
+
+
 def test_turns_stops_and_sails_that_are_eased_teach_nothing():
     estimator = circled((0.5, 0.0), 30)
     assert estimator.view().samples_s == 0.0, "a manoeuvre"

@@ -7,6 +7,7 @@ answer may have been lost: it gets the same answer, and nothing is done twice.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -31,6 +32,7 @@ from companion.skipper.planning.diversions import (
 )
 from companion.skipper.planning.next_tack import next_tack
 from companion.skipper.planning.not_found import hold
+from companion.skipper.planning.track import steps
 from companion.skipper.step.actions import Acknowledge, ReplanReason, RequestPlan, StopOrders
 from companion.skipper.step.config import Learning
 from companion.skipper.step.context import StepContext
@@ -472,7 +474,14 @@ def goal_place(ctx: StepContext, wanted: Wanted) -> Found | str:
 
 
 def _trouble(ctx: StepContext, place: Place) -> str:
-    return place.trouble or place_trouble(ctx, "the place", _en(ctx, place))
+    trouble = place.trouble or place_trouble(ctx, "the place", _en(ctx, place))
+    if trouble:
+        return trouble
+    area, en_m, least_m = ctx.to_stay_in.area, _en(ctx, place), steps(ctx)[-1].margin_m
+    clearance_m = float(area.clearance_m([en_m])[0])
+    if math.hypot(*en_m) > area.reach_m or clearance_m >= least_m:
+        return ""
+    return f"the place is {clearance_m:.1f} m from {area.nearest_name(en_m)}: no plan leads nearer than {least_m:g} m"
 
 
 def _en(ctx: StepContext, place: Place) -> PointEn:

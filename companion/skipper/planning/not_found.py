@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from companion.frozen import changed
@@ -195,6 +196,6 @@ def hold(ctx: StepContext, why: str, *, anew: bool = False) -> None:
     if is_there and room <= 0.0:
         return  # in water that dries, as any place about here
     end = waypoint(ctx.voyage.frame.geo_from_en(*place), command=Command.NAV_LOITER_UNLIM)
-    why = f"{why}; loitering with {room:.0f} m of room"
+    why = f"{why}; loitering " + (f"with {room:.0f} m of room" if math.isfinite(room) else "in open water")
     n, route = state.mission.index, state.mission.route
     upload(ctx, route.led_aside(n, boat, [(end, place)], rung="hold", why=why), n + 1, why)

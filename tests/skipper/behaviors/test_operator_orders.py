@@ -70,6 +70,7 @@ def test_hold_is_here_and_lasts_until_told_to_go_on(guidance):
         assert distance_m(world.position, here) < 60.0
     assert world.state.phase is Phase.HOLDING
     assert "ordered by the ground station; waiting until told to go on" in world.state.why
+    assert world.state.mission.route.why.endswith("loitering in open water")
     assert world.count(act.UploadMission) == 2, "the first plan and the loiter"
     assert answer(world, "go_on").text == "the end of hold: on to A"
     assert world.run(1500, is_done)
@@ -220,6 +221,7 @@ def test_a_second_place_takes_the_place_of_the_first():
     [
         (geo(0.0, 150.0), "not in free water"),
         (geo(0.0, 172.0), "m from o0: the margin's floor is"),
+        (geo(0.0, 179.0), "the place is 9.0 m from o0: no plan leads nearer than "),
         (geo(60_000.0, 0.0), "60 km from this water"),
         ("goal -1.3 51.1", "latitude and longitude are swapped?"),
         ("refuge", "the mission has no refuge"),
