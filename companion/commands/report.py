@@ -182,12 +182,13 @@ def in_words(record: VoyageRecord) -> list[str]:
 
 
 def boat_file_lines(s: Summary) -> list[str]:
-    """Return that her boat file is not the boat that sailed, and what makes it so; empty: nothing tells it."""
+    """Return that her boat file is not the boat that sailed, and the remedy; empty: nothing tells it."""
     share = speed_share(s)
     if share is None or abs(share - 1.0) < FILE_OFF:
         return []
-    found = f"She sailed at about {5 * round(20.0 * share)} % of her boat file's speeds: after some hours under sail"
-    return [f"{found} `companion boat learn VOYAGE_DIR ...` makes a file of the boat that she is."]
+    how = "slower" if share < 1.0 else "faster"
+    found = f"She sailed {how} than her boat file says, by {100.0 * FILE_OFF:.0f} % or more"
+    return [f"{found}: after some hours under sail `companion boat learn VOYAGE_DIR ...` makes a file of what she is."]
 
 
 def speed_share(s: Summary) -> float | None:
