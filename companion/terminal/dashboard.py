@@ -387,9 +387,8 @@ def _plan(view: View, *, is_wide: bool) -> Row:
     there = "" if plan.there_s is None else f"there in {span_text(plan.there_s)}"
     late = "" if plan.there_late_s is None or not is_wide else f" (90 %: {span_text(plan.there_late_s)})"
     risk = "" if plan.path_risk is None else f"off plan {share_text(plan.path_risk)}"
-    text = ", ".join(
-        part for part in (there + late, risk, f"#{number_text(plan.number)} {span_text(plan.age_s)} old") if part
-    )
+    which = f"#{number_text(plan.number)} {span_text(plan.age_s)} old" if plan.number is not None else plan.why
+    text = ", ".join(part for part in (there + late, risk, which) if part)
     return "Plan", f"{text}, {plan.bound_for}" if plan.bound_for else text, Style.PLAIN
 
 

@@ -655,17 +655,20 @@ def plan_of(
 ) -> values.PlanView | None:
     """Return the plan that is sailed; ``legs`` are those of the plans that it was spliced from, the newest first.
 
-    Where a field steers it is the plan that waits on board, without what is true only of a boat that sails it.
+    Where a field steers it is the plan that waits on board, without what is true only of a boat that sails it; where
+    she was led aside it is the way that she was led, without what is true only of a plan.
     """
     route, sailed, state = step.state.mission.route, step.sailed, step.state
     if route is None:
         return None
+    is_planned = route.cost_s is not None  # else she was led aside, by a way that no plan is behind
+    chosen = chosen if is_planned else None
     begin, count = min(state.mission.index, len(route.items)), len(route.items)
     left = tuple(_leg(route, n, legs) for n in range(begin, count))
     tack = next_tack(step, voyage.boat)
     return values.PlanView(
-        number=route.plan_id,
-        age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1),
+        number=route.plan_id if is_planned else None,
+        age_s=rounded(max(0.0, step.snapshot.t_s - route.plan_t_s), 1) if is_planned else None,
         reason="" if chosen is None else chosen.reason,
         why=(
             f"As it was made{'' if chosen.is_numbered else ', courses counted from its start'}: {chosen.why}"
@@ -674,8 +677,8 @@ def plan_of(
         ),
         rung=route.rung,
         bound_for=route.bound_for,
-        twd_from_deg=compass(route.plan_twd_from_rad),
-        tws_mps=rounded(route.plan_tws_mps),
+        twd_from_deg=compass(route.plan_twd_from_rad) if is_planned else None,
+        tws_mps=rounded(route.plan_tws_mps) if is_planned else None,
         delta_s=rounded(route.delta_s, 4),
         promised_risk=None if sailed is None else rounded(1.0 - sailed.delta_s, 4),
         path_risk=None if sailed is None else rounded(_risk_left(sailed, left), 4),

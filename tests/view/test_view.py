@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from bench.pages import schema
 from companion.compose import config_of, voyage_of
 from companion.current import STILL_WATER, over_water
+from companion.eta import UNKNOWN
 from companion.fold import Step
 from companion.geo.angles import difference_rad
 from companion.geo.frame import LocalFrame
@@ -33,7 +34,17 @@ from companion.telemetry.folder.reading import RecordedChart
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
 from companion.view.area import area_of
 from companion.view.events import _plan, nearest_of
-from companion.view.parts import Chosen, _bound_s, _risk_left, apparent, laylines_of, no_go_of, polar_of, refuges_of
+from companion.view.parts import (
+    Chosen,
+    _bound_s,
+    _risk_left,
+    apparent,
+    laylines_of,
+    no_go_of,
+    plan_of,
+    polar_of,
+    refuges_of,
+)
 from sitl.scenario.scenario import EventSpec
 from tests.view.conftest import sail, write_mission
 
@@ -86,6 +97,26 @@ def test_the_bound_of_a_plan_is_not_told_of_what_is_left_of_it(beat):
         assert view.plan.bound_s is None or view.plan.cost_s >= view.plan.bound_s - 0.1
 
 
+def test_of_a_way_that_she_is_led_aside_nothing_of_a_plan_is_told(beat):
+    """ "plan 1, judged 44 s ago" stood beside a loiter that was ordered, and that plan's sentence beside other legs."""
+    step = next(step for step in beat.steps if step.state.mission.route is not None and step.sailed is not None)
+    route = step.state.mission.route
+    made = next(
+        o.plan for s in beat.steps for o in s.snapshot.outcomes if isinstance(o, PlanOutcome) and o.plan.has_path
+    )
+    chosen = Chosen(t_s=0.0, reason="start", plan=made, why="Leg 1 passes the rock.")
+    aside = route.led_aside(
+        0, (0.0, 0.0), [(route.items[-1], (5.0, 5.0))], rung="hold", why="ordered; loitering in open water"
+    )
+    mission = replace(step.state.mission, route=aside, index=0)
+    held = replace(step, state=replace(step.state, mission=mission))
+    plan, sailed = (plan_of(s, s.voyage, UNKNOWN, chosen, ()) for s in (held, step))
+    assert (plan.number, plan.age_s, plan.twd_from_deg, plan.reason) == (None, None, None, "")
+    assert plan.why == "ordered; loitering in open water"
+    assert sailed.number == route.plan_id
+    assert "Leg 1 passes the rock." in sailed.why
+
+
 def test_plans_are_numbered_as_they_are_made_and_their_legs_as_the_mission_on_board_has_them(beat):
     """The first of a voyage was "plan 2", then came 6 and 7, of 3 plans; and "course 1" was leg 4 of the table."""
     titles = [
@@ -94,7 +125,7 @@ def test_plans_are_numbered_as_they_are_made_and_their_legs_as_the_mission_on_bo
     assert [int(re.match(r"plan (\d+): ", title)[1]) for title in titles] == list(range(1, len(titles) + 1))
     last = beat.under_way[-1]
     assert last.figures.plans == len(titles) > 0
-    assert {v.plan.number for v in beat.under_way} <= set(range(1, len(titles) + 1))
+    assert {v.plan.number for v in beat.under_way} <= {None, *range(1, len(titles) + 1)}
     told = 0
     for view in beat.under_way:
         tacked = re.match(r"As it was made: .*A tack leads into legs? ([^.]*)[.]", view.plan.why)
