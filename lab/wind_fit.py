@@ -25,7 +25,7 @@ from scipy.special import erf
 from companion.errors import InputError
 from companion.wind.estimators import CONSTANTS, SIGMA_MAX_RAD, normal_half_width
 from companion.wind.estimators import forecaster_kernels as kernel
-from companion.wind.study import FEWEST, HORIZONS_S, SCORED_LEVELS, Record, asked_rows, parse_csv, targets
+from companion.wind.study import FEWEST, SCORED_HORIZONS_S, SCORED_LEVELS, Record, asked_rows, parse_csv, targets
 from lab.simulated_wind import equation_17
 
 Array = NDArray[np.float64]
@@ -57,17 +57,17 @@ class Prepared:
         rows = asked_rows(record)
         self.ask = np.zeros(len(record), dtype=np.bool_)
         self.ask[rows] = True
-        self.target = [targets(record, h, rows) for h in HORIZONS_S]
+        self.target = [targets(record, h, rows) for h in SCORED_HORIZONS_S]
 
     def errors(self, constants: kernel.Constants) -> list[tuple[Array, Array, Array, Array, Array]]:
         """Return per horizon: direction error, sigma, speed error, its sigma, half widths (n, levels)."""
         state = kernel.new_state(constants)
         prior = state.quantile.copy()
         out = kernel.replay(
-            state, constants, prior, self.t_s, self.x, self.speed, self.ask, np.array(HORIZONS_S), _Z, _ZP
+            state, constants, prior, self.t_s, self.x, self.speed, self.ask, np.array(SCORED_HORIZONS_S), _Z, _ZP
         )
         found = []
-        for a in range(len(HORIZONS_S)):
+        for a in range(len(SCORED_HORIZONS_S)):
             good = self.target[a] >= 0
             row, o = self.target[a][good], out[good, a]
             error = (self.x[row] - o[:, 0] + math.pi) % (2.0 * math.pi) - math.pi
@@ -98,7 +98,7 @@ def crps_circular(error: Array, sigma: Array) -> Array:
 
 def figures(constants: kernel.Constants, prepared: Sequence[Prepared]) -> Array:
     """Return (records, horizons, 7): CRPS [rad], three coverages, speed CRPS, mean |error|, speed mean |error|."""
-    table = np.full((len(prepared), len(HORIZONS_S), 7), np.nan)
+    table = np.full((len(prepared), len(SCORED_HORIZONS_S), 7), np.nan)
     for i, p in enumerate(prepared):
         for a, (error, sigma, speed_error, speed_sigma, half) in enumerate(p.errors(constants)):
             if error.size >= FEWEST:
@@ -128,7 +128,7 @@ def fit(
     """Return the constants fitted to ``prepared`` (and, lightly, to ``simulated``)."""
     # Expected errors: a power law in the horizon through the records' mean |error|.
     table = np.nanmean(figures(start, prepared), axis=0)
-    log_h = np.log(np.array(HORIZONS_S) / 60.0)
+    log_h = np.log(np.array(SCORED_HORIZONS_S) / 60.0)
     slope, level = np.polyfit(log_h, np.log(table[:, 5]), 1)
     speed_slope, speed_level = np.polyfit(log_h, np.log(table[:, 6]), 1)
     wind = float(np.mean([max(2.0, float(np.mean(p.speed))) for p in prepared]))
@@ -180,7 +180,7 @@ def _tails(constants: kernel.Constants, prepared: Sequence[Prepared]) -> Array:
 
 def _report(title: str, table: Array) -> str:
     mean = np.nanmean(table, axis=0)
-    lines = [title, "  horizon s     " + " ".join(f"{h:7.0f}" for h in HORIZONS_S)]
+    lines = [title, "  horizon s     " + " ".join(f"{h:7.0f}" for h in SCORED_HORIZONS_S)]
     lines.append("  CRPS deg      " + " ".join(f"{math.degrees(v):7.2f}" for v in mean[:, 0]))
     lines.append("  MAE deg       " + " ".join(f"{math.degrees(v):7.2f}" for v in mean[:, 5]))
     lines.extend(

@@ -415,7 +415,7 @@ def by_age(age_s: float | None) -> values.Grade:
     return "unknown" if age_s is None else "bad" if age_s > SILENT_S else "poor" if age_s > LATE_S else "good"
 
 
-HORIZONS_S = (0.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+SHOWN_AHEAD_S = (0.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 WEDGES_S = (0.0, 60.0, 300.0)
 INTERVAL_LEVELS = (0.5, 0.8, 0.95)
 SWING_LEVEL = 0.8  # of the fan that a layline is drawn with
@@ -490,7 +490,7 @@ def bands_of(forecast: WindForecast) -> tuple[values.Band, ...]:
             tws_sigma_mps=rounded(_at(forecast, at_s, "sigma_tws_mps")),
             half_deg=tuple(degrees(half_width_rad(forecast, at_s, level)) for level in INTERVAL_LEVELS),
         )
-        for at_s in HORIZONS_S
+        for at_s in SHOWN_AHEAD_S
         if at_s <= last_s
     )
 

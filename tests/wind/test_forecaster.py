@@ -8,7 +8,7 @@ import pytest
 from companion.wind import Forecaster
 from companion.wind.estimators import forecaster_kernels as kernel
 from companion.wind.estimators.forecaster import CONSTANTS
-from companion.wind.study.score import HORIZONS_S
+from companion.wind.study.score import SCORED_HORIZONS_S
 from lab.simulated_wind import NOISE_RADPS, RHO_HZ, equation_17, weather
 from lab.wind_fit import Prepared, crps_circular, figures
 
@@ -26,7 +26,7 @@ def oracle(record, mean_rad, prepared):
     x = (record.twd_from_rad - mean_rad + math.pi) % (2.0 * math.pi) - math.pi
     rows = np.flatnonzero(prepared.ask)
     found = []
-    for a, h in enumerate(HORIZONS_S):
+    for a, h in enumerate(SCORED_HORIZONS_S):
         good = prepared.target[a] >= 0
         keep = (1.0 - RHO_HZ) ** h
         error = x[prepared.target[a][good]] - keep * x[rows[good]]
@@ -110,7 +110,7 @@ def test_scores_of_the_fit_are_those_of_the_score():
     record = weather(21, seconds=2400.0)
     slow = score(record, Forecaster())
     fast = figures(CONSTANTS, [Prepared(record)])[0]
-    for a, h in enumerate(HORIZONS_S):
+    for a, h in enumerate(SCORED_HORIZONS_S):
         of = slow.at(h)
         assert of is not None
         assert of.crps_rad == pytest.approx(fast[a, 0], rel=0.02)

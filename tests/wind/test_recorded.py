@@ -6,7 +6,7 @@ import pytest
 from companion.wind import make
 from companion.wind.estimators.forecaster import CONSTANTS
 from companion.wind.study.records import parse_csv
-from companion.wind.study.score import HORIZONS_S, average, score
+from companion.wind.study.score import SCORED_HORIZONS_S, average, score
 from lab.wind_fit import Prepared, figures
 
 pytestmark = pytest.mark.winddata
@@ -30,7 +30,7 @@ def test_better_than_the_kalman_filter_and_the_mean(records):
         name: {s.horizon_s: s.crps_rad for s in average([score(r, make(name)) for r in records])}
         for name in ("kalman", "mean90")
     }
-    default = dict(zip(HORIZONS_S, mean.tolist(), strict=True))
+    default = dict(zip(SCORED_HORIZONS_S, mean.tolist(), strict=True))
     assert default[120.0] <= 0.65 * rivals["kalman"][120.0]
     assert default[10.0] <= 0.72 * rivals["kalman"][10.0]
     assert default[120.0] <= 0.93 * rivals["mean90"][120.0]

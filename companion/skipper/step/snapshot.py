@@ -25,7 +25,7 @@ from companion.traffic import TrafficPicture
 SPEED_MPS = 5.0
 SIGMA_RAD = 1e-3
 SETTLED_S = 1e6
-_HORIZONS_S = np.array([0.0, 3600.0])
+_SETTLED_AT_S = np.array([0.0, 3600.0])
 _LEVELS = np.array([0.5, 0.8, 0.9, 0.95])
 
 
@@ -249,10 +249,10 @@ def wind_mean(snapshot: Snapshot) -> tuple[float, float] | None:
 
 def still_air(t_s: float) -> WindEstimate:
     """Return the wind that a motorboat is planned in: steady, believed, and of no consequence."""
-    n = len(_HORIZONS_S)
+    n = len(_SETTLED_AT_S)
     forecast = WindForecast(
         t_s=t_s,
-        horizon_s=_HORIZONS_S,
+        horizon_s=_SETTLED_AT_S,
         mean_twd_from_rad=np.zeros(n),
         sigma_twd_rad=np.full(n, SIGMA_RAD),
         mean_tws_mps=np.full(n, SPEED_MPS),

@@ -3,7 +3,7 @@
 from companion.wind.study.records import Ar1Fit, Record, fit_ar1, parse_csv
 from companion.wind.study.score import (
     FEWEST,
-    HORIZONS_S,
+    SCORED_HORIZONS_S,
     SCORED_LEVELS,
     Characterisation,
     HorizonScore,
@@ -18,7 +18,7 @@ from companion.wind.study.score import (
 
 __all__ = [
     "FEWEST",
-    "HORIZONS_S",
+    "SCORED_HORIZONS_S",
     "SCORED_LEVELS",
     "Ar1Fit",
     "Characterisation",

@@ -25,7 +25,7 @@ from companion.wind.estimators.estimator import Estimator, normal_half_width
 from companion.wind.estimators.kalman import R_DEG, WINDOW
 from companion.wind.study.records import Record
 
-HORIZONS_S = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
+SCORED_HORIZONS_S = (10.0, 30.0, 60.0, 120.0, 300.0, 600.0)
 SCORED_LEVELS = (0.50, 0.80, 0.95)
 STEP_S, WARM_S, MIN_MPS, WITHIN_S = 30.0, 600.0, 1.0, 1.05
 TRACE_S = 120.0  # [s] horizon of Score.trace and Score.pit
@@ -115,7 +115,7 @@ def score(
     record: Record,
     estimator: Estimator,
     *,
-    horizons_s: Sequence[float] = HORIZONS_S,
+    horizons_s: Sequence[float] = SCORED_HORIZONS_S,
     progress: Callable[[int], None] | None = None,
 ) -> Score:
     """Feed ``record`` to ``estimator`` and score it; ``progress`` hears the number of rows done now and then."""
