@@ -202,6 +202,20 @@ def test_what_her_file_says_of_her_speeds_is_what_the_current_reckons_with(error
     assert fold.current is not first
 
 
+@pytest.mark.parametrize("health", [WindHealth.GOOD, WindHealth.UNTRUSTED, WindHealth.NONE])
+def test_a_boat_whose_vane_is_not_believed_is_held_against_her_motion_all_the_same(health):
+    """Driven astern for 22 minutes while the vane stood still: nobody compared, for a wind that is not believed."""
+    fold = fresh()
+    seen = heard(fold, 1, 60)
+    beat = wire.MAVLink_heartbeat_message(10, 3, 128 | 1, 10, 4, 3)  # a boat of ArduRover's, armed, in AUTO
+    [frame] = Codec(9, 9).feed(Codec(1, 1).pack(beat))
+    fold.message(60.0, frame)
+    fold.tick(60.0)
+    sailing = fold._sailing(60.0, replace(seen.wind, health=health))
+    assert sailing.is_driven is (health is not WindHealth.NONE)
+    assert sailing.is_heard is (health is not WindHealth.UNTRUSTED)
+
+
 @pytest.mark.parametrize("is_engaged", [True, False])
 def test_while_the_last_resort_steers_the_step_is_off_the_plan(is_engaged):
     fold = fresh()

@@ -190,7 +190,8 @@ def _held(ctx: StepContext) -> str:
     boat, bound = ctx.boat_en, to_be_held(ctx, "")
     lacks_m = -1.0 if boat is None else room_lacking_m(ctx, boat)
     if bound is not None and bound.has_place:
-        return f"to {bound.name}: here a loiter has {lacks_m:.0f} m less than it takes in this wind"
+        lacks = f": here a loiter has {lacks_m:.0f} m less than it takes in this wind" if lacks_m > LACK_M else ""
+        return f"to {bound.name}{lacks or ' near by'}"
     if lacks_m > LACK_M:
         return f"loitering here, with {lacks_m:.0f} m less of room than a loiter takes in this wind"
     return "loitering here, where there is room"

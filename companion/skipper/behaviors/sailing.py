@@ -45,6 +45,7 @@ from companion.skipper.planning.diversions import diversion, is_at_rest, is_comp
 from companion.skipper.planning.not_found import FOUL, hold
 from companion.skipper.planning.right_of_way import stands_on
 from companion.skipper.planning.triggers import find_trigger, is_buoy
+from companion.skipper.planning.uploads import is_way_clear
 from companion.skipper.planning.vessels import near
 from companion.skipper.planning.waits import stay_left_s
 from companion.skipper.step import Diversion, Guidance, Phase, ReplanReason, SteerHeading, StepContext
@@ -319,7 +320,7 @@ def _plan_and_resume(ctx: StepContext) -> None:
         return
     bound = diversion(ctx)
     stays = bound is not None and not bound.has_place
-    if bound is not None and stays and not (is_at_rest(ctx) and (_is_outside(ctx) or _is_way_clear(ctx))):
+    if bound is not None and stays and not (is_at_rest(ctx) and (_is_outside(ctx) or is_way_clear(ctx))):
         _stay(ctx, bound, anew=True)
     elif ctx.state.pending.upload is None:
         _consider(ctx)
@@ -345,20 +346,8 @@ def _goes_on_at_once(ctx: StepContext) -> bool:
         state.steering.own_mode in HOMEWARD
         and state.pending.upload is None
         and bool(ctx.ahead())
-        and (not _is_outside(ctx) and _is_way_clear(ctx))
+        and (not _is_outside(ctx) and is_way_clear(ctx))
     )
-
-
-def _is_way_clear(ctx: StepContext) -> bool:
-    """Return whether what is left of the way on board, straight from where the boat is, comes no nearer than it may.
-
-    That is the margin's floor, or what the boat has about it now where that is less.
-    """
-    boat, leg, area = ctx.boat_en, ctx.leg(), ctx.voyage.area
-    if boat is None or leg is None:
-        return False
-    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m, float(area.clearance_m([boat])[0]) - HAIR_M)
-    return area.path_clearance_m([boat, leg[1], *ctx.ahead()[1:]]) >= max(0.0, floor_m)
 
 
 def _is_outside(ctx: StepContext) -> bool:

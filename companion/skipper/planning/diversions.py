@@ -348,14 +348,19 @@ def _stay(ctx: StepContext, why: str) -> Diversion | None:
 
 
 def to_be_held(ctx: StepContext, why: str) -> Diversion | None:
-    """Return a diversion to stay, or to water with room where there is too little near by; None: as ``_stay``."""
-    boat, water = ctx.boat_en, ctx.to_stay_in.area
-    lacks_m = 0.0 if boat is None or not ctx.ahead() else room_lacking_m(ctx, boat)
-    if boat is not None and lacks_m > LACK_M:
+    """Return a diversion to stay, or to water with room where here is too little of it; None: as ``_stay``.
+
+    That is planned to where it is near by, too: the turn towards it may be what there is no room for.
+    """
+    boat, water, wanted_m = ctx.boat_en, ctx.to_stay_in.area, roomy_m(ctx.known_config)
+    if boat is None or not ctx.ahead():
+        return _stay(ctx, why)
+    is_bound = _is_bound(ctx, ROOM)
+    if is_bound or float(water.clearance_m([boat])[0]) < wanted_m - LACK_M:
         room = _to_room(ctx, boat, why)
         if room is not None and room.en_m is not None:
-            here_m, there_m = water.clearance_m([held_at(ctx, boat)[0], room.en_m])
-            if _is_bound(ctx, ROOM) or there_m > here_m + min(lacks_m, ROOMIER_BY_M) - LACK_M:
+            near_m, there_m = water.clearance_m([held_at(ctx, boat)[0], room.en_m])
+            if is_bound or there_m > near_m + min(wanted_m - near_m, ROOMIER_BY_M) - LACK_M:
                 return room
     return _stay(ctx, why)
 

@@ -9,10 +9,10 @@ from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.planners import AUTO
 from companion.skipper.planning.asking import request
-from companion.skipper.planning.diversions import held_at
-from companion.skipper.planning.tides import opens_next
+from companion.skipper.planning.diversions import LACK_M, held_at, room_lacking_m
+from companion.skipper.planning.tides import closes_ahead, opens_next
 from companion.skipper.planning.track import of_way, steps
-from companion.skipper.planning.uploads import is_on_board_sound, is_sound, leads_there, too_risky, upload
+from companion.skipper.planning.uploads import is_on_board_sound, is_sound, is_way_clear, leads_there, too_risky, upload
 from companion.skipper.planning.vessels import lies_in_the_way, meetings
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import PendingPlan, Phase
@@ -82,6 +82,26 @@ def _risk_of_old(ctx: StepContext, pending: PendingPlan) -> str:
     return too_risky(pending.problem, [boat, *ahead], heading_rad=vehicle.heading_rad)
 
 
+def _stays_as_it_is(ctx: StepContext, pending: PendingPlan) -> str:
+    """Return why what is on board is sailed on at the ladder's end rather than left for a loiter; empty: it is left.
+
+    A loiter, and the turn to it, take room that nobody has judged: where there is too little, what is on board stays
+    as long as its legs keep the floor. Where it is sound, it stays for a loiter's sake only.
+    """
+    boat, vehicle = ctx.boat_en, ctx.snapshot.vehicle
+    if boat is None or vehicle is None or not ctx.ahead():
+        return ""
+    is_sound = is_on_board_sound(ctx) and _keeps_floor(ctx, pending)
+    risk = _risk_of_old(ctx, pending)
+    if is_sound and risk:
+        return risk
+    lack_m = room_lacking_m(ctx, boat)
+    if lack_m > LACK_M and (is_sound or (is_way_clear(ctx) and closes_ahead(ctx) is None)):
+        return f"a loiter near by has {lack_m:.0f} m less than it takes in this wind"
+    to_it = of_way(pending.problem, [boat, held_at(ctx, boat)[0]], heading_rad=vehicle.heading_rad, before_en=None)
+    return "the turn to a loiter near by comes below the floor" if is_sound and not to_it.is_within_error else ""
+
+
 def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
     """Keep the old plan while it is sound, else take the next step of the ladder, at last hold."""
     ladder = steps(ctx)
@@ -113,12 +133,12 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         if request(ctx, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
             return
     ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(state.plans.retry), rung=0))
-    risk = _risk_of_old(ctx, pending)
-    if risk and state.mission.route is not None and not met and is_on_board_sound(ctx) and _keeps_floor(ctx, pending):
+    stays = "" if met else _stays_as_it_is(ctx, pending)
+    if stays:
         ctx.say(
             Severity.WARNING,
             "no plan",
-            f"no plan, whatever is given up for one ({reason}): the old one stays; {risk}",
+            f"no plan, whatever is given up for one ({reason}): the old one stays; {stays}",
             every_s=0.0,
         )
         return

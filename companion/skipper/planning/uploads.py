@@ -31,6 +31,7 @@ from companion.words import counted
 
 SPARE_M = 0.3  # a boat below the floor may come no nearer than this more: the turn away takes room
 TACKS_RISK = 1e-3  # a chance of contact by failed tacks is greater than another by more than this
+NO_NEARER_M = 0.5  # a way clears what a boat lies in to within this
 MARGIN_M = 0.1  # margins that differ by less are the same
 
 
@@ -279,6 +280,18 @@ def is_on_board_sound(ctx: StepContext) -> bool:
     """Return whether what is left of the mission on board is sound from where the boat is."""
     boat, ahead = ctx.boat_en, ctx.ahead()
     return boat is not None and bool(ahead) and is_sound(ctx, [boat, *ahead]) and closes_ahead(ctx) is None
+
+
+def is_way_clear(ctx: StepContext) -> bool:
+    """Return whether what is left of the way on board, straight from where the boat is, comes no nearer than it may.
+
+    That is the margin's floor, or what the boat has about it now where that is less.
+    """
+    boat, leg, area = ctx.boat_en, ctx.leg(), ctx.voyage.area
+    if boat is None or leg is None:
+        return False
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m, float(area.clearance_m([boat])[0]) - NO_NEARER_M)
+    return area.path_clearance_m([boat, leg[1], *ctx.ahead()[1:]]) >= max(0.0, floor_m)
 
 
 def is_sound(ctx: StepContext, way: Sequence[PointEn]) -> bool:

@@ -90,6 +90,19 @@ def test_hold_where_a_loiter_takes_more_than_there_is_leads_to_water_with_room()
     assert world.clearance() > world.skipper.config.margin_floor_m
 
 
+def test_hold_beside_room_is_planned_to_there_and_not_turned_to_unjudged():
+    """The pool is 20 m off, and the turn towards it was what there was no room for: onto the bank."""
+    dock = (box(-200.0, -400.0, -19.0, 175.0), box(19.0, -400.0, 200.0, 175.0))
+    world = make(A, obstacles=dock, wind=lambda t: (math.pi / 2, 9.0))
+    assert world.run(240, lambda w: w.position[1] > 155.0)
+    planned = world.count(act.RequestPlan)
+    assert answer(world, "hold").text == f"to water with room near by, until {Verb.GO_ON}"
+    assert world.run(600, lambda w: "waiting until told to go on" in w.state.why)
+    assert world.count(act.RequestPlan) > planned
+    assert world.state.mission.route.plan_id > 0
+    assert world.skipper.voyage.area.clearance_m([world.state.mission.route.points_en_m[-1]])[0] >= 21.0
+
+
 def test_hold_says_how_much_room_there_lacks_where_none_is_roomier():
     dock = (box(-1200.0, -1500.0, -19.0, 1500.0), box(19.0, -1500.0, 1200.0, 1500.0))
     world = make(A, obstacles=dock, wind=lambda t: (math.pi / 2, 9.0))

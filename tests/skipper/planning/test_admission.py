@@ -197,6 +197,27 @@ def test_a_way_that_lacks_less_than_the_predictions_error_stays_when_nothing_bet
         assert asks_for_less is not stays
 
 
+BANKS = (shapely.box(-60.0, -300.0, -16.0, 400.0), shapely.box(16.0, -300.0, 60.0, 400.0))
+
+
+@pytest.mark.parametrize(
+    ("obstacles", "stays"),
+    [(BANKS, True), ((*BANKS, shapely.box(-2.0, 60.0, 2.0, 70.0)), False), ((), False)],
+    ids=["between banks", "with a rock on the way on board", "in open water"],
+)
+def test_at_the_ladders_end_what_is_on_board_is_not_left_for_a_loiter_without_room(obstacles, stays):
+    """Between two banks a loiter was uploaded on "no plan at all", and she turned onto one of them."""
+    way = route((0.0, 100.0), (0.0, 200.0), (0.0, 200.0))
+    ctx = moment(way, obstacles=obstacles, heading_deg=0.0, twd_deg=90.0, config={"margin_m": 10.0})
+    assert request(ctx, ReplanReason.ORDER, rung=len(steps(ctx)) - 1)
+    pending = ctx.state.pending.plan
+    ctx.actions.clear()
+    not_found(ctx, replace(pending, facts=replace(pending.facts, bound_for="home")), "none")
+    assert bool(uploads(ctx.actions)) is not stays
+    [says] = [a.text for a in ctx.actions if isinstance(a, Announce)]
+    assert ("the old one stays; a loiter near by has" in says) is stays
+
+
 def test_from_below_the_floor_only_what_comes_no_nearer_goes_on_board():
     world = sailing()
     beside = (-7.0, 100.0)  # 3 m from the rock, on its eastern side, heading along it
