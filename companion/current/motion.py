@@ -234,8 +234,8 @@ class MotionCheck:
             self.fits_s, self._tally, self._before_rad = 0.0, _Tally(), was
             self._back_s = self._moored_s = 0.0
             self.doubt = (
-                f"the wind's direction leapt by {math.degrees(by_rad):+.0f}°, farther than a wind shifts: "
-                "the vane was turned, or its offset"
+                f"the wind's direction leapt by {math.degrees(by_rad):+.0f}°, farther than a wind shifts "
+                "but in a front: the vane was turned, its offset was, or the wind is new"
             )
 
     def _look_for_its_return(self, twd_from_rad: float, dt_s: float, *, is_driven: bool) -> None:

@@ -17,6 +17,7 @@ from companion.geofence.mission import place_troubles, read_mission
 from companion.messages import GeoPoint
 from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
+from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.way import KEEP_SHARE, Side
 
 SAME_M = 1.0  # two goals so near are one mark that is passed twice
@@ -75,6 +76,7 @@ def check_mission(
                 if troubles
                 else (
                     *field_findings_of(mission),
+                    *_out_of_reach(mission),
                     *_roundings(mission),
                     *line_findings(mission),
                     *_circles(mission),
@@ -85,6 +87,25 @@ def check_mission(
             *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told),
         ),
     )
+
+
+def _out_of_reach(mission: Mission) -> Iterator[Finding]:
+    """Yield the places to reach that every step of the ladder keeps clear of: its floor, and a straight leg's track."""
+    voyage = voyage_of(mission)
+    least_m = min(min(mission.margin_floor_m, mission.margin_m) + TRACKS_M[0], mission.margin_m)
+    for number, goal in enumerate(voyage.goals, start=1):
+        if goal.side is not Side.NONE or goal.line or goal.box or goal.search or goal.field:
+            continue
+        clear_m = float(voyage.area.clearance_m([goal.en_m])[0])
+        if clear_m < least_m:
+            yield Finding(
+                severity=FindingLevel.ERROR,
+                code=Code.GOAL_OUTSIDE,
+                place=f"[[goal]] {number}",
+                text=f"lies {max(0.0, clear_m):.1f} m from {voyage.area.nearest_name(goal.en_m) or 'something'} and is "
+                f"never sailed to: no plan comes nearer than {least_m:g} m, the floor and what her track takes",
+                remedy="move it off, or let [area] margin_m and margin_floor_m be smaller",
+            )
 
 
 def _roundings(mission: Mission) -> Iterator[Finding]:

@@ -6,7 +6,7 @@ from companion.cli import main
 from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.geofence.mission.text import dump_options, parse_options
-from companion.mission_check import require_sailable
+from companion.mission_check import check_mission, require_sailable
 
 GATE = """
 name = "m"
@@ -189,3 +189,16 @@ def test_the_sweeps_of_a_search_are_told_and_drawn(tmp_path, capsys):
     load(tmp_path, SEARCH, rock=FAR)
     assert main(["mission", "check", str(tmp_path / "m.toml"), "--plot", str(tmp_path / "m.png"), "--no-plan"]) == 0
     assert "Area: 10 sweeps, 1" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("floor_m", "is_reached"), [(4.0, False), (2.0, True)])
+def test_a_goal_that_every_step_of_the_ladder_keeps_clear_of_is_said_before_sailing(tmp_path, floor_m, is_reached):
+    """It was "in order" 5 m from its fence with a floor of 4 m, and she waited before it for forty minutes."""
+    ring = "-0.01 -0.01, 0.01 -0.01, 0.01 0.01, -0.01 0.01, -0.01 -0.01"
+    (tmp_path / "fence.wkt").write_text(f"w|inclusion|POLYGON (({ring}))")
+    (tmp_path / "m.toml").write_text(
+        "[start]\nlat = 0.0\nlon = 0.0\n[[goal]]\nlat = 0.00995478\nlon = 0.0\n"
+        f'[area]\nfence = "fence.wkt"\nmargin_m = 8.0\nmargin_floor_m = {floor_m}\n'
+    )
+    told = [f.text for f in check_mission(tmp_path / "m.toml").findings if "never sailed to" in f.text]
+    assert bool(told) is not is_reached

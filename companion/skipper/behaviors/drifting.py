@@ -24,6 +24,7 @@ from companion.skipper.step.missions import ROOMIER_M
 from companion.skipper.step.state import Fix, Phase
 from companion.skipper.way import PointEn, distance_m, water_at
 from companion.skipper.way.drift import DriftAhead, drift_ahead, floor_from_m
+from companion.skipper.way.voyage import water_to_keep
 
 STEERAGE_MPS = 0.4  # less wind than this moves no boat that could be steered
 DRIFT_MPS = 0.15  # a slower velocity is a receiver's noise
@@ -133,7 +134,7 @@ def drift(ctx: StepContext) -> DriftAhead | None:
         return None
     if not (wind[1] < STEERAGE_MPS or _is_carried(ctx, boat, ground)):
         return None
-    water = water_at(ctx.voyage.area, boat)
+    water = water_to_keep(ctx.voyage.area, boat)
     here_m = float(water.clearance_m([boat])[0])
     floor_m = floor_from_m(here_m, min(ctx.config.margin_floor_m, ctx.config.margin_m))
     return drift_ahead(water, boat, ground, floor_m=floor_m)

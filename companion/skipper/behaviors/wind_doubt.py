@@ -25,7 +25,7 @@ from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Command, Mode, Severity, waypoint
 from companion.skipper.behaviors.drifting import goes_astern
 from companion.skipper.behaviors.helm import hand_back, is_busy, set_mode
-from companion.skipper.planning.uploads import upload
+from companion.skipper.planning.uploads import is_way_clear, upload
 from companion.skipper.step import CancelPlan, Phase, StepContext, WindBefore
 from companion.skipper.way.drift import HORIZON_S, floor_after_s
 from companion.skipper.way.geometry import distance_m, moved
@@ -48,6 +48,7 @@ WAY_MPS = 0.3  # made good towards it: slower the leg is not sailed
 TURNS_S = 20.0  # from lying head to wind until it is
 STRAYS_M = 15.0  # from the loiter's point: LOITER turns in circles of 12 m
 LEG_CLEAR_M = 1.0  # beside the hull: what the rest of a leg that it was set off must keep
+SAILS_MPS = 0.8  # ahead: she sails
 HAIR_M = 0.5
 
 
@@ -269,12 +270,29 @@ def holds(ctx: StepContext) -> bool:
             ctx.set(adrift=replace(memory, loiter_en_m=ctx.boat_en, loiter_s=ctx.t_s))
         ctx.phase(Phase.HOLDING, f"{why}: {WAITS}")
         return True
+    if _sails_where_no_loiter_has_room(ctx):
+        ctx.phase(Phase.HOLDING, f"{why}: sailing on, waiting until a loiter's circles have room")
+        return True
     if state.steering.until_s is not None:  # out of irons, it was believed
         ctx.set(steering=changed(ctx.state.steering, until_s=None, heading_rad=None))
     if not is_busy(ctx, Mode.LOITER.name) and set_mode(ctx, Mode.LOITER, why):
         ctx.set(operator=changed(ctx.state.operator, is_back=True))
     ctx.phase(Phase.HOLDING, f"{why}: waiting for the autopilot to take LOITER")
     return True
+
+
+def _sails_where_no_loiter_has_room(ctx: StepContext) -> bool:
+    """Return whether she makes way along what is on board, and a LOITER here would circle into what is near.
+
+    A front that turns the wind farther than it is believed to looks like a vane that was turned, but then she sails by
+    it; by a wind that is wrong she soon does not.
+    """
+    status, boat, vehicle = ctx.autopilot, ctx.boat_en, ctx.snapshot.vehicle
+    if status is None or boat is None or vehicle is None or status.mode is not Mode.AUTO or not ctx.ahead():
+        return False
+    east, north = vehicle.velocity_en_mps
+    ahead_mps = east * math.sin(vehicle.heading_rad) + north * math.cos(vehicle.heading_rad)
+    return ahead_mps >= SAILS_MPS and _circles_near(ctx, water_at(ctx.voyage.area, boat), boat) and is_way_clear(ctx)
 
 
 def _stop_planning(ctx: StepContext) -> None:

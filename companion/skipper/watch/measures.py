@@ -18,7 +18,7 @@ from companion.skipper.planning.diversions import diversion, home_trouble, is_co
 from companion.skipper.step import DiversionKind, StepContext, WindHealth
 from companion.skipper.step.state import Charge
 from companion.skipper.step.wind_limits import too_light, too_strong
-from companion.skipper.way.geometry import along_m, cross_track_m, distance_m
+from companion.skipper.way.geometry import along_m, bearing_rad, cross_track_m, distance_m, moved
 
 _J2000_UNIX_S = 946_728_000.0  # 2000-01-01 12:00 UTC
 _DAY_S = 86_400.0
@@ -53,6 +53,7 @@ FALL = 0.05  # the rate is told when the charge has fallen by this much ...
 LOOK_S = 300.0  # ... and for this long
 DETOUR = 2.0  # a beat is 1.4 times its straight way, and something lies between
 LEAST_MPS = 0.5
+AHEAD_S = 30.0  # along her leg, beside it: so far it is looked whether that comes below the floor
 SWINGS = 1.25  # of what her loiter takes in this wind: within it she is at her place
 
 
@@ -158,8 +159,13 @@ def _corridor(ctx: StepContext) -> float | None:
         off = max(0.0, distance_m(boat, leg[0]) - 2.0 * ctx.config.announce_m)
     else:
         off = abs(cross_track_m(boat, *leg))
-    clearance = ctx.voyage.area.path_clearance_m([boat, leg[1]])
-    allowed = max(ctx.config.grid_size_m, beaten_within_m(ctx))
+    beaten_m = beaten_within_m(ctx)
+    ways = [[boat, leg[1]]]
+    if beaten_m == 0.0:  # set off its leg by a steady current she sails beside it, not to its end
+        left_m, course_rad = max(0.0, distance_m(*leg) - along_m(boat, *leg)), bearing_rad(*leg)
+        ways.append([boat, moved(boat, course_rad, min(left_m, AHEAD_S * ctx.speed_mps))])
+    clearance = min(ctx.voyage.area.path_clearance_m(way) for way in ways)
+    allowed = max(ctx.config.grid_size_m, beaten_m)
     if clearance < ctx.config.margin_floor_m:
         allowed = min(allowed, corridor_m(ctx))
     return off / allowed

@@ -7,6 +7,7 @@ from itertools import pairwise
 import pytest
 import shapely
 import shapely.affinity
+from shapely import box
 
 from companion.messages import Mode
 from companion.skipper.behaviors.drifting import CALL, MEANS, is_cramped, lies_in_loiter, stops_drift
@@ -100,6 +101,17 @@ def test_in_a_loiter_she_lies_still_only_where_she_does(speed_mps, how):
     ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, mode=Mode.LOITER))
     assert stops_drift(ctx)
     assert ctx.state.why.startswith(f"becalmed, {how}")
+
+
+def test_over_the_missions_own_fence_the_call_for_the_anchor_goes_on():
+    """It may be the shore: she was told 386 m clear of everything, and the calls ended, while she lay over it."""
+    w = world(obstacles=(), voyage={"limits": box(-60.0, -60.0, 40.0, 600.0)})
+    assert w.run(400, lambda w: w.position[0] > 50.0)
+    begins = w.t
+    w.run(150)
+    told = [text for t_s, _, text in said(w, "anchor") if t_s > begins]
+    assert len(told) >= 2
+    assert all("onto the fence in 0 s" in text for text in told)
 
 
 def test_a_still_calm_changes_nothing():

@@ -213,6 +213,20 @@ def test_where_no_course_leads_to_sea_room_it_loiters():
     assert not said(world, SEA_ROOM)
 
 
+@pytest.mark.parametrize("is_sailing", [True, False])
+def test_a_boat_that_makes_way_between_banks_is_not_put_into_a_loiter_that_has_no_room(is_sailing):
+    """A front of 148 degrees in a channel: "the vane was turned", and she circled onto both its banks."""
+    world = north_of_the_rock((box(-300.0, -60.0, 500.0, -22.0), box(-300.0, 22.0, 500.0, 60.0)))
+    begins = doubted(world)
+    if not is_sailing:
+        world.wind, world.speed = lambda t: (math.pi / 2.0, 5.0), 0.0
+    world.run(10)
+    assert bool(asked_since(world, begins, act.SetMode)) is not is_sailing
+    assert not asked_since(world, begins, act.RequestPlan)
+    if is_sailing:
+        assert world.state.why == f"{WHY}: sailing on, waiting until a loiter's circles have room"
+
+
 def test_going_astern_in_a_loiter_shows_the_true_wind_that_nobody_remembers():
     world = north_of_the_rock()
     doubted(world, None)

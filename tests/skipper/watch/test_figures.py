@@ -173,6 +173,13 @@ def test_the_share_of_the_corridor(at, obstacles, share):
     assert measure(moment(WAY, at=at, obstacles=obstacles), "off the corridor") == pytest.approx(share)
 
 
+def test_what_lies_beside_the_leg_she_is_set_off_counts_and_not_only_what_lies_on_the_way_to_its_end():
+    """In a known cross current she lay 5 m to leeward of her leg for 90 s, beside a wall, and was told at 2.8 m."""
+    wall = box(140.0, 16.5, 250.0, 30.0)  # 6.5 m off where she goes on beside her leg
+    assert measure(moment(WAY, at=(100.0, 10.0), obstacles=(wall,)), "off the corridor") == pytest.approx(10.0 / 7.0)
+    assert measure(moment(WAY, at=(100.0, 10.0), obstacles=(wall,), speed_mps=0.1), "off the corridor") == 0.5
+
+
 def test_a_beat_has_its_own_corridor_where_that_is_wider():
     north = route((0.0, 600.0), (300.0, 600.0), (300.0, 600.0))
     wide = moment(north, at=(15.0, 100.0), heading_deg=45.0)
