@@ -19,10 +19,12 @@ from companion.frozen import changed
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Mode, Severity
 from companion.skipper.behaviors.helm import is_busy, set_mode
+from companion.skipper.planning.autopilot_beats import tacks_fail
 from companion.skipper.step import Phase, StepContext
-from companion.skipper.way import Gate, PointEn, Side, bearing_rad, cross_track_m, distance_m, water_at
+from companion.skipper.way import Gate, PointEn, Side, bearing_rad, cross_track_m, distance_m, moved, water_at
 from companion.skipper.way.drift import DriftAhead, drift_ahead, floor_from_m
 from companion.skipper.way.gates import marks_of
+from companion.skipper.way.voyage import water_to_keep
 
 DRIFT_LIMIT_RAD = math.radians(20.0)  # more is not leeway but a current or a compass error
 STEERAGE_MPS = 0.5  # slower than this the drift angle means nothing
@@ -30,6 +32,8 @@ AT_BUOY = 3.0  # rounding radii
 TACK_HYSTERESIS_RAD = math.radians(10.0)
 BACK_S, BACK_M = 4.0, 8.0  # the line is aimed at so far ahead, in time and at the least
 BACK_LIMIT_RAD = math.radians(45.0)
+ABOUT_S = 3.5  # a step to see it, the heading, and the turn until the boat goes no farther that way
+BOARD_S, BETTER_M = 8.0, 1.0  # of the other tack, which must be clearer by so much
 
 
 def drift_correction_rad(velocity_en_mps: tuple[float, float], heading_rad: float) -> float:
@@ -116,12 +120,50 @@ def _on_leg_rad(
     is_last = ctx.state.mission.index == ctx.last_waypoint() and distance_m(boat, leg[1]) < ctx.config.grid_size_m
     if is_last or distance_m(*leg) < 1.0 or abs(off_wind) < half:
         # On a leg that the wind has closed the boat goes about where the other tack is nearer to its end.
-        return sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), heading_rad, twd, half)
+        wanted = sailable_rad(wrap_pi(bearing_rad(boat, leg[1]) + drift), heading_rad, twd, half)
+        return _other_tack_rad(wanted, twd) if _must_go_about(ctx, boat, wanted, twd) else wanted
     # Back to the line on the leg's own tack: through the wind the boat would come to it sooner, and be on the wrong
     # one.
     back = back_to_line_rad(cross_track_m(boat, *leg), ctx.speed_mps)
     side = math.copysign(1.0, off_wind)
     return wrap_pi(twd + side * max(half, side * off_wind + side * back))
+
+
+def _must_go_about(ctx: StepContext, boat: PointEn, wanted_rad: float, twd: float) -> bool:
+    """Return whether a board close to the wind is about to come below the floor, and the other tack is clearer."""
+    if not _is_board(ctx, wanted_rad, twd):
+        return False
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
+    now_m = _board_m(ctx, boat, wanted_rad, ABOUT_S)
+    return now_m < floor_m and _board_m(ctx, boat, _other_tack_rad(wanted_rad, twd), BOARD_S) > now_m + BETTER_M
+
+
+def _goes_about_ahead(ctx: StepContext, boat: PointEn, wanted_rad: float, twd: float) -> bool:
+    """Return whether she need not be stopped before what a board leads to: the other tack is clearer, and in time."""
+    if not _is_board(ctx, wanted_rad, twd):
+        return False
+    other_m = _board_m(ctx, boat, _other_tack_rad(wanted_rad, twd), BOARD_S)
+    return other_m > _board_m(ctx, boat, wanted_rad, BOARD_S) + BETTER_M
+
+
+def _is_board(ctx: StepContext, wanted_rad: float, twd: float) -> bool:
+    is_close = abs(difference_rad(wanted_rad, twd)) < ctx.no_go_half_rad + TACK_HYSTERESIS_RAD
+    return is_close and ctx.voyage.boat.can_tack and not tacks_fail(ctx)
+
+
+def _other_tack_rad(wanted_rad: float, twd: float) -> float:
+    return wrap_pi(twd - difference_rad(wanted_rad, twd))
+
+
+def _board_m(ctx: StepContext, boat: PointEn, course_rad: float, span_s: float) -> float:
+    """Return how clear the water is that a board goes through in ``span_s`` at the polar's speed [m].
+
+    The speed that she has is that of a turn while she turns: by it a tack would be taken back in the middle.
+    """
+    wind, (east, north) = ctx.wind_now, ctx.current_en_mps
+    speed = 0.0 if wind is None else ctx.voyage.boat.polar.speed_mps(ctx.no_go_half_rad, wind[1])
+    there = moved((boat[0] + east * span_s, boat[1] + north * span_s), course_rad, speed * span_s)
+    return water_to_keep(ctx.voyage.area, boat).path_clearance_m([boat, there])
 
 
 def _past_marks(ctx: StepContext, boat: PointEn, heading_rad: float, wanted_rad: float, twd: float) -> float:
@@ -174,8 +216,11 @@ def ahead_of(ctx: StepContext) -> DriftAhead | None:
     course = bearing_rad(boat, leg[1])
     if status.mode is Mode.GUIDED and ctx.is_closed(boat, leg[1], ctx.wind_now):
         steered = course_rad(ctx)  # nothing turns the boat there but another plan
-        if steered is None:
+        wanted = desired_heading_rad(ctx)
+        if steered is None or wanted is None:
             return None
+        if ctx.wind_now is not None and _goes_about_ahead(ctx, boat, wanted, ctx.wind_now[0]):
+            return None  # a loiter's circle takes more room, and time, than a tack
         course, left_m = steered, math.inf
     hull_m, water = ctx.voyage.boat.hull.reach_m, water_at(ctx.voyage.area, boat)
     here_m = float(water.clearance_m([boat])[0])

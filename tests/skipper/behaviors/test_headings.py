@@ -243,8 +243,8 @@ def test_too_near_to_plan_round_she_is_stopped_in_guided_too(away_m):
     assert world.clearance() > 0.0
 
 
-def test_a_closed_leg_is_followed_no_farther_than_to_the_loiter():
-    """The wind comes ahead and no plan is found: close-hauled she makes for a bank, and nothing tacks her there."""
+def in_a_channel_that_shuts(*, can_tack):
+    """Return a boat by headings between two banks, a second before the wind comes ahead."""
     bank = shapely.box(-100.0, 60.0, -16.0, 400.0)
     world = by_heading(
         Goal(en_m=(0.0, 320.0), radius_m=8.0),
@@ -252,6 +252,14 @@ def test_a_closed_leg_is_followed_no_farther_than_to_the_loiter():
         wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0),
         config={"margin_m": 12.0, "margin_floor_m": 5.0},
     )
+    sailed = world.skipper.voyage
+    world.skipper = replace(world.skipper, voyage=replace(sailed, boat=replace(sailed.boat, can_tack=can_tack)))
+    return world
+
+
+def test_a_closed_leg_is_followed_no_farther_than_to_the_loiter():
+    """The wind comes ahead and no plan is found: close-hauled she makes for a bank, and does not tack there."""
+    world = in_a_channel_that_shuts(can_tack=False)
     assert world.run(44, is_steered)
     world.run(44 - world.t)
     assert 40.0 < world.position[1] < 150.0
@@ -260,6 +268,18 @@ def test_a_closed_leg_is_followed_no_farther_than_to_the_loiter():
     assert world.run(30, lambda w: w.mode is Mode.LOITER)
     assert world.clearance() > 0.5
     assert not any(phase == "operator" for _, phase, _ in world.log)
+
+
+def test_on_a_closed_leg_a_boat_that_tacks_keeps_the_floor_where_no_plan_is_found():
+    """A loiter's circle takes more room than a tack: in a neck she was stopped too near to a wall to be turned."""
+    world = in_a_channel_that_shuts(can_tack=True)
+    assert world.run(44, is_steered)
+    world.run(44 - world.t)
+    world.planner = lambda problem, seed: None
+    world.track.clear()
+    world.run(60)
+    assert world.clearance() > world.skipper.config.margin_floor_m
+    assert not said(world, "too near")
 
 
 def test_the_loiter_that_ends_a_mission_is_sailed_by_the_autopilot():
@@ -278,13 +298,7 @@ def test_the_loiter_that_ends_a_mission_is_sailed_by_the_autopilot():
 
 
 def test_a_loiter_that_is_refused_leaves_her_steered():
-    bank = shapely.box(-100.0, 60.0, -16.0, 400.0)
-    world = by_heading(
-        Goal(en_m=(0.0, 320.0), radius_m=8.0),
-        obstacles=(bank, shapely.box(16.0, 60.0, 100.0, 400.0)),
-        wind=lambda t: (-math.pi / 2.0 if t < 45.0 else 0.0, 5.0),
-        config={"margin_m": 12.0, "margin_floor_m": 5.0},
-    )
+    world = in_a_channel_that_shuts(can_tack=False)
     answer = world._answer
 
     def refuse(kind, action):
