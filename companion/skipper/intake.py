@@ -12,6 +12,7 @@ from companion.skipper.behaviors.helm import MOTOR_OFF, MOTOR_ON
 from companion.skipper.passing import pass_gates
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.diversions import diversion, is_composed
+from companion.skipper.planning.fallback import to_go
 from companion.skipper.planning.uploads import take_upload
 from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.config import Guidance
@@ -245,7 +246,7 @@ def _own_count(ctx: StepContext) -> None:
 
 def _remember(ctx: StepContext) -> None:
     """Keep the way made good, for the progress watchdog."""
-    boat, ahead = ctx.boat_en, ctx.ahead()
+    boat, ahead = ctx.boat_en, to_go(ctx)
     if boat is None:
         return
     # at rest no way is made, nor on a circle

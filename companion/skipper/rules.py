@@ -15,6 +15,7 @@ from companion.messages import GeoPoint
 from companion.orders import Wanted
 from companion.skipper.behaviors.drifting import follow_ground
 from companion.skipper.behaviors.failsafe import begin_again, follow_answer, follow_stops
+from companion.skipper.behaviors.fallback import follow_fallback
 from companion.skipper.behaviors.field_guidance import follow_field
 from companion.skipper.behaviors.operator_orders import preview, take_orders
 from companion.skipper.behaviors.position_doubt import follow
@@ -180,6 +181,7 @@ def observe(ctx: StepContext) -> None:
     watch_tacks(ctx)
     learn_boat(ctx)
     watch(ctx)
+    follow_fallback(ctx)
     follow_soundings(ctx)
     take_orders(ctx)
     if ctx.state.vehicle.rebooted:

@@ -474,6 +474,7 @@ def _name(ctx: StepContext) -> None:
         return
     raised = ", ".join(r.name for r in state.alarms.raised)
     tail = (f"; {state.progress.task}" if state.progress.task else "") + (f"; {raised}" if raised else "")
+    tail = (f"; by plan in AUTO: {state.fallback.why}" if ctx.falls_back else "") + tail
     gate, bound = ctx.gate, diversion(ctx)
     if is_composed(ctx) and gate is not None and gate.field is not None:
         left_s = stay_left_s(ctx, gate)

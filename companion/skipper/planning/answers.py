@@ -19,6 +19,7 @@ from companion.planner.track import ExpectedTrack
 from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
 from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
 from companion.skipper.planning.diversions import diversion
+from companion.skipper.planning.fallback import leaves_headings
 from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.track import clearance_text, of_way, steps
@@ -58,12 +59,12 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
         reason = outcome.text or (plan.reason if plan is not None else "the planner died")
         if (plan is None or plan.status is PlanStatus.UNANSWERED) and asks_again(ctx, pending, reason):
             return
-        not_found(ctx, pending, _no_room(ctx, pending) or reason)
+        _not_found(ctx, pending, _no_room(ctx, pending) or reason)
         return
     ctx.set(plans=changed(ctx.state.plans, unanswered=0, effort=min(1.0, MORE * ctx.state.plans.effort), rung=0))
     outside = _astray(ctx, pending, plan) or _dead_end(ctx, pending, plan)
     if outside:
-        not_found(ctx, pending, outside)
+        _not_found(ctx, pending, outside)
         return
     keep, set_current = _place(ctx, pending)
     if keep is None:
@@ -82,7 +83,7 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
         return  # no plan from that waypoint takes its tack away
     refused = "" if _keep_old(ctx, pending, plan) else put_in_place(ctx, pending, plan, keep, set_current)
     if refused:
-        not_found(ctx, pending, refused)
+        _not_found(ctx, pending, refused)
         return
     # A plan with less margin leads there; one to a nearer place does not, and what is led out of something first is
     # left in peace meanwhile.
@@ -90,6 +91,12 @@ def take_plan(ctx: StepContext, outcome: PlanOutcome) -> None:
     is_makeshift = bool(pending.lead_in) or ladder[min(pending.rung, len(ladder) - 1)].nearer_goal
     patience = ctx.failed(ctx.state.plans.retry) if pending.rung > 0 and is_makeshift else Retry()
     ctx.set(plans=changed(ctx.state.plans, retry=patience))
+
+
+def _not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
+    """Give up the guidance by headings before the boat waits for a plan by them, else as ever (``not_found``)."""
+    if not leaves_headings(ctx, pending, reason):
+        not_found(ctx, pending, reason)
 
 
 def _note_latency(ctx: StepContext, pending: PendingPlan, outcome: PlanOutcome) -> None:

@@ -89,6 +89,9 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
     if ctx.is_field_steered:
         if is_composed(ctx) and route is not None and ctx.state.progress.gate in route.gate_of:
             return None  # what is on board leads to the goal's place: that is where it goes when it is not steered
+        if ctx.asks_fallback:
+            interval_s = config.min_replan_interval_s if state.plans.last_s >= state.fallback.since_s else 0.0
+            return Trigger(reason=ReplanReason.NO_PROGRESS, text=state.fallback.why, interval_s=interval_s)
         return _at_end(ctx) or _extension(ctx, bound)  # the mission on board need not be the way that is sailed
     trigger = _traffic(ctx) or _tide(ctx)
     if trigger is None and not ctx.is_raised("wind untrusted"):

@@ -36,6 +36,7 @@ from companion.skipper.step.state import (
     Adrift,
     Alarms,
     Announced,
+    Fallback,
     FieldSteering,
     Fix,
     GoalProgress,
@@ -91,8 +92,13 @@ def permitted(action: Action, permissions: Permissions) -> bool:
 
 def field_steers(snapshot: Snapshot, state: SkipperState, config: SkipperConfig) -> bool:
     """Return whether a field steers the boat and not the plan on board: the mission's or a goal's own, if permitted."""
-    may = snapshot.permissions
-    return (state.by_field.composed or config.guidance is Guidance.FIELD) and may.may_steer and may.may_set_mode
+    may, is_own = snapshot.permissions, config.guidance is Guidance.FIELD and not in_place_of_guidance(state)
+    return (state.by_field.composed or is_own) and may.may_steer and may.may_set_mode
+
+
+def in_place_of_guidance(state: SkipperState) -> bool:
+    """Return whether AUTO sails a plan to the next goal in place of the mission's own guidance."""
+    return state.fallback.sails and state.fallback.gate == state.progress.gate
 
 
 def is_off_plan(snapshot: Snapshot, state: SkipperState, config: SkipperConfig) -> bool:
@@ -192,6 +198,7 @@ class StepContext:
         operator: OperatorState | None = None,
         steering: SteeringState | None = None,
         by_field: FieldSteering | None = None,
+        fallback: Fallback | None = None,
         adrift: Adrift | None = None,
         soundings: Soundings | None = None,
         tacking: Tacking | None = None,
@@ -224,6 +231,8 @@ class StepContext:
             state = changed(state, steering=steering)
         if by_field is not None:
             state = changed(state, by_field=by_field)
+        if fallback is not None:
+            state = changed(state, fallback=fallback)
         if adrift is not None:
             state = changed(state, adrift=adrift)
         if soundings is not None:
@@ -593,7 +602,19 @@ class StepContext:
     @property
     def guidance(self) -> Guidance:
         """What steers the boat now: the mission's guidance, or the field of the goal that is next."""
-        return Guidance.FIELD if self.state.by_field.composed else self.config.guidance
+        if self.state.by_field.composed:
+            return Guidance.FIELD
+        return Guidance.PLAN if self.falls_back else self.config.guidance
+
+    @property
+    def falls_back(self) -> bool:
+        """Whether AUTO sails a plan to the next goal in place of the mission's own guidance."""
+        return in_place_of_guidance(self.state)
+
+    @property
+    def asks_fallback(self) -> bool:
+        """Whether plans to the next goal are made for AUTO in place of the mission's own guidance."""
+        return self.state.fallback.gate == self.state.progress.gate
 
     @property
     def steers(self) -> bool:
@@ -611,7 +632,7 @@ class StepContext:
 
         A goal's own field ends there: what is planned from it on is sailed as the mission says.
         """
-        return self.config.guidance is not Guidance.PLAN and self.may_guide
+        return self.config.guidance is not Guidance.PLAN and self.may_guide and not self.asks_fallback
 
     @property
     def _is_at_safe_end(self) -> bool:

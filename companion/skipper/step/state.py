@@ -238,6 +238,17 @@ class FieldSteering:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Fallback:
+    """A goal that is sailed to by plan in AUTO, for the mission's own guidance comes to nothing on the way there."""
+
+    gate: int = -1  # the gate that it is for, -1: none
+    goal: int = -1  # whose gate that is: it lasts to the last of them
+    since_s: float = float("-inf")  # when it was asked for
+    sails: bool = False  # a plan asked for since then is in place, and AUTO sails it
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Inside:
     """Since when the boat is in a goal's box, or sails by its field, and by the autopilot's clock (None: not known)."""
 
@@ -471,6 +482,7 @@ class SkipperState:
     operator: OperatorState = OperatorState()
     steering: SteeringState = SteeringState()
     by_field: FieldSteering = FieldSteering()
+    fallback: Fallback = Fallback()
     adrift: Adrift = Adrift()
     soundings: Soundings = Soundings()
     tacking: Tacking = NO_TACKS  # what the boat's tacks have told

@@ -15,6 +15,7 @@ from companion.skipper.behaviors.field_guidance import meets_in
 from companion.skipper.behaviors.shoaling import depth_ahead_m
 from companion.skipper.planning.autopilot_beats import beaten_within_m
 from companion.skipper.planning.diversions import diversion, home_trouble, is_composed, is_led_off
+from companion.skipper.planning.fallback import to_go
 from companion.skipper.step import DiversionKind, StepContext, WindHealth
 from companion.skipper.step.state import Charge
 from companion.skipper.step.wind_limits import too_light, too_strong
@@ -119,7 +120,7 @@ def _too_near(ctx: StepContext) -> float | None:
 
 def _progress(ctx: StepContext) -> float | None:
     """Way made good in the window; None before the window is full or while there is a reason to stand still."""
-    if ctx.is_raised("becalmed") or ctx.snapshot.unsure or not ctx.ahead() or not ctx.state.progress.history:
+    if ctx.is_raised("becalmed") or ctx.snapshot.unsure or not to_go(ctx) or not ctx.state.progress.history:
         return None
     if ctx.state.mission.route is None or ctx.state.progress.history_plan != ctx.state.mission.route.plan_id:
         return None  # the history is of the plan before

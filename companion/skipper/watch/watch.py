@@ -13,6 +13,7 @@ from companion.safety import BY_NAME, CAUSES, HOMEWARD, PERSON, TABLE, Response,
 from companion.skipper.behaviors.drifting import STEERAGE_MPS, is_driven_astern
 from companion.skipper.behaviors.failsafe import TOLD_S, is_answered
 from companion.skipper.planning.diversions import words
+from companion.skipper.planning.fallback import may_fall_back
 from companion.skipper.planning.vessels import lies_at_goal
 from companion.skipper.step import SkipperConfig, StepContext
 from companion.skipper.step.state import Raised
@@ -301,6 +302,8 @@ def _patience_s(ctx: StepContext, dog: Watchdog) -> float:
 
 
 def _done_about(ctx: StepContext, dog: Watchdog) -> str:
+    if dog.response is Response.REPLAN and ctx.is_field_steered and dog.name == "no progress":
+        return "a plan is asked for, to be sailed in AUTO" if may_fall_back(ctx) else "steered on by field"
     return words(ctx.config, dog.name) if dog.response is Response.AS_SET else dog.response.value
 
 
