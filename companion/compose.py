@@ -617,7 +617,7 @@ def tide_of(mission: Mission) -> TideTable | None:
     if path is None:
         return None
     text, times = _timed(path, str(mission.path), "[area] tide")
-    return TideTable(rows=read_tide(text, str(path), times))
+    return TideTable(rows=read_tide(text, str(path), times), name=path.name)
 
 
 def _timed(path: Path, source: str, key: str) -> tuple[str, tuple[float | None, ...]]:

@@ -129,7 +129,7 @@ def _check(args: argparse.Namespace) -> int:
         print(f"{args.file}: {document.format}: {summary(document)}: in order")
         return 0
     from companion.compose import field_words
-    from companion.mission_check import check_mission, current_words_of, wind_limit_words
+    from companion.mission_check import check_mission, current_words_of, tide_words_of, wind_limit_words
 
     judged = check_mission(Path(args.file), from_deg=args.wind[1] if args.wind else None)
     if judged.mission is None or judged.refusals:
@@ -151,8 +151,9 @@ def _check(args: argparse.Namespace) -> int:
     limits = wind_limit_words(mission)
     if limits:
         print(f"{args.file}: {limits}")
-    for line in current_words_of(mission, time.time()):
-        print(f"{args.file}: {line}")
+    for line in (*current_words_of(mission, time.time()), tide_words_of(mission, time.time())):
+        if line:
+            print(f"{args.file}: {line}")
     print(
         f"{args.file}: {mission.name}: {counted(len(mission.goals), 'goal')}, "
         f"{counted(len(mission.area.solids), 'obstacle')}: "

@@ -99,22 +99,25 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, print, write and draw; return the exit code."""
+    from companion.mission_check import tide_words_of
     from companion.planner import PlanStatus, Problem
 
     if args.policy is not None and args.json:
         raise InputError("--policy", "", "is told as text", "leave --json out")
     ground: dict[str, Any] = {}
+    tide = ""
     if Path(args.problem).suffix.lower() == ".toml":
         mission = _mission(args)
         ways = len(mission.goals) + (mission.skipper.end == "home")
         if args.plot is not None and args.policy is None and ways > 1:
             raise _several(args)
         answers = _sail_through(mission, args)
+        tide = tide_words_of(mission, _departs_s(args))
         ground = {"area": mission.water(), "margin_m": mission.margin_m}
         if args.plot is not None and mission.drying:
             from companion.plots.drying import drying_picture
 
-            ground["drying"] = drying_picture(mission, time.time() if args.at is None else args.at.timestamp())
+            ground["drying"] = drying_picture(mission, _departs_s(args))
     elif args.wind is not None:
         raise InputError("--wind", "", "a problem has a wind of its own", "leave it out, or plan a mission TOML")
     elif args.at is not None:
@@ -138,6 +141,8 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(text)
     else:
         print("\n\n".join(describe(problem, answer, ground.get("margin_m", 0.0)) for problem, answer in answers))
+        if tide:
+            print(tide)
         for path in (args.out, args.plot):
             if path is not None:
                 print(f"written: {path}")
@@ -198,6 +203,11 @@ def _mission(args: argparse.Namespace) -> Mission:
     return mission
 
 
+def _departs_s(args: argparse.Namespace) -> float:
+    """Return the Unix time of departure [s]: as asked for, or now."""
+    return time.time() if args.at is None else float(args.at.timestamp())
+
+
 def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Problem, Plan]]:
     """Return the problems and plans of a mission from goal to goal, to the first that has no path."""
     from companion.mission_check import AssumedWind, legs, planned_legs
@@ -210,7 +220,7 @@ def _sail_through(mission: Mission, args: argparse.Namespace) -> list[tuple[Prob
         return answers[-1][1]
 
     wind = AssumedWind(from_deg=from_deg, speed_mps=tws_mps)
-    planned_legs(legs(mission, wind, unix_s=time.time() if args.at is None else args.at.timestamp()), answer)
+    planned_legs(legs(mission, wind, unix_s=_departs_s(args)), answer)
     return answers
 
 

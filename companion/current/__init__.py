@@ -3,7 +3,16 @@
 from companion.current.estimator import UNTOLD_MPS, CurrentEstimator, Sailing, WindAngleUncertainty, plain
 from companion.current.motion import FITS_S, MotionCheck, MotionSample
 from companion.current.prior import STILL, Prior, TableRow, read_table
-from companion.current.tide import TideRow, TideTable, closed_spans, lowest_m, open_spans, read_tide
+from companion.current.tide import (
+    TideRow,
+    TideTable,
+    closed_spans,
+    hour_words,
+    lowest_m,
+    open_spans,
+    read_tide,
+    span_words,
+)
 from companion.current.water_current import STILL_WATER, WaterCurrent, forecast_over_water, over_ground, over_water
 
 __all__ = [
@@ -23,6 +32,7 @@ __all__ = [
     "WindAngleUncertainty",
     "closed_spans",
     "forecast_over_water",
+    "hour_words",
     "lowest_m",
     "open_spans",
     "over_ground",
@@ -30,4 +40,5 @@ __all__ = [
     "plain",
     "read_table",
     "read_tide",
+    "span_words",
 ]

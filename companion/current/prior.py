@@ -1,8 +1,8 @@
 """What the mission expects of the current: nothing, a constant set and drift, or a tide table with times.
 
-A table that has ended, or has not begun, keeps its nearest row and widens it to the strength of the tide within an
-hour: it is never silently still water. Without the time of day no row can be chosen: the current is then unknown by as
-much as the strongest row.
+A table that has ended, has not begun, or has a gap keeps its nearest row and widens it to the strength of the tide
+within an hour: it is never silently still water. Without the time of day no row can be chosen: the current is then
+unknown by as much as the strongest row.
 """
 
 from __future__ import annotations
@@ -17,6 +17,9 @@ from companion.geo.angles import wrap_two_pi
 
 DEFAULT_SIGMA_MPS = 0.5  # of water of which the mission says nothing: most tidal waters are within twice of it
 ENDED_S = 3600.0  # a tide has become another within the hour
+APART_S = (
+    8.0 * 3600.0
+)  # from the strongest flood to the strongest ebb it is six hours: of rows farther apart nothing is
 MOST_ROWS = 20_000  # two years of hours
 MOST_MPS = 10.0  # the strongest tidal races reach 8
 SPAN_S = 60.0  # rows nearer together than this are a mistake
@@ -66,8 +69,8 @@ class Prior:
         rows = self.rows
         if not rows:
             return ExpectedCurrent(east_mps=self.east_mps, north_mps=self.north_mps, sigma_mps=self.sigma_mps)
-        widest = max(self.sigma_mps, self.strongest_mps)
         if utc_s is None:
+            widest = max(self.sigma_mps, self.strongest_mps)
             return ExpectedCurrent(
                 sigma_mps=widest, verdict=f"{self.name}: no row can be chosen before the time is known"
             )
@@ -75,22 +78,29 @@ class Prior:
             is_over = utc_s > rows[-1].utc_s
             row = rows[-1] if is_over else rows[0]
             off_s = abs(utc_s - row.utc_s)
-            share = min(1.0, off_s / ENDED_S)
-            what = "ended" if is_over else "begins in"
-            verdict = f"{self.name} {what} {_span(off_s)}{' ago' if is_over else ''}: its nearest row, widened"
-            return ExpectedCurrent(
-                east_mps=row.east_mps,
-                north_mps=row.north_mps,
-                verdict=verdict,
-                sigma_mps=self.sigma_mps + share * (math.hypot(widest, self.sigma_mps) - self.sigma_mps),
-            )
+            what = f"ended {_span(off_s)} ago" if is_over else f"begins in {_span(off_s)}"
+            return self._widened(row, off_s, what)
         after = min(max(1, bisect.bisect_right([r.utc_s for r in rows], utc_s)), len(rows) - 1)
         a, b = rows[after - 1], rows[after]
+        if b.utc_s - a.utc_s > APART_S:
+            row = min(a, b, key=lambda r: abs(r.utc_s - utc_s))
+            return self._widened(row, abs(row.utc_s - utc_s), f"has rows {_span(b.utc_s - a.utc_s)} apart here")
         share = (utc_s - a.utc_s) / (b.utc_s - a.utc_s)
         return ExpectedCurrent(
             east_mps=a.east_mps + share * (b.east_mps - a.east_mps),
             north_mps=a.north_mps + share * (b.north_mps - a.north_mps),
             sigma_mps=self.sigma_mps,
+        )
+
+    def _widened(self, row: TableRow, off_s: float, what: str) -> ExpectedCurrent:
+        """Return a row at a time ``off_s`` from it, which it holds for the less the farther off it is."""
+        widest = max(self.sigma_mps, self.strongest_mps)
+        share = min(1.0, off_s / ENDED_S)
+        return ExpectedCurrent(
+            east_mps=row.east_mps,
+            north_mps=row.north_mps,
+            verdict=f"{self.name} {what}: its nearest row, widened",
+            sigma_mps=self.sigma_mps + share * (math.hypot(widest, self.sigma_mps) - self.sigma_mps),
         )
 
 

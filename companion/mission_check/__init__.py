@@ -21,7 +21,7 @@ from companion.mission_check.legs import (
     waits_s,
 )
 from companion.mission_check.sailable import require_sailable
-from companion.mission_check.words import current_words_of, passage_words, wait_words, wind_limit_words
+from companion.mission_check.words import current_words_of, passage_words, tide_words_of, wait_words, wind_limit_words
 
 __all__ = [
     "AssumedWind",
@@ -42,6 +42,7 @@ __all__ = [
     "passage_words",
     "planned_legs",
     "require_sailable",
+    "tide_words_of",
     "wait_words",
     "waits_s",
     "wind_limit_words",

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import shapely
 
-from companion.compose import field_findings_of, voyage_of
+from companion.compose import field_findings_of, tide_of, voyage_of
+from companion.current import span_words
+from companion.current.tide import ROWS_REMEDY
 from companion.errors import InputError
 from companion.geofence import Code, Finding, FindingLevel, Mission
 from companion.geofence.check import AreaConditions, check_area
@@ -81,6 +83,7 @@ def check_mission(
                     *line_findings(mission),
                     *_circles(mission),
                     *_drying(mission),
+                    *_tide(mission),
                 )
             ),
             *_doubts(mission),
@@ -208,3 +211,16 @@ def _drying(mission: Mission) -> Iterator[Finding]:
                     text=f"lies in {water.name}, which dries: she does not go there to stay",
                     remedy="choose a place that is deep enough at low water",
                 )
+
+
+def _tide(mission: Mission) -> Iterator[Finding]:
+    """Yield that the tide's table leaves hours out between its rows: what dries is closed in them."""
+    table = tide_of(mission)
+    if table is not None and table.gaps():
+        yield Finding(
+            severity=FindingLevel.WARNING,
+            code=Code.DRIES,
+            place="[area] tide",
+            text=f"{span_words(table)}: nothing is known of the tide then, and what dries is closed",
+            remedy=ROWS_REMEDY,
+        )

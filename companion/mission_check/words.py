@@ -7,16 +7,17 @@ import math
 from itertools import pairwise
 
 from companion.boat import can_hold
-from companion.compose import RECENTRE_M, boat_of, voyage_of, water_of
-from companion.current import Prior, over_water
+from companion.compose import RECENTRE_M, boat_of, drying_of, tide_of, voyage_of, water_of
+from companion.current import Prior, hour_words, over_water, span_words
 from companion.geo.angles import direction, heading_of
 from companion.geo.frame import LocalFrame
 from companion.geofence import Mission
 from companion.geofence.mission import MissionGoal
 from companion.safety import LIGHT_WIND, STRONG_WIND
-from companion.words import counted
+from companion.words import counted, listed
 
 _DIRECTIONS = 24
+MOST_NAMED = 3  # pieces of water that dries; of more their number is told
 
 
 def current_words_of(mission: Mission, unix_s: float) -> tuple[str, ...]:
@@ -55,6 +56,28 @@ def current_words_of(mission: Mission, unix_s: float) -> tuple[str, ...]:
             f"way against {strongest:.2f} m/s in every direction"
         )
     return tuple(lines)
+
+
+def tide_words_of(mission: Mission, unix_s: float) -> str:
+    """Return how high the tide stands by the mission's table at a Unix time, and what dries that is closed then.
+
+    Empty without water that dries. Raises InputError as ``tide_of``.
+    """
+    table = tide_of(mission) if mission.drying else None
+    if table is None:
+        return ""
+    at = f"tide at {hour_words(unix_s)}"
+    height_m = table.height_m(unix_s)
+    if height_m is None:
+        return f"{at}: not known: {span_words(table)}; all that dries is closed"
+    waters = drying_of(mission, mission.frame())
+    closed = [w for w in waters if w.is_closed(table, unix_s, 0.0)]
+    if not closed:
+        return f"{at}: {height_m:.2f} m by {table.name}; what dries is open"
+    opens_s = min(w.closed_s(table, unix_s)[0][1] for w in closed)
+    opens = f"the first opens at {hour_words(unix_s + opens_s)}" if math.isfinite(opens_s) else "none opens by it again"
+    names = listed([w.name for w in closed]) if len(closed) <= MOST_NAMED else counted(len(closed), "piece")
+    return f"{at}: {height_m:.2f} m by {table.name}; closed of what dries: {names}; {opens}"
 
 
 def _holds(mission: Mission, prior: Prior) -> bool:

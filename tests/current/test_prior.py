@@ -48,6 +48,17 @@ def test_behind_its_end_and_before_its_begin_a_table_is_widened_and_never_silent
     assert prior.at(None).sigma_mps == pytest.approx(0.6)
 
 
+def test_of_the_hours_between_rows_of_another_day_the_nearest_row_is_widened(tmp_path):
+    """A straight line of two days was believed as the current of its noon."""
+    rows = "2026-11-21T12:00Z, 90, 0.6\n2026-11-21T18:00Z, 270, 0.6\n2026-11-23T12:00Z, 90, 0.6\n"
+    prior = water_of(mission(tmp_path, 'table = "tide.csv"\nsigma_mps = 0.1', rows))
+    assert prior.at(NOON + 3.0 * 3600.0).verdict == ""
+    gap = prior.at(NOON + 20.0 * 3600.0)
+    assert gap.verdict == "tide.csv has rows 42 h apart here: its nearest row, widened"
+    assert gap.sigma_mps == pytest.approx(math.hypot(0.6, 0.1))
+    assert prior.at(NOON + 6.0 * 3600.0 + 60.0).sigma_mps == pytest.approx(0.1, abs=0.02), "no leap where it begins"
+
+
 @pytest.mark.parametrize(
     ("current", "tide", "words"),
     [

@@ -145,7 +145,7 @@ def test_while_it_shoals_no_shoal_is_forgotten():
 
 
 def test_what_is_sounded_is_told_with_the_height_of_the_tide_where_a_table_tells_it():
-    rows = (TideRow(utc_s=-1e9, height_m=1.2), TideRow(utc_s=1e10, height_m=1.2))
+    rows = tuple(TideRow(utc_s=t, height_m=1.2) for t in range(1_799_990_000, 1_800_010_000, 3600))
     world = voyage_over_a_bank(config={"tide": TideTable(rows=rows)})
     tell, _ = sounded(world)
     world.shown |= {"utc_at_boot_s": 1.8e9}

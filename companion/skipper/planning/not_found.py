@@ -16,12 +16,14 @@ from companion.skipper.planning.uploads import is_on_board_sound, is_sound, is_w
 from companion.skipper.planning.vessels import lies_in_the_way, meetings
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import PendingPlan, Phase
+from companion.skipper.way.drying import AHEAD_S
 from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.stemming import waiting_place
 
 FOUL = "current too strong"  # the code under which it is said
 TIDE = "waiting for the tide"  # the same
-TIDE_S = 120.0  # between two tries then, at most
+TIDE_S = 120.0  # between two tries then, at most ...
+LATER_S = 1800.0  # ... and where the tide opens nothing as far as a plan looks ahead
 TRIES = 3  # of a planner that does not answer, before the next step of the ladder
 LESS, LEAST_EFFORT = 0.5, 0.05  # of the planning budget: after each request that was not answered; never less
 MORE = 1.2  # ... and after each that was
@@ -155,12 +157,14 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
     lies = lies_in_the_way(ctx)
     reason += f"; {lies}" if lies else ""
     opens = opens_next(ctx)
-    if opens:
+    if opens is not None:
         retry = ctx.state.plans.retry
-        soon_s = ctx.t_s + min(max(retry.not_before_s - ctx.t_s, 0.0), TIDE_S)
-        ctx.set(plans=changed(ctx.state.plans, retry=replace(retry, not_before_s=soon_s)))
-        ctx.say(Severity.WARNING, TIDE, f"no way before the tide is higher ({reason}): waiting; {opens}")
-        hold(ctx, opens)
+        patience_s = min(max(retry.not_before_s - ctx.t_s, 0.0), TIDE_S)
+        if opens.in_s > AHEAD_S + LATER_S:  # no plan looks so far: only another wind could find a way
+            patience_s = LATER_S
+        ctx.set(plans=changed(ctx.state.plans, retry=replace(retry, not_before_s=ctx.t_s + patience_s)))
+        ctx.say(Severity.WARNING, TIDE, f"no way before the tide is higher ({reason}): waiting; {opens.words}")
+        hold(ctx, opens.words)
         return
     ctx.say(
         Severity.CRITICAL,

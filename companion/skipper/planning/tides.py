@@ -9,13 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from companion.current import hour_words, span_words
 from companion.skipper.planning.vessels import timed_legs
 from companion.skipper.step.context import StepContext
 from companion.skipper.way import PointEn
 from companion.skipper.way.drying import DryingWater, TimedWater, timed
 from companion.traffic.plans import TimedLeg
 
-DAY_S, HOUR_S, MINUTE_S = 86_400, 3_600, 60
+DAY_S = 86_400.0
 
 
 def told(ctx: StepContext, start_en: PointEn, after_s: float, margin_m: float) -> TimedWater:
@@ -75,18 +76,30 @@ def _part(leg: TimedLeg, begin_s: float, end_s: float) -> shapely.LineString | N
     return shapely.LineString([(ax + share * (bx - ax), ay + share * (by - ay)) for share in at])
 
 
-def opens_next(ctx: StepContext) -> str:
-    """Return which of the water that is too shallow now opens first, and when, in words; empty: none does."""
-    now_s = ctx.utc_s
-    if now_s is None:
-        return ""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Opens:
+    """Which water that is too shallow now opens first, in how long [s], and both in words."""
+
+    in_s: float
+    words: str
+
+
+def opens_next(ctx: StepContext) -> Opens | None:
+    """Return which of the water that is too shallow now opens first, and when; None: none does by the table."""
+    now_s, table = ctx.utc_s, ctx.config.tide
+    if now_s is None or table is None:
+        return None
     soonest: tuple[float, str] | None = None
     for water in ctx.voyage.drying:
-        windows = water.closed_s(ctx.config.tide, now_s)
+        windows = water.closed_s(table, now_s)
         if windows and windows[0][0] <= 0.0 and math.isfinite(windows[0][1]):
             found = (windows[0][1], water.name)
             soonest = found if soonest is None else min(soonest, found)
     if soonest is None:
-        return ""
-    at_s = round(now_s + soonest[0]) % DAY_S
-    return f"{soonest[1]} opens at {at_s // HOUR_S:02d}:{at_s % HOUR_S // MINUTE_S:02d} UTC"
+        return None
+    in_s, name = soonest
+    is_today = (now_s + in_s) // DAY_S == now_s // DAY_S
+    at = hour_words(now_s + in_s)
+    words = f"{name} opens at {f'{at[-6:-1]} UTC' if is_today else at}"
+    unknown = "" if table.height_m(now_s) is not None else f"; nothing is known of the tide now: {span_words(table)}"
+    return Opens(in_s=in_s, words=words + unknown)

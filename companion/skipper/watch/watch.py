@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from companion.current import span_words
 from companion.frozen import changed
 from companion.geo.angles import direction, heading_of
 from companion.messages import Mode, Severity
@@ -219,7 +220,8 @@ def _remedy(ctx: StepContext) -> str:
 
 # --------------------
 # What is said of the current: when plans begin to reckon with one, when it has become another, and what is not known.
-# A tide table that has ended, or that no time can be found in, is said as soon as it is under way and every half hour.
+# A tide table that has ended, or that no time can be found in, is said as soon as it is under way and every half hour;
+# so is one of heights that does not hold now, where water that dries is open by it.
 
 
 def watch_water(ctx: StepContext) -> None:
@@ -229,6 +231,10 @@ def watch_water(ctx: StepContext) -> None:
         return
     if current.verdict:
         ctx.say(Severity.WARNING, "tide table", current.verdict, every_s=REMIND_S)
+    heights, now_s = ctx.config.tide, ctx.utc_s
+    if ctx.voyage.drying and heights is not None and now_s is not None and heights.height_m(now_s) is None:
+        text = f"nothing is known of the tide now: {span_words(heights)}; water that dries is closed"
+        ctx.say(Severity.WARNING, "tide heights", text, every_s=REMIND_S)
     if not current.is_significant:
         if told is not None:
             ctx.set(announced=changed(ctx.state.announced, water_en_mps=None))

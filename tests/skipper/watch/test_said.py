@@ -11,15 +11,17 @@ from types import SimpleNamespace
 import pytest
 from shapely.geometry import box
 
-from companion.current import WaterCurrent
+from companion.current import TideRow, TideTable, WaterCurrent
 from companion.messages import Mode, Severity
 from companion.skipper import Skipper
+from companion.skipper.step import StepContext
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.config import ALL_PERMITTED, SkipperConfig
 from companion.skipper.step.state import Stop, Tacking
 from companion.skipper.watch import watch as watching
 from companion.skipper.watch.tacks import TACK_FAILED, watch_tacks
 from companion.skipper.watch.watch import speak_of_stop, watch_water
+from companion.skipper.way.drying import DryingWater
 from tests.skipper.moments import NOW_S, moment, route
 from tests.skipper.world import World, voyage
 
@@ -160,6 +162,26 @@ def test_a_tide_table_that_ends_is_said_every_half_hour(ago_s, is_said):
     ctx = water(0.0, significant=False, verdict="ended", said=(("tide table", NOW_S - ago_s),))
     assert [a.code for a in spoken(ctx)] == ["tide table"] * is_said
     assert spoken(water(0.0, significant=False)) == []
+
+
+def test_heights_that_do_not_hold_now_are_said_where_water_dries_by_them():
+    rows = (TideRow(utc_s=900.0, height_m=2.0), TideRow(utc_s=20_000.0, height_m=0.4))
+    bar = DryingWater(name="the bar", polygon=LEE, margin_m=0.0, opens_at_m=1.0)
+
+    def said(utc_s, drying=(bar,)):
+        ctx = moment(WAY)
+        status = replace(ctx.snapshot.autopilot, t_s=NOW_S, utc_at_boot_s=utc_s, boot_s=0.0)
+        ctx = StepContext(
+            replace(ctx.voyage, drying=drying),
+            replace(ctx.config, tide=TideTable(rows=rows, name="week.csv")),
+            ctx.state,
+            replace(ctx.snapshot, autopilot=status),
+        )
+        watch_water(ctx)
+        return [a.code for a in spoken(ctx)]
+
+    assert said(800.0) == ["tide heights"]
+    assert said(1000.0) == said(800.0, drying=()) == []
 
 
 # -------------------------------------------------------------------------------------------- met by the rules

@@ -16,7 +16,7 @@ from companion.compose import drying_of, tide_of, voyage_of
 from companion.current import TideRow, TideTable, closed_spans, open_spans
 from companion.errors import InputError
 from companion.geofence import Code, FindingLevel, load_mission
-from companion.mission_check import AssumedWind, check_mission, leg_problem
+from companion.mission_check import AssumedWind, check_mission, leg_problem, tide_words_of
 from companion.planner import PlanStatus, plan
 from companion.planner.problem import evaluate
 from companion.skipper.planning.tides import opens_next
@@ -229,6 +229,54 @@ def test_what_opens_next_is_said_and_when():
         return opens_next(StepContext(voyage, replace(now.config, tide=tide), now.state, snapshot))
 
     opens_s = 1000.0 + water().closed_s(TABLE, 1000.0)[0][1]
-    assert at(TABLE) == f"the bar opens at {dt.datetime.fromtimestamp(round(opens_s), dt.UTC):%H:%M} UTC"
-    assert at(TABLE, utc_at_boot_s=opens_s + 60.0) == ""  # it is open
-    assert at(None) == at(TABLE, utc_at_boot_s=None) == ""
+    assert at(TABLE).words == f"the bar opens at {dt.datetime.fromtimestamp(opens_s, dt.UTC):%H:%M} UTC"
+    assert at(TABLE).in_s == pytest.approx(opens_s - 1000.0)
+    assert at(TABLE, utc_at_boot_s=opens_s + 60.0) is None  # it is open
+    assert at(None) is at(TABLE, utc_at_boot_s=None) is None
+
+
+def test_what_opens_on_another_day_is_said_with_the_day_and_what_the_table_holds_for():
+    """Two days and a half before the table's first row "opens at 00:10 UTC" was said."""
+    now = moment(route((0.0, 300.0), (0.0, 300.0)))
+    rows = (TideRow(utc_s=300_000.0, height_m=2.0), TideRow(utc_s=320_000.0, height_m=0.4))
+    table = TideTable(rows=rows, name="week.csv")
+    status = replace(now.snapshot.autopilot, t_s=NOW_S, utc_at_boot_s=1000.0, boot_s=0.0)
+    ctx = StepContext(
+        replace(now.voyage, drying=(water(),)),
+        replace(now.config, tide=table),
+        now.state,
+        replace(now.snapshot, autopilot=status),
+    )
+    assert opens_next(ctx).words == (
+        "the bar opens at 1970-01-04T11:20Z; nothing is known of the tide now: week.csv holds from 1970-01-04T11:20Z "
+        "to 1970-01-04T16:53Z"
+    )
+
+
+def test_the_tide_is_told_at_the_hour_that_is_looked_at():
+    """A bar that was closed, or a table that was over, was "obstacles or the fence close it"."""
+    mission = load_mission(GATE)
+    assert tide_words_of(mission, at("07:00")) == (
+        "tide at 2026-06-09T07:00Z: 0.38 m by tide-gate.csv; closed of what dries: The bar (drying height); the first "
+        "opens at 2026-06-09T08:32Z"
+    )
+    assert tide_words_of(mission, at("10:00")).endswith("what dries is open")
+    assert tide_words_of(mission, at("20:00")) == (
+        "tide at 2026-06-09T20:00Z: not known: tide-gate.csv holds from 2026-06-09T05:34Z to 2026-06-09T17:59Z; all "
+        "that dries is closed"
+    )
+    assert tide_words_of(replace(mission, drying=()), at("07:00")) == ""
+
+
+def test_a_gap_in_the_table_of_a_mission_is_found(tmp_path):
+    for name in ("tide-gate.toml", "tide-gate-water.geojson", "tide-gate-drying.geojson"):
+        (tmp_path / name).write_text((GATE.parent / name).read_text())
+    rows = (GATE.parent / "tide-gate.csv").read_text()
+    (tmp_path / "tide-gate.csv").write_text(rows + "2026-06-12T06:00:00Z, 3.0\n")
+    found = [f for f in check_mission(tmp_path / "tide-gate.toml").findings if f.place == "[area] tide"]
+    assert [f.severity for f in found] == [FindingLevel.WARNING]
+    assert found[0].text == (
+        "tide-gate.csv holds from 2026-06-09T05:34Z to 2026-06-12T06:00Z, but not between its rows of "
+        "2026-06-09T17:59Z and 2026-06-12T06:00Z: nothing is known of the tide then, and what dries is closed"
+    )
+    assert not [f for f in check_mission(GATE).findings if f.place == "[area] tide"]
