@@ -110,7 +110,7 @@ def hour_words(utc_s: float) -> str:
     >>> hour_words(1_795_510_800.0)
     '2026-11-24T09:00Z'
     """
-    return f"{np.datetime64(int(utc_s), 's')}"[:16] + "Z"
+    return f"{np.datetime_as_string(np.datetime64(round(utc_s), 's'), unit='m')}Z"
 
 
 def span_words(table: TideTable) -> str:

@@ -33,6 +33,11 @@ _SPEEDS |= {"cm.s-1": 0.01, "meters/second": 1.0, "m s^-1": 1.0}
 _LENGTHS = {"m": 1.0, "meter": 1.0, "meters": 1.0, "cm": 0.01}
 _MEMBERS = {"member", "number", "realization", "ensemble"}
 _SECONDS = {"second": 1.0, "minute": 60.0, "hour": 3600.0, "day": 86_400.0}
+# A date, perhaps an hour of it, and what zone they are of, as UDUNITS has it: 2026-12-01 00:00:00 +11:00
+_MOMENT = re.compile(
+    r"(\d{1,4})-(\d{1,2})-(\d{1,2})(?:(?:t|\s+)(\d{1,2}):(\d{1,2})(?::(\d{1,2})(?:\.\d*)?)?)?"
+    r"\s*(z|utc|gmt|[+-]\d{1,2}(?::?\d\d)?)?"
+)
 _CALENDARS = {"", "standard", "gregorian", "proleptic_gregorian"}
 # Amplitude and phase, as the atlases FES2014 and FES2022 name them, of heights and of streams; one file a constituent.
 _ATLAS = (("amplitude", "phase"), ("Ua", "Ug"), ("Va", "Vg"))
@@ -180,23 +185,43 @@ def _scale(variable: Stored, units: Mapping[str, float], source: str) -> float:
 
 
 def _unix_s(times: Stored, source: str) -> Floats:
-    found = re.match(r"(second|minute|hour|day)s? since (\S+)(?:[ T](\S+))?", times.said("units").lower())
+    found = re.match(r"(second|minute|hour|day)s? since (\S+)(.*)", times.said("units").lower())
     if found is None or times.said("calendar").lower() not in _CALENDARS:
         said = f"{times.said('units')}, {times.said('calendar')}".strip(", ")
         raise InputError(
             source, times.name, f"is in {said!r}", "write hours since 1970-01-01, of the standard calendar"
         )
-    try:
-        clock = (found[3] or "00:00:00").rstrip("zZ").split(".")[0]
-        year, month, day = (int(part) for part in found[2].rstrip("zZ").split("t")[0].split("-"))
-        hour, minute, second = (int(part) for part in (*clock.split(":"), "0", "0")[:3])
-        said = f"{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}"
-        begins = float(np.datetime64(said, "s").astype(np.int64))
-    except ValueError:
+    since = f"{found[2]}{found[3]}"
+    begins_s = _moment_s(since)
+    if begins_s is None:
         raise InputError(
-            source, times.name, f"counts from {found[2]!r}, which is no date", "write 1970-01-01"
-        ) from None
-    return begins + _SECONDS[found[1]] * times.values()
+            source, times.name, f"counts from {since!r}, which is no date", "write 1970-01-01 or 1970-01-01 00:00:00"
+        )
+    return begins_s + _SECONDS[found[1]] * times.values()
+
+
+def _moment_s(text: str) -> float | None:
+    """Return the Unix time [s] of a date, perhaps with an hour and a zone; None: it is none."""
+    found = re.fullmatch(_MOMENT, text)
+    if found is None:
+        return None
+    month, day, hour, minute, second = (int(found[k] or 0) for k in range(2, 7))
+    said = f"{int(found[1]):04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}"
+    try:
+        return float(np.datetime64(said, "s").astype(np.int64)) - _zone_s(found[7] or "")
+    except ValueError:
+        return None
+
+
+def _zone_s(text: str) -> float:
+    """Return how far a zone is ahead of UTC [s]. Raises ValueError: there is none such."""
+    if not text.startswith(("+", "-")):
+        return 0.0
+    digits = text[1:].replace(":", "")
+    hours, minutes = (int(digits), 0) if len(digits) < 3 else (int(digits[:-2]), int(digits[-2:]))
+    if hours > 14 or minutes > 59:
+        raise ValueError(text)
+    return (-1.0 if text[0] == "-" else 1.0) * (3600.0 * hours + 60.0 * minutes)
 
 
 def _part(lat: Floats, lon: Floats, box: Box | None) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:

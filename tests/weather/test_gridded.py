@@ -9,6 +9,7 @@ import pytest
 from companion import cli
 from companion.errors import InputError
 from companion.weather import phasors, read_weather
+from companion.weather.gridded import Stored, _unix_s
 from tests.passage.world import T0
 
 h5py = pytest.importorskip("h5py")
@@ -124,6 +125,26 @@ def test_a_wind_of_members(tmp_path):
     assert weather.wind_en_mps(T0, 51.0, 0.0) == pytest.approx(np.array([[0.1, 0.51], [0.05, 0.255]]), abs=6e-4)
 
 
+@pytest.mark.parametrize(
+    ("since", "ahead_h"),
+    [
+        ("2026-04-20 00:00:00 +11:00", 11.0),
+        ("2026-04-20T00:00:00+11:00", 11.0),
+        ("2026-04-20 00:00 -3:30", -3.5),
+        ("2026-04-20 +1100", 11.0),
+        ("2026-04-20 00:00:00.0 +9", 9.0),
+        ("2026-04-20 00:00:00 UTC", 0.0),
+        ("2026-04-20T00:00:00Z", 0.0),
+        ("2026-4-20", 0.0),
+    ],
+)
+def test_hours_since_a_time_of_another_zone_are_counted_from_there(since, ahead_h):
+    """What stands behind the hour was left out: a wind of Hobart's clock came eleven hours late."""
+    dims, values, attrs = variables(since=f"hours since {since}")["time"]
+    times = Stored(name="time", dims=dims, shape=values.shape, attrs=attrs, read=lambda part: values[part])
+    assert _unix_s(times, "c.nc")[1] == T0 + (6.0 - ahead_h) * 3600.0
+
+
 def changed(**more):
     found = variables()
     for name, change in more.items():
@@ -138,6 +159,8 @@ def changed(**more):
         (variables(units="knots"), "c.nc: uo: is in 'knots'; fetch it in m s-1"),
         (variables(since="months since 2026-04-20"), "c.nc: time: is in 'months since 2026-04-20'"),
         (variables(since="hours since 2026-13-20"), "c.nc: time: counts from '2026-13-20', which is no date"),
+        (variables(since="hours since 2026-04-20 00:00:00 AEDT"), "c.nc: time: counts from '2026-04-20 00:00:00 aedt'"),
+        (variables(since="hours since 2026-04-20 00:00:00 +27:00"), "c.nc: time: counts from '2026-04-20 00:00:00 +27"),
         ({k: v for k, v in variables().items() if k != "vo"}, "c.nc: uo: is there without its other component"),
         ({k: v for k, v in variables().items() if k not in {"uo", "vo"}}, "c.nc: holds no current and no wind: "),
         (
