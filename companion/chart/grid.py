@@ -15,6 +15,9 @@ from companion.errors import InputError
 from companion.geo import DEGREE_M
 
 MOST_CELLS = 25_000_000
+MOST_HEIGHT_M = 11_500.0  # the deepest trench has 10,935 m, the highest mountain 8,849
+_FILLED = (99.0, 999.0, 9999.0)  # what programs write for nothing, perhaps without saying so
+_ALIKE = 0.1  # a height that is one has others within so much of it
 COARSE_M = 100.0  # from here on a harbour is a cell or two
 
 
@@ -78,6 +81,26 @@ def parse_ascii_grid(text: str, source: str) -> Grid:
         y=south + cell * np.arange(rows, dtype=np.float64)[::-1],  # its first line is the northernmost
         heights_m=values.reshape(rows, columns),
     )
+
+
+def without_fill(grid: Grid) -> tuple[Grid, tuple[float, ...]]:
+    """Return a grid in which what stands for nothing is not known, and the numbers that did.
+
+    Those are beyond any sea or mountain, or one of 99, 999 and 9999, of either sign, with no other height near it: of a
+    hole that a file does not declare would else be made the deepest water of all.
+    """
+    heights = grid.heights_m
+    size = np.abs(heights)
+    doubtful = np.unique(heights[(size > MOST_HEIGHT_M) | np.isin(size, _FILLED)])
+    found = [value for value in doubtful.tolist() if abs(value) > MOST_HEIGHT_M or _is_alone(heights, value)]
+    if not found:
+        return grid, ()
+    return Grid(x=grid.x, y=grid.y, heights_m=np.where(np.isin(heights, found), np.nan, heights)), tuple(found)
+
+
+def _is_alone(heights: NDArray[np.float64], value: float) -> bool:
+    """Return whether no other height is about as great."""
+    return not ((heights != value) & (np.abs(heights - value) <= _ALIKE * abs(value))).any()
 
 
 def signed(grid: Grid, source: str, positive: str) -> Grid:

@@ -12,6 +12,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,19 +27,23 @@ from companion.chart.features import Box, Chart, Danger, Row, Source, Wanted
 from companion.chart.picture import DRAWN, ChartPicture, Mark, marks_of_chart, marks_of_rows
 from companion.disk import open_regular, read_regular
 from companion.errors import InputError, unreadable
+from companion.geo import DEGREE_M
 from companion.geofence import Circle, Code, Finding, FindingLevel, Zone, ZoneKind, read
 from companion.geofence.document import Mark as DrawnMark
 from companion.geofence.formats import decode, zone_kind
-from companion.words import counted
+from companion.words import counted, listed
 
 TEXT_BYTES = 512 * 1024 * 1024  # of an ASCII grid or a GeoJSON: a coast of a country
 LEADER = re.compile(rb"\d{5}[ 1-3][LD ]")  # how ISO 8211 begins, which S-57 is written in
+GEOTIFFS = frozenset({".tif", ".tiff"})
 GRIDS = frozenset({".tif", ".tiff", ".nc", ".asc", ".grd", ".bag"})
 OSM = frozenset({".osm", ".pbf"})
 LAYERED = OSM | {".shp", ".gpkg", ".fgb", ".gml", ".sqlite"}
 GEOGRAPHIC = re.compile(r"EPSG:(4326|4979)|OGC:CRS84|WGS[ _]?(19)?84", re.IGNORECASE)
 WATER = re.compile(r"water[-_ ]?polygons|ocean|seas?\b", re.IGNORECASE)
 S57_OPTIONS = {"UPDATES": "APPLY", "LIST_AS_STRING": "ON", "RETURN_PRIMITIVES": "OFF", "LNAM_REFS": "OFF"}
+SAME_DATUM_M = 1.0  # a position is good to 2.5 m
+DATUM_DEG = 0.01  # no datum lies farther from WGS 84
 LINE_M = 3.0
 POINT_M = 10.0
 
@@ -392,12 +397,66 @@ def _read_ascii(path: Path, box: Box, wanted: Wanted, positive: str) -> Chart:
     else:
         crs = "EPSG:4326" if _is_lonlat(grid) else None
     to_lonlat = _to_lonlat(crs, path, "header")
-    if to_lonlat is None or _is_lonlat(grid):
-        grid, to_lonlat = _cut(grid, box, path), None
-    cell_m = None if to_lonlat is None else float(abs(grid.y[1] - grid.y[0]))
-    return grids.chart_of(
-        grids.signed(grid, str(path), positive), Source(name=path.name), wanted, to_lonlat, cell_m=cell_m
+    cell_m = None if to_lonlat is None or _is_lonlat(grid) else float(abs(grid.y[1] - grid.y[0]))
+    if cell_m is None:
+        to_lonlat = _of_datum(to_lonlat, box, path)
+        grid = _cut(grid, box if to_lonlat is None else _grown(box), path)
+    return _of_grid(grid, path, Source(name=path.name), wanted, to_lonlat, positive=positive, cell_m=cell_m)
+
+
+def _of_grid(
+    grid: grids.Grid,
+    path: Path,
+    source: Source,
+    wanted: Wanted,
+    to_lonlat: Transform | None,
+    *,
+    positive: str,
+    cell_m: float | None,
+) -> Chart:
+    """Return what a grid says, and that it has numbers which stand for nothing."""
+    grid, filled = grids.without_fill(grid)
+    chart = grids.chart_of(grids.signed(grid, str(path), positive), source, wanted, to_lonlat, cell_m=cell_m)
+    if not filled:
+        return chart
+    numbers = listed([f"{value:g}" for value in filled[:3]])
+    text = f"has cells of {numbers}, which it does not call nothing and no depth is: solid, as all that is not known"
+    finding = Finding(
+        severity=FindingLevel.WARNING,
+        code=Code.FORMAT,
+        place="",
+        text=text,
+        remedy="declare it (gdal_edit.py -a_nodata)",
+        source=str(path),
     )
+    return replace(chart, findings=(*chart.findings, finding))
+
+
+def _of_datum(to_lonlat: Transform | None, box: Box, path: Path) -> Transform | None:
+    """Return what brings degrees of another datum to WGS 84; None where they are that within a metre.
+
+    Raises InputError where nothing is known of how the two lie to each other.
+    """
+    if to_lonlat is None:
+        return None
+    middle = np.array([[0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])]])
+
+    def unturned(xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        found = to_lonlat(xy)
+        found[:, 0] += 360.0 * np.round((xy[:, 0] - found[:, 0]) / 360.0)  # a grid may lie a turn from the box
+        return found
+
+    off_m = float(np.hypot(*(unturned(middle) - middle)[0]) * DEGREE_M)
+    if not math.isfinite(off_m):
+        raise InputError(
+            str(path), "header", "its datum cannot be brought to WGS 84 here", "export it as WGS 84 (EPSG:4326)"
+        )
+    return None if off_m < SAME_DATUM_M else unturned
+
+
+def _grown(box: Box) -> Box:
+    """Return a box that holds what lies in it by another datum."""
+    return (box[0] - DATUM_DEG, box[1] - DATUM_DEG, box[2] + DATUM_DEG, box[3] + DATUM_DEG)
 
 
 def _is_lonlat(grid: grids.Grid) -> bool:
@@ -424,12 +483,22 @@ def _read_raster(path: Path, box: Box, wanted: Wanted, positive: str) -> Chart:
             affine = raster.transform
             if raster.crs is None and affine.is_identity:
                 raise InputError(str(path), "", "does not say where it lies", "export it with its reference system")
+            if raster.crs is None and path.suffix.lower() in GEOTIFFS:
+                raise InputError(
+                    str(path),
+                    "",
+                    "does not say its reference system",
+                    "write it in (gdal_edit.py -a_srs EPSG:4326 where it is longitude and latitude of WGS 84)",
+                )
             if affine.b or affine.d:
                 raise InputError(str(path), "", "is a turned grid", "export it north up")
             x = affine.c + affine.a * (np.arange(raster.width) + 0.5)
             y = affine.f + affine.e * (np.arange(raster.height) + 0.5)
             crs = "EPSG:4326" if raster.crs is None else raster.crs.to_wkt()
             is_lonlat = raster.crs is None or raster.crs.is_geographic
+            shift = _of_datum(_to_lonlat(crs, path, "header"), box, path) if is_lonlat else None
+            if shift is not None:
+                box = _grown(box)
             if not is_lonlat:
                 box = _from_lonlat(crs).transform_bounds(*box)
             rows, parts = _within(x, y, box, path, is_round=is_lonlat)
@@ -447,11 +516,13 @@ def _read_raster(path: Path, box: Box, wanted: Wanted, positive: str) -> Chart:
     heading = " ".join(str(v).lower() for k, v in said.items() if k.rpartition("#")[2] in {"positive", "standard_name"})
     if positive == "auto" and ("down" in heading.split() or "depth" in heading):
         positive = "down"
-    return grids.chart_of(
-        grids.signed(grid, str(path), positive),
+    return _of_grid(
+        grid,
+        path,
         Source(name=path.name, edition=said.get("TIFFTAG_SOFTWARE", ""), date=said.get("TIFFTAG_DATETIME", "")[:10]),
         wanted,
-        None if is_lonlat else _to_lonlat(crs, path, "header"),
+        shift if is_lonlat else _to_lonlat(crs, path, "header"),
+        positive=positive,
         cell_m=None if is_lonlat else float(abs(affine.e)),
     )
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from shapely.geometry import Point
 
 from companion.chart import Source, Wanted
-from companion.chart.grid import Grid, chart_of, parse_ascii_grid, signed
+from companion.chart.grid import Grid, chart_of, parse_ascii_grid, signed, without_fill
 from companion.errors import InputError
 
 SOURCE = Source(name="g")
@@ -56,6 +56,24 @@ def test_what_is_not_known_is_solid():
     assert solid_of(Grid(x=np.arange(3.0), y=np.arange(3.0), heights_m=heights)).is_empty
     heights[0, 0] = np.nan
     assert solid_of(Grid(x=np.arange(3.0), y=np.arange(3.0), heights_m=heights)).area == 1.0
+
+
+@pytest.mark.parametrize("fill", [-9999.0, 9999.0, -32768.0, 3.4e38, -999.0, -99999.0])
+def test_a_number_that_stands_for_nothing_is_no_depth(fill):
+    """A hole that the file did not declare was free water 9999 m deep."""
+    heights = np.full((4, 4), -9.0)
+    heights[1, 2] = fill
+    grid, told = without_fill(Grid(x=np.arange(4.0), y=np.arange(4.0), heights_m=heights))
+    assert told == (fill,)
+    assert solid_of(grid).area == 4.0
+    assert np.isnan(signed(grid, "g", "down").heights_m[1, 2])
+
+
+def test_a_depth_of_999_metres_among_others_is_one():
+    heights = np.linspace(-1100.0, -900.0, 202)[1:-1].reshape(10, 20).round()
+    heights[3, 4] = -999.0
+    grid = Grid(x=np.arange(20.0), y=np.arange(10.0), heights_m=heights)
+    assert without_fill(grid) == (grid, ())
 
 
 def test_an_ascii_grid_begins_in_the_north():

@@ -387,7 +387,45 @@ def test_over_the_date_line_the_two_ends_of_a_grid_of_the_world_join(tmp_path, e
     assert area_of([chart], center, 60_000.0).solids == ()
 
 
-def grid_file(path, heights, west_deg, north_deg, cell_deg):
+@pytest.mark.parametrize("ending", ["asc", "tif"])
+def test_a_hole_that_a_grid_does_not_declare_is_solid_and_told(shell, ending):
+    heights = np.full((20, 20), -9.0)
+    heights[8:12, 8:12] = -32768.0
+    heights[0, 0] = 1.0
+    path = grid_file(shell.folder / f"g.{ending}", heights, -1.32, 50.83, 0.001)
+    code, out, _ = shell(path, "--around", "50.82,-1.31", "--radius", "500", "--depth", "2")
+    assert code == 0
+    assert (
+        "g." + ending + ": warning: has cells of -32768, which it does not call nothing and no depth is: solid" in out
+    )
+    (hole,) = json.loads((shell.folder / "chart.geojson").read_text())["features"]
+    assert shapely.covers(shapely.from_geojson(json.dumps(hole["geometry"])), box(-1.312, 50.818, -1.308, 50.822))
+
+
+def test_a_geotiff_that_does_not_say_where_its_numbers_are_from_is_refused(shell):
+    path = grid_file(shell.folder / "g.tif", np.full((20, 20), -9.0), -1.32, 50.83, 0.001, crs=None)
+    told = refusal(shell, path, "--around", "50.82,-1.31", "--radius", "800", "--depth", "2")
+    assert "g.tif: does not say its reference system; write it in" in told
+
+
+@pytest.mark.parametrize("ending", ["asc", "tif"])
+def test_degrees_of_another_datum_are_brought_to_wgs84(tmp_path, ending):
+    """A rock by an old Australian datum was 200 m from where it is."""
+    pyproj = pytest.importorskip("pyproj")
+    heights = np.full((200, 200), -9.0)
+    heights[100, 100] = 1.0
+    path = grid_file(tmp_path / f"g.{ending}", heights, 147.3, -42.8, 0.001, crs="EPSG:4202")
+    path.with_suffix(".prj").write_text(pyproj.CRS("EPSG:4202").to_wkt("WKT1_ESRI"))
+    at = (147.4005, -42.9005)
+    lon, lat = pyproj.Transformer.from_crs("EPSG:4202", "EPSG:4326", always_xy=True).transform(*at)
+    assert abs(lon - at[0]) > 0.001
+    (rock,) = read_chart(
+        path, box_about(GeoPoint(lat_deg=-42.9, lon_deg=147.4), 3000.0), Wanted(safety_depth_m=2)
+    ).dangers
+    assert (rock.geometry.centroid.x, rock.geometry.centroid.y) == pytest.approx((lon, lat), abs=1e-4)
+
+
+def grid_file(path, heights, west_deg, north_deg, cell_deg, crs="EPSG:4326"):
     """Write a grid whose first row lies in the north, as its ending says."""
     rows, columns = heights.shape
     if path.suffix == ".asc":
@@ -398,7 +436,7 @@ def grid_file(path, heights, west_deg, north_deg, cell_deg):
     rasterio = pytest.importorskip("rasterio")
     affine = rasterio.Affine(cell_deg, 0, west_deg, 0, -cell_deg, north_deg)
     shape = {"width": columns, "height": rows, "count": 1, "dtype": "float64"}
-    with rasterio.open(path, "w", driver="GTiff", crs="EPSG:4326", transform=affine, **shape) as out:
+    with rasterio.open(path, "w", driver="GTiff", crs=crs, transform=affine, **shape) as out:
         out.write(heights, 1)
     return path
 
