@@ -85,6 +85,8 @@ class Wanted:
     buoy_radius_m: float = 10.0
     most_doubt_m: float = 50.0
     """A survey's doubt of places widens margins by no more."""
+    floats_m: float | None = None
+    """Water no less deep than this is deep enough at some tide: a grid's is told by its depth; None: at none."""
     restricted: str = "prohibited"
     """Restricted areas: ``none``, ``prohibited`` (where entry is), ``all``."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ MOST_CELLS = 25_000_000
 MOST_HEIGHT_M = 11_500.0  # the deepest trench has 10,935 m, the highest mountain 8,849
 _FILLED = (99.0, 999.0, 9999.0)  # what programs write for nothing, perhaps without saying so
 _ALIKE = 0.1  # a height that is one has others within so much of it
+BAND_M = 0.5  # of water that dries: a piece of it is no farther from its own least depth ...
+MOST_BANDS = 6  # ... but where the tide is great: each band takes discs of a plan
 COARSE_M = 100.0  # from here on a harbour is a cell or two
 
 
@@ -137,14 +140,20 @@ def chart_of(
     ``to_lonlat`` brings (n, 2) of its x and y to longitude and latitude.
     """
     grid = grid.northwards()
-    solid = ~(grid.heights_m <= -wanted.safety_depth_m)
-    pieces = [piece for piece in shapely.get_parts(_shape(grid, solid)) if not piece.is_empty]
-    shapes = [*pieces, _shape(grid, np.ones_like(solid))]
+    levels = _levels_m(wanted)
+    pieces: list[tuple[BaseGeometry, float | None]] = []
+    shallower = np.zeros_like(grid.heights_m, dtype=np.bool_)
+    for level_m in levels:
+        solid = ~(grid.heights_m <= -level_m)
+        found = shapely.get_parts(_shape(grid, solid, shallower))
+        pieces += [(piece, _least_m(grid, solid & ~shallower, piece)) for piece in found if not piece.is_empty]
+        shallower = solid
+    shapes = [*(piece for piece, _ in pieces), _shape(grid, np.ones_like(shallower))]
     if to_lonlat is not None:
         shapes = [shapely.transform(shape, to_lonlat) for shape in shapes]
     dangers = tuple(
-        Danger(reason="shallow or land", geometry=shape, depth_m=_least_m(grid, solid, piece))
-        for shape, piece in zip(shapes[:-1], pieces, strict=True)
+        Danger(reason="shallow or land", geometry=shape, depth_m=depth_m)
+        for shape, (_, depth_m) in zip(shapes[:-1], pieces, strict=True)
     )
     step = float(grid.y[1] - grid.y[0])
     return Chart(
@@ -154,6 +163,18 @@ def chart_of(
         resolution_m=cell_m if cell_m is not None else step * DEGREE_M,
         knows_depths=True,
     )
+
+
+def _levels_m(wanted: Wanted) -> tuple[float, ...]:
+    """Return the depths that a grid is cut at, the last where water is free: what some tide covers is by its depth.
+
+    A flat that joins the shore, and slopes, would else be as deep as the land is, or as its highest part.
+    """
+    floats_m, free_m = wanted.floats_m, wanted.safety_depth_m
+    if floats_m is None or floats_m >= free_m:
+        return (free_m,)
+    count = min(MOST_BANDS, math.ceil((free_m - floats_m) / BAND_M))
+    return (*(floats_m + k * (free_m - floats_m) / count for k in range(count)), free_m)
 
 
 def _least_m(grid: Grid, solid: NDArray[np.bool_], piece: BaseGeometry) -> float | None:
@@ -168,9 +189,13 @@ def _least_m(grid: Grid, solid: NDArray[np.bool_], piece: BaseGeometry) -> float
     return -float(heights[row[own], column[own]].max()) if own.any() else None
 
 
-def _shape(grid: Grid, solid: NDArray[np.bool_]) -> BaseGeometry:
-    """Return the squares between four middles of which one is ``solid``, as one area."""
-    square = solid[:-1, :-1] | solid[:-1, 1:] | solid[1:, :-1] | solid[1:, 1:]
+def _squares(solid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return solid[:-1, :-1] | solid[:-1, 1:] | solid[1:, :-1] | solid[1:, 1:]
+
+
+def _shape(grid: Grid, solid: NDArray[np.bool_], less: NDArray[np.bool_] | None = None) -> BaseGeometry:
+    """Return the squares between four middles of which one is ``solid``, and none ``less``, as one area."""
+    square = _squares(solid) if less is None else _squares(solid) & ~_squares(less)
     padded = np.pad(square, 1)
     # an edge stands between two squares of which one is solid; each is a step of the grid, so they meet at its nodes
     row, column = np.nonzero(padded[1:-1, 1:] != padded[1:-1, :-1])

@@ -177,6 +177,7 @@ def _import(args: argparse.Namespace) -> int:
         air_draft_m=math.inf if args.air_draft is None else args.air_draft,
         buoy_radius_m=args.buoy_radius,
         most_doubt_m=args.most_doubt,
+        floats_m=floats_m,
         restricted=args.restricted,
     )
     charts: list[Chart] = []
@@ -196,20 +197,25 @@ def _import(args: argparse.Namespace) -> int:
             "say a smaller --radius or a larger --tolerance"
         )
     files = {str(obstacles): area.obstacles_json(), str(fence): area.fence_json()}
-    write_files(files | ({str(drying): area.drying_json()} if args.drying else {}), force=args.force)
+    if area.drying:
+        files[str(drying)] = area.drying_json()
+    write_files(files, force=args.force)
     print(
         f"{obstacles}: written: {counted(len(area.always), 'obstacle')} ({counted(area.positions(), 'position')}) "
         f"within {reach_m:.0f} m of {center.lat_deg:.5f}, {center.lon_deg:.5f}; solid is what is less deep than "
         f"{depth_m:g} m" + (f" with {tide_m:g} m of tide" if table else "")
     )
-    if args.drying:
+    if area.drying:
         print(
             f"{drying}: written: {counted(len(area.drying), 'piece')} of water that is too shallow at some hours only"
         )
+    elif args.drying:
+        old = ", and the one that is there is of before: leave it out of [area] drying" if drying.exists() else ""
+        print(f"{drying}: not written: no tide of the table makes deep enough what is too shallow here{old}")
     print(f"{fence}: written: the edge of it")
     if any(s.doubt_m == args.most_doubt > 0.0 for s in area.solids):
         print(f"surveys here are so doubtful that margins would be wider: cut at {args.most_doubt:g} m (--most-doubt)")
-    told = f', drying = ["{drying.name}"]' if args.drying else ""
+    told = f', drying = ["{drying.name}"]' if area.drying else ""
     print(f'in the mission: [area] obstacles = ["{obstacles.name}"], fence = "{fence.name}"{told}')
     bad = _troubles(area, places)
     for line in bad:

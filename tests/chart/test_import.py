@@ -165,6 +165,41 @@ def test_water_that_dries_goes_to_a_file_of_its_own_which_a_mission_reads(shell)
     assert told.startswith("--drying: is by the hours of a table")
 
 
+def test_a_flat_that_joins_the_shore_dries_by_its_own_depths(shell):
+    """It was as deep as the land is, so solid at all hours, and "0 pieces" was an empty file that no mission reads."""
+    heights = np.full((40, 24), -9.0)
+    heights[:, :12] = 5.0
+    heights[10:30, 12:18] = np.linspace(0.4, -1.4, 6)
+    rows = "\n".join(" ".join(f"{h:g}" for h in row) for row in heights)
+    header = "ncols 24\nnrows 40\nxllcorner -1.325\nyllcorner 50.80\ncellsize 0.001\n"
+    (shell.folder / "g.asc").write_text(f"{header}{rows}\n")
+    (shell.folder / "t.csv").write_text(TIDE.replace("4.0", "1.9"))
+    text = MISSION.replace("[area]\n", '[area]\ntide = "t.csv"\ndrying = ["m-chart-drying.geojson"]\n')
+    (shell.folder / "m.toml").write_text(text.replace("-1.3100", "-1.3050").replace("50.8250", "50.8200"))
+    code, out, _ = shell("g.asc", "--mission", "m.toml", "--radius", "700", "--drying")
+    assert code == 0, out
+    waters = load_mission(shell.folder / "m.toml").drying
+    depths = sorted(w.depth_m for w in waters)
+    assert depths[0] >= 1.7 - 1.9
+    assert max(np.diff([*depths, 1.7])) <= 0.5 + 0.36  # a band, and the step of the slope
+    (land,) = (s for s in load_mission(shell.folder / "m.toml").area.obstacles if s.name == "shallow or land")
+    all_of_it = shapely.union_all([land.shape, *(w.shape for w in waters)])
+    assert shapely.covers(all_of_it, box(-1.3125, 50.8125, -1.3080, 50.8175))
+    shallowest = next(w for w in waters if w.depth_m == depths[0])
+    assert not shapely.covers(land.shape, shallowest.shape.representative_point())
+
+
+def test_where_no_tide_makes_anything_deep_enough_no_file_is_named(shell):
+    (shell.folder / "a.geojson").write_text(collection((ISLAND, {})))
+    (shell.folder / "t.csv").write_text(TIDE)
+    (shell.folder / "m.toml").write_text(MISSION.replace("[area]\n", '[area]\ntide = "t.csv"\n'))
+    code, out, _ = shell("a.geojson", "--mission", "m.toml", "--drying")
+    assert code == 0
+    assert not (shell.folder / "m-chart-drying.geojson").exists()
+    assert "m-chart-drying.geojson: not written: no tide of the table makes deep enough what is too shallow here" in out
+    assert 'fence = "m-chart-fence.geojson"\n' in out
+
+
 @pytest.mark.parametrize(
     ("text", "begins", "told"),
     [
