@@ -15,8 +15,9 @@ from shapely.geometry.base import BaseGeometry
 from companion.chart.features import Chart, Danger, Source, box_about
 from companion.geo import DEGREE_M
 from companion.geo.frame import LocalFrame
-from companion.geofence import Circle, Document, Zone, ZoneKind
+from companion.geofence import Charted, Circle, Document, Zone, ZoneKind
 from companion.geofence.area import buffer_out, parts, polygons_about
+from companion.geofence.charted import MEMBER
 from companion.geofence.formats import MAX_POSITIONS
 from companion.geofence.shapes import polygon_lonlat, wrap_lon_deg
 from companion.messages import GeoPoint
@@ -82,9 +83,9 @@ class ChartArea:
         """Whether no mission could read it."""
         return self.positions() > MAX_POSITIONS
 
-    def obstacles_json(self) -> bytes:
+    def obstacles_json(self, made_for: Charted | None = None) -> bytes:
         """Return the obstacles as GeoJSON, each with its reason, source, edition, date and depth."""
-        return _collection([_feature(solid) for solid in self.always])
+        return _collection([_feature(solid) for solid in self.always], made_for)
 
     def drying_json(self) -> bytes:
         """Return the water that dries in the same way."""
@@ -281,6 +282,7 @@ def _geometry(shape: Polygon | Circle) -> dict[str, object]:
     return {"type": "Polygon", "coordinates": rings}
 
 
-def _collection(features: list[dict[str, object]]) -> bytes:
+def _collection(features: list[dict[str, object]], made_for: Charted | None = None) -> bytes:
     text = ",\n".join(json.dumps(f, ensure_ascii=False, separators=(",", ":")) for f in features)
-    return f'{{"type":"FeatureCollection","features":[\n{text}\n]}}\n'.encode()
+    said = "" if made_for is None else f'"{MEMBER}":{json.dumps(made_for.to_dict(), ensure_ascii=False)},'
+    return f'{{"type":"FeatureCollection",{said}"features":[\n{text}\n]}}\n'.encode()

@@ -161,6 +161,7 @@ def _shoals(args: argparse.Namespace) -> int:
 
 def _import(args: argparse.Namespace) -> int:
     from companion.chart import TOLERANCE_M, Wanted, area_of, box_about, read_chart, told_of
+    from companion.geofence import Charted
 
     center, reach_m, places, options = _water(args)
     out = args.out or (Path(args.mission).stem + "-chart" if args.mission else "chart")
@@ -170,7 +171,8 @@ def _import(args: argparse.Namespace) -> int:
     refuse_existing([str(obstacles), str(fence), *([str(drying)] if args.drying else [])], force=args.force)
     table = _tide_table(args, options)
     tide_m = _tide_m(args, table)
-    depth_m = _depth_m(args, options) - tide_m
+    needs_m = _depth_m(args, options)
+    depth_m = needs_m - tide_m
     floats_m = depth_m - _highest_m(args, table) if args.drying else None
     wanted = Wanted(
         safety_depth_m=depth_m,
@@ -196,7 +198,13 @@ def _import(args: argparse.Namespace) -> int:
             f"{obstacles}: not written: it would hold {area.positions()} positions, more than a mission reads; "
             "say a smaller --radius or a larger --tolerance"
         )
-    files = {str(obstacles): area.obstacles_json(), str(fence): area.fence_json()}
+    made_for = Charted(
+        needs_m=needs_m,
+        tide_m=tide_m,
+        hours_s=None if args.begins is None else (args.begins.timestamp(), args.ends.timestamp()),
+        drying=drying.name if area.drying else "",
+    )
+    files = {str(obstacles): area.obstacles_json(made_for), str(fence): area.fence_json()}
     if area.drying:
         files[str(drying)] = area.drying_json()
     write_files(files, force=args.force)
@@ -217,6 +225,10 @@ def _import(args: argparse.Namespace) -> int:
         print(f"surveys here are so doubtful that margins would be wider: cut at {args.most_doubt:g} m (--most-doubt)")
     told = f', drying = ["{drying.name}"]' if area.drying else ""
     print(f'in the mission: [area] obstacles = ["{obstacles.name}"], fence = "{fence.name}"{told}')
+    if args.depth is not None and options is not None and options.boat.draft_m is not None:
+        own_m = options.boat.draft_m + options.area.under_keel_m
+        if own_m > args.depth:
+            print(f"--depth {args.depth:g} is less than the {own_m:g} m of the mission's draft_m and under_keel_m")
     bad = _troubles(area, places)
     for line in bad:
         print(line)

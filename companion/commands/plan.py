@@ -99,20 +99,21 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, print, write and draw; return the exit code."""
-    from companion.mission_check import tide_words_of
+    from companion.mission_check import charted_findings, tide_words_of
     from companion.planner import PlanStatus, Problem
 
     if args.policy is not None and args.json:
         raise InputError("--policy", "", "is told as text", "leave --json out")
     ground: dict[str, Any] = {}
-    tide = ""
+    told: list[str] = []
     if Path(args.problem).suffix.lower() == ".toml":
         mission = _mission(args)
         ways = len(mission.goals) + (mission.skipper.end == "home")
         if args.plot is not None and args.policy is None and ways > 1:
             raise _several(args)
         answers = _sail_through(mission, args)
-        tide = tide_words_of(mission, _departs_s(args))
+        told = [finding.line() for finding in charted_findings(mission, _departs_s(args))]
+        told += [words for words in [tide_words_of(mission, _departs_s(args))] if words]
         ground = {"area": mission.water(), "margin_m": mission.margin_m}
         if args.plot is not None and mission.drying:
             from companion.plots.drying import drying_picture
@@ -141,8 +142,8 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(text)
     else:
         print("\n\n".join(describe(problem, answer, ground.get("margin_m", 0.0)) for problem, answer in answers))
-        if tide:
-            print(tide)
+        for line in told:
+            print(line)
         for path in (args.out, args.plot):
             if path is not None:
                 print(f"written: {path}")

@@ -365,6 +365,7 @@ def _voyage(
     from companion.compose import displays_of
     from companion.guard import Guard
     from companion.mavlink.transports import open_link
+    from companion.mission_check import charted_findings
     from companion.outputs import checked_displays
     from companion.telemetry.folder import DEFAULT_BUDGET_BYTES, VoyageArchive
 
@@ -387,7 +388,7 @@ def _voyage(
         pace=args.speedup,
     )
     told = checked_displays(displays_of(mission), guard)
-    for finding in mission.findings:
+    for finding in (*mission.findings, *charted_findings(mission, time.time())):
         err.write(f"companion run: {finding.line(str(mission.path))}\n")
     transport = open_link(args.link, seed=seed)
     again = args.again or sailed.is_new or confirm_again(mission, state_path, err)

@@ -5,6 +5,7 @@ metres for the planner. ``read(path)`` reads any single file into a ``Document``
 """
 
 from companion.geofence.area import Area, Fence, LocalArea
+from companion.geofence.charted import Charted
 from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.registry import read
 from companion.geofence.mission.mission import Mission, load_mission
@@ -12,6 +13,7 @@ from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
 
 __all__ = [
     "Area",
+    "Charted",
     "Circle",
     "Code",
     "Document",

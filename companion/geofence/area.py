@@ -20,6 +20,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.geo import LEAST_DEGREE_M
 from companion.geo.frame import LocalFrame
+from companion.geofence.charted import Charted
 from companion.geofence.shapes import Circle, Obstacle, Shape, Zone, ZoneKind, drawn, polygon_en
 from companion.words import listed
 
@@ -86,6 +87,8 @@ class Area:
 
     obstacles: tuple[Obstacle, ...] = ()
     fence: Fence = Fence()
+    charted: tuple[Charted, ...] = ()
+    """What those of the obstacles' files were made for that a chart's import wrote."""
 
     @property
     def solids(self) -> tuple[Obstacle, ...]:

@@ -9,6 +9,7 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from companion.errors import InputError
+from companion.geofence.charted import Charted
 from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind
 from companion.messages import GeoPoint, MissionItem
 from companion.words import one_line
@@ -53,6 +54,7 @@ class Code(enum.Enum):
     FORMAT = "format"
     FIELD = "field"
     DRIES = "dries at low water"
+    CHARTED = "made for another keel or tide"
     ROUNDING = "inside of a rounding"
     SMALL = "too small to meet"
     TWICE = "one name twice"
@@ -129,6 +131,8 @@ class Document:
     return_point: GeoPoint | None = None
     tracks: tuple[Track, ...] = ()
     findings: tuple[Finding, ...] = ()
+    charted: Charted | None = None
+    """What its obstacles were made for, where a chart's import says it."""
 
     @property
     def is_empty(self) -> bool:

@@ -1,6 +1,6 @@
 """Whether a mission can be sailed as it stands, and what plans of it would be: for who checks, draws or sails it."""
 
-from companion.mission_check.check import CheckedMission, check_mission
+from companion.mission_check.check import CheckedMission, charted_findings, check_mission
 from companion.mission_check.fields import (
     FieldPreview,
     HeadingFan,
@@ -28,6 +28,7 @@ __all__ = [
     "CheckedMission",
     "FieldPreview",
     "HeadingFan",
+    "charted_findings",
     "check_mission",
     "continued_plans",
     "current_words_of",

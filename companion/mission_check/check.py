@@ -10,7 +10,7 @@ from pathlib import Path
 import shapely
 
 from companion.compose import field_findings_of, tide_of, voyage_of
-from companion.current import span_words
+from companion.current import hour_words, span_words
 from companion.current.tide import ROWS_REMEDY
 from companion.errors import InputError
 from companion.geofence import Code, Finding, FindingLevel, Mission
@@ -23,6 +23,7 @@ from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.way import KEEP_SHARE, Side
 
 SAME_M = 1.0  # two goals so near are one mark that is passed twice
+HAIR_M = 0.005  # a depth is written in centimetres
 SMALL_M = 3.0  # a fix is good to 2.5 m
 
 
@@ -42,12 +43,12 @@ class CheckedMission:
 
 
 def check_mission(
-    path: Path, *, from_deg: float | None = None, given: Mapping[Path, bytes] | None = None
+    path: Path, *, from_deg: float | None = None, given: Mapping[Path, bytes] | None = None, unix_s: float | None = None
 ) -> CheckedMission:
     """Read a mission and its area as the boat will, and look for what is wrong with it: never raises InputError.
 
     ``from_deg``: where the wind comes from, in which gaps are looked at (else the mission's). ``given``: see
-    ``load_mission``.
+    ``load_mission``. ``unix_s``: the time now, by which hours that a chart was made for are over.
     """
     try:
         mission = read_mission(path, given or {})
@@ -86,6 +87,7 @@ def check_mission(
                     *_tide(mission),
                 )
             ),
+            *charted_findings(mission, unix_s),
             *_doubts(mission),
             *(f for f in found if f.severity is not FindingLevel.ERROR or f.code not in told),
         ),
@@ -224,3 +226,34 @@ def _tide(mission: Mission) -> Iterator[Finding]:
             text=f"{span_words(table)}: nothing is known of the tide then, and what dries is closed",
             remedy=ROWS_REMEDY,
         )
+
+
+def charted_findings(mission: Mission, unix_s: float | None) -> Iterator[Finding]:
+    """Yield the charts whose obstacles were made for less water than the boat needs, or for the tide of some hours.
+
+    ``unix_s``: when she sails; hours that do not hold then are a warning, others a note.
+    """
+    draft_m = mission.boat.draft_m
+    for charted in mission.area.charted:
+        if draft_m is not None and draft_m + mission.options.area.under_keel_m > charted.needs_m + HAIR_M:
+            yield Finding(
+                severity=FindingLevel.WARNING,
+                code=Code.CHARTED,
+                place="",
+                source=charted.source,
+                text=f"is made for {charted.needs_m:g} m of water, and this boat needs "
+                f"{draft_m + mission.options.area.under_keel_m:g} m (draft_m and under_keel_m)",
+                remedy="import the chart again",
+            )
+        if charted.hours_s is not None:
+            begins_s, ends_s = charted.hours_s
+            holds = unix_s is None or begins_s <= unix_s <= ends_s
+            yield Finding(
+                severity=FindingLevel.NOTE if holds else FindingLevel.WARNING,
+                code=Code.CHARTED,
+                place="",
+                source=charted.source,
+                text=f"reckons with {charted.tide_m:g} m of tide, from {hour_words(begins_s)} to {hour_words(ends_s)} "
+                "alone: at other hours there is less water",
+                remedy="" if holds else "sail in those hours, or import the chart again",
+            )

@@ -1,7 +1,9 @@
 """``companion chart import``: what it writes is what missions read; what cannot be believed is refused in one line."""
 
+import datetime as dt
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,9 +12,11 @@ from shapely.geometry import LineString, Point, box
 
 from companion import cli
 from companion.chart import Wanted, area_of, box_about, read_chart
-from companion.geofence import Circle, Document, Zone, ZoneKind, load_mission
+from companion.errors import InputError
+from companion.geofence import Circle, Code, Document, Zone, ZoneKind, load_mission, read
 from companion.geofence.formats import write
 from companion.messages import GeoPoint
+from companion.mission_check import check_mission
 
 AROUND = ["--around", "50.82,-1.31", "--radius", "1500"]
 ISLAND = box(-1.312, 50.8210, -1.308, 50.8230)
@@ -198,6 +202,52 @@ def test_where_no_tide_makes_anything_deep_enough_no_file_is_named(shell):
     assert not (shell.folder / "m-chart-drying.geojson").exists()
     assert "m-chart-drying.geojson: not written: no tide of the table makes deep enough what is too shallow here" in out
     assert 'fence = "m-chart-fence.geojson"\n' in out
+
+
+def test_what_a_chart_was_made_for_is_held_against_the_mission(shell):
+    """Made for three hours of tide, or a keel of 1.2 m, it was in order for any other."""
+    (shell.folder / "a.geojson").write_text(collection((ISLAND, {})))
+    (shell.folder / "t.csv").write_text(TIDE)
+    (shell.folder / "m.toml").write_text(MISSION)
+    hours = ["--from", "2026-11-24T11:00Z", "--to", "2026-11-24T13:00Z", "--tide", "t.csv"]
+    assert shell("a.geojson", "--mission", "m.toml", *hours)[0] == 0
+
+    def found(hour, text=MISSION):
+        (shell.folder / "m.toml").write_text(text)
+        unix_s = dt.datetime.fromisoformat(f"2026-11-24T{hour}+00:00").timestamp()
+        judged = check_mission(shell.folder / "m.toml", unix_s=unix_s)
+        return [(f.severity.value, f.text) for f in judged.findings if f.code is Code.CHARTED]
+
+    words = (
+        "reckons with 0.4 m of tide, from 2026-11-24T11:00Z to 2026-11-24T13:00Z alone: at other hours there is less"
+    )
+    assert found("12:00") == [("note", f"{words} water")]
+    assert found("13:01") == [("warning", f"{words} water")]
+    assert found("12:00", MISSION.replace("1.2", "2.9"))[0] == (
+        "warning",
+        "is made for 1.7 m of water, and this boat needs 3.4 m (draft_m and under_keel_m)",
+    )
+    assert cli.main(["fence", "convert", "m-chart.geojson", "again.geojson"]) == 0
+    assert read("again.geojson").charted == replace(read("m-chart.geojson").charted, source="again.geojson")
+    (shell.folder / "m.toml").write_text(MISSION)
+    _, out, _ = shell("a.geojson", "--mission", "m.toml", "--force", "--depth", "0.3")
+    assert "--depth 0.3 is less than the 1.7 m of the mission's draft_m and under_keel_m\n" in out
+    assert found("12:00")[0][0] == "warning"
+
+
+def test_a_mission_that_forgets_what_dries_is_refused(shell):
+    """Obstacles without the bar, and no bar: the plan led over it, in order."""
+    row, header = "-9 -9 -9 -9 -9\n", "ncols 5\nnrows 5\nxllcorner -1.33\nyllcorner 50.80\ncellsize 0.01\n"
+    (shell.folder / "g.asc").write_text(header + 2 * row + "-9 -9 -9 -9 0.5\n" + 2 * row)
+    (shell.folder / "t.csv").write_text(TIDE)
+    (shell.folder / "m.toml").write_text(MISSION.replace("[area]\n", '[area]\ntide = "t.csv"\n'))
+    assert shell("g.asc", "--mission", "m.toml", "--radius", "1500", "--drying")[0] == 0
+    with pytest.raises(InputError) as refused:
+        load_mission(shell.folder / "m.toml")
+    assert str(refused.value).endswith(
+        "m.toml: [area] drying: is missing: m-chart.geojson leaves out what dries, which is in m-chart-drying.geojson; "
+        'write drying = ["m-chart-drying.geojson"] and tide, or import the chart without --drying'
+    )
 
 
 @pytest.mark.parametrize(

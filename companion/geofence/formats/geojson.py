@@ -11,9 +11,11 @@ import json
 import math
 from typing import Any
 
+import numpy as np
 from shapely.geometry import LineString, Point, Polygon
 
 from companion.errors import InputError
+from companion.geofence.charted import MEMBER, Charted
 from companion.geofence.document import Code, Document, FindingLevel, Mark, Track
 from companion.geofence.formats.losses import Losses, Written, leave_out
 from companion.geofence.formats.rings import on_globe, polygons_from_rings
@@ -22,6 +24,7 @@ from companion.geofence.formats.untrusted import MAX_DEPTH, MAX_POSITIONS, JsonN
 from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 
+MOST_WATER_M = 1000.0  # that a chart's obstacles are made for
 _KINDS = {
     "inclusion": ZoneKind.INCLUSION,
     "keep-in": ZoneKind.INCLUSION,
@@ -242,7 +245,7 @@ def read_geojson(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION,
     root = parse_json(text, source)
     reading = _GeoJsonReading(source, kind, areas=areas)
     root_kind = root.member("type").text()
-    crs = root.get("crs")
+    crs, made_for = root.get("crs"), root.get(MEMBER)
     if crs is not None:
         named = json.dumps(crs.value)
         if not any(word in named for word in ("CRS84", "4326", "4979")):
@@ -282,6 +285,7 @@ def read_geojson(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION,
         return_point=reading.return_point,
         tracks=tuple(reading.tracks),
         findings=tuple(reading.findings),
+        charted=None if made_for is None else _charted(made_for),
     )
     if document.is_empty and not reading.findings:
         reading.findings.add(
@@ -289,6 +293,25 @@ def read_geojson(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION,
         )
         return Document(source=source, format="geojson", findings=tuple(reading.findings))
     return document
+
+
+def _charted(node: JsonNode) -> Charted:
+    """Return what a chart's import says of its obstacles. Raises InputError naming the place."""
+    begins, ends, tide, drying = (node.get(key) for key in ("from", "to", "tide_m", "drying"))
+    return Charted(
+        needs_m=node.member("needs_m").number(0.0, MOST_WATER_M),
+        tide_m=0.0 if tide is None else tide.number(-MOST_WATER_M, MOST_WATER_M),
+        hours_s=None if begins is None or ends is None else (_unix_s(begins), _unix_s(ends)),
+        drying="" if drying is None else drying.text(),
+        source=node.source,
+    )
+
+
+def _unix_s(node: JsonNode) -> float:
+    try:
+        return float(np.datetime64(node.text().removesuffix("Z"), "s").astype(np.int64))
+    except ValueError:
+        raise node.fail("is no time", "write 2026-11-24T08:00:00Z") from None
 
 
 def write_geojson(document: Document) -> Written:
@@ -336,7 +359,8 @@ def write_geojson(document: Document) -> Written:
             name=track.name,
             times_s=list(track.times_s) if track.times_s is not None else None,
         )
-    text = json.dumps({"type": "FeatureCollection", "features": features}, ensure_ascii=False, indent=1)
+    made_for = {} if document.charted is None else {MEMBER: document.charted.to_dict()}
+    text = json.dumps({"type": "FeatureCollection", **made_for, "features": features}, ensure_ascii=False, indent=1)
     return Written((text + "\n").encode(), tuple(losses))
 
 

@@ -15,6 +15,7 @@ from companion.disk import open_regular
 from companion.errors import InputError, unreadable
 from companion.geo.frame import RANGE_M, LocalFrame
 from companion.geofence.area import Area, Fence, LocalArea
+from companion.geofence.charted import Charted
 from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.registry import check_place, parse, read
 from companion.geofence.formats.untrusted import decode, read_bytes
@@ -321,6 +322,7 @@ def assembled(
         area = Area(
             obstacles=(*area.obstacles, *drawn.as_obstacles(options.area.point_radius_m)),
             fence=Fence(zones=(*area.fence.zones, *limits)),
+            charted=area.charted,
         )
     mission = Mission(
         options=options,
@@ -371,6 +373,7 @@ def load_area(
     obstacles: list[Obstacle] = []
     zones: list[Zone] = []
     findings: list[Finding] = []
+    charted: list[Charted] = []
 
     def load(name: str, key: str, kind: ZoneKind) -> Document:
         path = folder / name
@@ -389,6 +392,9 @@ def load_area(
     for name in options.obstacles:
         document = load(name, key, ZoneKind.EXCLUSION)
         obstacles.extend(document.as_obstacles(options.point_radius_m))
+        if document.charted is not None:
+            charted.append(document.charted)
+            _require_drying(document.charted, options, mission_path, name)
         zones.extend(z for z in document.zones if z.kind is ZoneKind.INCLUSION)
     if options.fence is not None:
         document = load(options.fence, "fence", ZoneKind.INCLUSION)
@@ -401,7 +407,19 @@ def load_area(
             )
         zones.extend(document.zones)
         obstacles.extend(o for o in document.without_zones().as_obstacles(options.point_radius_m))
-    return Area(obstacles=tuple(obstacles), fence=Fence(zones=tuple(zones))), tuple(findings)
+    area = Area(obstacles=tuple(obstacles), fence=Fence(zones=tuple(zones)), charted=tuple(charted))
+    return area, tuple(findings)
+
+
+def _require_drying(charted: Charted, options: AreaOptions, mission_path: Path, name: str) -> None:
+    """Refuse obstacles that leave out what dries, where the mission names none of it: plans would lead over it."""
+    if charted.drying and not options.drying:
+        raise InputError(
+            str(mission_path),
+            "[area] drying",
+            f"is missing: {name} leaves out what dries, which is in {charted.drying}",
+            f'write drying = ["{charted.drying}"] and tide, or import the chart without --drying',
+        )
 
 
 def load_drying(
