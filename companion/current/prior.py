@@ -17,9 +17,7 @@ from companion.geo.angles import wrap_two_pi
 
 DEFAULT_SIGMA_MPS = 0.5  # of water of which the mission says nothing: most tidal waters are within twice of it
 ENDED_S = 3600.0  # a tide has become another within the hour
-APART_S = (
-    8.0 * 3600.0
-)  # from the strongest flood to the strongest ebb it is six hours: of rows farther apart nothing is
+APART_S = 8.0 * 3600.0  # between rows farther apart nothing is told: from strongest flood to strongest ebb it is six
 MOST_ROWS = 20_000  # two years of hours
 MOST_MPS = 10.0  # the strongest tidal races reach 8
 SPAN_S = 60.0  # rows nearer together than this are a mistake
