@@ -19,7 +19,7 @@ from companion.geofence.mission import place_troubles, read_mission
 from companion.messages import GeoPoint
 from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
-from companion.skipper.planning.track import TRACKS_M
+from companion.skipper.planning import TRACKS_M
 from companion.skipper.way import KEEP_SHARE, Side
 
 SAME_M = 1.0  # two goals so near are one mark that is passed twice

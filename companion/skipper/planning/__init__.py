@@ -1,6 +1,7 @@
 """Planning under way: why, from where, with which step of the ladder, and what is done with the answer."""
 
 from companion.skipper.planning.next_tack import FOLLOWS, next_tack, next_tack_s, on_leg
+from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.planning.vessels import (
     ALIKE_S,
     GIVE_UP_RISK,
@@ -21,6 +22,7 @@ __all__ = [
     "OWN_TIMING_MPS",
     "PART_BY_RUNG",
     "SETTLED_M",
+    "TRACKS_M",
     "next_tack",
     "next_tack_s",
     "on_leg",
