@@ -223,9 +223,14 @@ def read_fen(text: str, source: str) -> Document:
     )
 
 
+_POLY_HEAD = "#saved by companion (Mission Planner polygon)"
+
+
 def read_poly(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION) -> Document:
-    """Return a .poly: one closed ring, or several named ones in the Regions variant."""
+    """Return a .poly: one closed ring, or several named ones in the Regions variant; one of ours says its kind."""
     findings = Findings()
+    said = re.match(rf"{re.escape(_POLY_HEAD)}: (\w+)", text)
+    kind = next((k for k in ZoneKind if said is not None and k.value == said[1]), kind)
     zones: list[Zone] = []
     blocks: list[tuple[str, int, list[str]]] = [("", 1, [])]  # name, number of the first line, lines
     for line_number, raw in enumerate(text.split("\n"), start=1):
@@ -333,10 +338,11 @@ def write_poly(document: Document) -> Written:
     leave_out(losses, document, {"zones"})
     zones = without_holes(document.zones, losses)
     losses.drop("zone", max(0, len(zones) - 1), severity=FindingLevel.ERROR, why="a .poly holds one ring")
-    lines = ["#saved by companion (Mission Planner polygon)"]
+    lines = [_POLY_HEAD + (f": {zones[0].kind.value}" if zones else "")]
     if zones:
         ring = ring_of(as_polygon(zones[0], losses))
-        losses.add(FindingLevel.NOTE, f"that the ring is an {zones[0].kind.value} zone is not carried by this format")
+        what = f"that the ring is an {zones[0].kind.value} zone is in a comment alone, which other programs pass over"
+        losses.add(FindingLevel.NOTE, what)
         lines.extend(f"{decimal(lat)} {decimal(lon)}" for lat, lon in (*ring, ring[0]))
     return Written(("\n".join(lines) + "\n").encode(), tuple(losses))
 

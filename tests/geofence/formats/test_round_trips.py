@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 
 from companion.geofence.document import Document, FindingLevel
 from companion.geofence.formats.registry import parse, write
-from companion.geofence.shapes import Circle, ZoneKind
+from companion.geofence.shapes import Circle, Zone, ZoneKind
 from tests.geofence.strategies import QUIET, documents
 
 SETTINGS = settings(**QUIET, max_examples=40)
@@ -226,3 +226,11 @@ def test_what_is_left_out_is_announced():
     assert {f.severity for f in losses} >= {FindingLevel.ERROR}
     assert any("keep-in ring" in f.text for f in losses)
     assert any("point or line" in f.text for f in losses)
+
+
+@pytest.mark.parametrize("kind", list(ZoneKind))
+def test_a_poly_of_ours_is_read_again_as_the_kind_that_it_was(kind):
+    """A zone to keep in came back as one to keep out of."""
+    ring = Polygon([(147.355, -42.91), (147.39, -42.91), (147.39, -42.89), (147.355, -42.89)])
+    back, _ = there_and_back(Document(zones=(Zone(kind=kind, shape=ring),)), "poly")
+    assert [z.kind for z in back.zones] == [kind]
