@@ -95,6 +95,7 @@ def _sentences(text: str) -> Iterator[list[str]]:
 def read_nmea(data: bytes, rows: Rows) -> None:
     """Read sentences from the first RMC on, by whose time they are."""
     t_s: float | None = None
+    untold = 0  # headings that nothing brings to true north
     for cells in _sentences(data.decode("latin-1")):
         kind = cells[0][-3:]
         value = [_number(c) for c in cells]
@@ -118,10 +119,11 @@ def read_nmea(data: bytes, rows: Rows) -> None:
         elif kind == "HDT" and n > 1 and value[1] is not None:
             rows.take(t_s, heading=math.radians(value[1]))
         elif kind in {"HDG", "HDM"} and n > 1 and value[1] is not None:
-            variation = rows.now.get("variation", (0.0, 0.0))[1]
+            variation = rows.now["variation"][1] if "variation" in rows.now else None
             if kind == "HDG" and n > 5 and value[4] is not None:
                 variation = math.radians(value[4] * (-1.0 if cells[5] == "W" else 1.0))
-            rows.take(t_s, heading=math.radians(value[1]) + variation)
+            untold += variation is None
+            rows.take(t_s, heading=math.radians(value[1]) + (variation or 0.0))
         elif kind == "VHW" and n > 6 and value[5] is not None:
             rows.take(t_s, stw=value[5] * MPS_PER_KNOT)
         elif kind == "MWV" and n > 5 and cells[2] == "R" and value[1] is not None and value[3] is not None:
@@ -131,6 +133,11 @@ def read_nmea(data: bytes, rows: Rows) -> None:
             rows.take(t_s, motor=100.0 if value[3] > 300.0 else 0.0)
     if t_s is not None:
         rows.sample(t_s)
+    if untold:
+        rows.notes.append(
+            f"its headings are magnetic, and of {untold} neither HDG nor RMC tells the variation: they are taken to be "
+            "true, and what the compass is found to be off by is the variation, too"
+        )
 
 
 def _rmc_time(cells: list[str]) -> float | None:

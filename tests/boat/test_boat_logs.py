@@ -210,6 +210,27 @@ def test_a_receiver_that_tells_no_course_tells_no_velocity_but_of_a_boat_that_li
     assert np.nanmax(np.hypot(*read.log.velocity_en_mps.T)) < 0.1
 
 
+@pytest.mark.parametrize(
+    ("rmc", "hdg", "is_told"), [(True, True, True), (True, False, True), (False, True, True), (False, False, False)]
+)
+def test_magnetic_headings_without_a_variation_are_told(tmp_path, rmc, hdg, is_told):
+    """They were true without a word, and 15 degrees of variation were the compass's."""
+    path = nmea(tmp_path / "a.nmea")
+    text = re.sub(r"\*..$", "", path.read_text(), flags=re.MULTILINE)  # a line without a checksum is believed
+    if not rmc:
+        text = re.sub(r"(RMC.*?\d{6}),2\.0,W", r"\1,,", text)
+    if not hdg:
+        text = re.sub(r"(HDG.*?,,),2\.0,W", r"\1,,", text)
+    path.write_text(text)
+    log = only(path)
+    told = [note for note in log.notes if "headings are magnetic" in note]
+    assert (told == []) is is_told
+    off_deg = np.degrees(
+        np.nanmedian(np.angle(np.exp(1j * (log.heading_rad - LOG.heading_rad[: len(log.heading_rad)]))))
+    )
+    assert off_deg == pytest.approx(0.0 if is_told else 2.0, abs=0.3)
+
+
 def test_an_autopilot_s_own_log_is_read(tmp_path):
     path, epoch_s = bin_log(tmp_path / "1.BIN")
     log = only(path)
