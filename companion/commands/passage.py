@@ -186,12 +186,12 @@ def _again(args: argparse.Namespace) -> int:
     forecasts = tuple(map(str, args.forecast)) if args.folder is None else _dropped(args.folder)
     mission = load_mission(args.mission)
     points = [mission.start or mission.origin, *(goal.point for goal in mission.goals)]
-    asked, passage = _read(args.file, None if args.now is None else args.now.timestamp(), args.here, forecasts)
+    asked, passage = _read(args.file, None if args.now is None else args.now.timestamp(), args.here, forecasts, "--now")
     now = (args.now or asked.depart.at).timestamp()
     print(told_of_age(passage.weather, now))
     if args.measured is not None:
         passage = _as_measured(passage, args.measured, now)
-    by, error = _by(args, asked), speed_error_of(asked.boat)
+    by, error = _by(args, asked, now), speed_error_of(asked.boat)
     by_s, sure = math.inf if by is None else by, asked.depart.sure
     with patience("planning"):
         [new] = sweep(passage, [now], error, nodes=NODES, by_utc_s=by_s, sure=sure, candidates=CANDIDATES)
@@ -251,7 +251,7 @@ def _sweep(args: argparse.Namespace) -> int:
     if count > MOST_DEPARTURES:
         raise InputError("companion passage plan", "--every", f"makes {count} departures of it", "say a longer time")
     asked, passage = _read(args.file, departs_utc_s=begins)
-    by = _by(args, asked)
+    by = _by(args, asked, begins)
     with patience("planning"):
         departures = sweep(
             passage,
@@ -275,9 +275,17 @@ def _sweep(args: argparse.Namespace) -> int:
     return 0 if best(departures, math.inf if by is None else by) is not None else JobError.exit_code
 
 
-def _by(args: argparse.Namespace, asked: PassageFile) -> float | None:
-    """Return until when she is to be there [Unix s], None where nobody says."""
+def _by(args: argparse.Namespace, asked: PassageFile, departs_s: float = -math.inf) -> float | None:
+    """Return until when she is to be there [Unix s], None where nobody says.
+
+    Raises InputError where that is asked for by ``--by`` and she departs no sooner.
+    """
     by = asked.depart.by if args.by is None else args.by
+    if args.by is not None and args.by.timestamp() <= departs_s:
+        from companion.weather import iso
+
+        said = f"{iso(args.by.timestamp())} is not after {iso(departs_s)}, when she departs"
+        raise InputError("--by", "", said, "say a later time")
     return None if by is None else by.timestamp()
 
 
@@ -317,7 +325,7 @@ def _plan(args: argparse.Namespace) -> int:
         raise InputError("companion passage plan", "--explain", "is of a --depart FROM..TO", "say it, too")
     _refuse_out(args)
     asked, passage = _read(args.file)
-    if len(passage.weather.members) > 1 or _by(args, asked) is not None:
+    if len(passage.weather.members) > 1 or _by(args, asked, asked.depart.at.timestamp()) is not None:
         with patience("planning"):
             found: Departure | None = _in_all(args, asked, passage)
         assert found is not None
@@ -344,9 +352,16 @@ def _plan(args: argparse.Namespace) -> int:
 
 
 def _read(
-    path: Path, departs_utc_s: float | None = None, here: GeoPoint | None = None, forecasts: tuple[str, ...] = ()
+    path: Path,
+    departs_utc_s: float | None = None,
+    here: GeoPoint | None = None,
+    forecasts: tuple[str, ...] = (),
+    departs: str = "--depart",
 ) -> tuple[PassageFile, Passage]:
-    """Return what a file asks, with the boat, forecasts and land that it names; ``here`` in place of its start."""
+    """Return what a file asks, with the boat, forecasts and land that it names; ``here`` in place of its start.
+
+    ``departs``: the option that ``departs_utc_s`` is of.
+    """
     import msgspec
 
     from companion.compose import polar_named
@@ -376,7 +391,14 @@ def _read(
     box = _box(frame)
     weather = read_weather([path.parent / name for name in asked.weather.files], box)
     depart = asked.depart.at.timestamp() if departs_utc_s is None else departs_utc_s
-    _check_weather(asked, weather, source, depart)
+    _check_weather(
+        asked,
+        weather,
+        source,
+        depart,
+        start="[start]" if here is None else "--from",
+        place="[depart] at" if departs_utc_s is None else departs,
+    )
     weather = _doubted(asked, weather)
     boat = asked.boat
     craft = craft_of(
@@ -471,14 +493,25 @@ def _box(frame: Any) -> tuple[float, float, float, float]:
     )
 
 
-def _check_weather(asked: PassageFile, weather: Weather, source: str, depart: float) -> None:
-    """Raise InputError where the forecast knows no wind at the start when she departs."""
+def _check_weather(
+    asked: PassageFile,
+    weather: Weather,
+    source: str,
+    depart: float,
+    *,
+    start: str = "[start]",
+    place: str = "[depart] at",
+) -> None:
+    """Raise InputError where the forecast knows no wind at the start when she departs.
+
+    ``start`` and ``place``: where it is said from where she sails, and when.
+    """
     from companion.weather import iso
 
     names = ", ".join(asked.weather.files)
     if not weather.wind:
         raise InputError(source, f"[weather] {names}", "holds no wind of 10 m here", "ask for 10u and 10v of the area")
-    for where, point in (("[start]", asked.start), ("[goal]", asked.goal)):
+    for where, point in ((start, asked.start), ("[goal]", asked.goal)):
         if not any(cube.covers(point.lat, point.lon) for cube in weather.wind):
             raise InputError(source, where, f"is outside the area of {names}", "ask for a larger area")
     if asked.limits.max_wave_m is not None and not weather.waves:
@@ -487,8 +520,8 @@ def _check_weather(asked: PassageFile, weather: Weather, source: str, depart: fl
         raise InputError(source, "[limits] lee_shore_m", "there is no shore", "name one in [area] obstacles")
     why = weather.why_unknown(depart, asked.start.lat, asked.start.lon)
     if why:
-        said = f"the wind at [start] is not known at {iso(depart)}: {why}"
-        raise InputError(source, "[depart] at", said, "say another time, or give a forecast of it")
+        said = f"the wind at {start} is not known at {iso(depart)}: {why}"
+        raise InputError(source, place, said, "say another time, or give a forecast of it")
 
 
 def _solids(asked: PassageFile, path: Path) -> list[BaseGeometry]:

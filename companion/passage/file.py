@@ -124,9 +124,13 @@ def parse_passage(text: str, source: str) -> PassageFile:
             if isinstance(value, float) and not math.isfinite(value):
                 raise InputError(source, f"[{table}] {key}", f"{value} is not a finite number")
     try:
-        return msgspec.convert(raw, PassageFile)
+        found = msgspec.convert(raw, PassageFile)
     except msgspec.ValidationError as error:
         raise _refusal(str(error), source) from None
+    at, by = found.depart.at, found.depart.by
+    if by is not None and by <= at:
+        raise InputError(source, "[depart] by", "is not after at, when she departs", "write a later time")
+    return found
 
 
 def _refusal(message: str, source: str) -> InputError:

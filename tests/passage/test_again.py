@@ -99,6 +99,9 @@ def test_a_new_forecast_by_the_command(shell, tmp_path, capsys):  # noqa: F811
     assert shell("--out", "m.toml")[0] == 0
     (tmp_path / "new.grb2").write_bytes(b"".join(wind_2(LAT, LON, h, 0.0, -8.0) for h in range(0, 49, 6)))
     words = ["passage", "again", "p.toml", "m.toml", "--forecast", "new.grb2", "--from", "50.0,-5.9", "--out", "n.toml"]
+    capsys.readouterr()
+    assert cli.main([*words, "--now", "2026-04-19T08:00Z"]) == 2
+    assert "p.toml: --now: the wind at --from is not known at 2026-04-19T08:00Z: " in capsys.readouterr().err
     assert cli.main([*words, "--now", "2026-04-20T08:00Z"]) == 0
     out = capsys.readouterr().out
     assert "old: arrives in 100 % of 5 runs in the one forecast there is" in out

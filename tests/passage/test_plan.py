@@ -171,6 +171,10 @@ def test_departures_are_compared(shell):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (
+            ["--by", "2026-04-20T06:00Z"],
+            "--by: 2026-04-20T06:00Z is not after 2026-04-20T06:00Z, when she departs; say a later time",
+        ),
         (["--explain"], "companion passage plan: --explain: is of a --depart FROM..TO; say it, too"),
         (
             ["--depart", "2026-04-20T00:00Z..2026-04-28T00:00Z", "--every", "10m"],
@@ -193,6 +197,10 @@ def test_an_option_that_goes_with_another(shell, words, said):
             ("at = 2026-04-20T06", "at = 2026-04-19T06"),
             "p.toml: [depart] at: the wind at [start] is not known at 2026-04-19T06:00Z: before the forecast's begin, "
             "2026-04-20T00:00Z; " + ANOTHER,
+        ),
+        (
+            ("at = 2026-04-20T06:00:00Z", "at = 2026-04-20T06:00:00Z\nby = 2026-04-20T05:00:00Z"),
+            "p.toml: [depart] by: is not after at, when she departs; write a later time",
         ),
         (
             ("at = 2026-04-20T06:00:00Z", "at = 2026-04-20T06:00:00"),
