@@ -142,6 +142,10 @@ class Parser(argparse.ArgumentParser):
 
     commands: Mapping[str, Parser] = MappingProxyType({})
 
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._negative_number_matcher = _NEGATIVE  # a place is none of argparse's, and would be an option
+
     def add_subparsers(self, **kwargs: Any) -> Any:
         """Return the subparsers, and keep them by their names."""
         subparsers = super().add_subparsers(**kwargs)

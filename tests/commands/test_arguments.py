@@ -6,7 +6,7 @@ import re
 import pytest
 
 from companion import cli
-from companion.program import with_negative_values
+from companion.program import Parser, with_negative_values
 from companion.program.arguments import moment
 from sitl import cli as sitl_cli
 
@@ -111,3 +111,12 @@ def test_a_time_without_a_zone_is_told_one_that_is_taken(text):
         moment(text)
     remedy = re.search(r"write (\S+)", str(refused.value))
     assert moment(remedy[1]).date().isoformat() == "2026-11-24"
+
+
+def test_a_place_in_the_south_is_a_word_of_an_order():
+    """`order goal -42.9,147.37` was "unrecognized arguments", and north of the equator it was done."""
+    parser = Parser(prog="companion order")
+    parser.add_argument("words", nargs="*")
+    parser.add_argument("--link")
+    taken = parser.parse_args(["goal", "-42.9,147.37", "--link", "x"])
+    assert (taken.words, taken.link) == (["goal", "-42.9,147.37"], "x")
