@@ -152,7 +152,7 @@ def _of_rows(rows: Iterator[Row], path: Path, wanted: Wanted, *, without_depths:
         elif zone_kind(row.text("kind")) is ZoneKind.INCLUSION:
             kept_in += 1
         else:
-            found += _plain(row, wanted)
+            found += _plain(row, wanted, path)
     if cell:
         if not (s57.has_depths(cell) or without_depths):
             raise s57.no_depths(str(path))
@@ -167,8 +167,15 @@ def _of_rows(rows: Iterator[Row], path: Path, wanted: Wanted, *, without_depths:
     return Chart(source=Source(name=path.name), dangers=tuple(found), findings=_findings(found, kept_in, path))
 
 
-def _plain(row: Row, wanted: Wanted) -> list[Danger]:
-    """Return what a feature without class or tags is, by what an obstacle file says of it; none: deep enough."""
+def _plain(row: Row, wanted: Wanted, path: Path) -> list[Danger]:
+    """Return what a feature without class or tags is, by what an obstacle file says of it; none: deep enough.
+
+    Raises InputError where it says a figure that is none: a radius in feet would be another.
+    """
+    for key in ("radius_m", "depth_m", "margin_m"):
+        if row.text(key) and row.number(key) is None:
+            said = f"{row.text(key)[:20]!r} is no number of metres"
+            raise InputError(str(path), f"{row.place} {key}", said, "write metres, as 12.2")
     shape, radius_m, depth_m = row.geometry.geom_type, row.number("radius_m"), row.number("depth_m")
     if depth_m is not None and depth_m >= wanted.safety_depth_m:
         return []

@@ -191,7 +191,10 @@ def _import(args: argparse.Namespace) -> int:
         for finding in chart.findings:
             print(finding.line(name))
         source = "" if str(chart.source) in {name, Path(name).name} else f"{chart.source}: "
-        print(f"{name}: {source}{told_of(chart)}" + ("" if chart.knows_depths else "; it tells no depths"))
+        print(
+            f"{name}: {source}{told_of(chart)}"
+            + ("" if chart.knows_depths else "; it tells no depths of the water between")
+        )
     area = area_of(charts, center, reach_m, args.tolerance or TOLERANCE_M, floats_m)
     if area.is_too_much:
         raise JobError(

@@ -294,6 +294,11 @@ def test_a_place_of_the_mission_that_is_not_in_free_water_is_told(shell):
             'a.geojson: crs: {"properties": {"name": "EPSG:27700"}} is not WGS 84',
         ),
         ("a.geojson", '{"features": [{}]}', "a.geojson: features[0]: has no geometry"),
+        (
+            "a.geojson",
+            collection((Point(-1.31, 50.82), {"radius_m": "40 ft"})),
+            "a.geojson: features[0] radius_m: '40 ft' is no number of metres; write metres, as 12.2",
+        ),
         ("water-polygons.geojson", collection(), "water-polygons.geojson: holds the water, by its name"),
         (
             "g.asc",
