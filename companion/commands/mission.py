@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,6 +30,7 @@ from companion.words import counted
 if TYPE_CHECKING:
     from companion.boat import ProposedMargin
     from companion.geofence import Document, Mission
+    from companion.geofence.formats import Written
     from companion.geofence.mission import MissionFiles
     from companion.planner import Plan, Problem
 
@@ -123,11 +125,20 @@ def _example(args: argparse.Namespace) -> int:
 
 
 def _check(args: argparse.Namespace) -> int:
+    from companion.geofence import FindingLevel
+    from companion.geofence.mission import course_of, drawing_findings
+
     if Path(args.file).suffix.lower() != ".toml":
         document = read_mission_file(args.file)
         print_findings(document.findings, args.file)
-        print(f"{args.file}: {document.format}: {summary(document)}: in order")
-        return 0
+        is_bad = print_findings(drawing_findings(document), args.file)
+        refused = course_of(document.items).refusals if document.items else ()
+        for finding in refused:
+            text = f"the companion does not sail it: {finding.text}"
+            print(replace(finding, severity=FindingLevel.WARNING, text=text).line(args.file))
+        verdict = "NOT in order" if is_bad else "in order for the autopilot alone" if refused else "in order"
+        print(f"{args.file}: {document.format}: {summary(document)}: {verdict}")
+        return int(is_bad)
     from companion.compose import field_words
     from companion.mission_check import check_mission, current_words_of, tide_words_of, wind_limit_words
 
@@ -208,8 +219,11 @@ def _convert(args: argparse.Namespace) -> int:
         return 0
     if args.part is not None:
         document = _only(document, args.part)
+    written = write(document, args.out)
+    if not args.lossy:
+        _require_free(document, written, args.out)
     write_out(
-        write(document, args.out),
+        written,
         args.out,
         lossy=args.lossy,
         force=args.force,
@@ -217,6 +231,22 @@ def _convert(args: argparse.Namespace) -> int:
     )
     print(f"{args.out}: written: {summary(read(args.out))}")  # what is in it, not what was meant to be
     return 0
+
+
+def _require_free(document: Document, written: Written, out: str) -> None:
+    """Raise JobError where the file would lay a zone over a waypoint, home or rally point that is in free water."""
+    from companion.geofence.formats import parse
+    from companion.geofence.mission import drawing_findings
+
+    before = {finding.place for finding in drawing_findings(document)}
+    made = parse(written.data, out, extension=Path(out).suffix.lower())
+    covered = [finding for finding in drawing_findings(made) if finding.place not in before]
+    if covered:
+        print_losses(written.losses, out)
+        raise JobError(
+            f"{out}: not written: in it {covered[0].place}, {covered[0].text}: this format has no zone with a hole; "
+            "choose another format, write the mission alone (--part mission), or say --lossy"
+        )
 
 
 def _upload(args: argparse.Namespace) -> int:

@@ -292,3 +292,42 @@ def test_help_has_examples(capsys):
 def test_a_mission_is_among_what_a_mission_is_converted_to(tmp_path, capsys):
     assert main(["mission", "convert", "missions/bay.toml", str(tmp_path / "bay.xyz")]) == 2
     assert "use .toml, " in capsys.readouterr().err
+
+
+RING = {
+    "type": "Polygon",
+    "coordinates": [[[-1.32, 50.81], [-1.3, 50.81], [-1.3, 50.83], [-1.32, 50.83], [-1.32, 50.81]]],
+}
+HOLE = [[-1.315, 50.815], [-1.305, 50.815], [-1.305, 50.825], [-1.315, 50.825], [-1.315, 50.815]]
+
+
+def test_a_filled_hole_over_a_waypoint_is_written_only_where_that_is_wanted(capsys, tmp_path, monkeypatch):
+    """The keep-out lay over start and goal, and the file was in order."""
+    monkeypatch.chdir(tmp_path)
+    ring = {"type": "Polygon", "coordinates": [*RING["coordinates"], HOLE]}
+    feature = {"type": "Feature", "properties": {"kind": "exclusion"}, "geometry": ring}
+    (tmp_path / "o.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    (tmp_path / "m.toml").write_text(
+        '[start]\nlat = 50.818\nlon = -1.31\n[[goal]]\nlat = 50.822\nlon = -1.31\n[area]\nobstacles = ["o.geojson"]\n'
+    )
+    code, _, err = run(capsys, "mission", "convert", "m.toml", "m.plan")
+    assert code == 1
+    assert "m.plan: not written: in it item 1, 50.822000, -1.310000 is inside the obstacle" in err
+    assert not (tmp_path / "m.plan").exists()
+    assert run(capsys, "mission", "convert", "m.toml", "m.plan", "--lossy")[0] == 0
+    code, out, _ = run(capsys, "mission", "check", "m.plan")
+    assert code == 1
+    assert "m.plan: item 1: error: 50.822000, -1.310000 is inside the obstacle" in out
+    assert "m.plan: home: warning: 50.818000, -1.310000 is inside the obstacle" in out
+    assert out.rstrip().endswith("NOT in order")
+    assert run(capsys, "mission", "convert", "m.toml", "m.geojson")[0] == 0
+
+
+def test_of_a_drawing_it_is_said_what_the_companion_does_not_sail(capsys, tmp_path):
+    rows = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t50.817\t-1.31\t0\t1"]
+    rows += ["1\t0\t3\t16\t0\t0\t0\t0\t50.82\t-1.31\t0\t1", "2\t0\t3\t178\t1\t3\t0\t0\t0\t0\t0\t1"]
+    (tmp_path / "m.waypoints").write_text("\n".join(rows) + "\n")
+    code, out, _ = run(capsys, "mission", "check", tmp_path / "m.waypoints")
+    assert code == 0
+    assert "item 2: warning: the companion does not sail it: DO_CHANGE_SPEED is nothing that a voyage does" in out
+    assert out.rstrip().endswith("in order for the autopilot alone")

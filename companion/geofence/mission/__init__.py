@@ -3,6 +3,7 @@
 from companion.geofence.mission.autopilot_mission import (
     NO_NAME,
     DrawnMission,
+    course_of,
     drawing_of,
     drawn_mission,
     hindrance,
@@ -11,7 +12,15 @@ from companion.geofence.mission.autopilot_mission import (
     stored_text,
 )
 from companion.geofence.mission.boat_file import BoatFile, LearnedTable, parse_boat_file, read_boat_file, with_boat_file
-from companion.geofence.mission.files import PERMITS, MissionFiles, document_of, goal_losses, mission_files, zones_only
+from companion.geofence.mission.files import (
+    PERMITS,
+    MissionFiles,
+    document_of,
+    drawing_findings,
+    goal_losses,
+    mission_files,
+    zones_only,
+)
 from companion.geofence.mission.goals import GoalField, GoalGate, MissionGoal, free_water, is_file
 from companion.geofence.mission.mission import (
     MOST_PASSAGE_BYTES,
@@ -96,7 +105,9 @@ __all__ = [
     "StartOptions",
     "StationAtomOptions",
     "WindOptions",
+    "course_of",
     "document_of",
+    "drawing_findings",
     "drawing_of",
     "drawn_mission",
     "dump_options",

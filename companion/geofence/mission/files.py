@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-from companion.geofence.document import Document, Finding, FindingLevel
+from companion.geo.frame import LocalFrame
+from companion.geofence.area import Area, Fence
+from companion.geofence.document import Code, Document, Finding, FindingLevel
 from companion.geofence.formats.losses import Losses, Written
 from companion.geofence.formats.registry import write
 from companion.geofence.mission.autopilot_mission import MissionStop, course_of
-from companion.geofence.mission.mission import Mission
+from companion.geofence.mission.mission import Mission, trouble_at
 from companion.geofence.mission.options import AreaOptions, MissionOptions, RefugeOptions, SkipperOptions, StartOptions
 from companion.geofence.mission.text import dump_options
 from companion.geofence.shapes import Circle, Zone, ZoneKind
@@ -26,6 +28,29 @@ def document_of(mission: Mission) -> Document:
         item_names=tuple(g.name for g in mission.goals) if any(g.name for g in mission.goals) else (),
         home=mission.start,
         rally=tuple(waypoint(r.point, command=Command.NAV_RALLY_POINT) for r in mission.refuges),
+    )
+
+
+def drawing_findings(document: Document) -> tuple[Finding, ...]:
+    """Return what of a drawing lies in what it keeps out of, or beyond what it keeps in: waypoints are errors."""
+    places = [(f"item {n}", i.point) for n, i in enumerate(document.items, start=1) if i.lat_e7 or i.lon_e7]
+    others = [] if document.home is None else [("home", document.home)]
+    others += [(f"rally point {n}", i.point) for n, i in enumerate(document.rally, start=1)]
+    if not (places or others) or not document.zones:
+        return ()
+    frame = LocalFrame((places or others)[0][1])
+    limits = tuple(z for z in document.zones if z.kind is ZoneKind.INCLUSION)
+    local = Area(obstacles=document.as_obstacles(AreaOptions().point_radius_m), fence=Fence(zones=limits)).local(frame)
+    return tuple(
+        Finding(
+            severity=FindingLevel.ERROR if place in dict(places) else FindingLevel.WARNING,
+            code=Code.GOAL_OUTSIDE,
+            place=place,
+            text=f"{point.lat_deg:.6f}, {point.lon_deg:.6f} {problem}",
+            remedy="move it into free water, or draw the zone anew",
+        )
+        for place, point in (*places, *others)
+        if (problem := trouble_at(local, frame.en_from_geo(point)))
     )
 
 
