@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import difflib
 import math
+import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -181,15 +182,33 @@ class _File(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     station: Annotated[tuple[_Station, ...], Meta(min_length=1)]
 
 
+def _named(place: str, data: Any) -> str:
+    """Return a place of msgspec's with the constituent, which it leaves out: ``waves[...]``."""
+    head, dots, tail = place.partition("[...]")
+    if not dots:
+        return place
+    for part in re.findall(r"[^.\[\]]+", head):
+        data = data[int(part)] if part.isdigit() else data[part]
+    for name, wave in data.items():
+        try:
+            msgspec.convert(wave, _Wave)
+        except msgspec.ValidationError:
+            return f"{head}.{name}{tail}"
+    return place
+
+
 def read_stations(text: str, source: str) -> tuple[Tides, ...]:
     """Return the heights and streams of a TOML text of stations. Raises InputError: station, key, remedy."""
+    data: dict[str, Any] = {}
     try:
-        raw = msgspec.convert(tomllib.loads(text), _File)
+        data = tomllib.loads(text)
+        raw = msgspec.convert(data, _File)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(source, "", f"is not TOML: {str(error)[:80]}") from None
     except msgspec.ValidationError as error:
         problem, _, place = str(error).partition(" - at `$.")
-        raise InputError(source, place.rstrip("`"), expected(problem), "see docs/reference/formats.md") from None
+        named = _named(place.rstrip("`"), data)
+        raise InputError(source, named, expected(problem), "see docs/reference/formats.md") from None
     out = []
     heights = [(s, [(None, s.height.mean_m, s.height.waves)]) for s in raw.station if s.height is not None]
     streams = [(s, [(r.towards_deg, r.mean_mps, r.waves) for r in s.stream]) for s in raw.station if s.stream]
