@@ -38,6 +38,7 @@ Exit codes: 0 written or told, 1 the logs hold too little sailing, 2 an invalid 
 TWA_DEG = (40.0, 45.0, 52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0, 165.0, 180.0)
 TRIAL_M = 1000.0  # from the start: nobody sails an hour to a trial
 MARK_M, MARK_SHARE = 10.0, 0.15  # a mark's radius, and the share of a board that it is at most
+MEDIAN = 0.5  # of the speeds that are written
 MOST_WINDS = 7  # columns of a table
 
 
@@ -111,7 +112,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
     show.add_argument(
         "--quantile",
         type=number(above=0.0, at_most=0.5),
-        default=0.5,
+        default=MEDIAN,
         metavar="P",
         help="of the speeds in these files, below which she is with this chance (default: 0.5; careful: 0.1)",
     )
@@ -317,6 +318,10 @@ def _show(args: argparse.Namespace) -> int:
     from companion.commands.output import write_files
     from companion.compose import speed_error_of
 
+    if args.quantile != MEDIAN and not (args.pol or args.orc or args.signalk):
+        raise InputError(
+            "--quantile", "", "is of the speeds in a file, and none is asked for", "say --pol, --orc or --signalk, too"
+        )
     polar, boat = _boat(args.file)
     sailed = _sailed(polar, boat)
     error = 0.0 if boat is None else speed_error_of(boat.boat)

@@ -42,6 +42,9 @@ def test_what_is_guessed_is_shown_drawn_and_written_for_opencpn(tmp_path, capsys
         )
         assert best[0] > math.radians(44.9)  # not inside her no-go zone
     middle = read_polar(tmp_path / "p.pol").polar.speed_mps(1.5, 3.0)
+    capsys.readouterr()
+    assert main(["boat", "show", str(file), "--quantile", "0.1"]) == 2
+    assert "--quantile: is of the speeds in a file, and none is asked for; say --pol" in capsys.readouterr().err
     assert main(["boat", "show", str(file), "--pol", str(tmp_path / "p.pol"), "--quantile", "0.1", "--force"]) == 0
     assert read_polar(tmp_path / "p.pol").polar.speed_mps(1.5, 3.0) == pytest.approx(0.639 * middle, rel=0.02)
 
