@@ -53,7 +53,7 @@ def cross():
     """Plan a passage, as ``companion passage plan`` does."""
     import numpy as np
 
-    from companion.boat import constant
+    from companion.boat import Boat, constant
     from companion.messages import GeoPoint
     from companion.passage import Passage, PassageFrame, craft_of, land_of, plan
     from companion.weather import Cube, Weather
@@ -68,7 +68,7 @@ def cross():
             start=start,
             goal=goal,
             radius_m=100.0,
-            craft=craft_of(constant(2.0), no_go_half_rad=0.7),
+            craft=craft_of(Boat(polar=constant(2.0), no_go_half_rad=0.7)),
             weather=Weather(wind=(cube,)),
             land=land_of(frame, (), (-3.0, -3.0, 3.0, 3.0), 0.0),
             frame=frame,

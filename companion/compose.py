@@ -163,6 +163,18 @@ def shape_error_of(mission: Mission) -> Polar | None:
     return polar_of_table(twa_deg, tws_mps, rest, name="error", source=str(path))
 
 
+def sailed_boat(options: BoatOptions, polar: Polar) -> Boat:
+    """Return what her speeds, her best angles and a passage are reckoned by."""
+    return Boat(
+        polar=polar,
+        no_go_half_rad=math.radians(options.no_go_half_deg),
+        max_twa_rad=math.radians(options.max_twa_deg),
+        tack_loss_s=options.tack_loss_s,
+        leeway_rad=math.radians(options.leeway_deg),
+        max_tws_mps=options.max_tws_mps,
+    )
+
+
 def boat_of(mission: Mission) -> Boat:
     """Return the mission's boat; one that does not sail has no no-go zone, and tacks cost it nothing."""
     if mission.autopilot.frame == "motor":

@@ -29,7 +29,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from companion.boat import avalon
+from companion.boat import Boat, avalon
 from companion.messages import GeoPoint
 from companion.passage import Craft, Land, Outcome, Passage, PassageFrame, craft_of, plan, sail
 from companion.weather import Weather
@@ -90,7 +90,7 @@ def _passage(weather: Weather, here: GeoPoint) -> Passage:
 
 
 def _craft() -> Craft:
-    return craft_of(avalon(), no_go_half_rad=NO_GO_RAD, tack_loss_s=20.0)._replace(share=SHARE)
+    return craft_of(Boat(polar=avalon(), no_go_half_rad=NO_GO_RAD, tack_loss_s=20.0))._replace(share=SHARE)
 
 
 def _route(asked: Passage, now_s: float) -> list[GeoPoint]:

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat import Polar
+from companion.boat import Boat, Polar
 from companion.messages import GeoPoint
 from companion.passage import Craft, Land, Passage, PassageFrame, craft_of, land_of, shares_of
 from companion.weather import Cube, ForecastError, Weather, dressed, errors_of, fitted
@@ -73,7 +73,7 @@ def scored(worlds: int, runs: int, seed: int = 0) -> Scored:
 
 @functools.cache
 def _craft() -> Craft:
-    return craft_of(POLAR, no_go_half_rad=0.0)
+    return craft_of(Boat(polar=POLAR, no_go_half_rad=0.0))
 
 
 def _times(weather: Weather, departs: float, shares: Sequence[float], land: Land) -> Floats:

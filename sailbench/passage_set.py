@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from companion.boat import read_polar
+from companion.boat import Boat, read_polar
 from companion.messages import GeoPoint
 from companion.passage import Passage, PassageFrame, craft_of, land_of
 from lab.climate import Box, truth
@@ -76,8 +76,8 @@ def passage(way: Way, season: str) -> Passage:
     days = frame.length_m / (_SLOW_MPS * 86_400.0) + _MORE_DAYS
     times = departs_utc_s(season) + np.arange(0.0, days * 86_400.0 + _STEP_S, _STEP_S)
     seed = 100 * (WAYS.index(way) + 1) + SEASONS[season]
-    craft = craft_of(
-        read_polar(POLAR).polar,
+    boat = Boat(
+        polar=read_polar(POLAR).polar,
         no_go_half_rad=math.radians(NO_GO_DEG),
         tack_loss_s=TACK_LOSS_S,
         max_tws_mps=MAX_TWS_MPS,
@@ -86,7 +86,7 @@ def passage(way: Way, season: str) -> Passage:
         start=start,
         goal=goal,
         radius_m=RADIUS_M,
-        craft=craft,
+        craft=craft_of(boat),
         weather=truth(seed, times, box),
         land=land_of(frame, coast(), box, MARGIN_M),
         frame=frame,

@@ -137,10 +137,14 @@ class Boat:
         """Return the angle of the best way to leeward, no deeper than the boat sails."""
         return self.polar.best_run(tws_mps, max_twa_rad=self.max_twa_rad)
 
-    def _made_good(
-        self, twa_rad: NDArray[np.float64], speed_mps: NDArray[np.float64], tws_mps: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return a polar's curve by the boat's course in place of its bow's angle, and the speed along it."""
+    def curve(self, tws_mps: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return angles to the wind of courses through the water [rad] and the speeds [m/s] along them, linear between.
+
+        Without leeway it is the polar's own curve.
+        """
+        twa_rad, speed_mps = self.polar.curve(tws_mps)
+        if self.leeway_rad == 0.0:
+            return twa_rad, speed_mps
         k = coefficient_of(self.leeway_rad)
         bows = np.unique(np.concatenate([twa_rad, np.radians(np.arange(0.0, 181.0, 5.0))]))
         speeds = np.interp(bows, twa_rad, speed_mps)
@@ -158,9 +162,7 @@ class Boat:
         unusual are written where there are any. Angles are those of courses through the water: with leeway they are
         wider than the bow's.
         """
-        twa_rad, speed_mps = self.polar.curve(tws_mps)
-        if self.leeway_rad > 0.0:
-            twa_rad, speed_mps = self._made_good(twa_rad, speed_mps, tws_mps)
+        twa_rad, speed_mps = self.curve(tws_mps)
         speed: dict[str, Any]
         if bool(np.all(speed_mps == speed_mps[0])):
             speed = {"model": "constant", "v_mps": float(speed_mps[0])}
@@ -200,9 +202,7 @@ def _speeds_of(boat: Boat) -> dict[str, Any]:
     angles = np.linspace(0.0, math.pi, SPEED_ANGLES)
     rows = []
     for tws_mps in boat.polar.tws_mps.tolist():
-        twa_rad, speed_mps = boat.polar.curve(tws_mps)
-        if boat.leeway_rad > 0.0:
-            twa_rad, speed_mps = boat._made_good(twa_rad, speed_mps, tws_mps)  # noqa: SLF001 - the value's own module
+        twa_rad, speed_mps = boat.curve(tws_mps)
         rows.append([round(float(v), 4) for v in np.interp(angles, twa_rad, speed_mps)])
     return {
         "tws_mps": boat.polar.tws_mps.tolist(),

@@ -388,15 +388,9 @@ def _boat(name: str) -> tuple[Polar, BoatFile | None]:
 def _sailed(polar: Polar, boat: BoatFile | None) -> Boat:
     """Return what decides on best angles: a polar alone has neither a no-go zone nor leeway."""
     from companion.boat import Boat
+    from companion.compose import sailed_boat
 
-    if boat is None:
-        return Boat(polar=polar, no_go_half_rad=0.0)
-    return Boat(
-        polar=polar,
-        no_go_half_rad=math.radians(boat.boat.no_go_half_deg),
-        max_twa_rad=math.radians(boat.boat.max_twa_deg),
-        leeway_rad=math.radians(boat.boat.leeway_deg),
-    )
+    return Boat(polar=polar, no_go_half_rad=0.0) if boat is None else sailed_boat(boat.boat, polar)
 
 
 def _words(name: str, boat: BoatFile | None) -> list[str]:

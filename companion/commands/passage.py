@@ -364,7 +364,7 @@ def _read(
     """
     import msgspec
 
-    from companion.compose import polar_named
+    from companion.compose import polar_named, sailed_boat
     from companion.geofence.formats import decode, read_bytes
     from companion.geofence.mission import with_boat_file
     from companion.messages import GeoPoint
@@ -400,15 +400,10 @@ def _read(
         place="[depart] at" if departs_utc_s is None else departs,
     )
     weather = _doubted(asked, weather)
-    boat = asked.boat
     craft = craft_of(
-        polar_named(boat, path),
-        no_go_half_rad=math.radians(boat.no_go_half_deg),
-        max_twa_rad=math.radians(boat.max_twa_deg),
-        tack_loss_s=boat.tack_loss_s,
+        sailed_boat(asked.boat, polar_named(asked.boat, path)),
         board_m=asked.sailing.board_m,
         night_share=asked.sailing.night_share,
-        max_tws_mps=math.inf if boat.max_tws_mps is None else boat.max_tws_mps,
         max_wave_m=math.inf if asked.limits.max_wave_m is None else asked.limits.max_wave_m,
         lee_tws_mps=asked.limits.lee_tws_mps,
     )

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.boat import Polar
+from companion.boat import Boat
 from companion.passage.kernels import Craft
 
 Floats = NDArray[np.float64]
@@ -25,29 +25,24 @@ _MIXED_RAD = math.radians(3.0)  # a side of the hull that spans more mixes two c
 
 
 def craft_of(
-    polar: Polar,
+    boat: Boat,
     *,
-    no_go_half_rad: float,
-    max_twa_rad: float = math.pi,
-    tack_loss_s: float = 0.0,
     board_m: float = 20_000.0,
     night_share: float = 1.0,
-    max_tws_mps: float = math.inf,
     max_wave_m: float = math.inf,
     lee_tws_mps: float = math.inf,
 ) -> Craft:
-    """Return the hulls of a polar; beyond its last column it is as in it."""
+    """Return the hulls of a boat's courses through the water, leeway and all; beyond its last column it is as in it."""
     count = round(MOST_TWS_MPS / TWS_STEP_MPS) + 1
-    twa = np.linspace(-math.pi, math.pi, _ANGLES + 1)[:-1]
-    twa = np.unique(np.concatenate([twa, *(s * np.array([no_go_half_rad, max_twa_rad]) for s in (-1.0, 1.0))]))
-    twa = twa[(np.abs(twa) >= no_go_half_rad - 1e-12) & (np.abs(twa) <= max_twa_rad + 1e-12)]
-    last = math.ceil(min(float(polar.tws_mps[-1]), MOST_TWS_MPS) / TWS_STEP_MPS)
+    last = math.ceil(min(float(boat.polar.tws_mps[-1]), MOST_TWS_MPS) / TWS_STEP_MPS)
+    still = _STILL_MPS * np.stack([np.cos(twa_of_8 := np.arange(8) * math.pi / 4.0), np.sin(twa_of_8)], axis=-1)
     sides: list[tuple[Floats, Floats]] = []
     for k in range(min(last, count - 1) + 1):
-        speed = polar.speeds_mps(twa, k * TWS_STEP_MPS)
+        tws_mps = k * TWS_STEP_MPS
+        twa = _courses(boat.made_good_rad(boat.no_go_half_rad, tws_mps), boat.max_twa_rad)
+        speed = np.interp(np.abs(twa), *boat.curve(tws_mps))
         points = speed[:, None] * np.stack([np.cos(twa), np.sin(twa)], axis=-1)
-        still = _STILL_MPS * np.stack([np.cos(twa_of_8 := np.arange(8) * math.pi / 4.0), np.sin(twa_of_8)], axis=-1)
-        sides.append(_sides(np.concatenate([points, still]), tack_loss_s / board_m))
+        sides.append(_sides(np.concatenate([points, still]), boat.tack_loss_s / board_m))
     most = max(len(n) for n, _ in sides)
     normals = np.zeros((len(sides), most, 2))
     losses = np.zeros((len(sides), most))
@@ -64,12 +59,19 @@ def craft_of(
         losses=losses,
         counts=np.array([len(normal) for normal, _ in sides]),
         tws_step_mps=TWS_STEP_MPS,
-        max_tws_mps=max_tws_mps,
+        max_tws_mps=math.inf if boat.max_tws_mps is None else boat.max_tws_mps,
         max_wave_m=max_wave_m,
         lee_tws_mps=lee_tws_mps,
         share=1.0,
         night_share=night_share,
     )
+
+
+def _courses(least_rad: float, most_rad: float) -> Floats:
+    """Return the angles to the wind that she may sail at, on both tacks [rad]."""
+    twa = np.linspace(-math.pi, math.pi, _ANGLES + 1)[:-1]
+    twa = np.unique(np.concatenate([twa, *(s * np.array([least_rad, most_rad]) for s in (-1.0, 1.0))]))
+    return np.asarray(twa[(np.abs(twa) >= least_rad - 1e-12) & (np.abs(twa) <= most_rad + 1e-12)])
 
 
 def _sides(points: Floats, loss_per_m: float) -> tuple[Floats, Floats]:

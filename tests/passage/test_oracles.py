@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from companion.boat import Polar, ardurover_sitl, avalon
+from companion.boat import Boat, Polar, ardurover_sitl, avalon
 from companion.passage import Outcome, plan
 from companion.weather import read_stations
 from tests.passage.world import EAST_DEG_M, HOURS, LAT, LON, NORTH_DEG_M, T0, cube, passage, place, steady
@@ -77,6 +77,20 @@ def test_dead_to_windward_it_is_vmg_and_tacks(polar):
     tacks = way / best.vmg_mps * best.speed_mps / 5000.0
     assert lossy.time_s - free.time_s == pytest.approx(100.0 * tacks, rel=0.02)
     assert free.sailed.hours("beating") == pytest.approx(free.time_s / 3600.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("polar", [ardurover_sitl(), avalon()], ids=["ardurover", "avalon"])
+def test_with_leeway_it_makes_good_what_the_boat_does(polar):
+    """To windward the best beat of the boat, leeway taken off; across the wind what plans of hours say."""
+    boat = Boat(polar=polar, no_go_half_rad=math.radians(45.0), leeway_rad=math.radians(6.0))
+    beat = boat.best_beat(5.0)
+    assert beat.vmg_mps < 0.95 * polar.best_beat(5.0, no_go_half_rad=boat.no_go_half_rad).vmg_mps
+    upwind = passage(place(0.0, 0.0), place(0.9, 0.0), polar=polar, no_go_deg=45.0, leeway_deg=6.0)
+    solved(upwind, upwind.frame.length_m / beat.vmg_mps, 0.01)
+    speeds = boat.problem_speeds()
+    reach_mps = [row[speeds["twa_deg"].index(90.0)] for row in speeds["v_mps"]]
+    across = passage(place(0.0, 0.0), place(0.0, 0.9), polar=polar, no_go_deg=45.0, leeway_deg=6.0)
+    solved(across, across.frame.length_m / float(np.interp(5.0, speeds["tws_mps"], reach_mps)), 0.02)
 
 
 def test_round_an_island_by_tangents_and_arc():

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from companion.boat import constant
+from companion.boat import Boat, constant
 from companion.messages import GeoPoint
 from companion.passage import Passage, PassageFrame, craft_of, land_of
 from companion.weather import Cube, Weather
@@ -56,11 +56,21 @@ def passage(
     radius_m=1.0,
     margin_m=0.0,
     no_go_deg=0.0,
+    leeway_deg=0.0,
+    tack_loss_s=0.0,
+    max_tws_mps=None,
     waves=None,
     lee_shore_m=0.0,
-    **boat,
+    **craft,
 ):
     """A passage in a northerly of 5 m/s for a boat of 2 m/s on every course, where nothing else is said."""
+    boat = Boat(
+        polar=polar or constant(2.0),
+        no_go_half_rad=math.radians(no_go_deg),
+        leeway_rad=math.radians(leeway_deg),
+        tack_loss_s=tack_loss_s,
+        max_tws_mps=max_tws_mps,
+    )
     frame = PassageFrame(start, goal)
     wind = cube(LAT, LON, HOURS, steady(0.0, -5.0)) if wind is None else wind
     winds = wind if isinstance(wind, tuple) else (wind,)
@@ -70,7 +80,7 @@ def passage(
         start=start,
         goal=goal,
         radius_m=radius_m,
-        craft=craft_of(polar or constant(2.0), no_go_half_rad=math.radians(no_go_deg), **boat),
+        craft=craft_of(boat, **craft),
         weather=Weather(
             wind=winds, waves=() if waves is None else (waves,), current=() if stream is None else (stream,)
         ),
