@@ -30,7 +30,6 @@ from companion.words import counted
 if TYPE_CHECKING:
     from companion.boat import ProposedMargin
     from companion.geofence import Document, Mission
-    from companion.geofence.formats import Written
     from companion.geofence.mission import MissionFiles
     from companion.planner import Plan, Problem
 
@@ -219,11 +218,8 @@ def _convert(args: argparse.Namespace) -> int:
         return 0
     if args.part is not None:
         document = _only(document, args.part)
-    written = write(document, args.out)
-    if not args.lossy:
-        _require_free(document, written, args.out)
     write_out(
-        written,
+        write(document, args.out),
         args.out,
         lossy=args.lossy,
         force=args.force,
@@ -231,22 +227,6 @@ def _convert(args: argparse.Namespace) -> int:
     )
     print(f"{args.out}: written: {summary(read(args.out))}")  # what is in it, not what was meant to be
     return 0
-
-
-def _require_free(document: Document, written: Written, out: str) -> None:
-    """Raise JobError where the file would lay a zone over a waypoint, home or rally point that is in free water."""
-    from companion.geofence.formats import parse
-    from companion.geofence.mission import drawing_findings
-
-    before = {finding.place for finding in drawing_findings(document)}
-    made = parse(written.data, out, extension=Path(out).suffix.lower())
-    covered = [finding for finding in drawing_findings(made) if finding.place not in before]
-    if covered:
-        print_losses(written.losses, out)
-        raise JobError(
-            f"{out}: not written: in it {covered[0].place}, {covered[0].text}: this format has no zone with a hole; "
-            "choose another format, write the mission alone (--part mission), or say --lossy"
-        )
 
 
 def _upload(args: argparse.Namespace) -> int:

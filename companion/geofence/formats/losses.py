@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import shapely
 from shapely.geometry import Polygon
 
 from companion.geofence.document import Code, Document, Finding, FindingLevel
@@ -116,19 +117,17 @@ def as_polygon(zone: Zone, losses: Losses) -> Polygon:
 def without_holes(zones: Sequence[Zone], losses: Losses) -> list[Zone]:
     """Return the zones for a format without holes, so that the sea does not grow.
 
-    A keep-in zone with holes becomes the zone and a keep-out zone for each hole: the same water. A keep-out zone
-    with holes is filled, so water inside it is lost: announced.
+    A keep-in zone with holes becomes the zone and a keep-out zone for each hole, a keep-out zone with holes is cut into
+    pieces without any: the same water, announced.
     """
     out: list[Zone] = []
     for zone in zones:
         if isinstance(zone.shape, Circle) or not zone.shape.interiors:
             out.append(zone)
             continue
-        filled = Polygon(zone.shape.exterior)
-        out.append(Zone(kind=zone.kind, shape=filled, name=zone.name, margin_m=zone.margin_m))
-        count = len(zone.shape.interiors)
-        name = zone.name or "a zone"
+        holes, name = counted(len(zone.shape.interiors), "hole"), zone.name or "a zone"
         if zone.kind is ZoneKind.INCLUSION:
+            out.append(filled(zone))
             out.extend(
                 Zone(
                     kind=ZoneKind.EXCLUSION,
@@ -138,7 +137,28 @@ def without_holes(zones: Sequence[Zone], losses: Losses) -> list[Zone]:
                 )
                 for i, ring in enumerate(zone.shape.interiors)
             )
-            losses.add(FindingLevel.NOTE, f"{count} hole(s) of {name} become keep-out zones of their own")
+            losses.add(FindingLevel.NOTE, f"{holes} of {name}: a keep-out zone for each")
         else:
-            losses.add(FindingLevel.WARNING, f"{count} hole(s) of {name} are filled: the water inside is given up")
+            pieces = _cut(zone.shape)
+            out.extend(replace(zone, shape=piece) for piece in pieces)
+            losses.add(
+                FindingLevel.NOTE,
+                f"{name} is cut into {counted(len(pieces), 'piece')}, whose water is the same: {holes}",
+            )
     return out
+
+
+def filled(zone: Zone) -> Zone:
+    """Return a zone without its holes."""
+    return zone if isinstance(zone.shape, Circle) else replace(zone, shape=Polygon(zone.shape.exterior))
+
+
+def _cut(polygon: Polygon) -> list[Polygon]:
+    """Return the pieces without holes that a polygon falls into, cut through each of its holes from south to north."""
+    if not polygon.interiors:
+        return [polygon]
+    west, south, east, north = polygon.bounds
+    inside = sorted(shapely.point_on_surface(Polygon(ring)).x for ring in polygon.interiors)
+    at = inside[len(inside) // 2]
+    halves = [shapely.intersection(polygon, shapely.box(w, south, e, north)) for w, e in ((west, at), (at, east))]
+    return [piece for part in shapely.get_parts(halves) if part.area > 0.0 for piece in _cut(part)]

@@ -15,7 +15,7 @@ import numpy as np
 from companion.errors import InputError
 from companion.geofence.document import Code, Document, FindingLevel
 from companion.geofence.formats.fence_items import FENCE_COMMANDS, items_to_zones, ring_of, zones_to_items
-from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out, without_holes
+from companion.geofence.formats.losses import Losses, Written, as_polygon, filled, leave_out, without_holes
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.formats.untrusted import MAX_POSITIONS, number, point_commas
 from companion.geofence.shapes import Zone, ZoneKind, wrap_lon_deg
@@ -315,8 +315,9 @@ def write_fen(document: Document) -> Written:
     """Return the document's keep-in zone as a .fen; it holds exactly one."""
     losses = Losses()
     leave_out(losses, document, {"zones", "return"})
-    inside = [z for z in without_holes(document.zones, losses) if z.kind is ZoneKind.INCLUSION]
-    others = len(without_holes(document.zones, Losses())) - min(1, len(inside))
+    zones = without_holes([z for z in document.zones if z.kind is ZoneKind.INCLUSION], losses)
+    inside = [z for z in zones if z.kind is ZoneKind.INCLUSION]
+    others = len(zones) - min(1, len(inside)) + sum(z.kind is ZoneKind.EXCLUSION for z in document.zones)
     losses.drop("zone", others, severity=FindingLevel.ERROR, why="a .fen holds one keep-in ring")
     lines = ["#saved by companion (Mission Planner fence: return point, then the ring)"]
     if inside:
@@ -333,15 +334,20 @@ def write_fen(document: Document) -> Written:
 
 
 def write_poly(document: Document) -> Written:
-    """Return the document's first zone as a .poly; it holds one ring and not its kind."""
+    """Return the document's first zone as a .poly; it holds one ring and not its kind, which is read as a keep-out."""
     losses = Losses()
     leave_out(losses, document, {"zones"})
-    zones = without_holes(document.zones, losses)
+    zones = document.zones
     losses.drop("zone", max(0, len(zones) - 1), severity=FindingLevel.ERROR, why="a .poly holds one ring")
     lines = [_POLY_HEAD + (f": {zones[0].kind.value}" if zones else "")]
     if zones:
-        ring = ring_of(as_polygon(zones[0], losses))
-        what = f"that the ring is an {zones[0].kind.value} zone is in a comment alone, which other programs pass over"
+        first = filled(zones[0])
+        if first != zones[0]:
+            losses.add(
+                FindingLevel.WARNING, "its holes are filled: the water inside is given up", "write a .plan or .wkt"
+            )
+        ring = ring_of(as_polygon(first, losses))
+        what = f"that the ring is an {first.kind.value} zone is in a comment alone, which other programs pass over"
         losses.add(FindingLevel.NOTE, what)
         lines.extend(f"{decimal(lat)} {decimal(lon)}" for lat, lon in (*ring, ring[0]))
     return Written(("\n".join(lines) + "\n").encode(), tuple(losses))

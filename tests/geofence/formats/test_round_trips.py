@@ -190,6 +190,17 @@ def test_poly_carries_one_ring(document):
     assert [zone_key(z) for z in back.zones] == [zone_key(z) for z in document.zones]
 
 
+@pytest.mark.parametrize(("name", "part"), [("plan", None), ("waypoints", "fence"), ("gpx", None)])
+def test_a_keep_out_zone_with_holes_keeps_their_water(name, part):
+    """What no chart covers lies all round the water of an import: filled, it covered the start and the goal."""
+    inside = [shapely.box(x, y, x + 0.01, y + 0.02) for x in (0.02, 0.05) for y in (0.02, 0.06)]
+    atoll = Polygon(shapely.box(0.0, 0.0, 0.1, 0.1).exterior, [lagoon.exterior for lagoon in inside])
+    document = Document(zones=(Zone(kind=ZoneKind.EXCLUSION, shape=atoll, name="atoll"),))
+    back, losses = there_and_back(document, name, **({} if part is None else {"part": part}))
+    assert all(f.severity is FindingLevel.NOTE for f in losses)
+    assert shapely.symmetric_difference(water(back), shapely.union_all(inside)).area < 1e-12
+
+
 def water(document: Document) -> shapely.Geometry:
     """What the keep-in zones leave less the keep-out zones; everything round the place without keep-in zones."""
     from companion.geofence.shapes import drawn
