@@ -15,6 +15,7 @@ from companion.geo import MPS_PER_KNOT
 from companion.passage import Departure, Passage, Route, shown
 from companion.passage.mission import mission_of
 from companion.plots.chart import legend_above, save
+from companion.plots.weather import draw_barbs
 from companion.weather import iso
 from companion.words import counted
 
@@ -42,9 +43,12 @@ def passage_figure(passage: Passage, route: Route, name: str, of: Departure | No
         _draw_arrivals(more[0], of)
     sailed = route.sailed
     assert sailed is not None
+    bound = f"no way under about {route.bound_s / 3600.0:.1f} h"
+    if of is not None and of.members > 1:  # the bound is of that member's forecast alone
+        bound = f"so in member {sailed.member}, of {of.members} the middle one"
     figure.suptitle(
         f"{name}: {iso(route.depart_utc_s)} to {iso(route.depart_utc_s + sailed.time_s)}, "
-        f"{sailed.time_s / 3600.0:.1f} h; no way under about {route.bound_s / 3600.0:.1f} h"
+        f"{sailed.time_s / 3600.0:.1f} h; {bound}"
     )
     return figure
 
@@ -111,7 +115,8 @@ def _draw_chart(axes: Axes, passage: Passage, route: Route) -> None:
     chosen = np.unique(np.linspace(0, len(lat) - 1, _BARBS).astype(int))
     row = passage.weather.members.index(sailed.member)
     wind = passage.weather.wind_en_mps(sailed.rows[chosen, 0], lat[chosen], lon[chosen])[row] / MPS_PER_KNOT
-    axes.barbs(lon[chosen], lat[chosen], wind[:, 0], wind[:, 1], length=6, lw=0.8, color="tab:blue", zorder=6)
+    there = (wind[:, 0], wind[:, 1])
+    draw_barbs(axes, lon[chosen], lat[chosen], there, length=6.0, lw=0.8, color="tab:blue", zorder=6.0)
     if passage.weather.has_current:
         flow = np.nan_to_num(passage.weather.current_en_mps(sailed.rows[chosen, 0], lat[chosen], lon[chosen]))
         axes.quiver(lon[chosen], lat[chosen], flow[:, 0], flow[:, 1], color="tab:green", width=0.002, zorder=6,

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.geo import MPS_PER_KNOT
 from companion.plots.chart import date_words, legend_above, place_words, save
 from companion.weather import Weather, iso
+
+Floats = NDArray[np.float64]
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,17 +59,41 @@ def draw_map(axes: Axes, weather: Weather, utc_s: float) -> None:
     sy, sx = max(1, lat.size // _BARBS), max(1, lon.size // _BARBS)
     part = (slice(sy // 2, None, sy), slice(sx // 2, None, sx))
     east, north = (wind[..., k][part] / MPS_PER_KNOT for k in (0, 1))
-    for south in (False, True):  # the feathers are on the other side south of the equator
-        rows = (y[part] < 0.0) == south
-        if rows.any():
-            axes.barbs(
-                x[part][rows], y[part][rows], east[rows], north[rows], length=5.5, lw=0.7, flip_barb=south, color="w"
-            )
+    draw_barbs(axes, x[part], y[part], (east, north), length=5.5, lw=0.7, color="w")
     axes.set_aspect(1.0 / max(0.1, math.cos(math.radians(float(np.mean(lat))))))
     axes.set_xlabel("longitude [deg]")
     axes.set_ylabel("latitude [deg]")
     many = f", mean of {len(cube.members)} members" if len(cube.members) > 1 else ""
     axes.set_title(f"{date_words(iso(utc_s))}{many}; barbs in knots", fontsize=10)
+
+
+def draw_barbs(
+    axes: Axes,
+    lon_deg: Floats,
+    lat_deg: Floats,
+    wind_kn: tuple[Floats, Floats],
+    *,
+    length: float,
+    lw: float,
+    color: str,
+    zorder: float = 1.0,
+) -> None:
+    """Draw winds, east and north in knots, at places; the feathers are on the other side south of the equator."""
+    for south in (False, True):
+        rows = (lat_deg < 0.0) == south
+        if rows.any():
+            east, north = (part[rows] for part in wind_kn)
+            axes.barbs(
+                lon_deg[rows],
+                lat_deg[rows],
+                east,
+                north,
+                length=length,
+                lw=lw,
+                flip_barb=south,
+                color=color,
+                zorder=zorder,
+            )
 
 
 def draw_hours(axes: Axes, weather: Weather, at: GeoPoint) -> None:

@@ -117,6 +117,26 @@ def test_band_currents_and_arrivals_are_drawn():
     assert words == ["route", "band", "waypoints", "current as she passes, up to 0.5 m/s"]
     assert arrivals.get_title(loc="right").startswith("2 of 3 runs arrive; 1 do not: 14.0 m/s of wind is more")
     assert sum(patch.get_height() for patch in arrivals.patches) == 2
+    assert figure.get_suptitle().endswith("so in member 1, of 3 the middle one")  # a bound would be of that one alone
+    plt.close(figure)
+
+
+@pytest.mark.parametrize("lat_deg", [-1.0, 1.0])
+def test_barbs_have_their_feathers_on_the_side_of_the_low(lat_deg):
+    """In a northerly the low, and they, lie to the east in the north, to the west in the south."""
+    import matplotlib.pyplot as plt
+    from matplotlib.quiver import Barbs
+
+    from companion.passage import plan
+    from companion.plots.passage import passage_figure
+    from tests.passage.world import T0, passage, place
+
+    asked = passage(place(lat_deg, 0.0), place(lat_deg, 0.4))
+    figure = passage_figure(asked, plan(asked, T0, nodes=20), "south")
+    [barbs] = [one for one in figure.axes[0].collections if isinstance(one, Barbs)]
+    x = barbs.get_paths()[0].vertices[:, 0]
+    assert (x.min() < 0.0) == (lat_deg < 0.0)
+    assert (x.max() > 0.0) == (lat_deg > 0.0)
     plt.close(figure)
 
 
