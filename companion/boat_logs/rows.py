@@ -14,6 +14,7 @@ from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint, Mode, VehicleState, WindSample
 from companion.wind import apparent_wind
 from companion.wind.study import Record
+from companion.words import counted
 
 LEAST_SAMPLES = 60
 STEP_S = 0.95  # samples are so far apart at least
@@ -94,6 +95,10 @@ class Rows:
     def log(self, name: str) -> BoatLog:
         """Return the log. Raises Useless: it is none to learn from."""
         table = np.array(self.rows, dtype=np.float64).reshape(len(self.rows), 11)
+        if 0 < len(table) < LEAST_SAMPLES:
+            raise Useless(
+                f"it is too short: {counted(len(table), 'sample')}, one a second, of {LEAST_SAMPLES} at least"
+            )
         for what, column, remedy in (
             ("the boat's speed", 1, "GLOBAL_POSITION_INT, or RMC"),
             ("the heading", 3, "ATTITUDE, or HDG"),
@@ -101,7 +106,9 @@ class Rows:
         ):
             known = int(np.sum(np.isfinite(table[:, column])))
             if known < LEAST_SAMPLES:
-                raise Useless(f"it tells {what} in {known} of {len(table)} samples ({remedy})")
+                raise Useless(
+                    f"it tells {what} in {known} of {len(table)} samples, of {LEAST_SAMPLES} at least ({remedy})"
+                )
         return BoatLog(
             name=name,
             t_s=table[:, 0],

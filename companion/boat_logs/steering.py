@@ -21,6 +21,7 @@ from companion.errors import InputError
 from companion.geo.angles import wrap_pi_array
 from companion.messages import Mode
 from companion.telemetry.folder import TLOG, parts
+from companion.words import counted
 
 _MESSAGES = MESSAGES | {
     wire.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
@@ -85,11 +86,13 @@ class _Series:
     def log(self, name: str) -> SteeringLog:
         bow = self.values.get("heading", [])
         if len(bow) < LEAST_SAMPLES:
-            raise Useless("it tells too little of the heading")
+            raise Useless(f"it tells the heading {counted(len(bow), 'time')}, of {LEAST_SAMPLES} at least")
         if self.servos:
             self._rudder_from_servos()
-        if len(self.values.get("rudder", [])) < LEAST_SAMPLES:
-            raise Useless("it does not tell where the rudder was (STER in a .BIN, SERVO_OUTPUT_RAW in a .tlog)")
+        known = len(self.values.get("rudder", []))
+        if known < LEAST_SAMPLES:
+            told = f"it tells where the rudder was {counted(known, 'time')}, of {LEAST_SAMPLES} at least"
+            raise Useless(f"{told} (STER in a .BIN, SERVO_OUTPUT_RAW in a .tlog)")
         t = np.arange(bow[0][0], bow[-1][0], STEP_S)
         heading = self.angle_at("heading", t)
         ahead = self.at("ve", t) * np.sin(heading) + self.at("vn", t) * np.cos(heading)

@@ -77,6 +77,14 @@ def table(path, *, without=(), knots=False):
     return path
 
 
+def test_a_log_that_is_too_short_is_called_so(tmp_path):
+    """It was said to tell the boat's speed in 21 of 21 samples, and skipped."""
+    path = table(tmp_path / "short.csv")
+    path.write_text("\n".join(path.read_text().splitlines()[:22]) + "\n")
+    _, [skipped] = read_logs([path])
+    assert skipped.why == "it is too short: 21 samples, one a second, of 60 at least"
+
+
 def nmea(path, *, spoiled=()):
     lines = []
 
