@@ -2,7 +2,8 @@ r"""The polar: boat speed by true wind angle and true wind speed.
 
 Between its nodes a polar is linear in |TWA| and in TWS. Outside them it never promises more than was measured:
 above the last wind column it stays at that column, below the first it falls linearly to nothing at no wind,
-below the first angle it falls linearly to nothing head to wind, beyond the last angle it stays at that row.
+below the first angle it falls linearly to nothing head to wind. Beyond a last angle abaft the beam it falls so fast
+that gybing at that angle makes more way to leeward; beyond another it stays at that row.
 
 Files are those that sailors have: OpenCPN's and qtVlm's .pol and .csv, Expedition's pairs. The grid is a header
 ``TWA\\TWS;4;6;8`` of wind speeds [kn], then rows of a wind angle [deg] and boat speeds [kn], separated by ``;``, tab,
@@ -29,6 +30,8 @@ from companion.disk import read_regular
 from companion.errors import InputError, unreadable
 from companion.geo import MPS_PER_KNOT
 from companion.geo.angles import wrap_pi_array
+
+Floats = NDArray[np.float64]
 
 _TO_WINDWARD_RAD = math.radians(60.0)  # every boat sails there, and is pressed as on a beat
 _NO_FASTER = 0.01
@@ -117,7 +120,8 @@ class Polar:
         if twa[0] > 0.0:
             twa, speed = np.concatenate([[0.0], twa]), np.concatenate([[0.0], speed])
         if twa[-1] < math.pi:
-            twa, speed = np.concatenate([twa, [math.pi]]), np.concatenate([speed, speed[-1:]])
+            deeper, share = _beyond(float(twa[-1]))
+            twa, speed = np.concatenate([twa, deeper]), np.concatenate([speed, share * speed[-1]])
         return np.array(twa), np.array(speed)
 
     def speed_mps(self, twa_rad: float, tws_mps: float) -> float:
@@ -200,6 +204,21 @@ class Polar:
         return SailingAngle(twa_rad=float(angles[i]), speed_mps=float(speeds[i]), vmg_mps=float(vmg[i]))
 
 
+def _beyond(last_rad: float) -> tuple[Floats, Floats]:
+    """Return nodes beyond the last angle of a polar, to π, and the speed there as a share of the speed at it.
+
+    Abaft the beam it falls along the tangent of the curve on which the way made to leeward stays what it is at the last
+    angle: from there on gybing at that angle makes more.
+    """
+    off_rad = math.pi - last_rad
+    if last_rad <= 0.5 * math.pi:
+        return np.array([math.pi]), np.array([1.0])
+    left = 1.0 - off_rad * math.tan(off_rad)
+    if left >= 0.0:
+        return np.array([math.pi]), np.array([left])
+    return np.array([last_rad + 1.0 / math.tan(off_rad), math.pi]), np.array([0.0, 0.0])
+
+
 # --- the polars that come with the program: constant, AVALON's polynomial, ArduRover's simulated sailboat.
 
 # [1], eq. 4.1: boat speed per wind speed against the true wind angle in RADIANS; both speeds in knots.
@@ -253,6 +272,8 @@ def ardurover_sitl() -> Polar:
 MAX_TWS_KN = 200.0
 MAX_SPEED_KN = 100.0
 MIN_SPEED_KN = 0.05  # OpenCPN stores "cannot sail" as 0.01
+MOST_TIMES = 3.0  # the wind: no boat but a foiler in its best breeze comes near
+LEAST_JUDGED_MPS = 1.0  # in less a boat is carried by its way and the gusts
 MAX_FILE_BYTES = 2_000_000  # a polar is a few kilobytes; anything else is another file
 
 _HEADER = re.compile(r"^(twa\s*[/\\]?\s*tws|twa|tws)$", re.IGNORECASE)
@@ -313,6 +334,21 @@ def parse_polar(text: str, *, source: str = "polar") -> PolarFile:
     return _parse_grid(lines[numeric[0] :], source)
 
 
+def _check_speeds(twa_deg: Floats, tws_mps: Floats, speed_mps: Floats, source: str) -> None:
+    """Raise InputError where a boat is far faster than the wind that drives it; NaN is not looked at."""
+    most = np.where(tws_mps >= LEAST_JUDGED_MPS, MOST_TIMES * tws_mps, math.inf)
+    wrong = np.argwhere(speed_mps > most[None, :])
+    if len(wrong):
+        i, j = wrong[0]
+        raise InputError(
+            source,
+            f"{twa_deg[i]:g} degrees, wind {tws_mps[j] / MPS_PER_KNOT:.1f} kn ({tws_mps[j]:.1f} m/s)",
+            f"a boat speed of {speed_mps[i, j] / MPS_PER_KNOT:.1f} kn ({speed_mps[i, j]:.1f} m/s) is more than "
+            f"{MOST_TIMES:g} times the wind",
+            "are its columns shifted, or knots and m/s mixed?",
+        )
+
+
 def polar_of_table(
     twa_deg: ArrayLike, tws_mps: ArrayLike, speed_mps: Sequence[Sequence[float]], *, name: str, source: str
 ) -> Polar:
@@ -321,7 +357,7 @@ def polar_of_table(
     if len({len(row) for row in speed_mps}) > 1:
         raise InputError(source, "[polar]", "its rows are not of one length", remedy)
     try:
-        return Polar(
+        polar = Polar(
             twa_rad=np.radians(np.asarray(twa_deg)),
             tws_mps=np.asarray(tws_mps),
             speed_mps_table=np.asarray(speed_mps),
@@ -329,6 +365,8 @@ def polar_of_table(
         )
     except ValueError as error:
         raise InputError(source, "[polar]", str(error), remedy) from None
+    _check_speeds(np.degrees(polar.twa_rad), polar.tws_mps, polar.speed_mps_table, source)
+    return polar
 
 
 def pol_text(polar: Polar, share: float = 1.0) -> str:
@@ -475,6 +513,7 @@ def _finish(
 ) -> PolarFile:
     if not bool(np.any(np.isfinite(speed_kn))):
         raise InputError(source, "", "holds no boat speed at all", "fill in the table")
+    _check_speeds(twa_deg, tws_kn * MPS_PER_KNOT, speed_kn * MPS_PER_KNOT, source)
     filled = speed_kn.copy()
     for i in range(twa_deg.size):  # between two known winds of the same row
         known = np.flatnonzero(np.isfinite(speed_kn[i]))
@@ -482,12 +521,9 @@ def _finish(
             inside = slice(known[0], known[-1] + 1)
             filled[i, inside] = np.interp(tws_kn[inside], tws_kn[known], speed_kn[i, known])
     known_columns = [j for j in range(tws_kn.size) if bool(np.any(np.isfinite(filled[:, j])))]
-    for j in known_columns:  # then along the angle: head to wind a boat stands, beyond the last row it keeps its speed
+    for j in known_columns:  # then along the angle
         known = np.flatnonzero(np.isfinite(filled[:, j]))
-        x, y = twa_deg[known], filled[known, j]
-        if x[0] > 0.0:
-            x, y = np.concatenate([[0.0], x]), np.concatenate([[0.0], y])
-        filled[:, j] = np.interp(twa_deg, x, y)
+        filled[:, j] = _along(twa_deg, twa_deg[known], filled[known, j])
     for i in range(twa_deg.size):  # then along the wind: nothing at no wind, above the last known column no more
         x, y = tws_kn[known_columns], filled[i, known_columns]
         if x[0] > 0.0:
@@ -549,9 +585,18 @@ def _parse_pairs(lines: list[tuple[int, str]], source: str) -> PolarFile | None:
     twa_deg = np.unique(np.concatenate([angles for angles, _ in columns]))
     table = np.empty((twa_deg.size, len(winds)))
     for j, (angles, speeds) in enumerate(columns):
-        x, y = (angles, speeds) if angles[0] == 0.0 else (np.r_[0.0, angles], np.r_[0.0, speeds])
-        table[:, j] = np.interp(twa_deg, x, y)
+        table[:, j] = _along(twa_deg, angles, speeds)
     return _finish(twa_deg, np.array(winds), table, source, [])
+
+
+def _along(twa_deg: Floats, known_deg: Floats, speed: Floats) -> Floats:
+    """Return speeds at angles by those at known ones: head to wind a boat stands, beyond the last as ``_beyond``."""
+    if known_deg[0] > 0.0:
+        known_deg, speed = np.r_[0.0, known_deg], np.r_[0.0, speed]
+    if known_deg[-1] < 180.0:
+        deeper, share = _beyond(math.radians(known_deg[-1]))
+        known_deg, speed = np.r_[known_deg, np.degrees(deeper)], np.r_[speed, share * speed[-1]]
+    return np.asarray(np.interp(twa_deg, known_deg, speed))
 
 
 def _looks_like_angles(values: list[float]) -> bool:

@@ -446,6 +446,10 @@ def _angles(boat: Boat) -> list[str]:
             made = [boat.made_good_rad(a.twa_rad, w) for a, w in zip(found, winds, strict=True)]
             lines.append(_row("  course [deg]", [f"{math.degrees(a):.0f}" for a in made]))
         lines.append(_row("  made good [m/s]", [f"{a.vmg_mps:.2f}" for a in found]))
+    last_deg = math.degrees(boat.polar.twa_rad[-1])
+    if 90.0 < last_deg < 179.9:
+        deeper = "deeper she is taken to be slower, so that gybing at that makes more"
+        lines.append(f"her speeds end at {last_deg:.0f} degrees: {deeper}")
     return lines
 
 

@@ -15,6 +15,17 @@ ANGLES = st.floats(-50.0, 50.0)
 WINDS = st.floats(0.0, 60.0)
 
 
+@pytest.mark.parametrize("last_deg", [95.0, 120.0, 150.0, 170.0])
+def test_beyond_its_last_angle_gybing_at_that_angle_makes_more(last_deg):
+    """It sailed dead before the wind as fast as at 150 degrees, and every plan ran dead."""
+    twa = np.radians([0.0, 45.0, 90.0, last_deg])
+    polar = Polar(twa_rad=twa, tws_mps=np.array([5.0]), speed_mps_table=np.array([[0.0], [1.5], [2.0], [2.0]]))
+    assert math.degrees(polar.best_run(5.0).twa_rad) == pytest.approx(last_deg)
+    made = -polar.speeds_mps(np.linspace(twa[-1], math.pi, 200), 5.0) * np.cos(np.linspace(twa[-1], math.pi, 200))
+    assert made.max() <= made[0] + 1e-12
+    assert polar.speed_mps(twa[-1] + 0.01, 5.0) == pytest.approx(2.0, abs=0.25)
+
+
 @pytest.mark.parametrize("polar", POLARS, ids=lambda p: p.name)
 @given(twa=ANGLES, tws=WINDS)
 @settings(max_examples=60)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.boat import Boat, ardurover_sitl, orc_text, parse_polar, read_polar
+from companion.boat import Boat, ardurover_sitl, orc_text, parse_polar, polar_of_table, read_polar
 from companion.errors import InputError
 from companion.geo import MPS_PER_KNOT
 
@@ -160,6 +160,20 @@ def test_a_bare_zero_between_speeds_is_still_a_gap():
     file = parse_polar("TWA\\TWS;6;10\n0;0;0\n45;3.0;4.0\n90;0;5.0\n150;3.5;4.5\n")
     assert len(file.warnings) == 1
     assert "line 4, column 2" in file.warnings[0]
+
+
+def test_a_column_that_ends_early_is_no_promise_of_a_run():
+    polar = parse_polar("TWA\\TWS;6;10\n45;3.0;3.5\n90;4.0;5.0\n150;3.0;4.0\n180;2.5;\n").polar
+    assert math.degrees(polar.best_run(10.0 * MPS_PER_KNOT).twa_rad) == pytest.approx(150.0)
+    assert knots(polar, 180.0, 10.0) < 4.0 * math.cos(math.radians(30.0))
+
+
+def test_speeds_far_above_the_wind_are_no_polar():
+    """Columns were shifted: 20 knots in 4 of wind were taken, and sailed by."""
+    with pytest.raises(InputError, match=r"20\.1 kn .* more than 3 times the wind; are its columns shifted"):
+        parse_polar("TWA\\TWS;4;6\n45;2.1;2.2\n90;20.1;30.2\n")
+    with pytest.raises(InputError, match="knots and m/s mixed"):
+        polar_of_table([45.0, 90.0], [2.0, 4.0], [[1.0, 2.0], [7.0, 2.0]], name="x", source="x.toml")
 
 
 def test_an_orc_table_is_in_knots_and_holds_no_wind_that_the_polar_does_not_reach():
