@@ -274,6 +274,7 @@ def lines_of_route(route: FarRoute) -> list[str]:
     for k, place in enumerate(route.places):
         said = "" if place.middle_s is None or not k else f"  by {when(route.departs_utc_s + place.middle_s)}"
         if said:
+            said += " as often as not" if place.early_s or place.late_s else ""
             said += f" (-{place.early_s / 3600.0:.1f} to +{place.late_s / 3600.0:.1f} h)"
         band = f"  {place.band_m:.0f} m to each side" if k else ""
         lines.append(f"  {k}: {place.point.lat_deg:.5f}, {place.point.lon_deg:.5f}{band}{said}")

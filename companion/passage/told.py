@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-import numpy as np
-
 from companion.geo import M_PER_NM
 from companion.passage.again import Again
 from companion.passage.frame import GEOD
+from companion.passage.mission import arrivals_s
 from companion.passage.plan import Route
 from companion.passage.replay import Sailed
 from companion.passage.sweep import Departure, at_least, at_most, best, shown
@@ -42,7 +41,12 @@ def told_of(route: Route, of: Departure | None = None) -> tuple[str, ...]:
         else f"so in member {sailed.member}, of {of.members} the middle one",
         f"wind {wind.min():.1f} to {wind.max():.1f} m/s, mean {wind.mean():.1f}; {', '.join(hours)}",
     ]
-    lines += [_leg(route, k) for k in range(1, len(route.waypoints))]
+    runs = (sailed,) if of is None or not of.runs else of.runs
+    often = "" if len(runs) == 1 else " as often as not"
+    for k, [there_s] in enumerate(arrivals_s(runs, route.waypoints, (0.5,))):
+        if k:
+            by = f" by {iso(route.depart_utc_s + there_s)}{often}" if math.isfinite(there_s) else ""
+            lines.append(_leg(route, k) + by)
     return tuple(lines)
 
 
@@ -172,22 +176,13 @@ def _number(hours: float) -> str:
 def _leg(route: Route, k: int) -> str:
     a, b = route.waypoints[k - 1], route.waypoints[k]
     azimuth, _, length = GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)
-    when = ""
-    if route.sailed is not None:
-        lat, lon = route.sailed.places.T
-        near = (lat - b.lat_deg) ** 2 + (np.cos(np.radians(b.lat_deg)) * _turned(lon - b.lon_deg)) ** 2
-        when = f" by {iso(float(route.sailed.rows[int(np.argmin(near)), 0]))}"
-    return f"  {k}: {b.lat_deg:.4f}, {b.lon_deg:.4f}  {length / M_PER_NM:.1f} NM on {azimuth % 360.0:03.0f}{when}"
+    return f"  {k}: {b.lat_deg:.4f}, {b.lon_deg:.4f}  {length / M_PER_NM:.1f} NM on {azimuth % 360.0:03.0f}"
 
 
 def _length_m(route: Route) -> float:
     """Return how long the legs are [m]."""
     places = pairwise(route.waypoints)
     return sum(float(GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2]) for a, b in places)
-
-
-def _turned(deg: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    return np.mod(deg + 180.0, 360.0) - 180.0
 
 
 def _way_left(route: Route) -> str:

@@ -7,7 +7,8 @@ import pytest
 
 from companion.boat import Polar
 from companion.passage import at_least, at_most, best, sweep
-from companion.passage.told import explained, told_of_chances, told_of_departures
+from companion.passage.told import explained, told_of, told_of_chances, told_of_departures
+from companion.weather import iso
 from tests.passage.world import EAST_DEG_M, HOURS, LAT, LON, T0, cube, passage, place, steady
 
 # As fast as two fifths of the wind up to 10 m/s, on every course.
@@ -90,6 +91,19 @@ def test_a_quantile_is_none_that_so_few_members_cannot_show():
     assert late[-1] == "not as sure as 90 %: no route that was tried is"
     [one] = sweep(asked(5.0), [T0], 0.0, nodes=20)
     assert "middle" not in told_of_departures([one], None)[0]
+
+
+def test_a_place_is_reached_by_the_median_of_all_runs():
+    """The command told the middle member's hour, the route over the radio and the page that of all runs."""
+    [d] = sweep(asked(5.0, 4.0, 2.5, 10.0), [T0], 0.4, nodes=20)
+    often, middle = T0 + d.hours(0.5) * 3600.0, T0 + d.middle().time_s
+    assert abs(often - middle) > 600.0
+    first, second, *_, leg = told_of(d.route, d)
+    assert f"arrives {iso(middle)}" in first
+    assert second.startswith("so in member ")
+    assert leg.endswith(f" by {iso(often)} as often as not")
+    [one] = sweep(asked(5.0), [T0], 0.0, nodes=20)
+    assert told_of(one.route, one)[-1].endswith(f" by {iso(T0 + one.middle().time_s)}")
 
 
 @pytest.mark.parametrize(("share", "members", "least"), [(1.0, 31, 0.908), (0.0, 31, 0.0), (30 / 31, 31, 0.856)])
