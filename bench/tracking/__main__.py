@@ -17,8 +17,8 @@ from pathlib import Path
 from bench.tracking.pictures import draw
 from bench.tracking.record import Track, sail_ardurover, sail_simulated
 from bench.tracking.recordings import load, save, thinned
-from bench.tracking.residuals import beat_table, l1_table, table
-from bench.tracking.trials import beats, corners
+from bench.tracking.residuals import beat_table, l1_table, stream_table, table
+from bench.tracking.trials import beats, corners, streams
 from companion.boat.l1 import PERIOD_S
 
 
@@ -38,7 +38,7 @@ def main() -> None:
         print(*l1_table(sailed, PERIOD_S), sep="\n")
         return
     if options.sail or options.simulated:
-        for trial in [*corners(), *beats()]:
+        for trial in [*corners(), *beats(), *streams()]:
             track = sail_ardurover(trial, options.speedup) if options.sail else sail_simulated(trial)
             sailed[trial.name] = thinned(track)
             print(f"{trial.name}: {track[-1, 0] - track[0, 0]:.0f} s", file=sys.stderr, flush=True)
@@ -46,7 +46,7 @@ def main() -> None:
             save(sailed)
     else:
         sailed = load()
-    print(*table(sailed), "", *beat_table(sailed), sep="\n")
+    print(*table(sailed), "", *beat_table(sailed), "", *stream_table(sailed), sep="\n")
     if options.figures is not None:
         draw(sailed, options.figures)
 

@@ -20,7 +20,7 @@ from companion.mavlink.reception import LinkIdentity
 from companion.mavlink.transports import open_link
 from companion.messages import Command, Mode, waypoint
 from sitl.ardurover import ArduRover, require
-from sitl.autopilot import HOME, AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
+from sitl.autopilot import HOME, AutopilotConfig, Departures, MemoryLink, SimulatedAutopilot, serve
 from sitl.autopilot import Truth as Now
 from sitl.world import WindModel
 from sitl.world.environment import AR1, Constant
@@ -73,12 +73,15 @@ def sail_ardurover(trial: Trial, speedup: float) -> Track:
             Link(open_link(rover.link), identity=IDENTITY, streams=()) as link,
             Autopilot(link, timeout_s=30.0 * speedup) as pilot,
         ):
+            rover.set_current(trial.set_rad, trial.drift_mps)
             return await _sail(trial, pilot, wind, lambda: rover.truth)
 
     return run(voyage(), speedup=speedup)
 
 
-def sail_simulated(trial: Trial, parameters: Mapping[str, float] | None = None) -> Track:
+def sail_simulated(
+    trial: Trial, parameters: Mapping[str, float] | None = None, departures: Departures | None = None
+) -> Track:
     """Sail a trial on the simulated autopilot, with ``parameters`` beside the trial's own."""
 
     async def voyage() -> Track:
@@ -90,10 +93,12 @@ def sail_simulated(trial: Trial, parameters: Mapping[str, float] | None = None) 
                 is_warm=True,
                 is_moored=True,
                 parameters={**_parameters(trial), **(parameters or {})},
+                departures=departures,
             ),
             wind,
             seed=trial.seed,
         )
+        autopilot.set_current(trial.set_rad, trial.drift_mps)
         wires = MemoryLink("shore", seed=trial.seed)
         async with (
             serve(autopilot, [wires.far]),

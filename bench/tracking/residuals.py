@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from bench.tracking.record import Track
-from bench.tracking.trials import WINDS_MPS, Trial, beats, corners
+from bench.tracking.trials import WINDS_MPS, Trial, beats, corners, streams
 from companion.boat.tracking import GuidanceModel, PredictedTrack, are_near_short, predict
 from sitl.autopilot.boat import kernel as k
 from sitl.autopilot.boat.parameters import Parameters
@@ -57,13 +57,16 @@ def helm_of(trial: Trial, l1_period_s: float = 0.0) -> GuidanceModel:
 
 
 def predicted(trial: Trial, l1_period_s: float = 0.0) -> PredictedTrack:
-    """Return the prediction for a trial of corners: from rest, in its steady wind."""
+    """Return the prediction for a trial of corners or of a current: from rest, in its steady wind."""
+    twd_rad, tws_mps = trial.water_wind
     return predict(
         [(0.0, 0.0), *trial.points_en_m],
         helm_of(trial, l1_period_s),
-        curve_mps=curve_mps(trial.tws_mps),
-        twd_from_rad=0.0,
+        curve_mps=curve_mps(tws_mps),
+        twd_from_rad=twd_rad,
         speed_mps=0.0,
+        current_en_mps=trial.current_en_mps,
+        ground_turn_rad=-twd_rad,
     )
 
 
@@ -115,6 +118,21 @@ def l1_table(sailed: dict[str, Track], l1_period_s: float) -> Iterator[str]:
             yield (
                 f"{np.max(curve_mps(tws)):.1f} m/s | {name} | {len(own)} | {' | '.join(told)} | "
                 f"{np.quantile(legs, 0.99):.2f}"
+            )
+
+
+def stream_table(sailed: dict[str, Track]) -> Iterator[str]:
+    """Yield the rows of the currents: each trial's residuals, and those of a prediction in still water."""
+    yield "wind, current | sailed m | residual m: 50 %, 90 %, 99 % | without the current m | off the legs m: 99 %"
+    for t in streams():
+        if t.name in sailed:
+            with_it, without = residuals(t, sailed[t.name]), residuals(replace(t, drift_mps=0.0), sailed[t.name])
+            ours, still = (
+                ", ".join(f"{q:.2f}" for q in np.quantile(r.track_m, QUANTILES[:3])) for r in (with_it, without)
+            )
+            yield (
+                f"{t.tws_mps:g} m/s, {t.drift_mps:g} m/s to {math.degrees(t.set_rad):.0f}° | {len(with_it.track_m)} | "
+                f"{ours} | {still} | {np.quantile(with_it.legs_m, 0.99):.2f}"
             )
 
 

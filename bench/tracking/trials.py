@@ -21,6 +21,16 @@ MANY = 34
 BEAT_M = 240.0
 BEAT_CORRIDORS_M = (5.0, 10.0, 20.0)
 BEAT_WINDS = ((3.0, 0.0), (5.0, 9.0), (5.0, 18.6), (9.5, 9.0))  # strength [m/s], spread [deg]
+# Strength of the wind, the current's drift [m/s] and where it sets to [deg]; four long legs on all sides of the wind.
+STREAMS = (
+    (1.5, 0.25, 90.0),
+    (1.5, 0.5, 225.0),
+    (3.0, 0.3, 0.0),
+    (3.0, 0.6, 135.0),
+    (6.0, 0.5, 90.0),
+    (6.0, 1.0, 270.0),
+)
+STREAM_COURSES_DEG, STREAM_LEG_M = (90.0, 190.0, 265.0, 130.0), 110.0
 SPREAD_TAU_S = 27.8  # of the wind's direction: Wolsieffer 2020, equation 17
 
 
@@ -31,11 +41,13 @@ class Trial:
     Attributes:
         name: What it is called.
         points_en_m: Waypoints; she lies at the origin, bow to the first of them.
-        tws_mps: True wind speed, the wind from north.
+        tws_mps: True wind speed over the ground, the wind from north.
         spread_rad: Standard deviation of the wind's direction, 0: constant.
         wp_radius_m: WP_RADIUS.
         corridor_m: SAIL_XTRACK_MAX.
         seed: Of the wind.
+        drift_mps: The current's speed, 0: none.
+        set_rad: Where it sets to.
 
     """
 
@@ -46,6 +58,19 @@ class Trial:
     corridor_m: float = 10.0
     spread_rad: float = 0.0
     seed: int = 0
+    drift_mps: float = 0.0
+    set_rad: float = 0.0
+
+    @property
+    def current_en_mps(self) -> PointEn:
+        """The water's velocity over the ground."""
+        return self.drift_mps * math.sin(self.set_rad), self.drift_mps * math.cos(self.set_rad)
+
+    @property
+    def water_wind(self) -> tuple[float, float]:
+        """Where the wind over the water comes from [rad], and its speed [m/s]."""
+        east, north = self.current_en_mps[0], self.tws_mps + self.current_en_mps[1]
+        return math.atan2(east, north), math.hypot(east, north)
 
     @property
     def first_rad(self) -> float:
@@ -84,6 +109,24 @@ def beats() -> list[Trial]:
         )
         for n, corridor in enumerate(BEAT_CORRIDORS_M)
         for tws, spread in BEAT_WINDS
+    ]
+
+
+def streams() -> list[Trial]:
+    """Return the trials of long legs across currents, and with and against them."""
+    points, here = [], (0.0, 0.0)
+    for course in map(math.radians, STREAM_COURSES_DEG):
+        here = (here[0] + STREAM_LEG_M * math.sin(course), here[1] + STREAM_LEG_M * math.cos(course))
+        points.append(here)
+    return [
+        Trial(
+            name=f"stream-{tws:g}-{drift:g}-{set_deg:g}",
+            points_en_m=tuple(points),
+            tws_mps=tws,
+            drift_mps=drift,
+            set_rad=math.radians(set_deg),
+        )
+        for tws, drift, set_deg in STREAMS
     ]
 
 

@@ -113,9 +113,7 @@ class Boat:
         """Return the angle to the wind of a course through the water, with the bow at ``twa_rad`` [rad, 0..π]."""
         if self.leeway_rad == 0.0:
             return twa_rad
-        speed = self.polar.speed_mps(twa_rad, tws_mps)
-        k, full_mps = coefficient_of(self.leeway_rad), self.polar.full_tws_mps
-        return min(twa_rad + float(leeway_at(k, twa_rad, tws_mps, speed, full_mps)), math.pi)
+        return min(twa_rad + float(self.leeways_rad(np.array([twa_rad]), tws_mps)[0]), math.pi)
 
     def best_beat(self, tws_mps: float, *, no_go_half_rad: float = 0.0) -> SailingAngle:
         """Return the bow's angle of the best way to windward that it may be sailed at, leeway taken off.
@@ -128,7 +126,7 @@ class Boat:
             return best
         bows = np.linspace(min(low_rad, 0.5 * math.pi), 0.5 * math.pi, 1 + math.ceil(0.5 * math.pi / BEST_STEP_RAD))
         speeds = self.polar.speeds_mps(bows, tws_mps)
-        slips = leeway_at(coefficient_of(self.leeway_rad), bows, tws_mps, speeds, self.polar.full_tws_mps)
+        slips = self.leeways_rad(bows, tws_mps)
         made = speeds * np.cos(bows + slips) / np.maximum(np.cos(slips), 0.1)
         i = int(np.argmax(made))
         return SailingAngle(twa_rad=float(bows[i]), speed_mps=float(speeds[i]), vmg_mps=float(made[i]))
@@ -145,15 +143,21 @@ class Boat:
         twa_rad, speed_mps = self.polar.curve(tws_mps)
         if self.leeway_rad == 0.0:
             return twa_rad, speed_mps
-        k = coefficient_of(self.leeway_rad)
         bows = np.unique(np.concatenate([twa_rad, np.radians(np.arange(0.0, 181.0, 5.0))]))
         speeds = np.interp(bows, twa_rad, speed_mps)
-        slips = leeway_at(k, bows, tws_mps, speeds, self.polar.full_tws_mps)
+        slips = self.leeways_rad(bows, tws_mps)
         courses = np.minimum(bows + slips, math.pi)
         # Nearer to the wind than where its course comes nearest to it the boat only drifts more: not sailed by anybody.
         later = np.append(np.minimum.accumulate(courses[::-1])[::-1][1:], math.inf)
         kept = courses < later - 1e-6
         return courses[kept], (speeds / np.maximum(np.cos(slips), 0.1))[kept]
+
+    def leeways_rad(self, bows_rad: NDArray[np.float64], tws_mps: float) -> NDArray[np.float64]:
+        """Return how far to leeward of its bow the boat goes with the bow at angles to the wind [rad]."""
+        if self.leeway_rad == 0.0:
+            return np.zeros(len(bows_rad))
+        speeds, full_mps = self.polar.speeds_mps(bows_rad, tws_mps), self.polar.full_tws_mps
+        return leeway_at(coefficient_of(self.leeway_rad), bows_rad, tws_mps, speeds, full_mps)
 
     def problem_boat(self, tws_mps: float) -> dict[str, Any]:
         """Return the ``boat`` part of a planning problem in this wind (degrees, as its JSON has them).

@@ -162,16 +162,21 @@ def sail(
     state: NDArray[np.float64],
     wind_rad: NDArray[np.float64],
     curve: NDArray[np.float64],
+    leeway: NDArray[np.float64],
+    water: tuple[float, float, float],
     h: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> int:
     """Sail the legs between ``points`` (n, 2), and fill ``out`` (m, T_SIZE); return how many rows were filled.
 
-    ``state`` is east, north, heading and speed at the start; ``wind_rad`` the wind's direction every
-    WIND_STEPS steps (the last one holds on); ``curve`` the polar in this wind; ``h`` the settings. Ends when the last
-    point is reached or ``out`` is full.
+    ``state`` is east, north, heading and speed through the water at the start; ``wind_rad`` the direction of the wind
+    over the water every WIND_STEPS steps (the last one holds on); ``curve`` the polar in this wind and ``leeway`` how
+    far to leeward of her bow she goes, both by the bow's angle to it in even steps from 0 to pi; ``water`` the
+    current's velocity, and what the wind over the ground, which the autopilot has, is turned by against that over the
+    water; ``h`` the settings. Ends when the last point is reached or ``out`` is full.
     """
     e, n, yaw, v = state[0], state[1], state[2], state[3]
+    ce, cn, turned = water
     rate, want_rate, integral = 0.0, 0.0, 0.0
     dt = STEP_S
     leg, last, looked_at = 0, points.shape[0] - 2, -1
@@ -186,7 +191,7 @@ def sail(
     want_speed = 0.0
     by_l1, l1_angle, l1_nudge = h[H_L1_PERIOD] > 0.0, 0.0, 0.0
     tacking, tack_yaw, tack_start, tack_end = False, 0.0, 0.0, -TACK_RETRY_S
-    heard = wind_rad[0]
+    heard = wrap(wind_rad[0] + turned)
     rows, step = 0, 0
     while rows < out.shape[0]:
         t = step * dt
@@ -195,10 +200,12 @@ def sail(
         i = min(i, wind_rad.shape[0] - 1)
         j = min(i + 1, wind_rad.shape[0] - 1)
         twd = wind_rad[i] + share * wrap(wind_rad[j] - wind_rad[i])
-        heard += dt / max(h[H_WIND_LAG_S], dt) * wrap(twd - heard)
+        heard += dt / max(h[H_WIND_LAG_S], dt) * wrap(twd + turned - heard)
         # what the autopilot believes of its place is a little old
         sin, cos = math.sin(yaw), math.cos(yaw)
-        ve, vn = v * sin, v * cos
+        slip = polar_at(leeway, wrap(twd - yaw))
+        slip = -slip if wrap(twd - yaw) > 0.0 else slip
+        ve, vn = v * math.sin(yaw + slip) + ce, v * math.cos(yaw + slip) + cn
         be, bn = e - ve * h[H_LATENCY_S], n - vn * h[H_LATENCY_S]
         if leg != looked_at:
             oe, on, de, dn = points[leg, 0], points[leg, 1], points[leg + 1, 0], points[leg + 1, 1]
@@ -309,9 +316,9 @@ def sail(
         rate = v * math.sin(rudder * RUDDER_MAX_RAD) / (max(h[H_TURN_RADIUS], 0.1) * math.sin(RUDDER_MAX_RAD))
         top = polar_at(curve, wrap(twd - yaw))
         v = max(v + (top * top - v * v) / (2.0 * h[H_GATHER_M]) * dt, 0.0)
-        half = yaw + 0.5 * rate * dt
-        e += v * math.sin(half) * dt
-        n += v * math.cos(half) * dt
+        half = yaw + slip + 0.5 * rate * dt
+        e += (v * math.sin(half) + ce) * dt
+        n += (v * math.cos(half) + cn) * dt
         yaw = wrap(yaw + rate * dt)
         if step % KEEP_STEPS == 0:
             out[rows, T_E], out[rows, T_N], out[rows, T_LEG] = e, n, leg

@@ -195,17 +195,27 @@ def predict(
     start_en_m: Sequence[float] | None = None,
     heading_rad: float | None = None,
     speed_mps: float | None = None,
+    leeway_rad: NDArray[np.float64] | None = None,
+    current_en_mps: tuple[float, float] = (0.0, 0.0),
+    ground_turn_rad: float = 0.0,
 ) -> PredictedTrack:
-    """Return the track along legs.
+    """Return the track along legs, over the ground.
+
+    Across a current, or with leeway, she lies off each leg: the point that she steers to is ahead of her, and her bow
+    is not on it.
 
     Args:
         points_en_m: (n, 2) the legs' ends, n at least 2; the first is where the first leg begins.
         helm: How the boat is steered.
-        curve_mps: Speeds by |TWA| (``curve_of``).
-        twd_from_rad: Where the wind comes from [rad]; an array holds it every half second.
+        curve_mps: Speeds by the bow's |TWA| (``curve_of``).
+        twd_from_rad: Where the wind comes from [rad], over the water; an array holds it every half second.
         start_en_m: Where it is; None: where the first leg begins.
         heading_rad: Its heading; None: along the first leg.
-        speed_mps: Its speed; None: the polar's on the first leg, its no-go zone's edge at the nearest.
+        speed_mps: Its speed through the water; None: the polar's on the first leg, at the zone's edge at the nearest.
+        leeway_rad: How far to leeward of her bow she goes, in even steps of its |TWA| from 0 to pi; None: not at all.
+        current_en_mps: The water's velocity over the ground, towards east and north [m/s].
+        ground_turn_rad: By how much the wind over the ground, which the autopilot has, comes from further to the right
+            than that over the water [rad].
 
     """
     points = np.ascontiguousarray(points_en_m, dtype=np.float64).reshape(-1, 2)
@@ -227,10 +237,13 @@ def predict(
     here = points[0] if start_en_m is None else np.asarray(start_en_m, dtype=np.float64)
     state = np.array([here[0], here[1], heading, speed_mps])
     length = float(np.sum(np.hypot(*np.diff(points, axis=0).T))) + float(np.hypot(*(here - points[0])))
-    slow = max(SLOWEST_MPS, 0.5 * float(np.max(curve_mps)) * math.cos(helm.no_go_half_rad))
+    slow = max(
+        SLOWEST_MPS, 0.5 * (float(np.max(curve_mps)) * math.cos(helm.no_go_half_rad) - math.hypot(*current_en_mps))
+    )
     limit_s = min(LONGEST_S, 120.0 + 3.0 * length / slow)
+    slips = np.zeros(2) if leeway_rad is None else np.ascontiguousarray(leeway_rad, dtype=np.float64)
     out = np.empty((int(limit_s / (k.STEP_S * k.KEEP_STEPS)), k.T_SIZE))
-    rows = int(k.sail(points, state, wind, curve_mps, helm.settings(), out))
+    rows = int(k.sail(points, state, wind, curve_mps, slips, (*current_en_mps, ground_turn_rad), helm.settings(), out))
     return PredictedTrack(
         en_m=out[:rows, :2].copy(),
         leg=out[:rows, k.T_LEG].astype(np.int64),

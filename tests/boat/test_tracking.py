@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from bench.tracking.record import sail_simulated
 from bench.tracking.recordings import load
 from bench.tracking.residuals import boards, curve_mps, helm_of, residuals
-from bench.tracking.trials import CORNERS_DEG, WINDS_MPS, beats, corners
-from companion.boat import AutopilotLimits, ardurover_sitl
+from bench.tracking.trials import CORNERS_DEG, WINDS_MPS, Trial, beats, corners, streams
+from companion.boat import AutopilotLimits, Boat, ardurover_sitl
 from companion.boat import track_kernels as s
 from companion.boat.tracking import (
     GuidanceModel,
@@ -29,6 +29,7 @@ from companion.boat.tracking import (
     predict,
     stated_error_m,
 )
+from sitl.autopilot import Departures
 
 POLAR = ardurover_sitl()
 HELM = GuidanceModel(wp_radius_m=3.0, wp_speed_mps=5.0)
@@ -45,7 +46,7 @@ def track(points, helm=HELM, tws=5.0, twd=0.0, **more):
 
 # ------------------------------------------------------------------------------------------- the real one
 def test_the_recordings_hold_every_trial_and_every_kind_of_corner(sailed):
-    assert set(sailed) == {t.name for t in [*corners(), *beats()]}
+    assert set(sailed) == {t.name for t in [*corners(), *beats(), *streams()]}
     turns = set()
     for trial in corners():
         path = np.asarray([(0.0, 0.0), *trial.points_en_m])
@@ -96,6 +97,15 @@ def test_a_board_goes_beyond_the_corridor_by_what_is_predicted_and_no_more_than_
         assert abs(len(real) - len(ours)) <= 2
         assert -0.2 <= np.median(ours) - np.median(real) <= 0.6
         assert max(real) <= max(ours) + 0.3
+
+
+@pytest.mark.parametrize("trial", streams(), ids=lambda t: t.name)
+def test_across_a_current_she_lies_off_her_legs_as_far_as_is_predicted(sailed, trial):
+    ours = residuals(trial, sailed[trial.name])
+    still = residuals(replace(trial, drift_mps=0.0), sailed[trial.name])
+    best = float(np.max(curve_mps(trial.water_wind[1])))
+    assert np.quantile(ours.track_m, 0.99) <= stated_error_m(best, HELM, has_short=False) + 0.3
+    assert np.quantile(ours.track_m, 0.9) < 0.5 * np.quantile(still.track_m, 0.9)
 
 
 # --------------------------------------------------------------------------------------------- always so
@@ -211,6 +221,32 @@ def off_m(trial, rate_deg, *, told):
     legs = [(0.0, 0.0), *trial.points_en_m]
     expected = predict(legs, helm, curve_mps=curve_mps(trial.tws_mps), twd_from_rad=0.0, speed_mps=0.0)
     return shapely.distance(shapely.LineString(expected.en_m), shapely.points(way[:, 1:3]))
+
+
+@pytest.mark.parametrize(("tws", "leeway_deg"), [(2.0, 10.0), (4.0, 6.0), (6.0, 10.0)])
+def test_with_leeway_she_lies_to_leeward_of_her_legs_as_far_as_is_predicted(tws, leeway_deg):
+    points, here = [], np.zeros(2)
+    for course in np.radians([65.0, 190.0, 296.0, 130.0]):
+        here = here + 110.0 * np.array([math.sin(course), math.cos(course)])
+        points.append((float(here[0]), float(here[1])))
+    trial = Trial(name="leeway", points_en_m=tuple(points), tws_mps=tws)
+    way = sail_simulated(trial, departures=Departures(leeway_rad=math.radians(leeway_deg)))
+    boat = Boat(polar=POLAR, leeway_rad=math.radians(leeway_deg))
+    slips = boat.leeways_rad(np.linspace(0.0, math.pi, 37), tws)
+    off = {}
+    for told in (slips, None):
+        expected = predict(
+            [(0.0, 0.0), *points],
+            helm_of(trial),
+            curve_mps=curve_mps(tws),
+            twd_from_rad=0.0,
+            speed_mps=0.0,
+            leeway_rad=told,
+        )
+        off[told is None] = shapely.distance(shapely.LineString(expected.en_m), shapely.points(way[:, 1:3]))
+    assert np.quantile(off[False], 0.9) < 0.5 * np.quantile(off[True], 0.9)
+    best = float(np.max(curve_mps(tws)))
+    assert np.quantile(off[False], 0.99) < stated_error_m(best, HELM, has_short=False)
 
 
 # ---------------------------------------------------------------------------------------------- the parts

@@ -436,6 +436,7 @@ def _parse_tracking(track: _JsonReader) -> Tracking:
         solids=tuple(_polygon(w, track.source, f"tracking.solids[{i}]") for i, w in enumerate(solids)),
         limits=None if limits is None else _polygon(limits, track.source, "tracking.limits"),
         before_en=None if at is None else (at.number("x"), at.number("y")),
+        leeway_rad=tuple(math.radians(a) for a in track.numbers("leeway_deg", ())),
         correlation_s=track.number("correlation_s", 60.0),
         is_known=track.flag("known", True),
     )

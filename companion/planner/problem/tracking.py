@@ -25,6 +25,7 @@ class Tracking:
         solids: What is solid, as it is: the problem's obstacles are grown by a margin.
         limits: What is around the boat, as it is; None: nothing.
         before_en: Where the leg begins that ends at the start; None: it begins there.
+        leeway_rad: How far to leeward of its bow the boat goes, in even steps of its |TWA| from 0 to pi; empty: none.
         correlation_s: How long the wind's direction remembers [s].
         is_known: The autopilot's parameters were read; without, the greater of the two stated errors holds everywhere.
 
@@ -36,6 +37,7 @@ class Tracking:
     solids: tuple[shapely.Geometry, ...] = ()
     limits: shapely.Geometry | None = None
     before_en: tuple[float, float] | None = None
+    leeway_rad: tuple[float, ...] = ()
     correlation_s: float = 60.0
     is_known: bool = True
 
@@ -44,8 +46,8 @@ class Tracking:
         """Whether every number is one, and in range."""
         before = self.before_en or (0.0, 0.0)
         return (
-            all(math.isfinite(x) for x in (self.floor_m, self.reach_m, self.correlation_s, *before))
-            and min(self.floor_m, self.reach_m, self.correlation_s) >= 0.0
+            all(math.isfinite(x) for x in (self.floor_m, self.reach_m, self.correlation_s, *before, *self.leeway_rad))
+            and min(self.floor_m, self.reach_m, self.correlation_s, *self.leeway_rad) >= 0.0
         )
 
     @cached_property

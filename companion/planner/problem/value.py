@@ -21,6 +21,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.boat.boat import SHAPE_TWA_RAD
+from companion.geo.angles import wrap_pi
 from companion.messages import Spread, Target
 from companion.planner.problem.json_read import read_fields
 from companion.planner.problem.parts import (
@@ -156,6 +157,11 @@ class Problem:
         if sigma.model == "forecast":
             return tuple(self.widening_rad(t) for t in sigma.horizon_s)
         return (0.0,)
+
+    @property
+    def ground_turn_rad(self) -> float:
+        """By how much the wind over the ground comes from further to the right than that over the water [rad]."""
+        return 0.0 if self.zone is None else float(wrap_pi(self.zone.from_rad - self.wind.twd_from_rad))
 
     @property
     def is_time_varying(self) -> bool:

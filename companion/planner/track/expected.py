@@ -72,9 +72,17 @@ class ExpectedTrack:
 
 @lru_cache(maxsize=8)  # by identity
 def curve_mps(problem: Problem) -> NDArray[np.float64]:
-    """Return the problem's polar as the prediction takes it."""
-    boat = problem.boat
-    return np.interp(np.linspace(0.0, math.pi, CURVE_NODES), boat.polar_twa_rad, boat.polar_mps)
+    """Return the problem's polar by the bow's angle, as the prediction takes it; the problem's is the course's."""
+    boat, bows = problem.boat, np.linspace(0.0, math.pi, CURVE_NODES)
+    return np.interp(bows + leeway_rad(problem), boat.polar_twa_rad, boat.polar_mps)
+
+
+@lru_cache(maxsize=8)  # by identity
+def leeway_rad(problem: Problem) -> NDArray[np.float64]:
+    """Return how far to leeward of its bow the problem's boat goes, as the prediction takes it."""
+    slips = problem.tracking.leeway_rad if problem.tracking is not None else ()
+    bows = np.linspace(0.0, math.pi, CURVE_NODES)
+    return np.interp(bows, np.linspace(0.0, math.pi, len(slips)), slips) if slips else np.zeros(CURVE_NODES)
 
 
 def expected(
@@ -188,6 +196,9 @@ def _tracked(
         curve_mps=curve_mps(problem),
         twd_from_rad=problem.wind.twd_from_rad,
         heading_rad=None if first else problem.start_heading_rad,
+        leeway_rad=leeway_rad(problem),
+        current_en_mps=problem.current.en_mps,
+        ground_turn_rad=problem.ground_turn_rad,
     )
     leg = track.leg - first
     mine = (leg >= 0) | (np.hypot(*(track.en_m - path[0]).T) < BESIDE_M)
@@ -260,6 +271,9 @@ def _worst_boards(
             curve_mps=curve,
             twd_from_rad=wind,
             heading_rad=None if first else problem.start_heading_rad,
+            leeway_rad=leeway_rad(problem),
+            current_en_mps=problem.current.en_mps,
+            ground_turn_rad=problem.ground_turn_rad,
         )
         for wind in winds
     ]

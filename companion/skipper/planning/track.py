@@ -18,6 +18,7 @@ from companion.skipper.planning.statement import Start
 from companion.skipper.step.context import StepContext
 from companion.skipper.way.voyage import AreaLike, PointEn, water_to_keep
 
+BOWS_RAD = np.linspace(0.0, np.pi, 37)
 # What a straight leg's track may need, in steps: water that is grown by a margin is kept, and made before sailing.
 TRACKS_M = (2.0, 2.5, 4.0, 8.0)
 
@@ -26,8 +27,8 @@ def problem_tracking(
     ctx: StepContext, start: Start, from_index: int | None, *, area: AreaLike, floor_m: float, forecast: WindForecast
 ) -> dict[str, Any]:
     """Return the ``tracking`` of a problem: the autopilot's parameters, the hull, and what is solid of ``area``."""
-    helm, route = _helm(ctx), ctx.state.mission.route
-    before = None
+    helm, route, tws_mps = _helm(ctx), ctx.state.mission.route, float(np.max(forecast.mean_tws_mps))
+    boat, before = ctx.voyage.boat, None
     if from_index is not None and route is not None:
         before = route.leg_from_en_m[from_index]
     elif start.lead_in:
@@ -36,7 +37,8 @@ def problem_tracking(
         **helm.stated(),
         "no_go_half_deg": float(np.degrees(ctx.no_go_half_rad)),
         "floor_m": floor_m,
-        "reach_m": ctx.voyage.boat.hull.reach_m,
+        "reach_m": boat.hull.reach_m,
+        **({} if boat.leeway_rad == 0.0 else {"leeway_deg": np.degrees(boat.leeways_rad(BOWS_RAD, tws_mps)).tolist()}),
         "solids": area.obstacles_wkt(0.0),
         "limits": (water_to_keep(area, start.en_m) if start.back_en else area).fence_wkt(0.0, start.en_m),
         "before": None if before is None else {"x": before[0], "y": before[1]},
