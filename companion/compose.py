@@ -53,6 +53,7 @@ from companion.geofence.mission import (
     LeaveAtomOptions,
     LineAtomOptions,
     MarkOptions,
+    MissionGoal,
     PointAtomOptions,
     RepulsiveLineAtomOptions,
     RepulsivePointAtomOptions,
@@ -67,7 +68,20 @@ from companion.orders import ALL, Verb, unknown
 from companion.planners import ALGORITHMS, AUTO, PlannerChoice
 from companion.skipper import SkipperConfig, Voyage
 from companion.skipper.step import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd
-from companion.skipper.way import TIDE_DOUBT_M, Box, Composed, DryingWater, Goal, Line, Refuge, Search, Side, Until
+from companion.skipper.way import (
+    KEEP_SHARE,
+    SAME_M,
+    TIDE_DOUBT_M,
+    Box,
+    Composed,
+    DryingWater,
+    Goal,
+    Line,
+    Refuge,
+    Search,
+    Side,
+    Until,
+)
 from companion.traffic import Policy, TargetLimits
 from companion.traffic.feeds import FeedName, parse_feed
 from companion.wind import Estimator, make
@@ -95,6 +109,7 @@ __all__ = [
 
 # What a guess at a polar, waves, leeway and tacks that fail take of the speeds: arrivals of `sitl mismatch` spread so.
 UNSAID_ERROR_PERCENT = 30.0
+BETWEEN_M = 1.0  # of room between a rounding and what is kept clear of the next mark
 POLARS: dict[str, Callable[[], Polar]] = {"ardurover": ardurover_sitl, "avalon": avalon}
 
 
@@ -462,7 +477,7 @@ def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
             radius_m=g.radius_m,
             name=g.name,
             side=_SIDES[g.rounding],
-            rounding_m=max(g.radius_m, mission.margin_m) if g.rounding else 12.0,
+            rounding_m=_rounding_m(mission, g, frame) if g.rounding else 12.0,
             bandwidth_m=mission.skipper.bandwidth_m if g.bandwidth_m is None else g.bandwidth_m,
             heading_rad=None if g.heading_deg is None else math.radians(g.heading_deg),
             line=_line(g.gate, frame, mission.margin_m),
@@ -494,6 +509,14 @@ def _voyage_in(mission: Mission, frame: LocalFrame, area: LocalArea) -> Voyage:
         recentre_m=(mission.passage.recentre_m or RECENTRE_M) if mission.is_passage else None,
         far_m=max(RANGE_M, mission.passage.leg_m or 0.0),
     )
+
+
+def _rounding_m(mission: Mission, goal: MissionGoal, frame: LocalFrame) -> float:
+    """Return how far off a mark is rounded: by the margin, less where the next mark leaves less, radius_m at least."""
+    here = frame.en_from_geo(goal.point)
+    others = [math.dist(here, frame.en_from_geo(g.point)) for g in mission.goals if g.rounding]
+    least_m = min((off_m for off_m in others if off_m > SAME_M), default=math.inf)
+    return max(goal.radius_m, min(mission.margin_m, (least_m - BETWEEN_M) / (1.0 + KEEP_SHARE)))
 
 
 def drying_of(mission: Mission, frame: LocalFrame) -> tuple[DryingWater, ...]:

@@ -20,9 +20,8 @@ from companion.messages import GeoPoint
 from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
 from companion.skipper.planning import TRACKS_M
-from companion.skipper.way import KEEP_SHARE, Side
+from companion.skipper.way import KEEP_SHARE, SAME_M, Side
 
-SAME_M = 1.0  # two goals so near are one mark that is passed twice
 HAIR_M = 0.005  # a depth is written in centimetres
 SMALL_M = 3.0  # a fix is good to 2.5 m
 
@@ -82,6 +81,7 @@ def check_mission(
                     *_out_of_reach(mission),
                     *_roundings(mission),
                     *line_findings(mission),
+                    *_marks_too_near(mission),
                     *_circles(mission),
                     *_drying(mission),
                     *_tide(mission),
@@ -135,6 +135,30 @@ def _roundings(mission: Mission) -> Iterator[Finding]:
             )
 
 
+def _marks_too_near(mission: Mission) -> Iterator[Finding]:
+    """Yield the marks whose rounding leads through what is kept clear of another: to there no plan is made."""
+    told = set[int]()
+    voyage, gates = voyage_gates(mission)
+    marks = [(n, g) for n, g in enumerate(voyage.goals, start=1) if g.side is not Side.NONE]
+    for number, gate in gates:
+        for other, mark in marks:
+            off_m = math.dist(mark.en_m, gate.en_m)
+            between_m = math.dist(mark.en_m, voyage.goals[number - 1].en_m)
+            if number in told or off_m >= KEEP_SHARE * mark.rounding_m or between_m <= SAME_M:
+                continue
+            told.add(number)
+            is_rounded = gate.buoy_en_m is not None
+            yield Finding(
+                severity=FindingLevel.ERROR,
+                code=Code.ROUNDING,
+                place=f"[[goal]] {number}",
+                text=f"{'is rounded' if is_rounded else 'lies'} {off_m:.1f} m from goal {other}'s mark; "
+                f"every plan keeps {KEEP_SHARE * mark.rounding_m:.1f} m clear of that: it is never sailed to",
+                remedy=f"let radius_m of goals that are rounded, and [area] margin_m, be at most "
+                f"{max(0.0, between_m - 1.0) / (1.0 + KEEP_SHARE):.0f} m, or move it {between_m:.0f} m away more",
+            )
+
+
 def _circles(mission: Mission) -> Iterator[Finding]:
     """Yield the roundings whose circle holds the start or another goal: half of it is kept clear by every plan."""
     voyage = voyage_of(mission)
@@ -146,7 +170,8 @@ def _circles(mission: Mission) -> Iterator[Finding]:
             continue
         for place, en_m in places:
             off_m = math.dist(en_m, goal.en_m)
-            if SAME_M < off_m < goal.rounding_m or (place == "[start]" and off_m <= SAME_M):
+            kept_m = 0.0 if place == "[start]" else KEEP_SHARE * goal.rounding_m  # nearer it is an error
+            if max(SAME_M, kept_m) < off_m < goal.rounding_m or (place == "[start]" and off_m <= SAME_M):
                 yield Finding(
                     severity=FindingLevel.WARNING,
                     code=Code.ROUNDING,

@@ -10,7 +10,7 @@ from companion import cli
 from companion.commands.output import summary
 from companion.compose import voyage_of
 from companion.errors import InputError
-from companion.geofence import Document, ZoneKind, load_mission
+from companion.geofence import Code, Document, FindingLevel, ZoneKind, load_mission
 from companion.geofence.document import Mark
 from companion.mission_check import check_mission, require_sailable
 from companion.skipper.way.gates import Approach, gates_of
@@ -245,8 +245,8 @@ PORT = {"rounding": 'rounding = "port"', "guidance": "plan"}
         (
             {"radius": 300, **PORT},
             [
+                "[[goal]] 2: error: lies 111.2 m from goal 1's mark; every plan keeps 150.0 m clear of that",
                 "[[goal]] 1 radius_m: warning: is rounded 300 m off, and [start] lies 222 m from it: 150 m are kept",
-                "[[goal]] 1 radius_m: warning: is rounded 300 m off, and [[goal]] 2 lies 111 m from it",
             ],
         ),
         ({"radius": 100, **PORT}, []),
@@ -284,6 +284,26 @@ def test_the_last_buoy_is_rounded_for_the_way_home(tmp_path, end, is_rounded):
     voyage = voyage_of(load_mission(mission))
     begun = Approach(goal=0, en_m=voyage.frame.en_from_geo(load_mission(mission).start))
     assert (len(gates_of(voyage, (begun,))) > 1) is is_rounded
+
+
+@pytest.mark.parametrize(
+    ("apart_m", "radius_m", "is_sailed"), [(40.0, 6.0, True), (18.0, 6.0, True), (14.0, 6.0, True), (14.0, 10.0, False)]
+)
+def test_marks_near_each_other_are_rounded_closer_and_said_where_no_plan_leads_between(
+    tmp_path, apart_m, radius_m, is_sailed
+):
+    def buoy(east_m):
+        return f"[[goal]]\nlat = 50.82\nlon = {-1.31 + east_m / 70_435.0}\nradius_m = {radius_m}\nrounding = 'port'\n"
+
+    mission = tmp_path / "m.toml"
+    mission.write_text(f"[start]\nlat = 50.8190\nlon = -1.31\n{buoy(0.0)}{buoy(apart_m)}")
+    voyage = voyage_of(load_mission(mission))
+    wanted_m = max(radius_m, load_mission(mission).margin_m)
+    assert all(goal.rounding_m <= wanted_m for goal in voyage.goals)
+    assert (voyage.goals[0].rounding_m == wanted_m) is (apart_m == 40.0)
+    told = [f for f in check_mission(mission).findings if f.severity is FindingLevel.ERROR]
+    assert (not told) is is_sailed
+    assert all(f.code is Code.ROUNDING and "never sailed to" in f.text for f in told)
 
 
 def test_points_and_lines_are_counted_in_words():

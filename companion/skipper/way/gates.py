@@ -38,6 +38,7 @@ from companion.skipper.way.voyage import AreaLike, Box, Composed, Goal, Line, Po
 ARC_RAD = math.radians(100.0)  # gates around a buoy are at most this far apart
 STRAIGHT_RAD = math.radians(60.0)  # a bend the other way up to this is passed with one gate, not with a loop
 KEEP_SHARE = 0.5  # the disc around the buoy that plans avoid, as a share of the rounding radius
+SAME_M = 1.0  # two goals so near are one mark that is passed twice
 BARRIER_M = 60.0  # shortest barrier
 SWEEP_RADIUS_M = 7.0  # the autopilot leaves a sweep's end 3 to 5 m before it
 BOX_RADIUS_M = 8.0  # its loiter lies this near to a box's roomiest place, and nearer as it is planned
