@@ -23,6 +23,8 @@ Ints = NDArray[np.int32]
 
 SLACK_RAD = 1e-6
 """How much deeper than the no-go zone's edge a leg may be [rad]: rounding only (the scorer allows 1.7e-4)."""
+LEAST_LEG_M = 1e-3
+"""A shorter leg has no course [m]: what rounding leaves of it points anywhere."""
 
 
 class SegmentGrid(NamedTuple):
@@ -344,7 +346,12 @@ def walk_on(b: BoatModel, xs: Floats, ys: Floats, first: int, last: int, t: floa
         if v <= 1e-9 or abs(a) > b.max_twa + SLACK_RAD:
             return math.inf
         if b.room > 0.0:
-            wound += wrap(a - h)
+            turn = wrap(a - h)
+            if length < LEAST_LEG_M and abs(turn) > SLACK_RAD:
+                return math.inf
+            if abs(turn) > math.pi - SLACK_RAD and turn * wound < 0.0:
+                turn = -turn  # straight back is a turn to either side: it unwinds nothing
+            wound += turn
             if abs(wound) > b.most_turn + SLACK_RAD and i > 0:
                 return math.inf
             if length >= b.room:

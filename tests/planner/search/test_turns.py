@@ -10,6 +10,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from companion.boat import Boat, ardurover_sitl
 from companion.planner import Problem, plan
 from companion.planner.explain import explain, turns
 from companion.planner.problem.evaluate import evaluate, manoeuvre
@@ -44,6 +45,28 @@ def problem(**changes):
 
 def names(answer):
     return [leg.manoeuvre for leg in answer.legs]
+
+
+@pytest.mark.parametrize("heading_deg", range(100, 132, 8))
+@pytest.mark.parametrize("seed", range(1, 9))
+def test_a_goal_close_behind_is_turned_to_by_no_leg_of_a_hair(heading_deg, seed):
+    """Legs of a micrometre point anywhere: by one the search turned round within half a circle, the scorer did not."""
+    raw = simple(
+        start={"x": 0.0, "y": 0.0, "heading_deg": heading_deg},
+        goal={"x": -9.0, "y": 10.85, "radius": 2.0},
+        obstacles=[],
+        fence=None,
+        wind={
+            "from_deg": 48.4,
+            "speed_mps": 5.35,
+            "sigma": {"model": "kalman", "sigma0_deg": 18.0, "growth_deg_per_sqrt_s": 0.6},
+        },
+        boat=Boat(polar=ardurover_sitl(), tack_loss_s=4.0).problem_boat(5.35),
+        delta_s=0.9,
+    )
+    made = plan(Problem.from_json(raw), seed=seed, expansions=15_000)
+    assert made.waypoints_en is not None, made.reason
+    assert evaluate(Problem.from_json(raw), made.waypoints_en).is_feasible
 
 
 # ------------------------------------------------------------------------------------- the scorer
