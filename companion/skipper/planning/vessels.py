@@ -86,7 +86,7 @@ def lies_at_goal(ctx: StepContext) -> str:
         if off_m < keep_m - gate.radius_m:
             return (
                 f"{vessel.label} lies {off_m:.0f} m from {gate.name}, and [traffic] safe_distance_m keeps {keep_m:g} m "
-                "from her: it is not reached while she lies there; the order skip_goal gives it up"
+                f"from her{_assumed(vessel)}: it is not reached while she lies there; the order skip_goal gives it up"
             )
     return ""
 
@@ -102,10 +102,19 @@ def lies_in_the_way(ctx: StepContext) -> str:
         if off_m < keep_m:
             return (
                 f"{vessel.label} lies {off_m:.0f} m from the straight way to {gate.name}, and [traffic] "
-                f"safe_distance_m keeps {keep_m:g} m from her: where no other way leads there she has to go first, or "
-                "the order skip_goal gives it up"
+                f"safe_distance_m keeps {keep_m:g} m from her{_assumed(vessel)}: where no other way leads there she "
+                "has to go first, or the order skip_goal gives it up"
             )
     return ""
+
+
+def _assumed(vessel: Vessel) -> str:
+    """Return in words which size is assumed of a vessel that tells none; empty: she does."""
+    hull = vessel.hull
+    if hull.is_known:
+        return ""
+    size = f"{hull.length_m:.0f} by {hull.beam_m:.0f} m"
+    return f" (her size is not told and taken to be {size}: a receiver as a feed has it)"
 
 
 def _lying(ctx: StepContext) -> list[Vessel]:

@@ -41,9 +41,8 @@ class Ship:
 
     def heard(self, t, **more):
         values = {"course_rad": self.course, "speed_mps": self.speed, "heading_rad": self.course}
-        return report(
-            t, self.at(t), name=self.name, bow_m=HALF_M, stern_m=HALF_M, port_m=3.0, starboard_m=3.0, **(values | more)
-        )
+        size = {"bow_m": HALF_M, "stern_m": HALF_M, "port_m": 3.0, "starboard_m": 3.0}
+        return report(t, self.at(t), name=self.name, **(values | size | more))
 
 
 def sail(world, ship, seconds=900.0, every_s=10.0):
@@ -265,13 +264,16 @@ def test_of_too_many_a_plan_is_told_of_the_ship_on_collision_course(comes_from):
 
 
 @pytest.mark.parametrize(("en", "what"), [((905.0, 30.0), "m from the goal"), ((450.0, 30.0), "from the straight way")])
-def test_a_vessel_that_lies_in_the_way_is_named_before_setting_sail(en, what):
+@pytest.mark.parametrize("is_told", [True, False])
+def test_a_vessel_that_lies_in_the_way_is_named_before_setting_sail(en, what, is_told):
     world = make()
     lying = Ship(en, 0.0, 0.0, name="Nellie")
-    world.extra = {"traffic": Targets.empty(FRAME).heard(lying.heard(0.0)).picture(1.0)}
+    untold = {} if is_told else {"bow_m": None, "stern_m": None, "port_m": None, "starboard_m": None}
+    world.extra = {"traffic": Targets.empty(FRAME).heard(lying.heard(0.0, **untold)).picture(1.0)}
     ctx = StepContext(world.skipper.voyage, world.skipper.config, world.state, world.snapshot())
     assert not ctx.state.voyage.sailing
     why = lies_in_the_way(ctx)
     assert "Nellie lies" in why
     assert what in why
     assert "skip_goal" in why
+    assert ("her size is not told and taken to be 100 by 16 m" in why) is (not is_told)
