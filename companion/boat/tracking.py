@@ -237,9 +237,7 @@ def predict(
     here = points[0] if start_en_m is None else np.asarray(start_en_m, dtype=np.float64)
     state = np.array([here[0], here[1], heading, speed_mps])
     length = float(np.sum(np.hypot(*np.diff(points, axis=0).T))) + float(np.hypot(*(here - points[0])))
-    slow = max(
-        SLOWEST_MPS, 0.5 * (float(np.max(curve_mps)) * math.cos(helm.no_go_half_rad) - math.hypot(*current_en_mps))
-    )
+    slow = max(SLOWEST_MPS, 0.5 * float(np.max(curve_mps)) * math.cos(helm.no_go_half_rad))
     limit_s = min(LONGEST_S, 120.0 + 3.0 * length / slow)
     slips = np.zeros(2) if leeway_rad is None else np.ascontiguousarray(leeway_rad, dtype=np.float64)
     out = np.empty((int(limit_s / (k.STEP_S * k.KEEP_STEPS)), k.T_SIZE))
