@@ -332,7 +332,8 @@ async def orders_served(path: Path, operator: OperatorCommands, views: ViewBroad
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         number = next(numbers)
         try:
-            with contextlib.suppress(ConnectionError, ValueError, TimeoutError):  # gone, or a line without end
+            # gone, a line without end, or the service ends, of which asyncio would tell as of an error
+            with contextlib.suppress(ConnectionError, ValueError, TimeoutError, asyncio.CancelledError):
                 while guests.take(writer) and (line := await reader.readline()):
                     guests.is_answered(writer)
                     if line.strip() == WATCH:

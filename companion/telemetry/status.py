@@ -21,7 +21,7 @@ from companion.skipper.planning import next_tack_s, on_leg
 from companion.skipper.step import Announce, Phase, Route
 from companion.skipper.way import gates_of
 from companion.telemetry.folder.logbook import Logbook
-from companion.telemetry.folder.records import VoyageFigures, sigma_ahead_rad
+from companion.telemetry.folder.records import VoyageFigures, sigma_ahead_mps, sigma_ahead_rad
 from companion.traffic import TrafficCounts
 from companion.traffic.feeds import Feed, Feeds
 
@@ -40,7 +40,6 @@ def companion_status(
     autopilot, wind, route, vehicle = snapshot.autopilot, snapshot.wind, state.mission.route, snapshot.vehicle
     legs, goal = voyage.legs, _goal(step, voyage)
     code, text = _alert(step)
-    tws_sigma = None if wind.forecast is None else float(wind.forecast.sigma_tws_mps[0])
     return CompanionStatus(
         t_s=snapshot.t_s,
         state=state.phase.value,
@@ -55,7 +54,7 @@ def companion_status(
         twd_from_rad=None if wind.mean_twd_from_rad is None else wrap_two_pi(wind.mean_twd_from_rad),
         twd_sigma_rad=sigma_ahead_rad(snapshot),
         tws_mps=wind.mean_tws_mps,
-        tws_sigma_mps=tws_sigma,
+        tws_sigma_mps=sigma_ahead_mps(snapshot),
         current_set_rad=snapshot.current.set_rad if snapshot.current.is_significant else None,
         current_drift_mps=snapshot.current.drift_mps if snapshot.current.is_significant else None,
         next_tack_s=next_tack_s(step, voyage.boat),

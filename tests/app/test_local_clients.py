@@ -54,6 +54,28 @@ async def said(path, *lines):
             await writer.wait_closed()
 
 
+def test_who_watches_when_the_companion_ends_is_no_error(tmp_path):
+    """Ctrl-C printed sixteen lines of asyncio where a ``watch --socket`` was open."""
+    errors = []
+
+    async def talk(_):
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: errors.append(context))
+        _, writer = await asyncio.open_unix_connection(tmp_path / "s")
+        writer.write(b"watch\n")
+        await asyncio.sleep(0.05)
+        served = [task for task in asyncio.all_tasks() if "talk" in repr(task) and task is not asyncio.current_task()]
+        assert served
+        for task in served:
+            task.cancel()
+        await asyncio.sleep(0.05)
+        writer.close()
+        with contextlib.suppress(ConnectionError):
+            await writer.wait_closed()
+
+    with_socket(tmp_path / "s", talk)
+    assert not errors
+
+
 def test_an_order_waits_for_its_answer_and_only_for_its_own(tmp_path):
     async def talk(operator):
         first = asyncio.create_task(said(tmp_path / "s", b"hold\n"))

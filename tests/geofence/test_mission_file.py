@@ -171,6 +171,18 @@ def test_the_fence_must_hold_start_and_goal(tmp_path):
         load(tmp_path, text, lake="POINT (-1.3 50.8)")
 
 
+def test_the_fence_and_the_obstacles_are_not_each_others_files(tmp_path):
+    """The fence's file was that of the obstacles: "in order", and she sailed without a fence."""
+    lake = "POLYGON ((-1.31 50.79, -1.29 50.79, -1.29 50.814, -1.31 50.814, -1.31 50.79))"
+    text = GOOD.replace('["rock.wkt"]', '["rock.wkt"]\nfence = "lake.wkt"')
+    with pytest.raises(InputError, match=r"lake\.wkt: holds no polygon or circle to stay inside, only what to"):
+        load(tmp_path, text, lake=f"r|exclusion|{ROCK}")
+    with pytest.raises(InputError, match=r"rock\.wkt: holds only what to stay inside, and is named in \[area\]"):
+        load(tmp_path, text, lake=lake, rock=f"l|inclusion|{lake}")
+    drawn = load(tmp_path, text, lake=f"l|inclusion|{lake}\nr|exclusion|{ROCK}", rock=ROCK)
+    assert len(drawn.area.fence.zones) == 2
+
+
 def test_what_has_no_name_has_one_number_in_the_area_and_on_the_page(tmp_path):
     rock = "POLYGON (({0} 50.801, {1} 50.801, {1} 50.802, {0} 50.802, {0} 50.801))"
     mission = load(

@@ -8,6 +8,7 @@ from shapely.geometry import box
 
 from companion.messages import GeoPoint, Mode
 from companion.orders import Verb
+from companion.skipper.behaviors.launch import finished
 from companion.skipper.behaviors.rest import comes_to_rest, rest
 from companion.skipper.planning.diversions import HOME, OFF_HOME, ROOM, after_last_goal, diversion
 from companion.skipper.step import actions as act
@@ -20,6 +21,7 @@ from companion.skipper.way.geometry import distance_m
 from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import Goal
 from tests.skipper.behaviors.test_failsafe import text
+from tests.skipper.moments import moment
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import is_done, make, said
 from tests.skipper.world import FRAME, restarted, with_parts
@@ -53,6 +55,17 @@ def test_the_way_home_is_planned_round_the_island_and_ends_in_a_loiter():
     assert act.ReplanReason.NEXT_GOAL in reasons  # on from the last goal, before she is there
     world.run(60)
     assert world.state.phase is Phase.DONE
+
+
+@pytest.mark.parametrize(
+    ("skipped", "words"), [(0, "all 2 goals reached"), (1, "1 of 2 goals reached, 1 given up by order")]
+)
+def test_what_was_reached_before_this_start_is_told_as_it_was(skipped, words):
+    """After a goal that was given up "all goals were reached before this start" was said."""
+    ctx = moment(orders={"skipped": skipped})
+    finished(ctx)
+    assert ctx.state.phase is Phase.DONE
+    assert ctx.state.why == f"{words} before this start; --again sails the mission again"
 
 
 # ------------------------------------------------------------------------------------------- room for a loiter

@@ -7,6 +7,7 @@ import re
 import shutil
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import shapely
 
@@ -147,6 +148,21 @@ def test_held_in_a_loiter_no_tack_comes_and_the_way_to_the_circles_middle_is_non
     assert None not in told["sails"]
     assert set(told["held"]) == {None}
     assert told["in auto"][2:] == (None, None)
+
+
+def test_the_winds_spread_by_radio_is_that_of_a_minute_ahead():
+    """Of the strength it was that of now: a tenth of what the page showed at the same moment."""
+    world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
+    snapshot = world.snapshot()
+    forecast = snapshot.wind.forecast
+    grows = np.linspace(0.1, 2.0, len(forecast.horizon_s))
+    forecast = replace(forecast, sigma_tws_mps=grows, sigma_twd_rad=0.1 * grows)
+    snapshot = replace(snapshot, wind=replace(snapshot.wind, forecast=forecast))
+    step = Step(snapshot=snapshot, state=world.state, actions=(), voyage=world.skipper.voyage)
+    status = companion_status(step, step.voyage, VoyageFigures(), None, None)
+    ahead = grows[int(np.argmax(forecast.horizon_s >= 60.0))]
+    assert status.tws_sigma_mps == pytest.approx(ahead)
+    assert status.twd_sigma_rad == pytest.approx(0.1 * ahead)
 
 
 @pytest.mark.parametrize("guidance", [Guidance.FIELD, Guidance.PLAN])

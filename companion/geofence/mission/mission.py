@@ -395,15 +395,31 @@ def load_area(
         if document.charted is not None:
             charted.append(document.charted)
             _require_drying(document.charted, options, mission_path, name)
-        zones.extend(z for z in document.zones if z.kind is ZoneKind.INCLUSION)
+        inside = [z for z in document.zones if z.kind is ZoneKind.INCLUSION]
+        if (
+            inside
+            and options.fence is not None
+            and not document.without_zones().marks
+            and len(inside) == len(document.zones)
+        ):
+            raise InputError(
+                str(folder / name),
+                "",
+                f"holds only what to stay inside, and is named in [area] {key}",
+                f"name the file of the obstacles; the fence is {options.fence}",
+            )
+        zones.extend(inside)
     if options.fence is not None:
         document = load(options.fence, "fence", ZoneKind.INCLUSION)
-        if not document.zones:
+        if all(zone.kind is ZoneKind.EXCLUSION for zone in document.zones):
+            only = ", only what to keep out of" if document.zones else ""
             raise InputError(
                 str(folder / options.fence),
                 "",
-                "holds no polygon or circle to stay inside",
-                "draw the fence as an area",
+                f"holds no polygon or circle to stay inside{only}",
+                "draw the fence as an area to stay inside, or name the file in [area] obstacles"
+                if only
+                else "draw the fence as an area",
             )
         zones.extend(document.zones)
         obstacles.extend(o for o in document.without_zones().as_obstacles(options.point_radius_m))

@@ -10,6 +10,7 @@ from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode, Severity
 from companion.skipper.behaviors.helm import arm, make_current, repair, set_mode
+from companion.skipper.behaviors.rest import reached_words
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.diversions import announcement, fenced_off, home_trouble
 from companion.skipper.planning.uploads import upload
@@ -20,7 +21,6 @@ from companion.skipper.way.gates import Approach
 from companion.skipper.way.geometry import distance_m, leg_distance_m
 from companion.skipper.way.shoals import beyond_words
 
-ARRIVED_BEFORE = "all goals were reached before this start; --again sails the mission again"
 MAY_UPLOAD = "[operator] set_auto = true in the mission, and no --dry-run"
 HAIR_M = 0.3  # what a repaired start's lead-in may come nearer by
 STALE_S = 60.0  # a plan that waits for permission is renewed no more often than this
@@ -100,7 +100,7 @@ def finished(ctx: StepContext) -> None:
             mission=changed(ctx.state.mission, own_index=ctx.state.mission.index),
         )
         return
-    ctx.phase(Phase.DONE, ARRIVED_BEFORE)
+    ctx.phase(Phase.DONE, f"{reached_words(ctx)} before this start; --again sails the mission again")
 
 
 def _request_start(ctx: StepContext, text: str = "") -> bool:

@@ -89,6 +89,14 @@ def _how_long(ctx: StepContext) -> str:
     return until or ANSWERED.get(ctx.state.operator.answering, TAKEN)
 
 
+def reached_words(ctx: StepContext) -> str:
+    """Return how many of the goals were reached, of a voyage that has none left."""
+    goals, skipped = len(ctx.voyage.legs), ctx.state.orders.skipped
+    if skipped:
+        return f"{goals - skipped} of {goals} goals reached, {skipped} given up by order"
+    return "the goal is reached" if goals == 1 else f"all {goals} goals reached"
+
+
 def rest(ctx: StepContext) -> None:
     """Keep station for as long as the mission asks, then lie in the mission's safe end."""
     if not ctx.state.voyage.over:
@@ -102,13 +110,8 @@ def rest(ctx: StepContext) -> None:
         lies = LIES.get(route.bound_for, "") if ctx.state.voyage.home_reached and route is not None else ""
         home = (f"; not home: {trouble}" if trouble else lies) + _lies_off(route)
         end = f"; the mission ends with {route.why}" if route is not None and route.rung == "hold" else ""
-        goals = len(ctx.voyage.legs)
-        reached = "the goal is reached" if goals == 1 else f"all {goals} goals reached"
-        if ctx.state.orders.skipped:
-            skipped = ctx.state.orders.skipped
-            reached = f"{goals - skipped} of {goals} goals reached, {skipped} given up by order"
         before = " before this start" if ctx.state.voyage.arrived else ""
-        _end(ctx, f"{reached}{before}{home}{end}", arrived=not trouble)
+        _end(ctx, f"{reached_words(ctx)}{before}{home}{end}", arrived=not trouble)
         return
     stopped = (
         ctx.state.steering.own_mode in STOPPING

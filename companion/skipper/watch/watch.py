@@ -279,7 +279,8 @@ def watch(ctx: StepContext) -> None:
         clear = now.clear_since_s if now.clear_since_s is not None else ctx.t_s
         if ctx.t_s - clear >= dog.exit_s:
             del raised[dog.name]
-            ctx.say(Severity.INFO, f"{dog.name} over", f"{dog.name}: over", every_s=0.0)
+            if _is_watched(ctx, dog):  # else nothing is known of it: a voyage that has ended looks at few of them
+                ctx.say(Severity.INFO, f"{dog.name} over", f"{dog.name}: over", every_s=0.0)
         else:
             raised[dog.name] = replace(now, clear_since_s=clear)
     order = {dog.name: n for n, dog in enumerate(TABLE)}

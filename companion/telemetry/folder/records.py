@@ -20,7 +20,7 @@ from companion.geo.angles import wrap_pi, wrap_two_pi
 from companion.geo.frame import LocalFrame
 from companion.geo.shift import Shift
 from companion.mavlink.wire import mission_hash
-from companion.messages import AisReport, Command, GeoPoint, MissionItem, Mode
+from companion.messages import AisReport, Command, GeoPoint, MissionItem, Mode, WindForecast
 from companion.orders import Order
 from companion.skipper import SkipperConfig
 from companion.skipper.step import (
@@ -234,8 +234,17 @@ def sigma_ahead_rad(snapshot: Snapshot) -> float | None:
     forecast = snapshot.wind.forecast
     if forecast is None:
         return None
-    index = int((forecast.horizon_s >= SHOWN_HORIZON_S).argmax())
-    return float(forecast.sigma_twd_rad[index])
+    return float(forecast.sigma_twd_rad[_ahead(forecast)])
+
+
+def sigma_ahead_mps(snapshot: Snapshot) -> float | None:
+    """Return the forecast's sigma of strength [m/s] a minute ahead."""
+    forecast = snapshot.wind.forecast
+    return None if forecast is None else float(forecast.sigma_tws_mps[_ahead(forecast)])
+
+
+def _ahead(forecast: WindForecast) -> int:
+    return int((forecast.horizon_s >= SHOWN_HORIZON_S).argmax())
 
 
 def _round(value: float | None, digits: int) -> float | None:

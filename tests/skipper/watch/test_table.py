@@ -195,6 +195,19 @@ def test_what_is_watched_when(where, parts, status, is_watched, monkeypatch):
     assert seen == {dog.name for dog in TABLE if is_watched(dog)}, where
 
 
+@pytest.mark.parametrize(("parts", "is_said"), [({}, True), (RESTING, False)], ids=["measured", "no longer watched"])
+def test_over_is_said_of_what_is_measured_to_be_over(parts, is_said, monkeypatch):
+    """At rest 36 s after the last goal "dark: over" was said of the middle of the night."""
+    dog = BY_NAME["becalmed"]
+    monkeypatch.setattr(watching, "measure", lambda _, name: dog.exit if name == dog.name else None)
+    ctx = moment(WAY, **parts)
+    ctx.set(alarms=replace(ctx.state.alarms, raised=(Raised(name=dog.name, since_s=0.0, clear_since_s=0.0),)))
+    ctx.snapshot = replace(ctx.snapshot, t_s=dog.exit_s + 1.0)
+    watching.watch(ctx)
+    assert not ctx.state.alarms.raised
+    assert (f"{dog.name} over" in [a.code for a in ctx.actions if isinstance(a, Announce)]) is is_said
+
+
 def test_an_autopilot_that_is_not_heard_is_watched_only_for_that():
     ctx = moment(WAY, seen={"heartbeat_age_s": 10.0})
     watching.watch(ctx)
