@@ -19,7 +19,7 @@ from companion.orders import Verb, permitted
 from companion.planner import Leg, Plan
 from companion.safety import BY_NAME
 from companion.skipper import SkipperConfig, Voyage
-from companion.skipper.planning import next_tack, on_leg
+from companion.skipper.planning import next_tack, on_leg, planned_forecast
 from companion.skipper.step import Route, WindHealth
 from companion.skipper.way import Goal, PointEn, Side, bearing_rad, gates_of, half_width_rad, mean_twd_rad
 from companion.telemetry.console import DISK, GONE
@@ -507,7 +507,7 @@ def apparent(
 
 
 def no_go_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.NoGo | None:
-    """Return the no-go zone now and later, widened as a plan that keeps the promise in force would have it.
+    """Return the no-go zone of courses now and later, widened as a plan that keeps the promise in force has it.
 
     None without a forecast, and of a boat that does not sail.
     """
@@ -515,7 +515,9 @@ def no_go_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.NoGo |
     if forecast is None or not config.sails:
         return None
     delta_s = config.delta_s if route is None else route.delta_s
-    half_rad = config.planned_no_go_rad(voyage.boat, step.snapshot.limits)
+    boat, bow_rad = voyage.boat, config.planned_no_go_rad(voyage.boat, step.snapshot.limits)
+    forecast = planned_forecast(boat, forecast, bow_rad, step.snapshot.doubt)
+    half_rad = boat.made_good_rad(bow_rad, float(forecast.mean_tws_mps[0]))
     wedges = []
     for at_s in WEDGES_S:
         if at_s <= float(forecast.horizon_s[-1]):

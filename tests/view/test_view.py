@@ -9,13 +9,14 @@ from itertools import islice
 
 import jsonschema
 import msgspec
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.pages import schema
 from companion.compose import config_of, voyage_of
-from companion.current import STILL_WATER, over_water
+from companion.current import STILL_WATER, WindAngleUncertainty, over_water
 from companion.eta import UNKNOWN
 from companion.fold import Step
 from companion.geo.angles import difference_rad
@@ -390,6 +391,27 @@ def test_the_no_go_zone_widens_by_the_promises_quantile(tmp_path):
         assert wedge.widening_deg == pytest.approx(1.6449 * sigma, abs=0.02)  # the one-sided 95 % of a normal
         assert wedge.half_deg == pytest.approx(zone.half_deg + wedge.widening_deg, abs=0.02)
     assert zone.half_deg == pytest.approx(47.0, abs=0.01)
+
+
+def test_the_no_go_zone_has_what_plans_allow_for(tmp_path):
+    """The wedges were 10 to 24 degrees narrower to either side than the zone that the plans beside them kept out of."""
+    config, voyage = SkipperConfig(delta_s=0.95), fold_of(tmp_path)._voyage
+    boat = replace(voyage.boat, leeway_rad=math.radians(5.0), no_go_error_rad=math.radians(4.0))
+    step = step_at((0.0, 0.0))
+    tws_mps = float(np.max(step.snapshot.wind.forecast.mean_tws_mps))
+    bow_rad = config.planned_no_go_rad(boat, None)
+    slips_rad = boat.made_good_rad(bow_rad, tws_mps) - bow_rad  # as the estimator has seen it
+    sure = WindAngleUncertainty(believed=(0.0, 0.0, 0.0, slips_rad, 0.0, 0.0), covariance=((0.0,) * 6,) * 6)
+    vane = replace(sure, covariance=(*((0.0,) * 6,) * 5, (*(0.0,) * 5, math.radians(6.0) ** 2)))
+    wedges = {}
+    for name, doubt in {"sure": sure, "vane": vane}.items():
+        told = replace(step, snapshot=replace(step.snapshot, doubt=doubt))
+        zone = no_go_of(told, replace(voyage, boat=boat), config)
+        made = math.degrees(boat.made_good_rad(bow_rad, float(step.snapshot.wind.forecast.mean_tws_mps[0])))
+        assert zone.half_deg == pytest.approx(made, abs=0.02)
+        wedges[name] = [w.widening_deg for w in zone.wedges]
+    assert wedges["sure"] == pytest.approx([1.6449 * math.hypot(sigma, 4.0) for sigma in (2.0, 6.0, 12.0)], abs=0.03)
+    assert all(a > b + 0.5 for a, b in zip(wedges["vane"], wedges["sure"], strict=True))
 
 
 def test_a_motor_boat_is_shown_no_no_go_zone_and_no_laylines(voyage):

@@ -1,6 +1,7 @@
 """Planning under way: why, from where, with which step of the ladder, and what is done with the answer."""
 
 from companion.skipper.planning.next_tack import FOLLOWS, next_tack, next_tack_s, on_leg
+from companion.skipper.planning.statement import planned_forecast
 from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.planning.vessels import (
     ALIKE_S,
@@ -26,5 +27,6 @@ __all__ = [
     "next_tack",
     "next_tack_s",
     "on_leg",
+    "planned_forecast",
     "soon",
 ]

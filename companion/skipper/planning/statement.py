@@ -17,6 +17,7 @@ import shapely
 from pyproj import Geod
 from shapely.geometry import LineString, Polygon
 
+from companion.boat import Boat
 from companion.current import STILL_WATER, WaterCurrent, WindAngleUncertainty, forecast_over_water
 from companion.geo.angles import difference_rad, wrap_two_pi
 from companion.geo.frame import LocalFrame
@@ -120,6 +121,24 @@ def wind_part(
         },
         "strength": strength_of(forecast, after_s=after_s, is_known=is_known).to_dict(),
     }
+
+
+def planned_forecast(
+    boat: Boat, forecast: WindForecast, half_rad: float, doubt: WindAngleUncertainty | None
+) -> WindForecast:
+    """Return the forecast by which plans widen the no-go zone: with what the sensors and the boat's file may err.
+
+    ``half_rad`` is the bow's angle to the wind that is kept out of; ``doubt``: of the wind's angle on a leg.
+    """
+    speed = float(np.max(forecast.mean_tws_mps))
+    if doubt is not None:
+        forecast = doubt.widened(
+            forecast,
+            beat_rad=half_rad,
+            speed_mps=boat.polar.speed_mps(half_rad, speed),
+            leeway_rad=boat.made_good_rad(half_rad, speed) - half_rad,
+        )
+    return with_no_go_error(forecast, boat.no_go_error_rad) if boat.no_go_error_rad > 0.0 else forecast
 
 
 def with_no_go_error(forecast: WindForecast, error_rad: float) -> WindForecast:
@@ -352,15 +371,7 @@ def problem_dict(
     speed = float(np.max(forecast.mean_tws_mps))
     length_s = 1.5 * distance_m(start.en_m, aim.en_m) / max(0.3, voyage.boat.polar.max_speed_mps(speed))
     half_rad = max(no_go_half_rad, voyage.boat.no_go_half_rad)
-    if doubt is not None:
-        forecast = doubt.widened(
-            forecast,
-            beat_rad=half_rad,
-            speed_mps=voyage.boat.polar.speed_mps(half_rad, speed),
-            leeway_rad=voyage.boat.made_good_rad(half_rad, speed) - half_rad,
-        )
-    if voyage.boat.no_go_error_rad > 0.0:
-        forecast = with_no_go_error(forecast, voyage.boat.no_go_error_rad)
+    forecast = planned_forecast(voyage.boat, forecast, half_rad, doubt)
     wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s, is_known=is_wind_known)
     water: dict[str, Any] = {}
     if current.is_significant:
