@@ -167,7 +167,9 @@ class VehicleAssembler:
         self._sounder = Sounder()
         self._sounded_s: float | None = None
         self._own_s = -math.inf  # when the companion's own sounder was heard
-        self._ranged_s = -math.inf  # when the message came that says how far the sounder reaches
+        self._faced_s: dict[bool, float] = {}  # when a sensor that looks down, or elsewhere, told a distance ...
+        self._faces: set[bool] = set()  # ... and which of the two there are
+        self._is_guessed = False  # the depth is a RANGEFINDER's, which does not say where it looks
         self._fenced_s = 0.0  # since when it tells of a fence without a gap
         self._fence_told = (False, -1)
         # Of each sensor: whether it was told beyond its entry, when, and what is believed.
@@ -374,26 +376,47 @@ class VehicleAssembler:
         return old
 
     def _sounding(self, t_s: float, kind: str, message: Message) -> dict[str, Any] | None:
-        """Take what an instrument that looks down tells; the same ping may come in more than one of the messages."""
+        """Take what an instrument that looks down tells; the same ping may come in more than one of the messages.
+
+        The others stand in for DISTANCE_SENSOR only where it never told of such an instrument: of one that has died
+        they repeat the last distance. RANGEFINDER is the nearest of all that there are, wherever they look.
+        """
         if kind == "DISTANCE_SENSOR":
-            if message.orientation != wire.MAV_SENSOR_ROTATION_PITCH_270:
-                return None
+            is_down = message.orientation == wire.MAV_SENSOR_ROTATION_PITCH_270
+            if t_s - self._faced_s.get(is_down, -math.inf) <= QUIET_S:
+                self._faces.add(is_down)  # two: one alone may be damaged or forged
+            self._faced_s[is_down] = t_s
+            if not is_down:
+                return self._not_guessed() if False in self._faces else None
             ping_m, least_m, most_m = (
                 cm / 100.0 for cm in (message.current_distance, message.min_distance, message.max_distance)
             )
-            self._ranged_s = t_s
-        elif t_s - self._ranged_s <= QUIET_S:
-            return None
         else:
+            is_guess = kind == "RANGEFINDER"
+            rivals = (True, False) if is_guess else (True,)
+            if any(rival in self._faces or t_s - self._faced_s.get(rival, -math.inf) <= QUIET_S for rival in rivals):
+                return None
+            if not is_guess and not message.healthy:
+                return None
             ping_m, least_m, most_m = float(message.distance), 0.0, math.inf
-        return None if t_s - self._own_s <= QUIET_S else self._pinged(t_s, ping_m, least_m, most_m)
+        if t_s - self._own_s <= QUIET_S:
+            return None
+        self._is_guessed = kind == "RANGEFINDER"
+        return self._pinged(t_s, ping_m, least_m, most_m)
+
+    def _not_guessed(self) -> dict[str, Any] | None:
+        """Forget a depth that RANGEFINDER told before it was known that a sensor looks elsewhere: none is lost."""
+        if not self._is_guessed:
+            return None
+        self._sounder, self._sounded_s, self._is_guessed = Sounder(), None, False
+        return {"sounds": None, "depth_m": None, "depth_rate_mps": None}
 
     def sounded(self, t_s: float, ping_m: float | None, most_m: float) -> list[Value]:
         """Take a ping of a sounder that the companion hears itself, None without an echo.
 
         While there is one it counts alone. ``most_m``: it reaches no farther.
         """
-        self._own_s = t_s
+        self._own_s, self._is_guessed = t_s, False
         if self._status is None:
             return []
         told = self._pinged(t_s, math.inf if ping_m is None else ping_m, 0.0, most_m)

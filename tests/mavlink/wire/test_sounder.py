@@ -87,3 +87,36 @@ def test_the_other_messages_of_the_same_ping_are_not_counted_twice():
 
 def test_what_is_no_number_is_no_depth():
     assert told([wire.MAVLink_rangefinder_message(math.nan, 0.0)] * 5).status.depth_m is None
+
+
+def ranged(depth_m):
+    return wire.MAVLink_rangefinder_message(depth_m, 0.0)
+
+
+def water(depth_m, *, healthy=1):
+    return wire.MAVLink_water_depth_message(0, 0, healthy, 0, 0, 0.0, 0.0, 0.0, 0.0, depth_m, 0.0)
+
+
+@pytest.mark.parametrize("repeats", [ranged(6.0), ranged(30.0), water(6.0), water(90.0, healthy=0)])
+def test_of_a_sounder_that_has_died_no_other_message_tells_a_depth(repeats):
+    """ArduRover stops DISTANCE_SENSOR of a rangefinder without data, and repeats its last distance in the others."""
+    status = beat(told([6.0] * 5 + [repeats] * 40), 22.5)
+    assert (status.sounds, status.depth_m, status.depth_rate_mps) == (False, None, None)
+
+
+def test_a_sounder_that_calls_itself_unhealthy_tells_no_depth():
+    assert told([water(6.0, healthy=0)] * 5).status.sounds is None
+    assert beat(told([water(6.0)] * 5 + [water(6.0, healthy=0)] * 20), 12.5).sounds is False
+
+
+@pytest.mark.parametrize("first", [0, 3])
+def test_what_looks_ahead_is_no_depth_in_the_message_without_a_direction(first):
+    ahead = ping(1.5, orientation=wire.MAV_SENSOR_ROTATION_NONE)
+    status = told([ranged(1.5)] * first + [ahead, ranged(1.5)] * 20).status
+    assert (status.sounds, status.depth_m) == (None, None)  # none is lost, either: there was none
+    assert told([ranged(1.5)] * first + [ahead, water(9.0)] * 20).status.depth_m == 9.0
+
+
+def test_one_distance_alone_does_not_silence_the_message_that_tells_the_depth():
+    for forged in (ping(0.4), ping(0.4, orientation=wire.MAV_SENSOR_ROTATION_NONE)):
+        assert told([ranged(9.0)] * 5 + [forged] + [ranged(9.0)] * 20).status.depth_m == 9.0
