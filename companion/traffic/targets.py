@@ -17,7 +17,7 @@ from companion.geo.shift import Shift, carried
 from companion.messages import AisReport
 from companion.traffic.approach import peril_m
 from companion.traffic.predict import predict
-from companion.traffic.vessel import Vessel, hull_of
+from companion.traffic.vessel import LAIN_S, Vessel, hull_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +60,7 @@ REACH_SLACK_M, REACH_MPS = 400.0, 30.0
 FAR_M = 60_000.0
 # The companion's clock never goes back; a replay's or a test's may. More than this is a jump, not disorder.
 CLOCK_BACK_S = 60.0
-LIES_MPS, SWINGS_M = 0.26, 15.0  # half a knot; a fix's error and a swing at the mooring, between two reports
+LIES_MPS, SWINGS_M = 0.26, 15.0  # half a knot; a fix's error and a swing at the mooring, in LAIN_S
 LIES_APART_S = 400.0  # a vessel that lies still reports each three minutes
 # Who goes next where there are too many is judged for an eighth of them, and for so long [s]: a flood of new numbers
 # must not have all of them judged for each.
@@ -314,6 +314,7 @@ def _moved(vessel: Vessel, report: AisReport, en: tuple[float, float], t_s: floa
         speed = math.hypot(de, dn) / dt if speed is None else speed
         course = wrap_two_pi(math.atan2(de, dn)) if course is None else course
         derived = True
+    lain_s, lain_en_m = _lain(vessel, report, en, dt)
     return replace(
         described,
         t_s=t_s,
@@ -326,11 +327,22 @@ def _moved(vessel: Vessel, report: AisReport, en: tuple[float, float], t_s: floa
         is_class_b=report.is_class_b or vessel.is_class_b,
         reports=vessel.reports + 1,
         derived=derived,
-        lain_s=vessel.lain_s + dt if _lies(vessel, report, en, dt) else 0.0,
+        lain_s=lain_s,
+        lain_en_m=lain_en_m,
     )
 
 
-def _lies(vessel: Vessel, report: AisReport, en: tuple[float, float], dt_s: float) -> bool:
-    """Return whether a vessel shows itself lying still since the report before: class B has no status that says so."""
+def _lain(
+    vessel: Vessel, report: AisReport, en: tuple[float, float], dt_s: float
+) -> tuple[float, tuple[float, float] | None]:
+    """Return for how long a vessel shows itself lying still [s], and since the last ``LAIN_S`` where [m].
+
+    Class B has no status that says so. From one report to the next a vessel that moves is as near as one that lies,
+    where its reports come each second: it is held against where it lay some time ago.
+    """
     has_speed = report.speed_mps is not None and report.speed_mps >= LIES_MPS
-    return not has_speed and math.dist(en, vessel.antenna_en_m) <= SWINGS_M and 0.0 <= dt_s <= LIES_APART_S
+    lay_en_m = vessel.antenna_en_m if vessel.lain_en_m is None else vessel.lain_en_m
+    if has_speed or math.dist(en, lay_en_m) > SWINGS_M or not 0.0 <= dt_s <= LIES_APART_S:
+        return 0.0, None
+    lain_s = vessel.lain_s + dt_s
+    return lain_s, lay_en_m if lain_s // LAIN_S == vessel.lain_s // LAIN_S else en

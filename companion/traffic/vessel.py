@@ -77,7 +77,8 @@ class Vessel:
     reports: int = 1
     is_shared_mmsi: bool = False
     derived: bool = False  # speed and course come from positions, not from the report
-    lain_s: float = 0.0  # for how long its reports have shown it lying still, as far as they were heard
+    lain_s: float = 0.0  # for how long its reports have shown it lying still, as far as they were heard, and ...
+    lain_en_m: tuple[float, float] | None = None  # ... where at the beginning of that, or of its last ``LAIN_S``
 
     @property
     def label(self) -> str:

@@ -70,6 +70,28 @@ def test_who_moves_or_was_hardly_heard_does_not_lie_still(step_m: float, every_s
     assert not t.picture(k * every_s).vessels[0].is_stopped
 
 
+@pytest.mark.parametrize(("speed_mps", "every_s"), [(5.0, 1.0), (5.0, 2.0), (1.4, 10.0), (0.4, 1.0), (0.4, 30.0)])
+@pytest.mark.parametrize("lay_s", [0, 300])
+def test_who_moves_without_a_speed_told_is_not_stopped_however_often_it_reports(
+    speed_mps: float, every_s: float, lay_s: int
+) -> None:
+    """Successive reports of a feed that tells each second are metres apart at any speed."""
+    t = Targets.empty(FRAME)
+    for t_s in range(-lay_s, 0, 10):
+        t = t.heard(report(float(t_s), (0.0, 0.0), is_class_b=True))
+    for k in range(int(130.0 / every_s) + 1):
+        t = t.heard(report(k * every_s, (speed_mps * k * every_s, 0.0), is_class_b=True))
+    assert not t.picture(k * every_s).vessels[0].is_stopped
+
+
+def test_who_swings_slowly_at_her_anchor_lies() -> None:
+    t = Targets.empty(FRAME)
+    for k in range(200):
+        swing_rad = 0.003 * 5.0 * k  # 0.09 m/s, 60 m to and fro
+        t = t.heard(report(5.0 * k, (30.0 * math.sin(swing_rad), 30.0 * math.cos(swing_rad)), is_class_b=True))
+        assert t.picture(5.0 * k).vessels[0].is_stopped == (k >= 24)
+
+
 def test_static_data_finds_its_vessel() -> None:
     t = Targets.empty(FRAME).heard(report(0.0, None, name="EARLY"))
     assert t.counts.static_unknown == 1
