@@ -91,6 +91,7 @@ class ForkServer:
         """Begin it anew, if it has died and that was not just done; return whether it was. It does not wait."""
         if self.is_alive or time.monotonic() < self._begun_s + _REST_S:
             return False
+        self._begun_s = time.monotonic()  # one that cannot be begun is not tried again at once, either
         self._control.close()
         self._control, theirs = socket.socketpair()
         with theirs:
@@ -101,7 +102,7 @@ class ForkServer:
                 start_new_session=True,
             )
         self._control.settimeout(_PATIENCE_S)
-        self._pid, self._is_ready, self._begun_s = self._program.pid, False, time.monotonic()
+        self._pid, self._is_ready = self._program.pid, False
         return True
 
     def _hear(self) -> None:

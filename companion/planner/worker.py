@@ -55,6 +55,7 @@ LEAST_RUN_S = 0.05  # a shorter run does not tell how much of the processor ther
 _TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 _PULSE_S = 0.5
 _LOOK_S = 0.2  # between two looks whether child and fork server live
+_REST_S = 10.0  # until the watch tries again to start a child that could not be; a request tries at once
 _SILENCE_S = 60.0
 """A child that gets ready may take as long as it takes, and says once in ``_BEAT_S`` that it lives; this long without a
 word [s] and it is taken for hung."""
@@ -162,6 +163,7 @@ class PlannerWorker:
         self._command = command or [sys.executable, "-m", "companion.planner.worker", algorithm]
         self._child: Child | None = None
         self._is_warm, self._was_warm, self._silence_s = False, False, math.inf
+        self._rests_until_s = -math.inf
         self._lock = asyncio.Lock()
         self._watch: asyncio.Task[None] | None = None
         self.restarts = 0
@@ -261,11 +263,15 @@ class PlannerWorker:
             except (OSError, EOFError, asyncio.IncompleteReadError, TimeoutError) as error:
                 hung = isinstance(error, TimeoutError)
                 reason = "the planner's worker did not answer in time" if hung else "the planner's worker died"
-                _LOG.warning("%s; it is replaced", reason)
-                await self._replace()
+                if self._child is None:
+                    reason = f"the planner's worker cannot be started ({error})"
+                    _LOG.warning("%s", reason)
+                else:
+                    _LOG.warning("%s; it is replaced", reason)
+                    await self._try_to_replace()
                 return _without(reason, best, seed=seed, algorithm=algorithm, elapsed_s=effort_s() - began_s)
             except asyncio.CancelledError:
-                await self._replace()  # its answer would be taken for that of the next request
+                await self._try_to_replace()  # its answer would be taken for that of the next request
                 raise
         if isinstance(value, Plan):
             return value
@@ -282,14 +288,20 @@ class PlannerWorker:
         """Replace child and fork server when they die."""
         while True:
             await asyncio.sleep(_LOOK_S)
-            if self._fork_server is not None and self._fork_server.revive():
-                _LOG.warning("the planners' fork server died; it is begun anew")
-            if not self._was_warm or self._lock.locked():  # whoever gets it ready or has it sees it by himself
+            try:
+                if self._fork_server is not None and self._fork_server.revive():
+                    _LOG.warning("the planners' fork server died; it is begun anew")
+            except OSError as error:
+                _LOG.warning("the planners' fork server died and cannot be begun anew (%s)", error)
+            if (
+                not self._was_warm or self._lock.locked() or effort_s() < self._rests_until_s
+            ):  # whoever gets it ready or has it sees it by himself
                 continue
             async with self._lock:
                 if not self.is_alive:
                     _LOG.warning("the planner's worker died; it is replaced")
-                    await self._replace()
+                    if not await self._try_to_replace():
+                        continue
                 with contextlib.suppress(OSError, EOFError):  # the next request is told of it
                     await self._warm()
 
@@ -326,6 +338,16 @@ class PlannerWorker:
         await self._stop()
         self.restarts += 1
         await self._start()
+
+    async def _try_to_replace(self) -> bool:
+        """Replace the child and return whether there is one: without memory or processes the watch tries again."""
+        try:
+            await self._replace()
+        except OSError as error:
+            _LOG.warning("the planner's worker cannot be started (%s); again in %g s", error, _REST_S)
+            self._rests_until_s = effort_s() + _REST_S
+            return False
+        return True
 
     async def _send(self, payload: bytes) -> None:
         assert self._child is not None

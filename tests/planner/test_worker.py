@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import itertools
 import os
 import signal
@@ -13,7 +14,8 @@ import threading
 import pytest
 
 from companion.clock import now_s, run, run_virtual
-from companion.planner import PlanStatus, Problem, plan, worker
+from companion.errors import JobError
+from companion.planner import PlanStatus, Problem, child, plan, worker
 from companion.planner.fork_server import ForkServer
 from companion.planner.worker import InlinePlanner, PlannerWorker
 from tests.planner.problems import load, simple
@@ -144,6 +146,70 @@ def test_a_worker_that_cannot_start_is_an_outcome():
             answer = await worker.plan(Problem.from_json(simple()), budget_s=0.2)
             assert answer.status is PlanStatus.UNANSWERED
             assert "died" in answer.reason
+
+    run(main())
+
+
+def test_a_child_that_cannot_be_started_again_is_an_outcome_and_is_tried_again(monkeypatch):
+    """ENOMEM, EAGAIN, EMFILE: what the system lacks now it may have in a minute, and the voyage goes on."""
+
+    async def refused(command):
+        raise OSError(errno.ENOMEM, "Cannot allocate memory")
+
+    async def main():
+        p = Problem.from_json(simple())
+        async with PlannerWorker(grace_s=1.0) as planner:
+            assert (await planner.plan(p, expansions=3_000)).has_path
+            begin = child.Started.begin
+            monkeypatch.setattr(worker, "_REST_S", 0.1)
+            monkeypatch.setattr(child.Started, "begin", refused)
+            os.kill(planner.pid, signal.SIGKILL)
+            await asyncio.sleep(0.5)  # the watch has seen it
+            assert not planner.is_alive
+            answer = await planner.plan(p, expansions=3_000)
+            assert answer.status is PlanStatus.UNANSWERED
+            assert "cannot be started" in answer.reason
+            assert "Cannot allocate memory" in answer.reason
+            monkeypatch.setattr(child.Started, "begin", begin)
+            async with asyncio.timeout(30.0):
+                while not planner.is_alive:  # noqa: ASYNC110 - the watch starts it, nobody asking
+                    await asyncio.sleep(0.1)
+            assert (await planner.plan(p, expansions=3_000)).has_path
+
+    run(main())
+
+
+def test_a_child_that_hangs_and_cannot_be_started_again_is_an_outcome(monkeypatch):
+    async def refused(command):
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    async def main():
+        p = Problem.from_json(simple())
+        async with PlannerWorker(grace_s=0.5) as planner:
+            assert (await planner.plan(p, expansions=3_000)).has_path
+            monkeypatch.setattr(child.Started, "begin", refused)
+            os.kill(planner.pid, signal.SIGSTOP)
+            assert (await planner.plan(p, budget_s=0.1)).status is PlanStatus.UNANSWERED
+
+    run(main())
+
+
+def test_a_fork_server_that_cannot_be_begun_anew_does_not_end_the_watch(monkeypatch):
+    class Refused:
+        def revive(self):
+            raise OSError(errno.EAGAIN, "Resource temporarily unavailable")
+
+        def planner(self):
+            raise JobError("no planner could be forked")
+
+    async def main():
+        p = Problem.from_json(simple())
+        async with PlannerWorker(grace_s=1.0, fork_server=Refused()) as planner:
+            assert (await planner.plan(p, expansions=3_000)).has_path
+            os.kill(planner.pid, signal.SIGKILL)
+            async with asyncio.timeout(30.0):
+                while planner.restarts == 0 or not planner.is_alive:  # noqa: ASYNC110 - it tells nobody
+                    await asyncio.sleep(0.1)
 
     run(main())
 
