@@ -246,7 +246,7 @@ def decode_json(datagram: bytes, t_s: float) -> AisReport | None:
     The form is our own, after what WRSC 2013 broadcast of its intruder: an object with ``id`` (or ``mmsi``), ``lat``
     and ``lon`` [deg]; optional ``heading_deg``, ``course_deg``, ``speed_mps`` (or ``speed_kn``), ``length_m``,
     ``beam_m``, ``name``, ``age_s``. A heading without a course is taken for the course (the intruder keeps both).
-    Keys that are not known are ignored; a value out of range is unknown; no position, no report.
+    Keys that are not known are ignored; a value out of range is unknown; no position or an age out of range, no report.
     """
     if len(datagram) > MAX_DATAGRAM:
         return None
@@ -258,7 +258,8 @@ def decode_json(datagram: bytes, t_s: float) -> AisReport | None:
         return None
     position = _json_position(raw)
     mmsi = _json_id(raw)
-    if position is None or mmsi is None:
+    age_s = 0.0 if raw.get("age_s") is None else _number(raw["age_s"], 0.0, 3600.0)
+    if position is None or mmsi is None or age_s is None:  # of an unknown age it would be a place of now
         return None
     heading = _json_angle(raw.get("heading_deg"))
     course = _json_angle(raw.get("course_deg"))
@@ -283,7 +284,7 @@ def decode_json(datagram: bytes, t_s: float) -> AisReport | None:
         port_m=beam / 2,
         starboard_m=beam / 2,
         is_class_b=True,
-        age_s=_number(raw.get("age_s"), 0.0, 3600.0) or 0.0,
+        age_s=age_s,
     )
 
 

@@ -177,3 +177,13 @@ def test_any_json_is_finite_or_nothing(raw: dict[str, object]) -> None:
     if r is not None:
         values = (r.course_rad, r.speed_mps, r.heading_rad, r.bow_m, r.stern_m, r.age_s)
         assert all(v is None or math.isfinite(v) for v in values)
+
+
+@pytest.mark.parametrize("age", [3601, -1, "7200", math.nan, 1e400, True])
+def test_a_report_whose_age_cannot_be_is_none_of_now(age) -> None:
+    """An age that was not understood was 0: a place of two hours ago was one of this second."""
+    raw = {"id": 7, "lat": 50.0, "lon": -1.0}
+    assert decode_json(json.dumps(raw).encode(), 0.0).age_s == 0.0
+    assert decode_json(json.dumps({**raw, "age_s": None}).encode(), 0.0).age_s == 0.0
+    assert decode_json(json.dumps({**raw, "age_s": 3600}).encode(), 0.0).age_s == 3600.0
+    assert decode_json(json.dumps({**raw, "age_s": age}).encode(), 0.0) is None

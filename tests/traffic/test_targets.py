@@ -118,6 +118,12 @@ def test_reports_out_of_order_do_not_move_a_track_back() -> None:
     assert t.picture(11.0).vessels[0].antenna_en_m[0] == pytest.approx(100.0, abs=1e-3)
 
 
+@pytest.mark.parametrize(("age_s", "stale"), [(600.0, 0), (600.1, 1), (3600.0, 1)])
+def test_a_report_that_was_old_when_it_came_is_refused(age_s: float, stale: int) -> None:
+    t = Targets.empty(FRAME).heard(report(5000.0, (100.0, 0.0), age_s=age_s))
+    assert (t.counts.stale, len(t.vessels)) == (stale, 1 - stale)
+
+
 def test_a_clock_set_back_keeps_the_ages() -> None:
     t = Targets.empty(FRAME).heard(report(5000.0, (100.0, 0.0))).heard(report(1000.0, (300.0, 0.0), mmsi=2))
     p = t.picture(1000.0)
