@@ -204,6 +204,13 @@ def _next_count(key: Path, given: int | None) -> _Count:
         )
     if given is None and count.last >= MOST_COUNTER:
         raise JobError(f"{key}: all {MOST_COUNTER} counters are used up; count from 1 again: companion far begin")
+    if given is not None and not trouble and given <= count.last:
+        raise InputError(
+            "--counter",
+            str(given),
+            f"is not after the last, {count.last}, and none is used twice",
+            f"leave it out, or say {count.last + 1} or more",
+        )
     if given is not None and count.last and given > count.last + MOST_JUMP:
         raise InputError(
             "--counter",

@@ -63,6 +63,17 @@ def test_what_cannot_be_ordered_is_one_line_and_uses_no_counter(key, tmp_path, c
     assert not (tmp_path / "far.key.far-counter").exists()
 
 
+@pytest.mark.parametrize("given", [2, 3])
+def test_a_counter_that_was_used_is_refused_ashore(key, tmp_path, capsys, given):
+    for _ in range(3):
+        run(capsys, "order", "hold", "--key", key, "--expires", "2h")
+    code, out, err = run(capsys, "order", "hold", "--key", key, "--expires", "2h", "--counter", given)
+    assert (code, out) == (2, "")
+    assert "is not after the last, 3" in err
+    assert (tmp_path / "far.key.far-counter").read_text() == "3\n"
+    assert run(capsys, "order", "hold", "--key", key, "--expires", "2h", "--counter", 4)[0] == 0
+
+
 def test_a_slip_of_the_counter_is_refused_ashore(key, tmp_path, capsys):
     run(capsys, "order", "hold", "--key", key, "--expires", "2h")
     code, _, err = run(capsys, "order", "hold", "--key", key, "--expires", "2h", "--counter", 65535)
