@@ -420,7 +420,8 @@ class VehicleAssembler:
         if self._status is None:
             return []
         told = self._pinged(t_s, math.inf if ping_m is None else ping_m, 0.0, most_m)
-        self._status = changed(self._status, **told, t_s=t_s)
+        # Neither its age nor its clock is told anew: the autopilot has not been heard.
+        self._status = changed(self._status, **told)
         return [self._status]
 
     def _pinged(self, t_s: float, ping_m: float, least_m: float, most_m: float) -> dict[str, Any]:

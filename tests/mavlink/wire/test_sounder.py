@@ -120,3 +120,16 @@ def test_what_looks_ahead_is_no_depth_in_the_message_without_a_direction(first):
 def test_one_distance_alone_does_not_silence_the_message_that_tells_the_depth():
     for forged in (ping(0.4), ping(0.4, orientation=wire.MAV_SENSOR_ROTATION_NONE)):
         assert told([ranged(9.0)] * 5 + [forged] + [ranged(9.0)] * 20).status.depth_m == 9.0
+
+
+def test_a_sounder_of_our_own_does_not_stand_in_for_the_autopilots_clock():
+    """While the autopilot was silent each ping made its status new, and its clock stood still."""
+    assembler = VehicleAssembler()
+    beat(assembler, 100.0)
+    assembler.take(100.0, heard(wire.MAVLink_system_time_message(1_780_000_100_000_000, 100_000)))
+    beat(assembler, 100.0)
+    for t_s in range(101, 161):
+        assembler.sounded(float(t_s), 5.0, 50.0)
+    status = assembler.status
+    assert (status.t_s, status.depth_m) == (100.0, 5.0)
+    assert status.unix_s(160.0) == 1_780_000_160.0
