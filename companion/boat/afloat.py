@@ -214,6 +214,7 @@ class Afloat:
         cut_s: where the next stretch begins.
         waiting: stretches that are not learned from yet.
         done_s: manoeuvres were looked for then, and ``last_s`` is the last that was taken.
+        ended_s: the last look before those that may not be learned from.
         left_out: how many stretches were not, by reason.
     """
 
@@ -224,6 +225,7 @@ class Afloat:
     waiting: tuple[Stretch, ...] = ()
     done_s: float = -math.inf
     last_s: float = -math.inf
+    ended_s: float = -math.inf
     left_out: tuple[tuple[Why, int], ...] = ()
 
     @classmethod
@@ -239,10 +241,12 @@ class Afloat:
         """Return it where the present may not be learned from; what is found out late counts for the minutes before."""
         if not self.looks and not self.waiting:
             return self
-        later = self if not self.looks else replace(self._counted(why), looks=(), done_s=-math.inf)
-        if why not in {Why.DOUBTED, Why.FROZEN_VANE, Why.RESET, Why.MOTOR} or not self.looks:
+        later = self
+        if self.looks:
+            later = replace(self._counted(why), looks=(), done_s=-math.inf, ended_s=self.looks[-1].t_s)
+        if why not in {Why.DOUBTED, Why.FROZEN_VANE, Why.RESET, Why.MOTOR}:
             return later
-        since_s = self.looks[-1].t_s - TAKEN_BACK_S
+        since_s = later.ended_s - TAKEN_BACK_S
         return replace(later, waiting=tuple(s for s in self.waiting if s.t_s < since_s))
 
     def _counted(self, why: Why, times: int = 1) -> Afloat:

@@ -154,7 +154,10 @@ def test_what_is_found_out_late_takes_back_the_minutes_before():
         assert all(s.t_s < end_s - TAKEN_BACK_S for s in later.waiting)
         assert dict(later.left_out)[why] == 1
         assert later.without(why) == later
-    assert now.without(Why.LIGHT).waiting == now.waiting
+        lulled = now.without(Why.LIGHT)  # another reason came a second before
+        assert lulled.waiting == now.waiting
+        assert lulled.without(why).waiting == later.waiting
+        assert lulled.without(why).without(why).waiting == later.waiting
 
 
 def test_nothing_is_learned_from_a_stretch_before_ten_minutes_more_are_steady():
