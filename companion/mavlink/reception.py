@@ -23,6 +23,7 @@ class LinkStats:
 
     frames_in: int = 0
     frames_out: int = 0
+    frames_counted: int = 0  # by their sequence numbers: those of the vehicle
     frames_lost: int = 0
     reboots: int = 0
     dropped: Counter[Drop] = field(default_factory=Counter)
@@ -31,6 +32,7 @@ class LinkStats:
 
     def count(self, system: int, component: int, seq: int) -> None:
         """Count what was lost before a frame, by the sender's sequence numbers."""
+        self.frames_counted += 1
         last = self.last_seq.get((system, component))
         if last is not None:
             gap = (seq - last) % 256
@@ -43,8 +45,8 @@ class LinkStats:
         self.last_seq[system, component] = seq
 
     def loss(self) -> float:
-        """Return the share of frames that never arrived."""
-        total = self.frames_in + self.frames_lost
+        """Return the share of the vehicle's frames that never arrived."""
+        total = self.frames_counted + self.frames_lost
         return self.frames_lost / total if total else 0.0
 
 

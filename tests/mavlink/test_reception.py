@@ -5,7 +5,7 @@ import random
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.mavlink.reception import BEHIND_S, CONTEST_OVER_S, SWITCH_S, BootClock, PlausibilityFilter
+from companion.mavlink.reception import BEHIND_S, CONTEST_OVER_S, SWITCH_S, BootClock, LinkStats, PlausibilityFilter
 from companion.mavlink.wire.assembler import VehicleAssembler
 from companion.mavlink.wire.frames import Codec, Drop
 from companion.messages import Mode, VehicleState
@@ -311,3 +311,14 @@ def test_a_jump_that_stays_is_believed_at_the_third_fix():
 
 def test_after_a_silence_any_place_is_possible():
     assert places((1.0, 0), (20.0, 500.0)) == [True, True]
+
+
+def test_the_loss_is_that_of_the_vehicles_own_frames():
+    """Another boat on the same radio is counted as heard, and what is lost of it is not."""
+    stats = LinkStats()
+    for seq in range(0, 1000, 2):
+        stats.frames_in += 1
+        stats.count(1, 1, seq % 256)
+    assert stats.loss() == pytest.approx(0.5, abs=0.01)
+    stats.frames_in += 9000
+    assert stats.loss() == pytest.approx(0.5, abs=0.01)
