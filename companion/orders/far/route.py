@@ -6,6 +6,7 @@ planned, and what is beyond follows in a later message.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ MOST_BYTES = 270  # to the boat; from her 340
 _NONE16 = 0xFFFF
 _STEP_DEG = 2.5e-5  # 2.8 m, of what three bytes hold of half a turn
 _LATER_S = 1800.0
+_BAND_M = 100.0
+_EXACT = 1e-6  # of a step: what arithmetic leaves of a whole number of them
 HEADER = Layout(
     (
         BitField(name="version", size=1, says=f"{VERSION}"),
@@ -35,7 +38,7 @@ PLACE = Layout(
         BitField(
             name="band",
             size=1,
-            step=100.0,
+            step=_BAND_M,
             unit="100 m",
             says="to each side of the leg to it, rounded down; 0: less than 100 m",
         ),
@@ -97,10 +100,10 @@ def _counts(place: FarPlace) -> dict[str, int]:
     values: dict[str, float | None] = {
         "lat": place.point.lat_deg,
         "lon": place.point.lon_deg,
-        "band": max(0.0, place.band_m - 50.0),  # rounded down: a band is a limit
+        "band": _BAND_M * math.floor(place.band_m / _BAND_M + _EXACT),  # a band is a limit
         "middle": place.middle_s,
-        "early": place.early_s + 0.5 * _LATER_S,  # and doubt up
-        "late": place.late_s + 0.5 * _LATER_S,
+        "early": _LATER_S * math.ceil(place.early_s / _LATER_S - _EXACT),  # and doubt is rounded up
+        "late": _LATER_S * math.ceil(place.late_s / _LATER_S - _EXACT),
     }
     return {name: by_name[name].count(value) for name, value in values.items()}
 

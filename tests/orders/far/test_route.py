@@ -83,3 +83,26 @@ def test_what_is_not_ours_is_refused():
             unpack_route(wrong, KEY)
     with pytest.raises(ValueError, match="has places"):
         pack_route(dataclasses.replace(route(), places=()), KEY)
+
+
+@pytest.mark.parametrize(
+    ("band_m", "told_m"), [(99.0, 0.0), (100.0, 100.0), (199.0, 100.0), (300.0, 300.0), (500.0, 500.0)]
+)
+def test_a_band_is_rounded_down_and_a_whole_one_is_itself(band_m, told_m):
+    place = FarPlace(point=GeoPoint(lat_deg=1.0, lon_deg=1.0), band_m=band_m)
+    assert carried(place).band_m == told_m
+
+
+@pytest.mark.parametrize(
+    ("late_s", "told_s"), [(0.0, 0.0), (1.0, 1800.0), (1800.0, 1800.0), (5400.0, 5400.0), (5401.0, 7200.0)]
+)
+def test_doubt_is_rounded_up_and_a_whole_half_hour_is_itself(late_s, told_s):
+    place = FarPlace(point=GeoPoint(lat_deg=1.0, lon_deg=1.0), band_m=0.0, middle_s=0.0, early_s=late_s, late_s=late_s)
+    back = carried(place)
+    assert (back.early_s, back.late_s) == (told_s, told_s)
+
+
+def carried(place):
+    """Return a place as it is read ashore."""
+    route = FarRoute(departs_utc_s=1.9e9, base_utc_s=1.9e9, members=1, places=(place,))
+    return unpack_route(pack_route(route, KEY), KEY).places[0]
