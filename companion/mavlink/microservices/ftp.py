@@ -227,6 +227,8 @@ class FtpRead(_Ftp):
             self._session = packet.session
         elif packet.offset == self._request.offset and packet.data:
             self._chunks[packet.offset] = packet.data
+        else:
+            return []  # nothing of what was asked for: asked again in its time, and not for ever
         return self._next(t_s)
 
     def _next(self, t_s: float) -> list[Message]:

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.errors import InputError
 from companion.mavlink.microservices.command import Party, Retransmission, TransferOutcome
-from companion.mavlink.microservices.ftp import FtpWrite, Packet, unpack
+from companion.mavlink.microservices.ftp import FtpRead, FtpWrite, Packet, unpack
 from companion.mavlink.microservices.mission import ListDownload, ListUpload
 from companion.mavlink.microservices.parameters import ALIASES, ParamList, names_of
 from companion.mavlink.signing import AHEAD_S, EPOCH_S, TICKS_PER_S, SigningStore, read_key
@@ -164,6 +164,25 @@ def test_a_session_left_open_is_reset_once(error):
         request = unpack(queue[0].payload)
         queue = machine.receive(0.1, answer(request, 128 if request.opcode == 2 else 129, bytes([error])))
     assert machine.result.outcome is TransferOutcome.REFUSED, "once, not for ever"
+
+
+@pytest.mark.parametrize(("offset", "data"), [(0, b""), (7, b"late")])
+def test_a_read_that_is_answered_with_nothing_of_what_was_asked_ends(offset, data):
+    """Such an answer was asked again at once, for ever."""
+    machine, t_s = FtpRead(PARTY, "@SYS/x"), 0.0
+    sent = machine.start(t_s)
+    for n in range(1000):
+        if not sent:
+            t_s = machine.wake_s
+            sent = machine.tick(t_s)
+        if machine.result is not None:
+            break
+        asked = unpack(sent[0].payload)
+        answer = Packet(asked.seq + 1, 1, 128, 0, asked.opcode, 0, offset if n else 0, data if n else bytes(4))
+        reply = wire.MAVLink_file_transfer_protocol_message(0, 1, 191, answer.pack())
+        sent = machine.receive(t_s, Codec(1, 191).feed(Codec(1, 1).pack(reply))[0])
+    assert machine.result.outcome is TransferOutcome.TIMEOUT
+    assert n < 50
 
 
 def test_lost_parameters_are_asked_for_by_their_number():
