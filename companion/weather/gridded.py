@@ -38,6 +38,7 @@ _MOMENT = re.compile(
     r"(\d{1,4})-(\d{1,2})-(\d{1,2})(?:(?:t|\s+)(\d{1,2}):(\d{1,2})(?::(\d{1,2})(?:\.\d*)?)?)?"
     r"\s*(z|utc|gmt|[+-]\d{1,2}(?::?\d\d)?)?"
 )
+_MOST_UTC_S = 253_402_300_800.0  # the year 10000
 _CALENDARS = {"", "standard", "gregorian", "proleptic_gregorian"}
 # Amplitude and phase, as the atlases FES2014 and FES2022 name them, of heights and of streams; one file a constituent.
 _ATLAS = (("amplitude", "phase"), ("Ua", "Ug"), ("Va", "Vg"))
@@ -47,6 +48,7 @@ _ATLAS = (("amplitude", "phase"), ("Ua", "Ug"), ("Va", "Vg"))
 class Stored:
     """A variable of a container: its dimensions, attributes as text or number, and how a part of it is read."""
 
+    source: str
     name: str
     dims: tuple[str, ...]
     shape: tuple[int, ...]
@@ -58,8 +60,12 @@ class Stored:
         return str(self.attrs.get(key, "")).strip()
 
     def values(self, part: Sequence[slice] | None = None) -> Floats:
-        """Return its values, or a part of them: unpacked, NaN where they are missing."""
-        raw = np.asarray(self.read(tuple(part or (slice(None),) * len(self.shape))), dtype=np.float64)
+        """Return its values, or a part of them: unpacked, NaN where they are missing. Raises InputError: damaged."""
+        try:
+            raw = np.asarray(self.read(tuple(part or (slice(None),) * len(self.shape))), dtype=np.float64)
+        except (OSError, ValueError, RuntimeError, TypeError) as error:  # parts are read and unpacked when asked for
+            text = f"cannot be read ({str(error)[:60]})"
+            raise InputError(self.source, self.name, text, "it is damaged: fetch it again") from None
         for key in ("_FillValue", "missing_value"):
             if isinstance(self.attrs.get(key), float):
                 raw = np.where(raw == self.attrs[key], np.nan, raw)
@@ -102,6 +108,15 @@ def _axis(container: Container, dims: Sequence[str], what: str, units: str) -> S
     return None
 
 
+def _ascending(axis: Stored, values: Floats) -> None:
+    """Raise InputError where an axis does not stand for different numbers in order."""
+    text = "" if np.isfinite(values).all() else "has values that are no numbers"
+    if not text and (np.diff(np.sort(values)) <= 0.0).any():
+        text = "has the same value twice"
+    if text:
+        raise InputError(axis.source, axis.name, text, "it is damaged: fetch it again")
+
+
 def _axes(variable: Stored, container: Container, source: str) -> tuple[Stored, Stored]:
     lat = _axis(container, variable.dims, "latitude", "degrees_n")
     lon = _axis(container, variable.dims, "longitude", "degrees_e")
@@ -112,6 +127,8 @@ def _axes(variable: Stored, container: Container, source: str) -> tuple[Stored, 
             "is on no grid of latitudes and longitudes",
             "interpolate it to one (cdo remapbil), or take a product that is on one",
         )
+    _ascending(lat, lat.values())
+    _ascending(lon, lon.values())
     return lat, lon
 
 
@@ -197,7 +214,11 @@ def _unix_s(times: Stored, source: str) -> Floats:
         raise InputError(
             source, times.name, f"counts from {since!r}, which is no date", "write 1970-01-01 or 1970-01-01 00:00:00"
         )
-    return begins_s + _SECONDS[found[1]] * times.values()
+    utc_s = begins_s + _SECONDS[found[1]] * times.values()
+    _ascending(times, utc_s)
+    if utc_s.size and not 0.0 <= utc_s.min() <= utc_s.max() < _MOST_UTC_S:
+        raise InputError(source, times.name, "has times that no forecast has", "it is damaged: fetch it again")
+    return utc_s
 
 
 def _moment_s(text: str) -> float | None:

@@ -78,7 +78,9 @@ def _of_netcdf(path: Path) -> dict[str, Stored]:
                 attrs = {
                     key: _plain(item.attrs[key]) for key in item.attrs if item.attrs.get_id(key).dtype.kind in "iufSO"
                 }
-                found[name] = Stored(name=name, dims=dims, shape=item.shape, attrs=attrs, read=item.__getitem__)
+                found[name] = Stored(
+                    source=str(path), name=name, dims=dims, shape=item.shape, attrs=attrs, read=item.__getitem__
+                )
     except (OSError, KeyError, ValueError, RuntimeError) as error:
         raise InputError(str(path), "", f"is no netCDF 4 ({str(error)[:60]})", "fetch it again") from None
     return found
@@ -104,7 +106,9 @@ def _of_zarr(path: Path) -> dict[str, Stored]:
                     attrs["_FillValue"] = float(fill)
             else:
                 dims = tuple(map(str, item.metadata.dimension_names or ()))
-            found[name] = Stored(name=name, dims=dims, shape=item.shape, attrs=attrs, read=item.__getitem__)
+            found[name] = Stored(
+                source=str(path), name=name, dims=dims, shape=item.shape, attrs=attrs, read=item.__getitem__
+            )
     except (OSError, KeyError, ValueError, RuntimeError, TypeError) as error:
         raise InputError(str(path), "", f"is no group of Zarr ({str(error)[:60]})", "fetch it again") from None
     return {name: v for name, v in found.items() if len(v.dims) == len(v.shape)}

@@ -141,7 +141,9 @@ def test_a_wind_of_members(tmp_path):
 def test_hours_since_a_time_of_another_zone_are_counted_from_there(since, ahead_h):
     """What stands behind the hour was left out: a wind of Hobart's clock came eleven hours late."""
     dims, values, attrs = variables(since=f"hours since {since}")["time"]
-    times = Stored(name="time", dims=dims, shape=values.shape, attrs=attrs, read=lambda part: values[part])
+    times = Stored(
+        source="f.nc", name="time", dims=dims, shape=values.shape, attrs=attrs, read=lambda part: values[part]
+    )
     assert _unix_s(times, "c.nc")[1] == T0 + (6.0 - ahead_h) * 3600.0
 
 
@@ -250,3 +252,39 @@ def test_an_atlas_without_an_area_is_refused(tmp_path, rows, columns):
     told = f"m2.nc: amplitude: is a grid of {rows} x {columns}: no place lies between its points; cut a wider piece"
     with pytest.raises(InputError, match=told):
         read_weather([tmp_path / "m2.nc"])
+
+
+def with_axis(name, values):
+    found = variables(lat=[50.0, 50.5, 51.0], lon=[-2.0, -1.5, -1.0])
+    return {**found, name: (found[name][0], np.array(values), found[name][2])}
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (variables(hours=[0.0, 6.0, 6.0, 12.0]), "time: has the same value twice"),
+        (variables(hours=[0.0, np.nan, 12.0]), "time: has values that are no numbers"),
+        (variables(hours=[0.0, 1e300]), "time: has times that no forecast has"),
+        (variables(lat=[50.0, 50.0, 51.0]), "latitude: has the same value twice"),
+        (with_axis("latitude", [50.0, np.nan, 51.0]), "latitude: has values that are no numbers"),
+        (with_axis("longitude", [-2.0, np.inf, -1.0]), "longitude: has values that are no numbers"),
+    ],
+)
+def test_an_axis_that_cannot_be_is_one_line(found, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError) as caught:
+        read_weather([netcdf(tmp_path / "f.nc", found)])
+    assert said in str(caught.value)
+    assert "fetch it again" in str(caught.value)
+
+
+def test_a_part_that_is_damaged_is_one_line(tmp_path):
+    path = netcdf(tmp_path / "f.nc", variables())
+    with h5py.File(path) as file:
+        at = file["uo"].id.get_chunk_info(0).byte_offset
+    data = bytearray(path.read_bytes())
+    data[at : at + 16] = bytes(16)
+    path.write_bytes(data)
+    with pytest.raises(InputError, match="uo: cannot be read") as caught:
+        read_weather([path])
+    assert "\n" not in str(caught.value)
