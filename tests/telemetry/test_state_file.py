@@ -113,6 +113,28 @@ def places(value):
             yield from places(value[key])
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"searched": [[1e12, 0.0]]},
+        {"approaches": [[0, 0.0, -1e12, None]]},
+        {"place": [1.9e9, 1e12, 0.0, 0.0, 0.0, 0.0, 0.0]},
+        {"place": [1.9e9, 0.0, 0.0, 1e12, 0.0, 0.0, 0.0]},
+        {"shoals": [[1e12, 0.0, 30.0, 5.0, 1.0]]},
+        {"standing": {"verb": "goal", "by": "x", "name": "", "before_s": 0.0, "en_m": [1e12, 0.0]}},
+        {"water": [91.0, 0.0]},
+        {"goals": [[0.0, 181.0, ""]]},
+        {"route": {**SAVED.to_dict()["route"], "points": [[1e12, 0.0], [0.0, 0.0]]}},
+        {"route": {**SAVED.to_dict()["route"], "from": [[1e12, 0.0], [0.0, 0.0]]}},
+    ],
+    ids=str,
+)
+def test_a_place_that_is_not_on_earth_is_not_believed(wrong):
+    """A grid about it took all memory at the first tick, of each start."""
+    with pytest.raises(ValueError, match="where a place should be"):
+        Persisted.from_dict({**SAVED.to_dict(), **wrong})
+
+
 def test_a_state_that_cannot_be_read_is_left_where_it_is(tmp_path):
     (tmp_path / "state.json").mkdir()
     state = file(tmp_path / "state.json")

@@ -20,6 +20,7 @@ MAX_ITEMS = 2000  # no autopilot holds more
 MAX_GOALS = 10**6
 MAX_POINTS = 20_000  # of the track of a search
 MAX_TACKS = 10**6
+MOST_M = 2.1e7  # to any place on Earth
 MAX_QUARTERS = 10**6  # turns round one buoy
 MOST_IRONS_S = 60.0  # more is a lull that the boat waited in: no room of a tack would be enough ever after
 MOST_LEE_MPS = 1.0  # more is a position that has jumped
@@ -230,7 +231,7 @@ class Persisted:
                 inside=None
                 if data.get("inside") is None
                 else (_whole(data["inside"][0], 0, MAX_GOALS), _number(data["inside"][1])),
-                searched=tuple((_number(e), _number(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
+                searched=tuple((_metres(e), _metres(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
                 covered=tuple((_whole(g, 0, MAX_GOALS), _number(s)) for g, s in data.get("covered", ())[:MAX_GOALS]),
                 tacks=_tacks(data.get("tacks", (0, 0))),
                 irons_s=_within(data.get("failed_tack", NO_FAILED_TACK)[0], MOST_IRONS_S),
@@ -256,7 +257,10 @@ def _geo_to_list(place: GeoPoint) -> list[float]:
 
 
 def _geo_from_list(data: Any) -> GeoPoint:
-    return GeoPoint(lat_deg=_number(data[0]), lon_deg=_number(data[1]))
+    lat_deg, lon_deg = _number(data[0]), _number(data[1])
+    if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+        raise ValueError(f"it is damaged: {lat_deg:g}, {lon_deg:g} where a place should be")
+    return GeoPoint(lat_deg=lat_deg, lon_deg=lon_deg)
 
 
 def _latency(data: Any) -> PlannerLatency:
@@ -283,9 +287,9 @@ def _place_from_list(data: Any) -> SavedPlace | None:
     east_mps, north_mps = velocity or (0.0, 0.0)  # of states that were saved before there was any
     return SavedPlace(
         utc_s=utc_s,
-        en_m=(east, north),
-        error_m=abs(error_m),
-        farthest_m=abs(farthest_m),
+        en_m=(_metres(east), _metres(north)),
+        error_m=abs(_metres(error_m)),
+        farthest_m=abs(_metres(farthest_m)),
         velocity_en_mps=(east_mps, north_mps),
     )
 
@@ -302,7 +306,9 @@ def _shoal_from_list(data: Any) -> Shoal:
     if not (0.0 < radius_m <= MOST_RADIUS_M and 0.0 <= doubt_m <= MOST_RADIUS_M):
         raise ValueError("it is damaged: a shoal of no size")
     tide_m = tide[0] if tide else None
-    return Shoal(en_m=(east, north), radius_m=radius_m, doubt_m=doubt_m, depth_m=depth_m, tide_m=tide_m)
+    return Shoal(
+        en_m=(_metres(east), _metres(north)), radius_m=radius_m, doubt_m=doubt_m, depth_m=depth_m, tide_m=tide_m
+    )
 
 
 def _approach_to_list(approach: Approach) -> list[Any]:
@@ -316,7 +322,7 @@ def _approach_to_list(approach: Approach) -> list[Any]:
 def _approach_from_list(data: list[Any]) -> Approach:
     goal, e, n, turn, *laid = data
     approach = Approach(
-        goal=_whole(goal, 0, MAX_GOALS), en_m=(_number(e), _number(n)), turn_rad=None if turn is None else _number(turn)
+        goal=_whole(goal, 0, MAX_GOALS), en_m=(_metres(e), _metres(n)), turn_rad=None if turn is None else _number(turn)
     )
     if not laid:
         return approach
@@ -325,7 +331,7 @@ def _approach_from_list(data: list[Any]) -> Approach:
         approach,
         twd_from_rad=_number(twd_from_rad),
         round=_whole(count, 1, MAX_GOALS),
-        sweeps=tuple(((_number(a), _number(b)), (_number(c), _number(d))) for a, b, c, d in sweeps[:MAX_POINTS]),
+        sweeps=tuple(((_metres(a), _metres(b)), (_metres(c), _metres(d))) for a, b, c, d in sweeps[:MAX_POINTS]),
     )
 
 
@@ -345,7 +351,7 @@ def _standing_from_dict(data: dict[str, Any] | None) -> Standing | None:
     if data is None:
         return None
     verb, place = Verb(data["verb"]), data["en_m"]
-    en_m = None if place is None else (_number(place[0]), _number(place[1]))
+    en_m = None if place is None else (_metres(place[0]), _metres(place[1]))
     if not BY_VERB[verb].stands or (en_m is None and verb not in {Verb.HOLD, Verb.STOP}):
         raise ValueError(f"it is damaged: no order stands as {verb}")
     return Standing(
@@ -379,8 +385,8 @@ def _route_from_dict(data: dict[str, Any] | None) -> Route | None:
         )
         for c, lat, lon, alt, frame, p in data["items"][: MAX_ITEMS + 1]
     )
-    points = tuple((_number(e), _number(n)) for e, n in data["points"])
-    starts = tuple((_number(e), _number(n)) for e, n in data["from"])
+    points = tuple((_metres(e), _metres(n)) for e, n in data["points"])
+    starts = tuple((_metres(e), _metres(n)) for e, n in data["from"])
     gates = tuple(_whole(g, -1, 10**9) for g in data["gates"])
     if not 0 < len(items) == len(points) == len(starts) == len(gates) <= MAX_ITEMS:
         raise ValueError("it is damaged: its lists differ in length")
@@ -417,6 +423,14 @@ def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or abs(value) > 1e12:
         raise ValueError(f"it is damaged: {str(value)[:20]} where a number should be")
     return float(value)
+
+
+def _metres(value: Any) -> float:
+    """Return metres of a place: none is farther than half way round the Earth."""
+    number = _number(value)
+    if abs(number) > MOST_M:
+        raise ValueError(f"it is damaged: {number:g} m where a place should be")
+    return number
 
 
 def _whole(value: Any, low: int, high: int) -> int:
