@@ -13,6 +13,7 @@ Outcomes that are part of normal life (no plan found, an upload refused) are enu
 from __future__ import annotations
 
 import errno
+import re
 
 
 class CompanionError(Exception):
@@ -63,3 +64,14 @@ class TransferError(LinkError):
 
 class JobError(CompanionError):
     """The job was understood and could not be done."""
+
+
+def not_toml(source: str, text: str, error: Exception) -> InputError:
+    """Return the error of a text that is no TOML: with the line, and the remedy where a decimal comma is to blame."""
+    what, _, where = str(error).partition(" (at ")
+    line = re.match(r"line (\d+)", where)
+    lines = text.splitlines()
+    at_fault = lines[int(line[1]) - 1] if line and int(line[1]) <= len(lines) else ""
+    has_comma = re.fullmatch(r"[^=#]*=\s*[+-]?\d+,\d+\s*(#.*)?", at_fault) is not None
+    remedy = "decimals take a point, no comma" if has_comma else ""
+    return InputError(source, where.rstrip(")"), f"is not TOML: {what[:1].lower()}{what[1:80]}", remedy)

@@ -222,7 +222,7 @@ TABLE: tuple[Watchdog, ...] = (
     W(name="dark", number=20,
       watches="the sun's height over the mission's `dark_below_deg`, by the autopilot's time", enter=0.0,
       exit=1.0, unit="deg from the limit", enter_s=30.0, exit_s=30.0, severity=S.NOTICE, response=Response.AS_SET,
-      told="it is dark: the sun is {:.0f} degrees below the mission's dark_below_deg",
+      told="it is dark: the sun is {:.0f} degrees lower than where dark begins (dark_below_deg)",
       why="who has no lights or no watch wants her to lie somewhere by night",
       ends=Ending(key="dark", default=End.SAY, rank=6, because="it is dark", until="until it is light", settings=(
           Setting(key="dark_below_deg", default=-6.0, least=-18.0, most=45.0, says="it is dark when the sun is lower "

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta, Struct
 
-from companion.errors import InputError
+from companion.errors import InputError, not_toml
 from companion.geofence.mission import AreaOptions, BoatOptions, Latitude, Longitude
 from companion.words import expected
 
@@ -118,7 +118,7 @@ def parse_passage(text: str, source: str) -> PassageFile:
     try:
         raw = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise InputError(source, "", f"is not TOML: {str(error)[:80]}") from None
+        raise not_toml(source, text, error) from None
     for table, keys in raw.items():
         for key, value in keys.items() if isinstance(keys, dict) else ():
             if isinstance(value, float) and not math.isfinite(value):

@@ -14,7 +14,7 @@ from companion.geo import MPS_PER_KNOT
 from companion.geo.angles import direction, wrap_pi, wrap_two_pi
 from companion.terminal.keys import KEYS, KeyCommands, shown
 from companion.terminal.screen import Frame, Style
-from companion.view import Event, FigureView, View
+from companion.view import Event, FigureView, View, WindView
 from companion.words import counted, one_line
 
 OLD_S = 10.0  # what was heard longer ago looks old
@@ -287,6 +287,13 @@ def _text_of(figure: FigureView, *, knots: bool) -> str:
     }.get(figure.kind, number_text)(figure.value)
 
 
+def _mean(wind: WindView) -> tuple[float | None, float | None]:
+    """Return the mean wind that the spread is of, direction [deg] and speed [m/s]; that of now before there is one."""
+    if wind.mean_twd_from_deg is None or wind.mean_tws_mps is None:
+        return wind.twd_from_deg, wind.tws_mps
+    return wind.mean_twd_from_deg, wind.mean_tws_mps
+
+
 def _wind(view: View, *, knots: bool) -> Row:
     wind = view.wind
     if wind is None:
@@ -295,11 +302,14 @@ def _wind(view: View, *, knots: bool) -> Row:
     gusts = "" if wind.tws_sigma_mps is None else f"±{speed_text(wind.tws_sigma_mps, knots=knots)}"
     style = Style.PLAIN if wind.health == "good" else Style.WARN
     health = "" if wind.health == "good" else f" {wind.health}"
+    has_mean = wind.mean_twd_from_deg is not None
+    now = f", now {direction_text(wind.twd_from_deg)}" if has_mean and wind.twd_from_deg is not None else ""
+    from_deg, tws_mps = _mean(wind)
     return (
         "Wind",
         (
-            f"{direction_text(wind.twd_from_deg)}{spread} {speed_text(wind.tws_mps, knots=knots)}{gusts} "
-            f"{unit_text(knots=knots)}{health}"
+            f"{direction_text(from_deg)}{spread} {speed_text(tws_mps, knots=knots)}{gusts} "
+            f"{unit_text(knots=knots)}{now}{health}"
         ),
         style,
     )
@@ -352,11 +362,11 @@ def _leg(view: View) -> Row:
 def _goal(view: View) -> Row:
     goal = next((g for g in view.goals if g.is_next), None)
     figures = view.figures
-    number = (
-        ""
-        if figures.goals is None or figures.goals_reached is None
-        else f"{min(figures.goals_reached + 1, figures.goals)}/{figures.goals} "
-    )
+    number = ""
+    if goal is not None and figures.goals == len(view.goals):  # else laps: the same marks again
+        number = f"{view.goals.index(goal) + 1}/{figures.goals} "
+    elif figures.goals is not None and figures.goals_reached is not None:
+        number = f"{min(figures.goals_reached + 1, figures.goals)}/{figures.goals} "
     if goal is None:
         return "Goal", f"{number}{length_text(view.boat.goal_m)}", Style.PLAIN
     text = f"{number}{length_text(goal.distance_m)} at {direction_text(goal.bearing_deg)} {goal.name}"
@@ -626,9 +636,9 @@ def line_of(view: View, unix_s: float, *, knots: bool) -> str:
         age_text(view),
     ]
     if wind is not None:
+        from_deg, tws_mps = _mean(wind)
         parts.append(
-            f"wind {direction_text(wind.twd_from_deg)}±{number_text(wind.sigma_deg)}° "
-            f"{speed_text(wind.tws_mps, knots=knots)} {unit}"
+            f"wind {direction_text(from_deg)}±{number_text(wind.sigma_deg)}° {speed_text(tws_mps, knots=knots)} {unit}"
         )
     parts.append(f"{direction_text(boat.cog_deg)} {speed_text(boat.sog_mps, knots=knots)} {unit}")
     if plan is not None and plan.leg is not None:

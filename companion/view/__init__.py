@@ -9,7 +9,7 @@ from companion.view.events import Event
 from companion.view.fold import ViewFold
 from companion.view.heard import HeardFold
 from companion.view.recorded import recorded_views
-from companion.view.values import SCHEMA, FigureView, Past, Trail, View, sample_of
+from companion.view.values import SCHEMA, FigureView, Past, Trail, View, WindView, sample_of
 
 __all__ = [
     "SCHEMA",
@@ -21,6 +21,7 @@ __all__ = [
     "Trail",
     "View",
     "ViewFold",
+    "WindView",
     "recorded_views",
     "sample_of",
 ]

@@ -19,7 +19,7 @@ import numpy as np
 from msgspec import Meta, Struct
 from numpy.typing import ArrayLike, NDArray
 
-from companion.errors import InputError
+from companion.errors import InputError, not_toml
 from companion.geo import EARTH_RADIUS_M
 from companion.weather.harmonics import KNOWN, Complexes, Floats, constituent_named, phasors
 from companion.words import expected
@@ -204,7 +204,7 @@ def read_stations(text: str, source: str) -> tuple[Tides, ...]:
         data = tomllib.loads(text)
         raw = msgspec.convert(data, _File)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise InputError(source, "", f"is not TOML: {str(error)[:80]}") from None
+        raise not_toml(source, text, error) from None
     except msgspec.ValidationError as error:
         problem, _, place = str(error).partition(" - at `$.")
         named = _named(place.rstrip("`"), data)

@@ -93,6 +93,7 @@ def test_defaults(tmp_path):
         (("lat = 50.805", "lat = nan"), ("[[goal]] 1 lat", "finite")),
         (("lat = 50.805", "lat = 50.805\nrounding = 'left'"), ("[[goal]] 1 rounding", "'left'")),
         (("lat = 50.805", "lat = 5O.805"), ("line 6", "not TOML")),
+        (("lat = 50.805", "lat = 50,805"), ("line 6", "not TOML", "decimals take a point")),
         (("[[goal]]", "[[gaol]]"), ("gaol", "unknown key")),
         (("rock.wkt", "rack.wkt"), ("[area] obstacles", "no such file", "relative")),
         (("lat = 50.805\nlon = -1.3005", "lat = 50.8015\nlon = -1.3005"), ("[[goal]] 1", "inside the obstacle")),

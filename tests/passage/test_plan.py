@@ -253,7 +253,7 @@ def test_an_option_that_goes_with_another(shell, words, said):
         ),
         (('"f.grb2"', '"g.grb2"'), "g.grb2: no such file; check the path"),
         (('"avalon"', '"avalanche"'), f"p.toml: [boat] polar: there is no polar 'avalanche'; {A_POLAR}"),
-        (("margin_m = 500.0", "margin_m = 500.0\n]"), "p.toml: is not TOML: Invalid statement (at line 17, column 1)"),
+        (("margin_m = 500.0", "margin_m = 500.0\n]"), "p.toml: line 17, column 1: is not TOML: invalid statement"),
     ],
 )
 def test_what_is_wrong_is_one_line(shell, change, said):

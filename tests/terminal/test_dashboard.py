@@ -161,6 +161,21 @@ def test_what_is_old_looks_old(age_s):
     assert Style.DIM in plain
 
 
+def test_the_spread_stands_beside_the_mean_that_it_is_of():
+    """ "341±10" was the wind of the moment beside the spread of a mean of 348."""
+    wind = replace(VIEW.wind, mean_twd_from_deg=88.0, mean_tws_mps=4.0)
+    text = draw(shown(replace(VIEW, wind=wind)), 80, 24).text
+    assert "Wind   088°±9° 7.8±1.2 kn, now 080°" in text
+
+
+def test_a_goal_that_was_given_up_is_counted():
+    """After skip_goal "goal 2 of 2" and "Goal 1/2" stood at the same time."""
+    first, second = GoalView(name="A", kind="point", at_en_m=(0.0, 0.0)), replace(VIEW.goals[-1], is_next=True)
+    figures = replace(VIEW.figures, goals=2, goals_reached=0)
+    text = draw(shown(replace(VIEW, goals=(first, second), figures=figures)), 80, 24).text
+    assert "Goal   2/2 " in text
+
+
 def test_a_companion_that_is_silent_beside_an_autopilot_that_is_not_looks_old():
     parts = (Part(name="autopilot", grade="good", age_s=0.2), Part(name="companion", grade="bad", age_s=31.0))
     assert "OLD 31 s" in draw(shown(replace(VIEW, source="radio", health=parts)), 80, 24).text.split("\n")[0]

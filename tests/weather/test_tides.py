@@ -162,7 +162,7 @@ def test_a_tide_is_not_added_to_a_current_that_has_one():
         ),
         (("lat = 50.0", "latt = 50.0"), "s.toml: station[0]: object contains unknown field latt"),
         (("[[station]]", "[[stations]]"), "s.toml: "),
-        (("[[station]]", "[station"), "s.toml: is not TOML"),
+        (("[[station]]", "[station"), "s.toml: line 2, column 9: is not TOML"),
     ],
 )
 def test_what_is_wrong_with_a_station_is_said(words, said):

@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 from msgspec import Struct
 
-from companion.errors import InputError
+from companion.errors import InputError, not_toml
 from companion.geofence.formats.untrusted import decode, read_bytes
 from companion.geofence.mission.options import BoatOptions
 from companion.words import expected
@@ -153,4 +153,4 @@ def _raw(text: str, source: str) -> dict[str, Any]:
                 "is a polar and no boat file",
                 "companion boat guess writes one; [boat] polar of it names a polar",
             ) from None
-        raise InputError(source, "", f"is not TOML: {str(error)[:80]}") from None
+        raise not_toml(source, text, error) from None

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 import tomli_w
 
-from companion.errors import InputError
+from companion.errors import InputError, not_toml
 from companion.geofence.formats.untrusted import decode, read_bytes
 from companion.geofence.mission.options import ATOMS, KINDS, AtomOptions, MissionOptions, PointOptions, tables
 from companion.words import choices, expected
@@ -57,12 +57,11 @@ def parse_options(text: str, source: str) -> MissionOptions:
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        what, _, where = str(error).partition(" (at ")
-        raise InputError(source, where.rstrip(")") or "", f"is not TOML: {what[:1].lower()}{what[1:]}") from None
+        raise not_toml(source, text, error) from None
     except RecursionError:
         raise InputError(source, "", "is nested too deeply") from None
     except ValueError as error:  # a number of thousands of digits
-        raise InputError(source, "", f"is not TOML: {str(error)[:60]}") from None
+        raise not_toml(source, "", error) from None
     _refuse_odd_numbers(raw, source, "")
     goals = raw.get("goal")
     for goal in goals if isinstance(goals, list) else ():

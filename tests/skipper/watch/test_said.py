@@ -334,4 +334,4 @@ def test_the_dark_is_said_in_a_sentence():
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()), shown={"utc_at_boot_s": midnight_s})
     assert world.run(300, lambda w: any(a.code == "dark" for _, a in w.actions if isinstance(a, Announce)))
     text = next(a.text for _, a in world.actions if isinstance(a, Announce) and a.code == "dark")
-    assert re.fullmatch(r"it is dark: the sun is \d+ degrees below the mission's dark_below_deg", text)
+    assert re.fullmatch(r"it is dark: the sun is \d+ degrees lower than where dark begins \(dark_below_deg\)", text)
