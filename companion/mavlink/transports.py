@@ -124,12 +124,13 @@ def parse_link(text: str) -> LinkName:
     """
 
     def bad(problem: str) -> InputError:
-        return InputError("--link", text or "(empty)", problem, _REMEDY)
+        return InputError("--link", " ".join(text.split()) or "(empty)", problem, _REMEDY)
 
     if re.match(r"(serial:)?(/|COM\d)", text):
         # a device by path holds colons itself, but never ends in a plain word or number after one
         serial = re.fullmatch(r"(?:serial:)?(.+?)(?::(\w*))?", text)
-        assert serial is not None
+        if serial is None:
+            raise bad("more than one line")
         device, baud = serial.group(1), serial.group(2)
         if baud is not None and not (baud.isascii() and baud.isdigit() and 1200 <= int(baud) <= 12_000_000):
             raise bad(f"{baud!r} is not a baud rate")

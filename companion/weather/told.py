@@ -61,8 +61,17 @@ def _told_of_cube(name: str, cube: Cube) -> list[str]:
         lines.append(f"  hole: {counted(int(lacking), 'time')} of single members missing")
     share = cube.unknown_share()
     if share > 0.0:
-        lines.append(f"  not known: {100.0 * share:.2g} % of it")
+        lines.append(f"  not known: {_percent(share)} % of it")
     return lines
+
+
+def _percent(share: float) -> str:
+    """Return a share in per cent by two digits, or as 100.
+
+    >>> [_percent(share) for share in (0.0832, 0.00123, 0.996, 1.0)]
+    ['8.3', '0.12', '100', '100']
+    """
+    return f"{100.0 * share:.2g}" if share < 0.995 else "100"
 
 
 def told_of_age(weather: Weather, now_s: float) -> str:
@@ -110,8 +119,11 @@ def _degrees(value: float, letters: str) -> str:
 
 
 def told_at(weather: Weather, lat_deg: float, lon_deg: float) -> tuple[str, ...]:
-    """Return a table of what is said of one place: a line for each time of the wind there, and of the gusts."""
-    cubes = [cube for cube in (weather.wind or weather.gust) if cube.covers(lat_deg, lon_deg)]
+    """Return a table of what is said of one place: a line for each time of the wind there.
+
+    Without a wind it is each of the gusts, else of the current.
+    """
+    cubes = [cube for cube in (weather.wind or weather.gust or weather.current) if cube.covers(lat_deg, lon_deg)]
     utc = np.unique(np.concatenate([cube.utc_s for cube in cubes])) if cubes else np.zeros(0)
     wind = weather.wind_en_mps(utc, lat_deg, lon_deg)
     speed = np.hypot(wind[..., 0], wind[..., 1])
@@ -131,11 +143,16 @@ def told_at(weather: Weather, lat_deg: float, lon_deg: float) -> tuple[str, ...]
         east, north = (_mean(wind[:, i, k]) for k in (0, 1))
         blows = f"{_spread(speed[:, i])} from {_compass(-east, -north)}" if weather.wind else "-"
         words = [iso(t), blows, _spread(gust[:, i])]
-        words.append(f"{math.hypot(*current[i]):.2f} to {_compass(*current[i])}" if weather.has_current else "-")
+        words.append(_stream(*current[i]) if weather.has_current else "-")
         words += [_spread(waves[:, i])] if waves.size else []
         words += [f"{tide[i]:.2f}"] if np.isfinite(tide).any() else []
         lines.append("  ".join(words))
     return tuple(lines)
+
+
+def _stream(east: float, north: float) -> str:
+    speed_mps = math.hypot(east, north)
+    return f"{speed_mps:.2f} to {_compass(east, north)}" if math.isfinite(speed_mps) else "?"
 
 
 def _mean(values: Floats) -> float:

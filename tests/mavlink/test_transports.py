@@ -7,7 +7,7 @@ import random
 import tty
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from companion.clock import run
@@ -68,6 +68,8 @@ def test_link_names(text, kind, where):
         "/dev/ttyS0:12",
         "tcp::5760",
         "udpin:h:²",
+        "/dev/ttyUSB0:57600\n",
+        "/dev/tty\nUSB0",
         "tcp:::1:5760",
         "tcp:a b:5760",
     ],
@@ -79,6 +81,7 @@ def test_bad_link_names_say_what_to_write(text):
 
 @settings(max_examples=100)
 @given(st.text(max_size=40))
+@example("/dev/ttyUSB0:57600\n")
 def test_any_text_is_a_link_or_an_input_error(text):
     try:
         parse_link(text)

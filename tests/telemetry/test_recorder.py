@@ -205,6 +205,25 @@ def test_the_kernel_says_full_in_the_middle_of_a_write():
     os.close(fd)
 
 
+class FillsUp(Disk):
+    """A disk with room for four bytes more."""
+
+    def write(self, fd, data):
+        if len(data) <= 4:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return super().write(fd, data[:4])
+
+
+def test_a_disk_that_fills_in_the_middle_of_a_record_leaves_none_of_it(tmp_path):
+    path = tmp_path / "log"
+    path.write_bytes(b"before\n")
+    fd = Disk().open_to_append(path)
+    with pytest.raises(OSError, match="No space"):
+        FillsUp().append(fd, b"a record\n"[:8])
+    os.close(fd)
+    assert path.read_bytes() == b"before\n"
+
+
 def test_two_companions_do_not_record_into_one_folder(tmp_path):
     with (
         Recorder(tmp_path / "v"),

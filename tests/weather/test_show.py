@@ -9,6 +9,11 @@ import numpy as np
 import pytest
 
 from companion import cli
+from companion.weather import Weather
+from companion.weather.told import told_at
+from tests.passage.world import LAT as LAT0
+from tests.passage.world import LON as LON0
+from tests.passage.world import cube, steady
 from tests.weather.grib_file import GUST, message_2, wind_2
 
 LAT, LON = np.linspace(48.0, 52.0, 5), np.linspace(-8.0, 2.0, 11)
@@ -115,3 +120,12 @@ def test_a_packing_that_needs_the_extra_says_so(tmp_path):
             "in the clone of this project: pip install '.[weather]'\n"
         ),
     )
+
+
+def test_a_current_alone_is_told_by_its_hours_and_what_is_not_known_of_it():
+    """Of a file of currents a header was printed and no line; of one without a number "nan to ?"."""
+    told = told_at(Weather(wind=(), current=(cube(LAT0, LON0, [0.0, 1.0], steady(0.3, 0.0)),)), 0.0, 0.0)
+    assert len(told) == 3
+    assert all("0.30 to 090" in line for line in told[1:])
+    unknown = told_at(Weather(wind=(), current=(cube(LAT0, LON0, [0.0, 1.0], steady(np.nan, np.nan)),)), 0.0, 0.0)
+    assert all(line.endswith("?") for line in unknown[1:])

@@ -198,7 +198,7 @@ def test_what_is_watched_when(where, parts, status, is_watched, monkeypatch):
 @pytest.mark.parametrize(("parts", "is_said"), [({}, True), (RESTING, False)], ids=["measured", "no longer watched"])
 def test_over_is_said_of_what_is_measured_to_be_over(parts, is_said, monkeypatch):
     """At rest 36 s after the last goal "dark: over" was said of the middle of the night."""
-    dog = BY_NAME["becalmed"]
+    dog = BY_NAME["dark"]
     monkeypatch.setattr(watching, "measure", lambda _, name: dog.exit if name == dog.name else None)
     ctx = moment(WAY, **parts)
     ctx.set(alarms=replace(ctx.state.alarms, raised=(Raised(name=dog.name, since_s=0.0, clear_since_s=0.0),)))
