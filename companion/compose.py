@@ -105,6 +105,7 @@ __all__ = [
     "voyage_of",
     "water_of",
     "waters_of",
+    "whole_polar",
 ]
 
 # What a guess at a polar, waves, leeway and tacks that fail take of the speeds: arrivals of `sitl mismatch` spread so.

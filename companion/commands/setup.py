@@ -297,6 +297,9 @@ def mission_of(args: argparse.Namespace, link: str | None, system: int | None) -
 def boat_of(args: argparse.Namespace) -> dict[str, bytes]:
     """Return the file of the boat, by its name: a polar that is there, or what is guessed of its sizes."""
     if args.polar is not None:
+        from companion.compose import whole_polar
+
+        whole_polar(args.polar)  # one that cannot be sailed by is not copied
         return {args.polar.name: args.polar.read_bytes()}
     if args.boat is None:
         return {}

@@ -58,6 +58,8 @@ class Code(enum.Enum):
     ROUNDING = "inside of a rounding"
     SMALL = "too small to meet"
     TWICE = "one name twice"
+    THERE_ALREADY = "reached before it is sailed to"
+    ODD_BOAT = "unlike any boat"
     NO_EFFECT = "does nothing"
 
 

@@ -23,6 +23,7 @@ from companion.skipper.planning import TRACKS_M
 from companion.skipper.way import KEEP_SHARE, SAME_M, Side
 
 HAIR_M = 0.005  # a depth is written in centimetres
+LEAST_NO_GO_DEG = 20.0  # an ice boat's
 SMALL_M = 3.0  # a fix is good to 2.5 m
 
 
@@ -195,6 +196,15 @@ def _doubts(mission: Mission) -> Iterator[Finding]:
                 text=f"{goal.radius_m:g} m: a fix is good to 2.5 m, and at 3 m/s she is past it in a second or two",
                 remedy=f"write {SMALL_M:g} or more, or she may sail about it for ever",
             )
+    yield from _there_already(mission)
+    if mission.boat.no_go_half_deg < LEAST_NO_GO_DEG and mission.autopilot.frame == "sailboat":
+        yield Finding(
+            severity=FindingLevel.WARNING,
+            code=Code.ODD_BOAT,
+            place="[boat] no_go_half_deg",
+            text=f"{mission.boat.no_go_half_deg:g}: no boat sails so near to the wind; half of the zone, in degrees",
+            remedy="write what she points at, 40 to 60 for most, or measure it: companion boat learn",
+        )
     named: dict[str, list[tuple[str, GeoPoint]]] = {
         "goal": [(goal.name, goal.point) for goal in mission.goals],
         "refuge": [(refuge.name, refuge.point) for refuge in mission.refuges],
@@ -220,6 +230,25 @@ def _doubts(mission: Mission) -> Iterator[Finding]:
             "in AUTO",
             remedy='leave it out, or write guidance = "plan"',
         )
+
+
+def _there_already(mission: Mission) -> Iterator[Finding]:
+    """Yield the places that are reached where the one before them is: she never sails to them."""
+    voyage = voyage_of(mission)
+    before = None if mission.start is None else ("[start]", voyage.frame.en_from_geo(mission.start))
+    for number, goal in enumerate(voyage.goals, start=1):
+        is_place = goal.side is Side.NONE and not (goal.line or goal.box or goal.search or goal.field)
+        if before is not None and is_place:
+            off_m = math.dist(before[1], goal.en_m)
+            if off_m <= goal.radius_m and (off_m > SAME_M or number == 1):
+                yield Finding(
+                    severity=FindingLevel.WARNING,
+                    code=Code.THERE_ALREADY,
+                    place=f"[[goal]] {number}",
+                    text=f"is reached where {before[0]} is, {off_m:.0f} m from it: its radius is {goal.radius_m:g} m",
+                    remedy="let radius_m be smaller, or move it",
+                )
+        before = (f"[[goal]] {number}", goal.en_m)
 
 
 def _drying(mission: Mission) -> Iterator[Finding]:

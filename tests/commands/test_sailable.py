@@ -19,6 +19,8 @@ from sitl.commands import run as sitl_run
 from sitl.run.embedded import permitted
 from sitl.scenario.scenario import load_scenario
 
+START = "[start]\nlat = 50.8200\nlon = -1.3100\n"
+PLACE = "[[goal]]\nlat = {}\nlon = -1.3100\nradius_m = {}\n"
 MISSIONS = Path(__file__).parents[2] / "missions"
 SCENARIOS = sorted((Path(sitl_run.__file__).parents[1] / "scenarios").glob("*.toml"))
 GOOD = (MISSIONS / "archipelago.toml").read_text()
@@ -304,6 +306,29 @@ def test_marks_near_each_other_are_rounded_closer_and_said_where_no_plan_leads_b
     told = [f for f in check_mission(mission).findings if f.severity is FindingLevel.ERROR]
     assert (not told) is is_sailed
     assert all(f.code is Code.ROUNDING and "never sailed to" in f.text for f in told)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (f"{START}{PLACE.format(50.8200, 10)}", ["[[goal]] 1: warning: is reached where [start] is, 0 m from it"]),
+        (f"{START}{PLACE.format(50.8220, 10)}{PLACE.format(50.8240, 10)}", []),
+        (
+            f"{START}{PLACE.format(50.8220, 10)}{PLACE.format(50.8240, 500)}",
+            ["[[goal]] 2: warning: is reached where [[goal]] 1 is, 222 m from it: its radius is 500 m"],
+        ),
+        (f"{START}{PLACE.format(50.8220, 10)}{PLACE.format(50.8220, 10)}", []),  # passed twice
+        (
+            f"{START}{PLACE.format(50.8220, 10)}[boat]\nno_go_half_deg = 4.5\n",
+            ["[boat] no_go_half_deg: warning: 4.5: no boat sails so near to the wind"],
+        ),
+    ],
+)
+def test_what_is_never_sailed_to_and_what_no_boat_can_is_told(tmp_path, text, told):
+    (tmp_path / "m.toml").write_text(text)
+    lines = [finding.line() for finding in check_mission(tmp_path / "m.toml").findings]
+    assert len(lines) == len(told)
+    assert all(line.startswith(words) for line, words in zip(lines, told, strict=True))
 
 
 def test_points_and_lines_are_counted_in_words():

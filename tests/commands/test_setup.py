@@ -129,6 +129,10 @@ def test_a_drawn_mission_is_run_as_one(tmp_path, capfd):
         (["Lake", "--yes"], "is no name of an instance"),
         (["lake", "--yes", "--dir", "/nowhere/at/all"], "/nowhere/at/all: no such folder; make it, or name another"),
         (["lake", "--yes", "--link", "udpin:1", "--no-doctor", *HERE], "udpin:1"),
+        (
+            ["lake", "--yes", "--no-doctor", "--link", "udpin:127.0.0.1:14597", "--polar", "/dev/null", *HERE],
+            "/dev/null",
+        ),
     ],
 )
 def test_bad_words_are_one_line_and_write_nothing(words, said, tmp_path, capfd):
