@@ -151,6 +151,9 @@ class ViewFold:
         legs: tuple[Leg, ...] = tuple(leg for known in reversed(self._plans.values()) for leg in known.plan.legs)
         goals = parts.goals_of(step, voyage)
         following = next((g for g in goals if g.is_next), None)
+        sought = None if following is None else (following.name, following.at_en_m)
+        if route is not None and route.bound_for:  # an order, or a refuge, leads elsewhere
+            sought = (route.bound_for, route.points_en_m[-1])
         eta = step.eta()
         ages = [a for a in (snapshot.heartbeat_age_s, snapshot.vehicle_age_s) if a is not None]
         return values.View(
@@ -166,9 +169,7 @@ class ViewFold:
             wind=wind_of(step),
             water=water_of(step),
             no_go=no_go_of(step, voyage, config),
-            laylines=None
-            if following is None or state.voyage.over
-            else laylines_of(step, voyage, config, following.name, following.at_en_m),
+            laylines=None if sought is None or state.voyage.over else laylines_of(step, voyage, config, *sought),
             polar=polar_of(step, voyage, config),
             plan=plan_of(step, voyage, eta, chosen, legs),
             predicted=predicted_of(eta),

@@ -32,6 +32,7 @@ from companion.skipper.way import Refuge
 from companion.telemetry.folder import TLOG, TRACK, VoyageFigures, read_rows
 from companion.telemetry.folder.logbook import chart_record
 from companion.telemetry.folder.reading import RecordedChart
+from companion.telemetry.status import companion_status
 from companion.view import Past, ViewFold, recorded_views, sample_of, values
 from companion.view.area import area_of
 from companion.view.events import _plan, nearest_of
@@ -47,6 +48,7 @@ from companion.view.parts import (
     refuges_of,
 )
 from sitl.scenario.scenario import EventSpec
+from tests.skipper.world import with_parts
 from tests.view.conftest import sail, write_mission
 
 RULES = {
@@ -224,6 +226,20 @@ def test_under_way_everything_is_there_and_agrees_with_the_step(beat):
     assert any(leg.risk is not None for view in beat.under_way for leg in view.plan.legs)
     assert any(view.laylines is not None and view.laylines.is_beat for view in beat.under_way)
     assert {v.boat.tack for v in beat.under_way} == {"port", "starboard"}
+
+
+def test_the_laylines_are_of_the_place_that_she_is_bound_for(beat):
+    """Under the order home they stayed at the mission's goal."""
+    both = zip(beat.steps, beat.views, strict=True)
+    step = next(s for s, view in both if view.laylines is not None and s.state.mission.route is not None)
+    route = step.state.mission.route
+    away = replace(route, bound_for="Bay", points_en_m=(*route.points_en_m[:-1], (0.0, 400.0)))
+    led = replace(step, state=with_parts(step.state, mission={"route": away}))
+    found = {}
+    for name, one in {"mark": step, "Bay": led}.items():
+        status = companion_status(one, one.voyage, VoyageFigures(), None, None)
+        found[name] = ViewFold(one.voyage, SkipperConfig()).take(one, status, VoyageFigures())[0].laylines
+    assert {name: lines.name for name, lines in found.items()} == {"mark": "mark", "Bay": "Bay"}
 
 
 def test_the_order_that_stands_is_seen_and_logged(beat):
