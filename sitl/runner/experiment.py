@@ -118,7 +118,7 @@ class Experiment(Generic[CaseT]):
         names = [text_of(self.key(job)) for job in mine]
         began_s, cpu_s, now, lost = time.monotonic(), 0.0, 0, []
         with contextlib.ExitStack() as stack:
-            stack.enter_context(_ends_when_told())
+            stack.enter_context(ends_when_told())
             store = None if options.file is None else stack.enter_context(ResultStore(options.file, self.name))
             held = StoredResults(campaign=self.name, by=made_by()) if store is None else store.held
             there = [held.results.get(name) for name in names]
@@ -172,14 +172,14 @@ def sail_kept(sail: Callable[[Job[CaseT]], dict[str, Any]], job: Job[CaseT]) -> 
 
 
 @contextlib.contextmanager
-def _ends_when_told() -> Iterator[None]:
+def ends_when_told() -> Iterator[None]:
     """Take SIGTERM, by which a queue ends what it began, for Ctrl-C: workers are ended, and nothing is left behind."""
     if threading.current_thread() is not threading.main_thread():  # where no signal comes
         yield
         return
 
     def end(*_: object) -> None:
-        raise KeyboardInterrupt
+        signal.raise_signal(signal.SIGINT)  # which a running loop takes between its steps, and ends its tasks
 
     before = signal.signal(signal.SIGTERM, end)
     try:

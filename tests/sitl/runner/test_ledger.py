@@ -1,5 +1,6 @@
 """Results stay: appended as they come, read again wherever a run was broken off, never mixed or torn."""
 
+import asyncio
 import json
 import multiprocessing
 import os
@@ -10,10 +11,12 @@ from dataclasses import replace
 
 import pytest
 
+from companion.clock import run_virtual
 from companion.disk import Disk
 from companion.errors import InputError, JobError
 from sitl.options import CampaignOptions
 from sitl.runner import ResultStore, made_by, read_results, result_store
+from sitl.runner.experiment import ends_when_told
 from tests.sitl.runner.jobs import attempts, jobs_in, quick, raising, work
 
 
@@ -194,3 +197,20 @@ def test_keys_are_in_the_order_of_numbers():
         '{"seed":9}',
         '{"seed":10}',
     ]
+
+
+def test_a_voyage_is_ended_between_its_steps_when_the_campaign_is_told():
+    """SIGTERM raised in the middle of a voyage's step: 150 lines of tracebacks, and once it went on for ever."""
+    steps = []
+
+    async def voyage():
+        os.kill(os.getpid(), signal.SIGTERM)
+        steps.append("whole")
+        try:
+            await asyncio.sleep(1000.0)
+        finally:
+            steps.append("ended")
+
+    with pytest.raises(KeyboardInterrupt), ends_when_told():
+        run_virtual(voyage())
+    assert steps == ["whole", "ended"]
