@@ -149,14 +149,16 @@ def _marks_too_near(mission: Mission) -> Iterator[Finding]:
                 continue
             told.add(number)
             is_rounded = gate.buoy_en_m is not None
+            own_m = voyage.goals[number - 1].rounding_m if is_rounded else 0.0
+            apart_m = math.ceil(own_m + KEEP_SHARE * mark.rounding_m)
             yield Finding(
                 severity=FindingLevel.ERROR,
                 code=Code.ROUNDING,
                 place=f"[[goal]] {number}",
                 text=f"{'is rounded' if is_rounded else 'lies'} {off_m:.1f} m from goal {other}'s mark; "
                 f"every plan keeps {KEEP_SHARE * mark.rounding_m:.1f} m clear of that: it is never sailed to",
-                remedy=f"let radius_m of goals that are rounded, and [area] margin_m, be at most "
-                f"{max(0.0, between_m - 1.0) / (1.0 + KEEP_SHARE):.0f} m, or move it {between_m:.0f} m away more",
+                remedy="let radius_m of what is rounded, or [area] margin_m, be smaller, or let the two lie "
+                f"{apart_m:.0f} m apart",
             )
 
 

@@ -202,6 +202,33 @@ def test_open_water_has_nothing_to_be_clear_of():
     assert found.expected_clearance_m is None
 
 
+def test_what_carries_her_sideways_is_in_what_is_expected_of_a_path():
+    """A reach 20 m off a wall to leeward: across the current and by leeway she lies nearer to it than her leg."""
+    path, wall = [(0.0, 0.0), (0.0, 150.0)], [shapely.box(20.0, -50.0, 25.0, 250.0)]
+    still = expected(problem(wall, wind_deg=270.0, tws=2.0), path).clearance_m
+    zone = {"from_deg": 270.0, "half_deg": 55.0}
+    current = {"current": {"set_deg": 90.0, "drift_mps": 0.4}, "zone": zone}
+    carried = expected(problem(wall, wind_deg=270.0, tws=2.0, **current), path).clearance_m
+    slips = expected(problem(wall, wind_deg=270.0, tws=2.0, tracking={"leeway_deg": [10.0] * 3}), path).clearance_m
+    assert carried < still - 4.0
+    assert slips < still - 2.0
+
+
+def test_a_beat_in_a_current_is_about_the_wind_over_the_ground():
+    zone = {"from_deg": 20.0, "half_deg": 55.0}
+    turned = problem([], wind_deg=0.0, current={"set_deg": 90.0, "drift_mps": 0.4}, zone=zone)
+    assert turned.ground_turn_rad == pytest.approx(math.radians(20.0))
+    legs = [(0.0, 0.0), (0.0, 200.0)]
+    sailed = {
+        deg: predict(legs, turned.tracking.helm, curve_mps=curve_mps(turned), twd_from_rad=0.0, ground_turn_rad=rad)
+        for deg, rad in ((0.0, 0.0), (20.0, turned.ground_turn_rad))
+    }
+    courses = {deg: np.degrees(np.arctan2(*np.diff(s.en_m[s.beats], axis=0).T)) for deg, s in sailed.items()}
+    held = {deg: np.median(np.abs(c[np.abs(c) < 120.0]) - 45.0) for deg, c in courses.items()}
+    assert held[0.0] == pytest.approx(0.0, abs=1.0)
+    assert abs(held[20.0]) > 15.0  # 25 degrees off the wind over the water on one tack, 65 on the other
+
+
 def test_unread_parameters_widen_what_is_kept():
     path = [(0.0, 0.0), (60.0, 0.0), (60.0, 150.0)]
     known, unread = (expected(problem(tracking={"known": k}), path).clearance_m for k in (True, False))

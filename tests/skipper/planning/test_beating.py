@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from shapely.geometry import box
 
 from companion.boat.tracking import GuidanceModel, beat_band_m
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg, problem_beat, room_m
+from companion.skipper.planning.statement import Start
+from companion.skipper.planning.track import problem_tracking
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import Route
 from companion.skipper.step.state import Phase
@@ -59,6 +62,20 @@ def test_a_beat_is_at_the_angle_of_her_bow_whatever_leeway_she_makes():
     now = ctx()
     slips = replace(now.voyage, boat=replace(now.voyage.boat, leeway_rad=math.radians(5.0)))
     assert problem_beat(StepContext(slips, now.config, now.state, now.snapshot), 15.0) == problem_beat(now, 15.0)
+
+
+def test_the_predicted_track_is_told_of_her_leeway():
+    now = ctx()
+    slips = replace(now.voyage, boat=replace(now.voyage.boat, leeway_rad=math.radians(5.0)))
+    told = {}
+    for name, sailed in {"none": now.voyage, "5": slips}.items():
+        moment = StepContext(sailed, now.config, now.state, now.snapshot)
+        start, forecast = Start(en_m=(0.0, 0.0), heading_rad=0.0), now.snapshot.wind.forecast
+        told[name] = problem_tracking(moment, start, None, area=sailed.area, floor_m=5.0, forecast=forecast)
+    assert "leeway_deg" not in told["none"]
+    angles = told["5"]["leeway_deg"]
+    tws_mps = float(np.max(forecast.mean_tws_mps))
+    assert angles[9] == pytest.approx(math.degrees(slips.boat.leeways_rad(np.array([math.radians(45.0)]), tws_mps)[0]))
 
 
 def test_no_corridor_no_permission_or_failed_tacks_leave_no_beat():
