@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.boat_logs.rows import REBOOT_BACK_S, Useless
 from companion.mavlink.tlog import read_tlog
-from companion.mavlink.wire import Dialect
+from companion.mavlink.wire import Dialect, since_boot_s
 
 JUMP_S = 5.0  # the logger's clock against the autopilot's
 _BIN_HEAD = bytes([0xA3, 0x95, 0x80])  # a log describes its own format first
@@ -41,19 +41,19 @@ class Tlog:
 
     def __iter__(self) -> Iterator[tuple[float, Any]]:
         """Yield when each message was sent [Unix s], and the message."""
-        offset_s, last_boot_s = None, 0.0
+        offset_s, last_boot_s, last_heard_s = None, 0.0, 0.0
         for heard_s, message in self._heard():
             kind = message.get_type()
             if kind == "HEARTBEAT" and message.autopilot != wire.MAV_AUTOPILOT_INVALID:
                 self._is_of(message.get_srcSystem())
             boot_ms = getattr(message, "time_boot_ms", None)
             if boot_ms is not None:
-                boot_s = boot_ms / 1e3
+                boot_s = since_boot_s(boot_ms, None if offset_s is None else last_boot_s + heard_s - last_heard_s)
                 if offset_s is None or boot_s < last_boot_s - REBOOT_BACK_S:
                     offset_s = heard_s - boot_s
                 elif kind == "GLOBAL_POSITION_INT" and abs(heard_s - boot_s - offset_s) > JUMP_S:
                     self.jumps, self.most_s = self.jumps + 1, max(self.most_s, abs(heard_s - boot_s - offset_s))
-                last_boot_s = boot_s
+                last_boot_s, last_heard_s = boot_s, heard_s
             yield heard_s if offset_s is None else last_boot_s + offset_s, message
 
     def _is_of(self, system: int) -> None:

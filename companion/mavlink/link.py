@@ -36,6 +36,7 @@ from companion.mavlink.signing import SigningStore
 from companion.mavlink.transports import Transport, TransportState
 from companion.mavlink.vehicle_identity import GAP_S, LISTEN_S, OtherCompanion, Speaker, listed
 from companion.mavlink.wire import codec
+from companion.mavlink.wire.boot_time import since_boot_s
 from companion.mavlink.wire.frames import Codec, Drop, Message
 from companion.mavlink.wire.streams import DEFAULT_STREAMS, Stream, StreamMonitor
 
@@ -149,6 +150,7 @@ class Link:
         self._heartbeat_s: float | None = None
         self._found, self._decided = asyncio.Event(), asyncio.Event()
         self._boot_s: float | None = None
+        self._boot_heard_s = 0.0
         self._rates = RateKeeper(self, self.monitor)
         self._throughput = Throughput()
         self._locks: dict[str, asyncio.Lock] = {}
@@ -417,7 +419,7 @@ class Link:
             if now < self._doubt_until_s and getattr(message, "time_boot_ms", None) is not None:
                 self._doubt_until_s = -math.inf  # the count is known again
             self.monitor.heard(now, kind)
-            self._notice_boot(kind, message)
+            self._notice_boot(now, kind, message)
             if kind == "HEARTBEAT" and codec.is_autopilot_heartbeat(message):
                 self._take_heartbeat(now)
         if kind in {"COMMAND_LONG", "COMMAND_INT"}:
@@ -456,17 +458,18 @@ class Link:
         if result != LATER:
             self.acknowledge(message.command, result, message.get_srcSystem(), message.get_srcComponent())
 
-    def _notice_boot(self, kind: str, message: Message) -> None:
+    def _notice_boot(self, now: float, kind: str, message: Message) -> None:
         boot_ms = getattr(message, "time_boot_ms", None)
         if boot_ms is None or kind == "NAMED_VALUE_FLOAT":
             return
-        boot_s = boot_ms / 1e3
+        boot_s = since_boot_s(boot_ms, None if self._boot_s is None else self._boot_s + now - self._boot_heard_s)
         if self._boot_s is not None and boot_s < self._boot_s - GAP_S:
             self.stats.reboots += 1
-            self._boot_s = boot_s
+            self._boot_s = None
             self.stats.last_seq.clear()
             self._rates.wanted.set()
-        self._boot_s = boot_s if self._boot_s is None else max(self._boot_s, boot_s)
+        if self._boot_s is None or boot_s > self._boot_s:
+            self._boot_s, self._boot_heard_s = boot_s, now
 
     async def _beat(self) -> None:
         """Send the heartbeat; watch for streams that fell below their rate."""

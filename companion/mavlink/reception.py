@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.mavlink.vehicle_identity import Census, CensusState
 from companion.mavlink.wire import codec
+from companion.mavlink.wire.boot_time import since_boot_s
 from companion.mavlink.wire.frames import Drop, Message
 
 RATE_WINDOW_S = 10.0
@@ -127,6 +128,10 @@ class BootClock:
         self._rival_count = 0
         self._rival_first_s = -math.inf
         self._rival_last_s = -math.inf
+
+    def since_boot_s(self, t_s: float, boot_ms: int) -> float:
+        """Return the time since the boot [s] of a message heard at ``t_s`` [s], over the end of its 32 bits."""
+        return since_boot_s(boot_ms, None if self._offset_s is None else t_s - self._offset_s)
 
     def take(self, t_s: float, boot_s: float) -> bool:
         """Return whether a message of ``boot_s`` heard at ``t_s`` [s] fits."""
@@ -245,7 +250,7 @@ class PlausibilityFilter:
     def objection(self, t_s: float, message: Message) -> Drop | None:
         """Return why ``message``, heard at ``t_s`` [s], is not used, None when it is."""
         boot_ms = getattr(message, "time_boot_ms", None)
-        boot_s = None if boot_ms is None else boot_ms / 1e3
+        boot_s = None if boot_ms is None else self.clock.since_boot_s(t_s, boot_ms)
         if boot_s is not None:
             if not self.clock.take(t_s, boot_s):
                 return Drop.WRONG_CLOCK

@@ -56,6 +56,17 @@ def with_peer(main, *, peer_signing=None, **link_options):
     return run_virtual(whole())
 
 
+def test_the_end_of_32_bits_of_boot_time_is_no_reboot_of_the_link():
+    async def main(peer, link):
+        for ms in range(-20_000, 20_001, 500):
+            peer.say(wire.MAVLink_attitude_message(ms % 2**32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+            await asyncio.sleep(0.5)
+        assert link.stats.reboots == 0
+        assert link.boot_s == (2**32 + 20_000) / 1e3
+
+    with_peer(main)
+
+
 @pytest.mark.parametrize("held_s", [0.45, 0.6, 1.6, 3.0])
 def test_what_waited_while_the_loop_was_held_up_proves_no_silence(held_s):
     """A computer that was busy for a moment read at once what had come, and took its own absence for a silence of the

@@ -15,7 +15,7 @@ ZERO_S = 1000.0  # our clock when the autopilot booted
 
 
 def attitude(boot_s):
-    return wire.MAVLink_attitude_message(round(boot_s * 1e3), 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    return wire.MAVLink_attitude_message(round(boot_s * 1e3) % 2**32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
 def beat(mode=10, armed=True):
@@ -166,6 +166,13 @@ def test_one_whose_messages_wait_now_and_then_is_heard_and_is_no_second_autopilo
         assert not clock.is_contested(heard_s)
     assert not unheard or begins_late
     assert all(period_s <= t <= period_s + SWITCH_S + lag_s for t in unheard)  # the first that did not wait, once
+
+
+def test_all_is_believed_over_the_end_of_32_bits_of_boot_time():
+    air = Air()
+    zero_s = air.t_s + 30.0 - 2**32 / 1e3
+    assert air.run(60.0, boot_zero_s=zero_s) == []
+    assert not air.witness.clock.is_new
 
 
 def test_a_second_route_without_the_delay_of_the_first_is_no_second_autopilot():

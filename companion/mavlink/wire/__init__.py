@@ -1,6 +1,7 @@
 """What is on the wire: frames, messages as values and back, lists of items, streams, our own status."""
 
 from companion.mavlink.wire.assembler import MEMORY_S, VehicleAssembler
+from companion.mavlink.wire.boot_time import since_boot_s
 from companion.mavlink.wire.codec import AUTOPILOT_COMPONENT, autopilot_version, is_autopilot_heartbeat
 from companion.mavlink.wire.companion_status import CONTROL_COMMAND, HIGH_LATENCY_S, StatusReader, StatusReport
 from companion.mavlink.wire.frames import Codec, Dialect, Drop, Message
@@ -33,4 +34,5 @@ __all__ = [
     "first_difference",
     "is_autopilot_heartbeat",
     "mission_hash",
+    "since_boot_s",
 ]

@@ -17,6 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.frozen import changed
 from companion.geo import DEGREE_M
 from companion.mavlink.wire import codec
+from companion.mavlink.wire.boot_time import since_boot_s
 from companion.mavlink.wire.frames import Message
 from companion.mavlink.wire.sounder import Sounder
 from companion.messages import (
@@ -139,6 +140,7 @@ class VehicleAssembler:
         self._status: AutopilotStatus | None = None
         self._texts = codec.TextAssembler()
         self._boot_s: float | None = None
+        self._boot_heard_s = 0.0
         self._forget()
 
     @property
@@ -193,27 +195,30 @@ class VehicleAssembler:
                 return [codec.ais_report(t_s, message)]
             if message.get_srcComponent() != codec.AUTOPILOT_COMPONENT:
                 return []
-            self._notice_boot(message)
+            self._notice_boot(t_s, message)
             return self._take(t_s, kind, message)
         except (ValueError, OverflowError, TypeError):
             return []
 
-    def _notice_boot(self, message: Message) -> None:
+    def _since_boot_s(self, t_s: float, boot_ms: int) -> float:
+        return since_boot_s(boot_ms, None if self._boot_s is None else self._boot_s + t_s - self._boot_heard_s)
+
+    def _notice_boot(self, t_s: float, message: Message) -> None:
         boot_ms = getattr(message, "time_boot_ms", None)
         if boot_ms is None or message.get_type() == "NAMED_VALUE_FLOAT":
             return
-        boot_s = boot_ms / 1e3
+        boot_s = self._since_boot_s(t_s, boot_ms)
         if self._boot_s is not None and boot_s < self._boot_s - REBOOT_BACK_S:
             self.reboots += 1
             self._forget()
             self._status = None
-            self._boot_s = boot_s
+            self._boot_s = None
         if self._boot_s is None or boot_s > self._boot_s:
-            self._boot_s = boot_s
+            self._boot_s, self._boot_heard_s = boot_s, t_s
 
     def _take(self, t_s: float, kind: str, message: Message) -> list[Value]:
         if kind == "ATTITUDE":
-            attitude = codec.attitude(message)
+            attitude = codec.attitude(message, self._since_boot_s(t_s, message.time_boot_ms))
             if self._attitude is not None and attitude.boot_s <= self._attitude.boot_s:
                 return []
             self._attitude = attitude
@@ -231,13 +236,13 @@ class VehicleAssembler:
         return self._fold_status(t_s, kind, message) if kind in _TELLING else []
 
     def _position(self, t_s: float, message: Message) -> list[Value]:
-        boot_s = message.time_boot_ms / 1e3
+        boot_s = self._since_boot_s(t_s, message.time_boot_ms)
         if boot_s <= self._position_boot_s:
             return []
         attitude = self._attitude
         if attitude is not None and abs(boot_s - attitude.boot_s) > ATTITUDE_MAX_AGE_S:
             attitude = None
-        state = codec.vehicle_state(t_s, message, attitude)
+        state = codec.vehicle_state(t_s, boot_s, message, attitude)
         if state is not None and not self._fixes.take(state):
             return []
         self._position_boot_s = boot_s
@@ -333,7 +338,8 @@ class VehicleAssembler:
             return {"home": codec.geo_point(message.latitude, message.longitude)}
         if kind == "SYSTEM_TIME":
             unix_s = message.time_unix_usec / 1e6
-            return {"utc_at_boot_s": unix_s - message.time_boot_ms / 1e3} if unix_s > KNOWS_TIME_S else None
+            boot_s = self._since_boot_s(t_s, message.time_boot_ms)
+            return {"utc_at_boot_s": unix_s - boot_s} if unix_s > KNOWS_TIME_S else None
         if kind == "NAMED_VALUE_FLOAT":
             # Twice in a row, as the fence: nothing true would ever contradict one that was forged.
             return self._sensor(t_s, message.name, float(message.value))

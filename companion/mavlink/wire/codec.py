@@ -82,20 +82,21 @@ class Attitude:
     yaw_rate_radps: float
 
 
-def attitude(message: Message) -> Attitude:
-    """Decode ATTITUDE."""
+def attitude(message: Message, boot_s: float) -> Attitude:
+    """Decode ATTITUDE, of the boot time ``boot_s`` [s]."""
     turn = 2.0 * math.pi
     return Attitude(
-        boot_s=message.time_boot_ms / 1e3,
+        boot_s=boot_s,
         roll_rad=number(message.roll, -turn, turn, "roll"),
         heading_rad=wrap_two_pi(number(message.yaw, -turn, turn, "yaw")),
         yaw_rate_radps=number(message.yawspeed, -10.0 * turn, 10.0 * turn, "yawspeed"),
     )
 
 
-def vehicle_state(t_s: float, message: Message, attitude_now: Attitude | None) -> VehicleState | None:
-    """Decode GLOBAL_POSITION_INT; the heading is ATTITUDE's if there is one, else the message's own.
+def vehicle_state(t_s: float, boot_s: float, message: Message, attitude_now: Attitude | None) -> VehicleState | None:
+    """Decode GLOBAL_POSITION_INT, heard at ``t_s`` and of the boot time ``boot_s`` [s].
 
+    The heading is ATTITUDE's if there is one, else the message's own.
     None before the autopilot has a position or a heading.
     """
     position = geo_point(message.lat, message.lon)
@@ -110,7 +111,7 @@ def vehicle_state(t_s: float, message: Message, attitude_now: Attitude | None) -
     limit = MAX_SPEED_MPS * 100.0
     return VehicleState(
         t_s=t_s,
-        boot_s=message.time_boot_ms / 1e3,
+        boot_s=boot_s,
         position=position,
         velocity_en_mps=(
             number(message.vy, -limit, limit, "vy") / 100.0,

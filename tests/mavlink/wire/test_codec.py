@@ -232,6 +232,28 @@ def test_copies_and_late_frames_are_dropped_and_a_reboot_is_not():
     assert assembler.reboots == 1
 
 
+def test_the_end_of_32_bits_of_boot_time_is_no_reboot():
+    end_ms = 2**32
+    assembler = VehicleAssembler()
+    states = []
+    for t_s in range(-20, 21):
+        if t_s == 2:
+            assert assembler.take(1.5, position(end_ms - 1000)) == []  # of before the end, overtaken
+        states += assembler.take(float(t_s), position((end_ms + 1000 * t_s) % end_ms))
+    assert assembler.reboots == 0
+    assert [s.boot_s for s in states] == [(end_ms + 1000 * t_s) / 1e3 for t_s in range(-20, 21)]
+    assert assembler.take(20.1, position(18_000)) == []  # one that was overtaken
+    assert len(assembler.take(21.0, position(2_000))) == 1  # and then it did boot
+    assert (assembler.reboots, assembler.boot_s) == (1, 2.0)
+
+
+def test_a_reboot_before_the_end_of_32_bits_is_one():
+    assembler = VehicleAssembler()
+    assembler.take(0.0, position(2**32 - 60_000))
+    assembler.take(5.0, position(2_000))
+    assert assembler.reboots == 1
+
+
 def test_apparent_wind_is_joined_by_boot_time_once():
     assembler = VehicleAssembler()
     assert assembler.take(0.0, named(b"AppWndSpd", 1000, 5.0)) == []
