@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from companion.wind import make
+from companion.wind.estimators import time_series
 
 CELL_S = 10
 SIGMA = math.radians(4.0)
@@ -41,6 +42,36 @@ def test_arma_tells_the_spread_of_the_process_that_it_sees(a1, a2, b):
         estimator = feed(make("arma"), arma(a1, a2, b, seed))
         ratios.append([estimator.forecast(10.0 * n)[1] / spread_of_arma(a1, a2, b, n) for n in (1, 2, 4, 12)])
     assert np.mean(ratios, axis=0) == pytest.approx(np.ones(4), abs=0.15)
+
+
+class Counted(float):
+    """A number that counts how often it is multiplied with."""
+
+    times = 0
+
+    def __mul__(self, other):
+        Counted.times += 1
+        return float(self) * other
+
+    __rmul__ = __mul__
+
+
+@pytest.mark.parametrize(("a1", "a2", "b"), [(1.2, -0.4, 0.3), (0.99, 0.0, 0.5), (1.9, -0.95, -0.5)])
+def test_arma_of_a_long_silence_is_told_at_the_cost_of_a_short_one(a1, a2, b, monkeypatch):
+    estimator = feed(make("arma"), arma(0.7, 0.0, 0.6, 1, 200))
+    estimator._theta = np.array([a1, a2, b])
+    monkeypatch.setattr(time_series, "_NOTHING", 0.0)
+    long = [estimator._predict(h) for h in (60.0, 3600.0, 1e6)]
+    monkeypatch.undo()
+    assert np.allclose([estimator._predict(h) for h in (60.0, 3600.0, 1e6)], long, rtol=1e-11, atol=1e-11)
+
+    class Theta:
+        def tolist(self):
+            return [Counted(a1), Counted(a2), Counted(b)]
+
+    estimator._theta, Counted.times = Theta(), 0
+    estimator._predict(1e8)
+    assert Counted.times < 50_000
 
 
 def test_arma_forecasts_a_swing_that_an_ar_of_order_one_cannot():

@@ -78,6 +78,7 @@ class Cells:
 
 
 _STABLE = 0.995  # the AR part is kept inside this much of its stability triangle
+_NOTHING = 1e-12  # of a departure [rad] and of a weight: what comes after it changes no forecast
 
 
 class Arma(Base):
@@ -129,6 +130,8 @@ class Arma(Base):
             psi = 1.0 if i == 0 else a1 * psi1 + a2 * psi2 + (b if i == 1 else 0.0)  # (b)
             psi1, psi2 = psi, psi1
             total += psi * psi
+            if max(abs(m1), abs(m2), abs(psi1), abs(psi2)) < _NOTHING:
+                break  # at the mean: a silence of days is no longer sum than one of hours
         part = steps - whole
         y = mean_before + part * (m1 - mean_before)
         variance = self._variance * (before + part * (total - before)) + self._cells.scatter
