@@ -101,9 +101,10 @@ async function confirm(verb, words, where) {
   // not in the way of the chart, where the way is shown
   if (PLANNED.has(verb)) dialog.show(); else dialog.showModal();
   if (!PLANNED.has(verb)) return give.focus();
-  for (let tries = 0; tries < 4 && dialog.open; tries++) {
+  const stands = () => dialog.open && preview.isConnected;  // not cancelled meanwhile, nor another asked for
+  for (let tries = 0; tries < 4 && stands(); tries++) {
     const found = /** @type {Preview | null} */ (await post("/api/preview", words));
-    if (found === null) return;
+    if (found === null || !stands()) return;
     if (found.error?.includes("again in a moment")) { await new Promise((resolve) => setTimeout(resolve, 1200)); continue; }
     if (found.error) return preview.replaceChildren(el("p", { class: "warn" }, found.error));
     showPreview({ way: found.way_en_m ?? [], risks: found.risks ?? [] });
