@@ -325,7 +325,7 @@ def _show(args: argparse.Namespace) -> int:
     polar, boat = _boat(args.file)
     sailed = _sailed(polar, boat)
     error = 0.0 if boat is None else speed_error_of(boat.boat)
-    print("\n".join([*_words(args.file, boat), *_angles(sailed), *_table("boat speed [m/s]", polar, _speeds)]))
+    print("\n".join([*_words(args.file, boat), *_angles(sailed), "", *_table("boat speed [m/s]", polar, _speeds)]))
     slower = math.exp(error * NormalDist().inv_cdf(args.quantile))
     for file, text in (
         (args.pol, pol_text(polar, slower)),
@@ -460,7 +460,6 @@ def _speeds(polar: Polar, twa_deg: float, tws_mps: float) -> str:
 def _table(title: str, polar: Polar, cell: Callable[[Polar, float, float], str]) -> list[str]:
     winds = _winds(polar)
     return [
-        "",
         title,
         _row("TWA, wind [m/s]", [f"{w:.1f}" for w in winds]),
         *(_row(f"  {twa:.0f}", [cell(polar, twa, w) for w in winds]) for twa in TWA_DEG),

@@ -132,6 +132,8 @@ async def give_on_board(path: Path, words: str, give_up_s: float) -> Answer:
     from companion.errors import LinkError
     from companion.orders import Answer, Result
 
+    if path.is_dir():
+        raise InputError(str(path), "", "is a folder", "name the socket in it, as companion run --socket does")
     try:
         async with asyncio.timeout(give_up_s):
             reader, writer = await asyncio.open_unix_connection(path)

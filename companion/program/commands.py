@@ -168,6 +168,12 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise InputError."""
+        odd = re.fullmatch(r"(?:argument .+: )?invalid choice: '(.*)' \(choose from .+\)", message, re.DOTALL)
+        if odd and self.commands and odd[1] not in self.commands:
+            near = difflib.get_close_matches(odd[1], self.commands, n=1)
+            message = f"there is no command {odd[1]!r}; " + (
+                f"did you mean `{self.prog} {near[0]}`?" if near else f"there are {', '.join(self.commands)}"
+            )
         raise InputError(self.prog, "", message, f"'{self.prog} --help' says more")
 
 

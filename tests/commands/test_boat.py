@@ -60,7 +60,9 @@ def test_two_boats_are_compared_in_the_winds_of_the_first(tmp_path, capsys):
     (tmp_path / "a.pol").write_text("TWA\\TWS;4;8\n60;2;4\n120;3;5\n")
     (tmp_path / "b.pol").write_text("TWA\\TWS;4;8\n60;3;4\n120;3;5\n")
     assert main(["boat", "compare", str(tmp_path / "a.pol"), str(tmp_path / "b.pol")]) == 0
-    rows = {line.split()[0]: line.split()[1:] for line in capsys.readouterr().out.splitlines() if line[:3] == "  6"}
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("how much faster")
+    rows = {line.split()[0]: line.split()[1:] for line in lines if line[:3] == "  6"}
     assert rows == {"60": ["+50", "+0"]}
 
 

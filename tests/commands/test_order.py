@@ -137,3 +137,13 @@ def test_the_buttons_are_written_and_not_over_a_file_of_that_name(tmp_path, caps
     assert cli.main(["order", "--qgc", str(file)]) == 2
     assert cli.main(["order", "--qgc", str(file), "--force"]) == 0
     capsys.readouterr()
+
+
+def test_a_folder_in_place_of_the_socket_is_called_that(tmp_path, capsys):
+    assert cli.main(["order", "hold", "--socket", str(tmp_path)]) == 2
+    assert f"{tmp_path}: is a folder" in capsys.readouterr().err
+
+
+def test_a_slip_in_a_command_of_a_command_is_answered_with_what_was_meant(capsys):
+    assert cli.main(["mission", "chekc", "lake.toml"]) == 2
+    assert "there is no command 'chekc'; did you mean `companion mission check`?" in capsys.readouterr().err

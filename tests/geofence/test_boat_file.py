@@ -11,6 +11,7 @@ from companion.compose import boat_of
 from companion.errors import InputError
 from companion.geofence import load_mission
 from companion.geofence.mission import load_settings, parse_boat_file
+from companion.geofence.mission.text import parse_options
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 SIZES = Sizes(length_m=1.5, displacement_kg=20.0, sail_area_m2=0.9)
@@ -65,10 +66,10 @@ def test_the_copy_of_a_voyage_sails_the_same_boat(tmp_path):
     ("file", "says"),
     [
         ("name = ", "is not TOML"),
-        (PEPPER.replace("length_m", "lenght_m"), "lenght_m"),
+        (PEPPER.replace("length_m", "lenght_m"), r"\[boat\] lenght_m: unknown key"),
         (PEPPER.replace("[boat] ", "[boat]\nfile = 'a.toml' "), r"\[boat\] file"),
         (PEPPER.replace("tack_fails = 0.05", "tack_fails = 5"), "tack_fails"),
-        (PEPPER.replace('name = "pepper"', ""), "name"),
+        (PEPPER.replace('name = "pepper"', ""), "name: is missing"),
     ],
 )
 def test_a_boat_file_that_cannot_be_believed_is_refused_by_name_and_place(tmp_path, file, says):
@@ -96,6 +97,13 @@ def test_a_boat_file_that_is_not_there_is_said_with_what_writes_one(tmp_path):
     path = mission(tmp_path, 'file = "salt.toml"')
     with pytest.raises(InputError, match=r"\[boat\] file .*salt.toml.*companion boat guess"):
         load_mission(path)
+
+
+def test_a_mission_and_a_boat_file_in_each_other_s_place_are_named_with_the_command_that_takes_them():
+    with pytest.raises(InputError, match=r"m.toml: is a mission, not a boat file; companion mission check m.toml"):
+        parse_boat_file(GOAL, "m.toml")
+    with pytest.raises(InputError, match=r"p.toml: is a boat file, not a mission; companion boat show p.toml"):
+        parse_options(PEPPER, "p.toml")
 
 
 def test_a_polar_in_place_of_a_boat_file_is_named_as_what_it_is():

@@ -6,6 +6,7 @@ before what its boat's file says.
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -114,6 +115,8 @@ def read_boat_file(path: Path) -> BoatFile:
 def parse_boat_file(text: str, source: str) -> BoatFile:
     """Return the boat that ``text`` tells of; see ``read_boat_file``."""
     raw = _raw(text, source)
+    if "goal" in raw:
+        raise InputError(source, "", "is a mission, not a boat file", f"companion mission check {source} is of it")
     table = raw.get("boat")
     for key in OWN:
         if isinstance(table, dict) and key in table:
@@ -121,8 +124,15 @@ def parse_boat_file(text: str, source: str) -> BoatFile:
     try:
         return msgspec.convert(raw, BoatFile)
     except msgspec.ValidationError as error:
-        what, _, where = str(error).partition(" - at `$")
-        raise InputError(source, where.strip("`."), expected(what), "companion boat guess writes an example") from None
+        what, _, path = str(error).partition(" - at `$")
+        head, _, key = path.strip("`.").partition(".")
+        where = f"[{head}] {key}" if key or head in BoatFile.__struct_fields__ else head
+        odd = re.search(r"(unknown|missing required) field `(.+)`", what)
+        if odd:
+            where, what = f"{where.rstrip()} {odd[2]}", "unknown key" if odd[1] == "unknown" else "is missing"
+        raise InputError(
+            source, where.strip(), what if odd else expected(what), "companion boat guess writes an example"
+        ) from None
 
 
 def with_boat_file(options: BoatOptions, mission_text: str, path: Path) -> BoatOptions:
