@@ -602,6 +602,7 @@ def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
         may_arm=operator.arm,
         may_set_mode=operator.set_auto,
         may_steer=operator.guided,
+        may_trim_vane=operator.trim_vane,
         may_replace_foreign=operator.replace_foreign,
     )
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from companion.boat import AutopilotLimits
-from companion.current import FITS_S, STILL, CurrentEstimator, Prior, Sailing
+from companion.current import FITS_S, STILL, CurrentEstimator, Prior, Sailing, VaneCheck
 from companion.eta import PRIOR_PACE, UNKNOWN, Eta, Pace, eta_of, paced
 from companion.geo.angles import wrap_pi
 from companion.geo.frame import LocalFrame
@@ -67,7 +67,7 @@ from companion.skipper.step import (
     is_off_plan,
 )
 from companion.traffic import TargetLimits, Targets
-from companion.wind import Estimator, WindStatus, WindTracker, WindVerdict, make
+from companion.wind import OFFSET_TYPES, VANE_OFFSET, VANE_TYPE, Estimator, WindStatus, WindTracker, WindVerdict, make
 
 __all__ = ["Step", "VoyageFold", "Waters", "begun"]
 
@@ -232,7 +232,6 @@ class ParameterStore:
 
 # Modes in which the sheets are trimmed to sail; in HOLD they are eased, and by hand nobody knows.
 _SAILS = frozenset({Mode.AUTO, Mode.GUIDED, Mode.LOITER})
-VANE_OFFSET = "WNDVN_DIR_OFS"  # [deg] that the autopilot adds to what the vane says
 UNTOLD_S = 60.0  # of a boat whose motion does not tell whether the wind that is learned anew is the right one
 _NO_INDEX = 65535  # of a parameter that was set or asked for by its name: one of a list has its place in it
 
@@ -291,7 +290,9 @@ class VoyageFold:
         self._prior = water
         boat = skipper.voyage.boat
         self.current = CurrentEstimator(boat.polar.speed_mps, water, speed_error=boat.told_speed_error)
+        self.vane = VaneCheck(boat.polar.speed_mps)
         self._anew = ""  # why the wind is learned anew, until it is ...
+        self._has_leapt = False  # the wind's direction has, and is doubted for it
         self._anew_s: float | None = None  # ... and since when
         self._sure_wind: tuple[float, float] | None = None  # the mean wind when it was believed last ...
         self._offset_rad: float | None = None  # ... and by how much the vane's offset was changed since
@@ -431,7 +432,10 @@ class VoyageFold:
         learns = ""
         if change.effect in {Effect.WIND, Effect.HEADING}:
             self._anew, self._anew_s = text, None
-            if change.name == VANE_OFFSET and change.before is not None:
+            self.vane = VaneCheck(self.skipper.voyage.boat.polar.speed_mps)
+            if change.name == VANE_OFFSET and change.after == self.state.vane.written_deg:
+                self._sure_wind = self._offset_rad = None  # it was told by a vane that was turned
+            elif change.name == VANE_OFFSET and change.before is not None:
                 self._offset_rad = (self._offset_rad or 0.0) + math.radians(change.after - change.before)
             elif change.effect is Effect.HEADING:
                 self._sure_wind = None  # it was told by another compass
@@ -511,7 +515,9 @@ class VoyageFold:
         if self._has_shore:
             self._shore_s = t_s
         wind = self._air.view(t_s)
-        self.current.update(t_s, self._utc_s(t_s), self._sailing(t_s, wind))
+        now = self._sailing(t_s, wind)
+        self.current.update(t_s, self._utc_s(t_s), now)
+        self._check_vane(now)
         self._air.room.contradict(self.current.motion_doubt if self.current.doubts_wind else "")
         unsure = self._unsure(t_s, wind)
         return Snapshot(
@@ -527,6 +533,8 @@ class VoyageFold:
             doubt=self.current.doubt(),
             speed_seen=self._pace.seen_speed,
             unsure=unsure,
+            vane=self.vane.view(),
+            vane_offset_rad=self._vane_offset_rad,
             wind_before=self._wind_before(wind, unsure=unsure),
             mission=self._mission,
             identity=replace(
@@ -557,6 +565,22 @@ class VoyageFold:
         if self.current.motion_doubt or (is_told and wind.record_s >= self.skipper.config.wind_settle_s):
             self._anew = ""
         return f"{self._anew}: the wind is learned anew" if self._anew else self.current.motion_doubt
+
+    def _check_vane(self, now: Sailing | None) -> None:
+        """Hold the vane against how the boat sails; a direction that leapt is another's, of a vane or a wind."""
+        leapt_rad = self.current.wind_before_rad
+        if leapt_rad is not None and not self._has_leapt:
+            self.vane.forget()
+        self._has_leapt = leapt_rad is not None
+        expected = self.current.expected_en_mps
+        self.vane.update(now, expected)
+
+    @property
+    def _vane_offset_rad(self) -> float | None:
+        """The offset that the autopilot adds to what its vane says; None: it was not read, or it adds none."""
+        values = self._parameters.values
+        offset_deg = values.get(VANE_OFFSET)
+        return None if offset_deg is None or values.get(VANE_TYPE) not in OFFSET_TYPES else math.radians(offset_deg)
 
     def _wind_before(self, wind: WindEstimate, *, unsure: str) -> WindBefore | None:
         """Return the wind as it was before it came to be doubted, None while it is believed or where that is not known.

@@ -39,6 +39,7 @@ from companion.skipper.step import (
     RunMotor,
     SetCurrent,
     SetMode,
+    SetParameter,
     SteerHeading,
     StopOrders,
     Tack,
@@ -275,6 +276,10 @@ class Executor:
             return _command(action.command_id, await autopilot.run_motor(on=action.is_on))
         if isinstance(action, SetCurrent):
             return _command(action.command_id, await autopilot.set_current(action.seq, reset=action.reset))
+        if isinstance(action, SetParameter):
+            written = await autopilot.set_parameter(action.name, action.value)
+            done_by = CommandResult.ACCEPTED if written.is_ok else CommandResult.REFUSED
+            return CommandOutcome(command_id=action.command_id, result=done_by, text=written.text)
         raise TypeError(f"nobody carries out {type(action).__name__}")
 
 
@@ -288,7 +293,7 @@ def _gave_up(action: Action, why: str) -> Outcome:
         return UploadOutcome(upload_id=action.upload_id, result=UploadResult.TIMEOUT, text=why)
     if isinstance(action, ReadMission):
         return ReadOutcome(read_id=action.read_id, text=why)
-    if isinstance(action, SetMode | Arm | SetCurrent | RunMotor | Tack):
+    if isinstance(action, SetMode | Arm | SetCurrent | SetParameter | RunMotor | Tack):
         return CommandOutcome(command_id=action.command_id, result=CommandResult.TIMEOUT, text=why)
     raise TypeError(f"{type(action).__name__} is no order")
 

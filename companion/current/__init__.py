@@ -13,6 +13,7 @@ from companion.current.tide import (
     read_tide,
     span_words,
 )
+from companion.current.vane import VaneCheck, VaneError
 from companion.current.water_current import STILL_WATER, WaterCurrent, forecast_over_water, over_ground, over_water
 
 __all__ = [
@@ -28,6 +29,8 @@ __all__ = [
     "TableRow",
     "TideRow",
     "TideTable",
+    "VaneCheck",
+    "VaneError",
     "WaterCurrent",
     "WindAngleUncertainty",
     "closed_spans",

@@ -297,6 +297,11 @@ class CurrentEstimator:
             return 0.0, 0.0
         return float(expected.east_mps + self._x[0]), float(expected.north_mps + self._x[1])
 
+    @property
+    def expected_en_mps(self) -> tuple[float, float]:
+        """What the mission expects of the current at this hour [m/s, east north]."""
+        return (0.0, 0.0) if self._expected is None else (self._expected.east_mps, self._expected.north_mps)
+
     def tells_of_new_water(self, *, sails_as_it_should: bool) -> bool:
         """Return whether all that was seen since it was begun is one current that can be, on headings apart.
 

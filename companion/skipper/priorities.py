@@ -22,6 +22,7 @@ from companion.skipper.behaviors.sailing import (
     stop_drift,
 )
 from companion.skipper.behaviors.shoaling import turns_back
+from companion.skipper.behaviors.vane_trim import trims_vane
 from companion.skipper.behaviors.wind_doubt import holds, seeks_sea_room
 from companion.skipper.board.on_board import mission_is_known
 from companion.skipper.board.vehicle_identity import stand_by
@@ -135,6 +136,12 @@ BEHAVIORS: tuple[Behavior, ...] = (
         when="the position is doubted and the place reckoned is not clear, or "
         "a LOITER's point jumped with it or lies beyond something",
         does="asks for LOITER, and keeps it until the position is believed",
+    ),
+    Behavior(
+        name="trim the vane",
+        act=trims_vane,
+        when="she does not sail, and by the way she moves her vane is turned",
+        does="writes `WNDVN_DIR_OFS`, as permitted",
     ),
     Behavior(
         name="seek sea room",

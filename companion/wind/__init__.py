@@ -8,7 +8,7 @@
 
 from companion.wind.estimators.catalogue import NAMES, Forecaster, make
 from companion.wind.estimators.estimator import HORIZONS_S, Estimator
-from companion.wind.parameters import VaneParameters
+from companion.wind.parameters import OFFSET_TYPES, VANE_OFFSET, VANE_TYPE, VaneParameters
 from companion.wind.sensor_faults import WindStatus, WindVerdict
 from companion.wind.tracker import WindTracker
 from companion.wind.true_wind import apparent_wind, true_wind
@@ -16,6 +16,9 @@ from companion.wind.true_wind import apparent_wind, true_wind
 __all__ = [
     "HORIZONS_S",
     "NAMES",
+    "OFFSET_TYPES",
+    "VANE_OFFSET",
+    "VANE_TYPE",
     "Estimator",
     "Forecaster",
     "VaneParameters",

@@ -12,6 +12,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+VANE_TYPE = "WNDVN_TYPE"
+VANE_OFFSET = "WNDVN_DIR_OFS"  # [deg] that the autopilot adds to what the vane says ...
+OFFSET_TYPES = (3.0, 4.0)  # ... where that is an analog or an NMEA one, and to no other
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VaneParameters:
@@ -30,7 +34,7 @@ class VaneParameters:
             value = parameters.get(name)
             return float(value) if value is not None and math.isfinite(value) else default
 
-        vane, speed = number("WNDVN_TYPE", None), number("WNDVN_SPEED_TYPE", None)
+        vane, speed = number(VANE_TYPE, None), number("WNDVN_SPEED_TYPE", None)
         return cls(
             vane_type=None if vane is None else round(vane),
             speed_type=None if speed is None else round(speed),

@@ -122,6 +122,7 @@ def _ordered(action: act.Action) -> str:
         act.UploadMission: "uploads",
         act.Arm: "orders arming",
         act.SetCurrent: "sets the item",
+        act.SetParameter: "writes a parameter",
         act.SteerHeading: "steers",
         act.ReadMission: "reads the mission",
     }.get(type(action), "")

@@ -198,6 +198,7 @@ OTHER = {
         "set_auto": True,
         "guided": True,
         "upload_fence": True,
+        "trim_vane": True,
         "replace_foreign": True,
         "orders": ["hold"],
         "local_orders": ["stop"],

@@ -359,3 +359,29 @@ def test_a_mission_says_whether_the_boat_is_learned(tmp_path, word):
     path.write_text(f'[[goal]]\nlat = 50.83\nlon = -1.3\n[boat]\nlearn = "{word}"\n', encoding="utf-8")
     assert config_of(load_mission(path)).learn is Learning(word)
     assert config_of(load_mission(DEMO)).learn is Learning.USE
+
+
+def test_an_offset_that_we_wrote_is_no_vane_that_was_turned_and_what_was_told_of_the_vane_begins_anew():
+    """The wind before it was told by a turned vane: by that, sea room was sought from a wind that never blew."""
+    fold = fresh()
+    told(fold, "WNDVN_DIR_OFS", 0.0)
+    before = heard(fold, 1, 60)
+    assert before.vane is not None
+    assert before.vane_offset_rad is None, "not said of which type the vane is: ArduPilot adds it to types 3 and 4"
+    told(fold, "WNDVN_TYPE", 4.0, index=12)
+    assert heard(fold, 60, 61).vane_offset_rad == 0.0
+    fold.state = replace(fold.state, vane=replace(fold.state.vane, written_deg=90.0))
+    vane = fold.vane
+    for _ in range(2):
+        told(fold, "WNDVN_DIR_OFS", 90.0)
+    after = heard(fold, 60, 62)
+    assert after.vane_offset_rad == pytest.approx(math.radians(90.0))
+    assert after.wind_before is None
+    assert "WNDVN_DIR_OFS" in after.unsure
+    assert fold.vane is not vane
+    for _ in range(2):
+        told(fold, "WNDVN_DIR_OFS", 0.0)
+    heard(fold, 62, 140)
+    for _ in range(2):
+        told(fold, "WNDVN_DIR_OFS", 30.0)
+    assert heard(fold, 140, 142).wind_before.turned_rad == pytest.approx(math.radians(30.0)), "somebody else's is"

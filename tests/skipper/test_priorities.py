@@ -8,6 +8,7 @@ from itertools import pairwise
 import pytest
 import shapely
 
+from companion.current import VaneError
 from companion.messages import Mode
 from companion.orders import Verb
 from companion.skipper import priorities
@@ -38,6 +39,7 @@ DOUBT = {
     }
 }
 DRIFTS = {"alarms": {"raised": (Raised(name="drifting", since_s=0.0),)}}
+LIES_DEAD, UNSEEN = {"vane": {"stuck_s": 0.0}}, {"position": {"last_seen": None}}
 IN_LOITER, IN_GUIDED = {"steering": {"own_mode": Mode.LOITER}}, {"steering": {"own_mode": Mode.GUIDED}}
 IN_IRONS = {"steering": {"until_s": 1e9, "heading_rad": 0.0, "own_mode": Mode.GUIDED}}
 
@@ -87,6 +89,13 @@ def south_of_island(s, state):
     )
 
 
+def vane_turned(s, state):
+    """Hold the boat as ``south_of_island``, with a vane that her motion says is turned, and may be put right."""
+    turned = VaneError(off_rad=math.pi / 2.0, sigma_rad=0.2, is_sure=True)
+    may = replace(s.permissions, may_trim_vane=True)
+    return replace(south_of_island(s, state), vane=turned, vane_offset_rad=0.0, permissions=may)
+
+
 def homeward_over_island(s, state):
     here = s.position_en_m
     island = min(ISLANDS, key=lambda p: p.distance(shapely.Point(here)))
@@ -127,11 +136,13 @@ SITUATIONS = {
         DOUBT | IN_LOITER | {"voyage": {"sailing": False}},
         showing(mode=Mode.LOITER),
     ),
-    ("seek sea room", "stop a drift"): (
+    ("stand off", "trim the vane"): (
         "standard",
-        IN_LOITER | DRIFTS | {"position": {"last_seen": None}},
-        south_of_island,
+        {"position": DOUBT["position"] | UNSEEN["position"]} | IN_LOITER | LIES_DEAD,
+        vane_turned,
     ),
+    ("trim the vane", "seek sea room"): ("standard", IN_LOITER | LIES_DEAD | UNSEEN, vane_turned),
+    ("seek sea room", "stop a drift"): ("standard", IN_LOITER | DRIFTS | UNSEEN, south_of_island),
     ("stop a drift", "rest"): ("done", IN_LOITER | DRIFTS, showing(mode=Mode.LOITER)),
     ("rest", "hold"): ("done", {}, unsure),
     ("hold", "turn back"): ("standard", going_back, unsure),
@@ -150,7 +161,6 @@ SITUATIONS = {
 # Neighbours that never both have something to do.
 NEVER_BOTH = {
     ("given up", "keep off"): "nothing is asked of a boat that was given up",
-    ("stand off", "seek sea room"): "no leg is sailed from a position that is doubted, or while a loiter is begun anew",
     ("brake", "sail on"): "one is for a boat that is sailed, the other for one that shows a stop",
 }
 

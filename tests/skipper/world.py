@@ -263,7 +263,7 @@ class World:
             later((self.t + self.upload_s, "upload", action))
         elif isinstance(action, act.ReadMission):
             later((self.t + 0.5, "read", action))
-        elif isinstance(action, (act.SetMode, act.Arm, act.SetCurrent, act.RunMotor, act.Tack)):
+        elif isinstance(action, (act.SetMode, act.Arm, act.SetCurrent, act.SetParameter, act.RunMotor, act.Tack)):
             later((self.t + 0.1, "command", action))
         elif isinstance(action, act.SteerHeading):
             self.steer, self.steer_until = action.heading_rad, self.t + 3.0

@@ -88,6 +88,7 @@ set_auto = false      # upload missions, set AUTO and the modes of the watchdogs
 arm = false           # arm
 guided = false        # steer under GUIDED: out of irons, round a vessel
 upload_fence = false  # put the fence on the autopilot and switch it on
+trim_vane = false     # put a vane right that is turned, by WNDVN_DIR_OFS
 # orders = ["hold", "go_on", "refuge", "home"]   # what the crew may order over the radio; "all"
 """
 

@@ -342,6 +342,8 @@ class OperatorOptions(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     set_auto: bool = False
     guided: bool = False
     upload_fence: bool = False
+    trim_vane: bool = False
+    """Write WNDVN_DIR_OFS where the boat does not sail because its vane is turned, as its own motion tells."""
     replace_foreign: bool = False
     """Overwrite a mission on the autopilot that is not ours, before setting sail; under way somebody else's stays."""
     orders: tuple[str, ...] | str = ()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from companion.frozen import changed
 from companion.messages import MissionState, Mode, Severity
 from companion.skipper.planning.uploads import upload
-from companion.skipper.step.actions import Action, Arm, RunMotor, SetCurrent, SetMode, Tack
+from companion.skipper.step.actions import Action, Arm, RunMotor, SetCurrent, SetMode, SetParameter, Tack
 from companion.skipper.step.context import SHOWS_S, StepContext
 from companion.skipper.way.geometry import is_past
 
@@ -64,6 +64,11 @@ def tack(ctx: StepContext, code: str, text: str) -> bool:
 def run_motor(ctx: StepContext, *, on: bool, text: str) -> bool:
     """Ask for the motor to be run or not; False when not permitted or not now."""
     return _ask(ctx, MOTOR_ON if on else MOTOR_OFF, lambda number: RunMotor(command_id=number, is_on=on, text=text))
+
+
+def write_parameter(ctx: StepContext, name: str, value: float, text: str) -> bool:
+    """Ask for a parameter to be written; False when not permitted or not now."""
+    return _ask(ctx, name, lambda number: SetParameter(command_id=number, name=name, value=value, text=text))
 
 
 def make_current(ctx: StepContext, seq: int) -> bool:

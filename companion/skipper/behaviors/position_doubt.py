@@ -359,6 +359,8 @@ def _begin_anew(ctx: StepContext) -> None:
     ):
         ctx.set(position=changed(ctx.state.position, anew=None))
     elif set_mode(ctx, Mode.LOITER, "loitering anew where she is"):
+        if ctx.state.adrift.loiter_en_m is not None:  # the drift is reckoned from there, too
+            ctx.set(adrift=changed(ctx.state.adrift, loiter_en_m=ctx.boat_en, loiter_s=ctx.t_s))
         ctx.set(position=changed(ctx.state.position, anew=Mode.LOITER))
 
 

@@ -81,7 +81,8 @@ def doubted_wind(ctx: StepContext) -> DoubtedWind | None:
             true_from_rad=vehicle.heading_rad, told_from_rad=told[0], drift_en_mps=vehicle.velocity_en_mps
         )
     before, route = ctx.snapshot.wind_before, ctx.state.mission.route
-    if before is None and told is not None and route is not None and route.plan_tws_mps > 0.0:
+    was_trimmed = ctx.state.vane.trimmed_s > ctx.state.mission.uploaded_s  # planned by a vane that was turned
+    if before is None and not was_trimmed and told is not None and route is not None and route.plan_tws_mps > 0.0:
         # Not remembered over a restart: the wind that the way on board was planned in is.
         before = WindBefore(
             twd_from_rad=route.plan_twd_from_rad,

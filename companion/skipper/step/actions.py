@@ -142,6 +142,16 @@ class SetCurrent:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SetParameter:
+    """Write a parameter of the autopilot; answered by CommandOutcome."""
+
+    command_id: int
+    name: str
+    value: float
+    text: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Tack:
     """Ask for a tack on a leg that the autopilot beats; answered by CommandOutcome."""
 
@@ -217,6 +227,7 @@ Action = (
     | SetMode
     | Arm
     | SetCurrent
+    | SetParameter
     | Tack
     | RunMotor
     | SteerHeading

@@ -87,6 +87,7 @@ class Permissions:
     may_arm: bool = False
     may_set_mode: bool = False  # AUTO to begin with, and the modes of the watchdogs
     may_steer: bool = False  # GUIDED headings (out of irons, buoys by heading)
+    may_trim_vane: bool = False  # write WNDVN_DIR_OFS
     may_replace_foreign: bool = False  # a mission that is not ours may be overwritten before setting sail
     orders: tuple[str, ...] = ()  # verbs that the crew may give by MAVLink, or "all" (``companion.orders``)
     local_orders: tuple[str, ...] = ()  # ... over the socket on board

@@ -23,6 +23,7 @@ from companion.skipper.step.actions import (
     RunMotor,
     SetCurrent,
     SetMode,
+    SetParameter,
     SteerHeading,
     Tack,
     UploadFence,
@@ -53,6 +54,7 @@ from companion.skipper.step.state import (
     SteeringState,
     Tacking,
     TrafficState,
+    VaneTrim,
     VehicleIdentity,
     VoyageState,
     is_given_up,
@@ -87,6 +89,8 @@ def permitted(action: Action, permissions: Permissions) -> bool:
         return permissions.may_upload
     if isinstance(action, SteerHeading):
         return permissions.may_steer
+    if isinstance(action, SetParameter):
+        return permissions.may_trim_vane
     return True
 
 
@@ -200,6 +204,7 @@ class StepContext:
         by_field: FieldSteering | None = None,
         fallback: Fallback | None = None,
         adrift: Adrift | None = None,
+        vane: VaneTrim | None = None,
         soundings: Soundings | None = None,
         tacking: Tacking | None = None,
         afloat: Afloat | None = None,
@@ -235,6 +240,8 @@ class StepContext:
             state = changed(state, fallback=fallback)
         if adrift is not None:
             state = changed(state, adrift=adrift)
+        if vane is not None:
+            state = changed(state, vane=vane)
         if soundings is not None:
             state = changed(state, soundings=soundings)
         if tacking is not None:
@@ -306,7 +313,8 @@ class StepContext:
     def act(self, action: Action) -> bool:
         """Ask for an action; False (nothing is asked) when it is not permitted, the autopilot not ours, or given up."""
         is_order = isinstance(
-            action, UploadMission | UploadFence | SetMode | Arm | SetCurrent | SteerHeading | Tack | RunMotor
+            action,
+            UploadMission | UploadFence | SetMode | Arm | SetCurrent | SetParameter | SteerHeading | Tack | RunMotor,
         )
         if is_order and (self.is_given_up or not self.state.vehicle.is_ours):
             return False

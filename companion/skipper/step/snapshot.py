@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from companion.boat import AutopilotLimits
-from companion.current import STILL_WATER, WaterCurrent, WindAngleUncertainty
+from companion.current import STILL_WATER, VaneError, WaterCurrent, WindAngleUncertainty
 from companion.geofence import Zone
 from companion.mavlink.vehicle_identity import Identity
 from companion.messages import AutopilotStatus, MissionItem, Mode, StatusText, VehicleState, WindForecast
@@ -202,6 +202,8 @@ class Snapshot:
     doubt: WindAngleUncertainty | None = None
     speed_seen: SpeedSeen = SpeedSeen()
     unsure: str = ""  # why no plan may be made for wind and water now, in words; empty: it may
+    vane: VaneError | None = None  # what the boat's own motion tells of the vane
+    vane_offset_rad: float | None = None  # WNDVN_DIR_OFS, as the autopilot adds it; None: not read, or it has none
     wind_before: WindBefore | None = None  # while the wind is doubted: what it was; None: not known, or believed
     mission: MissionOnBoard = MissionOnBoard()
     identity: Identity = field(default_factory=Identity)  # as far as the autopilot has told it

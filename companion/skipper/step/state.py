@@ -199,6 +199,17 @@ class Adrift:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class VaneTrim:
+    """What was written of the vane's offset (``companion.skipper.behaviors.vane_trim``)."""
+
+    stuck_s: float | None = None  # since when the boat does not sail, and its vane is surely turned
+    trims: int = 0
+    trimmed_s: float = float("-inf")
+    written_deg: float | None = None  # the last
+    first_rad: float | None = None  # what it was before the first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Sounded:
     """A place on the boat's own track, and what was sounded there; None: nothing was."""
 
@@ -484,6 +495,7 @@ class SkipperState:
     by_field: FieldSteering = FieldSteering()
     fallback: Fallback = Fallback()
     adrift: Adrift = Adrift()
+    vane: VaneTrim = VaneTrim()
     soundings: Soundings = Soundings()
     tacking: Tacking = NO_TACKS  # what the boat's tacks have told
     afloat: Afloat = NOTHING_LEARNED  # what her sailing has, of her speeds
