@@ -60,7 +60,6 @@ from companion.skipper.step import (
     ReadOutcome,
     Route,
     Snapshot,
-    WaypointReached,
     WindBefore,
     WindEstimate,
     WindHealth,
@@ -341,8 +340,6 @@ class VoyageFold:
                 if self._heartbeat_s is not None and t_s - self._heartbeat_s > GAP_S:
                     self._identity = self._identity.doubted()
                 self._heartbeat_s = t_s
-            elif kind == "MISSION_ITEM_REACHED":
-                self._events.append(WaypointReached(seq=int(message.seq)))
             elif kind == "PARAM_VALUE":
                 self.parameters(
                     {message.param_id: float(message.param_value)},

@@ -128,7 +128,6 @@ class AutopilotStatus:
     fence_on: bool | None = None  # it has told of a fence, and does; None: never
     fence_breached: bool | None = None
     fence_breaches: int | None = None  # since the boot; outside the home circle one more every 20 m
-    last_reached_seq: int | None = None
     rc_us: tuple[int, ...] = ()  # what the receiver hears, by channel from 1 [us]
     servo_us: tuple[int, ...] = ()  # what its servo outputs are told, by number from 1 [us]; 0: nothing
     home: GeoPoint | None = None

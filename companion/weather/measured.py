@@ -55,11 +55,6 @@ class Off:
         """Return how much of it is left after a time."""
         return math.exp(-ahead_s / MEMORY_S)
 
-    def sd_ahead_mps(self, ahead_s: float) -> float:
-        """Return the deviation of the corrected forecast from the wind after a time [m/s], a component."""
-        left = self.share(ahead_s) ** 2
-        return math.sqrt(left * self.sd_mps**2 + (1.0 - left) * OFF_MPS**2)
-
 
 def off_by(weather: Weather, measured: Measured, now_s: float) -> Off | None:
     """Return by how much a forecast is off now; None where nothing was measured in the last hours that it knows of."""

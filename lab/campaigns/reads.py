@@ -19,7 +19,6 @@ READS: Mapping[str, tuple[str, ...]] = {
     "WIND": ("assembler",),
     "NAMED_VALUE_FLOAT": ("assembler", "link", "companion_status"),
     "MISSION_CURRENT": ("assembler",),
-    "MISSION_ITEM_REACHED": ("assembler", "fold"),
     "NAV_CONTROLLER_OUTPUT": ("assembler",),
     "EKF_STATUS_REPORT": ("assembler",),
     "GPS_RAW_INT": ("assembler",),

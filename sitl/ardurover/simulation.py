@@ -328,11 +328,6 @@ class ArduRover:
         return f"tcp:127.0.0.1:{5763 + 10 * self.instance}"
 
     @property
-    def is_running(self) -> bool:
-        """Whether the process lives."""
-        return self._process is not None and self._process.returncode is None
-
-    @property
     def t_s(self) -> float:
         """Simulated time since the boat was ready [s]: the autopilot's clock, carried on between messages."""
         return self._boot_s - self._zero_boot_s + min(1.0, max(0.0, now_s() - self._boot_at_s))

@@ -136,11 +136,6 @@ FORGERIES: tuple[Forgery, ...] = (
         build=lambda _: wire.MAVLink_mission_current_message(1, 1, 5, 1),
     ),
     Forgery(
-        message="MISSION_ITEM_REACHED",
-        says="the present item",
-        build=lambda k: wire.MAVLink_mission_item_reached_message(k.seq),
-    ),
-    Forgery(
         message="NAV_CONTROLLER_OUTPUT",
         says="500 m off the leg",
         build=lambda _: wire.MAVLink_nav_controller_output_message(0.0, 0.0, 0, 0, 0, 0.0, 0.0, 500.0),

@@ -26,7 +26,6 @@ from companion.skipper.step.snapshot import (
     ReadOutcome,
     UploadOutcome,
     UploadResult,
-    WaypointReached,
     WindEstimate,
     WindHealth,
 )
@@ -293,12 +292,10 @@ EVENTS = {
         present_twd_from_rad=(s.wind.present_twd_from_rad or 0.0) + 1.6,
     )(s),
     # events and orders
-    "waypoint reached": event(WaypointReached(seq=1)),
-    "waypoint reached, nonsense": event(WaypointReached(seq=5000)),
     "mode changed": event(ModeChanged(before=Mode.AUTO, after=Mode.HOLD)),
     **{f"order {words}": event(order(words)) for words in ORDERS},
     "two stations": event(order("hold"), order("home", by=(254, 190))),
-    "all at once": event(AutopilotRebooted(), order("replan"), WaypointReached(seq=2)),
+    "all at once": event(AutopilotRebooted(), order("replan")),
     # outcomes
     "stale outcomes": lambda s: replace(
         s,

@@ -43,7 +43,6 @@ from companion.skipper.step.snapshot import (
     Snapshot,
     UploadOutcome,
     UploadResult,
-    WaypointReached,
     WindEstimate,
     WindHealth,
 )
@@ -225,7 +224,6 @@ class World:
         elif distance_m(self.position, target) < 3.5 or (
             distance_m(self.position, target) < 15.0 and is_past(self.position, self.leg_from, target)
         ):
-            self.events.append(WaypointReached(seq=self.seq))
             if self.seq < len(self.mission):
                 self.seq += 1
                 self.leg_from = target

@@ -99,7 +99,6 @@ _TELLING = frozenset(
     {
         "HEARTBEAT",
         "MISSION_CURRENT",
-        "MISSION_ITEM_REACHED",
         "NAV_CONTROLLER_OUTPUT",
         "EKF_STATUS_REPORT",
         "GPS_RAW_INT",
@@ -306,8 +305,6 @@ class VehicleAssembler:
                 "mission_total": None if message.total == 0xFFFF else message.total,
                 "mission_state": _mission_state(message.mission_state),
             }
-        if kind == "MISSION_ITEM_REACHED":
-            return {"last_reached_seq": message.seq}
         if kind == "NAV_CONTROLLER_OUTPUT":
             self._nav_s = t_s
             return {

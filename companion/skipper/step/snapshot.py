@@ -64,13 +64,6 @@ class MissionOnBoard:
 
 # ------------------------------------------------------------------------------------------- events
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WaypointReached:
-    """MISSION_ITEM_REACHED."""
-
-    seq: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ModeChanged:
     """The heartbeat's mode changed."""
 
@@ -99,7 +92,7 @@ class ParameterChanged:
     text: str
 
 
-Event = WaypointReached | ModeChanged | AutopilotRebooted | StatusText | Order | Disbelieved | ParameterChanged
+Event = ModeChanged | AutopilotRebooted | StatusText | Order | Disbelieved | ParameterChanged
 
 
 # ----------------------------------------------------------------------------------------- outcomes
