@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -590,21 +591,30 @@ def config_of(mission: Mission) -> SkipperConfig:
 
 def permissions_of(mission: Mission, *, dry_run: bool = False) -> Permissions:
     """Return what the operator allows. Uploading a mission goes with setting AUTO; a dry run allows nothing."""
-    if dry_run:
-        return Permissions()
     operator = mission.operator
-    return Permissions(
-        orders=_orders(mission, "orders", mission.operator.orders),
-        local_orders=_orders(mission, "local_orders", mission.operator.local_orders),
-        far_orders=_orders(mission, "far_orders", mission.operator.far_orders),
-        may_upload=operator.set_auto,
-        may_upload_fence=operator.upload_fence,
-        may_arm=operator.arm,
-        may_set_mode=operator.set_auto,
-        may_steer=operator.guided,
-        may_trim_vane=operator.trim_vane,
-        may_replace_foreign=operator.replace_foreign,
+    given = (
+        Permissions()
+        if dry_run
+        else Permissions(
+            orders=_orders(mission, "orders", mission.operator.orders),
+            local_orders=_orders(mission, "local_orders", mission.operator.local_orders),
+            far_orders=_orders(mission, "far_orders", mission.operator.far_orders),
+            may_upload=operator.set_auto,
+            may_upload_fence=operator.upload_fence,
+            may_arm=operator.arm,
+            may_set_mode=operator.set_auto,
+            may_steer=operator.guided,
+            may_trim_vane=operator.trim_vane,
+            may_replace_foreign=operator.replace_foreign,
+        )
     )
+    if given.may_upload:
+        return given
+    lacking = (
+        "" if operator.set_auto else "[operator] set_auto = true in the mission",
+        "no --dry-run" if dry_run else "",
+    )
+    return replace(given, to_upload=", and ".join(filter(None, lacking)))
 
 
 def _orders(mission: Mission, key: str, given: tuple[str, ...] | str) -> tuple[str, ...]:

@@ -21,7 +21,6 @@ from companion.skipper.way.gates import Approach
 from companion.skipper.way.geometry import distance_m, leg_distance_m
 from companion.skipper.way.shoals import beyond_words
 
-MAY_UPLOAD = "[operator] set_auto = true in the mission, and no --dry-run"
 HAIR_M = 0.3  # what a repaired start's lead-in may come nearer by
 STALE_S = 60.0  # a plan that waits for permission is renewed no more often than this
 
@@ -36,7 +35,9 @@ def start(ctx: StepContext) -> None:
         ctx.phase(Phase.NEW_CALCULATION, "making the first plan")
         return
     if state.plans.ready_route is not None and ctx.t_s - state.plans.ready_route.plan_t_s < 60.0:
-        ctx.phase(Phase.WAITING, f"a plan is ready; waiting for permission to upload it: {MAY_UPLOAD}")
+        ctx.phase(
+            Phase.WAITING, f"a plan is ready; waiting for permission to upload it: {snapshot.permissions.to_upload}"
+        )
         if snapshot.permissions.may_upload:
             upload(ctx, state.plans.ready_route, 1, "the first plan")
         return

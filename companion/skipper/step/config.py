@@ -92,6 +92,8 @@ class Permissions:
     orders: tuple[str, ...] = ()  # verbs that the crew may give by MAVLink, or "all" (``companion.orders``)
     local_orders: tuple[str, ...] = ()  # ... over the socket on board
     far_orders: tuple[str, ...] = ()  # ... over the satellite link
+    # what is to be changed for a mission to be put on the autopilot, where it may not be
+    to_upload: str = "[operator] set_auto = true in the mission, and no --dry-run"
 
 
 DRY_RUN = Permissions()

@@ -4,6 +4,8 @@ from dataclasses import replace
 
 import pytest
 
+from companion.compose import permissions_of
+from companion.geofence import load_mission
 from companion.messages import MissionItem, Mode, StatusText
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import ALL_PERMITTED, DRY_RUN
@@ -60,6 +62,28 @@ def test_an_earlier_mission_on_a_boat_that_lies_still_is_replaced(how):
     assert said(world, "earlier mission")
     assert world.run(1500, is_done)
     assert distance_m(world.position, (-250.0, 60.0)) < 40.0
+
+
+@pytest.mark.parametrize(
+    ("set_auto", "dry_run", "words"),
+    [
+        (True, True, "no --dry-run"),
+        (False, True, "[operator] set_auto = true in the mission, and no --dry-run"),
+        (False, False, "[operator] set_auto = true in the mission"),
+    ],
+)
+def test_only_what_is_not_in_place_already_is_asked_for(tmp_path, set_auto, dry_run, words):
+    path = tmp_path / "m.toml"
+    path.write_text(
+        "[[goal]]\nlat = 50.82\nlon = -1.3\n[start]\nlat = 50.817\nlon = -1.3\n"
+        f"[operator]\nset_auto = {str(set_auto).lower()}\n"
+    )
+    permissions = permissions_of(load_mission(path), dry_run=dry_run)
+    assert not permissions.may_upload
+    world = make()
+    world.permissions = permissions
+    world.run(120)
+    assert world.state.why == f"a plan is ready; waiting for permission to upload it: {words}"
 
 
 def test_a_dry_run_plans_beside_an_earlier_mission_and_leaves_it_there():
