@@ -210,10 +210,12 @@ def _arrival(terms: Terms, sailed: _Sailed, told: Told) -> Iterator[Check]:
         yield _at_most("nearest to a refuge, m", nearest_m, expect.refuge_within_m)
     if expect.max_time_s is not None:
         yield _at_most("time, s", sailed.duration_s, expect.max_time_s)
-    least_m = max((m for m in (expect.min_clearance_m, terms.floor_m) if m is not None), default=None)
+    floor_m = terms.floor_m if has_sailed else None
+    least_m = max((m for m in (expect.min_clearance_m, floor_m) if m is not None), default=None)
     if least_m is not None:
-        figure = sailed.clearance_m
-        yield Check(name="clearance, m", passed=figure >= least_m, figure=figure, required=f"at least {least_m}")
+        figure = sailed.clearance_m if has_sailed else None
+        is_kept = figure is not None and figure >= least_m
+        yield Check(name="clearance, m", passed=is_kept, figure=figure, required=f"at least {least_m}")
 
 
 def _vessels(terms: Terms, sailed: _Sailed) -> Iterator[Check]:
@@ -348,7 +350,10 @@ def verdict_line(record: Mapping[str, Any]) -> str:
             "from arming to the run's end, "
             f"{counted(f['replans'], 'replan')}, "
         )
-        words += "no obstacle or fence" if f["min_clearance_m"] is None else f"clearance {f['min_clearance_m']:.1f} m"
+        if f["min_clearance_m"] is not None:
+            words += f"clearance {f['min_clearance_m']:.1f} m"
+        else:
+            words += "no obstacle or fence" if f["time_s"] > 0.0 else "no clearance: she never set sail"
         if f["min_clearance_m"] is not None and f.get("promised_clearance_m") is not None:
             least_m = f["promised_clearance_m"]
             words += f" ({'promised' if least_m >= 0.0 else 'a plan began'} {clearance_words(least_m)})"

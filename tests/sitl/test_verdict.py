@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from companion.boat import Hull
 from sitl.commands.run import print_verdict
+from sitl.scenario import verdict_line
 from sitl.scenario.scenario import EventSpec, ExpectSpec, HeldSpec, is_ordinary
 from sitl.scenario.true_track import HullTrack, TrueTrack, count_roundings, count_tacks, longest_silence_s
 from tests.sitl.judged import judged
@@ -50,6 +51,25 @@ def test_a_verdict_is_printed_in_words(capsys):
     assert "FAIL  announced irons: none (wanted: irons)" in out
     assert "clearance, m: nothing near (wanted: at least 2.0)" in out
     assert not [mark for mark in ("[", "{", "None", "inf") if mark in out]
+
+
+def test_a_boat_that_never_set_sail_has_kept_no_clearance(capsys):
+    """ "pass  clearance, m: nothing near" and "no obstacle or fence" stood there of one that lay outside its fence."""
+    verdict = judged(
+        scenario="x",
+        seed=1,
+        expect=ExpectSpec(min_clearance_m=3.0),
+        truth=TrueTrack(),
+        solid=shapely.box(0.0, 0.0, 1.0, 1.0),
+        hull=DOT,
+        goal_en_m=(100.0, 0.0),
+        summary={"arrived": False, "replans": 0},
+        status_times_s=None,
+        alerts=[],
+    )
+    print_verdict(verdict)
+    assert "FAIL  clearance, m: not measured (wanted: at least 3.0)" in capsys.readouterr().out
+    assert verdict_line(verdict.to_dict()).endswith("no clearance: she never set sail")
 
 
 @pytest.mark.parametrize(("off_m", "passed"), [(0.9, False), (1.1, True)])
