@@ -173,20 +173,19 @@ def repaired(
     soonest at: the nearest may lie up the stream. Outside of the autopilot's fence and within the mission's own, which
     may be the shore, the limits are opened about a way back inside.
     """
-    margin_m = grown_m(margin_m)  # as the water is drawn that a plan may begin in
+    asked_m, margin_m = margin_m, grown_m(margin_m)  # as the water is drawn that a plan may begin in
     area, back = voyage.area, _back_inside(voyage.area, start, margin_m=margin_m, floor_m=floor_m)
     if back:
         out_m, area = outside_m(area, start.en_m), water_to_keep(area, start.en_m)
         start = replace(start, back_en=back, text=f"the start is {out_m:.0f} m outside the fence: planned back into it")
     here = float(area.clearance_m([start.en_m])[0])
     solid_m = min(floor_m, float(area.unfenced.clearance_m([start.en_m])[0])) - HAIR_M
-    if here >= margin_m:
+    spare_m, over_floor_m = (float(area.spare_m([start.en_m], m)[0]) for m in (asked_m, floor_m))
+    if spare_m >= 0.0:
         return start
-    if here >= floor_m:
+    if over_floor_m >= 0.0:
         text = f"the start is {here:.1f} m from an obstacle or limit: the margin gets a notch around it"
-        return replace(
-            start, notch_m=NOTCH * (margin_m - here) + HAIR_M, text="; ".join(filter(None, (start.text, text)))
-        )
+        return replace(start, notch_m=HAIR_M - NOTCH * spare_m, text="; ".join(filter(None, (start.text, text))))
     best: tuple[float, PointEn, float] | None = None
     courses = [2.0 * math.pi * n / REPAIR_DIRECTIONS for n in range(REPAIR_DIRECTIONS)]
     made_mps = {course: None if water is None else water.made_good_mps(course) for course in courses}
@@ -199,8 +198,7 @@ def repaired(
             if water is not None and made is None:
                 continue
             place = moved(start.en_m, course, ring_m)
-            room = float(area.clearance_m([place])[0])
-            if room < margin_m + HAIR_M:
+            if float(area.spare_m([place], asked_m)[0]) < HAIR_M:
                 continue
             way = np.linspace(start.en_m, place, 9)
             if float(np.min(area.clearance_m(way))) < here - HAIR_M:

@@ -350,3 +350,40 @@ def test_a_limit_on_the_paths_risk_reaches_the_problem_and_is_given_up_before_de
     assert answer.has_path
     assert answer.risk is not None
     assert answer.risk <= 0.2
+
+
+@pytest.mark.parametrize(("margin_m", "floor_m"), [(6.0, 3.0), (12.0, 6.0), (6.0, 6.0)])
+@pytest.mark.parametrize("is_fence", [False, True])
+def test_from_wherever_she_lies_about_the_floor_a_plan_begins(margin_m, floor_m, is_fence):
+    """The notch is drawn 4.5 % wider than the floor: 3.0 m off, or 6.1, none was found; 2.0 and 3.2 m off one was."""
+    limits, solids = (box(-300, 0, 300, 900), ()) if is_fence else (None, (box(-300, -50, 300, 0),))
+    made = voyage(Goal(en_m=(0.0, 100.0), radius_m=6.0), obstacles=solids, limits=limits)
+    gate = gates_of(made)[0]
+    for off_m in np.arange(2.9, 6.55, 0.1):
+        start = Start(en_m=(0.0, float(off_m)), heading_rad=0.0)
+        out = repaired(made, start, margin_m=margin_m, floor_m=floor_m, twd_from_rad=math.pi / 2.0)
+        problem = Problem.from_json(
+            problem_dict(
+                made,
+                gate,
+                start=out,
+                aim=Aim(en_m=gate.en_m, radius_m=6.0, gate=0),
+                forecast=forecast(0.0, math.pi / 2.0),
+                margin_m=margin_m,
+                delta_s=0.95,
+                no_go_half_rad=math.radians(47.0),
+                floor_m=floor_m,
+            )
+        )
+        assert defect_of(problem) is None, off_m
+        assert plan(problem, expansions=200).has_path, off_m
+
+
+@pytest.mark.parametrize("off_m", [13.0, 20.5])
+def test_a_start_inside_an_obstacles_own_margin_is_led_out(off_m):
+    """By the mission's margin it was free, and no plan began there."""
+    made = voyage(obstacles=(box(-50, -50, 50, 0),))
+    made = replace(made, area=replace(made.area, own_margins_m=(20.0,)))
+    out = repaired(made, Start(en_m=(0.0, off_m), heading_rad=0.0), margin_m=12.0, floor_m=6.0, twd_from_rad=math.pi)
+    assert out.lead_in
+    assert made.area.spare_m([out.en_m], 12.0)[0] > 0.0
