@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from companion.boat import points_too_high, required_margin
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode, Severity
 from companion.skipper.behaviors.helm import arm, make_current, repair, set_mode
 from companion.skipper.behaviors.rest import reached_words
-from companion.skipper.planning.asking import lacks, request
+from companion.skipper.planning.asking import GATHERS_WAY_S, SETS_SAIL_S, UPLOAD_LATENCY_S, drifted_en, lacks, request
 from companion.skipper.planning.diversions import announcement, fenced_off, home_trouble
 from companion.skipper.planning.uploads import upload
 from companion.skipper.planning.vessels import lies_in_the_way
@@ -20,8 +22,10 @@ from companion.skipper.step.wind_limits import winds_wanted
 from companion.skipper.way.gates import Approach
 from companion.skipper.way.geometry import distance_m, leg_distance_m
 from companion.skipper.way.shoals import beyond_words
+from companion.skipper.way.voyage import AreaLike, PointEn, water_to_keep
 
 HAIR_M = 0.3  # what a repaired start's lead-in may come nearer by
+LOOKS = 25  # places looked at on a way that begins where no clearance of a line tells
 STALE_S = 60.0  # a plan that waits for permission is renewed no more often than this
 
 
@@ -76,14 +80,20 @@ def start(ctx: StepContext) -> None:
         ctx.phase(Phase.WAITING, f"waiting for {lacks(ctx) or 'the next try: no problem can be stated'}")
 
 
-def _misplaced(ctx: StepContext) -> str:
-    """Return what is wrong with where the boat lies, empty: nothing that would keep a plan from starting there."""
+def _far_off(ctx: StepContext) -> str:
+    """Return that the boat is nowhere near her mission, in words; empty: she is, or her place is not known."""
     here = ctx.boat_en
-    if here is None:
+    far_m = 0.0 if here is None else distance_m(here, ctx.voyage.goals[0].en_m)
+    if far_m <= ctx.voyage.far_m:
         return ""
-    far_m = distance_m(here, ctx.voyage.goals[0].en_m)
-    if far_m > ctx.voyage.far_m:
-        return f"she is {far_m / 1000.0:.0f} km from the first goal; is it the right mission, and the right home?"
+    return f"she is {far_m / 1000.0:.0f} km from the first goal; is it the right mission, and the right home?"
+
+
+def _misplaced(ctx: StepContext) -> str:
+    """Return what is wrong with where the boat lies, in words; empty: nothing, or her place is not known."""
+    here, far = ctx.boat_en, _far_off(ctx)
+    if here is None or far:
+        return far
     clearance_m = float(ctx.voyage.area.clearance_m([here])[0])
     if clearance_m > 0.0:
         return ""
@@ -139,6 +149,7 @@ def launch(ctx: StepContext) -> None:
         )
         ctx.phase(Phase.STANDARD, "under way")
         ctx.say(Severity.NOTICE, "under way", "AUTO and armed: under way", every_s=0.0)
+        _tell_clearance(ctx)
         _look_at_margin(ctx)
         _look_at_no_go(ctx)
         _look_at_home(ctx)
@@ -146,6 +157,11 @@ def launch(ctx: StepContext) -> None:
             make_current(ctx, state.mission.index + 1)
         return
     ctx.set(voyage=changed(ctx.state.voyage, sailing=False))
+    far = _far_off(ctx)
+    if far:
+        ctx.phase(Phase.WAITING, f"waiting for her to be brought to her mission, or for the right one: {far}")
+        ctx.say(Severity.ERROR, "far off", f"not setting sail: {far}", every_s=math.inf)
+        return
     if stale:
         earliest_s = state.plans.last_s + ctx.config.no_go_replan_interval_s
         wait_s = max(state.plans.retry.not_before_s, state.pending.upload_retry.not_before_s, earliest_s) - ctx.t_s
@@ -157,6 +173,9 @@ def launch(ctx: StepContext) -> None:
             why = lacks(ctx) or "the next try: no problem can be stated"
         ctx.phase(Phase.WAITING, f"waiting for {why}: {stale}")
         return
+    wrong = _misplaced(ctx)
+    if wrong:
+        ctx.say(Severity.WARNING, "misplaced", f"{wrong}: her first leg leads back from there", every_s=math.inf)
     may = ctx.snapshot.permissions
     mode = status.mode.name if status.mode is not None else "unknown"
     if not status.ekf_ok:
@@ -217,17 +236,16 @@ def _stale(ctx: StepContext) -> str:
     boat, leg, wind, route = ctx.boat_en, ctx.leg(), ctx.wind_mean, ctx.state.mission.route
     if boat is None or leg is None or wind is None or route is None or ctx.snapshot.wind.forecast is None:
         return ""
-    wrong = _misplaced(ctx)
-    if wrong:
-        return wrong
+    near = _comes_near(ctx, boat, leg[1])
+    if near:
+        return f"she lies or has drifted {near}"
     age_s, config = ctx.t_s - ctx.state.plans.last_s, ctx.config
-    clear_m = ctx.voyage.area.path_clearance_m([boat, leg[1]])
-    # From below the floor a way that comes no nearer than the boat lies leads it out; another plan would be no other
-    # way.
-    here_m = float(ctx.voyage.area.clearance_m([boat])[0])
-    if clear_m < min(config.margin_floor_m, config.margin_m, here_m - HAIR_M):
-        where = f"{max(0.0, clear_m):.0f} m from {ctx.voyage.area.nearest_name(boat)} on the way to the first waypoint"
-        return f"she lies or has drifted {where}"
+    # A plan that is just there was made from where the drift leads. Held against it again, a boat that drifts ever
+    # faster would plan for ever and lie there: each plan takes longer than setting sail.
+    if age_s > ctx.plan_lead_s + UPLOAD_LATENCY_S + SETS_SAIL_S:
+        near = _comes_near(ctx, drifted_en(ctx, SETS_SAIL_S) or boat, leg[1])
+        if near:
+            return f"before she gathers way she drifts {near}"
     if age_s < STALE_S:
         return ""
     off_m = min(leg_distance_m(boat, *leg), distance_m(boat, leg[0]))
@@ -235,3 +253,38 @@ def _stale(ctx: StepContext) -> str:
         return f"she has drifted {off_m:.0f} m off the first leg"
     turned = abs(difference_rad(wind[0], route.plan_twd_from_rad))
     return f"the wind has turned {math.degrees(turned):.0f}°" if turned > config.wind_change_rad else ""
+
+
+def _comes_near(ctx: StepContext, here: PointEn, to: PointEn) -> str:
+    """Return in words how the way from a place to the first waypoint comes nearer than it may; empty: it does not.
+
+    From below the floor, or outside or inside of what is drawn, a way that comes no nearer leads her out: another plan
+    would be no other way.
+    """
+    config, area = ctx.config, water_to_keep(ctx.voyage.area, here)
+    floor_m = min(config.margin_floor_m, config.margin_m)
+    here_m, solid_m = (float(water.clearance_m([here])[0]) for water in (area, area.unfenced))
+    clear_m = _way_m(area, here, to)
+    is_near = clear_m < min(floor_m, here_m - HAIR_M)
+    if here_m <= 0.0 < solid_m:  # outside the limits nothing solid may lie on the way back
+        is_near = is_near or area.unfenced.path_clearance_m([here, to]) < min(floor_m, solid_m - HAIR_M)
+    return (
+        f"{max(0.0, clear_m):.0f} m from {area.nearest_name(here)} on the way to the first waypoint" if is_near else ""
+    )
+
+
+def _way_m(area: AreaLike, here: PointEn, to: PointEn) -> float:
+    """Return the least clearance of a straight way [m]; that of one that begins where it is 0 or less is below 0."""
+    if float(area.clearance_m([here])[0]) > 0.0:
+        return area.path_clearance_m([here, to])
+    return float(np.min(area.clearance_m(np.linspace(here, to, LOOKS))))
+
+
+def _tell_clearance(ctx: StepContext) -> None:
+    """Let the clearance that is told be of the track from where she gathers way, where the plan began elsewhere."""
+    here, leg, route = drifted_en(ctx, GATHERS_WAY_S), ctx.leg(), ctx.state.mission.route
+    if here is None or leg is None or route is None or route.expected_clearance_m is None:
+        return
+    seen_m = _way_m(water_to_keep(ctx.voyage.area, here), here, leg[1]) - ctx.voyage.boat.hull.reach_m
+    if seen_m < route.expected_clearance_m:
+        ctx.set(mission=changed(ctx.state.mission, route=replace(route, expected_clearance_m=seen_m)))

@@ -21,6 +21,7 @@ from companion.skipper.planning.tides import told
 from companion.skipper.planning.track import problem_tracking, steps
 from companion.skipper.planning.vessels import shares
 from companion.skipper.step import CancelPlan, Diversion, ReplanReason, RequestPlan, StepContext, WindHealth
+from companion.skipper.step.context import SHOWS_S
 from companion.skipper.step.missions import path_length_m
 from companion.skipper.step.state import PendingPlan
 from companion.skipper.way import Gate, bearing_rad, distance_m, half_width_rad, moved
@@ -31,6 +32,8 @@ from companion.skipper.way.stemming import waiting_place
 from companion.skipper.way.voyage import PointEn
 
 UPLOAD_LATENCY_S = 1.5  # item protocol, a few dozen items, and the read-back
+GATHERS_WAY_S = 1.5  # from AUTO and armed on she drifts on, before her sails draw ...
+SETS_SAIL_S = SHOWS_S + GATHERS_WAY_S  # ... and meanwhile as long as AUTO and arming take to show
 SLOW_MPS = 0.5  # slower than this the course over ground says nothing about the heading
 KNOWN_SHARE = 0.5  # of the distance to the goal: a way on board that ends so near to it leads there
 WIDTH_AHEAD_S = 60.0  # how far ahead the interval is taken that a plan remembers of its wind
@@ -135,10 +138,7 @@ def request(
     ctx.set(
         pending=changed(ctx.state.pending, plan=pending),
         plans=changed(
-            ctx.state.plans,
-            last_s=ctx.t_s,
-            rung=rung,
-            replans=ctx.state.plans.replans + (ctx.state.mission.route is not None),
+            ctx.state.plans, last_s=ctx.t_s, rung=rung, replans=ctx.state.plans.replans + ctx.state.voyage.sailing
         ),
     )
     budget = ctx.config.first_plan_budget_s if reason is ReplanReason.START else ctx.config.plan_budget_s
@@ -194,6 +194,12 @@ def _start(ctx: StepContext, from_index: int | None) -> Start | None:
         ahead = ctx.plan_lead_s + UPLOAD_LATENCY_S if sailing else 0.0
         heading = math.atan2(*vehicle.velocity_en_mps) if sailing else vehicle.heading_rad
         place = moved(boat, heading, vehicle.speed_mps * ahead)
+        if not ctx.state.voyage.sailing:
+            # Nobody sails her yet: she drifts until she gathers way. Onto something she is planned for where she lies.
+            after_s = ctx.plan_lead_s + UPLOAD_LATENCY_S + SETS_SAIL_S
+            drifted = drifted_en(ctx, after_s) or boat
+            if drifted != boat and ctx.voyage.area.path_clearance_m([boat, drifted]) > 0.0:
+                place, ahead = drifted, after_s
         # In a current a plan's headings are through the water.
         bow = vehicle.heading_rad if ctx.snapshot.current.is_significant else heading
         tacking = ctx.state.tacking
@@ -209,6 +215,14 @@ def _start(ctx: StepContext, from_index: int | None) -> Start | None:
         heading_rad=bearing_rad(route.leg_from_en_m[from_index], route.points_en_m[from_index]),
         after_s=path_length_m(way) / speed,
     )
+
+
+def drifted_en(ctx: StepContext, after_s: float) -> PointEn | None:
+    """Return where a boat that nobody sails has drifted to after ``after_s`` [s]; None: her place is not known."""
+    boat, vehicle = ctx.boat_en, ctx.snapshot.vehicle
+    if boat is None or vehicle is None or vehicle.speed_mps <= SLOW_MPS:
+        return boat
+    return moved(boat, math.atan2(*vehicle.velocity_en_mps), vehicle.speed_mps * after_s)
 
 
 def lacks(ctx: StepContext, from_index: int | None = None) -> str:
