@@ -129,7 +129,12 @@ BEHAVIORS: tuple[Behavior, ...] = (
         when="no mission of ours is on board",
         does="plans and uploads one, once position, wind and permissions are there",
     ),
-    Behavior(name="set sail", act=_set_sail, when="she is not under way", does="sets AUTO and arms, as permitted"),
+    Behavior(
+        name="set sail",
+        act=_set_sail,
+        when="she is not under way",
+        does="sets AUTO and arms, as permitted; not over a mode that somebody has set",
+    ),
     Behavior(
         name="stand off",
         act=stand_off,

@@ -45,6 +45,7 @@ _SAILED_TO = frozenset(
 )
 REBOOT_RACE_S = 15.0  # a mode change this long before a reboot shows was the reboot, not the operator
 MOVED_US = 100  # a stick or switch that is moved moves by more than this; at rest it trembles by a few
+UNCHOSEN = frozenset({None, Mode.INITIALISING})
 SAILED = frozenset({Mode.AUTO, Mode.GUIDED, *STOPPING}) - {Mode.HOLD}
 
 
@@ -84,6 +85,7 @@ def follow_stops(ctx: StepContext) -> None:
             signs=replace(signs, standing=up, breaches=status.fence_breaches, helm=helm, helm_s=ctx.t_s),
         )
     )
+    _follow_put(ctx, before)
     stop = ctx.state.operator.stop
     if status.is_armed and status.mode not in STOPPING:
         ctx.set(operator=changed(ctx.state.operator, stop=None))
@@ -102,6 +104,23 @@ def follow_stops(ctx: StepContext) -> None:
     stop = ctx.state.operator.stop
     if stop is not None and ctx.t_s - stop.t_s <= TOLD_S:
         ctx.set(operator=changed(ctx.state.operator, stop=replace(stop, cause=_cause(stop, ctx.state.operator.signs))))
+
+
+def _follow_put(ctx: StepContext, before: Signs) -> None:
+    """Notice that somebody changed the mode before she sets sail, and AUTO, which ends it.
+
+    What she is switched on in, whatever it is, nobody has chosen while we listened.
+    """
+    status, put = ctx.autopilot, ctx.state.operator.put
+    if status is None or status.mode in UNCHOSEN:
+        return
+    if ctx.state.voyage.sailing or status.mode is Mode.AUTO:
+        put = None
+    elif before.helm is not None and before.helm[0] not in {status.mode, *UNCHOSEN} and not ctx.is_own(status.mode):
+        put = Stop(t_s=ctx.t_s, before_s=before.helm_s, mode=status.mode, is_armed=status.is_armed, cause=PERSON)
+    if put is not None and ctx.t_s - put.t_s <= TOLD_S and _cause(put, ctx.state.operator.signs) != PERSON:
+        put = None
+    ctx.set(operator=changed(ctx.state.operator, put=put))
 
 
 def _was_sailed(ctx: StepContext, before: Signs) -> bool:
@@ -296,7 +315,7 @@ def begin_again(ctx: StepContext) -> None:
         steering=changed(ctx.state.steering, own_mode=None, until_s=None),
         pending=changed(ctx.state.pending, command=None),
         by_field=FieldSteering(),
-        operator=changed(ctx.state.operator, answering="", stop=None, signs=Signs()),
+        operator=changed(ctx.state.operator, answering="", stop=None, put=None, signs=Signs()),
         adrift=Adrift(),
     )
     if not keeps:

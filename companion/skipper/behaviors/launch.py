@@ -185,6 +185,10 @@ def launch(ctx: StepContext) -> None:
         ctx.phase(Phase.WAITING, "waiting for a position that can be believed")
     elif status.is_armed and status.mode is not Mode.AUTO:
         ctx.phase(Phase.WAITING, f"armed in {mode}: waiting for the operator to give AUTO")
+    elif ctx.state.operator.put is not None:
+        text = f"{mode} was set by somebody else"
+        ctx.phase(Phase.WAITING, f"not setting sail: waiting for AUTO, or the order go_on: {text}")
+        ctx.say(Severity.WARNING, "put", f"not setting sail: {text}: set AUTO, or order go_on", every_s=math.inf)
     elif status.mode is not Mode.AUTO:
         by_hand = "the operator to set AUTO (or [operator] set_auto = true)"
         who = "the autopilot to take AUTO" if may.may_set_mode else by_hand

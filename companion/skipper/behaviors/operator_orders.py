@@ -199,6 +199,7 @@ def _held(ctx: StepContext) -> str:
 
 def _go_on(ctx: StepContext, _: Order) -> Answer:
     was = ctx.state.orders.standing
+    ctx.set(operator=changed(ctx.state.operator, put=None))
     if was is None:
         ctx.set(plans=changed(ctx.state.plans, retry=PATIENT))
         gate = ctx.gate

@@ -408,6 +408,7 @@ class OperatorState:
     is_back: bool = False  # AUTO has come back: plan from where the boat is now
     signs: Signs = Signs()
     stop: Stop | None = None  # the boat is not being sailed though it was
+    put: Stop | None = None  # before she sets sail: a mode that a person chose since the autopilot was first heard
     answering: str = ""  # the cause whose stop we have ended or are ending; empty: none
     sent_home: bool = False  # ... which put the boat into RTL
 

@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 from shapely.geometry import box
 
+from companion.messages import Mode, StatusText
 from companion.skipper.step import actions as act
-from companion.skipper.step.config import Permissions
+from companion.skipper.step.config import ALL_PERMITTED, Permissions
 from companion.skipper.step.state import Phase
 from companion.skipper.way.voyage import Goal
 from tests.skipper.world import World, skipper, voyage
@@ -57,7 +58,7 @@ def test_outside_the_fence_she_is_not_led_back_over_a_rock():
     world.state = replace(world.state, plans=replace(world.state.plans, last_s=world.t))
     asked = world.count(act.RequestPlan)
     assert world.run(60, lambda w: w.count(act.RequestPlan) > asked and not w.state.pending.plan)
-    world.permissions = Permissions(may_upload=True, may_set_mode=True, may_arm=True)
+    world.permissions = ALL_PERMITTED
     assert world.run(60, is_sailing), world.state.why
     assert world.run(200, is_done)
     assert world.skipper.voyage.area.unfenced.path_clearance_m(world.track[-200:]) > 0.0
@@ -70,7 +71,7 @@ def test_far_from_her_mission_no_plan_is_uploaded_again_and_again():
     world.position = (0.0, -200_000.0)
     world.state = replace(world.state, position=replace(world.state.position, last_seen=None))
     uploads, plans = world.uploads, world.count(act.RequestPlan)
-    world.permissions = Permissions(may_upload=True, may_set_mode=True, may_arm=True)
+    world.permissions = ALL_PERMITTED
     world.run(300)
     assert not is_sailing(world)
     assert "is it the right mission" in world.state.why
@@ -101,7 +102,7 @@ def test_a_drift_that_carries_her_behind_something_before_she_gathers_way_is_pla
     assert world.run(30, lambda w: w.count(act.RequestPlan) > asked)
     assert "before she gathers way she drifts" in world.actions[-1][1].text
     assert world.skipper.voyage.area.path_clearance_m([world.position, first]) > world.skipper.config.margin_floor_m
-    world.permissions = Permissions(may_upload=True, may_set_mode=True, may_arm=True)
+    world.permissions = ALL_PERMITTED
     assert world.run(60, is_sailing), world.state.why
     assert world.count(act.RequestPlan) <= asked + 3  # and does not plan for ever
     assert world.state.plans.replans == 0  # as the record counts them: of plans under way
@@ -117,7 +118,7 @@ def test_the_clearance_told_at_setting_sail_is_that_of_the_way_from_where_she_is
     )
     assert world.run(60, lambda w: bool(w.mission))
     promised_m = world.state.mission.route.expected_clearance_m
-    world.permissions = Permissions(may_upload=True, may_set_mode=True, may_arm=True)
+    world.permissions = ALL_PERMITTED
     assert world.run(60, is_sailing)
     begun = len(world.track) - 5
     told_m = world.state.mission.route.expected_clearance_m
@@ -125,3 +126,54 @@ def test_the_clearance_told_at_setting_sail_is_that_of_the_way_from_where_she_is
     came_m = world.skipper.voyage.area.path_clearance_m(world.track[begun:]) - world.skipper.voyage.boat.hull.reach_m
     assert told_m <= promised_m
     assert told_m <= came_m + 0.5
+
+
+def chosen(world, mode):
+    """Let somebody else set a mode, as far as that, before she sets sail."""
+    world.permissions = MAY_UPLOAD
+    assert world.run(60, lambda w: bool(w.mission))
+    world.set_mode(mode)
+    world.run(2)
+    world.permissions = ALL_PERMITTED
+    return world
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.GUIDED, Mode.LOITER])
+@pytest.mark.parametrize("way", ["AUTO", "go_on"])
+def test_a_mode_that_somebody_sets_before_she_sails_is_not_overruled(mode, way):
+    """HOLD that was set while the plan was made was answered with AUTO and arming."""
+    world = chosen(make(), mode)
+    world.run(90)
+    assert (world.mode, world.armed) == (mode, False)
+    assert f"{mode.name} was set by somebody else" in world.state.why
+    assert sum(entry[1] == "put" for entry in world.log) == 1
+    if way == "AUTO":
+        world.set_mode(Mode.AUTO)
+    else:
+        world.order("go_on")
+    assert world.run(20, is_sailing), world.state.why
+
+
+@pytest.mark.parametrize("mode", [Mode.MANUAL, Mode.HOLD, Mode.LOITER])
+def test_whatever_she_is_switched_on_in_she_sets_sail_from(mode):
+    world = make(mode=Mode.INITIALISING)
+    world.run(2)
+    world.set_mode(mode)
+    assert world.run(60, is_sailing), world.state.why
+
+
+def test_hold_by_a_failsafe_before_she_sails_is_no_persons():
+    world = make(permissions=MAY_UPLOAD)
+    assert world.run(60, lambda w: bool(w.mission))
+    world.set_mode(Mode.HOLD)
+    world.events.append(StatusText(t_s=world.t, severity=2, text="EKF failsafe"))
+    world.run(2)
+    world.permissions = ALL_PERMITTED
+    assert world.run(20, is_sailing), world.state.why
+
+
+def test_a_reboot_before_she_sails_makes_what_she_is_switched_on_in_nobodys_choice():
+    world = chosen(make(), Mode.HOLD)
+    world.run(5)
+    world.boot_s = -world.t
+    assert world.run(60, is_sailing), world.state.why
