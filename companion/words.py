@@ -103,6 +103,19 @@ def _parts(kind: Any) -> list[Any]:
     return [kind, *(part for inner in get_args(kind) for part in _parts(inner))]
 
 
+def below_words(value: float, limit: float, digits: int = 1) -> str:
+    """Return a value that is below a limit with as many digits, 3 at most, as tell that it is.
+
+    >>> below_words(2.5, 3.0), below_words(2.97, 3.0), below_words(2.9998, 3.0), below_words(7.6, 8.0, 0)
+    ('2.5', '2.97', 'just under 3', '7.6')
+    """
+    for places in range(digits, 4):
+        told = f"{value:.{places}f}"
+        if float(told) < limit:
+            return told
+    return f"just under {limit:g}"
+
+
 def clearance_words(clearance_m: float, where: str = "inside an obstacle or outside the fence") -> str:
     """Return a clearance in words: a negative one is how far she is where she must not be."""
     return f"{-clearance_m:.1f} m {where}" if clearance_m < -0.05 else f"{abs(clearance_m):.1f} m"

@@ -11,7 +11,7 @@ from companion.frozen import changed
 from companion.messages import Severity
 from companion.skipper.behaviors.field_guidance import has_sailed
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waits_for_gun
-from companion.skipper.step.actions import CancelPlan
+from companion.skipper.step.actions import CancelPlan, ReplanReason
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.state import Inside
 from companion.skipper.way.gates import Approach, Gate, again, is_on_wrong_side
@@ -85,7 +85,10 @@ def pass_gates(ctx: StepContext) -> None:
         ctx.set(progress=changed(ctx.state.progress, gate=number + 1, reached=reached, closest_m=math.inf))
         if gate.ends_goal:
             ctx.set(progress=changed(ctx.state.progress, bearing_rad=0.0))
-            ctx.say(Severity.NOTICE, "goal", f"{gate.name} reached, {min(left, closest):.1f} m from it", every_s=0.0)
+            least_m = min(left, closest)
+            is_counted = counted and least_m > gate.radius_m
+            how = f": the autopilot has passed it, its radius is {gate.radius_m:g} m" if is_counted else ""
+            ctx.say(Severity.NOTICE, "goal", f"{gate.name} reached, {least_m:.1f} m from it{how}", every_s=0.0)
 
 
 def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
@@ -171,7 +174,7 @@ def _cross(ctx: StepContext) -> None:
     following = next((n for n, g in enumerate(ctx.gates) if g.goal > gate.goal), len(ctx.gates))
     if not gate.is_crossed:
         # The boat's route leads to the place before the line, which is behind it.
-        ctx.set(plans=changed(ctx.state.plans, asked=f"{gate.name} is crossed"))
+        ctx.set(plans=changed(ctx.state.plans, asked=f"{gate.name} is crossed", asked_as=ReplanReason.NEXT_GOAL))
     ctx.set(
         progress=changed(
             ctx.state.progress,
@@ -303,7 +306,9 @@ def lay_sweeps(ctx: StepContext, gate: Gate, *, is_shift: bool = False) -> bool:
     why = "the wind has turned: " if is_shift else f"{100.0 * share:.0f} % covered: " if rounds else ""
     ctx.set(
         pending=changed(ctx.state.pending, plan=None),
-        plans=changed(ctx.state.plans, asked=f"{why}{len(sweeps)} sweeps of {gate.name}"),
+        plans=changed(
+            ctx.state.plans, asked=f"{why}{len(sweeps)} sweeps of {gate.name}", asked_as=ReplanReason.NEXT_GOAL
+        ),
     )
     ctx.say(
         Severity.NOTICE,

@@ -373,3 +373,16 @@ def test_a_waypoint_close_beyond_the_line_may_be_left_a_moment_before_she_crosse
     pass_gates(ctx)
     said_of = [a for a in ctx.actions if isinstance(a, Announce) and a.code == "gate missed"]
     assert bool(said_of) is is_missed
+
+
+@pytest.mark.parametrize("off_m", [3.0, 7.0])
+def test_a_mark_that_counts_beyond_its_radius_says_by_what(off_m):
+    """ "goal 1 reached, 7.0 m from it" of one with a radius of 5 m: as near as she came, by the autopilot's count."""
+    goals = (Goal(en_m=(0.0, 100.0), radius_m=5.0, name="one"), Goal(en_m=(0.0, 300.0), name="two"))
+    way = route((0.0, 100.0), (0.0, 300.0), (0.0, 300.0), gate_of=(0, 1, -1))
+    here = (off_m, 101.0)
+    ctx = moment(way, goals=goals, at=here, mission={"route": way, "index": 1}, progress={"closest_m": off_m})
+    pass_gates(ctx)
+    words = next(a.text for a in ctx.actions if isinstance(a, Announce) and a.code == "goal")
+    by_count = ": the autopilot has passed it, its radius is 5 m" if off_m > 5.0 else ""
+    assert words == f"one reached, {off_m:.1f} m from it{by_count}"

@@ -718,6 +718,9 @@ def test_the_boat_in_irons_bears_away_and_sails_on():
     assert world.run(40, lambda w: w.mode is Mode.AUTO)
     assert world.state.phase is not Phase.OPERATOR
     assert world.run(1500, is_done)
+    reasons = {a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)}
+    assert act.ReplanReason.IN_IRONS in reasons
+    assert act.ReplanReason.ORDER not in reasons
 
 
 def test_after_two_failed_tacks_it_gybes_round():

@@ -39,7 +39,7 @@ from companion.geofence.mission.options import (
 from companion.geofence.mission.text import GOAL_MISSING, MAX_TOML_BYTES, parse_options
 from companion.geofence.shapes import Obstacle, Shape, Zone, ZoneKind
 from companion.messages import GeoPoint
-from companion.words import file_name
+from companion.words import below_words, file_name
 
 AS_IT_IS: Mapping[Path, bytes] = {}  # nothing is given: every file is read from the disk
 KM_M = 1_000.0
@@ -590,10 +590,8 @@ def gate_trouble(gate: GoalGate, frame: LocalFrame, local: LocalArea, floor_m: f
         return ""
     least = int(np.argmin(middle)) + int(roomy[0]) if len(roomy) else int(np.argmax(clear_m))
     clearance_m, where = float(clear_m[least]), opening[least]
-    return (
-        f"between its marks there are {max(0.0, clearance_m):.0f} m to {local.nearest_name(where)}: "
-        f"the margin's floor is {floor_m:g} m"
-    )
+    clear = below_words(max(0.0, clearance_m), floor_m, 0)
+    return f"between its marks there are {clear} m to {local.nearest_name(where)}: the margin's floor is {floor_m:g} m"
 
 
 # What a mission is called: by its name, or by its file's; and what is worth knowing about that.

@@ -26,6 +26,7 @@ from companion.planner.problem.evaluate import Evaluation, evaluate, shore_of
 from companion.planner.problem.value import Problem, resolved
 from companion.planner.risk.tacks import of_risky, tacks_at_risk
 from companion.planner.track.expected import ExpectedTrack, curve_mps, expected
+from companion.words import below_words
 
 Path = list[tuple[float, float]]
 Judge = Callable[[Path], Evaluation]
@@ -177,7 +178,8 @@ def lacking(problem: Problem, seen: ExpectedTrack) -> str:
     east, north = seen.worst_en or (0.0, 0.0)
     what = "a beat left to the autopilot" if seen.is_beat else "the track that would be sailed"
     return (
-        f"{what} comes to {floor - seen.lack_m:.1f} m of something solid at {east:.0f} east, {north:.0f} north; "
+        f"{what} comes to {below_words(floor - seen.lack_m, floor)} m of something solid "
+        f"at {east:.0f} east, {north:.0f} north; "
         f"the floor is {floor:.1f} m"
     )
 

@@ -40,7 +40,7 @@ from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.saved import Standing
 from companion.skipper.step.state import PATIENT, Answered, FieldSteering, Phase
 from companion.skipper.way import Approach, PointEn, distance_m
-from companion.words import counted
+from companion.words import below_words, counted
 
 REMEMBERED_S = 10.0  # longer than any station repeats a command that is not answered
 STATIONS = 8  # whose last order is remembered
@@ -246,7 +246,7 @@ def _skip_goal(ctx: StepContext, _: Order) -> Answer:
     ctx.set(
         orders=changed(ctx.state.orders, skipped=ctx.state.orders.skipped + 1),
         progress=changed(ctx.state.progress, missed_s=None),
-        plans=changed(ctx.state.plans, retry=PATIENT, asked=text),
+        plans=changed(ctx.state.plans, retry=PATIENT, asked=text, asked_as=ReplanReason.ORDER),
     )
     standing = ctx.state.orders.standing
     then = f"{ctx.gates[ctx.state.progress.gate].name} is next when {standing.words} ends" if standing else _next(ctx)
@@ -284,7 +284,11 @@ def _replan(ctx: StepContext, order: Order) -> Answer:
         trouble = f"there is nothing to plan: {ctx.state.why}"
     if trouble:
         return _not_now(trouble)
-    ctx.set(plans=changed(ctx.state.plans, asked=f"asked for by {order.source.words}", retry=PATIENT))
+    ctx.set(
+        plans=changed(
+            ctx.state.plans, asked=f"asked for by {order.source.words}", asked_as=ReplanReason.ORDER, retry=PATIENT
+        )
+    )
     return _done("a new plan from here is asked for")
 
 
@@ -361,7 +365,7 @@ def _forget_shoal(ctx: StepContext, order: Order) -> Answer:
     bound = diversion(ctx)
     is_bound = not ctx.state.voyage.over if bound is None else bound.has_place and not is_at_rest(ctx)
     if is_bound and not _hindrance(ctx):
-        ctx.set(plans=changed(ctx.state.plans, asked=text, retry=PATIENT))
+        ctx.set(plans=changed(ctx.state.plans, asked=text, asked_as=ReplanReason.ORDER, retry=PATIENT))
     return _done(f"{text}, {len(shoals) - 1} left")
 
 
@@ -483,7 +487,8 @@ def _trouble(ctx: StepContext, place: Place) -> str:
     clearance_m = float(area.clearance_m([en_m])[0])
     if math.hypot(*en_m) > area.reach_m or clearance_m >= least_m:
         return ""
-    return f"the place is {clearance_m:.1f} m from {area.nearest_name(en_m)}: no plan leads nearer than {least_m:g} m"
+    off = below_words(clearance_m, least_m)
+    return f"the place is {off} m from {area.nearest_name(en_m)}: no plan leads nearer than {least_m:g} m"
 
 
 def _en(ctx: StepContext, place: Place) -> PointEn:

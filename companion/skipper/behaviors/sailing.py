@@ -435,7 +435,7 @@ def bear_away(ctx: StepContext) -> bool:
             heading = bear_away_rad(boat, vehicle.heading_rad, wind[0], ctx.voyage.area)
             ctx.set(steering=changed(ctx.state.steering, until_s=ctx.t_s + STEER_S, heading_rad=heading))
         else:
-            ctx.set(plans=changed(ctx.state.plans, asked=IN_IRONS))
+            ctx.set(plans=changed(ctx.state.plans, asked=IN_IRONS, asked_as=ReplanReason.IN_IRONS))
             return False
     heading_rad = ctx.state.steering.heading_rad or 0.0
     until = ctx.state.steering.until_s
@@ -455,7 +455,7 @@ def bear_away(ctx: StepContext) -> bool:
             steering=changed(
                 ctx.state.steering, until_s=None, heading_rad=None, own_mode=None if refused else Mode.GUIDED
             ),
-            plans=changed(ctx.state.plans, asked=IN_IRONS),
+            plans=changed(ctx.state.plans, asked=IN_IRONS, asked_as=ReplanReason.IN_IRONS),
         )
         return False
     ctx.act(SteerHeading(heading_rad=heading_rad, text="out of irons"))

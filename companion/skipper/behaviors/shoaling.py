@@ -17,7 +17,7 @@ from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.skipper.behaviors.helm import hand_back
 from companion.skipper.planning.uploads import upload
-from companion.skipper.step import CancelPlan, Phase, StepContext
+from companion.skipper.step import CancelPlan, Phase, ReplanReason, StepContext
 from companion.skipper.step.state import Sounded
 from companion.skipper.way.geometry import distance_m, is_tack, moved
 from companion.skipper.way.shoals import MOST_SHOALS, Shoal, found, over, water_taken
@@ -149,7 +149,13 @@ def turns_back(ctx: StepContext) -> bool:
     ahead = moved(boat, course_rad, RUNS_S * vehicle.speed_mps)
     solid = ctx.voyage.area.unfenced
     if place is None or solid.path_clearance_m([boat, ahead, place]) < ctx.voyage.boat.hull.reach_m:
-        ctx.set(plans=changed(ctx.state.plans, asked="it shoals, and no deep water is known behind her"))
+        ctx.set(
+            plans=changed(
+                ctx.state.plans,
+                asked="it shoals, and no deep water is known behind her",
+                asked_as=ReplanReason.OBSTACLE,
+            )
+        )
         return False
     if state.pending.plan is not None:
         ctx.act(CancelPlan(request_id=state.pending.plan.request_id))
@@ -211,7 +217,7 @@ def _goes_back(ctx: StepContext, boat: PointEn, velocity_en_mps: tuple[float, fl
     has_opened = made_good_mps >= WAY_MPS and distance_m(boat, memory.turned_en_m) >= OPENED_M and is_deep
     if left_m <= THERE_M or has_opened or ctx.t_s - memory.turned_s > GIVES_UP_S:
         ctx.set(
-            plans=changed(ctx.state.plans, asked="it shoaled: with what was found"),
+            plans=changed(ctx.state.plans, asked="it shoaled: with what was found", asked_as=ReplanReason.OBSTACLE),
             soundings=changed(memory, turned_en_m=None),
         )
         return False

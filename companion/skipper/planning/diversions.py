@@ -24,6 +24,7 @@ from companion.skipper.way.shoals import beyond_words
 from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import PointEn, Refuge
 from companion.traffic import Policy
+from companion.words import below_words
 
 DRAGGED = "dragged off"  # a watchdog
 HOME, REST, ROOM = "home", "the place to rest", "water with room"
@@ -439,7 +440,7 @@ def place_trouble(ctx: StepContext, what: str, en_m: PointEn) -> str:
         near, bare = area.nearest_name(en_m), float(area.unfenced.clearance_m([en_m])[0])
         near += ", which dries" if near in {water.name for water in ctx.voyage.drying} else ""
         where = (
-            f"{clearance:.0f} m from {near}"
+            f"{below_words(clearance, floor_m, 0)} m from {near}"
             if clearance > 0.0
             else (beyond_words(area, en_m) if bare > 0.0 else f"not in free water but in {near}")
         )

@@ -73,7 +73,7 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
     if changed is not None:
         return changed
     if state.plans.asked:
-        return Trigger(reason=ReplanReason.ORDER, text=state.plans.asked)
+        return Trigger(reason=state.plans.asked_as, text=state.plans.asked)
     if state.progress.missed_s is not None and bound is None:
         return Trigger(reason=ReplanReason.MISSED_BUOY, text="missed: again", interval_s=config.settle_s)
     boat = ctx.boat_en

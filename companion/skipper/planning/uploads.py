@@ -27,7 +27,7 @@ from companion.skipper.step.state import PendingPlan, PendingUpload, Retry
 from companion.skipper.way import PointEn, distance_m
 from companion.skipper.way.judge import judge
 from companion.skipper.way.voyage import water_to_keep
-from companion.words import counted
+from companion.words import below_words, counted
 
 SPARE_M = 0.3  # a boat below the floor may come no nearer than this more: the turn away takes room
 TACKS_RISK = 1e-3  # a chance of contact by failed tacks is greater than another by more than this
@@ -254,7 +254,7 @@ def _below_floor(problem: Problem, new: ExpectedTrack, old: ExpectedTrack | None
     floor_m = 0.0 if problem.tracking is None else problem.tracking.floor_m
     if new.lack_m <= 0.0:
         return ""
-    says = f"it would pass {new.clearance_m:.1f} m clear, the floor is {floor_m:g} m"
+    says = f"it would pass {below_words(new.clearance_m, floor_m)} m clear, the floor is {floor_m:g} m"
     if here_m >= floor_m:
         return says
     least_m = here_m if old is None else min(here_m, old.clearance_m)

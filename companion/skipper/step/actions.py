@@ -30,7 +30,9 @@ class ReplanReason(enum.Enum):
     REFUGE = "refuge"  # the battery is critical, or the voyage out of time
     HOME = "home"  # all goals are reached, or the autopilot wants the boat home
     REST = "rest"  # dragged off the place where the boat loiters
-    ORDER = "order"  # somebody asked for it, or it has come out of irons
+    ORDER = "order"  # somebody asked for it
+    TACK_FAILED = "tack_failed"
+    IN_IRONS = "in_irons"  # it has come out of irons
     RETRY = "retry"  # a step of the ladder after nothing was found
     MISMATCH = "mismatch"  # the mission on the autopilot is not the one that was uploaded
 

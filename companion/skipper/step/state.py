@@ -372,6 +372,7 @@ class Planning:
 
     ready_route: Route | None = None  # planned, not allowed or not yet possible to upload
     asked: str = ""  # why a new plan is wanted at once, until it is asked for; empty: it is not
+    asked_as: ReplanReason = ReplanReason.ORDER
     last_s: float = float("-inf")  # when a plan was last asked for
     retry: Retry = PATIENT
     rung: int = 0  # step of the ladder being tried

@@ -17,6 +17,7 @@ from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import Mode, Severity
 from companion.skipper.planning.autopilot_beats import TACKS_FAIL_AFTER
+from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import MOST_IRONS_S, MOST_LEE_MPS
 from companion.skipper.step.state import Tacking
@@ -150,4 +151,4 @@ def _failed(ctx: StepContext, tacking: Tacking) -> None:
         return
     is_near = float(ctx.voyage.area.clearance_m([boat])[0]) < NEAR_SOLID_M
     if tacking.in_a_row >= TACKS_FAIL_AFTER or is_near:
-        ctx.set(plans=changed(ctx.state.plans, asked=TACK_FAILED))
+        ctx.set(plans=changed(ctx.state.plans, asked=TACK_FAILED, asked_as=ReplanReason.TACK_FAILED))

@@ -22,7 +22,7 @@ from companion.skipper.planning.answers import _told_m, take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.not_found import not_found
 from companion.skipper.planning.track import steps
-from companion.skipper.planning.uploads import judged
+from companion.skipper.planning.uploads import _below_floor, judged
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, SetCurrent, UploadMission
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import Retry
@@ -338,3 +338,10 @@ def test_a_gate_is_never_left_out_as_passed():
     ctx = turn_of(world)
     leave_passed(ctx)
     assert ctx.actions == []
+
+
+def test_a_plan_that_is_refused_for_a_hair_says_by_how_much():
+    """ "it would pass 3.0 m clear, the floor is 3 m"."""
+    problem = SimpleNamespace(tracking=SimpleNamespace(floor_m=3.0))
+    track = ExpectedTrack(clearance_m=2.97, lack_m=0.03, is_kept=False)
+    assert _below_floor(problem, track, None, here_m=9.0) == "it would pass 2.97 m clear, the floor is 3 m"

@@ -56,6 +56,7 @@ def test_a_failure_is_said_with_what_it_taught_and_asks_for_a_plan_near_somethin
     assert "1 of 1" in text
     assert "25 %" in text  # (0.1 * 5 + 1) / 6
     assert ctx.state.plans.asked == TACK_FAILED
+    assert ctx.state.plans.asked_as is ReplanReason.TACK_FAILED
 
 
 def test_far_from_everything_only_the_second_in_a_row_asks():

@@ -65,6 +65,12 @@ def test_no_reason_counts_without_a_place_a_wind_or_a_voyage(lacking):
     assert find_trigger(moment(DEEP, **(asked | lacking)), ()) is None
 
 
+@pytest.mark.parametrize("kind", [ReplanReason.TACK_FAILED, ReplanReason.IN_IRONS, ReplanReason.NEXT_GOAL])
+def test_a_plan_that_nobody_ordered_is_told_by_its_own_reason(kind):
+    """ "planning: order" stood there of a tack that had failed."""
+    assert reason(moment(DEEP, plans={"asked": "a tack failed", "asked_as": kind})) is kind
+
+
 def test_a_boat_that_was_given_back_plans_before_all_else_and_says_by_whom():
     by_person = find_trigger(moment(DEEP, operator={"is_back": True}, plans={"asked": "ordered"}), ())
     by_failsafe = find_trigger(moment(DEEP, operator={"is_back": True, "answering": "radio"}), ())
