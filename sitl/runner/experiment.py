@@ -173,7 +173,10 @@ def sail_kept(sail: Callable[[Job[CaseT]], dict[str, Any]], job: Job[CaseT]) -> 
 
 @contextlib.contextmanager
 def ends_when_told() -> Iterator[None]:
-    """Take SIGTERM, by which a queue ends what it began, for Ctrl-C: workers are ended, and nothing is left behind."""
+    """Take SIGTERM, by which a queue ends what it began, for Ctrl-C: workers are ended, and nothing is left behind.
+
+    A shell begins what it runs in the background with SIGINT ignored, and then nothing would come of it.
+    """
     if threading.current_thread() is not threading.main_thread():  # where no signal comes
         yield
         return
@@ -181,11 +184,14 @@ def ends_when_told() -> Iterator[None]:
     def end(*_: object) -> None:
         signal.raise_signal(signal.SIGINT)  # which a running loop takes between its steps, and ends its tasks
 
-    before = signal.signal(signal.SIGTERM, end)
+    before = signal.signal(signal.SIGTERM, end), signal.getsignal(signal.SIGINT)
+    if before[1] is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        signal.signal(signal.SIGTERM, before[0])
+        signal.signal(signal.SIGINT, before[1])
 
 
 def _settled(

@@ -199,7 +199,15 @@ def test_keys_are_in_the_order_of_numbers():
     ]
 
 
-def test_a_voyage_is_ended_between_its_steps_when_the_campaign_is_told():
+@pytest.fixture(params=[signal.default_int_handler, signal.SIG_IGN], ids=["in front", "in the background"])
+def ctrl_c(request):
+    """What a shell lets Ctrl-C do: nothing, to what it runs in the background."""
+    before = signal.signal(signal.SIGINT, request.param)
+    yield request.param
+    signal.signal(signal.SIGINT, before)
+
+
+def test_a_voyage_is_ended_between_its_steps_when_the_campaign_is_told(ctrl_c):
     """SIGTERM raised in the middle of a voyage's step: 150 lines of tracebacks, and once it went on for ever."""
     steps = []
 
@@ -214,3 +222,4 @@ def test_a_voyage_is_ended_between_its_steps_when_the_campaign_is_told():
     with pytest.raises(KeyboardInterrupt), ends_when_told():
         run_virtual(voyage())
     assert steps == ["whole", "ended"]
+    assert signal.getsignal(signal.SIGINT) is ctrl_c
