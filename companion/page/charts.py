@@ -9,7 +9,8 @@ import contextlib
 import functools
 import gzip
 import hashlib
-import mmap
+import os
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -176,8 +177,10 @@ class Pmtiles:
     def __init__(self, path: Path) -> None:
         from pmtiles.tile import deserialize_directory, deserialize_header
 
-        with path.open("rb") as file:
-            self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        # Read, not mapped: of a map of a file that is cut short meanwhile the process dies (SIGBUS), and the voyage.
+        with open_regular(path) as file:
+            self._file = os.dup(file.fileno())
+        weakref.finalize(self, os.close, self._file)
         self.header = deserialize_header(self._bytes(0, 127))
         self._directory = functools.lru_cache(_KEPT)(
             lambda offset, length: deserialize_directory(self._bytes(offset, length))
@@ -185,7 +188,7 @@ class Pmtiles:
         self._directory(self.header["root_offset"], self.header["root_length"])  # a broken one is refused at once
 
     def _bytes(self, offset: int, length: int) -> bytes:
-        return self._map[offset : offset + length]
+        return os.pread(self._file, min(length, MOST_TILE + 1), offset)  # nothing of it is longer
 
     def get(self, z: int, x: int, y: int) -> bytes | None:
         """Return a tile."""

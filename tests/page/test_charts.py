@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import os
 import sqlite3
 
 import pytest
@@ -118,6 +119,20 @@ def test_a_chart_with_flipped_bytes_is_refused_or_gives_pictures(both, tmp_path,
         chart = open_chart(broken)
         for z in ZOOMS:
             assert chart.tile(z, *tile_of(*PLACE, z))[0] == "image/png"
+
+
+def test_a_chart_that_is_cut_short_or_replaced_under_way_is_clear_water(both, tmp_path):
+    """Of PMTiles the companion died with the voyage (SIGBUS): copying a newer chart over it cuts it short first."""
+    z, (x, y) = 13, tile_of(*PLACE, 13)
+    for source in both:
+        path = tmp_path / source.name
+        path.write_bytes(source.read_bytes())
+        chart = open_chart(path)
+        assert chart.tile(z, x, y) == ("image/png", painted(z, x, y))
+        os.truncate(path, 200)
+        assert chart.tile(z, x, y) == ("image/png", NO_TILE)
+        path.write_bytes(source.read_bytes())
+        assert chart.tile(z, x, y) == ("image/png", painted(z, x, y))
 
 
 def test_the_page_serves_tiles_that_a_browser_keeps_and_no_others(both):
