@@ -113,7 +113,7 @@ def read_nmea(data: bytes, rows: Rows) -> None:
             if lat is not None and lon is not None:
                 rows.take(t_s, lat=lat, lon=lon)
             if n > 11 and value[10] is not None and "variation" not in rows.now:
-                rows.take(t_s, variation=math.radians(value[10] * (-1.0 if cells[11] == "W" else 1.0)))
+                rows.take(t_s, variation=_to_east(value[10], cells[11]))
         elif t_s is None:
             continue
         elif kind == "HDT" and n > 1 and value[1] is not None:
@@ -121,12 +121,15 @@ def read_nmea(data: bytes, rows: Rows) -> None:
         elif kind in {"HDG", "HDM"} and n > 1 and value[1] is not None:
             variation = rows.now["variation"][1] if "variation" in rows.now else None
             if kind == "HDG" and n > 5 and value[4] is not None:
-                variation = math.radians(value[4] * (-1.0 if cells[5] == "W" else 1.0))
+                variation = _to_east(value[4], cells[5])
+            deviation = _to_east(value[2] or 0.0, cells[3]) if kind == "HDG" and n > 3 else 0.0
             untold += variation is None
-            rows.take(t_s, heading=math.radians(value[1]) + (variation or 0.0))
+            rows.take(t_s, heading=math.radians(value[1]) + deviation + (variation or 0.0))
         elif kind == "VHW" and n > 6 and value[5] is not None:
             rows.take(t_s, stw=value[5] * MPS_PER_KNOT)
         elif kind == "MWV" and n > 5 and cells[2] == "R" and value[1] is not None and value[3] is not None:
+            if cells[5] == "V":
+                continue  # the instrument does not believe it itself
             unit = {"N": MPS_PER_KNOT, "M": 1.0, "K": 1.0 / 3.6}.get(cells[4], _NAN)
             rows.take(t_s, awa=math.radians(math.remainder(value[1], 360.0)), aws=value[3] * unit)
         elif kind == "RPM" and n > 3 and cells[1] == "E" and value[3] is not None:
@@ -147,6 +150,11 @@ def _rmc_time(cells: list[str]) -> float | None:
         return None
     fraction = _number("0." + cells[1].partition(".")[2]) if "." in cells[1] else 0.0
     return at.timestamp() + (fraction or 0.0)
+
+
+def _to_east(degrees: float, side: str) -> float:
+    """Return an angle to east or west as one to the east [rad]."""
+    return math.radians(degrees * (-1.0 if side == "W" else 1.0))
 
 
 def _degrees(text: str, side: str) -> float | None:

@@ -218,6 +218,29 @@ def test_a_receiver_that_tells_no_course_tells_no_velocity_but_of_a_boat_that_li
     assert np.nanmax(np.hypot(*read.log.velocity_en_mps.T)) < 0.1
 
 
+def test_a_wind_that_its_instrument_does_not_believe_is_none(tmp_path):
+    """MWV with V was learned from as one with A: our own outputs write it where a vane is not believed."""
+    path = nmea(tmp_path / "a.nmea")
+    lines = re.sub(r"\*..$", "", path.read_text(), flags=re.MULTILINE).splitlines()
+    for i, line in enumerate(lines):
+        if "MWV" in line and 4 * 100 <= i < 4 * 150:
+            lines[i] = "$WIMWV,170.0,R,40.0,N,V"
+    path.write_text("\n".join(lines))
+    log = only(path)
+    assert not np.isfinite(log.aws_mps[105:148]).any()
+    assert np.nanmax(log.aws_mps) < 15.0
+
+
+def test_the_deviation_that_a_compass_tells_counts(tmp_path):
+    """Of HDG the variation was added, and not the deviation beside it."""
+    path = nmea(tmp_path / "a.nmea")
+    text = re.sub(r"\*..$", "", path.read_text(), flags=re.MULTILINE)
+    path.write_text(re.sub(r"(HDG,[\d.]+),,,", r"\1,5.0,W,", text))
+    log = only(path)
+    turned = np.angle(np.exp(1j * (log.heading_rad - LOG.heading_rad[: len(log.heading_rad)])))
+    assert np.degrees(np.nanmedian(turned)) == pytest.approx(-5.0, abs=0.3)
+
+
 @pytest.mark.parametrize(
     ("rmc", "hdg", "is_told"), [(True, True, True), (True, False, True), (False, True, True), (False, False, False)]
 )
