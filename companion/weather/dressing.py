@@ -45,11 +45,28 @@ class Climate:
 
 
 def dressed(weather: Weather, error: ForecastError, *, seed: int = 0, copies: int | None = None) -> Weather:
-    """Return a forecast with members that are off as it is: several of each where it has few. A seed repeats it."""
+    """Return a forecast with members that are off as it is: several of each where it has few. A seed repeats it.
+
+    Each of them has the waves of the member that it is made of.
+    """
     members = weather.members
     many = max(1, math.ceil(COPIES / len(members))) if copies is None else copies
     numbers = {m: tuple(m * many + k for k in range(many)) for m in members}
-    return replace(weather, wind=tuple(_dressed(cube, error, numbers, seed) for cube in weather.wind))
+    return replace(
+        weather,
+        wind=tuple(_dressed(cube, error, numbers, seed) for cube in weather.wind),
+        waves=tuple(_numbered(cube, numbers) for cube in weather.waves),
+    )
+
+
+def _numbered(cube: Cube, numbers: dict[int, tuple[int, ...]]) -> Cube:
+    """Return a cube by the numbers of the members that are made of its own; of a single one as it is, for all."""
+    if len(cube.members) == 1:
+        return cube
+    made = [(number, row) for row, m in enumerate(cube.members) for number in numbers.get(m, ())]
+    if not made:
+        return cube
+    return replace(cube, members=tuple(n for n, _ in made), values=cube.values[[row for _, row in made]])
 
 
 def _dressed(cube: Cube, error: ForecastError, numbers: dict[int, tuple[int, ...]], seed: int) -> Cube:

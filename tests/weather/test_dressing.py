@@ -48,6 +48,18 @@ def test_few_members_become_several_and_many_stay_as_many():
     assert dressed(weather(*((0.1 * k, -8.0) for k in range(20))), ERROR).members == tuple(range(20))
 
 
+def test_a_copy_has_the_waves_of_the_member_that_it_is_made_of():
+    """Copies of five members were numbered anew, their waves were not: the second of the first had the second's."""
+    winds = weather(*((0.0, -float(m)) for m in range(1, 6)))
+    heights = cube(LAT, LON, DAYS, [steady(float(m), 0.0) for m in range(1, 6)])
+    waves = replace(heights, values=heights.values[..., :1])
+    still = ForecastError(now_mps=0.0, per_day_mps=0.0)
+    found = dressed(replace(winds, waves=(waves,)), still)
+    assert found.waves_m(T0, 0.5, 0.5).tolist() == (-found.wind_en_mps(T0, 0.5, 0.5)[:, 1]).tolist()
+    one = dressed(replace(winds, waves=(waves.only(0),)), still)
+    assert one.waves_m(T0, 0.5, 0.5).tolist() == [1.0] * 10
+
+
 def test_two_grids_of_a_member_have_one_error():
     fine = replace(cube(LAT, LON, np.arange(0.0, 49.0, 3.0), steady(0.0, -8.0)))
     both = dressed(Weather(wind=(fine, weather().wind[0])), ERROR, copies=5)
