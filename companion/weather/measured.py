@@ -134,12 +134,12 @@ def _shifted(cube: Cube, off: Off, shift: dict[int, Floats]) -> Cube:
     """Return a cube on its own times and, while the correction lasts, each hour of them."""
     ends = off.utc_s + _LASTS * MEMORY_S
     hours = off.utc_s + _HOUR_S * np.arange(0.0, (ends - off.utc_s) / _HOUR_S + 1.0)
+    # Just before now it is as it was: no hour is corrected that had passed.
+    hours = np.append(hours, off.utc_s - 1.0)
     hours = hours[(hours > cube.utc_s[0]) & (hours < cube.utc_s[-1])]
     for begins, closes in cube.holes_s():
         hours = hours[(hours <= begins) | (hours >= closes)]
-    # Just before now it is as it was: no hour is corrected that had passed.
-    before = off.utc_s - 1.0
-    times = np.unique(np.concatenate([cube.utc_s, hours, [before] if cube.utc_s[0] < before < cube.utc_s[-1] else []]))
+    times = np.unique(np.concatenate([cube.utc_s, hours]))
     values = _at_times(cube, times)
     ahead = times - off.utc_s
     left = np.where(ahead < 0.0, 0.0, np.exp(-np.maximum(0.0, ahead) / MEMORY_S))

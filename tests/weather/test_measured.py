@@ -55,6 +55,17 @@ def test_ten_minutes_over_the_date_line_are_a_place_on_it():
     assert abs(off.lon_deg) == pytest.approx(180.0, abs=0.02)
 
 
+def test_a_gap_that_it_is_now_in_stays_one():
+    """The wind just before now was set into the gap, which made two steps of it that are none: a wind was made up."""
+    hours = np.array([h for h in HOURS if not 21.0 < h < 27.0])
+    plain = Weather(wind=(cube(LAT, LON, hours, steady(0.0, -5.0)),))
+    off = off_by(plain, measured((2.0, -7.0), until=NOW - 3 * 3600.0), NOW)
+    after = corrected(plain, off)
+    assert after.wind[0].holes_s() == plain.wind[0].holes_s() == ((NOW - 3 * 3600.0, NOW + 3 * 3600.0),)
+    assert np.isnan(at(after, 0.5)).all()
+    assert np.isfinite(at(after, 3.0)).all()
+
+
 def test_each_member_is_corrected_and_keeps_what_is_not_known():
     plain = weather(*((0.0, -5.0 - 0.5 * k) for k in range(15)))
     off = off_by(plain, measured((1.0, -6.0)), NOW)
