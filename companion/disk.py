@@ -9,9 +9,11 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import gzip
 import io
 import os
 import stat
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -237,6 +239,18 @@ def read_regular(path: Path, most_bytes: int = -1, *, follows_links: bool = True
     """Return what is in such a file, at most so much of it. Raises OSError."""
     with open_regular(path, follows_links=follows_links) as file:
         return file.read(most_bytes)
+
+
+def unpacked(data: bytes) -> bytes:
+    """Return what gzip packed.
+
+    Raises:
+        gzip.BadGzipFile: it is none, is cut off, or is damaged: the library raises an error of another kind for each.
+    """
+    try:
+        return gzip.decompress(data)
+    except (EOFError, zlib.error) as error:
+        raise gzip.BadGzipFile(str(error)) from None
 
 
 def _require_regular(mode: int) -> None:

@@ -6,7 +6,6 @@ import csv
 import gzip
 import hashlib
 import math
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -156,7 +155,7 @@ def _fill(files: list[Path], data: list[bytes], rows: Rows) -> int | None:
             read_csv(data[0], rows)
         else:
             read_nmea(data[0], rows)
-    except (zlib.error, EOFError, gzip.BadGzipFile, csv.Error) as error:
+    except (gzip.BadGzipFile, csv.Error) as error:
         raise Useless(f"it is damaged ({str(error)[:60]})") from None
     return None
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
 import math
-import zlib
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -154,8 +152,6 @@ def read_steering(paths: list[Path]) -> tuple[list[SteeringLog], list[Skipped]]:
             skipped.append(Skipped(name=str(path), why=str(why)))
         except InputError as error:
             skipped.append(Skipped(name=str(path), why=error.problem))
-        except (zlib.error, EOFError, gzip.BadGzipFile) as error:
-            skipped.append(Skipped(name=str(path), why=f"it is damaged ({str(error)[:60]})"))
     return read, skipped
 
 

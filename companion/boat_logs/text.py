@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import datetime as dt
-import gzip
 import io
 import math
 from collections.abc import Iterator
 
 from companion.boat_logs.rows import AT_REST, Rows, Useless
+from companion.disk import unpacked
 from companion.geo import MPS_PER_KNOT
 
 _NAN = math.nan
@@ -22,9 +22,7 @@ _ANGLES = ("heading", "cog", "awa", "twd")
 
 def read_csv(data: bytes, rows: Rows) -> None:
     """Read columns ``t_s`` (or ``time``, ISO 8601), ``heading_deg, cog_deg, sog_mps`` or ``sog_kn`` and their like."""
-    text = (
-        gzip.decompress(data).decode("utf-8", "replace") if data[:2] == b"\x1f\x8b" else data.decode("utf-8", "replace")
-    )
+    text = unpacked(data).decode("utf-8", "replace") if data[:2] == b"\x1f\x8b" else data.decode("utf-8", "replace")
     reader = csv.DictReader(io.StringIO(text.lstrip("\ufeff")))
     names = {(n or "").strip().lower(): n for n in reader.fieldnames or []}
     if not {"t_s", "time"} & set(names):

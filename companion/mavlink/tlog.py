@@ -7,12 +7,12 @@ tail, and finds its way again after damage in the middle.
 
 from __future__ import annotations
 
-import gzip
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from companion.disk import unpacked
 from companion.errors import InputError
 from companion.mavlink.wire.frames import STX
 
@@ -66,8 +66,8 @@ def read_tlog(path: Path) -> list[TlogRecord]:
     """
     try:
         data = path.read_bytes()
-        data = gzip.decompress(data) if path.suffix == ".gz" else data
-    except (OSError, EOFError) as error:
+        data = unpacked(data) if path.suffix == ".gz" else data
+    except OSError as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(str(path), "", f"cannot be read ({reason})") from error
     records = list(parse_tlog(data))

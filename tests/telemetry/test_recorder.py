@@ -3,9 +3,11 @@
 import asyncio
 import contextlib
 import errno
+import gzip
 import json
 import math
 import os
+import re
 import subprocess
 import time
 from pathlib import Path
@@ -16,8 +18,9 @@ import pytest
 from companion.app.options import in_thread
 from companion.clock import run
 from companion.disk import NEW, Disk, what_is_there
-from companion.errors import JobError
+from companion.errors import InputError, JobError
 from companion.guard import Auxiliary, Guard
+from companion.mavlink.tlog import read_tlog
 from companion.telemetry.folder import recorder as module
 from companion.telemetry.folder.recorder import (
     DECISIONS,
@@ -38,6 +41,30 @@ def test_records_survive_a_torn_last_line(tmp_path):
     path = tmp_path / "v" / DECISIONS
     path.write_bytes(path.read_bytes()[:-4])
     assert [r["k"] for r in read_jsonl(path)] == [0, 1, 2, 3]
+
+
+def packed_and_damaged(data):
+    """Yield a packed part that is damaged as a card does it: bytes of its middle, of its end, and cut off."""
+    whole = gzip.compress(data, mtime=0)
+    middle = len(whole) // 2
+    yield whole[:middle] + b"\xff" * 40 + whole[middle + 40 :]
+    yield whole[:-8] + b"\0" * 8
+    yield whole[:middle]
+
+
+def test_a_closed_part_that_is_damaged_is_one_line(tmp_path):
+    """The library's own error came out of `companion report` and `replay`, as a traceback."""
+    lines = b"".join(b'{"k":%d,"is":"%x"}\n' % (k, k**9) for k in range(900))
+    (tmp_path / DECISIONS).write_bytes(b'{"k":9}\n')
+    for data in packed_and_damaged(lines):
+        part = tmp_path / "decisions-000001.jsonl.gz"
+        part.write_bytes(data)
+        with pytest.raises(JobError, match=re.escape(f"{part}: is damaged")):
+            read_jsonl(tmp_path / DECISIONS)
+        log = tmp_path / "telemetry-000001.tlog.gz"
+        log.write_bytes(data)
+        with pytest.raises(InputError, match=re.escape(f"{log}: cannot be read")):
+            read_tlog(log)
 
 
 def test_damage_in_the_middle_is_not_a_torn_line(tmp_path):

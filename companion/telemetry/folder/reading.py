@@ -278,7 +278,7 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 def _rows_of(path: Path) -> list[dict[str, Any]]:
     try:
         lines = read_part(path).decode().split("\n")
-    except (ValueError, EOFError, gzip.BadGzipFile):
+    except (ValueError, gzip.BadGzipFile):
         raise InputError(str(path), "", "is not text", DAMAGED) from None
     header = next(csv.reader(lines[:1]), [])
     missing = [name for name in TRACK_COLUMNS if name not in header]

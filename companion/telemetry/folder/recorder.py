@@ -36,7 +36,7 @@ from typing import Any, Self
 import numpy as np
 import tomli_w
 
-from companion.disk import Disk, FolderLock, is_mistake, open_regular, reason
+from companion.disk import Disk, FolderLock, is_mistake, open_regular, reason, unpacked
 from companion.errors import JobError
 
 DECISIONS = "decisions.jsonl"
@@ -75,9 +75,9 @@ def is_from_the_start(path: Path) -> bool:
 
 
 def read_part(path: Path) -> bytes:
-    """Return what is in a part."""
+    """Return what is in a part. Raises gzip.BadGzipFile where it is damaged."""
     data = path.read_bytes()
-    return gzip.decompress(data) if path.suffix == ".gz" else data
+    return unpacked(data) if path.suffix == ".gz" else data
 
 
 def _number(path: Path, part: Path) -> int:
@@ -555,10 +555,14 @@ def read_jsonl(path: Path) -> list[dict[str, Any]]:
 
     Raises:
         FileNotFoundError: it is not there.
+        JobError: it is damaged; the sentence says where.
     """
     records: list[dict[str, Any]] = []
     for part in parts(path) or [path]:
-        lines = read_part(part).split(b"\n")
+        try:
+            lines = read_part(part).split(b"\n")
+        except gzip.BadGzipFile as error:
+            raise JobError(f"{part}: is damaged ({error}); take it from its copy") from None
         for number, line in enumerate(lines):
             if not line.strip():
                 continue
