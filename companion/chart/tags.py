@@ -39,6 +39,8 @@ NATURAL = {
     "mud": "dries",
     "land": "land",
 }
+# Of these a depth is that of the water over them; of a pile, a pier or a buoy it is that of the water beside it.
+SUBMERGED = frozenset({"rock", "wreck", "obstruction", "reef", "shoal"})
 POINT_M = {"wreck": 20.0, "reef": 20.0, "shoal": 20.0}
 OTHER_POINT_M = 10.0
 LINE_M = 3.0
@@ -64,8 +66,6 @@ def dangers_of(row: Row, wanted: Wanted) -> list[Danger]:
     tags = {**{k: row.text(k) for k in row.attributes}, **hstore(row.text("other_tags"))}
     seamark, name = tags.get("seamark:type", ""), tags.get("seamark:name", "") or tags.get("name", "")
     depth_m = _depth_m(tags, seamark)
-    if depth_m is not None and depth_m >= wanted.safety_depth_m:
-        return []
     reason = (
         SEAMARKS.get(seamark, "") or MADE.get(tags.get("man_made", ""), "") or NATURAL.get(tags.get("natural", ""), "")
     )
@@ -76,13 +76,14 @@ def dangers_of(row: Row, wanted: Wanted) -> list[Danger]:
         is_shut = ENTRY_PROHIBITED in tags.get("seamark:restricted_area:restriction", "")
         if wanted.restricted == "all" or (wanted.restricted == "prohibited" and is_shut):
             reason = "entry prohibited" if is_shut else "restricted area"
-    if not reason:
+    if not reason or (reason in SUBMERGED and depth_m is not None and depth_m >= wanted.safety_depth_m):
         return []
     if row.geometry.geom_type.endswith("LineString"):
         radius_m = LINE_M
     if row.geometry.geom_type.endswith("Polygon"):
         radius_m = 0.0
-    return [Danger(reason=reason, geometry=row.geometry, name=name, depth_m=depth_m, radius_m=radius_m)]
+    over_m = depth_m if reason in SUBMERGED else None
+    return [Danger(reason=reason, geometry=row.geometry, name=name, depth_m=over_m, radius_m=radius_m)]
 
 
 def _depth_m(tags: dict[str, str], seamark: str) -> float | None:

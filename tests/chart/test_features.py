@@ -127,6 +127,11 @@ def test_a_header_that_is_not_to_be_believed_is_refused(header, told):
         ({"seamark:type": "buoy_lateral"}, [("buoy", 10.0)]),
         ({"seamark:type": "beacon_special_purpose"}, [("beacon", 10.0)]),
         ({"natural": "wood"}, []),
+        ({"natural": "reef", "depth": "12"}, []),
+        ({"seamark:type": "pile", "depth": "12"}, [("pile", 10.0)]),  # these stand in water of that depth
+        ({"man_made": "pier", "depth": "12"}, [("pier", 10.0)]),
+        ({"seamark:type": "platform", "seamark:platform:depth": "30"}, [("platform", 10.0)]),
+        ({"seamark:type": "mooring", "depth": "12"}, [("mooring", 10.0)]),
     ],
 )
 def test_a_tag_of_openstreetmap(attributes, told):
