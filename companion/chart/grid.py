@@ -53,6 +53,8 @@ def parse_ascii_grid(text: str, source: str) -> Grid:
             break
         try:
             header[words[0].lower()] = float(words[1])
+            if not math.isfinite(header[words[0].lower()]) and words[0].lower() != "nodata_value":
+                raise ValueError  # noqa: TRY301 - said below, as what is no number is
         except ValueError:
             raise InputError(source, f"line {first + 1}", f"{words[1][:20]!r} is not a number") from None
     missing = [k for k in ("ncols", "nrows", "cellsize") if k not in header]

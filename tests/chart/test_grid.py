@@ -87,6 +87,8 @@ def test_an_ascii_grid_begins_in_the_north():
 @pytest.mark.parametrize(
     ("text", "told"),
     [
+        (ASC.replace("ncols 3", "ncols inf"), "g.asc: line 1: 'inf' is not a number"),
+        (ASC.replace("0.5", "nan"), "g.asc: line 5: 'nan' is not a number"),
         (ASC.replace("-5", "x"), "g.asc: line 8: holds what is not a number; save it again"),
         (ASC.removesuffix(" -9999\n"), "g.asc: line 8: ends after 5 of 6 heights; fetch it again"),
         (ASC + "1 2 3\n", "g.asc: line 9: has more than 3 x 2 heights; save it again"),
