@@ -29,6 +29,7 @@ from bench.make_problems import BOAT, NONE, SHIP, ar1, coast, islands, kalman, w
 from bench.scaling import islands as board_of
 from companion.planner import Problem, plan
 from companion.planner.solve import warm
+from sailbench.problem_set import FOLDER
 
 KNOWN = Path(__file__).parent / "held_out.json"
 BUDGETS_S = (0.1, 0.3, 1.0)
@@ -317,7 +318,7 @@ def main(argv=None):
     if args.overrun is not None:
         here = Path(__file__).parent
         warm()
-        overrun([*here.glob("problems/*.json"), *here.glob("requests/*.json")], args.overrun or OVERRUN_S)
+        overrun([*FOLDER.glob("*.json"), *here.glob("requests/*.json")], args.overrun or OVERRUN_S)
         return 0
     problems = list(drawn(args.kinds, args.count))
     for _, _, held_out in problems[:: args.count]:
