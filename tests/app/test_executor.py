@@ -15,7 +15,7 @@ from companion.mavlink.link import Link
 from companion.messages import GeoPoint, Mode, waypoint
 from companion.planner import Problem
 from companion.planner.worker import InlinePlanner
-from companion.skipper.step.actions import ReadMission, ReplanReason, RequestPlan, SetMode, UploadMission
+from companion.skipper.step.actions import ReadMission, ReplanReason, RequestPlan, SetMode, SetParameter, UploadMission
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import CommandResult, UploadResult
 from sitl.autopilot import HOME, AutopilotConfig, Impairment, MemoryLink, SimulatedAutopilot, serve
@@ -123,3 +123,17 @@ def test_a_plan_that_is_not_urgent_gets_longer_on_a_slow_computer_and_no_other(s
 
     run_virtual(main())
     assert planner.budgets_s == pytest.approx([2.0 * first, 2.0 * ahead, 2.0], rel=1e-3)
+
+
+def test_a_parameter_is_written_on_the_autopilot_and_one_that_it_does_not_know_is_told():
+    values = []
+
+    async def orders(line, executor, boat, autopilot):
+        for number, name in enumerate(("WNDVN_DIR_OFS", "WNDVN_NOT_ONE"), 1):
+            executor.submit([SetParameter(command_id=number, name=name, value=-20.0)])
+            await asyncio.sleep(40.0)
+        values.append((await autopilot.get_parameter("WNDVN_DIR_OFS")).value)
+
+    outcomes = [o for _, o in carried_out(orders)]
+    assert values == [-20.0]
+    assert [(o.command_id, o.result) for o in outcomes] == [(1, CommandResult.ACCEPTED), (2, CommandResult.REFUSED)]

@@ -16,7 +16,7 @@ from companion.boat import Afloat, AutopilotLimits, LearnedAfloat, as_learned, m
 from companion.boat.afloat import Told
 from companion.clock import run
 from companion.compose import config_of, estimator_of, voyage_of
-from companion.current.estimator import SCALE_SD
+from companion.current.estimator import SCALE_SD, CurrentEstimator
 from companion.eta import Pace
 from companion.field.guidance import LastResort
 from companion.fold import VoyageFold
@@ -385,3 +385,15 @@ def test_an_offset_that_we_wrote_is_no_vane_that_was_turned_and_what_was_told_of
     for _ in range(2):
         told(fold, "WNDVN_DIR_OFS", 30.0)
     assert heard(fold, 140, 142).wind_before.turned_rad == pytest.approx(math.radians(30.0)), "somebody else's is"
+
+
+def test_the_vane_is_held_against_how_she_sails_and_anew_once_when_the_direction_leaps(monkeypatch):
+    fold, taken, forgotten = fresh(), [], []
+    monkeypatch.setattr(fold.vane, "update", lambda now, current_en_mps: taken.append(now.t_s))
+    monkeypatch.setattr(fold.vane, "forget", lambda: forgotten.append(True))
+    heard(fold, 1, 20)
+    assert taken == [float(t) for t in range(1, 20)]
+    assert not forgotten
+    monkeypatch.setattr(CurrentEstimator, "wind_before_rad", property(lambda _: 1.0))
+    heard(fold, 20, 30)
+    assert forgotten == [True]

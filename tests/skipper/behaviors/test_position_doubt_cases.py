@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 from shapely.geometry import box
 
-from companion.skipper.behaviors.position_doubt import follow, is_other_shut
+from companion.messages import Mode
+from companion.skipper.behaviors.position_doubt import follow, is_other_shut, stands_off
 from companion.skipper.step import StepContext
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.saved import Persisted, SavedPlace
@@ -193,3 +194,13 @@ def test_whether_the_reckoned_place_is_clear_ahead(rock, error_m, speed_mps, is_
     ctx = moment(WAY, obstacles=(rock,), speed_mps=speed_mps, position={"doubt": doubt})
     assert is_other_shut(ctx) is is_shut
     assert not is_other_shut(moment(WAY, obstacles=(rock,), speed_mps=speed_mps))
+
+
+@pytest.mark.parametrize("begun", [(500.0, 500.0), None])
+def test_the_drift_of_a_loiter_that_is_begun_anew_is_reckoned_from_there(begun):
+    """Reckoned from where the one before was begun, she circled well and was adrift for good."""
+    hold = {"steering": {"own_mode": Mode.HOLD}, "adrift": {"loiter_en_m": begun, "loiter_s": 0.0}}
+    ctx = seen(at=(40.0, 0.0), position={"anew": Mode.HOLD}, status={"mode": Mode.HOLD}, **hold)
+    assert stands_off(ctx)
+    adrift = ctx.state.adrift
+    assert (adrift.loiter_en_m, adrift.loiter_s) == (((40.0, 0.0), NOW_S) if begun else (None, 0.0))

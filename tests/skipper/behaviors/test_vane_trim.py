@@ -1,18 +1,24 @@
 """A vane that is turned: put right by WNDVN_DIR_OFS where that is permitted, said where it is not, and only in need."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
 
 import pytest
 
 from companion.current import VaneError
+from companion.geo.angles import wrap_pi
 from companion.messages import Mode
 from companion.skipper.behaviors.vane_trim import AGAIN_S, MOST_TRIMS, STUCK_S
+from companion.skipper.behaviors.wind_doubt import doubted_wind
 from companion.skipper.step import actions as act
+from companion.skipper.step.config import Permissions
+from companion.skipper.step.context import permitted
 from companion.skipper.step.state import Phase
+from tests.skipper.moments import NOW_S, moment, route
 from tests.skipper.test_voyage import make, said
 
+WAY = route((300.0, 0.0), (600.0, 0.0))
 WHY = "she makes 0.9 m/s astern where 2.5 m/s were to be expected"
 TURNED = VaneError(off_rad=math.radians(40.0), sigma_rad=math.radians(10.0), is_sure=True)
 
@@ -115,3 +121,22 @@ def test_one_that_helped_leaves_all_tries_to_the_next_fault():
     world.extra |= {"unsure": "", "vane": None}
     world.run(700)
     assert world.state.vane.trims == 0
+
+
+@pytest.mark.parametrize(
+    "name", [None, *(field.name for field in fields(Permissions) if field.name.startswith("may_"))]
+)
+def test_a_parameter_is_written_by_the_permission_to_trim_the_vane_and_by_no_other(name):
+    action = act.SetParameter(command_id=1, name="WNDVN_DIR_OFS", value=1.0)
+    permissions = Permissions(**({} if name is None else {name: True}))
+    assert permitted(action, permissions) == (name == "may_trim_vane")
+
+
+def test_after_it_was_written_the_wind_of_the_plan_on_board_is_not_the_true_one():
+    """It was planned by the vane that was turned: sea room was sought from a wind that never blew."""
+    ctx = moment(WAY, seen={"wind_before": None})
+    turned = replace(ctx.state.mission.route, plan_tws_mps=5.0, plan_twd_from_rad=wrap_pi(ctx.wind_now[0] + 1.5))
+    ctx.set(mission=replace(ctx.state.mission, route=turned, uploaded_s=NOW_S - 60.0))
+    assert doubted_wind(ctx) is not None
+    ctx.set(vane=replace(ctx.state.vane, trimmed_s=NOW_S - 30.0))
+    assert doubted_wind(ctx) is None
