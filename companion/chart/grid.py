@@ -51,12 +51,13 @@ def parse_ascii_grid(text: str, source: str) -> Grid:
         words = line.split()
         if len(words) != 2 or not words[0][:1].isalpha():
             break
+        key, wrong = words[0].lower(), InputError(source, f"line {first + 1}", f"{words[1][:20]!r} is not a number")
         try:
-            header[words[0].lower()] = float(words[1])
-            if not math.isfinite(header[words[0].lower()]) and words[0].lower() != "nodata_value":
-                raise ValueError  # noqa: TRY301 - said below, as what is no number is
+            header[key] = float(words[1])
         except ValueError:
-            raise InputError(source, f"line {first + 1}", f"{words[1][:20]!r} is not a number") from None
+            raise wrong from None
+        if key != "nodata_value" and not math.isfinite(header[key]):
+            raise wrong
     missing = [k for k in ("ncols", "nrows", "cellsize") if k not in header]
     if missing:
         raise InputError(source, "line 1", f"an ASCII grid has no {missing[0]}", "save it as Esri ASCII (.asc)")
