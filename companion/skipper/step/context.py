@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cached_property, lru_cache
+from typing import TypedDict, Unpack
 
 from companion.boat import Afloat, AutopilotLimits, as_learned, loiter_swing_m, mark_of
 from companion.frozen import changed
@@ -160,6 +161,32 @@ def with_known_boat(
     return voyage if boat is voyage.boat else replace(voyage, boat=boat)
 
 
+class Parts(TypedDict, total=False):
+    """The parts of ``SkipperState`` that rules replace."""
+
+    wants: tuple[str, ...]
+    vehicle: VehicleIdentity
+    mission: LoadedMission
+    progress: GoalProgress
+    voyage: VoyageState
+    plans: Planning
+    pending: Pending
+    operator: OperatorState
+    steering: SteeringState
+    by_field: FieldSteering
+    fallback: Fallback
+    adrift: Adrift
+    vane: VaneTrim
+    soundings: Soundings
+    tacking: Tacking
+    afloat: Afloat
+    position: PositionState
+    orders: Orders
+    alarms: Alarms
+    traffic: TrafficState
+    announced: Announced
+
+
 class StepContext:
     """The work of one step. ``voyage`` is in the water that the autopilot's fences leave: ``circle`` and ``drawn``.
 
@@ -189,76 +216,9 @@ class StepContext:
         self._jump: tuple[tuple[Snapshot, Fix, Mode | None], float] | None = None
 
     # ------------------------------------------------------------------------------------- changing
-    def set(
-        self,
-        *,
-        wants: tuple[str, ...] | None = None,
-        vehicle: VehicleIdentity | None = None,
-        mission: LoadedMission | None = None,
-        progress: GoalProgress | None = None,
-        voyage: VoyageState | None = None,
-        plans: Planning | None = None,
-        pending: Pending | None = None,
-        operator: OperatorState | None = None,
-        steering: SteeringState | None = None,
-        by_field: FieldSteering | None = None,
-        fallback: Fallback | None = None,
-        adrift: Adrift | None = None,
-        vane: VaneTrim | None = None,
-        soundings: Soundings | None = None,
-        tacking: Tacking | None = None,
-        afloat: Afloat | None = None,
-        position: PositionState | None = None,
-        orders: Orders | None = None,
-        alarms: Alarms | None = None,
-        traffic: TrafficState | None = None,
-        announced: Announced | None = None,
-    ) -> None:
-        """Replace parts of the state whole; a part that is None stays."""
-        state = self.state
-        if wants is not None:
-            state = changed(state, wants=wants)
-        if vehicle is not None:
-            state = changed(state, vehicle=vehicle)
-        if mission is not None:
-            state = changed(state, mission=mission)
-        if progress is not None:
-            state = changed(state, progress=progress)
-        if voyage is not None:
-            state = changed(state, voyage=voyage)
-        if plans is not None:
-            state = changed(state, plans=plans)
-        if pending is not None:
-            state = changed(state, pending=pending)
-        if operator is not None:
-            state = changed(state, operator=operator)
-        if steering is not None:
-            state = changed(state, steering=steering)
-        if by_field is not None:
-            state = changed(state, by_field=by_field)
-        if fallback is not None:
-            state = changed(state, fallback=fallback)
-        if adrift is not None:
-            state = changed(state, adrift=adrift)
-        if vane is not None:
-            state = changed(state, vane=vane)
-        if soundings is not None:
-            state = changed(state, soundings=soundings)
-        if tacking is not None:
-            state = changed(state, tacking=tacking)
-        if afloat is not None:
-            state = changed(state, afloat=afloat)
-        if position is not None:
-            state = changed(state, position=position)
-        if orders is not None:
-            state = changed(state, orders=orders)
-        if alarms is not None:
-            state = changed(state, alarms=alarms)
-        if traffic is not None:
-            state = changed(state, traffic=traffic)
-        if announced is not None:
-            state = changed(state, announced=announced)
-        self.state = state
+    def set(self, **parts: Unpack[Parts]) -> None:
+        """Replace parts of the state whole; what is not named stays."""
+        self.state = changed(self.state, **parts)
 
     def learn_shoals(self, shoals: tuple[Shoal, ...]) -> None:
         """Let these be the shoals that were sounded: from now on they are no water."""
