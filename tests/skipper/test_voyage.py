@@ -10,6 +10,7 @@ import shapely
 from shapely.geometry import box
 
 from companion.boat import AutopilotLimits
+from companion.current import WaterCurrent
 from companion.geo.angles import difference_rad
 from companion.messages import MissionItem, Mode, StatusText, sailed_part
 from companion.planner import PlanStatus, plan
@@ -663,6 +664,28 @@ def test_an_old_plan_that_is_as_good_as_a_new_one_stays():
     assert asked
     assert said(world, "plan kept")
     assert not [t for t, a in world.actions if isinstance(a, act.UploadMission) and t > asked[0]]
+
+
+def test_an_old_plan_that_stays_is_held_to_what_it_was_kept_under():
+    """A current comes and changes no way: it is planned for once, not each minute, and hides no reason behind it."""
+    world = make(Goal(en_m=(900.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0))
+
+    def beside(problem, seed):
+        found = plan(problem, expansions=world.expansions, seed=seed)
+        start, goal = found.waypoints_en[0], found.waypoints_en[-1]
+        return replace(found, waypoints_en=np.array([start, 0.5 * (start + goal) + (0.0, 8.0), goal]))
+
+    world.planner = beside
+    assert world.run(60, is_sailing)
+    sailed = world.state.mission.route
+    world.extra["current"] = WaterCurrent(east_mps=0.3, is_significant=True)
+    world.run(250)
+    assert said(world, "plan kept")
+    asked = [t for t, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.CURRENT]
+    assert len(asked) == 1
+    kept = world.state.mission.route
+    assert (kept.points_en_m, kept.plan_id, kept.why) == (sailed.points_en_m, sailed.plan_id, sailed.why)
+    assert (kept.plan_current_east_mps, kept.plan_current_north_mps) == (0.3, 0.0)
 
 
 def test_a_closed_way_ends_in_a_named_hold():

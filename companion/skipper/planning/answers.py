@@ -246,24 +246,23 @@ def _keep_old(ctx: StepContext, pending: PendingPlan, plan: Plan) -> bool:
             return False
     elif gain > max(ctx.config.keep_gain_s, ctx.config.keep_gain * old.time_s):
         return False
-    facts, when, told = pending.facts, arrival(problem, old.legs), path_risk(problem, old.legs)
-    ctx.set(
-        mission=changed(
-            ctx.state.mission,
-            route=replace(
-                route,
-                plan_t_s=facts.plan_t_s,
-                plan_twd_from_rad=facts.plan_twd_from_rad,
-                plan_tws_mps=facts.plan_tws_mps,
-                plan_half_width_rad=facts.plan_half_width_rad,
-                risk=told.total,
-                vessel_risk=told.vessels.total,
-                cost_s=old.time_s,
-                median_s=_time(when, "median_s"),
-                late_s=_time(when, "late_s"),
-            ),
-        )
+    when, told = arrival(problem, old.legs), path_risk(problem, old.legs)
+    kept = replace(
+        pending.facts,  # under these it was found sound: what has changed since is held against them from now on
+        items=route.items,
+        points_en_m=route.points_en_m,
+        leg_from_en_m=route.leg_from_en_m,
+        gate_of=route.gate_of,
+        plan_id=route.plan_id,
+        expected_clearance_m=route.expected_clearance_m,
+        why=route.why,
+        risk=told.total,
+        vessel_risk=told.vessels.total,
+        cost_s=old.time_s,
+        median_s=_time(when, "median_s"),
+        late_s=_time(when, "late_s"),
     )
+    ctx.set(mission=changed(ctx.state.mission, route=kept))
     ctx.say(
         Severity.INFO,
         "plan kept",
