@@ -119,3 +119,10 @@ def below_words(value: float, limit: float, digits: int = 1) -> str:
 def clearance_words(clearance_m: float, where: str = "inside an obstacle or outside the fence") -> str:
     """Return a clearance in words: a negative one is how far she is where she must not be."""
     return f"{-clearance_m:.1f} m {where}" if clearance_m < -0.05 else f"{abs(clearance_m):.1f} m"
+
+
+def goals_reached(goals: int, given_up: int) -> str:
+    """Return how many of the goals were reached, of a voyage that has none left."""
+    if given_up:
+        return f"{goals - given_up} of {goals} goals reached, {given_up} given up by order"
+    return "the goal is reached" if goals == 1 else f"all {goals} goals reached"

@@ -579,6 +579,7 @@ class _Shell:
             "arrived_before": self._arrived_before and not self.log.figures.uploads,
             **self.log.figures.to_dict(),
             "goals_reached": min(goals, len(state.progress.reached)),
+            "goals_given_up": state.orders.skipped,
             "goals": goals,
             "searched": [
                 {"goal": self.voyage.legs[goal].name or f"goal {goal + 1}", "covered": share}

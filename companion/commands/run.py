@@ -20,7 +20,7 @@ from companion.errors import CompanionError, InputError
 from companion.guard import Auxiliary
 from companion.program.arguments import chart_option, host_name, http_address, number, out_folder, system_id, whole
 from companion.program.commands import missing
-from companion.words import counted, file_name
+from companion.words import counted, file_name, goals_reached
 
 if TYPE_CHECKING:
     from companion.addresses import Displays
@@ -434,13 +434,19 @@ def _voyage(
     return None if summary["end_reason"] == ADOPTED else code
 
 
+def _how_arrived(goals: int, given_up: int) -> str:
+    """Return behind "arrived" what was not reached; empty: nothing."""
+    return f" ({goals_reached(goals, given_up)})" if given_up else ""
+
+
 def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
     """Return the exit code and what is said of a voyage at its end."""
     from companion.app.from_autopilot import ADOPTED
 
     if summary["arrived_before"]:
         # an order that gets no better by trying again
-        return 2, f"not sailed: {name} had arrived before this start; --again sails it again"
+        how = _how_arrived(summary["goals"], summary["goals_given_up"])
+        return 2, f"not sailed: {name} had arrived before this start{how}; --again sails it again"
     if summary["arrived"] and not summary["plans"] and not summary["uploads"]:
         text = (
             f"arrived, with nothing sailed anew: at this start she lay at the goal of {name} already, or the "
@@ -734,10 +740,12 @@ def confirm_again(mission: Any, state_path: Path, err: Console) -> bool | None:
         saved = read_state(state_path)
     except (OSError, ValueError):
         return False  # the voyage says what is wrong with it
-    if not Skipper(voyage=voyage_of(mission), config=config_of(mission)).has_arrived(saved):
+    voyage = voyage_of(mission)
+    if not Skipper(voyage=voyage, config=config_of(mission)).has_arrived(saved):
         return False
     day = datetime.fromtimestamp(state_path.stat().st_mtime, UTC)
-    err.write(f"{mission.name} has arrived already ({day:%d %b %Y %H:%M} UTC). Sail it again? [y/N] ")
+    how = _how_arrived(len(voyage.legs), saved.skipped)
+    err.write(f"{mission.name} has arrived already{how} ({day:%d %b %Y %H:%M} UTC). Sail it again? [y/N] ")
     if sys.stdin.readline().strip().lower() in {"y", "yes"}:
         return True
     return None

@@ -62,7 +62,7 @@ def _await_mission(ctx: StepContext) -> bool:
 
 
 def _await_next_start(ctx: StepContext) -> bool:
-    """Stay where all goals were reached before this start."""
+    """Stay where nothing was left to sail before this start."""
     if ctx.gate is not None or ctx.state.voyage.sailing:
         return False
     finished(ctx)
@@ -121,7 +121,7 @@ BEHAVIORS: tuple[Behavior, ...] = (
         does="waits to be told to go on",
     ),
     Behavior(
-        name="await start", act=_await_next_start, when="all goals were reached before this start", does="watches"
+        name="await start", act=_await_next_start, when="nothing was left to sail before this start", does="watches"
     ),
     Behavior(
         name="first plan",

@@ -572,6 +572,17 @@ def test_killed_at_any_moment_it_goes_on_without_an_upload(when):
     assert world.clearance() > world.skipper.config.margin_floor_m
 
 
+def test_the_goals_that_were_reached_are_known_over_a_restart():
+    """Summary, page and "out of time" counted from nothing again."""
+    near, far = Goal(en_m=(60.0, 0.0), radius_m=6.0), Goal(en_m=(160.0, 0.0), radius_m=6.0)
+    world = make(near, far, obstacles=(), wind=lambda t: (0.0, 5.0))
+    assert world.run(300, lambda w: w.state.progress.reached == (0,))
+    restarted(world)
+    assert world.run(10, lambda w: w.state.progress.reached == (0,))
+    assert world.run(300, is_done)
+    assert world.state.progress.reached == (0, 1)
+
+
 def test_killed_in_the_middle_of_an_upload_the_mixture_is_put_right():
     world = make(uploads_fail=lambda n: UploadResult.TIMEOUT if n == 2 else UploadResult.OK)
     killed = []

@@ -133,6 +133,10 @@ def test_a_mission_that_has_arrived_says_what_would_sail_it_again(short, tmp_pat
     assert again["arrived_before"] is True
     assert again["uploads"] == 0
     assert outcome_of("reach", again) == (2, "not sailed: reach had arrived before this start; --again sails it again")
+    given_up = again | {"goals": 3, "goals_given_up": 2}
+    assert (
+        "had arrived before this start (1 of 3 goals reached, 2 given up by order);" in outcome_of("reach", given_up)[1]
+    )
 
 
 def test_a_dry_run_leaves_the_state_of_a_voyage_that_is_interrupted(short, tmp_path):
@@ -210,5 +214,6 @@ def test_started_again_beside_the_boat_in_her_loiter_it_says_so_too(short, tmp_p
     assert verdict.passed, verdict.checks
     again = json.loads((tmp_path / "summary.json").read_bytes())
     assert (again["arrived"], again["arrived_before"], again["uploads"]) == (True, True, 0)
+    assert (again["goals_reached"], again["goals_given_up"]) == (1, 0)
     assert again["end_why"].startswith("the goal is reached before this start")
     assert outcome_of("reach", again)[0] == 2

@@ -103,7 +103,7 @@ def _misplaced(ctx: StepContext) -> str:
 
 
 def finished(ctx: StepContext) -> None:
-    """Nothing is left to sail: all goals were reached before this start. Watch the boat if it is under way."""
+    """Nothing was left to sail before this start. Watch the boat if it is under way."""
     status = ctx.autopilot
     if status is not None and status.is_armed and status.mode is Mode.AUTO and ctx.state.mission.route is not None:
         ctx.set(

@@ -18,6 +18,7 @@ from companion.skipper.behaviors.helm import hand_back, repair
 from companion.skipper.planning.diversions import HOME, OFF_HOME, ROOM, home_trouble, is_at_rest, pressing
 from companion.skipper.step import Diversion, DiversionKind, Phase, Route, SafeEnd, StepContext
 from companion.skipper.way import distance_m
+from companion.words import goals_reached
 
 ANSWERED = {"": "for a person", SHORE: "until the link to the shore is back, or a person gives AUTO"}
 TAKEN = "until a person takes her and gives AUTO back"
@@ -91,10 +92,7 @@ def _how_long(ctx: StepContext) -> str:
 
 def reached_words(ctx: StepContext) -> str:
     """Return how many of the goals were reached, of a voyage that has none left."""
-    goals, skipped = len(ctx.voyage.legs), ctx.state.orders.skipped
-    if skipped:
-        return f"{goals - skipped} of {goals} goals reached, {skipped} given up by order"
-    return "the goal is reached" if goals == 1 else f"all {goals} goals reached"
+    return goals_reached(len(ctx.voyage.legs), ctx.state.orders.skipped)
 
 
 def rest(ctx: StepContext) -> None:

@@ -232,6 +232,7 @@ def _take_up(ctx: StepContext, saved: Persisted) -> None:
             inside=None if saved.inside is None else Inside(goal=saved.inside[0], t_s=ctx.t_s, utc_s=saved.inside[1]),
             searched=saved.searched,
             covered=saved.covered,
+            reached=saved.reached,
         )
     )
 

@@ -45,6 +45,7 @@ def resumed(voyage: Voyage, saved: Persisted) -> tuple[Persisted, str]:
     gates = gates_of(voyage, approaches)
     first = next((i for i, gate in enumerate(gates) if gate.goal >= leg), len(gates))
     is_there = saved.inside is not None and saved.inside[0] < same
+    reached = tuple(goal for goal in saved.reached if goal < leg)
     kept = replace(
         saved,
         goals=saved_goals(voyage),
@@ -55,6 +56,8 @@ def resumed(voyage: Voyage, saved: Persisted) -> tuple[Persisted, str]:
         pending=None,
         unsure=None,
         arrived=saved.arrived and leg == len(now),
+        reached=reached,
+        skipped=min(saved.skipped, leg - len(reached)),  # what is sailed to anew was not given up
         approaches=approaches,
         quarters=saved.quarters if stays else 0,
         inside=saved.inside if is_there else None,

@@ -137,6 +137,7 @@ class Persisted:
     approaches: tuple[Approach, ...] = ()  # the numbering of the gates hangs on them
     quarters: int = 0  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
     standing: Standing | None = None  # the order that stands
+    reached: tuple[int, ...] = ()  # goals reached, in order
     skipped: int = 0  # goals given up by order
     set_sail_utc_s: float | None = None  # Unix time of setting sail
     inside: tuple[int, float] | None = None  # the goal whose box the boat stays in, Unix time of entry
@@ -183,6 +184,7 @@ class Persisted:
             "approaches": [_approach_to_list(a) for a in self.approaches],
             "quarters": self.quarters,
             "standing": _standing_to_dict(self.standing),
+            "reached": list(self.reached),
             "skipped": self.skipped,
             "set_sail_utc_s": self.set_sail_utc_s,
             "inside": None if self.inside is None else list(self.inside),
@@ -226,6 +228,7 @@ class Persisted:
                 approaches=tuple(_approach_from_list(a) for a in data.get("approaches", ())[: MAX_GOALS + 1]),
                 quarters=_whole(data.get("quarters", 0), -MAX_QUARTERS, MAX_QUARTERS),
                 standing=_standing_from_dict(data.get("standing")),
+                reached=tuple(_whole(g, 0, MAX_GOALS) for g in data.get("reached", ())[:MAX_GOALS]),
                 skipped=_whole(data.get("skipped", 0), 0, MAX_GOALS),
                 set_sail_utc_s=None if data.get("set_sail_utc_s") is None else _number(data["set_sail_utc_s"]),
                 inside=None

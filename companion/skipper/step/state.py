@@ -539,6 +539,7 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         approaches=state.progress.approaches,
         quarters=round(state.progress.bearing_rad / (0.5 * math.pi)),
         standing=standing_saved(state),
+        reached=state.progress.reached,
         skipped=state.orders.skipped,
         set_sail_utc_s=state.voyage.set_sail_utc_s,
         inside=None

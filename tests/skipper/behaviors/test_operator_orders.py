@@ -149,9 +149,9 @@ def test_what_stands_survives_a_restart_with_its_age(verb):
 def test_a_state_of_before_there_were_orders_still_loads():
     world = sailing()
     data = world.skipper.persisted(world.state).to_dict()
-    del data["standing"], data["skipped"]
+    del data["standing"], data["skipped"], data["reached"]
     old = Persisted.from_dict(data)
-    assert (old.standing, old.skipped) == (None, 0)
+    assert (old.standing, old.skipped, old.reached) == (None, 0, ())
 
 
 @pytest.mark.parametrize(

@@ -171,6 +171,7 @@ def test_what_is_taken_up_with_a_mission_that_is_adopted(armed, mode, was_sailin
         inside=(1, 77.0),
         searched=((1.0, 2.0),),
         covered=((0, 0.5),),
+        reached=(0,),
         own_mode=Mode.HOLD,
         motor=True,
     )
@@ -187,6 +188,7 @@ def test_what_is_taken_up_with_a_mission_that_is_adopted(armed, mode, was_sailin
     assert progress.bearing_rad == pytest.approx(1.5 * math.pi)
     assert progress.inside == Inside(goal=1, t_s=NOW_S, utc_s=77.0)
     assert (progress.searched, progress.covered) == (before.searched, before.covered)
+    assert progress.reached == (0,)
 
 
 def test_what_was_under_way_in_auto_needs_no_new_plan_at_once():

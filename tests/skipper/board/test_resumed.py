@@ -81,6 +81,23 @@ def test_beside_a_strangers_mission_the_state_that_is_kept_says_of_which_goals_i
     assert skipper(A, X, C).change_of(again).endswith("1 of the 2 goals reached counts, on to X")
 
 
+@pytest.mark.parametrize(
+    ("now", "reached", "skipped"),
+    [
+        ((A, B, C), (0,), 1),
+        ((A, B, X), (0,), 1),  # B stays given up
+        ((A, X, C), (0,), 0),  # what is in its place is sailed to
+        ((X, B, C), (), 0),
+    ],
+)
+def test_what_was_reached_and_what_given_up_is_known_of_the_goals_that_count(now, reached, skipped):
+    sails = skipper(A, B, C)
+    state = with_parts(sails.initial(), progress={"gate": 2, "reached": (0,)}, orders={"skipped": 1})
+    before = Persisted.from_dict(sails.persisted(state).to_dict())
+    kept, _ = resumed(skipper(*now).voyage, before)
+    assert (kept.reached, kept.skipped) == (reached, skipped)
+
+
 def test_what_had_arrived_has_arrived_no_more_with_a_goal_behind_the_last():
     before = saved(A, B, gate=2, arrived=True)
     assert skipper(A, B).has_arrived(before)
