@@ -94,7 +94,9 @@ class WindTracker:
         elif isinstance(message, ApparentWind):
             self._watch.apparent(message)
             if message.t_s - self._primary_t_s > WIND_PREFERRED_S and self._vehicle is not None:
-                self._take(true_wind(message, self._vehicle))
+                wind = true_wind(message, self._vehicle)
+                if wind.quality is not WindQuality.SUSPECT:  # made of a heading that she no longer has
+                    self._take(wind)
         else:
             if message.source is not WindSource.APPARENT:
                 self._primary_t_s = message.t_s

@@ -73,6 +73,19 @@ def test_a_silent_vane_that_repeats_itself_is_found_without_a_tack():
     assert WindVerdict.FROZEN in seen
 
 
+def test_a_vane_is_not_read_by_a_heading_that_is_no_longer_told():
+    """She went on tacking under a heading that stood still, and the wind was believed to tack with her."""
+    room, means = WindTracker(), []
+    for boat, felt, _ in voyage(seconds=600.0):
+        if boat.t_s < 400.0:
+            room.update(boat)
+        status = room.update(felt)
+        means.append(room.forecast_table(boat.t_s).mean_twd_from_rad[0])
+    assert status.t_s == 400.0  # a second on it is still one instant
+    assert room.status(600.0).verdicts == (WindVerdict.SILENT,)
+    assert max(abs(wrap_pi(mean - 0.3)) for mean in means[100:]) < 0.5
+
+
 def test_a_spiking_vane():
     rng = np.random.default_rng(3)
 
