@@ -106,6 +106,10 @@ class Planner(Protocol):
         """Plan; never raises for a problem, however bad."""
         ...
 
+    def overtake(self) -> None:
+        """Let what is being planned end at once: its answer is not wanted."""
+        ...
+
 
 class Executor:
     """The orders under way. ``run`` lives in the voyage's task group."""
@@ -139,10 +143,12 @@ class Executor:
         for action in actions:
             if isinstance(action, RequestPlan):
                 self._plan = action
+                self._planner.overtake()
                 self._plan_wanted.set()
             elif isinstance(action, CancelPlan):
                 if self._plan is not None and self._plan.request_id == action.request_id:
                     self._plan = None
+                    self._planner.overtake()
             elif isinstance(action, SteerHeading):
                 self._autopilot.steer_heading(action.heading_rad, thrust=action.thrust)
             elif isinstance(action, Announce):

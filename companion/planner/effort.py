@@ -22,6 +22,10 @@ HOPELESS_FROM = 1.0 / 3.0  # of a part
 FASTER = 0.8  # of the time of the path that was judged last: another way, which is judged at once
 
 
+class UnwantedError(Exception):
+    """Nobody waits for the answer any more: raised where a search tells what it spent."""
+
+
 class Effort:
     """What a search may spend: expansions, or seconds, or both (then the seconds are only a backstop).
 
@@ -29,11 +33,14 @@ class Effort:
     limit that decides (expansions when given), so a schedule made from it does not depend on the machine when
     there is an expansion budget. ``after_s`` of the seconds are for what is done with the path afterwards:
     ``judging_s`` of it for the judgement that is left, of which ``needed_s`` cannot be left out. ``has_answer``: a path
-    has been judged to be one; ``is_at_risk``: a tack of the best of them may fail onto something.
+    has been judged to be one; ``is_at_risk``: a tack of the best of them may fail onto something. ``is_wanted``: asked
+    at each ``spend``, which raises ``UnwantedError`` when it is not.
     """
 
-    def __init__(self, budget_s: float | None, expansions: int | None) -> None:
-        self.limit = expansions
+    def __init__(
+        self, budget_s: float | None, expansions: int | None, is_wanted: Callable[[], bool] | None = None
+    ) -> None:
+        self.limit, self.is_wanted = expansions, is_wanted
         self.budget_s = math.inf if budget_s is None else budget_s
         self.after_s = self.judging_s = self.needed_s = 0.0
         self.has_answer = self.is_at_risk = False
@@ -48,6 +55,8 @@ class Effort:
     def spend(self, expansions: int) -> None:
         """Count work done."""
         self.used += expansions
+        if self.is_wanted is not None and not self.is_wanted():
+            raise UnwantedError("nobody waits for it any more")
 
     @property
     def elapsed_s(self) -> float:
@@ -131,8 +140,9 @@ class Effort:
         """Return an effort of its own for another search: a share of the expansions, or of the seconds and its
         judgement; what it spends does not count here."""  # noqa: D205, D209
         if self.limit is not None:
-            return Effort(None, max(1, int(share * self.limit)))
-        other = Effort(None if math.isinf(self.budget_s) else share_s * self.budget_s + self.needed_s, None)
+            return Effort(None, max(1, int(share * self.limit)), self.is_wanted)
+        whole_s = None if math.isinf(self.budget_s) else share_s * self.budget_s + self.needed_s
+        other = Effort(whole_s, None, self.is_wanted)
         other.after_s = other.judging_s = self.needed_s
         return other
 

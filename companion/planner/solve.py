@@ -165,6 +165,7 @@ def plan(
     algorithm: str = "auto",
     settings: Settings | None = None,
     on_better: Callable[[Plan], None] | None = None,
+    is_wanted: Callable[[], bool] | None = None,
 ) -> Plan:
     """Plan ``problem``; never raises for a bad problem, that is ``PlanStatus.INVALID``.
 
@@ -180,8 +181,10 @@ def plan(
         on_better: is told of plans that can be sailed while better ones are looked for, each better than the one
             before (its time, with ``CONTACT_S`` for the risk of its tacks); with a budget in seconds alone. ``astar``
             has none to tell of: its first path is its only one.
+        is_wanted: whether the answer still is; asked with each part of the effort that is spent.
 
     Raises:
+        UnwantedError: it is not.
         InputError: the algorithm is unknown, the settings are another's, or a budget is not positive.
 
     """
@@ -201,7 +204,8 @@ def plan(
     if budget_s is None and expansions is None:
         budget_s = DEFAULT_BUDGET_S
     warm(algorithm)
-    effort = Effort(SEARCHED * budget_s if budget_s is not None and expansions is None else budget_s, expansions)
+    searched_s = SEARCHED * budget_s if budget_s is not None and expansions is None else budget_s
+    effort = Effort(searched_s, expansions, is_wanted)
     defect = defect_of(problem)
     empty = Plan(
         status=PlanStatus.INVALID,

@@ -14,6 +14,7 @@ import logging
 import math
 import os
 import pickle
+import select
 import socket
 import struct
 import sys
@@ -112,6 +113,7 @@ class InlinePlanner:
         self.is_alive = True
         self.restarts = 0
         self.share = 1.0
+        self._under_way: set[asyncio.Future[None]] = set()
 
     async def __aenter__(self) -> Self:
         """Nothing to start."""
@@ -137,8 +139,19 @@ class InlinePlanner:
         answer = plan(
             problem, expansions=expansions or self.expansions, seed=seed, algorithm=algorithm, settings=settings
         )
-        await asyncio.sleep(self.virtual_s)
+        over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._under_way.add(over)
+        try:
+            await asyncio.wait({over}, timeout=self.virtual_s)
+        finally:
+            self._under_way.discard(over)
         return answer
+
+    def overtake(self) -> None:
+        """Let the plans that are being made be answered at once: their answers are not wanted."""
+        for over in self._under_way:
+            if not over.done():
+                over.set_result(None)
 
 
 class PlannerWorker:
@@ -148,7 +161,8 @@ class PlannerWorker:
     and the first request waits for it: ``auto`` always, and ``algorithm``. With a ``fork_server`` the child is forked
     there, warm for ``auto`` from the beginning. A child that dies is replaced at once, between two requests too, and
     so is the fork server: on a tenth of a core the next answer would else wait for half a minute's loading.
-    ``restarts`` counts replacements of the child; ``share`` is what it got of the processor when it became ready.
+    ``restarts`` counts replacements of the child; ``share`` is what it got of the processor when it became ready. A
+    request that ``overtake`` came after is answered at once, with the best that was found or ``UNANSWERED``.
     """
 
     def __init__(
@@ -165,6 +179,7 @@ class PlannerWorker:
         self._is_warm, self._was_warm, self._silence_s = False, False, math.inf
         self._rests_until_s = -math.inf
         self._lock = asyncio.Lock()
+        self._overtaken, self._is_asked = 0, False  # how often; whether the child works
         self._watch: asyncio.Task[None] | None = None
         self.restarts = 0
         self.share = 1.0
@@ -244,6 +259,7 @@ class PlannerWorker:
                 "settings": settings,
             }
         )
+        overtaken = self._overtaken
         async with self._lock:
             began_s = effort_s()
             best: Plan | None = None
@@ -252,6 +268,9 @@ class PlannerWorker:
                     await self._replace()
                 await self._warm()
                 began_s = effort_s()
+                if overtaken != self._overtaken:
+                    return failed("another plan is wanted before it", seed=seed, algorithm=algorithm)
+                self._is_asked = True
                 await self._send(request)
                 deadline_s = effort_s() + (60.0 if budget_s is None else budget_s) + self._grace_s
                 is_last = False
@@ -273,6 +292,8 @@ class PlannerWorker:
             except asyncio.CancelledError:
                 await self._try_to_replace()  # its answer would be taken for that of the next request
                 raise
+            finally:
+                self._is_asked = False
         if isinstance(value, Plan):
             return value
         return _without(
@@ -282,6 +303,12 @@ class PlannerWorker:
             algorithm=algorithm,
             elapsed_s=effort_s() - began_s,
         )
+
+    def overtake(self) -> None:
+        """Let the requests that wait, and the one under way, end at once: their answers are not wanted."""
+        self._overtaken += 1
+        if self._is_asked and self._child is not None:
+            self._child.writer.write(_LENGTH.pack(0))
 
     # ------------------------------------------------------------------------------------ the child
     async def _keep(self) -> None:
@@ -433,21 +460,28 @@ def answer_requests(source: Any, sink: Any) -> None:
     """Answer requests on a stream of bytes until it closes, all being loaded.
 
     An answer is whether it is the last, and a plan or what failed; plans that can be sailed come before it as they are
-    found.
+    found. What comes while a plan is being made ends it: a request of no length is for nothing else.
     """
+    fd = source.fileno()  # read with nothing between: what waits in a buffer would not be seen
     began_s, cpu_s = effort_s(), time.process_time()
     own_speed = speed()
     _write(sink, _READY + f"{_share_since(began_s, cpu_s):.3f}".encode())
     while True:
-        head = source.read(_LENGTH.size)
+        head = _exactly(fd, _LENGTH.size)
         if len(head) < _LENGTH.size:
             return
-        request: dict[str, Any] = pickle.loads(source.read(_LENGTH.unpack(head)[0]))  # noqa: S301 - our parent's
+        length = _LENGTH.unpack(head)[0]
+        if length == 0:
+            continue
+        request: dict[str, Any] = pickle.loads(_exactly(fd, length))  # noqa: S301 - our parent's
         began_s, cpu_s = effort_s(), time.process_time()
         answer: Plan | str
         try:
             found = plan(
-                request.pop("problem"), **request, on_better=lambda found: _write(sink, pickle.dumps((False, found)))
+                request.pop("problem"),
+                **request,
+                on_better=lambda found: _write(sink, pickle.dumps((False, found))),
+                is_wanted=lambda: not select.select((fd,), (), (), 0.0)[0],
             )
             answer = replace(found, speed=own_speed * _share_since(began_s, cpu_s))
         except Exception as error:
@@ -455,6 +489,17 @@ def answer_requests(source: Any, sink: Any) -> None:
         _write(sink, pickle.dumps((True, answer)))
         del request, answer
         trim()  # the next plan may be an hour away
+
+
+def _exactly(fd: int, size: int) -> bytes:
+    """Return so many bytes; fewer: the stream has ended."""
+    data = bytearray()
+    while len(data) < size:
+        part = os.read(fd, size - len(data))
+        if not part:
+            break
+        data += part
+    return bytes(data)
 
 
 def _share_since(began_s: float, cpu_s: float) -> float:

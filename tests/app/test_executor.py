@@ -15,7 +15,15 @@ from companion.mavlink.link import Link
 from companion.messages import GeoPoint, Mode, waypoint
 from companion.planner import Problem
 from companion.planner.worker import InlinePlanner
-from companion.skipper.step.actions import ReadMission, ReplanReason, RequestPlan, SetMode, SetParameter, UploadMission
+from companion.skipper.step.actions import (
+    CancelPlan,
+    ReadMission,
+    ReplanReason,
+    RequestPlan,
+    SetMode,
+    SetParameter,
+    UploadMission,
+)
 from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.snapshot import CommandResult, UploadResult
 from sitl.autopilot import HOME, AutopilotConfig, Impairment, MemoryLink, SimulatedAutopilot, serve
@@ -137,3 +145,32 @@ def test_a_parameter_is_written_on_the_autopilot_and_one_that_it_does_not_know_i
     outcomes = [o for _, o in carried_out(orders)]
     assert values == [-20.0]
     assert [(o.command_id, o.result) for o in outcomes] == [(1, CommandResult.ACCEPTED), (2, CommandResult.REFUSED)]
+
+
+@pytest.mark.parametrize("is_cancelled", [False, True])
+def test_a_plan_does_not_wait_for_one_that_nobody_wants_any_more(is_cancelled):
+    """What lay ahead was planned for when the plan before it had all its time, and that told of a slow computer."""
+    answered = []
+
+    def asked(number):
+        return RequestPlan(
+            request_id=number,
+            problem=Problem.from_json(simple()),
+            reason=ReplanReason.OBSTACLE,
+            budget_s=2.0,
+            seed=number,
+            from_seq=None,
+        )
+
+    async def main():
+        planner = InlinePlanner(virtual_s=10.0, expansions=500)
+        executor = Executor(None, planner, lambda outcome: answered.append((now_s(), outcome.request_id)))
+        running = asyncio.create_task(executor.run())
+        executor.submit([asked(1)])
+        await asyncio.sleep(1.0)
+        executor.submit([*([CancelPlan(request_id=1)] if is_cancelled else []), asked(2)])
+        await asyncio.sleep(30.0)
+        running.cancel()
+
+    run_virtual(main())
+    assert answered == [(pytest.approx(11.0), 2)]

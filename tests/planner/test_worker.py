@@ -321,6 +321,31 @@ def test_a_child_that_is_killed_or_too_slow_leaves_the_best_that_it_had_found(en
     run(main())
 
 
+def test_a_plan_that_is_overtaken_ends_at_once_and_the_child_goes_on():
+    """The next waited for all of its time; with an end of the child it would have waited for its kernels."""
+
+    async def main():
+        problem, long_s = load("channel-beat"), 60.0
+        async with PlannerWorker() as planner:
+            await planner.ready()
+            wanted = (await planner.plan(problem, expansions=3_000, seed=2)).waypoints_en.tolist()
+            for times in range(1, 4):
+                old = asyncio.create_task(planner.plan(problem, expansions=10**9, budget_s=long_s))
+                behind = asyncio.create_task(planner.plan(problem, expansions=10**9, budget_s=long_s))
+                await asyncio.sleep(0.1 * times)
+                began_s = now_s()
+                planner.overtake()
+                planner.overtake()
+                new = await planner.plan(problem, expansions=3_000, seed=2)
+                assert now_s() - began_s < 0.25 * long_s  # of a machine that has other things to do
+                assert new.waypoints_en.tolist() == wanted
+                assert "another plan is wanted" in (await behind).reason
+                await old
+            assert planner.restarts == 0
+
+    run(main())
+
+
 # A child that gets a tenth of the processor: what takes a second and a half of its time is done in as much.
 STARVED = """
 import sys, time

@@ -389,7 +389,9 @@ def search_within(
         if not settled:
             seconds, steps = min(seconds, effort.budget_s / RISK_ROUNDS), min(steps, (effort.limit or 0) // RISK_ROUNDS)
         inner = Effort(
-            None if math.isinf(effort.budget_s) else max(1e-3, seconds), None if effort.limit is None else max(1, steps)
+            None if math.isinf(effort.budget_s) else max(1e-3, seconds),
+            None if effort.limit is None else max(1, steps),
+            effort.is_wanted,
         )
         inner.judging_s, inner.needed_s = effort.judging_s / RISK_ROUNDS, effort.needed_s
         outcome = search(widened(problem, extra), inner, seed)
