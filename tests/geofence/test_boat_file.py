@@ -100,9 +100,13 @@ def test_a_boat_file_that_is_not_there_is_said_with_what_writes_one(tmp_path):
 
 
 def test_a_mission_and_a_boat_file_in_each_other_s_place_are_named_with_the_command_that_takes_them():
-    with pytest.raises(InputError, match=r"m.toml: is a mission, not a boat file; companion mission check m.toml"):
+    with pytest.raises(
+        InputError, match=r"m.toml: is a mission, not a boat file; check it by: companion mission check m.toml"
+    ):
         parse_boat_file(GOAL, "m.toml")
-    with pytest.raises(InputError, match=r"p.toml: is a boat file, not a mission; companion boat show p.toml"):
+    with pytest.raises(
+        InputError, match=r"p.toml: is a boat file, not a mission; look at it by: companion boat show p.toml"
+    ):
         parse_options(PEPPER, "p.toml")
 
 

@@ -116,7 +116,7 @@ def parse_boat_file(text: str, source: str) -> BoatFile:
     """Return the boat that ``text`` tells of; see ``read_boat_file``."""
     raw = _raw(text, source)
     if "goal" in raw:
-        raise InputError(source, "", "is a mission, not a boat file", f"companion mission check {source} is of it")
+        raise InputError(source, "", "is a mission, not a boat file", f"check it by: companion mission check {source}")
     table = raw.get("boat")
     for key in OWN:
         if isinstance(table, dict) and key in table:

@@ -63,7 +63,7 @@ def parse_options(text: str, source: str) -> MissionOptions:
     except ValueError as error:  # a number of thousands of digits
         raise not_toml(source, "", error) from None
     if "polar" in raw and "goal" not in raw:
-        raise InputError(source, "", "is a boat file, not a mission", f"companion boat show {source} is of it")
+        raise InputError(source, "", "is a boat file, not a mission", f"look at it by: companion boat show {source}")
     _refuse_odd_numbers(raw, source, "")
     goals = raw.get("goal")
     for goal in goals if isinstance(goals, list) else ():
