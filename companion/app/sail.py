@@ -45,7 +45,7 @@ from companion.mavlink.transports import Transport
 from companion.mavlink.wire import Drop
 from companion.messages import CompanionStatus, MissionItem, Severity
 from companion.skipper import Skipper
-from companion.skipper.step import Phase, Snapshot
+from companion.skipper.step import Announce, Phase, Snapshot
 from companion.telemetry.console import DISK, GONE, left_behind
 from companion.telemetry.folder import (
     STATE,
@@ -146,6 +146,7 @@ class _Shell:
         self._arrived_before = False
         self._named = mission.autopilot.system  # of our autopilot: as named, or as of the voyage that goes on
         self._refusals: list[str] = []
+        self._unsaid: dict[str, Announce] = {}  # before the autopilot was found: the last of each code
         self.feeds = Feeds("AIS feed", NmeaDecoder)
         self.depths = Feeds("sounder", SoundingDecoder)
         self._fences: list[tuple[MissionItem, ...]] = []  # that were read of the autopilot since the last step
@@ -220,6 +221,7 @@ class _Shell:
                     on_adopt=adoption.ask,
                     on_answer=operator.answered,
                 )
+                executor.submit(tuple(self._unsaid.values()))
                 async with asyncio.TaskGroup() as group:  # what is worth the voyage
                     orders = group.create_task(executor.run(), name="executor")
                     self._keep_auxiliaries(autopilot, operator, adoption)
@@ -451,6 +453,10 @@ class _Shell:
             while not (await asyncio.wait([waiting, stopping], timeout=STEP_S, return_when=asyncio.FIRST_COMPLETED))[0]:
                 step = self._tick(self.log.now_s(), link)
                 await self._after_step(step, link)
+                for action in step.actions:
+                    if isinstance(action, Announce):
+                        self._unsaid.pop(action.code, None)  # in the order in which they were said last
+                        self._unsaid[action.code] = action
             if not waiting.done():
                 return False
             await waiting

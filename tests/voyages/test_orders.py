@@ -14,14 +14,15 @@ from companion.telemetry.folder.recorder import read_jsonl
 from sitl.faults import injection
 from sitl.run.embedded import run_embedded
 from sitl.scenario.scenario import EventSpec, ExpectSpec, HeldSpec, load_scenario
+from tests.voyages.test_disk_trouble import Shore
 
 HOLD = Path("sitl/scenarios/orders-hold.toml")
 PARKED = {"arrived": None, "within_m": None, "alerts": ("order",)}
 
 
-def sail(out, events, **changes):
+def sail(out, events, observer=None, **changes):
     scenario = msgspec.structs.replace(load_scenario(HOLD), events=tuple(events), **changes)
-    return run_virtual(run_embedded(scenario, HOLD, 0, out))
+    return run_virtual(run_embedded(scenario, HOLD, 0, out, observer=observer))
 
 
 def failed(verdict):
@@ -110,12 +111,14 @@ def test_killed_while_she_holds_she_holds_on_and_goes_on_when_told(tmp_path, sav
         expect = ExpectSpec(alerts=("order",), within_m=40.0, held=HeldSpec(from_s=70.0, to_s=150.0, within_m=35.0))
     else:
         expect = ExpectSpec(alerts=("order",), within_m=40.0, held=HeldSpec(from_s=70.0, to_s=103.0, within_m=35.0))
-    verdict = sail(tmp_path, events, expect=expect, limit_s=400.0)
+    shore = Shore()
+    verdict = sail(tmp_path, events, shore, expect=expect, limit_s=400.0)
     assert verdict.passed, failed(verdict)
     assert not replay(tmp_path).differences
     if saved == "kept":
         told = [d["text"] for d in read_jsonl(tmp_path / "decisions.jsonl") if d.get("code") == "order"]
         assert any(text.startswith("since before this start she is under an order: hold") for text in told)
+        assert "since before this start she is under an order: hold" in shore.said  # before the autopilot was found
 
 
 def test_the_state_says_what_she_was_told(tmp_path):
