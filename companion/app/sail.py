@@ -300,7 +300,7 @@ class _Shell:
             if options.is_again:
                 known = (*known, *persisted.names)
                 persisted = None
-        if self._named is None and persisted is not None:
+        if self._named is None and persisted is not None and skipper.fits(persisted):
             self._named = persisted.system
         self.fold = VoyageFold(
             skipper,

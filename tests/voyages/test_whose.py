@@ -18,6 +18,7 @@ from companion.geofence import load_mission
 from companion.mavlink.wire.frames import Codec
 from companion.messages import Mode
 from companion.replay import replay
+from companion.skipper.step.saved import Persisted
 from sitl.autopilot import AutopilotConfig, MemoryLink, RadioChannel, SimulatedAutopilot, serve
 from sitl.faults.computer_faults import FaultyPlanner
 from sitl.world.environment import AR1
@@ -134,6 +135,16 @@ def test_the_one_that_the_mission_names_is_sailed_and_the_other_left_alone(tmp_p
     assert world.boats[sailed].truth.is_armed
     assert world.is_untouched(left)
     assert not replay(world.folder, tmp_path / "mission.toml").differences
+
+
+def test_a_state_of_another_voyage_names_no_boat(tmp_path):
+    """Of two boats on the channel the one that another mission had sailed was taken, unasked."""
+    world = World(tmp_path, theirs={"sysid": 7}, ours={"sysid": 1})
+    saved = Persisted(voyage="another", gate=0, sailing=True, route=None, pending=None, system=7)
+    (tmp_path / "state.json").write_text(json.dumps(saved.to_dict()))
+    with pytest.raises(LinkError, match="2 autopilots are heard"):
+        world.run(limit_s=60.0, state_path=tmp_path / "state.json")
+    assert world.is_untouched("theirs")
 
 
 def test_a_neighbour_heard_first_is_not_sailed_once_ours_speaks_too(tmp_path):
