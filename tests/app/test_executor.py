@@ -87,6 +87,7 @@ def test_an_order_that_the_skipper_has_given_up_is_not_carried_out_late():
     assert upload.result is not UploadResult.OK
     assert upload_s < CONFIG.upload_timeout_s
     assert command.result is CommandResult.TIMEOUT
+    assert command.text == "waited too long behind other orders"  # it was not begun
     assert seen == [Mode.MANUAL, len(ITEMS)]
 
 

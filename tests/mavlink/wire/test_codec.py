@@ -232,6 +232,18 @@ def test_copies_and_late_frames_are_dropped_and_a_reboot_is_not():
     assert assembler.reboots == 1
 
 
+def test_the_clock_goes_on_where_the_boot_time_begins_again():
+    """Held against a boot time of 32 bits the autopilot's clock would go 49.7 days ahead with one SYSTEM_TIME."""
+    assembler, end_ms, began_s = VehicleAssembler(), 2**32, 1_780_000_000.0
+    assembler.take(0.0, heard(wire.MAVLink_heartbeat_message(11, 3, 65, 10, 4, 3)))
+    for t_s in range(-3, 4):
+        unix_us = round((began_s + t_s) * 1e6)
+        boot_ms = (end_ms + 1000 * t_s) % end_ms
+        assembler.take(10.0 + t_s, heard(wire.MAVLink_system_time_message(unix_us, boot_ms)))
+        assert assembler.status.utc_at_boot_s == pytest.approx(began_s - end_ms / 1e3, abs=1e-3)
+    assert assembler.reboots == 0
+
+
 def test_the_end_of_32_bits_of_boot_time_is_no_reboot():
     end_ms = 2**32
     assembler = VehicleAssembler()
