@@ -14,7 +14,7 @@ from companion.skipper.planning.waits import gun_in_s, stay_left_s, waits_for_gu
 from companion.skipper.step.actions import CancelPlan, ReplanReason
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.state import Inside
-from companion.skipper.way.gates import Approach, Gate, again, is_on_wrong_side
+from companion.skipper.way.gates import Approach, Gate, again, has_come_round, is_on_wrong_side
 from companion.skipper.way.geometry import distance_m, leg_distance_m
 from companion.skipper.way.line import BEFORE_M, BEYOND_M, STRAY_M, ahead_m, crossing, is_between, width_m
 from companion.skipper.way.sweeps import coverage, grown, is_off, left_over, sweeps_over
@@ -70,10 +70,14 @@ def pass_gates(ctx: StepContext) -> None:
                 ctx.void_route()
                 missed(ctx)
             return
-        if is_on_wrong_side(gate, ctx.state.progress.bearing_rad):
+        if not has_come_round(gate, ctx.state.progress.bearing_rad):
+            is_wrong = is_on_wrong_side(gate, ctx.state.progress.bearing_rad)
+            if not is_wrong and not (counted and left > near and not _is_last(ctx)):
+                return  # she is on her way round
+            how = "left on the wrong side" if is_wrong else "not rounded"
             ctx.approach(again(gate, boat, ctx.state.progress.bearing_rad))
             missed(ctx)
-            ctx.say(Severity.WARNING, "buoy missed", f"{gate.name} was left on the wrong side: again", every_s=0.0)
+            ctx.say(Severity.WARNING, "buoy missed", f"{gate.name} was {how}: again", every_s=0.0)
             return
         if gate.search is not None and gate.ends_goal:
             if lay_sweeps(ctx, gate):
@@ -87,8 +91,12 @@ def pass_gates(ctx: StepContext) -> None:
             ctx.set(progress=changed(ctx.state.progress, bearing_rad=0.0))
             least_m = min(left, closest)
             is_counted = counted and least_m > gate.radius_m
-            how = f": the autopilot has passed it, its radius is {gate.radius_m:g} m" if is_counted else ""
-            ctx.say(Severity.NOTICE, "goal", f"{gate.name} reached, {least_m:.1f} m from it{how}", every_s=0.0)
+            how = f"{least_m:.1f} m from it"
+            if gate.buoy_en_m is not None:
+                how = f"left to {gate.side.value}, {distance_m(boat, gate.buoy_en_m):.1f} m off"
+            elif is_counted:
+                how += f": the autopilot has passed it, its radius is {gate.radius_m:g} m"
+            ctx.say(Severity.NOTICE, "goal", f"{gate.name} reached, {how}", every_s=0.0)
 
 
 def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:

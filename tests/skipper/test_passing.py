@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
+from companion.geo.angles import difference_rad
 from companion.planner import plan
 from companion.skipper.passing import pass_gates
 from companion.skipper.planning.answers import take_plan
@@ -19,8 +20,9 @@ from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import Phase
+from companion.skipper.way.geometry import bearing_rad, moved
 from companion.skipper.way.line import ahead_m
-from companion.skipper.way.voyage import Box, Goal, Line
+from companion.skipper.way.voyage import Box, Goal, Line, Side
 from tests.skipper.moments import moment, route
 from tests.skipper.world import World, restarted, skipper, voyage, with_parts
 
@@ -157,6 +159,40 @@ def test_how_far_she_may_be_off_a_leg_is_no_second_radius_of_a_goal(off_m, is_re
     pass_gates(ctx)
     assert ctx.state.progress.reached == ((0,) if is_reached else ())
     assert ctx.state.progress.missed == (0 if is_reached else 1)
+
+
+BUOY = Goal(en_m=(0.0, 200.0), radius_m=10.0, rounding_m=10.0, side=Side.STARBOARD, name="buoy")
+
+
+@pytest.mark.parametrize("hand", [1.0, -1.0])
+@pytest.mark.parametrize("counted", [True, False])
+@pytest.mark.parametrize("is_last", [True, False])
+def test_near_a_buoy_is_not_round_it(is_last, counted, hand):
+    """Inside the gate's radius before she is abeam, or abeam on the other hand when the autopilot counts it."""
+    goals = (Goal(en_m=(0.0, 0.0)), BUOY) if is_last else (Goal(en_m=(0.0, 0.0)), BUOY, Goal(en_m=(0.0, 400.0)))
+    way = route((-10.0, 200.0), (-10.0, 230.0), begin=(0.0, 0.0), gate_of=(1, -1))
+    for north_m, is_round in ((192.0, False), (200.5, not is_last), (204.0, not is_last)):
+        place = (-hand * 9.5, north_m)
+        made = moment(way, goals=goals, at=place, mission={"index": int(counted)})
+        turned = difference_rad(bearing_rad(BUOY.en_m, place), math.pi)
+        made.set(progress=replace(made.state.progress, gate=1, reached=(0,), bearing_rad=turned))
+        pass_gates(made)
+        assert (1 in made.state.progress.reached) == (is_round and hand > 0.0), (place, made.state.progress)
+
+
+@pytest.mark.parametrize("bend_deg", [None, 0.0, 25.0, -50.0])
+@pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
+def test_a_buoy_straight_ahead_is_left_on_its_hand(side, bend_deg):
+    """Rounded as near as it counts, the last goal or not: she turned to the loiter, and home, before she was abeam."""
+    hand = 1.0 if side is Side.PORT else -1.0
+    buoy = replace(BUOY, side=side)
+    end = None if bend_deg is None else Goal(en_m=moved(buoy.en_m, -hand * math.radians(bend_deg), 150.0))
+    w = world(buoy, *(() if end is None else (end,)), position=(0.0, -20.0))
+    assert w.run(400.0, lambda w: 0 in w.state.progress.reached)
+    bearings = np.unwrap([bearing_rad(buoy.en_m, place) for place in w.track])
+    assert hand * (bearings[0] - bearings[-1]) > math.radians(90.0 if end is None else 30.0)
+    assert w.state.progress.missed == 0
+    assert said(w, "goal")[0].startswith(f"buoy reached, left to {side.value}, ")
 
 
 def under_way_to_a_gate(**config):

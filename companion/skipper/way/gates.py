@@ -37,6 +37,8 @@ from companion.skipper.way.voyage import AreaLike, Box, Composed, Goal, Line, Po
 
 ARC_RAD = math.radians(100.0)  # gates around a buoy are at most this far apart
 STRAIGHT_RAD = math.radians(60.0)  # a bend the other way up to this is passed with one gate, not with a loop
+SHORT_RAD = math.radians(30.0)  # the autopilot cuts corners: a gate counts this much short of it, going on round
+PAST_RAD = math.radians(60.0)  # the last gate of a buoy that nothing leads on from lies so far past abeam
 KEEP_SHARE = 0.5  # the disc around the buoy that plans avoid, as a share of the rounding radius
 SAME_M = 1.0  # two goals so near are one mark that is passed twice
 BARRIER_M = 60.0  # shortest barrier
@@ -68,7 +70,8 @@ class Gate:
     ``goal`` is the index into ``Voyage.legs``. ``keep_out`` are WKT polygons for the way here, besides the marks' own
     discs. For buoys ``buoy_en_m`` is the buoy and ``side`` where it is left; ``turn_rad`` is how far its rounding turns
     the boat, and ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the
-    approach's beginning, positive clockwise. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With
+    approach's beginning, positive clockwise; short of it by more than ``short_rad`` the gate does not count.
+    ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With
     ``line`` it is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place before
     it. With ``box`` it is where it stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before
     there are any, of none. With ``field`` it is steered by that, and it is where the mission on board leads meanwhile.
@@ -87,6 +90,7 @@ class Gate:
     side: Side = Side.NONE
     turn_rad: float = 0.0
     bearing_rad: float = 0.0
+    short_rad: float = SHORT_RAD
     is_first: bool = True
     keep_out: tuple[str, ...] = ()
     line: Line | None = None
@@ -250,7 +254,8 @@ def _round(
 
     To port the boat turns left around it: on its circle it is a quarter turn to the right of the buoy, seen in
     the direction of travel, and its compass bearing from the buoy falls. A buoy that has just been rounded
-    (``is_once_more``) is rounded by a whole turn.
+    (``is_once_more``) is rounded by a whole turn. Where no leg leads on from it (``after`` is None) a last gate past
+    abeam does: turned to the mission's loiter before she is abeam of it, she has left it on neither hand.
     """
     buoy = goal.en_m
     hand = 1.0 if goal.side is Side.PORT else -1.0
@@ -266,13 +271,16 @@ def _round(
         turn = -hand * difference_rad(way_out, way_in)
         if turn < -STRAIGHT_RAD or is_once_more:
             turn += 2.0 * math.pi
-    # The share of the turn that is done at each gate; the first is abeam of the buoy on the way in.
+    # How much of the turn is done at each gate; the first is abeam of the buoy on the way in.
     count = math.ceil(turn / ARC_RAD)
-    shares = [0.5] if turn <= math.radians(30.0) else [n / count for n in range(count + 1)]
+    turned = [0.5 * turn] if turn <= math.radians(30.0) else [n / count * turn for n in range(count + 1)]
+    if after is None:
+        turned.append(turned[-1] + PAST_RAD)
     gates: list[Gate] = []
     previous: float | None = None
-    for n, share in enumerate(shares):
-        place = wrap_pi(way_in + hand * (math.pi / 2.0 - share * turn))
+    for n, so_far in enumerate(turned):
+        place = wrap_pi(way_in + hand * (math.pi / 2.0 - so_far))
+        is_last = n == len(turned) - 1
         if previous is None:
             wrong = wrap_pi(place + math.pi)
             length = max(BARRIER_M, 0.4 * distance_m(before, buoy)) if before is not None else BARRIER_M
@@ -285,7 +293,7 @@ def _round(
                 radius_m=max(goal.radius_m, 0.4 * goal.rounding_m),
                 goal=index,
                 is_first=n == 0,
-                ends_goal=n == len(shares) - 1,
+                ends_goal=is_last,
                 name=name,
                 from_en_m=before if n == 0 else None,
                 bandwidth_m=goal.bandwidth_m if n == 0 else None,
@@ -294,7 +302,8 @@ def _round(
                 approach_en_m=before,
                 side=goal.side,
                 turn_rad=turn,
-                bearing_rad=-hand * (math.pi / 2.0 + share * turn),
+                bearing_rad=-hand * (math.pi / 2.0 + so_far),
+                short_rad=PAST_RAD if is_last and after is None else SHORT_RAD,
                 keep_out=(barrier_wkt(buoy, wrong, length),),
             )
         )
@@ -320,8 +329,21 @@ def is_on_wrong_side(gate: Gate, bearing: float) -> bool:
     """
     if gate.approach_en_m is None or gate.side is Side.NONE:
         return False
-    hand = 1.0 if gate.side is Side.PORT else -1.0
-    return hand * (bearing - gate.bearing_rad) > math.pi
+    return _short_rad(gate, bearing) > math.pi
+
+
+def has_come_round(gate: Gate, bearing: float) -> bool:
+    """Return whether a boat that came round the buoy by ``bearing`` [rad] is as far round as the gate asks for.
+
+    Being near is not enough: a gate's radius reaches to the buoy, on a wide approach before she is abeam of it, and the
+    autopilot's count far beyond.
+    """
+    return gate.approach_en_m is None or gate.side is Side.NONE or _short_rad(gate, bearing) <= gate.short_rad
+
+
+def _short_rad(gate: Gate, bearing: float) -> float:
+    """Return how far a boat that came round by ``bearing`` is short of the gate round its buoy [rad]."""
+    return (bearing - gate.bearing_rad) * (1.0 if gate.side is Side.PORT else -1.0)
 
 
 def astray(gate: Gate, way: Sequence[PointEn], bearing: float) -> str:

@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 from shapely.geometry import box
 
 from companion.geo.angles import difference_rad
-from companion.skipper.way.gates import Approach, again, bearing_on, gates_of, is_on_wrong_side
+from companion.skipper.way.gates import (
+    PAST_RAD,
+    Approach,
+    again,
+    astray,
+    bearing_on,
+    gates_of,
+    has_come_round,
+    is_on_wrong_side,
+)
 from companion.skipper.way.geometry import (
     along_m,
     bear_away_rad,
@@ -160,7 +169,26 @@ def test_a_buoy_that_is_the_whole_course_is_rounded_each_lap():
     made = voyage(Goal(en_m=(0.0, 200.0), side=Side.PORT), laps=3)
     gates = gates_of(made, (Approach(goal=0, en_m=(0.0, 0.0)),))
     turn = turned_round((0.0, 200.0), (0.0, 0.0), *(g.en_m for g in gates))
-    assert turn == pytest.approx(-math.pi / 2.0 - 2.0 * 2.0 * math.pi)
+    assert turn == pytest.approx(-math.pi / 2.0 - 2.0 * 2.0 * math.pi - PAST_RAD)
+
+
+@pytest.mark.parametrize("side", [Side.PORT, Side.STARBOARD])
+@pytest.mark.parametrize("course", range(0, 360, 45))
+@pytest.mark.parametrize("is_last", [True, False])
+def test_a_buoy_counts_from_abeam_of_it_on_and_on_its_hand_only(side, course, is_last):
+    """A radius that reaches to the buoy let her count it before she was abeam, and turn back short of it."""
+    hand, buoy, way = 1.0 if side is Side.PORT else -1.0, (0.0, 200.0), math.radians(course)
+    after = () if is_last else (Goal(en_m=moved(buoy, way, 200.0)),)
+    start = moved(buoy, way, -200.0)
+    made = voyage(Goal(en_m=buoy, side=side, radius_m=12.0), *after)
+    gate = [g for g in gates_of(made, (Approach(goal=0, en_m=start),)) if g.goal == 0][-1]
+    before = moved(moved(buoy, way + hand * math.pi / 2.0, 12.0), way, -10.0 if not is_last else -1.0)
+    abeam = moved(moved(buoy, way + hand * math.pi / 2.0, 12.0), way, 1.0)
+    other = moved(moved(buoy, way - hand * math.pi / 2.0, 12.0), way, 1.0)
+    assert not has_come_round(gate, bearing_on(gate, before, 0.0))
+    assert has_come_round(gate, bearing_on(gate, abeam, 0.0))
+    assert not has_come_round(gate, bearing_on(gate, other, 0.0))
+    assert astray(gate, [start, other, moved(buoy, way, 60.0), gate.en_m], 0.0)
 
 
 def test_barrier_closes_the_wrong_side():
@@ -180,7 +208,9 @@ def test_a_buoy_that_is_the_last_is_rounded_for_the_way_home():
     made = voyage(Goal(en_m=(0.0, 0.0), radius_m=8.0), buoy)
     staying = [gate for gate in gates_of(made) if gate.goal == 1]
     home = [gate for gate in gates_of(replace(made, onward_en_m=(0.0, -50.0))) if gate.goal == 1]
-    assert len(staying) == 1
+    assert len(staying) == 2
+    assert staying[0].en_m == pytest.approx((15.0, 200.0), abs=1e-6)
+    assert staying[1].en_m == pytest.approx(moved((0.0, 200.0), math.pi / 2.0 - PAST_RAD, 15.0), abs=1e-6)
     assert len(home) == 3
     assert home[0].en_m == pytest.approx((15.0, 200.0), abs=1e-6)
     assert home[1].en_m == pytest.approx((0.0, 215.0), abs=1e-6)
