@@ -17,6 +17,7 @@ from companion.skipper.planning.uploads import take_upload
 from companion.skipper.step.actions import CancelPlan
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import FRESH_S, StepContext
+from companion.skipper.step.route import Route
 from companion.skipper.step.snapshot import (
     AutopilotRebooted,
     CommandOutcome,
@@ -31,6 +32,7 @@ from companion.skipper.step.snapshot import (
 from companion.skipper.step.state import PATIENT, Fix, Phase
 from companion.skipper.way.gates import bearing_on
 from companion.skipper.way.geometry import distance_m, waypoint_done
+from companion.skipper.way.voyage import PointEn
 
 HISTORY_STEP_S = 10.0
 HISTORY_KEPT = 19  # 180 s and the present
@@ -219,6 +221,25 @@ def _counts(ctx: StepContext) -> bool:
     return ctx.state.mission.checked and not ctx.state.mission.foreign and not is_taken
 
 
+def _is_done(ctx: StepContext, route: Route, n: int, boat: PointEn) -> bool:
+    """Return whether a waypoint may be left behind by Büsser's double conditions.
+
+    A goal's is not left for the leg that follows before she is past it: until then she may come within its radius,
+    which the grid size is not. The last one is, for to the loiter behind it the autopilot takes her, in its time.
+    """
+    gate = route.gate_of[n]
+    is_place = gate >= ctx.state.progress.gate and ctx.gates[gate].buoy_en_m is None
+    is_goals = is_place and n < ctx.last_waypoint()
+    return waypoint_done(
+        boat,
+        route.leg_from_en_m[n],
+        route.points_en_m[n],
+        None if is_goals else route.points_en_m[n + 1],
+        grid_m=ctx.config.grid_size_m,
+        manoeuvre_m=ctx.config.manoeuvre_m,
+    )
+
+
 def _own_count(ctx: StepContext) -> None:
     """Advance our own target by Büsser's double conditions; note when the autopilot lags behind it.
 
@@ -228,14 +249,7 @@ def _own_count(ctx: StepContext) -> None:
     if boat is None or route is None:
         return
     own = max(ctx.state.mission.own_index, ctx.state.mission.index)
-    while own < len(route.items) - 1 and waypoint_done(
-        boat,
-        route.leg_from_en_m[own],
-        route.points_en_m[own],
-        route.points_en_m[own + 1],
-        grid_m=ctx.config.grid_size_m,
-        manoeuvre_m=ctx.config.manoeuvre_m,
-    ):
+    while own < len(route.items) - 1 and _is_done(ctx, route, own, boat):
         own += 1
         if own > ctx.state.mission.index + 1:
             break

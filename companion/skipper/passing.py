@@ -8,10 +8,11 @@ from typing import Any
 import shapely
 
 from companion.frozen import changed
-from companion.messages import Severity
+from companion.messages import Mode, Severity
 from companion.skipper.behaviors.field_guidance import has_sailed
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waits_for_gun
 from companion.skipper.step.actions import CancelPlan, ReplanReason
+from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.state import Inside
 from companion.skipper.way.gates import Approach, Gate, again, has_come_round, is_on_wrong_side
@@ -24,6 +25,7 @@ GAP_S = 2.0 + FRESH_S  # between two fixes that belong together
 AT_MOST = 4  # rounds: the sweeps, and what they left; the wind's own anew are not counted
 HAIR_M = 0.5
 COUNTED_M = 30.0
+WIDE_RAD = math.radians(60.0)  # by headings corners are cut within the grid size, which is wider than a buoy's circle
 UPON_M = 6.0  # before a line: a waypoint close beyond it may be left, or said to be left, a moment before she crosses
 OFTEN = 3  # misses on one voyage, and then somebody should know
 
@@ -58,24 +60,29 @@ def pass_gates(ctx: StepContext) -> None:
             return
         left = distance_m(boat, gate.en_m)
         counted = number in ctx.state.mission.route.gate_of[: ctx.state.mission.index]
-        near = max(gate.radius_m, _grid_m(ctx))
+        near = max(gate.radius_m, 0.0 if _is_own_count(ctx, gate) else _grid_m(ctx))
+        leaves = counted and left > near and (not _is_last(ctx) or _is_own_count(ctx, gate))
         if not (
             ctx.state.progress.closest_m <= gate.radius_m
             or (counted and left <= near and not _is_last(ctx))
             or _is_near_enough(ctx, gate, counted)
             or _is_before(gate, boat)
         ):
-            if counted and left > near and not _is_last(ctx):
-                # The autopilot has left it behind and we were never near.
+            if leaves:
+                # It was left behind and we were never near.
                 ctx.void_route()
                 missed(ctx)
             return
-        if not has_come_round(gate, ctx.state.progress.bearing_rad):
+        spare_rad = WIDE_RAD if counted and _is_steered(ctx) else 0.0
+        if not has_come_round(gate, ctx.state.progress.bearing_rad, spare_rad=spare_rad):
             is_wrong = is_on_wrong_side(gate, ctx.state.progress.bearing_rad)
-            if not is_wrong and not (counted and left > near and not _is_last(ctx)):
+            if not is_wrong and not leaves:
                 return  # she is on her way round
             how = "left on the wrong side" if is_wrong else "not rounded"
-            ctx.approach(again(gate, boat, ctx.state.progress.bearing_rad))
+            if is_wrong:
+                ctx.approach(again(gate, boat, ctx.state.progress.bearing_rad))
+            else:
+                ctx.void_route()  # from here on round it
             missed(ctx)
             ctx.say(Severity.WARNING, "buoy missed", f"{gate.name} was {how}: again", every_s=0.0)
             return
@@ -235,6 +242,20 @@ def _is_near_enough(ctx: StepContext, gate: Gate, counted: bool) -> bool:
 def _grid_m(ctx: StepContext) -> float:
     """Return how near the autopilot's count of a waypoint is believed [m]: as she may be off a leg, but no farther."""
     return min(ctx.config.grid_size_m, COUNTED_M)
+
+
+def _is_own_count(ctx: StepContext, gate: Gate) -> bool:
+    """Return whether we count a place's waypoint, who steer, and not the autopilot: we know of its radius.
+
+    Of a buoy it is how she comes round that counts.
+    """
+    return _is_steered(ctx) and gate.buoy_en_m is None
+
+
+def _is_steered(ctx: StepContext) -> bool:
+    """Return whether she is steered by headings or a field, and not by the autopilot along its legs."""
+    status = ctx.autopilot
+    return ctx.guidance is not Guidance.PLAN and status is not None and status.mode is Mode.GUIDED
 
 
 def _is_last(ctx: StepContext) -> bool:

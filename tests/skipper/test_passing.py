@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from companion.geo.angles import difference_rad
+from companion.messages import Mode
 from companion.planner import plan
 from companion.skipper.passing import pass_gates
 from companion.skipper.planning.answers import take_plan
@@ -16,6 +17,7 @@ from companion.skipper.planning.asking import request
 from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.track import steps
 from companion.skipper.step.actions import Announce, ReplanReason, UploadMission
+from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.snapshot import PlanOutcome
@@ -159,6 +161,40 @@ def test_how_far_she_may_be_off_a_leg_is_no_second_radius_of_a_goal(off_m, is_re
     pass_gates(ctx)
     assert ctx.state.progress.reached == ((0,) if is_reached else ())
     assert ctx.state.progress.missed == (0 if is_reached else 1)
+
+
+@pytest.mark.parametrize("steered", [Guidance.HEADING, Guidance.FIELD])
+@pytest.mark.parametrize(("off_m", "is_reached"), [(4.0, True), (28.0, False)])
+def test_what_we_steer_past_counts_by_its_radius_alone(off_m, is_reached, steered):
+    """ "G1 reached, 29.6 m from it: the autopilot has passed it", by headings: nobody but we had counted it."""
+    way = route((10.0, 100.0), (10.0, 200.0), (10.0, 230.0), gate_of=(0, 1, -1))
+    goals = (Goal(en_m=(10.0, 100.0), radius_m=5.0), Goal(en_m=(10.0, 200.0), radius_m=5.0))
+    guided = moment(way).autopilot
+    ctx = moment(
+        way,
+        goals=goals,
+        at=(10.0 + off_m, 100.0),
+        mission={"index": 1},
+        config={"guidance": steered, "grid_size_m": 30.0},
+        seen={"autopilot": replace(guided, mode=Mode.GUIDED)},
+        progress={"closest_m": off_m},
+    )
+    pass_gates(ctx)
+    assert ctx.state.progress.reached == ((0,) if is_reached else ())
+    assert ctx.state.progress.missed == (0 if is_reached else 1)
+
+
+@pytest.mark.parametrize("aside_m", [4.0, -4.0])
+def test_by_headings_she_comes_within_each_goals_radius(aside_m):
+    """Near the leg back, 30 m before a goal, she turned onto it, and the goal was reached from there."""
+    places = [(0.0, 120.0), (aside_m, 0.0), (0.0, 100.0)]
+    goals = [Goal(en_m=place, radius_m=4.0, name=f"{n}") for n, place in enumerate(places)]
+    made = skipper(voyage(*goals), guidance=Guidance.HEADING, grid_size_m=30.0)
+    w = World(skipper=made, wind=lambda t: (math.pi / 2.0, 5.0), position=(0.0, -40.0))
+    assert w.run(900.0, lambda w: len(w.state.progress.reached) == 3)
+    for place in places:
+        assert min(math.dist(place, there) for there in w.track) <= 4.5, place
+    assert not any("the autopilot has passed it" in text for text in said(w, "goal"))
 
 
 BUOY = Goal(en_m=(0.0, 200.0), radius_m=10.0, rounding_m=10.0, side=Side.STARBOARD, name="buoy")

@@ -70,8 +70,8 @@ class Gate:
     ``goal`` is the index into ``Voyage.legs``. ``keep_out`` are WKT polygons for the way here, besides the marks' own
     discs. For buoys ``buoy_en_m`` is the buoy and ``side`` where it is left; ``turn_rad`` is how far its rounding turns
     the boat, and ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the
-    approach's beginning, positive clockwise; short of it by more than ``short_rad`` the gate does not count.
-    ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With
+    approach's beginning, positive clockwise; short of it by more than ``short_rad`` the goal's last gate does not
+    count. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With
     ``line`` it is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place before
     it. With ``box`` it is where it stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before
     there are any, of none. With ``field`` it is steered by that, and it is where the mission on board leads meanwhile.
@@ -332,13 +332,15 @@ def is_on_wrong_side(gate: Gate, bearing: float) -> bool:
     return _short_rad(gate, bearing) > math.pi
 
 
-def has_come_round(gate: Gate, bearing: float) -> bool:
+def has_come_round(gate: Gate, bearing: float, *, spare_rad: float = 0.0) -> bool:
     """Return whether a boat that came round the buoy by ``bearing`` [rad] is as far round as the gate asks for.
 
     Being near is not enough: a gate's radius reaches to the buoy, on a wide approach before she is abeam of it, and the
-    autopilot's count far beyond.
+    autopilot's count far beyond. At a gate before the goal's last, half a turn short of it is the wrong hand, no less.
     """
-    return gate.approach_en_m is None or gate.side is Side.NONE or _short_rad(gate, bearing) <= gate.short_rad
+    if gate.approach_en_m is None or gate.side is Side.NONE:
+        return True
+    return _short_rad(gate, bearing) <= (gate.short_rad + spare_rad if gate.ends_goal else math.pi)
 
 
 def _short_rad(gate: Gate, bearing: float) -> float:
