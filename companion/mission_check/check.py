@@ -20,7 +20,7 @@ from companion.messages import GeoPoint
 from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
 from companion.skipper.planning import TRACKS_M
-from companion.skipper.way import KEEP_SHARE, SAME_M, Side
+from companion.skipper.way import KEEP_SHARE, SAME_M, Gate, Side
 
 HAIR_M = 0.005  # a depth is written in centimetres
 LEAST_NO_GO_DEG = 20.0  # an ice boat's
@@ -98,7 +98,7 @@ def check_mission(
 def _out_of_reach(mission: Mission) -> Iterator[Finding]:
     """Yield the places to reach that every step of the ladder keeps clear of: its floor, and a straight leg's track."""
     voyage = voyage_of(mission)
-    least_m = min(min(mission.margin_floor_m, mission.margin_m) + TRACKS_M[0], mission.margin_m)
+    least_m = _least_m(mission)
     for number, goal in enumerate(voyage.goals, start=1):
         if goal.side is not Side.NONE or goal.line or goal.box or goal.search or goal.field:
             continue
@@ -114,26 +114,32 @@ def _out_of_reach(mission: Mission) -> Iterator[Finding]:
             )
 
 
+def _least_m(mission: Mission) -> float:
+    """Return how near a goal may lie to be planned to at all [m]: by the ladder's floor, and a straight leg's track."""
+    return min(min(mission.margin_floor_m, mission.margin_m) + TRACKS_M[0], mission.margin_m)
+
+
 def _roundings(mission: Mission) -> Iterator[Finding]:
-    """Yield the buoys that cannot be rounded with the margin: a place of the circle has no room."""
-    told = set[int]()
+    """Yield the buoys with a place of their circle that has no room by the margin; by the floor: it is never sailed."""
+    worst: dict[int, tuple[float, Gate]] = {}
     voyage, gates = voyage_gates(mission)
     for number, gate in gates:
-        if gate.buoy_en_m is None or number in told:
-            continue
         clear_m = float(voyage.area.clearance_m([gate.en_m])[0])
-        if clear_m < mission.margin_m:
-            told.add(number)
-            goal = voyage.goals[number - 1]
-            near = voyage.area.nearest_name(gate.en_m) or "something"
-            yield Finding(
-                severity=FindingLevel.WARNING,
-                code=Code.NARROW_GAP,
-                place=f"[[goal]] {number} rounding",
-                text=f"rounded {goal.rounding_m:.0f} m off with {gate.name} to {goal.side.value} she comes to "
-                f"{max(0.0, clear_m):.1f} m from {near}; the margin is {mission.margin_m:g} m",
-                remedy="round it closer (radius_m and [area] margin_m say how far off), or leave it on the other hand",
-            )
+        if gate.buoy_en_m is not None and clear_m < min(mission.margin_m, worst.get(number, (math.inf, gate))[0]):
+            worst[number] = (clear_m, gate)
+    least_m = _least_m(mission)
+    for number, (clear_m, gate) in worst.items():
+        goal = voyage.goals[number - 1]
+        near = voyage.area.nearest_name(gate.en_m) or "something"
+        never = f", and no plan comes nearer than {least_m:g} m: it is never sailed" if clear_m < least_m else ""
+        yield Finding(
+            severity=FindingLevel.ERROR if never else FindingLevel.WARNING,
+            code=Code.NARROW_GAP,
+            place=f"[[goal]] {number} rounding",
+            text=f"rounded {goal.rounding_m:.0f} m off with {gate.name} to {goal.side.value} she comes to "
+            f"{max(0.0, clear_m):.1f} m from {near}; the margin is {mission.margin_m:g} m{never}",
+            remedy="round it closer (radius_m and [area] margin_m say how far off), or leave it on the other hand",
+        )
 
 
 def _marks_too_near(mission: Mission) -> Iterator[Finding]:

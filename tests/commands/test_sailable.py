@@ -190,6 +190,76 @@ def test_a_buoy_whose_circle_has_no_room_is_told(tmp_path, hand, told):
     assert all("the margin is 8 m" in finding.text for finding in found)
 
 
+@pytest.mark.parametrize(("floor_m", "level"), [(2.0, FindingLevel.WARNING), (7.0, FindingLevel.ERROR)])
+def test_a_buoy_whose_circle_is_below_the_floor_is_an_error(tmp_path, floor_m, level):
+    """ "In order" was said of one that lay in the fence: she loitered beside it for two hours."""
+    (tmp_path / "rock.wkt").write_text(
+        "POLYGON ((-1.30978 50.8208, -1.3092 50.8208, -1.3092 50.8210, -1.30978 50.8210, -1.30978 50.8208))"
+    )
+    mission = tmp_path / "m.toml"
+    mission.write_text(
+        f"""
+        [start]
+        lat = 50.8200
+        lon = -1.3103
+        [[goal]]
+        lat = 50.8209
+        lon = -1.3100
+        radius_m = 10
+        rounding = "port"
+        [[goal]]
+        lat = 50.8218
+        lon = -1.3097
+        [area]
+        obstacles = ["rock.wkt"]
+        margin_m = 8
+        margin_floor_m = {floor_m}
+        """
+    )
+    (found,) = (f for f in check_mission(mission).findings if f.place == "[[goal]] 1 rounding")
+    assert found.severity is level
+    assert ("never sailed" in found.text) is (level is FindingLevel.ERROR)
+
+
+@pytest.mark.parametrize(("beyond_m", "is_told"), [(9.0, True), (40.0, False)])
+@pytest.mark.parametrize("is_behind", [False, True])
+def test_a_line_with_no_room_to_turn_at_is_an_error(tmp_path, beyond_m, is_told, is_behind):
+    """10 m from a fence a gate was never crossed, from either side: no track of a plan kept clear of it."""
+    quay_m = 220.0 + beyond_m
+    wkt = ", ".join(
+        f"{-1.31 + east / 70_435.0:.7f} {50.82 + north / 111_250.0:.7f}"
+        for east, north in ((-300.0, quay_m), (300.0, quay_m), (300.0, quay_m + 30.0), (-300.0, quay_m + 30.0))
+    )
+    (tmp_path / "quay.wkt").write_text(f"POLYGON (({wkt}, {wkt.split(', ')[0]}))")
+    lat, west, east = 50.82 + 220.0 / 111_250.0, -1.31 - 25.0 / 70_435.0, -1.31 + 25.0 / 70_435.0
+    port, starboard = (east, west) if is_behind else (west, east)
+    mission = tmp_path / "m.toml"
+    mission.write_text(
+        f"""
+        [start]
+        lat = 50.8200
+        lon = -1.3100
+        [[goal]]
+        kind = "gate"
+        port_mark = {{ lat = {lat}, lon = {port} }}
+        starboard_mark = {{ lat = {lat}, lon = {starboard} }}
+        [[goal]]
+        lat = 50.8190
+        lon = -1.3100
+        [area]
+        obstacles = ["quay.wkt"]
+        margin_m = 2
+        margin_floor_m = 1
+        [boat]
+        length_m = 6
+        beam_m = 2
+        turn_rate_deg_s = 30
+        """
+    )
+    told = [f for f in check_mission(mission).findings if "never sailed" in f.text]
+    assert [(f.severity, f.place) for f in told] == [(FindingLevel.ERROR, "[[goal]] 1")] * is_told
+
+
 ROUND = """
 [start]
 lat = 50.8200

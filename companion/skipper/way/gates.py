@@ -19,11 +19,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from companion.geo.angles import difference_rad, wrap_pi
-from companion.skipper.way.geometry import barrier_wkt, bearing_rad, disc_wkt, distance_m, moved
+from companion.skipper.way.geometry import barrier_wkt, bearing_rad, disc_wkt, distance_m, has_way_out, moved
 from companion.skipper.way.line import (
     BEFORE_M,
     STRAY_M,
     ahead_m,
+    course_rad,
     crossing,
     crossing_en,
     foot_en,
@@ -159,6 +160,17 @@ def _gates_of(voyage: Voyage, area: AreaLike, approaches: tuple[Approach, ...]) 
 def no_room(gate: Gate, area: AreaLike, margin_m: float) -> str:
     """Return why a gate of a line has no room by a margin, in words of the line; empty: it has, or is of none."""
     return "" if gate.line is None else no_room_words(gate.line, gate.name, gate.en_m, area, margin_m)
+
+
+def is_dead_end(gate: Gate, area: AreaLike, *, radius_m: float, reach_m: float) -> bool:
+    """Return whether a hull that comes to the place beyond or before a line cannot turn away there, nor sail on.
+
+    Beyond the line it comes on the line's course, before it, from behind the line, the other way about.
+    """
+    if gate.line is None:
+        return False
+    course = course_rad(gate.line) + (math.pi if gate.is_before_line else 0.0)
+    return not has_way_out(area, gate.en_m, course, radius_m=radius_m, reach_m=reach_m)
 
 
 class Mark(NamedTuple):
