@@ -42,6 +42,7 @@ from companion.boat.log import (
 from companion.boat.manoeuvres import MOST_RECOVERY_S, manoeuvres_of
 from companion.boat.polar import Polar
 from companion.geo.angles import wrap_pi
+from companion.geo.distinct import distinct
 
 Floats = NDArray[np.float64]
 Row = tuple[float, float, float, float]
@@ -274,7 +275,7 @@ def as_learned(boat: Boat, told: Told) -> Boat:
 
 @lru_cache(maxsize=8)
 def _as_learned(boat: Boat, told: Told) -> Boat:
-    twa = np.unique(np.concatenate([boat.polar.twa_rad, np.radians(np.arange(0.0, 181.0, 15.0))]))
+    twa = distinct(np.concatenate([boat.polar.twa_rad, np.radians(np.arange(0.0, 181.0, 15.0))]))
     twa = twa[np.concatenate([[True], np.diff(twa) > 1e-9])]
     twa = np.minimum(twa, math.pi)
     tws = boat.polar.tws_mps

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from companion.boat.polar import Polar, SailingAngle
 from companion.geo import MPS_PER_KNOT
+from companion.geo.distinct import distinct
 
 Floats = NDArray[np.float64]
 
@@ -143,7 +144,7 @@ class Boat:
         twa_rad, speed_mps = self.polar.curve(tws_mps)
         if self.leeway_rad == 0.0:
             return twa_rad, speed_mps
-        bows = np.unique(np.concatenate([twa_rad, np.radians(np.arange(0.0, 181.0, 5.0))]))
+        bows = distinct(np.concatenate([twa_rad, np.radians(np.arange(0.0, 181.0, 5.0))]))
         speeds = np.interp(bows, twa_rad, speed_mps)
         slips = self.leeways_rad(bows, tws_mps)
         courses = np.minimum(bows + slips, math.pi)

@@ -30,6 +30,7 @@ from companion.disk import read_regular
 from companion.errors import InputError, unreadable
 from companion.geo import MPS_PER_KNOT
 from companion.geo.angles import wrap_pi_array
+from companion.geo.distinct import distinct
 
 Floats = NDArray[np.float64]
 
@@ -188,7 +189,7 @@ class Polar:
 
     def _best(self, tws_mps: float, low_rad: float, high_rad: float, sign: float) -> SailingAngle:
         count = max(2, 1 + math.ceil((high_rad - low_rad) / _SEARCH_STEP_RAD))
-        angles = np.unique(
+        angles = distinct(
             np.concatenate(
                 [
                     np.linspace(low_rad, high_rad, count),
@@ -582,7 +583,7 @@ def _parse_pairs(lines: list[tuple[int, str]], source: str) -> PolarFile | None:
             )
         winds.append(values[0])
         columns.append((angles, np.where(speeds >= MIN_SPEED_KN, speeds, 0.0)))
-    twa_deg = np.unique(np.concatenate([angles for angles, _ in columns]))
+    twa_deg = distinct(np.concatenate([angles for angles, _ in columns]))
     table = np.empty((twa_deg.size, len(winds)))
     for j, (angles, speeds) in enumerate(columns):
         table[:, j] = _along(twa_deg, angles, speeds)

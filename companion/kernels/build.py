@@ -10,15 +10,12 @@ work.
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import os
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -99,6 +96,11 @@ def prepare(packages: Sequence[str], *, say: Callable[[str], None]) -> None:
 
 def compile_listed(packages: Sequence[str]) -> int:
     """Compile what is not there and write how far it is; return 0, or KILLED."""
+    # Here: every companion asks this module whether all is compiled, and would keep what it never uses.
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from concurrent.futures.process import BrokenProcessPool
+
     sweep()
     left = [entry for package in packages for entry in read_list(package)]
     of, of_s, deaths = len(left), sum(entry.seconds for entry in left), 0
@@ -124,7 +126,9 @@ def compile_listed(packages: Sequence[str]) -> int:
 
 def leave_with_parent() -> None:
     """Let this process of a pool end when the one that it works for does: by itself it would wait for work for ever."""
-    parent = multiprocessing.parent_process()
+    from multiprocessing import parent_process
+
+    parent = parent_process()
     if parent is not None:
         _leave_after(parent.join)
 

@@ -107,7 +107,7 @@ def test_a_process_that_is_killed_is_followed_by_another_and_the_third_one_ends_
         def __exit__(self, *_):
             return False
 
-    monkeypatch.setattr(build, "ProcessPoolExecutor", Killed)
+    monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", Killed)
     assert build.compile_listed(ALL) == build.KILLED
     assert len(tries) == 3
     assert capsys.readouterr().out == ""

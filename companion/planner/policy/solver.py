@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.clock import effort_s
+from companion.geo.distinct import distinct
 from companion.geo.segments import PolygonIndex
 from companion.planner.policy.kernels import FAR_S, TOUCH_S, sweep
 from companion.planner.policy.policy import SETTLED_S, Chart, Handling, Policy
@@ -35,7 +36,7 @@ def angles_of(problem: Problem) -> Floats:
     boat = problem.boat
     near = [boat.no_go_half_rad + turn for turn in TURNS_RAD]
     deep = np.arange(math.ceil(near[-1] / EVERY_RAD) * EVERY_RAD, boat.max_twa_rad, EVERY_RAD)
-    return np.unique(np.minimum([*near, *deep, boat.max_twa_rad], boat.max_twa_rad))
+    return distinct(np.minimum([*near, *deep, boat.max_twa_rad], boat.max_twa_rad))
 
 
 def solve(

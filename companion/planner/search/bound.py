@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from companion.geo.distinct import distinct
 from companion.planner.problem.parts import NO_GO_SLACK_RAD, TOUCH_M
 from companion.planner.problem.value import Problem
 from companion.planner.search.gauge import Courses, Gauge, make_gauge, velocities
@@ -75,7 +76,7 @@ class Boards:
         """Return for each height the earliest time there [s], and the zone's half angle then [rad]."""
         boat = self.world.boat
         nodes = boat.twa[(boat.twa > self._least_rad) & (boat.twa < 0.5 * math.pi)]
-        angles = np.unique(np.concatenate([np.linspace(self._least_rad, 0.5 * math.pi, 721), nodes]))
+        angles = distinct(np.concatenate([np.linspace(self._least_rad, 0.5 * math.pi, 721), nodes]))
         speeds = np.interp(angles, boat.twa, boat.mps) * (1.0 + 1e-5)
         made = np.maximum(speeds[:-1], speeds[1:]) * np.cos(angles[:-1])  # at its largest between two angles
         best = np.maximum.accumulate(made[::-1])[::-1]
@@ -208,9 +209,9 @@ def _cuts(world: SearchWorld) -> Floats:
     edges = world.grid.edges
     x0, x1 = world.box[0] - 2.0 * _PAD_M, world.box[2] + 2.0 * _PAD_M
     longest = np.argsort(np.hypot(edges[:, 2] - edges[:, 0], edges[:, 3] - edges[:, 1]), kind="stable")[-_WALLS:]
-    ends = np.unique(edges[longest][:, [0, 2]])
+    ends = distinct(edges[longest][:, [0, 2]])
     about = ends[:, None] + np.array([-_BESIDE_M, -2.0 * _PAD_M, 2.0 * _PAD_M, _BESIDE_M])[None]
-    cuts = np.unique(np.concatenate([np.linspace(x0, x1, _STRIPS + 1), about.ravel()]))
+    cuts = distinct(np.concatenate([np.linspace(x0, x1, _STRIPS + 1), about.ravel()]))
     return np.asarray(cuts[(cuts >= x0) & (cuts <= x1)], np.float64)
 
 
@@ -320,7 +321,7 @@ def progress_s(problem: Problem, goal: tuple[float, float], radius_m: float) -> 
         return 0.0
     angle = np.linspace(least, top, 1801)
     nodes = np.asarray([a for a in problem.boat.polar_twa_rad if least < a < top])
-    angle = np.unique(np.concatenate([angle, nodes]))
+    angle = distinct(np.concatenate([angle, nodes]))
     v = np.interp(angle, problem.boat.polar_twa_rad, problem.boat.polar_mps) * (1.0 + 1e-5)
     heading = math.atan2(*goal)
     bearings = np.concatenate([np.linspace(-math.pi, math.pi, _NORMALS, endpoint=False), [0.0, heading]])
@@ -363,7 +364,7 @@ def late_s(problem: Problem, late: Gauge, metric_s: float, at_s: float) -> float
     half = np.array([problem.no_go_half_rad(float(t)) for t in times]) - NO_GO_SLACK_RAD
     least, top = max(0.0, float(half[0])), min(math.pi, problem.boat.max_twa_rad + NO_GO_SLACK_RAD)
     nodes = np.asarray(problem.boat.polar_twa_rad)
-    angle = np.unique(np.clip(np.concatenate([np.linspace(least, top, _ANGLES), half, nodes]), least, top))
+    angle = distinct(np.clip(np.concatenate([np.linspace(least, top, _ANGLES), half, nodes]), least, top))
     v = np.interp(angle, problem.boat.polar_twa_rad, problem.boat.polar_mps) * (1.0 + 1e-5)
     side, ahead = v * np.sin(angle), v * np.cos(angle)
     gauged = np.maximum(

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.geo.distinct import distinct
 from companion.kernels.jit import kernel
 from companion.planner.problem.parts import NO_GO_SLACK_RAD
 from companion.planner.problem.value import Problem
@@ -176,7 +177,7 @@ def velocities(p: Courses, half_rad: float) -> Floats:
     if half_rad > top:
         return np.empty((0, 2))
     nodes = np.asarray([a for a in p.polar_twa_rad if half_rad <= a <= top], np.float64)
-    a = np.unique(np.concatenate([np.linspace(half_rad, top, _SAMPLES), nodes]))
+    a = distinct(np.concatenate([np.linspace(half_rad, top, _SAMPLES), nodes]))
     v = np.interp(a, p.polar_twa_rad, p.polar_mps) * _OUT
     half = np.column_stack([v * np.sin(a), v * np.cos(a)])
     both = np.vstack([half, half[::-1] * np.array([-1.0, 1.0])])

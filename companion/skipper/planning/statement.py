@@ -20,6 +20,7 @@ from shapely.geometry import LineString, Polygon
 from companion.boat import Boat
 from companion.current import STILL_WATER, WaterCurrent, WindAngleUncertainty, forecast_over_water
 from companion.geo.angles import difference_rad, wrap_two_pi
+from companion.geo.distinct import distinct
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import grown_m
 from companion.messages import WindForecast
@@ -101,7 +102,7 @@ def wind_part(
     that swings is not forgotten. The half width is that of the central interval of probability 2 delta_s - 1.
     """
     horizons = forecast.horizon_s
-    times = np.unique(np.concatenate([[0.0], np.clip(horizons - after_s, 0.0, None)]))
+    times = distinct(np.concatenate([[0.0], np.clip(horizons - after_s, 0.0, None)]))
     span = times[times <= max(length_s, times[min(1, times.shape[0] - 1)])]
     means = np.array([mean_twd_rad(forecast, after_s + float(t)) for t in span])
     mean = math.atan2(float(np.mean(np.sin(means))), float(np.mean(np.cos(means))))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from companion.geo.distinct import distinct
 from companion.messages import WindForecast
 from companion.planner.problem import ASSUMED_SHARE, Strength
 from companion.skipper.step.context import StepContext
@@ -25,7 +26,7 @@ def strength_of(forecast: WindForecast, *, after_s: float = 0.0, is_known: bool 
     Never surer than an anemometer is (``LEAST_SHARE``); where the wind is not believed (``is_known``), no surer than
     one of which only the mean is known.
     """
-    times = np.unique(np.concatenate([[0.0], np.clip(forecast.horizon_s - after_s, 0.0, None)]))
+    times = distinct(np.concatenate([[0.0], np.clip(forecast.horizon_s - after_s, 0.0, None)]))
     mean = np.interp(after_s + times, forecast.horizon_s, forecast.mean_tws_mps)
     sigma = np.interp(after_s + times, forecast.horizon_s, forecast.sigma_tws_mps)
     least = (LEAST_SHARE if is_known else ASSUMED_SHARE) * mean
