@@ -557,3 +557,83 @@ def test_given_back_the_mission_is_compared_and_she_plans_from_where_she_is():
     assert (state.mission.checked, state.mission.read_since_s, state.phase) == (False, NOW_S, Phase.WAITING)
     assert codes(ctx) == ["operator back"]
     assert any("after 60 s" in a.text for a in ctx.actions)
+
+
+def test_an_autopilot_that_was_only_not_known_to_be_ours_is_compared_and_nobody_gave_her_back():
+    ctx = seen(Mode.AUTO, phase=Phase.OPERATOR, operator={"since_s": None})
+    assert not operator_has_it(ctx)
+    assert (ctx.state.phase, ctx.state.mission.checked) == (Phase.WAITING, False)
+    assert (ctx.state.operator.given_back_s, codes(ctx)) == (-math.inf, [])
+
+
+@pytest.mark.parametrize(
+    ("mode", "armed", "cause", "words"),
+    [
+        (Mode.MANUAL, True, "a person", "mode MANUAL"),
+        (Mode.MANUAL, False, "a person", "mode MANUAL, disarmed"),
+        (None, True, "a person", "mode unknown"),
+        (Mode.HOLD, True, "battery", "mode HOLD by the battery failsafe"),
+    ],
+)
+def test_what_she_was_put_into_is_named_and_by_which_failsafe(mode, armed, cause, words):
+    may = replace(ALL_PERMITTED, may_set_mode=False)  # a failsafe's stop is left to the crew, too
+    stop = stopped(mode, armed=armed, cause=cause)
+    ctx = seen(mode, armed=armed, stop=stop, phase=Phase.OPERATOR, operator={"since_s": NOW_S - 60.0}, permissions=may)
+    assert operator_has_it(ctx)
+    assert ctx.state.why == f"{words}: waiting for AUTO"
+
+
+def test_the_sticks_are_read_by_the_channels_that_the_autopilot_was_read_to_have():
+    swapped = AutopilotLimits.from_params({"RCMAP_ROLL": 4.0, "RCMAP_THROTTLE": 3.0, "MODE_CH": 8.0})
+    for limits in (None, swapped):
+        ctx = seen(Mode.AUTO, status={"rc_us": RC}, signs={"rc_us": ()})
+        ctx.snapshot = replace(ctx.snapshot, limits=limits)
+        follow_stops(ctx)
+        channels = [n for n in (limits or AutopilotLimits()).rc_channels if 1 <= n <= len(RC)]
+        assert ctx.state.operator.signs.rc_us == tuple(RC[n - 1] for n in channels)
+
+
+# ------------------------------------------------------------------------------- a mode before she sets sail
+@pytest.mark.parametrize(
+    ("mode", "before", "change", "is_put"),
+    [
+        (Mode.MANUAL, Mode.HOLD, {}, True),
+        (Mode.HOLD, Mode.HOLD, {}, False),  # as she was
+        (Mode.HOLD, None, {}, False),  # as she was switched on
+        (Mode.HOLD, Mode.INITIALISING, {}, False),
+        (Mode.INITIALISING, Mode.HOLD, {}, False),
+        (Mode.AUTO, Mode.HOLD, {}, False),
+        (Mode.LOITER, Mode.HOLD, {"own": Mode.LOITER}, False),  # ours
+        (Mode.MANUAL, Mode.HOLD, {"voyage": {"sailing": True}}, False),  # then it is a stop
+        (Mode.HOLD, Mode.MANUAL, {"signs": {"seen_s": (("battery", NOW_S - 1.0),)}}, False),  # a failsafe's
+        (Mode.HOLD, Mode.MANUAL, {"signs": {"seen_s": (("battery", NOW_S - 9.0),)}}, True),
+    ],
+)
+def test_a_mode_that_somebody_sets_before_she_sails_is_noticed(mode, before, change, is_put):
+    signs = {"helm": (before, True)} | change.get("signs", {})
+    ctx = seen(mode, **({"voyage": {"sailing": False}} | change | {"signs": signs}))
+    follow_stops(ctx)
+    put = ctx.state.operator.put
+    assert (put is not None) is is_put
+    if put is not None:
+        assert (put.t_s, put.before_s, put.mode, put.is_armed) == (NOW_S, NOW_S - 1.0, mode, True)
+
+
+@pytest.mark.parametrize(
+    ("mode", "age_s", "change", "is_kept"),
+    [
+        (Mode.MANUAL, 60.0, {}, True),
+        (Mode.INITIALISING, 60.0, {}, True),  # a reboot chooses nothing
+        (Mode.AUTO, 60.0, {}, False),  # it is over
+        (Mode.MANUAL, 60.0, {"voyage": {"sailing": True}}, False),
+        (Mode.MANUAL, 5.0, {"signs": {"seen_s": (("battery", NOW_S),)}}, False),  # its sign came late
+        (Mode.MANUAL, 5.1, {"signs": {"seen_s": (("battery", NOW_S),)}}, True),
+        (Mode.MANUAL, 5.0, {}, True),
+    ],
+)
+def test_it_is_kept_until_auto(mode, age_s, change, is_kept):
+    put = Stop(t_s=NOW_S - age_s, before_s=NOW_S - age_s - 1.0, mode=Mode.MANUAL, is_armed=True, cause="a person")
+    signs = {"helm": (Mode.MANUAL, True)} | change.get("signs", {})
+    ctx = seen(mode, operator={"put": put}, **({"voyage": {"sailing": False}} | change | {"signs": signs}))
+    follow_stops(ctx)
+    assert ctx.state.operator.put == (put if is_kept else None)
