@@ -61,6 +61,13 @@ def name_of(pid):
 
 prepare(("companion",), say=lambda _: None)
 fork_server = ForkServer.begin(answer_requests)
+revive = fork_server.revive
+
+def stopped_when_begun():   # on a busy machine it may be ready before the planner is missed
+    is_begun = revive()
+    if is_begun:
+        os.kill(fork_server.pid, signal.SIGSTOP)
+    return is_begun
 
 async def killed(worker):
     dead = worker.pid
@@ -81,10 +88,12 @@ async def main():
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
         assert [name_of(worker.pid), name_of(fork_server.pid)] == ["planner", "fork-server"]
         first = fork_server.pid
+        fork_server.revive = stopped_when_begun
         os.kill(fork_server.pid, signal.SIGKILL)   # with nobody to fork, it is started
         await killed(worker)
         assert (await worker.plan(p, expansions=3_000, seed=2)).waypoints_en.tolist() == wanted
         assert name_of(worker.pid) == "planner"
+        os.kill(fork_server.pid, signal.SIGCONT)
         while fork_server.pid == first or name_of(fork_server.pid) != "fork-server":   # ... and another is begun
             await asyncio.sleep(0.1)
         await killed(worker)
