@@ -224,12 +224,12 @@ def _counts(ctx: StepContext) -> bool:
 def _is_done(ctx: StepContext, route: Route, n: int, boat: PointEn) -> bool:
     """Return whether a waypoint may be left behind by Büsser's double conditions.
 
-    A goal's is not left for the leg that follows before she is past it: until then she may come within its radius,
-    which the grid size is not. The last one is, for to the loiter behind it the autopilot takes her, in its time.
+    While we steer, a goal's is not left for the leg that follows before she is past it: until then she may come within
+    its radius, which the grid size is not. The last one is, for to the loiter behind it she is taken in her time.
     """
     gate = route.gate_of[n]
     is_place = gate >= ctx.state.progress.gate and ctx.gates[gate].buoy_en_m is None
-    is_goals = is_place and n < ctx.last_waypoint()
+    is_goals = ctx.is_steered and is_place and n < ctx.last_waypoint()
     return waypoint_done(
         boat,
         route.leg_from_en_m[n],

@@ -8,11 +8,10 @@ from typing import Any
 import shapely
 
 from companion.frozen import changed
-from companion.messages import Mode, Severity
+from companion.messages import Severity
 from companion.skipper.behaviors.field_guidance import has_sailed
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waits_for_gun
 from companion.skipper.step.actions import CancelPlan, ReplanReason
-from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import FRESH_S, StepContext
 from companion.skipper.step.state import Inside
 from companion.skipper.way.gates import Approach, Gate, again, has_come_round, is_on_wrong_side
@@ -73,7 +72,7 @@ def pass_gates(ctx: StepContext) -> None:
                 ctx.void_route()
                 missed(ctx)
             return
-        spare_rad = WIDE_RAD if counted and _is_steered(ctx) else 0.0
+        spare_rad = WIDE_RAD if counted and ctx.is_steered else 0.0
         if not has_come_round(gate, ctx.state.progress.bearing_rad, spare_rad=spare_rad):
             is_wrong = is_on_wrong_side(gate, ctx.state.progress.bearing_rad)
             if not is_wrong and not leaves:
@@ -249,13 +248,7 @@ def _is_own_count(ctx: StepContext, gate: Gate) -> bool:
 
     Of a buoy it is how she comes round that counts.
     """
-    return _is_steered(ctx) and gate.buoy_en_m is None
-
-
-def _is_steered(ctx: StepContext) -> bool:
-    """Return whether she is steered by headings or a field, and not by the autopilot along its legs."""
-    status = ctx.autopilot
-    return ctx.guidance is not Guidance.PLAN and status is not None and status.mode is Mode.GUIDED
+    return ctx.is_steered and gate.buoy_en_m is None
 
 
 def _is_last(ctx: StepContext) -> bool:

@@ -575,6 +575,12 @@ class StepContext:
         return Guidance.PLAN if self.falls_back else self.config.guidance
 
     @property
+    def is_steered(self) -> bool:
+        """Whether she is steered by headings or a field, and not by the autopilot along its legs."""
+        status = self.autopilot
+        return self.guidance is not Guidance.PLAN and status is not None and status.mode is Mode.GUIDED
+
+    @property
     def falls_back(self) -> bool:
         """Whether AUTO sails a plan to the next goal in place of the mission's own guidance."""
         return in_place_of_guidance(self.state)
