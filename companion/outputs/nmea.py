@@ -275,7 +275,7 @@ def course_of(view: View) -> ActiveLeg | None:
 
 def legs_ahead(view: View) -> tuple[LegView, ...]:
     """Return the legs that are not sailed yet, but for the loiter at the end."""
-    return () if view.plan is None else tuple(leg for leg in view.plan.legs if not leg.is_done and not leg.is_loiter)
+    return () if view.plan is None else tuple(leg for leg in view.plan.legs if not leg.is_loiter)
 
 
 def names_ahead(view: View) -> tuple[str, ...]:

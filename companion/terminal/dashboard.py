@@ -180,7 +180,7 @@ def tape(frame: Frame, row: int, view: View) -> None:
             if abs((off - wind.twd_from_deg + 180.0) % 360.0 - 180.0) <= half:
                 frame.put(row + 1, column, ":", Style.DIM)
     bearing = None
-    leg = None if view.plan is None else next((leg for leg in view.plan.legs if not leg.is_done), None)
+    leg = None if view.plan is None else next(iter(view.plan.legs), None)
     if leg is not None and boat.at_en_m is not None and not leg.is_loiter:
         bearing = math.degrees(math.atan2(leg.to_en_m[0] - boat.at_en_m[0], leg.to_en_m[1] - boat.at_en_m[1]))
     lines = () if view.laylines is None else view.laylines.lines
@@ -351,7 +351,7 @@ def _leg(view: View) -> Row:
     if plan is None or plan.leg is None:
         return "Leg", "no plan is sailed", Style.PLAIN
     bearing = ""
-    leg = next((leg for leg in plan.legs if not leg.is_done), None)
+    leg = next(iter(plan.legs), None)
     if leg is not None and boat.at_en_m is not None:
         east, north = leg.to_en_m[0] - boat.at_en_m[0], leg.to_en_m[1] - boat.at_en_m[1]
         bearing = f" at {direction_text(math.degrees(math.atan2(east, north)) % 360.0)}"

@@ -148,7 +148,9 @@ class ViewFold:
         t_s, route = snapshot.t_s, step.state.mission.route
         # a loiter that nobody planned has the number of the plan before it, and none of its reasons
         chosen = None if route is None or route.cost_s is None else self._plans.get(route.plan_id)
-        legs: tuple[Leg, ...] = tuple(leg for known in reversed(self._plans.values()) for leg in known.plan.legs)
+        admitted = 0 if route is None else route.plan_id  # what was made since is not on board
+        spliced = (known.plan.legs for number, known in reversed(self._plans.items()) if number <= admitted)
+        legs: tuple[Leg, ...] = tuple(leg for of_plan in spliced for leg in of_plan)
         goals = parts.goals_of(step, voyage)
         following = next((g for g in goals if g.is_next), None)
         sought = None if following is None else (following.name, following.at_en_m)

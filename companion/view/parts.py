@@ -737,8 +737,6 @@ def _leg(route: Route, number: int, legs: tuple[Leg, ...]) -> values.LegView:
         twa_deg=signed(known.twa_rad),
         length_m=rounded(math.dist(start, end), 1),
         speed_mps=rounded(known.speed_mps),
-        starts_s=rounded(known.start_s, 1),
-        ends_s=rounded(known.end_s, 1),
         sigma_deg=degrees(known.sigma_rad),
         no_go_half_deg=degrees(known.no_go_half_rad),
         clearance_m=rounded(known.clearance_m),

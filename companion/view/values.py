@@ -196,7 +196,7 @@ def tack_of(twa_rad: float) -> Tack:
     return "starboard" if twa_rad > 0.0 else "port"
 
 
-SCHEMA = "companion.view/1"
+SCHEMA = "companion.view/2"
 
 Source = Literal["live", "recorded", "radio"]
 Level = Literal["critical", "error", "warning", "notice", "info"]
@@ -256,19 +256,16 @@ class BoatView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LegView:
-    """A leg of the plan. ``starts_s`` and ``ends_s`` count from the plan; the last leg may be the loiter at the end."""
+    """A leg of the plan as it was when it was made; the last may be the loiter at the end."""
 
     from_en_m: PointEn
     to_en_m: PointEn
-    is_done: bool = False
     is_loiter: bool = False
     is_beat: bool | None = None  # the autopilot beats it by itself
     course_deg: float | None = None
     twa_deg: float | None = None
     length_m: float | None = None
     speed_mps: float | None = None
-    starts_s: float | None = None
-    ends_s: float | None = None
     sigma_deg: float | None = None
     no_go_half_deg: float | None = None
     clearance_m: float | None = None  # beyond the margin, to the nearest obstacle or limit

@@ -192,20 +192,17 @@ export interface Laylines {
 }
 
 /**
- * A leg of the plan. ``starts_s`` and ``ends_s`` count from the plan; the last leg may be the loiter at the end.
+ * A leg of the plan as it was when it was made; the last may be the loiter at the end.
  */
 export interface Leg {
   from_en_m: [number, number];
   to_en_m: [number, number];
-  is_done: boolean;
   is_loiter: boolean;
   is_beat: boolean | null;
   course_deg: number | null;
   twa_deg: number | null;
   length_m: number | null;
   speed_mps: number | null;
-  starts_s: number | null;
-  ends_s: number | null;
   sigma_deg: number | null;
   no_go_half_deg: number | null;
   clearance_m: number | null;

@@ -203,7 +203,7 @@ winds = st.none() | st.builds(
     awa_deg=turns,
     aws_mps=st.none() | speeds,
 )
-legs = st.builds(LegView, from_en_m=places, to_en_m=places, is_done=st.booleans(), is_loiter=st.booleans())
+legs = st.builds(LegView, from_en_m=places, to_en_m=places, is_loiter=st.booleans())
 plans = st.none() | st.builds(
     PlanView, leg=st.none() | st.integers(1, 300), legs=st.lists(legs, max_size=12).map(tuple)
 )

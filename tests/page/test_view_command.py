@@ -210,7 +210,7 @@ def test_ashore_the_page_shows_what_the_radio_brings(is_named, tmp_path):
                 assert time.monotonic() < until_s, view
                 with urllib.request.urlopen(f"http://127.0.0.1:{port}/api/stream", timeout=10) as stream:
                     for line in stream:
-                        if line.startswith(b"data: ") and b"companion.view/1" in line:
+                        if line.startswith(b"data: ") and b"companion.view/2" in line:
                             view = json.loads(line[6:])
                             break
             assert (view["source"], view["orders"]["standing"]["verb"]) == ("radio", "hold")

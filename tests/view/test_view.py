@@ -37,6 +37,7 @@ from companion.view import Past, ViewFold, recorded_views, sample_of, values
 from companion.view.area import area_of
 from companion.view.events import _plan, nearest_of
 from companion.view.parts import (
+    SAME_M,
     Chosen,
     _bound_s,
     _risk_left,
@@ -47,6 +48,7 @@ from companion.view.parts import (
     polar_of,
     refuges_of,
 )
+from companion.view.values import degrees, rounded
 from sitl.scenario.scenario import EventSpec
 from tests.skipper.world import with_parts
 from tests.view.conftest import sail, write_mission
@@ -138,6 +140,28 @@ def test_plans_are_numbered_as_they_are_made_and_their_legs_as_the_mission_on_bo
                 told += 1
                 assert view.plan.legs[place].manoeuvre == "tack"
     assert told
+
+
+def test_legs_are_those_of_plans_that_are_on_board(beat):
+    """A plan that had been found and was on its way lent its legs to the one that was sailed."""
+    made, lent = {}, 0
+    for step, view in zip(beat.steps, beat.views, strict=True):
+        for outcome in step.snapshot.outcomes:
+            if isinstance(outcome, PlanOutcome) and outcome.plan is not None and outcome.plan.has_path:
+                made[step.state.plans.made] = outcome.plan
+        if view.plan is None or view.plan.number is None:
+            continue
+        for shown in (leg for leg in view.plan.legs if leg.risk is not None):
+            same = {
+                number: (degrees(leg.sigma_rad), rounded(leg.clearance_m))
+                for number, plan in made.items()
+                for leg in plan.legs
+                if math.dist(leg.to_en, shown.to_en_m) < SAME_M
+            }
+            newest = max(number for number in same if number <= view.plan.number)
+            assert (shown.sigma_deg, shown.clearance_m) == same[newest]
+            lent += any(told != same[newest] for number, told in same.items() if number > view.plan.number)
+    assert lent
 
 
 def test_what_the_boat_makes_of_her_polar_is_of_the_water(beat):
