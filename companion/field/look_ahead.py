@@ -1,7 +1,7 @@
 """Look-ahead: a fan of sailable headings, where each would take the boat, and what it would cost.
 
 The cheapest is the one nearest to the field's that keeps its distance from vessels for the next minute and a half
-and from the shore for as long as it needs to turn away from it.
+and from the shore for as long as it needs to turn away from it, and after which there is still a way out.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ RING_COST = 2.0  # of all of a disc's ring, then
 TOUCH_M = 3.0  # nearer is touching: the hull, and where she is within it
 TOUCH_COST = 1000.0
 TURNS_SPARE_S = 3.0
+QUICK_RADPS = math.radians(60.0)  # what a boat turns at, at the most
+LEFT_AFTER_S = 5.0  # so much later there is still a way out: wind and turn may differ from what is foreseen
+ALIKE_RAD = math.radians(17.0)  # headings that are nearer to each other lead to the same ways out
 _FAN_TWA = np.radians(np.arange(0.0, 181.0, 6.0))
 _STEP_S = 2.5
 _FINE_S = 0.5
@@ -45,17 +48,16 @@ def choose(
     """Return the heading of the fan with the least cost, its margin [m], and the side to pass what stands still on."""
     if not situation.obstacles and intent.stay_in is None and intent.clearance is None:
         return wanted_rad, None, 0
-    if twd is None:
-        headings = np.concatenate([[wanted_rad], wanted_rad + np.radians(np.arange(6.0, 360.0, 6.0))])
-    else:
-        open_twa = _FAN_TWA[habits.no_go_half_rad < _FAN_TWA]
-        edges = np.concatenate([[habits.no_go_half_rad], open_twa])
-        headings = np.concatenate([[wanted_rad], twd - edges, twd + edges])
+    headings = _fan(wanted_rad, twd, habits)
     track, lost_s = foresee(headings, twd, situation, habits)
     cost = 1.0 - np.cos(headings - wanted_rad) + 0.02 * lost_s
     margin, blocked = margins(track, situation.obstacles), False
-    clear = None if intent.clearance is None else _clear(track, intent.clearance, habits)
-    ashore = None if clear is None else _ashore(clear, habits)
+    shore, clear, ashore = intent.clearance, None, None
+    if shore is not None:
+        clear = _clear(track, shore, habits)
+        if float(clear[0, 0]) > _reach_m(situation, habits):
+            shore = None  # all that is looked at is open water
+        ashore = _ashore(clear, habits)
     if situation.obstacles:
         cost += _inside(track, margin, ashore, situation.obstacles)
         cost += np.maximum(0.0, 1.0 - np.maximum(margin, 0.0) / habits.comfort_m)
@@ -69,15 +71,79 @@ def choose(
         side = wrap_pi_array(headings - wanted_rad) * state.round_side
         cost += ashore + np.where(blocked & (side < 0.0), OTHER_SIDE_COST, 0.0)
     if clear is not None:
+        if shore is not None:
+            # Hers may turn much faster than is stated of her: what she is led into by that counts as touching, too.
+            quick, _ = foresee(headings, twd, situation, _quick(habits))
+            clear = np.minimum(clear, _clear(quick, shore, habits))
         cost += _touches(clear, habits)
     cost += _changing(headings, cost, situation.heading_rad, state.wanted_rad)
     best = int(np.argmin(cost))
+    if shore is not None and clear is not None:
+        touch_m = min(TOUCH_M, float(clear[:, 0].min()) - 0.5)
+        is_clear = (clear[:, : int(_turns_round_s(habits) / _STEP_S) + 2] >= touch_m).all(axis=1)
+        # The shore is certain, a vessel's disc is not; but no way out leads through one that could be kept out of.
+        may = is_clear & (margin >= min(0.0, float(margin[best])))
+        if may[best]:
+            order = [int(k) for k in np.argsort(cost, kind="stable") if may[k]]
+            best = _with_way_out(order, headings, (track, lost_s), twd, situation, shore, habits, touch_m)
     round_side = state.round_side
     if not blocked:
         round_side = 0
     elif round_side == 0:
         round_side = 1 if wrap_pi(float(headings[best]) - wanted_rad) > 0.0 else -1
     return wrap_pi(float(headings[best])), float(margin[best]) if situation.obstacles else None, round_side
+
+
+def _fan(wanted_rad: float, twd: float | None, habits: GuidanceSettings, every: int = 1) -> NDArray[np.float64]:
+    """Return the headings to choose from [rad], (k,): the field's own, then those that can be sailed, ``every`` one."""
+    if twd is None:
+        return np.concatenate([[wanted_rad], wanted_rad + np.radians(np.arange(6.0, 360.0, 6.0))[::every]])
+    edges = np.concatenate([[habits.no_go_half_rad], _FAN_TWA[habits.no_go_half_rad < _FAN_TWA][every - 1 :: every]])
+    return np.concatenate([[wanted_rad], twd - edges, twd + edges])
+
+
+def _reach_m(situation: Situation, habits: GuidanceSettings) -> float:
+    """Return how far off the shore has no part in what is chosen [m]: farther than all that is looked at."""
+    fastest = max(*habits.polar_mps, math.hypot(*situation.velocity_en_mps))
+    carried = habits.leeway_share * situation.tws_mps + math.hypot(*situation.current_en_mps)
+    looked_s = max(habits.shore_s, LEFT_AFTER_S + _turns_round_s(habits)) + 3.0 * _STEP_S
+    return (fastest + carried) * looked_s + max(1.5 * habits.keep_m, TOUCH_M)
+
+
+def _with_way_out(
+    order: Sequence[int],
+    headings: NDArray[np.float64],
+    foreseen: tuple[NDArray[np.float64], NDArray[np.float64]],
+    twd: float | None,
+    situation: Situation,
+    shore: Clearance,
+    habits: GuidanceSettings,
+    touch_m: float,
+) -> int:
+    """Return the first heading of ``order`` after which there is still a way out, its first of all where none has.
+
+    Into a wedge the way straight on is clear for longer than there is room to turn round, so that a heading is clear
+    is not enough: ``LEFT_AFTER_S`` later some heading must be clear for as long as turning round takes.
+    """
+    track, lost_s = foreseen
+    after, closed = round(LEFT_AFTER_S / _STEP_S), np.empty(0)
+    look = replace(habits, horizon_s=_turns_round_s(habits) + 2.0 * _STEP_S)
+    for k in order:
+        if bool((np.abs(wrap_pi_array(closed - headings[k])) < ALIKE_RAD).any()):
+            continue
+        turned = wrap_pi(float(headings[k]) - situation.heading_rad) * min(1.0, LEFT_AFTER_S / max(lost_s[k], _FINE_S))
+        east, north = (track[k, after] - track[k, after - 1]) / _STEP_S
+        then = replace(
+            situation,
+            en_m=(float(track[k, after, 0]), float(track[k, after, 1])),
+            velocity_en_mps=(float(east), float(north)),
+            heading_rad=wrap_pi(situation.heading_rad + turned),
+        )
+        ways, _ = foresee(_fan(float(headings[k]), twd, habits, every=2), twd, then, look)
+        if bool((_clear(ways, shore, look) >= touch_m).all(axis=1).any()):
+            return k
+        closed = np.append(closed, headings[k])
+    return order[0]
 
 
 def _changing(
@@ -205,6 +271,11 @@ def _leaving(
 def _turns_round_s(habits: GuidanceSettings) -> float:
     """Return how long turning round takes at most, to be sure [s]."""
     return math.pi / habits.turn_rate_radps + habits.tack_s + TURNS_SPARE_S
+
+
+def _quick(habits: GuidanceSettings) -> GuidanceSettings:
+    """Return the habits of a boat that turns at once: hers may turn much faster than is stated of her."""
+    return replace(habits, turn_rate_radps=max(QUICK_RADPS, habits.turn_rate_radps), tack_s=0.0)
 
 
 def _clear(track: NDArray[np.float64], clearance: Clearance, habits: GuidanceSettings) -> NDArray[np.float64]:

@@ -179,3 +179,43 @@ def test_of_two_ways_alike_the_one_that_was_chosen_is_kept(seed: int, twd_deg: f
 def test_distance_to_a_ship_is_given_up_before_the_shores(seed: int, twd_deg: float, ship_mps: float) -> None:
     """Held against the shore by all of a disc of 87 m, 50 of them distance kept, she came to 4.6 and 5.4 m of it."""
     assert chased(seed, twd_deg, ship_mps).clear_m > 7.0
+
+
+# Between an island and two squares the water narrows to the west to nothing, and the wind veers against her way back.
+ISLAND = [
+    (-132.0, -30.0),
+    (-56.0, 46.0),
+    (-93.0, 70.0),
+    (-237.0, 70.0),
+    (-431.0, -181.0),
+    (-89.0, -137.0),
+    (-49.0, -86.0),
+]
+WEDGE = area(Polygon(ISLAND), box(-98.0, -270.0, 143.0, -30.0), box(-338.0, -390.0, -98.0, -150.0))
+STATED_SLOW = GuidanceSettings(
+    no_go_half_rad=math.radians(47.0),
+    polar_twa_rad=tuple(map(math.radians, (0.0, 20.0, 35.0, 45.0, 60.0, 90.0, 120.0, 180.0))),
+    polar_mps=(0.0, 1.47, 2.65, 3.31, 4.0, 4.69, 4.75, 5.13),
+    turn_rate_radps=math.radians(8.0),
+    tack_s=4.0,
+    lag_s=3.0,
+    horizon_s=60.0,
+    keep_m=3.2,
+)
+
+
+@pytest.mark.parametrize("further_m", [0.0, 3.5])
+def test_she_turns_out_of_a_wedge_while_there_is_room_to(further_m: float) -> None:
+    """Straight on was clear until no way round was left, and then she touched."""
+    course = math.radians(256.0)
+    seen = Situation(
+        t_s=0.0,
+        en_m=(-14.0 + further_m * math.sin(course), -2.0 + further_m * math.cos(course)),
+        velocity_en_mps=(3.8 * math.sin(course), 3.8 * math.cos(course)),
+        heading_rad=course,
+        twd_from_rad=math.radians(207.0),
+        tws_mps=12.0,
+    )
+    intent = replace(hold_heading(course), clearance=WEDGE.clearance_m)
+    _, setpoint = step(GuidanceState(wanted_rad=course), seen, intent, STATED_SLOW)
+    assert abs(wrap_pi(setpoint.heading_rad - course)) > math.radians(60.0)
