@@ -23,7 +23,7 @@ from companion.skipper.planning.fallback import leaves_headings
 from companion.skipper.planning.not_found import MORE, asks_again, not_found
 from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.track import clearance_text, of_way, steps
-from companion.skipper.planning.uploads import is_begun_risky, is_riskier, judged, upload
+from companion.skipper.planning.uploads import clearance_here_m, is_begun_risky, is_riskier, judged, upload
 from companion.skipper.planning.vessels import apart_m, meetings
 from companion.skipper.step import DiversionKind, Phase, PlanOutcome, ReplanReason, Route, StepContext
 from companion.skipper.step.actions import Change
@@ -361,8 +361,9 @@ def put_in_place(ctx: StepContext, pending: PendingPlan, plan: Plan, keep: int, 
 
 
 def _told_m(ctx: StepContext, plan: Plan, planned_m: float | None, track: ExpectedTrack | None) -> float | None:
-    """Return the clearance that a plan is told with [m]: of the track that it was judged by, which begins at the boat.
+    """Return the clearance that a plan is told with [m]: of the track that it was judged by, and of where the boat is.
 
+    That track begins where she is by the time that the plan is on board, which may have more room than here.
     The planner's own (``planned_m``) is of a track that begins at a waypoint, on a heading that she may not have there.
     It stands where nothing was judged; and for the boards of legs that are left to the autopilot, which it alone looks
     at, where it keeps the floor.
@@ -373,7 +374,9 @@ def _told_m(ctx: StepContext, plan: Plan, planned_m: float | None, track: Expect
     has_boards = any(leg.is_beat for leg in plan.legs)
     if has_boards and planned_m is not None and planned_m >= min(ctx.config.margin_floor_m, ctx.config.margin_m):
         seen_m = min(seen_m, planned_m)
-    return seen_m if math.isfinite(seen_m) else None
+    if not math.isfinite(seen_m):
+        return None
+    return seen_m if ctx.boat_en is None else min(seen_m, clearance_here_m(ctx, ctx.boat_en))
 
 
 def _gybed_round(ctx: StepContext, pending: PendingPlan, start: PointEn, points: list[PointEn]) -> tuple[PointEn, ...]:

@@ -212,7 +212,7 @@ def judged(ctx: StepContext, route: Route, set_current: int | None, pending: Pen
     if boat is None or vehicle is None or not ctx.state.voyage.sailing:
         return Judgement()
     problem = pending.problem
-    here_m = float(water_to_keep(ctx.voyage.area, boat).clearance_m([boat])[0]) - ctx.voyage.boat.hull.reach_m
+    here_m = clearance_here_m(ctx, boat)
     # Below the floor, and where it has to be gybed round, a way of short legs is better than none.
     has_loops = not tacks_fail(ctx) and (problem.tracking is None or here_m >= problem.tracking.floor_m)
     first = ctx.state.mission.index if set_current is None else set_current - 1
@@ -242,6 +242,11 @@ def judged(ctx: StepContext, route: Route, set_current: int | None, pending: Pen
     if low or not ahead or not is_open(ctx, pending, before):
         return Judgement(low, seen)
     return Judgement(_less(ctx, pending, new, old, heading_rad=heading_rad), seen)
+
+
+def clearance_here_m(ctx: StepContext, boat: PointEn) -> float:
+    """Return the clearance of a boat's hull where it is [m]: outside the limits, of what is solid."""
+    return float(water_to_keep(ctx.voyage.area, boat).clearance_m([boat])[0]) - ctx.voyage.boat.hull.reach_m
 
 
 def _is_sailed(ctx: StepContext) -> bool:

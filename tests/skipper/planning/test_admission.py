@@ -22,7 +22,7 @@ from companion.skipper.planning.answers import _told_m, take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.not_found import not_found
 from companion.skipper.planning.track import steps
-from companion.skipper.planning.uploads import _below_floor, judged
+from companion.skipper.planning.uploads import _below_floor, clearance_here_m, judged
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, SetCurrent, UploadMission
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import Retry
@@ -270,6 +270,19 @@ def test_the_clearance_that_is_told_is_of_the_track_that_admitted_the_plan():
     assert new.route.expected_clearance_m == pytest.approx(track.clearance_m)
     assert track.clearance_m >= FLOOR_M
     assert f"passes {track.clearance_m:.1f} m clear" in told.text
+
+
+def test_no_plan_is_told_with_more_clearance_than_she_has():
+    """ "45.1 m" stood beside 36.7 for five seconds: the track begins where she is by the time that it is on board."""
+    world = sailing()
+    world.position, world.state = (0.0, 135.0), with_parts(world.state, position={"last_seen": None})  # past the rock
+    ctx = turn_of(world)
+    assert request(ctx, ReplanReason.RETRY)
+    pending = ctx.state.pending.plan
+    take_plan(ctx, PlanOutcome(request_id=pending.request_id, plan=plan(pending.problem, expansions=4000)))
+    new, here_m = ctx.state.pending.upload, clearance_here_m(ctx, world.position)
+    assert judged(ctx, new.route, new.set_current, pending).track.clearance_m > here_m + 1.0
+    assert new.route.expected_clearance_m == pytest.approx(here_m)
 
 
 @pytest.mark.parametrize(
