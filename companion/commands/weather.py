@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from argparse import ArgumentTypeError
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -109,7 +110,7 @@ def _tide(args: argparse.Namespace) -> int:
     """Print or write the tide of a place as a table over time."""
     import numpy as np
 
-    from companion.weather import iso, read_weather
+    from companion.weather import read_weather
 
     at: GeoPoint = args.at
     names = ", ".join(map(str, args.files))
@@ -138,12 +139,13 @@ def _tide(args: argparse.Namespace) -> int:
         )
     rows = ["time, set_deg, drift_mps" if args.stream else "time, height_m"]
     for t, row in zip(times.tolist(), found.tolist(), strict=True):
+        when = f"{datetime.fromtimestamp(t, UTC):%Y-%m-%dT%H:%M:%SZ}"  # a table of every 90 s has seconds
         if args.stream:
             east, north = row
             set_deg = float(np.degrees(np.arctan2(east, north)) % 360.0)
-            rows.append(f"{iso(t)}, {set_deg:.1f}, {float(np.hypot(east, north)):.3f}")
+            rows.append(f"{when}, {set_deg:.1f}, {float(np.hypot(east, north)):.3f}")
         else:
-            rows.append(f"{iso(t)}, {row[0]:.3f}")
+            rows.append(f"{when}, {row[0]:.3f}")
     if args.out is None:
         print("\n".join(rows))
     else:

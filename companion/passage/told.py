@@ -27,6 +27,7 @@ def told_of(route: Route, of: Departure | None = None) -> tuple[str, ...]:
     if not sailed.arrived:
         return (f"not there: after {_span(sailed.time_s)}, {_way_left(route)} from the goal: {sailed.why}",)
     arrives = route.depart_utc_s + sailed.time_s
+    minutes = round(arrives / 60.0) - round(route.depart_utc_s / 60.0)  # of the hours as they are told
     made = sailed.length_m / max(1.0, sailed.time_s)
     wind = sailed.rows[:, 3]
     way = f"{sailed.length_m / M_PER_NM:.0f} NM at {made:.2f} m/s"
@@ -35,7 +36,7 @@ def told_of(route: Route, of: Departure | None = None) -> tuple[str, ...]:
     if short_m >= 0.05 * M_PER_NM:
         way += f" to within {short_m / M_PER_NM:.1f} NM of the goal"
     lines = [
-        f"departs {iso(route.depart_utc_s)}, arrives {iso(arrives)}: {_span(sailed.time_s)}, {way}",
+        f"departs {iso(route.depart_utc_s)}, arrives {iso(arrives)}, {_span(60.0 * minutes)} later: {way}",
         _bound(route, sailed.time_s)
         if of is None or of.members == 1
         else f"so in member {sailed.member}, of {of.members} the middle one",
@@ -192,11 +193,11 @@ def _way_left(route: Route) -> str:
 
 
 def _span(seconds: float) -> str:
-    """Return a time as 1 d 05:20, or 17:05.
+    """Return how long something takes; a colon would make it an hour of the day.
 
-    >>> _span(105_600.0), _span(61_500.0)
-    ('1 d 05:20', '17:05')
+    >>> _span(105_600.0), _span(15_360.0), _span(300.0)
+    ('1 d 5 h 20 min', '4 h 16 min', '5 min')
     """
     minutes = round(seconds / 60.0) if math.isfinite(seconds) else 0
-    days, rest = divmod(minutes, 1440)
-    return (f"{days} d " if days else "") + f"{rest // 60:02}:{rest % 60:02}"
+    days, hours = divmod(minutes // 60, 24)
+    return (f"{days} d " if days else "") + (f"{hours} h " if minutes >= 60 else "") + f"{minutes % 60} min"

@@ -347,9 +347,9 @@ def _first_known(tides: list[Tides], components: int, utc: ArrayLike, lat: Array
 
 
 def iso(utc_s: float) -> str:
-    """Return a time as 2026-04-20T06:00Z.
+    """Return a time as 2026-04-20T06:00Z, to the nearest minute.
 
-    >>> iso(0.0)
-    '1970-01-01T00:00Z'
+    >>> iso(0.0), iso(89.0), iso(91.0)
+    ('1970-01-01T00:00Z', '1970-01-01T00:01Z', '1970-01-01T00:02Z')
     """
-    return f"{np.datetime_as_string(np.datetime64(round(utc_s), 's'), unit='m')}Z"
+    return f"{np.datetime64(round(utc_s / 60.0), 'm')}Z"

@@ -60,6 +60,9 @@ def test_a_route_is_told_drawn_and_written_as_a_mission(shell, tmp_path):
     assert (code, err) == (0, "")
     lines = out.splitlines()
     assert lines[0].startswith("departs 2026-04-20T06:00Z, arrives 2026-04-20T1")
+    hours = re.fullmatch(r"departs .*T06:00Z, arrives .*T(1\d):(\d\d)Z, (\d+) h (\d+) min later: .*", lines[0])
+    there_h, there_min, took_h, took_min = map(int, hours.groups())
+    assert 60 * (there_h - 6) + there_min == 60 * took_h + took_min  # 06:00 and 04:20 are not 10:19
     assert lines[1].startswith("no way is faster than about ")
     assert lines[2] == "wind 7.0 to 7.0 m/s, mean 7.0; 0 h by night, 0 h beating, 0 h waiting"
     assert (tmp_path / "p.png").stat().st_size > 20_000

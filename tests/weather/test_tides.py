@@ -189,6 +189,8 @@ def test_a_table_for_a_mission(tmp_path, monkeypatch, capsys):
     flows = tides()[1].at([row.utc_s for row in rows], 50.0, -6.0)
     assert np.array([(r.east_mps, r.north_mps) for r in rows]) == pytest.approx(flows, abs=2e-3)
     assert len(table_lines(text)) == 13
+    assert cli.main(["weather", "tide", "s.toml", *span, "--every", "1.5m"]) == 0
+    assert capsys.readouterr().out.splitlines()[2].startswith("2026-04-20T00:01:30Z, ")  # and not 00:01Z
     far = [*span[:1], "48.0,-6.0", *span[2:]]
     assert cli.main(["weather", "tide", "s.toml", *far]) == 2
     assert "no height of a tide is known there" in capsys.readouterr().err

@@ -67,9 +67,9 @@ export function often(passage) {
   return passage.high > passage.low && passage.runs > 1 ? `${(10 * (passage.high - passage.low)).toFixed(0)} of 10` : "";
 }
 
-/** @param {number} unix_s */
+/** A time to the nearest minute, as `companion passage` tells it. @param {number} unix_s */
 export function when(unix_s) {
-  const text = new Date(unix_s * 1000).toISOString();
+  const text = new Date(60000 * Math.round(unix_s / 60)).toISOString();
   return `${text.slice(5, 10)} ${text.slice(11, 16)}`;
 }
 
