@@ -24,6 +24,7 @@ from companion.boat.boat import coefficient_of, leeway_at
 from companion.boat.log import SHORT_S, STRETCH_S, Stretches
 from companion.boat.polar import Polar
 from companion.geo.angles import wrap_pi_array
+from companion.words import counted
 
 Floats = NDArray[np.float64]
 
@@ -169,7 +170,9 @@ def learn(stretches: Stretches, prior: Polar, prior_error: float, *, seed: int =
         ValueError: there are too few stretches.
     """
     if len(stretches) < LEAST_STRETCHES:
-        raise ValueError(f"{len(stretches)} stretches of steady sailing; {LEAST_STRETCHES} are the least")
+        raise ValueError(
+            f"{counted(len(stretches), 'stretch', 'stretches')} of steady sailing; {LEAST_STRETCHES} are the least"
+        )
     shape = _field(max(prior_error, 0.03))
     blocks, block = np.unique(
         np.column_stack([stretches.outing, np.floor(stretches.t_s / BLOCK_S)]).astype(np.int64),

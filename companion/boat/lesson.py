@@ -18,6 +18,7 @@ from companion.boat.learn import TWA_DEG, TWS_MPS, Known, LearnedBoat, learn
 from companion.boat.log import BoatLog, Why, stretches_of
 from companion.boat.manoeuvres import Chances, Manoeuvre, chances, manoeuvres_of
 from companion.boat.polar import Polar
+from companion.words import counted
 
 Floats = NDArray[np.float64]
 
@@ -215,8 +216,8 @@ def _findings(lesson: Lesson) -> list[str]:
     loose = sum(max(east.sd, north.sd) > OPEN_CURRENT_MPS for east, north in boat.currents)
     if loose:
         out.append(
-            f"the stream is not told from the boat's speed in {loose} of {len(boat.currents)} outings: a circle, or "
-            "four headings at right angles, within twenty minutes, settles it"
+            f"the stream is not told from the boat's speed in {loose} of {counted(len(boat.currents), 'outing')}: a "
+            "circle, or four headings at right angles, within twenty minutes, settles it"
         )
     if boat.common > OPEN_COMMON:
         out.append(
@@ -230,12 +231,14 @@ def _findings(lesson: Lesson) -> list[str]:
     if not lesson.no_go_is_sailed:
         out.append("how near to the wind the boat sails is guessed: five minutes close-hauled on each tack settle it")
     if lesson.tacks.tried < FEW_TACKS:
-        out.append(f"{lesson.tacks.tried} tacks were seen: six on one beat, of a minute each, tell what one costs")
+        out.append(
+            f"{counted(lesson.tacks.tried, 'tack')} seen: six on one beat, of a minute each, tell what one costs"
+        )
     elif lesson.tacks.loss_s is None:
         out.append("what a tack costs cannot be told, the boards are too short: six tacks, of a minute each, settle it")
     if lesson.tacks.failed:
         out.append(
-            f"{lesson.tacks.failed} of {lesson.tacks.tried} tacks failed: {100.0 * lesson.tacks.fails:.0f} %, at most "
-            f"{100.0 * lesson.tacks.fails_most:.0f} % with nine chances in ten"
+            f"{lesson.tacks.failed} of {counted(lesson.tacks.tried, 'tack')} failed: {100.0 * lesson.tacks.fails:.0f} "
+            f"%, at most {100.0 * lesson.tacks.fails_most:.0f} % with nine chances in ten"
         )
     return out

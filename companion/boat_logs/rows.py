@@ -107,7 +107,8 @@ class Rows:
             known = int(np.sum(np.isfinite(table[:, column])))
             if known < LEAST_SAMPLES:
                 raise Useless(
-                    f"it tells {what} in {known} of {len(table)} samples, of {LEAST_SAMPLES} at least ({remedy})"
+                    f"it tells {what} in {known} of {counted(len(table), 'sample')}, of {LEAST_SAMPLES} at least "
+                    f"({remedy})"
                 )
         return BoatLog(
             name=name,

@@ -415,7 +415,7 @@ def _words(name: str, boat: BoatFile | None) -> list[str]:
 
 
 def _learned_words(told: LearnedTable) -> list[str]:
-    out = [f"{told.stretches} stretches of steady sailing; left out: {_counts(told.left_out)}"]
+    out = [f"{counted(told.stretches, 'stretch', 'stretches')} of steady sailing; left out: {_counts(told.left_out)}"]
     for what, pair in (("vane", told.vane_deg), ("compass", told.compass_deg), ("leeway", told.leeway_deg)):
         out.append(f"  {what:<8}{pair[0]:+6.1f} degrees, deviation {pair[1]:.1f}")
     if told.tacks:

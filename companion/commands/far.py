@@ -275,7 +275,7 @@ def lines_of_route(route: FarRoute) -> list[str]:
 
     lines = [
         f"route of {when(route.departs_utc_s)}, by a forecast of {when(route.base_utc_s)} with"
-        f" {counted(route.members, 'member')}: {len(route.places)} places"
+        f" {counted(route.members, 'member')}: {counted(len(route.places), 'place')}"
         + (f"; {route.left_out} more are not in it: send them before she is there" if route.left_out else "")
     ]
     for k, place in enumerate(route.places):

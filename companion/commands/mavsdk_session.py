@@ -16,6 +16,7 @@ from typing import Any, Self
 
 from companion.errors import LinkError, TransferError
 from companion.messages import Command, GeoPoint, MissionItem, MissionType
+from companion.words import counted
 
 NAMES = {MissionType.MISSION: "mission", MissionType.FENCE: "fence", MissionType.RALLY: "rally"}
 
@@ -295,7 +296,7 @@ class MavsdkSession:
         while (count := self._count) is None and time.monotonic() < deadline_s:
             time.sleep(0.02)
         if count is None or count != len(listed):
-            told = "never said how many items it holds" if count is None else f"announced {count} items"
+            told = "never said how many items it holds" if count is None else f"announced {counted(count, 'item')}"
             raise TransferError(f"{what}: the autopilot {told} and {len(listed)} arrived: is the link dead?")
         items = tuple(from_mavsdk(item) for item in listed)
         if kind is not MissionType.MISSION:

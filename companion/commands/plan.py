@@ -243,7 +243,9 @@ def describe(problem: Problem, answer: Plan, margin_m: float = 0.0) -> str:
     """Return the plan as text for a person; ``margin_m`` is what the problem's obstacles were made larger by."""
     name = problem.id or "problem"
     lines = [f"{name}: {problem.title}" if problem.title else name]
-    effort = f"{answer.algorithm}, seed {answer.seed}, {answer.expansions} expansions in {answer.elapsed_s:.2f} s"
+    effort = (
+        f"{answer.algorithm}, seed {answer.seed}, {counted(answer.expansions, 'expansion')} in {answer.elapsed_s:.2f} s"
+    )
     if answer.first_s is not None:
         effort += f", first path after {1000.0 * answer.first_s:.0f} ms"
     if not answer.has_path:

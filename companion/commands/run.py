@@ -461,7 +461,7 @@ def outcome_of(name: str, summary: dict[str, Any]) -> tuple[int, str]:
     if not summary["arrived"] and summary["left_behind"] and summary["end_reason"] != ADOPTED:
         text += f"\n{summary['left_behind']}"
     if summary["records_dropped"]:
-        missing = f"{summary['records_dropped']} records are missing"
+        missing = f"{counted(summary['records_dropped'], 'record')} missing"
         text += "\n" + "; ".join(part for part in (missing, summary["disk_trouble"]) if part)
     return 0 if summary["arrived"] else 1, text
 

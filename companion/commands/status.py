@@ -258,7 +258,7 @@ def traffic_line(seen: dict[str, Any]) -> str:
         each, whole = 100.0 * seen["promised_risk"], 100.0 * seen["path_risk"]
         parts.append(f"too near one: {each:.1f} % at each instant, {whole:.1f} % on the way")
     if seen["feeds"]:
-        parts.append(f"{seen['silent_feeds']} of {seen['feeds']} feeds silent")
+        parts.append(f"{seen['silent_feeds']} of {counted(seen['feeds'], 'feed')} silent")
     if seen["silence_s"] is not None:
         parts.append(f"last report {seen['silence_s']:.0f} s ago")
     if seen["refused"]:

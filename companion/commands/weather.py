@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from companion.commands.output import force_option, refuse_existing, write_files
 from companion.errors import InputError
 from companion.program.arguments import add_command, duration, moment, out_file, picture, place
+from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.messages import GeoPoint
@@ -151,7 +152,7 @@ def _tide(args: argparse.Namespace) -> int:
     else:
         key = "[current] table" if args.stream else "[area] tide"
         write_files({str(args.out): ("\n".join(rows) + "\n").encode()}, force=args.force)
-        print(f"{args.out}: written, {len(rows) - 1} rows: name it in {key} of a mission")
+        print(f"{args.out}: written, {counted(len(rows) - 1, 'row')}: name it in {key} of a mission")
     return 0
 
 

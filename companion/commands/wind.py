@@ -17,6 +17,7 @@ import numpy as np
 from companion.commands.output import write_files
 from companion.errors import InputError
 from companion.program.arguments import add_command, out_file, picture
+from companion.words import counted
 
 if TYPE_CHECKING:
     from companion.wind.study import Ar1Fit, Characterisation, HorizonScore, Record, Score
@@ -107,7 +108,7 @@ def run(args: argparse.Namespace) -> int:
     if len(records) > 1:
         from companion.wind.study import average
 
-        print(f"mean of {len(records)} records")
+        print(f"mean of {counted(len(records), 'record')}")
         _print_table([(name, list(average([s[i] for s in scores]))) for i, name in enumerate(names)])
     if args.json is not None:
         document = {
@@ -193,7 +194,7 @@ def _print_record(record: Record, found: Sequence[Score], ar1: Ar1Fit) -> None:
     minutes = record.duration_s / 60.0
     speed = record.tws_mps
     print(
-        f"{record.name}: {len(record)} readings, {minutes:.0f} min, wind {np.mean(speed):.1f} m/s "
+        f"{record.name}: {counted(len(record), 'reading')}, {minutes:.0f} min, wind {np.mean(speed):.1f} m/s "
         f"({np.percentile(speed, 5):.1f}..{np.percentile(speed, 95):.1f}) from "
         f"{math.degrees(ar1.mean_twd_from_rad) % 360.0:.0f} deg"
     )
@@ -278,7 +279,7 @@ def _print_cost(record: Record, names: Sequence[str]) -> None:
                 asked += 1
         cost[name] = (1e6 * update_s / rows, 1e6 * forecast_s / max(1, asked))
     unit = cost["kalman"][0]
-    print(f"{'estimator':10}{'update us':>11}{'of kalman':>11}{'forecast us':>13}   ({rows} readings)")
+    print(f"{'estimator':10}{'update us':>11}{'of kalman':>11}{'forecast us':>13}   ({counted(rows, 'reading')})")
     for name, (update_us, forecast_us) in cost.items():
         print(f"{name:10}{update_us:11.1f}{update_us / unit:11.2f}{forecast_us:13.1f}")
 

@@ -6,6 +6,7 @@ import math
 
 from companion.boat import AutopilotLimits
 from companion.doctor.report import Examined, Level, Needs, Report
+from companion.words import counted
 
 FENCE_ITEMS = 84  # what every board holds (672 bytes of storage, 8 each)
 POLYGON_BIT = 4
@@ -52,7 +53,7 @@ def fence(report: Report, seen: Examined, needs: Needs) -> None:
         report.add(
             Level.ERROR,
             "fence size",
-            f"{len(seen.fence)} fence items; boards hold {FENCE_ITEMS}",
+            f"{counted(len(seen.fence), 'fence item')}; boards hold {FENCE_ITEMS}",
             "the rest is not there: simplify it with 'companion fence'",
         )
     if not on and needs.has_fence:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from companion.boat import Steering, SteeringBand
 from companion.doctor.report import DoctorFinding, Level, Report
+from companion.words import counted
 
 MOST_STEP = 0.3  # of a parameter, at once
 FF_OFF, FF_APART = 0.15, 0.4  # from what logs show, and one band's from another's (shares)
@@ -164,7 +165,7 @@ def _turns(report: Report, steering: Steering) -> None:
         report.add(
             Level.WARNING if steering.time_outs else Level.INFO,
             "tuning tacks",
-            f"{steering.time_outs} of {steering.tacks} tacks were given up{took}",
+            f"{steering.time_outs} of {counted(steering.tacks, 'tack')} were given up{took}",
             "where they stall, the bow is turned faster than way lasts: a lower WP_PIVOT_RATE turns by the rudder's "
             "flow, not against it",
             name="WP_PIVOT_RATE",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from companion.doctor.report import Examined, Level, Report
 from companion.skipper.step import ends_safely
+from companion.words import counted
 
 RATES_HZ = {"WIND": 0.9, "GLOBAL_POSITION_INT": 0.9, "ATTITUDE": 0.9, "MISSION_CURRENT": 0.4, "EKF_STATUS_REPORT": 0.4}
 OLDEST = (4, 3)  # before it the boat is steered by L1
@@ -78,7 +79,7 @@ def mission(report: Report, seen: Examined) -> None:
         report.add(
             Level.WARNING,
             "mission end",
-            f"the mission on board ({len(seen.mission)} items) has no safe end",
+            f"the mission on board ({counted(len(seen.mission), 'item')}) has no safe end",
             "after its last item the boat does what MIS_DONE_BEHAVE says",
         )
     held = [n for n, item in enumerate(seen.mission, start=1) if item.command == 16 and item.params[0] > 0.0]
@@ -93,7 +94,7 @@ def mission(report: Report, seen: Examined) -> None:
         report.add(
             Level.INFO,
             "mission",
-            f"a mission of {len(seen.mission)} items is on board",
+            f"a mission of {counted(len(seen.mission), 'item')} is on board",
             "unless it is the companion's own it is neither resumed nor replaced without permission",
         )
 

@@ -39,6 +39,7 @@ from companion.mavlink.wire import codec
 from companion.mavlink.wire.boot_time import since_boot_s
 from companion.mavlink.wire.frames import Codec, Drop, Message
 from companion.mavlink.wire.streams import DEFAULT_STREAMS, Stream, StreamMonitor
+from companion.words import counted
 
 # Streams below their rate are asked for again this often, at most [s].
 REASK_S = 30.0
@@ -516,9 +517,9 @@ class Link:
         if dropped[Drop.UNSIGNED]:
             return "its frames are not signed; 'companion key set' puts a key on the autopilot"
         if self.stats.frames_in == 0:
-            return f"{stats.bytes_in} bytes and no MAVLink frame among them; check the baud rate"
+            return f"{counted(stats.bytes_in, 'byte')} and no MAVLink frame among them; check the baud rate"
         census = self._reception.census
         wanted = f" of system {census.wanted}" if census.wanted is not None else ""
         heard = census.heard(self._now())
         others = f"; heard: {listed(heard)}" if heard else ""
-        return f"{self.stats.frames_in} frames, but no autopilot's heartbeat{wanted}{others}"
+        return f"{counted(self.stats.frames_in, 'frame')}, but no autopilot's heartbeat{wanted}{others}"

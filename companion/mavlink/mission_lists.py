@@ -21,6 +21,7 @@ from companion.mavlink.microservices.mission import ListDownload, ListUpload
 from companion.mavlink.wire import codec
 from companion.mavlink.wire.items import first_difference, pack_mission_dat, padded, unpack_mission_dat
 from companion.messages import ENDING, AutopilotStatus, GeoPoint, MissionItem, MissionState, MissionType, sailed_part
+from companion.words import counted
 
 Method = Literal["auto", "ftp", "items", "partial", "guarded"]
 
@@ -205,13 +206,13 @@ class MissionLists:
             return TransferResult(outcome=outcome, text=f"written, not read back: {read.text}", method=method)
         difference = first_difference(sailed_part(sent), sailed_part(read.items))
         if not difference and len(read.items) < len(sent):
-            difference = f"{len(sent)} items written, {len(read.items)} read back"
+            difference = f"{counted(len(sent), 'item')} written, {len(read.items)} read back"
         if difference:
             return TransferResult(
                 outcome=TransferOutcome.MISMATCH, text=difference, method=method, count=len(read.items)
             )
         tail = len(read.items) - len(sent)
-        text = f"{tail} old items stand behind the end" if tail > 0 else ""
+        text = f"{counted(tail, 'old item stands', 'old items stand')} behind the end" if tail > 0 else ""
         return TransferResult(outcome=TransferOutcome.OK, text=text, method=method, count=len(read.items))
 
     async def _upload_guarded(

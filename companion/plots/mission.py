@@ -282,7 +282,7 @@ def _draw_autopilot(axes: Axes, mission: Mission, frame: LocalFrame) -> list[Han
         ring = polygon_en(zone.shape, frame, cover=zone.kind is ZoneKind.EXCLUSION)
         axes.add_patch(PathPatch(outline(ring), fc="none", ec=AUTOPILOT, lw=0.9, ls=(0, (3, 2)), zorder=4))
     held = f", {result.reach_m:.0f} m about the straight way" if result.left_out else ""
-    label = f"fence on the autopilot ({len(result.items)} items{held})"
+    label = f"fence on the autopilot ({counted(len(result.items), 'item')}{held})"
     return [Line2D([], [], color=AUTOPILOT, lw=0.9, ls=(0, (3, 2)), label=label)]
 
 

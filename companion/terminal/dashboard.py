@@ -407,7 +407,7 @@ def _clear(view: View) -> Row:
     ships = (
         ""
         if not view.vessels
-        else f", {len(view.vessels)} vessels"
+        else f", {counted(len(view.vessels), 'vessel')}"
         if near is None
         else f", {near.name or near.mmsi} {length_text(near.cpa_m)} in {span_text(near.cpa_s)}"
     )

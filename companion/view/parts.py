@@ -27,6 +27,7 @@ from companion.telemetry.folder import VoyageFigures
 from companion.traffic import Alarm, Assessment
 from companion.view import values
 from companion.view.values import compass, degrees, metres, place, rounded, signed, tack_of
+from companion.words import counted
 
 MOST = 40  # vessels in a view, the worst first
 
@@ -372,7 +373,7 @@ def health_of(step: Step, status: CompanionStatus) -> tuple[values.Part, ...]:
                 name="AIS",
                 grade="poor" if is_poor else "good",
                 age_s=rounded(seen.silence_s, 0),
-                text=f"{seen.feeds - seen.silent_feeds} of {seen.feeds} feeds heard"
+                text=f"{seen.feeds - seen.silent_feeds} of {counted(seen.feeds, 'feed')} heard"
                 if seen.feeds
                 else "by the autopilot",
             )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from companion.weather.grib import GribField, Grid, Quantity
 from companion.weather.packing import values_of
 from companion.weather.weather import Cube, Weather, holes_of
+from companion.words import counted
 
 Box = tuple[float, float, float, float]
 """West, south, east, north [deg]; east is above 180 where it lies over the date line."""
@@ -52,7 +53,7 @@ def assemble(fields: Iterable[GribField], box: Box | None = None, *, most_bytes:
         if quantity.value.endswith("east"):
             cubes[quantity.value.split()[0]].append(_cube(grid, pair, box, most_bytes))
     notes = [f"not used: {title}, {n} of them" if n > 1 else f"not used: {title}" for title, n in other.most_common()]
-    notes += [f"{n} fields of {title} came twice: the last counts" for title, n in twice.items() if n]
+    notes += [f"{title}: {counted(n, 'field')} came twice, the last counts" for title, n in twice.items() if n]
     sort = {k: tuple(sorted((c for c in v if c is not None), key=lambda c: c.cell_deg2)) for k, v in cubes.items()}
     return Weather(
         wind=sort["wind"], gust=sort["gust"], waves=sort["waves"], current=sort["current"], notes=tuple(notes)

@@ -18,6 +18,7 @@ from companion.commands.view import read_record
 from companion.disk import Disk
 from companion.page import export
 from companion.program import control
+from companion.words import counted
 from sitl.rehearse.changes import TOLD, Tried, difference_text, is_sure, scaled
 from sitl.rehearse.estimates import Estimates, Share, between, percent, reached, why_bad
 from sitl.rehearse.prepared import PreparedRehearsal
@@ -96,7 +97,7 @@ def page_of(made: PreparedRehearsal, outcome: RehearsalOutcome, folder: Path, *,
         f"{'' if is_whole else '<meta http-equiv=refresh content=10>'}"
     )
     asked = (
-        f"<h1>{name}, rehearsed</h1><p>{len(known.records)} voyages, {html.escape(outcome.ends)}. Wind: "
+        f"<h1>{name}, rehearsed</h1><p>{counted(len(known.records), 'voyage')}, {html.escape(outcome.ends)}. Wind: "
         f"{html.escape(made.doubts.wind.told)}. Doubt in boat, sea and sensors: {made.doubts.boat:g}; "
         f"{'with' if made.doubts.faults else 'without'} trouble. In brackets what is 95 % sure.</p>"
     )

@@ -231,7 +231,9 @@ def _climate(path: Path, spec: WindSpec, off: tuple[float, float]) -> Given:
     if not cells or sum(cell.share for cell in cells) <= 0.0:
         raise InputError(str(path), "", "holds no wind", f"write lines of {','.join(CLIMATE)}")
     about = "" if off == (0.0, 0.0) else f", each off by {off[1]:g} m/s and {off[0]:g}°"
-    return Given(told=f"a climate of {len(cells)} winds, {path.name}{about}", spec=spec, error=off, cells=tuple(cells))
+    return Given(
+        told=f"a climate of {counted(len(cells), 'wind')}, {path.name}{about}", spec=spec, error=off, cells=tuple(cells)
+    )
 
 
 DRAWN_PERCENT = 8.7  # the deviation of what a drawn polar errs by as a whole

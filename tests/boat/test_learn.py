@@ -8,7 +8,7 @@ import pytest
 
 from companion.boat.guess import Sizes, guessed_polar
 from companion.boat.learn import TWA_DEG, TWS_MPS, learn
-from companion.boat.lesson import lesson_of, offset_step_deg
+from companion.boat.lesson import _findings, lesson_of, offset_step_deg
 from companion.boat.log import NEAR_RAD, Stretches, Why, steady, stretches_of
 from companion.boat.manoeuvres import _failures, chances, manoeuvres_of
 from companion.boat.polar import Polar
@@ -140,6 +140,9 @@ def test_the_no_go_zone_is_where_the_beats_were_held():
     lesson = lesson_of([beats], PRIOR, ERROR, no_go_half_rad=math.radians(45.0))
     assert lesson.no_go_is_sailed
     assert abs(math.degrees(lesson.no_go.mean) - 48.0) < 3.0
+    for tried, said in ((0, "0 tacks seen: "), (1, "1 tack seen: "), (2, "2 tacks seen: ")):
+        few = _findings(replace(lesson, tacks=replace(lesson.tacks, tried=tried)))
+        assert [finding for finding in few if finding.startswith(said)]
     assert lesson.turn_rate.mean == pytest.approx(math.radians(30.0), rel=0.15)
 
 

@@ -128,7 +128,7 @@ def test_a_trial_settles_what_a_reach_leaves_open(tmp_path, capsys):
     assert main(["boat", "trial", str(tmp_path / "lake.toml"), "--from-deg", "0"]) == 0
     capsys.readouterr()
     after = sailed_in(tmp_path / "lake-trial.toml", 0.0, tmp_path / "trial", (3,))
-    opened = ("reciprocal reach", "tacks were seen", "nobody sailed a beat", "close-hauled on each tack", "a circle")
+    opened = ("reciprocal reach", "tacks seen", "nobody sailed a beat", "close-hauled on each tack", "a circle")
     said = " ".join(before.findings)
     assert [what for what in opened if what not in said] == []
     said = " ".join(after.findings)

@@ -25,6 +25,7 @@ from companion.geofence.mission.options import (
 )
 from companion.geofence.shapes import Shape, ZoneKind, center_of, polygon_en
 from companion.messages import GeoPoint
+from companion.words import counted
 
 NARROWEST_M = 10.0  # between what is kept clear of the two marks: a track strays 3 m to either side, and tacks
 PREVIEW_M = 5.0  # previews sail to within this of a gate's middle
@@ -254,7 +255,7 @@ class GoalReader:
                 text.encode(), f"{source}: {place}", kind=ZoneKind.INCLUSION, axis=self.axis
             ).require_clean()
         if len(document.zones) != 1:
-            raise InputError(source, place, f"holds {len(document.zones)} polygons", "one is meant")
+            raise InputError(source, place, f"holds {counted(len(document.zones), 'polygon')}", "one is meant")
         return document.zones[0].shape
 
 

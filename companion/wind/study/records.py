@@ -17,6 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from companion.errors import InputError
 from companion.geo.angles import mean_direction_rad, wrap_pi, wrap_pi_array
+from companion.words import counted
 
 Array = NDArray[np.float64]
 
@@ -107,7 +108,7 @@ def parse_csv(lines: Iterable[str], source: str) -> Record:
             raise InputError(source, f"line {number}", f"wind speed {new[2]:g} is negative", "write m/s")
         rows.append(new)
     if len(rows) < 2:
-        raise InputError(source, "", f"{len(rows)} readings", "a record needs at least two")
+        raise InputError(source, "", f"{counted(len(rows), 'reading')}", "a record needs at least two")
     table = np.array(rows, dtype=np.float64)
     return Record(
         name=source,
@@ -149,7 +150,7 @@ class Ar1Fit:
 def fit_ar1(record: Record) -> Ar1Fit:
     """Return the fit to the record's direction. Raises InputError for fewer than 100 readings."""
     if len(record) < 100:
-        raise InputError(record.name, "", f"{len(record)} readings", "the AR(1) fit needs at least 100")
+        raise InputError(record.name, "", f"{counted(len(record), 'reading')}", "the AR(1) fit needs at least 100")
     centre = mean_direction_rad(record.twd_from_rad)
     centre = 0.0 if math.isnan(centre) else centre
     y = wrap_pi_array(record.twd_from_rad - centre)
