@@ -7,6 +7,7 @@ import contextlib
 import fcntl
 import math
 import os
+import string
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -273,16 +274,19 @@ def lines_of_route(route: FarRoute) -> list[str]:
     def when(utc_s: float) -> str:
         return f"{datetime.fromtimestamp(utc_s, UTC):%Y-%m-%dT%H:%MZ}"
 
+    from companion.orders.far.route import MIDDLE_S
+
     lines = [
         f"route of {when(route.departs_utc_s)}, by a forecast of {when(route.base_utc_s)} with"
-        f" {counted(route.members, 'member')}: {counted(len(route.places), 'place')}"
+        f" {counted(route.members, 'member')}: {counted(len(route.places), 'place')},"
+        f" hours to {counted(round(MIDDLE_S / 60.0), 'minute')}"
         + (f"; {route.left_out} more are not in it: send them before she is there" if route.left_out else "")
     ]
     for k, place in enumerate(route.places):
         said = "" if place.middle_s is None or not k else f"  by {when(route.departs_utc_s + place.middle_s)}"
         if said:
             said += " as often as not" if place.early_s or place.late_s else ""
-            said += f" (-{place.early_s / 3600.0:.1f} to +{place.late_s / 3600.0:.1f} h)"
+            said += f" (-{place.early_s / 3600.0:.1f} to +{place.late_s / 3600.0:.1f} h)" if route.members > 1 else ""
         band = f"  {place.band_m:.0f} m to each side" if k else ""
         lines.append(f"  {k}: {place.point.lat_deg:.5f}, {place.point.lon_deg:.5f}{band}{said}")
     return lines
@@ -319,7 +323,7 @@ def _write_route(route: FarRoute, mission: Path, out: Path, *, force: bool) -> N
 
 
 def _bytes_of(source: str) -> bytes:
-    """Return the bytes of a file, or of hexadecimal digits, in a file too."""
+    """Return the bytes of a message: a file's, or hexadecimal digits, in a file too. Raises InputError."""
     path = Path(source)
     text = source
     try:
@@ -334,12 +338,10 @@ def _bytes_of(source: str) -> bytes:
     try:
         return bytes.fromhex(text)
     except ValueError:
-        raise InputError(
-            source[:60],
-            "",
-            "is neither a file nor hexadecimal digits",
-            "name the file with the 42 bytes, or paste its digits",
-        ) from None
+        is_cut = all(c in string.hexdigits or c.isspace() for c in source)
+        what = "is an odd number of hexadecimal digits" if is_cut else "no such file, and no hexadecimal digits"
+        remedy = "paste all of them" if is_cut else "name the file of the message, or paste its digits"
+        raise InputError(source[:60], "", what, remedy) from None
 
 
 def lines_of(status: FarStatus, unix_s: float) -> list[str]:

@@ -129,6 +129,7 @@ def _write_far(
     """Write a route as the bytes of one message to the boat, with its key's code."""
     from companion.mavlink.signing import read_key
     from companion.orders.far import FarKey, FarPlace, FarRoute, pack_route
+    from companion.orders.far.route import MIDDLE_S
     from companion.passage import shown
     from companion.passage.mission import arrivals_s, mission_of
 
@@ -157,7 +158,7 @@ def _write_far(
     )
     data = pack_route(far, FarKey(read_key(args.far_key), args.system))
     write_files({str(args.far_out): data}, force=args.force)
-    print(f"{args.far_out}: written, {len(data)} bytes: {data.hex()}")
+    print(f"{args.far_out}: written, {len(data)} bytes, hours to {MIDDLE_S / 60.0:g} minutes: {data.hex()}")
 
 
 def _dropped(folder: Path) -> tuple[str, ...]:

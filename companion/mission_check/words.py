@@ -107,7 +107,7 @@ def passage_words(mission: Mission) -> str:
     places = [mission.start, *(goal.point for goal in mission.goals)]
     lengths_km = [math.hypot(*LocalFrame(a).en_from_geo(b)) / 1000.0 for a, b in pairwise(places)]
     bands = sorted({goal.bandwidth_m for goal in voyage_of(mission).goals if goal.bandwidth_m is not None})
-    widths = " and ".join(f"{band / 1000.0:g}" for band in bands)
+    widths = " to ".join(dict.fromkeys(f"{band / 1000.0:.3g}" for band in bands[:1] + bands[-1:]))
     band = f"bands of {widths} km to either side" if bands else "no band"
     return (
         f"a passage of {sum(lengths_km):.0f} km, the longest leg {max(lengths_km):.0f} km, {band}; "

@@ -21,7 +21,7 @@ CANDIDATES = 3  # members whose own best routes are tried, beside that of their 
 SURE = 0.9  # the share of runs that must arrive, where nobody says
 # Of the normal distribution, the middles of five parts of equal weight.
 _MIDDLES = (-1.2816, -0.5244, 0.0, 0.5244, 1.2816)
-_SURE = 0.95
+CONFIDENCE = 0.95  # of what members show
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -182,7 +182,7 @@ def at_most(share: float, members: int) -> float:
     for _ in range(60):
         p = 0.5 * (low + high)
         below = sum(math.comb(members, k) * p**k * (1.0 - p) ** (members - k) for k in range(seen + 1))
-        low, high = (p, high) if below > 1.0 - _SURE else (low, p)
+        low, high = (p, high) if below > 1.0 - CONFIDENCE else (low, p)
     return high
 
 

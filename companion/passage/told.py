@@ -12,7 +12,7 @@ from companion.passage.frame import GEOD
 from companion.passage.mission import arrivals_s
 from companion.passage.plan import Route
 from companion.passage.replay import Sailed
-from companion.passage.sweep import Departure, at_least, at_most, best, shown
+from companion.passage.sweep import CONFIDENCE, Departure, at_least, at_most, best, shown
 from companion.weather import iso
 from companion.words import counted
 
@@ -81,8 +81,10 @@ def told_of_chances(d: Departure, by_utc_s: float | None, sure: float) -> tuple[
     if chance < sure:
         lines.append(f"not as sure as {100.0 * sure:g} %: no route that was tried is")
     elif most < sure and not is_one:
+        enough = math.ceil(math.log(1.0 - CONFIDENCE) / math.log(sure)) if sure < 1.0 else 0  # none shows certainty
         lines.append(
-            f"{counted(d.members, 'member')} can show no more than {100.0 * most:.0f} % of the {100.0 * sure:g} %"
+            f"[depart] sure asks for {100.0 * sure:g} %: {counted(d.members, 'member')} that all arrive would show no "
+            f"more than {100.0 * most:.0f} %, " + (f"{enough} members would do" if enough else "and nothing shows that")
         )
     return tuple(lines)
 

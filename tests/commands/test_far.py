@@ -156,13 +156,16 @@ def test_a_status_is_read_in_words_from_a_file_or_digits(key, tmp_path, capsys):
     [
         ("00" * 42, "its code is wrong"),
         ("00", "it has 1 bytes, and not 42"),
-        ("nothing", "neither a file nor hexadecimal"),
+        ("nope.sbd", "nope.sbd: no such file, and no hexadecimal digits; name the file of the message, or paste its "),
+        ("abc", "abc: is an odd number of hexadecimal digits; paste all of them"),
+        (".", ".: cannot be read (Is a directory)"),
     ],
 )
 def test_what_is_no_status_is_one_line(key, capsys, source, why):
     code, _, err = run(capsys, "status", source, "--key", key)
     assert code == 2
     assert why in err
+    assert source == "00" or "42 bytes" not in err
 
 
 def test_a_boat_without_a_key_for_it_is_not_begun(tmp_path, capsys):

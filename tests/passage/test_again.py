@@ -171,12 +171,14 @@ def test_forecasts_that_are_dropped_into_a_folder_and_a_route_to_the_boat(shell,
     out = capsys.readouterr().out
     assert out.startswith("forecast of 2026-04-20T06:00Z, 2 h old, until 2026-04-22T06:00Z\n")
     sent = (tmp_path / "r.sbd").read_bytes()
-    assert f"r.sbd: written, {len(sent)} bytes: {sent.hex()}" in out
+    assert f"r.sbd: written, {len(sent)} bytes, hours to 5 minutes: {sent.hex()}" in out
     (tmp_path / "new.toml").unlink(missing_ok=True)
     made = ["far", "route", "r.sbd", "--key", "far.key"]
     assert cli.main([*made, "--mission", "m.toml", "--out", "new.toml"]) == 0
     out = capsys.readouterr().out
     assert out.startswith("route of 2026-04-20T08:00Z, by a forecast of 2026-04-20T06:00Z with 1 member: ")
+    assert out.splitlines()[0].endswith(", hours to 5 minutes")  # 09:05Z where the plan said 09:06Z
+    assert "-0.0 to +0.0 h" not in out  # one forecast says nothing of doubt
     from companion.geofence import load_mission
 
     old, new = (load_mission(tmp_path / name) for name in ("m.toml", "new.toml"))

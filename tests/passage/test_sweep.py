@@ -84,9 +84,11 @@ def test_a_quantile_is_none_that_so_few_members_cannot_show():
     assert lines == (
         "arrives in 100 % of 4 runs in 4 members: in at least 47 %, with 95 % confidence",
         "hours: 10.0 as often as not, 5.0 to 20.0 in 6 of 10",
-        "4 members can show no more than 47 % of the 90 %",
+        "[depart] sure asks for 90 %: 4 members that all arrive would show no more than 47 %, 29 members would do",
     )
     assert "hours (middle 6 of 10)" in told_of_departures([d], None)[0]
+    assert told_of_chances(d, None, 1.0)[-1].endswith("no more than 47 %, and nothing shows that")
+    assert at_least(1.0, 28) < 0.9 <= at_least(1.0, 29)
     late = told_of_chances(d, T0 + 3600.0 * 15.0, 0.9)
     assert late[-1] == "not as sure as 90 %: no route that was tried is"
     [one] = sweep(asked(5.0), [T0], 0.0, nodes=20)

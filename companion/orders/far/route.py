@@ -18,6 +18,7 @@ ROUTE = "route"  # the purpose of its code
 MOST_BYTES = 270  # to the boat; from her 340
 _NONE16 = 0xFFFF
 _STEP_DEG = 2.5e-5  # 2.8 m, of what three bytes hold of half a turn
+MIDDLE_S = 300.0  # to which the hours of places are told
 _LATER_S = 1800.0
 _BAND_M = 100.0
 _EXACT = 1e-6  # of a step: what arithmetic leaves of a whole number of them
@@ -43,7 +44,7 @@ PLACE = Layout(
             says="to each side of the leg to it, rounded down; 0: less than 100 m",
         ),
         BitField(
-            name="middle", size=2, step=300.0, unit="5 min", unknown=_NONE16, says="from `departs`, as often as not"
+            name="middle", size=2, step=MIDDLE_S, unit="5 min", unknown=_NONE16, says="from `departs`, as often as not"
         ),
         BitField(name="early", size=1, step=_LATER_S, unit="30 min", says="before it: a tenth of all runs are earlier"),
         BitField(name="late", size=1, step=_LATER_S, unit="30 min", says="after it: a tenth of all runs are later"),
