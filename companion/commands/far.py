@@ -274,7 +274,7 @@ def lines_of_route(route: FarRoute) -> list[str]:
     def when(utc_s: float) -> str:
         return f"{datetime.fromtimestamp(utc_s, UTC):%Y-%m-%dT%H:%MZ}"
 
-    from companion.orders.far.route import MIDDLE_S
+    from companion.orders.far import MIDDLE_S
 
     lines = [
         f"route of {when(route.departs_utc_s)}, by a forecast of {when(route.base_utc_s)} with"

@@ -128,8 +128,7 @@ def _write_far(
 ) -> None:
     """Write a route as the bytes of one message to the boat, with its key's code."""
     from companion.mavlink.signing import read_key
-    from companion.orders.far import FarKey, FarPlace, FarRoute, pack_route
-    from companion.orders.far.route import MIDDLE_S
+    from companion.orders.far import MIDDLE_S, FarKey, FarPlace, FarRoute, pack_route
     from companion.passage import shown
     from companion.passage.mission import arrivals_s, mission_of
 

@@ -20,11 +20,12 @@ from companion.orders.far.order import (
     unpack_beginning,
     unpack_order,
 )
-from companion.orders.far.route import MOST_BYTES, FarPlace, FarRoute, bands_m, pack_route, unpack_route
+from companion.orders.far.route import MIDDLE_S, MOST_BYTES, FarPlace, FarRoute, bands_m, pack_route, unpack_route
 from companion.orders.far.status import FarStatus, pack_status, unpack_status
 
 __all__ = [
     "BEGINNING_SIZE",
+    "MIDDLE_S",
     "MOST_BYTES",
     "MOST_COUNTER",
     "MOST_JUMP",
