@@ -18,6 +18,7 @@ _LEAST_BAND_M = 200.0
 _ROOM = 0.8  # of the way to land
 WAYPOINT_M = 200.0
 _LEG_ROOM = 1.2
+_SHARE_OF_LEG = 0.8
 
 
 def mission_of(route: Route, passage: Passage, name: str) -> dict[str, Any]:
@@ -42,14 +43,16 @@ def goals_of(points: Sequence[GeoPoint], bands_m: Sequence[float], radius_m: flo
     """Return start, goals and ``[passage]`` of a mission, of places and the bands about the legs between them."""
     goals, longest = [], 0.0
     for k, ((a, b), band_m) in enumerate(zip(pairwise(points), bands_m, strict=True), start=1):
-        longest = max(longest, GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2])
+        length_m = float(GEOD.inv(a.lon_deg, a.lat_deg, b.lon_deg, b.lat_deg)[2])
+        longest = max(longest, length_m)
         last = k == len(points) - 1
+        near_m = float(math.floor(_SHARE_OF_LEG * length_m))  # no place is reached where the one before it is
         goals.append(
             {
                 "name": "landfall" if last else f"waypoint {k}",
                 "lat": round(b.lat_deg, 7),
                 "lon": round(b.lon_deg, 7),
-                "radius_m": radius_m if last else WAYPOINT_M,
+                "radius_m": min(radius_m if last else WAYPOINT_M, max(1.0, near_m)),
                 "bandwidth_m": round(band_m),
             }
         )

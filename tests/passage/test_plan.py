@@ -84,6 +84,16 @@ def test_a_route_is_told_drawn_and_written_as_a_mission(shell, tmp_path):
     assert shell("--out", "m.toml", "--force")[0] == 0
 
 
+def test_what_is_written_is_checked_without_a_warning():
+    """Each place is reached behind the one before it: a last turn within the goal's radius was a warning."""
+    from companion.passage.mission import goals_of
+    from tests.passage.world import place
+
+    points = (place(0.0, 0.0), place(0.0, 0.3), place(0.0, 0.301), place(0.002, 0.308))
+    made = goals_of(points, (200.0, 200.0, 200.0), 1000.0)["goal"]
+    assert [goal["radius_m"] for goal in made] == [200.0, 89.0, 648.0]
+
+
 def test_the_members_fan_is_drawn(tmp_path):
     import matplotlib.pyplot as plt
 
@@ -210,7 +220,7 @@ def test_departures_are_compared(shell):
     ],
 )
 def test_an_option_that_goes_with_another(shell, words, said):
-    assert shell(*words)[::2] == (2, f"companion passage: {said}\n")
+    assert shell(*words)[::2] == (2, f"{said}\n")
 
 
 @pytest.mark.parametrize(
