@@ -88,7 +88,10 @@ def write_files(files: dict[str, bytes], *, force: bool) -> None:
 
 
 def refuse_existing(names: Sequence[str], *, force: bool) -> None:
-    """Raise InputError when one of the files exists and nobody said ``force``."""
+    """Raise InputError when one of the files is a folder, or exists and nobody said ``force``."""
+    for name in names:
+        if Path(name).is_dir():  # no force writes over it
+            raise InputError(name, "", "is a folder", "name a file in it")
     there = [name for name in names if Path(name).exists()]
     if there and not force:
         raise InputError(there[0], "", "exists", "say --force to overwrite it")

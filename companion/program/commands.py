@@ -305,7 +305,9 @@ class Program:
                     sys.stdout.flush()  # a reader that has gone is met here, and not where nobody answers for it
                 return code
         except CompanionError as error:
-            sys.stderr.write(f"{self.name} {args.command}: {error}\n")
+            called = f"{self.name} {args.command}"
+            said = str(error)  # one of a verb's options names the command by itself
+            sys.stderr.write(f"{said}\n" if said.startswith(f"{called} ") else f"{called}: {said}\n")
             return error.exit_code
         except ModuleNotFoundError as error:
             refusal = missing(error)

@@ -24,7 +24,7 @@ from companion import examples
 from companion.boat import Polar
 from companion.chart import parse_ascii_grid, signed
 from companion.compose import RECENTRE_M, polar_of
-from companion.errors import InputError
+from companion.errors import InputError, unreadable
 from companion.geo.frame import LocalFrame
 from companion.geofence import Mission, load_mission
 from companion.geofence.mission import without_defaults
@@ -507,10 +507,13 @@ def load_scenario(path: Path) -> Scenario:
     Raises:
         InputError: naming the file, the key and the remedy.
     """
+    if path.is_dir():
+        raise InputError(str(path), "", "is a folder", "name the TOML file of a mission or a scenario")
     try:
         text = path.read_bytes()
     except OSError as error:
-        raise InputError(str(path), "", error.strerror or "cannot be read", "name a scenario TOML file") from error
+        remedy = "name the TOML file of a mission or a scenario"
+        raise unreadable(str(path), error, remedy=remedy) from error
     try:
         raw: dict[str, Any] = msgspec.toml.decode(text)
     except (msgspec.DecodeError, ValueError, RecursionError) as error:

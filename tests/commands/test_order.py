@@ -147,3 +147,16 @@ def test_a_folder_in_place_of_the_socket_is_called_that(tmp_path, capsys):
 def test_a_slip_in_a_command_of_a_command_is_answered_with_what_was_meant(capsys):
     assert cli.main(["mission", "chekc", "lake.toml"]) == 2
     assert "there is no command 'chekc'; did you mean `companion mission check`?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("force", [[], ["--force"]])
+def test_a_folder_is_no_file_for_the_buttons(tmp_path, capsys, force):
+    """It was offered --force, which writes over no folder."""
+    assert cli.main(["order", "--qgc", str(tmp_path), *force]) == 2
+    assert capsys.readouterr().err == f"companion order: {tmp_path}: is a folder; name a file in it\n"
+
+
+def test_a_folder_is_no_mission_to_rehearse(tmp_path, capsys):
+    assert cli.main(["rehearse", str(tmp_path)]) == 2
+    said = "is a folder; name the TOML file of a mission or a scenario"
+    assert capsys.readouterr().err == f"companion rehearse: {tmp_path}: {said}\n"

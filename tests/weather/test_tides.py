@@ -192,6 +192,8 @@ def test_a_table_for_a_mission(tmp_path, monkeypatch, capsys):
     assert cli.main(["weather", "tide", "s.toml", *span, "--every", "1.5m"]) == 0
     assert capsys.readouterr().out.splitlines()[2].startswith("2026-04-20T00:01:30Z, ")  # and not 00:01Z
     far = [*span[:1], "48.0,-6.0", *span[2:]]
+    assert cli.main(["weather", "tide", "s.toml", *span[:4], "--to", "2026-04-19T00:00Z"]) == 2
+    assert capsys.readouterr().err.startswith("companion weather tide: --to: is not later than --from; ")
     assert cli.main(["weather", "tide", "s.toml", *far]) == 2
     assert "no height of a tide is known there" in capsys.readouterr().err
 
