@@ -136,8 +136,7 @@ def shrunk_polygon(polygon: Polygon, reserve: float, tolerance: float, core: Bas
     Holes are not looked at. None when there is none.
     """
     shrunk = shapely.buffer(Polygon(polygon.exterior), -reserve, join_style="mitre", mitre_limit=2.0)
-    pieces = [p for p in shapely.get_parts(shrunk) if isinstance(p, Polygon) and not p.is_empty]
-    start = next((p for p in pieces if shapely.covers(p, core)), None)
+    start = next((p for p in parts(shrunk) if shapely.covers(p, core)), None)
     if start is None:
         return None
     start = Polygon(start.exterior)
@@ -154,7 +153,7 @@ def _thinned(polygon: Polygon, tolerance: float, *, inward: bool) -> Polygon:
     """Return a coarser polygon between this one and half of the tolerance beyond it."""
     for share in (0.25, 0.1, 0.03):
         moved = shapely.buffer(polygon, -share * tolerance if inward else share * tolerance, quad_segs=2)
-        pieces = sorted((p for p in shapely.get_parts(moved) if isinstance(p, Polygon)), key=lambda p: -p.area)
+        pieces = sorted(parts(moved), key=lambda p: -p.area)
         if not pieces:
             continue
         # a chord of the buffer's corner may be cos(22.5 deg) of the distance away: simplify by less
@@ -166,8 +165,7 @@ def _thinned(polygon: Polygon, tolerance: float, *, inward: bool) -> Polygon:
 
 def enclosing_circle(polygon: Polygon) -> tuple[float, float, float]:
     """Return x, y, radius of the smallest circle round the polygon."""
-    circle = shapely.minimum_bounding_circle(polygon)
-    x, y = circle.centroid.coords[0] if circle.geom_type == "Polygon" else circle.coords[0]
+    x, y = shapely.minimum_bounding_circle(polygon).centroid.coords[0]
     vertices = np.asarray(polygon.exterior.coords)[:, :2]
     radius = float(np.max(np.hypot(vertices[:, 0] - x, vertices[:, 1] - y)))
     return float(x), float(y), radius
@@ -356,8 +354,6 @@ def prove(
         inner = _inner(zone.shape, plane)
         if zone.kind is ZoneKind.EXCLUSION or useful is None:
             continue
-        if any(_within_rim(zone, rim, margin_m, plane) for rim in area.fence.inclusions):
-            continue
         if not shapely.covers(shapely.buffer(inner, slack_m), _piece(useful, plane.point(inside[0]))):
             return "the keep-in zone shuts out water that the planner may use"
     for index, place in enumerate(inside):
@@ -366,9 +362,20 @@ def prove(
             z.kind is ZoneKind.EXCLUSION and shapely.covers(shape_in(z.shape, plane, cover=True)[0], point)
             for z in zones
         )
-        if shut or (keep_in is not None and not shapely.covers(keep_in, point)):
+        if shut or not all(_keeps_in(z, place, plane) for z in zones if z.kind is ZoneKind.INCLUSION):
             return f"the {'start' if index == 0 else f'goal {index}'} would be outside the autopilot's fence"
     return ""
+
+
+def _keeps_in(zone: Zone, place: GeoPoint, plane: Plane) -> bool:
+    """Whether a place lies in a keep-in zone as the autopilot measures it: from a circle's centre on its own sphere."""
+    if not isinstance(zone.shape, Circle):
+        return bool(shapely.covers(plane.metres(zone.shape), shapely.points(plane.point(place))))
+    center = zone.shape.center
+    middle_rad = math.radians(0.5 * (place.lat_deg + center.lat_deg))
+    east_deg = math.remainder(place.lon_deg - center.lon_deg, 360.0) * math.cos(middle_rad)
+    apart_m = AUTOPILOT_METRES_PER_DEGREE * math.hypot(east_deg, place.lat_deg - center.lat_deg)
+    return apart_m <= zone.shape.radius_m
 
 
 def _way(plane: Plane, places: Sequence[GeoPoint]) -> BaseGeometry:

@@ -12,7 +12,20 @@ from shapely.geometry import LineString, Point, Polygon
 
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, Circle, Fence, Obstacle, Zone, ZoneKind, load_mission
-from companion.geofence.autopilot_fence import AutopilotFence, FenceStatus, fence_for_autopilot, prove
+from companion.geofence.autopilot_fence import (
+    AUTOPILOT_METRES_PER_DEGREE,
+    STEPS,
+    AutopilotFence,
+    FenceStatus,
+    circle_round,
+    enclosing_circle,
+    fence_for_autopilot,
+    plane_of,
+    prove,
+    reduce_ring,
+    shape_in,
+    shrunk_polygon,
+)
 from companion.geofence.formats.fence_items import MAX_FENCE_ITEMS, items_to_zones, zones_to_items
 from companion.geofence.formats.rings import Findings
 from companion.geofence.shapes import unwrapped
@@ -311,6 +324,7 @@ def test_a_keep_in_zone_is_inside_the_limits_by_no_more_than_the_margin(half_m, 
         (195.0, 4.0, ""),
         (198.0, 4.0, "is not inside"),
         (192.0, 6.0, "shuts out water"),
+        (190.0, 9.99, "is not inside"),  # inside by a centimetre, where the plane's own error is three
     ],
 )
 def test_a_circle_to_keep_in_is_held_by_the_circle_of_the_limits(radius_m, off_m, says):
@@ -382,3 +396,207 @@ def test_many_small_zones_fill_the_storage_before_there_are_84_items():
     polygon = [MissionItem(command=Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION, params=(83.0, 0, 0, 0))] * 83
     assert storage_bytes(polygon) == 5 + 2 + 83 * 8
     assert storage_bytes(polygon) <= STORAGE_BYTES
+
+
+def test_the_steps_of_the_margin_begin_with_the_least_and_end_with_all_of_it():
+    assert tuple(sorted(STEPS)) == STEPS
+    assert STEPS[-1] == 1.0
+
+
+@pytest.mark.parametrize("lat_deg", [0.0, 20.0, 50.8, -68.0])
+@pytest.mark.parametrize("radius_m", [50.0, 3000.0, 40_000.0])
+def test_a_plane_is_wrong_by_no_more_than_it_says_on_the_earth_and_on_the_autopilots_sphere(lat_deg, radius_m):
+    """All that is proved in the plane allows for its error: were it more, a fence would let a rock through."""
+    middle = GeoPoint(lat_deg=lat_deg, lon_deg=10.0)
+    plane, frame = plane_of(Area(obstacles=(Obstacle(shape=Circle(middle, radius_m)),)), middle), LocalFrame(middle)
+    rng = np.random.default_rng(7)
+    for course, share, far in rng.uniform((0.0, 0.0, 0.05), (2.0 * math.pi, 0.9, 0.1), (60, 3)):
+        x, y = share * radius_m * math.cos(course), share * radius_m * math.sin(course)
+        a = frame.geo_from_en(x, y)
+        there = LocalFrame(a)
+        for turn in (0.0, 0.5 * math.pi, 1.0):
+            b = there.geo_from_en(far * radius_m * math.sin(turn), far * radius_m * math.cos(turn))
+            drawn_m = math.dist(plane.point(a), plane.point(b))
+            assert abs(drawn_m / (far * radius_m) - 1.0) <= plane.error
+            east_deg = (b.lon_deg - a.lon_deg) * math.cos(math.radians(0.5 * (a.lat_deg + b.lat_deg)))
+            sphere_m = AUTOPILOT_METRES_PER_DEGREE * math.hypot(east_deg, b.lat_deg - a.lat_deg)
+            assert abs(drawn_m / sphere_m - 1.0) <= plane.error
+    assert plane.error < 0.0075 + 3.0 * radius_m / 6.0e6
+
+
+@pytest.mark.parametrize("radius", [2.0, 40.0, 900.0, 40_000.0])
+def test_a_circle_is_drawn_around_or_inside_of_it_to_5_mm(radius):
+    for inside in (False, True):
+        ring = circle_round(30.0, -20.0, radius, inside=inside)
+        corners = np.asarray(ring.exterior.coords)
+        far = np.hypot(*(corners - (30.0, -20.0)).T)
+        near = np.hypot(*((corners[1:] + corners[:-1]) / 2.0 - (30.0, -20.0)).T)  # the middles of its sides
+        assert far.max() <= radius + (1e-9 * radius if inside else 0.005)
+        assert near.min() >= radius - (0.005 if inside else 1e-9 * radius)
+    plane = plane_of(Area(obstacles=(Obstacle(shape=Circle(ORIGIN, radius)),)), ORIGIN)
+    around, _ = shape_in(Circle(ORIGIN, radius), plane, cover=True)
+    within, _ = shape_in(Circle(ORIGIN, radius), plane, cover=False)
+    exact = np.linspace(0.0, 2.0 * np.pi, 1000)[:, None]
+    for share, ring, holds in ((1.0 + plane.error, around, True), (1.0 - plane.error, within, False)):
+        rim = shapely.points(share * radius * np.hstack([np.sin(exact), np.cos(exact)]))
+        held = shapely.intersects(shapely.buffer(ring, 1e-6), rim)
+        assert np.all(held) if holds else not np.all(shapely.contains_properly(ring, rim))
+        assert (
+            holds
+            or float(
+                np.max(shapely.distance(shapely.points((0.0, 0.0)), shapely.points(np.asarray(ring.exterior.coords))))
+            )
+            <= share * radius + 1e-6
+        )
+
+
+@settings(**QUIET, max_examples=40)
+@given(st.integers(0, 10_000), st.integers(4, 40), st.booleans())
+def test_a_ring_of_fewer_corners_still_holds_all_that_the_ring_held(seed, corners, grows):
+    """A corner that cut into a rock would be let through by the autopilot."""
+    rng = np.random.default_rng(seed)
+    t = 2.0 * math.pi * np.arange(corners) / corners
+    r = 60.0 * rng.uniform(0.35, 1.0, corners)
+    ring = np.column_stack([r * np.cos(t), r * np.sin(t)])[:: 1 if grows else -1]
+    allowed = Polygon(ring).buffer(15.0) if grows else Polygon(ring).difference(Polygon(ring).buffer(-15.0))
+    reduced = Polygon(reduce_ring(ring, lambda triangle: bool(shapely.covers(allowed, triangle))))
+    small, large = (Polygon(ring), reduced) if grows else (reduced, Polygon(ring))
+    assert shapely.covers(large.buffer(1e-9), small)
+    assert reduced.is_valid
+    assert len(reduced.exterior.coords) - 1 <= corners
+    beyond = shapely.difference(large, small)
+    assert beyond.is_empty or shapely.covers(allowed.buffer(1e-9), beyond)
+
+
+@settings(**QUIET, max_examples=20)
+@given(st.integers(0, 10_000))
+def test_the_move_that_gives_away_least_is_tried_first(seed):
+    rng = np.random.default_rng(seed)
+    t = 2.0 * math.pi * np.arange(12) / 12
+    r = 60.0 * rng.uniform(0.35, 1.0, 12)
+    tried: list[float] = []
+    reduce_ring(np.column_stack([r * np.cos(t), r * np.sin(t)]), lambda tri: tried.append(tri.area))  # none may be
+    assert len(tried) > 1
+    assert tried == pytest.approx(sorted(tried))
+
+
+def test_of_water_that_falls_apart_where_it_is_narrow_the_largest_part_is_thinned():
+    t = 2.0 * np.pi * np.arange(400) / 400
+    lake = Polygon(np.column_stack([(500.0 + 2.0 * np.sin(40 * t)) * np.cos(t), 500.0 * np.sin(t)]))
+    pond = shapely.Point(555.0, 0.0).buffer(60.0, quad_segs=60)
+    both = shapely.union(lake, pond)
+    both = both.difference(shapely.box(493.0, 1.0, 506.0, 90.0)).difference(shapely.box(493.0, -90.0, 506.0, -1.0))
+    assert both.geom_type == "Polygon"
+    core = shapely.Point(0.0, 0.0).buffer(470.0)
+    found = shrunk_polygon(both, 0.03, 20.0, core)
+    assert found is not None
+    assert shapely.covers(both, found)
+    assert shapely.covers(found, core)
+    assert len(found.exterior.coords) < 60
+
+
+def test_the_smallest_circle_round_a_polygon_holds_all_its_corners():
+    assert enclosing_circle(shapely.box(10.0, 0.0, 40.0, 40.0)) == pytest.approx((25.0, 20.0, 25.0))
+
+
+@pytest.mark.parametrize("radius_m", [449.96, 450.0, 450.02, 450.049])
+def test_limits_that_are_a_circle_give_a_circle_that_rounding_never_makes_larger(radius_m):
+    area = Area(fence=Fence(zones=(keep_in(Circle(ORIGIN, radius_m)),)))
+    result = fence_for_autopilot(area, 10.0, inside=[ORIGIN])
+    [zone] = result.zones
+    assert radius_m - 0.2 < zone.shape.radius_m <= radius_m - 0.03
+
+
+def test_limits_narrower_than_the_margin_have_no_keep_in_zone():
+    area = Area(fence=Fence(zones=(keep_in(square(8.0)),)))
+    result = fence_for_autopilot(area, 10.0, inside=[ORIGIN])
+    assert result.status is FenceStatus.NO_MARGIN
+    assert "no keep-in zone fits" in result.reason
+
+
+@pytest.mark.parametrize(("radius_deg", "is_too_large"), [(3.6, False), (4.6, True)])
+def test_an_area_that_no_plane_holds_is_refused(radius_deg, is_too_large):
+    area = Area(fence=Fence(zones=(keep_in(Circle(ORIGIN, radius_deg * 1.1e5)),)))
+    result = fence_for_autopilot(area, 500.0, inside=[ORIGIN])
+    assert (result.status is FenceStatus.TOO_LARGE) == is_too_large
+    assert ("cut it up" in result.reason) == is_too_large
+
+
+def test_a_refusal_names_what_most_items_go_to_with_how_many_each():
+    rock = Obstacle(shape=Circle(LocalFrame(ORIGIN).geo_from_en(0.0, 100.0), 20.0), name="rock")
+    lake = Area(obstacles=(rock,), fence=Fence(zones=(keep_in(island(0.0, 0.0, [500.0, 440.0] * 60).shape),)))
+    result = fence_for_autopilot(lake, 5.0, inside=[ORIGIN])
+    assert result.status is FenceStatus.TOO_MANY_ITEMS
+    assert "limits (120), rock (1)" in result.reason
+
+
+def test_what_fits_only_into_an_obstacles_own_margin_is_put_there():
+    """At the mission's 5 m the stars do not fit; the planner keeps 60 m off each of them anyway."""
+    roomy = tuple(Obstacle(shape=s.shape, name=s.name, margin_m=60.0) for s in stars(30))
+    result = fence_for_autopilot(Area(obstacles=roomy), 5.0, inside=[ORIGIN])
+    assert (result.status, result.reach_m) == (FenceStatus.OK, math.inf), result.reason
+    check(result, Area(obstacles=roomy), 60.0, [ORIGIN])
+    narrow = tuple(Obstacle(shape=s.shape, name=s.name, margin_m=1.0) for s in stars(8))
+    result = fence_for_autopilot(Area(obstacles=narrow), 20.0, inside=[ORIGIN])
+    assert (result.status, result.reach_m) == (FenceStatus.OK, math.inf), result.reason
+    check(result, Area(obstacles=narrow), 20.0, [ORIGIN])
+
+
+@pytest.mark.parametrize(("east_m", "says"), [(2998.0, "do not hold rock"), (3040.0, "")])
+@pytest.mark.parametrize("turn", [0.0, 0.7, 1.6, 3.0, 4.5])
+def test_a_rock_just_within_reach_of_the_way_is_missed_and_one_beyond_it_is_not(east_m, turn, says):
+    frame = LocalFrame(ORIGIN)
+    x, y = (east_m + 1.0) * math.sin(turn), (east_m + 1.0) * math.cos(turn)
+    area = Area(obstacles=(Obstacle(shape=Circle(frame.geo_from_en(x, y), 1.0), name="rock"),))
+    told = prove(area, (), 10.0, inside=[ORIGIN], reach_m=3000.0)
+    assert says in told
+    assert bool(told) == bool(says)
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "says"), [(490.0, "do not hold"), (500.0, "do not hold"), (506.0, ""), (540.0, "beyond the planner")]
+)
+def test_a_circle_round_a_circle_allows_for_the_autopilots_other_earth(radius_m, says):
+    """Its sphere has metres of another length: a circle of the very radius may leave some of the rock outside."""
+    center = LocalFrame(ORIGIN).geo_from_en(0.0, 700.0)
+    area = Area(obstacles=(Obstacle(shape=Circle(center, 500.0), name="bank"),))
+    items, _ = zones_to_items((Zone(kind=ZoneKind.EXCLUSION, shape=Circle(center, radius_m)),))
+    told = prove(area, items, 30.0, inside=[ORIGIN])
+    assert says in told
+    assert bool(told) == bool(says)
+
+
+@pytest.mark.parametrize(("radius_m", "says"), [(1000.0, "is not inside"), (994.0, ""), (980.0, "shuts out water")])
+def test_a_circle_inside_of_a_ring_allows_for_the_autopilots_other_earth(radius_m, says):
+    area = Area(fence=Fence(zones=(keep_in(island(0.0, 0.0, [1000.0] * 360).shape),)))
+    items, _ = zones_to_items((keep_in(Circle(ORIGIN, radius_m)),))
+    told = prove(area, items, 15.0, inside=[ORIGIN])
+    assert says in told
+    assert bool(told) == bool(says)
+
+
+@pytest.mark.parametrize(("goal_m", "says"), [(2995.0, ""), (3005.0, "goal 1 would be outside")])
+@pytest.mark.parametrize("turn", [0.0, 1.6, 4.0])
+def test_a_goal_a_few_metres_outside_of_a_large_circle_is_named(goal_m, turn, says):
+    """A circle of 3 km was asked with the plane's error on top, ten metres: a goal that it shuts out was proved."""
+    area = Area(fence=Fence(zones=(keep_in(island(0.0, 0.0, [3015.0] * 360).shape),)))
+    items, _ = zones_to_items((keep_in(Circle(ORIGIN, 3000.0)),))
+    along = GeoPoint(lat_deg=50.8 + math.cos(turn) * goal_m / AUTOPILOT_METRES_PER_DEGREE, lon_deg=-1.3)
+    cosine = math.cos(math.radians(0.5 * (along.lat_deg + 50.8)))
+    east_deg = math.sin(turn) * goal_m / AUTOPILOT_METRES_PER_DEGREE / cosine
+    goal = GeoPoint(lat_deg=along.lat_deg, lon_deg=-1.3 + east_deg)
+    told = prove(area, items, 40.0, inside=[ORIGIN, goal])
+    assert says in told
+    assert bool(told) == bool(says)
+
+
+def test_a_fence_holds_a_long_shore_as_it_is_on_the_ground_too():
+    """The planner's straight line of 8 km is a metre and a half from the one in degrees, which the autopilot draws."""
+    frame, t = LocalFrame(ORIGIN), 8000.0
+    for south_m, north_m in ((200.0, 900.0), (-900.0, -200.0)):
+        ring = np.array([(-t / 2, south_m), (t / 2, south_m), (t / 2, north_m), (-t / 2, north_m)])
+        area = Area(obstacles=(Obstacle(shape=Polygon(frame.array_lonlat_from_en(ring)), name="land"),))
+        result = fence_for_autopilot(area, 15.0, inside=[ORIGIN])
+        assert result.status is FenceStatus.OK, result.reason
+        [zone] = result.zones
+        assert shapely.covers(ground(zone.shape, frame), Polygon(ring))
