@@ -112,3 +112,41 @@ def test_a_circle_and_a_fence_over_the_date_line_are_rings_that_do_not_cross_the
     )
     made = fence_for_autopilot(area, 15.0, inside=[GeoPoint(lat_deg=51.5, lon_deg=179.96)])
     assert (made.status, made.reason) == (FenceStatus.OK, "")
+
+
+@pytest.mark.parametrize("cover", [True, False])
+def test_a_circle_that_is_larger_than_what_is_known_errs_to_the_safe_side(cover):
+    """A prohibited area of 60 km across must not be drawn smaller than it is, nor a limit larger."""
+    frame = frame_at(50.0, -4.0)
+    circle = Circle(GeoPoint(lat_deg=50.0, lon_deg=-4.8), 60_000.0)
+    [part] = polygons_about(circle, frame, REACH_M, cover=cover)
+    edge, straight_m = LocalFrame(circle.center), 2.0  # what sides of 8 km, straight in degrees, stray on the ground
+    for turn in np.linspace(0.35 * math.pi, 0.65 * math.pi, 301):
+        rim = frame.en_from_geo(edge.geo_from_en(60_000.0 * math.sin(turn), 60_000.0 * math.cos(turn)))
+        if math.hypot(*rim) < REACH_M:
+            off_m = float(shapely.distance(part.exterior, shapely.points(rim)))
+            assert part.covers(shapely.points(rim)) == cover or off_m < straight_m
+
+
+def test_of_a_passages_limits_every_one_counts_each_drawn_inside_and_less_its_own_margin():
+    frame = frame_at(50.0, -4.0)
+    west, east = (
+        Zone(kind=ZoneKind.INCLUSION, shape=Circle(frame.geo_from_en(x, 0.0), 3000.0), margin_m=own_m)
+        for x, own_m in ((-1000.0, None), (1000.0, 50.0))
+    )
+    local = Area(fence=Fence(zones=(west, east))).about(frame, REACH_M)
+    assert local.limits.bounds[0] == pytest.approx(-1950.0, abs=7.0)
+    assert local.limits.bounds[2] == pytest.approx(2000.0, abs=7.0)
+    for x, radius_m in ((-1000.0, 3000.0), (1000.0, 2950.0)):
+        far = np.hypot(*(shapely.get_coordinates(local.limits) - np.array([x, 0.0])).T)
+        assert far.max() <= radius_m + 1e-3
+
+
+@pytest.mark.parametrize("own_m", [None, 40.0])
+def test_an_obstacle_of_a_passage_keeps_its_own_margin_and_no_other(own_m):
+    frame = frame_at(50.0, -4.0)
+    rock = Obstacle(shape=Circle(frame.geo_from_en(0.0, 100.0), 20.0), margin_m=own_m)
+    local = Area(obstacles=(rock,)).about(frame, REACH_M)
+    assert local.own_margins_m == (own_m or 0.0,)
+    assert local.names == ("obstacle 1",)
+    assert local.limits is None

@@ -9,6 +9,7 @@ from shapely.geometry import Polygon
 
 from companion.geo.frame import LocalFrame
 from companion.geofence import Area, Circle, Fence, LocalArea, Obstacle, Zone, ZoneKind
+from companion.geofence.area import grown_m
 from companion.messages import GeoPoint
 from tests.geofence.strategies import QUIET
 
@@ -97,3 +98,40 @@ def test_inclusions_intersect_and_circles_err_to_the_safe_side():
     t = np.linspace(0.0, 2.0 * np.pi, 500)
     rim = np.column_stack([300.0 + 20.0 * np.cos(t), 20.0 * np.sin(t)])
     assert (picture.obstacle_clearance_m(rim) <= 1e-3).all()
+
+
+def test_what_is_asked_without_a_margin_is_the_bare_obstacles_and_limits():
+    area = local([shapely.box(0, 0, 10, 10), shapely.box(11, 0, 20, 10)], limits=shapely.box(-50, -50, 50, 50))
+    assert area.obstacle_names() == ["o0", "o1"]
+    assert len(area.obstacles_wkt()) == 2
+    assert shapely.from_wkt(area.fence_wkt()).bounds == (-50.0, -50.0, 50.0, 50.0)
+    assert area.water().bounds == (-50.0, -50.0, 50.0, 50.0)
+    assert area.contains([[10.5, 5.0], [49.5, 0.0], [50.5, 0.0]]).tolist() == [True, True, False]
+    assert area.obstacle_names(1.0) == ["o0 and o1"]
+
+
+@pytest.mark.parametrize(("place", "clearance_m"), [((20.0, 5.0), 10.0), ((45.0, 5.0), 5.0), ((60.0, 5.0), -1.0)])
+def test_a_path_that_is_a_single_place_is_as_clear_as_the_place(place, clearance_m):
+    area = local([shapely.box(0.0, 0.0, 10.0, 10.0)], limits=shapely.box(-50.0, -50.0, 50.0, 50.0))
+    assert area.path_clearance_m([place]) == pytest.approx(clearance_m)
+
+
+@pytest.mark.parametrize(("own_m", "asked_m", "kept_m"), [(0.0, 12.0, 12.0), (8.0, 12.0, 12.0), (30.0, 12.0, 30.0)])
+def test_what_is_spare_is_what_the_drawn_water_leaves_beyond_the_larger_margin(own_m, asked_m, kept_m):
+    """A way that was thought to have 18 m to spare would lie on the edge of what the planner may use."""
+    area = local([shapely.box(0.0, 0.0, 10.0, 10.0)], margins=[own_m], limits=shapely.box(-90.0, -90.0, 90.0, 90.0))
+    beside, inside, at_the_fence = area.spare_m([(50.0, 5.0), (5.0, 5.0), (-85.0, 5.0)], asked_m)
+    assert beside == pytest.approx(40.0 - grown_m(kept_m))
+    assert inside < 0.0
+    assert at_the_fence == pytest.approx(5.0 - grown_m(asked_m))
+    edge = shapely.get_coordinates(area.buffered(asked_m))
+    assert np.all(area.spare_m(edge, asked_m) <= 1e-6)
+
+
+def test_more_obstacles_come_after_the_areas_own_with_their_names_and_margins():
+    plain = local([shapely.box(0.0, 0.0, 10.0, 10.0)], margins=[5.0], limits=shapely.box(-90.0, -90.0, 90.0, 90.0))
+    more = plain.also(("ship",), (shapely.box(40.0, 0.0, 50.0, 10.0),), (20.0,))
+    assert (more.names, more.own_margins_m, more.limits) == (("o0", "ship"), (5.0, 20.0), plain.limits)
+    assert more.nearest_name((39.0, 5.0)) == "ship"
+    assert more.contains([[30.0, 5.0], [18.0, 5.0], [13.0, 5.0]], 1.0).tolist() == [False, True, False]
+    assert plain.contains([[30.0, 5.0]], 1.0).tolist() == [True]

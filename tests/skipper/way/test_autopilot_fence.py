@@ -50,6 +50,21 @@ def test_a_circle_that_the_autopilot_does_not_complain_of_is_not_where_we_believ
     limits, outside = AutopilotLimits.from_params(ON), (0.0, 150.0 + OUTSIDE_M + 1.0)
     assert circle_of(voyage(), limits, status(fence_breached=False), outside) is None
     assert circle_of(voyage(), limits, status(fence_breached=True), outside) is not None
+    for north_m in (150.0 - 3.0, 150.0 + OUTSIDE_M - 2.0):  # at its edge a fix may err: it counts
+        assert circle_of(voyage(), limits, status(fence_breached=False), (0.0, north_m)) is not None
+    assert circle_of(voyage(), limits, status(fence_breached=False), None) is not None
+
+
+@settings(max_examples=60)
+@given(st.floats(-300.0, 300.0), st.floats(-300.0, 300.0), st.floats(0.0, 2.0 * math.pi))
+def test_home_wherever_it_is_the_circle_is_inside_of_the_autopilots_by_no_more_than_a_metre(east_m, north_m, course):
+    home = AutopilotStatus(t_s=0.0, home=FRAME.geo_from_en(east_m, north_m))
+    circle = circle_of(voyage(), AutopilotLimits.from_params(ON), home, (east_m, north_m))
+    assert circle is not None
+    for off_m, is_inside in ((151.0, False), (148.9, True)):
+        place = (east_m + off_m * math.sin(course), north_m + off_m * math.cos(course))
+        assert (circle.inside_m(place) >= 0.0) is is_inside
+    assert circle.most_room_m == pytest.approx(75.0, abs=1.0)
 
 
 @settings(max_examples=60)
@@ -252,7 +267,13 @@ def test_the_place_inside_is_on_the_way_home_with_room_about_it(rocks, east_m):
 
 
 @pytest.mark.parametrize(
-    ("east_m", "says"), [(140.0, ""), (141.0, "less than 10 m inside"), (151.0, "151 m from home, outside")]
+    ("east_m", "says"),
+    [
+        (140.0, ""),
+        (141.0, "less than 10 m inside"),
+        (149.5, "less than 10 m inside"),
+        (151.0, "151 m from home, outside"),
+    ],
 )
 def test_a_place_too_near_to_the_circle_is_named_with_its_remedy(east_m, says):
     told = HomeCircle(en_m=(0.0, 0.0), radius_m=150.0).trouble("goal 1", (east_m, 0.0), 10.0)
