@@ -337,6 +337,8 @@ def _straightened(passage: Passage, waters: Waters, path: Floats, depart_s: floa
     """Return fewer points that are reached no later: left out where they can be, moved across the way where it pays."""
     points = path
     when = arrivals(waters, passage.craft, points, depart_s, step_s)
+    if not math.isfinite(when[-1]):
+        return points  # between the finer nodes she cannot sail it: against what would another be no later
     reach_m = 4.0 * waters.step_m
     for sweep in range(10):
         for leave_out in (True, False):

@@ -1,5 +1,6 @@
 """``companion passage plan``: a file asks, a route answers in lines; what cannot be believed is refused in one."""
 
+import importlib
 import re
 import tomllib
 
@@ -272,3 +273,18 @@ def test_an_option_that_goes_with_another(shell, words, said):
 )
 def test_what_is_wrong_is_one_line(shell, change, said):
     assert shell(change=change)[::2] == (2, f"companion passage: {said}\n")
+
+
+def test_a_way_that_the_finer_search_cannot_sail_is_not_made_a_straight_line(shell, monkeypatch):
+    module = importlib.import_module("companion.passage.plan")  # the room's ``plan`` is its function
+    real, ways = module.arrivals, []
+
+    def never(waters, craft, points, depart_s, step_s):
+        ways.append(points)
+        return np.append(real(waters, craft, points, depart_s, step_s)[:-1], np.inf)
+
+    monkeypatch.setattr(module, "arrivals", never)
+    _, out, err = shell()
+    assert err == ""
+    assert len(ways) == 1
+    assert out.count("\n  ") == len(ways[0]) - 1 > 2
