@@ -17,6 +17,7 @@ import shapely
 from companion.errors import InputError
 from companion.messages import GeoPoint
 from companion.passage import Outcome, Passage, plan, sail
+from sailbench.isochrones import isochrones
 from sailbench.passage_set import RADIUS_M, SEASONS, WAYS, Way, coast, departs_utc_s, passage
 from sailbench.plan_bench import processor_s
 
@@ -42,7 +43,7 @@ def shortest(asked: Passage, depart_utc_s: float) -> Sequence[tuple[float, float
     return companion(replace(asked, craft=even), depart_utc_s)
 
 
-ROUTERS: Mapping[str, Router] = {"companion": companion, "shortest": shortest}
+ROUTERS: Mapping[str, Router] = {"companion": companion, "isochrones": isochrones, "shortest": shortest}
 
 
 def router_named(name: str) -> Router:

@@ -1,4 +1,4 @@
-"""The passages of the bench: twelve routes in four seasons, one boat, one coast, weather that a seed makes.
+"""The passages of the bench: twelve routes (a file each) in four seasons, one boat, one coast, weather of a seed.
 
 The weather is made up after the climate (``lab.climate``); the coast is Natural Earth's at 1:110 million, in the public
 domain, without its small islands; the boat is a cruiser of 12 m, guessed from her sizes. Nothing has to be downloaded.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import datetime as dt
 import math
+import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -34,28 +35,21 @@ _STEP_S, _ROOM_DEG = 6 * 3600.0, 12.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Way:
-    """A start and a goal, latitude and longitude [deg], and why it is among them."""
+    """A start and a goal, latitude and longitude [deg], why it is among them, and the seed of its weather."""
 
     name: str
     start: tuple[float, float]
     goal: tuple[float, float]
     why: str
+    seed: int
 
 
-WAYS = (
-    Way(name="celtic-sea", start=(49.6, -6.6), goal=(51.2, -9.9), why="a day or two"),
-    Way(name="north-sea", start=(55.2, 0.5), goal=(59.0, 3.5), why="250 NM of open water"),
-    Way(name="biscay", start=(48.4, -5.6), goal=(43.9, -8.6), why="a bay on one side"),
-    Way(name="alboran", start=(39.0, 1.9), goal=(36.2, -3.2), why="round two capes"),
-    Way(name="bermuda", start=(40.5, -70.5), goal=(32.9, -64.6), why="out of the westerlies"),
-    Way(name="fiji-tonga", start=(-18.6, 178.9), goal=(-21.2, -175.5), why="over the date line, the trades ahead"),
-    Way(name="arabian-sea", start=(18.5, 71.8), goal=(16.6, 55.0), why="a coast beyond the goal"),
-    Way(name="tasman", start=(-34.0, 152.2), goal=(-38.6, 173.6), why="lows of the south"),
-    Way(name="to-hawaii", start=(36.5, -122.8), goal=(21.8, -156.8), why="round a high into the trades"),
-    Way(name="to-barbados", start=(27.4, -16.6), goal=(13.3, -59.2), why="before the trades"),
-    Way(name="atlantic-east", start=(41.0, -69.0), goal=(49.6, -7.0), why="before the westerlies"),
-    Way(name="atlantic-west", start=(51.0, -11.0), goal=(42.5, -61.0), why="against them"),
-)
+def _read(path: Path) -> Way:
+    of = tomllib.loads(path.read_text(encoding="utf-8"))
+    return Way(name=of["name"], start=tuple(of["start"]), goal=tuple(of["goal"]), why=of["why"], seed=of["seed"])
+
+
+WAYS = tuple(sorted((_read(path) for path in FOLDER.glob("*.toml")), key=lambda way: way.seed))
 
 
 def departs_utc_s(season: str) -> float:
@@ -75,7 +69,7 @@ def passage(way: Way, season: str) -> Passage:
     frame, box = PassageFrame(start, goal), box_of(way)
     days = frame.length_m / (_SLOW_MPS * 86_400.0) + _MORE_DAYS
     times = departs_utc_s(season) + np.arange(0.0, days * 86_400.0 + _STEP_S, _STEP_S)
-    seed = 100 * (WAYS.index(way) + 1) + SEASONS[season]
+    seed = way.seed + SEASONS[season]
     boat = Boat(
         polar=read_polar(POLAR).polar,
         no_go_half_rad=math.radians(NO_GO_DEG),

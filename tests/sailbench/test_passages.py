@@ -1,6 +1,7 @@
 """The passages of the bench: twelve ways in four seasons, and a judge whom no router's own figures move."""
 
 import math
+import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,10 @@ from pyproj import Geod
 
 from companion.errors import InputError
 from companion.messages import GeoPoint
+from companion.passage import Land
+from companion.passage.plan import is_free
 from sailbench.__main__ import main
+from sailbench.isochrones import isochrones
 from sailbench.passage_bench import (
     ROUTERS,
     PassageRow,
@@ -24,7 +28,7 @@ from sailbench.passage_bench import (
     table,
     write,
 )
-from sailbench.passage_set import SEASONS, WAYS, box_of, coast, departs_utc_s, passage
+from sailbench.passage_set import FOLDER, SEASONS, WAYS, box_of, coast, departs_utc_s, passage
 
 GEOD = Geod(ellps="WGS84")
 CELTIC, ALBORAN, FIJI = (next(w for w in WAYS if w.name == n) for n in ("celtic-sea", "alboran", "fiji-tonga"))
@@ -165,3 +169,35 @@ def test_a_router_that_is_not_there_is_told():
 
 def test_goals_are_of_the_file():
     assert passage(CELTIC, "winter").goal == GeoPoint(lat_deg=CELTIC.goal[0], lon_deg=CELTIC.goal[1])
+
+
+def test_each_route_is_a_file_whose_seed_does_not_hang_on_the_others():
+    for way in WAYS:
+        of = tomllib.loads((FOLDER / f"{way.name}.toml").read_text(encoding="utf-8"))
+        assert of.keys() == {"name", "why", "start", "goal", "seed"}
+        assert (way.name, way.start, way.goal) == (of["name"], tuple(of["start"]), tuple(of["goal"]))
+    assert [way.seed for way in WAYS] == [100 * (k + 1) for k in range(12)]
+
+
+def test_isochrones_find_a_way_round_a_cape_that_is_little_slower(celtic):
+    asked, departs = celtic
+    ours, plain = (judged(asked, departs, router(asked, departs)) for router in (companion, isochrones))
+    assert plain["outcome"] == "arrived"
+    assert 0.99 * ours["hours"] < plain["hours"] < 1.05 * ours["hours"]
+    land = shapely.box(0.2 * asked.frame.length_m, -60_000.0, 0.4 * asked.frame.length_m, 30_000.0)
+    shut = replace(asked, land=Land(land))
+    way = isochrones(shut, departs)
+    assert is_free(shut, [GeoPoint(lat_deg=lat, lon_deg=lon) for lat, lon in way])
+    assert judged(shut, departs, way)["hours"] > plain["hours"]
+
+
+def _until(cube, count):
+    return replace(cube, utc_s=cube.utc_s[:count], base_utc_s=cube.base_utc_s[:count], values=cube.values[:, :count])
+
+
+def test_isochrones_find_none_where_no_water_leads_and_where_she_is_not_to_be_out(celtic):
+    asked, departs = celtic
+    ring = shapely.box(-30_000.0, -30_000.0, 30_000.0, 30_000.0).exterior.buffer(5_000.0, quad_segs=1)
+    first = replace(asked.weather, wind=(_until(asked.weather.wind[0], 3),))
+    assert isochrones(replace(asked, weather=first, land=Land(ring)), departs) is None
+    assert isochrones(replace(asked, craft=asked.craft._replace(max_tws_mps=0.0)), departs) is None
