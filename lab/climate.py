@@ -128,7 +128,20 @@ def forecast(seed: int, utc_s: Floats, box: Box, *, members: int = 1, run: int =
     Of the forecasts of one truth each errs by itself, half of it as the others.
     """
     lat, lon = grid_of(box, step_deg)
-    true = _true(seed, utc_s, lat, lon)
+    return _told(_true(seed, utc_s, lat, lon), seed, utc_s, lat, lon, members, run)
+
+
+def forecast_of(
+    true: Weather, seed: int, utc_s: Floats, box: Box, *, members: int = 1, run: int = 0, step_deg: float = 1.0
+) -> Weather:
+    """Return what ``forecast`` does of a wind that is known, as a reanalysis or ``truth`` itself: its first member."""
+    lat, lon = grid_of(box, step_deg)
+    rows, columns = (part.ravel() for part in np.meshgrid(lat, lon, indexing="ij"))
+    blows = true.wind_over(utc_s, rows, columns)[0].astype(np.float64)
+    return _told(blows.reshape(utc_s.size, lat.size, lon.size, 2), seed, utc_s, lat, lon, members, run)
+
+
+def _told(true: Floats, seed: int, utc_s: Floats, lat: Floats, lon: Floats, members: int, run: int) -> Weather:
     grown = np.array([error_mps(t - utc_s[0]) for t in utc_s])
     share = np.interp(np.abs(lat), (15.0, 35.0), (_TROPIC_SHARE, 1.0))
     size = grown[:, None, None, None] * share[:, None, None]
