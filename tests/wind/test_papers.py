@@ -157,7 +157,7 @@ def test_csv_is_read():
         (["t_s,wind_from_deg,wind_speed_ms", "0,1,-5", "1,2,3"], "line 2: wind speed -5 is negative"),
         (["t_s,wind_from_deg,wind_speed_ms", "0,nan,5", "1,2,3"], "line 2: wind_from_deg is nan"),
         (["t_s,wind_from_deg,wind_speed_ms", "0,1"], "line 2: wind_speed_ms is ''"),
-        (["t_s,wind_from_deg,wind_speed_ms", "0,1,5"], "1 readings"),
+        (["t_s,wind_from_deg,wind_speed_ms", "0,1,5"], "1 reading"),
         ([], "no column t_s"),
     ],
 )
