@@ -170,7 +170,7 @@ def test_a_ship_reported_on_top_of_us_and_a_feed_that_stops(tmp_path, port):  # 
     assert any(w["name"] == "211000099" and w["alarm"] == "touch" for w in worst)
     assert seen[-1]["silent_feeds"] == 1
     assert seen[-1]["silence_s"] > 100.0
-    assert "1 of 1 feeds silent" in traffic_line(seen[-1])
+    assert "1 of 1 feed silent" in traffic_line(seen[-1])
     records = decisions(tmp_path / "out")
     assert [d["silent"] for d in records if d["kind"] == "feed"] == [True]
     said = [d for d in records if d.get("action") == "Announce" and d["code"] == "vessel near"]
