@@ -77,7 +77,7 @@ def loiter_place(
     """Return where to loiter after ``end_en`` and the room there [m].
 
     The first place with ``loiter_radius_m`` all round and to leeward, looked for in growing rings that a straight
-    line reaches; without one, the first that has it all round, else the roomiest, farther off where none is free. A
+    line reaches; without one, the first that has it all round, else the roomiest so, farther off where none is free. A
     line that the wind has closed is one that the autopilot beats about: it needs the room of that corridor as well.
     From below the floor a line comes no nearer than it begins. With ``wanted_m`` of room to be had within
     ``ROOMIER_M``, the first place with that comes before the nearest that will do. Outside the limits, where none of
@@ -120,11 +120,11 @@ def _roomy_place(
                 return place, room
             if room >= config.loiter_radius_m and (will_do is None or room > will_do[1] + ROOMIER_BY_M):
                 will_do = place, room
-            if room > best_room + 1.0:
-                best, best_room = place, room
-            if all_round is None:
-                about_m = float(_rooms_m(voyage, config, marks, [place], None)[0])
-                all_round = (place, about_m) if about_m >= config.loiter_radius_m else None
+            about_m = float(_rooms_m(voyage, config, marks, [place], None)[0])
+            if about_m > best_room + 1.0:
+                best, best_room = place, about_m
+            if all_round is None and about_m >= config.loiter_radius_m:
+                all_round = place, about_m
     return will_do or all_round or (best, best_room)
 
 

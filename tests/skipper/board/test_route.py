@@ -149,6 +149,15 @@ def test_from_below_the_floor_a_loiter_is_found_away_from_what_is_near():
     assert inside[1] < 90.0
 
 
+def test_in_a_pocket_without_room_the_loiter_is_where_it_is_roomiest():
+    """To leeward all lines cross the wall: a place 9.5 m from it was the best of these by a hair, and she touched."""
+    buoy = Goal(en_m=(0.0, 150.0), radius_m=8.0, side=Side.STARBOARD, rounding_m=12.0)
+    made = voyage(buoy, obstacles=(box(-40, 120, -32, 190), box(32, 120, 40, 190), box(-40, 180, 40, 190)))
+    config = replace(CONFIG, margin_m=12.0, margin_floor_m=6.0, tack_corridor_m=10.0)
+    place, room = loiter_place(made, config, (-2.1, 159.85), 2.892, wanted_m=21.0)
+    assert made.area.clearance_m([place])[0] >= room > 13.0
+
+
 def test_the_loiter_swings_clear_of_the_buoy_that_was_rounded_last():
     buoy = Goal(en_m=(0.0, 100.0), radius_m=10.0, side=Side.STARBOARD, rounding_m=10.0)
     made = voyage(buoy)
