@@ -158,12 +158,12 @@ def test_every_scenario_can_be_sailed(path):
 
 
 # ------------------------------------------------------------------------------------------ buoys without room
-@pytest.mark.parametrize(("hand", "told"), [("port", 1), ("starboard", 0)])
-def test_a_buoy_whose_circle_has_no_room_is_told(tmp_path, hand, told):
-    (tmp_path / "rock.wkt").write_text(
-        "POLYGON ((-1.30975 50.8208, -1.3092 50.8208, -1.3092 50.8210, -1.30975 50.8210, -1.30975 50.8208))"
+def buoy_by_a_rock(folder, *, west_deg, hand, radius_m, floor_m):
+    """Write a mission that rounds a buoy to the west of a rock; return its file."""
+    (folder / "rock.wkt").write_text(
+        f"POLYGON (({west_deg} 50.8208, -1.3092 50.8208, -1.3092 50.8210, {west_deg} 50.8210, {west_deg} 50.8208))"
     )
-    mission = tmp_path / "m.toml"
+    mission = folder / "m.toml"
     mission.write_text(
         f"""
         [start]
@@ -172,41 +172,8 @@ def test_a_buoy_whose_circle_has_no_room_is_told(tmp_path, hand, told):
         [[goal]]
         lat = 50.8209
         lon = -1.3100
-        radius_m = 12
+        radius_m = {radius_m}
         rounding = "{hand}"
-        [[goal]]
-        lat = 50.8218
-        lon = -1.3097
-        [area]
-        obstacles = ["rock.wkt"]
-        margin_m = 8
-        margin_floor_m = 4
-        """
-    )
-    checked = check_mission(mission)
-    assert not checked.refusals
-    found = [finding for finding in checked.findings if finding.place == "[[goal]] 1 rounding"]
-    assert len(found) == told
-    assert all("the margin is 8 m" in finding.text for finding in found)
-
-
-@pytest.mark.parametrize(("floor_m", "level"), [(2.0, FindingLevel.WARNING), (7.0, FindingLevel.ERROR)])
-def test_a_buoy_whose_circle_is_below_the_floor_is_an_error(tmp_path, floor_m, level):
-    """ "In order" was said of one that lay in the fence: she loitered beside it for two hours."""
-    (tmp_path / "rock.wkt").write_text(
-        "POLYGON ((-1.30978 50.8208, -1.3092 50.8208, -1.3092 50.8210, -1.30978 50.8210, -1.30978 50.8208))"
-    )
-    mission = tmp_path / "m.toml"
-    mission.write_text(
-        f"""
-        [start]
-        lat = 50.8200
-        lon = -1.3103
-        [[goal]]
-        lat = 50.8209
-        lon = -1.3100
-        radius_m = 10
-        rounding = "port"
         [[goal]]
         lat = 50.8218
         lon = -1.3097
@@ -216,6 +183,22 @@ def test_a_buoy_whose_circle_is_below_the_floor_is_an_error(tmp_path, floor_m, l
         margin_floor_m = {floor_m}
         """
     )
+    return mission
+
+
+@pytest.mark.parametrize(("hand", "told"), [("port", 1), ("starboard", 0)])
+def test_a_buoy_whose_circle_has_no_room_is_told(tmp_path, hand, told):
+    checked = check_mission(buoy_by_a_rock(tmp_path, west_deg=-1.30975, hand=hand, radius_m=12, floor_m=4))
+    assert not checked.refusals
+    found = [finding for finding in checked.findings if finding.place == "[[goal]] 1 rounding"]
+    assert len(found) == told
+    assert all("the margin is 8 m" in finding.text for finding in found)
+
+
+@pytest.mark.parametrize(("floor_m", "level"), [(2.0, FindingLevel.WARNING), (7.0, FindingLevel.ERROR)])
+def test_a_buoy_whose_circle_is_below_the_floor_is_an_error(tmp_path, floor_m, level):
+    """ "In order" was said of one that lay in the fence: she loitered beside it for two hours."""
+    mission = buoy_by_a_rock(tmp_path, west_deg=-1.30978, hand="port", radius_m=10, floor_m=floor_m)
     (found,) = (f for f in check_mission(mission).findings if f.place == "[[goal]] 1 rounding")
     assert found.severity is level
     assert ("never sailed" in found.text) is (level is FindingLevel.ERROR)

@@ -219,3 +219,19 @@ def test_she_turns_out_of_a_wedge_while_there_is_room_to(further_m: float) -> No
     intent = replace(hold_heading(course), clearance=WEDGE.clearance_m)
     _, setpoint = step(GuidanceState(wanted_rad=course), seen, intent, STATED_SLOW)
     assert abs(wrap_pi(setpoint.heading_rad - course)) > math.radians(60.0)
+
+
+def test_a_boat_that_may_turn_faster_than_is_stated_is_not_led_into_what_that_leads_into() -> None:
+    """Turned at the 8 degrees a second that are stated she passes ahead of the rock, at 60 she strikes it."""
+    rock = box(12.0, -8.0, 60.0, 10.0)
+    seen = Situation(
+        t_s=0.0,
+        en_m=(0.0, 0.0),
+        velocity_en_mps=(0.0, 4.0),
+        heading_rad=0.0,
+        twd_from_rad=math.radians(270.0),
+        tws_mps=12.0,
+    )
+    intent = replace(hold_heading(math.pi / 2.0), clearance=area(rock).clearance_m)
+    _, setpoint = step(GuidanceState(), seen, intent, STATED_SLOW)
+    assert abs(wrap_pi(setpoint.heading_rad - math.pi / 2.0)) > math.radians(30.0)

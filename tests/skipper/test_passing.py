@@ -11,6 +11,7 @@ import shapely
 from companion.geo.angles import difference_rad
 from companion.messages import Mode
 from companion.planner import plan
+from companion.skipper.intake import _own_count
 from companion.skipper.passing import pass_gates
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
@@ -182,6 +183,26 @@ def test_what_we_steer_past_counts_by_its_radius_alone(off_m, is_reached, steere
     pass_gates(ctx)
     assert ctx.state.progress.reached == ((0,) if is_reached else ())
     assert ctx.state.progress.missed == (0 if is_reached else 1)
+
+
+@pytest.mark.parametrize(
+    ("mode", "gate_of", "own_index"),
+    [(Mode.GUIDED, (0, 1, -1), 0), (Mode.GUIDED, (-1, 1, -1), 1), (Mode.AUTO, (0, 1, -1), 1)],
+)
+def test_the_waypoint_of_a_goal_is_not_left_before_it_while_we_steer(mode, gate_of, own_index):
+    """In AUTO it is the autopilot that counts: held back there, too, our own count took it for late."""
+    way = route((0.0, 100.0), (4.0, 0.0), (4.0, -30.0), gate_of=gate_of)
+    status = replace(moment(way).autopilot, mode=mode)
+    ctx = moment(
+        way,
+        goals=(Goal(en_m=(0.0, 100.0), radius_m=5.0), Goal(en_m=(4.0, 0.0), radius_m=5.0)),
+        at=(3.0, 75.0),  # on the leg that follows, and within the grid size
+        mission={"index": 0, "own_index": 0},
+        config={"guidance": Guidance.HEADING, "grid_size_m": 30.0},
+        seen={"autopilot": status},
+    )
+    _own_count(ctx)
+    assert ctx.state.mission.own_index == own_index
 
 
 @pytest.mark.parametrize("aside_m", [4.0, -4.0])

@@ -658,18 +658,23 @@ def test_an_old_plan_that_is_sound_stays_when_nothing_better_is_found():
     assert world.count(act.UploadMission) == 1
 
 
+def beside(world):
+    """Return a planner that goes 8 m aside of the straight way, and is no faster so."""
+
+    def planned(problem, seed):
+        found = plan(problem, expansions=world.expansions, seed=seed)
+        start, goal = found.waypoints_en[0], found.waypoints_en[-1]
+        return replace(found, waypoints_en=np.array([start, 0.5 * (start + goal) + (0.0, 8.0), goal]))
+
+    return planned
+
+
 def test_an_old_plan_that_is_as_good_as_a_new_one_stays():
     """A new plan for the old one's age goes another way and is no faster: the one on board is sailed on."""
     world = make(
         Goal(en_m=(700.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0), config={"plan_age_s": 90.0}
     )
-
-    def beside(problem, seed):
-        found = plan(problem, expansions=world.expansions, seed=seed)
-        start, goal = found.waypoints_en[0], found.waypoints_en[-1]
-        return replace(found, waypoints_en=np.array([start, 0.5 * (start + goal) + (0.0, 8.0), goal]))
-
-    world.planner = beside
+    world.planner = beside(world)
     assert world.run(600, is_done)
     asked = [t for t, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.PLAN_AGE]
     assert asked
@@ -680,13 +685,7 @@ def test_an_old_plan_that_is_as_good_as_a_new_one_stays():
 def test_an_old_plan_that_stays_is_held_to_what_it_was_kept_under():
     """A current comes and changes no way: it is planned for once, not each minute, and hides no reason behind it."""
     world = make(Goal(en_m=(900.0, 0.0), radius_m=6.0), obstacles=(), wind=lambda t: (0.0, 5.0))
-
-    def beside(problem, seed):
-        found = plan(problem, expansions=world.expansions, seed=seed)
-        start, goal = found.waypoints_en[0], found.waypoints_en[-1]
-        return replace(found, waypoints_en=np.array([start, 0.5 * (start + goal) + (0.0, 8.0), goal]))
-
-    world.planner = beside
+    world.planner = beside(world)
     assert world.run(60, is_sailing)
     sailed = world.state.mission.route
     world.extra["current"] = WaterCurrent(east_mps=0.3, is_significant=True)
