@@ -235,3 +235,15 @@ def test_a_boat_that_may_turn_faster_than_is_stated_is_not_led_into_what_that_le
     intent = replace(hold_heading(math.pi / 2.0), clearance=area(rock).clearance_m)
     _, setpoint = step(GuidanceState(), seen, intent, STATED_SLOW)
     assert abs(wrap_pi(setpoint.heading_rad - math.pi / 2.0)) > math.radians(30.0)
+
+
+def test_the_point_of_a_rock_between_two_steps_of_what_is_foreseen_is_kept_off() -> None:
+    """At 4.7 m/s they lie 11.7 m apart: the heading past its point, half a metre off, looked 5.9 m clear."""
+    rock = Polygon([(17.6, 0.5), (17.1, 30.0), (18.1, 30.0)])
+    east = math.pi / 2.0
+    seen = Situation(
+        t_s=0.0, en_m=(0.0, 0.0), velocity_en_mps=(4.69, 0.0), heading_rad=east, twd_from_rad=0.0, tws_mps=12.0
+    )
+    intent = replace(hold_heading(east), clearance=area(rock).clearance_m)
+    _, setpoint = step(GuidanceState(wanted_rad=east), seen, intent, STATED_SLOW)
+    assert wrap_pi(setpoint.heading_rad - east) > math.radians(8.0)  # to the south of it
