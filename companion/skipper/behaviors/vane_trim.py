@@ -23,7 +23,7 @@ DEAD_MPS = 0.3  # ahead, over ground: slower she lies dead
 STUCK_S = 10.0  # she has not sailed for so long
 AGAIN_S = 30.0  # the wind is learned anew meanwhile
 LEAST_RAD = math.radians(8.0)  # a vane that is wrong by less is sailed by
-MOST_TRIMS = 4
+MOST_TRIMS = 6
 WORKED_S = 600.0  # she has sailed for so long since: what comes is another fault
 SAID_S = 60.0
 
@@ -73,9 +73,10 @@ def trims_vane(ctx: StepContext) -> bool:
 def _does_not_sail(ctx: StepContext, vane: VaneError) -> bool:
     """Return whether she is held or driven for a wind that is not where it is told, or lies dead where she sailed.
 
-    One that has not sailed yet may lie dead in a head sea, by a vane that is right.
+    One that has not sailed yet may lie dead in a head sea, by a vane that is right. One whose vane was written already
+    is not done before that is within what is sailed by: she crawled close to the wind by what was left of the error.
     """
-    if ctx.snapshot.unsure or ctx.is_raised("drifting"):
+    if ctx.snapshot.unsure or ctx.is_raised("drifting") or ctx.state.vane.trims > 0:
         return True
     vehicle = ctx.snapshot.vehicle
     if vehicle is None or not vane.was_right:

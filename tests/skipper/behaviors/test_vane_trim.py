@@ -104,7 +104,8 @@ def test_one_that_lies_dead_without_any_doubt_is_not_where_she_has_sailed_by_it(
     assert bool(written(world)) == was_right
 
 
-def test_what_did_not_help_is_tried_four_times_and_taken_back():
+def test_what_did_not_help_is_tried_six_times_and_taken_back():
+    assert MOST_TRIMS == 6
     world = stuck()
     world.run((MOST_TRIMS + 3) * (AGAIN_S + 5.0))
     values, times = [a.value for _, a in written(world)], [at_s for at_s, _ in written(world)]
@@ -113,6 +114,16 @@ def test_what_did_not_help_is_tried_four_times_and_taken_back():
     assert all(b - a >= AGAIN_S for a, b in pairwise(times))
     assert "put back" in said(world, "vane")[-1][2]
     assert world.mode is Mode.LOITER
+
+
+@pytest.mark.parametrize("is_sure", [True, False])
+def test_what_is_left_of_an_error_that_was_written_is_written_too_though_she_makes_way(is_sure):
+    """Fitted back to front, the vane was still wrong by twenty degrees when she began to sail: she made 0.3 m/s."""
+    world = stuck()
+    world.run(STUCK_S + 5.0)
+    world.extra |= {"unsure": "", "vane": replace(TURNED, is_sure=is_sure), "vane_offset_rad": math.radians(-25.0)}
+    world.run(AGAIN_S + STUCK_S + 5.0)
+    assert [a.value for _, a in written(world)] == ([-25.0, -55.0] if is_sure else [-25.0])
 
 
 def test_one_that_helped_leaves_all_tries_to_the_next_fault():
