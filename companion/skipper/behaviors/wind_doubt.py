@@ -139,9 +139,11 @@ def seeks_sea_room(ctx: StepContext) -> bool:
         return False
     ctx.set(adrift=replace(state.adrift, looked_s=ctx.t_s))
     runs_s = 0.0 if goes_astern(ctx) else AHEAD_S  # a sheet that draws stops the boat at once
-    ahead = (boat[0] + runs_s * vehicle.velocity_en_mps[0], boat[1] + runs_s * vehicle.velocity_en_mps[1])
-    starts = [ahead]
-    if status.mode is Mode.LOITER:  # it turns in circles: the leg begins anywhere about here
+    east, north = vehicle.velocity_en_mps
+    # In AUTO she turns on to the leg as it comes on board, which takes its time or does not; in LOITER, anywhere about.
+    shares = (1.0,) if status.mode is Mode.LOITER else (1.0, 0.5, 0.0)
+    starts = [(boat[0] + share * runs_s * east, boat[1] + share * runs_s * north) for share in shares]
+    if status.mode is Mode.LOITER:
         starts += [moved(boat, math.radians(off), AHEAD_S * vehicle.speed_mps) for off in (0.0, 90.0, 180.0, 270.0)]
     found = sea_room(
         water, boat, starts, wind, no_go_half_rad=ctx.no_go_half_rad, clear_m=(ctx.config.margin_m, floor_m)

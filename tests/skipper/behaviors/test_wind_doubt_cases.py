@@ -314,7 +314,7 @@ def test_a_boat_that_was_put_into_a_loiter_on_her_way_there_is_given_back_to_it(
 @pytest.mark.parametrize(
     ("mode", "velocity", "begins"),
     [
-        (Mode.AUTO, (4.0, 3.0), [(12.0, 9.0)]),  # three seconds on
+        (Mode.AUTO, (4.0, 3.0), [(12.0, 9.0), (6.0, 4.5), (0.0, 0.0)]),  # three seconds on, or at once
         (Mode.LOITER, (4.0, 3.0), [(12.0, 9.0), (0.0, 15.0), (15.0, 0.0), (0.0, -15.0), (-15.0, 0.0)]),  # in a circle
         (Mode.LOITER, (-1.0, 0.0), [(0.0, 0.0), (0.0, 3.0), (3.0, 0.0), (0.0, -3.0), (-3.0, 0.0)]),  # astern: stopped
     ],
