@@ -248,7 +248,7 @@ def _zone_s(text: str) -> float:
 def _part(lat: Floats, lon: Floats, box: Box | None) -> tuple[NDArray[np.int64], NDArray[np.int64], Floats]:
     """Return rows and columns, both ascending, in a box and a cell beyond it, and the longitudes of the columns."""
     tall, wide = (float(np.abs(np.diff(axis)).max(initial=0.0)) % 360.0 for axis in (lat, lon))
-    west, south, east, north = box or (float(lon[0]), -90.0, float(lon[0]) + 360.0, 90.0)
+    west, south, east, north = box or (_first_deg(lon), -90.0, _first_deg(lon) + 360.0, 90.0)
     wide = min(wide, 5.0)
     rows = np.argsort(lat)
     rows = rows[(lat[rows] >= south - tall) & (lat[rows] <= north + tall)]
@@ -259,6 +259,17 @@ def _part(lat: Floats, lon: Floats, box: Box | None) -> tuple[NDArray[np.int64],
     _, first = np.unique(np.round(past[columns], 6), return_index=True)  # the first meridian may stand twice
     columns = columns[first]
     return rows, columns, west + past[columns]
+
+
+def _first_deg(lon: Floats) -> float:
+    """Return the longitude where a grid begins, going east: behind the widest gap between its meridians.
+
+    A file of the waters on both sides of the date line may have them from -180 to 180, and those are neighbours.
+    """
+    past = np.unique(np.mod(np.round(lon - lon[0], 6), 360.0))
+    gaps = np.diff(past, append=360.0)
+    is_even = gaps.max() < 1.5 * gaps.min()  # all round the earth
+    return float(lon[0] + (0.0 if is_even else past[(int(np.argmax(gaps)) + 1) % past.size]))
 
 
 def merged(cubes: Sequence[Cube]) -> tuple[Cube, ...]:

@@ -94,6 +94,18 @@ def test_a_box_over_the_first_meridian_of_a_grid_that_counts_to_360(written):
     assert weather.current_en_mps(T0, 50.75, -0.5)[1] == pytest.approx(0.5075, abs=2e-4)
 
 
+@pytest.mark.parametrize(
+    "lon", [(-180.0, -179.0, -178.0, 178.0, 179.0), (178.0, 179.0, -180.0, -179.0, -178.0), (-178.0, 178.0)]
+)
+def test_a_grid_on_both_sides_of_the_date_line_knows_nothing_of_the_rest_of_the_earth(lon, tmp_path):
+    """Of -180 to -178 and 178 to 179 the 356 degrees between were taken for one wide cell."""
+    [cube] = read_weather([netcdf(tmp_path / "c.nc", variables(lon=np.array(lon)))]).current
+    assert (cube.lon_deg[0], cube.lon_deg[-1]) == (178.0, 182.0)
+    assert cube.covers(51.0, -179.5)
+    assert cube.covers(51.0, 178.5)
+    assert not cube.covers(51.0, 0.0)
+
+
 def test_files_of_one_grid_are_one_and_the_last_counts(tmp_path):
     one = netcdf(tmp_path / "a.nc", variables())
     two = netcdf(tmp_path / "b.nc", variables(hours=HOURS + 24.0))
