@@ -61,7 +61,7 @@ def corridor_room_m(ctx: StepContext) -> float | None:
 
 def room_m(ctx: StepContext) -> float | None:
     """Return ``corridor_room_m`` where beats may be planned for the autopilot, None where not."""
-    if not ctx.config.autopilot_beats or ctx.snapshot.limits is None or tacks_fail(ctx):
+    if not (ctx.config.autopilot_beats and ctx.voyage.boat.can_tack) or ctx.snapshot.limits is None or tacks_fail(ctx):
         return None
     return corridor_room_m(ctx)
 

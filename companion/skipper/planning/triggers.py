@@ -203,7 +203,8 @@ def _no_go(ctx: StepContext) -> Trigger | None:
     if drift.clearance_m < floor and drift.clearance_m < straight - 1.0 and ctx.t_s - since >= 1.0:
         interval_s = ctx.config.no_go_replan_interval_s
         return Trigger(reason=ReplanReason.NO_GO, text=text, interval_s=interval_s, urgent=True)
-    if drift.off_leg_m > ctx.config.no_go_off_leg_m and ctx.t_s - since >= ctx.config.no_go_patience_s:
+    tacks_m = ctx.config.no_go_off_leg_m if ctx.voyage.boat.can_tack else 0.0  # the autopilot's is one that she cannot
+    if drift.off_leg_m > tacks_m and ctx.t_s - since >= ctx.config.no_go_patience_s:
         return Trigger(reason=ReplanReason.NO_GO, text=text, interval_s=ctx.config.min_replan_interval_s)
     return None
 

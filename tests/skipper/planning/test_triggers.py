@@ -281,6 +281,14 @@ def test_a_beat_that_is_left_to_the_autopilot_is_not_closed():
     assert ctx.state.plans.no_go_since_s is None
 
 
+@pytest.mark.parametrize("off_leg_m", [4.0, 30.0])
+def test_a_boat_that_cannot_tack_is_planned_for_before_the_autopilot_beats(off_leg_m):
+    """On a leg that a shift had closed she was left to tack at the corridor's edge, which she cannot."""
+    ctx = closed(config={"autopilot_beats": True, "no_go_off_leg_m": off_leg_m}, **since(10.0))
+    ctx.voyage = replace(ctx.voyage, boat=replace(ctx.voyage.boat, can_tack=False))
+    assert reason(ctx) is ReplanReason.NO_GO
+
+
 def test_a_beat_that_stays_near_its_leg_is_no_reason():
     assert reason(closed(config={"no_go_off_leg_m": 9.0}, **since(10.0))) is ReplanReason.NO_GO  # the corridor is 10 m
     assert find_trigger(closed(config={"no_go_off_leg_m": 30.0}, **since(10.0)), ()) is None
