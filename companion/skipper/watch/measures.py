@@ -181,6 +181,8 @@ def _ended(ctx: StepContext) -> float | None:
     route = ctx.state.mission.route
     if route is None or ctx.gate is None or ctx.autopilot is None or diversion(ctx) is not None or (is_composed(ctx)):
         return None
+    if ctx.snapshot.unsure:
+        return None  # nothing is planned by a wind or a water that is doubted, and a leg to sea room ends in its loiter
     if ctx.is_by_field:
         return 0.0  # where the mission on board ends is nothing to her
     return float(ctx.state.mission.index >= len(route.items) - 1 or ctx.autopilot.mission_state.name == "COMPLETE")

@@ -247,6 +247,8 @@ def test_a_mission_has_ended_at_its_last_item_or_as_the_autopilot_says(index, st
             measure(shown(moment(WAY, **({"mission": there} | change)), mission_state=state), "mission ended") is None
         )
     assert measure(silent(moment(WAY, mission=there)), "mission ended") is None
+    doubted = moment(WAY, mission=there, seen={"unsure": "the wind's direction leapt"})
+    assert measure(shown(doubted, mission_state=state), "mission ended") is None, "nothing is planned"
 
 
 @pytest.mark.parametrize(
