@@ -72,14 +72,18 @@ def add_parser(subparsers: Any, summary: str) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the command."""
     from companion.clock import run as run_loop
+    from companion.errors import LinkError
     from companion.mavlink.transports import open_link
 
-    return run_loop(_watch(args, open_link(args.link)))
+    try:
+        return run_loop(_watch(args, open_link(args.link)))
+    except LinkError as error:  # nobody answers, or the port is not to be had at all
+        sys.stderr.write(f"companion status: {error}\n")
+        return EXIT_NO_LINK
 
 
 async def _watch(args: argparse.Namespace, transport: Any) -> int:
     from companion.clock import now_s
-    from companion.errors import LinkError
     from companion.mavlink.link import Link
     from companion.mavlink.reception import SHORE
     from companion.mavlink.wire import StatusReader, VehicleAssembler
@@ -102,11 +106,7 @@ async def _watch(args: argparse.Namespace, transport: Any) -> int:
 
         link.subscribe(take)
         until_s = now_s() + args.timeout
-        try:
-            await link.wait_autopilot(args.timeout)
-        except LinkError as error:
-            sys.stderr.write(f"companion status: {error}\n")
-            return EXIT_NO_LINK
+        await link.wait_autopilot(args.timeout)
         try:
             async with asyncio.timeout_at(until_s):
                 # The parts take turns on the air; a moment more brings the packed one and a heartbeat.

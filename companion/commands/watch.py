@@ -37,8 +37,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         "Ashore over another link of the autopilot, from what the companion says there; on board at the socket of "
         "companion run --socket PATH, with everything that it knows. Keys give the orders that the mission permits; "
         "what moves the boat is asked again first. Where the output is no terminal, it is a line now and then.",
-        epilog="Keys: q end, ? help. Exit codes: 0 ended by a key or Ctrl-C, 3 nothing heard (without a terminal). "
-        "Examples: companion watch --link /dev/ttyUSB0:57600; companion watch --socket boat.sock",
+        epilog="Keys: q end, ? help. Exit codes: 0 ended by a key or Ctrl-C, 3 no link, or nothing heard "
+        "(without a terminal). Examples: companion watch --link /dev/ttyUSB0:57600; companion watch --socket boat.sock",
     )
     parser.add_argument(
         "--link", metavar="LINK", help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT"
@@ -83,7 +83,11 @@ def run(args: argparse.Namespace) -> int:
         )
     from companion.clock import run as run_loop
 
-    return run_loop(_watch(args))
+    try:
+        return run_loop(_watch(args))
+    except LinkError as error:  # the port is not to be had at all
+        sys.stderr.write(f"companion watch: {error}\n")
+        return EXIT_NO_LINK
 
 
 async def _watch(args: argparse.Namespace) -> int:

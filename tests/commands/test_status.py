@@ -80,3 +80,16 @@ def test_a_hold_that_was_ordered_raises_no_alarm(verb, code):
     order = None if verb is None else {"verb": verb, "stands_s": 5.0, "age_s": 0.1}
     document = {"age_s": 0.5, "traffic": None, "state": "holding", "order": order}
     assert exit_code(document, max_age_s=10.0) == code
+
+
+@pytest.mark.parametrize("command", ["status", "watch"])
+def test_a_port_that_another_program_has_is_no_link(command, capsys):
+    """They ended with 1, which neither of them tells of."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        link = f"udpin:127.0.0.1:{other.getsockname()[1]}"
+        assert cli.main([command, "--link", link]) == 3
+    assert capsys.readouterr().err == (
+        f"companion {command}: {link}: address already in use: another program listens there; stop it, or take "
+        "another port\n"
+    )
