@@ -78,7 +78,12 @@ def expected(problem: str) -> str:
 
     >>> expected("Expected `float` >= 5.0"), expected("Expected `str | null`, got `int`")
     ('expected a number of at least 5.0', 'expected a text in quotes, got a whole number')
+    >>> expected("Object missing required field `at_s`"), expected("Object contains unknown field `lat`")
+    ('`at_s` is missing', 'unknown key `lat`')
     """
+    key = re.fullmatch(r"Object (missing required|contains unknown) field (`.+`)", problem)
+    if key:  # as it is written, whatever kind is called the same
+        return f"{key[2]} is missing" if key[1] == "missing required" else f"unknown key {key[2]}"
 
     def kinds(match: re.Match[str]) -> str:
         found = [_KINDS.get(name, name) for name in match[1].split(" | ") if name != "null"]

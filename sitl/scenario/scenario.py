@@ -518,6 +518,8 @@ def load_scenario(path: Path) -> Scenario:
         raw: dict[str, Any] = msgspec.toml.decode(text)
     except (msgspec.DecodeError, ValueError, RecursionError) as error:
         raise InputError(str(path), "", f"is not TOML ({str(error)[:80]})", "is it the file that was meant?") from error
+    if not raw:
+        raise InputError(str(path), "", "is empty", "name the TOML file of a mission or a scenario")
     if "mission" not in raw and "goal" in raw:
         raw = {"name": str(raw.get("name", path.stem)), "mission": path.name, "wind": _previewed(raw.get("wind"))}
     try:
@@ -569,6 +571,8 @@ def _sentence(error: msgspec.ValidationError) -> str:
 def _suggestion(error: msgspec.ValidationError) -> str:
     if "Invalid enum value" in str(error):
         return "write one of " + ", ".join(choices(Scenario, str(error).partition(" - at `")[2].rstrip("`")))
+    if "missing required field" in str(error):
+        return "add it"
     if "unknown field" not in str(error):
         return ""
     word = str(error).partition("`")[2].partition("`")[0]

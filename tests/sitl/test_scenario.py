@@ -44,6 +44,10 @@ def test_our_scenarios_load_and_their_weather_repeats(path):
         ("name='x'\nmission='m.toml'\n[[events]]\nat_s=1\nkind='leak'\nstate='on'", "events", "known: none"),
         ("name='x'\nmission='m.toml'\n[satellite]\nlos=1", "", "loss"),
         ("name=", "", "TOML"),
+        ("", "", "s.toml: is empty; name the TOML file of a mission or a scenario"),
+        ("mission='m.toml'", "", "s.toml: `name` is missing; add it"),
+        ("name='x'\nmission='m.toml'\n[[events]]\nkind='leak'", "", "s.toml: events[0]: `at_s` is missing; add it"),
+        ("name='x'\nmission='m.toml'\nwidth_m=3", "", "s.toml: unknown key `width_m`; known: name,"),
     ],
 )
 def test_bad_scenarios(tmp_path, text, place, words):

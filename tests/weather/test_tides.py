@@ -160,7 +160,7 @@ def test_a_tide_is_not_added_to_a_current_that_has_one():
             ("M2 = [2.0, 350.0]", "M2 = [-2.0, 350.0]"),
             "s.toml: station[0].height.waves.M2[0]: expected a number of at least 0.0",
         ),
-        (("lat = 50.0", "latt = 50.0"), "s.toml: station[0]: object contains unknown field latt"),
+        (("lat = 50.0", "latt = 50.0"), "s.toml: station[0]: unknown key `latt`; see docs/reference/formats.md"),
         (("[[station]]", "[[stations]]"), "s.toml: "),
         (("[[station]]", "[station"), "s.toml: line 2, column 9: is not TOML"),
     ],
