@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from companion.errors import InputError
+from companion.errors import InputError, unreadable
 from sailbench import plan_bench, sailors
 from sailbench.problem_set import answers
 
@@ -38,9 +38,11 @@ def read(paths: Iterable[Path]) -> list[dict[str, Any]]:
     for path in paths:
         try:
             table = pq.read_table(path)
-        except (OSError, pa.ArrowInvalid) as error:
-            words = str(error).splitlines()[0]
-            raise InputError(str(path), "", f"cannot be read ({words})", "name what --out wrote") from error
+        except OSError as error:
+            raise unreadable(str(path), error, remedy="name what --out wrote") from error
+        except pa.ArrowInvalid as error:  # in words of its own, which name the file and a format that is none of ours
+            what = "is no table of results" if path.stat().st_size else "is empty"
+            raise InputError(str(path), "", what, "name what --out wrote") from error
         if not {"planner", "sailor"} & set(table.column_names):
             raise InputError(str(path), "", "holds neither planners nor sailors", "name what --out wrote")
         rows += table.to_pylist()

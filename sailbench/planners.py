@@ -152,8 +152,10 @@ def present() -> list[str]:
     return [name for name in BASELINES if has_ompl or not name.startswith("ompl-")]
 
 
-def planner_named(name: str) -> Planner:
+def planner_named(name: str, *, wanted: str = "planner", known: Sequence[str] = tuple(BASELINES)) -> Planner:
     """Return a baseline by name, or anybody's function as ``MODULE:FUNCTION``.
+
+    ``wanted`` and ``known`` are what is said where there is none.
 
     Raises:
         InputError: there is no such planner, or OMPL is not installed.
@@ -167,6 +169,6 @@ def planner_named(name: str) -> Planner:
     try:
         found: Planner = getattr(importlib.import_module(module), function)
     except (ImportError, AttributeError, ValueError) as error:
-        remedy = f"MODULE:FUNCTION, or one of {', '.join(BASELINES)}"
-        raise InputError("planner", name, f"there is none ({error})", remedy) from error
+        remedy = f"MODULE:FUNCTION, or one of {', '.join(known)}"
+        raise InputError(wanted, name, f"there is none ({error})", remedy) from error
     return found

@@ -90,7 +90,10 @@ SAILORS: Mapping[str, Sailor] = MappingProxyType(
 
 def sailor_named(name: str) -> Sailor:
     """Return a sailor by name, or who sails by anybody's planner, MODULE:FUNCTION. Raises InputError: there is none."""
-    return SAILORS[name] if name in SAILORS else partial(by_plan, planner=planner_named(name))
+    if name in SAILORS:
+        return SAILORS[name]
+    known = (*SAILORS, *(n for n in BASELINES if n not in SAILORS), COMPANION)
+    return partial(by_plan, planner=planner_named(name, wanted="sailor", known=known))
 
 
 class SailRow(TypedDict):

@@ -177,7 +177,12 @@ def test_the_command_asks_a_guest_by_name_and_keeps_its_rows(tmp_path, capsys, m
         ),
         (["plan", "--planners", "math:sale"], "sailbench: planner: math:sale: there is none"),
         (["plan", "none.json", "--planners", "greedy"], "sailbench: none.json: "),
-        (["page", "none.parquet"], "sailbench: none.parquet: cannot be read"),
+        (["page", "none.parquet"], "sailbench: none.parquet: no such file; name what --out wrote\n"),
+        (["page", __file__], f"sailbench: {__file__}: is no table of results; name what --out wrote\n"),
+        (
+            ["sail", "--sailors", "nobody"],
+            "sailbench: sailor: nobody: there is none (No module named 'nobody'); MODULE:FUNCTION, or one of ",
+        ),
         (["sail", "--environments", "Sea-v0", "--sailors", "greedy"], "sailbench: environment: Sea-v0: there is none"),
     ],
 )
@@ -186,6 +191,19 @@ def test_what_is_not_there_is_one_line(words, line, capsys):
     told = capsys.readouterr().err
     assert told.startswith(line)
     assert told.count("\n") == 1
+
+
+def test_the_companion_is_among_the_sailors_that_there_are(capsys):
+    assert main(["sail", "--sailors", "nobody"]) == 2
+    *known, last = capsys.readouterr().err.partition("one of ")[2].split(", ")
+    assert (sorted(known), last) == (sorted(BASELINES), "companion\n")
+
+
+def test_an_empty_file_is_no_results(tmp_path, capsys):
+    empty = tmp_path / "rows.parquet"
+    empty.touch()
+    assert main(["page", str(empty)]) == 2
+    assert capsys.readouterr().err == f"sailbench: {empty}: is empty; name what --out wrote\n"
 
 
 def test_without_the_library_its_planners_are_named_and_refused(capsys, monkeypatch):
