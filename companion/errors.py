@@ -45,13 +45,15 @@ class UnreadableError(InputError):
     """A file that is not there or a disk that fails: a card that is mounted late, or tried again, may have it."""
 
 
-def unreadable(source: str, error: OSError, place: str = "", remedy: str = "check the path") -> InputError:
+def unreadable(source: str, error: OSError, place: str = "", remedy: str = "") -> InputError:
     """Return what to raise for a file that could not be read: tried again unless its name or its rights are wrong."""
-    is_wrong = isinstance(error, PermissionError | IsADirectoryError | NotADirectoryError) or (
+    is_wrong = isinstance(error, PermissionError | NotADirectoryError) or (
         error.errno == errno.EINVAL
     )  # a FIFO, a device: ``companion.disk.open_regular``
+    if isinstance(error, IsADirectoryError):
+        return InputError(source, place, "is a folder", remedy or "name a file in it")
     problem = "no such file" if isinstance(error, FileNotFoundError) else f"cannot be read ({error.strerror or error})"
-    return (InputError if is_wrong else UnreadableError)(source, place, problem, remedy)
+    return (InputError if is_wrong else UnreadableError)(source, place, problem, remedy or "check the path")
 
 
 class LinkError(CompanionError):

@@ -130,7 +130,10 @@ def _shoals(args: argparse.Namespace) -> int:
     from companion.telemetry.state_file import read_state
 
     path = Path(args.state)
-    path = path / STATE if path.is_dir() else path
+    if path.is_dir():
+        if not (path / STATE).exists():
+            raise InputError(args.state, "", f"is a folder without {STATE}", "name a voyage's folder, or a saved state")
+        path = path / STATE
     mission = load_mission(Path(args.mission))
     frame, transducer_m = mission.frame(), mission.boat.transducer_m
     try:

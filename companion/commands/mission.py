@@ -473,6 +473,8 @@ def run_edit(args: argparse.Namespace) -> int:
     from companion.page import Address, is_tiles, open_charts
 
     path = Path(args.file)
+    if path.is_dir():
+        raise InputError(args.file, "", "is a folder", "name the TOML file of a mission in it")
     if path.suffix.lower() != ".toml":
         raise InputError(
             args.file,

@@ -118,6 +118,8 @@ def read_state(path: Path) -> Persisted:
     data = read_regular(path, MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise ValueError(f"it is longer than {MAX_BYTES >> 20} MB")
+    if not data:
+        raise ValueError("it is empty")
     try:
         values = json.loads(data)
     except RecursionError:

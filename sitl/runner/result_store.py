@@ -188,9 +188,12 @@ def read_results(path: Path) -> StoredResults:
         InputError: it cannot be read, or is no file of results; names file, line and remedy.
     """
     try:
-        return _parsed(path, path.read_bytes())
+        data = path.read_bytes()
     except OSError as error:
         raise unreadable(str(path), error) from error
+    if not data:
+        raise InputError(str(path), "", "is empty", "name another file")
+    return _parsed(path, data)
 
 
 def _parsed(path: Path, data: bytes) -> StoredResults:
@@ -218,7 +221,7 @@ class ResultStore:
         """Open or make it, take what it holds, cut off a last line that is not whole.
 
         Raises:
-            InputError: it is another campaign's, made by another program, or no file of results.
+            InputError: it is another campaign's, made by another program, no file of results, or cannot be written.
             JobError: another process writes it, or the disk does not take it.
         """
         self.path = path
@@ -226,7 +229,7 @@ class ResultStore:
         try:
             self._fd = self._disk.open_to_append(path)
         except OSError as error:
-            raise JobError(f"{path}: {reason(error)}") from error
+            raise InputError(str(path), "", f"cannot be written ({reason(error)})", "name another place") from error
         try:
             self.held = self._begin(campaign)
         except BaseException:
@@ -361,7 +364,8 @@ def read_table(path: Path) -> Table:
     except OSError as error:
         raise unreadable(str(path), error) from error
     except (pa.ArrowException, KeyError, TypeError, ValueError) as error:
-        raise InputError(str(path), "", "is no table of a campaign", "name another file") from error
+        what = "is no table of a campaign" if path.stat().st_size else "is empty"
+        raise InputError(str(path), "", what, "name another file") from error
     if number != FORMAT:
         raise InputError(str(path), "", f"is of format {number}, and {FORMAT} is known here", "update")
     ours = set(_made(by))

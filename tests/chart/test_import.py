@@ -325,7 +325,7 @@ def test_what_cannot_be_believed_is_refused_in_one_line(shell, name, text, told)
 def test_what_is_missing_is_said(shell):
     (shell.folder / "a.geojson").write_text(collection())
     assert refusal(shell, "b.geojson", *AROUND, "--depth", "2") == "b.geojson: no such file; check the path"
-    assert "Is a directory" in refusal(shell, ".", *AROUND, "--depth", "2")
+    assert refusal(shell, ".", *AROUND, "--depth", "2") == ".: is a folder; name a file in it"
     assert "it is a device and no regular file" in refusal(shell, "/dev/null", *AROUND, "--depth", "2")
     assert "--depth: is missing" in refusal(shell, "a.geojson", *AROUND)
     assert "--around: has no --radius" in refusal(shell, "a.geojson", *AROUND[:2])

@@ -48,6 +48,13 @@ def test_what_holds_none_or_is_no_state_is_one_line(tmp_path, capsys):
     out = tmp_path / "found.geojson"
     assert main(["chart", "shoals", voyage(tmp_path), str(out), "--mission", MISSION]) != 0
     assert "no shoal was found" in capsys.readouterr().err
+    (tmp_path / STATE).write_text("")
+    assert main(["chart", "shoals", str(tmp_path), str(out), "--mission", MISSION]) == 2
+    assert capsys.readouterr().err.endswith(": is no saved state (it is empty); name state.json of a voyage\n")
+    (tmp_path / STATE).unlink()
+    assert main(["chart", "shoals", str(tmp_path), str(out), "--mission", MISSION]) == 2
+    told = f"{tmp_path}: is a folder without state.json; name a voyage's folder, or a saved state\n"
+    assert capsys.readouterr().err == f"companion chart: {told}"
     (tmp_path / STATE).write_text("{")
     assert main(["chart", "shoals", str(tmp_path), str(out), "--mission", MISSION]) == 2
     assert "is no saved state" in capsys.readouterr().err

@@ -291,6 +291,32 @@ def test_on_a_full_disk_what_was_written_before_is_kept(short, tmp_path, monkeyp
     assert Path(name).read_text() == "before"
 
 
+@pytest.mark.parametrize(
+    ("program", "argv", "name", "remedy"),
+    [
+        (cli, ("fence", "check"), "empty.wkt", "export it again, or name another file"),
+        (cli, ("mission", "new", "m.toml", "--from"), "empty.gpx", "export it again, or name another file"),
+        (sitl_cli, ("run",), "empty.toml", "name the TOML file of a mission or a scenario"),
+        (sitl_cli, ("results", "show"), "empty.jsonl", "name another file"),
+        (sitl_cli, ("results", "show"), "empty.parquet", "name another file"),
+    ],
+)
+def test_an_empty_file_and_a_folder_are_called_so(tmp_path, monkeypatch, capsys, program, argv, name, remedy):
+    """They were no obstacles, no line of results, `Is a directory`."""
+    monkeypatch.chdir(tmp_path)
+    Path(name).touch()
+    assert program.main([*argv, name]) == 2
+    assert capsys.readouterr().err.endswith(f": {name}: is empty; {remedy}\n")
+    assert program.main([*argv, "."]) == 2
+    assert ": .: is a folder; name " in capsys.readouterr().err
+
+
+def test_results_that_cannot_be_begun_have_a_remedy(capsys):
+    assert sitl_cli.main(["faults", "--runs", "1", "--out", "/proc/x.jsonl"]) == 2
+    told = capsys.readouterr().err.splitlines()[-1]
+    assert told == "sitl faults: /proc/x.jsonl: cannot be written (No such file or directory); name another place"
+
+
 def test_a_device_that_is_named_is_written_to_and_stays():
     with pytest.raises(InputError, match=r"^/dev/full: cannot be written \(No space left on device\)"):
         write_files({"/dev/full": b"x"}, force=True)

@@ -158,7 +158,7 @@ def test_a_status_is_read_in_words_from_a_file_or_digits(key, tmp_path, capsys):
         ("00", "it has 1 bytes, and not 42"),
         ("nope.sbd", "nope.sbd: no such file, and no hexadecimal digits; name the file of the message, or paste its "),
         ("abc", "abc: is an odd number of hexadecimal digits; paste all of them"),
-        (".", ".: cannot be read (Is a directory)"),
+        (".", ".: is a folder; "),
     ],
 )
 def test_what_is_no_status_is_one_line(key, capsys, source, why):

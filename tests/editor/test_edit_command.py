@@ -38,6 +38,9 @@ def test_a_name_that_is_no_mission_and_a_folder_that_is_not_there(capsys, tmp_pa
     assert "companion mission new" in capsys.readouterr().err
     assert cli.main(["mission", "edit", str(tmp_path / "no" / "m.toml")]) == 2
     assert "folder is not there" in capsys.readouterr().err
+    assert cli.main(["mission", "edit", str(tmp_path)]) == 2
+    told = f"companion mission: {tmp_path}: is a folder; name the TOML file of a mission in it\n"
+    assert capsys.readouterr().err == told
 
 
 def test_a_port_in_use_is_one_line(capsys, tmp_path):

@@ -66,7 +66,7 @@ def readable(path):
     [
         (readable, "chmod 600"),
         (fifo, "it is a FIFO and no regular file"),
-        (Path.mkdir, "Is a directory"),
+        (Path.mkdir, "is a folder; "),
         (lambda path: path.write_text("short"), "can be read by others"),
         (lambda path: None, "no such file"),
     ],

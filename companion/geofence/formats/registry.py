@@ -242,7 +242,7 @@ def parse(
     """Return what the bytes of a file hold; see ``read``. The extension only decides between what looks alike."""
     content = Content(data=data, source=source, extension=extension, kind=kind, axis=axis, areas=areas)
     if not content.is_zip and not content.head:
-        raise InputError(source, "", "is empty", "an empty file is not 'no obstacles'")
+        raise InputError(source, "", "is empty", "export it again, or name another file")
     if not content.is_zip and content.head[0] == "<" and not content.xml_tag:
         raise InputError(source, "line 1", "is XML, but neither GPX nor KML")
     for row in FORMATS:
