@@ -25,7 +25,7 @@ from companion.skipper.step.snapshot import AutopilotRebooted, UploadResult, Win
 from companion.skipper.step.state import Phase
 from companion.skipper.way.geometry import bearing_rad, distance_m, is_tack, moved
 from companion.skipper.way.voyage import Goal, Side
-from tests.skipper.world import World, restarted, skipper, voyage, with_parts
+from tests.skipper.world import FRAME, World, restarted, skipper, voyage, with_parts
 
 ISLANDS = (box(-40, 120, 30, 160), box(60, 220, 120, 260), box(-120, 230, -20, 270))
 GOAL = Goal(en_m=(0.0, 400.0), radius_m=6.0, name="the goal")
@@ -730,6 +730,35 @@ def test_an_autopilot_that_points_higher_than_the_boat_is_told(autopilot_deg, is
     world.extra["limits"] = AutopilotLimits(sail_no_go_angle_rad=math.radians(autopilot_deg), wp_speed_mps=2.0)
     assert world.run(120, is_sailing)
     assert bool(said(world, "no-go")) is is_told
+
+
+@pytest.mark.parametrize(
+    ("shore_m", "corridor_m", "margin_m", "is_told"),
+    # 14.3 m are asked for; without a corridor 7.2, and nothing bounds how far she beats
+    [(13.0, 10.0, 12.0, True), (400.0, 10.0, 12.0, False), (400.0, 10.0, 15.0, False), (400.0, 0.0, 6.0, True)],
+)
+def test_a_margin_that_the_autopilot_does_not_keep_is_told_where_the_way_needs_it(
+    shore_m, corridor_m, margin_m, is_told
+):
+    shore = box(0, -shore_m - 50, 300, -shore_m)
+    config = {"margin_m": margin_m, "margin_floor_m": 5.0}
+    world = make(Goal(en_m=(250.0, 0.0)), obstacles=(shore,), wind=lambda t: (0.0, 5.0), config=config)
+    world.extra["limits"] = AutopilotLimits(sail_xtrack_max_m=corridor_m, wp_speed_mps=2.0)
+    assert world.run(120, is_sailing)
+    assert bool(said(world, "margin")) is is_told
+
+
+def test_a_margin_is_told_when_an_order_leads_her_where_it_is_needed():
+    rocks = (box(-40, 240, -13, 260), box(13, 240, 40, 260))
+    world = make(Goal(en_m=(250.0, 0.0)), obstacles=rocks, wind=lambda t: (math.pi / 2, 5.0), config={"margin_m": 12.0})
+    world.extra["limits"] = AutopilotLimits(sail_xtrack_max_m=10.0, wp_speed_mps=2.0)
+    assert world.run(120, is_sailing)
+    assert not said(world, "margin")
+    there = FRAME.geo_from_en(0.0, 300.0)
+    world.order(f"goal {there.lat_deg:.7f} {there.lon_deg:.7f}")
+    assert world.run(60, lambda w: said(w, "margin"))
+    assert world.run(60)
+    assert len(said(world, "margin")) == 1
 
 
 # ------------------------------------------------------------------------------------------ watchdogs

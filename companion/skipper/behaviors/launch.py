@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from companion.boat import points_too_high, required_margin
+from companion.boat import points_too_high
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode, Severity
@@ -15,7 +15,7 @@ from companion.skipper.behaviors.helm import arm, make_current, repair, set_mode
 from companion.skipper.behaviors.rest import reached_words
 from companion.skipper.planning.asking import GATHERS_WAY_S, SETS_SAIL_S, UPLOAD_LATENCY_S, drifted_en, lacks, request
 from companion.skipper.planning.diversions import announcement, fenced_off, home_trouble
-from companion.skipper.planning.uploads import upload
+from companion.skipper.planning.uploads import look_at_margin, upload
 from companion.skipper.planning.vessels import lies_in_the_way
 from companion.skipper.step import Phase, ReplanReason, SafeEnd, StepContext, WindHealth
 from companion.skipper.step.wind_limits import winds_wanted
@@ -150,7 +150,7 @@ def launch(ctx: StepContext) -> None:
         ctx.phase(Phase.STANDARD, "under way")
         ctx.say(Severity.NOTICE, "under way", "AUTO and armed: under way", every_s=0.0)
         _tell_clearance(ctx)
-        _look_at_margin(ctx)
+        look_at_margin(ctx)
         _look_at_no_go(ctx)
         _look_at_home(ctx)
         if status.mission_state in {MissionState.COMPLETE, MissionState.NOT_STARTED, MissionState.PAUSED}:
@@ -198,22 +198,6 @@ def launch(ctx: StepContext) -> None:
         who = "the autopilot to arm" if may.may_arm else "the operator to arm (or [operator] arm = true)"
         ctx.phase(Phase.WAITING, f"ready: waiting for {who}")
         arm(ctx)
-
-
-def _look_at_margin(ctx: StepContext) -> None:
-    """Say so when the autopilot's own corridor is wider than the margin that plans keep."""
-    limits, wind = ctx.snapshot.limits, ctx.wind_mean
-    if limits is None or wind is None:
-        return
-    boat = ctx.voyage.boat
-    limits = replace(limits, sail_xtrack_max_m=ctx.tack_corridor_m)
-    asked = required_margin(limits, speed_mps=boat.polar.max_speed_mps(wind[1]), hull=boat.hull)
-    if asked.total_m > ctx.config.margin_m + 0.5:
-        ctx.say(
-            Severity.WARNING,
-            "margin",
-            f"the margin is {ctx.config.margin_m:g} m; the autopilot's habits ask for {asked.describe()}",
-        )
 
 
 def _look_at_no_go(ctx: StepContext) -> None:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.boat import required_margin
 from companion.frozen import changed
 from companion.messages import Command, Mode, Severity
 from companion.planner import Leg, Problem
@@ -22,6 +23,7 @@ from companion.skipper.planning.track import of_way
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.step import Route, StepContext, UploadMission, UploadOutcome, UploadResult
 from companion.skipper.step.actions import Change
+from companion.skipper.step.config import Guidance
 from companion.skipper.step.missions import common_prefix, stopgap
 from companion.skipper.step.state import PendingPlan, PendingUpload, Retry
 from companion.skipper.way import PointEn, distance_m
@@ -128,6 +130,8 @@ def take_upload(ctx: StepContext, outcome: UploadOutcome) -> None:
                 replanned_index=ctx.state.plans.replanned_index if pending.set_current != 1 else -1,
             ),
         )
+        if ctx.state.voyage.sailing:
+            look_at_margin(ctx, every_s=math.inf)
         return
     ctx.set(
         pending=changed(ctx.state.pending, upload=None, upload_retry=ctx.failed(ctx.state.pending.upload_retry)),
@@ -138,6 +142,33 @@ def take_upload(ctx: StepContext, outcome: UploadOutcome) -> None:
         "upload failed",
         f"upload {outcome.result.value}: {outcome.text or 'no words'}; reading what is on board",
         every_s=0.0,
+    )
+
+
+def look_at_margin(ctx: StepContext, *, every_s: float | None = None) -> None:
+    """Say so when the autopilot's habits ask for more than the margin that plans keep, and the way needs it.
+
+    A way that keeps off everything by what they ask for may be left as far as they lead. Without a corridor nothing
+    bounds that, and in a field there is no way that is followed: then it is always said.
+    """
+    limits, wind, route = ctx.snapshot.limits, ctx.wind_mean, ctx.state.mission.route
+    if limits is None or wind is None or ctx.is_said("margin", every_s or ctx.config.announce_interval_s):
+        return
+    boat, corridor_m = ctx.voyage.boat, ctx.tack_corridor_m
+    limits = replace(limits, sail_xtrack_max_m=corridor_m)
+    asked = required_margin(limits, speed_mps=boat.polar.max_speed_mps(wind[1]), hull=boat.hull)
+    if asked.total_m <= ctx.config.margin_m + 0.5:
+        return
+    is_bounded = corridor_m > 0.0 or ctx.steers_plans
+    if is_bounded and ctx.guidance is not Guidance.FIELD and route is not None and ctx.boat_en is not None:
+        way = [ctx.boat_en, *route.points_en_m[max(ctx.state.mission.index, 0) :]]
+        if len(way) > 1 and ctx.voyage.area.path_clearance_m(way) >= asked.total_m:
+            return
+    ctx.say(
+        Severity.WARNING,
+        "margin",
+        f"the margin is {ctx.config.margin_m:g} m; the autopilot's habits ask for {asked.describe()}",
+        every_s=every_s,
     )
 
 
