@@ -281,19 +281,26 @@ def write(document: Document, path: str | Path, *, format_name: str = "", part: 
 
 
 def check_place(document: Document, near: GeoPoint, far_m: float = RANGE_M) -> Document:
-    """Return the document with a finding if part of it lies more than ``far_m`` from ``near``."""
+    """Return the document with a finding if something of it lies more than ``far_m`` from ``near``.
+
+    A fence by its middle, so that a corner that is wrong is told; all else by what is nearest, for a coast is long.
+    """
     frame = LocalFrame(near)
     places = [
-        (z.name or f"{noun} {i + 1}", z.shape)
+        (z.name or f"{noun} {i + 1}", z.shape, kind)
         for noun, kind in (("fence", ZoneKind.INCLUSION), ("obstacle", ZoneKind.EXCLUSION))
         for i, z in enumerate(z for z in document.zones if z.kind is kind)
     ]
-    places += [(m.name or f"mark {i + 1}", m.geometry) for i, m in enumerate(document.marks)]
-    for name, shape in places:
+    places += [(m.name or f"mark {i + 1}", m.geometry, ZoneKind.EXCLUSION) for i, m in enumerate(document.marks)]
+    for name, shape, kind in places:
         center = center_of(shape)
-        distance_m = float(np.hypot(*frame.en_from_geo(center)))
+        at, distance_m = center, float(np.hypot(*frame.en_from_geo(center)))
         if distance_m <= far_m or (not isinstance(shape, Circle) and _covers(shape, near)):
             continue
+        if kind is ZoneKind.EXCLUSION and not isinstance(shape, Circle):
+            at, distance_m = _nearest(shape, frame)
+            if distance_m <= far_m:
+                continue
         code, remedy = Code.FAR_AWAY, "check the coordinates"
         if abs(center.lon_deg) <= 90.0:
             swapped = GeoPoint(lat_deg=center.lon_deg, lon_deg=center.lat_deg)
@@ -304,11 +311,17 @@ def check_place(document: Document, near: GeoPoint, far_m: float = RANGE_M) -> D
             severity=FindingLevel.ERROR,
             code=code,
             place=name,
-            text=f"lies {distance_m / 1000.0:.0f} km from the mission, at {center.lat_deg:.4f}, {center.lon_deg:.4f}",
+            text=f"lies {distance_m / 1000.0:.0f} km from the mission, at {at.lat_deg:.4f}, {at.lon_deg:.4f}",
             remedy=remedy,
         )
         return replace(document, findings=(*document.findings, finding))
     return document
+
+
+def _nearest(shape: shapely.Geometry, frame: LocalFrame) -> tuple[GeoPoint, float]:
+    """Return the place of a shape in longitude and latitude that is nearest to a frame's origin, and how far [m]."""
+    line = shapely.shortest_line(shapely.points(0.0, 0.0), shapely.transform(shape, frame.array_en_from_lonlat))
+    return frame.geo_from_en(*line.coords[1]), float(line.length)
 
 
 def _covers(shape: shapely.Geometry, point: GeoPoint) -> bool:

@@ -122,6 +122,17 @@ def test_swapped_axes_are_told_by_the_place():
     assert check_place(far, near).findings[-1].code is Code.FAR_AWAY
 
 
+def test_a_long_coast_is_as_far_as_what_is_nearest_of_it():
+    """Its middle was 84 km off, and a mission that a passage was written as was refused."""
+    near = GeoPoint(lat_deg=43.0, lon_deg=-70.0)
+    coast = "POLYGON ((-70.1 43.1, -70.1 44.5, -70.3 44.5, -70.3 43.1, -70.1 43.1))"
+    assert check_place(parse(coast.encode(), "f.wkt"), near).findings == ()
+    fault = check_place(parse(coast.encode(), "f.wkt"), near, 10_000.0).findings[-1]
+    assert (fault.code, fault.text) == (Code.FAR_AWAY, "lies 14 km from the mission, at 43.1000, -70.1000")
+    fence = check_place(parse(coast.encode(), "f.wkt", kind=ZoneKind.INCLUSION), near).findings[-1]
+    assert fence.text == "lies 90 km from the mission, at 43.8000, -70.2000"  # one corner of it may be wrong
+
+
 @pytest.mark.parametrize(
     ("lonlat", "code", "said"),
     [
