@@ -222,7 +222,8 @@ class ProgressLine:
 
     def show(self, status: CompanionStatus, step: Step) -> None:
         """Show one step."""
-        text = " | ".join(part for part in (progress_text(step), status.disk_trouble, status.gone) if part)
+        # what is gone beside her was said once, as a note; it stays in the view's health and among its alarms
+        text = " | ".join(part for part in (progress_text(step), status.disk_trouble) if part)
         said, self._notes = self._notes, []
         loud = [a for a in step.actions if isinstance(a, Announce) and a.severity <= LOUD]
         t_s, phase = step.snapshot.t_s, step.state.phase.value

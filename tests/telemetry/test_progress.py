@@ -289,3 +289,18 @@ def test_a_full_disk_is_told_while_it_lasts_whatever_else_speaks(steps):
     assert full in [alarm.text for alarm in alarms(steps[0], status, {})]
     (records,) = (part for part in health_of(steps[0], status) if part.name == "records")
     assert (records.grade, records.text) == ("bad", full)
+
+
+def test_what_is_gone_beside_her_is_a_note_and_in_no_line_of_the_standing(steps):
+    """Each line ended in "without the live page: ... the port is in use"."""
+    gone = "without the live page: --http 127.0.0.1:8765: the port is in use; name another one"
+    status = replace(STATUS, alert_code="gone", alert_text=gone, gone=gone)
+    stream = io.StringIO()
+    with ProgressLine(stream) as progress:
+        progress.note(f"sailing on {gone}")
+        for step in steps:
+            progress.show(status, step)
+    assert stream.getvalue().count(gone) == 1
+    assert gone in [alarm.text for alarm in alarms(steps[0], status, {})]
+    (beside,) = (part for part in health_of(steps[0], status) if part.name == "beside the voyage")
+    assert beside.text == gone
