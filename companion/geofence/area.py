@@ -21,7 +21,7 @@ from shapely.geometry.base import BaseGeometry
 from companion.geo import LEAST_DEGREE_M
 from companion.geo.frame import LocalFrame
 from companion.geofence.charted import Charted
-from companion.geofence.shapes import Circle, Obstacle, Shape, Zone, ZoneKind, drawn, polygon_en
+from companion.geofence.shapes import CIRCLE_SIDES, Circle, Obstacle, Shape, Zone, ZoneKind, polygon_en
 from companion.words import listed
 
 if TYPE_CHECKING:
@@ -427,17 +427,17 @@ SAGITTA_M = 0.1
 RADIUS_M = 6_371_000.0
 LEAST_TAN = 0.1  # of the latitude: pieces at the equator are no longer than for this
 POLE_DEG = 89.0  # from here on a box of longitudes says nothing
+BENT = 2e-6  # of a circle's radius, the more its sides bend on the ground within 200 km of a frame's origin
+FARTHEST_M = 1.9e7  # from the origin: a ring round the other end of the earth would be inside out
 
 
 def polygons_about(shape: Shape, frame: LocalFrame, reach_m: float, *, cover: bool = True) -> list[Polygon]:
     """Return what of a shape lies within ``reach_m`` of the frame's origin, and a little more, in its metres.
 
-    ``cover`` is as for ``polygon_en``. A circle is itself where its middle is near, else what is drawn of it.
+    ``cover`` is as for ``polygon_en``.
     """
     if isinstance(shape, Circle):
-        if math.hypot(*frame.en_from_geo(shape.center)) + shape.radius_m <= reach_m:
-            return [polygon_en(shape, frame, cover=cover)]
-        shape = drawn(Zone(kind=ZoneKind.EXCLUSION if cover else ZoneKind.INCLUSION, shape=shape))
+        return _circle_about(shape, frame, reach_m, cover=cover)
     pieces: list[Polygon] = []
     for turns in (-1, 0, 1):
         aside_deg = np.array([360.0 * turns, 0.0])
@@ -452,6 +452,21 @@ def polygons_about(shape: Shape, frame: LocalFrame, reach_m: float, *, cover: bo
             if isinstance(p, Polygon) and not p.is_empty
         ]
     return [_in_metres(piece, frame) for piece in pieces]
+
+
+def _circle_about(circle: Circle, frame: LocalFrame, reach_m: float, *, cover: bool) -> list[Polygon]:
+    """Return what of a circle lies within ``reach_m``: its corners by geodesics, its sides straight in the frame."""
+    from pyproj import Geod  # as a frame has it: a planner's process does without
+
+    off_m = math.hypot(*frame.en_from_geo(circle.center))
+    if off_m - circle.radius_m > reach_m or off_m + circle.radius_m > FARTHEST_M:
+        return []
+    radius_m = circle.radius_m * ((1.0 + BENT) / math.cos(math.pi / CIRCLE_SIDES) if cover else 1.0)
+    courses_deg = np.arange(CIRCLE_SIDES) * (360.0 / CIRCLE_SIDES)
+    lon_deg, lat_deg = np.full(CIRCLE_SIDES, circle.center.lon_deg), np.full(CIRCLE_SIDES, circle.center.lat_deg)
+    lon_deg, lat_deg, _ = Geod(ellps="WGS84").fwd(lon_deg, lat_deg, courses_deg, np.full(CIRCLE_SIDES, radius_m))
+    ring = Polygon(frame.array_en_from_lonlat(np.column_stack([lon_deg, lat_deg])))
+    return [ring] if math.isinf(reach_m) else parts(shapely.clip_by_rect(ring, -reach_m, -reach_m, reach_m, reach_m))
 
 
 def _box(frame: LocalFrame, reach_m: float) -> Polygon:

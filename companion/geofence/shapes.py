@@ -17,10 +17,14 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 from shapely.geometry import Polygon
 
+from companion.geo import EARTH_RADIUS_M, LEAST_DEGREE_M
 from companion.geo.frame import LocalFrame
 from companion.messages import GeoPoint
 
 CIRCLE_SIDES = 48  # a circle drawn as a polygon has this many sides
+STRAY_SPARE = 1.12  # a slanting side strays by 9 % more than one along a parallel, and the earth is no sphere
+MOST_LAT_DEG = 85.0  # nearer to a pole no ring in degrees is one on the ground
+MOST_RADIUS_M = 1e6  # of a circle in a file: what is larger is a slip, and flat in no frame
 
 
 def wrap_lon_deg(lon_deg: float) -> float:
@@ -141,9 +145,16 @@ def center_of(shape: Shape) -> GeoPoint:
 def drawn(zone: Zone) -> Polygon:
     """Return the zone as a polygon in longitude and latitude.
 
-    A circle becomes ``CIRCLE_SIDES`` sides: around it for a keep-out zone, inside it for a keep-in zone.
+    A circle becomes ``CIRCLE_SIDES`` sides: around it for a keep-out zone, inside it for a keep-in zone. Straight in
+    degrees they run nearer to the equator than on the ground: those around it are so much farther out.
     """
     if isinstance(zone.shape, Circle):
-        frame = LocalFrame(zone.shape.center)
-        return polygon_lonlat(polygon_en(zone.shape, frame, cover=zone.kind is ZoneKind.EXCLUSION), frame)
+        circle, frame = zone.shape, LocalFrame(zone.shape.center)
+        is_around = zone.kind is ZoneKind.EXCLUSION
+        if is_around:
+            most_deg = min(MOST_LAT_DEG, abs(circle.center.lat_deg) + circle.radius_m / LEAST_DEGREE_M)
+            half_m = circle.radius_m * math.tan(math.pi / CIRCLE_SIDES)
+            stray_m = half_m**2 * math.tan(math.radians(most_deg)) / (2.0 * EARTH_RADIUS_M)
+            circle = Circle(circle.center, circle.radius_m + STRAY_SPARE * stray_m)
+        return polygon_lonlat(polygon_en(circle, frame, cover=is_around), frame)
     return zone.shape

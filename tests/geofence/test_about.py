@@ -5,17 +5,21 @@ import math
 import numpy as np
 import pytest
 import shapely
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from pyproj import Geod
 from shapely.geometry import Polygon
 
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence, polygons_about
 from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
-from companion.geofence.shapes import Circle, Obstacle, Zone, ZoneKind, drawn
+from companion.geofence.shapes import MOST_RADIUS_M, Circle, Obstacle, Zone, ZoneKind, drawn
 from companion.messages import GeoPoint
+from tests.geofence.strategies import QUIET
 
 EARTH = Geod(ellps="WGS84")
 REACH_M = 40_000.0
+SNAPS_M = 1e-3  # PROJ takes a place within 1e-10 radians of a frame's origin for the origin
 # Six degrees by one across the date line, with corners alone; and one at 75 degrees north.
 LONG = Polygon([(177.0, 51.3), (183.2, 51.3), (183.2, 52.6), (177.0, 52.6)])
 NORTHERN = Polygon([(10.0, 74.7), (30.0, 74.7), (30.0, 75.3), (10.0, 75.3)])
@@ -79,7 +83,7 @@ def test_what_is_far_is_left_out_and_the_edge_of_what_is_known_is_farther_than_t
     assert whole.names == ("near", "far")
 
 
-def test_a_circle_is_itself_when_it_is_near_and_drawn_when_it_is_not():
+def test_a_circle_that_is_near_is_drawn_and_one_that_is_far_is_left_out():
     frame = frame_at(75.0, 179.99)
     near = Circle(GeoPoint(lat_deg=75.01, lon_deg=-179.99), 500.0)
     [drawn] = polygons_about(near, frame, REACH_M)
@@ -114,18 +118,52 @@ def test_a_circle_and_a_fence_over_the_date_line_are_rings_that_do_not_cross_the
     assert (made.status, made.reason) == (FenceStatus.OK, "")
 
 
-@pytest.mark.parametrize("cover", [True, False])
-def test_a_circle_that_is_larger_than_what_is_known_errs_to_the_safe_side(cover):
-    """A prohibited area of 60 km across must not be drawn smaller than it is, nor a limit larger."""
-    frame = frame_at(50.0, -4.0)
-    circle = Circle(GeoPoint(lat_deg=50.0, lon_deg=-4.8), 60_000.0)
-    [part] = polygons_about(circle, frame, REACH_M, cover=cover)
-    edge, straight_m = LocalFrame(circle.center), 2.0  # what sides of 8 km, straight in degrees, stray on the ground
-    for turn in np.linspace(0.35 * math.pi, 0.65 * math.pi, 301):
-        rim = frame.en_from_geo(edge.geo_from_en(60_000.0 * math.sin(turn), 60_000.0 * math.cos(turn)))
-        if math.hypot(*rim) < REACH_M:
-            off_m = float(shapely.distance(part.exterior, shapely.points(rim)))
-            assert part.covers(shapely.points(rim)) == cover or off_m < straight_m
+@settings(**QUIET, max_examples=80)
+@example(reach_m=200_000.0, lat_deg=0.0, radius_m=31_485.0, course=6.0, beyond=0.0)
+@given(
+    reach_m=st.sampled_from([REACH_M, 200_000.0]),
+    lat_deg=st.sampled_from([0.0, -50.0, 75.0, 89.8, -90.0]),
+    radius_m=st.one_of(st.floats(10.0, 10_000.0), st.floats(10_000.0, MOST_RADIUS_M)),
+    course=st.floats(0.0, 2.0 * math.pi),
+    beyond=st.floats(-0.9, 0.9),
+)
+def test_a_circle_of_any_size_anywhere_errs_to_the_safe_side(reach_m, lat_deg, radius_m, course, beyond):
+    """A prohibited area of 60 km across was drawn a metre too small in its north; a limit must be no larger."""
+    edge = frame_at(lat_deg, 179.0)  # about the circle's middle: all places of its rim are equally far off
+    circle, away_m = Circle(edge.origin, radius_m), max(0.0, radius_m + beyond * reach_m)
+    frame = LocalFrame(edge.geo_from_en(away_m * math.sin(course), away_m * math.cos(course)))
+    around = shapely.union_all(polygons_about(circle, frame, reach_m))
+    within = shapely.union_all(polygons_about(circle, frame, reach_m, cover=False))
+    turns = course + np.linspace(-1.0, 1.0, 1001) * min(math.pi, reach_m / radius_m)
+    rim = edge.array_lonlat_from_en(radius_m * np.column_stack([np.sin(turns), np.cos(turns)]))
+    rim_en = frame.array_en_from_lonlat(rim)
+    near = shapely.points(rim_en[np.hypot(*rim_en.T) < reach_m])
+    assert np.all(shapely.distance(around, near) < SNAPS_M)
+    assert np.all(shapely.distance(within, near) < 0.005 * radius_m)  # and is no smaller than 48 sides make it
+    assert not np.any(shapely.contains_properly(shapely.buffer(within, -SNAPS_M), near))
+    drawn_m = np.hypot(*edge.array_en_from_lonlat(frame.array_lonlat_from_en(shapely.get_coordinates(around))).T)
+    assert drawn_m.max(initial=0.0) <= 1.0022 * radius_m
+
+
+@settings(**QUIET, max_examples=60)
+@given(
+    lat_deg=st.floats(-75.0, 75.0),
+    lon_deg=st.sampled_from([-4.0, 179.9]),
+    radius_m=st.one_of(st.floats(10.0, 10_000.0), st.floats(10_000.0, 500_000.0)),
+)
+@example(lat_deg=50.0, lon_deg=-4.0, radius_m=60_000.0)
+def test_a_circle_drawn_in_degrees_errs_to_the_safe_side_too(lat_deg, lon_deg, radius_m):
+    """A file that holds no circle has it so, and its sides are straight in longitude and latitude."""
+    frame, turns = frame_at(lat_deg, lon_deg), np.linspace(0.0, 2.0 * math.pi, 1441)
+    rim = frame.array_lonlat_from_en(radius_m * np.column_stack([np.sin(turns), np.cos(turns)]))
+    circle = Circle(frame.origin, radius_m)
+    around, within = (drawn(Zone(kind=kind, shape=circle)) for kind in (ZoneKind.EXCLUSION, ZoneKind.INCLUSION))
+    rim[:, 0] += 360.0 * np.round((np.mean(around.bounds[::2]) - rim[:, 0]) / 360.0)
+    assert np.all(shapely.distance(around, shapely.points(rim)) < 1e-10)
+    rim[:, 0] += 360.0 * np.round((np.mean(within.bounds[::2]) - rim[:, 0]) / 360.0)
+    assert not np.any(shapely.contains_properly(shapely.buffer(within, -1e-10), shapely.points(rim)))
+    corners_m = np.hypot(*frame.array_en_from_lonlat(shapely.get_coordinates(around)).T)
+    assert corners_m.max() <= (1.0022 + radius_m / 500_000.0 * 0.002) * radius_m
 
 
 def test_of_a_passages_limits_every_one_counts_each_drawn_inside_and_less_its_own_margin():

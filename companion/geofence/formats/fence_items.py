@@ -16,7 +16,7 @@ from shapely.geometry import Polygon
 from companion.geofence.document import Code, FindingLevel
 from companion.geofence.formats.losses import Losses, without_holes
 from companion.geofence.formats.rings import Findings, polygons_from_rings
-from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
+from companion.geofence.shapes import MOST_RADIUS_M, Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem, float32
 
 MAX_FENCE_ITEMS = 84  # ArduRover 4.7: "Only 84 items are supported" (672 bytes of storage, 8 a piece)
@@ -115,7 +115,7 @@ def items_to_zones(
             index += 1
         elif item.command in _CIRCLE:
             radius_m = item.params[0]
-            if radius_m > 0.0 and math.isfinite(radius_m):
+            if 0.0 < radius_m <= MOST_RADIUS_M:
                 zones.append(Zone(kind=_CIRCLE[Command(item.command)], shape=Circle(item.point, radius_m)))
             else:
                 findings.add(
@@ -123,7 +123,7 @@ def items_to_zones(
                     Code.DEGENERATE,
                     place,
                     f"the circle's radius is {radius_m:g} m",
-                    "give it a positive radius",
+                    f"give it a positive radius of at most {MOST_RADIUS_M:.0f} m",
                 )
             index += 1
         elif item.command in _VERTEX:

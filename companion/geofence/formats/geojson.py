@@ -21,7 +21,7 @@ from companion.geofence.formats.losses import Losses, Written, leave_out
 from companion.geofence.formats.rings import on_globe, polygons_from_rings
 from companion.geofence.formats.routes import Reading, RoutePoint, items_of, pins_as_dangers, pins_as_route
 from companion.geofence.formats.untrusted import MAX_DEPTH, MAX_POSITIONS, JsonNode, parse_json
-from companion.geofence.shapes import Circle, Zone, ZoneKind, wrap_lon_deg
+from companion.geofence.shapes import MOST_RADIUS_M, Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
 
 MOST_WATER_M = 1000.0  # that a chart's obstacles are made for
@@ -170,7 +170,7 @@ class _GeoJsonReading(Reading):
                 self.items.append(item)
                 self.item_names.append(name)
         elif radius is not None:
-            radius_m = radius.number(0.0, 1e6)
+            radius_m = radius.number(0.0, MOST_RADIUS_M)
             if radius_m <= 0.0:
                 raise radius.fail("a circle needs a positive radius")
             depth_m = _depth_m(properties)

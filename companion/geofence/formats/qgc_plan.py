@@ -14,7 +14,7 @@ from companion.geofence.formats.fence_items import ring_of
 from companion.geofence.formats.losses import Losses, Written, leave_out, without_holes
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.formats.untrusted import JsonNode, parse_json
-from companion.geofence.shapes import Circle, Zone, ZoneKind
+from companion.geofence.shapes import MOST_RADIUS_M, Circle, Zone, ZoneKind
 from companion.messages import Command, GeoPoint, MissionItem
 
 _FIRMWARE_ARDUPILOT = 3
@@ -198,7 +198,7 @@ def _zones(fence: JsonNode, findings: Findings) -> list[Zone]:
         kind = ZoneKind.INCLUSION if node.member("inclusion").flag() else ZoneKind.EXCLUSION
         circle = node.member("circle")
         center = _point(circle.member("center"), findings)
-        radius_m = circle.member("radius").number(0.0, 1e7)
+        radius_m = circle.member("radius").number(0.0, MOST_RADIUS_M)
         if radius_m <= 0.0:
             findings.add(FindingLevel.ERROR, Code.DEGENERATE, node.path, "the circle's radius is 0", "give it a radius")
         elif center is not None:

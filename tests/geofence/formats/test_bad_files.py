@@ -1,5 +1,6 @@
 """Each fault of a file is named with its place; none of them makes the sea larger."""
 
+import contextlib
 import itertools
 import json
 
@@ -13,10 +14,11 @@ from companion.errors import InputError
 from companion.geofence.area import Area, Fence
 from companion.geofence.check import AreaConditions, check_area
 from companion.geofence.document import Code, FindingLevel
+from companion.geofence.formats.fence_items import items_to_zones
 from companion.geofence.formats.registry import FORMATS, check_place, parse, write
 from companion.geofence.formats.rings import Findings, polygons_from_rings
 from companion.geofence.shapes import ZoneKind
-from companion.messages import GeoPoint
+from companion.messages import Command, GeoPoint, MissionItem
 from tests.geofence.strategies import QUIET
 
 SQUARE = "0 0, 0.01 0, 0.01 0.01, 0 0.01"
@@ -432,3 +434,18 @@ def test_a_cut_file_is_never_a_smaller_fence_without_a_word(extension):
 def test_xml_of_another_kind_is_not_taken_for_the_wkt_that_it_quotes():
     with pytest.raises(InputError, match="neither GPX nor KML"):
         parse(b"<svg><desc>POINT (1 2)</desc></svg>", "drawing.svg", extension=".svg")
+
+
+@pytest.mark.parametrize(("radius_m", "is_one"), [(1e6, True), (1.01e6, False), (-3.0, False)])
+def test_a_circle_of_more_than_a_thousand_kilometres_is_a_slip_in_every_format(radius_m, is_one):
+    """Whatever is drawn of one is drawn in metres about a place."""
+    item = MissionItem(command=Command.NAV_FENCE_CIRCLE_EXCLUSION, params=(radius_m, 0.0, 0.0, 0.0))
+    findings = Findings()
+    zones, _ = items_to_zones((item,), findings)
+    assert [z.shape.radius_m for z in zones] == [radius_m] * is_one
+    assert [f.severity for f in findings] == [FindingLevel.ERROR] * (not is_one)
+    plan = GOOD[".plan"].replace(b'"radius":30', b'"radius":' + json.dumps(radius_m).encode())
+    with contextlib.nullcontext() if is_one else pytest.raises(InputError, match="radius"):
+        assert (
+            max(getattr(z.shape, "radius_m", 0.0) for z in parse(plan, "f.plan", extension=".plan").zones) == radius_m
+        )
