@@ -278,9 +278,11 @@ def _rows_of_layers(
     try:
         with _whole(path) if options else contextlib.nullcontext():
             layers = [str(name) for name, _ in list_layers(path) if is_read(str(name).upper())]
+        has_places = False
         for layer in layers:
             with _whole(path) if options else contextlib.nullcontext():
                 meta, _, geometries, fields = read_layer(path, layer=layer, **(options or {}))
+            has_places |= geometries is not None
             if geometries is None:  # a table
                 geometries = [None] * (len(fields[0]) if fields else 0)
             has_shapes = any(data is not None for data in geometries)
@@ -295,6 +297,8 @@ def _rows_of_layers(
                 attributes = {name: _value(column[n]) for name, column in zip(names, fields, strict=True)}
                 if box is None or shape.is_empty or _touches(shape, box):
                     yield Row(layer=layer, place=place, geometry=shape, attributes=attributes)
+        if not (has_places or options):  # a spreadsheet would else be water without a danger
+            raise _no_chart(path, "holds no places, as a table does")
     except (DataLayerError, DataSourceError, shapely.errors.GEOSException) as error:
         # what is called as a chart and is none may have been cut short
         if "not recognized" in str(error) and path.suffix.lower() not in LAYERED and not options:
@@ -319,11 +323,11 @@ def _require_no_text(path: Path) -> None:
         raise _no_chart(path)
 
 
-def _no_chart(path: Path) -> InputError:
+def _no_chart(path: Path, why: str = "is no chart file") -> InputError:
     return InputError(
         str(path),
         "",
-        "is no chart file",
+        why,
         "name an S-57 cell (.000), a shapefile (.shp), GeoPackage, GeoJSON, OSM extract or a grid of depths",
     )
 

@@ -585,6 +585,19 @@ def test_a_text_that_is_no_chart_is_called_so_with_and_without_the_extra(shell, 
         monkeypatch.setitem(sys.modules, "pyogrio", None)
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("heights.csv", "2026-11-24T06:10Z, 0.9\n2026-11-24T12:10Z, 3.9\n"), ("survey.csv", "lat,lon,m\n50.8,-1.3,0.4\n")],
+)
+def test_a_table_is_no_water_without_a_danger(shell, name, text):
+    """A table of the tide, or soundings in a spreadsheet, made a chart of nothing solid at all."""
+    pytest.importorskip("pyogrio")
+    (shell.folder / name).write_text(text)
+    assert f"{name}: holds no places, as a table does; name an S-57 cell" in refusal(
+        shell, name, *AROUND, "--depth", "2"
+    )
+
+
 def test_a_file_that_gdal_knows_no_format_of_is_no_chart(shell):
     pytest.importorskip("pyogrio")
     (shell.folder / "photo.png").write_bytes(b"\x89PNG\x00\x01")
