@@ -19,6 +19,7 @@ from companion.planner import Plan, Problem, plan
 from companion.safety import DARK, End
 from sitl.rehearse.sampling import FORECASTS, Doubts, forecast_wind, given_wind
 from sitl.run.embedded import EXPANSIONS, mission_of
+from sitl.runner import require_free
 from sitl.scenario import Scenario, WindSpec, beginning, load_scenario, scenario_text
 
 SCENARIO = "rehearsal.toml"
@@ -70,6 +71,7 @@ def prepared(
 
     Raises:
         InputError: it cannot be read, sailed or planned, has no start, or the wind is none.
+        JobError: another rehearsal is sailed there.
         OSError: the folder does not take it.
     """
     base = load_scenario(path)
@@ -104,7 +106,11 @@ def prepared(
     )
     folder.mkdir(parents=True, exist_ok=True)
     source = folder / SCENARIO
-    Disk().replace(source, scenario_text(scenario).encode())
+    text = scenario_text(scenario).encode()
+    if not source.is_file() or source.read_bytes() != text:
+        for results in folder.glob("*.jsonl"):  # who sails here reads it for each voyage
+            require_free(results)
+        Disk().replace(source, text)
     return PreparedRehearsal(
         source=source,
         scenario=scenario,

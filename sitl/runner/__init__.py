@@ -12,6 +12,7 @@ from sitl.runner.result_store import (
     made_by,
     read_results,
     read_table,
+    require_free,
     table_of,
     write_table,
 )
@@ -34,6 +35,7 @@ __all__ = [
     "made_by",
     "read_results",
     "read_table",
+    "require_free",
     "sail_kept",
     "settled",
     "table_of",

@@ -214,6 +214,22 @@ def _parsed(path: Path, data: bytes) -> StoredResults:
     return held
 
 
+def require_free(path: Path) -> None:
+    """Raise JobError where another process writes this file of results: what it sails by is not to be changed."""
+    try:
+        with path.open("rb") as file:
+            _lock(file.fileno(), path)
+    except OSError as error:
+        raise JobError(f"{path}: {reason(error)}") from error
+
+
+def _lock(fd: int, path: Path) -> None:
+    try:
+        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise JobError(f"{path}: another run writes it; wait for it, or name another file") from error
+
+
 class ResultStore:
     """A file of results that is open to be appended to, by one process at a time."""
 
@@ -237,10 +253,7 @@ class ResultStore:
             raise
 
     def _begin(self, campaign: str) -> StoredResults:
-        try:
-            fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise JobError(f"{self.path}: another run writes it; wait for it, or name another file") from error
+        _lock(self._fd, self.path)
         data = self.path.read_bytes()
         whole = data[: data.rfind(b"\n") + 1]
         if not whole:

@@ -18,6 +18,7 @@ import pytest
 
 from companion import cli
 from companion.disk import Disk
+from companion.errors import JobError
 from companion.plots.chart import save
 from sitl import cli as sitl_cli
 from sitl.rehearse import picture, rehearsal
@@ -26,7 +27,7 @@ from sitl.rehearse.picture import shares_of
 from sitl.rehearse.prepared import prepared
 from sitl.rehearse.rehearsal import Follower, Limits, RehearsalOutcome, _words
 from sitl.rehearse.voyage import RehearsalCase, key_of
-from sitl.runner import CampaignResults, Job, ScenarioBundle, made_by
+from sitl.runner import CampaignResults, Job, ResultStore, ScenarioBundle, made_by
 from sitl.runner.result_store import StoredResults
 
 ROCKS = Path("missions/rocks.toml").resolve()
@@ -300,6 +301,34 @@ def test_a_part_says_how_the_parts_come_together(sailed, monkeypatch, capsys, tm
     code, said, _ = run(sailed, monkeypatch, capsys, *words)
     assert code == 0
     assert "2 voyages, all of them in the file before" in said
+
+
+def test_another_rehearsal_in_the_folder_of_one_that_sails_is_refused_and_changes_nothing(sailed, monkeypatch):
+    """Each voyage reads the scenario: what the first had left to sail was called off by the hours of the second."""
+    monkeypatch.chdir(sailed)
+    monkeypatch.setattr("sitl.rehearse.prepared._planned", lambda *_: [SimpleNamespace(cost_s=200.0)])
+
+    def made(limit_s):
+        return prepared(
+            Path("rocks.toml"),
+            Path("busy"),
+            wind=["5@0"],
+            wind_error=None,
+            doubt=1.0,
+            faults=False,
+            depart=None,
+            limit_s=limit_s,
+        )
+
+    source = made(60.0).source
+    before = source.read_bytes()
+    with ResultStore(Path("busy/results.jsonl"), "rehearse"):
+        with pytest.raises(JobError, match=r"busy/results\.jsonl: another run writes it; wait for it"):
+            made(90.0)
+        assert source.read_bytes() == before
+        assert made(60.0).source == source  # the parts of an array
+    made(90.0)
+    assert source.read_bytes() != before
 
 
 def test_on_another_machine_a_rehearsal_is_whole(sailed, monkeypatch):
