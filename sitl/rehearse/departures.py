@@ -132,4 +132,5 @@ def advice(found: Sequence[tuple[dt.datetime, Estimates]]) -> list[str]:
     if not alike:
         return [words + ", surely"]
     others = ", ".join(f"{h:%Y-%m-%d %H:%M}" for h in alike)
-    return [f"{words}; as good for all that {counted(len(best.records), 'voyage')} tell: {others}"]
+    tell = "tells" if len(best.records) == 1 else "tell"
+    return [f"{words}; as good for all that {counted(len(best.records), 'voyage')} {tell}: {others}"]
