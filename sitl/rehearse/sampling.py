@@ -21,7 +21,7 @@ import msgspec
 import numpy as np
 
 from companion.compose import water_of
-from companion.errors import InputError
+from companion.errors import InputError, unreadable
 from companion.geofence import Mission
 from companion.program import arguments
 from companion.weather import iso
@@ -191,7 +191,9 @@ def _of_file(path: Path, spec: WindSpec, error: tuple[float, float] | None) -> G
     try:
         with path.open(newline="", encoding="utf-8-sig") as lines:
             names = next(csv.reader(line for line in lines if not line.startswith("#")), [])
-    except (OSError, UnicodeDecodeError) as trouble:
+    except OSError as trouble:
+        raise unreadable("--wind", trouble, str(path), _REMEDY) from None
+    except UnicodeDecodeError as trouble:
         raise InputError("--wind", str(path), f"cannot be read ({trouble})", _REMEDY) from None
     if set(CLIMATE) <= set(names):
         return _climate(path, spec, error or (0.0, 0.0))

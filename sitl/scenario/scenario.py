@@ -525,6 +525,9 @@ def load_scenario(path: Path) -> Scenario:
     try:
         scenario = msgspec.convert(raw, Scenario)
     except msgspec.ValidationError as error:
+        if "mission" not in raw and ("missing required field" in str(error) or "from_autopilot" in raw):
+            problem = "has no [[goal]], as a mission has that is simulated, and names no mission, as a scenario does"
+            raise InputError(str(path), "", problem, "add one of them, or name another file") from error
         raise InputError(str(path), _place(error), _sentence(error), _suggestion(error)) from error
     scenario = msgspec.structs.replace(scenario, parameters={**AS_SET_UP, **scenario.parameters})
     if scenario.satellite is None and any(event.kind == "far_order" for event in scenario.events):
@@ -730,7 +733,9 @@ def scenario_seabed(scenario: Scenario, source: Path, frame: LocalFrame) -> Seab
         path = str(source.parent / spec.file)
         try:
             text = (source.parent / spec.file).read_text(encoding="ascii")
-        except (OSError, UnicodeDecodeError) as error:
+        except OSError as error:
+            raise unreadable(path, error, remedy="name an Esri ASCII grid (.asc)") from error
+        except UnicodeDecodeError as error:
             raise InputError(path, "", f"cannot be read ({error})", "name an Esri ASCII grid (.asc)") from error
         grid = signed(parse_ascii_grid(text, path), path, "auto").northwards()
     return Seabed(

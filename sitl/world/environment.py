@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.errors import InputError
+from companion.errors import InputError, unreadable
 from companion.geo.angles import wrap_two_pi
 
 # Wolsieffer 2020, equation 17: mean reversion of the wind direction and its noise over a step of 1 s.
@@ -190,7 +190,9 @@ class Recorded:
                     if rows and t <= rows[-1][0]:
                         raise InputError(str(path), f"line {reader.line_num}", "time does not increase")
                     rows.append((t, math.radians(direction), speed))
-        except (OSError, UnicodeDecodeError) as error:
+        except OSError as error:
+            raise unreadable(str(path), error, remedy="name a wind CSV") from error
+        except UnicodeDecodeError as error:
             raise InputError(str(path), "", f"cannot be read ({error})", "name a wind CSV") from error
         if not rows:
             raise InputError(str(path), "", "holds no wind")

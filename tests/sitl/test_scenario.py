@@ -48,6 +48,8 @@ def test_our_scenarios_load_and_their_weather_repeats(path):
         ("mission='m.toml'", "", "s.toml: `name` is missing; add it"),
         ("name='x'\nmission='m.toml'\n[[events]]\nkind='leak'", "", "s.toml: events[0]: `at_s` is missing; add it"),
         ("name='x'\nmission='m.toml'\nwidth_m=3", "", "s.toml: unknown key `width_m`; known: name,"),
+        ("from_autopilot=true", "", "has no [[goal]], as a mission has"),
+        ("name='x'\nmision='m.toml'", "", "did you mean `mission`?"),
     ],
 )
 def test_bad_scenarios(tmp_path, text, place, words):

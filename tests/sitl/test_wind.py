@@ -91,6 +91,11 @@ def test_record(tmp_path: Path) -> None:
     assert wind.at(99.0)[1] == 6.0
 
 
+def test_a_record_that_is_not_there_is_told_without_the_system_s_words(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nowhere\.csv: no such file; name a wind CSV$"):
+        Recorded.from_csv(tmp_path / "nowhere.csv")
+
+
 @pytest.mark.parametrize(
     ("text", "place"),
     [

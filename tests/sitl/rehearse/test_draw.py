@@ -128,7 +128,7 @@ def test_a_record_is_sailed_from_a_time_of_each_seed(tmp_path):
         ("90@10", "looks swapped: SPEED@FROM is 10@90, m/s and degrees"),
         ("45@10", "is out of range: up to 40 m/s"),
         ("90@60", "is out of range"),
-        ("nowhere.csv", "cannot be read"),
+        ("nowhere.csv", "^--wind: nowhere.csv: no such file; write SPEED@FROM"),
     ],
 )
 def test_a_wind_that_is_none_is_one_line(text, words):
