@@ -290,9 +290,9 @@ def _checked(args: argparse.Namespace, fork_server: ForkServer | None) -> int:
     from companion.traffic.feeds import parse_feed
 
     for name in args.feed:
-        parse_feed(name)
+        parse_feed(name, source="--feed")
     if args.sounder is not None:
-        parse_feed(args.sounder)
+        parse_feed(args.sounder, source="--sounder")
     for name in args.nmea:
         parse_nmea(name)
     for name in args.signalk:

@@ -307,7 +307,8 @@ class Program:
         except CompanionError as error:
             called = f"{self.name} {args.command}"
             said = str(error)  # one of a verb's options names the command by itself
-            sys.stderr.write(f"{said}\n" if said.startswith(f"{called} ") else f"{called}: {said}\n")
+            names_itself = said.startswith((f"{called} ", f"{called}: "))
+            sys.stderr.write(f"{said}\n" if names_itself else f"{called}: {said}\n")
             return error.exit_code
         except ModuleNotFoundError as error:
             refusal = missing(error)

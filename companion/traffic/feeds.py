@@ -57,8 +57,8 @@ class FeedName:
     baud: int = DEFAULT_BAUD
 
 
-def parse_feed(text: str, *, baud: int = DEFAULT_BAUD) -> FeedName:
-    """Parse a feed name; ``baud``: of a serial port that names none.
+def parse_feed(text: str, *, baud: int = DEFAULT_BAUD, source: str = "feed") -> FeedName:
+    """Parse a feed name; ``baud``: of a serial port that names none, ``source``: where the name stands.
 
     Raises:
         InputError: it is not one.
@@ -71,7 +71,7 @@ def parse_feed(text: str, *, baud: int = DEFAULT_BAUD) -> FeedName:
     match = re.fullmatch(r"(/[^\s:]+)(?::(\d{3,7}))?", text)
     if match:
         return FeedName(text=text, kind="serial", host=match[1], baud=int(match[2] or baud))
-    raise InputError("AIS feed", text, "is not a feed", "write udpin:HOST:PORT, tcp:HOST:PORT or /dev/NAME:BAUD")
+    raise InputError(source, text, "is not a feed", "write udpin:HOST:PORT, tcp:HOST:PORT or /dev/NAME:BAUD")
 
 
 class Feed(Generic[Report]):

@@ -168,13 +168,13 @@ def test_a_bad_feed_is_bad_usage(tmp_path, capsys):
         )
         == 2
     )
-    assert "radio: is not a feed" in capsys.readouterr().err
+    assert "companion run: --feed: radio: is not a feed" in capsys.readouterr().err
 
 
 def test_a_sounder_that_is_no_feed_is_bad_usage(tmp_path, capsys):
     link = f"udpin:127.0.0.1:{free_port()}"
     assert cli.main(["run", str(mission(tmp_path)), "--link", link, "--sounder", "radio"]) == 2
-    assert "radio: is not a feed" in capsys.readouterr().err
+    assert "companion run: --sounder: radio: is not a feed" in capsys.readouterr().err
 
 
 def test_a_scenario_is_not_sailed_into_the_folder_of_another_voyage(tmp_path, capsys):

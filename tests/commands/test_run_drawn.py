@@ -137,7 +137,8 @@ def test_a_dry_run_keeps_the_drawing_in_its_own_folder_only(said):
 
 def test_neither_a_mission_nor_a_drawing_is_asked_for(capsys):
     assert cli.main(["run", "--link", "tcp:127.0.0.1:1"]) == 2
-    assert "there is no mission; name a mission file, or sail what is drawn on the autopilot" in capsys.readouterr().err
+    said = "companion run: there is no mission; name a mission file, or sail what is drawn on the autopilot"
+    assert capsys.readouterr().err.startswith(said)
 
 
 @pytest.mark.ardurover
