@@ -22,6 +22,8 @@ from typing import Any
 
 import companion
 from companion.errors import InputError
+from companion.program.arguments import number, out_file, whole
+from companion.program.commands import Parser
 from sailbench import board, passage_bench, plan_bench, sailors
 from sailbench.environment import ENVIRONMENTS
 from sailbench.passage_set import SEASONS, WAYS
@@ -33,16 +35,18 @@ WARM_S = 60.0  # of processor time, for a guest to load and compile in
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 2 where it was asked for what is not there."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="python -m sailbench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     one = commands.add_parser("plan", help="planners on the problems", epilog="example: python -m sailbench plan")
     one.add_argument("problems", nargs="*", help="problem files (default: the set)")
     one.add_argument("--planners", nargs="+", default=present(), metavar="P", help="by name, or MODULE:FUNCTION")
-    one.add_argument("--budgets", nargs="+", type=float, default=[1.0], metavar="S", help="seconds (default: 1)")
-    one.add_argument("--seeds", type=int, default=2, help="of each problem and budget (default: 2)")
-    one.add_argument("--out", type=Path, metavar="FILE.parquet", help="keep the rows there")
+    one.add_argument(
+        "--budgets", nargs="+", type=number("s", above=0.0), default=[1.0], metavar="S", help="seconds (default: 1)"
+    )
+    one.add_argument("--seeds", type=whole(at_least=1), default=2, help="of each problem and budget (default: 2)")
+    one.add_argument("--out", type=out_file, metavar="FILE.parquet", help="keep the rows there")
     one.set_defaults(run=_plan)
     two = commands.add_parser("sail", help="sailors in the environments", epilog="example: python -m sailbench sail")
     two.add_argument("--environments", nargs="+", default=list(ENVIRONMENTS), metavar="E", help=", ".join(ENVIRONMENTS))
@@ -53,8 +57,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         metavar="S",
         help="greedy; who sails by a planner, named as for plan; companion: the whole program",
     )
-    two.add_argument("--seeds", type=int, default=10, help="weathers (default: 10)")
-    two.add_argument("--out", type=Path, metavar="FILE.parquet", help="keep the rows there")
+    two.add_argument("--seeds", type=whole(at_least=1), default=10, help="weathers (default: 10)")
+    two.add_argument("--out", type=out_file, metavar="FILE.parquet", help="keep the rows there")
     two.set_defaults(run=_sail)
     four = commands.add_parser(
         "passages", help="routers in the weather of weeks", epilog="example: python -m sailbench passages"
@@ -64,17 +68,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     four.add_argument("--passages", nargs="+", metavar="P", help="of the twelve: " + ", ".join(w.name for w in WAYS))
     four.add_argument("--seasons", nargs="+", default=list(SEASONS), metavar="S", choices=list(SEASONS))
-    four.add_argument("--out", type=Path, metavar="FILE.csv", help="keep the rows there")
+    four.add_argument("--out", type=out_file, metavar="FILE.csv", help="keep the rows there")
     four.set_defaults(run=_passages)
     three = commands.add_parser("page", help="the leaderboard", epilog="example: python -m sailbench page a.parquet")
     three.add_argument("results", nargs="+", type=Path, help="what --out wrote")
-    three.add_argument("--out", type=Path, default=Path("leaderboard.html"), help="(default: leaderboard.html)")
+    three.add_argument("--out", type=out_file, default=Path("leaderboard.html"), help="(default: leaderboard.html)")
     three.set_defaults(run=_page)
-    args = parser.parse_args(argv)
     try:
+        args = parser.parse_args(argv)
         args.run(args)
     except InputError as error:
-        print(f"sailbench: {error}", file=sys.stderr)
+        print(error if error.source.startswith(parser.prog) else f"sailbench: {error}", file=sys.stderr)
         return error.exit_code
     return 0
 

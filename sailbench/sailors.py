@@ -107,9 +107,7 @@ class SailRow(TypedDict):
 
 
 def sail(environment: str, name: str, seed: int) -> SailRow:
-    """Sail one voyage. Raises InputError: there is no such environment or sailor."""
-    if environment not in ENVIRONMENTS:
-        raise InputError("environment", environment, "there is none", f"one of {', '.join(ENVIRONMENTS)}")
+    """Sail one voyage in an environment that there is. Raises InputError: there is no such sailor."""
     if name == COMPANION:
         return _by_companion(environment, seed)
     made = gymnasium.make(environment)
@@ -152,7 +150,17 @@ def voyages(
     seeds: int,
     is_made: Callable[[str, str, int], bool] = lambda *_: False,
 ) -> Iterator[SailRow]:
-    """Yield a row for each environment, sailor and seed that is not made yet."""
+    """Yield a row for each environment, sailor and seed that is not made yet.
+
+    Raises:
+        InputError: there is no such environment or sailor, said before anybody sails.
+    """
+    for environment in environments:
+        if environment not in ENVIRONMENTS:
+            raise InputError("environment", environment, "there is none", f"one of {', '.join(ENVIRONMENTS)}")
+    for name in sailors:
+        if name != COMPANION:
+            sailor_named(name)
     for environment in environments:
         for name in sailors:
             for seed in range(seeds):
