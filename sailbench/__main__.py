@@ -22,8 +22,8 @@ from typing import Any
 
 import companion
 from companion.errors import InputError
+from companion.program import Parser
 from companion.program.arguments import number, out_file, whole
-from companion.program.commands import Parser
 from sailbench import board, passage_bench, plan_bench, sailors
 from sailbench.environment import ENVIRONMENTS
 from sailbench.passage_set import SEASONS, WAYS

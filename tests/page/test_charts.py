@@ -59,7 +59,7 @@ def test_where_there_is_no_tile_the_water_is_clear(both, z, x, y):
         (lambda path: mbtiles(path, zooms=()), "without tiles"),
         (lambda path: mbtiles(path, zooms=(10,), format="pbf"), "vector tiles"),
         (lambda path: mbtiles(path, zooms=(10,), format="geojson"), "not known"),
-        (lambda path: path.mkdir(), "cannot be read"),
+        (lambda path: path.mkdir(), "is a folder"),
         (lambda path: None, "no such file"),
     ],
 )

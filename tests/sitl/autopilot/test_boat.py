@@ -26,7 +26,7 @@ from tests.sitl.boats import boat_process, free_port
         (["--param", "WP_SPEED=nan"], "cannot be a parameter"),
         (["--sysid", "300"], "--sysid: 300 is out of range"),
         (["--port", "0", "--udp", "0"], "nobody could reach the boat"),
-        (["--wind", "none.csv"], "none.csv: cannot be read"),
+        (["--wind", "none.csv"], "none.csv: no such file"),
         (["--udp-out", "nowhere"], "host or port is missing"),
     ],
 )
