@@ -131,6 +131,7 @@ def _gates_of(voyage: Voyage, area: AreaLike, approaches: tuple[Approach, ...]) 
             before = legs[i - 1].en_m
         name = goal.name or f"goal {i + 1}"
         after = legs[i + 1].en_m if i + 1 < len(legs) else voyage.onward_en_m
+        began = len(out)
         if goal.line is not None:
             out.extend(_cross(goal, i, name, None if is_once_more else before, after, area))
         elif goal.search is not None and approach is not None and approach.round > 0:
@@ -154,6 +155,11 @@ def _gates_of(voyage: Voyage, area: AreaLike, approaches: tuple[Approach, ...]) 
         else:
             turn_rad = approach.turn_rad if approach is not None else None
             out.extend(_round(goal, i, name, before, after, turn_rad, is_once_more=is_once_more))
+        if i > 0 and approach is None and legs[i - 1].side is not Side.NONE and not is_once_more and began < len(out):
+            # Led back behind the buoy that she has just rounded she would unwind what she has turned about it.
+            buoy = legs[i - 1].en_m
+            behind = barrier_wkt(buoy, bearing_rad(goal.en_m, buoy), BARRIER_M)
+            out[began] = replace(out[began], keep_out=(*out[began].keep_out, behind))
     return tuple(out)
 
 

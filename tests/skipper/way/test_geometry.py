@@ -5,9 +5,10 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
+import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shapely.geometry import box
+from shapely.geometry import LineString, box
 
 from companion.geo.angles import difference_rad
 from companion.skipper.way.gates import (
@@ -191,10 +192,30 @@ def test_a_buoy_counts_from_abeam_of_it_on_and_on_its_hand_only(side, course, is
     assert astray(gate, [start, other, moved(buoy, way, 60.0), gate.en_m], 0.0)
 
 
-def test_barrier_closes_the_wrong_side():
-    import shapely
-    from shapely.geometry import LineString
+@pytest.mark.parametrize(("side", "hand"), [(Side.PORT, 1.0), (Side.STARBOARD, -1.0)])
+@pytest.mark.parametrize("following", [Side.NONE, Side.PORT])
+def test_behind_a_buoy_that_was_rounded_no_way_leads_back(side, hand, following):
+    """A beat from a leeward mark began behind it, on its other side: told as left to port, it was left to starboard."""
+    buoy, windward = (0.0, 0.0), (0.0, 300.0)
+    made = voyage(
+        Goal(en_m=(-200.0 * hand, 150.0)),
+        Goal(en_m=buoy, side=side),
+        Goal(en_m=windward, side=following),
+        Goal(en_m=buoy),
+    )
+    gates = gates_of(made)
+    last = [g for g in gates if g.goal == 1][-1].en_m
+    first = next(g for g in gates if g.goal == 2)
+    closed = shapely.union_all([shapely.from_wkt(w) for w in first.keep_out])
+    assert closed.intersects(LineString([last, (0.0, -20.0), (-40.0 * hand, 40.0), first.en_m])), "behind it"
+    assert not closed.intersects(LineString([last, (-40.0 * hand, 40.0), first.en_m])), "a board ahead of it"
+    assert not closed.intersects(LineString([last, (40.0 * hand, 40.0), first.en_m]))
+    others = gates_of(made, (Approach(goal=2, en_m=(0.0, 150.0)),))
+    anew = next(g for g in others if g.goal == 2)
+    assert len(anew.keep_out) == len(first.keep_out) - 1, "who begins anew from elsewhere may pass there"
 
+
+def test_barrier_closes_the_wrong_side():
     made = voyage(Goal(en_m=(0.0, 200.0), side=Side.PORT), Goal(en_m=(-150.0, 100.0)))
     gate = gates_of(made, (Approach(goal=0, en_m=(0.0, 0.0)),))[0]
     closed = shapely.union_all([shapely.from_wkt(w) for w in gate.keep_out])
