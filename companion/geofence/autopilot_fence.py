@@ -150,14 +150,13 @@ def shrunk_polygon(polygon: Polygon, reserve: float, tolerance: float, core: Bas
 
 
 def _thinned(polygon: Polygon, tolerance: float, *, inward: bool) -> Polygon:
-    """Return a coarser polygon between this one and half of the tolerance beyond it."""
+    """Return a coarser polygon between this one and two thirds of the tolerance beyond it."""
     for share in (0.25, 0.1, 0.03):
         moved = shapely.buffer(polygon, -share * tolerance if inward else share * tolerance, quad_segs=2)
-        pieces = sorted(parts(moved), key=lambda p: -p.area)
-        if not pieces:
-            continue
-        # a chord of the buffer's corner may be cos(22.5 deg) of the distance away: simplify by less
-        coarse = shapely.simplify(Polygon(pieces[0].exterior), 0.9 * share * tolerance, preserve_topology=True)
+        largest = max(parts(moved), key=lambda p: p.area, default=polygon)
+        # a chord of the buffer's corner is cos(22.5 deg) of the distance away, seldom cos(33.7 deg), and where a ring
+        # begins it may be simplified by half as much again: what does not hold is tried nearer
+        coarse = shapely.simplify(Polygon(largest.exterior), 0.9 * share * tolerance)
         if shapely.covers(polygon, coarse) if inward else shapely.covers(coarse, polygon):
             return coarse
     return polygon
@@ -185,6 +184,15 @@ AUTOPILOT_METRES_PER_DEGREE = 111_318.845  # ArduPilot's sphere (LATLON_TO_M), w
 EQUATOR_M, FLATTENING = 6_378_137.0, 1.0 / 298.257223563  # WGS 84
 
 
+def metres_per_degree(lat_deg: float) -> NDArray[np.float64]:
+    """Return the metres in a degree of longitude and of latitude, on the ellipsoid."""
+    sin2 = math.sin(math.radians(lat_deg)) ** 2
+    e2 = FLATTENING * (2.0 - FLATTENING)
+    east = EQUATOR_M / math.sqrt(1.0 - e2 * sin2) * math.cos(math.radians(lat_deg))
+    north = EQUATOR_M * (1.0 - e2) / (1.0 - e2 * sin2) ** 1.5
+    return np.asarray(np.radians(np.array([east, north])))
+
+
 @dataclass(frozen=True)
 class Plane:
     """Longitude and latitude scaled to metres: straight lines stay straight, as on the autopilot.
@@ -199,11 +207,7 @@ class Plane:
     @property
     def scale(self) -> NDArray[np.float64]:
         """Metres per degree of longitude and of latitude, on the ellipsoid."""
-        sin2 = math.sin(math.radians(self.lat_deg)) ** 2
-        e2 = FLATTENING * (2.0 - FLATTENING)
-        east = EQUATOR_M / math.sqrt(1.0 - e2 * sin2) * math.cos(math.radians(self.lat_deg))
-        north = EQUATOR_M * (1.0 - e2) / (1.0 - e2 * sin2) ** 1.5
-        return np.asarray(np.radians(np.array([east, north])))
+        return metres_per_degree(self.lat_deg)
 
     def metres(self, polygon: Polygon) -> Polygon:
         """Return a polygon of degrees in metres; longitudes are brought near the plane's."""
@@ -242,7 +246,7 @@ def plane_of(area: Area, near: GeoPoint) -> Plane:
             lats = [float(shape.bounds[1]), float(shape.bounds[3])]
         reach_deg = max(reach_deg, *(abs(lat - near.lat_deg) for lat in lats))
     flat = math.tan(math.radians(min(85.0, abs(near.lat_deg) + reach_deg))) * math.radians(reach_deg)
-    scale = Plane(near.lat_deg, near.lon_deg, 0.0).scale
+    scale = metres_per_degree(near.lat_deg)
     cosine = np.array([math.cos(math.radians(near.lat_deg)), 1.0])
     sphere = float(np.max(np.abs(scale / (AUTOPILOT_METRES_PER_DEGREE * cosine) - 1.0)))
     return Plane(near.lat_deg, near.lon_deg, flat + sphere + 1e-4)
@@ -307,8 +311,9 @@ def prove(
     """
     findings = Findings()
     zones, _ = items_to_zones(items, findings)
-    if any(f.severity is FindingLevel.ERROR for f in findings):
-        return findings[0].text
+    for finding in findings:
+        if finding.severity is FindingLevel.ERROR:
+            return finding.text
     plane = plane_of(area, inside[0])
     slack_m = 1e-6
     keep_in: BaseGeometry | None = None
@@ -339,7 +344,7 @@ def prove(
         if reach is None or not shapely.covers(shapely.buffer(polygon, slack_m), reach):
             return f"the keep-in zone is not inside {zone.name or 'the limits'}"
     margin = shapely.union_all(
-        [shapely.buffer(p, max(margin_m, o.margin_m or 0.0), quad_segs=16) for o, p in obstacles] or [Polygon()]
+        [shapely.buffer(p, max(margin_m, o.margin_m or margin_m), quad_segs=16) for o, p in obstacles] or [Polygon()]
     )
     limits, _ = limits_in(area, plane, [plane.point(inside[0])])
     limits = cut_by_rings(area, plane, [plane.point(inside[0])], limits, [])
@@ -598,7 +603,7 @@ def _solids(
         if limits is not None and not shapely.intersects(limits, polygon):
             outside += 1
             continue
-        solids.append(_Solid(name, polygon, circle, max(margin_m, obstacle.margin_m or 0.0)))
+        solids.append(_Solid(name, polygon, circle, max(margin_m, obstacle.margin_m or margin_m)))
     if outside:
         notes.append(f"{outside} obstacle(s) lie outside the keep-in zone, which covers them")
     return solids, notes

@@ -46,6 +46,24 @@ def test_a_margin_is_never_less_than_it_says(seed, margin_m):
     assert area.limit_clearance_m(shapely.get_coordinates(inner)).min() > margin_m - 1e-6
 
 
+@pytest.mark.parametrize("turn_deg", range(4, 180, 3))
+def test_a_corner_of_any_angle_is_kept_clear_of_by_the_margin(turn_deg):
+    """GEOS rounds the number of a corner's chords: one of 33 degrees is a single chord, nearer by 4 % in its middle."""
+    half = np.radians(0.5 * turn_deg)
+    x, y = 400.0 * np.cos(half), 400.0 * np.sin(half)
+    area = local([Polygon([(0.0, 0.0), (-x, -y), (x, -y)])])
+    edge = shapely.segmentize(area.buffered(10.0).boundary, 0.1)
+    assert area.obstacle_clearance_m(shapely.get_coordinates(edge)).min() >= 10.0
+
+
+def test_a_limit_without_a_margin_of_its_own_is_where_it_is_drawn():
+    ring = np.array([(-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0)])
+    for margin_m, far_m in ((None, 50.0), (10.0, 40.0)):
+        zone = Zone(kind=ZoneKind.INCLUSION, shape=Polygon(FRAME.array_lonlat_from_en(ring)), margin_m=margin_m)
+        bounds = Area(fence=Fence((zone,))).local(FRAME).limits.bounds
+        assert bounds == pytest.approx((-far_m, -far_m, far_m, far_m), abs=0.05 * (50.0 - far_m) + 1e-3)
+
+
 def test_few_points_and_many_points_agree():
     area = local(islands(3))
     points = np.random.default_rng(0).uniform(-400.0, 400.0, (900, 2))

@@ -134,4 +134,4 @@ def circle_of(
     circle = HomeCircle(en_m=en_m, radius_m=limits.fence_circle_m - COARSE_M)
     if here_en is not None and not status.fence_breached and circle.inside_m(here_en) < -OUTSIDE_M:
         return None
-    return circle if math.isfinite(math.hypot(*en_m)) and circle.radius_m > 0.0 else None
+    return circle if circle.radius_m > 0.0 else None

@@ -55,6 +55,12 @@ def test_a_circle_that_the_autopilot_does_not_complain_of_is_not_where_we_believ
     assert circle_of(voyage(), limits, status(fence_breached=False), None) is not None
 
 
+@pytest.mark.parametrize(("radius_m", "is_kept"), [(0.4, False), (2.0, True)])
+def test_a_circle_with_nothing_inside_is_none(radius_m, is_kept):
+    limits = AutopilotLimits.from_params({**ON, "FENCE_RADIUS": radius_m})
+    assert (circle_of(voyage(), limits, status(), (0.0, 0.0)) is not None) is is_kept
+
+
 @settings(max_examples=60)
 @given(st.floats(-300.0, 300.0), st.floats(-300.0, 300.0), st.floats(0.0, 2.0 * math.pi))
 def test_home_wherever_it_is_the_circle_is_inside_of_the_autopilots_by_no_more_than_a_metre(east_m, north_m, course):
@@ -211,6 +217,21 @@ def test_what_it_leaves_keeps_inside_of_it_and_all_else_as_it_was(limits):
     assert (east, north) == pytest.approx((0.0, 118.0), abs=4.0)
     assert drawn_of(plain, (square(IN, -300, -300, 300, 150),), None, MARGIN_M, is_off=False) is not drawn
     assert plain.without(drawn.taken, Drawn.words) is drawn.left  # which is worked out once
+
+
+@pytest.mark.parametrize(
+    ("way", "is_cut"),
+    [
+        ([(0.0, 100.0), (0.0, 300.0)], True),
+        ([(0.0, 100.0), (100.0, 100.0), (100.0, 300.0)], True),
+        ([(0.0, 100.0), (100.0, 100.0)], False),
+        ([(0.0, 300.0), (0.0, 350.0)], False),  # from within what is taken she sails on her way out
+        ([(0.0, 100.0)], False),
+    ],
+)
+def test_a_way_is_cut_where_it_leads_into_what_is_taken(way, is_cut):
+    drawn = drawn_of(area(**BAY), (square(IN, -300, -300, 300, 200),), None, MARGIN_M, is_off=False)
+    assert drawn.cuts(way) is is_cut
 
 
 def test_she_does_not_set_sail_for_a_goal_outside_of_what_is_drawn():
