@@ -426,11 +426,13 @@ def _voyage(
     summary = run_loop(
         _sail(mission, transport, folder, options, manager, fork_server, out, told, guard), speedup=args.speedup
     )
+    code, text = outcome_of(mission.name, summary)
+    out.write(f"{text}\n{folder}\n")  # before the picture: whatever ends its drawing, how the voyage ended is told
     # the next voyage waits for no picture, and where nobody was heard there is nothing to draw
     if summary["time_s"] is not None and not summary["arrived_before"] and summary["end_reason"] != ADOPTED:
+        if fork_server is not None:
+            fork_server.close()  # there is nothing more to plan, and to draw takes more memory than to sail
         _report(folder, err)
-    code, text = outcome_of(mission.name, summary)
-    out.write(f"{text}\n{folder}\n")
     return None if summary["end_reason"] == ADOPTED else code
 
 

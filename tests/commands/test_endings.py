@@ -15,10 +15,13 @@ from companion import cli
 from companion.app.options import SailOptions, at_once
 from companion.app.sail import sail
 from companion.clock import now_s, run_virtual
+from companion.commands import run
 from companion.commands.run import SignalEnding, epoch_of
 from companion.geofence import load_mission
+from companion.planner.fork_server import ForkServer
 from companion.program import INTERRUPTED
 from companion.program.arguments import absent_device
+from companion.telemetry.console import Console
 from companion.telemetry.folder.logbook import Logbook
 from sitl import cli as sitl
 from sitl.autopilot import MemoryLink
@@ -70,6 +73,37 @@ def test_a_signal_ends_what_is_not_begun_stops_a_voyage_and_ends_it_the_second_t
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def test_how_a_voyage_ended_is_told_before_its_picture_is_drawn(tmp_path, monkeypatch):
+    """What ended the drawing left it untold, and a fork server was there for planners of which none was to come."""
+    (tmp_path / "a.toml").write_text(MISSION)
+    happened = []
+
+    class Spare:
+        def close(self):
+            happened.append("fork server ended")
+
+    async def sailed(*_):
+        counts = dict.fromkeys(("plans", "uploads", "tacks", "replans"), 1)
+        reached = {"goals": 1, "goals_given_up": 0, "records_dropped": 0, "end_reason": "arrived", "time_s": 60.0}
+        return {"arrived": True, "arrived_before": False, **reached, **counts}
+
+    monkeypatch.setattr(ForkServer, "begin", lambda _: Spare())
+    monkeypatch.setattr(run, "_sail", sailed)
+    monkeypatch.setattr(run, "_report", lambda *_: happened.append("picture"))
+    monkeypatch.setattr(Console, "write", lambda _, text: happened.append(text.partition(";")[0]))
+    command = [
+        "run",
+        str(tmp_path / "a.toml"),
+        "--link",
+        f"udpin:127.0.0.1:{free_port()}",
+        "--out",
+        str(tmp_path / "v"),
+    ]
+    assert cli.main(command) == 0
+    told = happened.index("arrived")
+    assert happened[told + 1 : told + 3] == ["fork server ended", "picture"]
 
 
 def test_run_on_a_link_where_nobody_answers_ends_when_it_is_told_to(tmp_path):
