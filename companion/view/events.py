@@ -138,7 +138,8 @@ def nearest_of(problem: Problem, plan: Plan) -> str:
     """Return the name of what a plan is nearest to: an obstacle's, a mark's, the fence; empty: nothing is there."""
     if not plan.has_path:
         return ""
-    way = shapely.LineString(plan.waypoints_en)
+    # Where she is there already the way is one place.
+    way = shapely.LineString(plan.waypoints_en) if len(plan.waypoints_en) > 1 else shapely.points(*plan.waypoints_en)
     found = [(float(shapely.distance(o, way)), problem.obstacle_name(n)) for n, o in enumerate(problem.obstacles)]
     if problem.fence_polygon is not None:
         found.append((float(shapely.distance(problem.fence_polygon.boundary, way)), "the fence"))
