@@ -215,9 +215,21 @@ def _composed(ctx: StepContext, seen: Situation, field: Composed) -> Setpoint:
 
 
 def _station(ctx: StepContext, seen: Situation, field: Composed, conditions: FieldConditions) -> Station | None:
-    """Return the station to keep: the boat is there, under sail, with room, and nothing else presses."""
+    """Return the station to keep by a goal's field: she can keep it, and nothing else presses."""
     place = field.tree.station_en
-    if place is None or conditions.twd_from_rad is None:
+    station = None if place is None else _kept(ctx, seen, place)
+    if station is None:
+        return None
+    rest = field_of(field.tree, conditions, without_station=True)(seen.en_m)[0]
+    return station if math.hypot(rest[0], rest[1]) < WEAK else None
+
+
+def _kept(ctx: StepContext, seen: Situation, place: PointEn) -> Station | None:
+    """Return the station to keep at a place: the boat is there, under sail, with room, and nobody is near.
+
+    Its boards and loops look out neither for the shore nor for vessels: else a field that does leads to the place.
+    """
+    if seen.twd_from_rad is None:
         return None
     station = _station_at(ctx, place)
     is_there = ctx.state.by_field.station.phase is not StationPhase.RETURN
@@ -227,8 +239,7 @@ def _station(ctx: StepContext, seen: Situation, field: Composed, conditions: Fie
         return None
     if any(distance_m(seen.en_m, o.en_m) < o.keep_m + AROUND_M for o in seen.obstacles):
         return None
-    rest = field_of(field.tree, conditions, without_station=True)(seen.en_m)[0]
-    return station if math.hypot(rest[0], rest[1]) < WEAK else None
+    return station
 
 
 def _station_at(ctx: StepContext, place: PointEn) -> Station:
@@ -366,12 +377,24 @@ def keeps_station(ctx: StepContext) -> bool:
         set_mode(ctx, Mode.GUIDED, "keeping station by field")
     elif seen is not None:
         ctx.set(steering=changed(ctx.state.steering, own_mode=Mode.GUIDED))
-        after, setpoint = keep(memory.station, seen, _station_at(ctx, place), habits(ctx, seen.tws_mps))
-        ctx.set(by_field=replace(ctx.state.by_field, station=after))
+        setpoint = _at_station(ctx, seen, place)
         ctx.act(
             SteerHeading(heading_rad=setpoint.heading_rad, thrust=setpoint.thrust, text=f"station: {setpoint.reason}")
         )
     return True
+
+
+def _at_station(ctx: StepContext, seen: Situation, place: PointEn) -> Setpoint:
+    """Return how the station is kept, or sailed to clear of shore and vessels where its boards have no room."""
+    memory, can, station = ctx.state.by_field, habits(ctx, seen.tws_mps), _kept(ctx, seen, place)
+    if station is not None:
+        after, setpoint = keep(memory.station, seen, station, can)
+        ctx.set(by_field=replace(memory, station=after))
+        return setpoint
+    wanted = replace(go_to(place, seen.twd_from_rad or 0.0), clearance=ctx.water_now.area.clearance_m)
+    guidance, setpoint = step(memory.guidance, seen, wanted, can)
+    ctx.set(by_field=replace(memory, guidance=guidance, station=StationState()))
+    return setpoint
 
 
 # -------- Goals that are sailed by a field of their own: when it steers, when it is over, and when it leads nowhere.

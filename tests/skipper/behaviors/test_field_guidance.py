@@ -328,6 +328,24 @@ def test_station_keeping_lasts_as_long_as_asked(guidance):
     assert bool(steered(world)) is (guidance is not Guidance.PLAN)
 
 
+@pytest.mark.parametrize(("shore_m", "boards"), [(9.0, False), (14.0, False), (40.0, True)])
+def test_on_a_station_without_room_she_is_led_by_a_field_that_keeps_off_the_shore(shore_m, boards):
+    """Boards and loops look out for nothing: "keeping station: waiting 90 s more" was said of a boat on the shore."""
+    world = make(
+        box(50.0, shore_m, 250.0, 60.0),
+        goals=(Goal(en_m=(150.0, 0.0), radius_m=8.0),),
+        wind=lambda t: (math.pi, 6.0),
+        config={"guidance": Guidance.FIELD, "station_s": 60.0, "margin_m": 8.0, "margin_floor_m": 4.0},
+    )
+    assert world.run(600, lambda w: bool(w.state.progress.reached))
+    since = world.t
+    world.run(50)
+    told = [a.text for at_s, a in world.actions if at_s > since + 2.0 and isinstance(a, act.SteerHeading)]
+    assert len(told) > 40
+    assert any("board" in text or "loop" in text for text in told) is boards
+    assert all(text.startswith("station: ") for text in told)
+
+
 def test_by_field_the_floor_is_the_hulls_and_not_the_antennas():
     """Two channels by field: 4.95 m clear, and the floor was 5."""
     world = World(skipper=skipper(voyage(), guidance=Guidance.FIELD))
