@@ -130,7 +130,7 @@ def habits(ctx: StepContext, tws_mps: float) -> GuidanceSettings:
     """Return what the voyage's boat can do in this wind, and the margins of its plans."""
     boat = ctx.voyage.boat
     twa, speed = boat.polar.curve(max(1.0, tws_mps))
-    return GuidanceSettings(
+    can = GuidanceSettings(
         is_sailing=ctx.config.sails,
         no_go_half_rad=ctx.planned_no_go_rad,
         polar_twa_rad=tuple(map(float, twa)),
@@ -141,6 +141,7 @@ def habits(ctx: StepContext, tws_mps: float) -> GuidanceSettings:
         horizon_s=HORIZON_S,
         keep_m=ctx.config.margin_floor_m + boat.hull.reach_m,  # of the boat's place
     )
+    return can if boat.can_tack else replace(can, tack_min_mps=math.inf)
 
 
 def intent(ctx: StepContext, seen: Situation) -> Intent:

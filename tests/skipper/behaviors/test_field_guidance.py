@@ -355,6 +355,13 @@ def test_by_field_the_floor_is_the_hulls_and_not_the_antennas():
     assert habits(ctx, 5.0).keep_m == world.skipper.config.margin_floor_m + reach_m
 
 
+@pytest.mark.parametrize("can_tack", [True, False])
+def test_by_field_a_boat_that_cannot_tack_needs_more_way_for_one_than_there_is(can_tack):
+    ctx = moment(route((0.0, 300.0)))
+    ctx.voyage = replace(ctx.voyage, boat=replace(ctx.voyage.boat, can_tack=can_tack))
+    assert math.isinf(habits(ctx, 5.0).tack_min_mps) is not can_tack
+
+
 @pytest.mark.parametrize("drift_mps", [0.5, 4.0])
 def test_by_field_it_is_said_that_a_current_keeps_her_from_her_goal(drift_mps):
     """She was carried to leeward for 900 s, and nothing was said: no plan was asked for that would have told it."""

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from companion.boat import constant
@@ -16,6 +16,7 @@ from companion.skipper.behaviors.drifting import CALL
 from companion.skipper.behaviors.headings import (
     back_to_line_rad,
     buoy_heading_rad,
+    by_the_stern_rad,
     desired_heading_rad,
     drift_correction_rad,
     sailable_rad,
@@ -295,6 +296,37 @@ def test_the_loiter_that_ends_a_mission_is_sailed_by_the_autopilot():
     world.run(20)
     assert world.mode is Mode.AUTO
     assert not any(isinstance(a, act.SteerHeading) for _, a in world.actions[since:])
+
+
+@CHECK
+@given(st.floats(math.radians(30.0), math.pi - 0.01), st.floats(math.radians(30.0), math.pi - 0.01), ANGLE)
+@example(math.pi / 6.0, math.pi / 6.0, 2.125)  # exactly half a turn: to and fro for ever
+def test_a_boat_that_cannot_tack_is_turned_by_the_stern(off, to, twd):
+    """Sent straight to the heading of the other tack she was turned through the wind, 21 times in vain, and touched."""
+    heading, wanted = twd + off, twd - to
+    throughs = 0
+    for _ in range(200):
+        sent = by_the_stern_rad(wanted, heading, twd)
+        turn = difference_rad(sent, heading)  # the short way, as the autopilot does
+        step = math.copysign(min(abs(turn), math.radians(3.0)), turn)
+        before, after = difference_rad(heading, twd), difference_rad(heading + step, twd)
+        throughs += before * after < 0.0 and abs(before) + abs(after) < math.pi
+        heading += step
+    assert abs(difference_rad(heading, wanted)) < math.radians(0.1)
+    assert not throughs
+    assert by_the_stern_rad(twd + to, twd + off, twd) == twd + to  # on the same tack: as it is
+
+
+@pytest.mark.parametrize("can_tack", [True, False])
+def test_by_headings_a_boat_that_cannot_tack_is_not_sent_to_the_other_tack_at_once(can_tack):
+    ctx = moment(
+        route((0.0, 300.0), (300.0, 300.0)), heading_deg=50.0, twd_deg=0.0, config={"guidance": Guidance.HEADING}
+    )
+    ctx.voyage = replace(ctx.voyage, boat=replace(ctx.voyage.boat, can_tack=can_tack))
+    ctx.set(mission=replace(ctx.state.mission, route=route((-300.0, 250.0), (-600.0, 500.0)), index=0))
+    sent = difference_rad(desired_heading_rad(ctx), 0.0)
+    assert (sent < 0.0) is can_tack
+    assert can_tack or sent == pytest.approx(math.radians(130.0))
 
 
 def test_a_loiter_that_is_refused_leaves_her_steered():
