@@ -40,6 +40,9 @@ from companion.field.vector_fields import (
 )
 from companion.geo.angles import wrap_pi
 
+AWAY_RAD = math.radians(80.0)  # a step of a turn by the stern ...
+BROAD_RAD, RUNS_RAD = math.radians(100.0), math.radians(150.0)  # ... from so far off the wind onto the new tack
+
 
 def avoiding(field: Field, situation: Situation, habits: GuidanceSettings) -> Field:
     """Return the field with a repulsive point at every obstacle that is near and ahead (Schmitt, section 4.2).
@@ -97,6 +100,17 @@ def step(
 
 
 # ------------------------------------------------------------------------------- no-go protection
+def wearing_rad(heading_rad: float, twd_from_rad: float, side: int) -> float:
+    """Return the next heading of a turn by the stern onto the tack ``side``, 1: with the wind on the starboard side.
+
+    An autopilot turns the short way: it is led away from the wind by steps of less than half a turn.
+    """
+    off = wrap_pi(heading_rad - twd_from_rad)
+    if abs(off) > BROAD_RAD:
+        return wrap_pi(twd_from_rad - side * RUNS_RAD)
+    return wrap_pi(heading_rad + math.copysign(AWAY_RAD, off))
+
+
 def helm(
     state: GuidanceState, situation: Situation, wanted_rad: float, habits: GuidanceSettings
 ) -> tuple[GuidanceState, float, str]:
@@ -140,10 +154,7 @@ def helm(
         if done or t - state.since_s > 60.0:
             state = replace(state, manoeuvre=Manoeuvre.SAIL, failed_tacks=0)
         else:
-            # Away from the wind by steps of less than half a turn, so that the short way round is the stern's.
-            away = wrap_pi(situation.heading_rad - side * math.radians(80.0))
-            if abs(twa) > math.radians(100.0):
-                away = twd - goal_side * math.radians(150.0)
+            away = wearing_rad(situation.heading_rad, twd, goal_side)
             return replace(state, wanted_rad=wanted), outside_no_go(away, twd, habits.no_go_half_rad, state.q), "wear"
     return replace(state, wanted_rad=wanted), wanted, "field"
 

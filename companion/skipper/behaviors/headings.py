@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 
+from companion.field.guidance import wearing_rad
 from companion.frozen import changed
 from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Mode, Severity
@@ -32,11 +33,7 @@ AT_BUOY = 3.0  # rounding radii
 TACK_HYSTERESIS_RAD = math.radians(10.0)
 BACK_S, BACK_M = 4.0, 8.0  # the line is aimed at so far ahead, in time and at the least
 BACK_LIMIT_RAD = math.radians(45.0)
-AWAY_RAD = math.radians(
-    80.0
-)  # a step of a gybe, and from BROAD_RAD off the wind on its last: RUNS_RAD on the other side
 ASTERN_RAD = math.radians(5.0)  # beyond half a turn: by so much the stern's way is the shorter one, to be sure
-BROAD_RAD, RUNS_RAD = math.radians(100.0), math.radians(150.0)
 ABOUT_S = 3.5  # a step to see it, the heading, and the turn until the boat goes no farther that way
 BOARD_S, BETTER_M = 8.0, 1.0  # of the other tack, which must be clearer by so much
 
@@ -105,16 +102,11 @@ def desired_heading_rad(ctx: StepContext) -> float | None:
 
 
 def by_the_stern_rad(wanted_rad: float, heading_rad: float, twd_from_rad: float) -> float:
-    """Return the wanted heading, or the next one on the way to it where the short way leads through the wind's eye.
-
-    The autopilot turns the short way: away from the wind by steps of less than half a turn that is the stern's.
-    """
+    """Return the wanted heading, or the next one by the stern where the short way leads through the wind's eye."""
     off, to = difference_rad(heading_rad, twd_from_rad), difference_rad(wanted_rad, twd_from_rad)
     if off * to >= 0.0 or abs(off) + abs(to) >= math.pi + ASTERN_RAD:
         return wanted_rad
-    if abs(off) > BROAD_RAD:
-        return wrap_pi(twd_from_rad + math.copysign(RUNS_RAD, to))
-    return wrap_pi(heading_rad + math.copysign(AWAY_RAD, off))
+    return wearing_rad(heading_rad, twd_from_rad, -1 if to > 0.0 else 1)
 
 
 def _wanted_rad(ctx: StepContext) -> float | None:
