@@ -19,7 +19,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from companion.geo.angles import difference_rad, wrap_pi
-from companion.skipper.way.geometry import barrier_wkt, bearing_rad, disc_wkt, distance_m, has_way_out, moved
+from companion.skipper.way.geometry import Barrier, barrier, bearing_rad, disc_wkt, distance_m, has_way_out, moved
 from companion.skipper.way.line import (
     BEFORE_M,
     STRAY_M,
@@ -31,7 +31,7 @@ from companion.skipper.way.line import (
     no_room_words,
     place_before,
     place_beyond,
-    wings_wkt,
+    wings,
 )
 from companion.skipper.way.sweeps import Sweep
 from companion.skipper.way.voyage import AreaLike, Box, Composed, Goal, Line, PointEn, Search, Side, Voyage
@@ -68,14 +68,15 @@ class Approach:
 class Gate:
     """A place to pass: within ``radius_m`` of ``en_m``, coming from ``from_en_m`` (None: wherever the boat is).
 
-    ``goal`` is the index into ``Voyage.legs``. ``keep_out`` are WKT polygons for the way here, besides the marks' own
-    discs. For buoys ``buoy_en_m`` is the buoy and ``side`` where it is left; ``turn_rad`` is how far its rounding turns
-    the boat, and ``bearing_rad`` how far the boat's bearing from the buoy has come round by this gate, counted from the
-    approach's beginning, positive clockwise; short of it by more than ``short_rad`` the goal's last gate does not
-    count. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With
-    ``line`` it is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place before
-    it. With ``box`` it is where it stays. With ``search`` it is an end of a ``sweep`` (which, of how many), or, before
-    there are any, of none. With ``field`` it is steered by that, and it is where the mission on board leads meanwhile.
+    ``goal`` is the index into ``Voyage.legs``. ``keep_out`` is what stands in the way here alone, besides the
+    marks' own discs. For buoys ``buoy_en_m`` is the buoy and ``side`` where it is left; ``turn_rad`` is how far its
+    rounding turns the boat, and ``bearing_rad`` how far the boat's bearing from the buoy has come round by this
+    gate, counted from the approach's beginning, positive clockwise; short of it by more than ``short_rad`` the
+    goal's last gate does not count. ``is_first`` and ``ends_goal`` mark the goal's first and last gate. With
+    ``line`` it is a place beyond the line, which is crossed on the way; with ``is_before_line`` too, the place
+    before it. With ``box`` it is where it stays. With ``search`` it is an end of a ``sweep`` (which, of how many),
+    or, before there are any, of none. With ``field`` it is steered by that, and it is where the mission on board
+    leads meanwhile.
     """
 
     en_m: PointEn
@@ -93,7 +94,7 @@ class Gate:
     bearing_rad: float = 0.0
     short_rad: float = SHORT_RAD
     is_first: bool = True
-    keep_out: tuple[str, ...] = ()
+    keep_out: tuple[Barrier, ...] = ()
     line: Line | None = None
     is_before_line: bool = False
     box: Box | None = None
@@ -129,7 +130,7 @@ def _gates_of(voyage: Voyage, area: AreaLike, approaches: tuple[Approach, ...]) 
             before = approach.en_m
         elif i > 0 and not is_once_more:
             before = legs[i - 1].en_m
-        name = goal.name or f"goal {i + 1}"
+        name = _name(goal, i)
         after = legs[i + 1].en_m if i + 1 < len(legs) else voyage.onward_en_m
         began = len(out)
         if goal.line is not None:
@@ -158,9 +159,16 @@ def _gates_of(voyage: Voyage, area: AreaLike, approaches: tuple[Approach, ...]) 
         if i > 0 and approach is None and legs[i - 1].side is not Side.NONE and not is_once_more and began < len(out):
             # Led back behind the buoy that she has just rounded she would unwind what she has turned about it.
             buoy = legs[i - 1].en_m
-            behind = barrier_wkt(buoy, bearing_rad(goal.en_m, buoy), BARRIER_M)
+            behind = barrier(
+                buoy, bearing_rad(goal.en_m, buoy), BARRIER_M, f"the wrong side of {_name(legs[i - 1], i - 1)}"
+            )
             out[began] = replace(out[began], keep_out=(*out[began].keep_out, behind))
     return tuple(out)
+
+
+def _name(goal: Goal, index: int) -> str:
+    """Return what the ``index``-th leg's goal is called in sentences."""
+    return goal.name or f"goal {index + 1}"
 
 
 def no_room(gate: Gate, area: AreaLike, margin_m: float) -> str:
@@ -246,7 +254,7 @@ def _cross(
         name=name,
         from_en_m=before,
         bandwidth_m=goal.bandwidth_m,
-        keep_out=wings_wkt(line, area, way_m),
+        keep_out=wings(line, area, way_m, name),
         line=line,
     )
     if before is not None and ahead_m(line, before) <= -0.5 * BEFORE_M:
@@ -322,7 +330,7 @@ def _round(
                 turn_rad=turn,
                 bearing_rad=-hand * (math.pi / 2.0 + so_far),
                 short_rad=PAST_RAD if is_last and after is None else SHORT_RAD,
-                keep_out=(barrier_wkt(buoy, wrong, length),),
+                keep_out=(barrier(buoy, wrong, length, f"the wrong side of {name}"),),
             )
         )
         previous = place

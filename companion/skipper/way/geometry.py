@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from companion.geo.angles import difference_rad, heading_of, wrap_pi
 from companion.skipper.way.voyage import AreaLike, PointEn
@@ -92,13 +93,19 @@ def disc_wkt(center: PointEn, radius_m: float) -> str:
     return polygon_wkt(ring)
 
 
-def barrier_wkt(foot: PointEn, direction_rad: float, length_m: float) -> str:
+class Barrier(NamedTuple):
+    """What is kept out of on one way only, as a WKT polygon, and what it is called in sentences."""
+
+    wkt: str
+    name: str
+
+
+def barrier(foot: PointEn, direction_rad: float, length_m: float, name: str) -> Barrier:
     """Return a thin wedge from ``foot`` outwards."""
     tip = moved(foot, direction_rad, length_m)
     wide = 0.5
-    return polygon_wkt(
-        [foot, moved(tip, direction_rad + math.pi / 2.0, wide), moved(tip, direction_rad - math.pi / 2.0, wide)]
-    )
+    ring = [foot, moved(tip, direction_rad + math.pi / 2.0, wide), moved(tip, direction_rad - math.pi / 2.0, wide)]
+    return Barrier(polygon_wkt(ring), name)
 
 
 def polygon_wkt(ring: list[PointEn]) -> str:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.skipper.way.geometry import along_m, barrier_wkt, bearing_rad, cross_track_m, distance_m, moved
+from companion.skipper.way.geometry import Barrier, along_m, barrier, bearing_rad, cross_track_m, distance_m, moved
 from companion.skipper.way.voyage import AreaLike, Line, PointEn
 
 BEFORE_M = 25.0  # the place before the line: room to settle on the course across it
@@ -168,8 +168,8 @@ def no_room_words(line: Line, name: str, place_en: PointEn, area: AreaLike, marg
     )
 
 
-def wings_wkt(line: Line, area: AreaLike, way_m: float) -> tuple[str, ...]:
-    """Return a thin wedge from each mark outwards as WKT: what keeps a plan from going round the marks.
+def wings(line: Line, area: AreaLike, way_m: float, name: str) -> tuple[Barrier, ...]:
+    """Return a thin wedge from each mark of the line ``name`` outwards: what keeps a plan from going round the marks.
 
     It reaches so far that round its end is no short cut for a way of ``way_m``, or to the first land: what is passed
     behind in a few boat's lengths, a rock, is none.
@@ -181,5 +181,5 @@ def wings_wkt(line: Line, area: AreaLike, way_m: float) -> tuple[str, ...]:
         ashore = area.clearance_m([moved(mark, away, float(m)) for m in steps_m]) <= 0.0
         begins = [n for n in np.flatnonzero(ashore) if ashore[n : n + LAND_STEPS].all()]
         length_m = float(steps_m[begins[0]] if begins else steps_m[-1])
-        out.append(barrier_wkt(mark, away, max(STEP_M, length_m)))
+        out.append(barrier(mark, away, max(STEP_M, length_m), f"the outside of {name}"))
     return tuple(out)

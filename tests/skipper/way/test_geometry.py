@@ -206,19 +206,22 @@ def test_behind_a_buoy_that_was_rounded_no_way_leads_back(side, hand, following)
     gates = gates_of(made)
     last = [g for g in gates if g.goal == 1][-1].en_m
     first = next(g for g in gates if g.goal == 2)
-    closed = shapely.union_all([shapely.from_wkt(w) for w in first.keep_out])
+    closed = shapely.union_all([shapely.from_wkt(w.wkt) for w in first.keep_out])
     assert closed.intersects(LineString([last, (0.0, -20.0), (-40.0 * hand, 40.0), first.en_m])), "behind it"
     assert not closed.intersects(LineString([last, (-40.0 * hand, 40.0), first.en_m])), "a board ahead of it"
     assert not closed.intersects(LineString([last, (40.0 * hand, 40.0), first.en_m]))
     others = gates_of(made, (Approach(goal=2, en_m=(0.0, 150.0)),))
     anew = next(g for g in others if g.goal == 2)
     assert len(anew.keep_out) == len(first.keep_out) - 1, "who begins anew from elsewhere may pass there"
+    *own, behind = (kept.name for kept in first.keep_out)
+    assert behind == "the wrong side of goal 2", "called by the mark that it stands at"
+    assert set(own) <= {"the wrong side of goal 3"}
 
 
 def test_barrier_closes_the_wrong_side():
     made = voyage(Goal(en_m=(0.0, 200.0), side=Side.PORT), Goal(en_m=(-150.0, 100.0)))
     gate = gates_of(made, (Approach(goal=0, en_m=(0.0, 0.0)),))[0]
-    closed = shapely.union_all([shapely.from_wkt(w) for w in gate.keep_out])
+    closed = shapely.union_all([shapely.from_wkt(w.wkt) for w in gate.keep_out])
     assert closed.intersects(LineString([(0.0, 0.0), (-40.0, 200.0), (0.0, 240.0)]))  # leaves it to starboard
     assert not closed.intersects(LineString([(0.0, 0.0), (40.0, 200.0), (0.0, 240.0)]))
 

@@ -19,7 +19,7 @@ from companion.skipper.way.line import (
     crossing,
     crossing_en,
     is_between,
-    wings_wkt,
+    wings,
 )
 from companion.skipper.way.voyage import Goal, Line, Side
 from tests.skipper.world import area, voyage
@@ -91,15 +91,15 @@ def test_where_it_is_crossed_lies_in_the_opening(before, after):
 
 
 def test_the_wings_stand_outwards_and_end_ashore():
-    port, starboard = (shapely.from_wkt(w) for w in wings_wkt(NORTHWARD, area(), 100.0))
+    port, starboard = (shapely.from_wkt(w.wkt) for w in wings(NORTHWARD, area(), 100.0, "L"))
     assert port.bounds[2] == pytest.approx(-20.0, abs=0.6)
     assert starboard.bounds[0] == pytest.approx(20.0, abs=0.6)
     assert port.bounds[0] < -200.0
     land = shapely.box(60.0, 0.0, 400.0, 400.0)
-    _, short = (shapely.from_wkt(w) for w in wings_wkt(NORTHWARD, area(land), 100.0))
+    _, short = (shapely.from_wkt(w.wkt) for w in wings(NORTHWARD, area(land), 100.0, "L"))
     assert 60.0 <= short.bounds[2] <= 66.0
     rock = shapely.Point(45.0, 100.0).buffer(6.0)
-    _, beyond = (shapely.from_wkt(w) for w in wings_wkt(NORTHWARD, area(rock), 100.0))
+    _, beyond = (shapely.from_wkt(w.wkt) for w in wings(NORTHWARD, area(rock), 100.0, "L"))
     assert beyond.bounds[2] > 200.0, "round the outside of a rock beside the mark is no way through"
 
 
