@@ -9,11 +9,12 @@ from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.planners import AUTO
 from companion.skipper.planning.asking import request
-from companion.skipper.planning.diversions import LACK_M, held_at, room_lacking_m
+from companion.skipper.planning.diversions import LACK_M, diversion, held_at, room_lacking_m
 from companion.skipper.planning.tides import closes_ahead, opens_next
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, is_way_clear, leads_there, too_risky, upload
 from companion.skipper.planning.vessels import lies_in_the_way, meetings
+from companion.skipper.step import DiversionKind
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.way.drying import AHEAD_S
@@ -105,13 +106,17 @@ def _stays_as_it_is(ctx: StepContext, pending: PendingPlan) -> str:
 
 
 def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
-    """Keep the old plan while it is sound, else take the next step of the ladder, at last hold."""
+    """Keep the old plan while it is sound, else take the next step of the ladder, at last hold.
+
+    One that leads elsewhere than she is bound for, to the goals instead of a refuge, is kept at the ladder's end only.
+    """
     ladder = steps(ctx)
     state = ctx.state
     where = ladder[min(pending.rung, len(ladder) - 1)].name or "as configured"
     met = meetings(ctx) if state.mission.route is not None else ()
+    is_last, is_alike = pending.rung + 1 >= len(ladder), _is_bound_alike(ctx)
     if (
-        (pending.rung == 0 or leads_there(ctx, pending))
+        ((pending.rung == 0 and is_alike) or (is_last and not is_alike) or leads_there(ctx, pending))
         and state.mission.route is not None
         and not met
         and is_on_board_sound(ctx)
@@ -173,6 +178,15 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         every_s=0.0,
     )
     hold(ctx, f"no plan found: {reason}")
+
+
+def _is_bound_alike(ctx: StepContext) -> bool:
+    """Return whether what is on board is bound for where she is to go, or another refuge is asked for before it."""
+    route, bound = ctx.state.mission.route, diversion(ctx)
+    is_refuge = bound is not None and bound.kind is DiversionKind.REFUGE and not bound.is_ordered
+    if is_refuge and ctx.state.plans.retry.failures + 1 < len(ctx.voyage.refuges):
+        return True  # margin is given up for one when none has a way with all of it
+    return route is not None and route.bound_for == ("" if bound is None else bound.name)
 
 
 def _foul(ctx: StepContext, pending: PendingPlan) -> str:

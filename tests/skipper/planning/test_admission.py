@@ -14,19 +14,23 @@ import shapely
 from companion.boat.margins import AutopilotLimits
 from companion.current import WaterCurrent
 from companion.messages import Mode
+from companion.orders import Verb
 from companion.planner import plan
 from companion.planner.track import ExpectedTrack
 from companion.skipper.behaviors.helm import leave_passed, push_on
 from companion.skipper.intake import locate
 from companion.skipper.planning.answers import _told_m, take_plan
 from companion.skipper.planning.asking import request
+from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.not_found import not_found
 from companion.skipper.planning.track import steps
 from companion.skipper.planning.uploads import _below_floor, clearance_here_m, judged
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, SetCurrent, UploadMission
+from companion.skipper.step.config import Ends
+from companion.skipper.step.saved import Standing
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import Retry
-from companion.skipper.way.voyage import Goal
+from companion.skipper.way.voyage import Goal, Refuge
 from tests.skipper.moments import moment, route
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import make
@@ -358,3 +362,33 @@ def test_a_plan_that_is_refused_for_a_hair_says_by_how_much():
     problem = SimpleNamespace(tracking=SimpleNamespace(floor_m=3.0))
     track = ExpectedTrack(clearance_m=2.97, lack_m=0.03, is_kept=False)
     assert _below_floor(problem, track, None, here_m=9.0) == "it would pass 2.97 m clear, the floor is 3 m"
+
+
+@pytest.mark.parametrize(("leads_to", "rung", "stays"), [("", 0, False), ("", -1, True), ("home", 0, True)])
+def test_a_sound_way_that_leads_elsewhere_than_she_is_bound_for_is_kept_at_the_ladders_end_only(leads_to, rung, stays):
+    """Leaking, her refuge behind a gap that the margin closed, she sailed on to her goals: "the old one is sound"."""
+    order = Standing(verb=Verb.HOME, by="crew", name="home", en_m=(0.0, -200.0), since_s=0.0)
+    way = replace(route((0.0, 100.0), (0.0, 200.0), (0.0, 200.0)), bound_for=leads_to)
+    ctx = moment(way, heading_deg=0.0, twd_deg=90.0, orders={"standing": order})
+    assert diversion(ctx).name == "home"
+    assert request(ctx, ReplanReason.HOME, rung=rung % len(steps(ctx)))
+    ctx.actions.clear()
+    not_found(ctx, ctx.state.pending.plan, "none")
+    [says] = [a.text for a in ctx.actions if isinstance(a, Announce)]
+    assert ("the old one is sound and stays" in says) is stays
+    assert any(isinstance(a, RequestPlan) for a in ctx.actions) is not stays
+    assert not uploads(ctx.actions)
+
+
+@pytest.mark.parametrize(("count", "failures", "stays"), [(1, 0, False), (2, 0, True), (2, 1, False)])
+def test_margin_is_given_up_for_a_refuge_when_none_has_a_way_with_all_of_it(count, failures, stays):
+    refuges = tuple(Refuge(en_m=(0.0, -200.0 - 100.0 * n), name=f"R{n}") for n in range(count))
+    way = route((0.0, 100.0), (0.0, 200.0), (0.0, 200.0))
+    ctx = moment(way, heading_deg=0.0, twd_deg=90.0, up=("leaking",), config={"ends": Ends.of(leak="refuge")})
+    ctx.voyage = replace(ctx.voyage, refuges=refuges)
+    ctx.set(plans=replace(ctx.state.plans, retry=Retry(failures=failures)))
+    assert diversion(ctx).name == f"the refuge R{failures}"
+    assert request(ctx, ReplanReason.REFUGE)
+    ctx.actions.clear()
+    not_found(ctx, ctx.state.pending.plan, "none")
+    assert any(isinstance(a, RequestPlan) for a in ctx.actions) is not stays
