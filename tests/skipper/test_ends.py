@@ -375,6 +375,21 @@ def test_dragged_off_behind_the_island_the_way_back_is_planned():
     assert act.ReplanReason.REST in [a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)]
 
 
+def test_off_her_station_behind_the_island_the_way_back_is_planned_at_once():
+    """Led round a wall by the last resort she was given back to AUTO, "keeping station", and sailed through it."""
+    world = make(BEHIND, **{**ASIDE, "obstacles": (ISLAND,), "config": {"station_s": 400.0}})
+    assert world.run(900, lambda w: "keeping station" in w.state.why)
+    world.run(30)
+    world.position, world.track = (0.0, 20.0), []
+    world.run(5)
+    asked = [a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)]
+    assert asked.count(act.ReplanReason.REST) == 1
+    assert not said(world, "dragged off")
+    assert world.run(300, lambda w: distance_m(w.position, BEHIND.en_m) < 20.0 and "keeping station" in w.state.why)
+    assert world.clearance() > 0.0
+    assert "waiting 400 s" not in world.state.why
+
+
 def test_dragged_off_over_clear_water_the_autopilots_loiter_goes_back_alone():
     world = arrived(BEHIND, obstacles=())
     plans = world.count(act.RequestPlan)

@@ -1,8 +1,8 @@
 """The end of a voyage, and of a diversion: the boat loiters, and is watched.
 
 A voyage is over when all goals are reached (and home, where the mission ends there), or its time is up. From then on
-nothing is planned but the way back to its place, should it be dragged off it and the straight way not be clear; the
-watch goes on until somebody ends the program.
+nothing is planned but the way back to its place, should it be off it and the straight way not be clear; the watch goes
+on until somebody ends the program. So it is on a station that a mission asks for at its last goal.
 """
 
 from __future__ import annotations

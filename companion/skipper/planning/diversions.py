@@ -34,6 +34,7 @@ HOLD_ROOM = 2.0  # times the loiter's radius: it may lie here for hours, and a H
 LACK_M = 1.0  # of the room that a loiter takes: she is not moved for less, as the wind freshens
 LIES_THERE = {DiversionKind.HOME, DiversionKind.REFUGE, DiversionKind.GOAL}
 NO_ROOM = "{} has no room for a loiter"
+SWINGS = 1.25  # of what her loiter takes in this wind: within it she is at her place
 COMES_BACK_S = 120.0  # from where the field has led her she is back at her place: so long she is not dragged off
 ROOM_TRIES = 3  # to find a way to water with room, behind the last goal
 GOAL_RADIUS_M = 10.0  # a place that is named under way: there within this
@@ -214,7 +215,7 @@ def _at_the_end(ctx: StepContext) -> Diversion | None:
             return ended
     if state.voyage.over:
         return _back(ctx) or _off_narrow_rest(ctx)
-    return after_last_goal(ctx) if ctx.gate is None else None
+    return after_last_goal(ctx) or _back(ctx) if ctx.gate is None else None
 
 
 def _ended_early(ctx: StepContext, *, over_orders: bool) -> Diversion | None:
@@ -455,10 +456,28 @@ def _home(ctx: StepContext, why: str) -> Diversion | None:
     return Diversion(kind=DiversionKind.HOME, name=HOME, why=why, en_m=ctx.voyage.frame.en_from_geo(status.home))
 
 
+def resting_en(ctx: StepContext) -> PointEn | None:
+    """Return where the boat lies or is to lie when nothing else is to be sailed to, None: something is, or by field."""
+    voyage, route = ctx.state.voyage, ctx.state.mission.route
+    if voyage.over:
+        return voyage.rest_en_m
+    if ctx.gate is not None or not voyage.sailing or ctx.is_field_steered or route is None or not route.points_en_m:
+        return None
+    return route.points_en_m[-1]
+
+
+def is_off_rest(ctx: StepContext) -> bool:
+    """Return whether the boat is farther from where it lies than a loiter takes it in this wind."""
+    rest, boat = resting_en(ctx), ctx.boat_en
+    return rest is not None and boat is not None and distance_m(boat, rest) > SWINGS * ctx.loiter_swing_m
+
+
 def _back(ctx: StepContext) -> Diversion | None:
     """Return the way back to where the boat is to rest, when it is off it and the straight way is not clear."""
-    rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
+    rest, boat = resting_en(ctx), ctx.boat_en
     off = ctx.is_raised(DRAGGED) or bool(ctx.state.operator.answering) or is_led_off(ctx)
+    if not ctx.state.voyage.over:  # on a station the straight way is the autopilot's at once, and nothing looks at it
+        off = off or (is_off_rest(ctx) and not ctx.ahead())
     if rest is None or boat is None or not (off or _is_bound(ctx, REST)):
         return None
     if not _is_bound(ctx, REST) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:

@@ -238,7 +238,6 @@ class FieldSteering:
     not_before_s: float = float("-inf")  # somebody set AUTO in the middle of it: not again before
     guidance: GuidanceState = field(default_factory=GuidanceState)
     station: StationState = field(default_factory=StationState)
-    station_since_s: float | None = None
     composed: bool = False  # a goal's own field steers, or did until a plan from here is in place
     left_s: float | None = None  # since when the latter
     way_out_rad: float | None = None  # the way out of some water that is being taken
@@ -364,6 +363,7 @@ class VoyageState:
     over: str = ""  # why the voyage is over: what is left is to watch its loiter; empty: it is not
     arrived: bool = False  # ... with all goals reached, and home where the mission ends there
     rest_en_m: PointEn | None = None  # where the boat loiters since
+    station_since_s: float | None = None  # when she began to stay at the last goal for as long as the mission asks
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,14 @@ from companion.skipper.behaviors.drifting import meets_in_s, sails
 from companion.skipper.behaviors.field_guidance import meets_in
 from companion.skipper.behaviors.shoaling import depth_ahead_m
 from companion.skipper.planning.autopilot_beats import beaten_within_m
-from companion.skipper.planning.diversions import diversion, home_trouble, is_composed, is_led_off
+from companion.skipper.planning.diversions import (
+    diversion,
+    home_trouble,
+    is_composed,
+    is_led_off,
+    is_off_rest,
+    resting_en,
+)
 from companion.skipper.planning.fallback import to_go
 from companion.skipper.step import DiversionKind, StepContext, WindHealth
 from companion.skipper.step.state import Charge
@@ -55,7 +62,6 @@ LOOK_S = 300.0  # ... and for this long
 DETOUR = 2.0  # a beat is 1.4 times its straight way, and something lies between
 LEAST_MPS = 0.5
 AHEAD_S = 30.0  # along her leg, beside it: so far it is looked whether that comes below the floor
-SWINGS = 1.25  # of what her loiter takes in this wind: within it she is at her place
 
 
 def measure(ctx: StepContext, name: str) -> float | None:
@@ -243,13 +249,14 @@ def _time(ctx: StepContext) -> float | None:
 
 
 def _dragged(ctx: StepContext) -> float | None:
-    rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
-    if rest is None or boat is None or is_led_off(ctx):
+    rest, boat, voyage = resting_en(ctx), ctx.boat_en, ctx.state.voyage
+    lies = bool(voyage.over) or voyage.station_since_s is not None
+    if rest is None or boat is None or not lies or is_led_off(ctx):
         return None
-    bound, off_m = diversion(ctx), distance_m(boat, rest)
+    bound = diversion(ctx)
     if bound is not None and bound.kind is not DiversionKind.REST:
         return None
-    return off_m if off_m > SWINGS * ctx.loiter_swing_m else 0.0
+    return distance_m(boat, rest) if is_off_rest(ctx) else 0.0
 
 
 def _planner(ctx: StepContext) -> float | None:

@@ -328,6 +328,19 @@ def test_station_keeping_lasts_as_long_as_asked(guidance):
     assert bool(steered(world)) is (guidance is not Guidance.PLAN)
 
 
+def test_a_vessel_that_she_keeps_clear_of_does_not_begin_her_station_anew():
+    """ "waiting 400 s more" was said after each: where vessels pass, a station need never have ended."""
+    world = make(goals=(Goal(en_m=(150.0, 0.0), radius_m=8.0),), config={"station_s": 300.0})
+    assert world.run(600, lambda w: "keeping station" in w.state.why)
+    began = world.t
+    world.run(60)
+    meet(world, Intruder(world, 90.0, 60.0), 120.0)
+    assert said(world).count("last resort over") == 1
+    assert "dragged off" not in said(world), "the field has led her off"
+    assert world.run(300, lambda w: w.state.phase is Phase.DONE)
+    assert world.t - began < 320.0
+
+
 @pytest.mark.parametrize(("shore_m", "boards"), [(9.0, False), (14.0, False), (40.0, True)])
 def test_on_a_station_without_room_she_is_led_by_a_field_that_keeps_off_the_shore(shore_m, boards):
     """Boards and loops look out for nothing: "keeping station: waiting 90 s more" was said of a boat on the shore."""
