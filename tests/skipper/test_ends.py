@@ -245,6 +245,21 @@ def test_a_home_that_cannot_be_sailed_to_is_told_at_the_start_and_at_the_end(hom
     assert distance_m(world.position, BEHIND.en_m) < 40.0
 
 
+QUAY_SIDE = box(-80.0, -140.0, 80.0, -109.0)
+DOCK_SIDES = (box(-80.0, -140.0, -9.0, -60.0), box(9.2, -140.0, 80.0, -60.0))
+
+
+@pytest.mark.parametrize(("obstacles", "is_near"), [((QUAY_SIDE,), True), (DOCK_SIDES, False)], ids=["quay", "dock"])
+def test_home_by_a_quay_the_plan_ends_as_near_to_it_as_one_may_or_it_is_told(obstacles, is_near):
+    """ "goal is 9.0 m from o0, and 10.4 m are kept clear of it" was said every five minutes, and she was never home."""
+    floor = {"margin_m": 10.0, "margin_floor_m": 5.0}
+    world = homeward((0.0, -100.0), obstacles=obstacles, wind=lambda t: (1.5, 9.0), config=floor)
+    assert world.run(900, is_done)
+    assert world.state.voyage.arrived is is_near
+    assert ("; home" if is_near else "home is 9.0 m from o0: no plan leads nearer than 10") in world.state.why
+    assert world.clearance() > 5.0
+
+
 def test_without_a_plan_home_she_holds_at_the_last_goal_and_says_what_she_waits_for():
     world = homeward()
     assert world.run(300, lambda w: w.position[1] > 100.0)

@@ -7,7 +7,6 @@ answer may have been lost: it gets the same answer, and nothing is done twice.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -19,6 +18,7 @@ from companion.skipper.behaviors.shoaling import SHOALING
 from companion.skipper.board.on_board import adopt
 from companion.skipper.planning.asking import lacks, request
 from companion.skipper.planning.diversions import (
+    GOAL_RADIUS_M,
     LACK_M,
     diversion,
     home_trouble,
@@ -32,7 +32,6 @@ from companion.skipper.planning.diversions import (
 )
 from companion.skipper.planning.next_tack import next_tack
 from companion.skipper.planning.not_found import hold
-from companion.skipper.planning.track import steps
 from companion.skipper.step.actions import Acknowledge, ReplanReason, RequestPlan, StopOrders
 from companion.skipper.step.config import Learning
 from companion.skipper.step.context import StepContext
@@ -40,7 +39,7 @@ from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.saved import Standing
 from companion.skipper.step.state import PATIENT, Answered, FieldSteering, Phase
 from companion.skipper.way import Approach, PointEn, distance_m
-from companion.words import below_words, counted
+from companion.words import counted
 
 REMEMBERED_S = 10.0  # longer than any station repeats a command that is not answered
 STATIONS = 8  # whose last order is remembered
@@ -454,7 +453,7 @@ def refuge_place(ctx: StepContext, wanted: Wanted) -> Found | str:
         named = ", ".join(f"{n} {r.name}".rstrip() for n, r in enumerate(refuges, start=1))
         return f"the mission has no such refuge: it has {named}"
     chosen = refuges[number]
-    return place_trouble(ctx, refuge_name(chosen), chosen.en_m) or (chosen.name, chosen.en_m)
+    return place_trouble(ctx, refuge_name(chosen), chosen.en_m, chosen.radius_m) or (chosen.name, chosen.en_m)
 
 
 def home_place(ctx: StepContext) -> Found | str:
@@ -480,15 +479,7 @@ def goal_place(ctx: StepContext, wanted: Wanted) -> Found | str:
 
 
 def _trouble(ctx: StepContext, place: Place) -> str:
-    trouble = place.trouble or place_trouble(ctx, "the place", _en(ctx, place))
-    if trouble:
-        return trouble
-    area, en_m, least_m = ctx.to_stay_in.area, _en(ctx, place), steps(ctx)[-1].margin_m
-    clearance_m = float(area.clearance_m([en_m])[0])
-    if math.hypot(*en_m) > area.reach_m or clearance_m >= least_m:
-        return ""
-    off = below_words(clearance_m, least_m)
-    return f"the place is {off} m from {area.nearest_name(en_m)}: no plan leads nearer than {least_m:g} m"
+    return place.trouble or place_trouble(ctx, "the place", _en(ctx, place), GOAL_RADIUS_M)
 
 
 def _en(ctx: StepContext, place: Place) -> PointEn:

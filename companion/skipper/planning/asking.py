@@ -16,7 +16,7 @@ from companion.planner import Problem
 from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
 from companion.skipper.planning.diversions import after_last_goal, diversion, gate_for, room_behind
 from companion.skipper.planning.ladder import Rung
-from companion.skipper.planning.statement import Aim, Start, aim_at, problem_dict, repaired
+from companion.skipper.planning.statement import Aim, Start, aim_at, aim_near, problem_dict, repaired
 from companion.skipper.planning.tides import told
 from companion.skipper.planning.track import problem_tracking, steps
 from companion.skipper.planning.vessels import shares
@@ -277,7 +277,12 @@ def _gate_after(ctx: StepContext, from_index: int | None) -> int | None:
 def _aim(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) -> Aim:
     if step.nearer_goal:
         return _nearer(ctx, target, gate, start, step)
-    return aim_at(ctx.voyage, ctx.config, target, gate, start.en_m)
+    aim = aim_at(ctx.voyage, ctx.config, target, gate, start.en_m)
+    if gate >= 0 or aim.en_m != target.en_m:
+        return aim
+    # Home is where she was armed, by a quay: the plan ends as near to it as it may.
+    whole = replace(aim, radius_m=target.radius_m)
+    return aim_near(ctx.to_stay_in.area, ctx.config, whole, step.margin_m) or aim
 
 
 def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) -> Aim:

@@ -13,6 +13,8 @@ from companion.boat import Boat
 from companion.messages import Severity
 from companion.orders import Verb
 from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, End, Recovery
+from companion.skipper.planning.statement import Aim, aim_near
+from companion.skipper.planning.track import steps
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step import Diversion, DiversionKind, SafeEnd, SkipperConfig, StepContext
 from companion.skipper.step.missions import ROOMIER_BY_M, loiter_place, place_with_room, roomy_m
@@ -421,11 +423,11 @@ def home_trouble(ctx: StepContext) -> str:
     status = ctx.snapshot.autopilot
     if status is None or status.home is None:
         return "the autopilot has not told where home is"
-    return place_trouble(ctx, HOME, ctx.voyage.frame.en_from_geo(status.home))
+    return place_trouble(ctx, HOME, ctx.voyage.frame.en_from_geo(status.home), HOME_RADIUS_M)
 
 
-def place_trouble(ctx: StepContext, what: str, en_m: PointEn) -> str:
-    """Return why no way can be planned to a place to stay in (empty: one can be looked for).
+def place_trouble(ctx: StepContext, what: str, en_m: PointEn, radius_m: float) -> str:
+    """Return why no way can be planned to within ``radius_m`` of a place to stay in (empty: one can be looked for).
 
     Water that dries is none, whatever the tide is now: she would take the ground there.
     """
@@ -446,7 +448,13 @@ def place_trouble(ctx: StepContext, what: str, en_m: PointEn) -> str:
             else (beyond_words(area, en_m) if bare > 0.0 else f"not in free water but in {near}")
         )
         return f"{what} is {where}: the margin's floor is {floor_m:g} m"
-    return ""
+    if clearance >= ctx.config.margin_m:
+        return ""
+    least_m = steps(ctx)[-1].margin_m
+    if aim_near(area, ctx.config, Aim(en_m=en_m, radius_m=radius_m, gate=-1), least_m) is not None:
+        return ""
+    off = below_words(clearance, least_m)
+    return f"{what} is {off} m from {area.nearest_name(en_m)}: no plan leads nearer than {least_m:g} m"
 
 
 def _home(ctx: StepContext, why: str) -> Diversion | None:

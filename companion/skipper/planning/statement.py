@@ -63,6 +63,7 @@ LEG_SAVING = 8e-5  # share of a plan's time that a leg must save: each is an ite
 HAIR_M = 0.2  # a repaired point stands this far clear of the margin it was repaired for
 PIECE_M = 2000.0  # a geodesic is off a chord of this length by 8 cm at most, at 75 degrees of latitude too
 MOST_LEVEL = 0.9999  # of an interval: beyond it no normal distribution tells
+NEAR_SHARES, NEAR_COUNT = (0.0, 0.2, 0.4, 0.6, 0.8), 24  # of an aim's radius, and how many places all round
 _EARTH = Geod(ellps="WGS84")
 
 
@@ -251,8 +252,7 @@ def _back_inside(area: AreaLike, start: Start, *, margin_m: float, floor_m: floa
 def aim_at(voyage: Voyage, config: SkipperConfig, target: Gate, gate: int, start_en: PointEn) -> Aim:
     """Return what to plan for: the gate ``target``, or a place on the way where a local plan ends (Büsser 4.1)."""
     left_m = distance_m(start_en, target.en_m)
-    # The autopilot leaves a waypoint behind before it is there: the plan ends that much inside the radius.
-    inner_m = max(target.radius_m - config.announce_m, 0.2 * target.radius_m)
+    inner_m = _inner_m(config, target.radius_m)
     if left_m <= config.horizon_m:
         return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
     radius = max(50.0, 0.02 * config.horizon_m)
@@ -274,6 +274,23 @@ def aim_at(voyage: Voyage, config: SkipperConfig, target: Gate, gate: int, start
             if float(voyage.area.clearance_m([place])[0]) >= config.margin_m + radius:
                 return Aim(en_m=place, radius_m=radius, gate=-1)
     return Aim(en_m=target.en_m, radius_m=inner_m, gate=gate)
+
+
+def _inner_m(config: SkipperConfig, radius_m: float) -> float:
+    """Return how near a plan to a place comes [m]: the autopilot leaves a waypoint behind before it is there."""
+    return max(radius_m - config.announce_m, 0.2 * radius_m)
+
+
+def aim_near(area: AreaLike, config: SkipperConfig, place: Aim, margin_m: float) -> Aim | None:
+    """Return an aim within one to a place that completes nothing, the nearest that keeps a margin; None: none does."""
+    inner_m = _inner_m(config, place.radius_m)
+    for share in NEAR_SHARES:
+        ring = [moved(place.en_m, 2.0 * math.pi * n / NEAR_COUNT, share * inner_m) for n in range(NEAR_COUNT)]
+        rooms_m = area.clearance_m(ring)
+        best = int(np.argmax(rooms_m))
+        if rooms_m[best] >= margin_m:
+            return Aim(en_m=ring[best], radius_m=(1.0 - share) * inner_m, gate=-1)
+    return None
 
 
 def _seen(voyage: Voyage, config: SkipperConfig, start_en: PointEn, target_en: PointEn) -> PointEn:
