@@ -305,6 +305,8 @@ def _stop(ctx: StepContext, order: Order) -> Answer:
         plans=changed(ctx.state.plans, asked="", ready_route=None),
     )
     mode = "an unknown mode" if status is None or status.mode is None else status.mode.name
+    if status is not None and status.mode is Mode.GUIDED:  # which nobody steers from now on
+        mode += ", and stops there: set AUTO for the mission on board, or take her"
     upload = ", but for the end of an upload that is under way" if is_busy else ""
     return _stand(ctx, order, f"nothing more is asked of her until {Verb.GO_ON}{upload}; she is in {mode}")
 

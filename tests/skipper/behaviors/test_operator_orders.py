@@ -344,6 +344,15 @@ def test_given_up_nothing_is_asked_of_her_until_told_to_go_on():
     assert world.run(1500, is_done)
 
 
+@pytest.mark.parametrize("guidance", list(Guidance))
+def test_given_up_while_she_is_steered_it_is_said_that_she_stops_there(guidance):
+    """Headings end after 3 s: she lay and circled in a channel, and "she is in GUIDED" was all that was said."""
+    world = sailing(config={"guidance": guidance})
+    text = answer(world, "stop").text
+    assert ("she is in GUIDED, and stops there: set AUTO" in text) is (guidance is not Guidance.PLAN)
+    assert ("she is in AUTO" in text) is (guidance is Guidance.PLAN)
+
+
 def test_given_up_during_an_upload_the_upload_ends_and_nothing_follows():
     world = sailing(upload_s=6.0)
     answer(world, "replan")
