@@ -126,6 +126,20 @@ def clearance_words(clearance_m: float, where: str = "inside an obstacle or outs
     return f"{-clearance_m:.1f} m {where}" if clearance_m < -0.05 else f"{abs(clearance_m):.1f} m"
 
 
+def time_words(seconds: float) -> str:
+    """Return how long something took; a colon would make it an hour of the day.
+
+    >>> time_words(45.2), time_words(145.0), time_words(15_380.0), time_words(105_600.0)
+    ('45 s', '2 min 25 s', '4 h 16 min', '1 d 5 h 20 min')
+    """
+    if round(seconds) < 3600:
+        minutes, rest = divmod(round(seconds), 60)
+        return f"{minutes} min {rest} s" if minutes else f"{rest} s"
+    hours, minutes = divmod(round(seconds / 60.0), 60)
+    days, hours = divmod(hours, 24)
+    return (f"{days} d " if days else "") + f"{hours} h {minutes} min"
+
+
 def goals_reached(goals: int, given_up: int) -> str:
     """Return how many of the goals were reached, of a voyage that has none left."""
     if given_up:

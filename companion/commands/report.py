@@ -13,7 +13,7 @@ from companion.commands.output import force_option, patience, write_out
 from companion.errors import InputError, JobError
 from companion.program.arguments import out_file, picture
 from companion.program.commands import missing
-from companion.words import clearance_words, counted
+from companion.words import clearance_words, counted, time_words
 
 TRACKS = (".gpx", ".kml", ".kmz", ".geojson")  # the formats that hold a track
 
@@ -220,9 +220,7 @@ def _end(record: VoyageRecord) -> str:
     why = ": ".join(part for part in (s.end_reason or "unknown", s.end_why) if part)
     end = "Arrived" if s.arrived else f"Not arrived ({why})"
     if s.time_s is not None:
-        minutes, seconds = divmod(round(s.time_s), 60)
-        clock = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
-        end += f" after {clock} and {s.distance_m or 0.0:.0f} m"
+        end += f" after {time_words(s.time_s)} and {s.distance_m or 0.0:.0f} m"
     goals = f"; {s.goals_reached} of {counted(s.goals, 'goal')} reached" if s.goals is not None else ""
     return f"{end}, with {counted(s.tacks, 'tack')} and {counted(s.gybes, 'gybe')}{goals}."
 

@@ -296,7 +296,7 @@ def orders_of(step: Step) -> values.OrdersView:
 def figures_of(step: Step, figures: VoyageFigures, voyage: Voyage) -> values.Figures:
     """Return the voyage so far."""
     return values.Figures(
-        time_s=None if figures.first_s is None else rounded(figures.last_s - figures.first_s, 0),
+        time_s=rounded(figures.sailing.time_s, 0),
         distance_m=rounded(figures.distance_m, 1),
         tacks=figures.tacks,
         gybes=figures.gybes,

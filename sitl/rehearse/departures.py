@@ -16,7 +16,7 @@ from companion.errors import InputError
 from companion.program.arguments import moment
 from companion.words import counted
 from sitl.options import options_of
-from sitl.rehearse.estimates import Estimates, clock, percent
+from sitl.rehearse.estimates import Estimates, lasting, percent
 from sitl.rehearse.prepared import PreparedRehearsal
 from sitl.rehearse.rehearsal import Follower, Limits
 from sitl.rehearse.report import RESULTS
@@ -104,7 +104,7 @@ def compare(
 
 def _line(hour: dt.datetime, known: Estimates) -> str:
     _, half, most = known.times
-    times = f"{clock(half.value)}, {clock(most.value)}"
+    times = f"{lasting(half.value)}, {lasting(most.value)}"
     shares = f"{percent(known.arrives):<16}{percent(known.low):<17}"
     return f"{hour:%Y-%m-%d %H:%M}  {len(known.records):>8}  {shares}{times}"
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from companion.safety import TABLE
-from companion.words import counted
+from companion.words import counted, time_words
 
 LEVEL = 0.95
 _STEPS = 50  # halvings of a share
@@ -128,7 +128,7 @@ class Estimates:
         middle = next(time for time in self.times if time.of_all == 0.5)
         return (
             f"of {len(self.records)}: arrives {percent(self.arrives)}, below the floor {percent(self.low)}, "
-            f"half by {clock(middle.value)}"
+            f"half by {lasting(middle.value)}"
         )
 
     def worst(self, most: int) -> list[Record]:
@@ -193,7 +193,7 @@ def why_bad(record: Record) -> str:
     if record.get("contacts"):
         return "touched something" + ("" if record.get("arrived") else ", did not arrive")
     how = (
-        f"arrived after {clock(record['time_s'])}"
+        f"arrived after {lasting(record['time_s'])}"
         if record.get("arrived")
         else (f"did not arrive ({record.get('end_reason') or 'time is up'})")
     )
@@ -210,24 +210,22 @@ def percent(share: Share) -> str:
     return f"{low:.0f} to {high:.0f} %" if high >= 10.0 else f"{low:.1f} to {high:.1f} %"
 
 
-def clock(seconds: float) -> str:
-    """Return a time in minutes and seconds.
+def lasting(seconds: float) -> str:
+    """Return a time in words.
 
-    >>> clock(75.0), clock(7300.0), clock(math.inf)
-    ('1:15', '2:01:40', 'never')
+    >>> lasting(75.0), lasting(7300.0), lasting(math.inf)
+    ('1 min 15 s', '2 h 2 min', 'never')
     """
-    if not math.isfinite(seconds):
-        return "never"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+    return time_words(seconds) if math.isfinite(seconds) else "never"
 
 
 def reached(time: Quantile) -> str:
     """Return in words when a share of the voyages is there."""
     share = f"{100.0 * time.of_all:.0f} %"
     return (
-        f"{share} are there within {clock(time.value)}" if math.isfinite(time.value) else (f"fewer than {share} arrive")
+        f"{share} are there within {lasting(time.value)}"
+        if math.isfinite(time.value)
+        else (f"fewer than {share} arrive")
     )
 
 
@@ -235,12 +233,12 @@ def between(time: Quantile) -> str:
     """Return in words between which times a quantile is by 95 %.
 
     >>> between(Quantile(of_all=0.1, value=60.0, low=0.0, high=75.0))
-    '1:15 at the latest'
+    '1 min 15 s at the latest'
     """
     is_bound = math.isfinite(time.high)
     if time.low <= 0.0:
-        return f"{clock(time.high)} at the latest" if is_bound else "any time: too few voyages"
-    return f"{clock(time.low)} to {clock(time.high)}"
+        return f"{lasting(time.high)} at the latest" if is_bound else "any time: too few voyages"
+    return f"{lasting(time.low)} to {lasting(time.high)}"
 
 
 def as_lines(known: Estimates) -> list[str]:

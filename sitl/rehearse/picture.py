@@ -25,7 +25,7 @@ from companion.plots.drying import draw_drying, drying_picture
 from companion.plots.mission import draw_area, draw_marks, extent_of
 from companion.words import counted
 from sitl.rehearse.changes import Tried, scaled
-from sitl.rehearse.estimates import Estimates, clock, percent
+from sitl.rehearse.estimates import Estimates, lasting, percent
 from sitl.rehearse.prepared import PreparedRehearsal
 from sitl.rehearse.report import RehearsalOutcome
 
@@ -162,6 +162,17 @@ def _chances(axes: Axes, known: Estimates) -> None:
     axes.grid(visible=True, axis="x", alpha=0.3)
 
 
+def clock(seconds: float) -> str:
+    """Return a time for a tick of an axis, which has no room for words.
+
+    >>> clock(75.0), clock(7300.0)
+    ('1:15', '2:01:40')
+    """
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
 def _times(axes: Axes, known: Estimates, planned_s: float) -> None:
     times = sorted(record["time_s"] for record in known.records if record.get("arrived"))
     if times:
@@ -172,16 +183,16 @@ def _times(axes: Axes, known: Estimates, planned_s: float) -> None:
             axes.plot([time.low, high], [time.of_all, time.of_all], color=AMBER, lw=1.6)
             axes.plot(time.value, time.of_all, "o", color=AMBER)
             axes.annotate(
-                clock(time.value), (time.value, time.of_all), xytext=(5, -11), textcoords="offset points", fontsize=8
+                lasting(time.value), (time.value, time.of_all), xytext=(5, -11), textcoords="offset points", fontsize=8
             )
     if planned_s > 0.0:
-        axes.axvline(planned_s, color="black", lw=0.9, ls=":", label=f"first plan: {clock(planned_s)}")
+        axes.axvline(planned_s, color="black", lw=0.9, ls=":", label=f"first plan: {lasting(planned_s)}")
         axes.legend(loc="lower right", fontsize=8, frameon=False)
     low_s = min([*times, *([planned_s] if planned_s else [])], default=0.0)
     axes.set(
         ylim=(0.0, 1.02),
         xlim=(0.9 * low_s, None),
-        xlabel="time since setting sail",
+        xlabel="time since setting sail, [h:]min:s",
         ylabel="share that is there",
         title="Times, with three quantiles and what is 95 % sure of them",
     )

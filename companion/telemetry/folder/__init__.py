@@ -30,6 +30,7 @@ from companion.telemetry.folder.recorder import (
     parts,
 )
 from companion.telemetry.folder.records import (
+    SailingTime,
     VoyageFigures,
     action_record,
     ais_of,
@@ -54,6 +55,7 @@ __all__ = [
     "RecordedChart",
     "RecordedPlan",
     "Recorder",
+    "SailingTime",
     "Summary",
     "VoyageArchive",
     "VoyageFigures",

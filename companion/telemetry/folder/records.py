@@ -316,20 +316,46 @@ DISTANCE_STEP_M = 0.5
 
 
 @dataclass(slots=True)
+class SailingTime:
+    """Accumulates: from the first step under way (armed, in AUTO or GUIDED) to the end of the voyage.
+
+    What follows the end, a loiter, counts no more. ``take`` once a step.
+    """
+
+    first_s: float | None = None
+    last_s: float = 0.0
+
+    def take(self, step: Step) -> bool:
+        """Take one step; return whether it counts."""
+        autopilot = step.snapshot.autopilot
+        sails = autopilot is not None and autopilot.is_armed and autopilot.mode in {Mode.AUTO, Mode.GUIDED}
+        if step.state.voyage.over or not (sails or self.first_s is not None):
+            return False
+        self.last_s = step.snapshot.t_s
+        if self.first_s is None:
+            self.first_s = self.last_s
+        return True
+
+    @property
+    def time_s(self) -> float | None:
+        """How long it is; None: she has not set sail."""
+        return None if self.first_s is None else self.last_s - self.first_s
+
+
+@dataclass(slots=True)
 class VoyageFigures:
     """Accumulates; ``take`` once a step.
 
-    Time and distance count from the first step under way (armed, AUTO) to the end of the voyage, clearance and contacts
-    for as long as the boat is watched. ``promised_risk`` is the largest probability, at any instant of any plan that
-    was sailed, of being forced into the no-go zone or too near to a vessel (1 - delta_s); ``path_risk`` the largest of
-    a whole plan's, as if nobody replanned on the way. What vessels have of both is beside them.
+    Time and distance count from the first step under way to the end of the voyage (``SailingTime``), clearance and
+    contacts for as long as the boat is watched. ``promised_risk`` is the largest probability, at any instant of any
+    plan that was sailed, of being forced into the no-go zone or too near to a vessel (1 - delta_s); ``path_risk`` the
+    largest of a whole plan's, as if nobody replanned on the way. What vessels have of both is beside them.
     ``promised_clearance_m`` is the least clearance that a plan expected which was sailed, beside what was kept;
     ``promised_s``, ``median_s`` and ``late_s`` are the first plan's time, and when half and nine of ten of the winds of
     its spread would have brought the boat to its end: to the first goal, ``promised_to``, and no farther.
     """
 
-    first_s: float | None = None
-    last_s: float = 0.0
+    sailing: SailingTime = field(default_factory=SailingTime)
     distance_m: float = 0.0
     tacks: int = 0
     gybes: int = 0
@@ -369,7 +395,7 @@ class VoyageFigures:
             self._anchor = step.shift.point(self._anchor)
         for action in step.actions:
             if isinstance(action, RequestPlan):
-                self.replans += self.first_s is not None
+                self.replans += self.sailing.first_s is not None
             elif isinstance(action, UploadMission):
                 self.uploads += 1
             elif isinstance(action, Announce):
@@ -395,22 +421,18 @@ class VoyageFigures:
                 self.promised_to = None if route.cost_s is None or goal is None else goal.name or "goal 1"
             if route.risk is not None:
                 self.path_risk = max(self.path_risk or 0.0, route.risk)
-        autopilot = snapshot.autopilot
-        sails = autopilot is not None and autopilot.is_armed and autopilot.mode in {Mode.AUTO, Mode.GUIDED}
-        if sails and self.first_s is None and not step.state.voyage.over:
-            self.first_s = snapshot.t_s
-        if self.first_s is None:
+        counts = self.sailing.take(step)
+        if self.sailing.first_s is None:
             return
         if clearance_m is not None:
             self.min_clearance_m = min(self.min_clearance_m, clearance_m)
             self.contacts += clearance_m <= 0.0 and not self._touching
             self._touching = clearance_m <= 0.0
-        if step.state.voyage.over:
+        if not counts:
             return  # what follows is a loiter
-        self.last_s = snapshot.t_s
         self.ranges.take(step)
-        if autopilot is not None:
-            self.servos.take(autopilot.servo_us)
+        if snapshot.autopilot is not None:
+            self.servos.take(snapshot.autopilot.servo_us)
         if snapshot.position_en_m is not None:
             self._move(snapshot.position_en_m)
         self._wind(step)
@@ -464,7 +486,7 @@ class VoyageFigures:
         """Return the figures."""
         return {
             "contacts": self.contacts,
-            "time_s": None if self.first_s is None else self.last_s - self.first_s,
+            "time_s": self.sailing.time_s,
             "distance_m": self.distance_m,
             "tacks": self.tacks,
             "gybes": self.gybes,

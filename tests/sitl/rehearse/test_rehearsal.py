@@ -22,11 +22,11 @@ from companion.errors import JobError
 from companion.plots.chart import save
 from sitl import cli as sitl_cli
 from sitl.rehearse import picture, rehearsal
-from sitl.rehearse.estimates import as_lines, clock, estimates_of, why_bad
+from sitl.rehearse.estimates import as_lines, estimates_of, lasting, why_bad
 from sitl.rehearse.picture import shares_of
 from sitl.rehearse.prepared import prepared
 from sitl.rehearse.rehearsal import Follower, Limits, RehearsalOutcome, _words
-from sitl.rehearse.voyage import RehearsalCase, key_of
+from sitl.rehearse.voyage import RehearsalCase, key_of, sail
 from sitl.runner import CampaignResults, Job, ResultStore, ScenarioBundle, made_by
 from sitl.runner.result_store import StoredResults
 
@@ -116,17 +116,17 @@ def test_watchdogs_are_counted_by_voyages_and_times_by_all():
     )
     assert {name: share.came for name, share in known.watchdogs.items()} == {"in irons": 2}
     assert [q.value for q in known.times] == [200.0, 201.0, math.inf]
-    assert "fewer than 90 % arrive (3:20 to never)" in "\n".join(as_lines(known))
+    assert "fewer than 90 % arrive (3 min 20 s to never)" in "\n".join(as_lines(known))
     assert known.to_dict()["time_s"][2]["value"] is None
     assert json.loads(json.dumps(known.to_dict(), allow_nan=False))["voyages"] == 3
-    assert clock(59.6) == "1:00"
+    assert lasting(59.6) == "1 min 0 s"
 
 
 def test_where_nothing_was_sailed_only_that_is_said_and_no_bound_is_that_she_is_there_at_once():
     assert as_lines(estimates_of(())) == ["no voyage was sailed to its end: nothing is known yet"]
     few = "\n".join(as_lines(estimates_of([record(n) for n in range(6)])))
-    assert "10 % are there within 3:20 (3:23 at the latest)" in few
-    assert "0:00" not in few
+    assert "10 % are there within 3 min 20 s (3 min 23 s at the latest)" in few
+    assert " 0 s" not in few
     assert "any time: too few voyages" in "\n".join(as_lines(estimates_of([record(0)])))
 
 
@@ -248,11 +248,19 @@ def test_a_user_rehearses_a_mission_goes_on_and_looks_at_the_worst(sailed, monke
         for words in ("east of the start", "Times", "What a change is worth")
     )
     assert all(word.get_path_effects() for word in chart.texts)  # read where tracks run through them
-    assert times.xaxis.get_major_formatter()(371.0, 0) == "6:11"  # as the times beside it
+    assert times.xaxis.get_major_formatter()(371.0, 0) == "6:11"
     assert changes.get_xlabel() == "time, % (95 %)"
     worst = Path(figures["worst"][0]["folder"])
     assert (worst / "track.csv").is_file()
     assert cli.main(["replay", str(worst)]) == 0
+
+
+def test_a_voyage_takes_as_long_as_its_own_report_tells(tmp_path):
+    """It was told seven seconds longer: those in which her loiter is watched before the program ends."""
+    made = prepared(ROCKS, tmp_path, wind=["5@0"], wind_error=None, doubt=0.0, faults=False, depart=None, limit_s=None)
+    found = sail(Job(scenario=made.source, seed=1, case=RehearsalCase(doubts=made.doubts), keep=tmp_path / "voyage"))
+    assert found["arrived"]
+    assert found["time_s"] == json.loads((tmp_path / "voyage/summary.json").read_bytes())["time_s"]
 
 
 def test_a_disk_that_is_full_when_all_is_sailed_costs_no_voyage(sailed, monkeypatch, capsys):
