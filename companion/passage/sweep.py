@@ -22,6 +22,7 @@ SURE = 0.9  # the share of runs that must arrive, where nobody says
 # Of the normal distribution, the middles of five parts of equal weight.
 _MIDDLES = (-1.2816, -0.5244, 0.0, 0.5244, 1.2816)
 CONFIDENCE = 0.95  # of what members show
+SEARCH_ERROR = 0.01  # a share of the time that ways may differ by which are as fast (tests/passage/test_oracles.py)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -12,7 +12,7 @@ from companion.passage.frame import GEOD
 from companion.passage.mission import arrivals_s
 from companion.passage.plan import Route
 from companion.passage.replay import Sailed
-from companion.passage.sweep import CONFIDENCE, Departure, at_least, at_most, best, shown
+from companion.passage.sweep import CONFIDENCE, SEARCH_ERROR, Departure, at_least, at_most, best, shown
 from companion.weather import iso
 from companion.words import counted
 
@@ -146,20 +146,34 @@ def explained(departures: Sequence[Departure], by_utc_s: float | None) -> tuple[
     if first is None:
         return ("none of these departures arrives" + ("" if by_utc_s is None else f" by {iso(by_utc_s)}"),)
     often = first.hours(0.5)
+    others = [d for d in departures if d is not first and d.runs]
     said = f"{often:.1f} h as often as not" if math.isfinite(often) else f"{100.0 * first.chance(by):.0f} % of all"
+    if others and all(_is_as_good(d, first, by) for d in others):
+        ways = "these departures" if len(others) + 1 == len(departures) else "those that have a way"
+        against = _against(first, by)
+        alike = f"none of {ways} is better than another: each is there in {said}"
+        return (alike + (f", {against}" if against else ""),)
     lines = [f"best, of the surest the least long under way: {iso(first.utc_s)}, there in {said}"]
-    for d in departures:
-        if d is first or not d.runs:
-            continue
+    for d in others:
         later = (d.utc_s - first.utc_s) / 3600.0
         there = later + d.hours(0.5) - first.hours(0.5)
         said = f"{abs(later):.3g} h {'later' if later > 0.0 else 'earlier'}"
         comes = (
             f"there {abs(there):.1f} h {'later' if there > 0.0 else 'earlier'}" if math.isfinite(there) else "not there"
         )
-        longer = f"{max(0.0, d.hours(0.5) - often):.1f} h longer under way"  # there earlier, and not the best
+        longer = (
+            "as good"
+            if _is_as_good(d, first, by)
+            else f"{max(0.0, d.hours(0.5) - often):.1f} h longer under way"  # there earlier, and not the best
+        )
         lines.append(f"{said}: {comes}, {_against(d, by) or longer}")
     return tuple(lines)
+
+
+def _is_as_good(d: Departure, first: Departure, by: float) -> bool:
+    """Return whether a departure arrives as surely as the best one, and as fast for all that the search tells."""
+    often, best_h = d.hours(0.5), first.hours(0.5)
+    return d.chance(by) >= first.chance(by) and (often == best_h or often <= best_h * (1.0 + SEARCH_ERROR))
 
 
 def _against(d: Departure, by: float) -> str:

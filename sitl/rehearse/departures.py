@@ -113,8 +113,8 @@ def advice(found: Sequence[tuple[dt.datetime, Estimates]]) -> list[str]:
     """Return in words which departure is the best, and which cannot be told from it.
 
     The best is the one of which most is sure: the lower end of its chance to arrive, less the upper end of its chance
-    to come below the floor; of equals the faster one. Others whose intervals reach to its are as good for all that is
-    known.
+    to come below the floor; of equals the faster one, and where all are equal there is none. Others whose intervals
+    reach to its are as good for all that is known.
     """
     known = [(hour, e) for hour, e in found if e.records]
     if not known:
@@ -122,15 +122,18 @@ def advice(found: Sequence[tuple[dt.datetime, Estimates]]) -> list[str]:
 
     def worth(row: tuple[dt.datetime, Estimates]) -> tuple[float, float]:
         e = row[1]
-        return round(e.arrives.low - e.low.high, 3), -e.times[1].value
+        half_s = e.times[1].value
+        return round(e.arrives.low - e.low.high, 3), -(round(half_s) if math.isfinite(half_s) else half_s)
 
     hour, best = max(known, key=worth)
     if best.arrives.came == 0:
         return ["none of these departures arrives"]
     alike = [h for h, e in known if h != hour and e.arrives.high >= best.arrives.low and e.low.low <= best.low.high]
+    told = f"for all that {counted(len(best.records), 'voyage')} {'tells' if len(best.records) == 1 else 'tell'}"
+    if len(known) > 1 and all(worth(row) == worth((hour, best)) for row in known):
+        return [f"none of these departures is better than another, {told}"]
     words = f"best: {hour:%Y-%m-%d %H:%M}"
     if not alike:
         return [words + ", surely"]
     others = ", ".join(f"{h:%Y-%m-%d %H:%M}" for h in alike)
-    tell = "tells" if len(best.records) == 1 else "tell"
-    return [f"{words}; as good for all that {counted(len(best.records), 'voyage')} {tell}: {others}"]
+    return [f"{words}; as good {told}: {others}"]

@@ -120,10 +120,17 @@ def test_what_is_said_of_departures():
     assert lines[3] == "2026-04-23T18:00Z   no way: the forecast ends before she is there, or does not reach so far"
     assert lines[4] == "of 2 members of the forecast: what none of them shows may still come in 78 %"
     said = explained(found, None)
-    assert said[0] == "best, of the surest the least long under way: 2026-04-20T00:00Z, there in 50 % of all"
-    assert said[1].endswith("in 50 % 14.0 m/s of wind is more than she is to be out in")
+    assert len(said) == 1
+    assert said[0].startswith("none of those that have a way is better than another: each is there in 50 % of all, ")
+    assert said[0].endswith("in 50 % 14.0 m/s of wind is more than she is to be out in")
     sure = explained(sweep(asked(5.0), [T0, T0 + 3600.0], 0.0, nodes=20), None)
-    assert sure[1] == "1 h later: there 1.0 h later, 0.0 h longer under way"  # "nothing against it" told not why
+    assert sure == ("none of these departures is better than another: each is there in 10.0 h as often as not",)
+    grows = lambda t, y, x: (0.0 * x, 0.0 * y - np.where(t < 6.0 * 3600.0, 5.0, 10.0))  # noqa: E731
+    ready = passage(A, B, polar=POLAR, wind=cube(LAT, LON, HOURS, grows))
+    told = explained(sweep(ready, [T0 + 3600.0 * h for h in (0, 20, 24)], 0.0, nodes=20), None)
+    assert told[0].startswith("best, of the surest the least long under way: 2026-04-20")
+    assert told[1] == "20 h earlier: there 17.8 h earlier, 2.2 h longer under way"
+    assert told[2] == "4 h later: there 4.0 h later, as good"
     assert explained(found, T0 + 3600.0) == ("none of these departures arrives by 2026-04-20T01:00Z",)
 
 
