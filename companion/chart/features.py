@@ -71,6 +71,8 @@ class Chart:
     supersedes: bool = False
     """Whether coarser charts count for nothing where this one speaks: a navigational chart's own, no grid's."""
     knows_depths: bool = False
+    is_elsewhere: bool = False
+    """Whether all of it lies outside of what was asked for: it says nothing of that, not even that it is free."""
     findings: tuple[Finding, ...] = ()
 
 

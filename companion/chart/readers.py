@@ -44,12 +44,42 @@ WATER = re.compile(r"water[-_ ]?polygons|ocean|seas?\b", re.IGNORECASE)
 S57_OPTIONS = {"UPDATES": "APPLY", "LIST_AS_STRING": "ON", "RETURN_PRIMITIVES": "OFF", "LNAM_REFS": "OFF"}
 SAME_DATUM_M = 1.0  # a position is good to 2.5 m
 DATUM_DEG = 0.01  # no datum lies farther from WGS 84
+ELSEWHERE, FETCH_IT = "and holds nothing of the place that is asked for", "fetch it for the mission's water"
 LINE_M = 3.0
 POINT_M = 10.0
 
 
 def read_chart(path: Path, box: Box, wanted: Wanted, *, positive: str = "auto", without_depths: bool = False) -> Chart:
     """Return what of a file lies in the box. Raises InputError: one line with file, place and remedy."""
+    chart = _read(path, box, wanted, positive=positive, without_depths=without_depths)
+    shapes = [danger.geometry for danger in chart.dangers] + ([] if chart.coverage is None else [chart.coverage])
+    if any(_touches(shape, box) for shape in shapes if not shape.is_empty):
+        return chart
+    return _unless_elsewhere(chart, path, box)
+
+
+def _unless_elsewhere(chart: Chart, path: Path, box: Box) -> Chart:
+    """Return a chart of which nothing lies in the box: it is water without a danger if the file reaches there."""
+    everything = _read(path, EVERYWHERE, Wanted(safety_depth_m=math.inf), without_depths=True)
+    shapes = [danger.geometry for danger in everything.dangers]
+    shapes += [] if everything.coverage is None else [everything.coverage]
+    whole = shapely.GeometryCollection([shape for shape in shapes if not shape.is_empty])
+    if whole.is_empty or _touches(whole, box):
+        return chart
+    west, south, east, north = whole.bounds
+    is_swapped = _touches(shapely.box(south, west, north, east), box)
+    finding = Finding(
+        severity=FindingLevel.WARNING,
+        code=Code.SWAPPED_AXES if is_swapped else Code.FAR_AWAY,
+        place="",
+        text=f"reaches from {south:.4f}, {west:.4f} to {north:.4f}, {east:.4f} {ELSEWHERE}",
+        remedy="are latitude and longitude swapped in it?" if is_swapped else FETCH_IT,
+        source=str(path),
+    )
+    return replace(chart, dangers=(), is_elsewhere=True, findings=(finding,))
+
+
+def _read(path: Path, box: Box, wanted: Wanted, *, positive: str = "auto", without_depths: bool = False) -> Chart:
     ending = path.suffix.lower()
     try:
         with open_regular(path):
@@ -582,9 +612,8 @@ def _within(
         raise InputError(
             str(path),
             "",
-            f"reaches from {y.min():{form}}, {x.min():{form}} to {y.max():{form}}, {x.max():{form}} "
-            "and holds nothing of the place that is asked for",
-            "fetch it for the mission's water",
+            f"reaches from {y.min():{form}}, {x.min():{form}} to {y.max():{form}}, {x.max():{form}} {ELSEWHERE}",
+            FETCH_IT,
         )
     if rows.size * count > grids.MOST_CELLS:
         raise InputError(str(path), "", "has too many cells in reach", "say a smaller --radius")

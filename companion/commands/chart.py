@@ -190,14 +190,19 @@ def _import(args: argparse.Namespace) -> int:
         chart = read_chart(
             Path(name), box_about(center, reach_m), wanted, positive=args.positive, without_depths=args.without_depths
         )
-        charts.append(chart)
         for finding in chart.findings:
             print(finding.line(name))
+        if chart.is_elsewhere:  # one of many cells, perhaps
+            continue
+        charts.append(chart)
         source = "" if str(chart.source) in {name, Path(name).name} else f"{chart.source}: "
         print(
             f"{name}: {source}{told_of(chart)}"
             + ("" if chart.knows_depths else "; it tells no depths of the water between")
         )
+    if not charts:
+        what = f"{args.files[0]} holds nothing" if len(args.files) == 1 else "no file holds anything"
+        raise JobError(f"{obstacles}: not written: {what} of the water that is asked for")
     area = area_of(charts, center, reach_m, args.tolerance or TOLERANCE_M, floats_m)
     if area.is_too_much:
         raise JobError(

@@ -101,7 +101,10 @@ def charted(
         InputError: a chart cannot be believed; JobError: it is too much to be edited.
     """
     wanted = Wanted(safety_depth_m=depth_m)
-    charts = [read_chart(w.path, box_about(center, reach_m), wanted, without_depths=True) for w in waters]
+    read = [read_chart(w.path, box_about(center, reach_m), wanted, without_depths=True) for w in waters]
+    charts = [chart for chart in read if not chart.is_elsewhere]
+    if not charts:
+        raise JobError("the charts hold nothing of this water: choose a place that they cover")
     area, tolerance_m = _few_enough(charts, center, reach_m)
     shapes = [shape for shape in sketch.shapes if not _is_chart(shape.of, base)]
     grounds, data, texts = dict(base.grounds), dict(base.data), dict(base.texts)
@@ -118,7 +121,7 @@ def charted(
     drawn = msgspec.structs.replace(sketch, revision=made.revision, shapes=tuple(shapes))
     depths = "" if all(chart.knows_depths for chart in charts) else "; not every chart tells depths"
     words = (
-        f"{len(area.solids)} obstacles of {', '.join(str(w.picture.source) for w in waters)}: what is less deep than "
+        f"{len(area.solids)} obstacles of {', '.join(str(chart.source) for chart in charts)}: what is less deep than "
         f"{depth_m:g} m within {reach_m:g} m, drawn {2.0 * tolerance_m:g} m too large at the most{depths}. "
         "Not fit for navigation: look at it before it is sailed by"
     )

@@ -602,3 +602,26 @@ def test_a_file_that_gdal_knows_no_format_of_is_no_chart(shell):
     pytest.importorskip("pyogrio")
     (shell.folder / "photo.png").write_bytes(b"\x89PNG\x00\x01")
     assert "photo.png: is no chart file" in refusal(shell, "photo.png", *AROUND, "--depth", "2")
+
+
+def test_a_chart_that_lies_elsewhere_makes_no_free_water(shell):
+    """It was "no danger", with exit code 0: an area without an obstacle."""
+    there = box(10.0, 40.0, 10.1, 40.1)
+    (shell.folder / "other.geojson").write_text(collection((there, {})))
+    (shell.folder / "other.wkt").write_text(there.wkt)
+    (shell.folder / "swapped.wkt").write_text(box(50.8, -1.35, 50.9, -1.25).wkt)
+    (shell.folder / "here.geojson").write_text(collection((ISLAND, {})))
+    reaches = "warning: reaches from 40.0000, 10.0000 to 40.1000, 10.1000 and holds nothing of the place"
+    for name in ("other.geojson", "other.wkt"):
+        code, out, err = shell(name, *AROUND, "--depth", "2")
+        assert (code, err) == (
+            1,
+            f"companion chart: chart.geojson: not written: {name} holds nothing of the water that is asked for\n",
+        )
+        assert out.startswith(f"{name}: {reaches} that is asked for; fetch it for the mission's water\n")
+        assert not list(shell.folder.glob("chart*"))
+    assert "are latitude and longitude swapped in it?" in shell("swapped.wkt", *AROUND, "--depth", "2")[1]
+    code, out, _ = shell("other.wkt", "here.geojson", *AROUND, "--depth", "2")  # one of many cells, perhaps
+    assert code == 0
+    assert f"other.wkt: {reaches}" in out
+    assert "written: 1 obstacle" in out
