@@ -36,6 +36,8 @@ def read(paths: Iterable[Path]) -> list[dict[str, Any]]:
 
     rows: list[dict[str, Any]] = []
     for path in paths:
+        if path.is_dir():  # read as one table of all that is in it
+            raise InputError(str(path), "", "is a folder", "name a file in it, as --out wrote")
         try:
             table = pq.read_table(path)
         except OSError as error:

@@ -350,8 +350,10 @@ def run_new(args: argparse.Namespace) -> int:
     from companion.geofence.mission import mission_files
 
     out = Path(args.out)
+    if out.is_dir():
+        raise InputError(args.out, "", "is a folder", "name a file in it that ends in .toml")
     if out.suffix.lower() != ".toml":
-        raise InputError(args.out, "", "a mission file ends in .toml")
+        raise InputError(args.out, "", "a mission file ends in .toml", f"write {out.with_suffix('.toml')}")
     drawing = read_mission_file(args.source) if args.source else Document(source="--goal")
     print_findings(drawing.findings, drawing.source)
     near = args.start or drawing.home or (args.goal[0] if args.goal else None)

@@ -126,14 +126,21 @@ async def _give(args: argparse.Namespace, wanted: Wanted) -> Answer:
         return await give(link, wanted, give_up_s=args.timeout)
 
 
+def require_socket(path: Path) -> None:
+    """Raise InputError for what is there and is no socket; what is not there yet may come."""
+    if path.is_dir():
+        raise InputError(str(path), "", "is a folder", "name the socket in it, as companion run --socket does")
+    if path.exists() and not path.is_socket():
+        raise InputError(str(path), "", "is no socket", "name the one that companion run --socket made")
+
+
 async def give_on_board(path: Path, words: str, give_up_s: float) -> Answer:
     """Give an order at the socket of a companion on board. Raises LinkError: it is not there."""
     from companion.disk import reason
     from companion.errors import LinkError
     from companion.orders import Answer, Result
 
-    if path.is_dir():
-        raise InputError(str(path), "", "is a folder", "name the socket in it, as companion run --socket does")
+    require_socket(path)
     try:
         async with asyncio.timeout(give_up_s):
             reader, writer = await asyncio.open_unix_connection(path)

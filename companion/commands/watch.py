@@ -107,8 +107,10 @@ async def _watch(args: argparse.Namespace) -> int:
 
 
 def _source(args: argparse.Namespace) -> ViewSource:
-
     if args.socket is not None:
+        from companion.commands.order import require_socket
+
+        require_socket(args.socket)
         return OnBoard(args.socket)
     signing = None
     if args.signing_key is not None:

@@ -182,6 +182,8 @@ def read_record(path: Path) -> Record:
         from companion.boat_logs import read_wind
 
         return read_wind(path)
+    if not path.stat().st_size:
+        raise InputError(str(path), "", "is empty", "name a CSV, tlog or .bin")
     try:
         with path.open(newline="", encoding="utf-8") as lines:
             return parse_csv(lines, path.name)

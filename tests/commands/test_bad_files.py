@@ -311,6 +311,26 @@ def test_an_empty_file_and_a_folder_are_called_so(tmp_path, monkeypatch, capsys,
     assert ": .: is a folder; name " in capsys.readouterr().err
 
 
+def test_a_mission_that_is_to_be_a_folder_or_no_toml_is_told_with_a_remedy(tmp_path, monkeypatch, capsys):
+    """A folder was asked to end in .toml."""
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["mission", "new", "."]) == 2
+    assert capsys.readouterr().err == "companion mission: .: is a folder; name a file in it that ends in .toml\n"
+    assert cli.main(["mission", "new", "bay"]) == 2
+    assert capsys.readouterr().err == "companion mission: bay: a mission file ends in .toml; write bay.toml\n"
+
+
+@pytest.mark.parametrize("argv", [("watch", "--socket"), ("order", "hold", "--socket")], ids=" ".join)
+def test_what_is_no_socket_is_told_so(tmp_path, capsys, argv):
+    """`companion watch` waited for somebody to listen at a file of text."""
+    (tmp_path / "notes.txt").touch()
+    assert cli.main([*argv, str(tmp_path / "notes.txt")]) == 2
+    said = capsys.readouterr().err
+    assert said.endswith("notes.txt: is no socket; name the one that companion run --socket made\n")
+    assert cli.main([*argv, str(tmp_path)]) == 2
+    assert ": is a folder; name the socket in it" in capsys.readouterr().err
+
+
 def test_results_that_cannot_be_begun_have_a_remedy(capsys):
     assert sitl_cli.main(["faults", "--runs", "1", "--out", "/proc/x.jsonl"]) == 2
     told = capsys.readouterr().err.splitlines()[-1]

@@ -187,6 +187,7 @@ def test_the_command_asks_a_guest_by_name_and_keeps_its_rows(tmp_path, capsys, m
             "python -m sailbench: there is no command 'leaderboard'; there are plan, sail, passages, page",
         ),
         (["page", "none.parquet"], "sailbench: none.parquet: no such file; name what --out wrote\n"),
+        (["page", "docs"], "sailbench: docs: is a folder; name a file in it, as --out wrote\n"),
         (["page", __file__], f"sailbench: {__file__}: is no table of results; name what --out wrote\n"),
         (
             ["sail", "--sailors", "nobody"],

@@ -144,6 +144,14 @@ def test_an_ardupilot_log_is_read(tmp_path):
     assert record.tws_mps[7] == pytest.approx(4.0)
 
 
+def test_an_empty_record_is_called_empty(tmp_path):
+    """It had "no column t_s" in line 1."""
+    path = tmp_path / "none.csv"
+    path.touch()
+    with pytest.raises(InputError, match=r"none\.csv: is empty; name a CSV, tlog or \.bin"):
+        read_record(path)
+
+
 def test_a_log_without_wind_is_refused(tmp_path):
     path = tmp_path / "none.tlog"
     path.write_bytes(b"")
